@@ -17,6 +17,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/report/stage_page.h"
 #include "pipeline/stage/stage.h"
 #include "segment/images/image.h"
 
@@ -221,7 +222,7 @@ std::vector<CellRow> rows_of(stage::StageContext& context, const Parameters& p, 
 }
 
 Registered registered(const Cell& cell, const Way& way) {
-  Registered there{.beads = moved(cell.beads, way.motion),
+  Registered there{.beads = cell.beads,
                    .gel = cell.gel,
                    .motion = way.motion,
                    .seen_low_um = cell.beads.front().position_um,
@@ -353,6 +354,27 @@ Figures figures_of(const Parameters& p, const std::vector<CellRow>& rows, const 
   return figures;
 }
 
+/// mean.html
+void write_page(stage::StageContext& context, const std::string& picture, const std::string& registration_csv,
+                const StageReport& report) {
+  const mbtfm::report::StagePage page{
+      .title = "Mean of registered cells",
+      .facts = {report.summary + "."},
+      .findings = context.findings_,
+      .picture_svg = picture,
+      .picture_title = "Mean traction",
+      .picture_explained =
+          "A ratio of tips to edge is mostly resolution: set the model through the same blur (--model) "
+          "beside it, never the model as it is.",
+      .tables = {{"Registration",
+                  "How each cell lies on the reference, and how well its outline fits there.",
+                  "registration.csv",
+                  registration_csv,
+                  {"cell", "kept", "angle_deg", "mirrored", "misfit_um", "ambiguous"}}},
+      .figures = report.figures};
+  files::write_text(context.output("out", "mean.html"), report::html_of(page));
+}
+
 StageReport run(const Parameters& p, stage::StageContext& context) {
   const std::vector<Cell> cells = read_cells(context, p);
   context.progress(0.1, "laying outlines onto the reference");
@@ -398,15 +420,17 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   blur.fttc_um = gaussian_um(blur.shares, [](const WaveShare& s) { return 0.5 * (s.along + s.across); });
   blur.registration_um = gaussian_um(blur.shares, [](const WaveShare& s) { return s.registration; });
 
-  write_registration(context.output("out", "registration.csv"), rows);
+  const Path registration_file = context.output("out", "registration.csv");
+  write_registration(registration_file, rows);
   write_mean(context.output("out", "mean.csv"), context.output("out", "mean.vtp"), means, model);
   write_blur(context.output("out", "blur.csv"), blur.shares);
   files::write_outline(context.output("out", "reference.csv"), alignment.reference_um);
-  files::write_text(context.output("out", "mean.svg"), picture_of({.reference_um = alignment.reference_um,
-                                                                   .outlines_um = std::move(outlines),
-                                                                   .nodes = means,
-                                                                   .spacing_um = spacing,
-                                                                   .band_um = band}));
+  const std::string picture = picture_of({.reference_um = alignment.reference_um,
+                                          .outlines_um = std::move(outlines),
+                                          .nodes = means,
+                                          .spacing_um = spacing,
+                                          .band_um = band});
+  files::write_text(context.output("out", "mean.svg"), picture);
   StageReport report;
   report.figures = figures_of(p, rows, means, ratio, blur, size);
   files::write_figures(context.output("out", "mean.json"), report.figures);
@@ -416,6 +440,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   if (ratio)
     report.summary += "; tips over the rest of the edge " + brief(ratio->ratio) + " (" + brief(ratio->low) + " to " +
                       brief(ratio->high) + ")";
+  write_page(context, picture, files::read_text(registration_file), report);
   return report;
 }
 
@@ -433,6 +458,6 @@ int main(int argc, char** argv) {
                  {"model", Kind::optional_input,
                   "traction.csv of a model on a lattice in the frame of the reference: it is blurred as the cells are"},
                  {"out", Kind::output_folder,
-                  "mean.csv, mean.vtp, mean.json, mean.svg, registration.csv, blur.csv, reference.csv"}}},
+                  "mean.csv, mean.vtp, mean.json, mean.svg, mean.html, registration.csv, blur.csv, reference.csv"}}},
       argc, argv, run);
 }

@@ -1,6 +1,8 @@
 /// mbtfm-sheet: contracting sheets and colonies on their ground, and tensions from tractions.
 #include <algorithm>
+#include <map>
 #include <memory>
+#include <set>
 
 #include "continuum/sheet/borders.h"
 #include "continuum/sheet/decide.h"
@@ -12,12 +14,14 @@
 #include "mbtfm/sheets/tables.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
+#include "pipeline/charts/chart.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
+#include "pipeline/report/stage_page.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/stage.h"
 #include "segment/cells/mask.h"
@@ -27,6 +31,10 @@
 namespace mbtfm::sheet {
 namespace {
 
+/// Which parts of a sheet have a contraction of their own.
+enum class Parts { none, edge, cells };
+constexpr auto words(Parts) { return std::array{"none", "edge", "cells"}; }
+
 struct Parameters {
   std::optional<double> pixel_size_um;
   std::optional<double> gel_modulus_kPa;  ///< unset: there is no gel
@@ -35,6 +43,7 @@ struct Parameters {
   SheetParameters sheet;
   double most_unbalanced = kMostUnbalanced;
   std::optional<double> traction_sigma_kPa, traction_correlation_um;
+  Parts fit_parts = Parts::none;                  ///< the simplest
   bool fit_line_tension = false;                  ///< most colonies have none
   tensions::Loss loss = tensions::Loss::squares;  ///< beads are Gaussian to first order
 };
@@ -59,6 +68,10 @@ void declare(stage::ParameterList& list, Parameters& p) {
       "traction_correlation_um", p.traction_correlation_um, Range::size_um(),
       "with --traction: distance over which neighbours share their error, the resolution of the reconstruction (um); "
       "unset: each patch has its own");
+  list.add(
+      "fit_parts", p.fit_parts,
+      "with --displacement: parts with a contraction of their own: none, all of the sheet alike; edge: the band of "
+      "edge_band_um and what is inside of it; cells: each cell of the label image --cells");
   list.add("fit_line_tension", p.fit_line_tension, "with --displacement: fit line_tension_nN, too");
   list.add("loss", p.loss, "with --displacement: of the residuals; all but squares take beads less that stray");
 }
@@ -126,6 +139,57 @@ Region region_of(const std::vector<Polygon>& rings) {
   return region;
 }
 
+/// Where the sheet adheres: none where that is everywhere.
+std::vector<Polygon> adhesive_area(const Parameters& p, stage::StageContext& context) {
+  if (!context.has_input("adhesive")) return {};
+  return read_rings(context.input("adhesive"), p.pixel_size_um);
+}
+
+/// The triangles end at the border of the adhesive area where it lies inside of the sheet.
+Region with_borders_of(Region region, const std::vector<Polygon>& adhesive_um) {
+  constexpr double kClear_um = 0.1;  // nearer to the rim a border would ask for slivers
+  const Polygon& rim = region.rims.front().points_um();
+  for (const Polygon& border : adhesive_um) {
+    if (std::ranges::all_of(border,
+                            [&](Vec2 p) { return contains(rim, p) && distance_to_boundary_um(rim, p) > kClear_um; }))
+      region.lines.emplace_back(border);
+  }
+  return region;
+}
+
+CellLabels read_labels(const Path& file, const std::optional<double>& pixel_um) {
+  if (!pixel_um) throw UsageError("pixel_size_um is missing: " + file.string() + " counts in pixels");
+  constexpr int kWidestLine_px = 15;
+  const cells::LabelMask mask = cells::with_parts_labelled(cells::read_mask(file));
+  return with_lines_filled({mask.width, mask.height, *pixel_um, mask.labels}, kWidestLine_px);
+}
+
+/// Contraction by cell of the label image; of what has no label, the sheet's own.
+/// @throws UsageError where a cell is in no row and the sheet has no contraction
+std::function<double(Vec2)> contraction_by_cell(const Parameters& p, stage::StageContext& context) {
+  if (!context.has_input("cells")) throw UsageError("--contractions are by cell: give their label image as --cells");
+  const Path file = context.input("contractions");
+  const files::CsvTable table(file);
+  table.require({"cell", "contraction_nN_per_um"});
+  std::map<int, double> by_cell;
+  for (int row = 0; row < table.n_rows(); ++row)
+    by_cell[table.integer(row, "cell", 1)] = table.number(row, "contraction_nN_per_um", Range::between(0, 1e4));
+  const bool has_rest = p.sheet.contraction_nN_per_um || p.sheet.contraction_kPa;
+  const double rest = has_rest ? contraction_of(p.sheet) : 0;
+  const auto cells = std::make_shared<const CellLabels>(read_labels(context.input("cells"), p.pixel_size_um));
+  for (const int label : cells->labels)
+    if (label != 0 && !by_cell.contains(label) && !has_rest)
+      throw InputError(file.string(), "a row for each cell of the label image", "none of cell " + std::to_string(label),
+                       "add it, or give contraction_nN_per_um of all other cells");
+  return [=](Vec2 place) {
+    const int column = static_cast<int>(std::floor(place.x / cells->pixel_um)),
+              row = static_cast<int>(std::floor(place.y / cells->pixel_um));
+    const bool is_seen = column >= 0 && row >= 0 && column < cells->width && row < cells->height;
+    const auto found = by_cell.find(is_seen ? cells->at(column, row) : 0);
+    return found == by_cell.end() ? rest : found->second;
+  };
+}
+
 std::vector<GroundPatch> read_tractions(const Path& file) {
   const files::CsvTable table(file);
   const std::vector<Vec2> points = files::read_points(file);
@@ -176,12 +240,8 @@ std::size_t write_solution(stage::StageContext& context, const Solution& solutio
 /// borders.csv and cell_tension.csv. @returns means over all borders, by their length
 Figures write_cells(stage::StageContext& context, const Solution& solution, const std::optional<double>& pixel_um) {
   if (!context.has_input("cells")) return {};
-  const Path file = context.input("cells");
-  if (!pixel_um) throw UsageError("pixel_size_um is missing: " + file.string() + " counts in pixels");
-  constexpr int kWidestLine_px = 15;
   constexpr double kShortest_um = 2;
-  const cells::LabelMask mask = cells::with_parts_labelled(cells::read_mask(file));
-  const CellLabels labels = with_lines_filled({mask.width, mask.height, *pixel_um, mask.labels}, kWidestLine_px);
+  const CellLabels labels = read_labels(context.input("cells"), pixel_um);
   const std::vector<Border> borders = borders_of(labels, solution, kShortest_um);
   write_borders(context.output("out", "borders.csv"), borders);
   write_cell_tensions(context.output("out", "cell_tension.csv"), cell_tensions(labels, solution));
@@ -266,14 +326,26 @@ struct Run {
   Solution solution;
   Figures figures;
   std::vector<Effect> effects;
-  std::string told = {};  ///< for the last line
+  std::string told = {};                     ///< for the last line
+  std::vector<report::Listing> tables = {};  ///< of the page
 };
+
+/// Where it is by cell, nN_per_um is the largest.
+Contraction contraction_asked(const Parameters& p, stage::StageContext& context) {
+  if (!context.has_input("contractions")) return {contraction_of(p.sheet), p.sheet.edge_band_um, {}};
+  Contraction contraction{0, p.sheet.edge_band_um, contraction_by_cell(p, context)};
+  const files::CsvTable table(context.input("contractions"));
+  for (int row = 0; row < table.n_rows(); ++row)
+    contraction.nN_per_um = std::max(contraction.nN_per_um, table.number(row, "contraction_nN_per_um"));
+  return contraction;
+}
 
 Run run_forward(const Parameters& p, stage::StageContext& context, const Region& region) {
   Scene scene;
-  scene.region = region;
+  scene.adhesive_um = adhesive_area(p, context);
+  scene.region = with_borders_of(region, scene.adhesive_um);
   scene.material = material_of(p.sheet);
-  scene.contraction = {contraction_of(p.sheet), p.sheet.edge_band_um};
+  scene.contraction = contraction_asked(p, context);
   scene.line_tension_nN = p.sheet.line_tension_nN;
   scene.adhesion_nN_per_um3 = p.sheet.adhesion_stiffness_nN_per_um3;
   scene.measure = p.sheet.contraction_measure;
@@ -425,11 +497,78 @@ tensions::LinearData data_of_adhesions(const DisplacementField& beads, stage::St
 }
 
 std::string sentence_of(const sheets::SheetEstimate& e) {
-  const std::string name = name_of(e.quantity);
+  const std::string name = name_of(e.quantity) + (e.part.empty() ? "" : " of " + e.part);
   if (e.identifiable) return name + " " + brief(e.value) + " (" + brief(*e.low) + " to " + brief(*e.high) + ")";
   if (e.low) return name + " > " + brief(*e.low);
   if (e.high) return name + " < " + brief(*e.high);
   return name + " not known";
+}
+
+std::vector<report::Listing> tables_of_fit(const Path& estimates, const Path& models) {
+  return {{"What the beads tell",
+           "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).",
+           "sheet_fit.csv",
+           files::read_text(estimates),
+           {"quantity", "part", "value", "sigma", "low", "high", "identifiable"}},
+          {"Does the scene call for the sheet?",
+           "The beads call for the model of the smallest bic. chi_squared is in units of the noise.",
+           "sheet_models.csv",
+           files::read_text(models),
+           {"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"}}};
+}
+
+/// A part of the sheet: 1 there, 0 elsewhere. All parts add up to the sheet.
+struct Part {
+  std::string name;
+  std::function<double(Vec2)> share;
+};
+
+std::vector<Part> parts_of_cells(const Parameters& p, stage::StageContext& context) {
+  if (!context.has_input("cells")) throw UsageError("fit_parts = cells: give the label image of the cells as --cells");
+  const auto cells = std::make_shared<const CellLabels>(read_labels(context.input("cells"), p.pixel_size_um));
+  std::set<int> labels(cells->labels.begin(), cells->labels.end());
+  labels.erase(0);
+  constexpr std::size_t kMost = 30;  // a solution for each at each of 20 stiffnesses
+  if (labels.size() > kMost)
+    throw InputError(context.input("cells").string(), "at most 30 cells with contractions of their own",
+                     std::to_string(labels.size()), "join cells, or take fit_parts = edge");
+  const auto label_at = [cells](Vec2 place) {
+    const int column = static_cast<int>(std::floor(place.x / cells->pixel_um)),
+              row = static_cast<int>(std::floor(place.y / cells->pixel_um));
+    const bool is_seen = column >= 0 && row >= 0 && column < cells->width && row < cells->height;
+    return is_seen ? cells->at(column, row) : 0;
+  };
+  std::vector<Part> parts;
+  for (const int label : labels)
+    parts.push_back(
+        {"cell " + std::to_string(label), [=](Vec2 place) { return label_at(place) == label ? 1.0 : 0.0; }});
+  parts.push_back({"no cell", [=](Vec2 place) { return label_at(place) == 0 ? 1.0 : 0.0; }});
+  return parts;
+}
+
+std::vector<Part> parts_of(const Parameters& p, stage::StageContext& context, const Region& region) {
+  if (p.fit_parts == Parts::cells) return parts_of_cells(p, context);
+  if (p.fit_parts == Parts::none) return {};
+  if (!p.sheet.edge_band_um) throw UsageError("[sheet] edge_band_um is missing: fit_parts = edge asks how wide it is");
+  const auto is_edge = [rims = region.rims, band = *p.sheet.edge_band_um](Vec2 place) {
+    return std::ranges::any_of(
+        rims, [&](const Curve& rim) { return distance_to_boundary_um(rim.points_um(), place) <= band; });
+  };
+  return {{"inside", [=](Vec2 place) { return is_edge(place) ? 0.0 : 1.0; }},
+          {"edge", [=](Vec2 place) { return is_edge(place) ? 1.0 : 0.0; }}};
+}
+
+/// At the points of the elements.
+std::vector<double> share_of(const Part& part, const Elements& elements, const Region& region) {
+  return contraction_at_points(elements, region, {1, {}, part.share});
+}
+
+/// Those of them that lie on the sheet.
+std::vector<Part> parts_on(std::vector<Part> parts, const Elements& elements, const Region& region) {
+  std::erase_if(parts, [&](const Part& part) {
+    return std::ranges::all_of(share_of(part, elements, region), [](double s) { return s == 0; });
+  });
+  return parts;
 }
 
 Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region) {
@@ -448,18 +587,28 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   const DisplacementField beads = read_beads(context);
   const double narrow = narrow_um(region), nu = p.sheet.poisson_ratio;
   Scene scene;
-  scene.region = region;
+  scene.adhesive_um = adhesive_area(p, context);
+  scene.region = with_borders_of(region, scene.adhesive_um);
   scene.material = {1, nu, *p.sheet.thickness_um};
-  scene.contraction = {1, p.sheet.edge_band_um};
+  scene.contraction = {1, p.sheet.edge_band_um, {}};
   scene.adhesion_nN_per_um3 = p.sheet.adhesion_stiffness_nN_per_um3;
   scene.size = size_for_fit(region);
   if (p.sheet.mesh_um) scene.size = with_edge(scene.size, *p.sheet.mesh_um);
   const auto model = choice::make_substrate(gel, p.substrate, context.threads);
   context.progress(0.1, "solving for the sheet at each stiffness");
   const auto elements = elements_of(scene);
-  const OnGel ground(*elements, *model, scene.adhesion_nN_per_um3, context.threads);
+  const OnGel ground(*elements, *model, scene.adhesion_nN_per_um3, adhering_triangles(*elements, scene.adhesive_um),
+                     context.threads);
+  const std::vector<Part> parts = parts_on(parts_of(p, context, region), *elements, region);
+  std::vector<std::vector<double>> shares;
+  std::vector<std::string> names;
+  for (const Part& part : parts) {
+    shares.push_back(share_of(part, *elements, region));
+    names.push_back(part.name);
+  }
+  if (parts.empty()) shares.push_back(contraction_at_points(*elements, region, scene.contraction));
   const sheets::StiffnessTable table({.elements = elements,
-                                      .contraction = contraction_at_points(*elements, region, scene.contraction),
+                                      .contractions = shares,
                                       .poisson_ratio = nu,
                                       .thickness_um = *p.sheet.thickness_um,
                                       .n_rims = static_cast<int>(region.rims.size()),
@@ -469,35 +618,48 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   std::optional<double> known;
   if (p.sheet.youngs_modulus_kPa)
     known = Material{*p.sheet.youngs_modulus_kPa, nu, *p.sheet.thickness_um}.stiffness_nN_per_um();
-  sheets::SheetFit fit = fit_sheet(data_of(beads, table, ground, *model, context.threads), table, p.loss, known);
+  sheets::SheetFit fit = fit_sheet(data_of(beads, table, ground, *model, context.threads), table, p.loss, known, names);
   if (context.has_input("adhesions")) compare_with_adhesions(fit, data_of_adhesions(beads, context, *model));
 
   scene.material.youngs_modulus_kPa = fit.stiffness_nN_per_um * (1 - nu * nu) / *p.sheet.thickness_um;
-  scene.contraction.nN_per_um = fit.loads(0);
-  scene.line_tension_nN = p.fit_line_tension ? fit.loads(1) : 0;
+  const Eigen::Index n_parts = table.n_contractions();
+  scene.contraction.nN_per_um = fit.loads.head(n_parts).maxCoeff();
+  if (!parts.empty()) {
+    scene.contraction.edge_band_um = std::nullopt;
+    scene.contraction.at = [&](Vec2 place) {
+      double sum = 0;
+      for (std::size_t k = 0; k < parts.size(); ++k)
+        sum += fit.loads(static_cast<Eigen::Index>(k)) * parts[k].share(place);
+      return sum;
+    };
+  }
+  scene.line_tension_nN = p.fit_line_tension ? fit.loads(n_parts) : 0;
   Run result{.solution = solve_on(ground, elements, scene), .figures = {}, .effects = model->effects()};
   std::vector<Vec2> places;
   for (const Bead& bead : beads) places.push_back(bead.position_um);
   write_beads(context, *model, result.solution, places);
-  write_estimates(context.output("out", "sheet_fit.csv"), fit);
-  write_models(context.output("out", "sheet_models.csv"), fit);
+  const Path estimates_file = context.output("out", "sheet_fit.csv"),
+             models_file = context.output("out", "sheet_models.csv");
+  write_estimates(estimates_file, fit);
+  write_models(models_file, fit);
   std::string told;
   for (const sheets::SheetEstimate& e : fit.estimates) told += (told.empty() ? "" : "; ") + sentence_of(e);
   result.told = told;
+  result.tables = tables_of_fit(estimates_file, models_file);
   const auto stiffness =
       std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &sheets::SheetEstimate::quantity);
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
   result.figures = {{"ground", std::string(name_of(Ground::gel))},
                     {"strain", std::string(name_of(Strain::small))},
                     {"stiffness_nN_per_um", fit.stiffness_nN_per_um},
-                    {"contraction_nN_per_um", fit.loads(0)},
+                    {"contraction_nN_per_um", scene.contraction.nN_per_um},
                     {"youngs_modulus_kPa", scene.material.youngs_modulus_kPa},
                     {"correlation", fit.correlation},
                     {"relative_l2", fit.relative_l2},
                     {"expected_relative_l2", fit.expected_relative_l2},
                     {"n_beads", std::int64_t{fit.n_beads}},
                     {"n_down_weighted", std::int64_t{fit.n_down_weighted}},
-                    {"aic", fit.models[1].aic},
+                    {"aic", fit.models[parts.empty() ? 1 : 2].aic},
                     {"aic_of_nothing", fit.models.front().aic}};
   const double x = free_contraction(scene.material, scene.contraction.nN_per_um);
   result.effects.push_back(stage::decided(EffectKind::gel_response, Switch::on, true, "the beads move with the gel"));
@@ -507,6 +669,23 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   context.notice(
       noticed(FindingKind::sheet_strain, x, "A sheet that nothing holds would contract by " + brief(x) + "."));
   return result;
+}
+
+/// sheet.html
+void write_page(stage::StageContext& context, const Run& done, const Balance& balance) {
+  report::StagePage page{
+      .title = "Contracting sheet", .facts = {}, .findings = context.findings_, .tables = {}, .figures = done.figures};
+  if (!done.told.empty()) page.facts.push_back("Fitted to the beads: " + done.told + ".");
+  page.facts.push_back("The mean tension is " + charts::readable(balance.mean_tension_nN_per_um) + " nN/µm over " +
+                       charts::readable(balance.area_um2) + " µm²; the forces on the ground add up to " +
+                       charts::readable(balance.total_force_nN) + " nN in size, and to a net force of " +
+                       charts::readable(norm(balance.net_force_nN)) + " nN.");
+  page.picture_svg = picture_of(done.solution, "x to the right, y down");
+  page.picture_title = "Tension and traction";
+  page.picture_explained =
+      "Left: mean of the two principal tensions. Right: traction on the ground; arrows are means over squares.";
+  page.tables = done.tables;
+  files::write_text(context.output("out", "sheet.html"), report::html_of(page));
 }
 
 StageReport run(const Parameters& p, stage::StageContext& context) {
@@ -521,6 +700,11 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
     throw UsageError("--beads is for a sheet of given contraction: leave out --displacement and --traction");
   if (context.has_input("area") && !has_tractions)
     throw UsageError("--area is for --traction: without it the outline is the area");
+  if (context.has_input("contractions") && (has_beads || has_tractions))
+    throw UsageError("--contractions are for a sheet of given contraction: leave out --displacement and --traction");
+  if (context.has_input("adhesive") && has_tractions)
+    throw UsageError(
+        "--adhesive is for a sheet on springs or a gel: with --traction the tractions tell where it adheres");
   if (context.has_input("adhesions") && !has_beads)
     throw UsageError("--adhesions are compared with a fit: give --displacement");
   Run done = has_tractions ? run_from_traction(p, context, region)
@@ -532,6 +716,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   append(done.figures, write_cells(context, done.solution, p.pixel_size_um));
   files::write_figures(context.output("out", "sheet.json"), done.figures);
   notice_mesh(context, done.solution);
+  write_page(context, done, balance);
   context.progress(1, "done");
 
   StageReport report;
@@ -571,11 +756,16 @@ int main(int argc, char** argv) {
              "on a gel: points of its surface, x_um, y_um, at which displacement.csv is written"},
             {"cells", Kind::optional_input,
              "label image of the cells: borders.csv has the forces between them, cell_tension.csv what is in each"},
+            {"contractions", Kind::optional_input,
+             "with --cells: contraction of each of them (cell, contraction_nN_per_um); of all others that of [sheet]"},
+            {"adhesive", Kind::optional_input,
+             "where the sheet adheres, as the outline: a pattern; everywhere, if not given"},
             {"area", Kind::optional_input,
              "with --traction: where the sheet is free to end, around the outline; the outline, if not given"},
             {"points", Kind::optional_input, "points at which sheet.csv is written: x_um, y_um; else at the nodes"},
             {"out", Kind::output_folder,
-             "sheet.csv, traction.csv, sheet.vtu, sheet.svg and sheet.json are written here; of a fit sheet_fit.csv, "
+             "sheet.csv, traction.csv, sheet.vtu, sheet.svg, sheet.html and sheet.json are written here; of a fit "
+             "sheet_fit.csv, "
              "sheet_models.csv and displacement.csv, too"}}},
       argc, argv, run);
 }

@@ -3,6 +3,7 @@
 
 #include "pipeline/contract/numbers.h"
 #include "pipeline/stage/stage.h"
+#include "samples/colonies/folder.h"
 #include "samples/experiment/cell_folder.h"
 #include "samples/gels/folder.h"
 
@@ -33,11 +34,15 @@ void refuse_given_segmentation(const std::filesystem::path& cell) {
 struct SimulateParameters {
   drawing::ScenarioParameters cell;
   gels::SpaceParameters space;
+  colonies::ColonyParameters colony;
+  sheet::SheetParameters sheet;
 };
 
 void declare(stage::ParameterList& list, SimulateParameters& p) {
   declare(list, p.cell);
   declare(list, p.space);
+  declare(list, p.colony);
+  declare(list, p.sheet);
 }
 
 /// A cell on a gel in space.
@@ -62,8 +67,46 @@ StageReport run_in_space(const SimulateParameters& p, stage::StageContext& conte
   return report;
 }
 
+/// Colonies: one in the folder itself, several in folders colony_001 and so on.
+StageReport run_colonies(const SimulateParameters& p, stage::StageContext& context) {
+  const Work work(context.threads, context.progress);
+  const colonies::Contracting contracting(p.colony, p.sheet, p.cell, work.part(0, 0.5));
+  const int n = p.colony.n_colonies;
+  double largest_um = 0, noise_um = 0;
+  std::size_t n_beads = 0;
+  for (int k = 0; k < n; ++k) {
+    std::string number = std::to_string(k + 1);
+    number.insert(0, std::max<std::size_t>(3, number.size()) - number.size(), '0');
+    const std::string folder = n == 1 ? "" : "colony_" + number + "/";
+    const auto file = [&](const std::string& name) { return context.output("out", folder + name); };
+    work.tell(0.5 + 0.5 * k / n, "colony " + std::to_string(k + 1) + " of " + std::to_string(n));
+    const colonies::Colony colony = contracting.colony(k);
+    colonies::Whole whole{p.cell, p.colony, p.sheet};
+    whole.scenario.seed = colonies::seed_of(p.cell, k);
+    colonies::write_folder(colony, contracting.solution(), whole, file);
+    if (p.cell.images) colonies::write_images(colony, whole.scenario, file, {context.threads});
+    largest_um = std::max(largest_um, colony.largest_displacement_um);
+    noise_um = std::max(noise_um, colony.noise_um);
+    n_beads += colony.measured.size();
+  }
+  const sheet::Balance balance = sheet::balance_of(contracting.solution());
+  StageReport report;
+  report.figures = {{"n_colonies", std::int64_t{n}},
+                    {"n_beads", static_cast<std::int64_t>(n_beads)},
+                    {"total_force_nN", balance.total_force_nN},
+                    {"mean_tension_nN_per_um", balance.mean_tension_nN_per_um},
+                    {"largest_displacement_um", largest_um},
+                    {"noise_um", noise_um}};
+  report.summary = p.cell.scenario + ": " + std::to_string(n) + (n == 1 ? " colony on " : " colonies on ") +
+                   (contracting.is_on_gel() ? "a gel" : "springs") + ", total force " + brief(balance.total_force_nN) +
+                   " nN, mean tension " + brief(balance.mean_tension_nN_per_um) + " nN/um, largest displacement " +
+                   brief(largest_um) + " um, noise " + brief(noise_um) + " um";
+  return report;
+}
+
 StageReport run(const SimulateParameters& all, stage::StageContext& context) {
   const drawing::ScenarioParameters& parameters = all.cell;
+  if (all.colony.shape != colonies::Shape::none) return run_colonies(all, context);
   if (parameters.images) refuse_given_segmentation(context.outputs_.at("out"));
   if (all.space.scene != gels::SpaceScene::none) return run_in_space(all, context);
   const Work work(context.threads, context.progress);

@@ -35,15 +35,6 @@ struct Pulls {
 
 }  // namespace
 
-DisplacementField moved(const DisplacementField& beads, const Motion& motion) {
-  DisplacementField there = beads;
-  for (Bead& bead : there) {
-    bead.position_um = motion.place_um(bead.position_um);
-    bead.displacement_um = motion.vector(bead.displacement_um);
-  }
-  return there;
-}
-
 CellField::CellField(const std::vector<tractions::Patch>& patches, const Motion& motion, Vec2 seen_low_um,
                      Vec2 seen_high_um)
     : motion_(motion), seen_low_um_(seen_low_um), seen_high_um_(seen_high_um), origin_um_(patches.at(0).position_um) {
@@ -61,7 +52,7 @@ std::optional<Sample> CellField::at(Vec2 place_um) const {
   const Vec2 seen = motion_.back_um(place_um);
   if (seen.x < seen_low_um_.x || seen.y < seen_low_um_.y || seen.x > seen_high_um_.x || seen.y > seen_high_um_.y)
     return std::nullopt;
-  const Vec2 at = (1 / spacing_um_) * (place_um - origin_um_);
+  const Vec2 at = (1 / spacing_um_) * (seen - origin_um_);
   const int column = static_cast<int>(std::floor(at.x)), row = static_cast<int>(std::floor(at.y));
   if (column < 0 || row < 0 || column >= n_columns_ || row >= n_rows_) return std::nullopt;
   const auto by_column = keys(at.x - column), by_row = keys(at.y - row);
@@ -72,7 +63,7 @@ std::optional<Sample> CellField::at(Vec2 place_um) const {
       sum += by_column[i] * by_row[j] * nodes_[static_cast<std::size_t>(r) * n_columns_ + c];
     }
   }
-  return sum;
+  return Sample{motion_.vector(sum.displacement_um), motion_.vector(sum.traction_kPa)};
 }
 
 std::optional<Sample> CellField::at(Vec2 place_um, const std::vector<Motion>& motions) const {

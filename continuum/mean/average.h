@@ -16,13 +16,13 @@ struct Sample {
   Vec2 displacement_um, traction_kPa;
 };
 
-/// Beads carried along with their cell: places and vectors.
-DisplacementField moved(const DisplacementField& beads, const Motion& motion);
-
-/// A cell's fields in the frame of the reference: on a lattice of their own, cubic between its nodes (Keys 1981).
+/// A cell's fields in the frame of the reference: found on a lattice of its own frame, cubic between its nodes (Keys
+/// 1981), then turned with it. In the frame of the image the beads fill the lattice, however the cell lies in it; a
+/// lattice of the reference's frame would have empty corners, and its tractions another regularisation for each turn.
 class CellField {
  public:
-  /// @param patches   of a lattice, rows first
+  /// @param patches   of a lattice in the cell's own frame, rows first
+  /// @param motion    from there to the reference
   /// @param seen_low_um, seen_high_um  the rectangle of the beads in the cell's own frame
   CellField(const std::vector<tractions::Patch>& patches, const Motion& motion, Vec2 seen_low_um, Vec2 seen_high_um);
   /// None where the beads do not reach.

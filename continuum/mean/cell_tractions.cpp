@@ -43,7 +43,8 @@ CellField blurred(const std::function<Vec2(Vec2 place_um)>& traction_kPa, const 
   tractions::NodeField nodes = problem.transform().no_field();
   for (int j = 0; j < problem.field().n_rows; ++j) {
     for (int i = 0; i < problem.field().n_columns; ++i) {
-      const Vec2 traction = traction_kPa(problem.field().position_um(i, j));
+      const Vec2 there = cell.motion.place_um(problem.field().position_um(i, j));
+      const Vec2 traction = cell.motion.vector_back(traction_kPa(there));
       const Eigen::Index at = i + static_cast<Eigen::Index>(problem.box().n_columns) * j;
       nodes.x[at] = traction.x;
       nodes.y[at] = traction.y;

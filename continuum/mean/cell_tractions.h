@@ -9,7 +9,7 @@
 
 namespace mbtfm::mean {
 
-/// A cell's beads, moved to the frame of the reference, with the gel under it.
+/// A cell's beads in its own frame, with the gel under it, and how it is laid onto the reference.
 struct Registered {
   DisplacementField beads;
   Gel gel;

@@ -43,6 +43,10 @@ std::shared_ptr<const Elements> elements_of(const Scene& scene) {
 std::vector<double> contraction_at_points(const Elements& elements, const Region& region,
                                           const Contraction& contraction) {
   std::vector<double> s = even(elements, contraction.nN_per_um);
+  if (contraction.at)
+    for (int t = 0; t < elements.n_triangles(); ++t)
+      for (int p = 0; p < Elements::kPoints; ++p)
+        s[static_cast<std::size_t>(Elements::kPoints * t + p)] = contraction.at(elements.at(t, p).place_um);
   if (!contraction.edge_band_um) return s;
   for (int t = 0; t < elements.n_triangles(); ++t)
     for (int p = 0; p < Elements::kPoints; ++p) {
@@ -54,10 +58,23 @@ std::vector<double> contraction_at_points(const Elements& elements, const Region
   return s;
 }
 
+std::vector<int> adhering_triangles(const Elements& elements, const std::vector<Polygon>& adhesive_um) {
+  std::vector<int> adhering;
+  for (int t = 0; t < elements.n_triangles(); ++t) {
+    const Vec2 centre = patch_of(elements, t).centre_um;
+    const auto n_around = std::ranges::count_if(adhesive_um, [&](const Polygon& p) { return contains(p, centre); });
+    if (adhesive_um.empty() || n_around % 2 == 1) adhering.push_back(t);
+  }
+  return adhering;
+}
+
 Solution solve_on_springs(const Scene& scene, int threads) {
   Solution solution = prepared(elements_of(scene), scene);
   const Elements& elements = *solution.elements;
-  solution.sheet.spring_nN_per_um3 = even(elements, scene.adhesion_nN_per_um3.value_or(0));
+  solution.sheet.spring_nN_per_um3 = even(elements, 0);
+  for (const int t : adhering_triangles(elements, scene.adhesive_um))
+    std::fill_n(solution.sheet.spring_nN_per_um3.begin() + Elements::kPoints * t, Elements::kPoints,
+                scene.adhesion_nN_per_um3.value_or(0));
   if (scene.strain == Strain::large) {
     LargeStrain large = on_springs_large(elements, solution.sheet, scene.measure, threads);
     solution.u = std::move(large.u);
@@ -96,18 +113,22 @@ Solution solve_on(const OnGel& ground, std::shared_ptr<const Elements> triangles
   solution.report = found.report;
   solution.at_points = tension_at_points(elements, solution.sheet, solution.u);
   solution.at_nodes = recovered(elements, solution.at_points);
+  for (int t = 0; t < elements.n_triangles(); ++t)
+    solution.patches.push_back({patch_of(elements, t).centre_um, elements.area_um2(t), {}, {}});
   const Eigen::VectorXd gel_um = ground.gel_um(found.forces_nN);
-  for (int t = 0; t < elements.n_triangles(); ++t) {
-    const double area = ground.areas_um2()[static_cast<std::size_t>(t)];
-    solution.patches.push_back({ground.patches()[static_cast<std::size_t>(t)].centre_um, area,
-                                1 / area * at_node(found.forces_nN, t), at_node(gel_um, t)});
+  for (std::size_t k = 0; k < ground.triangles().size(); ++k) {
+    GroundPatch& patch = solution.patches[static_cast<std::size_t>(ground.triangles()[k])];
+    patch.traction_kPa = 1 / patch.area_um2 * at_node(found.forces_nN, static_cast<int>(k));
+    patch.displacement_um = at_node(gel_um, static_cast<int>(k));
   }
   return solution;
 }
 
 Solution solve_on_gel(const Scene& scene, const substrate::Substrate& gel, int threads) {
   const std::shared_ptr<const Elements> elements = elements_of(scene);
-  return solve_on(OnGel(*elements, gel, scene.adhesion_nN_per_um3, threads), elements, scene);
+  return solve_on(
+      OnGel(*elements, gel, scene.adhesion_nN_per_um3, adhering_triangles(*elements, scene.adhesive_um), threads),
+      elements, scene);
 }
 
 Balance balance_of(const Solution& solution) {

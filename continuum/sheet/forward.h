@@ -1,6 +1,7 @@
 /// A contracting sheet from its outline to tractions and tensions.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -27,7 +28,8 @@ constexpr auto words(Strain) { return std::array{"small", "large"}; }
 /// Where the sheet contracts.
 struct Contraction {
   double nN_per_um = 0;
-  std::optional<double> edge_band_um = {};  ///< only so near to the edge; unset: everywhere
+  std::optional<double> edge_band_um = {};       ///< only so near to the edge; unset: everywhere
+  std::function<double(Vec2 place_um)> at = {};  ///< in place of nN_per_um, where it differs
 };
 
 struct Scene {
@@ -36,6 +38,7 @@ struct Scene {
   Contraction contraction;
   double line_tension_nN = 0;
   std::optional<double> adhesion_nN_per_um3 = {};  ///< unset: bonded, where there is a gel
+  std::vector<Polygon> adhesive_um = {};  ///< the sheet adheres where a place lies in an odd number; none: everywhere
   Strain strain = Strain::small;
   ContractionMeasure measure = ContractionMeasure::surface_tension;
   TriangleSize size;
@@ -54,7 +57,7 @@ struct Solution {
   Sheet sheet;
   NodeVectors u;
   std::vector<Tensor> at_points, at_nodes;  ///< S
-  std::vector<GroundPatch> patches;         ///< by triangle
+  std::vector<GroundPatch> patches;         ///< by triangle; of one that does not adhere without traction
   Report report;
   std::vector<double> sigma_by_triangle = {};  ///< of the mean tension (nN/um); empty: not known
 };
@@ -62,6 +65,9 @@ struct Solution {
 /// Contraction at each point of the elements.
 std::vector<double> contraction_at_points(const Elements& elements, const Region& region,
                                           const Contraction& contraction);
+
+/// Triangles whose centre lies where the sheet adheres, rising.
+std::vector<int> adhering_triangles(const Elements& elements, const std::vector<Polygon>& adhesive_um);
 
 /// @throws InvalidData, NotSolved
 Solution solve_on_springs(const Scene& scene, int threads);

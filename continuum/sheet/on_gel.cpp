@@ -23,20 +23,24 @@ using Eigen::VectorXd;
 /// W u and Wᵀ F.
 struct Means {
   const Elements& elements;
+  const std::vector<int>& triangles;
   const std::vector<std::array<double, 6>>& weights;
 
+  Index n() const { return 2 * std::ssize(triangles); }
   VectorXd of(const NodeVectors& u) const {
-    VectorXd means = VectorXd::Zero(2 * elements.n_triangles());
-    for (int t = 0; t < elements.n_triangles(); ++t)
+    VectorXd means = VectorXd::Zero(n());
+    for (std::size_t k = 0; k < triangles.size(); ++k)
       for (int i = 0; i < 6; ++i)
-        means.segment<2>(2 * t) += weights[static_cast<std::size_t>(t)][i] * u.segment<2>(2 * elements.nodes(t)[i]);
+        means.segment<2>(2 * static_cast<Index>(k)) +=
+            weights[k][i] * u.segment<2>(2 * elements.nodes(triangles[k])[i]);
     return means;
   }
   NodeVectors spread(const VectorXd& forces) const {
     NodeVectors f = NodeVectors::Zero(2 * elements.n_nodes());
-    for (int t = 0; t < elements.n_triangles(); ++t)
+    for (std::size_t k = 0; k < triangles.size(); ++k)
       for (int i = 0; i < 6; ++i)
-        f.segment<2>(2 * elements.nodes(t)[i]) += weights[static_cast<std::size_t>(t)][i] * forces.segment<2>(2 * t);
+        f.segment<2>(2 * elements.nodes(triangles[k])[i]) +=
+            weights[k][i] * forces.segment<2>(2 * static_cast<Index>(k));
     return f;
   }
 };
@@ -51,7 +55,7 @@ Eigen::MatrixXd rigid_motions(const Elements& elements) {
   return rigid;
 }
 Eigen::MatrixXd of_patches(const Eigen::MatrixXd& rigid, const Means& means) {
-  Eigen::MatrixXd patches(2 * means.elements.n_triangles(), 3);
+  Eigen::MatrixXd patches(means.n(), 3);
   for (int k = 0; k < 3; ++k) patches.col(k) = means.of(rigid.col(k));
   return patches;
 }
@@ -110,10 +114,12 @@ substrate::Ellipse patch_of(const Elements& elements, int triangle) {
 }
 
 OnGel::OnGel(const Elements& elements, const substrate::Substrate& gel, std::optional<double> adhesion_nN_per_um3,
-             int threads)
-    : elements_(elements), threads_(threads), adhesion_(adhesion_nN_per_um3) {
+             std::vector<int> adhering, int threads)
+    : elements_(elements), threads_(threads), adhesion_(adhesion_nN_per_um3), adhering_(std::move(adhering)) {
+  if (adhering_.size() < 2)
+    throw InvalidData("where the sheet adheres", "two of its triangles or more", std::to_string(adhering_.size()));
   std::vector<Vec2> centres;
-  for (int t = 0; t < elements.n_triangles(); ++t) {
+  for (const int t : adhering_) {
     ellipses_.push_back(patch_of(elements, t));
     centres.push_back(ellipses_.back().centre_um);
     areas_um2_.push_back(elements.area_um2(t));
@@ -143,13 +149,15 @@ void OnGel::average_near(const substrate::Substrate& gel, const std::vector<Vec2
   numerics::parallel_for(static_cast<int>(centres.size()), threads_, [&](int j) {
     std::vector<Vec2> points;
     for (const int i : near[static_cast<std::size_t>(j)])
-      for (int p = 0; p < Elements::kPoints; ++p) points.push_back(elements_.at(i, p).place_um);
+      for (int p = 0; p < Elements::kPoints; ++p)
+        points.push_back(elements_.at(adhering_[static_cast<std::size_t>(i)], p).place_um);
     const Eigen::MatrixXd field = gel.compliance_um_per_nN(points, {ellipses_[static_cast<std::size_t>(j)]});
     Index row = 0;
     for (const int i : near[static_cast<std::size_t>(j)]) {
       Eigen::Matrix2d mean = Eigen::Matrix2d::Zero();
       for (int p = 0; p < Elements::kPoints; ++p, row += 2)
-        mean += elements_.at(i, p).weight_um2 / areas_um2_[static_cast<std::size_t>(i)] * field.middleRows<2>(row);
+        mean += elements_.at(adhering_[static_cast<std::size_t>(i)], p).weight_um2 /
+                areas_um2_[static_cast<std::size_t>(i)] * field.middleRows<2>(row);
       compliance_.block<2, 2>(2 * i, 2 * j) = mean;
     }
   });
@@ -168,8 +176,8 @@ VectorXd OnGel::ground_um(const VectorXd& forces_nN) const {
 }
 
 OnGel::Solution OnGel::solve(const Material& material, const NodeVectors& load_nN) const {
-  const Means means{elements_, weights_};
-  const Index n = 2 * elements_.n_triangles();
+  const Means means{elements_, adhering_, weights_};
+  const Index n = means.n();
   Stiffness free(elements_, pins(elements_)), held(elements_, {});
   VectorXd spring(n);  // nN/um of each patch: what the gel under it and its neighbours is like
   constexpr double kNeighbours = 4;
@@ -179,13 +187,17 @@ OnGel::Solution OnGel::solve(const Material& material, const NodeVectors& load_n
     spring(i) = 1 / spring(i);
   }
   for (int t = 0; t < elements_.n_triangles(); ++t) {
-    Stiffness::OfElement K = elastic_stiffness(elements_, t, material);
+    const Stiffness::OfElement K = elastic_stiffness(elements_, t, material);
     free.add(t, K);
-    const auto& w = weights_[static_cast<std::size_t>(t)];
+    held.add(t, K);
+  }
+  for (std::size_t k = 0; k < adhering_.size(); ++k) {
+    Stiffness::OfElement K = Stiffness::OfElement::Zero();
+    const auto& w = weights_[k];
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j < 6; ++j)
-        for (int a = 0; a < 2; ++a) K(2 * i + a, 2 * j + a) += spring(2 * t + a) * w[i] * w[j];
-    held.add(t, K);
+        for (int a = 0; a < 2; ++a) K(2 * i + a, 2 * j + a) = spring(2 * static_cast<Index>(k) + a) * w[i] * w[j];
+    held.add(adhering_[k], K);
   }
   if (!free.factorise(0, threads_) || !held.factorise(0, threads_))
     throw NotSolved({.reason = "the sheet has no stiffness: check its Young's modulus and thickness"});

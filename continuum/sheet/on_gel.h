@@ -11,8 +11,8 @@
 
 namespace mbtfm::sheet {
 
-/// Each triangle is a patch of even traction. With F the patches' forces, C the gel's compliance (and the springs'), W
-/// the means over patches of the sheet's displacement:
+/// Each triangle that adheres is a patch of even traction. With F the patches' forces, C the gel's compliance (and the
+/// springs'), W the means over patches of the sheet's displacement:
 ///
 ///   W u = C F,   K u = f − Wᵀ F,   F without net force and torque
 ///
@@ -22,19 +22,21 @@ namespace mbtfm::sheet {
 class OnGel {
  public:
   /// @param adhesion_nN_per_um3  unset: bonded
-  /// @throws as substrate::Substrate::response
+  /// @param adhering  the triangles that are patches, rising
+  /// @throws as substrate::Substrate::response; InvalidData where fewer than two triangles adhere
   OnGel(const Elements& elements, const substrate::Substrate& gel, std::optional<double> adhesion_nN_per_um3,
-        int threads);
+        std::vector<int> adhering, int threads);
 
   struct Solution {
     NodeVectors u;
-    Eigen::VectorXd forces_nN;  ///< by triangle, x and y
+    Eigen::VectorXd forces_nN;  ///< by patch, x and y
     Report report;
   };
   /// Small strains. @param load_nN  on the nodes, balanced: forces_of_contraction_nN
   /// @throws NotSolved where the iteration does not end
   Solution solve(const Material& material, const NodeVectors& load_nN) const;
 
+  const std::vector<int>& triangles() const { return adhering_; }  ///< by patch
   const std::vector<substrate::Ellipse>& patches() const { return ellipses_; }
   const std::vector<double>& areas_um2() const { return areas_um2_; }
   /// Displacement of the gel under each patch.
@@ -46,6 +48,7 @@ class OnGel {
   const Elements& elements_;
   int threads_;
   std::optional<double> adhesion_;
+  std::vector<int> adhering_;
   std::vector<substrate::Ellipse> ellipses_;
   std::vector<double> areas_um2_;
   std::vector<std::array<double, 6>> weights_;  ///< W

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "mbtfm/sheets/beside_fibres.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::fit {
@@ -56,6 +57,11 @@ ModelChecks check_model(const ReadyCell& cell, const EnsembleFit& fit, const Par
                      .missing_adhesions = missing_adhesions(fit, data, of, p.gel, threads),
                      .drawn = cross_validation_of(cell, fit, p.fit.cross_validation, threads)};
   checks.left_out = leave_each_fibre_out(fit, checks.influence);
+  if (!p.compare_sheet) return checks;
+  std::vector<Polygon> outline = {of.outline_um};
+  outline.insert(outline.end(), of.holes_um.begin(), of.holes_um.end());
+  if (auto sheet = sheets::score_of_sheet(data, outline, p.gel, *cell.gel, threads))
+    checks.models.push_back(std::move(*sheet));
   return checks;
 }
 

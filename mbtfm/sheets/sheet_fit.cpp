@@ -28,12 +28,28 @@ struct Profile {
   MatrixXd normal;    ///< of the loads
 };
 
-Profile profile_at(const LinearData& data, const StiffnessTable& table, double stiffness) {
-  const MatrixXd columns = tensions::displace(data.reduced, table.shares(stiffness));
+/// @param joined  the loads that are fitted as one: loads × fewer
+Profile profile_at(const LinearData& data, const StiffnessTable& table, double stiffness, const MatrixXd& joined) {
+  const MatrixXd columns = tensions::displace(data.reduced, table.shares(stiffness) * joined);
   Profile profile{.stiffness = stiffness, .loads = {}, .misfit = 0, .normal = columns.transpose() * columns};
   profile.loads = profile.normal.ldlt().solve(columns.transpose() * data.reduced.target);
   profile.misfit = (columns * profile.loads - data.reduced.target).squaredNorm();
   return profile;
+}
+
+Profile profile_at(const LinearData& data, const StiffnessTable& table, double stiffness) {
+  return profile_at(data, table, stiffness, MatrixXd::Identity(table.n_loads(), table.n_loads()));
+}
+
+/// Of a sheet whose parts all contract alike: the least over the scanned stiffnesses.
+double even_misfit(const LinearData& data, const StiffnessTable& table, const std::vector<Profile>& scan) {
+  const Eigen::Index n = table.n_contractions(), n_others = table.n_loads() - n;
+  MatrixXd joined = MatrixXd::Zero(n + n_others, 1 + n_others);
+  joined.topLeftCorner(n, 1).setOnes();
+  joined.bottomRightCorner(n_others, n_others).setIdentity();
+  double least = std::numeric_limits<double>::infinity();
+  for (const Profile& p : scan) least = std::min(least, profile_at(data, table, p.stiffness, joined).misfit);
+  return least;
 }
 
 /// @param known  the stiffness; unset: all of the table
@@ -145,8 +161,9 @@ Limits limits_of_stiffness(const std::vector<Profile>& scan, const Profile& best
   return limits;
 }
 
-SheetEstimate estimate(Quantity quantity, double value, double sigma, const Limits& limits) {
-  SheetEstimate e{.quantity = quantity, .value = value, .sigma = sigma, .low = limits.low, .high = limits.high};
+SheetEstimate estimate(Quantity quantity, const std::string& part, double value, double sigma, const Limits& limits) {
+  SheetEstimate e{
+      .quantity = quantity, .part = part, .value = value, .sigma = sigma, .low = limits.low, .high = limits.high};
   if (limits.is_open_below) e.low = std::nullopt;
   if (limits.is_open_above) e.high = std::nullopt;
   e.identifiable = e.low && e.high;
@@ -196,7 +213,8 @@ LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, 
                           threads);
 }
 
-SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known) {
+SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known,
+                   const std::vector<std::string>& parts) {
   data = weighed(std::move(data), table, loss, known);
   const Eigen::Index n_unknowns = table.n_loads() + (known ? 0 : 1);
   const std::vector<Profile> scan = scanned(data, table, known);
@@ -211,19 +229,25 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   const auto sigma = [&](Eigen::Index k) { return std::sqrt(std::max(0.0, covariance(k, k))); };
   if (!known) fit.correlation = covariance(0, at_M) / (sigma(0) * sigma(at_M));
   const Limits of_M = limits_of_stiffness(scan, best, fit.variance);
-  Limits of_s = limits_of_load(scan, best, fit.variance, 0, false),
-         of_ratio = limits_of_load(scan, best, fit.variance, 0, true);
-  of_s.is_open_above = of_M.is_open_above;      // a stiff sheet pulls as its strain, s over M, has it
-  of_ratio.is_open_above = of_M.is_open_below;  // a soft one as its contraction
-  const double s = best.loads(0), M = best.stiffness;
-  const double relative =
-      std::sqrt(std::max(0.0, covariance(0, 0) / (s * s) + covariance(at_M, at_M) - 2 * covariance(0, at_M) / s));
-  fit.estimates = {estimate(Quantity::contraction, s, sigma(0), of_s),
-                   estimate(Quantity::stiffness, M, M * sigma(at_M), of_M),
-                   estimate(Quantity::contraction_over_stiffness, s / M, std::abs(s / M) * relative, of_ratio)};
-  if (table.n_loads() == 2)
-    fit.estimates.push_back(
-        estimate(Quantity::line_tension, best.loads(1), sigma(1), limits_of_load(scan, best, fit.variance, 1, false)));
+  const double M = best.stiffness;
+  fit.estimates = {estimate(Quantity::stiffness, {}, M, M * sigma(at_M), of_M)};
+  for (Eigen::Index k = 0; k < table.n_contractions(); ++k) {
+    Limits of_s = limits_of_load(scan, best, fit.variance, k, false),
+           of_ratio = limits_of_load(scan, best, fit.variance, k, true);
+    of_s.is_open_above = of_M.is_open_above;      // a stiff sheet pulls as its strain, s over M, has it
+    of_ratio.is_open_above = of_M.is_open_below;  // a soft one as its contraction
+    const double s = best.loads(k);
+    const std::string part = parts.empty() ? "" : parts[static_cast<std::size_t>(k)];
+    // of s / M, where log M and s are correlated
+    const double of_share =
+        std::sqrt(std::max(0.0, covariance(k, k) + s * s * covariance(at_M, at_M) - 2 * s * covariance(k, at_M))) / M;
+    fit.estimates.insert(fit.estimates.end() - (k == 0 ? 1 : 0),
+                         estimate(Quantity::contraction, part, s, sigma(k), of_s));
+    fit.estimates.push_back(estimate(Quantity::contraction_over_stiffness, part, s / M, of_share, of_ratio));
+  }
+  if (table.n_loads() > table.n_contractions())
+    fit.estimates.push_back(estimate(Quantity::line_tension, {}, best.loads(at_M - 1), sigma(at_M - 1),
+                                     limits_of_load(scan, best, fit.variance, at_M - 1, false)));
   fit.relative_l2 = tensions::relative_l2(data, fit.node_amplitudes);
   fit.n_beads = static_cast<int>(data.position_um.size());
   fit.n_down_weighted = static_cast<int>((data.bead_weight.array() < 0.5).count());
@@ -238,8 +262,15 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   };
   const double floor = data.reduced.floor_squared;
   model("nothing", 0, data.reduced.target.squaredNorm() + floor, 1);
-  model(table.n_loads() == 2 ? "sheet-with-line" : "sheet", static_cast<int>(n_unknowns), best.misfit + floor,
-        fit.relative_l2);
+  const bool has_parts = table.n_contractions() > 1;
+  const std::string name = table.n_loads() > table.n_contractions() ? "sheet-with-line" : "sheet";
+  if (has_parts) {
+    const double even = even_misfit(data, table, scan) + floor;
+    const double least = std::max(best.misfit + floor, std::numeric_limits<double>::min());
+    model(name, static_cast<int>(n_unknowns) - table.n_contractions() + 1, even,
+          fit.relative_l2 * std::sqrt(even / least));
+  }
+  model(has_parts ? name + "-in-parts" : name, static_cast<int>(n_unknowns), best.misfit + floor, fit.relative_l2);
   fit.report = {.converged = true, .iterations = kScan, .last_change = 0, .reason = "scanned over the stiffness"};
   return fit;
 }

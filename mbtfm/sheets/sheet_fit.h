@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "mbtfm/sheets/stiffness_table.h"
@@ -17,13 +18,15 @@ constexpr auto words(Quantity) {
 
 struct SheetEstimate {
   Quantity quantity = Quantity::contraction;
+  std::string part = {};  ///< of the sheet, where it has parts with contractions of their own
   double value = 0;
   std::optional<double> sigma;      ///< standard error; none where the beads do not tell the quantity
   std::optional<double> low, high;  ///< 95 %; none where the beads set no limit to that side
   bool identifiable = true;         ///< limited to both sides
 };
 
-/// A model of the gel's motion: nothing, the sheet, the sheet with a cable along its edge.
+/// A model of the gel's motion: nothing, the sheet, the sheet with a cable along its edge, or with parts that contract
+/// each by its own.
 struct SheetModel {
   std::string name;
   int n_parameters = 0;
@@ -33,9 +36,9 @@ struct SheetModel {
 struct SheetFit {
   std::vector<SheetEstimate> estimates;
   double stiffness_nN_per_um = 0;
-  Eigen::VectorXd loads;            ///< contraction, line tension
+  Eigen::VectorXd loads;            ///< contractions by part, line tension
   Eigen::VectorXd node_amplitudes;  ///< of the table's forces: what the sheet does at the solution
-  double correlation = 0;           ///< of the errors of contraction and log stiffness
+  double correlation = 0;           ///< of the errors of the first contraction and log stiffness
   double variance = 1;              ///< of a weighted component of a bead, that the error bars are made with
   double relative_l2 = 0, expected_relative_l2 = 0;
   int n_beads = 0, n_down_weighted = 0;
@@ -56,7 +59,8 @@ tensions::LinearData data_of(const DisplacementField& beads, const StiffnessTabl
 /// is a function of one number, which is scanned and then refined (variable projection). 95 % intervals: where the
 /// misfit, least over all else, is 1.96² variances above the best.
 /// @param stiffness_nN_per_um  known; unset: fitted
+/// @param parts  names of the table's contractions, where there are several
 SheetFit fit_sheet(tensions::LinearData data, const StiffnessTable& table, tensions::Loss loss,
-                   std::optional<double> stiffness_nN_per_um = {});
+                   std::optional<double> stiffness_nN_per_um = {}, const std::vector<std::string>& parts = {});
 
 }  // namespace mbtfm::sheets

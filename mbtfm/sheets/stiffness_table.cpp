@@ -14,20 +14,24 @@ constexpr double kSoftest = 0.03, kStiffest = 300;  // M / (mu R)
 
 StiffnessTable::StiffnessTable(const SheetShape& shape, const sheet::OnGel& ground, const Gel& gel, double size_um,
                                int threads)
-    : n_loads_(shape.has_line ? 2 : 1) {
+    : n_contractions_(static_cast<int>(shape.contractions.size())),
+      n_loads_(n_contractions_ + (shape.has_line ? 1 : 0)) {
   scale_nN_per_um_ = gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio)) * size_um;
   low_ = std::log(kSoftest * scale_nN_per_um_);
   high_ = std::log(kStiffest * scale_nN_per_um_);
   sheet::Sheet unit;
   unit.n_rims = shape.n_rims;
-  unit.contraction_nN_per_um = shape.contraction;
-  std::vector<sheet::NodeVectors> loads = {sheet::forces_of_contraction_nN(*shape.elements, unit)};
+  std::vector<sheet::NodeVectors> loads;
+  for (const std::vector<double>& contraction : shape.contractions) {
+    unit.contraction_nN_per_um = contraction;
+    loads.push_back(sheet::forces_of_contraction_nN(*shape.elements, unit));
+  }
   if (shape.has_line) {
     unit.contraction_nN_per_um = sheet::even(*shape.elements, 0);
     unit.line_tension_nN = 1;
     loads.push_back(sheet::forces_of_contraction_nN(*shape.elements, unit));
   }
-  forces_nN_.resize(2 * shape.elements->n_triangles(), kNodes * n_loads_);
+  forces_nN_.resize(2 * std::ssize(ground.patches()), kNodes * n_loads_);
   for (int k = 0; k < kNodes; ++k)
     nodes_.push_back(0.5 * (low_ + high_) - 0.5 * (high_ - low_) * std::cos((k + 0.5) * std::numbers::pi / kNodes));
   numerics::parallel_for(kNodes * n_loads_, threads, [&](int j) {

@@ -106,7 +106,7 @@ const Table<ModelScore>& model_table() {
   static const Table<Row> table{
       .file = "4_fit/models.csv",
       .row = "each model that is compared",
-      .columns = {{"model", "its name: no-fibres, full, adhesion-forces", &Row::name},
+      .columns = {{"model", "its name: no-fibres, full, adhesion-forces, sheet", &Row::name},
                   {"n_parameters", "numbers that are fitted", &Row::n_parameters},
                   {"chi_squared", "misfit in units of the noise", &Row::chi_squared, kResult},
                   {"relative_l2", "‖measured − model‖ / ‖measured‖", &Row::relative_l2, kResult},

@@ -173,6 +173,9 @@ std::vector<std::string> on_outputs(const Provenance& provenance) {
   return sentences;
 }
 
+constexpr const char* kNothingOpen =
+    "No finding is open: nothing that the program checks speaks against these results.";
+
 std::string item(const char* kind, const char* mark, const std::string& text, const std::string& more = {}) {
   return fmt::format("<li class=\"{}\">{}{}{}</li>\n", kind, mark, charts::html_escaped(text), more);
 }
@@ -238,11 +241,17 @@ std::string findings_section(const CellResults& results, const Provenance& prove
         item(accuracy->is_met ? "fact" : "caution", accuracy->is_met ? "" : "<b>Caution:</b> ",
              "Verified by the error budget: " + accuracy->verdict + ".");
   }
-  if (open.empty() && was_asked(provenance))
-    open =
-        item("good", "<b>✓</b> ", "No finding is open: nothing that the program checks speaks against these results.");
+  if (open.empty() && was_asked(provenance)) open = item("good", "<b>✓</b> ", kNothingOpen);
   for (const std::string& sentence : on_outputs(provenance)) notes += item("fact", "", sentence);
   return section("In short", html + open + notes + "</ul>\n");
+}
+
+std::string list_of(const std::vector<std::string>& facts, const std::vector<Finding>& findings) {
+  std::string html = "<ul class=\"findings\">\n", open, notes;
+  for (const std::string& fact : facts) html += item("fact", "", fact);
+  for (const Finding& finding : findings) (is_open(finding) ? open : notes) += item_of(finding);
+  if (open.empty()) open = item("good", "<b>✓</b> ", kNothingOpen);
+  return html + open + notes + "</ul>\n";
 }
 
 }  // namespace mbtfm::report

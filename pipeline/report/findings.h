@@ -13,6 +13,9 @@ namespace mbtfm::report {
 /// none is open, and the notes.
 std::string findings_section(const CellResults& results, const Provenance& provenance);
 
+/// The same of what one program found: these sentences, its open findings with their remedies or a tick, its notes.
+std::string list_of(const std::vector<std::string>& facts, const std::vector<Finding>& findings);
+
 /// What was found, and how well the model explains it.
 std::vector<std::string> facts_of(const CellResults& results);
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/listed.h"
+
 namespace mbtfm::report {
 
 namespace {
@@ -28,6 +30,19 @@ std::string rounded(double value, std::optional<int> decimals) {
 
 std::string rounded(const std::optional<double>& value, std::optional<int> decimals) {
   return value ? rounded(*value, decimals) : "–";
+}
+
+std::string text_of_figure(const Value& value) {
+  return std::visit(
+      [](const auto& v) -> std::string {
+        using V = std::decay_t<decltype(v)>;
+        if constexpr (!std::is_arithmetic_v<V> && !std::is_same_v<V, std::string>) return listed(v);
+        if constexpr (std::is_same_v<V, std::string>) return v;
+        if constexpr (std::is_same_v<V, bool>) return v ? "yes" : "no";
+        if constexpr (std::is_same_v<V, double>) return charts::readable(v);
+        if constexpr (std::is_same_v<V, std::int64_t>) return std::to_string(v);
+      },
+      value);
 }
 
 std::string with_sign(double value, int decimals) { return with_minus(fmt::format("{:+.{}f}", value, decimals)); }

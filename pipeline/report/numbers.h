@@ -5,6 +5,7 @@
 #include <string>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/report.h"
 
 namespace mbtfm::report {
 
@@ -17,6 +18,9 @@ int decimals_for(double error);
 std::string rounded(double value, std::optional<int> decimals);
 /// "–" for none.
 std::string rounded(const std::optional<double>& value, std::optional<int> decimals);
+
+/// Of a figure: a number as above, a list with commas.
+std::string text_of_figure(const Value& value);
 
 /// "+0.3", "−0.3", "0.0"
 std::string with_sign(double value, int decimals);

@@ -1,5 +1,4 @@
 #include "pipeline/report/report.h"
-#include "pipeline/contract/listed.h"
 
 #include <fmt/format.h>
 
@@ -141,19 +140,7 @@ std::string figure_pairs(const CellResults& results) {
       {"meshes", std::to_string(fit.n_meshes)},
       {"iterations", std::to_string(fit.iterations)},
       {"converged", fit.converged ? "yes" : "no"}};
-  for (const auto& [name, value] : fit.more) {
-    pairs.emplace_back(name, std::visit(
-                                 [](const auto& v) -> std::string {
-                                   using V = std::decay_t<decltype(v)>;
-                                   if constexpr (!std::is_arithmetic_v<V> && !std::is_same_v<V, std::string>)
-                                     return listed(v);
-                                   if constexpr (std::is_same_v<V, std::string>) return v;
-                                   if constexpr (std::is_same_v<V, bool>) return v ? "yes" : "no";
-                                   if constexpr (std::is_same_v<V, double>) return charts::readable(v);
-                                   if constexpr (std::is_same_v<V, std::int64_t>) return std::to_string(v);
-                                 },
-                                 value));
-  }
+  for (const auto& [name, value] : fit.more) pairs.emplace_back(name, text_of_figure(value));
   return html_of_pairs(pairs);
 }
 

@@ -28,6 +28,14 @@ void write_beads(const std::filesystem::path& file, const std::vector<Vec2>& rel
   files::write_text(file, csv.str());
 }
 
+/// As the camera records it. @param exposure  number of the image
+void write_image(const FileNamer& file, const std::string& name, const images::Image& photons, int exposure,
+                 const drawing::ScenarioParameters& p, const Work& work) {
+  work.tell(0.5 + 0.1 * exposure, "rendering " + name);
+  images::write_tiff(file(name),
+                     drawing::recorded(photons, drawing::at_quality(p.microscope), p.seed, exposure, work.threads));
+}
+
 }  // namespace
 
 void write_cell_folder(const Experiment& e, const drawing::ScenarioParameters& parameters, const FileNamer& file) {
@@ -46,24 +54,29 @@ void write_cell_folder(const Experiment& e, const drawing::ScenarioParameters& p
   files::write_displacement(file("2_track/displacement.csv"), e.measured);
 }
 
-void write_images(const Experiment& e, const drawing::ScenarioParameters& p, const FileNamer& file, const Work& work) {
-  const int threads = work.threads;
+void write_bead_images(const DisplacementField& measured, const drawing::ScenarioParameters& p, const FileNamer& file,
+                       const Work& work) {
   const drawing::MicroscopeParameters m = drawing::at_quality(p.microscope);
-  const auto write = [&](const std::string& name, const images::Image& photons, int exposure) {
-    work.tell(0.5 + 0.1 * exposure, "rendering " + name);
-    images::write_tiff(file(name), drawing::recorded(photons, m, p.seed, exposure, threads));
-  };
   std::vector<Vec2> relaxed, stressed;
-  for (const Bead& bead : e.measured) {
+  for (const Bead& bead : measured) {
     relaxed.push_back(bead.position_um);
     stressed.push_back(bead.position_um + bead.displacement_um + Vec2{p.drift_x_um, p.drift_y_um});
   }
   const drawing::BeadImages beads = drawing::bead_spots(relaxed, stressed, p.lost_bead_fraction, m, p.seed);
-  write("paxillin.tif", drawing::photons_of(drawing::paxillin_specimen(e.cell, m, p.seed, threads), m, threads), 0);
-  write("actin.tif", drawing::photons_of(drawing::actin_specimen(e.cell, p.actin, m, p.seed, threads), m, threads), 1);
-  write("beads_relaxed.tif", drawing::photons_of(beads.relaxed, m, threads), 2);
-  write("beads_stressed.tif", drawing::photons_of(beads.stressed, m, threads), 3);
+  write_image(file, "beads_relaxed.tif", drawing::photons_of(beads.relaxed, m, work.threads), 2, p, work);
+  write_image(file, "beads_stressed.tif", drawing::photons_of(beads.stressed, m, work.threads), 3, p, work);
   write_beads(file("truth/beads.csv"), relaxed, stressed);
+}
+
+void write_images(const Experiment& e, const drawing::ScenarioParameters& p, const FileNamer& file, const Work& work) {
+  const int threads = work.threads;
+  const drawing::MicroscopeParameters m = drawing::at_quality(p.microscope);
+  write_image(file, "paxillin.tif",
+              drawing::photons_of(drawing::paxillin_specimen(e.cell, m, p.seed, threads), m, threads), 0, p, work);
+  write_image(file, "actin.tif",
+              drawing::photons_of(drawing::actin_specimen(e.cell, p.actin, m, p.seed, threads), m, threads), 1, p,
+              work);
+  write_bead_images(e.measured, p, file, work);
 }
 
 }  // namespace mbtfm::experiment

@@ -15,6 +15,10 @@ using FileNamer = std::function<std::filesystem::path(const std::string& file)>;
 void write_cell_folder(const Experiment& experiment, const drawing::ScenarioParameters& parameters,
                        const FileNamer& file);
 
+/// beads_relaxed.tif, beads_stressed.tif and truth/beads.csv; the noise is in the stressed positions.
+void write_bead_images(const DisplacementField& measured, const drawing::ScenarioParameters& parameters,
+                       const FileNamer& file, const Work& work);
+
 /// The four images, and truth/beads.csv. The noise is in the stressed positions of the beads.
 void write_images(const Experiment& experiment, const drawing::ScenarioParameters& parameters, const FileNamer& file,
                   const Work& work);

@@ -108,7 +108,8 @@ DisplacementField displacement_of(const Experiment& e, const drawing::ScenarioPa
   return field;
 }
 
-/// Gaussian noise on each component.
+}  // namespace
+
 DisplacementField with_noise(DisplacementField field, double noise_um, std::uint64_t seed) {
   drawing::Random random(seed, drawing::Stream::noise);
   for (Bead& bead : field) {
@@ -119,8 +120,6 @@ DisplacementField with_noise(DisplacementField field, double noise_um, std::uint
   }
   return field;
 }
-
-}  // namespace
 
 std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
   constexpr double kBytes = 300;  // of a bead: its place in the grid, its displacement, its spots in two images

@@ -37,6 +37,9 @@ Experiment simulate(const drawing::ScenarioParameters& parameters, const Work& w
 /// The same of a cell that is given, with its tensions.
 Experiment simulate(drawing::DrawnCell drawn, const drawing::ScenarioParameters& parameters, const Work& work = {});
 
+/// Gaussian noise on each component, of the seed's own stream.
+DisplacementField with_noise(DisplacementField field, double noise_um, std::uint64_t seed);
+
 /// Random positions on the field, no two nearer than the scenario's bead distance.
 /// @throws UsageError where they do not fit
 std::vector<Vec2> place_beads(const drawing::ScenarioParameters& parameters);

@@ -3,10 +3,13 @@
 
 #include <cmath>
 #include <fstream>
+#include <numbers>
 #include <random>
 
+#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json_record.h"
+#include "segment/images/image.h"
 #include "tests/support/program.h"
 #include "tests/support/sheets.h"
 
@@ -136,6 +139,77 @@ TEST_F(Sheet, what_cannot_be_is_refused_by_name) {
   const auto outcome = run(std::string(kSheet) + springs, "", "eight.csv");
   EXPECT_EQ(outcome.code, 3) << outcome.output;
   EXPECT_NE(outcome.output.find("piece 1 of ring 0 and piece 3 of ring 0 cross"), std::string::npos) << outcome.output;
+}
+
+TEST_F(Sheet, images_of_a_contracting_cell_give_its_contraction_and_stiffness_back) {
+  const std::string cell = (folder_ / "cell").string();
+  const auto run_step = [&](const std::string& command) {
+    const auto outcome = test::run_program(command);
+    ASSERT_EQ(outcome.code, 0) << outcome.output;
+  };
+  run_step(
+      "mbtfm-simulate --quiet --scenario contracting-disc --images --radius_um 14 --image_size_px 480 --beads 2500 "
+      "--mesh_um 0.7 --out " +
+      cell);
+  run_step("mbtfm-track --quiet --stressed " + cell + "/beads_stressed.tif --relaxed " + cell +
+           "/beads_relaxed.tif --config " + cell + "/cell.toml --out " + cell + "/2_track");
+  run_step("mbtfm-sheet --quiet --outline " + cell + "/1_segment/outline.csv --displacement " + cell +
+           "/2_track/displacement.csv --mesh_um 0.6 --config " + cell + "/cell.toml --out " + cell + "/sheet");
+  const files::CsvTable truth(folder_ / "cell/truth/sheet.csv"), fitted(folder_ / "cell/sheet/sheet_fit.csv");
+  for (int row = 0; row < 2; ++row) {
+    ASSERT_EQ(truth.text(row, "quantity"), fitted.text(row, "quantity"));
+    // three standard errors, and what these triangles leave of the sheet: 2 %
+    const double value = truth.number(row, "value");
+    EXPECT_NEAR(fitted.number(row, "value"), value, 3 * fitted.number(row, "sigma") + 0.02 * value)
+        << truth.text(row, "quantity");
+    EXPECT_LT(fitted.number(row, "sigma"), 0.15 * value);
+  }
+  const std::string page = files::read_text(folder_ / "cell/sheet/sheet.html");
+  for (const char* words : {"In short", "Caution:", "What the beads tell", "stiffness_nN_per_um", "<svg"})
+    EXPECT_NE(page.find(words), std::string::npos) << words;
+}
+
+TEST_F(Sheet, a_sheet_pulls_only_where_it_adheres) {
+  files::write_outline(folder_ / "ring.csv", test::circle(20, 120), {test::circle(14, 120)});
+  const std::string soft = std::string(kSheet) + "adhesion_stiffness_nN_per_um3 = 0.03\n";
+  ASSERT_EQ(run(soft, "--adhesive " + (folder_ / "ring.csv").string()).code, 0);
+  const files::CsvTable traction(folder_ / "out" / "traction.csv");
+  double area = 0;
+  for (int row = 0; row < traction.n_rows(); ++row) {
+    const double r = std::hypot(traction.number(row, "x_um"), traction.number(row, "y_um"));
+    const double t = std::hypot(traction.number(row, "tx_kPa"), traction.number(row, "ty_kPa"));
+    EXPECT_EQ(t > 0, 14 < r && r < 20) << r;
+    if (t > 0) area += traction.number(row, "area_um2");
+  }
+  // triangles end at the ring's border, which has corners every 3 degrees
+  EXPECT_NEAR(area, std::numbers::pi * (400 - 196), 2e-3 * area);
+}
+
+TEST_F(Sheet, cells_of_a_label_image_contract_each_by_its_own) {
+  // two halves, of which the right one pulls alone
+  images::Image image;
+  image.width = image.height = 60;
+  image.pixel_size_um = 1;
+  for (int y = 0; y < 60; ++y)
+    for (int x = 0; x < 60; ++x) image.pixels.push_back(x < 30 ? 1.F : 2.F);
+  images::write_tiff(folder_ / "cells.tif", image);
+  Polygon moved = test::circle(25, 180);
+  for (Vec2& p : moved) p += Vec2{30, 30};
+  files::write_outline(folder_ / "moved.csv", moved);
+  files::write_text(folder_ / "contractions.csv", "cell,contraction_nN_per_um\n1,0\n2,0.02\n");
+  const std::string cells = "--pixel_size_um 1 --cells " + (folder_ / "cells.tif").string();
+  const std::string settings =
+      "[sheet]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.3\nthickness_um = 0.4\n"
+      "adhesion_stiffness_nN_per_um3 = 0.03\n";
+  auto outcome = run(settings, cells + " --contractions " + (folder_ / "contractions.csv").string(), "moved.csv");
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  const files::CsvTable tension(folder_ / "out" / "cell_tension.csv");
+  ASSERT_EQ(tension.n_rows(), 2);
+  EXPECT_GT(tension.number(1, "mean_tension_nN_per_um"), 4 * std::abs(tension.number(0, "mean_tension_nN_per_um")));
+  files::write_text(folder_ / "contractions.csv", "cell,contraction_nN_per_um\n2,0.02\n");
+  outcome = run(settings, cells + " --contractions " + (folder_ / "contractions.csv").string(), "moved.csv");
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_NE(outcome.output.find("none of cell 1"), std::string::npos) << outcome.output;
 }
 
 }  // namespace

@@ -46,8 +46,14 @@ TEST(Simulate, every_scenario_makes_a_cell_that_reads_back) {
     SCOPED_TRACE(name);
     const test::TemporaryFolder folder;
     const fs::path cell = folder / "cell";
-    const Outcome outcome = simulate("--beads 500 --scenario " + name + " --out " + cell.string());
+    const Outcome outcome = simulate("--beads 500 --mesh_um 6 --scenario " + name + " --out " + cell.string());
     ASSERT_EQ(outcome.code, 0) << outcome.message;
+    if (fs::exists(cell / "truth" / "sheet.csv")) {  // a contracting sheet
+      EXPECT_FALSE(files::read_outline(cell / "1_segment" / "outline.csv").empty());
+      EXPECT_EQ(files::read_displacement(cell / "truth" / "displacement.csv").size(), 500u);
+      EXPECT_EQ(files::read_displacement(cell / "2_track" / "displacement.csv").size(), 500u);
+      continue;
+    }
     if (fs::exists(cell / "surface.vtp")) {  // on a gel in space
       EXPECT_EQ(files::read_displacement_in_space(cell / "truth" / "displacement_3d.csv").size(), 500u);
       EXPECT_EQ(files::read_displacement_in_space(cell / "2_track" / "displacement_3d.csv").size(), 500u);
@@ -119,6 +125,51 @@ TEST(Simulate, flags_override_the_scenario_and_its_record_repeats_it) {
       simulate("--scenario " + (first / "truth" / "scenario.toml").string() + " --out " + again.string());
   ASSERT_EQ(outcome.code, 0) << outcome.message;
   EXPECT_EQ(content_of(first / "2_track" / "displacement.csv"), content_of(again / "2_track" / "displacement.csv"));
+}
+
+TEST(Simulate, colonies_differ_by_place_beads_and_dipoles_alone) {
+  const test::TemporaryFolder folder;
+  const Outcome outcome = simulate(
+      "--scenario colony-spikes --beads 2000 --noise_um 0 --n_colonies 2 --scatter_um 8 --n_dipoles 0 --mesh_um 8 "
+      "--out " +
+      (folder / "all").string());
+  ASSERT_EQ(outcome.code, 0) << outcome.message;
+  const fs::path a = folder / "all" / "colony_001", b = folder / "all" / "colony_002";
+  EXPECT_EQ(content_of(a / "truth" / "sheet.csv"), content_of(b / "truth" / "sheet.csv"));
+  const Polygon one = files::read_outline(a / "1_segment" / "outline.csv").front(),
+                other = files::read_outline(b / "1_segment" / "outline.csv").front();
+  ASSERT_EQ(one.size(), other.size());
+  EXPECT_NEAR(signed_area_um2(one), signed_area_um2(other), 1e-9 * std::abs(signed_area_um2(one)));
+  EXPECT_GT(norm(one.front() - other.front()), 1);
+  // a contracting sheet draws its beads in, wherever it lies and however it is turned
+  for (const fs::path& cell : {a, b}) {
+    Vec2 centre;
+    const Polygon rim = files::read_outline(cell / "1_segment" / "outline.csv").front();
+    for (const Vec2 p : rim) centre += (1.0 / static_cast<double>(rim.size())) * p;
+    double inwards = 0, whole = 0;
+    for (const Bead& bead : files::read_displacement(cell / "truth" / "displacement.csv")) {
+      if (!contains(rim, bead.position_um)) continue;
+      inwards -= dot(bead.displacement_um, bead.position_um - centre) / norm(bead.position_um - centre);
+      whole += norm(bead.displacement_um);
+    }
+    EXPECT_GT(inwards, 0.8 * whole);
+  }
+}
+
+TEST(Simulate, on_springs_what_lies_under_the_sheet_moves_and_nothing_else) {
+  const test::TemporaryFolder folder;
+  const fs::path cell = folder / "cell";
+  const std::string disc = "--scenario contracting-disc --beads 2000 --mesh_um 4 --ground springs ";
+  ASSERT_EQ(simulate(disc + "--adhesion_stiffness_nN_per_um3 0.1 --out " + cell.string()).code, 0);
+  const Polygon rim = files::read_outline(cell / "1_segment" / "outline.csv").front();
+  for (const Bead& bead : files::read_displacement(cell / "truth" / "displacement.csv")) {
+    const double clear = distance_to_boundary_um(rim, bead.position_um);
+    if (clear < 0.1) continue;
+    EXPECT_EQ(norm(bead.displacement_um) > 0, contains(rim, bead.position_um));
+  }
+  const Outcome pulled = simulate(disc + "--adhesion_stiffness_nN_per_um3 0.1 --n_dipoles 3 --out " + cell.string());
+  EXPECT_EQ(pulled.code, 2);
+  EXPECT_NE(pulled.message.find("n_dipoles"), std::string::npos) << pulled.message;
 }
 
 TEST(Simulate, wrong_arguments_are_explained_and_leave_nothing_behind) {

@@ -1,9 +1,11 @@
 /// The fit of a sheet to the beads under it: what it finds, and whether its error bars hold.
 #include <gtest/gtest.h>
 
+#include <numbers>
 #include <random>
 
 #include "continuum/sheet/forward.h"
+#include "mbtfm/sheets/beside_fibres.h"
 #include "mbtfm/sheets/sheet_fit.h"
 #include "substrate/greens/models.h"
 #include "tests/support/sheets.h"
@@ -37,9 +39,10 @@ struct FittedDisc {
         [=](double t) { return has_line ? 0.5 * radius / std::hypot(0.5 * std::cos(t), std::sin(t)) : radius; }, 360));
     elements = std::make_shared<const Elements>(sheet::triangulated(
         region, {.at_curves_um = radius / 8, .largest_um = radius / 3, .growth = 0.4, .most_turn_rad = 0.5}, 10000));
-    ground = std::make_unique<sheet::OnGel>(*elements, *model, std::nullopt, 1);
+    ground =
+        std::make_unique<sheet::OnGel>(*elements, *model, std::nullopt, sheet::adhering_triangles(*elements, {}), 1);
     table = std::make_unique<StiffnessTable>(SheetShape{.elements = elements,
-                                                        .contraction = sheet::even(*elements, 1),
+                                                        .contractions = {sheet::even(*elements, 1)},
                                                         .poisson_ratio = kRatio,
                                                         .thickness_um = kThickness_um,
                                                         .n_rims = 1,
@@ -59,9 +62,12 @@ struct FittedDisc {
 
   /// Solved on its own, not by the table.
   DisplacementField exact(double E_kPa, double s_nN_per_um, double line_nN = 0) const {
+    return exact(E_kPa, sheet::even(*elements, s_nN_per_um), line_nN);
+  }
+  DisplacementField exact(double E_kPa, std::vector<double> contraction, double line_nN = 0) const {
     sheet::Sheet made;
     made.material = {E_kPa, kRatio, kThickness_um};
-    made.contraction_nN_per_um = sheet::even(*elements, s_nN_per_um);
+    made.contraction_nN_per_um = std::move(contraction);
     made.line_tension_nN = line_nN;
     const auto solved = ground->solve(made.material, sheet::forces_of_contraction_nN(*elements, made));
     std::vector<Vec2> places, forces;
@@ -118,6 +124,38 @@ TEST(SheetFit, a_stiff_sheet_tells_contraction_over_stiffness_and_a_lower_limit)
   EXPECT_LT((*ratio.high - *ratio.low) / truth, 0.3);
 }
 
+TEST(SheetFit, parts_that_contract_each_by_its_own_are_told_apart_where_they_differ) {
+  const FittedDisc disc(25);
+  std::vector<std::vector<double>> parts(2, sheet::even(*disc.elements, 0));
+  for (int t = 0; t < disc.elements->n_triangles(); ++t)
+    for (int p = 0; p < Elements::kPoints; ++p)
+      parts[norm(disc.elements->at(t, p).place_um) > 18][static_cast<std::size_t>(Elements::kPoints * t + p)] = 1;
+  const StiffnessTable table({.elements = disc.elements,
+                              .contractions = parts,
+                              .poisson_ratio = kRatio,
+                              .thickness_um = kThickness_um,
+                              .n_rims = 1,
+                              .has_line = false},
+                             *disc.ground, disc.gel, 25, 1);
+  for (const double at_edge : {1.0, 3.0}) {
+    std::vector<double> contraction = parts[0];
+    for (std::size_t k = 0; k < contraction.size(); ++k) contraction[k] += at_edge * parts[1][k];
+    std::mt19937_64 random(12);
+    const DisplacementField field = with_noise(disc.exact(3, contraction), random);
+    const SheetFit fit = fit_sheet(data_of(field, table, *disc.ground, *disc.model, 1), table, tensions::Loss::squares,
+                                   {}, {"inside", "edge"});
+    for (const SheetEstimate& e : fit.estimates) {
+      if (e.quantity != Quantity::contraction) continue;
+      // four standard errors
+      EXPECT_NEAR(e.value, e.part == "edge" ? at_edge : 1, 4 * e.sigma.value_or(0)) << e.part;
+      EXPECT_LT(e.sigma.value_or(1), 0.5) << e.part;
+    }
+    ASSERT_EQ(fit.models.size(), 3u);
+    EXPECT_EQ(fit.models[2].name, "sheet-in-parts");
+    EXPECT_EQ(fit.models[2].bic<fit.models[1].bic, at_edge> 1);
+  }
+}
+
 TEST(SheetFit, a_known_stiffness_leaves_the_contraction_alone) {
   const FittedDisc disc(25);
   std::mt19937_64 random(8);
@@ -127,6 +165,40 @@ TEST(SheetFit, a_known_stiffness_leaves_the_contraction_alone) {
   EXPECT_DOUBLE_EQ(held.stiffness_nN_per_um, disc.stiffness(10));
   EXPECT_LT(*of(held, Quantity::contraction).sigma, *of(free, Quantity::contraction).sigma);
   EXPECT_NEAR(of(held, Quantity::contraction).value, 1, 4 * *of(held, Quantity::contraction).sigma);
+}
+
+TEST(SheetFit, beside_adhesions_the_sheet_is_called_for_where_a_sheet_pulls_and_only_there) {
+  const FittedDisc disc(25);
+  std::vector<substrate::Ellipse> adhesions;
+  std::vector<Vec2> places;
+  for (int k = 0; k < 12; ++k) {
+    const double t = std::numbers::pi * k / 6;
+    adhesions.push_back({22.0 * Vec2{std::cos(t), std::sin(t)}, 1.5, 1, t});
+  }
+  for (const Bead& bead : disc.beads) places.push_back(bead.position_um);
+  const Eigen::MatrixXd compliance = disc.model->compliance_um_per_nN(places, adhesions);
+  const auto bic_of = [&](const DisplacementField& field) {
+    const tensions::LinearData data = tensions::reduce(field, compliance);
+    const auto sheet = score_of_sheet(data, {test::circle(25, 180)}, disc.gel, *disc.model, 1);
+    EXPECT_TRUE(sheet.has_value());
+    const double of_adhesions = data.reduced.floor_squared / tensions::noise_variance(data) +
+                                static_cast<double>(data.reduced.n_felt) * std::log(static_cast<double>(data.n_used));
+    return std::pair(sheet ? sheet->bic : 0, of_adhesions);
+  };
+  std::mt19937_64 random(13);
+  const auto [sheet_of_sheet, adhesions_of_sheet] = bic_of(with_noise(disc.exact(3, 1), random));
+  EXPECT_LT(sheet_of_sheet, adhesions_of_sheet);
+  // two fibres: four adhesions pull towards the one across
+  DisplacementField pulled = disc.beads;
+  Eigen::VectorXd forces = Eigen::VectorXd::Zero(24);
+  for (const int k : {0, 6, 2, 8})
+    forces.segment<2>(2 * k) << -5 * adhesions[static_cast<std::size_t>(k)].centre_um.x / 22,
+        -5 * adhesions[static_cast<std::size_t>(k)].centre_um.y / 22;
+  const Eigen::VectorXd u = compliance * forces;
+  for (std::size_t i = 0; i < pulled.size(); ++i)
+    pulled[i].displacement_um = {u(2 * static_cast<Eigen::Index>(i)), u(2 * static_cast<Eigen::Index>(i) + 1)};
+  const auto [sheet_of_fibres, adhesions_of_fibres] = bic_of(with_noise(pulled, random));
+  EXPECT_GT(sheet_of_fibres, adhesions_of_fibres);
 }
 
 TEST(SheetFit, stray_beads_do_not_move_a_robust_fit) {
