@@ -60,12 +60,11 @@ double share_astray(const Problem& problem, const Eigen::VectorXd& residual) {
 
 void find_doubts(const Problem& problem, const SpatialParameters& parameters, SpatialReconstruction& r) {
   const Observed& observed = problem.observed;
-  const int n_off = observed.n_above + observed.n_below_base + observed.n_beyond;
-  r.findings.push_back(noticed(
-      FindingKind::beads_off_the_gel, static_cast<double>(n_off) / (n_off + observed.n_beads),
-      std::to_string(observed.n_above) + " beads lie above the gel's surface and " +
-          std::to_string(observed.n_below_base) + " below its base, " + std::to_string(observed.n_beyond) +
-          " beyond the rim of the surface that is known, of " + std::to_string(n_off + observed.n_beads) + "."));
+  const int n_off = observed.n_above + observed.n_below_base;
+  r.findings.push_back(noticed(FindingKind::beads_off_the_gel, static_cast<double>(n_off) / (n_off + observed.n_beads),
+                               std::to_string(observed.n_above) + " beads lie above the gel's surface and " +
+                                   std::to_string(observed.n_below_base) + " below its base, of " +
+                                   std::to_string(n_off + observed.n_beads) + "."));
   const double away_um = distance_to_beads_um(problem);
   r.findings.push_back(noticed(FindingKind::beads_far, away_um / observed.distance_um,
                                "The nearest beads lie " + brief(away_um) + " um from the surface, and " +

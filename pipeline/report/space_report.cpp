@@ -61,7 +61,7 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   facts.push_back(fmt::format(
       "Balance: the forces add up to {} ({} of their sum of sizes), the moments about their centre to {}. A cell that "
       "nothing else holds has neither.",
-      with_error(force.size, force.sigma, "nN"), power_of_ten(total > 0 ? force.size / total : 0),
+      with_error(force.size, force.sigma, "nN"), readable(total > 0 ? force.size / total : 0),
       with_error(moment.size, moment.sigma, "nN µm")));
   if (const auto resolution = r.find("median_resolution_um")) {
     facts.push_back(fmt::format(

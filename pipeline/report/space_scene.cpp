@@ -130,13 +130,14 @@ std::string text_at(Vec2 p, const std::string& text) {
                      text);
 }
 
-/// The two front edges, with their lengths.
+/// Below the middles of the two front edges: their lengths.
 std::string edges(const Heights& heights, const Paper& paper) {
   const int right = heights.n_x() - 1, front = heights.n_y() - 1;
-  const auto below = [&](Vec3 p) { return paper.px(p) + Vec2{0, 24}; };
-  const Vec3 a = heights.at(0, front), b = heights.at(right, front), c = heights.at(0, 0);
-  return text_at(below(0.5 * (a + b)), fmt::format("x: {} µm", charts::readable(b.x - a.x))) +
-         text_at(below(0.5 * (a + c)) + Vec2{-22, 6}, fmt::format("y: {} µm", charts::readable(a.y - c.y)));
+  const Vec3 low = heights.at(0, 0), high = heights.at(right, front);
+  return text_at(paper.px(heights.at(right / 2, front)) + Vec2{0, 30},
+                 fmt::format("x: {} µm", charts::readable(high.x - low.x))) +
+         text_at(paper.px(heights.at(0, front / 2)) + Vec2{-40, 30},
+                 fmt::format("y: {} µm", charts::readable(high.y - low.y)));
 }
 
 }  // namespace
