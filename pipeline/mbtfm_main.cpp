@@ -26,6 +26,7 @@
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/batch_progress.h"
 #include "pipeline/runner/batch_table.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/image_sets.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/process.h"
@@ -102,6 +103,7 @@ runner::RunOptions run_options(const CommandLine& line) {
           .version = kVersion,
           .say = teller(line),
           .sink = line.is_json ? event_sink : std::function<runner::Sink()>(),
+          .note = line.is_json || line.is_quiet ? nullptr : std::function<void(const std::string&)>(say),
           .finish = nullptr};
 }
 
@@ -138,7 +140,7 @@ int run(const CommandLine& line) {
   speak_for_stages(line);
   runner::RunOptions options = run_options(line);
   options.finish = [&] {
-    if (!files::is_own_file(line.folder / "4_fit/fit.json")) return;
+    if (!report::has_results(line.folder)) return;
     report::update_report(line.folder);
     const fs::path page = line.folder / "report.html";
     if (line.is_json) return stage::print(report::result_event(line.folder, page));
@@ -329,7 +331,7 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
   // one value a flag: else the folder that follows would be taken for another
   command
       ->add_option("--only", line.only,
-                   "run this stage only: segment, track, network or fit; several with commas: segment,network")
+                   "run this stage only: " + runner::stage_names() + "; several with commas: segment,track")
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("--redo", line.redo, "run this stage even if up to date or changed by hand; several with commas")
@@ -374,7 +376,7 @@ int demo(CommandLine line) {
 stage::WordsOfFlags words_of_flags() {
   std::vector<std::string> presets, stages;
   for (const cost::Preset& preset : cost::presets()) presets.push_back(preset.name);
-  for (const runner::Stage& stage : runner::stages()) stages.push_back(stage.name);
+  for (const runner::Stage& stage : runner::all_stages()) stages.push_back(stage.name);
   return {{"--preset", presets}, {"--only", stages}, {"--redo", stages}};
 }
 

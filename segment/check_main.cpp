@@ -6,11 +6,13 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/batch.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/stage.h"
 #include "segment/beads/track.h"
 #include "segment/cells/segment_cell.h"
+#include "segment/stacks/run.h"
 #include "segment/survey/survey.h"
 
 namespace {
@@ -25,6 +27,7 @@ void declare(stage::ParameterList&, CheckParameters&) {}
 struct Chosen {
   cells::SegmentParameters segment;
   beads::TrackParameters track;
+  stacks::StackParameters in_space;
 };
 
 Chosen chosen_in(const fs::path& toml) {
@@ -34,6 +37,10 @@ Chosen chosen_in(const fs::path& toml) {
   stage::read_toml(of_segment, toml);
   declare(of_track, chosen.track);
   int binning = 1;  // of the stage: images are looked at as they are
+  of_track.table("track");
+  declare(of_track, chosen.in_space);
+  images::PlaneChoice surface_plane;
+  declare(of_track, surface_plane, "surface", "the stack of beads on the surface");
   of_track.table("track");
   of_track.add("binning", binning, Range::between(1, images::kLargestBinning), "pixels of a side in one");
   stage::read_toml(of_track, toml);
@@ -58,6 +65,30 @@ survey::CellImages images_of(const fs::path& cell) {
   return images;
 }
 
+/// Of a cell whose beads are followed in space: do the stacks go together, and are there beads enough?
+survey::Survey survey_in_space(const fs::path& cell, const runner::ImageNames& names) {
+  const Chosen chosen = chosen_in(cell / "cell.toml");
+  const stacks::StackLook look =
+      stacks::look_at_stacks(runner::resolve_image(cell, names, "beads_relaxed"),
+                             runner::resolve_image(cell, names, "beads_stressed"), chosen.track, chosen.in_space, 1);
+  survey::Survey survey;
+  survey.facts = std::to_string(look.width) + " x " + std::to_string(look.height) + " pixels of " +
+                 images::in_um(look.pixel_um) + " x " + std::to_string(look.depth) + " slices of " +
+                 images::in_um(look.step_um) + "; " + std::to_string(look.n_beads) + " beads in space, " +
+                 brief(look.distance_um) + " um apart";
+  constexpr int kEnough = 500;  // of the errors of good stacks, fewer resolve less than a cell of four adhesions
+  if (look.n_beads < kEnough)
+    survey.doubts.push_back("Few beads (limit " + std::to_string(kEnough) +
+                            "): the map of tractions will be mostly smoothing. Use more beads, or a deeper stack.");
+  return survey;
+}
+
+survey::Survey survey_of(const fs::path& cell) {
+  const runner::ImageNames names = runner::read_image_names(cell);
+  if (runner::stages_of(cell, names).kind == runner::CellKind::space) return survey_in_space(cell, names);
+  return survey::survey(images_of(cell), 1);
+}
+
 struct Seen {
   std::string text;
   bool is_fine = true;
@@ -65,7 +96,7 @@ struct Seen {
 
 Seen look_at(const fs::path& cell, const std::string& name) {
   try {
-    const survey::Survey survey = survey::survey(images_of(cell), 1);
+    const survey::Survey survey = survey_of(cell);
     std::string text = name + ": " + survey.facts + (survey.doubts.empty() ? "; fine" : "");
     for (const std::string& doubt : survey.doubts) text += "\n" + stage::warning("  caution: " + doubt);
     return {.text = text + "\n", .is_fine = survey.doubts.empty()};

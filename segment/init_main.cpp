@@ -42,17 +42,32 @@ std::vector<std::string> images_in(const fs::path& folder) {
 struct Says {
   std::string note;
   std::optional<double> pixel_size_um;
+  int n_slices = 1;                 ///< of a TIFF: pages or slices of one channel and time
+  std::optional<double> z_step_um;  ///< their distance
 };
+
+/// A bead image of that many slices may be a stack in space: fewer say nothing of a bead's picture along z.
+constexpr int kFewestSlices = 8;
+
+bool is_tiff(const fs::path& file) { return file.extension() == ".tif" || file.extension() == ".tiff"; }
 
 Says says_of(const fs::path& file) {
   try {
     const images::Image image = images::read_image(file);
-    return {.note = std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels",
-            .pixel_size_um = image.pixel_size_um};
+    Says says{.note = std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels",
+              .pixel_size_um = image.pixel_size_um,
+              .z_step_um = {}};
+    if (!is_tiff(file)) return says;
+    const std::vector<images::Image> slices = images::read_slices(file, {});
+    says.n_slices = static_cast<int>(slices.size());
+    says.z_step_um = slices.front().z_step_um;
+    if (says.n_slices > 1) says.note += ", " + std::to_string(says.n_slices) + " slices";
+    return says;
   } catch (const InputError& error) {
     return {
         .note = "expected " + error.expected + ", found " + error.found + (error.hint.empty() ? "" : ": " + error.hint),
-        .pixel_size_um = {}};
+        .pixel_size_um = {},
+        .z_step_um = {}};
   }
 }
 
@@ -66,6 +81,26 @@ struct Written {
   std::string text, open;  ///< of cell.toml; what is to be completed
 };
 
+/// The table [track] of stacks, and what is to be completed in it.
+std::string track_table(const Says& beads, std::vector<std::string>& open) {
+  std::string text = "\n[track]\n# The bead images are stacks of " + std::to_string(beads.n_slices) +
+                     " slices. Their beads are followed in space as soon as z_points is given.\n"
+                     "# z_points = \"into-gel\"    # needed: the first slice is the highest; \"out-of-gel\": the first "
+                     "is the deepest\n";
+  open.emplace_back("z_points in [track]");
+  if (beads.z_step_um) {
+    text += "# The files say that the slices are " + shortest(*beads.z_step_um) + " um apart. To overrule it:\n" +
+            "# z_step_um = " + shortest(*beads.z_step_um) + "\n";
+  } else {
+    text += "# z_step_um = 0.5    # needed, as no file says it: how far the stage moved between two slices (um)\n";
+    open.emplace_back("z_step_um in [track]");
+  }
+  return text +
+         "# first_slice_z_um = 0    # z of the upper face of the highest slice; z = 0 is where gel.thickness_um counts "
+         "from\n# dimensions = \"plane\"    # instead of all this: follow beads in the maximum projection, on a flat "
+         "gel\n";
+}
+
 Written cell_toml(const fs::path& folder) {
   const std::vector<std::string> names = images_in(folder);
   const survey::Roles roles = survey::roles_of(names);
@@ -73,14 +108,18 @@ Written cell_toml(const fs::path& folder) {
   std::vector<std::string> open;
   std::optional<double> pixel_size_um;
   std::string calibrated;
-  for (const char* key : {"adhesion", "actin", "beads_stressed", "beads_relaxed"}) {
+  std::optional<Says> stacks;
+  for (const char* key : {"beads_stressed", "beads_relaxed", "surface_beads", "adhesion", "actin"}) {
     const auto file = roles.files.find(key);
     if (file == roles.files.end()) {
+      const bool is_needed = key != std::string("surface_beads") && (!stacks || std::string(key).starts_with("beads_"));
+      if (!is_needed) continue;  // a cell in space may have no other images
       images += "# " + std::string(key) + " = \"\"    # which file? no name tells\n";
       open.push_back(std::string(key) + " in [images]");
       continue;
     }
     const Says says = says_of(folder / file->second);
+    if (std::string(key).starts_with("beads_") && says.n_slices >= kFewestSlices) stacks = says;
     images += std::string(key) + " = " + quoted(file->second) + "    # " + says.note + "\n";
     if (!pixel_size_um && says.pixel_size_um) {
       pixel_size_um = says.pixel_size_um;
@@ -103,6 +142,7 @@ Written cell_toml(const fs::path& folder) {
       "given\n"
       "\n[images]\n" +
       images;
+  if (stacks) text += track_table(*stacks, open);
   open.insert(open.begin(), "youngs_modulus_kPa in [gel]");
   return {.text = text, .open = listed(open)};
 }

@@ -161,6 +161,7 @@ Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const
   figures.emplace_back("n_beads_flagged", std::int64_t{problem.observed.n_flagged});
   figures.emplace_back("n_beads_above", std::int64_t{problem.observed.n_above});
   figures.emplace_back("n_beads_below_base", std::int64_t{problem.observed.n_below_base});
+  figures.emplace_back("n_beads_beyond_surface", std::int64_t{problem.observed.n_beyond});
   add("bead_distance_um", problem.observed.distance_um);
   add("median_depth_um", problem.observed.depth_um);
   for (const auto& figure : r.figures) figures.push_back(figure);

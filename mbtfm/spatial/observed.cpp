@@ -42,6 +42,10 @@ Observed observe(const std::vector<BeadInSpace>& beads, const Gel& gel, const Gr
       ++observed.n_flagged;
       continue;
     }
+    if (!ground.knows({at.x, at.y})) {
+      ++observed.n_beyond;
+      continue;
+    }
     const double height = ground.height_um({at.x, at.y});
     const double sigma_z = bead.sigma_z_um > 0 ? bead.sigma_z_um : parameters.axial_sigma_ratio * bead.sigma_um;
     if (height - at.z > kErrorsAbove * sigma_z + kRounding_um) {
@@ -62,7 +66,8 @@ Observed observe(const std::vector<BeadInSpace>& beads, const Gel& gel, const Gr
     throw InvalidData("displacement", "at least 4 beads in the gel that are not flagged",
                       std::to_string(observed.n_beads) + " of " + std::to_string(beads.size()) + " (" +
                           std::to_string(observed.n_flagged) + " flagged, " + std::to_string(observed.n_above) +
-                          " above the surface, " + std::to_string(observed.n_below_base) + " below the base)");
+                          " above the surface, " + std::to_string(observed.n_below_base) + " below the base, " +
+                          std::to_string(observed.n_beyond) + " where no surface is known)");
   }
   observed.distance_um = distance_between_um(points, depths);
   observed.depth_um = numerics::quantile(depths, 0.5);

@@ -24,6 +24,7 @@ struct Observed {
   int n_flagged = 0;     ///< left out, as their flags say
   int n_above = 0;       ///< left out: further above the surface than errors bring them
   int n_below_base = 0;  ///< left out
+  int n_beyond = 0;      ///< left out: beyond the rim of the surface that is known
   double depth_um = 0;   ///< below the surface, the median
   Eigen::Index n_components() const { return at.n_components(); }
 };

@@ -65,6 +65,7 @@ std::string left_out_of(const Observed& observed) {
   tell(observed.n_flagged, " flagged beads left out");
   tell(observed.n_above, " beads above the surface left out");
   tell(observed.n_below_base, " beads below the base left out");
+  tell(observed.n_beyond, " beads left out where no surface is known");
   return text;
 }
 
@@ -74,6 +75,21 @@ void notice_balance(stage::StageContext& context, const SpatialReconstruction& r
   context.notice(noticed(FindingKind::tractions_out_of_balance, sigma > 0 ? net / sigma : 0,
                          "The tractions add up to " + brief(net) + " nN, with a standard error of " + brief(sigma) +
                              " nN; the sum of their sizes is " + brief(balance.total_force_nN) + " nN."));
+}
+
+/// What does not go together is told with the names of the files.
+Problem problem_of(const StageParameters& p, const SpatialInputs& inputs, const Meshing& meshing,
+                   const substrate::SubstrateParameters& gel, const stage::StageContext& context) {
+  try {
+    return make_problem(inputs, p.spatial, meshing, gel, context.threads);
+  } catch (const InvalidData& error) {
+    std::string names;
+    for (const char* input : {"displacement", "surface", "outline", "adhesions"}) {
+      if (context.has_input(input)) names += (names.empty() ? "" : ", ") + context.inputs_.at(input).string();
+    }
+    throw InputError(names + ": " + error.element, error.expected, error.found,
+                     "do these files belong to one cell, with one origin, in um, and z into the gel?");
+  }
 }
 
 Meshing meshing_of(const StageParameters& p, tractions::TractionMethod method) {
@@ -111,7 +127,7 @@ StageReport run_in_space(const StageParameters& p, stage::StageContext& context)
   const SpatialInputs inputs = read_inputs(p, context);
   const tractions::TractionMethod method = checked_method(p.traction, inputs);
   context.progress(0.05, "displacing the gel");
-  Problem problem = make_problem(inputs, p.spatial, meshing_of(p, method), linear_gel(p.substrate), context.threads);
+  Problem problem = problem_of(p, inputs, meshing_of(p, method), linear_gel(p.substrate), context);
   context.progress(0.6, "reconstructing tractions");
   const auto find = [&](const Problem& of) { return reconstruct(of, inputs, p.traction, p.spatial, context.threads); };
   SpatialReconstruction r = find(problem);

@@ -13,6 +13,8 @@ namespace mbtfm::spatial {
 
 Ground::Ground(const HeightMap* map) : height_(map ? std::make_shared<const surface::Height>(*map) : nullptr) {}
 
+bool Ground::knows(Vec2 at_um) const { return !height_ || height_->contains(at_um); }
+
 Vec3 Ground::normal(Vec2 at_um) const {
   if (!height_) return {0, 0, -1};
   const Vec2 slope = height_->slope(at_um);

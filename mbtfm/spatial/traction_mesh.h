@@ -17,6 +17,8 @@ class Ground {
  public:
   explicit Ground(const HeightMap* map);
   double height_um(Vec2 at_um) const { return height_ ? (*height_)(at_um) : 0; }
+  /// A surface that is not flat is known where the map is.
+  bool knows(Vec2 at_um) const;
   /// Out of the gel, of length 1.
   Vec3 normal(Vec2 at_um) const;
   /// Of the surface over the area that it covers seen from above.

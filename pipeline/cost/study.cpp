@@ -14,6 +14,7 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/match_fibres.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
 
@@ -75,6 +76,11 @@ class Scratch {
         folder_(files::inside(cell, "cost/scratch", cell.string())),  // it is emptied
         images_(runner::read_image_names(cell)) {
     files::check_cell_folder(cell);
+    if (const auto of = runner::stages_of(cell, images_); of.kind == runner::CellKind::space)
+      throw InputError(
+          cell.string(), "a cell on a flat gel: the knobs that are turned are those of the tension fit",
+          "one in space (" + of.why + ")",
+          "its report tells how long each stage took; traction.spacing_um sets how many tractions there are");
     has_images_ = has_all_images(cell, images_);
     for (const char* file : {"1_segment/adhesions.csv", "2_track/displacement.csv", "cell.toml"}) {
       if (files::is_file(cell / file)) continue;

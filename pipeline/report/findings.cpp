@@ -213,7 +213,8 @@ std::string item_of(const Finding& f) {
 bool was_asked(const Provenance& provenance) {
   return std::ranges::any_of(provenance.stages, [](const StageLine& stage) {
     const auto state = named<StageState>(stage.state);
-    return stage.name == "fit" && (state == StageState::must_run || state == StageState::up_to_date);
+    return (stage.name == "fit" || stage.name == "traction") &&
+           (state == StageState::must_run || state == StageState::up_to_date);
   });
 }
 
@@ -227,9 +228,9 @@ std::vector<std::string> facts_of(const CellResults& results) {
   return facts;
 }
 
-std::string findings_section(const CellResults& results, const Provenance& provenance) {
+std::string findings_section(const std::vector<std::string>& facts, const Provenance& provenance) {
   std::string html = "<ul class=\"findings\">\n", open, notes;
-  for (const std::string& fact : facts_of(results)) html += item("fact", "", fact);
+  for (const std::string& fact : facts) html += item("fact", "", fact);
   for (const StageLine& stage : provenance.stages) {
     if (!stage.converged)
       open += item("bad", "<b>Distrust:</b> ",

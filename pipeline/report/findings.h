@@ -11,7 +11,7 @@ namespace mbtfm::report {
 
 /// The section of a cell's report: sentences on what was found, the open findings with their remedies, a tick where
 /// none is open, and the notes.
-std::string findings_section(const CellResults& results, const Provenance& provenance);
+std::string findings_section(const std::vector<std::string>& facts, const Provenance& provenance);
 
 /// The same of what one program found: these sentences, its open findings with their remedies or a tick, its notes.
 std::string list_of(const std::vector<std::string>& facts, const std::vector<Finding>& findings);

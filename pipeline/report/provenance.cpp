@@ -78,6 +78,8 @@ Provenance read_provenance(const std::filesystem::path& run_file) {
   const files::JsonRecord run(run_file, "a run.json as mbtfm run writes it",
                               "delete it; if that does not help, the record.json of the stage, too");
   provenance.version = run.at("version").text();
+  provenance.kind = run.text_or("kind", provenance.kind);
+  provenance.kind_because = run.text_or("kind_because", "");
   provenance.started = run.text_or("started", "");
   provenance.ended = run.text_or("ended", "");
   provenance.processor = run.text_or("processor", "");

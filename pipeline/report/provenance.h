@@ -33,8 +33,9 @@ struct WantedAccuracy {
 
 struct Provenance {
   std::string version;
-  std::string started, ended, processor;  ///< of the run; empty: not known
-  std::string preset;                     ///< empty: none was asked for
+  std::string kind = "plane", kind_because;  ///< of the cell
+  std::string started, ended, processor;     ///< of the run; empty: not known
+  std::string preset;                        ///< empty: none was asked for
   std::optional<WantedAccuracy> accuracy;
   std::vector<StageLine> stages;
   std::vector<EffectLine> effects;

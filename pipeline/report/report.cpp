@@ -16,12 +16,14 @@
 #include "pipeline/report/page.h"
 #include "pipeline/report/provenance.h"
 #include "pipeline/report/results.h"
+#include "pipeline/report/space_report.h"
 #include "pipeline/report/tension_plot.h"
 #include "pipeline/report/tension_table.h"
 
 namespace mbtfm::report {
 
-extern const std::string_view kParaviewScript;  // view_in_paraview.py, made into C++ by the build
+// view_in_paraview.py and view_in_paraview_3d.py, made into C++ by the build
+extern const std::string_view kParaviewScript, kParaviewScriptInSpace;
 
 namespace {
 
@@ -158,7 +160,9 @@ std::string effects_table(const Provenance& provenance) {
   return html_of(table);
 }
 
-std::string provenance_section(const CellResults& results, const Provenance& provenance) {
+}  // namespace
+
+std::string provenance_section(const Provenance& provenance, const std::string& figures) {
   Table stages{{{"stage"}, {"state"}, {"result"}, {"seconds", true}, {"memory (MB)", true}, {"version"}}, {}, "Stages"};
   for (const StageLine& stage : provenance.stages) {
     stages.rows.push_back({charts::html_escaped(stage.name), charts::html_escaped(stage.state),
@@ -174,7 +178,7 @@ std::string provenance_section(const CellResults& results, const Provenance& pro
     html += fmt::format("<p class=\"sub\">Preset: {}; it holds for all that cell.toml does not set.</p>\n",
                         charts::html_escaped(provenance.preset));
   if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
-  html += folded("Figures of the fit", figure_pairs(results));
+  html += figures;
   for (const StageLine& stage : provenance.stages) {
     if (!stage.parameters.empty()) html += folded("Parameters of " + stage.name, html_of_pairs(stage.parameters));
     if (!stage.figures.empty()) html += folded("Figures of " + stage.name, html_of_pairs(stage.figures));
@@ -183,12 +187,14 @@ std::string provenance_section(const CellResults& results, const Provenance& pro
   return section("How it was computed", html);
 }
 
+namespace {
+
 /// Of the program's version and all that the report shows: the outputs of the stages, the truth, cell.toml, and which
 /// preset or accuracy was asked for.
 std::string fingerprint(const std::filesystem::path& cell) {
   namespace fs = std::filesystem;
   std::vector<fs::path> files = {cell / "cell.toml"};
-  for (const char* folder : {"1_segment", "2_track", "3_network", "4_fit", "truth"}) {
+  for (const char* folder : {"1_segment", "2_track", "3_network", "4_fit", "3_surface", "4_traction", "truth"}) {
     if (!files::is_folder(cell / folder)) continue;
     for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder)) {
       if (files::is_own_file(entry.path())) files.push_back(entry.path());
@@ -206,7 +212,14 @@ std::string fingerprint(const std::filesystem::path& cell) {
 
 }  // namespace
 
+bool is_in_space(const std::filesystem::path& cell) { return read_provenance(cell / "run.json").kind == "space"; }
+
+bool has_results(const std::filesystem::path& cell) {
+  return files::is_own_file(cell / (is_in_space(cell) ? "4_traction/traction.json" : "4_fit/fit.json"));
+}
+
 std::string report_html(const std::filesystem::path& cell) {
+  if (is_in_space(cell)) return report_in_space(cell);
   const CellResults results = read_results(cell);
   const Provenance provenance = read_provenance(cell / "run.json");
   const std::string head = fmt::format(
@@ -215,21 +228,21 @@ std::string report_html(const std::filesystem::path& cell) {
       "µm thick · mbtfm {}</p>\n",
       charts::html_escaped(results.name), charts::readable(results.gel.youngs_modulus_kPa),
       charts::readable(results.gel.poisson_ratio), charts::readable(results.gel.thickness_um), kVersion);
-  std::string body = findings_section(results, provenance);
+  std::string body = findings_section(facts_of(results), provenance);
   if (!results.cell.fibres.empty()) body += tension_section(results);
   body += map_section(results) + adhesion_section(results);
   if (const auto budget = read_error_budget(cell / "run.json"); !budget.empty())
     body += section("Error budget", error_budget_html(budget, results.name));
   body += section("For your methods section", methods_paragraph(results, provenance)) +
-          provenance_section(results, provenance);
+          provenance_section(provenance, folded("Figures of the fit", figure_pairs(results)));
   return page(results.name + " – mbtfm", head, body);
 }
 
 void update_report(const std::filesystem::path& cell) {
   files::check_cell_folder(cell);
   const std::filesystem::path script = cell / "view_in_paraview.py";
-  if (!files::is_own_text(script) || files::read_text(script) != kParaviewScript)
-    files::write_whole(script, std::string(kParaviewScript));
+  const std::string view(is_in_space(cell) ? kParaviewScriptInSpace : kParaviewScript);
+  if (!files::is_own_text(script) || files::read_text(script) != view) files::write_whole(script, view);
   const std::filesystem::path file = cell / "report.html";
   const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
   if (files::is_own_text(file) && files::read_text(file).ends_with(signature)) return;

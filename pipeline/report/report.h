@@ -6,6 +6,10 @@
 
 namespace mbtfm::report {
 
+/// run.json says that the cell's beads are in space. @throws InputError where it is malformed
+bool is_in_space(const std::filesystem::path& cell);
+/// The last stage of the cell has written: fit, or traction where the beads are in space.
+bool has_results(const std::filesystem::path& cell);
 /// The page, from the files of a cell folder whose stages are done. @throws InputError
 std::string report_html(const std::filesystem::path& cell);
 /// Write it as report.html into the cell folder, beside view_in_paraview.py, unless the one there was made by this

@@ -13,6 +13,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/batch_progress.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
 
@@ -55,7 +56,8 @@ std::optional<fs::file_time_type> time_of_record(const fs::path& cell) {
 ProcessLimits limits_of_cell(const ProcessLimits& of_stage) {
   constexpr double kMargin_s = 60;
   if (!of_stage.seconds) return {};
-  return {.seconds = static_cast<double>(stages().size()) * *of_stage.seconds + kMargin_s, .memory_bytes = {}};
+  constexpr double kMostStages = 4;  // a cell has, of either kind
+  return {.seconds = kMostStages * *of_stage.seconds + kMargin_s, .memory_bytes = {}};
 }
 
 void tell_that_unreadable(const std::exception& error, BatchCell& cell) {
@@ -166,8 +168,8 @@ void check_parameters_once(std::vector<Look>& looks, const BatchOptions& options
     for (const std::string& stage : look.stages) cells_by_settings[{stage, settings.at(stage)}].push_back(&look);
   }
   for (const auto& [key, same] : cells_by_settings) {
-    const auto stage =
-        std::find_if(stages().begin(), stages().end(), [&, &key = key](const Stage& s) { return s.name == key.first; });
+    const auto stage = std::find_if(all_stages().begin(), all_stages().end(),
+                                    [&, &key = key](const Stage& s) { return s.name == key.first; });
     try {
       check_parameters(*stage, same.front()->outcome.cell / "cell.toml", options.run, [](std::string_view) {});
     } catch (const StageFailed& error) {

@@ -14,7 +14,8 @@
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
-#include "pipeline/runner/record.h"
+#include "pipeline/runner/cell_stages.h"
+#include "pipeline/runner/run_cell.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -58,6 +59,15 @@ std::optional<StageSays> record_of(const fs::path& cell, const Stage& stage) {
   }
 }
 
+/// Those of the cell as it is now; where that cannot be read, of both kinds: records of either may be there.
+std::vector<Stage> stages_told_of(const fs::path& cell) {
+  try {
+    return stages_of(cell, read_image_names(cell)).stages;
+  } catch (const InputError&) {
+    return all_stages();
+  }
+}
+
 struct BatchRow {
   BatchCell cell;
   std::vector<Finding> findings = {};
@@ -89,7 +99,7 @@ files::Column<BatchRow> figure_column(const std::string& name) {
 
 std::string last_summary(const fs::path& cell, const std::vector<std::string>& only) {
   std::string summary;
-  for (const Stage& stage : stages()) {
+  for (const Stage& stage : stages_told_of(cell)) {
     if (!is_asked(stage, only)) continue;
     const auto record = record_of(cell, stage);
     if (record && !record->summary.empty()) summary = record->summary;
@@ -105,7 +115,7 @@ void write_batch_table(const fs::path& file, const fs::path& folder, const std::
   for (const BatchCell& cell : cells) {
     BatchRow& row = rows.emplace_back(BatchRow{.cell = cell});
     if (cell.exit_code != 0) continue;  // what it has on disk may be of an earlier run
-    for (const Stage& stage : stages()) {
+    for (const Stage& stage : stages_told_of(cell.cell)) {
       if (!is_asked(stage, only)) continue;
       const auto record = record_of(cell.cell, stage);
       if (!record) continue;

@@ -17,6 +17,7 @@ struct ImageNames {
   std::string actin = "actin.tif";
   std::string beads_stressed = "beads_stressed.tif";
   std::string beads_relaxed = "beads_relaxed.tif";
+  std::string surface_beads = "surface_beads.tif";
   std::string displacement;  ///< a field from another program, instead of the beads' images
   // drawn by hand in ImageJ, used where they are there
   std::string outline_roi = "outline.roi|outline.zip";

@@ -8,7 +8,7 @@
 #include <cstring>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/runner/stages.h"
+#include "pipeline/runner/cell_stages.h"
 
 namespace mbtfm::runner {
 
@@ -42,9 +42,9 @@ bool LockFile::lock(int byte, IfTaken if_taken) const {
 }
 
 CellLock::CellLock(const std::filesystem::path& cell, const std::vector<std::string>& only) : file_(cell) {
-  for (int i = 0; i < static_cast<int>(stages().size()); ++i) {
-    if (!is_asked(stages()[i], only) || file_.lock(i, LockFile::IfTaken::give_up)) continue;
-    throw CellBusy(cell.string() + ": another mbtfm works on it (" + stages()[i].name +
+  for (int i = 0; i < static_cast<int>(all_stages().size()); ++i) {
+    if (!is_asked(all_stages()[i], only) || file_.lock(i, LockFile::IfTaken::give_up)) continue;
+    throw CellBusy(cell.string() + ": another mbtfm works on it (" + all_stages()[i].name +
                    "); wait for it to end, or end it");
   }
 }
@@ -52,7 +52,7 @@ CellLock::CellLock(const std::filesystem::path& cell, const std::vector<std::str
 void CellLock::share_with_programs() const { fcntl(file_.descriptor(), F_SETFD, 0); }
 
 RunRecordLock::RunRecordLock(const std::filesystem::path& cell) : file_(cell) {
-  file_.lock(static_cast<int>(stages().size()), LockFile::IfTaken::wait);
+  file_.lock(static_cast<int>(all_stages().size()), LockFile::IfTaken::wait);
 }
 
 }  // namespace mbtfm::runner

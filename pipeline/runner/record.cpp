@@ -12,6 +12,7 @@
 #include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
+#include "pipeline/runner/cell_stages.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -153,7 +154,7 @@ void complete_record(const fs::path& record_file, const StageRecord& record, con
 Settings read_settings(const fs::path& toml_file, const std::vector<Setting>& beneath) {
   const toml::table whole = files::parse_toml(toml_file);
   Settings settings;
-  for (const Stage& stage : stages()) {
+  for (const Stage& stage : all_stages()) {
     toml::table relevant;
     for (const auto& [key, value] : whole) {
       const std::string table = value.is_table() ? std::string(key.str()) : std::string();

@@ -11,6 +11,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/machine.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
 #include "pipeline/stage/stage.h"
@@ -45,6 +46,7 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
       add(argument.flag, (cell / argument.path).string());
   }
   add("config", (cell / "cell.toml").string());
+  for (const Setting& setting : stage.settings) add(setting.key, setting.value);
   add(stage.output.flag, (cell / stage.output.path).string());
   add("threads", std::to_string(threads));
   add("record", record_file_of(cell, stage).string());
@@ -100,6 +102,13 @@ void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
   }
 }
 
+/// @throws UsageError where the preset says nothing to this kind of cell
+void expect_fit(const std::string& preset, const CellStages& of) {
+  if (of.kind == CellKind::plane || preset.empty() || preset == "standard") return;
+  throw UsageError("--preset " + preset + ": presets are for cells on flat gels, and this one is in space (" + of.why +
+                   "): leave it out, and set traction.spacing_um for more or fewer tractions");
+}
+
 fs::path checked(fs::path cell) {
   files::check_cell_folder(cell);
   return cell;
@@ -112,9 +121,12 @@ class CellRun {
       : cell_(checked(std::move(cell))),
         options_(options),
         images_(read_image_names(cell_)),
+        of_(stages_of(cell_, images_)),
         beneath_(unset_in(cell_ / "cell.toml", options.beneath)),
         settings_(read_settings(cell_ / "cell.toml", beneath_)),
-        hashes_(cell_) {}
+        hashes_(cell_) {
+    expect_fit(options.preset, of_);
+  }
 
   CellOutcome look();
   CellOutcome run();
@@ -136,6 +148,7 @@ class CellRun {
   fs::path cell_;
   const RunOptions& options_;
   ImageNames images_;
+  CellStages of_;
   std::vector<Setting> beneath_;
   Settings settings_;
   HashCache hashes_;
@@ -161,7 +174,7 @@ CellRun::Present CellRun::present(const Stage& stage) {
 
 CellOutcome CellRun::look() {
   CellOutcome outcome;
-  for (const Stage& stage : stages()) {
+  for (const Stage& stage : of_.stages) {
     const Present now = present(stage);
     outcome.stages.push_back(
         {.stage = stage.name,
@@ -176,8 +189,8 @@ CellOutcome CellRun::look() {
 /// Before anything runs: the inputs are there, and every stage that will run accepts its parameters.
 void CellRun::check_before_start(CellOutcome& now) const {
   std::vector<std::string> changed;  // folders whose stage will run
-  for (std::size_t i = 0; i < stages().size(); ++i) {
-    const Stage& stage = stages()[i];
+  for (std::size_t i = 0; i < of_.stages.size(); ++i) {
+    const Stage& stage = of_.stages[i];
     const StageState state = now.stages[i].status.state;
     const bool follows = std::any_of(stage.reads.begin(), stage.reads.end(), [&](const std::string& file) {
       return contains_name(changed, fs::path(file).begin()->string());
@@ -286,14 +299,14 @@ void CellRun::start(const Stage& stage, const Present& before, int threads, Stag
        .report = report_in(record_file)});
 }
 
-/// Tracking needs nothing of the cell: it runs beside segmentation and network. The fit needs both.
+/// Tracking needs nothing of the cell: it runs beside segmentation and network. The last stage needs both.
 void CellRun::run_chains(CellOutcome& outcome) {
-  const std::vector<Stage>& all = stages();
-  const std::vector<std::vector<int>> chains = {{0, 2}, {1}};
+  const std::vector<Stage>& all = of_.stages;
+  const std::vector<std::vector<int>>& chains = of_.chains;
   const auto is_wanted = [&](const std::vector<int>& chain) {
     return std::any_of(chain.begin(), chain.end(), [&](int i) { return is_asked(all[i], options_.only); });
   };
-  const int workers = is_wanted(chains[0]) && is_wanted(chains[1]) ? std::min(options_.threads, 2) : 1;
+  const int workers = std::ranges::count_if(chains, is_wanted) > 1 ? std::min(options_.threads, 2) : 1;
   // Two at least: one chain ends before the other, which then has the processors to itself.
   const int threads = workers == 1 ? options_.threads : std::max(2, options_.threads / 2);
   // A chain that fails does not stop the other: what is done does not depend on the number of threads.
@@ -316,6 +329,7 @@ CellOutcome CellRun::run() {
   if (is_whole) remove_partial_files(cell_);
   CellOutcome outcome = look();
   outcome.started = numerics::utc_now();
+  if (of_.kind == CellKind::space && options_.note) options_.note("beads in space, as " + of_.why);
   const bool has_work = std::any_of(outcome.stages.begin(), outcome.stages.end(), [](const StageOutcome& stage) {
     return stage.status.state == StageState::must_run;
   });
@@ -344,9 +358,8 @@ CellOutcome CellRun::run() {
 void expect_known(const RunOptions& options) {
   for (const auto& names : {options.only, options.redo}) {
     for (const std::string& name : names) {
-      const bool is_known =
-          std::any_of(stages().begin(), stages().end(), [&](const Stage& stage) { return stage.name == name; });
-      if (!is_known) throw UsageError("unknown stage '" + name + "': expected segment, track, network or fit");
+      const bool is_known = std::ranges::any_of(all_stages(), [&](const Stage& stage) { return stage.name == name; });
+      if (!is_known) throw UsageError("unknown stage '" + name + "': expected " + stage_names());
     }
   }
 }
@@ -422,7 +435,9 @@ bool is_done(const fs::path& cell, const RunOptions& options, const CellOutcome&
     // What was changed by hand since then is neither checked nor reported.
     if (state == StageState::replaced && recorded_state(cell, stage.stage) != name_of(state)) return false;
   }
-  if (is_asked(stages().back(), options.only) && !files::is_own_file(cell / "report.html")) return false;
+  const std::string& last = now.stages.back().stage;
+  const bool is_last_asked = options.only.empty() || contains_name(options.only, last);
+  if (is_last_asked && !files::is_own_file(cell / "report.html")) return false;
   return run_record_tells_of(cell, options);
 }
 

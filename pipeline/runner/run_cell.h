@@ -25,9 +25,10 @@ struct RunOptions {
   std::string preset = {};            ///< name of what `beneath` comes from; empty: none
   std::vector<Setting> beneath = {};  ///< in place of defaults, where cell.toml says nothing
   std::string version;
-  std::function<void(const StageTold&)> say;  ///< what became of each stage
-  std::function<Sink()> sink = {};            ///< makes one for what a stage prints; empty: our standard error
-  std::function<void()> finish;               ///< called when the stages are done, the cell still being ours
+  std::function<void(const StageTold&)> say;          ///< what became of each stage
+  std::function<Sink()> sink = {};                    ///< makes one for what a stage prints; empty: our standard error
+  std::function<void(const std::string&)> note = {};  ///< takes why the cell has the stages that it has
+  std::function<void()> finish;                       ///< called when the stages are done, the cell still being ours
 };
 
 /// How a stage that ended with an error did so.

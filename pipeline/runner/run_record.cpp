@@ -10,6 +10,7 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/machine.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
 
 namespace mbtfm::runner {
@@ -89,7 +90,7 @@ ordered_json stage_entry(const Stage& stage, const StageOutcome& outcome, const 
 ordered_json images_in(const fs::path& cell) {
   const ImageNames names = read_image_names(cell);
   ordered_json images = ordered_json::object();
-  for (const Stage& stage : stages()) {
+  for (const Stage& stage : stages_of(cell, names).stages) {
     for (const auto& inputs : {images_of(stage, names), stage.optional_images}) {
       for (const ImageInput& image : inputs) {
         const ImageMatch match = match_image(cell, name_of_image(names, image.key));
@@ -120,6 +121,7 @@ RunOutcome outcome_of(const ordered_json& entries) {
 void write_run_record(const fs::path& cell, const RunOptions& options, const CellOutcome& outcome) {
   const RunRecordLock lock(cell);
   const std::optional<files::JsonRecord> before = open_run_record(cell);
+  const CellStages of = stages_of(cell, read_image_names(cell));
   ordered_json run, entries;
   ordered_json effects = ordered_json::array(), findings = ordered_json::array();
   const auto gather = [](ordered_json& all, const ordered_json& entry, const char* key, const std::string& stage) {
@@ -128,15 +130,17 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
       all.push_back(std::move(one));
     }
   };
-  for (std::size_t i = 0; i < stages().size(); ++i) {
-    const Stage& stage = stages()[i];
-    entries[stage.name] = stage_entry(stage, outcome.stages[i], cell, entry_of(before, stage.name));
+  for (std::size_t i = 0; i < of.stages.size(); ++i) {
+    const Stage& stage = of.stages[i];
+    entries[stage.name] = stage_entry(stage, outcome.stages.at(i), cell, entry_of(before, stage.name));
     gather(effects, entries[stage.name], "effects", stage.name);
     gather(findings, entries[stage.name], "findings", stage.name);
   }
   run["program"] = "mbtfm";
   run["version"] = options.version;
   run["cell"] = fs::weakly_canonical(cell).filename().string();
+  run["kind"] = name_of(of.kind);
+  if (!of.why.empty()) run["kind_because"] = of.why;
   run["outcome"] = name_of(outcome_of(entries));
   run["started"] = outcome.started;
   if (!outcome.ended.empty()) run["ended"] = outcome.ended;
@@ -149,10 +153,10 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   run["effects"] = std::move(effects);
   run["findings"] = std::move(findings);
   // Of a fit that has not ended in this run, the old file may be what is to be replaced.
-  const bool has_fit = is_done_entry(entries[stages().back().name]);
+  const bool has_fit = is_done_entry(entries[of.stages.back().name]);
   run["stages"] = std::move(entries);
   const fs::path fit_file = cell / "4_fit/fit.json";
-  if (has_fit && files::is_own_file(fit_file)) {
+  if (of.kind == CellKind::plane && has_fit && files::is_own_file(fit_file)) {
     const files::JsonRecord fit(fit_file, "a fit summary as mbtfm-fit writes it", "delete it to run the fit again");
     if (const auto budget = fit.find("error_budget")) run["error_budget"] = budget->json();
   }
@@ -166,7 +170,7 @@ bool run_record_tells_of(const fs::path& cell, const RunOptions& options) {
   if (files::is_own_text(file) && files::read_text(file).find("\n \"outcome\": \"done\",") != std::string::npos)
     return true;
   const std::optional<files::JsonRecord> run = open_run_record(cell);
-  return std::all_of(stages().begin(), stages().end(), [&](const Stage& stage) {
+  return std::ranges::all_of(stages_of(cell, read_image_names(cell)).stages, [&](const Stage& stage) {
     const auto entry = entry_of(run, stage.name);
     return !is_asked(stage, options.only) || (entry && is_done_state(entry->text_or("state", "")));
   });
@@ -179,7 +183,7 @@ std::string recorded_state(const fs::path& cell, const std::string& stage) {
 
 std::optional<RecordedFailure> recorded_failure(const fs::path& cell) {
   const std::optional<files::JsonRecord> run = open_run_record(cell);
-  for (const Stage& stage : stages()) {
+  for (const Stage& stage : all_stages()) {
     const auto entry = entry_of(run, stage.name);
     const auto failure = entry ? failure_in(*entry) : std::nullopt;
     if (failure) return RecordedFailure{.stage = stage.name, .how = failure->how, .message = failure->message};

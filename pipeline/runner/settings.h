@@ -9,11 +9,6 @@
 
 namespace mbtfm::runner {
 
-/// A key of cell.toml and its value, as a flag spells it.
-struct Setting {
-  std::string table, key, value;
-};
-
 /// Those that cell.toml does not set itself. @throws InputError where it is no TOML
 std::vector<Setting> unset_in(const std::filesystem::path& toml_file, const std::vector<Setting>& settings);
 

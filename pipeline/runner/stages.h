@@ -22,6 +22,11 @@ struct PathArgument {
   std::string where = {};  ///< a file: the argument is given only where it is there; empty: always
 };
 
+/// A key of cell.toml and its value, as a flag spells it.
+struct Setting {
+  std::string table, key, value;
+};
+
 struct Stage {
   std::string name;    ///< the executable is mbtfm-NAME
   std::string folder;  ///< of its outputs and its record
@@ -34,11 +39,13 @@ struct Stage {
   std::vector<std::string> reads_where_there;  ///< further ones, which the stage before writes in some cases only
   std::vector<std::string> writes;             ///< files without which the stage is not done
   std::vector<std::string> series;             ///< globs: files that it writes in some cases only, as of a time series
-  std::vector<std::string> tables;   ///< of cell.toml that its result depends on; empty: above the first table
-  std::vector<std::string> effects;  ///< keys of [effects] that it depends on
-  bool explains = false;             ///< what is off would change: it takes --explain
+  std::vector<std::string> tables;     ///< of cell.toml that its result depends on; empty: above the first table
+  std::vector<std::string> effects;    ///< keys of [effects] that it depends on
+  std::vector<Setting> settings = {};  ///< that hold whatever cell.toml says
+  bool explains = false;               ///< what is off would change: it takes --explain
 };
 
+/// Of a cell on a flat gel; those of others: cell_stages.h.
 const std::vector<Stage>& stages();
 
 /// Is the file, relative to the cell folder, one that this stage writes of a time series?

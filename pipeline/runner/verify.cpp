@@ -11,6 +11,7 @@
 #include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/run_record.h"
 
 namespace mbtfm::runner {
@@ -53,7 +54,7 @@ void add_files(FileKind kind, const Stage& stage, const files::JsonRecord& entry
 /// @throws InputError where a file that is called an output does not lie in the stage's folder
 std::vector<KnownFile> files_in(const files::JsonRecord& run, const fs::path& run_json) {
   std::vector<KnownFile> files;
-  for (const Stage& stage : stages()) {
+  for (const Stage& stage : all_stages()) {
     const auto entry = run.at("stages").find(stage.name);
     if (!entry) continue;
     add_files(FileKind::input, stage, *entry, files);
@@ -70,7 +71,7 @@ std::vector<KnownFile> files_in(const files::JsonRecord& run, const fs::path& ru
 std::vector<fs::path> named_images(const fs::path& cell) {
   const ImageNames names = read_image_names(cell);
   std::vector<fs::path> files;
-  for (const Stage& stage : stages()) {
+  for (const Stage& stage : stages_of(cell, names).stages) {
     for (const auto& inputs : {images_of(stage, names), stage.optional_images}) {
       for (const ImageInput& image : inputs) {
         for (fs::path& file : match_image(cell, name_of_image(names, image.key)).files)
@@ -196,7 +197,7 @@ Verification verify_cell(const fs::path& cell) {
   Verification found;
   for (const KnownFile& file : files_in(run, run_json)) compare(file, cell, images, found);
   const Settings settings = read_settings(cell / "cell.toml");
-  for (const Stage& stage : stages()) {
+  for (const Stage& stage : stages_of(cell, read_image_names(cell)).stages) {
     const auto entry = run.at("stages").find(stage.name);
     if (is_given(entry)) continue;
     const auto of_runner = entry ? entry->find("run") : std::nullopt;

@@ -14,6 +14,7 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/batch.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/statistics/conditions.h"
 
 namespace mbtfm::statistics {
@@ -54,6 +55,8 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
 
 /// Why a cell cannot enter, as its folder tells; empty: it can.
 std::string obstacle(const Path& cell) {
+  if (runner::stages_of(cell, runner::read_image_names(cell)).kind == runner::CellKind::space)
+    return "in space: it has tractions and no tensions; its force, strain energy and moment are in batch.csv";
   for (const std::string& file : files_of_a_cell()) {
     if (!files::is_own_file(cell / file)) return "no fit: " + file + " is not there";
   }

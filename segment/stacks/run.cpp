@@ -82,6 +82,13 @@ struct Read {
   Detection detection;
 };
 
+void require_direction(const StackParameters& p) {
+  if (p.z_points) return;
+  throw UsageError(
+      "expected track.z_points with stacks: into-gel where the slices lead from the surface into the gel, out-of-gel "
+      "where the first slice is the deepest");
+}
+
 Read read_and_detect(const fs::path& file, const images::PlaneChoice& plane, const char* which, double detection_snr,
                      const Frame* as, stage::StageContext& context) {
   std::vector<images::Image> slices = images::read_slices(file, plane);
@@ -298,6 +305,28 @@ bool are_in_space(const beads::TrackParameters& track, const StackParameters& p)
   return are_whole && p.z_points.has_value();
 }
 
+StackLook look_at_stacks(const fs::path& relaxed, const fs::path& stressed, const beads::TrackParameters& track,
+                         const StackParameters& parameters, int threads) {
+  require_direction(parameters);
+  std::vector<images::Image> slices = images::read_slices(relaxed, track.relaxed_plane);
+  const Frame first = frame_of(relaxed.filename().string(), slices);
+  require_slices(first);
+  const Frame other = frame_of(stressed.filename().string(), images::read_slices(stressed, track.stressed_plane));
+  require_same_size(first, other);
+  const Scale scale = scale_of(first, other, track, parameters);
+  const Detection detection =
+      with_names(first.name, [&] { return detect(std::move(slices), track.detection_snr, "relaxed", threads); });
+  const double volume_um3 = scale.pixel_um * first.width * scale.pixel_um * first.height * scale.step_um * first.depth;
+  const auto n = static_cast<double>(std::max<std::size_t>(1, detection.spots.size()));
+  return {.width = first.width,
+          .height = first.height,
+          .depth = first.depth,
+          .pixel_um = scale.pixel_um,
+          .step_um = scale.step_um,
+          .n_beads = static_cast<int>(detection.spots.size()),
+          .distance_um = std::cbrt(volume_um3 / n)};
+}
+
 StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& surface_plane,
                 const StackParameters& parameters, stage::StageContext& context) {
   const auto tell = [&](double fraction, const char* what) {
@@ -306,11 +335,7 @@ StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& 
   const fs::path relaxed_file = context.input("relaxed"), stressed_file = context.input("stressed");
   if (track.stressed_last > 0)
     throw UsageError("stressed_last is for images in the plane: track the stacks of a time series one by one");
-  if (!parameters.z_points) {
-    throw UsageError(
-        "expected track.z_points with stacks: into-gel where the slices lead from the surface into the gel, out-of-gel "
-        "where the first slice is the deepest");
-  }
+  require_direction(parameters);
   tell(0, "finding beads of the relaxed stack");
   const Read relaxed = with_names(relaxed_file.string(), [&] {
     return read_and_detect(relaxed_file, track.relaxed_plane, "relaxed", track.detection_snr, nullptr, context);

@@ -81,7 +81,8 @@ Widths SpotShape::at(Vec3 place) const {
   const auto t = terms(place);
   double xy = 0, z = 0;
   for (int k = 0; k < kTerms; ++k) xy += t[k] * log_xy_[k], z += t[k] * log_z_[k];
-  return {std::exp(xy), std::exp(z)};
+  return {std::exp(std::clamp(xy, bounds_xy_.low, bounds_xy_.high)),
+          std::exp(std::clamp(z, bounds_z_.low, bounds_z_.high))};
 }
 
 SpotShape SpotShape::through(const std::vector<Sample>& samples, const Volume& volume) {
@@ -93,7 +94,7 @@ SpotShape SpotShape::through(const std::vector<Sample>& samples, const Volume& v
   // twenty samples for each term and more: an unsure slope does more harm than none
   const auto n = static_cast<int>(samples.size());
   const int n_terms = n >= 240 ? kTerms : n >= 80 ? 2 : 1;
-  const auto fitted = [&](std::array<double, kTerms>& into, const auto& value) {
+  const auto fitted = [&](std::array<double, kTerms>& into, Bounds& bounds, const auto& value) {
     Eigen::VectorXd weight = Eigen::VectorXd::Ones(n), y(n), solution;
     Eigen::MatrixXd a(n, n_terms);
     for (int k = 0; k < n; ++k) {
@@ -114,9 +115,12 @@ SpotShape SpotShape::through(const std::vector<Sample>& samples, const Volume& v
       }
     }
     for (int m = 0; m < n_terms; ++m) into[m] = solution[m];
+    constexpr double kFew = 0.05, kBeyond = 0.3;  // share of samples at either end; a third wider than most of them
+    const std::vector<double> logs(y.data(), y.data() + n);
+    bounds = {numerics::quantile(logs, kFew) - kBeyond, numerics::quantile(logs, 1 - kFew) + kBeyond};
   };
-  fitted(shape.log_xy_, [](Widths w) { return w.xy; });
-  fitted(shape.log_z_, [](Widths w) { return w.z; });
+  fitted(shape.log_xy_, shape.bounds_xy_, [](Widths w) { return w.xy; });
+  fitted(shape.log_z_, shape.bounds_z_, [](Widths w) { return w.z; });
   return shape;
 }
 

@@ -35,6 +35,11 @@ class SpotShape {
   std::array<double, kTerms> terms(Vec3 place) const;
   Vec3 middle_{0, 0, 0}, half_{1, 1, 1};
   std::array<double, kTerms> log_xy_{}, log_z_{};
+  /// Of the logarithms: what samples bear out. Beyond them, where no sample is, the polynomial may go anywhere.
+  struct Bounds {
+    double low = -1e9, high = 1e9;
+  };
+  Bounds bounds_xy_, bounds_z_;
 };
 
 /// Variance of a voxel: of the dark by slice, and in proportion to a bead's own light.

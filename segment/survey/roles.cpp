@@ -13,6 +13,7 @@ constexpr std::array kBeads = {"bead", "fluosphere", "tfm", "gel"};
 constexpr std::array kRelaxed = {"relax", "ref",    "after",   "null", "tryps",   "sds",
                                  "post",  "nocell", "no_cell", "zero", "undeform"};
 constexpr std::array kStressed = {"stress", "before", "pre", "load", "deform", "withcell", "with_cell", "force"};
+constexpr std::array kSurface = {"surf"};
 constexpr std::array kAdhesion = {"pax", "vinc", "zyx", "adhes", "fak", "talin", "integrin", "_fa", "fa_"};
 constexpr std::array kActin = {"actin", "phall", "_act", "act_", "fiber", "fibre", "utroph", "ftract"};
 
@@ -30,6 +31,7 @@ std::string key_of(std::string name) {
     if (is_adhesion) return "adhesion";
     if (is_actin) return "actin";
   }
+  if (has_any(name, kBeads) && has_any(name, kSurface)) return "surface_beads";
   if (has_any(name, kRelaxed)) return "beads_relaxed";  // "undeformed", too, which has "deform" in it
   return has_any(name, kStressed) ? "beads_stressed" : "";
 }

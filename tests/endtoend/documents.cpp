@@ -50,6 +50,13 @@ TEST(Tutorial, every_command_runs) {
     EXPECT_TRUE(fs::is_regular_file(folder / file)) << file;
 }
 
+TEST(CurvedGels, every_command_runs) {
+  const test::TemporaryFolder folder;
+  run_commands_of(kDocs / "curved-gels.md", folder.path());
+  for (const char* file : {"curved/cell_1/report.html", "curved/cell_1/4_traction/traction.csv"})
+    EXPECT_TRUE(fs::is_regular_file(folder / file)) << file;
+}
+
 std::vector<fs::path> pages() {
   std::vector<fs::path> list = {kProject / "README.md", kProject / "CONTRIBUTING.md", kProject / "samples/README.md"};
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kDocs)) {

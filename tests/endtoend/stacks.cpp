@@ -5,9 +5,11 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/images/image.h"
@@ -125,6 +127,104 @@ TEST_F(Stacks, what_does_not_go_together_is_refused_with_the_remedy) {
     EXPECT_NE(outcome.output.find(c.says), std::string::npos) << outcome.output;
     EXPECT_FALSE(fs::exists(*folder_ / "out2"));
   }
+}
+
+/// The four tables of a segmentation: the patches of the scene as adhesions, seen from above.
+void write_adhesions_seen_from_above(const fs::path& folder) {
+  const files::CsvTable patches(folder / "truth/patches.csv");
+  std::vector<Adhesion> adhesions;
+  Polygon outline;
+  for (int row = 0; row < patches.n_rows(); ++row) {
+    const double radius_um = patches.number(row, "radius_um");
+    Adhesion& a = adhesions.emplace_back();
+    a.adhesion_id = row + 1;
+    a.position_um = {patches.number(row, "x_um"), patches.number(row, "y_um")};
+    a.major_axis_um = a.minor_axis_um = 2 * radius_um;
+    a.area_um2 = std::numbers::pi * radius_um * radius_um;
+  }
+  for (int k = 0; k < 40; ++k) {
+    const double angle = 2 * std::numbers::pi * k / 40;
+    outline.push_back(Vec2{36, 36} + 34 * Vec2{std::cos(angle), std::sin(angle)});
+  }
+  const fs::path out = folder / "1_segment";
+  fs::create_directories(out);
+  files::write_adhesions(out / "adhesions.csv", adhesions);
+  files::write_fibres(out / "fibres.csv", out / "fibre_points.csv", {});
+  files::write_outline(out / "outline.csv", outline, {}, {});
+}
+
+TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
+  const fs::path folder = *folder_ / "study/cell_1";
+  fs::create_directories(folder.parent_path());
+  fs::copy(cell(), folder, fs::copy_options::recursive);
+  write_adhesions_seen_from_above(folder);
+  // few tractions: the gel's answer to them is most of the work
+  files::write_text(folder / "cell.toml",
+                    files::read_text(folder / "cell.toml") + "\n[traction]\nspacing_um = 9\nmethod = \"tikhonov\"\n");
+  const std::string run = "mbtfm run " + folder.string();
+  const auto refused = run_program(run + " --preset fast");
+  EXPECT_EQ(refused.code, 2) << refused.output;
+  EXPECT_NE(refused.output.find("presets are for cells on flat gels"), std::string::npos) << refused.output;
+  EXPECT_FALSE(fs::exists(folder / "run.json"));
+  const auto first = run_program(run);
+  ASSERT_EQ(first.code, 0) << first.output;
+  for (const char* file :
+       {"2_track/displacement_3d.csv", "3_surface/surface.vtp", "4_traction/traction.csv", "4_traction/traction.vtp",
+        "4_traction/traction_adhesion_forces.csv", "report.html", "view_in_paraview.py"})
+    EXPECT_TRUE(fs::exists(folder / file)) << file;
+  std::ifstream file(folder / "run.json");
+  const auto record = nlohmann::json::parse(file);
+  EXPECT_EQ(record.at("kind"), "space");
+  EXPECT_EQ(record.at("outcome"), "done");
+  EXPECT_NE(record.at("kind_because").get<std::string>().find("track.z_points"), std::string::npos);
+  EXPECT_EQ(record.at("stages").at("segment").at("state"), "given");
+  const std::string page = files::read_text(folder / "report.html");
+  for (const char* says :
+       {"<h2>In space</h2>", "Normal traction", "Tangential traction", "Resolution", "Forces of the adhesions",
+        "Beads in a slice along x", "Balance", "Strain energy", "Tractions in space were found with the program mbtfm"})
+    EXPECT_NE(page.find(says), std::string::npos) << says;
+  EXPECT_EQ(page.find("nan"), std::string::npos);
+  const auto again = run_program(run);
+  EXPECT_EQ(again.code, 0) << again.output;
+  EXPECT_NE(again.output.find("traction  up to date"), std::string::npos) << again.output;
+  EXPECT_NE(again.output.find("beads in space, as track.z_points is set"), std::string::npos) << again.output;
+  EXPECT_EQ(run_program("mbtfm verify " + folder.string()).code, 0);
+  const auto batch = run_program("mbtfm batch " + folder.parent_path().string());
+  EXPECT_EQ(batch.code, 0) << batch.output;
+  const files::CsvTable table(folder.parent_path() / "batch.csv");
+  EXPECT_GT(table.number(0, "traction.total_force_nN"), 0);
+  EXPECT_GT(table.number(0, "traction.strain_energy_fJ"), 0);
+  EXPECT_TRUE(table.has("traction.moment_x_nN_um"));
+  EXPECT_EQ(run_program("mbtfm cost " + folder.string()).code, 3);
+
+  // an outline that covers nothing of it
+  const std::string tractions = files::read_text(folder / "4_traction/traction.csv");
+  files::write_outline(folder / "1_segment/outline.csv", {{500, 500}, {540, 500}, {520, 540}});
+  const auto elsewhere = run_program(run);
+  EXPECT_EQ(elsewhere.code, 3) << elsewhere.output;
+  for (const char* says : {"outline.csv", "all of it elsewhere", "hint:"})
+    EXPECT_NE(elsewhere.output.find(says), std::string::npos) << elsewhere.output;
+  EXPECT_EQ(files::read_text(folder / "4_traction/traction.csv"), tractions);
+}
+
+TEST_F(Stacks, init_and_check_know_them) {
+  const fs::path folder = *folder_ / "new";
+  fs::create_directories(folder);
+  for (const char* file : {"beads_relaxed.tif", "beads_stressed.tif"}) fs::copy(cell() / file, folder / file);
+  const auto made = run_program("mbtfm init " + folder.string());
+  ASSERT_EQ(made.code, 0) << made.output;
+  EXPECT_NE(made.output.find("z_points in [track]"), std::string::npos) << made.output;
+  EXPECT_EQ(made.output.find("actin"), std::string::npos) << made.output;
+  fs::remove(folder / "cell.toml");
+  fs::copy(cell() / "cell.toml", folder / "cell.toml");
+  const auto looked = run_program("mbtfm check " + folder.string());
+  EXPECT_EQ(looked.code, 0) << looked.output;
+  EXPECT_NE(looked.output.find("beads in space"), std::string::npos) << looked.output;
+  fs::remove(folder / "beads_stressed.tif");
+  EXPECT_NE(run_program("mbtfm check " + folder.string()).code, 0);
+  const auto lacks = run_program("mbtfm run " + folder.string());
+  EXPECT_EQ(lacks.code, 3) << lacks.output;
+  EXPECT_FALSE(fs::exists(folder / "2_track"));
 }
 
 TEST_F(Stacks, scenes_are_in_balance_and_at_rest_at_the_base) {

@@ -191,7 +191,7 @@ TEST(Report, a_tick_stands_only_where_no_finding_is_open) {
   const FakeCell cell;
   const CellResults results = read_results(cell.folder.path());
   const auto has_tick = [&](const Provenance& p) {
-    return findings_section(results, p).find("✓") != std::string::npos;
+    return findings_section(facts_of(results), p).find("✓") != std::string::npos;
   };
   EXPECT_TRUE(has_tick(fitted_here({})));
   EXPECT_TRUE(has_tick(fitted_here({*noticed(FindingKind::wide_interval, 1, "x")})));
@@ -206,7 +206,7 @@ TEST(Report, a_tick_stands_only_where_no_finding_is_open) {
 TEST(Report, an_open_finding_shows_its_text_number_threshold_and_remedy) {
   const FakeCell cell;
   const Finding finding = *noticed(FindingKind::missing_fibre, 3, "three <fibres>");
-  const std::string html = findings_section(read_results(cell.folder.path()), fitted_here({finding}));
+  const std::string html = findings_section(facts_of(read_results(cell.folder.path())), fitted_here({finding}));
   for (const std::string& part : {std::string("three &lt;fibres&gt;"), charts::html_escaped(finding.remedy),
                                   charts::html_escaped(finding.reason), std::string(": 3. Threshold: 0;")})
     EXPECT_NE(html.find(part), std::string::npos) << part;

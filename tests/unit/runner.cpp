@@ -10,6 +10,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/batch.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/images.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_cell.h"
@@ -176,6 +177,50 @@ TEST(Stages, every_effect_belongs_to_a_stage_that_runs_again_for_it) {
   for (const Stage& stage : stages()) of_stages.insert(of_stages.end(), stage.effects.begin(), stage.effects.end());
   for (const std::string& key : stage::effect_keys())
     EXPECT_NE(std::ranges::find(of_stages, key), of_stages.end()) << key;
+}
+
+/// Names of the stages of a cell with these settings, its kind before them.
+class Kinds : public Runner {
+ protected:
+  CellStages stages_with(const std::string& toml) {
+    write_parameters(toml);
+    return stages_of(cell_, read_image_names(cell_));
+  }
+  static std::string told(const CellStages& of) {
+    std::string names = name_of(of.kind);
+    for (const Stage& stage : of.stages) names += " " + stage.name;
+    return names;
+  }
+};
+
+TEST_F(Kinds, beads_are_in_space_where_the_tracker_follows_them_there) {
+  fs::remove(cell_ / "paxillin.tif");
+  fs::remove(cell_ / "actin.tif");
+  const std::string plane = "plane segment track network fit", space = "space track surface traction";
+  EXPECT_EQ(told(stages_with("")), plane);
+  EXPECT_EQ(told(stages_with("[track]\nz_points = 'into-gel'\n")), space);
+  EXPECT_EQ(told(stages_with("[track]\ndimensions = 'space'\n")), space);
+  EXPECT_EQ(told(stages_with("[track]\nz_points = 'into-gel'\ndimensions = 'plane'\n")), plane);
+  EXPECT_EQ(told(stages_with("[track]\nz_points = 'into-gel'\nrelaxed_z = 3\n")), plane);
+}
+
+TEST_F(Kinds, what_lies_in_the_folder_decides_where_surface_and_cell_come_from) {
+  const std::string toml = "[track]\nz_points = 'into-gel'\n";
+  const auto arguments = [](const Stage& stage) {
+    std::string flags;
+    for (const PathArgument& argument : stage.arguments) flags += argument.flag + " ";
+    return flags;
+  };
+  const CellStages whole = stages_with(toml);
+  EXPECT_EQ(told(whole), "space segment track surface traction");
+  EXPECT_EQ(arguments(whole.stages[2]), "beads ");
+  EXPECT_EQ(arguments(whole.stages[3]), "displacement surface outline adhesions ");
+  fs::remove(cell_ / "paxillin.tif");
+  files::write_text(cell_ / "surface_beads.tif", "a stack");
+  const CellStages without = stages_with(toml);
+  EXPECT_EQ(arguments(without.stages[2]), "points ");
+  EXPECT_EQ(arguments(without.stages[3]), "displacement surface outline ");
+  EXPECT_EQ(arguments(stages_with(toml + "[surface]\nformula = 'wave'\n").stages[2]), "");
 }
 
 TEST_F(Runner, order_and_comments_of_the_parameter_file_do_not_matter) {

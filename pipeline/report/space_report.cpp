@@ -1,0 +1,241 @@
+#include "pipeline/report/space_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/version.h"
+#include "pipeline/files/base64.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/numerics/order_statistics.h"
+#include "pipeline/report/colours.h"
+#include "pipeline/report/findings.h"
+#include "pipeline/report/numbers.h"
+#include "pipeline/report/page.h"
+#include "pipeline/report/space_maps.h"
+#include "pipeline/report/space_scene.h"
+
+namespace mbtfm::report {
+namespace fs = std::filesystem;
+namespace {
+
+std::string with_error(double value, std::optional<double> sigma, const char* unit) {
+  if (!sigma || !(*sigma > 0)) return readable(value) + " " + unit;
+  const int decimals = decimals_for(*sigma);
+  return fmt::format("{} ± {} {}", rounded(value, decimals), rounded(*sigma, decimals), unit);
+}
+
+/// Net force or moment, with its standard error where there is one.
+struct Sum {
+  double size = 0;
+  std::optional<double> sigma;  ///< along itself
+};
+Sum sum_of(const SpaceResults& r, const std::string& name, const std::string& unit) {
+  const Vec3 v = r.vector(name, unit);
+  Sum sum{.size = norm(v), .sigma = {}};
+  if (!r.find(name + "_sigma_x_" + unit) || !(sum.size > 0)) return sum;
+  const Vec3 s = r.vector(name + "_sigma", unit);
+  sum.sigma = std::hypot(v.x * s.x, v.y * s.y, v.z * s.z) / sum.size;
+  return sum;
+}
+
+double largest_traction_kPa(const SpaceResults& r) {
+  double largest = 0;
+  for (const SurfaceTraction& t : r.tractions) largest = std::max(largest, norm(t.traction_kPa));
+  return largest;
+}
+
+std::vector<std::string> facts_of(const SpaceResults& r) {
+  const Sum force = sum_of(r, "net_force", "nN"), moment = sum_of(r, "moment", "nN_um");
+  const double total = r.number("total_force_nN");
+  std::vector<std::string> facts;
+  facts.push_back(fmt::format(
+      "The cell pulls and presses with {} nN in total, the sum of the sizes of its tractions over {}; {} nN of it are "
+      "along the surface's normal. The largest traction is {} kPa.",
+      readable(total), r.texts.at("tractions_over"), readable(r.number("normal_force_nN")),
+      readable(largest_traction_kPa(r))));
+  facts.push_back(fmt::format("The strain energy of the gel is {} fJ.", readable(r.number("strain_energy_fJ"))));
+  facts.push_back(fmt::format(
+      "Balance: the forces add up to {} ({} of their sum of sizes), the moments about their centre to {}. A cell that "
+      "nothing else holds has neither.",
+      with_error(force.size, force.sigma, "nN"), readable(total > 0 ? force.size / total : 0),
+      with_error(moment.size, moment.sigma, "nN µm")));
+  if (const auto resolution = r.find("median_resolution_um")) {
+    facts.push_back(fmt::format(
+        "Two forces are told apart where they are {} µm apart or more (median over the surface); {} numbers of {} are "
+        "resolved.",
+        readable(*resolution), readable(r.number("effective_unknowns")), readable(r.number("n_unknowns"))));
+  }
+  return facts;
+}
+
+std::string how_lambda(const SpaceResults& r, const Provenance& provenance) {
+  if (r.texts.at("method") == "group-l1")
+    return "The weight of the penalty was the one at which the misfit is what the noise of the beads leaves.";
+  if (!r.find("lambda")) return {};
+  std::string by = "risk";
+  for (const StageLine& stage : provenance.stages) {
+    for (const auto& [name, value] : stage.parameters) {
+      if (stage.name == "traction" && name.ends_with("lambda_by")) by = value;
+    }
+  }
+  return fmt::format("The regularisation was chosen by the data (criterion: {}): lambda = {}.", by,
+                     readable(r.number("lambda")));
+}
+
+std::string svg_of(const Path& file, const std::string& title, const std::string& caption) {
+  if (!files::is_own_file(file)) return {};
+  return fmt::format(
+      "<figure><h3>{0}</h3><img alt=\"{0}\" style=\"width:100%\" "
+      "src=\"data:image/svg+xml;base64,{1}\"><figcaption>{2}</figcaption></figure>\n",
+      html_escaped(title), files::base64(files::read_text(file)), html_escaped(caption));
+}
+
+std::string html_of(const Figure& map) { return figure(map.chart, map.caption, map.legend); }
+
+std::string space_section(const SpaceResults& r) {
+  const ColourScale colours = traction_colours(r);
+  return section("In space",
+                 "<figure><h3>Tractions on the surface</h3>\n" + picture_in_space(r, colours) +
+                     legend(colour_bar(colours)) +
+                     "<figcaption>The gel’s surface from a side and above. Colour: size of the traction; grey: outside "
+                     "of the place where tractions are looked for. Arrows: the strongest tractions, in space. To turn "
+                     "it: paraview --script=view_in_paraview.py in the cell’s folder.</figcaption></figure>\n");
+}
+
+std::string map_section(const SpaceResults& r) {
+  std::string html = "<div class=\"grid\">\n" + html_of(normal_map(r)) + html_of(tangential_map(r));
+  for (const auto& map : {error_map(r), resolution_map(r)}) {
+    if (map) html += html_of(*map);
+  }
+  return section("Tractions", html + "</div>\n");
+}
+
+std::string data_section(const SpaceResults& r) {
+  std::string html = "<div class=\"grid\">\n";
+  for (const Figure& slice : bead_slices(r)) html += html_of(slice);
+  return section("Surface and beads",
+                 html + "</div>\n" +
+                     svg_of(r.folder / "3_surface/surface.svg", "The surface",
+                            "Heights, and sections through the middle with the standard error as a band."));
+}
+
+std::string lambda_section(const SpaceResults& r, const Provenance& provenance) {
+  const std::string text = how_lambda(r, provenance);
+  if (text.empty()) return {};
+  return section("Regularisation", "<p>" + html_escaped(text) + "</p>\n" +
+                                       svg_of(r.folder / "4_traction/traction_lambda.svg", "Criteria by lambda",
+                                              "What each criterion says of every lambda; marked: its choice."));
+}
+
+std::string force_section(const SpaceResults& r) {
+  if (r.forces.empty()) return {};
+  std::vector<ForceInSpace> forces = r.forces;
+  std::ranges::stable_sort(forces, std::greater{}, [](const ForceInSpace& f) { return norm(f.force_nN); });
+  Table table{{{"adhesion", true},
+               {"force (nN)", true},
+               {"std. error (nN)", true},
+               {"Fx (nN)", true},
+               {"Fy (nN)", true},
+               {"Fz (nN), into the gel", true},
+               {"area (µm²)", true},
+               {"x (µm)", true},
+               {"y (µm)", true},
+               {"z (µm)", true}},
+              {},
+              "Forces of the adhesions"};
+  for (const ForceInSpace& f : forces) {
+    const auto decimals = f.sigma_nN && *f.sigma_nN > 0 ? std::optional(decimals_for(*f.sigma_nN)) : std::nullopt;
+    table.rows.push_back({std::to_string(f.adhesion_id), rounded(norm(f.force_nN), decimals),
+                          rounded(f.sigma_nN, decimals), rounded(f.force_nN.x, decimals),
+                          rounded(f.force_nN.y, decimals), rounded(f.force_nN.z, decimals), rounded(f.area_um2, 2),
+                          fmt::format("{:.1f}", f.at_um.x), fmt::format("{:.1f}", f.at_um.y),
+                          fmt::format("{:.1f}", f.at_um.z)});
+  }
+  const Path file = r.folder / "4_traction/traction_adhesion_forces.csv";
+  return section("Forces of the adhesions",
+                 "<p>The adhesions were seen from above and laid onto the surface; their area is that of the "
+                 "surface.</p>\n" +
+                     html_of(table, {r.name + "_" + file.filename().string(), files::read_text(file)}));
+}
+
+std::string methods(const SpaceResults& r, const Provenance& provenance) {
+  std::vector<double> sigma, sigma_z;
+  int n_good = 0;
+  for (const BeadInSpace& bead : r.beads) {
+    if (!bead.flag.empty()) continue;
+    ++n_good;
+    sigma.push_back(bead.sigma_um);
+    sigma_z.push_back(bead.sigma_z_um);
+  }
+  std::string text = fmt::format(
+      "Tractions in space were found with the program mbtfm{}. {} beads were followed in the volume of the gel between "
+      "two confocal stacks",
+      provenance.version.empty() ? "" : " " + provenance.version, n_good);
+  if (!sigma.empty() && numerics::median(sigma) > 0)
+    text += fmt::format(", with a standard error of {} nm across and {} nm along the optical axis (medians)",
+                        readable(1000 * numerics::median(sigma)), readable(1000 * numerics::median(sigma_z)));
+  text += fmt::format(
+      ". The surface of the gel was found from data, too. The gel was taken as linear elastic on a rigid base (Young’s "
+      "modulus "
+      "{} kPa, Poisson’s ratio {}, thickness {} µm) and its answer to tractions computed by finite elements that "
+      "follow "
+      "the surface. Tractions at the vertices of a lattice of {} × {} µm ({} unknowns) were fitted to the "
+      "displacements "
+      "by the method {} over {}. {} {}.",
+      readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio), readable(r.gel.thickness_um),
+      readable(r.number("spacing_x_um")), readable(r.number("spacing_y_um")), r.number("n_unknowns"),
+      r.texts.at("method"), r.texts.at("tractions_over"), how_lambda(r, provenance),
+      fmt::format("The tractions leave {} of the displacement (relative L2)", readable(r.number("relative_l2"))));
+  return "<p class=\"cite\">" + html_escaped(text) + "</p>\n";
+}
+
+std::string figure_pairs(const SpaceResults& r) {
+  std::vector<std::pair<std::string, std::string>> pairs;
+  for (const auto& [name, value] : r.texts) pairs.emplace_back(name, value);
+  for (const auto& [name, value] : r.numbers) pairs.emplace_back(name, readable(value));
+  return html_of_pairs(pairs);
+}
+
+}  // namespace
+
+std::string report_in_space(const fs::path& cell) {
+  const SpaceResults r = read_space_results(cell);
+  const Provenance provenance = read_provenance(cell / "run.json");
+  const std::string head = fmt::format(
+      "<h1>{}</h1><p class=\"what\">Forces in space of one cell on a curved gel</p>\n<p class=\"sub\">Gel: Young’s "
+      "modulus {} kPa, Poisson’s ratio {}, {} µm thick below z = 0 · {} · mbtfm {}</p>\n",
+      html_escaped(r.name), readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio),
+      readable(r.gel.thickness_um), html_escaped(provenance.kind_because), kVersion);
+  const std::string body = findings_section(facts_of(r), provenance) + space_section(r) + map_section(r) +
+                           force_section(r) + data_section(r) + lambda_section(r, provenance) +
+                           section("For your methods section", methods(r, provenance)) +
+                           provenance_section(provenance, folded("Figures of the tractions", figure_pairs(r)));
+  return page(r.name + " – mbtfm", head, body);
+}
+
+std::string result_line_in_space(const fs::path& cell) {
+  const SpaceResults r = read_space_results(cell);
+  const Sum force = sum_of(r, "net_force", "nN");
+  return "total force " + readable(r.number("total_force_nN")) + " nN; net force " +
+         with_error(force.size, force.sigma, "nN") + "; strain energy " + readable(r.number("strain_energy_fJ")) +
+         " fJ";
+}
+
+std::string result_event_in_space(const fs::path& cell, const fs::path& report) {
+  const SpaceResults r = read_space_results(cell);
+  const Sum force = sum_of(r, "net_force", "nN");
+  nlohmann::ordered_json event = {{"event", "result"},
+                                  {"total_force_nN", r.number("total_force_nN")},
+                                  {"net_force_nN", force.size},
+                                  {"net_force_error_nN", nullptr},
+                                  {"strain_energy_fJ", r.number("strain_energy_fJ")},
+                                  {"report", report.string()}};
+  if (force.sigma) event["net_force_error_nN"] = *force.sigma;
+  return files::json_text(event) + "\n";
+}
+
+}  // namespace mbtfm::report

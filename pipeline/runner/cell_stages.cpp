@@ -1,0 +1,166 @@
+#include "pipeline/runner/cell_stages.h"
+
+#include <algorithm>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/toml.h"
+
+namespace mbtfm::runner {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char *kDisplacement = "2_track/displacement_3d.csv", *kSurfaceBeads = "2_track/surface_beads.csv",
+                     *kSurface = "3_surface/surface.vtp";
+
+const Stage& stage_named(const std::string& name) {
+  const auto stage = std::ranges::find(stages(), name, &Stage::name);
+  MBTFM_ASSERT(stage != stages().end());
+  return *stage;
+}
+
+Stage tracking() {
+  Stage stage = stage_named("track");
+  stage.instead.reset();
+  stage.optional_images = {{"surface_beads", "surface_beads"}};
+  stage.writes = {kDisplacement};
+  stage.series = {kSurfaceBeads};
+  return stage;
+}
+
+Stage surface() {
+  return {.name = "surface",
+          .folder = "3_surface",
+          .images = {},
+          .optional_images = {},
+          .arguments = {{"beads", kDisplacement}},
+          .output = {"out", kSurface},
+          .reads = {kDisplacement},
+          .reads_where_there = {},
+          .writes = {kSurface},
+          .series = {},
+          .tables = {"", "surface", "checks"},
+          .effects = {},
+          .settings = {{"surface", "z_points", "into-gel"}}};  // as tables of the tracker are
+}
+
+Stage traction() {
+  return {.name = "traction",
+          .folder = "4_traction",
+          .images = {},
+          .optional_images = {},
+          .arguments = {{"displacement", kDisplacement}, {"surface", kSurface}},
+          .output = {"out", "4_traction/traction.csv"},
+          .reads = {kDisplacement, kSurface},
+          .reads_where_there = {},
+          .writes = {"4_traction/traction.csv", "4_traction/traction.vtp", "4_traction/traction.json"},
+          .series = {"4_traction/traction_*"},
+          .tables = {"", "gel", "traction", "substrate", "checks"},
+          .effects = {"large_strain", "effect_tolerance"}};
+}
+
+/// A value of cell.toml, as text; empty where it is not set.
+std::string text_in(const toml::table& whole, const char* table, const char* key) {
+  return whole[table][key].value_or(std::string());
+}
+
+bool has_image(const fs::path& cell, const ImageNames& images, const char* key) {
+  return !match_image(cell, name_of_image(images, key)).files.empty();
+}
+
+/// Why the beads are followed in space; empty where they are not. As the tracker decides, from the same settings.
+std::string why_in_space(const fs::path& cell, const toml::table& toml) {
+  const std::string dimensions = text_in(toml, "track", "dimensions");
+  if (dimensions == "plane") return {};
+  if (dimensions == "space") return "track.dimensions is space";
+  for (const char* one : {"relaxed_z", "stressed_z", "relaxed_page", "stressed_page"}) {
+    if (toml["track"][one]) return {};
+  }
+  if (toml["track"]["z_points"]) return "track.z_points is set: the bead images are stacks";
+  if (files::is_own_file(cell / kDisplacement) && !files::is_own_file(cell / "2_track/displacement.csv"))
+    return std::string(kDisplacement) + " is there";
+  return {};
+}
+
+/// What is seen of the cell beside its beads is laid onto the surface from above.
+bool has_cell(const fs::path& cell, const ImageNames& images) {
+  return has_image(cell, images, "adhesion") || has_image(cell, images, "actin") ||
+         files::is_own_file(cell / "1_segment/outline.csv");
+}
+/// Somebody saw them; candidates along the rim, which a flat cell may have, are none.
+bool has_adhesions(const fs::path& cell, const ImageNames& images) {
+  return has_image(cell, images, "adhesion") || has_image(cell, images, "adhesion_mask") ||
+         has_image(cell, images, "adhesion_rois") ||
+         (files::is_own_file(cell / "1_segment/adhesions.csv") && !files::is_own_file(cell / "1_segment/record.json"));
+}
+
+void read_file(Stage& stage, const std::string& flag, const std::string& file) {
+  stage.arguments.push_back({flag, file});
+  stage.reads.push_back(file);
+}
+
+}  // namespace
+
+const std::vector<Stage>& stages_in_space() {
+  static const std::vector<Stage> list = {stage_named("segment"), tracking(), surface(), traction()};
+  return list;
+}
+
+const std::vector<Stage>& all_stages() {
+  static const std::vector<Stage> list = [] {
+    std::vector<Stage> all = stages();
+    for (const Stage& stage : stages_in_space()) {
+      if (std::ranges::find(all, stage.name, &Stage::name) == all.end()) all.push_back(stage);
+    }
+    return all;
+  }();
+  return list;
+}
+
+std::string stage_names() {
+  std::string names;
+  const auto n = all_stages().size();
+  for (std::size_t i = 0; i < n; ++i) names += (i == 0 ? "" : i + 1 < n ? ", " : " or ") + all_stages()[i].name;
+  return names;
+}
+
+CellStages stages_of(const fs::path& cell, const ImageNames& images) {
+  const toml::table toml = files::parse_toml(cell / "cell.toml");
+  CellStages of{.kind = CellKind::space, .why = why_in_space(cell, toml), .stages = {}, .chains = {{0, 2}, {1}}};
+  if (of.why.empty()) {
+    of.kind = CellKind::plane;
+    of.stages = stages();
+    return of;
+  }
+  Stage surface_stage = surface(), traction_stage = traction();
+  if (!text_in(toml, "surface", "formula").empty()) {
+    surface_stage.arguments.clear();
+    surface_stage.reads.clear();
+    of.why += "; the surface is [surface] formula";
+  } else if (has_image(cell, images, "surface_beads") || files::is_own_file(cell / kSurfaceBeads)) {
+    surface_stage.arguments = {{"points", kSurfaceBeads}};
+    surface_stage.reads = {kSurfaceBeads};
+    of.why += "; the surface is that of its own beads";
+  } else {
+    of.why += "; the surface is where the beads in the gel end";
+  }
+  const bool has_images = has_cell(cell, images);
+  if (has_images) {
+    of.stages.push_back(stage_named("segment"));
+    read_file(traction_stage, "outline", "1_segment/outline.csv");
+    const bool are_seen = has_adhesions(cell, images);
+    if (are_seen) read_file(traction_stage, "adhesions", "1_segment/adhesions.csv");
+    of.why +=
+        are_seen ? "; the adhesions seen from above are laid onto it" : "; the outline seen from above is laid onto it";
+  } else {
+    of.why += "; no image of the cell: tractions anywhere above the beads";
+  }
+  const int first = static_cast<int>(of.stages.size());
+  of.chains = {{first, first + 1}};
+  if (has_images) of.chains.push_back({0});
+  for (Stage& stage : std::vector<Stage>{tracking(), surface_stage, traction_stage})
+    of.stages.push_back(std::move(stage));
+  return of;
+}
+
+}  // namespace mbtfm::runner
