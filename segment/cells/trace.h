@@ -55,6 +55,8 @@ struct FaintEnd {
 enum class LineEnd { first, last };
 FaintEnd faint_end(const Ridges& ridges, const TraceRule& rule, const Trace& trace, LineEnd end);
 
+inline cv::Point2d left_of(cv::Point2d e) { return {-e.y, e.x}; }
+
 /// Unit vector from the inside of the line to its first or last point, over `reach` pixels.
 cv::Point2d outward(const std::vector<cv::Point2d>& points, LineEnd end, double reach);
 

@@ -47,7 +47,6 @@ std::vector<EndPoint> ends_of(const std::vector<Trace>& traces, double reach_px)
 }
 
 double angle_between(cv::Point2d a, cv::Point2d b) { return std::atan2(std::abs(a.cross(b)), a.dot(b)); }
-cv::Point2d left_of(cv::Point2d e) { return {-e.y, e.x}; }
 
 /// y = offset + slope x + bend x²/2, in a frame along the course of two ends that point at each other.
 struct Parabola {
