@@ -34,7 +34,7 @@ Plan plan_of(const Parameters& parameters, stage::StageContext& context) {
             .own_kPa = own_kPa,
             .parameters = parameters,
             .asked = asked,
-            .grid = grid_of(scene, asked, computed),
+            .grid = grid_of(scene, asked, computed, context.threads),
             .most_beads_per_um2 = most_beads_per_um2(scene),
             .drawn = {},
             .cells = {}};

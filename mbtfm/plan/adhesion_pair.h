@@ -15,32 +15,35 @@ namespace mbtfm::plan {
 /// by more: chi² larger by kTold, odds of 90 to 1, in kChance of all experiments.
 inline constexpr double kTold = 9, kChance = 0.8;
 
-/// The squares that the best single adhesion leaves of the two's exact displacement:
+/// The squares that the best single adhesion leaves of the two's exact displacement, where beads are everywhere:
 ///
 ///   lambda = min over place x and force F₁ of  integral of |u₂ − G(x) F₁|² dA      (um⁴)
 ///
-/// for two forces of 1 nN on a gel of 1 kPa, mean over forces along the line and across it. chi² grows by density /
-/// noise² (force/modulus)² of that on average. Half-space: the base is much further than adhesions are from each other.
+/// for two forces of 1 nN on a gel of 1 kPa. Half-space: the base is much further than adhesions are from each other.
+struct SquaresLeft {
+  double along_um4 = 0, across_um4 = 0;  ///< forces along the line, across it
+};
 /// @param distance_um  two radii or more: nearer ones are one
-double squares_left_um4(const Gel& gel, double area_um2, double distance_um);
+SquaresLeft squares_left(const Gel& gel, double area_um2, double distance_um);
 
-/// That at which chi² passes: with lambda' = density (force / (modulus noise))² lambda, chi² of one less chi² of two
-/// has mean lambda' and variance 4 lambda', so it exceeds kTold with the chance kChance where sqrt(lambda') = 0.84 +
-/// sqrt(0.84² + kTold).
-double needed_squares();
-
-/// The curve of squares_left_um4, computed once for a size.
+/// The least distance, over experiments whose beads lie at random. With beads at places b, chi² of one less chi² of two
+/// has the mean lambda' = (force / (modulus noise))² min over x, F₁ of sum over b |u₂(b) − G(x, b) F₁|² and the
+/// variance 4 lambda'. So an experiment tells the two with the chance Phi((lambda' − kTold) / (2 sqrt(lambda'))), and
+/// the least distance is where its mean over drawn experiments is kChance. With many beads lambda' is density times
+/// squares_left; with few, chance decides whether one lies between the two, and the mean says nothing.
 class PairResolution {
  public:
-  PairResolution(const Gel& gel, double area_um2, int threads);
+  PairResolution(const Gel& gel, double area_um2, std::vector<double> beads_per_um2, int threads);
   /// At least the distance at which they touch. None where not even kFarthest_um is enough.
-  std::optional<double> least_distance_um(double force_nN, double youngs_modulus_kPa, double beads_per_um2,
+  /// @param density  index in beads_per_um2
+  std::optional<double> least_distance_um(double force_nN, double youngs_modulus_kPa, std::size_t density,
                                           double noise_um) const;
   static constexpr double kFarthest_um = 30;
   double touching_um() const { return distance_um_.front(); }
 
  private:
-  std::vector<double> distance_um_, squares_um4_;
+  std::vector<double> distance_um_;
+  std::vector<std::vector<std::vector<double>>> squares_um2_;  ///< by distance, density, drawn experiment
 };
 
 }  // namespace mbtfm::plan

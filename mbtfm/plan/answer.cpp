@@ -53,16 +53,17 @@ std::string about_adhesions(const Plan& plan, const Point& p) {
                      " per µm² the force of the middle adhesion has a standard "
                      "error of " +
                      about(with.standard_error_nN) + " nN with the network and " + about(alone.standard_error_nN) +
-                     " nN without it; the smallest force seen is three times that. ";
+                     " nN without it, and FTTC errs by " +
+                     about(expected_of(plan.grid, p, Quantity::fttc_force).standard_error_nN) +
+                     " nN; the smallest force seen is three times that. ";
   const std::string pair =
       "Without the network two adhesions of " + brief(plan.parameters.tension_nN) + " nN each are ";
   if (!alone.least_distance_um) return text + pair + "not told apart at any distance in a cell.";
   const std::string distance = about(*alone.least_distance_um) + " µm";
   return text + pair +
-         (*alone.least_distance_um > plan.grid.touching_um ? "told apart from " + distance + " on"
+         (*alone.least_distance_um > plan.grid.touching_um ? "told apart if they are " + distance + " apart or more"
                                                            : "told apart even where they touch, at " + distance) +
-         ", where beads lie near them; with fewer than one bead per µm² chance decides, and twice to three times that "
-         "distance is safe.";
+         ".";
 }
 
 std::string about_cells(const Plan& plan) {
@@ -71,11 +72,11 @@ std::string about_cells(const Plan& plan) {
     if (n.difference != plan.parameters.difference) continue;
     if (n.fibres_per_cell != std::max(1.0, std::round(n.scatter.fibres_per_cell))) continue;
     text += (text.empty() ? "" : ", ") + std::string(n.cells ? std::to_string(*n.cells) : "more than 10000") +
-            " for the " + name_of(n.scatter.type) + "s (" + brief(n.fibres_per_cell) + " a cell)";
+            " cells for " + name_of(n.scatter.type) + "s (" + brief(n.fibres_per_cell) + " in each cell)";
   }
   if (text.empty()) return text;
   return "To see a difference of " + percent(plan.parameters.difference) + " between two conditions with a chance of " +
-         percent(plan.parameters.power) + " takes so many cells of each: " + text + ".";
+         percent(plan.parameters.power) + ", each condition needs " + text + ".";
 }
 
 std::string about_drawn(const Drawn& d) {

@@ -38,7 +38,4 @@ struct Drawn {
 Drawn draw_experiments(const Scene& scene, const Computed& computed, const Point& point, int n_experiments,
                        const Work& work);
 
-/// The cell as a segmentation shows it: each adhesion and each free end of a fibre is off by chance.
-Cell as_segmented(Cell cell, const tensions::SegmentationErrors& errors, drawing::Random& random);
-
 }  // namespace mbtfm::plan

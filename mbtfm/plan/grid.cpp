@@ -7,6 +7,7 @@
 #include "mbtfm/tensions/linear_data.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/numerics/parallel.h"
 #include "substrate/choice/large_strain.h"
 
 namespace mbtfm::plan {
@@ -14,6 +15,8 @@ namespace mbtfm::plan {
 using namespace tensions;
 
 namespace {
+
+constexpr std::uint64_t kDrawOfFttc = 50;  // between those of the bound and those of whole experiments
 
 /// Of one estimate: what the beads make, and what the rest makes.
 struct Errors {
@@ -134,6 +137,42 @@ std::vector<Expected> at_point(const Scene& scene, const Asked& asked, const Com
   return all;
 }
 
+/// Magnitudes of FTTC's errors in one experiment, on parts of the densest beads. Forces are linear in displacements and
+/// lambda is free of units, so gels and noises with the same product have the same errors.
+std::vector<double> errors_of_fttc(const Scene& scene, const Computed& c, const Asked& asked, const Point& point) {
+  drawing::Random places(scene.experiment.seed, drawing::Stream::beads, kDrawOfFttc),
+      noise(scene.experiment.seed, drawing::Stream::noise, kDrawOfFttc),
+      segmentation(scene.experiment.seed, drawing::Stream::specimen, kDrawOfFttc);
+  const BeadsOnGel beads = some_of(c.densest, point.beads_per_um2 / asked.beads_per_um2.back(), places);
+  const Experiment experiment{as_segmented(scene.cell.cell, scene.fit.segmentation, segmentation),
+                              measured(beads, c.cell.forces_nN, point, noise)};
+  std::vector<double> errors_nN;
+  add_errors_along(errors_nN, fttc_forces_nN(scene, experiment, point, 1), c.cell.forces_nN);
+  return errors_nN;
+}
+
+Expected expected_of_fttc(const Point& point, const std::vector<double>& errors_nN, double target_nN) {
+  const auto n_within = std::ranges::count_if(errors_nN, [&](double e) { return e <= target_nN; });
+  const double error_nN = robust_error(errors_nN);
+  return {.point = point,
+          .quantity = Quantity::fttc_force,
+          .n = static_cast<int>(errors_nN.size()),
+          .standard_error_nN = error_nN,
+          .target_nN = target_nN,
+          .share_within = static_cast<double>(n_within) / static_cast<double>(errors_nN.size()),
+          .smallest_seen_nN = Grid::kSeen * error_nN,
+          .least_distance_um = {}};
+}
+
+/// By gel, density, noise.
+std::vector<Point> points_of(const Asked& asked) {
+  std::vector<Point> points;
+  for (const double E : asked.youngs_modulus_kPa)
+    for (const double density : asked.beads_per_um2)
+      for (const double noise_um : asked.noise_um) points.push_back({E, density, noise_um});
+  return points;
+}
+
 /// Density at which a tension's standard error is the target; infinite where what is left without noise is more, or
 /// beads would stand closer than a nanometre.
 double needed_beads_per_um2(const Computed& c, std::size_t label, double target_nN, double scale) {
@@ -216,24 +255,31 @@ Computed compute(const Scene& scene, const Asked& asked, const Work& work) {
   return c;
 }
 
-Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c) {
+Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c, int threads) {
   Grid grid;
   const OnOwnGel own = on_own_gel(c);
-  const PairResolution pairs(scene.fit.gel, median_area_um2(scene), 1);
+  const PairResolution pairs(scene.fit.gel, median_area_um2(scene), asked.beads_per_um2, threads);
   grid.touching_um = pairs.touching_um();
   const double force_nN = asked.target_nN / asked.within;
-  for (const double E : asked.youngs_modulus_kPa) {
-    for (std::size_t k = 0; k < asked.beads_per_um2.size(); ++k) {
-      for (const double noise_um : asked.noise_um) {
-        const Point point{E, asked.beads_per_um2[k], noise_um};
-        for (Expected e : at_point(scene, asked, c, c.densities.precision[k], point)) {
-          e.largest_displacement_um = own.largest_displacement_um * c.densest.modulus_kPa / E;
-          e.left_out = choice::left_out_at_beads(of_modulus(scene.fit.gel, E), own.traction_kPa);
-          if (e.quantity == Quantity::free_force)
-            e.least_distance_um = pairs.least_distance_um(force_nN, E, point.beads_per_um2, noise_um);
-          grid.expected.push_back(e);
-        }
-      }
+  const std::vector<Point> points = points_of(asked);
+  std::vector<std::vector<double>> of_fttc(points.size());
+  numerics::parallel_for(static_cast<int>(points.size()), threads, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    of_fttc[k] = errors_of_fttc(scene, c, asked, points[k]);
+  });
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Point& point = points[i];
+    const double E = point.youngs_modulus_kPa;
+    const auto density = static_cast<std::size_t>(std::ranges::find(asked.beads_per_um2, point.beads_per_um2) -
+                                                  asked.beads_per_um2.begin());
+    std::vector<Expected> all = at_point(scene, asked, c, c.densities.precision[density], point);
+    all.push_back(expected_of_fttc(point, of_fttc[i], asked.target_nN));
+    for (Expected& e : all) {
+      e.largest_displacement_um = own.largest_displacement_um * c.densest.modulus_kPa / E;
+      e.left_out = choice::left_out_at_beads(of_modulus(scene.fit.gel, E), own.traction_kPa);
+      if (e.quantity == Quantity::free_force)
+        e.least_distance_um = pairs.least_distance_um(force_nN, E, density, point.noise_um);
+      grid.expected.push_back(e);
     }
   }
   if (c.cell.fibre_ids.size() > 1) {

@@ -6,22 +6,31 @@
 #include <vector>
 
 #include "mbtfm/plan/adhesion_pair.h"
-#include "mbtfm/plan/precision.h"
+#include "mbtfm/plan/experiment.h"
 
 namespace mbtfm::plan {
 
 /// What is estimated. Of those that there are many of in a cell the plan gives the middle one.
-enum class Quantity { fibres, dorsal, arc, ventral, edge, network_force, total_force, adhesion_force, free_force };
+enum class Quantity {
+  fibres,
+  dorsal,
+  arc,
+  ventral,
+  edge,
+  network_force,
+  total_force,
+  adhesion_force,
+  free_force,
+  fttc_force
+};
 constexpr auto words(Quantity) {
-  return std::array{"fibre",         "dorsal fibre", "transverse arc", "ventral fibre",       "edge fibre",
-                    "network force", "total force",  "adhesion force", "adhesion force alone"};
+  return std::array{
+      "fibre",         "dorsal fibre", "transverse arc", "ventral fibre",        "edge fibre",
+      "network force", "total force",  "adhesion force", "adhesion force alone", "adhesion force by FTTC"};
 }
 
-struct Point {
-  double youngs_modulus_kPa = 0, beads_per_um2 = 0, noise_um = 0;
-};
-
-/// Of a quantity at a point. Of many, medians; share_within counts.
+/// Of a quantity at a point. Of many, medians; share_within counts. fttc_force has no bound: its errors are those of
+/// one drawn experiment.
 struct Expected {
   Point point;
   Quantity quantity = Quantity::fibres;
@@ -65,7 +74,7 @@ struct Computed {
 };
 Computed compute(const Scene& scene, const Asked& asked, const Work& work);
 
-Grid grid_of(const Scene& scene, const Asked& asked, const Computed& computed);
+Grid grid_of(const Scene& scene, const Asked& asked, const Computed& computed, int threads);
 
 /// By the beads' noise alone, for a noise of 1 um on 1 kPa: between the densities computed on the line of logarithms,
 /// beyond them as the law has it, with the root of the density.

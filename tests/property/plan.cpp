@@ -109,7 +109,7 @@ TEST(Plan, at_the_density_that_is_needed_half_of_the_fibres_meet_the_target) {
   p.within = "50%";
   const Asked asked = asked_by(p, 8);
   const Computed computed = compute(scene, asked, kThreads);
-  const Grid grid = grid_of(scene, asked, computed);
+  const Grid grid = grid_of(scene, asked, computed, kThreads);
   ASSERT_EQ(grid.needed.size(), 2u);
   for (const Needed& n : grid.needed) {
     ASSERT_TRUE(n.beads_per_um2) << n.youngs_modulus_kPa;
@@ -146,10 +146,15 @@ TEST(Plan, a_list_that_is_none_is_refused) {
 
 const Gel kGel{.youngs_modulus_kPa = 5, .poisson_ratio = 0.49, .thickness_um = 60};
 
+double mean_left_um4(double area_um2, double distance_um) {
+  const SquaresLeft left = squares_left(kGel, area_um2, distance_um);
+  return (left.along_um4 + left.across_um4) / 2;
+}
+
 /// Squares of 1/r over an area have no length in them.
 TEST(AdhesionPair, the_squares_left_do_not_change_where_all_lengths_grow) {
   for (const double distance_um : {0.8, 2.0, 10.0}) {
-    const double small = squares_left_um4(kGel, 0.4, distance_um), large = squares_left_um4(kGel, 1.6, 2 * distance_um);
+    const double small = mean_left_um4(0.4, distance_um), large = mean_left_um4(1.6, 2 * distance_um);
     EXPECT_NEAR(large, small, 1e-9 * small) << distance_um;
   }
 }
@@ -158,28 +163,49 @@ TEST(AdhesionPair, the_squares_left_do_not_change_where_all_lengths_grow) {
 TEST(AdhesionPair, the_squares_left_rise_with_the_distance_and_far_off_with_its_logarithm) {
   double before = 0;
   for (const double distance_um : {1.2, 2.0, 4.0, 8.0}) {
-    const double squares = squares_left_um4(kGel, 1, distance_um);
+    const double squares = mean_left_um4(1, distance_um);
     EXPECT_GT(squares, before);
     before = squares;
   }
-  const auto step = [](double from_um) {
-    return squares_left_um4(kGel, 1, 2 * from_um) - squares_left_um4(kGel, 1, from_um);
-  };
+  const auto step = [](double from_um) { return mean_left_um4(1, 2 * from_um) - mean_left_um4(1, from_um); };
   // 2 pi <|u|² r²> ln 2 for each doubling, but for what the free place and force of the one still explain of the other
   EXPECT_NEAR(step(16) / step(8), 1, 0.1);
 }
 
-TEST(AdhesionPair, the_least_distance_asks_for_force_over_noise_and_modulus_and_for_the_root_of_the_density) {
-  const PairResolution pairs(kGel, 0.46, kThreads);
-  const auto base = pairs.least_distance_um(1, 8, 1, 0.04);
+TEST(AdhesionPair, the_least_distance_asks_for_force_over_noise_and_modulus) {
+  const PairResolution pairs(kGel, 0.46, {1}, kThreads);
+  const auto base = pairs.least_distance_um(1, 8, 0, 0.04);
   ASSERT_TRUE(base);
   EXPECT_GT(*base, pairs.touching_um());
-  EXPECT_NEAR(*pairs.least_distance_um(2, 8, 1, 0.08), *base, 1e-12 * *base);
-  EXPECT_NEAR(*pairs.least_distance_um(1, 4, 1, 0.08), *base, 1e-12 * *base);
-  EXPECT_NEAR(*pairs.least_distance_um(1, 8, 4, 0.08), *base, 1e-12 * *base);
-  EXPECT_GT(*pairs.least_distance_um(1, 8, 1, 0.05), *base);
-  EXPECT_DOUBLE_EQ(*pairs.least_distance_um(1, 8, 1, 1e-4), pairs.touching_um());
-  EXPECT_FALSE(pairs.least_distance_um(0.01, 8, 0.1, 0.1)) << "nothing is seen of such forces";
+  EXPECT_NEAR(*pairs.least_distance_um(2, 8, 0, 0.08), *base, 1e-12 * *base);
+  EXPECT_NEAR(*pairs.least_distance_um(1, 4, 0, 0.08), *base, 1e-12 * *base);
+  EXPECT_GT(*pairs.least_distance_um(1, 8, 0, 0.05), *base);
+  EXPECT_DOUBLE_EQ(*pairs.least_distance_um(1, 8, 0, 1e-6), pairs.touching_um());
+  EXPECT_FALSE(pairs.least_distance_um(0.01, 8, 0, 0.1)) << "nothing is seen of such forces";
+}
+
+/// Many beads: lambda' is density (force / (modulus noise))² squares_left for forces along and across, and the mean of
+/// their chances is kChance.
+TEST(AdhesionPair, of_many_beads_only_the_density_counts) {
+  constexpr double kDensity = 400, kWanted_um = 2;
+  const PairResolution pairs(kGel, 0.46, {kDensity}, kThreads);
+  const SquaresLeft left = squares_left(kGel, 0.46, kWanted_um);
+  const auto chance = [](double lambda) { return 0.5 * std::erfc(-(lambda - kTold) / std::sqrt(8 * lambda)); };
+  double low = 1e-4, high = 100;  // of the noise
+  for (int i = 0; i < 60; ++i) {
+    const double noise_um = std::sqrt(low * high), factor = kDensity / std::pow(8 * noise_um, 2);
+    const bool is_told = chance(factor * left.along_um4) + chance(factor * left.across_um4) > 2 * kChance;
+    (is_told ? low : high) = noise_um;
+  }
+  // 150 draws of some 500 beads near the two, and a line between distances 28 % apart
+  EXPECT_NEAR(*pairs.least_distance_um(1, 8, 0, low), kWanted_um, 0.04 * kWanted_um);
+}
+
+/// The mean of what beads tell is the same for a hundredth of the beads with a tenth of the noise. But then chance
+/// decides whether one lies near the two.
+TEST(AdhesionPair, few_exact_beads_are_worth_less_than_many_poor_ones) {
+  const PairResolution pairs(kGel, 0.46, {0.1, 10}, kThreads);
+  EXPECT_GT(*pairs.least_distance_um(1, 8, 0, 0.01), 1.3 * *pairs.least_distance_um(1, 8, 1, 0.1));
 }
 
 // --- how many cells

@@ -149,8 +149,6 @@ void study_errors(int only) {
 
 // --- pairs
 
-constexpr double kFieldHalf_um = 20;
-
 Eigen::MatrixXd field_of(const Gel& gel, Vec2 centre_um, double radius_um, const std::vector<Vec2>& beads_um) {
   substrate::Ellipse e;
   e.centre_um = centre_um;
@@ -196,9 +194,10 @@ double misfit_of_one(const Gel& gel, double radius_um, const std::vector<Vec2>& 
 /// Whether one drawn experiment tells the two apart.
 bool is_told(const Gel& gel, double radius_um, double distance_um, double beads_per_um2, double noise_um, int draw) {
   std::mt19937_64 random(static_cast<std::uint64_t>(draw) + 77);
-  std::uniform_real_distribution<double> place(-kFieldHalf_um, kFieldHalf_um);
+  const double half_um = 10 + 6 * distance_um;
+  std::uniform_real_distribution<double> place(-half_um, half_um);
   std::normal_distribution<double> normal(0, noise_um);
-  const auto n = static_cast<int>(beads_per_um2 * 4 * kFieldHalf_um * kFieldHalf_um);
+  const auto n = static_cast<int>(beads_per_um2 * 4 * half_um * half_um);
   std::vector<Vec2> beads_um;
   for (int i = 0; i < n; ++i) {
     const double x = place(random);
@@ -221,12 +220,14 @@ void study_pairs() {
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
   constexpr double kArea_um2 = 0.46;
   const double radius_um = std::sqrt(kArea_um2 / 3.141592653589793);
-  const PairResolution pairs(gel, kArea_um2, kThreads);
+  const std::vector<double> densities = {0.25, 0.5, 1, 2};
+  const PairResolution pairs(gel, kArea_um2, densities, kThreads);
   std::printf("beads_per_um2,noise_um,predicted_um,drawn_um,ratio\n");
-  for (const double density : {0.25, 1.0}) {
-    for (const double noise_um : {0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.06}) {
-      const auto predicted = pairs.least_distance_um(1, gel.youngs_modulus_kPa, density, noise_um);
-      if (!predicted || *predicted > 6 || *predicted <= pairs.touching_um()) continue;
+  for (std::size_t i = 0; i < densities.size(); ++i) {
+    const double density = densities[i];
+    for (const double noise_um : {0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06}) {
+      const auto predicted = pairs.least_distance_um(1, gel.youngs_modulus_kPa, i, noise_um);
+      if (!predicted || *predicted > 8 || *predicted <= pairs.touching_um()) continue;
       constexpr int kExperiments = 100;
       // the distance that kChance of the experiments tell, between two that bracket it
       double low = 0.4 * *predicted, high = 2.5 * *predicted;
