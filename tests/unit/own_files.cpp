@@ -87,9 +87,9 @@ TEST_F(OwnFiles, writing_replaces_a_link_and_a_second_name_and_a_pipe) {
 TEST_F(OwnFiles, a_device_is_not_replaced) {
   const fs::path device = folder_ / "null";
   if (mknod(device.c_str(), S_IFCHR | 0666, makedev(1, 3)) != 0) GTEST_SKIP() << "no right to make a device";
-  write_text(folder_ / "new", "text");
-  EXPECT_THROW(put_in_place(folder_ / "new", device), OutputError);
-  EXPECT_THROW(write_whole(device, "text"), OutputError);
+  files::write_text(folder_ / "new", "text");
+  EXPECT_THROW(files::put_in_place(folder_ / "new", device), OutputError);
+  EXPECT_THROW(files::write_whole(device, "text"), OutputError);
   EXPECT_TRUE(fs::is_character_file(device));
 }
 
