@@ -18,6 +18,7 @@ namespace {
 /// Of a pipe or a device, which may have no end.
 std::string read_stream(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw InputError(file.string(), "a readable file", std::strerror(errno));
   std::string text;
   std::vector<char> block(1 << 16);
   while (stream) {
