@@ -14,6 +14,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
@@ -87,7 +88,7 @@ void declare(stage::ParameterList& list, Parameters& p) {
 /// The first of some names that a folder has; empty: none.
 Path first_of(const Path& folder, std::initializer_list<const char*> names) {
   for (const char* name : names) {
-    if (fs::is_regular_file(folder / name)) return name;
+    if (files::is_file(folder / name)) return name;
   }
   return {};
 }
@@ -97,20 +98,23 @@ Path displacement_in(const Path& folder) { return first_of(folder, {"2_track/dis
 
 /// Folders that hold an outline and a displacement, by name.
 std::vector<Path> folders_of_cells(const Path& top) {
-  if (!fs::is_directory(top)) throw InputError(top.string(), "a folder of cell folders", "none of that name");
+  if (!files::is_folder(top)) throw InputError(top.string(), "a folder of cell folders", "none of that name");
   std::set<Path> found;
-  for (auto entry = fs::recursive_directory_iterator(top); entry != fs::recursive_directory_iterator(); ++entry) {
-    if (!entry->is_directory()) continue;
+  std::error_code error;
+  const auto how = fs::directory_options::skip_permission_denied;  // lost+found
+  for (fs::recursive_directory_iterator entry(top, how, error), end; !error && entry != end; entry.increment(error)) {
+    if (!files::is_folder(entry->path())) continue;  // a link that leads round in a circle is none
     if (outline_in(entry->path()).empty() || displacement_in(entry->path()).empty()) continue;
-    found.insert(fs::proximate(entry->path(), top));
+    found.insert(entry->path().lexically_relative(top));
     entry.disable_recursion_pending();
   }
+  if (error) throw InputError(top.string(), "folders that can be read", error.message());
   return {found.begin(), found.end()};
 }
 
 Gel gel_of(const Path& cell, const Gel& otherwise) {
   Gel gel = otherwise;
-  if (!fs::is_regular_file(cell / "cell.toml")) return gel;
+  if (!files::is_file(cell / "cell.toml")) return gel;
   stage::ParameterList list;
   declare(list, gel);
   read_toml(list, cell / "cell.toml");

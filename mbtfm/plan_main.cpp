@@ -28,6 +28,7 @@ Plan plan_of(const Parameters& parameters, stage::StageContext& context) {
   const Scene scene = scene_of(parameters, context);
   const double own_kPa = scene.fit.gel.youngs_modulus_kPa;
   const Asked asked = asked_by(parameters, own_kPa);
+  for (const double E : asked.youngs_modulus_kPa) context.expect_plausible("youngs_modulus_kPa", E);
   const Computed computed = compute(scene, asked, work);
   Plan plan{.name = scene.name,
             .own_kPa = own_kPa,

@@ -9,6 +9,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/stage.h"
 #include "segment/images/image.h"
@@ -33,7 +34,7 @@ bool is_image(const fs::path& file) {
 std::vector<std::string> images_in(const fs::path& folder) {
   std::vector<std::string> names;
   for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file() && is_image(entry.path())) names.push_back(entry.path().filename().string());
+    if (is_image(entry.path()) && files::is_file(entry.path())) names.push_back(entry.path().filename().string());
   std::ranges::sort(names);
   return names;
 }
@@ -149,8 +150,8 @@ Written cell_toml(const fs::path& folder) {
 
 StageReport init(stage::StageContext& context) {
   const fs::path folder = context.input("cell", {});
-  if (!fs::is_directory(folder)) throw InputError(folder.string(), "a folder with the images of a cell", "none");
-  if (fs::exists(folder / "cell.toml"))
+  if (!files::is_folder(folder)) throw InputError(folder.string(), "a folder with the images of a cell", "none");
+  if (fs::symlink_status(folder / "cell.toml").type() != fs::file_type::not_found)
     throw InputError((folder / "cell.toml").string(), "no cell.toml yet", "one",
                      "it is yours: edit it, or rename it first");
   if (images_in(folder).empty())

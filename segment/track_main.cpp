@@ -8,6 +8,7 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/named_array.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/stage/effects.h"
@@ -180,7 +181,7 @@ constexpr const char* kImageExtensions[] = {".tif", ".tiff", ".png", ".jpg", ".j
 /// The images of a folder in the order of their names, or those of a file.
 std::vector<Frame> frames_of(stage::StageContext& context, const TrackParameters& parameters) {
   const fs::path& given = context.inputs_.at("stressed");
-  if (!fs::is_directory(given)) return frames_of_file(context.input("stressed"), parameters);
+  if (!files::is_folder(given)) return frames_of_file(context.input("stressed"), parameters);
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(given)) {
     const std::string extension = entry.path().extension().string();
@@ -327,6 +328,9 @@ StageReport complete_series(const std::vector<Frame>& frames, stage::StageContex
   keep_field(context, earlier, "displacement.csv");
   std::int64_t n_kept = 0;
   for (const files::FrameRow& row : files::read(earlier / "frames.csv", files::frame_table())) {
+    if (row.frame < 1 || row.frame > static_cast<int>(frames.size()))
+      throw InputError((earlier / "frames.csv").string(), "frames from 1 to " + std::to_string(frames.size()),
+                       std::to_string(row.frame), "remove the folder: it is of another series");
     if (!row.refused.empty()) continue;
     const std::string name = files::displacement_of_frame(row.frame);
     if (fs::is_regular_file(earlier / name)) {

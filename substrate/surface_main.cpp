@@ -9,6 +9,7 @@
 #include "pipeline/contract/axes.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/place.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/columns.h"
 #include "pipeline/files/csv.h"
@@ -57,7 +58,7 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.table("surface");
   list.add("formula", p.formula, "surface by formula, instead of a file: " + formulas_listed() + "; [ ] may lack");
   const std::string cut = " of the rectangle; must be given with a formula, else all of the data";
-  const Range place = Range::any();
+  const Range place = possible_place_um();
   list.add("low_x_um", p.low_x_um, place, "lowest x" + cut);
   list.add("low_y_um", p.low_y_um, place, "lowest y" + cut);
   list.add("high_x_um", p.high_x_um, place, "highest x" + cut);
@@ -158,7 +159,8 @@ Made finished(HeightMap map, const Parameters& p, const std::string& source, std
   const double finest = std::min(map.spacing_um.x, map.spacing_um.y);
   constexpr int kMostLines = 500;  // of a quarter of a million vertices
   const double asked = p.spacing_um.value_or(finest * std::ceil(1.0 * std::max(map.n_x, map.n_y) / kMostLines));
-  FilledMap whole = filled(binned(map, std::max(1, static_cast<int>(asked / finest + 1e-9))), p.largest_hole_um);
+  const double by = std::clamp(asked / finest + 1e-9, 1.0, 1.0 * std::max(map.n_x, map.n_y));
+  FilledMap whole = filled(binned(map, static_cast<int>(by)), p.largest_hole_um);
   Made made{.map = std::move(whole.map), .from = std::move(from)};
   if (whole.n_filled > 0) {
     made.share_repaired = static_cast<double>(whole.n_filled) / static_cast<double>(made.map.z_um.size());

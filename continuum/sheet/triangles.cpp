@@ -291,11 +291,16 @@ Triangles numbered(Delaunay& delaunay, const Region& region) {
 }  // namespace
 
 double expected_triangles(const Region& region, const TriangleSize& size) {
+  constexpr double kMostSides = 1e6;  // beyond, the sizes along the curves would fill the memory: bends are left out
   double along = 0;
-  for (std::size_t c = 0; c < region.rims.size() + region.lines.size(); ++c) {
-    const Curve& curve = curve_of(region, static_cast<int>(c));
+  const int n_curves = static_cast<int>(region.rims.size() + region.lines.size());
+  for (int c = 0; c < n_curves; ++c) along += curve_of(region, c).length_um() / size.at_curves_um;
+  const bool is_beyond = !(along < kMostSides);
+  if (!is_beyond) along = 0;
+  for (int c = 0; c < n_curves && !is_beyond; ++c) {
+    const Curve& curve = curve_of(region, c);
     const double step = sample_um(curve, size);
-    for (const double h : sizes_along(curve, side_of(region, static_cast<int>(c)), size, step)) along += step / h;
+    for (const double h : sizes_along(curve, side_of(region, c), size, step)) along += step / h;
   }
   // of a strip whose triangles grow: each layer has fewer by its growth; what is left inside is even
   const double layers = 2.3 * along / std::max(size.growth, 0.05);

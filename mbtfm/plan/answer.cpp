@@ -122,8 +122,10 @@ std::string answer_sentence(const Plan& plan) {
                            " kPa and a noise of " + brief(noise_um) + " µm ";
   const Needed& n = needed_of(plan.grid, gel_kPa, noise_um);
   if (!n.beads_per_um2)
-    return with + "no number of beads suffices " + asked_for + ": networks and segmentation alone make an error of " +
-           about(plan.grid.model_error_nN) + " nN.";
+    return with + "no number of beads suffices " + asked_for +
+           (plan.grid.model_error_nN < plan.asked.target_nN
+                ? "."
+                : ": networks and segmentation alone make an error of " + about(plan.grid.model_error_nN) + " nN.");
   if (!can_be_had(n, plan.most_beads_per_um2))
     return with + "you would need " + about(*n.beads_per_um2) + " beads per µm² " + asked_for + ", more than the " +
            about(plan.most_beads_per_um2) + " that can be told apart" + of_other_gels(plan, gel_kPa, noise_um) + ".";

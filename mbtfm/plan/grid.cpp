@@ -173,12 +173,14 @@ std::vector<Point> points_of(const Asked& asked) {
   return points;
 }
 
-/// Density at which a tension's standard error is the target; infinite where what is left without noise is more.
+/// Density at which a tension's standard error is the target; infinite where what is left without noise is more, or
+/// beads would stand closer than a nanometre.
 double needed_beads_per_um2(const Computed& c, std::size_t label, double target_nN, double scale) {
   const double other_nN = c.model.tensions[label].total_nN();
   if (other_nN >= target_nN) return std::numeric_limits<double>::infinity();
   const double wanted = std::sqrt(target_nN * target_nN - other_nN * other_nN) / scale;
   double low = 1e-6, high = 1e6;  // errors fall as the density rises
+  if (unit_error(c.densities, label, high) > wanted) return std::numeric_limits<double>::infinity();
   while (high / low > 1 + 1e-6) {
     const double middle = std::sqrt(low * high);
     (unit_error(c.densities, label, middle) > wanted ? low : high) = middle;

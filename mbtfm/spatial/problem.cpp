@@ -28,14 +28,18 @@ TractionMesh lattice_for(const Ground& ground, const Expected& expected, const M
     throw UsageError("traction.spacing_um = " + brief(spacing) + ": the beads lie over " + brief(size.x) + " x " +
                      brief(size.y) + " um");
   }
+  constexpr int kMostAtAll = 5000;  // the norm's own decomposition then takes half a minute
+  const auto require_few = [&](double n, double most) {
+    if (n <= most) return;
+    throw UsageError("traction.spacing_um = " + brief(spacing) + " makes " + brief(n) + " vertices of tractions, " +
+                     std::to_string(kMostAtAll) +
+                     " are the most: choose a wider spacing, or a region with traction.background = 0");
+  };
+  constexpr double kMostLooked = 1e6;  // of all places, where those of a region are wanted alone
+  require_few(size.x * size.y / (spacing * spacing), kMostLooked);
   TractionMesh mesh = make_traction_mesh(
       ground, expected.over, spacing, [&](Vec2 middle) { return expected.background > 0 || expected.is_part(middle); });
-  constexpr int kMostAtAll = 5000;  // the norm's own decomposition then takes half a minute
-  if (mesh.n_vertices() > kMostAtAll) {
-    throw UsageError("traction.spacing_um = " + brief(spacing) + " makes " + std::to_string(mesh.n_vertices()) +
-                     " vertices of tractions, " + std::to_string(kMostAtAll) +
-                     " are the most: choose a wider spacing, or a region with traction.background = 0");
-  }
+  require_few(mesh.n_vertices(), kMostAtAll);
   return mesh;
 }
 

@@ -34,7 +34,7 @@ struct TriangleMesh {
   std::vector<std::array<int, 3>> triangles;  ///< points of the corners
 };
 
-/// @throws InvalidData where a number is not finite, or a corner no point
+/// @throws InvalidData where a number is not finite or beyond a metre, or a corner no point
 void check(const TriangleMesh& mesh);
 
 }  // namespace mbtfm

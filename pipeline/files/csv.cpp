@@ -10,6 +10,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/place.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/text.h"
 
@@ -142,12 +143,23 @@ void CsvTable::fail(int row, const std::string& column, const std::string& expec
 
 std::string CsvTable::text(int row, const std::string& column) const { return rows_[row].fields[index_of(column)]; }
 
+namespace {
+
+/// What a number of this column can be at all, whatever it is asked for.
+Range possible(const std::string& column) {
+  constexpr double kLargest = 1e30;  // powers of larger ones are no numbers; no unit of ours has such
+  return column.ends_with("_um") ? possible_place_um() : Range::between(-kLargest, kLargest);
+}
+
+}  // namespace
+
 double CsvTable::number(int row, const std::string& column, Range range) const {
   const std::string& field = rows_[row].fields[index_of(column)];
   double value = 0;
   const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
   const bool is_number = error == std::errc() && end == field.data() + field.size() && std::isfinite(value);
   if (!is_number || !is_inside(range, value)) fail(row, column, describe("a number", range));
+  if (!is_inside(possible(column), value)) fail(row, column, describe("a number", possible(column)));
   return value;
 }
 

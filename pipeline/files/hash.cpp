@@ -50,7 +50,7 @@ std::string sha256_of_file(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw InputError(file.string(), "a readable file", "none");
   Sha256 hash;
-  std::vector<char> block(1 << 20);
+  std::vector<char> block(1 << 16);
   while (stream) {
     stream.read(block.data(), static_cast<std::streamsize>(block.size()));
     hash.add(block.data(), static_cast<std::size_t>(stream.gcount()));

@@ -40,6 +40,10 @@ void check_own_folder(const fs::path& folder) {
     throw InputError(folder.string(), "a folder that can be read", error.message());
 }
 
+[[noreturn]] void refuse_device(const fs::path& file) {
+  throw OutputError("cannot replace " + file.string() + ": a device is there; write into a folder");
+}
+
 }  // namespace
 
 bool is_file(const fs::path& file) {
@@ -103,6 +107,8 @@ void make_way(const fs::path& file) {
     case fs::file_type::regular:
       if (fs::hard_link_count(file, error) < 2) return;
       break;
+    case fs::file_type::block:
+      refuse_device(file);
     default:
       break;
   }
@@ -111,6 +117,8 @@ void make_way(const fs::path& file) {
 }
 
 void put_in_place(const fs::path& temporary, const fs::path& file) {
+  const fs::file_type type = type_of(file);  // as root, a rename would take /dev/null away from the whole machine
+  if (type == fs::file_type::character || type == fs::file_type::block) refuse_device(file);
   std::error_code error;
   fs::rename(temporary, file, error);
   if (error) throw OutputError("cannot put " + file.string() + " in place: " + error.message());

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/place.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/order_statistics.h"
@@ -37,9 +38,6 @@ double scale_of(const TrackParameters& parameters) {
   if (parameters.pixel_size_um) return *parameters.pixel_size_um;
   throw UsageError("length_unit = px needs pixel_size_um: give it in cell.toml or as --pixel_size_um");
 }
-
-// A metre: what lies beyond is damage, or in another unit, and its squares would not be numbers.
-constexpr double kFarthest_um = 1e6;
 
 struct GivenField {
   DisplacementField field;

@@ -48,6 +48,8 @@ std::string head_of(const std::filesystem::path& file) {
   const auto status = std::filesystem::status(file, error);
   if (!std::filesystem::exists(status)) throw InputError(file.string(), kExpected, "no such file");
   if (std::filesystem::is_directory(status)) throw InputError(file.string(), kExpected, "a folder");
+  if (!std::filesystem::is_regular_file(status))  // to open a pipe is to wait for who writes into it
+    throw InputError(file.string(), kExpected, "a pipe, a socket or a device", "save the image as a file");
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw InputError(file.string(), kExpected, "a file that may not be read", "check its permissions");
   std::array<char, 16> bytes{};

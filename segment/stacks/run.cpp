@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -352,6 +353,10 @@ StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& 
     if (track.pixel_size_um && frame->pixel_um)
       context.doubt(stage::doubt_about_pixel_size(*track.pixel_size_um, *frame->pixel_um),
                     frame->name + ": pixel_size_um");
+  }
+  if (std::ranges::equal(relaxed.detection.spots, stressed.detection.spots, {}, &Spot::place, &Spot::place)) {
+    throw InputError(relaxed_file.string() + ", " + stressed_file.string(), "two stacks",
+                     "the same beads to the last bit in both", "is one of them given twice?");
   }
   tell(0.8, "following beads");
   const Followed followed = with_names(relaxed_file.string() + ", " + stressed_file.string(), [&] {

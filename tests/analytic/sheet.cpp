@@ -52,6 +52,17 @@ TEST(Curve, a_loop_is_found_and_a_neighbour_is_none) {
   EXPECT_FALSE(crossing_of({test::circle(10), test::rectangle(30, 5)}).empty()) << "a hole that reaches out";
 }
 
+TEST(Sheet, triangles_beyond_all_memory_are_counted_and_refused_before_any_is_made) {
+  const sheet::Region disc{.rims = {sheet::Curve(test::circle(25))}, .lines = {}};
+  const sheet::TriangleSize size{.at_curves_um = 1e-9, .largest_um = 5, .growth = 0.13};
+  // a side of 1e-9 um: 1.6e11 of them around the rim
+  EXPECT_GT(sheet::expected_triangles(disc, size), 1e11);
+  EXPECT_THROW(sheet::triangulated(disc, size, 200000), InvalidData);
+  // springs of 1e9 nN/um3 under a soft sheet: an edge that cannot be resolved is as fine as the program will make it
+  const sheet::TriangleSize coarser = sheet::size_on_springs(disc, 2e-5);
+  EXPECT_LE(sheet::expected_triangles(disc, coarser), 5e4);
+}
+
 TEST(Sheet, discs_on_springs_are_the_closed_form) {
   const auto csv = test::chapter4("sheet_disc");
   int row = 0;

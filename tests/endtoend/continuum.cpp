@@ -105,6 +105,7 @@ void write_cell(const Path& folder, double angle, std::uint64_t seed, double spi
 
 TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name) {
   for (int k = 0; k < 5; ++k) write_cell(folder_ / ("cells/cell_" + std::to_string(k)), 0.4 * k, k, 12);
+  std::filesystem::create_symlink("round", folder_ / "cells/round");  // in a circle: no folder, no end of the others
   const std::string settings_file = settings("");
   const std::string mean =
       "mbtfm-mean " + file("cells") + " --config " + settings_file + " --symmetry C4v --spacing_um 3";
@@ -125,6 +126,7 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
   const auto again = test::run_program(pattern + " --model " + file("mean/mean.csv") + " --out " + file("again"));
   EXPECT_EQ(again.code, 0) << again.output;
 
+  std::filesystem::remove(folder_ / "cells/round");
   write_cell(folder_ / "cells/round", 0, 9, 0);
   const auto refused = test::run_program(pattern + " --out " + file("no"));
   EXPECT_EQ(refused.code, 3) << refused.output;

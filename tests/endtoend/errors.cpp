@@ -212,6 +212,7 @@ TEST_F(Errors, a_cell_toml_that_init_wrote_runs_once_the_modulus_is_in_it) {
   fs::rename(cell_ / "paxillin.tif", cell_ / "day1_Paxillin.tif");
   fs::rename(cell_ / "beads_relaxed.tif", cell_ / "beads_after_trypsin.tif");
   fs::rename(cell_ / "beads_stressed.tif", cell_ / "beads_with_cell.tif");
+  fs::create_symlink("round.tif", cell_ / "round.tif");  // a link that leads round in a circle is no image
   const Outcome made = run_program("mbtfm init " + cell_.string());
   EXPECT_EQ(made.code, 0) << made.output;
   EXPECT_NE(made.output.find("complete in it: youngs_modulus_kPa in [gel]"), std::string::npos) << made.output;

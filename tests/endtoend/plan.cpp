@@ -75,6 +75,21 @@ TEST(Plan, what_is_no_plan_is_refused_and_leaves_nothing_behind) {
   EXPECT_FALSE(fs::exists(folder / "plan"));
 }
 
+TEST(Plan, a_modulus_in_pascals_is_refused_and_no_end_of_a_search_is_an_answer) {
+  const test::TemporaryFolder folder;
+  const std::string ask = "mbtfm plan --scenario two-adhesions --drawn 0 --beads_per_um2 0.5 --noise_um 0.05 --out " +
+                          (folder / "plan").string() + " --youngs_modulus_kPa ";
+  const Outcome pascals = run_program(ask + "8400");
+  EXPECT_EQ(pascals.code, 3) << pascals.output;
+  EXPECT_NE(pascals.output.find("8400 Pa is 8.4 kPa"), std::string::npos) << pascals.output;
+  EXPECT_FALSE(fs::exists(folder / "plan"));
+  const Outcome stiff = run_program(ask + "900");
+  ASSERT_EQ(stiff.code, 0) << stiff.output;
+  EXPECT_NE(stiff.output.find("no number of beads suffices to see 1 nN per fibre to 20 %."), std::string::npos)
+      << stiff.output;
+  EXPECT_TRUE(files::CsvTable(folder / "plan/plan_needed.csv").text(0, "beads_per_um2").empty());
+}
+
 /// A cell that hardly pulls, so that the two bead images differ by the noise alone.
 class Unloaded : public ::testing::Test {
  protected:

@@ -115,6 +115,7 @@ TEST_F(Stacks, what_does_not_go_together_is_refused_with_the_remedy) {
       {track(unscaled, unscaled), "track.z_step_um"},
       {track(relaxed(), coarser), "track.z_step_um"},
       {track(dark, stressed()), "bright beads"},
+      {track(relaxed(), relaxed()), "two stacks"},
       {"mbtfm-track --relaxed " + relaxed() + " --stressed " + stressed() + " --dimensions space --out " +
            (*folder_ / "out2").string(),
        "track.z_points", 2},

@@ -171,6 +171,7 @@ TEST_F(Surface, asks_for_what_no_file_tells) {
   EXPECT_EQ(run("").code, 2);
   EXPECT_EQ(run("--formula 'flat'" + kSquare + " --z_points into-gel --points " + file("points.csv")).code, 2);
   EXPECT_EQ(run("--formula flat").code, 2);
+  EXPECT_EQ(run("--formula flat --low_x_um -20 --low_y_um -20 --high_y_um 20 --high_x_um 1e300").code, 2);
   write("broken.csv", "x_um,y_um,z_um\n0,0,nan\n");
   EXPECT_EQ(run("--z_points into-gel --points " + file("broken.csv")).code, 3);
   write("mesh.stl", "solid\nendsolid\n");

@@ -1,6 +1,7 @@
 /// What the runner reads of a cell that it finds: record.json, fit.json, run.json, and the hashes it keeps.
 #include "pipeline/contract/results.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/json_record.h"
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/runner/run_record.h"
@@ -71,25 +72,28 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   runner::RunOptions options;
   options.version = "0.1.0";
 
-  const auto run = fuzz::cell_with("run.json", input);
+  const auto run = fuzz::cell_with("run.json", input), recorded = fuzz::cell_with("4_fit/record.json", input),
+             fitted = fuzz::cell_with("4_fit/fit.json", input), hashed = fuzz::cell_with(".mbtfm.hashes", input);
+  fuzz::answer([&] { runner::HashCache(hashed).hash({"cell.toml"}); });
   fuzz::answer([&] { runner::recorded_failure(run); });
+  fuzz::answer([&] { runner::last_summary(recorded, {}); });
+  fuzz::answer([&] { files::read_fit_summary(fitted / "4_fit/fit.json"); });
+
+  // What goes through a whole cell is asked where the input is JSON at all: else it ends as those above, in JsonRecord.
+  bool is_json = false;
+  fuzz::answer([&] {
+    files::JsonRecord(run / "run.json", "JSON");
+    is_json = true;
+  });
+  if (!is_json) return 0;
   fuzz::answer([&] { runner::run_record_tells_of(run, options); });
   fuzz::answer([&] { runner::verify_cell(run); });
-
-  const auto recorded = fuzz::cell_with("4_fit/record.json", input);
   fuzz::answer([&] { runner::write_run_record(recorded, options, runner::look_at_cell(recorded, options)); });
-  fuzz::answer([&] { runner::last_summary(recorded, {}); });
   fuzz::answer([&] {
     runner::BatchCell cell;
     cell.cell = recorded;
     runner::write_batch_table(fuzz::folder() / "batch.csv", fuzz::folder(), {cell}, {});
   });
-
-  const auto fitted = fuzz::cell_with("4_fit/fit.json", input);
-  fuzz::answer([&] { files::read_fit_summary(fitted / "4_fit/fit.json"); });
   fuzz::answer([&] { runner::write_run_record(fitted, options, fuzz::untouched()); });
-
-  const auto hashed = fuzz::cell_with(".mbtfm.hashes", input);
-  fuzz::answer([&] { runner::HashCache(hashed).hash({"cell.toml"}); });
   return 0;
 }

@@ -355,5 +355,44 @@ TEST(Columns, results_have_six_digits_and_what_is_computed_with_has_all) {
   EXPECT_EQ(files::read_displacement(folder / "displacement.csv").at(0).sigma_um, third);
 }
 
+TEST(Files, numbers_that_no_cell_can_have_are_refused_by_row_and_column) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](const std::string& row) {
+    files::write_text(folder / "a.csv", "x_um,y_um,ux_um,uy_um,traction_kPa\n1,2,0,0,3\n" + row + "\n");
+    const files::CsvTable table(folder / "a.csv");
+    try {
+      for (const char* column : {"x_um", "y_um", "ux_um", "uy_um", "traction_kPa"}) table.number(1, column);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal("-1e6,1e6,0,0,-1e30"), "");
+  for (const char* row : {"1e7,0,0,0,0", "0,-1e300,0,0,0", "0,0,1e40,0,0"})
+    EXPECT_NE(refusal(row).find("a number >= -1e+06 and <= 1e+06"), std::string::npos) << refusal(row);
+  EXPECT_NE(refusal("0,0,0,0,1e200").find("a.csv:3: column 'traction_kPa'"), std::string::npos)
+      << refusal("0,0,0,0,1e200");
+}
+
+TEST(Files, what_has_no_end_is_refused_and_what_is_empty_is_empty) {
+  EXPECT_EQ(files::read_text("/dev/null"), "");
+  EXPECT_THROW(files::read_text("/dev/zero"), InputError);
+}
+
+TEST(Files, a_surface_beyond_a_metre_is_none) {
+  HeightMap map{.origin_um = {0, 0}, .spacing_um = {1, 1}, .n_x = 4, .n_y = 4, .z_um = {}, .sigma_um = {}};
+  map.z_um.assign(16, -2);
+  EXPECT_NO_THROW(check(map));
+  for (const double far : {1e300, -2e6, std::nan("")}) {
+    HeightMap high = map, away = map, wide = map;
+    high.z_um[5] = far;
+    away.origin_um.y = far;
+    wide.spacing_um.x = std::abs(far);
+    for (const HeightMap& damaged : {high, away, wide}) EXPECT_THROW(check(damaged), InvalidData) << far;
+    const TriangleMesh mesh{.points_um = {{0, 0, 0}, {1, 0, 0}, {0, 1, far}}, .triangles = {{0, 1, 2}}};
+    EXPECT_THROW(check(mesh), InvalidData) << far;
+  }
+}
+
 }  // namespace
 }  // namespace mbtfm

@@ -1,6 +1,7 @@
 #include "segment/images/image.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <tiffio.h>
 
 #include <algorithm>
@@ -45,6 +46,13 @@ TEST(Image, a_written_tiff_comes_back_with_its_calibration) {
   image.pixel_size_um.reset();
   write_tiff(folder / "b.tif", image);
   EXPECT_FALSE(read_image(folder / "b.tif").pixel_size_um);
+}
+
+TEST(Image, a_pipe_is_refused_and_not_waited_for) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(mkfifo((folder / "a.tif").c_str(), 0600), 0);
+  EXPECT_THROW(read_image(folder / "a.tif"), InputError);
+  EXPECT_THROW(read_image("/dev/null"), InputError);
 }
 
 TEST(Image, binned_ones_hold_the_means_of_whole_blocks_and_keep_their_scale) {

@@ -159,6 +159,14 @@ TEST(ImagePlanes, channels_are_called_by_name_and_listed_where_none_was_chosen) 
   EXPECT_NE(refusal(file, {.channel = "4"}).find("3 channels"), std::string::npos);
 }
 
+TEST(ImagePlanes, a_claim_of_millions_of_channels_is_told_in_a_line) {
+  const TemporaryFolder folder;
+  write_pages(folder / "a.ome.tif", 1, ome("SizeC='4000000' SizeZ='1' SizeT='1'", ""));
+  const std::string told = refusal(folder / "a.ome.tif", {});
+  EXPECT_NE(told.find("4000000 channels: 1, 2, 3,"), std::string::npos) << told.substr(0, 300);
+  EXPECT_LT(told.size(), 500u);
+}
+
 TEST(ImagePlanes, frames_must_be_chosen_and_slices_be_there) {
   const TemporaryFolder folder;
   const fs::path file = folder / "a.tif";

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 
 #include <functional>
 
@@ -80,6 +81,16 @@ TEST_F(OwnFiles, writing_replaces_a_link_and_a_second_name_and_a_pipe) {
     }
   }
   EXPECT_THROW(files::write_text(cell_ / "4_fit", ""), OutputError);
+}
+
+/// Only root can make one, and root alone could replace it: --out /dev/null once took it away from the machine.
+TEST_F(OwnFiles, a_device_is_not_replaced) {
+  const fs::path device = folder_ / "null";
+  if (mknod(device.c_str(), S_IFCHR | 0666, makedev(1, 3)) != 0) GTEST_SKIP() << "no right to make a device";
+  files::write_text(folder_ / "new", "text");
+  EXPECT_THROW(files::put_in_place(folder_ / "new", device), OutputError);
+  EXPECT_THROW(files::write_whole(device, "text"), OutputError);
+  EXPECT_TRUE(fs::is_character_file(device));
 }
 
 TEST_F(OwnFiles, a_link_under_the_temporary_name_is_not_followed) {
