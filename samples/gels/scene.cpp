@@ -234,13 +234,39 @@ Vec3 aimed_traction(const std::vector<Bump>& bumps, Vec3 place) {
   return sum;
 }
 
-/// Least squares of the traction over the surface with the sum of forces and that of moments held at zero.
+/// Places of the surface within a lateral distance of 1.5 radii of a patch.
+std::vector<Row> rows_within(const Surface& surface, const Patch& patch, double step_um) {
+  constexpr double kReach = 1.5;  // radii
+  std::vector<Row> rows;
+  const int n = static_cast<int>(kReach * patch.radius_um / step_um) + 1;
+  for (int j = -n; j <= n; ++j) {
+    for (int i = -n; i <= n; ++i) {
+      const Vec2 away{i * step_um, j * step_um}, at = Vec2{patch.centre_um.x, patch.centre_um.y} + away;
+      if (norm(away) <= kReach * patch.radius_um)
+        rows.push_back({at, step_um * step_um * norm(surface.area_normal(at))});
+    }
+  }
+  return rows;
+}
+
+Eigen::Vector3d force_through(const FieldUnderASurface& field, const Surface& surface, const std::vector<Row>& rows) {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  for (const Row& row : rows) force += row.area * traction(field, surface, row.at);
+  return force;
+}
+
+/// Least squares of the traction over the surface. The sum of forces and that of moments are held at zero, and the
+/// force through each patch at the one it is aimed at.
 std::vector<FieldUnderASurface::Source> fitted_sources(const Surface& surface, const std::vector<Bump>& bumps,
                                                        const SceneSize& size, int threads) {
   const std::vector<Eigen::Vector3d> places = places_outside(surface, bumps);
   const std::vector<Row> rows = rows_of(surface, bumps, size.field_um);
   const auto n_rows = static_cast<Eigen::Index>(rows.size()), n = static_cast<Eigen::Index>(3 * places.size());
-  Eigen::MatrixXd a(3 * n_rows, n);
+  constexpr double kStep = 1.5;  // um: of the forces through patches, which are smooth over 6 um
+  std::vector<std::vector<Row>> within;
+  for (const Bump& bump : bumps) within.push_back(rows_within(surface, bump.patch, kStep));
+  const auto n_patches = std::ssize(bumps);
+  Eigen::MatrixXd a(3 * n_rows, n), through(3 * n_patches, n);
   Eigen::VectorXd b(3 * n_rows);
   numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int s) {
     for (int c = 0; c < 3; ++c) {
@@ -250,13 +276,15 @@ std::vector<FieldUnderASurface::Source> fitted_sources(const Surface& surface, c
         const Row& row = rows[static_cast<std::size_t>(r)];
         a.col(3 * s + c).segment<3>(3 * r) = std::sqrt(row.area) * traction(unit, surface, row.at);
       }
+      for (Eigen::Index p = 0; p < n_patches; ++p)
+        through.col(3 * s + c).segment<3>(3 * p) = force_through(unit, surface, within[static_cast<std::size_t>(p)]);
     }
   });
   for (Eigen::Index r = 0; r < n_rows; ++r) {
     const Row& row = rows[static_cast<std::size_t>(r)];
     b.segment<3>(3 * r) = std::sqrt(row.area) * as_eigen(aimed_traction(bumps, surface.at(row.at)));
   }
-  const Eigen::Index n_all = n + 6;
+  const Eigen::Index n_all = n + 6 + 3 * n_patches;
   Eigen::MatrixXd system = Eigen::MatrixXd::Zero(n_all, n_all);
   system.topLeftCorner(n, n) = a.transpose() * a;
   constexpr double kRidge = 1e-5;  // of the mean diagonal: forces of opposite sign side by side do not grow
@@ -272,8 +300,12 @@ std::vector<FieldUnderASurface::Source> fitted_sources(const Surface& surface, c
       for (int m = 0; m < 3; ++m) system(at, n + 3 + m) = system(n + 3 + m, at) = scale * moment[m];
     }
   }
+  system.bottomLeftCorner(3 * n_patches, n) = scale * through;
+  system.topRightCorner(n, 3 * n_patches) = scale * through.transpose();
   Eigen::VectorXd right = Eigen::VectorXd::Zero(n_all);
   right.head(n) = a.transpose() * b;
+  for (Eigen::Index p = 0; p < n_patches; ++p)
+    right.segment<3>(n + 6 + 3 * p) = scale * as_eigen(bumps[static_cast<std::size_t>(p)].patch.aimed_nN);
   const Eigen::VectorXd f = system.partialPivLu().solve(right).head(n);
   std::vector<FieldUnderASurface::Source> sources;
   for (std::size_t s = 0; s < places.size(); ++s)
@@ -307,17 +339,9 @@ void measure_patches(GelScene& scene, const Surface& surface, const std::vector<
   const FieldUnderASurface field = scene.exact();
   scene.patches.resize(bumps.size());
   numerics::parallel_for(static_cast<int>(bumps.size()), threads, [&](int p) {
-    constexpr double kReach = 1.5, kStep = 0.5;  // radii; um
-    const Bump& bump = bumps[static_cast<std::size_t>(p)];
-    Patch patch = bump.patch;
-    const int n = static_cast<int>(kReach * patch.radius_um / kStep) + 1;
-    for (int j = -n; j <= n; ++j) {
-      for (int i = -n; i <= n; ++i) {
-        const Vec2 d{i * kStep, j * kStep}, at = Vec2{patch.centre_um.x, patch.centre_um.y} + d;
-        if (norm(d) > kReach * patch.radius_um) continue;
-        patch.force_nN += kStep * kStep * norm(surface.area_normal(at)) * as_vec(traction(field, surface, at));
-      }
-    }
+    constexpr double kStep = 0.5;  // um
+    Patch patch = bumps[static_cast<std::size_t>(p)].patch;
+    patch.force_nN = as_vec(force_through(field, surface, rows_within(surface, patch, kStep)));
     scene.patches[static_cast<std::size_t>(p)] = patch;
   });
 }
