@@ -10,7 +10,7 @@ families=("$@")
 [ $# -gt 0 ] || families=(csv field vtu surface settings records image ome roi)
 inputs=${MBTFM_FUZZ_INPUTS:-1000000}
 export UBSAN_OPTIONS=print_stacktrace=1
-# who allocated what is asked once an input is found, and freed memory is watched for 16 MB, not 256: a quarter of the time
+# freed memory is watched for 16 MB, not 256, which the limit of memory would count; stacks are asked of a kept input
 export ASAN_OPTIONS=${ASAN_OPTIONS:-malloc_context_size=2:quarantine_size_mb=16}
 
 if echo 'extern "C" int LLVMFuzzerTestOneInput(const char*, unsigned long) { return 0; }' |
@@ -31,7 +31,7 @@ for family in "${families[@]}"; do
     mkdir -p "$MBTFM_FUZZ_CORPUS"
     # libFuzzer reads its corpus after the target has put the samples there. Its clock is the wall's: on a busy machine
     # an input of a millisecond waits 5 s for the processor. Inputs above 5 s are told and kept, above 60 s they fail.
-    # Samples have 0.1 to 3 kB; what longer inputs add is a repetition that costs most of the time.
+    # Samples have 0.1 to 7 kB; what longer inputs add is a repetition that costs most of the time.
     "$build/tests/fuzzer_$family" -runs="$inputs" -timeout=60 -report_slow_units=5 -malloc_limit_mb=1024 -rss_limit_mb=2048 \
       -max_len="${MBTFM_FUZZ_LONGEST:-8192}" -print_final_stats=1 -artifact_prefix="$build/tests/$family-" "$MBTFM_FUZZ_CORPUS" 2>&1 |
       tee "$build/tests/fuzz-$family.log" | grep -vE '^#[0-9]+[[:space:]]+(NEW|REDUCE|RELOAD)|NEW_FUNC' || failed+=("$family")
