@@ -332,8 +332,7 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
     std::vector<Adhesion> candidates = candidates_in(in, around, lines, Placement::first);
     hold(s.cell, std::move(candidates), std::move(lines), around, in);
     require_candidates(in, s.cell);
-    if (in.source == AdhesionSource::pattern)
-      s.pattern = pattern_at(*in.drawn.adhesion_mask, around, in.field);
+    if (in.source == AdhesionSource::pattern) s.pattern = pattern_at(*in.drawn.adhesion_mask, around, in.field);
   }
   s.n_anchors = static_cast<int>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::anchor, &Adhesion::origin));
   s.unused = unused_in(in);

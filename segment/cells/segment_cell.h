@@ -45,7 +45,7 @@ struct Segmentation {
   bool is_aligned = false;                      ///< fibres and outline were moved by it
   AdhesionSource source = AdhesionSource::image;
   std::optional<PatternAtCell> pattern{};  ///< where the cell sits on one: see pattern_at()
-  int n_anchors = 0;                        ///< that hold ends of fibres where no adhesion is
+  int n_anchors = 0;                       ///< that hold ends of fibres where no adhesion is
   /// The cell with the candidates at other places, the same fibres tied to them; none where there is nothing to place.
   std::optional<Cell> second{};
   std::vector<std::string> unused{};  ///< inputs that others took the place of, a sentence each
