@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pipeline/numerics/dense_panel.h"
+#include "pipeline/numerics/memory.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::numerics {
@@ -15,25 +16,26 @@ namespace {
 constexpr double kLostPivot = 1e-14;
 constexpr int kColumnsATime = 16;  // blocks: of an update, by one thread
 
-/// Add a child's columns [begin, end) to a matrix of the parent: those of its columns, or those below.
-template <int kBlock, class Real>
-void add_columns(const EliminationPanel& child, const Real* update, int begin, int end, Real* to, std::size_t stride,
-                 int first_place) {
-  const std::size_t from_stride = kBlock * child.rows.size();
+/// Add a child's columns [begin, end) to a matrix of the parent: those of its columns, or those below. column_of(place,
+/// side) is where a column of it begins with the block of its diagonal.
+template <int kBlock, class Real, class ColumnOf>
+void add_columns(const EliminationPanel& child, const Real* update, int begin, int end, const ColumnOf& column_of) {
+  const TriangleStrips strips{kBlock * child.rows.size()};
   const auto after = [](int column, const EliminationPanel::Run& run) { return column < run.row; };
   auto columns = std::upper_bound(child.runs.begin(), child.runs.end(), begin, after) - 1;
   for (; columns != child.runs.end() && columns->row < end; ++columns) {
     const int first = std::max(begin, columns->row), last = std::min(end, columns->row + columns->length);
     for (int column = first; column < last; ++column) {
-      const int place = columns->place + column - columns->row - first_place;
+      const int place = columns->place + column - columns->row;
+      const std::size_t diagonal = kBlock * static_cast<std::size_t>(column);
       for (int side = 0; side < kBlock; ++side) {
-        const Real* from = update + (kBlock * static_cast<std::size_t>(column) + side) * from_stride;
-        Real* t = to + (kBlock * static_cast<std::size_t>(place) + side) * stride;
+        const Real* from = update + strips.at(diagonal, diagonal + static_cast<std::size_t>(side));
+        Real* to = column_of(place, side);
         for (auto rows = columns; rows != child.runs.end(); ++rows) {
           const int skipped = rows == columns ? column - rows->row : 0;
-          const Real* f = from + kBlock * (rows->row + skipped);
-          Real* at = t + kBlock * (rows->place + skipped - first_place);
-          for (int i = 0; i < kBlock * (rows->length - skipped); ++i) at[i] += f[i];
+          const Real* f = from + kBlock * (rows->row + skipped - column);
+          Real* t = to + kBlock * (rows->place + skipped - place);
+          for (int i = 0; i < kBlock * (rows->length - skipped); ++i) t[i] += f[i];
         }
       }
     }
@@ -43,10 +45,14 @@ void add_columns(const EliminationPanel& child, const Real* update, int begin, i
 }  // namespace
 
 template <int kBlock, class Real>
-void BlockCholesky<kBlock, Real>::assemble(const Panel& panel, const BlockMatrix<kBlock>& matrix, double shift) {
+void BlockCholesky<kBlock, Real>::assemble(const Panel& panel, const BlockMatrix<kBlock>& matrix,
+                                           const FactoriseOptions& options) {
   Real* values = values_of(panel);
   const std::size_t stride = kBlock * panel.height();
-  std::fill_n(values, stride * kBlock * panel.n_columns, Real(0));
+  parallel_for((panel.n_columns + kColumnsATime - 1) / kColumnsATime, options.threads, [&](int t) {
+    const int n = std::min(kColumnsATime, panel.n_columns - t * kColumnsATime);
+    std::fill_n(values + stride * kBlock * kColumnsATime * t, stride * kBlock * n, Real(0));
+  });
   for (const Panel::Entry& entry : panel.entries) {
     const double* block = &matrix.value[kBlock * kBlock * static_cast<std::size_t>(entry.slot)];
     Real* to = values + kBlock * entry.column * stride + kBlock * static_cast<std::size_t>(entry.row);
@@ -54,7 +60,8 @@ void BlockCholesky<kBlock, Real>::assemble(const Panel& panel, const BlockMatrix
       for (int q = 0; q < kBlock; ++q)
         to[q * stride + p] = static_cast<Real>(block[entry.is_turned ? kBlock * q + p : kBlock * p + q]);
   }
-  for (int j = 0; shift != 0 && j < kBlock * panel.n_columns; ++j) values[j * (stride + 1)] += static_cast<Real>(shift);
+  for (int j = 0; options.shift != 0 && j < kBlock * panel.n_columns; ++j)
+    values[j * (stride + 1)] += static_cast<Real>(options.shift);
 }
 
 /// To the panel's columns what its children have there, or the rest to what it hands on itself. Of an update only what
@@ -62,15 +69,19 @@ void BlockCholesky<kBlock, Real>::assemble(const Panel& panel, const BlockMatrix
 template <int kBlock, class Real>
 void BlockCholesky<kBlock, Real>::add_updates(const Panel& panel, bool to_columns, const Updates& updates,
                                               int threads) {
-  Real* to = to_columns ? values_of(panel) : updates[&panel - elimination_->panels.data()].get();
-  const std::size_t stride = kBlock * (to_columns ? panel.height() : panel.rows.size());
+  Real* to = to_columns ? values_of(panel) : updates[&panel - elimination_->panels.data()];
+  const std::size_t height = kBlock * panel.height();
+  const TriangleStrips strips{kBlock * panel.rows.size()};
+  const auto column_of = [&](int place, int side) {
+    const auto row = static_cast<std::size_t>(kBlock * (to_columns ? place : place - panel.n_columns));
+    const std::size_t column = row + static_cast<std::size_t>(side);
+    return to + (to_columns ? column * height + row : strips.at(row, column));
+  };
   for (const int c : panel.children) {
     const Panel& child = elimination_->panels[c];
     const int begin = to_columns ? 0 : child.n_rows_in_columns;
     const int end = to_columns ? child.n_rows_in_columns : static_cast<int>(child.rows.size());
-    const auto add = [&](int from, int until) {
-      add_columns<kBlock>(child, updates[c].get(), from, until, to, stride, to_columns ? 0 : panel.n_columns);
-    };
+    const auto add = [&](int from, int until) { add_columns<kBlock>(child, updates[c], from, until, column_of); };
     if (threads == 1) {
       add(begin, end);
     } else {
@@ -82,42 +93,80 @@ void BlockCholesky<kBlock, Real>::add_updates(const Panel& panel, bool to_column
 
 template <int kBlock, class Real>
 bool BlockCholesky<kBlock, Real>::eliminate(const Panel& panel, const BlockMatrix<kBlock>& matrix,
-                                            const FactoriseOptions& options, Updates& updates) {
-  auto& update = updates[&panel - elimination_->panels.data()];
+                                            const FactoriseOptions& options, const Updates& updates) {
   Real* values = values_of(panel);
   const std::size_t height = kBlock * panel.height(), width = kBlock * static_cast<std::size_t>(panel.n_columns);
   const bool holds_still = options.lost_pivot == LostPivot::holds_still;
-  assemble(panel, matrix, options.shift);
+  assemble(panel, matrix, options);
   std::vector<Real> least_pivot(width, 0);
   for (std::size_t j = 0; holds_still && j < width; ++j)
     least_pivot[j] = static_cast<Real>(kLostPivot) * values[j * (height + 1)];
   add_updates(panel, true, updates, options.threads);
-  update = std::make_unique_for_overwrite<Real[]>(kBlock * kBlock * panel.n_update_blocks());
-  partial_cholesky<Real>({values, height, width}, least_pivot.data(), update.get(), options.threads);
+  partial_cholesky<Real>({values, height, width}, least_pivot.data(), updates[&panel - elimination_->panels.data()],
+                         options.threads);
   for (std::size_t j = 0; !holds_still && j < width; ++j)
     if (!std::isfinite(values[j * (height + 1)])) return false;
   add_updates(panel, false, updates, options.threads);
-  for (const int child : panel.children) updates[child].reset();
   return true;
 }
 
 template <int kBlock, class Real>
 bool BlockCholesky<kBlock, Real>::factorise(const BlockMatrix<kBlock>& matrix, const FactoriseOptions& options) {
-  const std::vector<Panel>& panels = elimination_->panels;
   factor_.resize(static_cast<Eigen::Index>(kBlock * kBlock * elimination_->n_blocks()));
+  use_large_pages(factor_.data(), static_cast<std::size_t>(factor_.size()) * sizeof(Real));
+  return options.threads == 1 ? factorise_in_a_row(matrix, options) : factorise_side_by_side(matrix, options);
+}
+
+/// Updates lie on two stacks that grow from the ends of one array towards each other: on top of one are those of a
+/// panel's children, and its own goes onto the other. The system is asked for memory once, not by each panel.
+template <int kBlock, class Real>
+bool BlockCholesky<kBlock, Real>::factorise_in_a_row(const BlockMatrix<kBlock>& matrix,
+                                                     const FactoriseOptions& options) {
+  const std::vector<Panel>& panels = elimination_->panels;
+  const std::size_t n_numbers = elimination_->most_update_numbers(kBlock);
+  const auto numbers = std::make_unique_for_overwrite<Real[]>(n_numbers);
+  use_large_pages(numbers.get(), n_numbers * sizeof(Real));
+  std::vector<char> is_low(panels.size(), 0);
+  for (std::size_t k = panels.size(); k-- > 0;)
+    if (panels[k].parent >= 0) is_low[k] = !is_low[panels[k].parent];
+  Real *low = numbers.get(), *high = low + n_numbers;
   Updates updates(panels.size());
-  if (options.threads == 1)
-    return std::all_of(panels.begin(), panels.end(),
-                       [&](const Panel& panel) { return eliminate(panel, matrix, options, updates); });
+  for (std::size_t k = 0; k < panels.size(); ++k) {
+    const std::size_t own = update_size(panels[k]);
+    updates[k] = is_low[k] ? low : high - own;
+    (is_low[k] ? low += own : high -= own);
+    if (!eliminate(panels[k], matrix, options, updates)) return false;
+    for (const int child : panels[k].children)
+      (is_low[k] ? high += update_size(panels[child]) : low -= update_size(panels[child]));
+  }
+  return true;
+}
+
+template <int kBlock, class Real>
+bool BlockCholesky<kBlock, Real>::factorise_side_by_side(const BlockMatrix<kBlock>& matrix,
+                                                         const FactoriseOptions& options) {
+  const std::vector<Panel>& panels = elimination_->panels;
+  Updates updates(panels.size());
+  std::vector<std::unique_ptr<Real[]>> owned(panels.size());
+  std::atomic<bool> is_positive = true;
+  const auto run = [&](int k, const FactoriseOptions& with) {
+    if (!is_positive) return;
+    const std::size_t size = update_size(panels[k]);
+    owned[k] = std::make_unique_for_overwrite<Real[]>(size);
+    use_large_pages(owned[k].get(), size * sizeof(Real));
+    updates[k] = owned[k].get();
+    if (!eliminate(panels[k], matrix, with, updates)) is_positive = false;
+    for (const int child : panels[k].children) owned[child].reset();
+  };
   FactoriseOptions alone = options;
   alone.threads = 1;
-  std::atomic<bool> is_positive = true;
-  parallel_for(static_cast<int>(elimination_->subtrees.size()), options.threads, [&](int t) {
-    for (const int k : elimination_->subtrees[t])
-      if (is_positive && !eliminate(panels[k], matrix, alone, updates)) is_positive = false;
-  });
-  return is_positive && std::all_of(elimination_->above.begin(), elimination_->above.end(),
-                                    [&](int k) { return eliminate(panels[k], matrix, options, updates); });
+  for (const auto& [subtrees, above] : elimination_->stages) {
+    parallel_for(static_cast<int>(subtrees.size()), options.threads, [&](int t) {
+      for (const int k : subtrees[t]) run(k, alone);
+    });
+    for (const int k : above) run(k, options);
+  }
+  return is_positive;
 }
 
 template <int kBlock, class Real>

@@ -42,8 +42,8 @@ class BlockCholesky {
 
   explicit BlockCholesky(std::shared_ptr<const Elimination> elimination) : elimination_(std::move(elimination)) {}
 
-  /// Subtrees run side by side; the panels above them one after the other, cut into tiles. Neither depends on the
-  /// number of threads, so the bits do not. @returns whether no pivot was lost that must not be
+  /// Stage by stage, subtrees run side by side, and the panels above them one after the other, cut into tiles. Neither
+  /// depends on the number of threads, so the bits do not. @returns whether no pivot was lost that must not be
   bool factorise(const BlockMatrix<kBlock>& matrix, const FactoriseOptions& options);
 
   /// In place, with the last factorisation. Skips the panels below which no right-hand side is.
@@ -59,10 +59,13 @@ class BlockCholesky {
 
  private:
   using Panel = EliminationPanel;
-  using Updates = std::vector<std::unique_ptr<Real[]>>;  // by panel: what it hands on
+  using Updates = std::vector<Real*>;  // by panel: what it hands on
+  static std::size_t update_size(const Panel& panel) { return panel.n_update_numbers(kBlock); }
+  bool factorise_in_a_row(const BlockMatrix<kBlock>& matrix, const FactoriseOptions& options);
+  bool factorise_side_by_side(const BlockMatrix<kBlock>& matrix, const FactoriseOptions& options);
   bool eliminate(const Panel& panel, const BlockMatrix<kBlock>& matrix, const FactoriseOptions& options,
-                 Updates& updates);
-  void assemble(const Panel& panel, const BlockMatrix<kBlock>& matrix, double shift);
+                 const Updates& updates);
+  void assemble(const Panel& panel, const BlockMatrix<kBlock>& matrix, const FactoriseOptions& options);
   void add_updates(const Panel& panel, bool to_columns, const Updates& updates, int threads);
   Real* values_of(const Panel& panel) { return factor_.data() + kBlock * kBlock * panel.at; }
 

@@ -32,7 +32,7 @@ template <class Real>
 void fill(Factor<Real>& factor, const BlockMatrix<3>& matrix, const FactorOptions& options) {
   const double memory_limit_GB = options.memory_limit_GB;
   const double needed_GB =
-      9e-9 * sizeof(Real) * factor.elimination().most_blocks() +
+      1e-9 * sizeof(Real) * factor.elimination().most_numbers(3) +
       8e-9 * (static_cast<double>(matrix.value.size()) + 3.0 * matrix.n * kBlockColumns * options.threads);
   if (needed_GB > memory_limit_GB) {
     // a factor grows at most as the power 4/3 of the unknowns (nested dissection of a cube)
@@ -107,12 +107,13 @@ void SparseCholesky::solve(int n_columns, const std::vector<int>& needed, const 
     if (std::find(own, own + e.panels[k].n_columns, 1) != own + e.panels[k].n_columns) is_needed[k] = 1;
     if (is_needed[k] && e.panels[k].parent >= 0) is_needed[e.panels[k].parent] = 1;
   }
-  const int n_blocks = (n_columns + kBlockColumns - 1) / kBlockColumns;
-  parallel_for(n_blocks, impl_->threads, [&](int block) {
-    const int first = block * kBlockColumns;
-    const int width = std::min(kBlockColumns, n_columns - first);
-    constexpr int kAtATime = kRightHandSides<float>;  // twice those of double
-    const int padded = (width + kAtATime - 1) / kAtATime * kAtATime;
+  constexpr int kAtATime = kRightHandSides<float>;  // twice those of double
+  const auto parts = [](int n, int of) { return (n + of - 1) / of; };
+  const int n_groups = parts(n_columns, kAtATime), threads = std::max(1, impl_->threads);
+  const int n_blocks = std::min(n_groups, parts(parts(n_columns, kBlockColumns), threads) * threads);
+  parallel_for(n_blocks, threads, [&](int block) {
+    const auto begin = [&](int b) { return kAtATime * static_cast<int>(std::int64_t{b} * n_groups / n_blocks); };
+    const int first = begin(block), padded = begin(block + 1) - first, width = std::min(padded, n_columns - first);
     std::vector<double> values(3 * e.place.size() * padded, 0.0);
     for (int k = 0; k < width; ++k) fill(first + k, {&values[k], padded, e.place});
     std::visit([&](const auto& factor) { solve_block(factor, is_needed, padded, values); }, impl_->factor);

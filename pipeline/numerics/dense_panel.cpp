@@ -32,7 +32,7 @@ constexpr std::size_t kChunk = 16;
 // Columns of the factor multiplied at once: eight rows of them take a quarter of the nearest cache.
 constexpr std::size_t kDepth = 128;
 // What threads share of a large panel, and what the second cache holds of it.
-constexpr std::size_t kPanelColumns = 192, kTileRows = 384;
+constexpr std::size_t kPanelColumns = 192, kTileRows = TriangleStrips::kColumns;
 constexpr std::size_t kMostRows = 16;  // of a tile in registers
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -161,9 +161,11 @@ void partial_cholesky(const DensePanel<Real>& l, const Real* least_pivot, Real* 
   }
   const Span below{l.width, l.height};
   const std::size_t n = n_tiles(below.size());
+  const TriangleStrips strips{below.size()};
   const auto square = [&](Span b, Span a) {
-    Real* to = change + (b.begin - l.width) * below.size() + a.begin - l.width;
-    use.subtract_product(l, {0, l.width}, b, a, to, below.size(), false, scratch<Real>());
+    const std::size_t column = b.begin - l.width;
+    use.subtract_product(l, {0, l.width}, b, a, change + strips.at(a.begin - l.width, column), strips.stride(column),
+                         false, scratch<Real>());
   };
   if (n == 1) return square(below, below);
   numerics::parallel_for(static_cast<int>(n * (n + 1) / 2), threads, [&](int which) {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense_panel.h"
 
 namespace mbtfm::numerics {
 namespace {
@@ -18,8 +19,9 @@ using Lists = std::vector<std::vector<int>>;
 // both together are so narrow that the work for them is less than that for a panel.
 constexpr double kStoredZeros = 0.05;
 constexpr int kNarrow = 4;
-// Subtrees of at most this share of the work run side by side: enough of them to balance a handful of threads
-constexpr double kSubtreeShare = 1.0 / 32;
+// Subtrees of at most this share of the work run side by side, until they are that share of it: enough of them to
+// balance a handful of threads, few enough that what they hand on stays small beside the factor
+constexpr double kSubtreeShare = 1.0 / 128, kStageShare = 1.0 / 8;
 
 /// By node: its neighbours, rising.
 Lists neighbours(const BlockPattern& pattern) {
@@ -109,6 +111,10 @@ double work_of(const EliminationPanel& panel) {
 
 }  // namespace
 
+std::size_t EliminationPanel::n_update_numbers(int rows_of_block) const {
+  return TriangleStrips{static_cast<std::size_t>(rows_of_block) * rows.size()}.size();
+}
+
 int EliminationPanel::place_of(int row) const {
   if (row < first + n_columns) return row - first;
   return n_columns + static_cast<int>(std::lower_bound(rows.begin(), rows.end(), row) - rows.begin());
@@ -122,7 +128,7 @@ Elimination::Elimination(const BlockPattern& pattern, Search search) {
   find_panels(graph, node_at);
   tie_panels();
   store_entries(pattern);
-  find_subtrees();
+  find_stages();
 }
 
 void Elimination::find_panels(const Lists& graph, const std::vector<int>& node_at) {
@@ -197,7 +203,7 @@ void Elimination::store_entries(const BlockPattern& pattern) {
     }
 }
 
-void Elimination::find_subtrees() {
+void Elimination::find_stages() {
   const int n = static_cast<int>(panels.size());
   std::vector<double> work(n);
   double all = 0;
@@ -206,38 +212,57 @@ void Elimination::find_subtrees() {
     all += work_of(panels[k]);
     if (panels[k].parent >= 0) work[panels[k].parent] += work[k];
   }
-  std::vector<int> subtree_of(n, -1), roots;
-  for (int k = n - 1; k >= 0; --k) {
-    const int parent = panels[k].parent;
-    if (parent >= 0 && subtree_of[parent] >= 0) {
-      subtree_of[k] = subtree_of[parent];
-    } else if (work[k] <= kSubtreeShare * all) {
-      subtree_of[k] = static_cast<int>(roots.size());
-      roots.push_back(k);
+  const auto is_small = [&](int k) { return k >= 0 && work[k] <= kSubtreeShare * all; };
+  double taken = 0;
+  int root = -1;  // of the subtree that the panel before was of
+  for (int k = 0; k < n; ++k) {
+    if (stages.empty()) stages.emplace_back();
+    if (!is_small(k)) {
+      stages.back().above.push_back(k);
+      continue;
     }
+    if (k > root) {  // each subtree in a row
+      for (root = k; is_small(panels[root].parent);) root = panels[root].parent;
+      if (taken >= kStageShare * all) {
+        stages.emplace_back();
+        taken = 0;
+      }
+      taken += work[root];
+      stages.back().subtrees.emplace_back();
+    }
+    stages.back().subtrees.back().push_back(k);
   }
-  std::vector<int> rank(roots.size()), place_of(roots.size());
-  std::iota(rank.begin(), rank.end(), 0);
-  std::stable_sort(rank.begin(), rank.end(), [&](int a, int b) { return work[roots[a]] > work[roots[b]]; });
-  for (std::size_t r = 0; r < rank.size(); ++r) place_of[rank[r]] = static_cast<int>(r);
-  subtrees.resize(roots.size());
-  for (int k = 0; k < n; ++k) (subtree_of[k] < 0 ? above : subtrees[place_of[subtree_of[k]]]).push_back(k);
+  for (Stage& stage : stages)
+    std::stable_sort(stage.subtrees.begin(), stage.subtrees.end(),
+                     [&](const auto& a, const auto& b) { return work[a.back()] > work[b.back()]; });
 }
 
 std::size_t Elimination::n_blocks() const { return panels.empty() ? 0 : panels.back().at + panels.back().n_blocks(); }
 
-double Elimination::most_blocks() const {
-  // of the tree walked children first; side by side, each subtree has its own stack: that of the largest for each
+std::size_t Elimination::most_update_numbers(int rows_of_block) const {
+  std::size_t stack = 0, most = 0;
+  for (const EliminationPanel& panel : panels) {
+    stack += panel.n_update_numbers(rows_of_block);
+    most = std::max(most, stack);
+    for (const int child : panel.children) stack -= panels[child].n_update_numbers(rows_of_block);
+  }
+  return most;
+}
+
+double Elimination::most_numbers(int rows_of_block) const {
   double stack = 0, most = 0;
   const auto visit = [&](int k) {
-    stack += static_cast<double>(panels[k].n_update_blocks());
+    stack += static_cast<double>(panels[k].n_update_numbers(rows_of_block));
     most = std::max(most, stack);
-    for (const int child : panels[k].children) stack -= static_cast<double>(panels[child].n_update_blocks());
+    for (const int child : panels[k].children)
+      stack -= static_cast<double>(panels[child].n_update_numbers(rows_of_block));
   };
-  for (const std::vector<int>& subtree : subtrees)
-    for (const int k : subtree) visit(k);
-  for (const int k : above) visit(k);
-  return static_cast<double>(n_blocks()) + most;
+  for (const Stage& stage : stages) {
+    for (const std::vector<int>& subtree : stage.subtrees)
+      for (const int k : subtree) visit(k);
+    for (const int k : stage.above) visit(k);
+  }
+  return static_cast<double>(rows_of_block * rows_of_block) * static_cast<double>(n_blocks()) + most;
 }
 
 }  // namespace mbtfm::numerics

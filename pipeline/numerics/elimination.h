@@ -39,7 +39,7 @@ struct EliminationPanel {
 
   std::size_t height() const { return static_cast<std::size_t>(n_columns) + rows.size(); }
   std::size_t n_blocks() const { return height() * static_cast<std::size_t>(n_columns); }
-  std::size_t n_update_blocks() const { return rows.size() * rows.size(); }
+  std::size_t n_update_numbers(int rows_of_block) const;  ///< of what it hands on: TriangleStrips
   int place_of(int row) const;
 };
 
@@ -50,20 +50,28 @@ struct Elimination {
   /// Nested dissection (METIS), elimination tree, panels. @throws InternalError where METIS fails
   Elimination(const BlockPattern& pattern, Search search);
 
-  std::vector<int> place;                  ///< by node: its column of the factor
-  std::vector<EliminationPanel> panels;    ///< children before parents
-  std::vector<std::vector<int>> subtrees;  ///< panels of each that is run whole, by falling work
-  std::vector<int> above;                  ///< the others, children first
+  /// Subtrees side by side, each run whole; then the panels above them, one after the other.
+  struct Stage {
+    std::vector<std::vector<int>> subtrees;  ///< by falling work
+    std::vector<int> above;                  ///< children first
+  };
+
+  std::vector<int> place;                ///< by node: its column of the factor
+  std::vector<EliminationPanel> panels;  ///< children before parents
+  std::vector<Stage> stages;             ///< in turn, so that few subtrees wait for their parents at a time
 
   std::size_t n_blocks() const;  ///< of the factor
-  /// The most blocks that the factor and the updates take at a time, for any number of threads.
-  double most_blocks() const;
+  /// The most numbers that updates take at a time where the panels come one after the other.
+  std::size_t most_update_numbers(int rows_of_block) const;
+  /// The most numbers that the factor and the updates take at a time, for any number of threads and blocks of so many
+  /// rows.
+  double most_numbers(int rows_of_block) const;
 
  private:
   void find_panels(const std::vector<std::vector<int>>& graph, const std::vector<int>& node_at);
   void tie_panels();
   void store_entries(const BlockPattern& pattern);
-  void find_subtrees();
+  void find_stages();
   std::vector<int> panel_of_column() const;
 };
 

@@ -1,9 +1,11 @@
 #include "pipeline/numerics/memory.h"
 
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -25,6 +27,13 @@ void expect_room_for(const Demand& demand) {
   throw OutOfMemory(demand.what + " would have " + brief(demand.count) + " " + demand.parts + ", which take " +
                     gigabytes(needed) + " of memory at the least; allowed are " + gigabytes(allowed) + ": " +
                     demand.remedy);
+}
+
+void use_large_pages(void* begin, std::size_t bytes) {
+  constexpr std::uintptr_t kPage = std::uintptr_t{2} << 20;
+  const auto first = reinterpret_cast<std::uintptr_t>(begin);
+  const std::uintptr_t low = (first + kPage - 1) / kPage * kPage, high = (first + bytes) / kPage * kPage;
+  if (low < high) madvise(reinterpret_cast<void*>(low), high - low, MADV_HUGEPAGE);
 }
 
 }  // namespace mbtfm::numerics

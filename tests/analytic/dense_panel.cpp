@@ -15,6 +15,27 @@ constexpr int kHeights[] = {1, 2, 7, 8, 9, 16, 18, 31, 128, 150, 290};
 // And about the columns (192) and rows (384) that threads share.
 constexpr int kLargeHeight = 900, kLargeWidth = 401;
 
+/// The lower triangle of what strips hold; zero above.
+template <class Real>
+Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic> square_of(const std::vector<Real>& values, std::size_t n) {
+  const TriangleStrips strips{n};
+  Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic> square(n, n);
+  square.setZero();
+  for (std::size_t column = 0; column < n; ++column)
+    for (std::size_t row = column; row < n; ++row) square(row, column) = values[strips.at(row, column)];
+  return square;
+}
+
+TEST(TriangleStrips, have_a_place_of_its_own_for_each_number_and_little_more_than_half_the_square) {
+  for (const std::size_t n : {0u, 1u, 383u, 384u, 385u, 1200u}) {
+    const TriangleStrips strips{n};
+    std::vector<int> taken(strips.size());
+    for (std::size_t column = 0; column < n; ++column)
+      for (std::size_t row = column; row < n; ++row) ASSERT_EQ(taken.at(strips.at(row, column))++, 0);
+    EXPECT_LE(strips.size(), n * (n + TriangleStrips::kColumns) / 2);
+  }
+}
+
 TEST(PartialCholesky, is_the_factor_and_the_schur_complement) {
   for (const int height : kHeights)
     for (const int width : kHeights) {
@@ -62,14 +83,13 @@ Results<Real> results_of(std::size_t height, std::size_t width, std::size_t n_ri
                          Instructions instructions) {
   std::srand(1);
   using Matrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
-  const auto below = static_cast<Eigen::Index>(height - width);
   Matrix columns = Matrix::Random(static_cast<Eigen::Index>(height), static_cast<Eigen::Index>(width));
   columns.diagonal().array() += static_cast<Real>(height);
-  Matrix change = Matrix::Zero(below, below);
+  std::vector<Real> change(TriangleStrips{height - width}.size());
   const std::vector<Real> least_pivot(width, 0);
   partial_cholesky<Real>({columns.data(), height, width}, least_pivot.data(), change.data(), threads, instructions);
   Matrix kept = columns.template triangularView<Eigen::Lower>();
-  Matrix kept_change = change.template triangularView<Eigen::Lower>();
+  const Matrix kept_change = square_of(change, height - width);
   Matrix start = Matrix::Random(static_cast<Eigen::Index>(n_right_hand_sides), static_cast<Eigen::Index>(height));
   Results<Real> results{{kept.reshaped().begin(), kept.reshaped().end()},
                         {kept_change.reshaped().begin(), kept_change.reshaped().end()},
@@ -108,7 +128,8 @@ TYPED_TEST(Panels, large_ones_are_the_factor_too) {
   using Matrix = Eigen::Matrix<TypeParam, Eigen::Dynamic, Eigen::Dynamic>;
   const Matrix root = Matrix::Random(kLargeHeight, kLargeHeight);
   const Matrix a = Matrix::Identity(kLargeHeight, kLargeHeight) + root * root.transpose() / kLargeHeight;
-  Matrix columns = a.leftCols(kLargeWidth), change(kLargeHeight - kLargeWidth, kLargeHeight - kLargeWidth);
+  Matrix columns = a.leftCols(kLargeWidth);
+  std::vector<TypeParam> change(TriangleStrips{kLargeHeight - kLargeWidth}.size());
   const std::vector<TypeParam> least_pivot(kLargeWidth, 0);
   partial_cholesky<TypeParam>({columns.data(), kLargeHeight, kLargeWidth}, least_pivot.data(), change.data());
   // height² times rounding
@@ -117,7 +138,7 @@ TYPED_TEST(Panels, large_ones_are_the_factor_too) {
   const Matrix whole = a.llt().matrixL();
   EXPECT_LT((lower - whole.leftCols(kLargeWidth)).norm(), rounding);
   const Matrix below = lower.bottomRows(kLargeHeight - kLargeWidth);
-  const Matrix difference = change + below * below.transpose();
+  const Matrix difference = square_of(change, kLargeHeight - kLargeWidth) + below * below.transpose();
   EXPECT_LT(Matrix(difference.template triangularView<Eigen::Lower>()).norm(), rounding);
 }
 
