@@ -20,8 +20,8 @@ struct Demand {
 /// @throws OutOfMemory with the count and the memory, where it would take more than four fifths of memory_bytes()
 void expect_room_for(const Demand& demand);
 
-/// Ask the system for large pages where there is nothing yet: a gigabyte is then at hand in a third of the time, and
-/// columns far apart are found sooner. Less than such a page, or a system without them: nothing happens.
+/// Ask the system for large pages where there is nothing yet: fewer of them have to be handed out. Less than such a
+/// page, or a system without them: nothing happens.
 void use_large_pages(void* begin, std::size_t bytes);
 
 }  // namespace mbtfm::numerics
