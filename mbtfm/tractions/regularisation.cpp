@@ -153,10 +153,7 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removabl
   const RiskScale scale(scan.risk);
   std::vector<double> tamed;
   for (const double r : scan.risk) tamed.push_back(scale.to(r));
-  // Directions that the data hardly see count with 1 / lambda²: where the model is off by more there than the noise,
-  // the risk falls to the end of the scan. What is best for the tractions smooths more than what is best for the
-  // displacements, as long as the tractions hold no more of a direction the less the data see it: so never less.
-  scan.by_risk = std::max(lambda_at(smallest_at(tamed)), scan.by_gcv);
+  scan.by_risk = lambda_at(smallest_at(tamed));
   return scan;
 }
 
