@@ -12,7 +12,7 @@ namespace mbtfm::cells {
 struct Trace {
   std::vector<cv::Point2d> points;
   std::vector<double> height;   ///< of the ridge at each
-  std::vector<bool> is_shared;  ///< the height is that of another line, upon which it runs there
+  std::vector<bool> is_shared;  ///< the height tells nothing of this line: it is another one's, or a gap's
 
   std::size_t size() const { return points.size(); }
   /// The points from `from` to before `to`.

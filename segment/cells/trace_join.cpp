@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -102,27 +102,58 @@ bool is_bright_between(const Parabola& way, double from, double to, const Ridges
   return mean >= rule.follow_noise && least >= kDark * rule.follow_noise;
 }
 
+double sum_of_squares(std::initializer_list<double> parts) {
+  return std::inner_product(parts.begin(), parts.end(), parts.begin(), 0.0);
+}
+
+/// By turn, offset, gap and height: pieces that are too short tell no parabola.
+std::optional<double> mismatch_of_short(const EndPoint& a, const EndPoint& b, const Parabola& way,
+                                        const TraceRule& rule) {
+  constexpr double kTurn = 0.14;   // 8°: by as much a fibre turns from the one to the other
+  constexpr double kHeight = 0.5;  // logarithm
+  constexpr double kWorst = 9, kNearer = 0.64;
+  const cv::Point2d gap = b.point - a.point;
+  const double distance = std::hypot(gap.x, gap.y), nearest = kNearer * rule.join_gap_px;
+  if (distance > nearest) return std::nullopt;
+  if (std::min(a.height, b.height) < rule.follow_share * std::max(a.height, b.height)) return std::nullopt;
+  const double open = gap.dot(way.along) < 0 ? 0 : 0.1 * distance;
+  const double sum = sum_of_squares({angle_between(a.outward, -b.outward) / kTurn,
+                                     gap.cross(way.along) / (rule.line_radius_px / 2 + open), 2 * distance / nearest,
+                                     std::log(a.height / b.height) / kHeight});
+  return sum <= kWorst ? std::optional(sum) : std::nullopt;
+}
+
+std::optional<double> mismatch_of_long(const EndPoint& a, const EndPoint& b, const Parabola& way,
+                                       const TraceRule& rule) {
+  constexpr double kTurn = 0.14;
+  constexpr double kMisfit = 0.09;  // of the line's radius
+  constexpr double kHeight = 1;     // over the nucleus a fibre dims by a factor of 2 to 5
+  constexpr double kWorst = 7;
+  constexpr double kFarther = 1.5;  // than what is known of the shorter one no parabola is drawn out
+  const double ahead = way.place_of(b.point) - way.place_of(a.point);
+  if (ahead > kFarther * static_cast<double>(std::min(a.part.size(), b.part.size()))) return std::nullopt;
+  const cv::Point2d gap = b.point - a.point;
+  const double sum =
+      sum_of_squares({angle_between(a.outward, -b.outward) / kTurn, way.misfit_px / (kMisfit * rule.line_radius_px),
+                      way.bend * rule.smallest_radius_px, 2 * std::hypot(gap.x, gap.y) / rule.join_gap_px,
+                      std::log(a.height / b.height) / kHeight});
+  return sum <= kWorst ? std::optional(sum) : std::nullopt;
+}
+
 /// How badly two ends fit to one line, the sum of the squares of what separates them in its usual size; nothing where
 /// they do not. What is usual was counted among the ends of simulated cells (docs/developers/dense_fibres.md).
 std::optional<double> mismatch(const EndPoint& a, const EndPoint& b, const Ridges& ridges, const TraceRule& rule) {
-  constexpr double kTurn = 0.14, kMostTurn = 1;  // 8°: by as much a fibre turns from the one to the other
-  constexpr double kMisfit = 0.09;               // of the line's radius
-  constexpr double kHeight = 1;                  // logarithm: over the nucleus a fibre dims by a factor of 2 to 5
-  constexpr double kWorst = 7;
-  constexpr double kFarther = 1.5;  // than what is known of the shorter one no parabola is drawn out
+  constexpr double kMostTurn = 1;
   const cv::Point2d gap = b.point - a.point;
-  const double distance = std::hypot(gap.x, gap.y), turn = angle_between(a.outward, -b.outward);
-  if (distance > rule.join_gap_px || turn > kMostTurn) return std::nullopt;
+  if (std::hypot(gap.x, gap.y) > rule.join_gap_px) return std::nullopt;
+  if (angle_between(a.outward, -b.outward) > kMostTurn) return std::nullopt;
   const Parabola way = parabola_through(a, b);
-  const double from = way.place_of(a.point), to = way.place_of(b.point), ahead = to - from;
-  if (-ahead > rule.overlap_px) return std::nullopt;
-  if (ahead > kFarther * static_cast<double>(std::min(a.part.size(), b.part.size()))) return std::nullopt;
-  const double parts[] = {turn / kTurn, way.misfit_px / (kMisfit * rule.line_radius_px),
-                          way.bend * rule.smallest_radius_px, 2 * distance / rule.join_gap_px,
-                          std::log(a.height / b.height) / kHeight};
-  const double sum = std::inner_product(std::begin(parts), std::end(parts), std::begin(parts), 0.0);
-  if (!(sum <= kWorst)) return std::nullopt;
-  if (ahead > 2 * rule.line_radius_px && !is_bright_between(way, from, to, ridges, rule)) return std::nullopt;
+  const double from = way.place_of(a.point), to = way.place_of(b.point);
+  if (from - to > rule.overlap_px) return std::nullopt;
+  const bool is_short = static_cast<double>(std::min(a.part.size(), b.part.size())) < rule.course_px;
+  const auto sum = is_short ? mismatch_of_short(a, b, way, rule) : mismatch_of_long(a, b, way, rule);
+  if (!sum) return std::nullopt;
+  if (to - from > 2 * rule.line_radius_px && !is_bright_between(way, from, to, ridges, rule)) return std::nullopt;
   return sum;
 }
 
@@ -204,7 +235,7 @@ Trace bridge(const Trace& line, const Trace& next, const Ridges& ridges, const T
     const double share = (x - from) / (to - from);
     trace.points.push_back(way.at(x) + ((1 - share) * missed + share * missed_next) * left_of(way.along));
     trace.height.push_back(ridges.at(trace.points.back(), way.angle_at(x)));
-    trace.is_shared.push_back(false);
+    trace.is_shared.push_back(true);  // chosen because it is bright: that says nothing about the line
   }
   return trace;
 }
