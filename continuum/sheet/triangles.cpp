@@ -179,12 +179,7 @@ void insert_curve(Seeded& seeded, const Curve& curve, SheetIs where, int number,
   }
   for (std::size_t k = 0; k < places.size(); ++k) {
     const std::size_t next = (k + 1) % places.size(), before = (k + places.size() - 1) % places.size();
-    try {
-      seeded.delaunay.insert_constraint(handles[k], handles[next]);
-    } catch (const Delaunay::Intersection_of_constraints_exception&) {
-      throw InvalidData("the sheet's outline", "curves that do not cross each other",
-                        "two that cross near (" + brief(places[k].x) + ", " + brief(places[k].y) + ") um");
-    }
+    seeded.delaunay.insert_constraint(handles[k], handles[next]);
     seeded.points_um.push_back(places[k]);
     // the mesher compares it with longest sides, which are a fifth longer than a triangle's mean
     seeded.sizes_um.push_back(1.2 * std::max(norm(places[next] - places[k]), norm(places[before] - places[k])));

@@ -23,7 +23,7 @@ std::shared_ptr<const sheet::Elements> coarse_elements(const sheet::Region& regi
   try {
     return std::make_shared<const sheet::Elements>(
         sheet::triangulated(region, size, static_cast<std::size_t>(4 * kMostTriangles)));
-  } catch (const InvalidData&) {
+  } catch (const std::exception&) {  // also the triangulation's own: curves that cross where their polygon does not
     return nullptr;
   }
 }
