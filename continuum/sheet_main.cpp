@@ -56,7 +56,7 @@ void declare(stage::ParameterList& list, Parameters& p) {
   modulus.member = &p.gel_modulus_kPa;
   modulus.is_required = false;
   modulus.default_value = "";
-  modulus.meaning += "; unset: the sheet stands on springs, or on nothing";
+  modulus.meaning += "; unset: springs carry the sheet, or nothing does";
   declare(list, p.substrate);
   declare(list, p.substrate.effects, {"finite_thickness", "finite_sides", "depth_graded_gel", "effect_tolerance"});
   declare(list, p.sheet);
@@ -749,7 +749,7 @@ int main(int argc, char** argv) {
            {{"outline", Kind::input,
              "outline of the sheet: outline.csv, a mask (PNG, TIFF) or an ImageJ selection (.roi, .zip)"},
             {"traction", Kind::optional_input,
-             "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 where they lie on no lattice): "
+             "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 if they lie on no lattice): "
              "tensions follow from it"},
             {"displacement", Kind::optional_input,
              "displacement.csv of the beads: contraction and stiffness are fitted to them"},

@@ -67,8 +67,8 @@ StageReport run(const spatial::StageParameters& p, stage::StageContext& context)
                    sums.where + ", relative L2 " + brief(r.relative_l2);
   if (r.length_um) report.summary += ", lambda E " + brief(*r.length_um) + " um";
   if (assumed_um) {
-    report.summary +=
-        "; the field states no errors: " + brief(*assumed_um) + " um is assumed for all, as its neighbours tell";
+    report.summary += "; the field states no errors: " + brief(*assumed_um) +
+                      " um is assumed for all, estimated from neighbouring beads";
   }
   if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged beads left out";
   report.converged = r.report.converged;
@@ -94,16 +94,16 @@ int main(int argc, char** argv) {
   return mbtfm::stage::run_stage<mbtfm::spatial::StageParameters>(
       {.name = "traction",
        .purpose = "reconstruct tractions from bead displacements by a standard method",
-       .files =
-           {{"displacement", FileArgument::Kind::input,
-             "displacement.csv of the beads, without the column sigma_um their errors are told from neighbours; or "
-             "displacement_3d.csv of beads in space"},
-            {"surface", FileArgument::Kind::optional_input,
-             "surface.vtp of mbtfm-surface, where the gel is not flat; its z = 0 is thickness_um above the base"},
-            {"adhesions", FileArgument::Kind::optional_input, "adhesions.csv: forces are summed up by adhesion"},
-            {"outline", FileArgument::Kind::optional_input, "outline.csv: sums are taken over the cell"},
-            {"out", FileArgument::Kind::output,
-             "traction.csv; traction.vtp, traction.json, traction_lambda.csv and .svg, and "
-             "traction_adhesion_forces.csv come beside it"}}},
+       .files = {{"displacement", FileArgument::Kind::input,
+                  "displacement.csv of the beads, without the column sigma_um their errors are estimated from "
+                  "neighbours; or "
+                  "displacement_3d.csv of beads in space"},
+                 {"surface", FileArgument::Kind::optional_input,
+                  "surface.vtp of mbtfm-surface, if the gel is not flat; its z = 0 is thickness_um above the base"},
+                 {"adhesions", FileArgument::Kind::optional_input, "adhesions.csv: forces are summed up by adhesion"},
+                 {"outline", FileArgument::Kind::optional_input, "outline.csv: sums are taken over the cell"},
+                 {"out", FileArgument::Kind::output,
+                  "traction.csv; traction.vtp, traction.json, traction_lambda.csv and .svg, and "
+                  "traction_adhesion_forces.csv come beside it"}}},
       argc, argv, run);
 }

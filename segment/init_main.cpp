@@ -115,7 +115,7 @@ Written cell_toml(const fs::path& folder) {
     if (file == roles.files.end()) {
       const bool is_needed = key != std::string("surface_beads") && (!stacks || std::string(key).starts_with("beads_"));
       if (!is_needed) continue;  // a cell in space may have no other images
-      images += "# " + std::string(key) + " = \"\"    # which file? no name tells\n";
+      images += "# " + std::string(key) + " = \"\"    # which file? no name shows it\n";
       open.push_back(std::string(key) + " in [images]");
       continue;
     }

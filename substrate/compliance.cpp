@@ -14,13 +14,13 @@ void declare(stage::ParameterList& list, SubstrateParameters& p) {
   list.table("substrate");
   list.add("model", p.model, "elastic model of the gel; auto: the cheapest that has the effects that are on");
   list.add("material", p.material,
-           "law of the gel: linear (small strains), or neo-hooke, where the tractions call for large ones");
+           "law of the gel: linear (small strains), or neo-hooke, if the tractions are large enough");
   list.add("displacement_tolerance", p.displacement_tolerance, Range::between(0, 1),
            "refined, curved: relative L2 error of an adhesion's displacements, mean over adhesions, that the mesh is "
            "refined "
            "until it is estimated to have; 0: the first mesh, no error estimated");
   list.add("modulus_profile", p.modulus_profile,
-           "depths (um) and Young's moduli (kPa), linear between, a step where a depth stands twice: '0:16, "
+           "depths (um) and Young's moduli (kPa), linear between, a step if a depth is given twice: '0:16, "
            "10:16, 10:8.4'; empty: youngs_modulus_kPa throughout");
   list.add("margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
            "split, refined, curved: from the adhesions and beads to the sides of the block where the gel's own are far "

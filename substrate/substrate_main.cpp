@@ -245,7 +245,7 @@ void write_result(stage::StageContext& context, const substrate::Substrate& mode
     return write_at_points(context, model, load, figures);
   }
   if (!load.into_the_gel_nN.empty())
-    throw UsageError("expected --points where forces point into the gel: pictures show those along it");
+    throw UsageError("expected --points if forces point into the gel: pictures show those along it");
   const Path file = context.output("out");
   if (context.outputs_.at("out").extension() != ".vtu") {
     throw UsageError("expected --points, or an --out that ends with .vtu or volume.vtu");
@@ -337,9 +337,9 @@ int main(int argc, char** argv) {
                  {"forces", Kind::optional_input, "adhesion_forces.csv: adhesion_id, fx_nN, fy_nN; fz_nN into the gel"},
                  {"traction", Kind::optional_input,
                   "instead of those: tractions on a lattice: x_um, y_um, tx_kPa, ty_kPa; tz_kPa into the "
-                  "gel; area_um2 where it is none"},
+                  "gel; area_um2 if it is none"},
                  {"surface", Kind::optional_input,
-                  "surface.vtp of mbtfm-surface, where the gel is not flat; its z = 0 is thickness_um above the base"},
+                  "surface.vtp of mbtfm-surface, if the gel is not flat; its z = 0 is thickness_um above the base"},
                  {"points", Kind::optional_input,
                   "points: x_um, y_um; z_um into the gel, from a flat surface or from the z = 0 of surface.vtp"},
                  {"out", Kind::output,

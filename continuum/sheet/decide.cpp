@@ -22,8 +22,8 @@ GroundChoice decide_ground(std::optional<Ground> asked, const Material& material
                            std::optional<double> adhesion_nN_per_um3, const std::optional<Gel>& gel) {
   const bool has_springs = adhesion_nN_per_um3.has_value();
   if (asked == Ground::springs && !has_springs)
-    throw UsageError("[sheet] adhesion_stiffness_nN_per_um3 is missing: ground = springs stands on it");
-  if (asked == Ground::gel && !gel) throw UsageError("[gel] youngs_modulus_kPa is missing: ground = gel stands on it");
+    throw UsageError("[sheet] adhesion_stiffness_nN_per_um3 is missing: ground = springs needs it");
+  if (asked == Ground::gel && !gel) throw UsageError("[gel] youngs_modulus_kPa is missing: ground = gel needs it");
   if (!asked && !gel && !has_springs)
     throw UsageError(
         "the sheet has no ground: give [gel] youngs_modulus_kPa, or [sheet] adhesion_stiffness_nN_per_um3 for springs");

@@ -20,10 +20,9 @@ void declare(stage::ParameterList& list, SheetParameters& p) {
            "stiffness of the adhesions per area, or of springs that stand for the ground (nN/um3 = kPa/um); unset: the "
            "sheet is bonded to the gel");
   list.add("ground", p.ground,
-           "what the sheet stands on; auto: the gel, or springs where no gel is given or the gel is much stiffer than "
+           "what carries the sheet; auto: the gel, or springs if no gel is given or the gel is much stiffer than "
            "the adhesions; none: the tractions are given");
-  list.add("strain", p.strain,
-           "small strains or large ones; auto: large on springs where the contraction calls for it");
+  list.add("strain", p.strain, "small strains or large ones; auto: large on springs if the contraction is large");
   list.add("contraction_measure", p.contraction_measure,
            "large strain: what the contraction is a tension of: the deformed surface, or the material at rest");
   list.add("mesh_um", p.mesh_um, Range::mesh_um(), "size of the triangles at the edge (um); unset: by the scene");

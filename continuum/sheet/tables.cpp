@@ -13,7 +13,7 @@ const files::Table<SheetPoint>& sheet_table() {
   using Row = SheetPoint;
   static const files::Table<Row> table{
       .file = "sheet.csv",
-      .row = "each point given to `mbtfm-sheet`, or each node of its mesh; empty fields where a point is outside",
+      .row = "each point given to `mbtfm-sheet`, or each node of its mesh; empty fields if a point is outside",
       .columns = {
           {"x_um", "the point", [](const Row& row) { return row.position_um.x; }},
           {"y_um", "the point", [](const Row& row) { return row.position_um.y; }},

@@ -26,11 +26,11 @@ TakenCell take_cell(const Inputs& inputs, const stage::EffectSwitches& switches)
   const auto has_fibre = [](const Link& link) { return link.fibre_id != 0; };
   if (!taken.fibres.is_on && std::ranges::any_of(inputs.network.links, has_fibre)) {
     throw InputError(inputs.network_file, "a network without stress fibres, as effects.stress_fibres says", "fibres",
-                     "span it anew: mbtfm-network with the same cell.toml");
+                     "make it again: mbtfm-network with the same cell.toml");
   }
   if (cuts_of(taken.cell).empty() != inputs.network.held_by_cut.empty()) {
     throw InputError(inputs.network_file, "a network that the cut of outline.csv holds",
-                     "of an outline with another cut", "span it anew: mbtfm-network with the same cell");
+                     "of an outline with another cut", "make it again: mbtfm-network with the same cell");
   }
   return taken;
 }

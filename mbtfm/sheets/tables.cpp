@@ -19,7 +19,7 @@ const files::Table<SheetEstimate>& estimate_table() {
            &Row::part},
           {"value", "where the misfit is least", &Row::value, {.digits = kForPeople}},
           {"sigma",
-           "standard error; empty where the beads do not tell the quantity",
+           "standard error; empty if the beads do not determine the quantity",
            &Row::sigma,
            {.digits = kForPeople}},
           {"low", "lower end of the 95 % interval; empty: none", &Row::low, {.digits = kForPeople}},

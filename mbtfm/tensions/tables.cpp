@@ -71,7 +71,7 @@ const Table<FitOfFrame>& frame_fit_table() {
            },
            kResult},
           of_fit("relative_l2", "‖measured − model‖ / ‖measured‖", &FrameFit::relative_l2),
-          of_fit("chi_squared_per_degree", "1 where the model explains all but the noise",
+          of_fit("chi_squared_per_degree", "1 if the model explains all but the noise",
                  &FrameFit::chi_squared_per_degree),
           of_fit("converged", "the fit came to its end", &FrameFit::converged),
           {"refused", "why the frame has no fit; empty: it has", fit(&FrameFit::refused)},
@@ -139,7 +139,7 @@ std::vector<DrawRow> draw_rows(const CrossValidation& result) {
 const Table<DrawRow>& draw_table() {
   static const Table<DrawRow> table{
       .file = "4_fit/cross_validation.csv",
-      .row = "each draw of tensions (where draws are asked for)",
+      .row = "each draw of tensions (if draws are asked for)",
       .columns = {{"draw", "counts from 1", &DrawRow::draw},
                   {"own", "relative L2 of tensions drawn by fibre type", &DrawRow::own, kResult},
                   {"exchanged", "the same with dorsal and ventral exchanged", &DrawRow::exchanged, kResult}}};

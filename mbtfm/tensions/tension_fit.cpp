@@ -8,20 +8,20 @@ void declare(stage::ParameterList& list, FitParameters& p) {
   list.table("fit");
   list.add("method", p.method, "how the tensions are found");
   list.add("gradients", p.gradients, "of the conjugate gradient methods");
-  list.add("robust_kind", p.robust_kind, "what a bead's residual costs where the effect robust_loss is on",
+  list.add("robust_kind", p.robust_kind, "what a bead's residual costs if the effect robust_loss is on",
            {Loss::huber, Loss::tukey, Loss::l1});
   list.add("substrate", p.substrate, "how a trial's displacements come about; per-evaluation: solved for each trial");
   list.add("region_um", p.region_um, Range::zero_or_size_um(),
            "beads further than this outside the outline are left out of the fit (um); unset: none is");
   list.add("n_meshes", p.n_meshes, Range::between(1, 1000),
-           "networks to fit on; tensions are their mean, and two or more tell the error of the model");
+           "networks to fit on; tensions are their mean, and two or more also give the error of the model");
   list.add("tolerance", p.tolerance, Range::between(1e-15, 1),
            "relative change of the tensions at which the fit stops");
   list.add("max_steps", p.max_steps, Range::between(1, 100000), "steps of Gauss-Newton at most");
   list.add("max_evaluations", p.max_evaluations, Range::between(1, 10000000),
            "equilibria solved by a conjugate gradient method at most");
   list.add("far_distance_um", p.far_distance_um, Range::zero_or_size_um(),
-           "beads this far outside the outline tell the noise level (um)");
+           "beads this far outside the outline give the noise level (um)");
   list.add("frame_interval_s", p.frame_interval_s, Range::between(1e-6, 1e7),
            "time between the frames of a series (s)");
   list.add("bootstrap", p.bootstrap, Range::between(0, 1000000),

@@ -131,9 +131,10 @@ void declare(stage::ParameterList& list, NetworkParameters& parameters) {
            "growth of the edge length with distance from what is resolved finer");
   list.add("seed", parameters.seed, "of the first placement of the vertices");
   list.add("seeds", parameters.seeds, "first placement of the vertices");
-  list.add("link_weights", parameters.link_weights,
-           "tension and stiffness of the actin network's links: the same for all, or by the width of material each "
-           "stands for");
+  list.add(
+      "link_weights", parameters.link_weights,
+      "tension and stiffness of the actin network's links: the same for all, or by the width of material that each "
+      "represents");
   list.add("link_reach", parameters.link_reach,
            "what the actin network's links join: vertices at the two ends of an edge, or also those across from each "
            "other at one, so that links run in twelve directions rather than six");
@@ -142,7 +143,7 @@ void declare(stage::ParameterList& list, NetworkParameters& parameters) {
            "or the one at its centre");
   list.add("rim_points", parameters.rim_points, Range::between(3, 1000), "vertices round an adhesion's rim, at least");
   list.add("free_fibre_ends", parameters.free_fibre_ends,
-           "edge length where a fibre ends freely: as elsewhere, or the fibre's width");
+           "edge length at the free end of a fibre: as elsewhere, or the fibre's width");
 }
 
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters) {

@@ -43,13 +43,13 @@ const files::Table<CostRow>& cost_table() {
       .row = "each value of each knob that was tried",
       .columns = {{"knob", "the parameter", [](const Row& row) { return row.measured.rung.knob; }},
                   {"value", "its value", [](const Row& row) { return row.measured.rung.value; }},
-                  {"seconds", "of all stages where the cell has its images, else of network and fit",
+                  {"seconds", "of all stages if the cell has its images, else of network and fit",
                    of(&Measurement::seconds), kResult},
                   {"cpu_seconds", "the same of all threads", of(&Measurement::cpu_seconds), kResult},
                   {"peak_memory_MB", "the largest of the stages", of(&Measurement::peak_memory_MB), kResult},
                   {"n_runs", "of which the times are the median", of(&Measurement::n_runs)},
                   {"tension_error",
-                   "‖t − reference‖/‖reference‖ over the fibres; the reference is the truth where it "
+                   "‖t − reference‖/‖reference‖ over the fibres; the reference is the truth if it "
                    "is known, else the finest choice",
                    of(&Measurement::tension_error), kResult},
                   {"force_error", "of the total force, relative", of(&Measurement::force_error), kResult},

@@ -225,7 +225,7 @@ std::string page_of(const Table<Row>& table) {
   std::string page =
       "\n## `" + table.file + "`\n\nA row for " + table.row + ".\n\n| column | is | values |\n|---|---|---|\n";
   for (const auto& c : table.columns)
-    page += "| `" + c.name + "` | " + c.meaning + " | " + c.kind + (c.may_lack ? "; may lack" : "") + " |\n";
+    page += "| `" + c.name + "` | " + c.meaning + " | " + c.kind + (c.may_lack ? "; may be missing" : "") + " |\n";
   return page;
 }
 

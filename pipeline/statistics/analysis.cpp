@@ -53,7 +53,7 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
   }
   if (n_unknown > 0) {
     warnings.push_back(fmt::format(
-        "The tensions of {} of {} fibres could not be identified and do not enter: where these are the weak ones, the "
+        "The tensions of {} of {} fibres could not be identified and do not enter: if these are the weak ones, the "
         "means of the others are too large.",
         n_unknown, n_fibres));
   }
@@ -114,7 +114,7 @@ void warn_of_pseudo_replication(const Measure& m, std::vector<std::string>& warn
     }
     if (smallest < kLevel) continue;
     warnings.push_back(fmt::format(
-        "{}{}: {} and {} {} differ where each counts for itself (p = {}), not with the cell as the unit (p = {}): to "
+        "{}{}: {} and {} {} differ if each counts for itself (p = {}), not with the cell as the unit (p = {}): to "
         "claim the former would be pseudo-replication.",
         prefix_of(by_value.within), m.sample.name, kind_for_people(by_value.group_a), kind_for_people(by_value.group_b),
         name_of(m.sample.each), charts::readable(*by_value.p_holm), charts::readable(smallest)));

@@ -165,14 +165,14 @@ bool is_measured(const Tension& t) {
 void declare(stage::ParameterList& list, StudyParameters& parameters) {
   list.table("stats");
   list.add("condition_from", parameters.condition_from,
-           "where a cell's condition is told: `folder` (the first folder below the study's), `folder2` (the one below "
-           "that), or the name of a column of --table; empty: the column `condition` where the table has one");
+           "source of a cell's condition: `folder` (the first folder below the study's), `folder2` (the one below "
+           "that), or the name of a column of --table; empty: the column `condition` if the table has one");
   list.add("conditions", parameters.conditions,
            "order of the conditions, with commas between them; the first is the reference that the others are "
            "compared with; empty: by the alphabet. Example: \"control, blebbistatin\"");
   list.add("replicate_from", parameters.replicate_from,
-           "where a cell's replicate (day, dish, animal) is told: `folder`, `folder2`, … or the name of a column of "
-           "--table; empty: the column `replicate` or `day` where the table has one");
+           "source of a cell's replicate (day, dish, animal): `folder`, `folder2`, … or the name of a column of "
+           "--table; empty: the column `replicate` or `day` if the table has one");
   list.add("exclude_findings", parameters.exclude_findings,
            "cells with one of these open findings do not enter; identities with commas between them. Example: "
            "\"explains-little, cell-cut\"");
@@ -186,12 +186,12 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
   list.add("strong_tension_nN", parameters.strong_tension_nN, Range::force_nN(),
            "the share of fibres above this tension is given, too (nN)");
   list.add("near_adhesion_um", parameters.near_adhesion_um, Range::size_um(),
-           "beads this near to an adhesion's centre, or on it, tell which way it moves (um)");
+           "beads this near to an adhesion's centre, or on it, show which way it moves (um)");
   list.add("bootstrap_draws", parameters.bootstrap_draws, Range::between(100, 1000000),
            "draws of cells behind the intervals of means and medians");
   list.add("bootstrap_seed", parameters.bootstrap_seed, "of these draws");
   list.add("fibre_types", parameters.fibre_types, Range::between(3, 4),
-           "types of fibres that are told apart; 3: dorsal, arc and ventral, edge fibres count as ventral; 4: edge "
+           "number of fibre types; 3: dorsal, arc and ventral, edge fibres count as ventral; 4: edge "
            "fibres are a type of their own");
 }
 

@@ -174,7 +174,7 @@ const Table<FibreRow>& fibre_table() {
            of_fibre({"fibre_id", "type", "length_um", "width_um", "confidence"}),
            files::columns_of<FibreRow>(tension, of_row),
            {{"sigma_nN",
-             "standard error that the statistics take: half the interval over 1.96, the upper half where 0 cuts the "
+             "standard error that the statistics take: half the interval over 1.96, the upper half if 0 cuts the "
              "lower",
              [](const FibreRow& row) { return standard_error_nN(row.of.tension.tension); }, kResult}}})};
   return table;
@@ -372,7 +372,7 @@ const Table<Comparison>& test_table() {
             {"cells_b", "cells of the second", of_pair(&Row::cells_b)},
             {"statistic", "of the test", &Row::statistic, kResult},
             {"degrees_of_freedom", "of the statistic's denominator", &Row::degrees, kResult},
-            {"p", "chance of such a difference or a larger one where there is none", &Row::p_value, kResult},
+            {"p", "chance of such a difference or a larger one if there is none", &Row::p_value, kResult},
             {"p_holm", "corrected over the pairs that one question compares", &Row::p_holm, kResult},
             {"effect", "how large the difference is",
              [](const Row& t) { return t.effect_name.empty() ? std::nullopt : std::optional(t.effect); }, kResult},
@@ -431,7 +431,7 @@ const Table<InCell<Direction>>& direction_table() {
       .columns = files::joined<Row>({cell_columns<Direction>(),
                                      {{"relation", "between what", of(&Direction::relation)},
                                       {"adhesion_id", "the adhesion", of(&Direction::adhesion_id)},
-                                      {"fibre_id", "the fibre, where there is one", of(&Direction::fibre_id)},
+                                      {"fibre_id", "the fibre, if there is one", of(&Direction::fibre_id)},
                                       {"angle_deg", "the angle", of(&Direction::angle_deg), kResult}}})};
   return table;
 }

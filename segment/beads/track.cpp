@@ -222,10 +222,10 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
       "stressed_last", p.stressed_last, {.low = 0},
       "last stressed_time, or stressed_page, of a time series, each tracked against the relaxed image; 0: one image");
   list.add("method", p.method,
-           "what is followed: single beads, or the texture in windows (correlation); auto: windows where beads fail");
+           "what is followed: single beads, or the texture in windows (correlation); auto: windows if beads fail");
   list.add("detection_snr", p.detection_snr, Range::factor(), "height of a bead over the noise (standard deviations)");
   list.add("largest_displacement_um", p.largest_displacement_um, Range::between(0, 100),
-           "how far to look for a bead, after the drift (um); 0: 32 pixels, further where beads are sparse");
+           "how far to look for a bead, after the drift (um); 0: 32 pixels, further if beads are sparse");
   list.add("may_push", p.may_push,
            "the cell may push its gel outward; otherwise that is taken for exchanged images, an error");
   list.add("least_similarity", p.least_similarity, Range::between(0, 1),
@@ -237,7 +237,7 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
   list.add("ux_column", p.ux_column, "column of --displacement: stressed minus relaxed position");
   list.add("uy_column", p.uy_column, "column of --displacement");
   list.add("sigma_column", p.sigma_column,
-           "column of --displacement: standard error of a component; where there is none, from the neighbours");
+           "column of --displacement: standard error of a component; if there is none, from the neighbours");
   list.add("length_unit", p.length_unit,
            "of --displacement: um, or px (0 at the centre of the first pixel, of pixel_size_um)");
 }

@@ -79,7 +79,7 @@ void declare(stage::ParameterList& list, AdhesionParameters& p) {
            "smoothing widens the adhesions");
   list.add("adhesion_smoothing_um", p.adhesion_smoothing_um, Range::between(0, 100),
            "standard deviation of the Gaussian before thresholding (um); unset: the least from 0.05 to 0.2 um at which "
-           "the faintest adhesion stands out of the noise");
+           "the faintest adhesion is above the noise");
   list.add("adhesion_seed_noise", p.adhesion_seed_noise, Range::factor(),
            "height of an adhesion's brightest pixel over its background (standard deviations of the noise)");
   list.add("adhesion_rim_noise", p.adhesion_rim_noise, Range::factor(),

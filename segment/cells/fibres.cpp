@@ -289,7 +289,7 @@ void declare(stage::ParameterList& list, FibreParameters& p) {
   list.add("fibre_faint_um", p.fibre_faint_um, Range::zero_or_size_um(),
            "an end is followed to an adhesion this far while it is brighter than the texture (um)");
   list.add("fibre_simplify_um", p.fibre_simplify_um, Range::size_um(),
-           "points are left out where the line moves less (um)");
+           "points are left out if the line moves less than this (um)");
 }
 
 TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,

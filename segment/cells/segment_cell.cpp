@@ -24,7 +24,7 @@ void declare(stage::ParameterList& list, SegmentParameters& p) {
   declare(list, p.adhesion_plane, "adhesion", "the adhesion image");
   declare(list, p.actin_plane, "actin", "the actin image");
   list.add("align_channels", p.align_channels,
-           "move fibres and outline to where the adhesion image has them; auto: where fibre ends tell a shift",
+           "move fibres and outline to where the adhesion image has them; auto: if fibre ends show a shift",
            {Switch::automatic, Switch::off});
   list.add("contact_sheet", p.contact_sheet,
            "draw contact_sheet.png, overlays over the values of one or two of these parameters: name=a,b,c name=d,e");

@@ -97,10 +97,10 @@ void require_packed_bytes(const std::filesystem::path& file, std::uint64_t n_byt
 void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image) {
   choice.prefix = prefix;
   list.add(prefix + "_channel", choice.channel,
-           "channel of " + image + ": its number, from 1, or name; must be given where the file has several");
+           "channel of " + image + ": its number, from 1, or name; must be given if the file has several");
   list.add(prefix + "_z", choice.z, "slice of " + image + ", from 1; max: the maximum projection of all");
   list.add(prefix + "_time", choice.time, {.low = 1},
-           "frame of " + image + ", from 1; must be given where the file has several");
+           "frame of " + image + ", from 1; must be given if the file has several");
   list.add(prefix + "_page", choice.page, {.low = 1},
            "page of " + image +
                " as it lies in the file, from 1, instead of channel, z and time; unset: the first of a "

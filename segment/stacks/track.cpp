@@ -62,7 +62,7 @@ void declare(stage::ParameterList& list, StackParameters& p) {
   list.add("z_step_um", p.z_step_um, Range::mesh_um(),
            "distance of the slices, as the stage moved (um); unset: from the files' own calibration");
   list.add("z_points", p.z_points,
-           "where the slices of a stack lead from the first to the last, which no program can tell: into-gel or "
+           "where the slices of a stack lead from the first to the last, which no program can know: into-gel or "
            "out-of-gel; auto: stacks are projected and beads followed in the plane");
   list.add("first_slice_z_um", p.first_slice_z_um, Range::between(-1e4, 1e4),
            "z of the outer face of the slice nearest to the gel's surface (um); z points into the gel");

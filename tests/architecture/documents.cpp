@@ -69,7 +69,8 @@ TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
 
 std::string column_page() {
   return "# Columns\n\nEvery table of a cell folder, a batch and a study, column by column. The other files are in\n"
-         "[formats.md](formats.md). *May lack*: older files, or files made elsewhere, need not have this column.\n"
+         "[formats.md](formats.md). *May be missing*: older files, or files made elsewhere, need not have this "
+         "column.\n"
          "Results have six significant digits; numbers that a later stage computes with have all digits.\n" +
          files::pages_of_cell_tables() + tensions::pages_of_tables() + tractions::pages_of_tables() +
          sheet::pages_of_tables() + sheet::pages_of_cells() + sheets::pages_of_tables() + solids::pages_of_tables() +
