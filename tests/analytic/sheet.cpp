@@ -7,6 +7,7 @@
 #include "continuum/sheet/from_traction.h"
 #include "continuum/sheet/mesh_size.h"
 #include "continuum/sheet/tables.h"
+#include "pipeline/contract/errors.h"
 #include "tests/support/sheets.h"
 
 namespace {

@@ -228,7 +228,7 @@ TEST(Mask, of_a_pattern_lies_beneath_the_cell_by_the_share_of_the_parts_that_it_
   const auto share = [&](double x_um) {
     const CellOutline cell{
         .outer_um = {{x_um, 5}, {x_um + 12, 5}, {x_um + 12, 17}, {x_um, 17}}, .holes_um = {}, .area_um2 = 144};
-    return share_beneath(pattern, cell, kField);
+    return pattern_at(pattern, cell, kField).beneath;
   };
   // by columns of points 0.2 um apart, over 10 um
   EXPECT_NEAR(share(5).value(), 1, 0.02);
@@ -236,7 +236,7 @@ TEST(Mask, of_a_pattern_lies_beneath_the_cell_by_the_share_of_the_parts_that_it_
   EXPECT_FALSE(share(-20));
   images::Image whole = test::even_image(kSide, kSide, 255);  // cut by the image
   const CellOutline cell{.outer_um = {{5, 5}, {17, 5}, {17, 17}, {5, 17}}, .holes_um = {}, .area_um2 = 144};
-  EXPECT_FALSE(share_beneath(mask(whole), cell, kField));
+  EXPECT_FALSE(pattern_at(mask(whole), cell, kField).beneath);
 }
 
 TEST(Mask, a_mask_of_another_size_is_refused_with_both_sizes) {
