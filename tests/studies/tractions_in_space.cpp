@@ -1,72 +1,95 @@
-/// How exact tractions in space are, on scenes whose truth is exact: tractions_in_space ROWS FOLDER SCENE...
+/// How exact tractions in space are, on scenes whose truth is exact: tractions_in_space FOLDER SCENE...
 /// The bars beside the numbers are those of an independent dense inversion (docs/developers/tractions_in_space.md).
-#include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <functional>
 #include <iostream>
 #include <map>
 #include <string>
 
 #include "mbtfm/spatial/reconstruction.h"
-#include "mbtfm/tractions/fttc.h"
-#include "mbtfm/tractions/recurrences.h"
-#include "substrate/surface/beads.h"
 #include "tests/support/traction_scene.h"
 
 namespace {
 
 using namespace mbtfm;
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 using spatial::BeadLoss;
 using test::ForceErrors;
 using test::TractionScene;
-using tractions::LambdaCriterion;
-
-constexpr int kThreads = 2;
-
-double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
-struct Setting {
-  substrate::SubstrateParameters gel = {};
-  std::optional<double> spacing_um = {};
-  std::shared_ptr<const HeightMap> surface = nullptr;  ///< unset: the scene's
-  bool has_patches = false;
-};
 
 struct Known {
   const TractionScene& scene;
   spatial::Problem problem;
-  MatrixXd areas_um2;
+  Eigen::MatrixXd areas_um2;
 
-  Known(const TractionScene& of, const Setting& s) : scene(of), problem(problem_of(of, s)) {
-    areas_um2 = patch_areas_um2(scene, problem);
+  void observe(double noise, double astray, const spatial::SpatialParameters& parameters) {
+    std::vector<BeadInSpace> beads = scene.observed(noise, astray);
+    problem.observed = spatial::observe(beads, scene.gel, problem.ground, parameters);
   }
-  static spatial::Problem problem_of(const TractionScene& scene, const Setting& s) {
-    Gel gel = scene.gel;
-    if (s.surface) gel.surface = s.surface;
-    const spatial::SpatialInputs inputs{scene.observed(0.02), gel, scene.adhesions(), {}};
-    spatial::Meshing meshing{.spacing_um = s.spacing_um, .has_patches = s.has_patches};
-    const double begin = seconds();
-    spatial::Problem made = make_problem(inputs, {}, meshing, s.gel, kThreads);
-    write_all(made, file);
-    const std::map<std::string, std::function<void(const TractionScene&)>> kRows = {
-        {"noise", study_noise},     {"losses", study_losses},
-        {"patches", study_patches}, {"recurrences", study_recurrences},
-        {"meshes", study_meshes},   {"fttc", study_fttc},
-        {"surface", study_surface}, {"thesis", study_thesis},
-        {"scan", study_scan}};
+  ForceErrors forces(const spatial::SpatialReconstruction& r) const {
+    return test::force_errors(scene, forces_on(problem, r, areas_um2));
+  }
+};
 
-  }  // namespace
+/// The map with the lambda that an oracle would take, and the forces with it.
+double best_map_error(const Known& known) {
+  const spatial::Problem& p = known.problem;
+  const auto basis =
+      spatial::orthonormal_basis(norm_of(p.mesh, p.ground, [&](Vec2 at) { return p.expected.amplitude(at); }));
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(p.observed.displacement_um.size());
+  const auto spectrum =
+      spectrum_of(p, basis.response(p.response_um_per_kPa, 2), ones, static_cast<double>(ones.size()), 2);
+  double best = 1;
+  const double largest = std::sqrt(spectrum.values().maxCoeff());
+  for (double lambda = 0.3 * largest; lambda > 1e-4 * largest; lambda *= 0.89)
+    best = std::min(best, test::map_error(known.scene, p.mesh, basis.tractions(spectrum.solve(lambda))));
+  return best;
+}
 
-  int main(int argc, char** argv) {
-    if (argc < 4 || !kRows.contains(argv[1])) {
-      std::cerr << "usage: tractions_in_space ROWS FOLDER SCENE...\nROWS:";
-      for (const auto& [name, study] : kRows) std::cerr << ' ' << name;
-      std::cerr << '\n';
-      return 2;
+void tell(const Known& known, const char* what, double noise, double astray, const spatial::SpatialReconstruction& r,
+          double best) {
+  const double error = test::map_error(known.scene, known.problem.mesh, r.traction_kPa);
+  const ForceErrors forces = known.forces(r);
+  std::printf(
+      "%-12s %-11s noise %.2f astray %.1f  map %.3f (%.2f x best)  forces %.3f  error/stated %.2f  degrees %.0f"
+      "  scale %.2f\n",
+      known.scene.name.c_str(), what, noise, astray, error, best > 0 ? error / best : 0.0, forces.mean,
+      forces.over_stated, r.degrees, r.weighing.scale);
+  std::fflush(stdout);
+}
+
+void study(const TractionScene& scene) {
+  spatial::SpatialParameters parameters;
+  spatial::SpatialInputs inputs{scene.observed(0.02), scene.gel, {}, {}};
+  substrate::SubstrateParameters gel;
+  Known known{scene, make_problem(inputs, parameters, {}, gel, 2), {}};
+  known.areas_um2 = patch_areas_um2(scene, known.problem);
+  std::printf("%s: %ld unknowns, spacing %.2f um, beads %.2f um apart, model error %.4f\n", scene.name.c_str(),
+              static_cast<long>(known.problem.n_unknowns()), known.problem.mesh.spacing_um.x,
+              known.problem.observed.distance_um, known.problem.model_error);
+  const tractions::TractionParameters traction;
+  for (const double noise : {0.0, 0.02, 0.05, 0.1, 0.2}) {
+    known.observe(noise, 0, parameters);
+    const double best = best_map_error(known);
+    tell(known, "tikhonov", noise, 0, reconstruct_tikhonov(known.problem, traction, parameters, 2), best);
+    tell(known, "group-l1", noise, 0, reconstruct_group_l1(known.problem, traction, parameters, 2), best);
+  }
+  for (const BeadLoss loss :
+       {BeadLoss::l2, BeadLoss::l1, BeadLoss::huber, BeadLoss::biweight, BeadLoss::l1_by_component}) {
+    parameters.loss = loss;
+    for (const double astray : {0.0, 0.1, 0.3}) {
+      known.observe(0.1, astray, parameters);
+      tell(known, name_of(loss), 0.1, astray, reconstruct_tikhonov(known.problem, traction, parameters, 2), 0);
+      if (loss == BeadLoss::biweight)
+        tell(known, "group-l1 bw", 0.1, astray, reconstruct_group_l1(known.problem, traction, parameters, 2), 0);
     }
-    for (int k = 3; k < argc; ++k) kRows.at(argv[1])(test::traction_scene(std::filesystem::path(argv[2]) / argv[k]));
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3) {
+    std::cerr << "usage: tractions_in_space FOLDER SCENE...\n";
+    return 2;
+  }
+  for (int k = 2; k < argc; ++k) study(test::traction_scene(std::filesystem::path(argv[1]) / argv[k]));
+}

@@ -8,15 +8,11 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numeric>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/files/csv.h"
-#include "pipeline/files/csv_files.h"
-#include "pipeline/files/toml.h"
-#include "pipeline/files/vtk_files.h"
 #include "substrate/surface/formula.h"
 
 namespace mbtfm::test {
@@ -71,55 +67,7 @@ struct TractionScene {
   }
 };
 
-inline Vec3 vector_in(const files::CsvTable& t, int row, const char* x, const char* y, const char* z) {
-  return {t.number(row, x), t.number(row, y), t.number(row, z)};
-}
-
-/// A cell folder of `mbtfm-simulate` with a scene in space. Noise and stray beads are drawn here: one of each to a
-/// bead.
-inline TractionScene simulated_scene(const std::filesystem::path& folder) {
-  TractionScene scene;
-  scene.name = folder.filename().string();
-  const auto toml = files::parse_toml(folder / "cell.toml");
-  const auto number = [&](const char* key) { return toml["gel"][key].value<double>().value(); };
-  scene.gel = {number("youngs_modulus_kPa"), number("poisson_ratio"), number("thickness_um")};
-  HeightMap map = files::read_surface(folder / "surface.vtp");
-  const auto [low, high] = std::ranges::minmax(map.z_um);
-  if (high > low) scene.gel.surface = std::make_shared<const HeightMap>(std::move(map));
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> half(-0.5, 0.5), share(0, 1);
-  for (const BeadInSpace& bead : files::read_displacement_in_space(folder / "truth/displacement_3d.csv")) {
-    scene.beads_um.push_back(bead.position_um);
-    scene.exact_um.push_back(bead.displacement_um);
-    scene.largest_um = std::max(scene.largest_um, norm(bead.displacement_um));
-    const auto drawn = [&random](auto& from) {
-      const double x = from(random), y = from(random), z = from(random);
-      return Vec3{x, y, z};
-    };
-    scene.noise.push_back(drawn(normal));
-    const double rank = share(random);
-    scene.outliers.push_back({scene.beads_um.size() - 1, rank, drawn(half)});
-  }
-  const files::CsvTable patches(folder / "truth/patches.csv");
-  for (int row = 0; row < patches.n_rows(); ++row) {
-    scene.patches.push_back({{patches.number(row, "x_um"), patches.number(row, "y_um")},
-                             patches.number(row, "radius_um"),
-                             vector_in(patches, row, "fx_nN", "fy_nN", "fz_nN")});
-  }
-  const files::CsvTable truth(folder / "truth/surface_traction.csv");
-  constexpr double kStep = 2.5;
-  const spatial::Ground ground(scene.gel.surface.get());
-  for (int row = 0; row < truth.n_rows(); ++row) {
-    scene.lattice_um.push_back({truth.number(row, "x_um"), truth.number(row, "y_um")});
-    scene.traction_kPa.push_back(vector_in(truth, row, "tx_kPa", "ty_kPa", "tz_kPa"));
-    scene.areas_um2.push_back(kStep * kStep * ground.stretch(scene.lattice_um.back()));
-  }
-  return scene;
-}
-
 inline TractionScene traction_scene(const std::filesystem::path& folder) {
-  if (!std::filesystem::exists(folder / "scene.json")) return simulated_scene(folder);
   TractionScene scene;
   scene.name = folder.filename().string();
   std::ifstream file(folder / "scene.json");
@@ -136,22 +84,25 @@ inline TractionScene traction_scene(const std::filesystem::path& folder) {
         std::make_shared<const HeightMap>(surface::sampled(surface::formula_of(formula), {-60, -60}, {60, 60}, 1));
   }
   scene.largest_um = json.at("u_max_um").get<double>();
+  const auto vector = [](const files::CsvTable& t, int row, const char* x, const char* y, const char* z) {
+    return Vec3{t.number(row, x), t.number(row, y), t.number(row, z)};
+  };
   const files::CsvTable beads(folder / "beads.csv");
   for (int row = 0; row < beads.n_rows(); ++row) {
-    scene.beads_um.push_back(vector_in(beads, row, "x_um", "y_um", "z_um"));
-    scene.exact_um.push_back(vector_in(beads, row, "ux_um", "uy_um", "uz_um"));
-    scene.noise.push_back(vector_in(beads, row, "ex", "ey", "ez"));
+    scene.beads_um.push_back(vector(beads, row, "x_um", "y_um", "z_um"));
+    scene.exact_um.push_back(vector(beads, row, "ux_um", "uy_um", "uz_um"));
+    scene.noise.push_back(vector(beads, row, "ex", "ey", "ez"));
   }
   const files::CsvTable outliers(folder / "outliers.csv");
   for (int row = 0; row < outliers.n_rows(); ++row) {
     scene.outliers.push_back({static_cast<std::size_t>(outliers.integer(row, "bead", 0)), outliers.number(row, "rank"),
-                              vector_in(outliers, row, "bx", "by", "bz")});
+                              vector(outliers, row, "bx", "by", "bz")});
   }
   const files::CsvTable patches(folder / "patches.csv");
   for (int row = 0; row < patches.n_rows(); ++row) {
     scene.patches.push_back({{patches.number(row, "x_um"), patches.number(row, "y_um")},
                              patches.number(row, "radius_um"),
-                             vector_in(patches, row, "fx_nN", "fy_nN", "fz_nN")});
+                             vector(patches, row, "fx_nN", "fy_nN", "fz_nN")});
   }
   const files::CsvTable truth(folder / "surface.csv");
   const spatial::Ground ground(scene.gel.surface.get());
@@ -160,7 +111,7 @@ inline TractionScene traction_scene(const std::filesystem::path& folder) {
     const Vec2 at{truth.number(row, "x_um"), truth.number(row, "y_um")};
     const auto share = [](double x) { return std::abs(x) > kHalf + 1e-9 ? 0 : std::abs(x) > kHalf - 1e-9 ? 0.5 : 1; };
     scene.lattice_um.push_back(at);
-    scene.traction_kPa.push_back(vector_in(truth, row, "tx_kPa", "ty_kPa", "tz_kPa"));
+    scene.traction_kPa.push_back(vector(truth, row, "tx_kPa", "ty_kPa", "tz_kPa"));
     scene.areas_um2.push_back(share(at.x) * share(at.y) * kStep * kStep * ground.stretch(at));
   }
   return scene;
