@@ -290,7 +290,8 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
     context.notice(images::noticed_loss(*image));
     context.notice(images::noticed_saturation(*image));
   }
-  if (adhesion && actin && adhesion->image.pixels == actin->image.pixels) {
+  // one file for both is by intent: there is no image of the actin, and the adhesions show the cell
+  if (adhesion && actin && adhesion->name != actin->name && adhesion->image.pixels == actin->image.pixels) {
     throw InputError(adhesion->name + ", " + actin->name, "images of adhesions and of actin", "the same pixels in both",
                      "name the right file or channel of each in [images] of cell.toml");
   }

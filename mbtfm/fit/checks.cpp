@@ -1,6 +1,7 @@
 #include "mbtfm/fit/checks.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "mbtfm/sheets/beside_fibres.h"
 #include "pipeline/contract/numbers.h"
@@ -26,6 +27,17 @@ std::optional<CrossValidation> cross_validation_of(const ReadyCell& ready, const
   if (n_draws == 0 || !tensions.contains(FibreType::dorsal) || !tensions.contains(FibreType::ventral)) return {};
   const TensionProblem problem(ready.networks.front(), fit.data.reduced, adhesion_ids_of(cell));
   return cross_validate(problem, fit.data, fit.meshes.front().fit.trial, types, tensions, n_draws, 1, threads);
+}
+
+/// A fit of a sheet takes as long as that of the cell. It is worth it if fibres are in doubt: the network alone does as
+/// well by BIC, or bears more than half of the force.
+bool is_sheet_asked(Switch asked, const std::vector<ModelScore>& models, const EnsembleFit& fit) {
+  if (asked != Switch::automatic) return asked == Switch::on;
+  const auto bic_of = [&](const char* name) {
+    const auto model = std::ranges::find(models, name, &ModelScore::name);
+    return model == models.end() ? std::numeric_limits<double>::infinity() : model->bic;
+  };
+  return bic_of("no-fibres") <= bic_of("full") || 2 * fit.network_force_nN.value > fit.total_force_nN.value;
 }
 
 }  // namespace
@@ -57,7 +69,7 @@ ModelChecks check_model(const ReadyCell& cell, const EnsembleFit& fit, const Par
                      .missing_adhesions = missing_adhesions(fit, data, of, p.gel, threads),
                      .drawn = cross_validation_of(cell, fit, p.fit.cross_validation, threads)};
   checks.left_out = leave_each_fibre_out(fit, checks.influence);
-  if (!p.compare_sheet) return checks;
+  if (!is_sheet_asked(p.compare_sheet, checks.models, fit)) return checks;
   std::vector<Polygon> outline = {of.outline_um};
   outline.insert(outline.end(), of.holes_um.begin(), of.holes_um.end());
   if (auto sheet = sheets::score_of_sheet(data, outline, p.gel, *cell.gel, threads))

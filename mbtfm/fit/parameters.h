@@ -19,8 +19,8 @@ struct Parameters {
   tensions::FitParameters fit;
   tensions::SegmentationErrors segmentation;
   stage::EffectSwitches effects;
-  bool compare_sheet = true;  ///< half a second for a cell of 10 000 beads
-  bool explain = false;       ///< a fit for each effect that is off; what is off is off because it does not matter
+  Switch compare_sheet = Switch::automatic;  ///< as long as the fit itself for a cell of 10 000 beads
+  bool explain = false;  ///< a fit for each effect that is off; what is off is off because it does not matter
 };
 void declare(stage::ParameterList& list, Parameters& parameters);
 
