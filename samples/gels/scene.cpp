@@ -262,7 +262,7 @@ std::vector<FieldUnderASurface::Source> fitted_sources(const Surface& surface, c
   const std::vector<Eigen::Vector3d> places = places_outside(surface, bumps);
   const std::vector<Row> rows = rows_of(surface, bumps, size.field_um);
   const auto n_rows = static_cast<Eigen::Index>(rows.size()), n = static_cast<Eigen::Index>(3 * places.size());
-  constexpr double kStep = 1.5;  // um: of the forces through patches, which are smooth over 6 um
+  constexpr double kStep = 1;  // um: of the forces through patches, which are smooth over 6 um
   std::vector<std::vector<Row>> within;
   for (const Bump& bump : bumps) within.push_back(rows_within(surface, bump.patch, kStep));
   const auto n_patches = std::ssize(bumps);

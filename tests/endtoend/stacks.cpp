@@ -255,7 +255,7 @@ TEST_F(Stacks, scenes_are_in_balance_and_at_rest_at_the_base) {
       const Vec3 difference{off("fx_nN", "aimed_fx_nN"), off("fy_nN", "aimed_fy_nN"), off("fz_nN", "aimed_fz_nN")};
       const Vec3 aimed{patches.number(row, "aimed_fx_nN"), patches.number(row, "aimed_fy_nN"),
                        patches.number(row, "aimed_fz_nN")};
-      // the sources are solved for it, with a sum of steps of 1.5 um, and it is measured with one of 0.5 um
+      // the sources are solved for it, with a sum of steps of 1 um, and it is measured with one of 0.5 um
       EXPECT_LT(norm(difference), 0.05 * norm(aimed)) << "patch " << row + 1;
     }
   }
