@@ -291,12 +291,10 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
     context.notice(images::noticed_saturation(*image));
   }
   const bool is_one = adhesion && actin && adhesion->image.pixels == actin->image.pixels;
-  if (is_one && adhesion->name != actin->name) {
+  if (is_one && adhesion->name != actin->name) {  // one file for both is by intent: no image of the actin is there
     throw InputError(adhesion->name + ", " + actin->name, "images of adhesions and of actin", "the same pixels in both",
                      "name the right file or channel of each in [images] of cell.toml");
   }
-  // one file for both may be by intent: there is no image of the actin
-  context.notice(noticed(FindingKind::one_image_for_both, is_one, "One image is given as adhesions and as actin."));
   const HandDrawn drawn{roi_set(context, "outline-roi", binning), roi_set(context, "adhesion-rois", binning),
                         roi_set(context, "fibre-rois", binning), mask(context, "outline-mask", binning),
                         mask(context, "adhesion-mask", binning)};

@@ -29,11 +29,6 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        4,
        "adhesion images of five kinds of cell and microscope have 1.7 to 3.1, actin bundles taken for adhesions 6 to 8",
        "Look at the adhesion image: it shows actin where its signal bleeds through or the two channels are exchanged."},
-      {one_image_for_both, "one-image-for-both", "segment", caution,
-       "1 if one image is given as adhesions and as actin", 0,
-       "an image of the actin alone shows bundles, which are then taken for adhesions",
-       "If the image shows the adhesions, fibres are hardly seen in it: draw them by hand (images.fibre_rois), or read "
-       "the forces of the adhesions alone. If it shows the actin, leave images.adhesion out."},
       {bright_actin, "bright-actin", "segment", caution, "length of bright actin that is in no fibre (um)", 0,
        "lines as bright as the cell's middle fibre, 3 um and longer, 3 um and more from the edge: none in six "
        "simulated cells with fibres, in two of three without, and in four of six real ones; 9 to 26 um if one fibre "

@@ -29,7 +29,6 @@ enum class FindingKind {
   adhesions_left_out,
   actin_shift,
   adhesions_long,
-  one_image_for_both,
   bright_actin,
   adhesions_assumed,
   pattern_too_fine,
