@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <iterator>
 #include <optional>
+#include <set>
+#include <string>
 #include <string_view>
 
 #include "pipeline/contract/errors.h"
@@ -50,7 +52,10 @@ struct Says {
 /// A bead image of that many slices may be a stack in space: fewer say nothing of a bead's picture along z.
 constexpr int kFewestSlices = 8;
 
-bool is_tiff(const fs::path& file) { return file.extension() == ".tif" || file.extension() == ".tiff"; }
+bool is_tiff(const fs::path& file) {
+  static const std::set<std::string> kTiff = {".tif", ".tiff"};
+  return kTiff.contains(file.extension().string());
+}
 
 Says says_of(const fs::path& file) {
   try {

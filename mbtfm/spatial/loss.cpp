@@ -74,8 +74,7 @@ Weighing weigh(BeadLoss loss, const Observed& observed, const Eigen::VectorXd& r
   }
   // An M-estimator varies as least squares with weights `mean` and the variance of its scores over their slope squared
   // (Maronna, Martin & Yohai, 10.3).
-  weighing.per_square = mean * score / (curvature * curvature);
-  weighing.variance = scale * scale * weighing.per_square;
+  weighing.variance = scale * scale * mean * score / (curvature * curvature);
   weighing.n_data = n_rows * scale * scale * square / weighing.variance;
   return weighing;
 }

@@ -17,7 +17,6 @@ double loss_weight(BeadLoss loss, double residual, Eigen::Index n_components);
 struct Weighing {
   Eigen::VectorXd by_row;  ///< weights of the squares of S (u − G t), all at most 1
   double scale = 1;        ///< standard deviation of a component, in units of sigma, that most beads have
-  double per_square = 1;   ///< `variance` over the square of the scale that the weights were made with
   /// So much one datum varies, and so many of them there are, as weighed: with these, formulas for least squares hold.
   double variance = 1, n_data = 0;
 };

@@ -160,9 +160,7 @@ SpatialReconstruction reconstruct_green(const Problem& problem, const tractions:
     for (Index f = 0; f < n_faces; ++f)
       response.col(c * n_faces + f) = roots[f] * problem.facet_response_um_per_kPa.col(3 * f + c);
   }
-  SpatialReconstruction r = reconstruct_in(Basis(std::move(shapes)), response, problem, traction, parameters, threads);
-  if (r.oversmoothed_kPa2.size() > 0) r.covariance_kPa2 += r.oversmoothed_kPa2;
-  return r;
+  return reconstruct_in(Basis(std::move(shapes)), response, problem, traction, parameters, threads);
 }
 
 }  // namespace mbtfm::spatial

@@ -66,7 +66,6 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
   }
   r = reconstruct_in(Basis(std::move(shapes)), response, problem, traction, parameters, threads);
   if (r.covariance_kPa2.size() == 0) return r;  // nothing has moved
-  if (r.oversmoothed_kPa2.size() > 0) r.covariance_kPa2 += r.oversmoothed_kPa2;
   r.forces = forces_beside_background(problem, of_background, r, threads);
   const double alone = misfit_alone(problem, of_patches, r.weighing.by_row, r.weighing.n_data, threads);
   r.figures.emplace_back("misfit_of_patches_alone", alone / r.variance);

@@ -29,8 +29,7 @@ struct SpatialReconstruction {
   Eigen::VectorXd unshortened_kPa;  ///< what forces are the sums of; empty: traction_kPa
   /// Of tractions: by the noise, and by what is not resolved. Empty: the method tells none.
   Eigen::MatrixXd covariance_kPa2;
-  Eigen::MatrixXd oversmoothed_kPa2;  ///< what lambda takes away beyond that; empty: nothing
-  Eigen::VectorXd resolved;           ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
+  Eigen::VectorXd resolved;  ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
   std::optional<tractions::LambdaScan> scan;
   std::optional<double> lambda;     ///< of |S (u − G t)|² + lambda² |s|²
   std::optional<double> length_um;  ///< lambda times E, the same for every method
@@ -69,8 +68,8 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
 /// integral over the surface, and their weights have a mean of one.
 double lambda_per_um_per_kPa(const Problem& problem);
 
-/// By a criterion; risk not below what the evidence calls for. The risk needs the variance of a datum: where the model
-/// is wrong by more than is known, and more smoothly than noise, it would let tractions follow that, without an end.
+/// By a criterion; risk not below cross-validation. The risk needs the variance of a datum: where the model is wrong by
+/// more than is known, it would let tractions follow that, without an end.
 double lambda_by(const tractions::LambdaScan& scan, tractions::LambdaCriterion criterion);
 
 /// The same as tikhonov where the problem has no matrix. No standard errors.

@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "mbtfm/spatial/reconstruction.h"
-#include "mbtfm/tractions/recurrences.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
 
@@ -18,7 +17,6 @@ struct Fit {
   std::optional<tractions::Spectrum> spectrum;
   tractions::LambdaScan scan;
   double lambda = 0;
-  double over_judged = 1;  ///< variance as weighed over that of the scan
   VectorXd x;
   Weighing weighing;
 };
@@ -37,7 +35,7 @@ double lambda_per_um_per_kPa(const Problem& problem) {
 
 double lambda_by(const tractions::LambdaScan& scan, tractions::LambdaCriterion criterion) {
   const double lambda = chosen_lambda(scan, criterion);
-  return criterion == tractions::LambdaCriterion::risk ? std::max(lambda, scan.by_evidence) : lambda;
+  return criterion == tractions::LambdaCriterion::risk ? std::max(lambda, scan.by_gcv) : lambda;
 }
 
 SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& response, const Problem& problem,
@@ -45,27 +43,27 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
                                      int threads) {
   SpatialReconstruction r;
   const Observed& observed = problem.observed;
-  // of a datum as weighed
-  const auto least_variance = [&](const Weighing& weighing) {
-    const double of_unit = std::max(observed.states_errors ? 1.0 : 0.0, problem.variance_of_model());
-    const double least = of_unit * weighing.per_square;
-    return parameters.loss == BeadLoss::l2 ? least : std::max(least, weighing.variance);
+  const auto floor = [&](double variance) {
+    return std::max({variance, observed.states_errors ? 1.0 : 0.0, problem.variance_of_model()});
   };
   const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
-    const double least = least_variance(weighing);
-    return spectrum.scan(least > 0 ? std::optional(least) : std::nullopt, tractions::Recurrences::kLeastFelt);
+    std::optional<double> stated;
+    if (parameters.loss != BeadLoss::l2) {
+      stated = floor(weighing.variance);
+    } else if (floor(0) > 0) {
+      stated = floor(0);
+    }
+    return spectrum.scan(stated);
   };
   // The tractions of the weighed beads with the lambda of their own noise, or with that of `judged`: beads far astray
-  // that keep some weight would be followed by ever smaller lambdas, so that lambda is chosen without them. Of both,
-  // variance / lambda² is what tractions are expected to be.
+  // that keep some weight would be followed by ever smaller lambdas, so that lambda is chosen without them.
   const auto fit = [&](Weighing weighing, const std::optional<Weighing>& judged = {}) {
     Fit made;
     made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
     made.scan = judged ? scanned(spectrum_of(problem, response, judged->by_row, judged->n_data, threads), *judged)
                        : scanned(*made.spectrum, weighing);
-    made.over_judged = judged ? least_variance(weighing) / least_variance(*judged) : 1;
     made.lambda = traction.lambda_um_per_kPa ? *traction.lambda_um_per_kPa * lambda_per_um_per_kPa(problem)
-                                             : lambda_by(made.scan, traction.lambda_by) * std::sqrt(made.over_judged);
+                                             : lambda_by(made.scan, traction.lambda_by);
     made.x = made.spectrum->solve(made.lambda);
     made.weighing = std::move(weighing);
     return made;
@@ -102,16 +100,9 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   }
   r.degrees = last.spectrum->degrees(last.lambda);
   r.weighing = weigh(parameters.loss, observed, residual(last.x), r.degrees);
-  r.variance = std::max(last.over_judged * last.scan.variance, least_variance(last.weighing));
+  r.variance = std::max(last.scan.variance, floor(0));
   r.traction_kPa = basis.tractions(last.x);
   r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(last.lambda, r.variance), threads);
-  // Lambda by the risk may be larger than what tractions of the size that the evidence has call for: then more is
-  // smoothed away than they are expected to be.
-  const double by_evidence = last.scan.by_evidence * std::sqrt(last.over_judged);
-  if (by_evidence < last.lambda) {
-    const double more_kPa2 = r.variance * (std::pow(by_evidence, -2) - std::pow(last.lambda, -2));
-    r.oversmoothed_kPa2 = basis.covariance(more_kPa2 * last.spectrum->taken_away(last.lambda), threads);
-  }
   r.scan = std::move(last.scan);
   r.lambda = last.lambda;
   r.length_um = last.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
@@ -129,7 +120,6 @@ SpatialReconstruction reconstruct_tikhonov(const Problem& problem, const tractio
   if (r.lambda && problem.patch_response_um_per_nN.size() > 0)
     r.forces = forces_beside_background(problem, response, r, threads);
   if (r.lambda) r.resolved = resolved_shares(r.covariance_kPa2, *r.lambda * *r.lambda / r.variance * norm);
-  if (r.oversmoothed_kPa2.size() > 0) r.covariance_kPa2 += r.oversmoothed_kPa2;
   return r;
 }
 

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <vector>
-
-#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::tractions {
 
@@ -26,46 +23,22 @@ struct Recurrence {
   static void make_orthogonal(VectorXd& v, const MatrixXd& to, Index n) {
     for (int pass = 0; pass < 2; ++pass) v -= to.leftCols(n) * (to.leftCols(n).transpose() * v);
   }
-  Index size() const { return std::ssize(alpha); }
-  MatrixXd bidiagonal() const {
-    MatrixXd b = MatrixXd::Zero(size() + 1, size());
-    for (Index j = 0; j < size(); ++j) {
-      b(j, j) = alpha[static_cast<std::size_t>(j)];
-      if (j < std::ssize(beta)) b(j + 1, j) = beta[static_cast<std::size_t>(j)];
-    }
-    return b;
-  }
   /// The problem in this basis, whose data is start e_1.
   Spectrum small(double n_data) const {
-    const MatrixXd b = bidiagonal();
-    return {b.transpose() * b, start * b.row(0).transpose(), start * start, n_data};
+    const auto k = static_cast<Index>(alpha.size());
+    MatrixXd bidiagonal = MatrixXd::Zero(k + 1, k);
+    for (Index j = 0; j < k; ++j) {
+      bidiagonal(j, j) = alpha[static_cast<std::size_t>(j)];
+      if (j < std::ssize(beta)) bidiagonal(j + 1, j) = beta[static_cast<std::size_t>(j)];
+    }
+    return {bidiagonal.transpose() * bidiagonal, start * bidiagonal.row(0).transpose(), start * start, n_data};
   }
 };
 
-/// A on the space of all right vectors V together. They are far from independent: an orthonormal basis of the space is
-/// V E D^(-1/2), VᵀV = E D Eᵀ, without what rounding left of it; and A V = U B is known.
-Spectrum joint(const std::vector<Recurrence>& all, const VectorXd& data, double n_data) {
-  constexpr double kIndependent = 1e-9;  // of the largest: V has unit columns, and D an error of 1e-16 of it
-  Index n = 0;
-  for (const Recurrence& r : all) n += r.size();
-  MatrixXd right(all.front().right.rows(), n), moved(data.size(), n);
-  Index at = 0;
-  for (const Recurrence& r : all) {
-    right.middleCols(at, r.size()) = r.right.leftCols(r.size());
-    moved.middleCols(at, r.size()) = r.left.leftCols(r.size() + 1) * r.bidiagonal();
-    at += r.size();
-  }
-  const auto [values, vectors] = numerics::symmetric_eigen(numerics::gram(right));
-  const auto n_kept = static_cast<Index>((values.array() > kIndependent * values.maxCoeff()).count());
-  // rising: those kept are the last
-  const MatrixXd to_basis = vectors.rightCols(n_kept) * values.tail(n_kept).cwiseSqrt().cwiseInverse().asDiagonal();
-  const MatrixXd of_basis = moved * to_basis;
-  return {numerics::gram(of_basis), of_basis.transpose() * data, data.squaredNorm(), n_data};
-}
-
 }  // namespace
 
-Recurrences::Recurrences(const LinearMap& map, const VectorXd& data, const RecurrenceOptions& options) {
+Recurrences::Recurrences(const LinearMap& map, const VectorXd& data, const RecurrenceOptions& options)
+    : n_data_(static_cast<double>(map.n_data)), n_felt_(static_cast<double>(std::min(map.n_data, map.n_unknowns))) {
   constexpr double kNothing = 1e-13;  // of the first: what is left is rounding
   const auto n = static_cast<std::size_t>(1 + options.probes);
   const auto steps = std::min<Index>(options.steps, std::min(map.n_data, map.n_unknowns));
@@ -112,10 +85,30 @@ Recurrences::Recurrences(const LinearMap& map, const VectorXd& data, const Recur
       if (!r.is_done) r.left.col(j + 1) = u / beta;
     }
   }
-  const auto n_data = static_cast<double>(map.n_data);
-  basis_ = all.front().right.leftCols(all.front().size());
-  of_data_.emplace(all.front().small(n_data));
-  joint_.emplace(joint(all, data, n_data));
+  basis_ = all.front().right.leftCols(std::ssize(all.front().alpha));
+  for (const Recurrence& r : all) small_.push_back(r.small(n_data_));
+}
+
+double Recurrences::degrees(double lambda) const {
+  double sum = 0;
+  for (std::size_t k = 1; k < small_.size(); ++k) sum += small_[k].explained(lambda);
+  return std::min(sum / static_cast<double>(small_.size() - 1), n_felt_);
+}
+
+LambdaScan Recurrences::scan(std::optional<double> stated_variance) const {
+  const Spectrum& data = small_.front();
+  // the least values of the small problem have not settled: below a thousandth of the largest, lambda would hang on
+  // them
+  const double largest = std::sqrt(data.values().maxCoeff());
+  const double smallest = std::max(0.1 * std::sqrt(data.values().minCoeff()), 1e-3 * largest);
+  std::vector<ScanPoint> points;
+  for (const double lambda : lambdas_between(largest, smallest)) {
+    ScanPoint point = data.point_at(lambda);
+    point.degrees = degrees(lambda);
+    points.push_back(point);
+  }
+  return judge(std::move(points), n_data_, n_felt_, stated_variance,
+               [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); });
 }
 
 }  // namespace mbtfm::tractions

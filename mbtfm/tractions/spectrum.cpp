@@ -13,9 +13,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-Eigen::Array<bool, Eigen::Dynamic, 1> is_felt(const ArrayXd& values, double least) {
-  return values > least * values.maxCoeff();
-}
+/// Below, rounding of the normal matrix is all there is.
+Eigen::Array<bool, Eigen::Dynamic, 1> is_felt(const ArrayXd& values) { return values > 1e-12 * values.maxCoeff(); }
 
 }  // namespace
 
@@ -27,26 +26,26 @@ Spectrum::Spectrum(MatrixXd normal, VectorXd pulled, double data_squared, double
   projected_ = vectors_.transpose() * pulled;
 }
 
-LambdaScan Spectrum::scan(std::optional<double> stated_variance, double least_felt) const {
+LambdaScan Spectrum::scan(std::optional<double> stated_variance) const {
   const double largest = std::sqrt(values_.maxCoeff());
-  // at a tenth of the smallest singular value nothing is smoothed any more
-  const double smallest = std::max(0.1 * std::sqrt(values_.minCoeff()), std::sqrt(least_felt) * largest);
+  // At a tenth of the smallest singular value nothing is smoothed any more; below a millionth of the largest, rounding
+  // of the normal matrix is all there is.
+  const double smallest = std::max(0.1 * std::sqrt(values_.minCoeff()), 1e-6 * largest);
   std::vector<ScanPoint> points;
-  for (const double lambda : lambdas_between(largest, smallest)) points.push_back(point_at(lambda, least_felt));
+  for (const double lambda : lambdas_between(largest, smallest)) points.push_back(point_at(lambda));
   // Few loads follow many beads nowhere quite: what they leave, noise or not, is the error of each bead. (Its median,
   // for tractions that follow all but a few, would call most of it signal.)
-  return judge(std::move(points), n_data_, static_cast<double>(is_felt(values_, least_felt).count()), stated_variance,
+  return judge(std::move(points), n_data_, static_cast<double>(is_felt(values_).count()), stated_variance,
                [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); });
 }
 
-ScanPoint Spectrum::point_at(double lambda, double least_felt) const {
+ScanPoint Spectrum::point_at(double lambda) const {
   const ArrayXd shares = projected_ / (values_ + lambda * lambda);
   return {.lambda = lambda,
           .misfit = misfit(lambda),
           .norm = shares.square().sum(),
           .degrees = degrees(lambda),
-          .removable_misfit =
-              is_felt(values_, least_felt).select(shares.square() / values_, 0).sum() * std::pow(lambda, 4)};
+          .removable_misfit = is_felt(values_).select(shares.square() / values_, 0).sum() * std::pow(lambda, 4)};
 }
 
 double Spectrum::explained(double lambda) const { return (projected_.square() / (values_ + lambda * lambda)).sum(); }
@@ -66,10 +65,6 @@ MatrixXd Spectrum::covariance(double lambda, double variance) const {
 
 MatrixXd Spectrum::posterior(double lambda, double variance) const {
   return outer(variance / (values_ + lambda * lambda));
-}
-
-MatrixXd Spectrum::taken_away(double lambda) const {
-  return outer((lambda * lambda / (values_ + lambda * lambda)).square());
 }
 
 VectorXd Spectrum::resolved(double lambda) const {

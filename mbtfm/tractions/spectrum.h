@@ -11,28 +11,22 @@ namespace mbtfm::tractions {
 /// |A s − u|² + lambda² |s|², from AᵀA and Aᵀu.
 class Spectrum {
  public:
-  static constexpr double kRounding = 1e-12;  ///< of values: below, rounding of the normal matrix is all there is
-
   /// @param normal  AᵀA; what is below its diagonal does not count
   /// @param pulled  Aᵀu
   Spectrum(Eigen::MatrixXd normal, Eigen::VectorXd pulled, double data_squared, double n_data);
 
   /// @param stated_variance  of one datum
-  /// @param least_felt       directions whose value of AᵀA is a smaller share of the largest count as not felt, and no
-  ///                         lambda is looked at that is below them; what noise does to them would move the risk
-  LambdaScan scan(std::optional<double> stated_variance, double least_felt = kRounding) const;
+  LambdaScan scan(std::optional<double> stated_variance) const;
   Eigen::VectorXd solve(double lambda) const;
   /// Of solve(lambda), by the noise alone. @param variance  of one datum
   Eigen::MatrixXd covariance(double lambda, double variance) const;
   /// Of s itself, where nothing but its size was known before: noise and what the penalty takes away.
   Eigen::MatrixXd posterior(double lambda, double variance) const;
-  /// Mean square of what the penalty takes away, where each unknown has a variance of one.
-  Eigen::MatrixXd taken_away(double lambda) const;
   /// By unknown: how much of a change of it solve(lambda) shows, 0 … 1.
   Eigen::VectorXd resolved(double lambda) const;
   double explained(double lambda) const;  ///< uᵀ H u, H the matrix that takes u to A s
   /// What a scan tells of one lambda.
-  ScanPoint point_at(double lambda, double least_felt = kRounding) const;
+  ScanPoint point_at(double lambda) const;
   double misfit(double lambda) const;       ///< |u − A s|² of solve(lambda)
   double degrees(double lambda) const;      ///< trace of the matrix that takes u to A s
   double relative_l2(double lambda) const;  ///< |u − A s| / |u|

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
 
 #include "pipeline/contract/stage_state.h"
 #include "pipeline/report/numbers.h"
@@ -211,10 +213,10 @@ std::string item_of(const Finding& f) {
 
 /// Stages that ran and asked: without one there is nothing that a tick could stand for.
 bool was_asked(const Provenance& provenance) {
+  static const std::set<std::string> kAsking = {"fit", "traction"};
   return std::ranges::any_of(provenance.stages, [](const StageLine& stage) {
     const auto state = named<StageState>(stage.state);
-    return (stage.name == "fit" || stage.name == "traction") &&
-           (state == StageState::must_run || state == StageState::up_to_date);
+    return kAsking.contains(stage.name) && (state == StageState::must_run || state == StageState::up_to_date);
   });
 }
 

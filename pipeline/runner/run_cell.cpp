@@ -4,7 +4,9 @@
 #include <exception>
 #include <iomanip>
 #include <mutex>
+#include <set>
 #include <sstream>
+#include <string>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/own_files.h"
@@ -104,7 +106,8 @@ void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
 
 /// @throws UsageError where the preset says nothing to this kind of cell
 void expect_fit(const std::string& preset, const CellStages& of) {
-  if (of.kind == CellKind::plane || preset.empty() || preset == "standard") return;
+  static const std::set<std::string> kChangeNothing = {"", "standard"};
+  if (of.kind == CellKind::plane || kChangeNothing.contains(preset)) return;
   throw UsageError("--preset " + preset + ": presets are for cells on flat gels, and this one is in space (" + of.why +
                    "): leave it out, and set traction.spacing_um for more or fewer tractions");
 }

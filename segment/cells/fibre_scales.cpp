@@ -39,7 +39,7 @@ TraceRule rule_of(const FibreParameters& p, double pixel_um) {
   rule.shortest_px = p.fibre_shortest_um / pixel_um;
   rule.end_window_px = 4 * p.fibre_averaging_um / pixel_um;
   rule.course_px = 3.4 * p.fibre_averaging_um / pixel_um;
-  rule.join_gap_px = 4.67 * p.fibre_gap_um / pixel_um;
+  rule.join_gap_px = 3 * p.fibre_gap_um / pixel_um;
   rule.overlap_px = 1.92 * p.fibre_gap_um / pixel_um;
   rule.faint_px = p.fibre_faint_um / pixel_um;
   return rule;

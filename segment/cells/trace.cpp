@@ -17,6 +17,7 @@ namespace {
 using std::numbers::pi;
 
 cv::Point2d unit(double angle_rad) { return {std::cos(angle_rad), std::sin(angle_rad)}; }
+cv::Point2d left_of(cv::Point2d e) { return {-e.y, e.x}; }
 double length(cv::Point2d d) { return std::hypot(d.x, d.y); }
 
 /// Which directions of lines already pass through each pixel, a bit each.

@@ -12,7 +12,7 @@ namespace mbtfm::cells {
 struct Trace {
   std::vector<cv::Point2d> points;
   std::vector<double> height;   ///< of the ridge at each
-  std::vector<bool> is_shared;  ///< the height tells nothing of this line: it is another one's, or a gap's
+  std::vector<bool> is_shared;  ///< the height is that of another line, upon which it runs there
 
   std::size_t size() const { return points.size(); }
   /// The points from `from` to before `to`.
@@ -35,7 +35,7 @@ struct TraceRule {
   double end_level = 0.5;     ///< a line ends where its height falls to this share of what it is before
   double end_window_px = 20;  ///< over this length
   double course_px = 25;      ///< this length of an end tells where it points
-  double join_gap_px = 25;    ///< ends that point at each other from this far may be one line
+  double join_gap_px = 15;    ///< ends that point at each other from this far may be one line
   double overlap_px = 25;     ///< and ends that lie beside each other over this length
   double faint_px = 40;       ///< how far beyond its end a line may go on faintly
 };
@@ -54,8 +54,6 @@ struct FaintEnd {
 };
 enum class LineEnd { first, last };
 FaintEnd faint_end(const Ridges& ridges, const TraceRule& rule, const Trace& trace, LineEnd end);
-
-inline cv::Point2d left_of(cv::Point2d e) { return {-e.y, e.x}; }
 
 /// Unit vector from the inside of the line to its first or last point, over `reach` pixels.
 cv::Point2d outward(const std::vector<cv::Point2d>& points, LineEnd end, double reach);

@@ -1,5 +1,4 @@
-/// The parts of the fibre finder: what lies beside fibres, what a faint end leads to, what counts as texture,
-/// which pieces are one line.
+/// The parts of the fibre finder: what lies beside fibres, what a faint end leads to, what counts as texture.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +9,6 @@
 #include "segment/cells/fibre_ends.h"
 #include "segment/cells/fibre_significance.h"
 #include "segment/cells/ridge.h"
-#include "segment/cells/trace_join.h"
 
 namespace mbtfm::cells {
 namespace {
@@ -199,139 +197,6 @@ TEST(FibreParts, texture_is_the_deviation_of_what_is_free) {
   EXPECT_NEAR(cv::mean(texture_of(responses, is_free, 24))[0], 3, 0.35);
   is_free.setTo(0);
   EXPECT_EQ(cv::countNonZero(texture_of(responses, is_free, 24)), 0);  // nothing to tell it from
-}
-
-/// Lines of Gaussian profile on a bright ground with noise of 1, and the rule at 0.1 um a pixel.
-struct Drawing {
-  static constexpr int kSide = 256;
-  cv::Mat image{kSide, kSide, CV_32F, cv::Scalar(100)};
-  TraceRule rule{.smallest_radius_px = 60, .line_radius_px = 3.6, .course_px = 24, .join_gap_px = 70};
-
-  Drawing() {
-    std::mt19937 random(1);
-    std::normal_distribution<float> normal(0, 1);
-    for (float& v : cv::Mat_<float>(image)) v += normal(random);
-  }
-  void draw(const std::vector<cv::Point2d>& points, float height) {
-    constexpr int kReach = 8;
-    for (const cv::Point2d& p : points)  // a pixel apart: together as high as one line
-      for (int y = cvRound(p.y) - kReach; y <= cvRound(p.y) + kReach; ++y)
-        for (int x = cvRound(p.x) - kReach; x <= cvRound(p.x) + kReach; ++x) {
-          const double dx = x - p.x, dy = y - p.y;
-          image.at<float>(y, x) += height / 4 * static_cast<float>(std::exp(-(dx * dx + dy * dy) / 5));
-        }
-  }
-  std::vector<Trace> joined_of(std::vector<Trace> pieces) const {
-    const cv::Mat is_inside(kSide, kSide, CV_8U, cv::Scalar(255));
-    return joined(std::move(pieces),
-                  find_ridges(image, is_inside, {.width_sigma_px = 2, .length_sigma_px = 7, .noise_radius_px = 48}),
-                  rule);
-  }
-};
-
-std::vector<cv::Point2d> arc_points(cv::Point2d from, double angle_rad, double curvature, int n) {
-  std::vector<cv::Point2d> points = {from};
-  while (static_cast<int>(points.size()) < n) {
-    const double a = angle_rad + curvature * (static_cast<double>(points.size()) - 0.5);
-    points.push_back(points.back() + cv::Point2d(std::cos(a), std::sin(a)));
-  }
-  return points;
-}
-
-Trace piece_of(const std::vector<cv::Point2d>& points, std::size_t from, std::size_t to) {
-  const Trace whole{points, std::vector<double>(points.size(), 20), std::vector<bool>(points.size(), false)};
-  return whole.part(from, to);
-}
-
-double farthest_px(const std::vector<cv::Point2d>& points, const std::vector<cv::Point2d>& from) {
-  double farthest = 0;
-  for (const cv::Point2d& p : points) {
-    double nearest = 1e9;
-    for (const cv::Point2d& q : from) nearest = std::min(nearest, std::hypot(p.x - q.x, p.y - q.y));
-    farthest = std::max(farthest, nearest);
-  }
-  return farthest;
-}
-
-/// Straight over 55 pixels, or bent with a radius of 250 over 35. A parabola departs from a circle by (length/2)⁴/(8
-/// R³), here by less than 0.2 pixels.
-TEST(FibreParts, pieces_on_one_parabola_with_a_bright_way_between_are_one_line_along_it) {
-  struct Case {
-    double curvature;
-    std::size_t gap;
-  };
-  for (const auto& [curvature, gap] : {Case{0, 55}, Case{0.004, 35}}) {
-    SCOPED_TRACE(curvature);
-    Drawing drawing;
-    const auto arc = arc_points({30, 100}, 0.1, curvature, 190);
-    drawing.draw(arc, 20);
-    const auto lines = drawing.joined_of({piece_of(arc, 0, 70), piece_of(arc, 70 + gap, 190)});
-    ASSERT_EQ(lines.size(), 1u);
-    EXPECT_LT(farthest_px(arc, lines[0].points), 1);
-    EXPECT_LT(farthest_px(lines[0].points, arc), 1);
-    for (std::size_t i = 1; i < lines[0].size(); ++i) {
-      const cv::Point2d step = lines[0].points[i] - lines[0].points[i - 1];
-      EXPECT_LT(std::hypot(step.x, step.y), 2);
-    }
-  }
-}
-
-TEST(FibreParts, pieces_with_a_dark_way_between_are_two_lines) {
-  Drawing drawing;
-  const auto line = arc_points({30, 100}, 0.1, 0, 190);
-  drawing.draw({line.begin(), line.begin() + 70}, 20);
-  drawing.draw({line.begin() + 125, line.end()}, 20);
-  EXPECT_EQ(drawing.joined_of({piece_of(line, 0, 70), piece_of(line, 125, 190)}).size(), 2u);
-}
-
-/// All four ends at the crossing are within reach of each other.
-TEST(FibreParts, lines_that_cross_go_straight_on) {
-  for (const double angle : {0.4, 0.8, 1.5}) {
-    SCOPED_TRACE(angle);
-    Drawing drawing;
-    std::vector<Trace> pieces;
-    std::vector<std::vector<cv::Point2d>> lines;
-    for (const double a : {0.0, angle}) {
-      lines.push_back(arc_points(cv::Point2d(125, 125) - 80 * cv::Point2d(std::cos(a), std::sin(a)), a, 0, 161));
-      drawing.draw(lines.back(), 20);
-      pieces.push_back(piece_of(lines.back(), 0, 68));
-      pieces.push_back(piece_of(lines.back(), 93, 161));
-    }
-    const auto joined = drawing.joined_of(pieces);
-    ASSERT_EQ(joined.size(), 2u);
-    for (std::size_t i = 0; i < 2; ++i) EXPECT_LT(farthest_px(joined[i].points, lines[i]), 1);
-  }
-}
-
-/// Six pixels apart, both broken at the same place.
-TEST(FibreParts, each_of_two_lines_side_by_side_is_joined_to_itself) {
-  Drawing drawing;
-  std::vector<Trace> pieces;
-  std::vector<std::vector<cv::Point2d>> lines;
-  for (const double y : {120.0, 126.0}) {
-    lines.push_back(arc_points({30, y}, 0, 0, 190));
-    drawing.draw(lines.back(), 20);
-    pieces.push_back(piece_of(lines.back(), 0, 80));
-    pieces.push_back(piece_of(lines.back(), 105, 190));
-  }
-  const auto joined = drawing.joined_of(pieces);
-  ASSERT_EQ(joined.size(), 2u);
-  for (std::size_t i = 0; i < 2; ++i) EXPECT_LT(farthest_px(joined[i].points, lines[i]), 1);
-}
-
-TEST(FibreParts, which_way_a_piece_was_traced_does_not_matter_to_the_joining) {
-  Drawing drawing;
-  const auto arc = arc_points({30, 100}, 0.1, 0.004, 190);
-  drawing.draw(arc, 20);
-  for (const bool is_first_turned : {false, true})
-    for (const bool is_second_turned : {false, true}) {
-      Trace first = piece_of(arc, 0, 90), second = piece_of(arc, 120, 190);
-      if (is_first_turned) first.reverse();
-      if (is_second_turned) second.reverse();
-      const auto lines = drawing.joined_of({second, first});
-      ASSERT_EQ(lines.size(), 1u);
-      EXPECT_LT(farthest_px(arc, lines[0].points), 1);
-    }
 }
 
 }  // namespace
