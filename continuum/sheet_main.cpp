@@ -117,16 +117,16 @@ std::vector<Polygon> read_rings(const Path& file, const std::optional<double>& p
     rings = rings_of_picture(file, *pixel_um);
   }
   for (Polygon& ring : rings) ring = distinct(ring);
+  const std::string crossing = crossing_of(rings);
+  if (!crossing.empty())
+    throw InputError(file.string(), "an outline that does not cross itself", crossing + " cross",
+                     "a piece runs from a point to the next; remove the loop, or draw the outline again");
   for (const Polygon& ring : rings) {
     const double around = ring.size() < 3 ? 0 : length_um(ring) + norm(ring.front() - ring.back());
     constexpr double kThinnest = 1e-6;  // a strip four millionths as wide as long
     if (!(std::abs(signed_area_um2(ring)) > kThinnest * around * around))
       throw InputError(file.string(), "an outline around an area", "one around none");
   }
-  const std::string crossing = crossing_of(rings);
-  if (!crossing.empty())
-    throw InputError(file.string(), "an outline that does not cross itself", crossing + " cross",
-                     "a piece runs from a point to the next; remove the loop, or draw the outline again");
   return rings;
 }
 

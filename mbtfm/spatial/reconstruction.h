@@ -68,10 +68,6 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
 /// integral over the surface, and their weights have a mean of one.
 double lambda_per_um_per_kPa(const Problem& problem);
 
-/// By a criterion; risk not below cross-validation. The risk needs the variance of a datum: where the model is wrong by
-/// more than is known, it would let tractions follow that, without an end.
-double lambda_by(const tractions::LambdaScan& scan, tractions::LambdaCriterion criterion);
-
 /// The same as tikhonov where the problem has no matrix. No standard errors.
 SpatialReconstruction reconstruct_large(const Problem& problem, const tractions::TractionParameters& traction,
                                         const SpatialParameters& parameters);

@@ -139,7 +139,7 @@ TEST_F(Sheet, what_cannot_be_is_refused_by_name) {
   files::write_text(folder_ / "line.csv", "x_um,y_um\n0,1e-300\n20,2e-300\n40,1e-300\n20,0\n");
   const auto line = run(std::string(kSheet) + springs, "", "line.csv");
   EXPECT_EQ(line.code, 3) << line.output;
-  EXPECT_NE(line.output.find("an outline around an area"), std::string::npos) << line.output;
+  EXPECT_NE(line.output.find("line.csv: expected an outline"), std::string::npos) << line.output;
   const auto outcome = run(std::string(kSheet) + springs, "", "eight.csv");
   EXPECT_EQ(outcome.code, 3) << outcome.output;
   EXPECT_NE(outcome.output.find("piece 1 of ring 0 and piece 3 of ring 0 cross"), std::string::npos) << outcome.output;
