@@ -62,7 +62,7 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
                                    parameters.loss == BeadLoss::l2 || round == 0 ? 0.0 : r.weighing.variance});
     r.scan = recurrences.scan(least > 0 ? std::optional(least) : std::nullopt);
     r.lambda = traction.lambda_um_per_kPa ? *traction.lambda_um_per_kPa * lambda_per_um_per_kPa(problem)
-                                          : chosen_lambda(*r.scan, traction.lambda_by);
+                                          : lambda_by(*r.scan, traction.lambda_by);
     r.traction_kPa = basis.tractions(recurrences.solve(*r.lambda));
     r.degrees = recurrences.degrees(*r.lambda);
     r.relative_l2 = recurrences.relative_l2(*r.lambda);

@@ -68,6 +68,10 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
 /// integral over the surface, and their weights have a mean of one.
 double lambda_per_um_per_kPa(const Problem& problem);
 
+/// By a criterion. Where the risk's is below a tenth of the evidence's, the evidence's: the model is then wrong by more
+/// than the stated errors in a way that tractions can follow, and the risk has no minimum but the end of the scan.
+double lambda_by(const tractions::LambdaScan& scan, tractions::LambdaCriterion criterion);
+
 /// The same as tikhonov where the problem has no matrix. No standard errors.
 SpatialReconstruction reconstruct_large(const Problem& problem, const tractions::TractionParameters& traction,
                                         const SpatialParameters& parameters);

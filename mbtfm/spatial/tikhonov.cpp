@@ -33,6 +33,13 @@ double lambda_per_um_per_kPa(const Problem& problem) {
   return std::sqrt(n / area * problem.observed.sigma_um.cwiseAbs2().cwiseInverse().mean());
 }
 
+double lambda_by(const tractions::LambdaScan& scan, tractions::LambdaCriterion criterion) {
+  constexpr double kRunsAway = 0.1;  // tractions of ten times the size that the evidence sees
+  const double lambda = chosen_lambda(scan, criterion);
+  const bool runs_away = criterion == tractions::LambdaCriterion::risk && lambda < kRunsAway * scan.by_evidence;
+  return runs_away ? scan.by_evidence : lambda;
+}
+
 SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& response, const Problem& problem,
                                      const tractions::TractionParameters& traction, const SpatialParameters& parameters,
                                      int threads) {
@@ -58,7 +65,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     made.scan = judged ? scanned(spectrum_of(problem, response, judged->by_row, judged->n_data, threads), *judged)
                        : scanned(*made.spectrum, weighing);
     made.lambda = traction.lambda_um_per_kPa ? *traction.lambda_um_per_kPa * lambda_per_um_per_kPa(problem)
-                                             : chosen_lambda(made.scan, traction.lambda_by);
+                                             : lambda_by(made.scan, traction.lambda_by);
     made.x = made.spectrum->solve(made.lambda);
     made.weighing = std::move(weighing);
     return made;
