@@ -48,7 +48,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "not single ones."},
       {pattern_too_fine, "pattern-too-fine", "segment", caution,
        "area of a candidate for an adhesion over that of the pattern's parts beneath the cell (median)", 1,
-       "a candidate then reaches beyond the part that holds it, and what the beads tell of its force is wrong",
+       "a candidate then reaches beyond the part that holds it, and the force that is found for it is wrong",
        "Leave segment.adhesions out: each part of the mask is then an adhesion. Or lower "
        "segment.candidate_spacing_um."},
       {pattern_as_cell, "pattern-as-cell", "segment", caution, "share of the cell's area that lies on the pattern", 0.9,
@@ -145,8 +145,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {adhesions_without_beads, "adhesions-without-beads", "fit", caution,
        "adhesions whose nearest bead is three distances between beads away, or further", 0,
        "of beads scattered at random, one such gap in 10^12 adhesions is chance: the beads do not show this part of "
-       "the "
-       "cell",
+       "the cell",
        "Check that the bead images (or the displacement) show the whole cell at the same place and with the same pixel "
        "size as its other images: neither cropped nor binned by themselves. Disregard the forces of these adhesions."},
       {cell_cut, "cell-cut", "fit", caution, "1 if the image's border cuts the cell", 0,
