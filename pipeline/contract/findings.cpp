@@ -90,7 +90,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the common motion is found from the beads at rest; beyond two thirds that move they cannot be found any more",
        "Record a wider field or a deeper stack, so that part of the gel is at rest."},
       {slices_moved, "slices-moved", "track", note,
-       "drift of the slices of one stack against the other's, over its standard error", 3, "chance alone makes it 1",
+       "how surely the slices of one stack moved against the other's: square root of twice the logarithm of the odds",
+       3,
+       "chance alone makes it 1; a mean motion that changes slowly with depth and is no larger than the field's own "
+       "scatter there counts as the gel's",
        "Nothing if it was taken off (track.slice_drift); slices.csv has it. If it recurs, let the stage settle."},
       {beads_scatter, "beads-scatter", "track", note,
        "scatter of beads in space about their neighbours over their standard errors", 1.5,
