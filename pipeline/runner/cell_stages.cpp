@@ -25,6 +25,7 @@ Stage tracking() {
   stage.optional_images = {{"surface_beads", "surface_beads"}};
   stage.writes = {kDisplacement};
   stage.series = {kSurfaceBeads};
+  stage.keeps_frames = false;
   return stage;
 }
 
