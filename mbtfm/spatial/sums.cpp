@@ -69,9 +69,9 @@ void set_force(PartForce& part, const Vector3d& force_nN, const Matrix3d& covari
 
 std::vector<PartForce> forces_beside_background(const Problem& problem, const MatrixXd& background,
                                                 const SpatialReconstruction& r, int threads) {
-  const VectorXd roots = r.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
-  const MatrixXd A = roots.asDiagonal() * background, P = roots.asDiagonal() * problem.patch_response_um_per_nN;
-  const VectorXd u = roots.cwiseProduct(problem.displacement_um());
+  const Rows rows(problem, r.weighing.by_row);
+  const MatrixXd A = rows.of(background), P = rows.of(problem.patch_response_um_per_nN);
+  const VectorXd u = rows.of(problem.displacement_um());
   MatrixXd inner = MatrixXd::Zero(A.cols(), A.cols());
   numerics::add_upper_gram(A, inner, threads);
   inner.diagonal().array() += *r.lambda * *r.lambda;
