@@ -128,6 +128,12 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
     forces.middleCols<3>(3 * v) = area * Matrix3d::Identity();
     moments.middleCols<3>(3 * v) = area * cross_arm;
   }
+  if (r.covariance_kPa2.size() > 0) {
+    VectorXd along(3 * n);
+    for (Index v = 0; v < n; ++v)
+      along.segment<3>(3 * v) = mesh.areas_um2[static_cast<std::size_t>(v)] * traction(v).stableNormalized();
+    balance.total_force_sigma_nN = std::sqrt(std::max(0.0, along.dot(r.covariance_kPa2 * along)));
+  }
   balance.force_nN = vec(forces * r.traction_kPa);
   balance.moment_nN_um = vec(moments * r.traction_kPa);
   balance.force_sigma_nN = errors_of(forces, r.covariance_kPa2);

@@ -239,8 +239,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {tractions_out_of_balance, "tractions-out-of-balance", "traction", caution,
        "length of the net force over its standard error", 4,
        "a cell at rest pulls as much one way as the other; four standard errors are more than chance",
-       "Check that the whole cell lies above the beads and that the drift of the stage was taken out: a shift of all "
-       "beads looks like a net force."},
+       "Check that the whole cell lies above the beads: forces beyond them are missing in the sum. Look for a cell "
+       "beside it, or for a support that holds the cell."},
       {beads_stray, "beads-stray", "traction", caution,
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
