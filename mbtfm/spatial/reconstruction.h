@@ -134,8 +134,9 @@ struct Balance {
   Vec3 force_nN, force_sigma_nN;
   Vec3 moment_nN_um, moment_sigma_nN_um;  ///< about `centre_um`
   Vec3 centre_um;
-  double total_force_nN = 0;   ///< ∫ |t| dA
-  double normal_force_nN = 0;  ///< ∫ |t . n| dA
+  double total_force_nN = 0;        ///< ∫ |t| dA
+  double total_force_sigma_nN = 0;  ///< along the tractions found
+  double normal_force_nN = 0;       ///< ∫ |t . n| dA
   double strain_energy_fJ = 0;
 };
 Balance balance_of(const Problem& problem, const SpatialReconstruction& reconstruction);

@@ -93,8 +93,9 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   };
   const VectorXd displacement_um = problem.displacement_um();
   const VectorXd of_nothing = displacement_um.cwiseQuotient(observed.sigma_um);
-  const auto residual = [&](const VectorXd& x) -> VectorXd {
-    return (displacement_um - response * x).cwiseQuotient(observed.sigma_um);
+  const auto residual = [&](const Fit& made, const VectorXd& x) -> VectorXd {
+    const VectorXd left = (displacement_um - response * x).cwiseQuotient(observed.sigma_um);
+    return left - Rows(problem, made.weighing.by_row).common_part(left);
   };
   if (displacement_um.isZero(0)) {
     r.traction_kPa = VectorXd::Zero(problem.n_unknowns());
@@ -120,7 +121,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
       Fit next = fit(std::move(weighing), judged);
       change = (next.x - last.x).norm() / std::max(next.x.norm(), 1e-300);
       const double least_smooth = std::min(next.chosen.lambda, next.scan.by_gcv);
-      const VectorXd left = residual(next.spectrum->solve(least_smooth));
+      const VectorXd left = residual(next, next.spectrum->solve(least_smooth));
       const double degrees = next.spectrum->degrees(least_smooth);
       weighing = weigh(parameters.loss, observed, left, degrees);
       if (parameters.loss != BeadLoss::biweight) judged = weigh(BeadLoss::biweight, observed, left, degrees);
@@ -129,7 +130,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   }
   const double lambda = last.chosen.lambda;
   r.degrees = last.spectrum->degrees(lambda);
-  r.weighing = weigh(parameters.loss, observed, residual(last.x), r.degrees);
+  r.weighing = weigh(parameters.loss, observed, residual(last, last.x), r.degrees);
   r.variance = std::max(last.scan.variance, floor(0));
   r.traction_kPa = basis.tractions(last.x);
   const VectorXd before = variances_before(last.x, last.spectrum->posterior_variances(lambda, r.variance));

@@ -90,7 +90,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the common motion is found from the beads at rest; beyond two thirds that move they cannot be found any more",
        "Record a wider field or a deeper stack, so that part of the gel is at rest."},
       {slices_moved, "slices-moved", "track", note,
-       "drift of the slices of one stack against the other's, over its standard error", 3, "chance alone makes it 1",
+       "how surely the slices of one stack moved against the other's: square root of twice the logarithm of the odds",
+       3,
+       "chance alone makes it 1; a mean motion that changes slowly with depth and is no larger than the field's own "
+       "scatter there counts as the gel's",
        "Nothing if it was taken off (track.slice_drift); slices.csv has it. If it recurs, let the stage settle."},
       {beads_scatter, "beads-scatter", "track", note,
        "scatter of beads in space about their neighbours over their standard errors", 1.5,
@@ -236,8 +239,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {tractions_out_of_balance, "tractions-out-of-balance", "traction", caution,
        "length of the net force over its standard error", 4,
        "a cell at rest pulls as much one way as the other; four standard errors are more than chance",
-       "Check that the whole cell lies above the beads and that the drift of the stage was taken out: a shift of all "
-       "beads looks like a net force."},
+       "Check that the whole cell lies above the beads: forces beyond them are missing in the sum. Look for a cell "
+       "beside it, or for a support that holds the cell."},
       {beads_stray, "beads-stray", "traction", caution,
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
