@@ -27,10 +27,8 @@ struct SpatialReconstruction {
   tractions::TractionMethod method{};
   Eigen::VectorXd traction_kPa;     ///< three a vertex
   Eigen::VectorXd unshortened_kPa;  ///< what forces are the sums of; empty: traction_kPa
-  /// Of tractions: by the noise, and by what smoothing took away. Empty: the method tells none.
+  /// Of tractions: by the noise, and by what is not resolved. Empty: the method tells none.
   Eigen::MatrixXd covariance_kPa2;
-  /// The same where the size of tractions is everywhere that of the penalty: what the beads resolve is told from it.
-  Eigen::MatrixXd of_even_size_kPa2;
   Eigen::VectorXd resolved;  ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
   std::optional<tractions::LambdaScan> scan;
   std::optional<double> lambda;                         ///< of |S (u − G t)|² + lambda² |s|²

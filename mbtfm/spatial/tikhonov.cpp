@@ -22,16 +22,6 @@ struct Fit {
   Weighing weighing;
 };
 
-/// What the tractions' squares are likely to be, by place: the penalty has one size for all of them, but where a cell
-/// pulls they are larger than that, and smoothing takes more away than it knows. The mean square of what was found with
-/// what is not known of it (a step of expectation and maximisation, Dempster, Laird & Rubin 1977), over the components.
-VectorXd variances_before(const VectorXd& x, const VectorXd& posterior) {
-  const Index n = x.size() / 3;
-  const VectorXd squares = x.cwiseAbs2() + posterior;
-  const VectorXd mean = (squares.head(n) + squares.segment(n, n) + squares.tail(n)) / 3;
-  return mean.replicate(3, 1);
-}
-
 }  // namespace
 
 double lambda_per_um_per_kPa(const Problem& problem) {
@@ -133,9 +123,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   r.weighing = weigh(parameters.loss, observed, residual(last, last.x), r.degrees);
   r.variance = std::max(last.scan.variance, floor(0));
   r.traction_kPa = basis.tractions(last.x);
-  const VectorXd before = variances_before(last.x, last.spectrum->posterior_variances(lambda, r.variance));
-  r.covariance_kPa2 = basis.covariance(last.spectrum->square_error(lambda, r.variance, before), threads);
-  r.of_even_size_kPa2 = basis.covariance(last.spectrum->posterior(lambda, r.variance), threads);
+  r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(lambda, r.variance), threads);
   r.scan = std::move(last.scan);
   r.lambda = lambda;
   r.lambda_by = last.chosen.by;
@@ -154,7 +142,7 @@ SpatialReconstruction reconstruct_tikhonov(const Problem& problem, const tractio
   SpatialReconstruction r = reconstruct_in(basis, response, problem, traction, parameters, threads);
   if (r.lambda && problem.patch_response_um_per_nN.size() > 0)
     r.forces = forces_beside_background(problem, response, r, threads);
-  if (r.lambda) r.resolved = resolved_shares(r.of_even_size_kPa2, *r.lambda * *r.lambda / r.variance * norm);
+  if (r.lambda) r.resolved = resolved_shares(r.covariance_kPa2, *r.lambda * *r.lambda / r.variance * norm);
   return r;
 }
 

@@ -67,18 +67,6 @@ MatrixXd Spectrum::posterior(double lambda, double variance) const {
   return outer(variance / (values_ + lambda * lambda));
 }
 
-VectorXd Spectrum::posterior_variances(double lambda, double variance) const {
-  return vectors_.array().square().matrix() * (variance / (values_ + lambda * lambda)).matrix();
-}
-
-MatrixXd Spectrum::square_error(double lambda, double variance, const VectorXd& before) const {
-  MatrixXd sum = covariance(lambda, variance);
-  const MatrixXd taken = outer(lambda * lambda / (values_ + lambda * lambda));
-  numerics::add_upper_outer(taken * before.cwiseSqrt().asDiagonal(), sum);
-  numerics::mirror_upper(sum);
-  return sum;
-}
-
 VectorXd Spectrum::resolved(double lambda) const {
   return vectors_.array().square().matrix() * (values_ / (values_ + lambda * lambda)).matrix();
 }

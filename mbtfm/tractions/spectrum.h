@@ -22,12 +22,6 @@ class Spectrum {
   Eigen::MatrixXd covariance(double lambda, double variance) const;
   /// Of s itself, where nothing but its size was known before: noise and what the penalty takes away.
   Eigen::MatrixXd posterior(double lambda, double variance) const;
-  /// The diagonal of posterior().
-  Eigen::VectorXd posterior_variances(double lambda, double variance) const;
-  /// Mean square error of solve(lambda) where the unknowns have variances of their own before anything is measured:
-  ///   variance V diag(v/(v + lambda²)²) Vᵀ + B diag(before) B,  B = V diag(lambda²/(v + lambda²)) Vᵀ
-  /// With variance / lambda² for all of them it is posterior().
-  Eigen::MatrixXd square_error(double lambda, double variance, const Eigen::VectorXd& before) const;
   /// By unknown: how much of a change of it solve(lambda) shows, 0 … 1.
   Eigen::VectorXd resolved(double lambda) const;
   double explained(double lambda) const;  ///< uᵀ H u, H the matrix that takes u to A s
