@@ -20,8 +20,8 @@ hard_cases() {
 for mode in "${modes[@]}"; do
   echo "== $mode"
   case $mode in
-    release) build release && hard_cases build ;;
-    traps) build release && LD_PRELOAD=$PWD/build/tests/libmbtfm_fp_traps.so hard_cases build ;;
+    release) build release && MBTFM_SCENES=20 hard_cases build ;;
+    traps) build release && MBTFM_SCENES=20 LD_PRELOAD=$PWD/build/tests/libmbtfm_fp_traps.so hard_cases build ;;
     # the sanitizers take five to ten times as long: fewer random scenes
     # up to GCC 13 the leak check takes some thread-local blocks of libraries loaded at run time, as deal.II is, for
     # those of glibc before 2.25, and dies of what it reads there (github.com/google/sanitizers/issues/1322)

@@ -138,6 +138,7 @@ Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const
   };
   figures.emplace_back("method", std::string(name_of(r.method)));
   add("total_force_nN", balance.total_force_nN);
+  if (r.covariance_kPa2.size() > 0) add("total_force_sigma_nN", balance.total_force_sigma_nN);
   add("normal_force_nN", balance.normal_force_nN);
   add_vector("net_force", "nN", balance.force_nN);
   add_vector("moment", "nN_um", balance.moment_nN_um);

@@ -167,9 +167,9 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   VectorXd at_minimum;
   int steps = 0;
   for (int round = 0; round < n_rounds; ++round) {
-    const VectorXd roots = r.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
-    const MatrixXd weighed = roots.asDiagonal() * response;
-    const VectorXd data = roots.cwiseProduct(problem.displacement_um());
+    const Rows rows(problem, r.weighing.by_row);
+    const MatrixXd weighed = rows.of(response);
+    const VectorXd data = rows.of(problem.displacement_um());
     const MatrixXd normal = numerics::gram(weighed, threads);
     GroupLasso lasso(normal, weighed.transpose() * data, data.squaredNorm(), weights, largest);
     mu = choose_mu(lasso, variance * r.weighing.n_data);
@@ -179,9 +179,9 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
     r.relative_l2 = std::sqrt(std::max(0.0, lasso.misfit()) / std::max(data.squaredNorm(), 1e-300));
     const bool is_last = round + 1 == n_rounds;
     if (is_last) posterior = posterior_of(lasso, normal, mu, variance, threads);
-    if (!is_last) r.weighing = weigh(parameters.loss, problem.observed, problem.residual(r.traction_kPa), r.degrees);
+    r.weighing =
+        weigh(parameters.loss, problem.observed, problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees);
   }
-  r.weighing = weigh(parameters.loss, problem.observed, problem.residual(r.traction_kPa), r.degrees);
   r.unshortened_kPa = basis.tractions(posterior.mean);
   r.covariance_kPa2 = basis.covariance(posterior.covariance, threads);
   const VectorXd seen =

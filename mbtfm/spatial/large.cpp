@@ -15,19 +15,19 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// W S G L and its transpose, by solutions of the gel.
-tractions::LinearMap map_of(const Problem& problem, const Basis& basis, const VectorXd& roots) {
+/// P W S G L and its transpose, by solutions of the gel.
+tractions::LinearMap map_of(const Problem& problem, const Basis& basis, const Rows& rows) {
   const Index n_points = problem.map->rows(), n = problem.observed.n_components();
   tractions::LinearMap map;
-  map.n_data = roots.size();
+  map.n_data = problem.observed.displacement_um.size();
   map.n_unknowns = 3 * basis.size();
-  map.forward = [&problem, &basis, roots](const MatrixXd& x) -> MatrixXd {
+  map.forward = [&problem, &basis, &rows](const MatrixXd& x) -> MatrixXd {
     MatrixXd t(problem.n_unknowns(), x.cols());
     for (Index k = 0; k < x.cols(); ++k) t.col(k) = basis.tractions(x.col(k));
-    return roots.asDiagonal() * problem.at_beads(problem.map->displace(t));
+    return rows.of(problem.at_beads(problem.map->displace(t)));
   };
-  map.transposed = [&problem, &basis, roots, n_points, n](const MatrixXd& y) -> MatrixXd {
-    const MatrixXd weighed = roots.asDiagonal() * y;
+  map.transposed = [&problem, &basis, &rows, n_points, n](const MatrixXd& y) -> MatrixXd {
+    const MatrixXd weighed = rows.transposed(y);
     MatrixXd at_points = MatrixXd::Zero(n_points, y.cols());
     for (Index b = 0; b < problem.observed.n_beads; ++b) at_points.middleRows(3 * b, n) = weighed.middleRows(n * b, n);
     const MatrixXd pulled = problem.map->pull_back(at_points);
@@ -53,11 +53,10 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
   }
   const int n_rounds = parameters.loss == BeadLoss::l2 ? 1 : 5;
   r.weighing = weigh(parameters.loss == BeadLoss::biweight ? BeadLoss::huber : parameters.loss, observed,
-                     problem.residual(r.traction_kPa), 0);
+                     observed.displacement_um.cwiseQuotient(observed.sigma_um), 0);
   for (int round = 0; round < n_rounds; ++round) {
-    const VectorXd roots = r.weighing.by_row.cwiseSqrt().cwiseQuotient(observed.sigma_um);
-    const tractions::Recurrences recurrences(map_of(problem, basis, roots),
-                                             roots.cwiseProduct(observed.displacement_um), {});
+    const Rows rows(problem, r.weighing.by_row);
+    const tractions::Recurrences recurrences(map_of(problem, basis, rows), rows.of(observed.displacement_um), {});
     const double least = std::max({observed.states_errors ? 1.0 : 0.0, problem.variance_of_model(),
                                    parameters.loss == BeadLoss::l2 || round == 0 ? 0.0 : r.weighing.variance});
     r.scan = recurrences.scan(least > 0 ? std::optional(least) : std::nullopt);
@@ -67,7 +66,7 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
     r.degrees = recurrences.degrees(*r.lambda);
     r.relative_l2 = recurrences.relative_l2(*r.lambda);
     r.variance = std::max(r.scan->variance, least);
-    r.weighing = weigh(parameters.loss, observed, problem.residual(r.traction_kPa), r.degrees);
+    r.weighing = weigh(parameters.loss, observed, problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees);
   }
   r.length_um = *r.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
   r.remark = "standard errors are computed of up to " + std::to_string(kMostVertices) + " vertices, and there are " +

@@ -27,9 +27,9 @@ struct Functional {
 };
 
 Functional functional_of(const Problem& problem, const Basis& basis, const SpatialReconstruction& r, int threads) {
-  const VectorXd roots = r.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
-  return {roots.asDiagonal() * basis.response(problem.response_um_per_kPa, threads),
-          roots.cwiseProduct(problem.displacement_um()), *r.lambda * *r.lambda};
+  const Rows rows(problem, r.weighing.by_row);
+  return {rows.of(basis.response(problem.response_um_per_kPa, threads)), rows.of(problem.displacement_um()),
+          *r.lambda * *r.lambda};
 }
 
 Basis basis_of(const Problem& problem) {
@@ -130,9 +130,11 @@ SpatialReconstruction reconstruct_direct(const Problem& problem, int threads) {
   numerics::solve_upper_transposed(normal, right);
   numerics::solve_upper(normal, right);
   r.traction_kPa = right.col(0);
-  const VectorXd residual = problem.residual(r.traction_kPa);
+  const VectorXd even = VectorXd::Ones(problem.observed.displacement_um.size());
+  const VectorXd residual = problem.residual(r.traction_kPa, even);
   r.weighing = weigh(BeadLoss::l2, problem.observed, residual, 0);
-  r.relative_l2 = residual.norm() / std::max(problem.residual(VectorXd::Zero(problem.n_unknowns())).norm(), 1e-300);
+  const VectorXd of_nothing = problem.residual(VectorXd::Zero(problem.n_unknowns()), even);
+  r.relative_l2 = residual.norm() / std::max(of_nothing.norm(), 1e-300);
   r.remark = "direct imposes the noise of the beads with their displacement: no map to be believed";
   return r;
 }

@@ -95,10 +95,11 @@ VectorXd Problem::surface_displacement_um(const VectorXd& traction_kPa) const {
   return u + surface_offset_um;
 }
 
-VectorXd Problem::residual(const VectorXd& traction_kPa) const {
+VectorXd Problem::residual(const VectorXd& traction_kPa, const VectorXd& weights_by_row) const {
   const VectorXd explained =
       map ? VectorXd(at_beads(map->displace(traction_kPa)).col(0)) : VectorXd(response_um_per_kPa * traction_kPa);
-  return (displacement_um() - explained).cwiseQuotient(observed.sigma_um);
+  const VectorXd left = (displacement_um() - explained).cwiseQuotient(observed.sigma_um);
+  return left - Rows(*this, weights_by_row).common_part(left);
 }
 
 Problem Problem::with_response(const MatrixXd& matrix, const VectorXd& displaced_um, const VectorXd& about_kPa) const {
@@ -148,6 +149,7 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
     problem.adhesion_areas_um2 = adhesion_areas_um2(problem.mesh, ground, inputs.adhesions, 0);
   }
   if (meshing.has_facets) problem.facet_response_um_per_kPa = facet_response(*model, problem.mesh, problem.observed.at);
+  if (gel.effects.common_motion != Switch::off) problem.common_um = common_motions(problem.observed);
   problem.model_error = model->stated_error();
   problem.figures = model->figures();
   return problem;
@@ -155,12 +157,13 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
 
 tractions::Spectrum spectrum_of(const Problem& problem, const MatrixXd& response, const VectorXd& weights_by_row,
                                 double n_data, int threads) {
-  const VectorXd roots = weights_by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
-  const MatrixXd weighed = roots.asDiagonal() * response;
-  const VectorXd data = roots.cwiseProduct(problem.displacement_um());
+  const Rows rows(problem, weights_by_row);
+  const MatrixXd weighed = rows.of(response);
+  const VectorXd data = rows.of(problem.displacement_um());
   MatrixXd normal = MatrixXd::Zero(weighed.cols(), weighed.cols());
   numerics::add_upper_gram(weighed, normal, threads);
-  return {std::move(normal), weighed.transpose() * data, data.squaredNorm(), n_data};
+  return {std::move(normal), weighed.transpose() * data, data.squaredNorm(),
+          n_data - static_cast<double>(rows.n_common())};
 }
 
 }  // namespace mbtfm::spatial

@@ -6,6 +6,7 @@
 
 #include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/region.h"
+#include "mbtfm/spatial/rows.h"
 #include "mbtfm/tractions/spectrum.h"
 #include "substrate/compliance.h"
 #include "substrate/response.h"
@@ -32,6 +33,7 @@ struct Problem {
   Eigen::MatrixXd patch_response_um_per_nN = {};  ///< to forces spread evenly over them, x, y, z of each in turn
   Eigen::MatrixXd adhesion_areas_um2 = {};  ///< adhesions × vertices: the area of each, as weights of the vertices
   Eigen::MatrixXd facet_response_um_per_kPa = {};  ///< to even tractions on the faces, where they are asked for
+  Eigen::MatrixXd common_um = {};                  ///< what all beads may do together beside; no columns: nothing
   double model_error = 0;                          ///< relative, of G, as the gel's model states it
   Figures figures = {};                            ///< of that model
 
@@ -45,8 +47,8 @@ struct Problem {
   Eigen::VectorXd displacement_um() const;
   /// Of the vertices.
   Eigen::VectorXd surface_displacement_um(const Eigen::VectorXd& traction_kPa) const;
-  /// S (u − u_0 − G t)
-  Eigen::VectorXd residual(const Eigen::VectorXd& traction_kPa) const;
+  /// S (u − u_0 − G t), and less the common motion that rows of these weights see in it.
+  Eigen::VectorXd residual(const Eigen::VectorXd& traction_kPa, const Eigen::VectorXd& weights_by_row) const;
   /// The same with other answers: G = `matrix`, and u = `displacement_um` under the tractions `about_kPa`.
   Problem with_response(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& displaced_um,
                         const Eigen::VectorXd& about_kPa) const;
@@ -67,7 +69,7 @@ struct Meshing {
 Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& parameters, const Meshing& meshing,
                      const substrate::SubstrateParameters& gel, int threads);
 
-/// Least squares of the weighed beads over the unknowns of a basis.
+/// Least squares of the weighed beads over the unknowns of a basis, the common motion found besides.
 /// @param response  of the beads to them
 tractions::Spectrum spectrum_of(const Problem& problem, const Eigen::MatrixXd& response,
                                 const Eigen::VectorXd& weights_by_row, double n_data, int threads);

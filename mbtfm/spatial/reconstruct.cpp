@@ -85,7 +85,7 @@ void find_doubts(const Problem& problem, const SpatialParameters& parameters, Sp
                                      " times the squares that the stated errors of the beads explain."));
   }
   if (parameters.loss == BeadLoss::l2) {
-    const double share = share_astray(problem, problem.residual(r.traction_kPa));
+    const double share = share_astray(problem, problem.residual(r.traction_kPa, r.weighing.by_row));
     r.findings.push_back(
         noticed(FindingKind::beads_stray, share,
                 brief(100 * share) + " % of the beads lie further from the model than noise has them."));

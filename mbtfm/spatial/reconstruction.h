@@ -124,7 +124,8 @@ struct Balance {
   Vec3 force_nN, force_sigma_nN;
   Vec3 moment_nN_um, moment_sigma_nN_um;  ///< about `centre_um`
   Vec3 centre_um;
-  double total_force_nN = 0;   ///< ∫ |t| dA
+  double total_force_nN = 0;        ///< ∫ |t| dA
+  double total_force_sigma_nN = 0;  ///< along the tractions found
   double normal_force_nN = 0;  ///< ∫ |t . n| dA
   double strain_energy_fJ = 0;
 };

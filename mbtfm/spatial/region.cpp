@@ -78,7 +78,7 @@ Expected expected_tractions(const SpatialInputs& inputs, const Observed& observe
     throw InvalidData("the gel's surface", "one that lies above the beads, " + text_of(beads),
                       text_of({ground.map()->low_um(), ground.map()->high_um()}));
   }
-  if (region == Region::all) return {known, [](Vec2) { return true; }, "all above the beads", 1};
+  if (region == Region::all) return {known, [](Vec2) { return true; }, "the whole surface above the beads", 1};
   if (region == Region::outline && inputs.outline_um.empty())
     throw UsageError("traction.region = outline: --outline is missing");
   if (region == Region::adhesions && inputs.adhesions.empty())

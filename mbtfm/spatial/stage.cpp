@@ -119,7 +119,7 @@ void declare(stage::ParameterList& list, StageParameters& p) {
   declare(list, p.traction);
   declare(list, p.spatial);
   declare(list, p.substrate);
-  declare(list, p.substrate.effects, {"large_strain", "effect_tolerance"});
+  declare(list, p.substrate.effects, {"large_strain", "common_motion", "effect_tolerance"});
 }
 
 StageReport run_in_space(const StageParameters& p, stage::StageContext& context) {
@@ -137,7 +137,6 @@ StageReport run_in_space(const StageParameters& p, stage::StageContext& context)
     strain.is_on = false;
     strain.why += "; but not with " + std::string(name_of(r.method)) + ", or with so many tractions";
   }
-  report.effects = {strain};
   if (strain.is_on) {
     context.progress(0.7, "large strains of the gel");
     Strained strained = on_strained_gel(problem, std::move(r), p.substrate, find, context.threads);
@@ -150,6 +149,11 @@ StageReport run_in_space(const StageParameters& p, stage::StageContext& context)
                            "Tractions of " + brief(mean_traction_kPa(problem, r.traction_kPa)) + " kPa on a gel of " +
                                brief(problem.gel.youngs_modulus_kPa) + " kPa: linear elasticity leaves out " +
                                brief(100 * left_out) + " % of the displacement."));
+  }
+  const auto common = common_motion_beside(problem, r);
+  report.effects = {strain, common_motion_effect(p.substrate.effects.common_motion, common)};
+  if (common) {
+    for (auto& figure : figures_of(*common)) r.figures.push_back(std::move(figure));
   }
   for (const auto& finding : r.findings) context.notice(finding);
   const Balance balance = balance_of(problem, r);

@@ -69,9 +69,9 @@ void set_force(PartForce& part, const Vector3d& force_nN, const Matrix3d& covari
 
 std::vector<PartForce> forces_beside_background(const Problem& problem, const MatrixXd& background,
                                                 const SpatialReconstruction& r, int threads) {
-  const VectorXd roots = r.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
-  const MatrixXd A = roots.asDiagonal() * background, P = roots.asDiagonal() * problem.patch_response_um_per_nN;
-  const VectorXd u = roots.cwiseProduct(problem.displacement_um());
+  const Rows rows(problem, r.weighing.by_row);
+  const MatrixXd A = rows.of(background), P = rows.of(problem.patch_response_um_per_nN);
+  const VectorXd u = rows.of(problem.displacement_um());
   MatrixXd inner = MatrixXd::Zero(A.cols(), A.cols());
   numerics::add_upper_gram(A, inner, threads);
   inner.diagonal().array() += *r.lambda * *r.lambda;
@@ -127,6 +127,12 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
     cross_arm << 0, -arm.z, arm.y, arm.z, 0, -arm.x, -arm.y, arm.x, 0;
     forces.middleCols<3>(3 * v) = area * Matrix3d::Identity();
     moments.middleCols<3>(3 * v) = area * cross_arm;
+  }
+  if (r.covariance_kPa2.size() > 0) {
+    VectorXd along(3 * n);
+    for (Index v = 0; v < n; ++v)
+      along.segment<3>(3 * v) = mesh.areas_um2[static_cast<std::size_t>(v)] * traction(v).stableNormalized();
+    balance.total_force_sigma_nN = std::sqrt(std::max(0.0, along.dot(r.covariance_kPa2 * along)));
   }
   balance.force_nN = vec(forces * r.traction_kPa);
   balance.moment_nN_um = vec(moments * r.traction_kPa);

@@ -72,8 +72,9 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   };
   const VectorXd displacement_um = problem.displacement_um();
   const VectorXd of_nothing = displacement_um.cwiseQuotient(observed.sigma_um);
-  const auto residual = [&](const VectorXd& x) -> VectorXd {
-    return (displacement_um - response * x).cwiseQuotient(observed.sigma_um);
+  const auto residual = [&](const Fit& made) -> VectorXd {
+    const VectorXd left = (displacement_um - response * made.x).cwiseQuotient(observed.sigma_um);
+    return left - Rows(problem, made.weighing.by_row).common_part(left);
   };
   if (displacement_um.isZero(0)) {
     r.traction_kPa = VectorXd::Zero(problem.n_unknowns());
@@ -93,7 +94,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     for (int round = 0; round < kMostRounds && change > kSettled; ++round) {
       Fit next = fit(std::move(weighing), judged);
       change = (next.x - last.x).norm() / std::max(next.x.norm(), 1e-300);
-      const VectorXd left = residual(next.x);
+      const VectorXd left = residual(next);
       const double degrees = next.spectrum->degrees(next.lambda);
       weighing = weigh(parameters.loss, observed, left, degrees);
       if (parameters.loss != BeadLoss::biweight) judged = weigh(BeadLoss::biweight, observed, left, degrees);
@@ -101,7 +102,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     }
   }
   r.degrees = last.spectrum->degrees(last.lambda);
-  r.weighing = weigh(parameters.loss, observed, residual(last.x), r.degrees);
+  r.weighing = weigh(parameters.loss, observed, residual(last), r.degrees);
   r.variance = std::max(last.scan.variance, floor(0));
   r.traction_kPa = basis.tractions(last.x);
   r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(last.lambda, r.variance), threads);

@@ -90,7 +90,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the common motion is found from the beads at rest; beyond two thirds that move they cannot be found any more",
        "Record a wider field or a deeper stack, so that part of the gel is at rest."},
       {slices_moved, "slices-moved", "track", note,
-       "drift of the slices of one stack against the other's, over its standard error", 3, "chance alone makes it 1",
+       "how surely the slices of one stack moved against the other's: square root of twice the logarithm of the odds",
+       3,
+       "chance alone makes it 1; a mean motion that changes slowly with depth and is no larger than the field's own "
+       "scatter there counts as the gel's",
        "Nothing if it was taken off (track.slice_drift); slices.csv has it. If it recurs, let the stage settle."},
       {beads_scatter, "beads-scatter", "track", note,
        "scatter of beads in space about their neighbours over their standard errors", 1.5,
@@ -148,12 +151,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the cell",
        "Check that the bead images (or the displacement) show the whole cell at the same place and with the same pixel "
        "size as its other images: neither cropped nor binned by themselves. Disregard the forces of these adhesions."},
-      {cell_cut, "cell-cut", "fit", caution, "1 if the image's border cuts the cell", 0,
-       "in six simulated cells cut on one side or two the intervals of the tensions held, but the total force of the "
-       "adhesions in view was too large by 2 to 4 of its standard errors: weak adhesions take up what noise there is",
-       "Record the whole cell if you can. Use the tensions, not the total force. With effects.beyond_cut = off "
-       "distrust "
-       "the fibres and adhesions near the cut, too, and the force through it."},
+      {cell_cut, "cell-cut", "fit", note, "1 if the image's border cuts the cell", 0,
+       "the total force is that of the adhesions in view, and what passes through the cut balances it",
+       "Record the whole cell if you can. A note if forces beyond the cut are allowed for; a caution if "
+       "effects.beyond_cut = off: distrust then the fibres and adhesions near the cut, and the force through it."},
       {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for", 0,
        "a pair of adhesions is named if chance would name one in one cell of twenty, all pairs tried",
        "Look for the fibre in the actin image between these adhesions (dashed in the map). If it is there, add it: "
@@ -236,8 +237,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {tractions_out_of_balance, "tractions-out-of-balance", "traction", caution,
        "length of the net force over its standard error", 4,
        "a cell at rest pulls as much one way as the other; four standard errors are more than chance",
-       "Check that the whole cell lies above the beads and that the drift of the stage was taken out: a shift of all "
-       "beads looks like a net force."},
+       "Check that the whole cell lies above the beads: forces beyond them are missing in the sum. Look for a cell "
+       "beside it, or for a support that holds the cell."},
       {beads_stray, "beads-stray", "traction", caution,
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",

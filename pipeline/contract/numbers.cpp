@@ -1,6 +1,7 @@
 #include "pipeline/contract/numbers.h"
 
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 
 namespace mbtfm {
@@ -20,6 +21,9 @@ std::string significant(double value, int digits) {
 std::string brief(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
+  constexpr double kReadsAsExponent = 999.5, kLeaveExponent = 1e6;
+  const double size = std::abs(value);
+  if (size >= kReadsAsExponent && size < kLeaveExponent) std::snprintf(text, sizeof text, "%.0f", std::stod(text));
   return text;
 }
 

@@ -53,16 +53,25 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   const double total = r.number("total_force_nN");
   std::vector<std::string> facts;
   facts.push_back(fmt::format(
-      "The cell pulls and presses with {} nN in total, the sum of the sizes of its tractions over {}; {} nN of it are "
+      "The cell pulls and presses with {} in total, the sum of the sizes of its tractions over {}; {} nN of it are "
       "along the surface's normal. The largest traction is {} kPa.",
-      readable(total), r.texts.at("tractions_over"), readable(r.number("normal_force_nN")),
-      readable(largest_traction_kPa(r))));
+      with_error(total, r.find("total_force_sigma_nN"), "nN"), r.texts.at("tractions_over"),
+      readable(r.number("normal_force_nN")), readable(largest_traction_kPa(r))));
   facts.push_back(fmt::format("The strain energy of the gel is {} fJ.", readable(r.number("strain_energy_fJ"))));
   facts.push_back(fmt::format(
       "Balance: the forces add up to {} ({} of their sum of sizes), the moments about their centre to {}. A cell that "
       "nothing else holds has neither.",
       with_error(force.size, force.sigma, "nN"), readable(total > 0 ? force.size / total : 0),
       with_error(moment.size, moment.sigma, "nN µm")));
+  if (r.find("common_turn_deg")) {
+    const auto shift = [&](const std::string& axis) -> std::string {
+      const auto value = r.find("common_shift_" + axis + "_um");
+      return value ? " " + axis + " " + with_error(*value, r.find("common_shift_" + axis + "_sigma_um"), "µm") : "";
+    };
+    facts.push_back("All beads share a shift of" + shift("x") + "," + shift("y") +
+                    (r.find("common_shift_z_um") ? "," : "") + shift("z") +
+                    ", beside what the tracker took off. It was found with the tractions.");
+  }
   if (const auto resolution = r.find("median_resolution_um")) {
     facts.push_back(fmt::format(
         "Two forces are told apart where they are {} µm apart or more (median over the surface); {} numbers of {} are "
@@ -220,9 +229,9 @@ std::string report_in_space(const fs::path& cell) {
 std::string result_line_in_space(const fs::path& cell) {
   const SpaceResults r = read_space_results(cell);
   const Sum force = sum_of(r, "net_force", "nN");
-  return "total force " + readable(r.number("total_force_nN")) + " nN; net force " +
-         with_error(force.size, force.sigma, "nN") + "; strain energy " + readable(r.number("strain_energy_fJ")) +
-         " fJ";
+  return "total force " + with_error(r.number("total_force_nN"), r.find("total_force_sigma_nN"), "nN") +
+         "; net force " + with_error(force.size, force.sigma, "nN") + "; strain energy " +
+         readable(r.number("strain_energy_fJ")) + " fJ";
 }
 
 std::string result_event_in_space(const fs::path& cell, const fs::path& report) {
@@ -230,11 +239,13 @@ std::string result_event_in_space(const fs::path& cell, const fs::path& report) 
   const Sum force = sum_of(r, "net_force", "nN");
   nlohmann::ordered_json event = {{"event", "result"},
                                   {"total_force_nN", r.number("total_force_nN")},
+                                  {"total_force_error_nN", nullptr},
                                   {"net_force_nN", force.size},
                                   {"net_force_error_nN", nullptr},
                                   {"strain_energy_fJ", r.number("strain_energy_fJ")},
                                   {"report", report.string()}};
   if (force.sigma) event["net_force_error_nN"] = *force.sigma;
+  if (const auto sigma = r.find("total_force_sigma_nN")) event["total_force_error_nN"] = *sigma;
   return files::json_text(event) + "\n";
 }
 

@@ -25,6 +25,7 @@ Stage tracking() {
   stage.optional_images = {{"surface_beads", "surface_beads"}};
   stage.writes = {kDisplacement};
   stage.series = {kSurfaceBeads};
+  stage.keeps_frames = false;
   return stage;
 }
 
@@ -56,7 +57,7 @@ Stage traction() {
           .writes = {"4_traction/traction.csv", "4_traction/traction.vtp", "4_traction/traction.json"},
           .series = {"4_traction/traction_*"},
           .tables = {"", "gel", "traction", "substrate", "checks"},
-          .effects = {"large_strain", "effect_tolerance"}};
+          .effects = {"large_strain", "common_motion", "effect_tolerance"}};
 }
 
 /// A value of cell.toml, as text; empty where it is not set.

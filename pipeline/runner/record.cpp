@@ -239,7 +239,7 @@ StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& reco
   if (!missing.empty()) return {StageState::must_run, missing.front() + " is gone"};
   const std::vector<Difference> of_inputs = differences(record->inputs, now.inputs);
   const bool is_same = record->version == now.version && record->settings == now.settings;
-  const bool keeps_frames = is_same && are_of_series(of_inputs);
+  const bool keeps_frames = stage.keeps_frames && is_same && are_of_series(of_inputs);
   for (const auto& [name, hash] : record->outputs) {
     if (!now.outputs.contains(name)) return {StageState::must_run, name + " is gone", keeps_frames};
   }

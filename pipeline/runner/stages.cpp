@@ -40,7 +40,8 @@ const std::vector<Stage>& stages() {
        .writes = {displacement},
        .series = {"2_track/frames.csv", "2_track/displacement_*.csv"},
        .tables = {"", "images", "track", "checks"},
-       .effects = {"drift_affine", "effect_tolerance"}},
+       .effects = {"drift_affine", "effect_tolerance"},
+       .keeps_frames = true},
       {.name = "network",
        .folder = "3_network",
        .images = {},
@@ -70,7 +71,8 @@ const std::vector<Stage>& stages() {
        .effects = {"stress_fibres", "finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement",
                    "large_strain", "common_motion", "beads_under_load", "channel_shift", "beyond_cut",
                    "cable_elasticity", "robust_loss", "time_coupling", "effect_tolerance"},
-       .explains = true},
+       .explains = true,
+       .keeps_frames = true},
   };
   return list;
 }

@@ -43,6 +43,7 @@ struct Stage {
   std::vector<std::string> effects;    ///< keys of [effects] that it depends on
   std::vector<Setting> settings = {};  ///< that hold whatever cell.toml says
   bool explains = false;               ///< what is off would change: it takes --explain
+  bool keeps_frames = false;           ///< of a time series, those that still hold: it takes --kept
 };
 
 /// Of a cell on a flat gel; those of others: cell_stages.h.

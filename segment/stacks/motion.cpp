@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pipeline/numerics/order_statistics.h"
+#include "segment/stacks/mean_by_depth.h"
 
 namespace mbtfm::stacks {
 namespace {
@@ -38,14 +39,15 @@ std::vector<double> places_along_z(const std::vector<Moved>& beads, const Slices
 
 /// The unknowns: turn, shift along z, then x and y for each place along z.
 struct Fit {
-  Eigen::VectorXd solution, sigma;
+  Eigen::VectorXd solution;
+  Eigen::MatrixXd covariance;
   std::vector<double> weights;
 };
 
 Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 centre) {
   const auto n_places = static_cast<Eigen::Index>(z.size());
   const Eigen::Index n = 2 + 2 * n_places;
-  Fit fit{.solution = Eigen::VectorXd::Zero(n), .sigma = Eigen::VectorXd::Zero(n), .weights = {}};
+  Fit fit{.solution = Eigen::VectorXd::Zero(n), .covariance = {}, .weights = {}};
   std::vector<double> x, y, along, sigmas, sigmas_z;
   for (const Moved& b : beads) {
     x.push_back(b.displacement_um.x), y.push_back(b.displacement_um.y), along.push_back(b.displacement_um.z);
@@ -109,12 +111,92 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
     normal.diagonal().array() += 1e-12;
     const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
     fit.solution += factor.solve(right);
-    if (round + 1 == kRounds) {
-      const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(n, n));
-      fit.sigma = scale * inverse.diagonal().cwiseMax(0).cwiseSqrt();
-    }
+    if (round + 1 == kRounds) fit.covariance = scale * scale * factor.solve(Eigen::MatrixXd::Identity(n, n));
   }
   return fit;
+}
+
+/// The places on both sides of a bead, with its shares of them.
+struct OfPlaces {
+  Eigen::Index place[2];
+  double share[2];
+};
+OfPlaces of_places(const std::vector<double>& z, double at) {
+  const Between b = between(z, at);
+  const auto low = static_cast<Eigen::Index>(b.below);
+  return {{low, std::min(low + 1, static_cast<Eigen::Index>(z.size()) - 1)}, {1 - b.share_above, b.share_above}};
+}
+
+/// How far single beads are off the mean motion at their depth, root mean square of a component without the noise.
+struct Scatter {
+  std::vector<double> across_um, along_um;  ///< by place
+};
+
+Scatter scatter_by_depth(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 centre, const Fit& fit) {
+  struct Off {
+    double z, across, along, sigma, sigma_z;
+  };
+  std::vector<Off> all;
+  for (const Moved& bead : beads) {
+    const Vec3 d = bead.place_um - centre, u = bead.displacement_um;
+    const OfPlaces at = of_places(z, bead.place_um.z);
+    Vec2 mean{-fit.solution[0] * d.y, fit.solution[0] * d.x};
+    for (int p = 0; p < 2; ++p)
+      mean += at.share[p] * Vec2{fit.solution[2 + 2 * at.place[p]], fit.solution[3 + 2 * at.place[p]]};
+    all.push_back({bead.place_um.z, std::hypot(u.x - mean.x, u.y - mean.y), std::abs(u.z - fit.solution[1]),
+                   bead.sigma_um, bead.sigma_z_um});
+  }
+  std::ranges::sort(all, {}, &Off::z);
+  Scatter scatter;
+  for (const double place : z) {
+    constexpr std::size_t kNear = 40;  // whose depths are nearest
+    const std::size_t n = std::min(kNear, all.size());
+    const auto above = static_cast<std::size_t>(std::ranges::lower_bound(all, place, {}, &Off::z) - all.begin());
+    const std::size_t first = std::min(above - std::min(above, n / 2), all.size() - n);
+    const auto median_of = [&](double Off::*member) {
+      std::vector<double> values;
+      for (std::size_t i = first; i < first + n; ++i) values.push_back(all[i].*member);
+      return numerics::median(std::move(values));
+    };
+    const auto beyond = [](double spread, double sigma) {
+      return std::sqrt(std::max(0.0, spread * spread - sigma * sigma));
+    };
+    // medians of a Rayleigh and of a folded normal variable
+    scatter.across_um.push_back(beyond(median_of(&Off::across) / 1.1774, median_of(&Off::sigma)));
+    scatter.along_um.push_back(beyond(median_of(&Off::along) / 0.6745, median_of(&Off::sigma_z)));
+  }
+  return scatter;
+}
+
+struct Means {
+  MeanByDepth across, along;  ///< along z: both components the same
+};
+
+Means means_by_depth(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 centre, const Fit& fit) {
+  const auto n = static_cast<Eigen::Index>(z.size());
+  Scatter scatter = scatter_by_depth(beads, z, centre, fit);
+  Eigen::VectorXd n_beads = Eigen::VectorXd::Zero(n), weight = n_beads, sum_z_um = n_beads, noise_um2 = n_beads;
+  for (std::size_t b = 0; b < beads.size(); ++b) {
+    const OfPlaces at = of_places(z, beads[b].place_um.z);
+    for (int p = 0; p < 2; ++p) {
+      const double w = at.share[p] * fit.weights[b];
+      n_beads[at.place[p]] += at.share[p];
+      weight[at.place[p]] += w;
+      sum_z_um[at.place[p]] += w * (beads[b].displacement_um.z - fit.solution[1]);
+      noise_um2[at.place[p]] += w * beads[b].sigma_z_um * beads[b].sigma_z_um;
+    }
+  }
+  const std::vector<double> by_place(n_beads.begin(), n_beads.end());
+  Means means{.across = {z, Eigen::MatrixX2d(n, 2), Eigen::MatrixXd(n, n), std::move(scatter.across_um), by_place},
+              .along = {z, Eigen::MatrixX2d(n, 2), Eigen::MatrixXd::Zero(n, n), std::move(scatter.along_um), by_place}};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    means.across.um.row(i) << fit.solution[2 + 2 * i], fit.solution[3 + 2 * i];
+    for (Eigen::Index j = 0; j < n; ++j) means.across.noise_um2(i, j) = fit.covariance(2 + 2 * i, 2 + 2 * j);
+    const double seen = std::max(weight[i], 1e-3);  // a place without beads says nothing
+    means.along.um.row(i).setConstant(fit.solution[1] + sum_z_um[i] / seen);
+    means.along.noise_um2(i, i) = std::max(noise_um2[i] / seen, 1e-12) / seen;
+  }
+  return means;
 }
 
 }  // namespace
@@ -133,40 +215,27 @@ CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, 
   CommonMotion motion;
   if (beads.empty()) return motion;
   for (const Moved& bead : beads) motion.centre_um += (1 / static_cast<double>(beads.size())) * bead.place_um;
-  const auto take = [&](const Fit& fit) {
-    motion.turn_rad = fit.solution[0], motion.turn_sigma_rad = fit.sigma[0];
-    const auto at_rest = std::ranges::count_if(fit.weights, [](double w) { return w > 0.25; });
-    motion.share_at_rest = static_cast<double>(at_rest) / static_cast<double>(beads.size());
-  };
-  const Fit sliced = fitted(beads, motion.z_um = places_along_z(beads, slices), motion.centre_um);
-  const std::size_t n = motion.z_um.size();
-  Vec2 mean;
-  for (std::size_t k = 0; k < n; ++k) {
-    const auto at = static_cast<Eigen::Index>(2 + 2 * k);
-    motion.slices_um.push_back({sliced.solution[at], sliced.solution[at + 1]});
-    motion.slices_sigma_um.push_back(std::max(sliced.sigma[at], sliced.sigma[at + 1]));
-    mean += (1 / static_cast<double>(n)) * motion.slices_um.back();
-  }
-  double squares = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const Vec2 off = motion.slices_um[k] = motion.slices_um[k] - mean;
-    squares += dot(off, off) / (motion.slices_sigma_um[k] * motion.slices_sigma_um[k] + 1e-18);
-  }
-  motion.slice_drift_ratio = n > 1 ? std::sqrt(squares / (2.0 * static_cast<double>(n - 1))) : 0;
+  motion.z_um = places_along_z(beads, slices);
+  const Fit fit = fitted(beads, motion.z_um, motion.centre_um);
+  motion.turn_rad = fit.solution[0];
+  motion.turn_sigma_rad = std::sqrt(std::max(0.0, fit.covariance(0, 0)));
+  const auto at_rest = std::ranges::count_if(fit.weights, [](double w) { return w > 0.25; });
+  motion.share_at_rest = static_cast<double>(at_rest) / static_cast<double>(beads.size());
+
+  const Means means = means_by_depth(beads, motion.z_um, motion.centre_um, fit);
+  StageByDepth across = stage_by_depth(means.across, slice_drift != Switch::off && motion.z_um.size() > 2);
   constexpr double kCertain = 3;
-  const bool is_called_for = n > 2 && motion.slice_drift_ratio > kCertain;
-  motion.has_slice_drift = slice_drift == Switch::on || (slice_drift == Switch::automatic && is_called_for);
-  if (motion.has_slice_drift) {
-    take(sliced);
-    motion.shift_um = {mean.x, mean.y, sliced.solution[1]};
-    const double error = motion.slices_sigma_um.front() / std::sqrt(static_cast<double>(n));
-    motion.shift_sigma_um = {error, error, sliced.sigma[1]};
-    return motion;
+  motion.slice_drift_ratio = std::sqrt(2 * across.log_likelihood_gain);
+  motion.has_slice_drift =
+      slice_drift == Switch::on || (slice_drift == Switch::automatic && motion.slice_drift_ratio > kCertain);
+  for (Eigen::Index k = 0; k < across.um.rows(); ++k) {
+    motion.slices_um.push_back({across.drift_um(k, 0), across.drift_um(k, 1)});
+    motion.slices_sigma_um.push_back(across.sigma_um[k]);
   }
-  const Fit whole = fitted(beads, {0}, motion.centre_um);
-  take(whole);
-  motion.shift_um = {whole.solution[2], whole.solution[3], whole.solution[1]};
-  motion.shift_sigma_um = {whole.sigma[2], whole.sigma[3], whole.sigma[1]};
+  if (!motion.has_slice_drift) across = stage_by_depth(means.across, false);
+  const StageByDepth along = stage_by_depth(means.along, false);
+  motion.shift_um = {across.shift_um.x(), across.shift_um.y(), along.shift_um.x()};
+  motion.shift_sigma_um = {across.shift_sigma_um, across.shift_sigma_um, along.shift_sigma_um};
   return motion;
 }
 

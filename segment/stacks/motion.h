@@ -21,7 +21,7 @@ struct CommonMotion {
   std::vector<double> z_um;                 ///< places along z, rising
   std::vector<Vec2> slices_um;              ///< drift there beyond the shift; linear between
   std::vector<double> slices_sigma_um;      ///< standard error of each component
-  double slice_drift_ratio = 0;             ///< root mean square of that drift over its standard errors
+  double slice_drift_ratio = 0;             ///< square root of twice the gain in log likelihood by that drift
   bool has_slice_drift = false;             ///< it is part of the motion; otherwise only told
   double share_at_rest = 0;                 ///< of the beads
 
@@ -35,8 +35,9 @@ struct Slices {
 
 /// By robust least squares: beads that the cell moves do not count. Their share is not known before; the scale is that
 /// of the quietest third, so that up to two thirds may move. A bead's picture is about as long as two slices, so its
-/// place moves by what is linear between those of the slices; where beads are few, of every second one, and so on. On
-/// `automatic` the drift belongs to the motion where it is three times its standard errors.
+/// place moves by what is linear between those of the slices; where beads are few, of every second one, and so on. How
+/// much of the mean at each depth is the stage's: stage_by_depth(). On `automatic` the drift belongs to the motion
+/// where the ratio is above 3.
 CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, const Slices& slices);
 
 }  // namespace mbtfm::stacks

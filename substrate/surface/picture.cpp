@@ -43,16 +43,17 @@ std::vector<std::pair<Vec2, Vec2>> contour(const HeightMap& map, double z_um) {
 
 charts::Chart map_chart(const HeightMap& map, const std::string& image_address, const std::vector<Vec2>& off_um) {
   const Vec2 half = 0.5 * map.spacing_um, low = map.origin_um - half, high = map.high_um() + half;
-  charts::Chart chart("Height of the gel's surface", {.label = "x (µm)", .low = low.x, .high = high.x},
+  charts::Chart chart("Height of the gel's surface, z (µm)", {.label = "x (µm)", .low = low.x, .high = high.x},
                       {.label = "y (µm)", .low = high.y, .high = low.y});
   chart.same_scales();
   chart.picture(low, high, image_address);
   const HeightRange range = range_of(map);
   for (const double z : charts::ticks(range.low, range.high)) {
     if (z <= range.low || z >= range.high) continue;
-    const std::string name = "z = " + charts::readable(z) + " µm";
-    chart.pieces(contour(map, z), "stroke:#ffffff;stroke-width:0.8;fill:none", name);
-    chart.key(name, charts::hex(charts::colour_at(kHeights, range.share(z))));
+    const auto line = contour(map, z);
+    if (line.empty()) continue;
+    chart.pieces(line, "stroke:#ffffff;stroke-width:0.8;fill:none", "z = " + charts::readable(z) + " µm");
+    chart.label(line[line.size() / 2].first, charts::readable(z));
   }
   const double arm = 0.008 * norm(high - low);
   std::vector<std::pair<Vec2, Vec2>> crosses;

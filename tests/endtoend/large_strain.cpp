@@ -17,13 +17,19 @@ using test::run_program;
 
 class LargeStrains : public ::testing::Test {
  protected:
-  void SetUp() override {
+  static void SetUpTestSuite() {
+    made_ = new test::TemporaryFolder;
     // its elements are finer than the fit's, and noise of two thousandths lets the gel's law be seen
     const Outcome made = run_program(
         "mbtfm-simulate --quiet --scenario two-adhesions --seed 3 --beads 6000 "
         "--youngs_modulus_kPa 11 --noise 0.002 --simulation_material neo-hooke --out " +
-        cell().string());
+        (*made_ / "cell").string());
     ASSERT_EQ(made.code, 0) << made.output;
+  }
+  static void TearDownTestSuite() { delete made_; }
+
+  void SetUp() override {
+    fs::copy(*made_ / "cell", cell(), fs::copy_options::recursive);
     toml_ = files::read_text(cell() / "cell.toml");
   }
   fs::path cell() const { return folder_ / "cell"; }
@@ -45,6 +51,7 @@ class LargeStrains : public ::testing::Test {
   }
 
  private:
+  static inline test::TemporaryFolder* made_ = nullptr;
   test::TemporaryFolder folder_;
   std::string toml_;
 };

@@ -189,6 +189,14 @@ TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
   EXPECT_NE(again.output.find("traction up to date"), std::string::npos) << again.output;
   EXPECT_NE(again.output.find("beads in space, as track.z_points is set"), std::string::npos) << again.output;
   EXPECT_EQ(run_program("mbtfm verify " + folder.string()).code, 0);
+  // beads corrected by hand are the user's, and the tractions follow them
+  auto beads = files::read_displacement_in_space(folder / "2_track/displacement_3d.csv");
+  beads.pop_back();
+  files::write_displacement_in_space(folder / "2_track/displacement_3d.csv", beads);
+  const auto by_hand = run_program(run);
+  EXPECT_EQ(by_hand.code, 0) << by_hand.output;
+  EXPECT_NE(by_hand.output.find("displacement_3d.csv was changed by hand: kept"), std::string::npos) << by_hand.output;
+  EXPECT_NE(by_hand.output.find("2_track/displacement_3d.csv"), std::string::npos) << by_hand.output;
   const auto batch = run_program("mbtfm batch " + folder.parent_path().string());
   EXPECT_EQ(batch.code, 0) << batch.output;
   const files::CsvTable table(folder.parent_path() / "batch.csv");

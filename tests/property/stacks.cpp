@@ -187,6 +187,57 @@ TEST(Stacks, neighbours_add_their_own_errors_along_each_axis) {
   EXPECT_GT(n, 300);
 }
 
+/// Four adhesions whose pulls reach the rim of the view and leave a mean at each depth.
+Vec3 pull_everywhere(Vec3 x) {
+  Vec3 u;
+  for (const auto& [px, py, fx, fy] :
+       {std::array{25.0, 25.0, 0.5, 0.3}, {75.0, 30.0, -0.2, 0.5}, {30.0, 75.0, 0.6, -0.1}, {75.0, 75.0, -0.1, -0.3}}) {
+    const double dx = x.x - px, dy = x.y - py, dz = x.z + 6;
+    const double a = 12 / std::sqrt(dx * dx + dy * dy + dz * dz);
+    u += Vec3{a * fx, a * fy, 0};
+  }
+  return u;
+}
+
+/// What is left of the truth but for one shift of all, which none can tell from a stage that moved as a whole.
+double rms_beyond_a_shift(const BeadClouds& clouds, const Followed& followed) {
+  std::vector<Vec3> off;
+  Vec3 mean;
+  for (std::size_t k = 0; k < clouds.displacement.size(); ++k) {
+    if (!followed.field[k].flag.empty()) continue;
+    off.push_back(followed.field[k].displacement_um - pull_everywhere(clouds.relaxed[k].position_um));
+    mean += off.back();
+  }
+  double squares = 0;
+  for (const Vec3& o : off) {
+    const Vec3 left = o - 1.0 / static_cast<double>(off.size()) * mean;
+    squares += left.x * left.x + left.y * left.y;
+  }
+  return std::sqrt(squares / (2.0 * static_cast<double>(off.size())));
+}
+
+TEST(Stacks, the_mean_pull_of_a_cell_that_fills_the_view_is_no_drift_of_slices) {
+  const BeadClouds clouds = bead_clouds(1000, 0.02, 0.03, 8, pull_everywhere);
+  const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 2);
+  EXPECT_FALSE(followed.common.has_slice_drift) << followed.common.slice_drift_ratio;
+  // errors of two places; what a turn of the field looks like adds some
+  EXPECT_LT(rms_beyond_a_shift(clouds, followed), 1.5 * std::numbers::sqrt2 * 0.02);
+}
+
+/// A microscope whose stage jumps from slice to slice of 0.5 um.
+TEST(Stacks, jumps_of_the_stage_under_a_cell_that_fills_the_view_are_taken_off) {
+  const auto jumps = [](Vec3 x) {
+    const double slice = x.z / 0.5, below = std::floor(slice), share = slice - below;
+    const auto at = [](double k) { return 0.15 * std::sin(12.9898 * k * k + 1); };
+    return Vec3{(1 - share) * at(below) + share * at(below + 1), 0, 0};
+  };
+  const BeadClouds clouds = bead_clouds(4000, 0.02, 0.03, 9, [&](Vec3 x) { return pull_everywhere(x) + jumps(x); });
+  const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {0, 0.5}, 2);
+  EXPECT_TRUE(followed.common.has_slice_drift);
+  // errors of two places, 0.028 um, and of the depth, 0.06 um where the stage jumps by some 0.6 um per um
+  EXPECT_LT(rms_beyond_a_shift(clouds, followed), 1.25 * std::hypot(0.028, 0.036));
+}
+
 // --- pictures
 
 struct Errors {

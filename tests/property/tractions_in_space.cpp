@@ -222,6 +222,48 @@ TEST_F(InSpace, beads_that_are_wrong_do_not_pull_with_a_robust_loss) {
   }
 }
 
+/// As a stage that has moved and a dish that was put back a little turned do.
+TEST_F(InSpace, what_all_beads_do_together_changes_nothing_and_is_found) {
+  const std::vector<BeadInSpace> beads = scene.beads(0.03);
+  Problem still = scene.problem(beads, parameters);
+  const MatrixXd motions = common_motions(still.observed);
+  const VectorXd motion = Eigen::Vector4d(0.3, -0.2, 0.25, 0.002);
+  Problem moved = still;
+  moved.observed.displacement_um += motions * motion;
+  const auto off = reconstruct_tikhonov(still, traction, parameters, 1),
+             not_found = reconstruct_tikhonov(moved, traction, parameters, 1);
+  EXPECT_GT(apart(not_found.traction_kPa, off.traction_kPa), 0.5);
+  still.common_um = moved.common_um = motions;
+  const SpatialInputs inputs{{}, scene.gel, {}, {}};
+  for (const auto method : {tractions::TractionMethod::tikhonov, tractions::TractionMethod::group_l1}) {
+    traction.method = method;
+    const auto one = reconstruct(still, inputs, traction, parameters, 1),
+               two = reconstruct(moved, inputs, traction, parameters, 1);
+    // the data of both are the same numbers to rounding; lambda is found by a search
+    EXPECT_LE(apart(two.traction_kPa, one.traction_kPa), 1e-6) << name_of(method);
+    EXPECT_LE((two.covariance_kPa2 - one.covariance_kPa2).norm(), 1e-6 * one.covariance_kPa2.norm());
+    const auto there = common_motion_beside(still, one), added = common_motion_beside(moved, two);
+    EXPECT_LE((added->values - there->values - motion).norm(), 1e-6);
+    for (Eigen::Index k = 0; k < 4; ++k) EXPECT_LE(std::abs(there->values[k]), 4 * there->sigma[k]) << k;
+    if (!one.lambda) continue;
+    // at the minimum over tractions and motion no slope is left
+    const VectorXd errors = still.observed.sigma_um.cwiseAbs2().cwiseInverse();
+    const VectorXd left =
+        still.displacement_um() - still.response_um_per_kPa * one.traction_kPa - motions * there->values;
+    const VectorXd slope = still.response_um_per_kPa.transpose() * errors.cwiseProduct(left);
+    const MatrixXd norm = norm_of(still.mesh, still.ground, [&](Vec2 at) { return still.expected.amplitude(at); });
+    // by vertex, then by component
+    const MatrixXd tractions = one.traction_kPa.reshaped(3, norm.rows()).transpose();
+    const MatrixXd penalty = *one.lambda * *one.lambda * (norm * tractions).transpose();
+    EXPECT_LE(apart(slope, penalty.reshaped()), 1e-6);
+  }
+  traction.method.reset();
+  parameters.loss = BeadLoss::huber;
+  EXPECT_LE(apart(reconstruct_tikhonov(moved, traction, parameters, 1).traction_kPa,
+                  reconstruct_tikhonov(still, traction, parameters, 1).traction_kPa),
+            0.05);
+}
+
 TEST_F(InSpace, beads_that_did_not_move_make_no_traction) {
   std::vector<BeadInSpace> beads = scene.beads(0.02);
   for (BeadInSpace& b : beads) b.displacement_um = {};

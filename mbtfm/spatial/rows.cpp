@@ -1,0 +1,99 @@
+#include "mbtfm/spatial/rows.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "mbtfm/spatial/reconstruction.h"
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::spatial {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+MatrixXd common_motions(const Observed& observed) {
+  const auto& beads = std::get<std::vector<Vec3>>(observed.at.points_um);
+  const Index n = observed.n_components();
+  Vec3 centre;
+  for (const Vec3& bead : beads) centre += 1 / static_cast<double>(beads.size()) * bead;
+  MatrixXd motions = MatrixXd::Zero(n * observed.n_beads, n + 1);
+  for (Index b = 0; b < observed.n_beads; ++b) {
+    motions.block(n * b, 0, n, n).setIdentity();
+    const Vec3 d = beads[static_cast<std::size_t>(b)] - centre;
+    motions(n * b, n) = -d.y;
+    motions(n * b + 1, n) = d.x;
+  }
+  return motions;
+}
+
+Rows::Rows(const Problem& problem, const VectorXd& weights_by_row)
+    : roots_(weights_by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um)),
+      root_weights_(weights_by_row.cwiseSqrt()) {
+  if (problem.common_um.cols() == 0) return;
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(roots_.asDiagonal() * problem.common_um);
+  common_ = qr.householderQ() * MatrixXd::Identity(roots_.size(), qr.rank());
+}
+
+MatrixXd Rows::of(const MatrixXd& by_row) const {
+  MatrixXd weighed = roots_.asDiagonal() * by_row;
+  if (common_.cols() > 0) weighed -= common_ * (common_.transpose() * weighed);
+  return weighed;
+}
+
+MatrixXd Rows::transposed(const MatrixXd& weighed) const {
+  if (common_.cols() == 0) return roots_.asDiagonal() * weighed;
+  return roots_.asDiagonal() * (weighed - common_ * (common_.transpose() * weighed));
+}
+
+VectorXd Rows::common_part(const VectorXd& over_errors) const {
+  if (common_.cols() == 0) return VectorXd::Zero(over_errors.size());
+  const VectorXd part = common_ * (common_.transpose() * root_weights_.cwiseProduct(over_errors));
+  // a row without weight moves with the others, too; those are few, and their residuals only tell that they are astray
+  return part.cwiseQuotient(root_weights_.cwiseMax(1e-3));
+}
+
+std::optional<CommonMotionInSpace> common_motion_beside(const Problem& problem, const SpatialReconstruction& found) {
+  if (problem.common_um.cols() == 0 || found.covariance_kPa2.size() == 0) return std::nullopt;
+  const VectorXd roots = found.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
+  const MatrixXd C = roots.asDiagonal() * problem.common_um;
+  const MatrixXd inverse = (C.transpose() * C).ldlt().solve(MatrixXd::Identity(C.cols(), C.cols()));
+  const MatrixXd by_row = inverse * C.transpose() * roots.asDiagonal();
+  const VectorXd left_um = problem.displacement_um() - problem.response_um_per_kPa * found.traction_kPa;
+  const MatrixXd by_traction = by_row * problem.response_um_per_kPa;
+  const MatrixXd covariance = found.variance * inverse + by_traction * found.covariance_kPa2 * by_traction.transpose();
+  return CommonMotionInSpace{by_row * left_um, covariance.diagonal().cwiseMax(0).cwiseSqrt()};
+}
+
+Effect common_motion_effect(Switch setting, const std::optional<CommonMotionInSpace>& found) {
+  if (!found) return stage::decided(EffectKind::common_motion, setting, true, "found with the tractions");
+  std::string why = "found with the tractions: shift";
+  const Index n = found->values.size() - 1;
+  constexpr std::array kAxes = {" x ", " y ", " z "};
+  const auto with_error = [&](Index k, double unit) {
+    return brief(unit * found->values[k]) + " +- " + brief(unit * found->sigma[k]);
+  };
+  for (Index k = 0; k < n; ++k) why += kAxes.at(static_cast<std::size_t>(k)) + with_error(k, 1) + " um,";
+  why += " turn " + with_error(n, 180 / std::numbers::pi) + " degrees";
+  return stage::decided(EffectKind::common_motion, setting, true, why);
+}
+
+Figures figures_of(const CommonMotionInSpace& found) {
+  Figures figures;
+  constexpr std::array kAxes = {"x", "y", "z"};
+  const Index n = found.values.size() - 1;
+  for (Index k = 0; k < n; ++k) {
+    const std::string name = std::string("common_shift_") + kAxes.at(static_cast<std::size_t>(k));
+    figures.emplace_back(name + "_um", found.values[k]);
+    figures.emplace_back(name + "_sigma_um", found.sigma[k]);
+  }
+  constexpr double kDegree = 180 / std::numbers::pi;
+  figures.emplace_back("common_turn_deg", kDegree * found.values[n]);
+  figures.emplace_back("common_turn_sigma_deg", kDegree * found.sigma[n]);
+  return figures;
+}
+
+}  // namespace mbtfm::spatial
