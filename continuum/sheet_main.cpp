@@ -15,6 +15,7 @@
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -499,11 +500,29 @@ tensions::LinearData data_of_adhesions(const DisplacementField& beads, stage::St
   return tensions::reduce(beads, model.compliance_um_per_nN(places, ellipses));
 }
 
+struct Words {
+  std::string name, unit;
+};
+Words words_of(sheets::Quantity quantity) {
+  switch (quantity) {
+    case sheets::Quantity::contraction:
+      return {"contraction", " nN/um"};
+    case sheets::Quantity::stiffness:
+      return {"stiffness", " nN/um"};
+    case sheets::Quantity::line_tension:
+      return {"line tension", " nN"};
+    case sheets::Quantity::contraction_over_stiffness:
+      return {"contraction over stiffness", ""};
+  }
+  throw InternalError("unknown quantity");
+}
+
 std::string sentence_of(const sheets::SheetEstimate& e) {
-  const std::string name = name_of(e.quantity) + (e.part.empty() ? "" : " of " + e.part);
-  if (e.identifiable) return name + " " + brief(e.value) + " (" + brief(*e.low) + " to " + brief(*e.high) + ")";
-  if (e.low) return name + " > " + brief(*e.low);
-  if (e.high) return name + " < " + brief(*e.high);
+  const auto& [quantity, unit] = words_of(e.quantity);
+  const std::string name = quantity + (e.part.empty() ? "" : " of " + e.part);
+  if (e.identifiable) return name + " " + brief(e.value) + unit + " (" + brief(*e.low) + " to " + brief(*e.high) + ")";
+  if (e.low) return name + " > " + brief(*e.low) + unit;
+  if (e.high) return name + " < " + brief(*e.high) + unit;
   return name + " not known";
 }
 
@@ -698,11 +717,14 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
 void write_page(stage::StageContext& context, const Run& done, const Balance& balance) {
   report::StagePage page{
       .title = "Contracting sheet", .facts = {}, .findings = context.findings_, .tables = {}, .figures = done.figures};
+  constexpr double kRounding = 1e-6;
   if (!done.told.empty()) page.facts.push_back("Fitted to the beads: " + done.told + ".");
   page.facts.push_back("The mean tension is " + charts::readable(balance.mean_tension_nN_per_um) + " nN/µm over " +
                        charts::readable(balance.area_um2) + " µm²; the forces on the ground add up to " +
-                       charts::readable(balance.total_force_nN) + " nN in size, and to a net force of " +
-                       charts::readable(norm(balance.net_force_nN)) + " nN.");
+                       charts::readable(balance.total_force_nN) + " nN in size, " +
+                       (norm(balance.net_force_nN) > kRounding * balance.total_force_nN
+                            ? "and to a net force of " + charts::readable(norm(balance.net_force_nN)) + " nN."
+                            : std::string("and balance each other.")));
   page.picture_svg = picture_of(done.solution, "x to the right, y down");
   page.picture_title = "Tension and traction";
   page.picture_explained =

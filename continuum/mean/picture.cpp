@@ -52,6 +52,8 @@ charts::Chart traction_chart(const Scene& scene) {
     chart.arrow(node.position_um, (kLongest_px / largest) * node.mean.traction_kPa,
                 "stroke:#ffffff;stroke-width:1;fill:none");
   }
+  chart.put_key(charts::Chart::KeySide::above);
+  chart.key("0 Pa", charts::hex(charts::colour_at(kTractions, 0)));
   chart.key("largest " + charts::readable(1000 * largest) + " Pa", charts::hex(charts::colour_at(kTractions, 1)));
   return chart;
 }
@@ -63,6 +65,7 @@ charts::Chart outlines_chart(const Scene& scene) {
   for (const Polygon& outline : scene.outlines_um)
     chart.curve(closed(outline), "stroke:#4A9CC9;stroke-width:0.7;fill:none");
   chart.curve(closed(scene.reference_um), "stroke:#D55E00;stroke-width:1.6;fill:none");
+  chart.put_key(charts::Chart::KeySide::above);
   chart.key("reference", "#D55E00");
   return chart;
 }

@@ -67,7 +67,8 @@ void draw_values(Chart& map, const Solution& solution, const Frame& frame, const
     const Vec2 d{1.15 * s.half, 1.15 * s.half};  // no white lines between
     map.bar(s.middle - d, s.middle + d, "fill:" + colour + ";stroke:none");
   }
-  for (const double share : {1.0, 0.5, 0.0})
+  map.put_key(Chart::KeySide::above);
+  for (const double share : {0.0, 0.5, 1.0})
     map.key(charts::readable(low + share * range) + " " + unit,
             charts::hex(charts::colour_at(charts::ColourMap::plasma, share)));
 }

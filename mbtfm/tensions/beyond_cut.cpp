@@ -270,7 +270,7 @@ DataWithBeyond with_own_forces(DataWithBeyond given, const Cell& cell) {
   for (Eigen::Index k = 0; k < found.n_own; ++k) {
     forces.block<2, 2>(2 * near[static_cast<std::size_t>(k)], before + 2 * k)
         .diagonal()
-        .setConstant(std::sqrt(mean_square / variance));
+        .setConstant(expected[static_cast<std::size_t>(k)] * std::sqrt(mean_square / variance));
   }
   Eigen::MatrixXd motions(data.motions.rows(), before + n_own);
   motions << data.motions, data.response->displace(forces.rightCols(n_own));

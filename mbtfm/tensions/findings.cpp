@@ -241,11 +241,10 @@ Noticed cell_cut(const FitOutcome& o) {
       FindingKind::cell_cut, 1,
       "The image's border cuts the cell. The fit holds the network along the cut; " + brief(force.value) + " +- " +
           brief(force.standard_error) + " nN pass through it. " +
-          (o.beyond
-               ? "Forces beyond the cut were allowed for; fibres and adhesions near it have larger errors, and the "
-                 "total force is somewhat too large."
-               : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are "
-                 "taken for forces of the adhesions near it."));
+          (o.beyond ? "Forces beyond the cut were allowed for; fibres and adhesions near it have larger errors."
+                    : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are "
+                      "taken for forces of the adhesions near it."),
+      o.beyond ? Severity::note : Severity::caution);
 }
 
 Noticed common_motion(const FitOutcome& o) {

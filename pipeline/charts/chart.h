@@ -100,7 +100,7 @@ class Chart {
   void picture(Vec2 corner, Vec2 opposite, const std::string& address);
   /// A line of the key, in the frame's upper corner on the given side.
   void key(const std::string& text, const std::string& colour);
-  enum class KeySide { left, right };
+  enum class KeySide { left, right, above };  ///< above: in a row over the frame, off what a map shows
   void put_key(KeySide side) { key_side_ = side; }
 
   static constexpr double kWidth_px = 460;

@@ -173,6 +173,22 @@ std::string upper_axis(const Axis& axis) {
   return svg + text(kLeft_px + Chart::kFrameWidth_px / 2, kTop_px - 23, "middle", axis.label);
 }
 
+/// Squares of colour, each before its text.
+std::string key_row(const std::vector<std::pair<std::string, std::string>>& keys) {
+  constexpr double kSquare_px = 11, kGap_px = 16, kLetter_px = 8;
+  const double baseline = kTop_px - 10;
+  double x = kLeft_px;
+  std::string svg;
+  for (const auto& [text, colour] : keys) {
+    const auto n_characters = std::ranges::count_if(text, [](char c) { return (c & 0xC0) != 0x80; });  // of UTF-8
+    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\"/>\n", x,
+                       baseline - kSquare_px + 1, kSquare_px, kSquare_px, colour);
+    svg += fmt::format("<text x=\"{:.1f}\" y=\"{}\">{}</text>\n", x + kSquare_px + 4, baseline, html_escaped(text));
+    x += kSquare_px + 4 + kLetter_px * static_cast<double>(n_characters) + kGap_px;
+  }
+  return svg;
+}
+
 }  // namespace
 
 double Chart::ink_height_px() const {
@@ -202,6 +218,7 @@ std::string Chart::str() const {
   svg += "</svg>\n";
   svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#444\"/>\n", kLeft_px,
                      kTop_px, Chart::kFrameWidth_px, frame.height_px);
+  if (key_side_ == KeySide::above) return svg + key_row(keys_);
   for (std::size_t i = 0; i < keys_.size(); ++i) {
     const bool is_left = key_side_ == KeySide::left;
     svg += fmt::format(

@@ -151,12 +151,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the cell",
        "Check that the bead images (or the displacement) show the whole cell at the same place and with the same pixel "
        "size as its other images: neither cropped nor binned by themselves. Disregard the forces of these adhesions."},
-      {cell_cut, "cell-cut", "fit", caution, "1 if the image's border cuts the cell", 0,
-       "in six simulated cells cut on one side or two the intervals of the tensions held, but the total force of the "
-       "adhesions in view was too large by 2 to 4 of its standard errors: weak adhesions take up what noise there is",
-       "Record the whole cell if you can. Use the tensions, not the total force. With effects.beyond_cut = off "
-       "distrust "
-       "the fibres and adhesions near the cut, too, and the force through it."},
+      {cell_cut, "cell-cut", "fit", note, "1 if the image's border cuts the cell", 0,
+       "the total force is that of the adhesions in view, and what passes through the cut balances it",
+       "Record the whole cell if you can. A note if forces beyond the cut are allowed for; a caution if "
+       "effects.beyond_cut = off: distrust then the fibres and adhesions near the cut, and the force through it."},
       {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for", 0,
        "a pair of adhesions is named if chance would name one in one cell of twenty, all pairs tried",
        "Look for the fibre in the actin image between these adhesions (dashed in the map). If it is there, add it: "

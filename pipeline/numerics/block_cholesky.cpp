@@ -160,11 +160,11 @@ bool BlockCholesky<kBlock, Real>::factorise_side_by_side(const BlockMatrix<kBloc
   };
   FactoriseOptions alone = options;
   alone.threads = 1;
-  for (const auto& [subtrees, above] : elimination_->stages) {
-    parallel_for(static_cast<int>(subtrees.size()), options.threads, [&](int t) {
-      for (const int k : subtrees[t]) run(k, alone);
+  for (const auto& stage : elimination_->stages) {
+    parallel_for(static_cast<int>(stage.subtrees.size()), options.threads, [&](int t) {
+      for (const int k : stage.subtrees[t]) run(k, alone);
     });
-    for (const int k : above) run(k, options);
+    for (const int k : stage.above) run(k, options);
   }
   return is_positive;
 }

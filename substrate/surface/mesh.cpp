@@ -72,6 +72,15 @@ HeightMap lattice_over(const Extent& extent, double spacing_um) {
   return map;
 }
 
+/// Where the lattice has a hundred vertices to a triangle, or ten thousand if these are more: what is finer repeats the
+/// planes of a few large triangles, at a cost that has nothing to do with the mesh's size.
+double finest_spacing_um(const Extent& extent, std::size_t n_triangles) {
+  const double most = 1e4 + 100 * static_cast<double>(n_triangles);
+  const Vec2 size = extent.high_um - extent.low_um;
+  // four lines run along even the narrowest strip
+  return std::max(std::sqrt(size.x * size.y / most), 4 * std::max(size.x, size.y) / most);
+}
+
 /// Every edge has two triangles. Points at one place count as one.
 bool is_closed(const TriangleMesh& mesh) {
   std::vector<int> order(mesh.points_um.size()), place(mesh.points_um.size());
@@ -262,7 +271,7 @@ double suggested_spacing_um(const TriangleMesh& mesh) {
   if (lengths_um.empty()) throw InvalidData(kMesh, "triangles that span an area, seen along z", "none");
   const auto middle = lengths_um.begin() + static_cast<std::ptrdiff_t>(lengths_um.size() / 2);
   std::nth_element(lengths_um.begin(), middle, lengths_um.end());
-  return *middle;
+  return std::max(*middle, finest_spacing_um(extent_of(mesh), mesh.triangles.size()));
 }
 
 MeshSurface sample_mesh(const TriangleMesh& mesh, double spacing_um) {

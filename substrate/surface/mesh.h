@@ -10,7 +10,8 @@ struct MeshSurface {
   int n_flipped = 0;  ///< triangles whose corners run the other way round than most others', seen along z
 };
 
-/// Median length of the triangles' edges, seen along z: a lattice of this spacing resolves what the mesh does.
+/// Median length of the triangles' edges, seen along z: a lattice of this spacing resolves what the mesh does. It is
+/// wider where most edges are so short that the lattice would have more than 10 000 vertices and 100 a triangle.
 /// @throws InvalidData where the mesh has no edge that is longer than 0 so
 double suggested_spacing_um(const TriangleMesh& mesh);
 

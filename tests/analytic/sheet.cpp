@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <random>
 #include <sstream>
 
 #include "continuum/sheet/from_traction.h"
@@ -313,6 +314,51 @@ TEST(Sheet, tensions_follow_from_tractions) {
       EXPECT_LE(S.difference, 0.01 * s) << shape << " " << nu;
     }
   }
+}
+
+/// Errors drawn here as the errors are said to be: one for each component in each square of the correlation's side.
+TEST(Sheet, errors_of_tensions_are_the_scatter_under_drawn_errors_of_tractions) {
+  Region disc;
+  disc.rims.emplace_back(test::circle(20, 60));
+  const TriangleSize size{.at_curves_um = 4, .largest_um = 6, .growth = 0.3};
+  const TractionNoise noise{.sigma_kPa = 0.1, .correlation_um = 4};
+  const auto tractions = [&](double even_kPa, std::mt19937_64* random) {
+    std::normal_distribution<double> normal(0, noise.sigma_kPa);
+    std::vector<GroundPatch> patches;
+    for (int j = -5; j <= 5; ++j) {
+      for (int i = -5; i <= 5; ++i) {
+        const Vec2 at = noise.correlation_um * Vec2{static_cast<double>(i), static_cast<double>(j)};
+        if (norm(at) > 19) continue;
+        Vec2 traction = (-even_kPa / 20) * at;
+        if (random) traction += {normal(*random), normal(*random)};
+        patches.push_back({at, noise.correlation_um * noise.correlation_um, traction, {}});
+      }
+    }
+    return patches;
+  };
+  const auto solved = [&](std::mt19937_64* random) {
+    return tensions_from(tractions(1, random), disc, {1, 0.5, 1}, size, 1, kMostUnbalanced, noise);
+  };
+  const auto by_triangle = [](const FromTraction& found) {
+    std::vector<double> means;
+    for (std::size_t p = 0; p < found.solution.at_points.size(); ++p) {
+      if (p % Elements::kPoints == 0) means.push_back(0);
+      means.back() += mean_of(found.solution.at_points[p]) / Elements::kPoints;
+    }
+    return means;
+  };
+  const FromTraction exact = solved(nullptr);
+  const std::vector<double> truth = by_triangle(exact);
+  std::mt19937_64 random(5);
+  constexpr int kDraws = 48;
+  double square = 0, claimed = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const std::vector<double> drawn = by_triangle(solved(&random));
+    for (std::size_t t = 0; t < truth.size(); ++t) square += std::pow(drawn[t] - truth[t], 2) / kDraws;
+  }
+  for (const double sigma : exact.errors->by_triangle) claimed += sigma * sigma;
+  // 48 draws each: a tenth, were all triangles one; three times the root of two of that
+  EXPECT_NEAR(std::sqrt(square / claimed), 1, 0.3);
 }
 
 TEST(Sheet, quadratic_elements_are_of_third_order_on_the_ellipse) {

@@ -327,6 +327,36 @@ TEST(Mean, noise_falls_with_the_root_of_the_number_and_error_bars_cover_the_trut
   EXPECT_NEAR(static_cast<double>(n_covered) / n, 0.95, 0.02) << n;
 }
 
+/// By its definition: the standard deviation of the cells, by n - 1 of them, over the root of n.
+TEST(Mean, two_cells_have_the_error_of_half_their_difference) {
+  const std::vector<Vec2> nodes = {{0, 0}};
+  const auto of = [](std::initializer_list<double> values) {
+    Samples samples;
+    for (const double v : values) samples.push_back({Sample{{v, 2 * v}, {-3 * v, 0}}});
+    return samples;
+  };
+  const Sample two = *mean_of(nodes, of({1, 5}), spiked(30, 0, 0, 100)).at(0).sigma;
+  EXPECT_NEAR(two.displacement_um.x, 2, 1e-14);
+  EXPECT_NEAR(two.displacement_um.y, 4, 1e-14);
+  EXPECT_NEAR(two.traction_kPa.x, 6, 1e-14);
+  EXPECT_EQ(two.traction_kPa.y, 0);
+  // 1, 2, 6 about 3: squares of 14 over 2, over 3
+  const Sample three = *mean_of(nodes, of({1, 2, 6}), spiked(30, 0, 0, 100)).at(0).sigma;
+  EXPECT_NEAR(three.displacement_um.x, std::sqrt(14.0 / 6), 1e-14);
+}
+
+TEST(Mean, the_blur_of_a_gaussian_is_its_standard_deviation) {
+  constexpr double kSigma_um = 3, kStep = 1.001;
+  std::vector<WaveShare> shares;
+  for (double wavelength = 1; wavelength < 100; wavelength *= kStep) {
+    const double phase = 2 * std::numbers::pi * kSigma_um / wavelength;
+    shares.push_back({.wavelength_um = wavelength, .along = std::exp(-phase * phase / 2)});
+  }
+  const double blur = gaussian_um(shares, [](const WaveShare& one) { return one.along; });
+  EXPECT_GE(blur, kSigma_um * (1 - 1e-12));  // the first wave of which half is left
+  EXPECT_LE(blur, kSigma_um * kStep * (1 + 1e-12));
+}
+
 /// Tractions towards the middle of a spiked shape: `tip` at its tips, 1 along the rest of its edge, with scatter.
 Samples pulled_edges(const std::vector<Vec2>& nodes, const std::vector<EdgePart>& parts, double tip, int n_cells,
                      std::mt19937_64& random) {

@@ -221,7 +221,8 @@ TEST(SheetFit, intervals_hold_the_truth_and_standard_errors_are_the_scatter) {
     const double M = disc.stiffness(E);
     std::mt19937_64 random(11);
     int s_held = 0, M_held = 0;
-    double s_sum = 0, s_squares = 0, s_sigma = 0, m_sum = 0, m_squares = 0, m_sigma = 0;
+    double s_sum = 0, s_squares = 0, s_sigma = 0, m_sum = 0, m_squares = 0, m_sigma = 0, r_sum = 0, r_squares = 0,
+           r_sigma = 0;
     for (int run = 0; run < kRuns; ++run) {
       const SheetFit fit = fit_sheet(disc.data(with_noise(exact, random)), *disc.table, tensions::Loss::squares);
       const SheetEstimate &s = of(fit, Quantity::contraction), &stiffness = of(fit, Quantity::stiffness);
@@ -234,11 +235,18 @@ TEST(SheetFit, intervals_hold_the_truth_and_standard_errors_are_the_scatter) {
       m_sum += m;
       m_squares += m * m;
       m_sigma += stiffness.sigma.value_or(0) / stiffness.value / kRuns;
+      const SheetEstimate& ratio = of(fit, Quantity::contraction_over_stiffness);
+      r_sum += ratio.value;
+      r_squares += ratio.value * ratio.value;
+      r_sigma += ratio.sigma.value_or(0) / kRuns;
     }
+    const double r_scatter = std::sqrt((r_squares - r_sum * r_sum / kRuns) / (kRuns - 1));
     const double s_scatter = std::sqrt((s_squares - s_sum * s_sum / kRuns) / (kRuns - 1));
     const double m_scatter = std::sqrt((m_squares - m_sum * m_sum / kRuns) / (kRuns - 1));
-    std::printf("E %g: held %d, %d of %d; s %.4f, error %.4f, scatter %.4f; log M error %.3f, scatter %.3f\n", E,
-                s_held, M_held, kRuns, s_sum / kRuns, s_sigma, s_scatter, m_sigma, m_scatter);
+    std::printf(
+        "E %g: held %d, %d of %d; s %.4f, error %.4f, scatter %.4f; log M error %.3f, scatter %.3f; "
+        "s / M error %.4f, scatter %.4f\n",
+        E, s_held, M_held, kRuns, s_sum / kRuns, s_sigma, s_scatter, m_sigma, m_scatter, r_sigma, r_scatter);
     // 95 % of 200 are 190 ± 3.1: three standard deviations of the count
     EXPECT_GE(s_held, 181) << E;
     EXPECT_GE(M_held, 181) << E;
@@ -246,6 +254,7 @@ TEST(SheetFit, intervals_hold_the_truth_and_standard_errors_are_the_scatter) {
     EXPECT_LE(M_held, 199) << E;
     EXPECT_NEAR(s_sigma / s_scatter, 1, 0.15) << E;
     EXPECT_NEAR(m_sigma / m_scatter, 1, 0.15) << E;
+    EXPECT_NEAR(r_sigma / r_scatter, 1, 0.15) << E;
   }
 }
 

@@ -9,6 +9,7 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/track.h"
 #include "segment/stacks/detect.h"
+#include "segment/stacks/motion.h"
 #include "segment/stacks/near.h"
 #include "segment/stacks/track.h"
 #include "tests/support/stack_scene.h"
@@ -143,6 +144,47 @@ TEST(Stacks, without_drift_of_slices_none_is_taken_off) {
   const BeadClouds clouds = bead_clouds(3000, 0.02, 0.03, 7, pull);
   const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 2);
   EXPECT_FALSE(followed.common.has_slice_drift) << followed.common.slice_drift_ratio;
+}
+
+/// The drift of slices over its standard errors: where there is none, two components of each slice but one make chi².
+/// With a hundred beads to a slice the bead's worth of smoothness between slices is a hundredth.
+TEST(Stacks, without_drift_of_slices_its_ratio_to_its_errors_is_one) {
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> place(0, 100), height(0, 50);
+  std::normal_distribution<double> noise(0, 0.03);
+  double square = 0, degrees = 0;
+  for (int draw = 0; draw < 20; ++draw) {
+    std::vector<Moved> beads;
+    for (int k = 0; k < 1500; ++k)
+      beads.push_back({.place_um = {place(random), place(random), height(random)},
+                       .displacement_um = {0.2 + noise(random), noise(random) - 0.1, 0.3 + 3 * noise(random)},
+                       .sigma_um = 0.03,
+                       .sigma_z_um = 0.09});
+    const CommonMotion motion = common_motion(beads, Switch::automatic, {.step_um = 5});
+    const double of_one = 2.0 * static_cast<double>(motion.slices_um.size() - 1);
+    square += of_one * motion.slice_drift_ratio * motion.slice_drift_ratio;
+    degrees += of_one;
+  }
+  // 400 degrees: four standard deviations of chi² over them are 0.28; robust weights take no more than a tenth
+  EXPECT_NEAR(square / degrees, 1, 4 * std::sqrt(2 / degrees) + 0.1) << degrees;
+}
+
+/// What its neighbours add to a bead's variance is a sum of theirs: along z it is to that across as theirs are.
+TEST(Stacks, neighbours_add_their_own_errors_along_each_axis) {
+  const BeadClouds clouds = bead_clouds(500, 0.03, 0, 3, [](Vec3) { return Vec3{0.2, -0.1, 0.3}; });
+  constexpr double kAlong = 3;  // errors along z over those across
+  const Matching matching = match(clouds.relaxed, clouds.stressed, {}, 1);
+  int n = 0;
+  for (std::size_t k = 0; k < clouds.relaxed.size(); ++k) {
+    const Match& m = matching.matches[k];
+    if (m.flag != TrackFlag::none) continue;
+    const PlacedBead &a = clouds.relaxed[k], &b = clouds.stressed[static_cast<std::size_t>(m.partner)];
+    const double own = a.sigma_um * a.sigma_um + b.sigma_um * b.sigma_um, all = m.sigma_um * m.sigma_um;
+    EXPECT_GT(all, own);
+    EXPECT_NEAR(m.sigma_z_um * m.sigma_z_um, kAlong * kAlong * all, 1e-9 * all);
+    ++n;
+  }
+  EXPECT_GT(n, 300);
 }
 
 /// Four adhesions whose pulls reach the rim of the view and leave a mean at each depth.

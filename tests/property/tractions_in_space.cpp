@@ -211,6 +211,24 @@ TEST_F(InSpace, forces_lie_within_their_standard_errors) {
   }
 }
 
+/// The standard deviation of a weighted sum lies between those of its terms, added and taken off.
+TEST_F(InSpace, the_error_of_a_forces_magnitude_is_that_along_it) {
+  scene.spots = {{{-10, -9}, 4, {40, 0, 0}}, {{11, -6}, 4, {0, 35, 0}}};
+  const Problem problem = scene.problem(scene.beads(0.01), parameters);
+  const SpatialInputs inputs{{}, scene.gel, scene.adhesions(), {}};
+  for (const auto method : {tractions::TractionMethod::tikhonov, tractions::TractionMethod::patches}) {
+    traction.method = method;
+    const auto r = reconstruct(problem, inputs, traction, parameters, 1);
+    for (const PartForce& part : r.forces) {
+      const Vec3 a = (1 / norm(part.force_nN)) * part.force_nN, s = part.sigma_nN;
+      const double terms[] = {std::abs(a.x) * s.x, std::abs(a.y) * s.y, std::abs(a.z) * s.z};
+      const double most = terms[0] + terms[1] + terms[2], largest = std::max({terms[0], terms[1], terms[2]});
+      EXPECT_LE(part.magnitude_sigma_nN, most * (1 + 1e-9)) << name_of(method);
+      EXPECT_GE(part.magnitude_sigma_nN, (2 * largest - most) * (1 - 1e-9)) << name_of(method);
+    }
+  }
+}
+
 TEST_F(InSpace, beads_that_are_wrong_do_not_pull_with_a_robust_loss) {
   std::vector<BeadInSpace> beads = scene.beads(0.03);
   const Problem good = scene.problem(beads, parameters);

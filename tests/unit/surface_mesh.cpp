@@ -251,6 +251,25 @@ TEST(SurfaceMesh, the_suggested_spacing_is_the_side_of_squares) {
   EXPECT_NEAR(suggested_spacing_um(height_field(wavy)), kSide, 1e-12);
 }
 
+/// A square of two triangles and, in its corner, many more that are a millionth of it wide; then a strip as narrow.
+TEST(SurfaceMesh, small_triangles_beside_large_ones_make_no_lattice_of_millions) {
+  for (const double height : {1.0, 1e-6}) {
+    TriangleMesh mesh{.points_um = {{0, 0, 0}, {1, 0, 0}, {1, height, 0}, {0, height, 0}},
+                      .triangles = {{0, 1, 2}, {0, 2, 3}}};
+    const double small = 1e-6 * height;
+    for (int k = 0; k < 20; ++k) {
+      const int first = static_cast<int>(mesh.points_um.size());
+      for (const Vec2 p : {Vec2{0, 0}, Vec2{small, 0}, Vec2{0, small}}) mesh.points_um.push_back({p.x, p.y, 0});
+      mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    const HeightMap map = sample_mesh(mesh, suggested_spacing_um(mesh)).map;
+    // 10 000, 100 a triangle; up to two lines more along either side, for its end and what is left
+    const double most = 1e4 + 100 * 22;
+    EXPECT_LE(map.z_um.size(), most + 2 * (map.n_x + map.n_y)) << height;
+    for (const double z : map.z_um) ASSERT_EQ(z, 0);
+  }
+}
+
 TEST(SurfaceMesh, stage_coordinates_as_floats_make_no_overhang_and_no_hole) {
   const TemporaryFolder folder;
   TriangleMesh mesh = height_field(wavy);
