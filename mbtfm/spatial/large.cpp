@@ -68,10 +68,7 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
     r.degrees = recurrences.degrees(*r.lambda);
     r.relative_l2 = recurrences.relative_l2(*r.lambda);
     r.variance = std::max(r.scan->variance, least);
-    // as in tikhonov.cpp: the scale is not to hold what was smoothed away
-    const double least_smooth = std::min(chosen.lambda, r.scan->by_gcv);
-    const VectorXd left = problem.residual(basis.tractions(recurrences.solve(least_smooth)), r.weighing.by_row);
-    r.weighing = weigh(parameters.loss, observed, left, recurrences.degrees(least_smooth));
+    r.weighing = weigh(parameters.loss, observed, problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees);
   }
   r.length_um = *r.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
   r.remark = "standard errors are computed of up to " + std::to_string(kMostVertices) + " vertices, and there are " +

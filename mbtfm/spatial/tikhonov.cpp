@@ -83,8 +83,8 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   };
   const VectorXd displacement_um = problem.displacement_um();
   const VectorXd of_nothing = displacement_um.cwiseQuotient(observed.sigma_um);
-  const auto residual = [&](const Fit& made, const VectorXd& x) -> VectorXd {
-    const VectorXd left = (displacement_um - response * x).cwiseQuotient(observed.sigma_um);
+  const auto residual = [&](const Fit& made) -> VectorXd {
+    const VectorXd left = (displacement_um - response * made.x).cwiseQuotient(observed.sigma_um);
     return left - Rows(problem, made.weighing.by_row).common_part(left);
   };
   if (displacement_um.isZero(0)) {
@@ -96,23 +96,17 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   Fit last = fit(weigh(BeadLoss::l2, observed, of_nothing, 0));
   if (parameters.loss != BeadLoss::l2) {
     // From tractions that no bead has pulled on: biweight has several minima, and beads far off hide in those of l2.
-    // The scale of the residuals and lambda belong together. Of smooth tractions the residuals hold what was smoothed
-    // away; a scale and weights from them call it noise, which asks for still smoother tractions, to the end. So the
-    // first lambda does without a scale, and scales are those of the residuals at the lambda of cross-validation, which
-    // needs none.
     constexpr int kMostRounds = 12;
     constexpr double kSettled = 0.005;
     Weighing weighing =
         weigh(parameters.loss == BeadLoss::biweight ? BeadLoss::huber : parameters.loss, observed, of_nothing, 0);
-    weighing.variance = 0;           // of no use: all of the displacement is in it
     std::optional<Weighing> judged;  // none before a residual is known
     double change = 1;
     for (int round = 0; round < kMostRounds && change > kSettled; ++round) {
       Fit next = fit(std::move(weighing), judged);
       change = (next.x - last.x).norm() / std::max(next.x.norm(), 1e-300);
-      const double least_smooth = std::min(next.chosen.lambda, next.scan.by_gcv);
-      const VectorXd left = residual(next, next.spectrum->solve(least_smooth));
-      const double degrees = next.spectrum->degrees(least_smooth);
+      const VectorXd left = residual(next);
+      const double degrees = next.spectrum->degrees(next.chosen.lambda);
       weighing = weigh(parameters.loss, observed, left, degrees);
       if (parameters.loss != BeadLoss::biweight) judged = weigh(BeadLoss::biweight, observed, left, degrees);
       last = std::move(next);
@@ -120,7 +114,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   }
   const double lambda = last.chosen.lambda;
   r.degrees = last.spectrum->degrees(lambda);
-  r.weighing = weigh(parameters.loss, observed, residual(last, last.x), r.degrees);
+  r.weighing = weigh(parameters.loss, observed, residual(last), r.degrees);
   r.variance = std::max(last.scan.variance, floor(0));
   r.traction_kPa = basis.tractions(last.x);
   r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(lambda, r.variance), threads);
