@@ -98,7 +98,12 @@ void notice_large_contraction(stage::StageContext& context, const Setting& setti
 Figures figures_of(const Setting& setting, const std::vector<Indentation>& solved) {
   double error = 0, imbalance = 0;
   int iterations = 0;
+  std::int64_t n_failed = 0;
   for (const Indentation& one : solved) {
+    if (one.failure) {
+      ++n_failed;
+      continue;
+    }
     error = std::max(error, one.error_um / one.reading.largest_u_um);
     imbalance = std::max(imbalance, one.imbalance);
     iterations = std::max(iterations, one.iterations);
@@ -111,6 +116,7 @@ Figures figures_of(const Setting& setting, const std::vector<Indentation>& solve
                      {"largest_relative_error", error},
                      {"net_force_over_sum", imbalance},
                      {"newton_iterations", std::int64_t{iterations}}};
+  if (n_failed > 0) figures.emplace_back("n_cases_without_equilibrium", n_failed);
   if (solved.size() > 1) return figures;
   const Indentation& one = solved.front();
   for (std::size_t k = 0; k < setting.depths_um.size(); ++k)
@@ -130,7 +136,30 @@ std::string summary_of(const Setting& setting, const std::vector<Indentation>& s
            " um below the surface), moves by " + brief(r.largest_u_um) + " um at most; error " +
            brief(solved.front().error_um) + " um";
   }
-  return std::to_string(solved.size()) + " cases, " + std::to_string(optima.size()) + " best heights";
+  const auto n_failed = std::ranges::count_if(solved, [](const Indentation& i) { return i.failure.has_value(); });
+  return std::to_string(solved.size()) + " cases, " +
+         (n_failed > 0 ? std::to_string(n_failed) + " of them without an equilibrium, " : std::string()) +
+         std::to_string(optima.size()) + " best heights";
+}
+
+/// Cases that are not solved: all of them, or some of a sweep.
+/// @throws NotSolved where none is solved
+void notice_failures(stage::StageContext& context, const std::vector<Indentation>& solved) {
+  std::vector<const Indentation*> failed;
+  for (const Indentation& one : solved) {
+    if (one.failure) failed.push_back(&one);
+  }
+  if (failed.empty()) return;
+  const Indentation& first = *failed.front();
+  if (failed.size() == solved.size()) {
+    throw NotSolved({.reason = solved.size() == 1 ? *first.failure
+                                                  : "none of " + std::to_string(solved.size()) +
+                                                        " cases has an equilibrium; the first: " + *first.failure});
+  }
+  context.notice(noticed(FindingKind::cases_not_solved, static_cast<double>(failed.size()),
+                         std::to_string(failed.size()) + " of " + std::to_string(solved.size()) +
+                             " cases have no equilibrium. The first has height " + brief(first.of.height_um) +
+                             " um and modulus ratio " + brief(first.of.modulus_ratio) + ": " + *first.failure + "."));
 }
 
 std::vector<Indentation> solved_cases(const Setting& setting, const std::vector<Case>& cases,
@@ -147,12 +176,14 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   const std::vector<Case> cases = cases_of(p.sweep, {p.height_um, p.gel.youngs_modulus_kPa / p.youngs_modulus_kPa});
   expect_sense(p, setting, cases);
   const std::vector<Indentation> solved = solved_cases(setting, cases, context);
+  notice_failures(context, solved);
   const std::vector<Optimum> best = optima(setting, solved, context.threads);
   write_indentations(context.output("out", "indent.csv"), solved, setting.depths_um);
-  const auto deepest =
-      std::ranges::max_element(solved, {}, [](const Indentation& i) { return i.reading.depth_um.back(); });
+  const auto deepest = std::ranges::max_element(
+      solved, {}, [](const Indentation& i) { return i.failure ? -HUGE_VAL : i.reading.depth_um.back(); });
   write_deformed_vtu(context.output("out", "indent.vtu"), deformed_section(setting, deepest->of));
   StageReport report;
+  report.converged = std::ranges::none_of(solved, [](const Indentation& i) { return i.failure.has_value(); });
   report.figures = figures_of(setting, solved);
   if (solved.size() > 1) {
     write_optima(context.output("out", "optima.csv"), best);

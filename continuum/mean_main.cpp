@@ -363,7 +363,7 @@ void write_page(stage::StageContext& context, const std::string& picture, const 
                 const StageReport& report) {
   const mbtfm::report::StagePage page{
       .title = "Mean of registered cells",
-      .facts = {report.summary + "."},
+      .facts = {"M" + report.summary.substr(1) + "."},  // a sentence begins with a capital letter
       .findings = context.findings_,
       .picture_svg = picture,
       .picture_title = "Mean traction",

@@ -526,6 +526,22 @@ std::string sentence_of(const sheets::SheetEstimate& e) {
   return name + " not known";
 }
 
+void notice_expansion(stage::StageContext& context, const sheets::SheetFit& fit, int n_parts) {
+  const std::vector<sheets::SheetEstimate> found = expanding(fit);
+  std::string text;
+  bool is_sure = false;  // the interval holds no contraction
+  for (const sheets::SheetEstimate& e : found) {
+    const bool is_below = e.high && *e.high < 0;
+    is_sure = is_sure || is_below;
+    text += std::string(text.empty() ? "By the beads " : "; ") + (e.part.empty() ? std::string("the sheet") : e.part) +
+            " would contract with " + brief(e.value) + " nN/um" +
+            (e.low && e.high ? " (" + brief(*e.low) + " to " + brief(*e.high) + ")" : std::string());
+  }
+  if (!text.empty()) text += is_sure ? ": it expands." : ": that is no contraction.";
+  context.notice(noticed(FindingKind::sheet_expands, static_cast<double>(found.size()) / n_parts, text,
+                         is_sure ? Severity::bad : Severity::caution));
+}
+
 std::vector<report::Listing> tables_of_fit(const Path& estimates, const Path& models) {
   return {{"What the beads tell",
            "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).",
@@ -671,6 +687,10 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   const auto stiffness =
       std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &sheets::SheetEstimate::quantity);
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
+  notice_expansion(context, fit, static_cast<int>(n_parts));
+  context.notice(noticed(FindingKind::sheet_at_bound, fit.is_at_bound ? 1 : 0,
+                         "The best stiffness, " + brief(fit.stiffness_nN_per_um) + " nN/um, is an end of the range " +
+                             brief(table.softest_nN_per_um()) + " to " + brief(table.stiffest_nN_per_um()) + "."));
   result.figures = {{"ground", std::string(name_of(Ground::gel))},
                     {"strain", std::string(name_of(Strain::small))},
                     {"stiffness_nN_per_um", fit.stiffness_nN_per_um},

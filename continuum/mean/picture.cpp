@@ -53,6 +53,7 @@ charts::Chart traction_chart(const Scene& scene) {
                 "stroke:#ffffff;stroke-width:1;fill:none");
   }
   chart.put_key(charts::Chart::KeySide::above);
+  chart.key("0 Pa", charts::hex(charts::colour_at(kTractions, 0)));
   chart.key("largest " + charts::readable(1000 * largest) + " Pa", charts::hex(charts::colour_at(kTractions, 1)));
   return chart;
 }

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
+#include "pipeline/contract/errors.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::solids {
@@ -136,15 +138,33 @@ Indentation solve_case(const Setting& setting, const Case& of, const Resolutions
   return result;
 }
 
+/// @throws InvalidData; what is not solved is told
+Indentation tried_case(const Setting& setting, const Case& of, const Resolutions& at) {
+  try {
+    return solve_case(setting, of, at);
+  } catch (const NotSolved& error) {
+    const Section section{setting.volume_um3, of.height_um};
+    return {.of = of,
+            .contact_radius_um = section.contact_radius_um(),
+            .contact_area_um2 = section.contact_area_um2(),
+            .failure = error.report.reason};
+  }
+}
+
 /// By rising height.
 using ByHeight = std::map<double, Indentation>;
 
 /// The best height and its neighbours, of the fine mesh or the coarse one.
 std::optional<std::array<Largest, 3>> around_best(const ByHeight& solved, std::size_t depth, Reading Indentation::*of) {
-  const auto value = [&](const auto& entry) { return (entry.second.*of).depth_um[depth]; };
+  const auto value = [&](const auto& entry) {
+    return entry.second.failure ? -std::numeric_limits<double>::infinity() : (entry.second.*of).depth_um[depth];
+  };
   const auto best =
       std::max_element(solved.begin(), solved.end(), [&](const auto& a, const auto& b) { return value(a) < value(b); });
   if (solved.size() < 3 || best == solved.begin() || std::next(best) == solved.end()) return std::nullopt;
+  for (const auto& of_three : {std::prev(best), best, std::next(best)}) {
+    if (of_three->second.failure) return std::nullopt;
+  }
   const auto point = [&](auto entry) { return Largest{entry->first, value(*entry)}; };
   return std::array{point(std::prev(best)), point(best), point(std::next(best))};
 }
@@ -162,7 +182,7 @@ std::optional<Optimum> optimum_of(const Setting& setting, ByHeight solved, doubl
     const double nearest = std::ranges::min(*around, {}, [&](const Largest& p) { return std::abs(p.at - top.at); }).at;
     if (k > 0 && std::abs(nearest - top.at) < kStays * top.at) break;
     const double height = std::abs(nearest - top.at) < kStays * top.at ? top.at + 4 * kStays * top.at : top.at;
-    solved[height] = solve_case(setting, {height, ratio}, at);
+    solved[height] = tried_case(setting, {height, ratio}, at);
     around = around_best(solved, depth, &Indentation::reading);
     if (!around) return std::nullopt;
     const Largest next = top_of(*around);
@@ -195,7 +215,7 @@ std::vector<Indentation> indentations(const Setting& setting, const std::vector<
   for (int round = 0; round < n_rounds; ++round) {
     const int begin = n * round / n_rounds, end = n * (round + 1) / n_rounds;
     numerics::parallel_for(end - begin, threads,
-                           [&](int k) { solved[begin + k] = solve_case(setting, cases[begin + k], at); });
+                           [&](int k) { solved[begin + k] = tried_case(setting, cases[begin + k], at); });
     if (progress) progress(static_cast<double>(end) / n, "cells on gels");
   }
   return solved;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "continuum/solids/section.h"
@@ -42,11 +43,13 @@ struct Indentation {
   double energy_fJ = 0;  ///< elastic, with what the contraction gains
   double imbalance = 0;  ///< net force of the cell on the gel over the sum of its parts; exactly none
   int iterations = 1;
+  std::optional<std::string> failure = {};  ///< why there is no equilibrium: then only case and contact are known
 };
 
 /// @throws InvalidData as section_mesh and where a depth lies below the base; NotSolved as solve
 Indentation indentation(const Setting& setting, const Case& of);
-/// Many cases, side by side; the answer does not depend on the number of threads.
+/// Many cases, side by side; the answer does not depend on the number of threads. A case that is not solved says why.
+/// @throws InvalidData as indentation
 std::vector<Indentation> indentations(const Setting& setting, const std::vector<Case>& cases, int threads,
                                       const Progress& progress);
 
@@ -61,7 +64,8 @@ struct Optimum {
 };
 
 /// For each stiffness and depth of reading, by a parabola through the three best heights, solved again at its top until
-/// that stays where it is. None where the best height is the first or the last, or there are fewer than three.
+/// that stays where it is. None where the best height is the first or the last, there are fewer than three, or a height
+/// about it is not solved.
 std::vector<Optimum> optima(const Setting& setting, const std::vector<Indentation>& solved, int threads);
 
 }  // namespace mbtfm::solids

@@ -16,26 +16,36 @@ files::Table<Indentation> table_of_cases(const std::vector<double>& depths_um) {
       .columns = {{"height_um", "height of the cell", [](const Indentation& i) { return i.of.height_um; }},
                   {"modulus_ratio", "Young's modulus of the gel over the cell's",
                    [](const Indentation& i) { return i.of.modulus_ratio; }}}};
-  for (std::size_t k = 0; k < depths_um.size(); ++k) {
-    table.columns.push_back({"depth_" + shortest(depths_um[k]) + "_um",
-                             "largest displacement into the gel, " + shortest(depths_um[k]) + " um below its surface",
-                             [k](const Indentation& i) { return i.reading.depth_um[k]; },
+  // of a case without an equilibrium the fields are empty
+  const auto add = [&](const std::string& name, const std::string& meaning, auto get) {
+    table.columns.push_back({name,
+                             meaning,
+                             [get](const Indentation& i) -> std::optional<double> {
+                               if (i.failure) return std::nullopt;
+                               return get(i);
+                             },
                              {.digits = kForPeople}});
-  }
-  const auto add = [&](const char* name, const char* meaning, auto get) {
-    table.columns.push_back({name, meaning, get, {.digits = kForPeople}});
   };
+  for (std::size_t k = 0; k < depths_um.size(); ++k) {
+    add("depth_" + shortest(depths_um[k]) + "_um",
+        "largest displacement into the gel, " + shortest(depths_um[k]) + " um below its surface",
+        [k](const Indentation& i) { return i.reading.depth_um[k]; });
+  }
   add("largest_u_um", "largest displacement anywhere", [](const Indentation& i) { return i.reading.largest_u_um; });
   add("error_um", "largest change of the depths and displacements of the row on a coarser mesh",
       [](const Indentation& i) { return i.error_um; });
-  add("contact_radius_um", "radius of the contact", [](const Indentation& i) { return i.contact_radius_um; });
-  add("contact_area_um2", "area of the contact", [](const Indentation& i) { return i.contact_area_um2; });
+  table.columns.push_back(
+      {"contact_radius_um", "radius of the contact", &Indentation::contact_radius_um, {.digits = kForPeople}});
+  table.columns.push_back(
+      {"contact_area_um2", "area of the contact", &Indentation::contact_area_um2, {.digits = kForPeople}});
   add("lift_um", "largest displacement of the gel's surface out of it, near the rim of the contact",
       [](const Indentation& i) { return i.reading.lift_um; });
   add("largest_u_gel_um", "largest displacement in the gel",
       [](const Indentation& i) { return i.reading.largest_u_gel_um; });
   add("top_down_um", "displacement of the cell's top towards the gel",
       [](const Indentation& i) { return i.reading.top_down_um; });
+  table.columns.push_back({"not_solved", "why the case has no equilibrium; empty: it has one",
+                           [](const Indentation& i) { return i.failure.value_or(""); }});
   return table;
 }
 

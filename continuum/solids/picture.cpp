@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <map>
+#include <optional>
 
 #include "continuum/solids/outputs.h"
 #include "pipeline/charts/chart.h"
@@ -10,20 +11,26 @@ namespace mbtfm::solids {
 namespace {
 
 constexpr charts::ColourMap kDepths = charts::ColourMap::viridis;
+constexpr const char* kNoEquilibrium = "#cccccc";
 
-/// By ratio, then by height.
-using Depths = std::map<double, std::map<double, double>>;
+/// By height; none where there is no equilibrium.
+using DepthByHeight = std::map<double, std::optional<double>>;
+/// By ratio.
+using Depths = std::map<double, DepthByHeight>;
 
 Depths depths_of(const std::vector<Indentation>& solved, std::size_t read_at) {
   Depths depths;
-  for (const Indentation& one : solved) depths[one.of.modulus_ratio][one.of.height_um] = one.reading.depth_um[read_at];
+  for (const Indentation& one : solved) {
+    auto& depth = depths[one.of.modulus_ratio][one.of.height_um];
+    if (!one.failure) depth = one.reading.depth_um[read_at];
+  }
   return depths;
 }
 
 double largest_of(const Depths& depths) {
   double largest = 0;
   for (const auto& [ratio, by_height] : depths) {
-    for (const auto& [height, depth] : by_height) largest = std::max(largest, depth);
+    for (const auto& [height, depth] : by_height) largest = std::max(largest, depth.value_or(0));
   }
   return largest;
 }
@@ -33,14 +40,15 @@ std::string read_at_text(const Setting& setting, std::size_t read_at) {
   return depth == 0 ? std::string("at the surface") : charts::readable(depth) + " µm below the surface";
 }
 
-/// The depth at a height, between those solved.
-double between_heights(const std::map<double, double>& by_height, double height) {
+/// The depth at a height, between two that are solved.
+std::optional<double> between_heights(const DepthByHeight& by_height, double height) {
   const auto above = by_height.lower_bound(height);
   if (above == by_height.begin()) return above->second;
   if (above == by_height.end()) return std::prev(above)->second;
   const auto below = std::prev(above);
   const double share = (height - below->first) / (above->first - below->first);
-  return (1 - share) * below->second + share * above->second;
+  if (!below->second || !above->second) return std::nullopt;
+  return (1 - share) * *below->second + share * *above->second;
 }
 
 /// A stripe for each stiffness, coloured by depth along the heights.
@@ -61,11 +69,11 @@ charts::Chart map_chart(const Setting& setting, const Depths& depths, const std:
     for (int k = 0; k < kStripes; ++k) {
       const double low = heights.front() + (heights.back() - heights.front()) * k / kStripes;
       const double high = heights.front() + (heights.back() - heights.front()) * (k + 1) / kStripes;
-      const double depth = between_heights(by_height, 0.5 * (low + high));
-      const std::string colour = charts::hex(charts::colour_at(kDepths, depth / largest));
+      const auto depth = between_heights(by_height, 0.5 * (low + high));
+      const std::string colour = depth ? charts::hex(charts::colour_at(kDepths, *depth / largest)) : kNoEquilibrium;
       chart.bar({low, row - 0.5}, {high, row + 0.5}, "fill:" + colour + ";stroke:" + colour + ";stroke-width:0.5",
                 "height " + charts::readable(0.5 * (low + high)) + " µm, ratio " + charts::readable(ratio) + ": " +
-                    charts::readable(depth) + " µm");
+                    (depth ? charts::readable(*depth) + " µm" : "no equilibrium"));
     }
     for (const Optimum& best : optima) {
       if (best.modulus_ratio != ratio || best.read_at_um != setting.depths_um[read_at]) continue;
@@ -79,6 +87,20 @@ charts::Chart map_chart(const Setting& setting, const Depths& depths, const std:
   return chart;
 }
 
+/// Of neighbouring heights that are solved.
+std::vector<std::vector<Vec2>> pieces_of(const DepthByHeight& by_height) {
+  std::vector<std::vector<Vec2>> pieces(1);
+  for (const auto& [height, depth] : by_height) {
+    if (depth) {
+      pieces.back().push_back({height, *depth});
+    } else if (!pieces.back().empty()) {
+      pieces.emplace_back();
+    }
+  }
+  if (pieces.back().empty()) pieces.pop_back();
+  return pieces;
+}
+
 charts::Chart curves_chart(const Setting& setting, const Depths& depths, const std::vector<Optimum>& optima,
                            std::size_t read_at) {
   std::vector<double> heights;
@@ -89,10 +111,10 @@ charts::Chart curves_chart(const Setting& setting, const Depths& depths, const s
   std::size_t k = 0;
   for (const auto& [ratio, by_height] : depths) {
     const std::string colour = charts::kColours[k++ % std::size(charts::kColours)];
-    std::vector<Vec2> points;
-    for (const auto& [height, depth] : by_height) points.push_back({height, depth});
-    chart.curve(points, "stroke:" + colour + ";stroke-width:1.6;fill:none", "ratio " + charts::readable(ratio));
-    for (const Vec2 point : points) chart.dot(point, 2, "fill:" + colour);
+    for (const std::vector<Vec2>& points : pieces_of(by_height)) {
+      chart.curve(points, "stroke:" + colour + ";stroke-width:1.6;fill:none", "ratio " + charts::readable(ratio));
+      for (const Vec2 point : points) chart.dot(point, 2, "fill:" + colour);
+    }
     for (const Optimum& best : optima) {
       if (best.modulus_ratio == ratio && best.read_at_um == setting.depths_um[read_at])
         chart.diamond({best.height_um, best.depth_um}, 5, "fill:" + colour + ";stroke:#ffffff;stroke-width:1");
@@ -113,7 +135,11 @@ std::string picture_of(const Setting& setting, const std::vector<Indentation>& s
     charts.push_back(curves_chart(setting, depths, optima, read_at));
   }
   double error = 0;
-  for (const Indentation& one : solved) error = std::max(error, one.error_um);
+  bool has_holes = false;
+  for (const Indentation& one : solved) {
+    error = std::max(error, one.error_um);
+    has_holes = has_holes || one.failure;
+  }
   return charts::svg_file(
       charts, 2,
       {"Cells of " + charts::readable(setting.volume_um3) + " µm³ that contract with " +
@@ -121,7 +147,7 @@ std::string picture_of(const Setting& setting, const std::vector<Indentation>& s
            significant(setting.cell.poisson_ratio, 6) + ". Depth: the largest displacement into the gel.",
        "Diamonds: the height that presses deepest, with its error. On a coarser mesh depths differ "
        "by at most " +
-           charts::readable(error) + " µm."});
+           charts::readable(error) + " µm." + (has_holes ? " Grey: beside a case without an equilibrium." : "")});
 }
 
 }  // namespace mbtfm::solids

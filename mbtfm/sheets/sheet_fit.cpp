@@ -221,6 +221,9 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   const Profile best = least(data, table, scan);
   SheetFit fit;
   fit.stiffness_nN_per_um = best.stiffness;
+  constexpr double kAtBound = 1e-4;  // of log M; the search ends at 1e-9
+  fit.is_at_bound = !known && std::min(std::log(best.stiffness / table.softest_nN_per_um()),
+                                       std::log(table.stiffest_nN_per_um() / best.stiffness)) < kAtBound;
   fit.loads = best.loads;
   fit.node_amplitudes = table.shares(best.stiffness) * best.loads;
   fit.variance = tensions::misfit_variance(data, fit.node_amplitudes, n_unknowns, loss);
@@ -273,6 +276,14 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   model(has_parts ? name + "-in-parts" : name, static_cast<int>(n_unknowns), best.misfit + floor, fit.relative_l2);
   fit.report = {.converged = true, .iterations = kScan, .last_change = 0, .reason = "scanned over the stiffness"};
   return fit;
+}
+
+std::vector<SheetEstimate> expanding(const SheetFit& fit) {
+  std::vector<SheetEstimate> found;
+  for (const SheetEstimate& e : fit.estimates) {
+    if (e.quantity == Quantity::contraction && (e.value < 0 || (e.high && *e.high < 0))) found.push_back(e);
+  }
+  return found;
 }
 
 void compare_with_adhesions(SheetFit& fit, const LinearData& adhesions) {

@@ -38,6 +38,7 @@ struct SheetFit {
   double stiffness_nN_per_um = 0;
   Eigen::VectorXd loads;            ///< contractions by part, line tension
   Eigen::VectorXd node_amplitudes;  ///< of the table's forces: what the sheet does at the solution
+  bool is_at_bound = false;         ///< the best stiffness is the table's first or last
   double correlation = 0;           ///< of the errors of the first contraction and log stiffness
   double variance = 1;              ///< of a weighted component of a bead, that the error bars are made with
   double relative_l2 = 0, expected_relative_l2 = 0;
@@ -45,6 +46,9 @@ struct SheetFit {
   std::vector<SheetModel> models;
   Report report;
 };
+
+/// The contractions that no cell has: best below zero, or with an interval that holds no value above.
+std::vector<SheetEstimate> expanding(const SheetFit& fit);
 
 /// One more model: forces of the adhesions, each for itself. chi² of all models is then in units of the noise that
 /// these leave, or of the stated errors where these are larger.

@@ -128,6 +128,8 @@ void write_tractions_vtp(const Path& file, const Problem& problem, const Spatial
   files::write_quads_vtp(file, grid);
 }
 
+const char* how_lambda(const SpatialReconstruction& r) { return r.lambda_by ? name_of(*r.lambda_by) : "given"; }
+
 Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const Balance& balance) {
   Figures figures;
   const auto add = [&](const std::string& name, double value) { figures.emplace_back(name, value); };
@@ -153,7 +155,10 @@ Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const
   if (r.chi_squared > 0) add("chi_squared_per_datum", r.chi_squared);
   if (r.degrees > 0) add("effective_unknowns", r.degrees);
   if (r.resolved.size() > 0) add("median_resolution_um", numerics::median(resolution_um(problem, r)));
-  if (r.lambda) add("lambda", *r.lambda);
+  if (r.lambda) {
+    add("lambda", *r.lambda);
+    figures.emplace_back("lambda_by", std::string(how_lambda(r)));
+  }
   figures.emplace_back("tractions_over", problem.expected.where);
   figures.emplace_back("n_unknowns", std::int64_t{problem.n_unknowns()});
   add("spacing_x_um", problem.mesh.spacing_um.x);

@@ -16,6 +16,8 @@ void write_part_forces(const Path& file, const std::vector<PartForce>& forces);
 /// Their part of docs/columns.md.
 std::string pages_of_tables();
 
+/// The criterion that chose lambda, or "given".
+const char* how_lambda(const SpatialReconstruction& reconstruction);
 Figures summary_of(const Problem& problem, const SpatialReconstruction& reconstruction, const Balance& balance);
 
 }  // namespace mbtfm::spatial

@@ -189,6 +189,7 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   r.resolved = (seen.head(n) + seen.segment(n, n) + seen.tail(n)) / 3;
   r.degrees = seen.sum();
   r.lambda.reset();
+  r.lambda_by.reset();
   r.length_um.reset();
   r.scan.reset();
   r.figures = {{"penalty_per_nN", mu},

@@ -60,13 +60,18 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
     const double least = std::max({observed.states_errors ? 1.0 : 0.0, problem.variance_of_model(),
                                    parameters.loss == BeadLoss::l2 || round == 0 ? 0.0 : r.weighing.variance});
     r.scan = recurrences.scan(least > 0 ? std::optional(least) : std::nullopt);
-    r.lambda = traction.lambda_um_per_kPa ? *traction.lambda_um_per_kPa * lambda_per_um_per_kPa(problem)
-                                          : lambda_by(*r.scan, traction.lambda_by);
+    const ChosenLambda chosen = choose_lambda(problem, *r.scan, traction);
+    r.lambda = chosen.lambda;
+    r.lambda_by = chosen.by;
+    r.findings = {chosen.finding};
     r.traction_kPa = basis.tractions(recurrences.solve(*r.lambda));
     r.degrees = recurrences.degrees(*r.lambda);
     r.relative_l2 = recurrences.relative_l2(*r.lambda);
     r.variance = std::max(r.scan->variance, least);
-    r.weighing = weigh(parameters.loss, observed, problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees);
+    // as in tikhonov.cpp: the scale is not to hold what was smoothed away
+    const double least_smooth = std::min(chosen.lambda, r.scan->by_gcv);
+    const VectorXd left = problem.residual(basis.tractions(recurrences.solve(least_smooth)), r.weighing.by_row);
+    r.weighing = weigh(parameters.loss, observed, left, recurrences.degrees(least_smooth));
   }
   r.length_um = *r.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
   r.remark = "standard errors are computed of up to " + std::to_string(kMostVertices) + " vertices, and there are " +

@@ -31,12 +31,13 @@ struct SpatialReconstruction {
   Eigen::MatrixXd covariance_kPa2;
   Eigen::VectorXd resolved;  ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
   std::optional<tractions::LambdaScan> scan;
-  std::optional<double> lambda;     ///< of |S (u − G t)|² + lambda² |s|²
-  std::optional<double> length_um;  ///< lambda times E, the same for every method
-  double degrees = 0;               ///< how many numbers the beads tell
-  double relative_l2 = 0;           ///< |S (u − G t)| / |S u|, weighed by the loss
-  double noise_um = 0;              ///< along the surface, as the beads have it
-  double chi_squared = 0;           ///< misfit over what the stated errors leave, per datum; 0: not stated
+  std::optional<double> lambda;                         ///< of |S (u − G t)|² + lambda² |s|²
+  std::optional<double> length_um;                      ///< lambda times E, the same for every method
+  std::optional<tractions::LambdaCriterion> lambda_by;  ///< what chose lambda in the end; none: it was given
+  double degrees = 0;                                   ///< how many numbers the beads tell
+  double relative_l2 = 0;                               ///< |S (u − G t)| / |S u|, weighed by the loss
+  double noise_um = 0;                                  ///< along the surface, as the beads have it
+  double chi_squared = 0;  ///< misfit over what the stated errors leave, per datum; 0: not stated
   Weighing weighing;
   double variance = 1;            ///< of one datum as weighed, in units of sigma²
   std::vector<PartForce> forces;  ///< by adhesion
@@ -68,9 +69,16 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
 /// integral over the surface, and their weights have a mean of one.
 double lambda_per_um_per_kPa(const Problem& problem);
 
-/// By a criterion. Where the risk's is below a tenth of the evidence's, the evidence's: the model is then wrong by more
-/// than the stated errors in a way that tractions can follow, and the risk has no minimum but the end of the scan.
-double lambda_by(const tractions::LambdaScan& scan, tractions::LambdaCriterion criterion);
+struct ChosenLambda {
+  double lambda = 0;
+  std::optional<tractions::LambdaCriterion> by;  ///< none: given
+  std::optional<Finding> finding;                ///< where it is not the criterion that was asked for
+};
+/// The one that is given, or by the criterion. Where the risk's is below a tenth of the evidence's, the evidence's: the
+/// model is then wrong by more than the stated errors in a way that tractions can follow, and the risk has no minimum
+/// but the end of the scan. The finding says so.
+ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
+                           const tractions::TractionParameters& traction);
 
 /// The same as tikhonov where the problem has no matrix. No standard errors.
 SpatialReconstruction reconstruct_large(const Problem& problem, const tractions::TractionParameters& traction,
@@ -126,7 +134,7 @@ struct Balance {
   Vec3 centre_um;
   double total_force_nN = 0;        ///< ∫ |t| dA
   double total_force_sigma_nN = 0;  ///< along the tractions found
-  double normal_force_nN = 0;  ///< ∫ |t . n| dA
+  double normal_force_nN = 0;       ///< ∫ |t . n| dA
   double strain_energy_fJ = 0;
 };
 Balance balance_of(const Problem& problem, const SpatialReconstruction& reconstruction);

@@ -27,23 +27,22 @@ SpatialInputs read_inputs(const StageParameters& p, stage::StageContext& context
 }
 
 /// The criteria by lambda: files and picture of the flat methods.
-void write_scan(stage::StageContext& context, const StageParameters& p, const SpatialReconstruction& r) {
+void write_scan(stage::StageContext& context, const SpatialReconstruction& r) {
   tractions::Reconstruction shown;
   shown.scan = r.scan;
   shown.lambda = r.lambda;
   shown.length_um = r.length_um;
   tractions::write_lambda_scan(context.output_beside("out", "_lambda.csv"), *r.scan, *r.length_um / *r.lambda);
-  tractions::write_lambda_picture(
-      context.output_beside("out", "_lambda.svg"), shown,
-      p.traction.lambda_um_per_kPa ? "as given" : std::string("by ") + name_of(p.traction.lambda_by));
+  tractions::write_lambda_picture(context.output_beside("out", "_lambda.svg"), shown,
+                                  r.lambda_by ? std::string("by ") + name_of(*r.lambda_by) : "as given");
 }
 
-void write_outputs(stage::StageContext& context, const StageParameters& p, const Problem& problem,
-                   const SpatialReconstruction& r, const Figures& summary) {
+void write_outputs(stage::StageContext& context, const Problem& problem, const SpatialReconstruction& r,
+                   const Figures& summary) {
   write_tractions(context.output("out"), problem, r);
   write_tractions_vtp(context.output_beside("out", ".vtp"), problem, r);
   files::write_figures(context.output_beside("out", ".json"), summary);
-  if (r.scan) write_scan(context, p, r);
+  if (r.scan) write_scan(context, r);
   if (!r.forces.empty()) write_part_forces(context.output_beside("out", "_adhesion_forces.csv"), r.forces);
 }
 
@@ -51,7 +50,8 @@ std::string summary_line(const SpatialReconstruction& r, const Balance& balance)
   std::string line = name_of(r.method) + std::string(": total force ") + brief(balance.total_force_nN) +
                      " nN, net force " + brief(norm(balance.force_nN)) + " nN, strain energy " +
                      brief(balance.strain_energy_fJ) + " fJ, relative L2 " + brief(r.relative_l2);
-  if (r.length_um) line += ", lambda E " + brief(*r.length_um) + " um";
+  if (r.length_um)
+    line += ", lambda E " + brief(*r.length_um) + " um (" + (r.lambda_by ? "by " : "") + how_lambda(r) + ")";
   if (r.degrees > 0) line += ", " + brief(r.degrees) + " numbers resolved";
   if (!r.remark.empty()) line += "; " + r.remark;
   return line;
@@ -161,7 +161,7 @@ StageReport run_in_space(const StageParameters& p, stage::StageContext& context)
     context.expect_plausible("total_force_nN", balance.total_force_nN);
   notice_balance(context, r, balance);
   const Figures summary = summary_of(problem, r, balance);
-  write_outputs(context, p, problem, r, summary);
+  write_outputs(context, problem, r, summary);
   context.progress(1, "done");
   report.summary = summary_line(r, balance) + left_out_of(problem.observed);
   report.figures = summary;

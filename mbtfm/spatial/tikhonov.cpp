@@ -3,6 +3,7 @@
 
 #include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
 
 namespace mbtfm::spatial {
@@ -16,7 +17,7 @@ namespace {
 struct Fit {
   std::optional<tractions::Spectrum> spectrum;
   tractions::LambdaScan scan;
-  double lambda = 0;
+  ChosenLambda chosen;
   VectorXd x;
   Weighing weighing;
 };
@@ -33,11 +34,22 @@ double lambda_per_um_per_kPa(const Problem& problem) {
   return std::sqrt(n / area * problem.observed.sigma_um.cwiseAbs2().cwiseInverse().mean());
 }
 
-double lambda_by(const tractions::LambdaScan& scan, tractions::LambdaCriterion criterion) {
-  constexpr double kRunsAway = 0.1;  // tractions of ten times the size that the evidence sees
-  const double lambda = chosen_lambda(scan, criterion);
-  const bool runs_away = criterion == tractions::LambdaCriterion::risk && lambda < kRunsAway * scan.by_evidence;
-  return runs_away ? scan.by_evidence : lambda;
+ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
+                           const tractions::TractionParameters& traction) {
+  using enum tractions::LambdaCriterion;
+  const double unit = lambda_per_um_per_kPa(problem);
+  if (traction.lambda_um_per_kPa) return {*traction.lambda_um_per_kPa * unit, {}, {}};
+  ChosenLambda chosen{chosen_lambda(scan, traction.lambda_by), traction.lambda_by, {}};
+  if (traction.lambda_by != risk) return chosen;
+  const auto length = [&](double lambda) { return brief(lambda / unit * problem.gel.youngs_modulus_kPa) + " um"; };
+  chosen.finding = noticed(FindingKind::lambda_runs_away, scan.by_evidence / scan.by_risk,
+                           "By risk lambda E is " + length(scan.by_risk) + ", by evidence " + length(scan.by_evidence) +
+                               ". The one by evidence was taken.");
+  if (chosen.finding) {
+    chosen.lambda = scan.by_evidence;
+    chosen.by = evidence;
+  }
+  return chosen;
 }
 
 SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& response, const Problem& problem,
@@ -64,16 +76,15 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
     made.scan = judged ? scanned(spectrum_of(problem, response, judged->by_row, judged->n_data, threads), *judged)
                        : scanned(*made.spectrum, weighing);
-    made.lambda = traction.lambda_um_per_kPa ? *traction.lambda_um_per_kPa * lambda_per_um_per_kPa(problem)
-                                             : lambda_by(made.scan, traction.lambda_by);
-    made.x = made.spectrum->solve(made.lambda);
+    made.chosen = choose_lambda(problem, made.scan, traction);
+    made.x = made.spectrum->solve(made.chosen.lambda);
     made.weighing = std::move(weighing);
     return made;
   };
   const VectorXd displacement_um = problem.displacement_um();
   const VectorXd of_nothing = displacement_um.cwiseQuotient(observed.sigma_um);
-  const auto residual = [&](const Fit& made) -> VectorXd {
-    const VectorXd left = (displacement_um - response * made.x).cwiseQuotient(observed.sigma_um);
+  const auto residual = [&](const Fit& made, const VectorXd& x) -> VectorXd {
+    const VectorXd left = (displacement_um - response * x).cwiseQuotient(observed.sigma_um);
     return left - Rows(problem, made.weighing.by_row).common_part(left);
   };
   if (displacement_um.isZero(0)) {
@@ -85,31 +96,40 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   Fit last = fit(weigh(BeadLoss::l2, observed, of_nothing, 0));
   if (parameters.loss != BeadLoss::l2) {
     // From tractions that no bead has pulled on: biweight has several minima, and beads far off hide in those of l2.
+    // The scale of the residuals and lambda belong together. Of smooth tractions the residuals hold what was smoothed
+    // away; a scale and weights from them call it noise, which asks for still smoother tractions, to the end. So the
+    // first lambda does without a scale, and scales are those of the residuals at the lambda of cross-validation, which
+    // needs none.
     constexpr int kMostRounds = 12;
     constexpr double kSettled = 0.005;
     Weighing weighing =
         weigh(parameters.loss == BeadLoss::biweight ? BeadLoss::huber : parameters.loss, observed, of_nothing, 0);
+    weighing.variance = 0;           // of no use: all of the displacement is in it
     std::optional<Weighing> judged;  // none before a residual is known
     double change = 1;
     for (int round = 0; round < kMostRounds && change > kSettled; ++round) {
       Fit next = fit(std::move(weighing), judged);
       change = (next.x - last.x).norm() / std::max(next.x.norm(), 1e-300);
-      const VectorXd left = residual(next);
-      const double degrees = next.spectrum->degrees(next.lambda);
+      const double least_smooth = std::min(next.chosen.lambda, next.scan.by_gcv);
+      const VectorXd left = residual(next, next.spectrum->solve(least_smooth));
+      const double degrees = next.spectrum->degrees(least_smooth);
       weighing = weigh(parameters.loss, observed, left, degrees);
       if (parameters.loss != BeadLoss::biweight) judged = weigh(BeadLoss::biweight, observed, left, degrees);
       last = std::move(next);
     }
   }
-  r.degrees = last.spectrum->degrees(last.lambda);
-  r.weighing = weigh(parameters.loss, observed, residual(last), r.degrees);
+  const double lambda = last.chosen.lambda;
+  r.degrees = last.spectrum->degrees(lambda);
+  r.weighing = weigh(parameters.loss, observed, residual(last, last.x), r.degrees);
   r.variance = std::max(last.scan.variance, floor(0));
   r.traction_kPa = basis.tractions(last.x);
-  r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(last.lambda, r.variance), threads);
+  r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(lambda, r.variance), threads);
   r.scan = std::move(last.scan);
-  r.lambda = last.lambda;
-  r.length_um = last.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
-  r.relative_l2 = last.spectrum->relative_l2(last.lambda);
+  r.lambda = lambda;
+  r.lambda_by = last.chosen.by;
+  r.findings.push_back(std::move(last.chosen.finding));
+  r.length_um = lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
+  r.relative_l2 = last.spectrum->relative_l2(lambda);
   return r;
 }
 

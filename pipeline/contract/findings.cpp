@@ -243,6 +243,13 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
        "Set traction.loss = biweight."},
+      {lambda_runs_away, "lambda-runs-away", "traction", caution, "lambda by evidence over lambda by risk", 10,
+       "in scenes whose noise is that of the beads it is 0.5 to 0.8; far above, tractions follow what the model has "
+       "wrong, "
+       "and by risk they would be as many times too large",
+       "Check surface, gel and sigma_um: the misfit is not the beads' noise. The tractions are those with lambda by "
+       "evidence, and may be smoothed too much. To choose yourself, set traction.lambda_by or "
+       "traction.lambda_um_per_kPa."},
       {modulus_error_unknown, "modulus-error-unknown", "fit", note, "1 if gel.youngs_modulus_sigma_kPa is not given", 0,
        "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
        "Give gel.youngs_modulus_sigma_kPa; the error budget then has a line for it."},
@@ -250,6 +257,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "contraction of the cell if nothing held it, (1 - 2 nu) stress / Young's modulus", 0.05,
        "beyond it large strains change the depth by more than the best stated errors",
        "Compare with indent.strain = large."},
+      {cases_not_solved, "cases-not-solved", "indent", caution, "cases of the sweep without an equilibrium", 0,
+       "the map has a hole there, and no best height is given beside it",
+       "Read the reasons in indent.csv. Lower cell.contraction_kPa: beyond some contraction the body buckles or an "
+       "element is turned inside out. Or leave these heights and ratios out of indent.sweep."},
       {registration_ambiguous, "registration-ambiguous", "mean", caution,
        "cells that lie on the reference in more than one way", 0,
        "the second-best way fits within the error of the best: which side of such a cell is which was decided by "
@@ -276,6 +287,17 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "a sheet much stiffer than its gel moves it by contraction over stiffness alone, a soft one by its contraction",
        "Read what is limited: contraction_over_stiffness of a stiff sheet, contraction_nN_per_um of a soft one. If the "
        "stiffness is known, give sheet.youngs_modulus_kPa."},
+      {sheet_expands, "sheet-expands", "sheet", caution,
+       "share of the sheet's parts whose best contraction is below zero, or whose 95 % interval holds no contraction",
+       0,
+       "cells pull their ground inward; one that pushes it outward is exchanged images, another cell or a wrong "
+       "outline",
+       "Check which image is stressed and which relaxed, the outline, and what pulls beside it. If the interval holds "
+       "zero, the beads tell no contraction: use its upper end."},
+      {sheet_at_bound, "sheet-at-bound", "sheet", caution,
+       "1 if the best stiffness is the softest or the stiffest that is looked at", 0,
+       "the misfit falls up to the end of the range: the value is the range's end, not what the beads tell",
+       "Read sheet_fit.csv for what is limited. If the stiffness is known, give sheet.youngs_modulus_kPa."},
       {tractions_off_balance, "tractions-off-balance", "sheet", caution,
        "net force over the sum of forces, or net torque over its largest possible, whichever is more", 0.05,
        "a colony that nothing else touches pulls with no net force; what is there is noise, or a neighbour's pull",

@@ -82,10 +82,12 @@ enum class FindingKind {
   patches_do_not_fit,
   tractions_out_of_balance,
   beads_stray,
+  lambda_runs_away,
   // fit: the gel
   modulus_error_unknown,
   // indent
   contraction_beyond_linear,
+  cases_not_solved,
   // mean
   registration_ambiguous,
   cells_left_out,
@@ -95,6 +97,8 @@ enum class FindingKind {
   sheet_strain,
   sheet_coarse,
   sheet_not_identifiable,
+  sheet_expands,
+  sheet_at_bound,
   tractions_off_balance,
   tractions_outside
 };

@@ -81,18 +81,14 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   return facts;
 }
 
-std::string how_lambda(const SpaceResults& r, const Provenance& provenance) {
+std::string how_lambda(const SpaceResults& r) {
   if (r.texts.at("method") == "group-l1")
     return "The weight of the penalty was the one at which the misfit is what the noise of the beads leaves.";
-  if (!r.find("lambda")) return {};
-  std::string by = "risk";
-  for (const StageLine& stage : provenance.stages) {
-    for (const auto& [name, value] : stage.parameters) {
-      if (stage.name == "traction" && name.ends_with("lambda_by")) by = value;
-    }
-  }
-  return fmt::format("The regularisation was chosen by the data (criterion: {}): lambda = {}.", by,
-                     readable(r.number("lambda")));
+  const auto by = r.texts.find("lambda_by");
+  if (!r.find("lambda") || by == r.texts.end()) return {};
+  const std::string lambda = readable(r.number("lambda"));
+  if (by->second == "given") return "The regularisation was given: lambda = " + lambda + ".";
+  return "The regularisation was chosen by the data (criterion: " + by->second + "): lambda = " + lambda + ".";
 }
 
 std::string svg_of(const Path& file, const std::string& title, const std::string& caption) {
@@ -132,8 +128,8 @@ std::string data_section(const SpaceResults& r) {
                             "Heights, and sections through the middle with the standard error as a band."));
 }
 
-std::string lambda_section(const SpaceResults& r, const Provenance& provenance) {
-  const std::string text = how_lambda(r, provenance);
+std::string lambda_section(const SpaceResults& r) {
+  const std::string text = how_lambda(r);
   if (text.empty()) return {};
   return section("Regularisation", "<p>" + html_escaped(text) + "</p>\n" +
                                        svg_of(r.folder / "4_traction/traction_lambda.svg", "Criteria by lambda",
@@ -197,7 +193,7 @@ std::string methods(const SpaceResults& r, const Provenance& provenance) {
       "by the method {} over {}. {} {}.",
       readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio), readable(r.gel.thickness_um),
       readable(r.number("spacing_x_um")), readable(r.number("spacing_y_um")), r.number("n_unknowns"),
-      r.texts.at("method"), r.texts.at("tractions_over"), how_lambda(r, provenance),
+      r.texts.at("method"), r.texts.at("tractions_over"), how_lambda(r),
       fmt::format("The tractions leave {} of the displacement (relative L2)", readable(r.number("relative_l2"))));
   return "<p class=\"cite\">" + html_escaped(text) + "</p>\n";
 }
@@ -220,7 +216,7 @@ std::string report_in_space(const fs::path& cell) {
       html_escaped(r.name), readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio),
       readable(r.gel.thickness_um), html_escaped(provenance.kind_because), kVersion);
   const std::string body = findings_section(facts_of(r), provenance) + space_section(r) + map_section(r) +
-                           force_section(r) + data_section(r) + lambda_section(r, provenance) +
+                           force_section(r) + data_section(r) + lambda_section(r) +
                            section("For your methods section", methods(r, provenance)) +
                            provenance_section(provenance, folded("Figures of the tractions", figure_pairs(r)));
   return page(r.name + " – mbtfm", head, body);

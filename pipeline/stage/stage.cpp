@@ -156,8 +156,10 @@ void tell(const std::string& stage, const StageReport& report, double seconds, R
                 reader);
     print(events_of(stage, report));
   }
-  if (reader != Reader::person || !report.converged) return;
-  std::fprintf(stderr, "mbtfm-%s: %s\n", stage.c_str(), report.summary.c_str());
+  if (!report.converged)
+    std::fprintf(stderr, "mbtfm-%s: error: not converged: %s\n", stage.c_str(), report.summary.c_str());
+  if (reader != Reader::person) return;
+  if (report.converged) std::fprintf(stderr, "mbtfm-%s: %s\n", stage.c_str(), report.summary.c_str());
   for (const Effect& e : report.effects) std::fprintf(stderr, "  %s\n", line_of(e).c_str());
   for (const Finding& f : report.findings) {
     const std::string line = line_of(f);
@@ -295,11 +297,7 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
     if (!line.record.empty()) write_record(line.record, description, list, context, report, {started, seconds.count()});
     commit(context);
     tell(description.name, report, seconds.count(), whose);
-    if (!report.converged) {
-      std::fprintf(stderr, "mbtfm-%s: error: not converged: %s\n", description.name.c_str(), report.summary.c_str());
-      return kNotSolved;
-    }
-    return kDone;
+    return report.converged ? kDone : kNotSolved;
   } catch (...) {
     discard(context);
     throw;

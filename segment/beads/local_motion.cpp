@@ -71,7 +71,7 @@ std::optional<LocalMotion> local_motion(Vec2 place, const std::vector<int>& othe
     w.near = w.weight = std::exp(-2 * per_reach * per_reach * dot(w.offset, w.offset));
   }
   const double n = static_cast<double>(witnesses.size());
-  std::vector<double> misfits(witnesses.size()), sorted;
+  std::vector<double> misfits(witnesses.size());
   for (int round = 0; round < 3; ++round) {
     const Fitted fitted = weighted_fit(witnesses, result.reach_px);
     result.motion = fitted.motion;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <string>
 
 #include "pipeline/numerics/order_statistics.h"
@@ -112,28 +113,47 @@ double width_along_z(const Volume& volume) {
   return std::clamp(std::sqrt(3 / (4 * std::log(near / far))), kNarrowest, kWidest);
 }
 
-/// Heights of a tenth of a bright bead's of the same depth are spurious more often than not: halos, bleed-through,
-/// dust.
-void drop_dimmest(std::vector<Peak>& peaks, int depth) {
-  constexpr int kLayers = 8;
+constexpr int kLayers = 8;
+
+std::size_t layer_of(double z, int depth) {
+  return static_cast<std::size_t>(std::clamp(static_cast<int>(kLayers * z / depth), 0, kLayers - 1));
+}
+
+/// The height up to which four fifths of the light are. Maxima of noise, however many, carry little of it.
+double bright_height(std::vector<double> heights) {
+  constexpr double kShare = 0.8;
+  std::ranges::sort(heights);
+  const double all = std::accumulate(heights.begin(), heights.end(), 0.0);
+  double sum = 0;
+  for (const double height : heights) {
+    sum += height;
+    if (sum >= kShare * all) return height;
+  }
+  return 0;
+}
+
+/// By layer, a tenth of a bright bead's height: dimmer ones are spurious more often than not: halos, bleed-through,
+/// dust, and in stacks whose dark is cut off at zero grains of light by the hundred thousand.
+std::vector<double> least_heights(const std::vector<Spot>& spots, int depth) {
   std::vector<std::vector<double>> heights(kLayers);
-  const auto layer_of = [&](const Peak& p) {
-    return static_cast<std::size_t>(std::clamp(static_cast<int>(kLayers * p.place.z / depth), 0, kLayers - 1));
-  };
-  for (const Peak& p : peaks) heights[layer_of(p)].push_back(p.height);
+  for (const Spot& spot : spots) heights[layer_of(spot.place.z, depth)].push_back(spot.height);
   std::vector<double> least;
-  for (const std::vector<double>& of_layer : heights) least.push_back(0.1 * numerics::quantile(of_layer, 0.9));
-  std::erase_if(peaks, [&](const Peak& p) { return p.height < least[layer_of(p)]; });
+  for (std::vector<double>& of_layer : heights) least.push_back(0.1 * bright_height(std::move(of_layer)));
+  return least;
+}
+
+void drop_dimmest(std::vector<Spot>& spots, const std::vector<double>& least, int depth) {
+  std::erase_if(spots, [&](const Spot& spot) { return spot.height < least[layer_of(spot.place.z, depth)]; });
 }
 
 /// No more than can be told apart: one in a ball of three widths.
-void keep_highest(std::vector<Peak>& peaks, const Volume& volume, Widths w) {
+void keep_highest(std::vector<Spot>& spots, const Volume& volume, Widths w) {
   constexpr double kBall = 4.0 / 3 * std::numbers::pi * 27;
   const double room = static_cast<double>(volume.values.size()) / (kBall * w.xy * w.xy * w.z);
   const auto most = static_cast<std::size_t>(std::max(100.0, room));
-  if (peaks.size() <= most) return;
-  std::ranges::stable_sort(peaks, [](const Peak& a, const Peak& b) { return a.height > b.height; });
-  peaks.resize(most);
+  if (spots.size() <= most) return;
+  std::ranges::stable_sort(spots, [](const Spot& a, const Spot& b) { return a.height > b.height; });
+  spots.resize(most);
 }
 
 std::vector<Spot> spots_of(const std::vector<Peak>& peaks) {
@@ -143,23 +163,23 @@ std::vector<Spot> spots_of(const std::vector<Peak>& peaks) {
 }
 
 /// What stands out of the rest: a bead that another hid, unless it is what the other's picture has beyond a Gaussian.
-std::vector<Peak> hidden(const SpotFit& fit, double detection_snr, int threads) {
+std::vector<Spot> hidden(const SpotFit& fit, double detection_snr, int threads) {
   const Volume& rest = fit.rest();
   const Widths w = fit.shape().at({0.5 * rest.width, 0.5 * rest.height, 0.5 * rest.depth});
-  std::vector<Peak> peaks = peaks_of(rest, w, fit.noise(), detection_snr, threads);
-  drop_dimmest(peaks, rest.depth);
+  std::vector<Spot> found = spots_of(peaks_of(rest, w, fit.noise(), detection_snr, threads));
+  drop_dimmest(found, least_heights(fit.spots(), rest.depth), rest.depth);
   std::vector<Vec3> places;
   const double stretch = w.xy / w.z;
   for (const Spot& spot : fit.spots()) places.push_back({spot.place.x, spot.place.y, stretch * spot.place.z});
   constexpr double kNear = 4, kOwnLight = 0.3;  // widths; of the neighbour's height
   const Near near(places, kNear * w.xy);
-  std::erase_if(peaks, [&](const Peak& p) {
-    const Vec3 at{p.place.x, p.place.y, stretch * p.place.z};
+  std::erase_if(found, [&](const Spot& spot) {
+    const Vec3 at{spot.place.x, spot.place.y, stretch * spot.place.z};
     return std::ranges::any_of(near.within(at, kNear * w.xy, 100), [&](int s) {
-      return p.height < kOwnLight * fit.spots()[static_cast<std::size_t>(s)].height;
+      return spot.height < kOwnLight * fit.spots()[static_cast<std::size_t>(s)].height;
     });
   });
-  return peaks;
+  return found;
 }
 
 }  // namespace
@@ -172,11 +192,11 @@ Detection detect(std::vector<images::Image> slices, double detection_snr, const 
   Noise noise = flatten(volume, across, threads);
   noise.light_variance = light_variance_of(volume, noise);
   const Widths first{across, width_along_z(volume)};
-  std::vector<Peak> peaks = peaks_of(volume, first, noise, detection_snr, threads);
-  drop_dimmest(peaks, volume.depth);
-  keep_highest(peaks, volume, first);
+  std::vector<Spot> spots = spots_of(peaks_of(volume, first, noise, detection_snr, threads));
+  drop_dimmest(spots, least_heights(spots, volume.depth), volume.depth);
+  keep_highest(spots, volume, first);
   SpotFit fit(volume, SpotShape(first), noise, threads);
-  fit.add(spots_of(peaks));
+  fit.add(spots);
   constexpr int kFirstRounds = 3, kRounds = 6;
   constexpr double kSame = 0.8;  // widths: two so near make one maximum, the second is a maximum of noise
   fit.improve(kFirstRounds);
@@ -186,7 +206,7 @@ Detection detect(std::vector<images::Image> slices, double detection_snr, const 
     fit.measure_noise();
   }
   fit.drop_doubles(kSame);
-  fit.add(spots_of(hidden(fit, detection_snr, threads)));
+  fit.add(hidden(fit, detection_snr, threads));
   fit.improve(kRounds);
   fit.drop_doubles(kSame);
   fit.improve(kFirstRounds);

@@ -61,6 +61,30 @@ TEST_F(Continuum, a_sweep_finds_the_height_that_presses_deepest) {
   EXPECT_NE(files::read_text(file("out/indent.svg")).find("<svg"), std::string::npos);
 }
 
+/// On a soft gel Newton's method finds no equilibrium of large strains for cells above 9 um.
+TEST_F(Continuum, cases_of_a_sweep_that_are_not_solved_say_so_in_their_row) {
+  const std::string large =
+      "mbtfm-indent --config " + settings(kCell) + " --strain large --order 4 --towards_rim 4 --out " + file("out");
+  const auto outcome = test::run_program(large + " --sweep 'height_um=5.3,7.4,9.5 modulus_ratio=0.1'");
+  ASSERT_EQ(outcome.code, 4) << outcome.output;
+  EXPECT_NE(outcome.output.find("caution (cases-not-solved)"), std::string::npos) << outcome.output;
+  const files::CsvTable table(file("out/indent.csv"));
+  ASSERT_EQ(table.n_rows(), 3);
+  for (int row = 0; row < 3; ++row) {
+    const bool is_solved = table.text(row, "not_solved").empty();
+    EXPECT_EQ(is_solved, row < 2) << row;
+    EXPECT_EQ(table.optional_number(row, "depth_0_um").has_value(), is_solved) << row;
+    EXPECT_GT(table.number(row, "contact_radius_um"), 0);
+  }
+  EXPECT_EQ(files::CsvTable(file("out/optima.csv")).n_rows(), 0);  // 7.4 um presses deepest, but beside a hole
+  for (const char* name : {"indent.json", "indent.vtu", "indent.svg"})
+    EXPECT_FALSE(files::read_text(file("out/") + name).empty()) << name;
+  std::filesystem::remove_all(file("out"));
+  EXPECT_EQ(test::run_program(large + " --height_um 9.5 --sweep modulus_ratio=0.1").code,
+            7);  // none is solved: nothing is written
+  EXPECT_FALSE(std::filesystem::exists(file("out/indent.csv")));
+}
+
 TEST_F(Continuum, what_is_no_cell_or_no_gel_for_it_is_refused) {
   const auto refused = [&](const std::string& cell, const std::string& words) {
     const auto outcome = test::run_program("mbtfm-indent --config " + settings(cell) + " --out " + file("out"));

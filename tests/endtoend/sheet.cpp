@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <numbers>
 #include <random>
 
@@ -108,6 +109,42 @@ TEST_F(Sheet, contraction_and_stiffness_come_back_from_beads) {
   EXPECT_EQ(fit.text(1, "quantity"), "stiffness_nN_per_um");
   EXPECT_NEAR(fit.number(1, "value"), 30 * 0.4 / (1 - 0.09), 4 * fit.number(1, "sigma"));
   EXPECT_LT(figure("aic"), figure("aic_of_nothing") - 1000);
+}
+
+/// Beads that move outward, as if the two images were exchanged, and beads that a rigid sheet moves.
+TEST_F(Sheet, one_that_expands_or_has_the_stiffness_of_a_bound_is_doubted) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0, 0.01);
+  const auto fitted = [&](const std::function<double(double)>& outward_um) {
+    DisplacementField beads;
+    for (int i = -20; i <= 20; ++i) {
+      for (int j = -20; j <= 20; ++j) {
+        const Vec2 at{2.0 * i, 2.0 * j};
+        const double r = norm(at), x = noise(random), y = noise(random);
+        beads.push_back({.position_um = at,
+                         .displacement_um = (r > 0 ? outward_um(r) / r : 0) * at + Vec2{x, y},
+                         .sigma_um = 0.01,
+                         .flag = {}});
+      }
+    }
+    files::write_displacement(folder_ / "displacement.csv", beads);
+    const auto outcome =
+        run("[gel]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.49\nthickness_um = 60\n[sheet]\npoisson_ratio = 0.3\n"
+            "thickness_um = 0.4\nmesh_um = 2\n",
+            "--displacement " + (folder_ / "displacement.csv").string() + " --record " +
+                (folder_ / "record.json").string());
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    return files::read_text(folder_ / "record.json");
+  };
+  const auto radial = [](double r) { return 0.8 * r / 25 * std::exp(-std::pow(r / 25, 4)); };
+  const std::string outward = fitted(radial);
+  EXPECT_NE(outward.find("sheet-expands"), std::string::npos) << outward;
+  EXPECT_NE(outward.find("\"bad\""), std::string::npos) << "ten and more standard errors";
+  const std::string inward = fitted([&](double r) { return -radial(r); });
+  EXPECT_EQ(inward.find("sheet-expands"), std::string::npos) << inward;
+  // a narrow ring: no sheet, however soft, pulls so near to its edge
+  const std::string at_rim = fitted([](double r) { return -0.8 * std::exp(-std::pow((r - 25) / 1.5, 2)); });
+  EXPECT_NE(at_rim.find("sheet-at-bound"), std::string::npos) << at_rim;
 }
 
 struct Refused {

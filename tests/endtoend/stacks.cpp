@@ -12,6 +12,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/report/space_report.h"
 #include "segment/images/image.h"
 #include "segment/stacks/near.h"
 #include "tests/support/program.h"
@@ -184,6 +185,20 @@ TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
                            "Forces of the adhesions", "Beads in a slice along x", "Balance", "strain energy of the gel",
                            "Tractions in space were found with the program mbtfm"})
     EXPECT_NE(page.find(says), std::string::npos) << says;
+  // the page tells what chose lambda, not what was asked for
+  EXPECT_NE(page.find("(criterion: risk)"), std::string::npos);
+  const std::string figures = files::read_text(folder / "4_traction/traction.json");
+  const auto told = [&](const char* by) {
+    const std::string key = "\"lambda_by\": \"risk\"";
+    files::write_text(folder / "4_traction/traction.json",
+                      std::string(figures).replace(figures.find(key), key.size(), std::string("\"lambda_by\": ") + by));
+    return report::report_in_space(folder);
+  };
+  const std::string by_evidence = told("\"evidence\"");
+  EXPECT_NE(by_evidence.find("(criterion: evidence)"), std::string::npos);
+  EXPECT_EQ(by_evidence.find("(criterion: risk)"), std::string::npos);
+  EXPECT_NE(told("\"given\"").find("The regularisation was given"), std::string::npos);
+  files::write_text(folder / "4_traction/traction.json", figures);
   const auto again = run_program(run);
   EXPECT_EQ(again.code, 0) << again.output;
   EXPECT_NE(again.output.find("traction up to date"), std::string::npos) << again.output;

@@ -198,6 +198,26 @@ TEST_F(TractionInSpace, finds_forces_of_adhesions_on_a_wave_with_their_errors) {
   }
 }
 
+/// Of a gel of another Poisson's ratio, by beads so exact that it shows: the risk lets tractions follow what is wrong.
+TEST_F(TractionInSpace, says_which_criterion_chose_lambda_in_the_end) {
+  std::vector<BeadInSpace> beads = files::read_displacement_in_space(folder_ / "exact.csv");
+  for (BeadInSpace& b : beads) b.sigma_um = 1e-5, b.sigma_z_um = 3e-5;
+  files::write_displacement_in_space(folder_ / "exact_beads.csv", beads);
+  const std::string dense = "--spacing_um 4 --method tikhonov ";
+  const auto text = [&](const char* name) { return files::read_text(folder_ / name); };
+  const auto expect_chosen = [&](const test::Outcome& outcome, const std::string& by, const char* file_says) {
+    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    EXPECT_NE(outcome.output.find("um (" + by + ")"), std::string::npos) << outcome.output;
+    EXPECT_EQ(outcome.output.find("lambda-runs-away") != std::string::npos, by == "by evidence") << outcome.output;
+    EXPECT_NE(text("traction_3d.json").find(std::string("\"lambda_by\": \"") + file_says + '"'), std::string::npos);
+    EXPECT_NE(text("traction_3d_lambda.svg").find("Chosen, " + (by == "given" ? "as given" : by) + ":"),
+              std::string::npos);
+  };
+  expect_chosen(run(dense + "--poisson_ratio 0.3", "exact_beads.csv"), "by evidence", "evidence");
+  expect_chosen(run(dense), "by risk", "risk");
+  expect_chosen(run(dense + "--lambda_um_per_kPa 0.01"), "given", "given");
+}
+
 TEST_F(TractionInSpace, doubts_a_total_force_that_no_cell_has) {
   const std::string cell = "--spacing_um 4 --grow_um 3 --adhesions " + at("adhesions.csv");
   EXPECT_EQ(run(cell).output.find("total force of the cell"), std::string::npos);

@@ -281,6 +281,29 @@ TEST(Stacks, noise_alone_shows_no_beads) {
   }
 }
 
+/// A stack whose dark is cut off at zero, as recordings of 8 bits have it: its noise is that of rounding alone, and
+/// every tenth voxel has a grain or two of light.
+TEST(Stacks, grains_of_light_in_a_dark_that_is_cut_off_are_no_beads) {
+  const test::StackScene scene = test::stack_scene(120, 5, pull);
+  std::vector<images::Image> stack = scene.stack(false, 5);
+  std::vector<double> dark(stack.front().pixels.begin(), stack.front().pixels.end());
+  const double zero = numerics::quantile(dark, 0.5), largest = numerics::quantile(dark, 0.9999);
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (images::Image& slice : stack) {
+    for (float& v : slice.pixels) {
+      const double beyond_noise = std::max(0.0, (v - zero) / (largest - zero) - 0.15);
+      const double grain = unit(random) < 0.1 ? 1 + std::floor(2 * unit(random)) : 0;
+      v = static_cast<float>(std::min(255.0, std::floor(200 * beyond_noise) + grain));
+    }
+    slice.full_scale = 255;
+  }
+  const Detection found = detect(std::move(stack), 5, "test", 2);
+  // a tenth of the beads lies beyond the rim, and a few are too dim
+  EXPECT_GT(found.spots.size(), 60u);
+  EXPECT_LT(found.spots.size(), 130u);
+}
+
 TEST(Stacks, beads_whose_light_is_cut_off_are_flagged_and_the_others_are_not) {
   test::StackScene scene = test::stack_scene(150, 21, pull);
   for (std::size_t k = 0; k < 15; ++k) scene.relaxed[k].brightness = 60;

@@ -118,6 +118,30 @@ TEST_F(InSpace, adjoint_and_thesis_cg_end_at_the_minimum_of_tikhonov) {
   EXPECT_LE(apart(reconstruct_thesis_cg(problem, traction, parameters, 1).traction_kPa, tikhonov.traction_kPa), 1e-3);
 }
 
+TEST_F(InSpace, a_lambda_by_risk_that_runs_away_is_replaced_and_called_so) {
+  using enum tractions::LambdaCriterion;
+  const Problem right = scene.problem(scene.beads(0.02), parameters);
+  const auto named = reconstruct_tikhonov(right, traction, parameters, 1);
+  EXPECT_EQ(named.lambda_by, risk);
+  tractions::LambdaScan scan = *named.scan;
+  scan.by_evidence = 9 * scan.by_risk;  // the bound is ten
+  const auto chosen = choose_lambda(right, scan, traction);
+  EXPECT_EQ(chosen.by, risk);
+  EXPECT_EQ(chosen.lambda, scan.by_risk);
+  EXPECT_FALSE(chosen.finding);
+  scan.by_evidence = 11 * scan.by_risk;
+  const auto replaced = choose_lambda(right, scan, traction);
+  EXPECT_EQ(replaced.by, evidence);
+  EXPECT_EQ(replaced.lambda, scan.by_evidence);
+  ASSERT_TRUE(replaced.finding);
+  EXPECT_EQ(replaced.finding->id, "lambda-runs-away");
+  EXPECT_NEAR(replaced.finding->number.value_or(0), 11, 1e-9);
+  traction.lambda_by = gcv;  // what was asked for by name is taken
+  EXPECT_EQ(choose_lambda(right, scan, traction).by, gcv);
+  traction.lambda_um_per_kPa = 0.1;
+  EXPECT_FALSE(choose_lambda(right, scan, traction).by);
+}
+
 TEST_F(InSpace, twice_the_displacement_with_twice_the_errors_is_twice_the_traction) {
   std::vector<BeadInSpace> beads = scene.beads(0.02);
   const Problem problem = scene.problem(beads, parameters);
@@ -262,6 +286,20 @@ TEST_F(InSpace, what_all_beads_do_together_changes_nothing_and_is_found) {
   EXPECT_LE(apart(reconstruct_tikhonov(moved, traction, parameters, 1).traction_kPa,
                   reconstruct_tikhonov(still, traction, parameters, 1).traction_kPa),
             0.05);
+}
+
+/// Most beads move by less than their errors: a scale of all that they did would call the others astray.
+TEST_F(InSpace, a_robust_loss_leaves_the_tractions_of_good_beads) {
+  scene.n_beads = 400;
+  scene.spacing_um = 5;
+  const Problem problem = scene.problem(scene.beads(0.15), parameters);
+  const auto by_squares = reconstruct_tikhonov(problem, traction, parameters, 1);
+  for (const BeadLoss loss : {BeadLoss::huber, BeadLoss::biweight}) {
+    parameters.loss = loss;
+    const auto robust = reconstruct_tikhonov(problem, traction, parameters, 1);
+    // they keep 95 % of the efficiency, and lambda moves a little: the maps differ by less than half of their error
+    EXPECT_LE(apart(robust.traction_kPa, by_squares.traction_kPa), 0.3) << name_of(loss);
+  }
 }
 
 TEST_F(InSpace, beads_that_did_not_move_make_no_traction) {

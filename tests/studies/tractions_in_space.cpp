@@ -50,9 +50,10 @@ void tell(const Known& known, const char* what, double noise, double astray, con
   const ForceErrors forces = known.forces(r);
   std::printf(
       "%-12s %-11s noise %.2f astray %.1f  map %.3f (%.2f x best)  forces %.3f  error/stated %.2f  degrees %.0f"
-      "  scale %.2f\n",
+      "  scale %.2f  lambda %.3g (%s; risk %.3g evidence %.3g gcv %.3g)\n",
       known.scene.name.c_str(), what, noise, astray, error, best > 0 ? error / best : 0.0, forces.mean,
-      forces.over_stated, r.degrees, r.weighing.scale);
+      forces.over_stated, r.degrees, r.weighing.scale, r.lambda.value_or(0), r.lambda_by ? name_of(*r.lambda_by) : "-",
+      r.scan ? r.scan->by_risk : 0.0, r.scan ? r.scan->by_evidence : 0.0, r.scan ? r.scan->by_gcv : 0.0);
   std::fflush(stdout);
 }
 
