@@ -24,7 +24,8 @@ DeclaredCommand declared(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options()) {
     if (!option->get_group().empty()) command.options.push_back(option_of(*option));
   }
-  std::ranges::stable_partition(command.options, [](const DeclaredOption& option) { return option.flag.empty(); });
+  std::stable_partition(command.options.begin(), command.options.end(),
+                        [](const DeclaredOption& option) { return option.flag.empty(); });
   for (const CLI::App* subcommand : app.get_subcommands([](const CLI::App*) { return true; })) {
     if (!subcommand->get_group().empty()) command.subcommands.push_back(declared(*subcommand));
   }
