@@ -140,14 +140,14 @@ std::string picture_of(const Setting& setting, const std::vector<Indentation>& s
     error = std::max(error, one.error_um);
     has_holes = has_holes || one.failure;
   }
-  return charts::svg_file(
-      charts, 2,
-      {"Cells of " + charts::readable(setting.volume_um3) + " µm³ that contract with " +
-           charts::readable(setting.cell.contraction_kPa) + " kPa, Poisson's ratio " +
-           significant(setting.cell.poisson_ratio, 6) + ". Depth: the largest displacement into the gel.",
-       "Diamonds: the height that presses deepest, with its error. On a coarser mesh depths differ "
-       "by at most " +
-           charts::readable(error) + " µm." + (has_holes ? " Grey: beside a case without an equilibrium." : "")});
+  std::vector<std::string> lines = {
+      "Cells of " + charts::readable(setting.volume_um3) + " µm³ that contract with " +
+          charts::readable(setting.cell.contraction_kPa) + " kPa, Poisson's ratio " +
+          significant(setting.cell.poisson_ratio, 6) + ". Depth: the largest displacement into the gel.",
+      "Diamonds: the height that presses deepest, with its error. On a coarser mesh depths differ by at most " +
+          charts::readable(error) + " µm."};
+  if (has_holes) lines.emplace_back("Grey: beside a case without an equilibrium.");
+  return charts::svg_file(charts, 2, lines);
 }
 
 }  // namespace mbtfm::solids

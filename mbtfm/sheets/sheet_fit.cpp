@@ -237,9 +237,10 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   for (Eigen::Index k = 0; k < table.n_contractions(); ++k) {
     Limits of_s = limits_of_load(scan, best, fit.variance, k, false),
            of_ratio = limits_of_load(scan, best, fit.variance, k, true);
-    of_s.is_open_above = of_M.is_open_above;      // a stiff sheet pulls as its strain, s over M, has it
-    of_ratio.is_open_above = of_M.is_open_below;  // a soft one as its contraction
     const double s = best.loads(k);
+    const auto away_from_zero = s < 0 ? &Limits::is_open_below : &Limits::is_open_above;
+    of_s.*away_from_zero = of_M.is_open_above;      // a stiff sheet pulls as its strain, s over M, has it
+    of_ratio.*away_from_zero = of_M.is_open_below;  // a soft one as its contraction
     const std::string part = parts.empty() ? "" : parts[static_cast<std::size_t>(k)];
     // of s / M, where log M and s are correlated
     const double of_share =
