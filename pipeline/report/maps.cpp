@@ -188,7 +188,7 @@ Figure contracted_network(const CellResults& results) {
           legend(colour_bar(scale))};
 }
 
-/// Of the model's tractions; the usual method's map shares it.
+/// Of the model's tractions.
 ColourScale traction_scale(const CellResults& results) {
   const auto by_id = adhesions_by_id(results.cell);
   std::vector<double> tractions_kPa;
@@ -359,27 +359,28 @@ Figure usual_method_map(const CellResults& results) {
   const UsualMethod& usual = results.usual_method.value();
   const Box box = map_box(results);
   charts::Chart map = empty_map(box, "What the usual method says");
-  const ColourScale colours = traction_scale(results);
+  double largest_kPa = 0;
+  for (const Vec2 t : usual.tractions_kPa) largest_kPa = std::max(largest_kPa, norm(t));
+  // its own: smoothed, they are so much smaller that the model's colours show nothing
+  const ColourScale colours{.low = 0, .high = round_end(largest_kPa), .label = "traction (kPa)"};
   map.picture(box.low, box.high, picture_of_squares(usual, box, colours));
   draw_outline(map, results.cell, "fill:none;stroke-width:1.3;stroke:#fff;stroke-dasharray:5 3");
   draw_adhesions(map, results, "fill:none;stroke:#fff;stroke-width:0.7", Hover::none);
-  double largest_kPa = 0;
-  for (const Vec2 t : usual.tractions_kPa) largest_kPa = std::max(largest_kPa, norm(t));
   const std::string lambda =
       usual.lambda_um_per_kPa
           ? fmt::format(", λ = {} µm/kPa (criterion: {})", charts::readable(*usual.lambda_um_per_kPa), usual.lambda_by)
           : "";
-  return {map,
-          fmt::format("Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on "
-                      "squares of {:.2g} µm, in the colours of “Forces on the substrate”; the largest is {} kPa. FTTC "
-                      "knows neither adhesions nor fibres: a traction spreads around its adhesion, and noise makes "
-                      "tractions everywhere. Total force in the outline, noise included: {} nN; by the model: {} nN. "
-                      "White: outline and "
-                      "adhesions.",
-                      lambda, usual.spacing_um, charts::readable(largest_kPa), charts::readable(usual.total_force_nN),
-                      charts::readable(results.fit.total_force_nN)) +
-              caption_of_cut(results.cell),
-          legend(colour_bar(colours))};
+  return {
+      map,
+      fmt::format("Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on "
+                  "squares of {:.2g} µm; the largest is {} kPa. Its scale of colours is not that of “Forces on the "
+                  "substrate”. FTTC knows neither adhesions nor fibres: a traction spreads around its adhesion, and "
+                  "noise makes tractions everywhere. Total force in the outline, noise included: {} nN; by the "
+                  "model: {} nN. White: outline and adhesions.",
+                  lambda, usual.spacing_um, charts::readable(largest_kPa), charts::readable(usual.total_force_nN),
+                  charts::readable(results.fit.total_force_nN)) +
+          caption_of_cut(results.cell),
+      legend(colour_bar(colours))};
 }
 
 std::vector<Figure> displacement_maps(const CellResults& results) {

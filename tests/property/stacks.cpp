@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/track.h"
 #include "segment/stacks/detect.h"
-#include "segment/stacks/motion.h"
 #include "segment/stacks/near.h"
 #include "segment/stacks/track.h"
 #include "tests/support/stack_scene.h"
@@ -144,29 +142,6 @@ TEST(Stacks, without_drift_of_slices_none_is_taken_off) {
   const BeadClouds clouds = bead_clouds(3000, 0.02, 0.03, 7, pull);
   const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 2);
   EXPECT_FALSE(followed.common.has_slice_drift) << followed.common.slice_drift_ratio;
-}
-
-/// The drift of slices over its standard errors: where there is none, two components of each slice but one make chi².
-/// With a hundred beads to a slice the bead's worth of smoothness between slices is a hundredth.
-TEST(Stacks, without_drift_of_slices_its_ratio_to_its_errors_is_one) {
-  std::mt19937_64 random(4);
-  std::uniform_real_distribution<double> place(0, 100), height(0, 50);
-  std::normal_distribution<double> noise(0, 0.03);
-  double square = 0, degrees = 0;
-  for (int draw = 0; draw < 20; ++draw) {
-    std::vector<Moved> beads;
-    for (int k = 0; k < 1500; ++k)
-      beads.push_back({.place_um = {place(random), place(random), height(random)},
-                       .displacement_um = {0.2 + noise(random), noise(random) - 0.1, 0.3 + 3 * noise(random)},
-                       .sigma_um = 0.03,
-                       .sigma_z_um = 0.09});
-    const CommonMotion motion = common_motion(beads, Switch::automatic, {.step_um = 5});
-    const double of_one = 2.0 * static_cast<double>(motion.slices_um.size() - 1);
-    square += of_one * motion.slice_drift_ratio * motion.slice_drift_ratio;
-    degrees += of_one;
-  }
-  // 400 degrees: four standard deviations of chi² over them are 0.28; robust weights take no more than a tenth
-  EXPECT_NEAR(square / degrees, 1, 4 * std::sqrt(2 / degrees) + 0.1) << degrees;
 }
 
 /// What its neighbours add to a bead's variance is a sum of theirs: along z it is to that across as theirs are.
