@@ -60,7 +60,7 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
     const double least = std::max({observed.states_errors ? 1.0 : 0.0, problem.variance_of_model(),
                                    parameters.loss == BeadLoss::l2 || round == 0 ? 0.0 : r.weighing.variance});
     r.scan = recurrences.scan(least > 0 ? std::optional(least) : std::nullopt);
-    const ChosenLambda chosen = choose_lambda(problem, *r.scan, traction);
+    const ChosenLambda chosen = choose_lambda(problem, *r.scan, traction, parameters.loss);
     r.lambda = chosen.lambda;
     r.lambda_by = chosen.by;
     r.findings = {chosen.finding};

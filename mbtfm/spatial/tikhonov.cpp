@@ -35,12 +35,14 @@ double lambda_per_um_per_kPa(const Problem& problem) {
 }
 
 ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
-                           const tractions::TractionParameters& traction) {
+                           const tractions::TractionParameters& traction, BeadLoss loss) {
   using enum tractions::LambdaCriterion;
   const double unit = lambda_per_um_per_kPa(problem);
   if (traction.lambda_um_per_kPa) return {*traction.lambda_um_per_kPa * unit, {}, {}};
-  ChosenLambda chosen{chosen_lambda(scan, traction.lambda_by), traction.lambda_by, {}};
-  if (traction.lambda_by != risk) return chosen;
+  const bool is_robust = loss != BeadLoss::l2;
+  const tractions::LambdaCriterion by = is_robust && traction.lambda_by == risk ? gcv : traction.lambda_by;
+  ChosenLambda chosen{chosen_lambda(scan, by), by, {}};
+  if (by != risk) return chosen;
   const auto length = [&](double lambda) { return brief(lambda / unit * problem.gel.youngs_modulus_kPa) + " um"; };
   chosen.finding = noticed(FindingKind::lambda_runs_away, scan.by_evidence / scan.by_risk,
                            "By risk lambda E is " + length(scan.by_risk) + ", by evidence " + length(scan.by_evidence) +
@@ -60,10 +62,12 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   const auto floor = [&](double variance) {
     return std::max({variance, observed.states_errors ? 1.0 : 0.0, problem.variance_of_model()});
   };
+  // Not by the scale of the residual: where lambda is too large the residual holds what moved the beads, and a noise of
+  // that size would ask for such a lambda.
   const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
     std::optional<double> stated;
-    if (parameters.loss != BeadLoss::l2) {
-      stated = floor(weighing.variance);
+    if (parameters.loss != BeadLoss::l2 && observed.states_errors) {
+      stated = weighing.variance / (weighing.scale * weighing.scale) * floor(0);
     } else if (floor(0) > 0) {
       stated = floor(0);
     }
@@ -76,7 +80,9 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
     made.scan = judged ? scanned(spectrum_of(problem, response, judged->by_row, judged->n_data, threads), *judged)
                        : scanned(*made.spectrum, weighing);
-    made.chosen = choose_lambda(problem, made.scan, traction);
+    made.chosen = choose_lambda(problem, made.scan, traction, parameters.loss);
+    if (judged && made.chosen.by)
+      made.chosen.lambda *= std::sqrt(weighing.variance / judged->variance);  // the same prior
     made.x = made.spectrum->solve(made.chosen.lambda);
     made.weighing = std::move(weighing);
     return made;
@@ -94,28 +100,27 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     return r;
   }
   Fit last = fit(weigh(BeadLoss::l2, observed, of_nothing, 0));
-  if (parameters.loss != BeadLoss::l2) {
-    // From tractions that no bead has pulled on: biweight has several minima, and beads far off hide in those of l2.
+  const auto settle = [&](BeadLoss loss) {
     constexpr int kMostRounds = 12;
     constexpr double kSettled = 0.005;
-    Weighing weighing =
-        weigh(parameters.loss == BeadLoss::biweight ? BeadLoss::huber : parameters.loss, observed, of_nothing, 0);
-    std::optional<Weighing> judged;  // none before a residual is known
     double change = 1;
     for (int round = 0; round < kMostRounds && change > kSettled; ++round) {
-      Fit next = fit(std::move(weighing), judged);
+      const VectorXd left = residual(last);
+      const double degrees = last.spectrum->degrees(last.chosen.lambda);
+      std::optional<Weighing> judged;
+      if (loss != BeadLoss::biweight) judged = weigh(BeadLoss::biweight, observed, left, degrees);
+      Fit next = fit(weigh(loss, observed, left, degrees), judged);
       change = (next.x - last.x).norm() / std::max(next.x.norm(), 1e-300);
-      const VectorXd left = residual(next);
-      const double degrees = next.spectrum->degrees(next.chosen.lambda);
-      weighing = weigh(parameters.loss, observed, left, degrees);
-      if (parameters.loss != BeadLoss::biweight) judged = weigh(BeadLoss::biweight, observed, left, degrees);
       last = std::move(next);
     }
-  }
+  };
+  // biweight has several minima: from huber's, the only one
+  if (parameters.loss == BeadLoss::biweight) settle(BeadLoss::huber);
+  if (parameters.loss != BeadLoss::l2) settle(parameters.loss);
   const double lambda = last.chosen.lambda;
   r.degrees = last.spectrum->degrees(lambda);
   r.weighing = weigh(parameters.loss, observed, residual(last), r.degrees);
-  r.variance = std::max(last.scan.variance, floor(0));
+  r.variance = std::max(parameters.loss == BeadLoss::l2 ? last.scan.variance : r.weighing.variance, floor(0));
   r.traction_kPa = basis.tractions(last.x);
   r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(lambda, r.variance), threads);
   r.scan = std::move(last.scan);

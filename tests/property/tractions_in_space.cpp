@@ -125,21 +125,21 @@ TEST_F(InSpace, a_lambda_by_risk_that_runs_away_is_replaced_and_called_so) {
   EXPECT_EQ(named.lambda_by, risk);
   tractions::LambdaScan scan = *named.scan;
   scan.by_evidence = 9 * scan.by_risk;  // the bound is ten
-  const auto chosen = choose_lambda(right, scan, traction);
+  const auto chosen = choose_lambda(right, scan, traction, BeadLoss::l2);
   EXPECT_EQ(chosen.by, risk);
   EXPECT_EQ(chosen.lambda, scan.by_risk);
   EXPECT_FALSE(chosen.finding);
   scan.by_evidence = 11 * scan.by_risk;
-  const auto replaced = choose_lambda(right, scan, traction);
+  const auto replaced = choose_lambda(right, scan, traction, BeadLoss::l2);
   EXPECT_EQ(replaced.by, evidence);
   EXPECT_EQ(replaced.lambda, scan.by_evidence);
   ASSERT_TRUE(replaced.finding);
   EXPECT_EQ(replaced.finding->id, "lambda-runs-away");
   EXPECT_NEAR(replaced.finding->number.value_or(0), 11, 1e-9);
   traction.lambda_by = gcv;  // what was asked for by name is taken
-  EXPECT_EQ(choose_lambda(right, scan, traction).by, gcv);
+  EXPECT_EQ(choose_lambda(right, scan, traction, BeadLoss::l2).by, gcv);
   traction.lambda_um_per_kPa = 0.1;
-  EXPECT_FALSE(choose_lambda(right, scan, traction).by);
+  EXPECT_FALSE(choose_lambda(right, scan, traction, BeadLoss::l2).by);
 }
 
 TEST_F(InSpace, twice_the_displacement_with_twice_the_errors_is_twice_the_traction) {
@@ -241,8 +241,15 @@ TEST_F(InSpace, beads_that_are_wrong_do_not_pull_with_a_robust_loss) {
       apart(reconstruct_tikhonov(bad, traction, parameters, 1).traction_kPa, without.traction_kPa);
   for (const BeadLoss loss : {BeadLoss::l1, BeadLoss::huber, BeadLoss::biweight}) {
     parameters.loss = loss;
-    const auto robust = reconstruct_tikhonov(bad, traction, parameters, 1);
+    const auto robust = reconstruct_tikhonov(bad, traction, parameters, 1),
+               of_good = reconstruct_tikhonov(good, traction, parameters, 1);
+    RecordProperty(name_of(loss), std::to_string(apart(robust.traction_kPa, without.traction_kPa)) + " " +
+                                      std::to_string(apart(of_good.traction_kPa, without.traction_kPa)) + " " +
+                                      std::to_string(by_squares));
     EXPECT_LE(apart(robust.traction_kPa, without.traction_kPa), 0.35 * by_squares) << name_of(loss);
+    // no tractions at all are 1 apart
+    EXPECT_LE(apart(robust.traction_kPa, without.traction_kPa), 0.5) << name_of(loss);
+    EXPECT_LE(apart(of_good.traction_kPa, without.traction_kPa), 0.3) << name_of(loss);
   }
 }
 
