@@ -51,16 +51,16 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
     r.remark = "no bead has moved: there is no traction";
     return r;
   }
+  // as reconstruct_in() has it: from least squares, and to biweight by way of huber
   const int n_rounds = parameters.loss == BeadLoss::l2 ? 1 : 5;
-  r.weighing = weigh(parameters.loss == BeadLoss::biweight ? BeadLoss::huber : parameters.loss, observed,
-                     observed.displacement_um.cwiseQuotient(observed.sigma_um), 0);
+  r.weighing = weigh(BeadLoss::l2, observed, observed.displacement_um.cwiseQuotient(observed.sigma_um), 0);
   for (int round = 0; round < n_rounds; ++round) {
     const Rows rows(problem, r.weighing.by_row);
     const tractions::Recurrences recurrences(map_of(problem, basis, rows), rows.of(observed.displacement_um), {});
     const double least = std::max({observed.states_errors ? 1.0 : 0.0, problem.variance_of_model(),
                                    parameters.loss == BeadLoss::l2 || round == 0 ? 0.0 : r.weighing.variance});
     r.scan = recurrences.scan(least > 0 ? std::optional(least) : std::nullopt);
-    const ChosenLambda chosen = choose_lambda(problem, *r.scan, traction, parameters.loss);
+    const ChosenLambda chosen = choose_lambda(problem, *r.scan, traction, false);
     r.lambda = chosen.lambda;
     r.lambda_by = chosen.by;
     r.findings = {chosen.finding};
@@ -68,7 +68,9 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
     r.degrees = recurrences.degrees(*r.lambda);
     r.relative_l2 = recurrences.relative_l2(*r.lambda);
     r.variance = std::max(r.scan->variance, least);
-    r.weighing = weigh(parameters.loss, observed, problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees);
+    const bool is_on_its_way = parameters.loss == BeadLoss::biweight && round < 2;
+    r.weighing = weigh(is_on_its_way ? BeadLoss::huber : parameters.loss, observed,
+                       problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees);
   }
   r.length_um = *r.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
   r.remark = "standard errors are computed of up to " + std::to_string(kMostVertices) + " vertices, and there are " +

@@ -76,11 +76,12 @@ struct ChosenLambda {
 };
 /// The one that is given, or by the criterion. Where the risk's is below a tenth of the evidence's, the evidence's: the
 /// model is then wrong by more than the stated errors in a way that tractions can follow, and the risk has no minimum
-/// but the end of the scan. The finding says so. With a robust loss cross-validation's is taken for the risk's: weights
-/// hang on the residuals, and what they leave of large displacements looks like noise to the risk, which then smooths
-/// most of the tractions away.
+/// but the end of the scan. The finding says so. Cross-validation's is taken for the risk's where that is not sound:
+/// with a robust loss, whose weights hang on the residuals, so that what they leave of large displacements looks like
+/// noise to it; and with traces from random signs, whose errors it divides by lambda². It then smooths most tractions
+/// away.
 ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
-                           const tractions::TractionParameters& traction, BeadLoss loss);
+                           const tractions::TractionParameters& traction, bool is_risk_sound);
 
 /// The same as tikhonov where the problem has no matrix. No standard errors.
 SpatialReconstruction reconstruct_large(const Problem& problem, const tractions::TractionParameters& traction,

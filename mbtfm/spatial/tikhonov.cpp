@@ -35,12 +35,11 @@ double lambda_per_um_per_kPa(const Problem& problem) {
 }
 
 ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
-                           const tractions::TractionParameters& traction, BeadLoss loss) {
+                           const tractions::TractionParameters& traction, bool is_risk_sound) {
   using enum tractions::LambdaCriterion;
   const double unit = lambda_per_um_per_kPa(problem);
   if (traction.lambda_um_per_kPa) return {*traction.lambda_um_per_kPa * unit, {}, {}};
-  const bool is_robust = loss != BeadLoss::l2;
-  const tractions::LambdaCriterion by = is_robust && traction.lambda_by == risk ? gcv : traction.lambda_by;
+  const tractions::LambdaCriterion by = traction.lambda_by == risk && !is_risk_sound ? gcv : traction.lambda_by;
   ChosenLambda chosen{chosen_lambda(scan, by), by, {}};
   if (by != risk) return chosen;
   const auto length = [&](double lambda) { return brief(lambda / unit * problem.gel.youngs_modulus_kPa) + " um"; };
@@ -80,7 +79,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
     made.scan = judged ? scanned(spectrum_of(problem, response, judged->by_row, judged->n_data, threads), *judged)
                        : scanned(*made.spectrum, weighing);
-    made.chosen = choose_lambda(problem, made.scan, traction, parameters.loss);
+    made.chosen = choose_lambda(problem, made.scan, traction, parameters.loss == BeadLoss::l2);
     if (judged && made.chosen.by)
       made.chosen.lambda *= std::sqrt(weighing.variance / judged->variance);  // the same prior
     made.x = made.spectrum->solve(made.chosen.lambda);

@@ -125,21 +125,24 @@ TEST_F(InSpace, a_lambda_by_risk_that_runs_away_is_replaced_and_called_so) {
   EXPECT_EQ(named.lambda_by, risk);
   tractions::LambdaScan scan = *named.scan;
   scan.by_evidence = 9 * scan.by_risk;  // the bound is ten
-  const auto chosen = choose_lambda(right, scan, traction, BeadLoss::l2);
+  const auto chosen = choose_lambda(right, scan, traction, true);
   EXPECT_EQ(chosen.by, risk);
   EXPECT_EQ(chosen.lambda, scan.by_risk);
   EXPECT_FALSE(chosen.finding);
   scan.by_evidence = 11 * scan.by_risk;
-  const auto replaced = choose_lambda(right, scan, traction, BeadLoss::l2);
+  const auto replaced = choose_lambda(right, scan, traction, true);
   EXPECT_EQ(replaced.by, evidence);
   EXPECT_EQ(replaced.lambda, scan.by_evidence);
   ASSERT_TRUE(replaced.finding);
   EXPECT_EQ(replaced.finding->id, "lambda-runs-away");
   EXPECT_NEAR(replaced.finding->number.value_or(0), 11, 1e-9);
+  const auto unsound = choose_lambda(right, scan, traction, false);
+  EXPECT_EQ(unsound.by, gcv);
+  EXPECT_EQ(unsound.lambda, scan.by_gcv);
   traction.lambda_by = gcv;  // what was asked for by name is taken
-  EXPECT_EQ(choose_lambda(right, scan, traction, BeadLoss::l2).by, gcv);
+  EXPECT_EQ(choose_lambda(right, scan, traction, true).by, gcv);
   traction.lambda_um_per_kPa = 0.1;
-  EXPECT_FALSE(choose_lambda(right, scan, traction, BeadLoss::l2).by);
+  EXPECT_FALSE(choose_lambda(right, scan, traction, true).by);
 }
 
 TEST_F(InSpace, twice_the_displacement_with_twice_the_errors_is_twice_the_traction) {
