@@ -1,8 +1,8 @@
 #include "segment/stacks/mean_by_depth.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 namespace mbtfm::stacks {
@@ -69,7 +69,7 @@ StageByDepth stage_by_depth(const MeanByDepth& mean, bool may_drift) {
   const double range_um = std::max(1e-9, mean.z_um.back() - mean.z_um.front());
   // a floor for the factorisation, far below any bead's error
   const MatrixXd noise = mean.noise_um2 + 1e-12 * MatrixXd::Identity(n, n);
-  std::optional<Model> still, best;
+  std::optional<Model> still, moving;
   const auto better = [](std::optional<Model>& old, Model&& other) {
     if (!old || other.log_likelihood > old->log_likelihood) old = std::move(other);
   };
@@ -83,13 +83,14 @@ StageByDepth stage_by_depth(const MeanByDepth& mean, bool may_drift) {
     for (int steps = -1; steps < kFactors; ++steps) {
       for (int jitter = steps < 0 ? 0 : -1; jitter < kFactors; ++jitter) {
         const auto variance = [&](int k) { return k < 0 ? 0.0 : std::pow(kLeast_um * std::pow(3, k), 2); };
-        better(best, model_of(mean, without, of_stage(n, variance(steps), variance(jitter))));
+        better(moving, model_of(mean, without, of_stage(n, variance(steps), variance(jitter))));
       }
     }
   }
-  const Model& model = best ? *best : *still;
+  const Model& model = moving ? *moving : *still;
   StageByDepth result;
-  result.log_likelihood_gain = model.log_likelihood - still->log_likelihood;
+  // the least steps that are tried may fit worse than none
+  result.log_likelihood_gain = std::max(0.0, model.log_likelihood - still->log_likelihood);
   result.um = (model.stage * model.weighed).rowwise() + model.shift_um.transpose();
   // cov(stage + shift − theirs) = D − D C⁻¹ D + (1 − D C⁻¹ 1)(1 − D C⁻¹ 1)ᵀ / 1ᵀ C⁻¹ 1
   const VectorXd remote = VectorXd::Ones(n) - model.stage * model.of_shift;

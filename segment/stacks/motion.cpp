@@ -11,16 +11,18 @@
 namespace mbtfm::stacks {
 namespace {
 
-/// Shares of the two places along z between which a bead lies.
+/// The two places along z between which a bead lies, and its shares of them.
 struct Between {
-  std::size_t below = 0;
-  double share_above = 0;
+  Eigen::Index place[2];
+  double share[2];
 };
 Between between(const std::vector<double>& z, double at) {
-  if (z.size() < 2 || at <= z.front()) return {};
-  if (at >= z.back()) return {z.size() - 2, 1};
-  const auto above = static_cast<std::size_t>(std::ranges::upper_bound(z, at) - z.begin());
-  return {above - 1, (at - z[above - 1]) / (z[above] - z[above - 1])};
+  const auto last = static_cast<Eigen::Index>(z.size()) - 1;
+  if (last == 0 || at <= z.front()) return {{0, std::min<Eigen::Index>(1, last)}, {1, 0}};
+  if (at >= z.back()) return {{last - 1, last}, {0, 1}};
+  const auto above = static_cast<Eigen::Index>(std::ranges::upper_bound(z, at) - z.begin());
+  const double share = (at - z[above - 1]) / (z[above] - z[above - 1]);
+  return {{above - 1, above}, {1 - share, share}};
 }
 
 /// The slices that see beads, or every second one, every third one …: ten beads for each at least.
@@ -68,8 +70,8 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
     for (std::size_t b = 0; b < beads.size(); ++b) {
       const Vec3 d = beads[b].place_um - centre, u = beads[b].displacement_um;
       const Between at = between(z, beads[b].place_um.z);
-      const auto low = static_cast<Eigen::Index>(2 + 2 * at.below), high = std::min<Eigen::Index>(low + 2, n - 2);
-      const double s = at.share_above;
+      const Eigen::Index low = 2 + 2 * at.place[0], high = 2 + 2 * at.place[1];
+      const double s = at.share[1];
       left[b] = {u.x - (1 - s) * fit.solution[low] - s * fit.solution[high] + fit.solution[0] * d.y,
                  u.y - (1 - s) * fit.solution[low + 1] - s * fit.solution[high + 1] - fit.solution[0] * d.x,
                  u.z - fit.solution[1]};
@@ -84,8 +86,8 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
       if (fit.weights[b] == 0) continue;
       const Vec3 d = beads[b].place_um - centre;
       const Between at = between(z, beads[b].place_um.z);
-      const auto low = static_cast<Eigen::Index>(2 + 2 * at.below), high = std::min<Eigen::Index>(low + 2, n - 2);
-      const double s = at.share_above;
+      const Eigen::Index low = 2 + 2 * at.place[0], high = 2 + 2 * at.place[1];
+      const double s = at.share[1];
       const double w = fit.weights[b] / (unit * unit), wz = fit.weights[b] / (unit_z * unit_z);
       const Eigen::Index at_x[] = {0, low, high}, at_y[] = {0, low + 1, high + 1};
       const double of_x[] = {-d.y, 1 - s, s}, of_y[] = {d.x, 1 - s, s};
@@ -116,17 +118,6 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
   return fit;
 }
 
-/// The places on both sides of a bead, with its shares of them.
-struct OfPlaces {
-  Eigen::Index place[2];
-  double share[2];
-};
-OfPlaces of_places(const std::vector<double>& z, double at) {
-  const Between b = between(z, at);
-  const auto low = static_cast<Eigen::Index>(b.below);
-  return {{low, std::min(low + 1, static_cast<Eigen::Index>(z.size()) - 1)}, {1 - b.share_above, b.share_above}};
-}
-
 /// How far single beads are off the mean motion at their depth, root mean square of a component without the noise.
 struct Scatter {
   std::vector<double> across_um, along_um;  ///< by place
@@ -139,7 +130,7 @@ Scatter scatter_by_depth(const std::vector<Moved>& beads, const std::vector<doub
   std::vector<Off> all;
   for (const Moved& bead : beads) {
     const Vec3 d = bead.place_um - centre, u = bead.displacement_um;
-    const OfPlaces at = of_places(z, bead.place_um.z);
+    const Between at = between(z, bead.place_um.z);
     Vec2 mean{-fit.solution[0] * d.y, fit.solution[0] * d.x};
     for (int p = 0; p < 2; ++p)
       mean += at.share[p] * Vec2{fit.solution[2 + 2 * at.place[p]], fit.solution[3 + 2 * at.place[p]]};
@@ -177,7 +168,7 @@ Means means_by_depth(const std::vector<Moved>& beads, const std::vector<double>&
   Scatter scatter = scatter_by_depth(beads, z, centre, fit);
   Eigen::VectorXd n_beads = Eigen::VectorXd::Zero(n), weight = n_beads, sum_z_um = n_beads, noise_um2 = n_beads;
   for (std::size_t b = 0; b < beads.size(); ++b) {
-    const OfPlaces at = of_places(z, beads[b].place_um.z);
+    const Between at = between(z, beads[b].place_um.z);
     for (int p = 0; p < 2; ++p) {
       const double w = at.share[p] * fit.weights[b];
       n_beads[at.place[p]] += at.share[p];
@@ -206,9 +197,11 @@ Vec3 CommonMotion::at(Vec3 place_um) const {
   Vec3 u = shift_um + Vec3{-turn_rad * d.y, turn_rad * d.x, 0};
   if (!has_slice_drift || z_um.empty()) return u;
   const Between b = between(z_um, place_um.z);
-  const Vec2 low = slices_um[b.below], high = slices_um[std::min(b.below + 1, slices_um.size() - 1)];
-  return u + Vec3{(1 - b.share_above) * low.x + b.share_above * high.x,
-                  (1 - b.share_above) * low.y + b.share_above * high.y, 0};
+  for (int p = 0; p < 2; ++p) {
+    const Vec2 drift = slices_um[static_cast<std::size_t>(b.place[p])];
+    u += b.share[p] * Vec3{drift.x, drift.y, 0};
+  }
+  return u;
 }
 
 CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, const Slices& slices) {

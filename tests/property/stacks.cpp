@@ -8,6 +8,7 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/track.h"
 #include "segment/stacks/detect.h"
+#include "segment/stacks/mean_by_depth.h"
 #include "segment/stacks/near.h"
 #include "segment/stacks/track.h"
 #include "tests/support/stack_scene.h"
@@ -144,6 +145,18 @@ TEST(Stacks, without_drift_of_slices_none_is_taken_off) {
   EXPECT_FALSE(followed.common.has_slice_drift) << followed.common.slice_drift_ratio;
 }
 
+/// A mean that is the same at every depth: no drift fits it better than none, and the ratio is still a number.
+TEST(Stacks, the_ratio_of_a_stage_at_rest_is_a_number) {
+  MeanByDepth mean{.z_um = {0, 1, 2, 3, 4, 5},
+                   .um = Eigen::MatrixX2d::Constant(6, 2, 0.1),
+                   .noise_um2 = 1e-10 * Eigen::MatrixXd::Identity(6, 6),
+                   .field_um = std::vector<double>(6, 0),
+                   .beads_by_place = std::vector<double>(6, 10)};
+  const StageByDepth stage = stage_by_depth(mean, true);
+  EXPECT_EQ(stage.log_likelihood_gain, 0);
+  EXPECT_NEAR(stage.shift_um.x(), 0.1, 1e-9);
+}
+
 /// What its neighbours add to a bead's variance is a sum of theirs: along z it is to that across as theirs are.
 TEST(Stacks, neighbours_add_their_own_errors_along_each_axis) {
   const BeadClouds clouds = bead_clouds(500, 0.03, 0, 3, [](Vec3) { return Vec3{0.2, -0.1, 0.3}; });
@@ -195,6 +208,7 @@ TEST(Stacks, the_mean_pull_of_a_cell_that_fills_the_view_is_no_drift_of_slices) 
   const BeadClouds clouds = bead_clouds(1000, 0.02, 0.03, 8, pull_everywhere);
   const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 2);
   EXPECT_FALSE(followed.common.has_slice_drift) << followed.common.slice_drift_ratio;
+  EXPECT_GE(followed.common.slice_drift_ratio, 0);
   // errors of two places; what a turn of the field looks like adds some
   EXPECT_LT(rms_beyond_a_shift(clouds, followed), 1.5 * std::numbers::sqrt2 * 0.02);
 }
