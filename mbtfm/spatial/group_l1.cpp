@@ -190,6 +190,7 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   r.degrees = seen.sum();
   r.lambda.reset();
   r.lambda_by.reset();
+  r.findings.clear();  // of that lambda
   r.length_um.reset();
   r.scan.reset();
   r.figures = {{"penalty_per_nN", mu},

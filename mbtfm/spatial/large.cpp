@@ -57,9 +57,7 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
   for (int round = 0; round < n_rounds; ++round) {
     const Rows rows(problem, r.weighing.by_row);
     const tractions::Recurrences recurrences(map_of(problem, basis, rows), rows.of(observed.displacement_um), {});
-    const double least = std::max({observed.states_errors ? 1.0 : 0.0, problem.variance_of_model(),
-                                   parameters.loss == BeadLoss::l2 || round == 0 ? 0.0 : r.weighing.variance});
-    r.scan = recurrences.scan(least > 0 ? std::optional(least) : std::nullopt);
+    r.scan = recurrences.scan(stated_variance(problem, parameters.loss, r.weighing));
     const ChosenLambda chosen = choose_lambda(problem, *r.scan, traction, false);
     r.lambda = chosen.lambda;
     r.lambda_by = chosen.by;
@@ -67,11 +65,12 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
     r.traction_kPa = basis.tractions(recurrences.solve(*r.lambda));
     r.degrees = recurrences.degrees(*r.lambda);
     r.relative_l2 = recurrences.relative_l2(*r.lambda);
-    r.variance = std::max(r.scan->variance, least);
     const bool is_on_its_way = parameters.loss == BeadLoss::biweight && round < 2;
     r.weighing = weigh(is_on_its_way ? BeadLoss::huber : parameters.loss, observed,
                        problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees);
   }
+  r.variance =
+      std::max(parameters.loss == BeadLoss::l2 ? r.scan->variance : r.weighing.variance, problem.least_variance());
   r.length_um = *r.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
   r.remark = "standard errors are computed of up to " + std::to_string(kMostVertices) + " vertices, and there are " +
              std::to_string(problem.mesh.n_vertices());

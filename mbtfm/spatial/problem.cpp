@@ -98,8 +98,13 @@ VectorXd Problem::surface_displacement_um(const VectorXd& traction_kPa) const {
 VectorXd Problem::residual(const VectorXd& traction_kPa, const VectorXd& weights_by_row) const {
   const VectorXd explained =
       map ? VectorXd(at_beads(map->displace(traction_kPa)).col(0)) : VectorXd(response_um_per_kPa * traction_kPa);
-  const VectorXd left = (displacement_um() - explained).cwiseQuotient(observed.sigma_um);
-  return left - Rows(*this, weights_by_row).common_part(left);
+  return over_errors(displacement_um() - explained, weights_by_row);
+}
+
+VectorXd Problem::over_errors(const VectorXd& rows_um, const VectorXd& weights_by_row) const {
+  if (common_um.cols() == 0) return rows_um.cwiseQuotient(observed.sigma_um);
+  const MatrixXd common = Rows(*this, weights_by_row).common_in(rows_um);
+  return (rows_um - common_um * common).cwiseQuotient(observed.sigma_um);
 }
 
 Problem Problem::with_response(const MatrixXd& matrix, const VectorXd& displaced_um, const VectorXd& about_kPa) const {
@@ -114,9 +119,10 @@ Problem Problem::with_response(const MatrixXd& matrix, const VectorXd& displaced
   return other;
 }
 
-double Problem::variance_of_model() const {
+double Problem::least_variance() const {
   const double in_sigma = observed.displacement_um.cwiseQuotient(observed.sigma_um).squaredNorm();
-  return model_error * model_error * in_sigma / static_cast<double>(observed.displacement_um.size());
+  const double of_model = model_error * model_error * in_sigma / static_cast<double>(observed.displacement_um.size());
+  return std::max(observed.states_errors ? 1.0 : 0.0, of_model);
 }
 
 Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& parameters, const Meshing& meshing,

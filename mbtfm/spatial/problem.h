@@ -47,13 +47,15 @@ struct Problem {
   Eigen::VectorXd displacement_um() const;
   /// Of the vertices.
   Eigen::VectorXd surface_displacement_um(const Eigen::VectorXd& traction_kPa) const;
-  /// S (u − u_0 − G t), and less the common motion that rows of these weights see in it.
+  /// S r, r the rows (um) less the common motion that beads of these weights see in them.
+  Eigen::VectorXd over_errors(const Eigen::VectorXd& rows_um, const Eigen::VectorXd& weights_by_row) const;
+  /// The same of u − u_0 − G t.
   Eigen::VectorXd residual(const Eigen::VectorXd& traction_kPa, const Eigen::VectorXd& weights_by_row) const;
   /// The same with other answers: G = `matrix`, and u = `displacement_um` under the tractions `about_kPa`.
   Problem with_response(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& displaced_um,
                         const Eigen::VectorXd& about_kPa) const;
-  /// What the model's error leaves of a datum, as a variance in units of sigma².
-  double variance_of_model() const;
+  /// Of a datum, in units of sigma²: one where errors are stated, or what the model's error leaves if that is more.
+  double least_variance() const;
 };
 
 struct Meshing {

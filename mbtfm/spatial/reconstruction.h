@@ -69,6 +69,11 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
 /// integral over the surface, and their weights have a mean of one.
 double lambda_per_um_per_kPa(const Problem& problem);
 
+/// Of one datum as weighed, as far as errors are stated; for a criterion of lambda. Not by the scale of the residual:
+/// where lambda is too large the residual holds what moved the beads, and a noise of that size would ask for such a
+/// lambda.
+std::optional<double> stated_variance(const Problem& problem, BeadLoss loss, const Weighing& weighing);
+
 struct ChosenLambda {
   double lambda = 0;
   std::optional<tractions::LambdaCriterion> by;  ///< none: given

@@ -1,7 +1,6 @@
 #include "mbtfm/spatial/rows.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -31,11 +30,10 @@ MatrixXd common_motions(const Observed& observed) {
 }
 
 Rows::Rows(const Problem& problem, const VectorXd& weights_by_row)
-    : roots_(weights_by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um)),
-      root_weights_(weights_by_row.cwiseSqrt()) {
+    : roots_(weights_by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um)) {
   if (problem.common_um.cols() == 0) return;
-  const Eigen::ColPivHouseholderQR<MatrixXd> qr(roots_.asDiagonal() * problem.common_um);
-  common_ = qr.householderQ() * MatrixXd::Identity(roots_.size(), qr.rank());
+  factor_.compute(roots_.asDiagonal() * problem.common_um);
+  common_ = factor_.householderQ() * MatrixXd::Identity(roots_.size(), factor_.rank());
 }
 
 MatrixXd Rows::of(const MatrixXd& by_row) const {
@@ -49,26 +47,23 @@ MatrixXd Rows::transposed(const MatrixXd& weighed) const {
   return roots_.asDiagonal() * (weighed - common_ * (common_.transpose() * weighed));
 }
 
-VectorXd Rows::common_part(const VectorXd& over_errors) const {
-  if (common_.cols() == 0) return VectorXd::Zero(over_errors.size());
-  const VectorXd part = common_ * (common_.transpose() * root_weights_.cwiseProduct(over_errors));
-  // a row without weight moves with the others, too; those are few, and their residuals only tell that they are astray
-  return part.cwiseQuotient(root_weights_.cwiseMax(1e-3));
-}
+MatrixXd Rows::common_in(const MatrixXd& by_row) const { return factor_.solve(roots_.asDiagonal() * by_row); }
 
 std::optional<CommonMotionInSpace> common_motion_beside(const Problem& problem, const SpatialReconstruction& found) {
   if (problem.common_um.cols() == 0 || found.covariance_kPa2.size() == 0) return std::nullopt;
+  const Rows rows(problem, found.weighing.by_row);
   const VectorXd roots = found.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
   const MatrixXd C = roots.asDiagonal() * problem.common_um;
-  const MatrixXd inverse = (C.transpose() * C).ldlt().solve(MatrixXd::Identity(C.cols(), C.cols()));
-  const MatrixXd by_row = inverse * C.transpose() * roots.asDiagonal();
+  const MatrixXd by_traction = rows.common_in(problem.response_um_per_kPa);
+  const MatrixXd covariance =
+      found.variance * (C.transpose() * C).inverse() + by_traction * found.covariance_kPa2 * by_traction.transpose();
   const VectorXd left_um = problem.displacement_um() - problem.response_um_per_kPa * found.traction_kPa;
-  const MatrixXd by_traction = by_row * problem.response_um_per_kPa;
-  const MatrixXd covariance = found.variance * inverse + by_traction * found.covariance_kPa2 * by_traction.transpose();
-  return CommonMotionInSpace{by_row * left_um, covariance.diagonal().cwiseMax(0).cwiseSqrt()};
+  return CommonMotionInSpace{rows.common_in(left_um), covariance.diagonal().cwiseMax(0).cwiseSqrt()};
 }
 
 Effect common_motion_effect(Switch setting, const std::optional<CommonMotionInSpace>& found) {
+  if (setting == Switch::off)
+    return stage::decided(EffectKind::common_motion, setting, true, "as told: the beads at rest lie still");
   if (!found) return stage::decided(EffectKind::common_motion, setting, true, "found with the tractions");
   std::string why = "found with the tractions: shift";
   const Index n = found->values.size() - 1;

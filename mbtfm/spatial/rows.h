@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/QR>
 #include <optional>
 
 #include "mbtfm/spatial/observed.h"
@@ -28,13 +29,14 @@ class Rows {
 
   Eigen::MatrixXd of(const Eigen::MatrixXd& by_row) const;
   Eigen::MatrixXd transposed(const Eigen::MatrixXd& weighed) const;
-  /// S C c that the rows r = S (…) have most of.
-  Eigen::VectorXd common_part(const Eigen::VectorXd& over_errors) const;
+  /// The sizes of the common motions that explain rows best: motions × columns.
+  Eigen::MatrixXd common_in(const Eigen::MatrixXd& by_row) const;
   Eigen::Index n_common() const { return common_.cols(); }
 
  private:
-  Eigen::VectorXd roots_, root_weights_;
-  Eigen::MatrixXd common_;  ///< Q
+  Eigen::VectorXd roots_;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor_;  ///< of W S C
+  Eigen::MatrixXd common_;                              ///< Q
 };
 
 /// The motion that was found beside tractions, in the order of common_motions().

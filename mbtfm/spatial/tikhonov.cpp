@@ -34,6 +34,13 @@ double lambda_per_um_per_kPa(const Problem& problem) {
   return std::sqrt(n / area * problem.observed.sigma_um.cwiseAbs2().cwiseInverse().mean());
 }
 
+std::optional<double> stated_variance(const Problem& problem, BeadLoss loss, const Weighing& weighing) {
+  const double least = problem.least_variance();
+  if (loss != BeadLoss::l2 && problem.observed.states_errors)
+    return weighing.variance / (weighing.scale * weighing.scale) * least;
+  return least > 0 ? std::optional(least) : std::nullopt;
+}
+
 ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
                            const tractions::TractionParameters& traction, bool is_risk_sound) {
   using enum tractions::LambdaCriterion;
@@ -58,19 +65,8 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
                                      int threads) {
   SpatialReconstruction r;
   const Observed& observed = problem.observed;
-  const auto floor = [&](double variance) {
-    return std::max({variance, observed.states_errors ? 1.0 : 0.0, problem.variance_of_model()});
-  };
-  // Not by the scale of the residual: where lambda is too large the residual holds what moved the beads, and a noise of
-  // that size would ask for such a lambda.
   const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
-    std::optional<double> stated;
-    if (parameters.loss != BeadLoss::l2 && observed.states_errors) {
-      stated = weighing.variance / (weighing.scale * weighing.scale) * floor(0);
-    } else if (floor(0) > 0) {
-      stated = floor(0);
-    }
-    return spectrum.scan(stated);
+    return spectrum.scan(stated_variance(problem, parameters.loss, weighing));
   };
   // The tractions of the weighed beads with the lambda of their own noise, or with that of `judged`: beads far astray
   // that keep some weight would be followed by ever smaller lambdas, so that lambda is chosen without them.
@@ -88,9 +84,8 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   };
   const VectorXd displacement_um = problem.displacement_um();
   const VectorXd of_nothing = displacement_um.cwiseQuotient(observed.sigma_um);
-  const auto residual = [&](const Fit& made) -> VectorXd {
-    const VectorXd left = (displacement_um - response * made.x).cwiseQuotient(observed.sigma_um);
-    return left - Rows(problem, made.weighing.by_row).common_part(left);
+  const auto residual = [&](const Fit& made) {
+    return problem.over_errors(displacement_um - response * made.x, made.weighing.by_row);
   };
   if (displacement_um.isZero(0)) {
     r.traction_kPa = VectorXd::Zero(problem.n_unknowns());
@@ -119,7 +114,8 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   const double lambda = last.chosen.lambda;
   r.degrees = last.spectrum->degrees(lambda);
   r.weighing = weigh(parameters.loss, observed, residual(last), r.degrees);
-  r.variance = std::max(parameters.loss == BeadLoss::l2 ? last.scan.variance : r.weighing.variance, floor(0));
+  r.variance =
+      std::max(parameters.loss == BeadLoss::l2 ? last.scan.variance : r.weighing.variance, problem.least_variance());
   r.traction_kPa = basis.tractions(last.x);
   r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(lambda, r.variance), threads);
   r.scan = std::move(last.scan);
