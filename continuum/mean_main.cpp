@@ -18,6 +18,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/report/page.h"
 #include "pipeline/report/stage_page.h"
 #include "pipeline/stage/stage.h"
 #include "segment/images/image.h"
@@ -363,7 +364,7 @@ void write_page(stage::StageContext& context, const std::string& picture, const 
                 const StageReport& report) {
   const mbtfm::report::StagePage page{
       .title = "Mean of registered cells",
-      .facts = {"M" + report.summary.substr(1) + "."},  // a sentence begins with a capital letter
+      .facts = {mbtfm::report::capitalised(report.summary + ".")},
       .findings = context.findings_,
       .picture_svg = picture,
       .picture_title = "Mean traction",

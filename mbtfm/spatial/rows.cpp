@@ -61,9 +61,11 @@ std::optional<CommonMotionInSpace> common_motion_beside(const Problem& problem, 
   return CommonMotionInSpace{rows.common_in(left_um), covariance.diagonal().cwiseMax(0).cwiseSqrt()};
 }
 
-Effect common_motion_effect(Switch setting, const std::optional<CommonMotionInSpace>& found) {
+Effect common_motion_effect(Switch setting, const Problem& problem, const std::optional<CommonMotionInSpace>& found) {
   if (setting == Switch::off)
     return stage::decided(EffectKind::common_motion, setting, true, "as told: the beads at rest lie still");
+  if (problem.common_um.cols() == 0)
+    return stage::decided(EffectKind::common_motion, setting, false, "the displacement is imposed as it was measured");
   if (!found) return stage::decided(EffectKind::common_motion, setting, true, "found with the tractions");
   std::string why = "found with the tractions: shift";
   const Index n = found->values.size() - 1;

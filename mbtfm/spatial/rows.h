@@ -46,8 +46,8 @@ struct CommonMotionInSpace {
 /// None where the problem has no common motions, or the reconstruction no standard errors.
 std::optional<CommonMotionInSpace> common_motion_beside(const Problem& problem, const SpatialReconstruction& found);
 
-/// Always on but where it is switched off, as on flat gels.
-Effect common_motion_effect(Switch setting, const std::optional<CommonMotionInSpace>& found);
+/// Always on but where it is switched off, as on flat gels, or the method has no place for it.
+Effect common_motion_effect(Switch setting, const Problem& problem, const std::optional<CommonMotionInSpace>& found);
 Figures figures_of(const CommonMotionInSpace& found);
 
 }  // namespace mbtfm::spatial

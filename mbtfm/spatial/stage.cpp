@@ -100,9 +100,14 @@ Meshing meshing_of(const StageParameters& p, tractions::TractionMethod method) {
           .has_facets = method == green};
 }
 
-/// Strains are small until tractions are known that make them large.
-substrate::SubstrateParameters linear_gel(substrate::SubstrateParameters gel) {
+/// Strains are small until tractions are known that make them large; and `direct` has no place for a common motion.
+/// @throws UsageError where that is asked for
+substrate::SubstrateParameters gel_to_begin_with(substrate::SubstrateParameters gel, tractions::TractionMethod method) {
   gel.effects.large_strain = Switch::off;
+  if (method != tractions::TractionMethod::direct) return gel;
+  if (gel.effects.common_motion == Switch::on)
+    throw UsageError("effects.common_motion = on: direct imposes the displacement as it was measured; take tikhonov");
+  gel.effects.common_motion = Switch::off;
   return gel;
 }
 
@@ -127,7 +132,7 @@ StageReport run_in_space(const StageParameters& p, stage::StageContext& context)
   const SpatialInputs inputs = read_inputs(p, context);
   const tractions::TractionMethod method = checked_method(p.traction, inputs);
   context.progress(0.05, "displacing the gel");
-  Problem problem = problem_of(p, inputs, meshing_of(p, method), linear_gel(p.substrate), context);
+  Problem problem = problem_of(p, inputs, meshing_of(p, method), gel_to_begin_with(p.substrate, method), context);
   context.progress(0.6, "reconstructing tractions");
   const auto find = [&](const Problem& of) { return reconstruct(of, inputs, p.traction, p.spatial, context.threads); };
   SpatialReconstruction r = find(problem);
@@ -151,7 +156,7 @@ StageReport run_in_space(const StageParameters& p, stage::StageContext& context)
                                brief(100 * left_out) + " % of the displacement."));
   }
   const auto common = common_motion_beside(problem, r);
-  report.effects = {strain, common_motion_effect(p.substrate.effects.common_motion, common)};
+  report.effects = {strain, common_motion_effect(p.substrate.effects.common_motion, problem, common)};
   if (common) {
     for (auto& figure : figures_of(*common)) r.figures.push_back(std::move(figure));
   }

@@ -245,9 +245,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Set traction.loss = biweight."},
       {lambda_runs_away, "lambda-runs-away", "traction", caution, "lambda by evidence over lambda by risk", 10,
        "in scenes whose noise is that of the beads it is 0.5 to 0.8; far above, tractions follow what the model has "
-       "wrong, "
-       "and by risk they would be as many times too large",
-       "Check surface, gel and sigma_um: the misfit is not the beads' noise. The tractions are those with lambda by "
+       "wrong, and by risk they would be as many times too large",
+       "Check surface, gel and sigma_um, and whether one stack grew against the other (another focus or temperature): "
+       "the misfit is not the beads' noise. The tractions are those with lambda by "
        "evidence, and may be smoothed too much. To choose yourself, set traction.lambda_by or "
        "traction.lambda_um_per_kPa."},
       {modulus_error_unknown, "modulus-error-unknown", "fit", note, "1 if gel.youngs_modulus_sigma_kPa is not given", 0,

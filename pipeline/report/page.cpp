@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
+
 #include "pipeline/files/base64.h"
 
 namespace mbtfm::report {
@@ -79,6 +81,11 @@ std::string html_of_pairs(const std::vector<std::pair<std::string, std::string>>
             charts::html_escaped(value) + "</td></tr>\n";
   }
   return html + "</tbody></table></div>\n";
+}
+
+std::string capitalised(std::string text) {
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return text;
 }
 
 std::string section(const std::string& title, const std::string& content) {

@@ -34,6 +34,9 @@ std::string html_of(const Table& table, const Download& csv);
 /// Two columns: name, value.
 std::string html_of_pairs(const std::vector<std::pair<std::string, std::string>>& pairs);
 
+/// A sentence begins so: "Control: ventral fibres".
+std::string capitalised(std::string text);
+
 /// A section with its line in the page's table of contents.
 std::string section(const std::string& title, const std::string& content);
 /// Folded until clicked.

@@ -64,13 +64,14 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
       with_error(force.size, force.sigma, "nN"), readable(total > 0 ? force.size / total : 0),
       with_error(moment.size, moment.sigma, "nN µm")));
   if (r.find("common_turn_deg")) {
-    const auto shift = [&](const std::string& axis) -> std::string {
-      const auto value = r.find("common_shift_" + axis + "_um");
-      return value ? " " + axis + " " + with_error(*value, r.find("common_shift_" + axis + "_sigma_um"), "µm") : "";
-    };
-    facts.push_back("All beads share a shift of" + shift("x") + "," + shift("y") +
-                    (r.find("common_shift_z_um") ? "," : "") + shift("z") +
-                    ", beside what the tracker took off. It was found with the tractions.");
+    std::string shifts;
+    for (const std::string axis : {"x", "y", "z"}) {
+      const std::string name = "common_shift_" + axis;
+      if (const auto shift = r.find(name + "_um"))
+        shifts += axis + " " + with_error(*shift, r.find(name + "_sigma_um"), "µm") + ", ";
+    }
+    facts.push_back("All beads share a shift of " + shifts +
+                    "beside what the tracker took off. It was found with the tractions.");
   }
   if (const auto resolution = r.find("median_resolution_um")) {
     facts.push_back(fmt::format(

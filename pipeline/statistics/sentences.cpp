@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <set>
 
+#include "pipeline/report/page.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
+
+using report::capitalised;
 namespace {
 
 using charts::readable;
@@ -15,12 +18,6 @@ std::string p_text(double p) { return p < 1e-4 ? "p < 0.0001" : fmt::format("p =
 std::string plural_of(const Sample& sample, const std::string& kind) {
   if (sample.each == Observed::cells) return name_of(sample.each);
   return named<FibreType>(kind) == FibreType::arc ? "transverse arcs" : kind + " " + name_of(sample.each);
-}
-
-/// A sentence begins so, for people: "Control: ventral fibres".
-std::string capitalised(std::string text) {
-  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
-  return text;
 }
 
 std::string mean_text(const Summary& s, const Measure& m) {

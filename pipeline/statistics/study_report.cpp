@@ -224,9 +224,7 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
            ".</p>\n";
   }
   for (const PrimaryDifference& d : primary.differences) {
-    std::string text = sentence_of(primary, d);
-    text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
-    html += "<p class=\"what\"><b>" + html_escaped(text) + ".</b></p>\n";
+    html += "<p class=\"what\"><b>" + html_escaped(report::capitalised(sentence_of(primary, d))) + ".</b></p>\n";
   }
   for (const Figure& figure : figures) {
     if (figure.name == kPrimaryFigure) html += charts_of(figure);
