@@ -218,6 +218,19 @@ TEST_F(TractionInSpace, says_which_criterion_chose_lambda_in_the_end) {
   expect_chosen(run(dense + "--lambda_um_per_kPa 0.01"), "given", "given");
 }
 
+TEST_F(TractionInSpace, says_whether_a_common_motion_was_looked_for) {
+  const std::string dense = "--spacing_um 4 --method ";
+  EXPECT_NE(run(dense + "tikhonov").output.find("common motion: on (auto): found with the tractions: shift x"),
+            std::string::npos);
+  EXPECT_NE(run(dense + "tikhonov --common_motion off").output.find("common motion: off (as switched): as told"),
+            std::string::npos);
+  EXPECT_NE(run(dense + "direct").output.find("common motion: off (auto): the displacement is imposed"),
+            std::string::npos);
+  const auto refused = run(dense + "direct --common_motion on");
+  EXPECT_EQ(refused.code, 2) << refused.output;
+  EXPECT_NE(refused.output.find("direct imposes the displacement as it was measured"), std::string::npos);
+}
+
 TEST_F(TractionInSpace, doubts_a_total_force_that_no_cell_has) {
   const std::string cell = "--spacing_um 4 --grow_um 3 --adhesions " + at("adhesions.csv");
   EXPECT_EQ(run(cell).output.find("total force of the cell"), std::string::npos);
