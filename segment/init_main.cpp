@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <iterator>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 
@@ -52,18 +51,13 @@ struct Says {
 /// A bead image of that many slices may be a stack in space: fewer say nothing of a bead's picture along z.
 constexpr int kFewestSlices = 8;
 
-bool is_tiff(const fs::path& file) {
-  static const std::set<std::string> kTiff = {".tif", ".tiff"};
-  return kTiff.contains(file.extension().string());
-}
-
 Says says_of(const fs::path& file) {
   try {
     const images::Image image = images::read_image(file);
     Says says{.note = std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels",
               .pixel_size_um = image.pixel_size_um,
               .z_step_um = {}};
-    if (!is_tiff(file)) return says;
+    if (!images::is_tiff(file)) return says;
     const std::vector<images::Image> slices = images::read_slices(file, {});
     says.n_slices = static_cast<int>(slices.size());
     says.z_step_um = slices.front().z_step_um;

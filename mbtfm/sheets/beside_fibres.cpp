@@ -61,7 +61,7 @@ std::optional<tensions::ModelScore> score_of_sheet(const tensions::LinearData& d
   const std::optional<StiffnessTable> table = table_of(elements, ground, gel, region, threads);
   if (!table) return {};
   tensions::LinearData of_sheet = data;
-  of_sheet.forces_by_motion.resize(0, 0);  // of adhesions, which the sheet has none of
+  of_sheet.motions.forces.resize(0, 0);  // of adhesions, which the sheet has none of
   const auto response = model.response({ground.patches(), 2}, {data.position_um});
   of_sheet.response = substrate::dense_response(response->displace(table->forces_nN()), threads);
   of_sheet = tensions::reweighted(std::move(of_sheet), data.bead_weight);

@@ -209,10 +209,10 @@ Eigen::MatrixXd motions_that_stand_out(const LinearData& data, const Eigen::Matr
 
 DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::Ellipse>& places,
                                   const Eigen::MatrixXd& compliance_um_per_nN, double area_um2) {
-  MBTFM_ASSERT(data.motion_precision.size() == 0);
+  MBTFM_ASSERT(data.motions.precision.size() == 0);
   const Eigen::MatrixXd Z = by_root_of_area(compliance_um_per_nN, places);
-  const Eigen::Index n_affine = data.motions.cols();
-  Eigen::MatrixXd with_even = with_even_traction(data.motions, places, compliance_um_per_nN);
+  const Eigen::Index n_affine = data.motions.shapes.cols();
+  Eigen::MatrixXd with_even = with_even_traction(data.motions.shapes, places, compliance_um_per_nN);
   data = with_motions(std::move(data), std::move(with_even));
   const Spectrum spectrum = spectrum_of(data, Z);
   // With few beads at the cut the likelihood is flat down to zero; then what is hidden is as strong as what is seen.
@@ -220,9 +220,9 @@ DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::
   const double seen = n_adhesions / area_um2 * mean_square_force(data, spectrum.variance) / spectrum.variance;
   const double kappa = std::max(seen, likeliest_kappa(spectrum));
   const Eigen::MatrixXd random = motions_that_stand_out(data, Z, kappa);
-  const Eigen::Index n_free = data.motions.cols();
+  const Eigen::Index n_free = data.motions.shapes.cols();
   Eigen::MatrixXd motions(Z.rows(), n_free + random.cols());
-  if (n_free > 0) motions.leftCols(n_free) = data.motions;
+  if (n_free > 0) motions.leftCols(n_free) = data.motions.shapes;
   motions.rightCols(random.cols()) = random;
   // An even traction is free, so that what these motions have of it may be left to it. Both together would be the same
   // motion twice, whose square no rounding leaves definite.
@@ -265,19 +265,19 @@ DataWithBeyond with_own_forces(DataWithBeyond given, const Cell& cell) {
   if (near.empty() || mean_square <= 0) return given;
   found.n_own = static_cast<Eigen::Index>(near.size());
   found.own_nN = std::sqrt(mean_square);
-  const Eigen::Index before = data.motions.cols(), n_own = 2 * found.n_own;
+  const Eigen::Index before = data.motions.shapes.cols(), n_own = 2 * found.n_own;
   Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(n_forces, before + n_own);
   for (Eigen::Index k = 0; k < found.n_own; ++k) {
     forces.block<2, 2>(2 * near[static_cast<std::size_t>(k)], before + 2 * k)
         .diagonal()
         .setConstant(expected[static_cast<std::size_t>(k)] * std::sqrt(mean_square / variance));
   }
-  Eigen::MatrixXd motions(data.motions.rows(), before + n_own);
-  motions << data.motions, data.response->displace(forces.rightCols(n_own));
+  Eigen::MatrixXd motions(data.motions.shapes.rows(), before + n_own);
+  motions << data.motions.shapes, data.response->displace(forces.rightCols(n_own));
   Eigen::VectorXd precision = Eigen::VectorXd::Ones(before + n_own);
-  precision.head(before) = data.motion_precision;
+  precision.head(before) = data.motions.precision;
   data = with_motions(std::move(data), std::move(motions), std::move(precision));
-  data.forces_by_motion = std::move(forces);
+  data.motions.forces = std::move(forces);
   return given;
 }
 

@@ -62,10 +62,10 @@ Eigen::MatrixXd curved_motions(const DisplacementField& beads) {
 }  // namespace
 
 MotionsBeside motions_beside(const LinearData& data, const EnsembleFit& fit) {
-  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
-  const Eigen::MatrixXd by_force = data.motion_inverse * data.response->pull_back(weighted).transpose();
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
+  const Eigen::MatrixXd by_force = data.motions.inverse * data.response->pull_back(weighted).transpose();
   return {.values = motion_in(data, data.displacement_um - data.response->displace(fit.forces_nN)),
-          .sigma = covariance_of_estimates(fit, data.motion_inverse, by_force).diagonal().cwiseMax(0).cwiseSqrt()};
+          .sigma = covariance_of_estimates(fit, data.motions.inverse, by_force).diagonal().cwiseMax(0).cwiseSqrt()};
 }
 
 FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um) {

@@ -78,10 +78,10 @@ VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& g
 /// B = (MᵀW²M + Λ)⁻¹ and L Lᵀ its block of the place, U = M B_place L⁻ᵀ.
 MatrixXd pulled_place(const BudgetInputs& in) {
   const Index n = in.n_of_place;
-  const MatrixXd columns = in.data.motion_inverse.rightCols(n);
+  const MatrixXd columns = in.data.motions.inverse.rightCols(n);
   const MatrixXd upper = columns.bottomRows(n).llt().matrixU();
   return in.data.response->pull_back(squared_weights(in.data).asDiagonal() *
-                                     (in.data.motions * columns * upper.inverse()));
+                                     (in.data.motions.shapes * columns * upper.inverse()));
 }
 
 /// What the beads would tell more of the tensions if the place were known: Cov − (Cov⁻¹ + V Vᵀ/s²)⁻¹ with V = Jᵀ U.

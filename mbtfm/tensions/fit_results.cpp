@@ -184,8 +184,8 @@ FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double s
 
 DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementField& beads, const LinearData& data) {
   Eigen::VectorXd model = moved_by(data, forces_nN);
-  if (data.motions.cols() > 0) {
-    model += data.motions * motion_in(data, data.displacement_um - data.response->displace(forces_nN));
+  if (data.motions.shapes.cols() > 0) {
+    model += data.motions.shapes * motion_in(data, data.displacement_um - data.response->displace(forces_nN));
   }
   DisplacementField field = beads;
   for (std::size_t i = 0; i < field.size(); ++i) {

@@ -63,7 +63,8 @@ Eigen::MatrixXd inverse_of_motions(Eigen::MatrixXd square, const Eigen::VectorXd
 }
 
 Eigen::MatrixXd inverse_of_motions(const LinearData& data, const Eigen::VectorXd& weight) {
-  return inverse_of_motions(data.motions.transpose() * (weight.asDiagonal() * data.motions), data.motion_precision);
+  return inverse_of_motions(data.motions.shapes.transpose() * (weight.asDiagonal() * data.motions.shapes),
+                            data.motions.precision);
 }
 
 /// F with FFᵀ what these motions explain of a Gram matrix Gᵀ W² P G.
@@ -120,8 +121,8 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
   MBTFM_ASSERT(response->rows() == n_rows);
   LinearData data;
   data.threads = threads;
-  data.motions = std::move(motions);
-  data.n_used = -data.motions.cols();
+  data.motions.shapes = std::move(motions);
+  data.n_used = -data.motions.shapes.cols();
   data.has_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
   data.displacement_um.resize(n_rows);
   data.weight_per_um = Eigen::VectorXd::Zero(n_rows);
@@ -139,9 +140,9 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
 
 LinearData with_motions(LinearData data, Eigen::MatrixXd motions, Eigen::VectorXd precision) {
   MBTFM_ASSERT(precision.size() == 0 || precision.size() == motions.cols());
-  data.n_used += n_unexpected(data.motions, data.motion_precision) - n_unexpected(motions, precision);
-  data.motions = std::move(motions);
-  data.motion_precision = std::move(precision);
+  data.n_used += n_unexpected(data.motions.shapes, data.motions.precision) - n_unexpected(motions, precision);
+  data.motions.shapes = std::move(motions);
+  data.motions.precision = std::move(precision);
   const Eigen::VectorXd as_they_are = data.bead_weight;
   return reweighted(std::move(data), as_they_are);
 }
@@ -153,33 +154,33 @@ LinearData with_more_motions(LinearData data, const Eigen::MatrixXd& motions) {
       *data.reduced.compliance,
       explained_by(data, weight, beside, inverse_of_motions(motions.transpose() * (weight.asDiagonal() * beside), {})),
       data.threads);
-  const Eigen::Index before = data.motions.cols(), n = motions.cols();
+  const Eigen::Index before = data.motions.shapes.cols(), n = motions.cols();
   data.n_used -= n;
-  data.motions.conservativeResize(motions.rows(), before + n);
-  data.motions.rightCols(n) = motions;
-  if (data.motion_precision.size() > 0) {
-    data.motion_precision.conservativeResize(before + n);
-    data.motion_precision.tail(n).setZero();
+  data.motions.shapes.conservativeResize(motions.rows(), before + n);
+  data.motions.shapes.rightCols(n) = motions;
+  if (data.motions.precision.size() > 0) {
+    data.motions.precision.conservativeResize(before + n);
+    data.motions.precision.tail(n).setZero();
   }
-  if (data.forces_by_motion.size() > 0) {
-    data.forces_by_motion.conservativeResize(Eigen::NoChange, before + n);
-    data.forces_by_motion.rightCols(n).setZero();
+  if (data.motions.forces.size() > 0) {
+    data.motions.forces.conservativeResize(Eigen::NoChange, before + n);
+    data.motions.forces.rightCols(n).setZero();
   }
-  data.motion_inverse = inverse_of_motions(data, weight);
+  data.motions.inverse = inverse_of_motions(data, weight);
   data.reduced = reduced_by(data, weight, std::move(root));
   return data;
 }
 
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
-  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
-  return data.motion_inverse * (weighted.transpose() * displacements);
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
+  return data.motions.inverse * (weighted.transpose() * displacements);
 }
 
 std::optional<OwnForces> own_forces_in(const LinearData& data) {
-  const Eigen::MatrixXd& E = data.forces_by_motion;
+  const Eigen::MatrixXd& E = data.motions.forces;
   if (E.size() == 0) return std::nullopt;
-  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
-  const Eigen::MatrixXd gain = E * data.motion_inverse;
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
+  const Eigen::MatrixXd gain = E * data.motions.inverse;
   return OwnForces{
       .left = Eigen::MatrixXd::Identity(E.rows(), E.rows()) - gain * data.response->pull_back(weighted).transpose(),
       .found_nN = gain * (weighted.transpose() * data.displacement_um),
@@ -187,7 +188,7 @@ std::optional<OwnForces> own_forces_in(const LinearData& data) {
 }
 
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements) {
-  if (data.motions.cols() > 0) displacements -= data.motions * motion_in(data, displacements);
+  if (data.motions.shapes.cols() > 0) displacements -= data.motions.shapes * motion_in(data, displacements);
   return displacements;
 }
 
@@ -199,11 +200,11 @@ LinearData reweighted(LinearData data, const Eigen::VectorXd& bead_weight) {
   data.bead_weight = bead_weight;
   data.reduced.compliance.reset();  // not two of them in memory
   const Eigen::VectorXd weight = squared_weights(data);
-  data.motion_inverse = inverse_of_motions(data, weight);
+  data.motions.inverse = inverse_of_motions(data, weight);
   Eigen::MatrixXd A = data.response->upper_gram(weight);
   const double trace = A.diagonal().sum();
-  numerics::add_upper_gram(explained_by(data, weight, data.motions, data.motion_inverse).transpose(), A, data.threads,
-                           -1);
+  numerics::add_upper_gram(explained_by(data, weight, data.motions.shapes, data.motions.inverse).transpose(), A,
+                           data.threads, -1);
   data.reduced = reduced_by(data, weight, root_of(std::move(A), trace, data.threads));
   return data;
 }

@@ -27,6 +27,17 @@ struct ReducedData {
 /// C F: 2·adhesions × any number
 Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads = 1);
 
+/// What the beads may do besides following the forces: sums of some shapes, of sizes that are found with these.
+struct Motions {
+  Eigen::MatrixXd shapes;     ///< M: 2·beads × motions
+  Eigen::VectorXd precision;  ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its size, in
+                              ///< units of the noise's; 0 where nothing is known of it; empty: all 0
+  Eigen::MatrixXd inverse;  ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place tell no turn from a shift. The covariance
+                            ///< of the sizes by noise of variance 1
+  Eigen::MatrixXd forces;  ///< E: by motion, the forces of adhesions that it comes of, beside those found as forces;
+                           ///< 2·adhesions × motions; empty: none
+};
+
 struct LinearData {
   std::vector<Vec2> position_um;       ///< of the beads
   substrate::SharedResponse response;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
@@ -34,17 +45,11 @@ struct LinearData {
   Eigen::VectorXd offset_um;           ///< of a gel that is not linear: G F + offset moves its beads; empty: 0
   Eigen::VectorXd weight_per_um;       ///< W, diagonal, 2·beads: 1/sigma; 0 where the bead is not used
   Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
-  Eigen::MatrixXd motions;             ///< M: what the beads may do besides, found with the forces; 2·beads × some
-  Eigen::VectorXd motion_precision;    ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its
-                                       ///< size, in units of the noise's; 0 where nothing is known of it; empty: all 0
-  Eigen::MatrixXd motion_inverse;  ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place tell no turn from a shift. The
-                                   ///< covariance of the motions' sizes by noise of variance 1
-  Eigen::MatrixXd forces_by_motion;  ///< E: by motion, the forces of adhesions that it comes of, beside those found as
-                                     ///< forces; 2·adhesions × motions; empty: none
-  Eigen::Index n_used = 0;           ///< components of the beads that are used, less one for each motion of precision 0
-  bool has_errors = false;           ///< the beads state their sigma; without, W is 1 and the misfit tells the error
-  int threads = 1;                   ///< to reduce it with
-  ReducedData reduced;               ///< of all that, bead_weight included
+  Motions motions;
+  Eigen::Index n_used = 0;  ///< components of the beads that are used, less one for each motion of precision 0
+  bool has_errors = false;  ///< the beads state their sigma; without, W is 1 and the misfit tells the error
+  int threads = 1;          ///< to reduce it with
+  ReducedData reduced;      ///< of all that, bead_weight included
 };
 
 /// @param beads  all with sigma_um > 0, or weights are the same for all
@@ -59,7 +64,7 @@ LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_
 // New data of the same beads. Who moves the old ones in has no two matrices in memory.
 
 /// The beads may move by any sum of these (2·beads × some) besides, instead of those that were allowed. Reduces again.
-/// @param precision  by motion, see LinearData::motion_precision
+/// @param precision  by motion, see Motions::precision
 LinearData with_motions(LinearData data, Eigen::MatrixXd motions, Eigen::VectorXd precision = {});
 /// They may move by any sum of these too, of precision 0: quicker.
 LinearData with_more_motions(LinearData data, const Eigen::MatrixXd& motions);

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <set>
 #include <string>
 
 #include "pipeline/contract/stage_state.h"
@@ -211,12 +211,15 @@ std::string item_of(const Finding& f) {
   return {};
 }
 
-/// Stages that ran and asked: without one there is nothing that a tick could stand for.
+/// Stages that compare a model with the beads.
+enum class Judging { fit, traction };
+constexpr auto words(Judging) { return std::array{"fit", "traction"}; }
+
+/// Without one there is nothing that a tick could stand for.
 bool was_asked(const Provenance& provenance) {
-  static const std::set<std::string> kAsking = {"fit", "traction"};
   return std::ranges::any_of(provenance.stages, [](const StageLine& stage) {
     const auto state = named<StageState>(stage.state);
-    return kAsking.contains(stage.name) && (state == StageState::must_run || state == StageState::up_to_date);
+    return named<Judging>(stage.name) && (state == StageState::must_run || state == StageState::up_to_date);
   });
 }
 

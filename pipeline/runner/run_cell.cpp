@@ -4,7 +4,6 @@
 #include <exception>
 #include <iomanip>
 #include <mutex>
-#include <set>
 #include <sstream>
 #include <string>
 
@@ -105,11 +104,10 @@ void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
 }
 
 /// @throws UsageError where the preset says nothing to this kind of cell
-void expect_fit(const std::string& preset, const CellStages& of) {
-  static const std::set<std::string> kChangeNothing = {"", "standard"};
-  if (of.kind == CellKind::plane || kChangeNothing.contains(preset)) return;
-  throw UsageError("--preset " + preset + ": presets are for cells on flat gels, and this one is in space (" + of.why +
-                   "): leave it out, and set traction.spacing_um for more or fewer tractions");
+void expect_fit(const RunOptions& options, const CellStages& of) {
+  if (of.kind == CellKind::plane || options.beneath.empty()) return;
+  throw UsageError("--preset " + options.preset + ": presets are for cells on flat gels, and this one is in space (" +
+                   of.why + "): leave it out, and set traction.spacing_um for more or fewer tractions");
 }
 
 fs::path checked(fs::path cell) {
@@ -128,7 +126,7 @@ class CellRun {
         beneath_(unset_in(cell_ / "cell.toml", options.beneath)),
         settings_(read_settings(cell_ / "cell.toml", beneath_)),
         hashes_(cell_) {
-    expect_fit(options.preset, of_);
+    expect_fit(options, of_);
   }
 
   CellOutcome look();

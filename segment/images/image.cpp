@@ -38,7 +38,7 @@ std::string microscopes_hint(const std::filesystem::path& file) {
          name + "' '" + file.stem().string() + ".ome.tif'";
 }
 
-bool is_tiff(std::string_view head) {
+bool begins_as_tiff(std::string_view head) {
   return head.starts_with("II\x2A\x00"sv) || head.starts_with("MM\x00\x2A"sv) || head.starts_with("II\x2B\x00"sv) ||
          head.starts_with("MM\x00\x2B"sv);
 }
@@ -122,7 +122,7 @@ void require_one_page(const std::filesystem::path& file, const PlaneChoice& choi
 Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
   const std::string head = head_of(file);
   if (choice.page && *choice.page < 1) throw InputError(file.string(), "a page from 1", std::to_string(*choice.page));
-  if (is_tiff(head)) return read_tiff(file, choice);
+  if (begins_as_tiff(head)) return read_tiff(file, choice);
   if (head.starts_with("\x89PNG")) {
     require_one_page(file, choice, "a PNG image");
     return read_png(file, choice);
@@ -140,8 +140,10 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
   throw InputError(file.string(), kExpected, head.empty() ? "an empty file" : "bytes of neither");
 }
 
+bool is_tiff(const std::filesystem::path& file) { return begins_as_tiff(head_of(file)); }
+
 std::vector<Image> read_slices(const std::filesystem::path& file, const PlaneChoice& choice) {
-  if (!is_tiff(head_of(file))) throw InputError(file.string(), "a TIFF with a slice in each page", "another file");
+  if (!is_tiff(file)) throw InputError(file.string(), "a TIFF with a slice in each page", "another file");
   return read_tiff_slices(file, choice);
 }
 

@@ -48,6 +48,9 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice = 
 /// A page, from 0, as it lies in the file.
 inline Image read_image(const std::filesystem::path& file, int page) { return read_image(file, {.page = page + 1}); }
 
+/// By its first bytes. @throws InputError where the file cannot be read
+bool is_tiff(const std::filesystem::path& file);
+
 /// All slices of a TIFF of one channel and frame, whatever the choice says of z, from the first on; all pages of a file
 /// that states no dimensions.
 /// @throws InputError as read_image, and where the file is no TIFF or its slices are not of one size

@@ -127,7 +127,7 @@ TEST(CommonMotion, reduced_data_are_those_of_the_projected_displacements) {
   const TensionScene scene = test::tension_scene("case_21", 50, 0.05, 7);
   const LinearData data = reweighted(with_motions(scene, scene.beads), Eigen::VectorXd::LinSpaced(50, 0.1, 1));
   const Eigen::VectorXd weight = squared_weights(data);
-  const Eigen::MatrixXd& M = data.motions;
+  const Eigen::MatrixXd& M = data.motions.shapes;
   const Eigen::MatrixXd P =
       Eigen::MatrixXd::Identity(100, 100) -
       M * (M.transpose() * weight.asDiagonal() * M).inverse() * M.transpose() * weight.asDiagonal();

@@ -111,7 +111,7 @@ TEST(CutCells, tensions_forces_and_the_force_through_the_cut_are_found_within_th
 TEST(CutCells, own_forces_of_adhesions_are_expected_near_the_cut_and_fade_away_from_it) {
   const Scene s = scene(41);
   const CutFit found = test::fit_cut(s.cut.cell, s.beads, s.gel, 2);
-  const Eigen::MatrixXd& own = found.fit.data.forces_by_motion;
+  const Eigen::MatrixXd& own = found.fit.data.motions.forces;
   int n_near = 0, n_far = 0;
   for (std::size_t a = 0; a < s.cut.cell.adhesions.size(); ++a) {
     const Adhesion& adhesion = s.cut.cell.adhesions[a];

@@ -162,7 +162,7 @@ TEST(Placement, beads_that_do_not_tell_it_leave_the_cell_where_it_is) {
     const PlacedCell stays = place(setting);
     EXPECT_FALSE(stays.effect.is_on) << name_of(setting);
     EXPECT_EQ(norm(stays.placement.shift_um), 0) << name_of(setting);
-    EXPECT_EQ(stays.data.motions.cols(), 6) << name_of(setting);
+    EXPECT_EQ(stays.data.motions.shapes.cols(), 6) << name_of(setting);
   }
 }
 
