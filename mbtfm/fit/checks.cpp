@@ -18,11 +18,11 @@ std::optional<CrossValidation> cross_validation_of(const ReadyCell& ready, const
   const Cell& cell = ready.scene.cell;
   TypeTensions tensions;
   std::vector<FibreType> types;
-  for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
+  for (std::size_t i = 1; i < fit.tensions.fibre_ids.size(); ++i) {
     const auto fibre = std::find_if(cell.fibres.begin(), cell.fibres.end(),
-                                    [&](const Fibre& f) { return f.fibre_id == fit.fibre_ids[i]; });
+                                    [&](const Fibre& f) { return f.fibre_id == fit.tensions.fibre_ids[i]; });
     types.push_back(fibre->type == FibreType::edge ? FibreType::ventral : fibre->type);  // held alike, at both ends
-    tensions[types.back()].push_back(fit.tensions_nN[i].value);
+    tensions[types.back()].push_back(fit.tensions.nN[i].value);
   }
   if (n_draws == 0 || !tensions.contains(FibreType::dorsal) || !tensions.contains(FibreType::ventral)) return {};
   const TensionProblem problem(ready.networks.front(), fit.data.reduced, adhesion_ids_of(cell));
@@ -94,7 +94,7 @@ std::vector<std::string> names_of_groups(const EnsembleFit& fit) {
   for (const FibreGroup& group : fibres_not_told_apart(fit)) {
     std::string& text = names.emplace_back();
     for (std::size_t k = 0; k < group.indices.size(); ++k) {
-      text += (k > 0 ? " + " : "") + std::to_string(fit.fibre_ids[static_cast<std::size_t>(group.indices[k])]);
+      text += (k > 0 ? " + " : "") + std::to_string(fit.tensions.fibre_ids[static_cast<std::size_t>(group.indices[k])]);
     }
     text += ": " + brief(group.sum_nN.value) + " ± " + brief(group.sum_nN.standard_error) + " nN";
   }

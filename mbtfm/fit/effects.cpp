@@ -111,7 +111,7 @@ Effect of_forces_beyond(const FittedCell& c) {
   return beyond_cut_effect(c.parameters.effects.beyond_cut, c.seen, c.ready.beyond);
 }
 
-Effect of_loss(const FittedCell& c) { return robust_loss_effect(c.parameters.effects.robust_loss, c.fit.loss); }
+Effect of_loss(const FittedCell& c) { return robust_loss_effect(c.parameters.effects.robust_loss, c.fit.misfit.loss); }
 
 }  // namespace
 

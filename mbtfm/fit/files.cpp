@@ -67,7 +67,7 @@ void write_checks(stage::StageContext& context, const ModelChecks& checks, const
 /// The first network, contracted by the mean tensions.
 void write_contracted(const Path& file, const cables::CableNetwork& network, const EnsembleFit& fit) {
   std::vector<double> tensions;
-  for (const Estimate& e : fit.tensions_nN) tensions.push_back(e.value);
+  for (const Estimate& e : fit.tensions.nN) tensions.push_back(e.value);
   const cables::Equilibrium& nearby = cables::equilibrium_of(*fit.meshes.front().fit.trial.rest);
   const cables::Equilibrium e = network.equilibrium(tensions, nearby.positions_um);
   files::write_contracted_network(file, network.network(), e.positions_um, e.link_force_nN, e.link_states);

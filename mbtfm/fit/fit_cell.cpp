@@ -120,7 +120,7 @@ Found found_by(const ReadyCell& cell, const EnsembleFit& fit, const std::optiona
       .forces = forces_of(fit, cell.scene.cell),
       .summary = summary_of(fit, cell.scene,
                             cables::surface_tension_nN_per_um(cell.networks.front().network(),
-                                                              cell.scene.cell.outline_um, fit.tensions_nN[0].value),
+                                                              cell.scene.cell.outline_um, fit.tensions.nN[0].value),
                             p.fit)};
   const stage::Stopwatch watch;
   found.summary.error_budget = budget_of(cell, fit, p, work.threads);
@@ -155,7 +155,7 @@ ModelFields fields_of(const ReadyCell& cell, const EnsembleFit& fit, const Model
   const auto field = [&](const Eigen::VectorXd& forces_nN) {
     return in_bead_frame(field_of(forces_nN, cell.scene.beads, fit.data), tracked, cell.placement);
   };
-  return {.fitted = field(fit.forces_nN), .without_fibres = field(checks.models.front().forces_nN)};
+  return {.fitted = field(fit.forces.nN), .without_fibres = field(checks.models.front().forces_nN)};
 }
 
 FittedCell with_effects(FittedCell cell, const Work& work) {

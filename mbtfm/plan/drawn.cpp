@@ -50,13 +50,13 @@ Drawn draw_experiments(const Scene& scene, const Computed& c, const Point& point
     const EnsembleFit fit = fit_of(scene, c.cell, e, std::move(data), work.threads);
     add_errors_along(with_network, adhesion_forces_nN(fit), c.cell.forces_nN);
     add_errors_along(fttc, fttc_forces_nN(scene, e, point, work.threads), c.cell.forces_nN);
-    for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i)
+    for (std::size_t i = 1; i < fit.tensions.fibre_ids.size(); ++i)
       drawn.tensions.push_back({.experiment = k + 1,
-                                .fibre_id = fit.fibre_ids[i],
+                                .fibre_id = fit.tensions.fibre_ids[i],
                                 .true_nN = c.cell.tensions_nN[static_cast<Eigen::Index>(i)],
-                                .found_nN = fit.tensions_nN[i].value,
+                                .found_nN = fit.tensions.nN[i].value,
                                 .predicted_error_nN = standard_error_nN(c, i, point),
-                                .stated_error_nN = fit.tensions_nN[i].standard_error});
+                                .stated_error_nN = fit.tensions.nN[i].standard_error});
   }
   drawn.forces = {robust_error(with_network), robust_error(alone), robust_error(fttc)};
   sum_up(drawn);

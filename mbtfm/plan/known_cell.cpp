@@ -129,9 +129,9 @@ ModelErrors model_errors(const Scene& scene, const KnownCell& cell, const Displa
   errors.total_force_nN = total_nN(cell.forces_nN);
   errors.network_force_nN = fit.network_force_nN.value;
   errors.network_force = scaled(errors.tensions.front(), errors.network_force_nN / cell.tensions_nN[0]);
-  errors.adhesion_forces_nN.resize(static_cast<Eigen::Index>(fit.force_magnitudes_nN.size()));
-  for (std::size_t a = 0; a < fit.force_magnitudes_nN.size(); ++a)
-    errors.adhesion_forces_nN[static_cast<Eigen::Index>(a)] = fit.force_magnitudes_nN[a].from_model();
+  errors.adhesion_forces_nN.resize(static_cast<Eigen::Index>(fit.forces.magnitudes.size()));
+  for (std::size_t a = 0; a < fit.forces.magnitudes.size(); ++a)
+    errors.adhesion_forces_nN[static_cast<Eigen::Index>(a)] = fit.forces.magnitudes[a].from_model();
   return errors;
 }
 

@@ -48,12 +48,12 @@ void add_errors(MeshFit& mesh, const EnsembleFit& all) {
   const Eigen::MatrixXd by_slope = numerics::transposed_product(J, *all.data.reduced.compliance);
   if (all.model_error)
     mesh.local.model_variance = by_slope * all.model_error->force_variance_nN2.asDiagonal() * by_slope.transpose();
-  mesh.response = response_of(mesh.local, all.variance);
+  mesh.response = response_of(mesh.local, all.misfit.variance);
   mesh.by_force = mesh.response * by_slope;
-  mesh.noise_covariance_nN2 = all.variance * mesh.response;
-  mesh.covariance_nN2 = covariance_nN2(mesh.local, all.variance);
-  mesh.past_bounds_nN = past_bounds_nN(mesh.local, all.variance);
-  mesh.intervals_95 = profiles_95(mesh.local, all.variance);
+  mesh.noise_covariance_nN2 = all.misfit.variance * mesh.response;
+  mesh.covariance_nN2 = covariance_nN2(mesh.local, all.misfit.variance);
+  mesh.past_bounds_nN = past_bounds_nN(mesh.local, all.misfit.variance);
+  mesh.intervals_95 = profiles_95(mesh.local, all.misfit.variance);
 }
 
 /// Forces are not linear in the tensions, which matters only where these are badly known: relative to the network's,
@@ -73,13 +73,13 @@ double network_bias(const MeshFit& mesh, const TensionProblem& problem, int thre
 void add_bootstrap(EnsembleFit& all, const network::Ensemble& networks, const std::vector<int>& adhesion_ids,
                    const FitParameters& parameters, int threads) {
   const std::size_t n_meshes = all.meshes.size();
-  std::vector<std::vector<double>> deviations(all.tensions_nN.size());
+  std::vector<std::vector<double>> deviations(all.tensions.nN.size());
   for (std::size_t m = 0; m < n_meshes; ++m) {
     std::vector<std::uint64_t> draws;
     for (std::size_t d = m; d < static_cast<std::size_t>(parameters.bootstrap); d += n_meshes) draws.push_back(d + 1);
     const TensionProblem problem(networks[m], all.data.reduced, adhesion_ids);
     const Eigen::MatrixXd of_mesh = bootstrap_deviations_nN(
-        problem, parameters, all.meshes[m].fit.trial, all.variance,
+        problem, parameters, all.meshes[m].fit.trial, all.misfit.variance,
         all.model_error ? all.model_error->force_variance_nN2 : Eigen::VectorXd(), draws, threads);
     for (std::size_t i = 0; i < deviations.size(); ++i) {
       const auto row = of_mesh.row(static_cast<Eigen::Index>(i));
@@ -89,8 +89,8 @@ void add_bootstrap(EnsembleFit& all, const network::Ensemble& networks, const st
   for (std::size_t i = 0; i < deviations.size(); ++i) {
     double sum = 0;
     for (const double d : deviations[i]) sum += d * d;
-    all.tensions_nN[i].standard_error = std::sqrt(sum / parameters.bootstrap);
-    all.tensions_nN[i].sides_95 = percentiles_95(deviations[i]);
+    all.tensions.nN[i].standard_error = std::sqrt(sum / parameters.bootstrap);
+    all.tensions.nN[i].sides_95 = percentiles_95(deviations[i]);
   }
 }
 
@@ -118,7 +118,7 @@ std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh
         q.gradients.cwiseProduct(numerics::product(mesh.noise_covariance_nN2, q.gradients)).colwise().sum();
     if (value.size() == 0) {
       value = noise = Eigen::VectorXd::Zero(q.values.size());
-      model = Eigen::MatrixXd::Zero(all.model_error ? all.forces_nN.size() : 0, q.values.size());
+      model = Eigen::MatrixXd::Zero(all.model_error ? all.forces.nN.size() : 0, q.values.size());
     }
     value += q.values / n_meshes;
     noise += own_noise / n_meshes;
@@ -164,24 +164,24 @@ std::vector<Estimate> with_own_forces(const EnsembleFit& all, const Eigen::Matri
 
 /// R + E a, of one mesh.
 Eigen::VectorXd exerted_nN(const EnsembleFit& all, const Eigen::VectorXd& network_nN) {
-  return all.own ? Eigen::VectorXd(all.own->left * network_nN + all.own->found_nN) : network_nN;
+  return all.forces.own ? Eigen::VectorXd(all.forces.own->left * network_nN + all.forces.own->found_nN) : network_nN;
 }
 
 /// Of the adhesions' forces, along the mean over meshes.
 std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
   constexpr Eigen::Index kAtOnce = 256;  // adhesions: some MB of numbers
-  const Eigen::Index n = all.forces_nN.size() / 2;
+  const Eigen::Index n = all.forces.nN.size() / 2;
   const Eigen::VectorXd forces_nN = adhesion_forces_nN(all);
   std::vector<Estimate> magnitudes;
   for (Eigen::Index first = 0; first < n; first += kAtOnce) {
     const Eigen::Index count = std::min(kAtOnce, n - first);
-    Eigen::MatrixXd along = Eigen::MatrixXd::Zero(all.forces_nN.size(), count);
+    Eigen::MatrixXd along = Eigen::MatrixXd::Zero(all.forces.nN.size(), count);
     for (Eigen::Index k = 0; k < count; ++k) {
       const Eigen::Vector2d force = forces_nN.segment<2>(2 * (first + k));
       along.col(k).segment<2>(2 * (first + k)) =
           force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
     }
-    if (all.own) {
+    if (all.forces.own) {
       const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
         return along.transpose() * exerted_nN(all, mesh.fit.trial.forces_nN);
       };
@@ -206,7 +206,7 @@ CutForce cut_force_of(const EnsembleFit& all) {
     cut.reaction.torque_nN_um += mesh.cut.torque_nN_um / static_cast<double>(all.meshes.size());
   }
   const auto along_of = [&](const Eigen::Vector2d& direction) -> Estimate {
-    const Eigen::VectorXd along = along_cut(direction, all.forces_nN.size());
+    const Eigen::VectorXd along = along_cut(direction, all.forces.nN.size());
     const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
       const Eigen::VectorXd& network_nN = mesh.fit.trial.forces_nN;
       return Eigen::VectorXd::Constant(
@@ -235,7 +235,7 @@ Estimate total_force_of(const EnsembleFit& all) {
   const Eigen::VectorXd forces_nN = adhesion_forces_nN(all), along = directions_of(forces_nN);
   const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
     const Eigen::MatrixXd derivatives =
-        all.own ? Eigen::MatrixXd(all.own->left * mesh.force_derivatives) : mesh.force_derivatives;
+        all.forces.own ? Eigen::MatrixXd(all.forces.own->left * mesh.force_derivatives) : mesh.force_derivatives;
     return Eigen::VectorXd::Constant(
         1, along.dot(exerted_nN(all, mesh.fit.trial.forces_nN) + derivatives * mesh.past_bounds_nN) -
                magnitude_bias_nN(forces_nN, derivatives, mesh.covariance_nN2));
@@ -250,7 +250,7 @@ Estimate total_force_of(const EnsembleFit& all) {
 
 /// Proportional to the network's tension.
 Estimate network_force_of(const EnsembleFit& all) {
-  const Eigen::VectorXd along = directions_of(all.network_forces_nN);
+  const Eigen::VectorXd along = directions_of(all.forces.of_network_nN);
   const auto per_tension = [&](const MeshFit& mesh) {
     const double tension = mesh.local.tensions_nN[0];
     return tension > 0 ? along.dot(mesh.network_forces_nN) / tension : 0;
@@ -259,7 +259,7 @@ Estimate network_force_of(const EnsembleFit& all) {
       all,
       [&](const MeshFit& mesh) {
         return per_tension(mesh) *
-               std::max(0.0, (1 - all.network_bias) * mesh.local.tensions_nN[0] + mesh.past_bounds_nN[0]);
+               std::max(0.0, (1 - all.tensions.network_bias) * mesh.local.tensions_nN[0] + mesh.past_bounds_nN[0]);
       },
       [&](const MeshFit& mesh) -> Eigen::VectorXd {
         return per_tension(mesh) * Eigen::VectorXd::Unit(mesh.local.g.size(), 0);
@@ -269,14 +269,14 @@ Estimate network_force_of(const EnsembleFit& all) {
 void add_means(EnsembleFit& all) {
   const auto n_meshes = static_cast<double>(all.meshes.size());
   const MeshFit& first = all.meshes.front();
-  all.forces_nN = all.network_forces_nN = Eigen::VectorXd::Zero(first.fit.trial.forces_nN.size());
-  all.torques_nN_um = Eigen::VectorXd::Zero(first.torques_nN_um.size());
+  all.forces.nN = all.forces.of_network_nN = Eigen::VectorXd::Zero(first.fit.trial.forces_nN.size());
+  all.forces.torques_nN_um = Eigen::VectorXd::Zero(first.torques_nN_um.size());
   all.report.converged = true;
   for (const MeshFit& mesh : all.meshes) {
     const Report& report = mesh.fit.report;
-    all.forces_nN += mesh.fit.trial.forces_nN / n_meshes;
-    all.network_forces_nN += mesh.network_forces_nN / n_meshes;
-    all.torques_nN_um += mesh.torques_nN_um / n_meshes;
+    all.forces.nN += mesh.fit.trial.forces_nN / n_meshes;
+    all.forces.of_network_nN += mesh.network_forces_nN / n_meshes;
+    all.forces.torques_nN_um += mesh.torques_nN_um / n_meshes;
     all.report.iterations = std::max(all.report.iterations, report.iterations);
     all.report.last_change = std::max(all.report.last_change, report.last_change);
     if (all.report.reason.empty() || (all.report.converged && !report.converged)) all.report.reason = report.reason;
@@ -285,16 +285,16 @@ void add_means(EnsembleFit& all) {
 }
 
 void add_estimates(EnsembleFit& all, bool is_cut) {
-  const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
-  all.covariance_nN2 = Eigen::MatrixXd::Zero(n_tensions, n_tensions);
+  const auto n_tensions = static_cast<Eigen::Index>(all.tensions.fibre_ids.size());
+  all.tensions.covariance_nN2 = Eigen::MatrixXd::Zero(n_tensions, n_tensions);
   for (const MeshFit& mesh : all.meshes) {
-    all.covariance_nN2 += mesh.covariance_nN2 / static_cast<double>(all.meshes.size());
+    all.tensions.covariance_nN2 += mesh.covariance_nN2 / static_cast<double>(all.meshes.size());
   }
   for (Eigen::Index i = 0; i < n_tensions; ++i) {
-    all.tensions_nN.push_back(sum_of(all, {static_cast<int>(i)}));
-    all.tensions_nN.back().sides_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
+    all.tensions.nN.push_back(sum_of(all, {static_cast<int>(i)}));
+    all.tensions.nN.back().sides_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
   }
-  all.force_magnitudes_nN = force_magnitudes_of(all);
+  all.forces.magnitudes = force_magnitudes_of(all);
   all.total_force_nN = total_force_of(all);
   all.network_force_nN = network_force_of(all);
   if (is_cut) all.cut = cut_force_of(all);
@@ -333,7 +333,7 @@ FirstFit fit_first(const network::Contractile& network, LinearData data, const s
 
 /// What each mesh makes of the mean tensions, by its derivatives about its own.
 std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
-  Eigen::VectorXd mean_nN = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(all.fibre_ids.size()));
+  Eigen::VectorXd mean_nN = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(all.tensions.fibre_ids.size()));
   for (const MeshFit& mesh : all.meshes) mean_nN += mesh.fit.trial.tensions_nN / static_cast<double>(all.meshes.size());
   std::vector<MeshForces> forces;
   for (const MeshFit& mesh : all.meshes) {
@@ -355,8 +355,8 @@ double variance_beside_model_error(const LinearData& data, const Eigen::VectorXd
 }  // namespace
 
 Eigen::VectorXd values_of(const EnsembleFit& fit) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(fit.tensions_nN.size()));
-  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = fit.tensions_nN[static_cast<std::size_t>(i)].value;
+  Eigen::VectorXd values(static_cast<Eigen::Index>(fit.tensions.nN.size()));
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = fit.tensions.nN[static_cast<std::size_t>(i)].value;
   return values;
 }
 
@@ -382,7 +382,7 @@ Eigen::MatrixXd covariance_beside(const EnsembleFit& fit, const Eigen::MatrixXd&
   const MeshFit& mesh = fit.meshes.front();
   const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
   Eigen::MatrixXd covariance =
-      fit.variance * of_noise + sign * (by_tension * mesh.noise_covariance_nN2 * by_tension.transpose());
+      fit.misfit.variance * of_noise + sign * (by_tension * mesh.noise_covariance_nN2 * by_tension.transpose());
   if (fit.model_error) {
     const Eigen::MatrixXd left = by_force - by_tension * mesh.by_force;  // of errors of the forces, tensions following
     covariance += left * fit.model_error->force_variance_nN2.asDiagonal() * left.transpose();
@@ -401,15 +401,15 @@ Eigen::MatrixXd covariance_of_scores(const EnsembleFit& fit, const Eigen::Matrix
   return covariance_beside(fit, of_noise, by_force, -1);
 }
 
-Eigen::VectorXd adhesion_forces_nN(const EnsembleFit& fit) { return exerted_nN(fit, fit.forces_nN); }
+Eigen::VectorXd adhesion_forces_nN(const EnsembleFit& fit) { return exerted_nN(fit, fit.forces.nN); }
 
 Eigen::MatrixXd by_network_force(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
-  return fit.own ? Eigen::MatrixXd(fit.own->left.transpose() * sums) : sums;
+  return fit.forces.own ? Eigen::MatrixXd(fit.forces.own->left.transpose() * sums) : sums;
 }
 
 Eigen::VectorXd own_variances(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
-  if (!fit.own) return Eigen::VectorXd::Zero(sums.cols());
-  return fit.variance * sums.cwiseProduct(fit.own->covariance * sums).colwise().sum().transpose();
+  if (!fit.forces.own) return Eigen::VectorXd::Zero(sums.cols());
+  return fit.misfit.variance * sums.cwiseProduct(fit.forces.own->covariance * sums).colwise().sum().transpose();
 }
 
 Eigen::Vector2d CutForce::direction() const {
@@ -422,7 +422,7 @@ Eigen::VectorXd along_cut(const Eigen::Vector2d& direction, Eigen::Index n_force
 }
 
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
-  Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.fibre_ids.size()));
+  Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.tensions.fibre_ids.size()));
   for (const int i : indices) ones[i] = 1;
   return estimate_of(
       fit, [&](const MeshFit& mesh) { return ones.dot(mesh.fit.trial.tensions_nN); },
@@ -452,14 +452,14 @@ std::vector<MeshFit> fit_meshes(const network::Ensemble& networks, const Reduced
 
 /// Of the beads, and of the model where two meshes or more tell it.
 void add_variances(EnsembleFit& all) {
-  const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
-  all.chi_squared_per_degree = weighted_residual(all.data, all.forces_nN).squaredNorm() /
-                               static_cast<double>(std::max<Eigen::Index>(1, all.data.n_used - n_tensions));
-  all.variance = misfit_variance(all.data, all.forces_nN, n_tensions, all.loss);
+  const auto n_tensions = static_cast<Eigen::Index>(all.tensions.fibre_ids.size());
+  all.misfit.chi_squared_per_degree = weighted_residual(all.data, all.forces.nN).squaredNorm() /
+                                      static_cast<double>(std::max<Eigen::Index>(1, all.data.n_used - n_tensions));
+  all.misfit.variance = misfit_variance(all.data, all.forces.nN, n_tensions, all.misfit.loss);
   if (all.meshes.size() < 2) return;
   all.model_error = model_error(forces_at_mean(all), all.data.reduced,
-                                variance_beside_model_error(all.data, all.forces_nN, n_tensions, all.loss));
-  all.variance = all.model_error->noise_variance;
+                                variance_beside_model_error(all.data, all.forces.nN, n_tensions, all.misfit.loss));
+  all.misfit.variance = all.model_error->noise_variance;
 }
 
 void check_networks(const network::Ensemble& networks) {
@@ -477,8 +477,8 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   check_networks(networks);
   const int n_meshes = static_cast<int>(networks.size());
   EnsembleFit all;
-  all.fibre_ids = networks.front().fibre_ids();
-  check_suffice(data.n_used, static_cast<Eigen::Index>(all.fibre_ids.size()));
+  all.tensions.fibre_ids = networks.front().fibre_ids();
+  check_suffice(data.n_used, static_cast<Eigen::Index>(all.tensions.fibre_ids.size()));
   std::mutex mutex;
   int n_done = 0;
   const auto tell = [&] {
@@ -490,15 +490,15 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   FirstFit first =
       fit_first(networks.front(), std::move(data), adhesion_ids, parameters, threads, solved_misfit, start);
   tell();
-  all.loss = first.loss;
+  all.misfit.loss = first.loss;
   all.data = std::move(first.data);
   all.meshes = fit_meshes(networks, all.data.reduced, adhesion_ids, parameters, threads, solved_misfit,
                           std::move(first.fit), tell);
   add_means(all);
-  all.own = own_forces_in(all.data);
+  all.forces.own = own_forces_in(all.data);
   add_variances(all);
   numerics::parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
-  all.network_bias =
+  all.tensions.network_bias =
       network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data.reduced, adhesion_ids), threads);
   add_estimates(all, networks.front().is_cut());
   if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);

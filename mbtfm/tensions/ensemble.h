@@ -50,23 +50,38 @@ struct CutForce {
   Eigen::Vector2d direction() const;  ///< of length 1
 };
 
-struct EnsembleFit {
+/// The tensions, the actin network's first.
+struct FoundTensions {
   std::vector<int> fibre_ids;  ///< front() is 0, the actin network
-  std::vector<Estimate> tensions_nN;
-  Eigen::MatrixXd covariance_nN2;             ///< of the tensions; mean over the meshes
-  Eigen::VectorXd forces_nN;                  ///< of the network, by adhesion: fx, fy; mean over the meshes
-  std::optional<OwnForces> own;               ///< that adhesions near a cut have beside these
-  Eigen::VectorXd torques_nN_um;              ///< by adhesion, about the origin; mean over the meshes
-  std::vector<Estimate> force_magnitudes_nN;  ///< by adhesion
-  std::optional<CutForce> cut;                ///< none: the image shows the whole cell
-  Eigen::VectorXd network_forces_nN;          ///< with every fibre at the network's tension: the network's part
+  std::vector<Estimate> nN;
+  Eigen::MatrixXd covariance_nN2;  ///< mean over the meshes
+  double network_bias = 0;         ///< of the network's, relative: by forces that bend within its error
+};
+
+/// What the adhesions carry, fx and fy by adhesion; means over the meshes.
+struct FoundForces {
+  Eigen::VectorXd nN;                ///< of the network
+  std::optional<OwnForces> own;      ///< that adhesions near a cut have beside these
+  Eigen::VectorXd torques_nN_um;     ///< by adhesion, about the origin
+  std::vector<Estimate> magnitudes;  ///< by adhesion
+  Eigen::VectorXd of_network_nN;     ///< with every fibre at the network's tension: the network's part
+};
+
+/// What the mean over meshes leaves of the beads.
+struct Unexplained {
+  double chi_squared_per_degree = 0;  ///< 1 where the model explains all but the noise
+  double variance = 0;                ///< of a component of the data: see misfit_variance
+  Loss loss = Loss::squares;          ///< that the first fit called for
+};
+
+struct EnsembleFit {
+  FoundTensions tensions;
+  FoundForces forces;
+  std::optional<CutForce> cut;  ///< none: the image shows the whole cell
   /// Sums of the magnitudes of both, less what noise and the bounds t >= 0 add to them on average.
   Estimate total_force_nN, network_force_nN;
-  double chi_squared_per_degree = 0;      ///< of the mean over meshes: 1 where the model explains all but the noise
-  double network_bias = 0;                ///< of its tension, relative: by forces that bend within its error
-  double variance = 0;                    ///< of a component of `data`: see misfit_variance
+  Unexplained misfit;
   LinearData data;                        ///< as the loss weighs it
-  Loss loss = Loss::squares;              ///< that the first fit called for
   std::optional<ModelError> model_error;  ///< that two meshes or more tell
   std::vector<MeshFit> meshes;
   Report report;  ///< converged where every fit is

@@ -60,12 +60,12 @@ struct MeanVariances {
 /// s² of the beads alone over the variance that the fit counts with: the rest is the model's where no model error is.
 double bead_share(const BudgetInputs& in) {
   if (in.fit.model_error || !in.data.has_errors) return 1;
-  return std::min(1.0, noise_variance(in.data) / in.fit.variance);
+  return std::min(1.0, noise_variance(in.data) / in.fit.misfit.variance);
 }
 
 /// How far the iterations stopped from the minimum, and the forces from balance.
 VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& gain) {
-  const double imbalance = mesh.fit.trial.rest->imbalance_nN() / std::max(fit.forces_nN.norm(), 1e-300);
+  const double imbalance = mesh.fit.trial.rest->imbalance_nN() / std::max(fit.forces.nN.norm(), 1e-300);
   VectorXd slope = mesh.local.g;
   for (Index i = 0; i < slope.size(); ++i) {
     if (mesh.local.tensions_nN[i] <= 0) slope[i] = std::min(slope[i], 0.0);  // at its bound, where the minimum is
@@ -88,12 +88,12 @@ MatrixXd pulled_place(const BudgetInputs& in) {
 MatrixXd covariance_by_place(const EnsembleFit& fit, const MeshFit& mesh, const MatrixXd& pulled) {
   const MatrixXd answered = mesh.noise_covariance_nN2 * (mesh.force_derivatives.transpose() * pulled);  // Cov V
   MatrixXd middle = pulled.transpose() * mesh.force_derivatives * answered;
-  middle.diagonal().array() += fit.variance;
+  middle.diagonal().array() += fit.misfit.variance;
   return answered * middle.ldlt().solve(answered.transpose());
 }
 
 MeanVariances mean_variances(const BudgetInputs& in) {
-  const Index n_rows = static_cast<Index>(in.fit.fibre_ids.size()) + (in.fit.cut ? 2 : 1);
+  const Index n_rows = static_cast<Index>(in.fit.tensions.fibre_ids.size()) + (in.fit.cut ? 2 : 1);
   const double n = static_cast<double>(in.fit.meshes.size());
   const VectorXd none = VectorXd::Zero(n_rows);
   MeanVariances mean{none, none, none, none, none};
@@ -199,7 +199,7 @@ AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const n
   const Adhesion& a = in.cell.adhesions[adhesion];
   const substrate::Ellipse ellipse = substrate::ellipse_of(a);
   const auto row = 2 * static_cast<Index>(adhesion);
-  const Vec2 force_nN{in.fit.forces_nN[row], in.fit.forces_nN[row + 1]};
+  const Vec2 force_nN{in.fit.forces.nN[row], in.fit.forces.nN[row + 1]};
   const std::vector<Variation> variations = variations_of(ellipse, in.segmentation);
   AdhesionChanges changes{.near = beads_near(in.beads, ellipse), .displacement = {}, .by_vertices = {}};
   const auto n = static_cast<Index>(variations.size());
@@ -218,8 +218,8 @@ AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const n
 
 VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers, int threads) {
   const auto sums = in.fit.meshes.front().fit.trial.rest->answer_to_geometry(by_network_adhesion(in, gain.of_model));
-  VectorXd tensions_nN(static_cast<Index>(in.fit.tensions_nN.size()));
-  for (Index i = 0; i < tensions_nN.size(); ++i) tensions_nN[i] = in.fit.tensions_nN[static_cast<std::size_t>(i)].value;
+  VectorXd tensions_nN(static_cast<Index>(in.fit.tensions.nN.size()));
+  for (Index i = 0; i < tensions_nN.size(); ++i) tensions_nN[i] = in.fit.tensions.nN[static_cast<std::size_t>(i)].value;
   std::vector<AdhesionChanges> changes(in.cell.adhesions.size());
   numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
     changes[static_cast<std::size_t>(i)] = changes_of(in, static_cast<std::size_t>(i), *sums, gain.of_model.rows());
@@ -248,7 +248,7 @@ VectorXd field_of_base_um(const BudgetInputs& in) {
     for (std::size_t a = 0; a < in.cell.adhesions.size(); ++a) {
       const greens::Sym2 g =
           layer.point_correction_um_per_nN(in.beads[b].position_um - in.cell.adhesions[a].position_um);
-      const Eigen::Vector2d f = in.fit.forces_nN.segment<2>(2 * static_cast<Index>(a));
+      const Eigen::Vector2d f = in.fit.forces.nN.segment<2>(2 * static_cast<Index>(a));
       field.segment<2>(2 * static_cast<Index>(b)) +=
           Eigen::Vector2d(g.xx * f.x() + g.xy * f.y(), g.xy * f.x() + g.yy * f.y());
     }
@@ -261,8 +261,8 @@ VectorXd field_of_base_um(const BudgetInputs& in) {
 VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers) {
   const VectorXd values = gain.of_tensions * in.fit.meshes.front().fit.trial.tensions_nN;
   VectorXd variance = (in.substrate_error * values).cwiseAbs2();
-  for (Index a = 0; a < in.fit.forces_nN.size(); a += 2) {
-    variance += (in.substrate_error * gain.of_forces.middleCols<2>(a) * in.fit.forces_nN.segment<2>(a)).cwiseAbs2();
+  for (Index a = 0; a < in.fit.forces.nN.size(); a += 2) {
+    variance += (in.substrate_error * gain.of_forces.middleCols<2>(a) * in.fit.forces.nN.segment<2>(a)).cwiseAbs2();
   }
   if (!in.lacks_base) return variance;
   const VectorXd field = field_of_base_um(in);
@@ -282,7 +282,7 @@ VectorXd change_by_other_gel_um(const BudgetInputs& in, const Gel& other, int th
     return greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads)
         ->response({ellipses}, {points})
         ->kept()
-        ->displace(in.fit.forces_nN);
+        ->displace(in.fit.forces.nN);
   };
   return field(other) - field(in.gel);
 }
@@ -318,14 +318,14 @@ std::optional<VectorXd> gel_variances(const BudgetInputs& in, const Gain& gain, 
 /// Of a tension at zero the part by noise and model is what its interval's upper half says: it could be that much, and
 /// linear propagation knows only that it is held.
 void add_room_above(const EnsembleFit& fit, MeanVariances& mean) {
-  for (std::size_t i = 0; i < fit.tensions_nN.size(); ++i) {
-    const Estimate& tension = fit.tensions_nN[i];
+  for (std::size_t i = 0; i < fit.tensions.nN.size(); ++i) {
+    const Estimate& tension = fit.tensions.nN[i];
     const auto at = static_cast<Index>(i);
     if (!tension.sides_95 || !std::isfinite(tension.sides_95->above)) continue;
     const double room = std::pow(tension.sides_95->above / kNormal95, 2);
     if (tension.value > 0 || room <= mean.beads[at] + mean.mesh[at] + mean.model[at]) continue;
     const LocalMisfit& local = fit.meshes.front().local;
-    const double by_noise = fit.variance * local.H(at, at);
+    const double by_noise = fit.misfit.variance * local.H(at, at);
     const double by_model = local.model_variance.size() > 0 ? local.model_variance(at, at) : 0;
     const double share = by_noise + by_model > 0 ? by_noise / (by_noise + by_model) : 1;
     mean.place[at] = 0;
@@ -357,7 +357,7 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   mean.beads.tail(sums.cols()) += own_variances(in.fit, sums);
   add_room_above(in.fit, mean);
   if (in.fit.model_error)
-    mean.mesh[static_cast<Index>(in.fit.fibre_ids.size())] +=
+    mean.mesh[static_cast<Index>(in.fit.tensions.fibre_ids.size())] +=
         std::pow(roughness_of_total(adhesion_forces_nN(in.fit), *in.fit.model_error).sigma_nN, 2);
   const VectorXd segmentation = segmentation_variances(in, gain, answers, threads);
   const VectorXd substrate = substrate_variances(in, gain, answers);
@@ -377,11 +377,11 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
     return p;
   };
   ErrorBudget budget;
-  const auto n = static_cast<Index>(in.fit.fibre_ids.size());
+  const auto n = static_cast<Index>(in.fit.tensions.fibre_ids.size());
   for (Index i = 0; i < n; ++i) {
     const auto at = static_cast<std::size_t>(i);
     budget.tensions.push_back(
-        {.fibre_id = in.fit.fibre_ids[at], .tension_nN = in.fit.tensions_nN[at].value, .parts_nN = parts(i)});
+        {.fibre_id = in.fit.tensions.fibre_ids[at], .tension_nN = in.fit.tensions.nN[at].value, .parts_nN = parts(i)});
   }
   budget.total_force_nN = total_nN(adhesion_forces_nN(in.fit));
   budget.total_force_parts_nN = parts(n);

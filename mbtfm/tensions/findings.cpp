@@ -125,7 +125,7 @@ Region worst_region(const LinearData& data, const Eigen::VectorXd& forces_nN, do
 }
 
 Noticed beads_disagree(const FitOutcome& o) {
-  const Region worst = worst_region(o.data, o.fit.forces_nN, o.summary.noise_um);
+  const Region worst = worst_region(o.data, o.fit.forces.nN, o.summary.noise_um);
   return noticed(FindingKind::beads_disagree_by_region, worst.chi_squared,
                  "In the square of " + brief(worst.side_um) + " um about (" + brief(worst.centre_um.x) + ", " +
                      brief(worst.centre_um.y) + ") um the model leaves " + brief(worst.chi_squared) +
@@ -304,12 +304,12 @@ std::vector<int> adhesions_without_beads(const std::vector<Adhesion>& adhesions,
 
 Imbalance imbalance_of(const EnsembleFit& fit) {
   Eigen::Vector2d net_nN = Eigen::Vector2d::Zero();
-  for (Eigen::Index i = 0; i < fit.forces_nN.size(); i += 2) net_nN += fit.forces_nN.segment<2>(i);
+  for (Eigen::Index i = 0; i < fit.forces.nN.size(); i += 2) net_nN += fit.forces.nN.segment<2>(i);
   const CutReaction cut = fit.cut ? fit.cut->reaction : CutReaction{};
   constexpr double kTiny = 1e-300;  // a cell without any force is balanced
-  return {.force = (net_nN + cut.force_nN).norm() / std::max(total_nN(fit.forces_nN), kTiny),
-          .torque = std::abs(fit.torques_nN_um.sum() + cut.torque_nN_um) /
-                    std::max(fit.torques_nN_um.cwiseAbs().sum(), kTiny)};
+  return {.force = (net_nN + cut.force_nN).norm() / std::max(total_nN(fit.forces.nN), kTiny),
+          .torque = std::abs(fit.forces.torques_nN_um.sum() + cut.torque_nN_um) /
+                    std::max(fit.forces.torques_nN_um.cwiseAbs().sum(), kTiny)};
 }
 
 std::vector<Finding> findings_of(const FitOutcome& o) {

@@ -68,14 +68,14 @@ std::optional<double> if_finite(double number) { return std::isfinite(number) ? 
 
 std::vector<Tension> tensions_of(const EnsembleFit& fit) {
   double largest_nN = 0;
-  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) largest_nN = std::max(largest_nN, fit.tensions_nN[i].value);
+  for (std::size_t i = 1; i < fit.tensions.nN.size(); ++i) largest_nN = std::max(largest_nN, fit.tensions.nN[i].value);
   std::vector<Tension> tensions;
-  for (std::size_t i = 0; i < fit.fibre_ids.size(); ++i) {
-    const Estimate& e = fit.tensions_nN[i];
+  for (std::size_t i = 0; i < fit.tensions.fibre_ids.size(); ++i) {
+    const Estimate& e = fit.tensions.nN[i];
     const Interval interval = interval_95(e);
     // A tension that could be anything that occurs in this cell was not measured.
     const double scale = i == 0 ? e.value : largest_nN;
-    tensions.push_back({.fibre_id = fit.fibre_ids[i],
+    tensions.push_back({.fibre_id = fit.tensions.fibre_ids[i],
                         .tension_nN = e.value,
                         .low_nN = interval.low,
                         .high_nN = if_finite(interval.high),
@@ -95,10 +95,10 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
   std::vector<AdhesionForce> forces;
   for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
     const auto at = 2 * static_cast<Eigen::Index>(a);
-    const Vec2 network_nN{fit.forces_nN[at], fit.forces_nN[at + 1]};
-    const double about_origin_nN_um = fit.torques_nN_um[static_cast<Eigen::Index>(a)];
+    const Vec2 network_nN{fit.forces.nN[at], fit.forces.nN[at + 1]};
+    const double about_origin_nN_um = fit.forces.torques_nN_um[static_cast<Eigen::Index>(a)];
     const Vec2 force_nN{exerted_nN[at], exerted_nN[at + 1]};
-    const Estimate& magnitude_nN = fit.force_magnitudes_nN[a];
+    const Estimate& magnitude_nN = fit.forces.magnitudes[a];
     const double student = quantile_975(magnitude_nN) / kNormal95;  // as in interval_95
     const numerics::MagnitudeInterval interval =
         numerics::magnitude_interval_95(norm(force_nN), student * magnitude_nN.standard_error);
@@ -119,14 +119,14 @@ namespace {
 template <class Part>
 double over_fibres(const EnsembleFit& fit, const Part& part) {
   double sum = 0;
-  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) sum += std::pow(part(fit.tensions_nN[i]), 2);
+  for (std::size_t i = 1; i < fit.tensions.nN.size(); ++i) sum += std::pow(part(fit.tensions.nN[i]), 2);
   return std::sqrt(sum);
 }
 
 Figures figures_of(const CutForce& cut, const EnsembleFit& fit, const std::vector<Adhesion>& adhesions) {
   const Interval interval = interval_95(cut.magnitude_nN);
   double torque_nN_um = cut.reaction.torque_nN_um;  // and of the adhesions' own forces, at their centres
-  const Eigen::VectorXd own_nN = adhesion_forces_nN(fit) - fit.forces_nN;
+  const Eigen::VectorXd own_nN = adhesion_forces_nN(fit) - fit.forces.nN;
   for (std::size_t a = 0; a < adhesions.size(); ++a) {
     const auto at = 2 * static_cast<Eigen::Index>(a);
     torque_nN_um -= cross(adhesions[a].position_um, {own_nN[at], own_nN[at + 1]});
@@ -141,7 +141,7 @@ Figures figures_of(const CutForce& cut, const EnsembleFit& fit, const std::vecto
 /// sigma √n / |u less the motion|: the relative L2 that noise alone would leave.
 double expected_relative_l2(const EnsembleFit& fit, double noise_um) {
   const LinearData& data = fit.data;
-  const double measured_um = (residual_um(data, fit.forces_nN) + moved_by(data, fit.forces_nN)).norm();
+  const double measured_um = (residual_um(data, fit.forces.nN) + moved_by(data, fit.forces.nN)).norm();
   return measured_um > 0 ? noise_um * std::sqrt(static_cast<double>(data.displacement_um.size())) / measured_um : 0;
 }
 
@@ -150,10 +150,10 @@ double expected_relative_l2(const EnsembleFit& fit, double noise_um) {
 FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double surface_tension_nN_per_um,
                       const FitParameters& parameters) {
   const Polygon& outline_um = scene.cell.outline_um;
-  const NoiseLevel noise = noise_level(scene.beads, fit.data, fit.forces_nN, outline_um, parameters.far_distance_um);
+  const NoiseLevel noise = noise_level(scene.beads, fit.data, fit.forces.nN, outline_um, parameters.far_distance_um);
   const Imbalance balance = imbalance_of(fit);
   FitSummary s;
-  s.relative_l2 = relative_l2(fit.data, fit.forces_nN);
+  s.relative_l2 = relative_l2(fit.data, fit.forces.nN);
   s.noise_um = noise.sigma_um;
   s.expected_relative_l2 = expected_relative_l2(fit, noise.sigma_um);
   s.total_force_nN = fit.total_force_nN.value;
@@ -164,7 +164,7 @@ FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double s
   s.iterations = fit.report.iterations;
   s.converged = fit.report.converged;
   s.more = {{"noise_source", noise.source},
-            {"chi_squared_per_degree", fit.chi_squared_per_degree},
+            {"chi_squared_per_degree", fit.misfit.chi_squared_per_degree},
             {"total_force_sigma_nN", fit.total_force_nN.standard_error},
             {"network_force_sigma_nN", fit.network_force_nN.standard_error},
             {"net_force_over_total", balance.force},
@@ -174,7 +174,7 @@ FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double s
             {"n_beads", std::int64_t(scene.beads.size())},
             {"n_flagged_beads", std::int64_t(scene.n_flagged)},
             {"method", name_of(parameters.method)},
-            {"loss", name_of(fit.loss)},
+            {"loss", name_of(fit.misfit.loss)},
             {"reason", fit.report.reason}};
   if (!fit.cut) return s;
   const Figures of_cut = figures_of(*fit.cut, fit, scene.cell.adhesions);

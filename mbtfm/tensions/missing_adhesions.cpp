@@ -165,7 +165,7 @@ MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const Linear
   const MeshFit& mesh = fit.meshes.front();
   const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
   const Eigen::MatrixXd information =
-      q.square - by_tension * mesh.noise_covariance_nN2 * by_tension.transpose() / fit.variance;
+      q.square - by_tension * mesh.noise_covariance_nN2 * by_tension.transpose() / fit.misfit.variance;
   const Eigen::Vector2d force = information.ldlt().solve(q.score);
   return {.position_um = q.place_um,
           .force_nN = {force[0], force[1]},
@@ -179,8 +179,10 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
   const std::vector<Vec2> places = free_places(cell);
   const BeadSquares beads(data);
   const DiscField disc(gel);
-  const Eigen::VectorXd weight = squared_weights(data), residual = residual_um(data, fit.forces_nN);
-  const auto ask_at = [&](Vec2 place_um) { return ask(place_um, beads, disc, data, weight, residual, fit.variance); };
+  const Eigen::VectorXd weight = squared_weights(data), residual = residual_um(data, fit.forces.nN);
+  const auto ask_at = [&](Vec2 place_um) {
+    return ask(place_um, beads, disc, data, weight, residual, fit.misfit.variance);
+  };
   std::vector<Question> asked(places.size());
   numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int i) {
     asked[static_cast<std::size_t>(i)] = ask_at(places[static_cast<std::size_t>(i)]);

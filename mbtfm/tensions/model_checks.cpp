@@ -51,9 +51,9 @@ Eigen::VectorXd best_uniform_nN(const TensionProblem& problem) {
 }  // namespace
 
 Eigen::MatrixXd correlation_of(const EnsembleFit& fit) {
-  Eigen::VectorXd scale = fit.covariance_nN2.diagonal().cwiseSqrt();
+  Eigen::VectorXd scale = fit.tensions.covariance_nN2.diagonal().cwiseSqrt();
   for (double& s : scale) s = s > 0 ? 1 / s : 0;
-  return scale.asDiagonal() * fit.covariance_nN2 * scale.asDiagonal();
+  return scale.asDiagonal() * fit.tensions.covariance_nN2 * scale.asDiagonal();
 }
 
 std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
@@ -86,9 +86,10 @@ Influence influence_of(const EnsembleFit& fit, const LinearData& data) {
   const BeadAnswers answers(data, solve_normal(data.reduced, mesh.by_force.transpose()).transpose());
   const Eigen::VectorXd own_error = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1 / w : 0; });
   const Eigen::Index n_beads = data.bead_weight.size();
-  Influence influence{.variance = Eigen::VectorXd(answers.n_rows()),
-                      .n_informing_beads = Eigen::VectorXd(answers.n_rows()),
-                      .most_informed = std::vector<int>(static_cast<std::size_t>(n_beads), fit.fibre_ids.front())};
+  Influence influence{
+      .variance = Eigen::VectorXd(answers.n_rows()),
+      .n_informing_beads = Eigen::VectorXd(answers.n_rows()),
+      .most_informed = std::vector<int>(static_cast<std::size_t>(n_beads), fit.tensions.fibre_ids.front())};
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(n_beads);
   answers.for_each_block([&](Eigen::Index first, const Eigen::MatrixXd& block) {
     for (Eigen::Index k = 0; k < block.rows(); ++k) {
@@ -100,7 +101,7 @@ Influence influence_of(const EnsembleFit& fit, const LinearData& data) {
         by_bead[b] = row.segment<2>(2 * b).squaredNorm();
         if (by_bead[b] <= largest[b]) continue;
         largest[b] = by_bead[b];
-        influence.most_informed[static_cast<std::size_t>(b)] = fit.fibre_ids[static_cast<std::size_t>(i)];
+        influence.most_informed[static_cast<std::size_t>(b)] = fit.tensions.fibre_ids[static_cast<std::size_t>(i)];
       }
       const double sum_of_squares = by_bead.squaredNorm();
       influence.variance[i] = by_bead.sum();
@@ -121,10 +122,10 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
   const Eigen::VectorXd uniform = best_uniform_nN(TensionProblem(first_network, reduced, adhesion_ids));
   std::vector<ModelScore> models = {
       score("no-fibres", 1, misfit(uniform), variance, data),
-      score("full", static_cast<int>(fit.fibre_ids.size()), misfit(fit.forces_nN), variance, data),
+      score("full", static_cast<int>(fit.tensions.fibre_ids.size()), misfit(fit.forces.nN), variance, data),
       score("adhesion-forces", static_cast<int>(reduced.n_felt), reduced.floor_squared, variance, data)};
   models[0].forces_nN = uniform;
-  models[1].forces_nN = fit.forces_nN;
+  models[1].forces_nN = fit.forces.nN;
   models[2].forces_nN = free_forces_nN(reduced);
   for (ModelScore& model : models) model.relative_l2 = relative_l2(data, model.forces_nN);
   return models;
@@ -132,8 +133,8 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
 
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence) {
   std::vector<FibreLeftOut> fibres;
-  for (Eigen::Index i = 1; i < static_cast<Eigen::Index>(fit.fibre_ids.size()); ++i) {
-    FibreLeftOut left{.fibre_id = fit.fibre_ids[static_cast<std::size_t>(i)],
+  for (Eigen::Index i = 1; i < static_cast<Eigen::Index>(fit.tensions.fibre_ids.size()); ++i) {
+    FibreLeftOut left{.fibre_id = fit.tensions.fibre_ids[static_cast<std::size_t>(i)],
                       .chi_squared_rise = 0,
                       .aic_rise = 0,
                       .n_informing_beads = 0};
@@ -174,11 +175,11 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   ReducedData data = fit.data.reduced;
   if (fit.model_error) {
     ModelError error = *fit.model_error;
-    error.force_variance_nN2 += segmentation_variance_nN2(fit.forces_nN, adhesions, segmentation);
+    error.force_variance_nN2 += segmentation_variance_nN2(fit.forces.nN, adhesions, segmentation);
     data = whitened(data, error, threads);
   }
   const Eigen::MatrixXd& C = *data.compliance;
-  const Eigen::VectorXd residual = data.target - displace(data, fit.forces_nN);
+  const Eigen::VectorXd residual = data.target - displace(data, fit.forces.nN);
   // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.
   const Eigen::MatrixXd CJ = displace(data, mesh.force_derivatives, threads);
   const Eigen::MatrixXd cross_terms = numerics::transposed_product(CJ, C, threads);
@@ -205,7 +206,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
         const double slope = e.dot(q.segment<2>(i) - q.segment<2>(j));
         const double curvature = e.dot((own[a] + own[b]) * e) - 2 * e.dot(K.block<2, 2>(i, j - first) * e);
         if (slope <= 0 || curvature <= 0) continue;
-        const double gain = slope * slope / curvature / fit.variance;
+        const double gain = slope * slope / curvature / fit.misfit.variance;
         if (gain < limit * limit) continue;
         found.push_back({.start_adhesion_id = adhesions[a].adhesion_id,
                          .end_adhesion_id = adhesions[b].adhesion_id,

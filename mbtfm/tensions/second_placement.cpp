@@ -20,11 +20,11 @@ void add(double& part, double more) { part = std::hypot(part, more); }
 
 PlacementSpread spread_between(const EnsembleFit& first, const EnsembleFit& second) {
   PlacementSpread result;
-  for (std::size_t i = 0; i < first.fibre_ids.size(); ++i) {
-    const auto at = std::ranges::find(second.fibre_ids, first.fibre_ids[i]);
-    if (at == second.fibre_ids.end()) continue;
-    const auto j = static_cast<std::size_t>(at - second.fibre_ids.begin());
-    result.tensions_nN[*at] = spread(first.tensions_nN[i].value, second.tensions_nN[j].value);
+  for (std::size_t i = 0; i < first.tensions.fibre_ids.size(); ++i) {
+    const auto at = std::ranges::find(second.tensions.fibre_ids, first.tensions.fibre_ids[i]);
+    if (at == second.tensions.fibre_ids.end()) continue;
+    const auto j = static_cast<std::size_t>(at - second.tensions.fibre_ids.begin());
+    result.tensions_nN[*at] = spread(first.tensions.nN[i].value, second.tensions.nN[j].value);
   }
   result.total_force_nN = spread(first.total_force_nN.value, second.total_force_nN.value);
   if (first.cut && second.cut)

@@ -68,8 +68,8 @@ FrameFit described(const SeriesFrame& frame, const EnsembleFit& fit) {
           .tensions = tensions_of(fit),
           .total_force_nN = fit.total_force_nN,
           .network_force_nN = fit.network_force_nN,
-          .relative_l2 = relative_l2(fit.data, fit.forces_nN),
-          .chi_squared_per_degree = fit.chi_squared_per_degree,
+          .relative_l2 = relative_l2(fit.data, fit.forces.nN),
+          .chi_squared_per_degree = fit.misfit.chi_squared_per_degree,
           .converged = fit.report.converged};
 }
 

@@ -82,9 +82,9 @@ const Table<FitOfFrame>& frame_fit_table() {
 std::vector<CorrelationRow> correlation_rows(const EnsembleFit& fit) {
   const Eigen::MatrixXd correlation = correlation_of(fit);
   std::vector<CorrelationRow> rows;
-  for (std::size_t i = 0; i < fit.fibre_ids.size(); ++i) {
-    for (std::size_t j = i + 1; j < fit.fibre_ids.size(); ++j) {
-      rows.push_back({fit.fibre_ids[i], fit.fibre_ids[j],
+  for (std::size_t i = 0; i < fit.tensions.fibre_ids.size(); ++i) {
+    for (std::size_t j = i + 1; j < fit.tensions.fibre_ids.size(); ++j) {
+      rows.push_back({fit.tensions.fibre_ids[i], fit.tensions.fibre_ids[j],
                       correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))});
     }
   }
@@ -150,7 +150,7 @@ std::vector<ChangeRow> change_rows(const std::vector<Change>& changes, const Ens
   std::vector<ChangeRow> rows;
   for (const Change& change : changes) {
     for (Eigen::Index i = 0; i < change.by_tension_nN.size(); ++i)
-      rows.push_back({change.effect, fit.fibre_ids[static_cast<std::size_t>(i)], change.by_tension_nN[i]});
+      rows.push_back({change.effect, fit.tensions.fibre_ids[static_cast<std::size_t>(i)], change.by_tension_nN[i]});
   }
   return rows;
 }

@@ -123,7 +123,7 @@ TEST(TensionFit, beads_outside_the_region_do_not_count) {
   const EnsembleFit result = test::fit_own_network(scene);
   // 0.05 of noise, a hundred beads a tension
   EXPECT_LE((test::values_of(result) - scene.tensions_nN).norm(), 0.2 * scene.tensions_nN.norm());
-  EXPECT_LE(relative_l2(result.data, result.forces_nN), 1);
+  EXPECT_LE(relative_l2(result.data, result.forces.nN), 1);
 }
 
 TEST(Intervals, errors_make_the_sum_of_magnitudes_as_much_too_large_as_they_do_on_average) {

@@ -42,9 +42,10 @@ TEST(CommonMotion, whatever_it_is_the_tensions_and_their_errors_stay) {
     const EnsembleFit a = fit_of(scene, still, loss), b = fit_of(scene, moved, loss);
     const double scale = values_of(a).norm();
     EXPECT_LE((values_of(a) - values_of(b)).norm(), 1e-6 * scale) << name_of(loss);  // where iterations end
-    EXPECT_LE((a.covariance_nN2 - b.covariance_nN2).norm(), 1e-5 * a.covariance_nN2.norm()) << name_of(loss);
-    EXPECT_NEAR(a.chi_squared_per_degree, b.chi_squared_per_degree, 1e-6) << name_of(loss);
-    EXPECT_NEAR(relative_l2(a.data, a.forces_nN), relative_l2(b.data, b.forces_nN), 1e-6) << name_of(loss);
+    EXPECT_LE((a.tensions.covariance_nN2 - b.tensions.covariance_nN2).norm(), 1e-5 * a.tensions.covariance_nN2.norm())
+        << name_of(loss);
+    EXPECT_NEAR(a.misfit.chi_squared_per_degree, b.misfit.chi_squared_per_degree, 1e-6) << name_of(loss);
+    EXPECT_NEAR(relative_l2(a.data, a.forces.nN), relative_l2(b.data, b.forces.nN), 1e-6) << name_of(loss);
   }
 }
 

@@ -92,14 +92,14 @@ TEST(Contractile, a_model_that_is_linear_is_fitted_as_linear_least_squares_has_i
   const VectorXd expected = covariance * (J.transpose() * y);
   ASSERT_TRUE(fit.report.converged);
   for (int i = 0; i < 3; ++i) {
-    const double sigma = std::sqrt(covariance(i, i) * fit.variance);
+    const double sigma = std::sqrt(covariance(i, i) * fit.misfit.variance);
     // the fit stops where a step moves less than a hundredth of the standard errors
     EXPECT_NEAR(values_of(fit)[i], expected[i], 0.05 * sigma) << i;
-    EXPECT_NEAR(std::sqrt(fit.covariance_nN2(i, i)), sigma, 1e-3 * sigma) << i;
-    EXPECT_NEAR(interval_95(fit.tensions_nN[static_cast<std::size_t>(i)]).high - expected[i], 1.96 * sigma,
+    EXPECT_NEAR(std::sqrt(fit.tensions.covariance_nN2(i, i)), sigma, 1e-3 * sigma) << i;
+    EXPECT_NEAR(interval_95(fit.tensions.nN[static_cast<std::size_t>(i)]).high - expected[i], 1.96 * sigma,
                 0.07 * sigma);
   }
-  EXPECT_NEAR((fit.forces_nN - forces * values_of(fit)).norm(), 0, 1e-9 * fit.forces_nN.norm());
+  EXPECT_NEAR((fit.forces.nN - forces * values_of(fit)).norm(), 0, 1e-9 * fit.forces.nN.norm());
 }
 
 }  // namespace

@@ -68,8 +68,8 @@ TEST(CutCells, tensions_forces_and_the_force_through_the_cut_are_found_within_th
       ++n_tensions;
       n_covered += *tensions[i].low_nN <= truth && truth <= tensions[i].high_nN.value_or(1e9);
       const auto over_sigma = [&](const tensions::Estimate& e) { return (e.value - truth) / e.standard_error; };
-      error += std::pow(over_sigma(found.fit.tensions_nN[i]), 2);
-      error_if_ignored += std::pow(over_sigma(blind.fit.tensions_nN[i]), 2);
+      error += std::pow(over_sigma(found.fit.tensions.nN[i]), 2);
+      error_if_ignored += std::pow(over_sigma(blind.fit.tensions.nN[i]), 2);
     }
     const Eigen::VectorXd forces = tensions::adhesion_forces_nN(found.fit);
     for (std::size_t a = 0; a < s.cut.cell.adhesions.size(); ++a) {
@@ -77,7 +77,7 @@ TEST(CutCells, tensions_forces_and_the_force_through_the_cut_are_found_within_th
       if (s.cut.share_inside.at(id) < 1) continue;
       const Vec2 truth = std::ranges::find(s.experiment.forces, id, &AdhesionForce::adhesion_id)->force_nN;
       const Eigen::Vector2d f = forces.segment<2>(2 * static_cast<Eigen::Index>(a));
-      const tensions::Estimate& e = found.fit.force_magnitudes_nN[a];
+      const tensions::Estimate& e = found.fit.forces.magnitudes[a];
       ++n_forces;
       n_forces_covered += std::abs(f.norm() - f.normalized().dot(Eigen::Vector2d(truth.x, truth.y))) <=
                           tensions::interval_95(e).high - e.value;
@@ -137,9 +137,9 @@ TEST(CutCells, finer_places_change_nothing) {
   const CutFit b = test::fit_cut(s.cut.cell, s.beads, s.gel, 2, Beyond::allowed, {.finest = 0.5, .growth = 0.5});
   EXPECT_GT(b.beyond->n_places, 2 * a.beyond->n_places);
   double squares = 0, n = 0;
-  for (std::size_t i = 1; i < a.fit.tensions_nN.size(); ++i, n += 1) {
-    const double error = a.fit.tensions_nN[i].standard_error;
-    squares += std::pow((a.fit.tensions_nN[i].value - b.fit.tensions_nN[i].value) / error, 2);
+  for (std::size_t i = 1; i < a.fit.tensions.nN.size(); ++i, n += 1) {
+    const double error = a.fit.tensions.nN[i].standard_error;
+    squares += std::pow((a.fit.tensions.nN[i].value - b.fit.tensions.nN[i].value) / error, 2);
   }
   EXPECT_LT(std::sqrt(squares / n), 0.1);
   EXPECT_NEAR(a.fit.cut->x_nN.value, b.fit.cut->x_nN.value, 0.2 * a.fit.cut->x_nN.standard_error);

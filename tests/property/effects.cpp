@@ -96,16 +96,17 @@ TEST(EffectsOfTheFit, elasticity_that_is_off_is_that_of_very_soft_cables) {
 TEST(EffectsOfTheFit, a_robust_loss_where_beads_stray) {
   TensionScene s = scene(0.05);
   const auto on = networks(1);
-  EXPECT_FALSE(
-      robust_loss_effect(Switch::automatic, fitted(on, s.data, s, loss_of_switch(Switch::automatic, Loss::huber)).loss)
-          .is_on);
+  EXPECT_FALSE(robust_loss_effect(Switch::automatic,
+                                  fitted(on, s.data, s, loss_of_switch(Switch::automatic, Loss::huber)).misfit.loss)
+                   .is_on);
   for (std::size_t i = 0; i < s.beads.size(); i += 33) s.beads[i].displacement_um += Vec2{8 * s.beads[i].sigma_um, 0};
   s.data = reduce(s.beads, s.compliance_um_per_nN);
-  EXPECT_TRUE(
-      robust_loss_effect(Switch::automatic, fitted(on, s.data, s, loss_of_switch(Switch::automatic, Loss::huber)).loss)
-          .is_on);
+  EXPECT_TRUE(robust_loss_effect(Switch::automatic,
+                                 fitted(on, s.data, s, loss_of_switch(Switch::automatic, Loss::huber)).misfit.loss)
+                  .is_on);
   EXPECT_FALSE(
-      robust_loss_effect(Switch::off, fitted(on, s.data, s, loss_of_switch(Switch::off, Loss::huber)).loss).is_on);
+      robust_loss_effect(Switch::off, fitted(on, s.data, s, loss_of_switch(Switch::off, Loss::huber)).misfit.loss)
+          .is_on);
   EXPECT_EQ(loss_of_switch(Switch::on, Loss::tukey), Loss::tukey);
 }
 

@@ -98,18 +98,18 @@ TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
                                            .gel = kGel,
                                            .segmentation = kExact},
                                           2);
-  for (std::size_t i = 0; i < fit.tensions_nN.size(); ++i) {
+  for (std::size_t i = 0; i < fit.tensions.nN.size(); ++i) {
     const ErrorParts& parts = budget.tensions[i].parts_nN;
-    EXPECT_NEAR(parts.beads, fit.tensions_nN[i].noise, 1e-9 * parts.beads) << i;
+    EXPECT_NEAR(parts.beads, fit.tensions.nN[i].noise, 1e-9 * parts.beads) << i;
     ASSERT_TRUE(parts.mesh);
-    const double stated = fit.tensions_nN[i].standard_error;
+    const double stated = fit.tensions.nN[i].standard_error;
     EXPECT_NEAR(std::hypot(parts.beads, *parts.mesh, parts.model), stated, 1e-6 * stated) << i;
     EXPECT_EQ(parts.segmentation, 0);
     EXPECT_EQ(parts.substrate, 0);
     EXPECT_LT(parts.solver, 0.2 * parts.beads);  // the fit stops where no bead could tell the difference
   }
   EXPECT_NEAR(budget.total_force_nN,
-              Eigen::Map<const Eigen::Matrix2Xd>(fit.forces_nN.data(), 2, 16).colwise().norm().sum(), 1e-9);
+              Eigen::Map<const Eigen::Matrix2Xd>(fit.forces.nN.data(), 2, 16).colwise().norm().sum(), 1e-9);
 }
 
 TEST(ErrorBudget, one_mesh_tells_nothing_of_the_mesh) {
@@ -268,17 +268,17 @@ TEST(ErrorBudget, of_a_tension_at_zero_is_what_its_interval_says) {
   scene.displacement_um += 4 * (scene.displacement_um - pulling_um);  // as if the fibre pushed
   test::measure(scene, 0.05, 3);
   const Fitted f = fitted(std::move(scene));
-  ASSERT_EQ(f.fit.tensions_nN[1].value, 0);
-  ASSERT_EQ(f.fit.tensions_nN[1].noise, 0);  // it is held
+  ASSERT_EQ(f.fit.tensions.nN[1].value, 0);
+  ASSERT_EQ(f.fit.tensions.nN[1].noise, 0);  // it is held
   const ErrorParts parts = f.budget(kExact).tensions[1].parts_nN;
   EXPECT_GT(parts.beads, 0);
-  EXPECT_NEAR(std::hypot(parts.beads, parts.model), f.fit.tensions_nN[1].sides_95->above / kNormal95, 1e-9);
+  EXPECT_NEAR(std::hypot(parts.beads, parts.model), f.fit.tensions.nN[1].sides_95->above / kNormal95, 1e-9);
 }
 
 EnsembleFit answer_of(std::vector<int> ids, const std::vector<double>& tensions_nN, double total_nN) {
   EnsembleFit fit;
-  fit.fibre_ids = std::move(ids);
-  for (const double t : tensions_nN) fit.tensions_nN.push_back({.value = t});
+  fit.tensions.fibre_ids = std::move(ids);
+  for (const double t : tensions_nN) fit.tensions.nN.push_back({.value = t});
   fit.total_force_nN.value = total_nN;
   return fit;
 }

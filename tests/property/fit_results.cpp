@@ -44,7 +44,7 @@ TEST(AdhesionForces, are_off_by_no_more_than_stated_where_the_cells_network_is_a
       const double truth = scene.forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm();
       const double error = norm(forces[a].force_nN) - truth;
       stated += std::pow(error / *forces[a].sigma_nN, 2);
-      by_beads += std::pow(error / fit.force_magnitudes_nN[a].noise, 2);
+      by_beads += std::pow(error / fit.forces.magnitudes[a].noise, 2);
     }
   }
   EXPECT_LT(stated / n, 1 + 4 * std::sqrt(2.0 / n));  // as if each told of itself
@@ -92,7 +92,7 @@ TEST(StrainEnergy, of_discs_far_apart_is_that_of_each_by_itself) {
                               .minor_axis_um = 2 * kRadius_um});
   }
   EnsembleFit fit;
-  fit.forces_nN = Eigen::Vector4d(kForce_nN, 0, -kForce_nN, 0);
+  fit.forces.nN = Eigen::Vector4d(kForce_nN, 0, -kForce_nN, 0);
   fit.meshes.emplace_back();
   fit.meshes[0].force_derivatives = Eigen::Vector4d(1, 0, -1, 0);  // one fibre between them
   fit.meshes[0].noise_covariance_nN2 = Eigen::MatrixXd::Constant(1, 1, 0.01);
@@ -115,7 +115,7 @@ TEST(ContractileMoment, follows_a_cell_that_is_turned) {
   const Eigen::Rotation2Dd turn(kAngle);
   Cell cell;
   EnsembleFit fit;
-  fit.forces_nN.resize(6);
+  fit.forces.nN.resize(6);
   const Eigen::Vector2d places[] = {{-20, 3}, {18, -5}, {2, 9}}, forces[] = {{5, -1}, {-6, 2}, {1, -1}};
   for (int a = 0; a < 3; ++a) {
     const Eigen::Vector2d at = turn * places[a];
@@ -124,7 +124,7 @@ TEST(ContractileMoment, follows_a_cell_that_is_turned) {
                               .area_um2 = 1,
                               .major_axis_um = 1.2,
                               .minor_axis_um = 1});
-    fit.forces_nN.segment<2>(2 * a) = turn * forces[a];
+    fit.forces.nN.segment<2>(2 * a) = turn * forces[a];
   }
   fit.meshes.emplace_back();
   fit.meshes[0].force_derivatives = Eigen::MatrixXd::Zero(6, 1);

@@ -63,11 +63,11 @@ Answer answer_of(const Case& c, double relative, unsigned seed) {
   }
   LinearData data = reduce(beads, c.scene.compliance_um_per_nN);
   const EnsembleFit fit = fit_ensemble(c.networks, data, c.scene.adhesion_ids, {.loss = Loss::squares}, 2);
-  const auto n = static_cast<Eigen::Index>(fit.tensions_nN.size());
+  const auto n = static_cast<Eigen::Index>(fit.tensions.nN.size());
   Answer answer{
       .value = Eigen::VectorXd(n), .error = Eigen::VectorXd(n), .low = Eigen::VectorXd(n), .high = Eigen::VectorXd(n)};
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Estimate& e = fit.tensions_nN[static_cast<std::size_t>(i)];
+    const Estimate& e = fit.tensions.nN[static_cast<std::size_t>(i)];
     const Interval interval = interval_95(e);
     answer.value[i] = e.value;
     answer.error[i] = e.standard_error;

@@ -36,11 +36,11 @@ TEST(ModelScores, beads_that_are_pushed_are_explained_best_by_no_tension) {
   scene.displacement_um *= -1;
   test::measure(scene, 0.02, 5);
   EnsembleFit nothing;  // of the fit the scores take these alone
-  nothing.fibre_ids = scene.cables.fibre_ids();
-  nothing.forces_nN = Eigen::VectorXd::Zero(scene.forces_nN.size());
+  nothing.tensions.fibre_ids = scene.cables.fibre_ids();
+  nothing.forces.nN = Eigen::VectorXd::Zero(scene.forces_nN.size());
   const std::vector<ModelScore> models = compare_models(nothing, scene.data, scene.cables, scene.adhesion_ids);
   EXPECT_EQ(models[0].name, "no-fibres");
-  EXPECT_EQ(models[0].forces_nN, nothing.forces_nN);
+  EXPECT_EQ(models[0].forces_nN, nothing.forces.nN);
   EXPECT_EQ(models[0].relative_l2, 1);
 }
 

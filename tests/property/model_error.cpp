@@ -137,9 +137,9 @@ TEST(ModelError, of_the_total_force_is_what_it_misses_where_forces_are_not_the_m
   };
   const Eigen::Index n = scene.compliance_um_per_nN.cols();
   const EnsembleFit fit = fitted(Eigen::VectorXd::Zero(n));
-  const Eigen::VectorXd along = directions_of(fit.forces_nN);
+  const Eigen::VectorXd along = directions_of(fit.forces.nN);
   const auto total = [](const EnsembleFit& f) {  // as fitted: roughness is an error of its own, added to that
-    return f.total_force_nN.value - roughness_of_total(f.forces_nN, *f.model_error).lacking_nN;
+    return f.total_force_nN.value - roughness_of_total(f.forces.nN, *f.model_error).lacking_nN;
   };
   double variance = 0;
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -148,7 +148,7 @@ TEST(ModelError, of_the_total_force_is_what_it_misses_where_forces_are_not_the_m
     variance += std::pow(total(other) - total(fit) - deviation * along[k], 2);
   }
   // linear about the fit: forces bend by some per cent over a deviation, and fits stop short by a part of the noise
-  const double of_roughness = roughness_of_total(fit.forces_nN, *fit.model_error).sigma_nN;
+  const double of_roughness = roughness_of_total(fit.forces.nN, *fit.model_error).sigma_nN;
   const double stated = std::sqrt(std::pow(fit.total_force_nN.from_model(), 2) - of_roughness * of_roughness);
   EXPECT_NEAR(std::sqrt(variance) / stated, 1, 0.15);
 }
@@ -248,9 +248,9 @@ OverStated errors_over_stated(mesh::LinkReach reach_of_truth, int n_meshes) {
     const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {}, 2);
     EXPECT_TRUE(fit.report.converged) << fit.report.reason;
     for (std::size_t i = 1; i < 6; ++i) {
-      const double error = fit.tensions_nN[i].value - tensions[static_cast<Eigen::Index>(i)];
-      squares.all += std::pow(error / fit.tensions_nN[i].standard_error, 2) / 20;
-      squares.noise_alone += std::pow(error / fit.tensions_nN[i].noise, 2) / 20;
+      const double error = fit.tensions.nN[i].value - tensions[static_cast<Eigen::Index>(i)];
+      squares.all += std::pow(error / fit.tensions.nN[i].standard_error, 2) / 20;
+      squares.noise_alone += std::pow(error / fit.tensions.nN[i].noise, 2) / 20;
     }
   }
   return squares;
@@ -288,7 +288,7 @@ TEST(ModelError, what_the_beads_tell_of_a_tension_adds_up_to_their_part_of_its_e
   for (Eigen::Index i = 0; i < influence.variance.size(); ++i) {
     const double part = mesh.noise_covariance_nN2(i, i) / mesh.covariance_nN2(i, i);
     EXPECT_LT(part, 0.999) << "the meshes must differ for this to tell anything";
-    EXPECT_NEAR(fit.variance * influence.variance[i], part, 1e-6);
+    EXPECT_NEAR(fit.misfit.variance * influence.variance[i], part, 1e-6);
   }
 }
 
@@ -319,10 +319,10 @@ TEST(ModelError, is_drawn_by_the_bootstrap_as_the_covariance_has_it) {
   parameters.bootstrap = 80;
   const EnsembleFit drawn = fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2);
   for (std::size_t i = 1; i < 4; ++i) {
-    const Estimate& e = fit.tensions_nN[i];
+    const Estimate& e = fit.tensions.nN[i];
     EXPECT_GT(e.standard_error, 1.5 * e.noise) << "the model must count for this to tell anything";
     // 80 draws tell a standard deviation to 8 %; four of those
-    EXPECT_NEAR(drawn.tensions_nN[i].standard_error / e.standard_error, 1, 0.32) << "fibre " << i;
+    EXPECT_NEAR(drawn.tensions.nN[i].standard_error / e.standard_error, 1, 0.32) << "fibre " << i;
   }
 }
 

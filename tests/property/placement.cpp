@@ -126,7 +126,7 @@ TEST(Placement, wherever_the_images_say_the_cell_lies_the_tensions_are_the_same)
   for (const Vec2 shift : {Vec2{0.3, -0.2}, Vec2{-1, 0.6}}) {
     const ShiftedCell off = shifted_cell(shift, 0.01, 0.03, 4);
     const auto [fit, found] = off.fit();
-    EXPECT_LE((values_of(fit) - values_of(still)).norm(), 0.3 * std::sqrt(still.covariance_nN2.trace()))
+    EXPECT_LE((values_of(fit) - values_of(still)).norm(), 0.3 * std::sqrt(still.tensions.covariance_nN2.trace()))
         << "what is left of the shift is linear to a fraction of the error";
     EXPECT_LE(norm(found.placement.shift_um - shift - no_shift.placement.shift_um), 0.5 * found.sigma.head(2).norm());
     EXPECT_NEAR(found.placement.turn_rad, 0.01 + no_shift.placement.turn_rad, 0.5 * found.sigma[2]);
@@ -172,7 +172,7 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
   networks.emplace_back(still.scene.cables.network(), still.scene.cables.parameters());
   const LinearData known = still.data_of(still.scene.beads);
   const EnsembleFit with_known = fit_ensemble(networks, known, still.scene.adhesion_ids, {}, 1);
-  const Eigen::VectorXd& forces = with_known.forces_nN;
+  const Eigen::VectorXd& forces = with_known.forces.nN;
   const LinearData unknown =
       with_more_motions(known, placement_motions(kGel, still.scene.ellipses, forces, still.scene.points_um,
                                                  known.response->displace(forces), {30, 30}, 1));
@@ -187,10 +187,10 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
                                            .n_of_place = 3},
                                           1);
   const auto noise = [](const EnsembleFit& of) -> Eigen::VectorXd {
-    return of.meshes.front().noise_covariance_nN2.diagonal() / of.variance;
+    return of.meshes.front().noise_covariance_nN2.diagonal() / of.misfit.variance;
   };
   for (Eigen::Index i = 0; i < 3; ++i) {
-    const double more = fit.variance * (noise(fit)[i] - noise(with_known)[i]);
+    const double more = fit.misfit.variance * (noise(fit)[i] - noise(with_known)[i]);
     ASSERT_TRUE(budget.tensions[static_cast<std::size_t>(i)].parts_nN.place);
     // the two fits end at tensions that differ by a fraction of an error
     EXPECT_NEAR(std::pow(*budget.tensions[static_cast<std::size_t>(i)].parts_nN.place, 2), more, 0.1 * more) << i;
@@ -215,9 +215,9 @@ TEST(Placement, frames_of_a_series_hold_the_error_of_the_place) {
   const FrameFit allowed = frame_fit([&](LinearData frame, const Eigen::VectorXd& forces_nN) {
     return with_place(std::move(frame), shifted.cell, kGel, forces_nN, known.second.placement.centre_um, 1);
   });
-  for (std::size_t i = 0; i < single.tensions_nN.size(); ++i) {
+  for (std::size_t i = 0; i < single.tensions.nN.size(); ++i) {
     // the forces whose motions are allowed are those of a rough fit here, of the fit's end there
-    EXPECT_NEAR(*allowed.tensions[i].sigma_nN, single.tensions_nN[i].standard_error,
+    EXPECT_NEAR(*allowed.tensions[i].sigma_nN, single.tensions.nN[i].standard_error,
                 0.02 * *allowed.tensions[i].sigma_nN)
         << i;
     EXPECT_GT(*allowed.tensions[i].sigma_nN, *held.tensions[i].sigma_nN) << i;

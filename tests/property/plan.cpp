@@ -62,10 +62,10 @@ TEST(Plan, its_error_by_beads_is_that_which_a_fit_states) {
   const tensions::EnsembleFit fit = tensions::fit_ensemble(
       one, tensions::reduce(field, beads.response, {}, kThreads, tensions::affine_motions(field)), cell.adhesion_ids,
       scene.fit.fit, kThreads, {}, &truth);
-  for (std::size_t i = 0; i < fit.tensions_nN.size(); ++i) {
+  for (std::size_t i = 0; i < fit.tensions.nN.size(); ++i) {
     const double planned = kNoise_um * scene.fit.gel.youngs_modulus_kPa * unit.tensions[static_cast<Eigen::Index>(i)];
     // the plan takes the mean of two meshes, of which the fit has the first: tensions differ by some per cent
-    EXPECT_NEAR(fit.tensions_nN[i].noise, planned, 0.2 * planned) << "tension " << i;
+    EXPECT_NEAR(fit.tensions.nN[i].noise, planned, 0.2 * planned) << "tension " << i;
   }
 }
 

@@ -54,7 +54,7 @@ Experiment two_adhesions() {
 /// As a fit of a network would hold them.
 tensions::EnsembleFit free_forces(tensions::LinearData data) {
   tensions::EnsembleFit fit;
-  fit.forces_nN = tensions::free_forces_nN(data.reduced);
+  fit.forces.nN = tensions::free_forces_nN(data.reduced);
   fit.data = std::move(data);
   fit.meshes.resize(1);
   return fit;
@@ -74,7 +74,7 @@ TEST(StrainedGel, forces_that_made_a_displacement_on_it_are_found_again) {
     e.beads[i].displacement_um = {displacement[2 * i], displacement[2 * i + 1]};
 
   const auto error = [&](const tensions::EnsembleFit& fit) {
-    return (fit.forces_nN - e.forces_nN).norm() / e.forces_nN.norm();
+    return (fit.forces.nN - e.forces_nN).norm() / e.forces_nN.norm();
   };
   const tensions::EnsembleFit on_linear_gel = free_forces(data_of(on, e.beads));
   EXPECT_GT(error(on_linear_gel), 0.005);

@@ -29,11 +29,11 @@ TEST(TensionFit, errors_reach_the_Cramer_Rao_limit_and_intervals_cover) {
       measure(scene, noise, 100 + repeat);
       const EnsembleFit fit = fit_own_network(scene);
       for (Eigen::Index i = 0; i < limit.size(); ++i) {
-        const Interval interval = interval_95(fit.tensions_nN[static_cast<std::size_t>(i)]);
+        const Interval interval = interval_95(fit.tensions.nN[static_cast<std::size_t>(i)]);
         n_covered += interval.low <= scene.tensions_nN[i] && scene.tensions_nN[i] <= interval.high ? 1 : 0;
         ++n_intervals;
         if (scene.tensions_nN[i] < 3 * limit[i]) continue;  // the bound t >= 0 makes those better than the limit
-        sum += std::pow((fit.tensions_nN[static_cast<std::size_t>(i)].value - scene.tensions_nN[i]) / limit[i], 2);
+        sum += std::pow((fit.tensions.nN[static_cast<std::size_t>(i)].value - scene.tensions_nN[i]) / limit[i], 2);
         ++n;
       }
     }
@@ -232,7 +232,7 @@ TEST(TensionFit, leaving_a_stray_bead_out_moves_the_tensions_as_foretold) {
     for (const Eigen::Index b : strays) is_used[static_cast<std::size_t>(b)] = false;
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN, is_used);
     const Eigen::VectorXd moved = values_of(fit_own_network(scene, parameters)) - values_of(with);
-    const Eigen::VectorXd sigma = (mesh.covariance_nN2.diagonal() / with.variance).cwiseSqrt();
+    const Eigen::VectorXd sigma = (mesh.covariance_nN2.diagonal() / with.misfit.variance).cwiseSqrt();
     const double found = moved.cwiseQuotient(sigma).cwiseAbs().maxCoeff();
     EXPECT_GT(found, 0.1);
     EXPECT_NEAR(foretold, found, 0.1 * found);  // forces are not quite linear in the tensions
@@ -243,7 +243,7 @@ TEST(TensionFit, leaving_a_stray_bead_out_moves_the_tensions_as_foretold) {
 TEST(TensionFit, a_bead_far_away_that_is_micrometres_off_changes_neither_tensions_nor_their_errors) {
   TensionScene scene = tension_scene("case_21", 2000, 0.05, 730);
   const EnsembleFit unspoilt = fit_own_network(scene);
-  ASSERT_EQ(unspoilt.loss, Loss::squares);
+  ASSERT_EQ(unspoilt.misfit.loss, Loss::squares);
   const auto farthest = std::max_element(scene.beads.begin(), scene.beads.end(), [&](const Bead& b, const Bead& c) {
     return norm(b.position_um - scene.ellipses[0].centre_um) < norm(c.position_um - scene.ellipses[0].centre_um);
   });
@@ -253,17 +253,17 @@ TEST(TensionFit, a_bead_far_away_that_is_micrometres_off_changes_neither_tension
   scene.compliance_um_per_nN.middleRows<2>(2 * static_cast<Eigen::Index>(far)) *= 1e-6;
   scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
   const EnsembleFit fit = fit_own_network(scene);
-  const Eigen::VectorXd sigma = unspoilt.covariance_nN2.diagonal().cwiseSqrt();
-  EXPECT_EQ(fit.loss, Loss::huber);
+  const Eigen::VectorXd sigma = unspoilt.tensions.covariance_nN2.diagonal().cwiseSqrt();
+  EXPECT_EQ(fit.misfit.loss, Loss::huber);
   // the noise that the fit counts with; that of 4 000 components is known to 2.2 %
-  EXPECT_NEAR(fit.variance, unspoilt.variance, 0.1 * unspoilt.variance);
+  EXPECT_NEAR(fit.misfit.variance, unspoilt.misfit.variance, 0.1 * unspoilt.misfit.variance);
   // Huber's loss leaves 95 % of the information: 2.5 % wider, and moved by 0.23 standard errors of scatter
   EXPECT_LE((values_of(fit) - values_of(unspoilt)).cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 1);
   int n_known = 0;
   for (Eigen::Index i = 0; i < sigma.size(); ++i) {
     if (sigma[i] > 0.3 * values_of(unspoilt)[i]) continue;  // so badly known that it is another where the tension moves
     ++n_known;
-    EXPECT_LE(std::sqrt(fit.covariance_nN2(i, i)), 1.15 * sigma[i]) << i;
+    EXPECT_LE(std::sqrt(fit.tensions.covariance_nN2(i, i)), 1.15 * sigma[i]) << i;
   }
   EXPECT_GE(n_known, 5);
 }
@@ -277,7 +277,7 @@ TEST(TensionFit, by_default_a_few_bad_beads_do_no_harm_and_good_ones_are_fitted_
     FitParameters by_squares;
     by_squares.loss = Loss::squares;
     const EnsembleFit unspoilt = fit_own_network(scene);
-    EXPECT_EQ(unspoilt.loss, Loss::squares);
+    EXPECT_EQ(unspoilt.misfit.loss, Loss::squares);
     EXPECT_EQ(values_of(unspoilt), values_of(fit_own_network(scene, by_squares)));
     clean += error(unspoilt);
     for (std::size_t a = 0; a < 4; ++a) {
@@ -288,11 +288,11 @@ TEST(TensionFit, by_default_a_few_bad_beads_do_no_harm_and_good_ones_are_fitted_
     }
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
     const EnsembleFit fit = fit_own_network(scene);
-    EXPECT_EQ(fit.loss, Loss::huber);
+    EXPECT_EQ(fit.misfit.loss, Loss::huber);
     robust += error(fit);
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
     const EnsembleFit as_told = fit_own_network(scene, by_squares);
-    EXPECT_EQ(as_told.loss, Loss::squares);
+    EXPECT_EQ(as_told.misfit.loss, Loss::squares);
     squares += error(as_told);
   }
   // norms over three repeats of some ten tensions are good to 13 %, their squares' ratio to a third
@@ -305,11 +305,11 @@ TEST(TensionFit, a_fit_does_not_depend_on_the_weights_that_another_left) {
   for (std::size_t b = 0; b < 10; ++b) scene.beads[100 * b].displacement_um += Vec2{1, 0};
   scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
   const EnsembleFit first = fit_own_network(scene);
-  ASSERT_EQ(first.loss, Loss::huber);
+  ASSERT_EQ(first.misfit.loss, Loss::huber);
   EXPECT_TRUE((first.data.bead_weight.array() < 1).any());
   scene.data = first.data;
   const EnsembleFit again = fit_own_network(scene);
-  EXPECT_EQ(again.loss, first.loss);
+  EXPECT_EQ(again.misfit.loss, first.misfit.loss);
   EXPECT_EQ(values_of(again), values_of(first));
   EXPECT_EQ(again.data.bead_weight, first.data.bead_weight);
   FitParameters by_squares;

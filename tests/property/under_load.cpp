@@ -62,7 +62,7 @@ PullingCell pulling_cell(double share, double noise, unsigned seed) {
 }
 
 double error_of(const PullingCell& cell, const EnsembleFit& fit) {
-  return (values_of(fit) - cell.scene.tensions_nN).norm() / std::sqrt(fit.covariance_nN2.trace());
+  return (values_of(fit) - cell.scene.tensions_nN).norm() / std::sqrt(fit.tensions.covariance_nN2.trace());
 }
 
 TEST(UnderLoad, beads_go_to_where_the_cell_pulls_them) {

@@ -20,7 +20,7 @@ using test::values_of;
 
 void expect_sound(const EnsembleFit& fit) {
   EXPECT_TRUE(fit.report.converged) << fit.report.reason;
-  for (const Estimate& e : fit.tensions_nN) {
+  for (const Estimate& e : fit.tensions.nN) {
     EXPECT_TRUE(std::isfinite(e.value));
     EXPECT_GE(e.value, 0);
     const Interval interval = interval_95(e);
@@ -90,9 +90,9 @@ TEST(TensionFitHard, parallel_fibres_0_2_um_apart_are_named_with_their_sum) {
   EXPECT_EQ(groups[0].indices, (std::vector<int>{3, 4}));
   EXPECT_LE(std::abs(groups[0].sum_nN.value - 5), 4 * groups[0].sum_nN.noise);
   // the sum is worth reporting: better known than either by what a correlation of −0.95 means, sqrt(2 (1 − 0.95))
-  EXPECT_LT(groups[0].sum_nN.noise, 0.35 * fit.tensions_nN[3].noise);
+  EXPECT_LT(groups[0].sum_nN.noise, 0.35 * fit.tensions.nN[3].noise);
   test::came_out("sum " + test::two_digits(groups[0].sum_nN.value) + " ± " + test::two_digits(groups[0].sum_nN.noise) +
-                 " nN, each ± " + test::two_digits(fit.tensions_nN[3].noise) + " nN");
+                 " nN, each ± " + test::two_digits(fit.tensions.nN[3].noise) + " nN");
 }
 
 TEST(TensionFitHard, a_hundred_fibres) {
@@ -116,8 +116,8 @@ TEST(TensionFitHard, a_hundred_fibres) {
   expect_sound(fit);
   double sum = 0;
   int n = 0;
-  for (std::size_t i = 0; i < fit.tensions_nN.size(); ++i) {
-    const Estimate& e = fit.tensions_nN[i];
+  for (std::size_t i = 0; i < fit.tensions.nN.size(); ++i) {
+    const Estimate& e = fit.tensions.nN[i];
     if (e.value <= 2 * e.noise) continue;  // those at the bound are better than their noise
     sum += std::pow((e.value - tensions[static_cast<Eigen::Index>(i)]) / e.noise, 2);
     ++n;
@@ -153,11 +153,11 @@ TEST(TensionFitHard, a_fibre_without_beads_near_it_gets_a_wide_interval_that_cov
   const EnsembleFit fit = fit_own_network(scene);
   expect_sound(fit);
   double widest = 0;
-  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
-    const double before = everywhere.tensions_nN[i].noise;  // none where the tension is held at zero
-    if (before > 0) widest = std::max(widest, fit.tensions_nN[i].noise / before);
-    const Interval interval = interval_95(fit.tensions_nN[i]);
-    const double sigmas = 2 * fit.tensions_nN[i].noise;  // beyond the interval: four standard errors
+  for (std::size_t i = 1; i < fit.tensions.nN.size(); ++i) {
+    const double before = everywhere.tensions.nN[i].noise;  // none where the tension is held at zero
+    if (before > 0) widest = std::max(widest, fit.tensions.nN[i].noise / before);
+    const Interval interval = interval_95(fit.tensions.nN[i]);
+    const double sigmas = 2 * fit.tensions.nN[i].noise;  // beyond the interval: four standard errors
     EXPECT_LE(interval.low - sigmas, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
     EXPECT_GE(interval.high + sigmas, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
   }
@@ -179,10 +179,10 @@ TEST(TensionFitHard, where_nothing_pulls_no_tension_is_found) {
   const EnsembleFit fit = fit_own_network(scene);
   expect_sound(fit);
   int n_covering = 0;
-  for (const Estimate& e : fit.tensions_nN) n_covering += interval_95(e).low <= 1e-9 ? 1 : 0;
+  for (const Estimate& e : fit.tensions.nN) n_covering += interval_95(e).low <= 1e-9 ? 1 : 0;
   // 95 % intervals, at the bound 97.5 %: of a dozen one may miss
-  EXPECT_GE(n_covering, static_cast<int>(fit.tensions_nN.size()) - 1);
-  test::came_out(std::to_string(n_covering) + " of " + std::to_string(fit.tensions_nN.size()));
+  EXPECT_GE(n_covering, static_cast<int>(fit.tensions.nN.size()) - 1);
+  test::came_out(std::to_string(n_covering) + " of " + std::to_string(fit.tensions.nN.size()));
 }
 
 TEST(TensionFitHard, one_adhesion_that_carries_everything) {
@@ -210,15 +210,15 @@ TEST(TensionFitHard, noise_as_large_as_the_signal_widens_the_intervals) {
   const EnsembleFit much = fit_own_network(scene);
   expect_sound(much);
   int n_covering = 0;
-  for (std::size_t i = 0; i < much.tensions_nN.size(); ++i) {
-    const Interval wide = interval_95(much.tensions_nN[i]), narrow = interval_95(little.tensions_nN[i]);
+  for (std::size_t i = 0; i < much.tensions.nN.size(); ++i) {
+    const Interval wide = interval_95(much.tensions.nN[i]), narrow = interval_95(little.tensions.nN[i]);
     EXPECT_GT(wide.high - wide.low, narrow.high - narrow.low) << "tension " << i;
     const double truth = scene.tensions_nN[static_cast<Eigen::Index>(i)];
     n_covering += wide.low <= truth && truth <= wide.high ? 1 : 0;
   }
   // binomial, 0.95 of a dozen or more: 80 % is four standard deviations below
-  EXPECT_GE(n_covering, static_cast<int>(0.8 * static_cast<double>(much.tensions_nN.size())));
-  test::came_out(std::to_string(n_covering) + " of " + std::to_string(much.tensions_nN.size()) + " cover");
+  EXPECT_GE(n_covering, static_cast<int>(0.8 * static_cast<double>(much.tensions.nN.size())));
+  test::came_out(std::to_string(n_covering) + " of " + std::to_string(much.tensions.nN.size()) + " cover");
 }
 
 }  // namespace

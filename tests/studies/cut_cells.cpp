@@ -29,9 +29,9 @@ struct Score {
 Score tensions(const tensions::EnsembleFit& fit, const std::vector<Tension>& truth, const Cell& of) {
   Score score;
   for (const Fibre& f : of.fibres) {
-    const auto i = std::ranges::find(fit.fibre_ids, f.fibre_id) - fit.fibre_ids.begin();
-    if (static_cast<std::size_t>(i) == fit.fibre_ids.size()) continue;
-    const tensions::Estimate& e = fit.tensions_nN[static_cast<std::size_t>(i)];
+    const auto i = std::ranges::find(fit.tensions.fibre_ids, f.fibre_id) - fit.tensions.fibre_ids.begin();
+    if (static_cast<std::size_t>(i) == fit.tensions.fibre_ids.size()) continue;
+    const tensions::Estimate& e = fit.tensions.nN[static_cast<std::size_t>(i)];
     const double t = std::ranges::find(truth, f.fibre_id, &Tension::fibre_id)->tension_nN;
     const tensions::Interval interval = tensions::interval_95(e);
     score.add(e.value, t, std::max(1e-9, e.standard_error), interval.low <= t && t <= interval.high);
@@ -48,7 +48,7 @@ Score adhesions(const tensions::EnsembleFit& fit, const test::CutCell& cut, cons
     const Eigen::VectorXd exerted = tensions::adhesion_forces_nN(fit);
     const Vec2 found{exerted[row], exerted[row + 1]};
     const Vec2 t = std::ranges::find(truth, id, &AdhesionForce::adhesion_id)->force_nN;
-    const tensions::Estimate& e = fit.force_magnitudes_nN[a];
+    const tensions::Estimate& e = fit.forces.magnitudes[a];
     const double along = norm(found) > 0 ? dot(t, found) / norm(found) : 0;
     const tensions::Interval interval = tensions::interval_95(e);
     score.add(norm(found), along, std::max(1e-9, e.standard_error),
@@ -144,7 +144,7 @@ int main(int argc, char** argv) {
               double(f.n_covered) / f.n, cut.outside_nN.x, cut.outside_nN.y, x, y, c.x_nN.standard_error,
               c.y_nN.standard_error, (x - cut.outside_nN.x) / c.x_nN.standard_error,
               (y - cut.outside_nN.y) / c.y_nN.standard_error, int(beyond.n_places), int(beyond.n_motions),
-              beyond.intensity_nN_per_um, found.fit.chi_squared_per_degree,
+              beyond.intensity_nN_per_um, found.fit.misfit.chi_squared_per_degree,
               found.motion->motion.growth / found.motion->sigma[3]);
         }
       }

@@ -204,23 +204,23 @@ std::string substrate_sheet() {
 charts::Chart intervals(const std::string& title, test::TensionScene& scene) {
   const tensions::EnsembleFit fit = test::fit_own_network(scene);
   std::vector<double> values = {0};
-  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
-    const double higher = std::max(fit.tensions_nN[i].value, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
+  for (std::size_t i = 1; i < fit.tensions.nN.size(); ++i) {
+    const double higher = std::max(fit.tensions.nN[i].value, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
     // a collapsed fibre pulls alike with any tension: its interval has no end
-    values.push_back(std::min(tensions::interval_95(fit.tensions_nN[i]).high, std::max(40.0, 3 * higher)));
+    values.push_back(std::min(tensions::interval_95(fit.tensions.nN[i]).high, std::max(40.0, 3 * higher)));
     values.push_back(higher);
   }
   charts::Chart chart(title,
                       {.label = "fibre",
                        .low = 0.3,
-                       .high = static_cast<double>(fit.tensions_nN.size()) - 0.3,
+                       .high = static_cast<double>(fit.tensions.nN.size()) - 0.3,
                        .scale = charts::Scale::linear},
                       charts::axis_over("tension (nN)", values, charts::Scale::linear));
-  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
+  for (std::size_t i = 1; i < fit.tensions.nN.size(); ++i) {
     const auto x = static_cast<double>(i);
-    const tensions::Interval interval = tensions::interval_95(fit.tensions_nN[i]);
+    const tensions::Interval interval = tensions::interval_95(fit.tensions.nN[i]);
     chart.curve({{x, interval.low}, {x, interval.high}}, stroke(0));
-    chart.dot({x, fit.tensions_nN[i].value}, 3, fill(0));
+    chart.dot({x, fit.tensions.nN[i].value}, 3, fill(0));
     chart.dot({x + 0.25, scene.tensions_nN[static_cast<Eigen::Index>(i)]}, 3, fill(1));
   }
   chart.key("fitted, 95 %", charts::kColours[0]);

@@ -101,13 +101,13 @@ void print_row(const Scene& s, tensions::LinearData data, mesh::NetworkParameter
   const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   double of_mean = 0, of_single = 0, size = 0, over_stated = 0;
   int n_covered = 0, n = 0;
-  for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i, ++n) {
+  for (std::size_t i = 1; i < fit.tensions.fibre_ids.size(); ++i, ++n) {
     const double t = s.experiment.tensions[i].tension_nN;
-    const double error = fit.tensions_nN[i].value - t;
+    const double error = fit.tensions.nN[i].value - t;
     of_mean += error * error;
     size += t * t;
-    over_stated += std::pow(error / fit.tensions_nN[i].standard_error, 2);
-    const tensions::Interval interval = tensions::interval_95(fit.tensions_nN[i]);
+    over_stated += std::pow(error / fit.tensions.nN[i].standard_error, 2);
+    const tensions::Interval interval = tensions::interval_95(fit.tensions.nN[i]);
     n_covered += interval.low <= t && t <= interval.high ? 1 : 0;
     for (const auto& mesh : fit.meshes)
       of_single += std::pow(mesh.fit.trial.tensions_nN[static_cast<Eigen::Index>(i)] - t, 2) / n_meshes;

@@ -123,8 +123,8 @@ struct Score {
 Score score(const tensions::EnsembleFit& fit, const OtherNetwork& o) {
   double error = 0, size = 0, over_stated = 0;
   int n_covered = 0, n = 0;
-  for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i, ++n) {
-    const tensions::Estimate& estimate = fit.tensions_nN[i];
+  for (std::size_t i = 1; i < fit.tensions.fibre_ids.size(); ++i, ++n) {
+    const tensions::Estimate& estimate = fit.tensions.nN[i];
     const double t = o.experiment.tensions[i].tension_nN;
     const tensions::Interval interval = tensions::interval_95(estimate);
     error += std::pow(estimate.value - t, 2);
@@ -180,7 +180,7 @@ void forces(Cells cells) {
         const Eigen::Vector2d got(f.force_nN.x, f.force_nN.y), unit = got.normalized();
         std::printf("%d,%s,%d,%d,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g\n", int(c), name, f.adhesion_id, int(f.connected),
                     wanted.norm(), got.norm(), f.sigma_nN.value_or(0), unit[0] * wanted[1] - unit[1] * wanted[0],
-                    found.network_forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm(),
+                    found.forces.of_network_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm(),
                     distance_to_boundary_um(o.experiment.cell.outline_um, o.experiment.cell.adhesions[a].position_um));
       }
     }

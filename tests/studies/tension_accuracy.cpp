@@ -159,9 +159,9 @@ void add_forces(NoiseRow& row, const TensionScene& scene, const tensions::Ensemb
   const Eigen::VectorXd errors_nN = linearised.errors_nN();
   row.total_bias.add(fit.total_force_nN.value / true_total_nN, linearised.total_error_nN(errors_nN) / true_total_nN);
   row.network_bias.add(fit.network_force_nN.value / true_network_nN, errors_nN[0] / scene.tensions_nN[0]);
-  row.plain_total += tensions::total_nN(fit.forces_nN) / true_total_nN;
+  row.plain_total += tensions::total_nN(fit.forces.nN) / true_total_nN;
   row.total += fit.total_force_nN.value / true_total_nN;
-  row.plain_network += tensions::total_nN(fit.network_forces_nN) / true_network_nN;
+  row.plain_network += tensions::total_nN(fit.forces.of_network_nN) / true_network_nN;
   row.network += fit.network_force_nN.value / true_network_nN;
 }
 
@@ -169,7 +169,7 @@ void add_forces(NoiseRow& row, const TensionScene& scene, const tensions::Ensemb
 void add_tensions(NoiseRow& row, const Eigen::VectorXd& true_nN, const Eigen::VectorXd& limit_nN,
                   const tensions::EnsembleFit& fit) {
   for (Eigen::Index i = 0; i < limit_nN.size(); ++i) {
-    const tensions::Estimate& estimate = fit.tensions_nN[static_cast<std::size_t>(i)];
+    const tensions::Estimate& estimate = fit.tensions.nN[static_cast<std::size_t>(i)];
     const double t = true_nN[i], error = estimate.value - t;
     const tensions::Interval interval = tensions::interval_95(estimate);
     const int is_covered = interval.low <= t && t <= interval.high ? 1 : 0;
@@ -209,8 +209,8 @@ void add_repeats(NoiseRow& row, TensionScene& scene, double noise, int n_repeats
   for (int r = 0; r < n_repeats; ++r) {
     measure_again(scene, noise, first_seed + static_cast<unsigned>(r));
     const tensions::EnsembleFit fit = test::fit_own_network(scene);
-    row.l2 += tensions::relative_l2(fit.data, fit.forces_nN);
-    row.n_robust += fit.loss == tensions::Loss::squares ? 0 : 1;
+    row.l2 += tensions::relative_l2(fit.data, fit.forces.nN);
+    row.n_robust += fit.misfit.loss == tensions::Loss::squares ? 0 : 1;
     ++row.n_repeats;
     add_forces(row, scene, fit, true_network_nN, linearised);
     add_tensions(row, scene.tensions_nN, limit, fit);
@@ -389,7 +389,7 @@ void beside_fttc(const Arguments& a) {
   }
   std::printf("method,total_force,force_error\n");
   for (const auto& [name, f] :
-       {std::pair<const char*, const Eigen::VectorXd&>{"model", fit.forces_nN}, {"fttc", by_fttc}}) {
+       {std::pair<const char*, const Eigen::VectorXd&>{"model", fit.forces.nN}, {"fttc", by_fttc}}) {
     std::printf("%s,%.3f,%.3f\n", name, tensions::total_nN(f) / tensions::total_nN(scene.forces_nN),
                 (f - scene.forces_nN).norm() / scene.forces_nN.norm());
   }
@@ -397,7 +397,7 @@ void beside_fttc(const Arguments& a) {
   files::write_text(
       a.folder / "beside-fttc.svg",
       test::open_svg(960, 265) + arrows("true forces", cell, at_adhesions(cell, scene.forces_nN), kScale_um_per_nN, 0) +
-          arrows("model-based, 25 % noise", cell, at_adhesions(cell, fit.forces_nN), kScale_um_per_nN, 320) +
+          arrows("model-based, 25 % noise", cell, at_adhesions(cell, fit.forces.nN), kScale_um_per_nN, 320) +
           arrows("FTTC, 25 % noise", cell, at_adhesions(cell, by_fttc), kScale_um_per_nN, 640) + "</svg>\n");
 }
 
@@ -448,20 +448,20 @@ void segmentation(const Arguments& a) {
       const tensions::EnsembleFit fit = test::fit_own_network(scene);
       double change = 0, largest = 0, expected = 0, measured = 0;
       int m = 0;
-      for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
-        const int id = fit.fibre_ids[i];
-        if (id > n) largest = std::max(largest, fit.tensions_nN[i].value);
+      for (std::size_t i = 1; i < fit.tensions.fibre_ids.size(); ++i) {
+        const int id = fit.tensions.fibre_ids[i];
+        if (id > n) largest = std::max(largest, fit.tensions.nN[i].value);
         if (id > n) continue;
-        if (std::strcmp(name, "right") == 0) right[id] = fit.tensions_nN[i].value;
-        change += std::pow(fit.tensions_nN[i].value - right[id], 2);
+        if (std::strcmp(name, "right") == 0) right[id] = fit.tensions.nN[i].value;
+        change += std::pow(fit.tensions.nN[i].value - right[id], 2);
         ++m;
       }
       for (const Bead& b : scene.beads)
         measured += dot(b.displacement_um, b.displacement_um), expected += 2 * b.sigma_um * b.sigma_um;
-      std::printf("%d,%s,%.4f,%.4f,%.3f,%.3f\n", c, name, tensions::relative_l2(fit.data, fit.forces_nN),
+      std::printf("%d,%s,%.4f,%.4f,%.3f,%.3f\n", c, name, tensions::relative_l2(fit.data, fit.forces.nN),
                   std::sqrt(expected / measured), std::sqrt(change / m), largest);
       for (auto [series, value] :
-           {std::pair{&misfits, tensions::relative_l2(fit.data, fit.forces_nN) / std::sqrt(expected / measured)},
+           {std::pair{&misfits, tensions::relative_l2(fit.data, fit.forces.nN) / std::sqrt(expected / measured)},
             std::pair{&changes, std::sqrt(change / m)}}) {
         (*series)[name].name = name;
         (*series)[name].is_line = false;
@@ -503,7 +503,7 @@ void directions(const Arguments& a) {
       const Eigen::Vector2d f = free.segment<2>(row);
       if (f.norm() < 1) continue;  // nN: below the noise its direction is chance
       isotropic.push_back(f.dot(equal.segment<2>(row)) / (f.norm() * equal.segment<2>(row).norm()));
-      full.push_back(f.dot(fit.forces_nN.segment<2>(row)) / (f.norm() * fit.forces_nN.segment<2>(row).norm()));
+      full.push_back(f.dot(fit.forces.nN.segment<2>(row)) / (f.norm() * fit.forces.nN.segment<2>(row).norm()));
     }
   }
   const auto mean = [](const std::vector<double>& v) {
@@ -555,7 +555,7 @@ void types(const Arguments& a) {
   std::printf(
       "draws,median_l2_own,median_l2_exchanged,share_exchanged_worse,fitted_l2,seconds\n%d,%.4f,%.4f,%.3f,%.4f,%.1f\n",
       a.n_repeats, median(result.own), median(result.exchanged), double(n_worse) / a.n_repeats,
-      tensions::relative_l2(fit.data, fit.forces_nN), now_s() - begin);
+      tensions::relative_l2(fit.data, fit.forces.nN), now_s() - begin);
   save(a, "types",
        {{.title = "tensions drawn by type",
          .x_label = "relative L2",
