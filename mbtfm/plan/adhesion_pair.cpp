@@ -1,12 +1,14 @@
 #include "mbtfm/plan/adhesion_pair.h"
 
-#include <Eigen/Core>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "samples/drawing/random.h"
 #include "substrate/greens/half_space.h"
@@ -63,56 +65,86 @@ Vec2 place_of_one(int k) {
   constexpr double kStep = 1.0 / 16, kAside = 1.0 / 8;  // both adhesions are among the places
   return {kStep * (k % kAlong - kAlong / 2), kAside * (k / kAlong - kAcross / 2)};
 }
+constexpr int kMiddle = kPlaces / 2, kFirst = kMiddle - 8, kSecond = kMiddle + 8;  ///< where the two are
 
-/// Two adhesions, and all single ones, over the patches around them.
+/// Two adhesions, and all single ones, at the patches around them.
 struct PairFields {
   std::vector<Patch> patches;
-  /// A row a patch: |u₂|² for forces along x and along y; then for each place of the single one GᵀG (xx, xy, yy) and
-  /// Gᵀu₂ (by column).
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> products;
+  Eigen::MatrixXd fields;    ///< 2·patches × 2·places: displacement by a unit force along x, along y
+  Eigen::MatrixXd products;  ///< patches × what has to be summed over beads; by the constants below
 };
-constexpr Eigen::Index kOfPair = 2, kOfPlace = 7;
+/// |u₂|² for forces along x and along y, and G₁ᵀG₂ of the two (xx, xy, yx, yy); then for each place of the single one
+/// GᵀG (xx, xy, yy) and Gᵀu₂ (by column).
+constexpr Eigen::Index kOfPair = 6, kOfPlace = 7;
+
+double radius_of(double area_um2) { return std::sqrt(area_um2 / std::numbers::pi); }
+
+std::vector<Patch> patches_around(double area_um2, double distance_um) {
+  const double radius_um = radius_of(area_um2);
+  // far away the two less the best one are a quadrupole, whose squares beyond a radius fall with its fourth power:
+  // beyond eight distances lies a thousandth
+  const double side_um = 2 * (8 * distance_um + 12 * radius_um);
+  std::vector<Patch> patches;
+  divide({0, 0}, side_um, {{-0.5 * distance_um, 0}, {0.5 * distance_um, 0}}, radius_um, patches);
+  return patches;
+}
 
 PairFields fields_of(const Gel& given, double area_um2, double distance_um) {
   Gel gel = given;
   gel.youngs_modulus_kPa = 1;
-  const double radius_um = std::sqrt(area_um2 / std::numbers::pi);
-  const std::vector<Vec2> places = {{-0.5 * distance_um, 0}, {0.5 * distance_um, 0}};
-  // far away the two less the best one are a quadrupole, whose squares beyond a radius fall with its fourth power:
-  // beyond eight distances lies a thousandth
-  const double side_um = 2 * (8 * distance_um + 12 * radius_um);
-  PairFields fields;
-  divide({0, 0}, side_um, places, radius_um, fields.patches);
-  const Eigen::MatrixXd both = field_of(gel, disc(places[0], radius_um), fields.patches) +
-                               field_of(gel, disc(places[1], radius_um), fields.patches);
-  const auto n = static_cast<Eigen::Index>(fields.patches.size());
-  fields.products.resize(n, kOfPair + kPlaces * kOfPlace);
-  for (Eigen::Index i = 0; i < n; ++i)
-    fields.products.row(i).head<kOfPair>() = both.middleRows<2>(2 * i).colwise().squaredNorm();
-  for (int k = 0; k < kPlaces; ++k) {
-    const Eigen::MatrixXd one = field_of(gel, disc(distance_um * place_of_one(k), radius_um), fields.patches);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const Eigen::Matrix2d G = one.middleRows<2>(2 * i), GG = G.transpose() * G,
-                            Gu = G.transpose() * both.middleRows<2>(2 * i);
-      fields.products.row(i).segment<kOfPlace>(kOfPair + k * kOfPlace) << GG(0, 0), GG(0, 1), GG(1, 1), Gu(0, 0),
-          Gu(1, 0), Gu(0, 1), Gu(1, 1);
+  const double radius_um = radius_of(area_um2);
+  PairFields f{.patches = patches_around(area_um2, distance_um), .fields = {}, .products = {}};
+  const auto n = static_cast<Eigen::Index>(f.patches.size());
+  f.fields.resize(2 * n, 2 * kPlaces);
+  for (int k = 0; k < kPlaces; ++k)
+    f.fields.middleCols<2>(2 * k) = field_of(gel, disc(distance_um * place_of_one(k), radius_um), f.patches);
+  f.products.resize(n, kOfPair + kPlaces * kOfPlace);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto rows = f.fields.middleRows<2>(2 * i);
+    const Eigen::Matrix2d first = rows.middleCols<2>(2 * kFirst), second = rows.middleCols<2>(2 * kSecond),
+                          both = first + second, crossed = first.transpose() * second;
+    f.products.row(i).head<kOfPair>() << both.col(0).squaredNorm(), both.col(1).squaredNorm(), crossed(0, 0),
+        crossed(0, 1), crossed(1, 0), crossed(1, 1);
+    for (int k = 0; k < kPlaces; ++k) {
+      const Eigen::Matrix2d G = rows.middleCols<2>(2 * k), GG = G.transpose() * G, Gu = G.transpose() * both;
+      f.products.row(i).segment<kOfPlace>(kOfPair + k * kOfPlace) << GG(0, 0), GG(0, 1), GG(1, 1), Gu(0, 0), Gu(1, 0),
+          Gu(0, 1), Gu(1, 1);
     }
   }
-  return fields;
+  return f;
 }
 
-/// What the best single force at each place leaves of the fields by forces along the line and across it (columns).
-/// @param sums  of the products over beads
-Eigen::MatrixX2d left_by_place(const Eigen::RowVectorXd& sums) {
-  Eigen::MatrixX2d left(kPlaces, 2);
-  for (int k = 0; k < kPlaces; ++k) {
+/// Of one set of beads, for forces along the line and across it.
+/// @param sums      of the products over beads
+/// @param of_noise  Gᵀ times the beads' noise, by place, x and y
+std::array<Excess, 2> excess_of(const Eigen::RowVectorXd& sums, const Eigen::RowVectorXd& of_noise) {
+  std::array<Excess, 2> both;
+  for (Excess& e : both) e.resize(kPlaces, 3);
+  const auto square_at = [&](int k) {
     const Eigen::Matrix<double, 1, kOfPlace> s = sums.segment<kOfPlace>(kOfPair + k * kOfPlace);
-    const Eigen::Matrix2d GG{{s[0], s[1]}, {s[1], s[2]}}, Gu{{s[3], s[5]}, {s[4], s[6]}};
-    left.row(k) = sums.head<kOfPair>();
-    if (GG.determinant() <= 1e-12 * GG.squaredNorm()) continue;  // one bead or none
-    left.row(k) -= (Gu.array() * (GG.inverse() * Gu).array()).colwise().sum().matrix();
+    return Eigen::Matrix2d{{s[0], s[1]}, {s[1], s[2]}};
+  };
+  Eigen::Matrix4d of_two;
+  of_two << square_at(kFirst), Eigen::Matrix2d{{sums[2], sums[3]}, {sums[4], sums[5]}},
+      Eigen::Matrix2d{{sums[2], sums[4]}, {sums[3], sums[5]}}, square_at(kSecond);
+  Eigen::Vector4d noise_of_two;
+  noise_of_two << of_noise.segment<2>(2 * kFirst).transpose(), of_noise.segment<2>(2 * kSecond).transpose();
+  const double explained_by_two =
+      noise_of_two.dot(Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix4d>(of_two).solve(noise_of_two));
+  for (int k = 0; k < kPlaces; ++k) {
+    const Eigen::Matrix2d GG = square_at(k);
+    // one bead or none: no single force is found
+    const Eigen::Matrix2d inverse = GG.determinant() > 1e-12 * GG.squaredNorm()
+                                        ? Eigen::Matrix2d(GG.inverse())
+                                        : Eigen::Matrix2d(Eigen::Matrix2d::Zero());
+    const Eigen::Vector2d noise = of_noise.segment<2>(2 * k).transpose();
+    for (int c = 0; c < 2; ++c) {
+      const Eigen::Vector2d Gu = sums.segment<2>(kOfPair + k * kOfPlace + 3 + 2 * c).transpose(), found = inverse * Gu;
+      both[static_cast<std::size_t>(c)].row(k) << sums[c] - Gu.dot(found),
+          noise_of_two[c] + noise_of_two[2 + c] - found.dot(noise), explained_by_two - noise.dot(inverse * noise);
+    }
   }
-  return left;
+  return both;
 }
 
 /// By how much a parabola through three values at even steps falls below the middle one, the least.
@@ -121,93 +153,98 @@ double below_middle(double before, double middle, double after) {
   return bend > 0 ? std::pow(after - before, 2) / (8 * bend) : 0;
 }
 
-/// The least of them, between the places, too.
-Eigen::Array2d least_left(const Eigen::RowVectorXd& sums) {
-  const Eigen::MatrixX2d left = left_by_place(sums);
-  Eigen::Array2d least;
-  for (int c = 0; c < 2; ++c) {
-    Eigen::Index k = 0;
-    least[c] = left.col(c).minCoeff(&k);
-    const Eigen::Index along = k % kAlong, across = k / kAlong;
-    if (along > 0 && along + 1 < kAlong) least[c] -= below_middle(left(k - 1, c), left(k, c), left(k + 1, c));
-    if (across > 0 && across + 1 < kAcross)
-      least[c] -= below_middle(left(k - kAlong, c), left(k, c), left(k + kAlong, c));
+/// At the best place of the single adhesion, between those of the table, too.
+/// @param force  in units of the noise times the modulus
+double least_excess(const Excess& e, double force) {
+  const Eigen::ArrayXd of = force * force * e.col(0) + 2 * force * e.col(1) + e.col(2);
+  Eigen::Index k = 0;
+  double least = of.minCoeff(&k);
+  const Eigen::Index along = k % kAlong, across = k / kAlong;
+  if (along > 0 && along + 1 < kAlong) least -= below_middle(of[k - 1], of[k], of[k + 1]);
+  if (across > 0 && across + 1 < kAcross) least -= below_middle(of[k - kAlong], of[k], of[k + kAlong]);
+  return least;
+}
+
+/// Standard normal numbers, a row an experiment: the same for every distance and density, whose errors by chance are
+/// then alike.
+Eigen::MatrixXd normal_numbers(int n_experiments, Eigen::Index n) {
+  Eigen::MatrixXd z(n_experiments, n);
+  for (int k = 0; k < n_experiments; ++k) {
+    drawing::Random random(1, drawing::Stream::noise, static_cast<std::uint64_t>(k));
+    for (double& component : z.row(k)) component = random.normal();
   }
-  return least.max(0);
+  return z;
 }
 
 /// Of experiments whose beads lie at random: two each, with forces along the line and across it.
-std::vector<double> drawn_squares(const PairFields& fields, double beads_per_um2) {
-  constexpr int kExperiments = 150;  // the distance that four in five tell is then known to some 4 %
-  constexpr double kMany = 10;       // beads far off, where it hardly matters how many there are
-  Eigen::RowVectorXd by_many = Eigen::RowVectorXd::Zero(fields.products.cols());
-  std::vector<Eigen::Index> few;
-  for (std::size_t i = 0; i < fields.patches.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    const double mean = beads_per_um2 * fields.patches[i].area_um2;
-    if (mean < kMany) few.push_back(row);
-    if (mean >= kMany) by_many += mean * fields.products.row(row);
-  }
-  std::vector<double> squares;
-  for (std::uint64_t draw = 0; draw < kExperiments; ++draw) {
-    drawing::Random random(1, drawing::Stream::beads, draw);
-    Eigen::RowVectorXd sums = by_many;
-    for (const Eigen::Index row : few) {
-      const int n = random.poisson(beads_per_um2 * fields.patches[static_cast<std::size_t>(row)].area_um2);
-      if (n > 0) sums += n * fields.products.row(row);
+/// @param normal  a row an experiment
+std::vector<Excess> drawn_excess(const PairFields& f, double beads_per_um2, const Eigen::MatrixXd& normal) {
+  constexpr double kMany = 10;  // beads far off, where it hardly matters how many there are
+  const auto n = static_cast<Eigen::Index>(f.patches.size());
+  Eigen::MatrixXd counts(normal.rows(), n), noise(normal.rows(), 2 * n);
+  for (Eigen::Index k = 0; k < counts.rows(); ++k) {
+    drawing::Random random(1, drawing::Stream::beads, static_cast<std::uint64_t>(k));
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double mean = beads_per_um2 * f.patches[static_cast<std::size_t>(i)].area_um2;
+      counts(k, i) = mean < kMany ? random.poisson(mean) : mean;
+      noise.block<1, 2>(k, 2 * i) = std::sqrt(counts(k, i)) * normal.block<1, 2>(k, 2 * i);
     }
-    for (const double left : least_left(sums)) squares.push_back(left);
   }
-  return squares;
+  const Eigen::MatrixXd sums = numerics::product(counts, f.products), of_noise = numerics::product(noise, f.fields);
+  std::vector<Excess> all;
+  for (Eigen::Index k = 0; k < counts.rows(); ++k)
+    for (Excess& e : excess_of(sums.row(k), of_noise.row(k))) all.push_back(std::move(e));
+  return all;
 }
 
-/// Of the standard normal distribution.
-double normal_cdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
+double normal_quantile(double chance) { return boost::math::quantile(boost::math::normal(), chance); }
 
-double normal_quantile(double chance) {
-  return boost::math::quantile(boost::math::normal(), std::clamp(chance, 1e-6, 1 - 1e-6));
-}
-
-double chance_to_tell(const std::vector<double>& squares, double factor) {
-  double sum = 0;
-  for (const double s : squares)
-    if (s > 0) sum += normal_cdf((factor * s - kTold) / (2 * std::sqrt(factor * s)));
-  return sum / static_cast<double>(squares.size());
+/// Each noise and its opposite are as likely. Neither 0 nor 1, which no number of experiments tells.
+double chance_to_tell(const std::vector<Excess>& experiments, double force) {
+  double n_told = 0.5;
+  for (const Excess& e : experiments)
+    for (const double sign : {-1, 1}) n_told += least_excess(e, sign * force) > kTold;
+  return n_told / (2 * static_cast<double>(experiments.size()) + 1);
 }
 
 }  // namespace
 
 SquaresLeft squares_left(const Gel& gel, double area_um2, double distance_um) {
-  const PairFields fields = fields_of(gel, area_um2, distance_um);
-  Eigen::RowVectorXd sums = Eigen::RowVectorXd::Zero(fields.products.cols());
-  for (std::size_t i = 0; i < fields.patches.size(); ++i)
-    sums += fields.patches[i].area_um2 * fields.products.row(static_cast<Eigen::Index>(i));
-  const Eigen::Array2d left = least_left(sums);
-  return {.along_um4 = left[0], .across_um4 = left[1]};
+  const PairFields f = fields_of(gel, area_um2, distance_um);
+  Eigen::RowVectorXd sums = Eigen::RowVectorXd::Zero(f.products.cols());
+  for (std::size_t i = 0; i < f.patches.size(); ++i)
+    sums += f.patches[i].area_um2 * f.products.row(static_cast<Eigen::Index>(i));
+  const auto [along, across] = excess_of(sums, Eigen::RowVectorXd::Zero(2 * kPlaces));
+  return {.along_um4 = std::max(0.0, least_excess(along, 1)), .across_um4 = std::max(0.0, least_excess(across, 1))};
 }
 
 PairResolution::PairResolution(const Gel& gel, double area_um2, std::vector<double> beads_per_um2, int threads) {
   constexpr int kDistances = 16;
-  const double least_um = 2 * std::sqrt(area_um2 / std::numbers::pi);
-  squares_um2_.resize(kDistances);
+  const double least_um = 2 * radius_of(area_um2);
+  excess_.resize(kDistances);
   for (int k = 0; k < kDistances; ++k)
     distance_um_.push_back(least_um * std::pow(kFarthest_um / least_um, double(k) / (kDistances - 1)));
+  std::size_t n_most = 0;
+  for (const double distance_um : distance_um_) n_most = std::max(n_most, patches_around(area_um2, distance_um).size());
+  constexpr int kExperiments = 400;  // the distance that four in five tell is then known to some 4 %
+  const Eigen::MatrixXd normal = normal_numbers(kExperiments, 2 * static_cast<Eigen::Index>(n_most));
   numerics::parallel_for(kDistances, threads, [&](int k) {
     const auto i = static_cast<std::size_t>(k);
     const PairFields fields = fields_of(gel, area_um2, distance_um_[i]);
-    for (const double density : beads_per_um2) squares_um2_[i].push_back(drawn_squares(fields, density));
+    for (const double density : beads_per_um2) excess_[i].push_back(drawn_excess(fields, density, normal));
   });
 }
 
 std::optional<double> PairResolution::least_distance_um(double force_nN, double youngs_modulus_kPa, std::size_t density,
                                                         double noise_um) const {
-  const double factor = std::pow(force_nN / (youngs_modulus_kPa * noise_um), 2);
+  const double force = force_nN / (youngs_modulus_kPa * noise_um);
   double before = 0;
   for (std::size_t i = 0; i < distance_um_.size(); ++i) {
-    const double chance = chance_to_tell(squares_um2_[i].at(density), factor);
+    const double chance = chance_to_tell(excess_[i].at(density), force);
     if (chance >= kChance) {
       if (i == 0) return touching_um();
-      // sqrt(lambda') is nearly linear in the distance's logarithm, and so is the normal variable with this chance
+      // the square root of the excess is nearly linear in the distance's logarithm, and so is the chance's normal
+      // variable
       const double low = normal_quantile(before), high = normal_quantile(chance);
       const double share = (normal_quantile(kChance) - low) / (high - low);
       return distance_um_[i - 1] * std::pow(distance_um_[i] / distance_um_[i - 1], share);

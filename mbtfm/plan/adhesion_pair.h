@@ -1,6 +1,7 @@
 /// When beads tell two adhesions apart.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <vector>
 
@@ -26,11 +27,19 @@ struct SquaresLeft {
 /// @param distance_um  two radii or more: nearer ones are one
 SquaresLeft squares_left(const Gel& gel, double area_um2, double distance_um);
 
-/// The least distance, over experiments whose beads lie at random. With beads at places b, chi² of one less chi² of two
-/// has the mean lambda' = (force / (modulus noise))² min over x, F₁ of sum over b |u₂(b) − G(x, b) F₁|² and the
-/// variance 4 lambda'. So an experiment tells the two with the chance Phi((lambda' − kTold) / (2 sqrt(lambda'))), and
-/// the least distance is where its mean over drawn experiments is kChance. With many beads lambda' is density times
-/// squares_left; with few, chance decides whether one lies between the two, and the mean says nothing.
+/// chi² of one adhesion's fit less that of the fit of two, in one experiment, over the places of the one: a² times the
+/// first column + 2a times the second + the third, where the forces are a times noise and modulus. With beads at places
+/// b and their noise n
+///
+///   first = sum over b |u₂(b) − G F₁|²,  second = n · (u₂ − G F₁),  third = |P₂ n|² − |P₁ n|²
+///
+/// for the best F₁ without noise; P project on what two forces and one can explain. @see SquaresLeft
+using Excess = Eigen::ArrayX3d;
+
+/// The least distance, over experiments whose beads lie at random and have noise: the place of the one that fits best
+/// is found in each. (Its chi² over the noise cannot be taken at the place that is best without noise: the more so the
+/// flatter chi² is over the places, that is, where noise is large and the two are far apart.) With few beads chance
+/// decides whether one lies between the two, too.
 class PairResolution {
  public:
   PairResolution(const Gel& gel, double area_um2, std::vector<double> beads_per_um2, int threads);
@@ -43,7 +52,7 @@ class PairResolution {
 
  private:
   std::vector<double> distance_um_;
-  std::vector<std::vector<std::vector<double>>> squares_um2_;  ///< by distance, density, drawn experiment
+  std::vector<std::vector<std::vector<Excess>>> excess_;  ///< by distance, density, drawn experiment
 };
 
 }  // namespace mbtfm::plan

@@ -1,7 +1,9 @@
 /// Laws of a plan: how its errors scale, and that they are those of the fit.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "mbtfm/plan/cell_numbers.h"
@@ -9,6 +11,8 @@
 #include "mbtfm/tensions/common_motion.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/numerics/parallel.h"
+#include "tests/support/drawn_pair.h"
 
 namespace mbtfm::plan {
 namespace {
@@ -197,21 +201,39 @@ TEST(AdhesionPair, the_least_distance_asks_for_force_over_noise_and_modulus) {
   EXPECT_FALSE(pairs.least_distance_um(0.01, 8, 0, 0.1)) << "nothing is seen of such forces";
 }
 
-/// Many beads: lambda' is density (force / (modulus noise))² squares_left for forces along and across, and the mean of
-/// their chances is kChance.
-TEST(AdhesionPair, of_many_beads_only_the_density_counts) {
-  constexpr double kDensity = 400, kWanted_um = 2;
-  const PairResolution pairs(kGel, 0.46, {kDensity}, kThreads);
-  const SquaresLeft left = squares_left(kGel, 0.46, kWanted_um);
-  const auto chance = [](double lambda) { return 0.5 * std::erfc(-(lambda - kTold) / std::sqrt(8 * lambda)); };
-  double low = 1e-4, high = 100;  // of the noise
-  for (int i = 0; i < 60; ++i) {
-    const double noise_um = std::sqrt(low * high), factor = kDensity / std::pow(8 * noise_um, 2);
-    const bool is_told = chance(factor * left.along_um4) + chance(factor * left.across_um4) > 2 * kChance;
-    (is_told ? low : high) = noise_um;
+/// Many beads: four times as many with twice the noise say the same.
+TEST(AdhesionPair, of_many_beads_only_the_density_over_the_squared_noise_counts) {
+  const PairResolution pairs(kGel, 0.46, {128, 512}, kThreads);
+  for (const double noise_um : {0.32, 0.48}) {
+    const double few_um = *pairs.least_distance_um(1, 8, 0, noise_um);
+    EXPECT_GT(few_um, pairs.touching_um());
+    // 400 experiments tell either to some 4 %, and they have the same random numbers
+    EXPECT_NEAR(*pairs.least_distance_um(1, 8, 1, 2 * noise_um), few_um, 0.04 * few_um) << noise_um;
   }
-  // 150 draws of some 500 beads near the two, and a line between distances 28 % apart
-  EXPECT_NEAR(*pairs.least_distance_um(1, 8, 0, low), kWanted_um, 0.04 * kWanted_um);
+}
+
+/// Where noise is large the single adhesion goes to the place that the noise likes best, the nearer to the truth the
+/// fewer experiments tell two from one.
+TEST(AdhesionPair, at_the_least_distance_four_in_five_experiments_tell_the_two_apart) {
+  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
+  constexpr double kArea_um2 = 0.46;
+  constexpr int kExperiments = 400;
+  const PairResolution pairs(gel, kArea_um2, {1}, kThreads);
+  for (const double noise_um : {0.02, 0.04}) {
+    const double distance_um = *pairs.least_distance_um(1, gel.youngs_modulus_kPa, 0, noise_um);
+    const test::DrawnPair pair{.gel = gel,
+                               .radius_um = std::sqrt(kArea_um2 / std::numbers::pi),
+                               .distance_um = distance_um,
+                               .beads_per_um2 = 1,
+                               .noise_um = noise_um,
+                               .half_field_um = 6 + 2 * distance_um};
+    std::vector<char> told(kExperiments);
+    numerics::parallel_for(kExperiments, kThreads,
+                           [&](int draw) { told[static_cast<std::size_t>(draw)] = test::is_told(pair, draw); });
+    // three standard deviations of a share of 400, and of the plan's own 400
+    const double share = static_cast<double>(std::ranges::count(told, 1)) / kExperiments;
+    EXPECT_NEAR(share, kChance, 3 * std::sqrt(2 * kChance * (1 - kChance) / kExperiments)) << noise_um;
+  }
 }
 
 /// The mean of what beads tell is the same for a hundredth of the beads with a tenth of the noise. But then chance

@@ -2,10 +2,12 @@
 ///   errors    standard errors predicted over the scatter of 100 drawn experiments, six scenes (or one of them, from
 ///   1),
 ///             three noises
-///   pairs     least distance of two adhesions, predicted and drawn
-///   scaling   of the standard errors with noise, modulus and density
+///   pairs     least distance of two adhesions, predicted and drawn, with [1000] experiments a point, at all noises or
+///   [one] scaling   of the standard errors with noise, modulus and density
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -18,7 +20,7 @@
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
-#include "substrate/greens/half_space.h"
+#include "tests/support/drawn_pair.h"
 
 namespace {
 
@@ -149,98 +151,64 @@ void study_errors(int only) {
 
 // --- pairs
 
-Eigen::MatrixXd field_of(const Gel& gel, Vec2 centre_um, double radius_um, const std::vector<Vec2>& beads_um) {
-  substrate::Ellipse e;
-  e.centre_um = centre_um;
-  e.semi_major_um = e.semi_minor_um = radius_um;
-  const greens::HalfSpaceEllipse disc(gel, e);
-  Eigen::MatrixXd G(2 * static_cast<Eigen::Index>(beads_um.size()), 2);
-  for (std::size_t i = 0; i < beads_um.size(); ++i) {
-    const bool is_far = norm(beads_um[i] - centre_um) > 8 * radius_um;
-    const greens::Sym2 g = is_far ? disc.far_compliance_um_per_nN(beads_um[i]) : disc.compliance_um_per_nN(beads_um[i]);
-    G.middleRows<2>(2 * static_cast<Eigen::Index>(i)) << g.xx, g.xy, g.xy, g.yy;
+/// Where the chance to tell two adhesions apart is kChance, by experiments at five distances around an expected one: a
+/// line of the chance's normal variable over the distance's logarithm, by weighted least squares.
+struct DrawnDistance {
+  double distance_um = 0, relative_error = 0;
+};
+DrawnDistance drawn_distance(const Gel& gel, double radius_um, double density, double noise_um, double expected_um,
+                             int n_experiments) {
+  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();
+  const boost::math::normal standard;
+  for (const double step : {-2, -1, 0, 1, 2}) {
+    const double x = 0.2 * step, distance_um = expected_um * std::exp(x);
+    std::vector<char> told(static_cast<std::size_t>(n_experiments));
+    numerics::parallel_for(n_experiments, kThreads, [&](int draw) {
+      told[static_cast<std::size_t>(draw)] = test::is_told({.gel = gel,
+                                                            .radius_um = radius_um,
+                                                            .distance_um = distance_um,
+                                                            .beads_per_um2 = density,
+                                                            .noise_um = noise_um,
+                                                            .half_field_um = 10 + 6 * distance_um},
+                                                           draw);
+    });
+    const double n = n_experiments,
+                 chance = (static_cast<double>(std::ranges::count(told, 1)) + 0.5) / (n + 1);  // neither 0 nor 1
+    const double z = boost::math::quantile(standard, chance),
+                 weight = n * std::pow(boost::math::pdf(standard, z), 2) / (chance * (1 - chance));
+    const Eigen::Vector2d row(1, x);
+    normal += weight * row * row.transpose();
+    right += weight * z * row;
   }
-  return G;
+  const Eigen::Matrix2d covariance = normal.inverse();
+  const Eigen::Vector2d line = covariance * right;
+  const double at = (boost::math::quantile(standard, kChance) - line[0]) / line[1];
+  const Eigen::Vector2d row(1, at);
+  return {expected_um * std::exp(at), std::sqrt(row.dot(covariance * row)) / line[1]};
 }
 
-double misfit(const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
-  return (u - G * (G.transpose() * G).ldlt().solve(G.transpose() * u)).squaredNorm();
-}
-
-/// The best place of one adhesion, by a pattern of steps that halve, from the middle and from both places.
-double misfit_of_one(const Gel& gel, double radius_um, const std::vector<Vec2>& beads_um, const Eigen::VectorXd& u,
-                     double distance_um) {
-  double best = 1e300;
-  for (const double start : {0.0, -0.5, 0.5}) {
-    Vec2 at{start * distance_um, 0};
-    double here = misfit(field_of(gel, at, radius_um, beads_um), u);
-    for (double step = 0.25 * distance_um; step > 0.02 * radius_um;) {
-      bool has_moved = false;
-      for (const Vec2 way : {Vec2{1, 0}, Vec2{-1, 0}, Vec2{0, 1}, Vec2{0, -1}}) {
-        const double there = misfit(field_of(gel, at + step * way, radius_um, beads_um), u);
-        if (there >= here) continue;
-        here = there;
-        at += step * way;
-        has_moved = true;
-        break;
-      }
-      if (!has_moved) step /= 2;
-    }
-    best = std::min(best, here);
-  }
-  return best;
-}
-
-/// Whether one drawn experiment tells the two apart.
-bool is_told(const Gel& gel, double radius_um, double distance_um, double beads_per_um2, double noise_um, int draw) {
-  std::mt19937_64 random(static_cast<std::uint64_t>(draw) + 77);
-  const double half_um = 10 + 6 * distance_um;
-  std::uniform_real_distribution<double> place(-half_um, half_um);
-  std::normal_distribution<double> normal(0, noise_um);
-  const auto n = static_cast<int>(beads_per_um2 * 4 * half_um * half_um);
-  std::vector<Vec2> beads_um;
-  for (int i = 0; i < n; ++i) {
-    const double x = place(random);
-    beads_um.push_back({x, place(random)});
-  }
-  Eigen::MatrixXd both(2 * n, 4);
-  both.leftCols<2>() = field_of(gel, {-0.5 * distance_um, 0}, radius_um, beads_um);
-  both.rightCols<2>() = field_of(gel, {0.5 * distance_um, 0}, radius_um, beads_um);
-  const bool is_along = draw % 2 == 0;
-  const Eigen::Vector2d one = is_along ? Eigen::Vector2d(1, 0) : Eigen::Vector2d(0, 1);
-  Eigen::Vector4d forces;
-  forces << one, one;
-  Eigen::VectorXd u = both * forces;
-  for (double& component : u) component += normal(random);
-  const double two = misfit(both, u);
-  return misfit_of_one(gel, radius_um, beads_um, u, distance_um) - two > kTold * noise_um * noise_um;
-}
-
-void study_pairs() {
+/// @param n_experiments  of a point, a fifth at each distance
+/// @param only_um  a noise; 0: all
+void study_pairs(int n_experiments, double only_um) {
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
   constexpr double kArea_um2 = 0.46;
   const double radius_um = std::sqrt(kArea_um2 / 3.141592653589793);
   const std::vector<double> densities = {0.25, 0.5, 1, 2};
   const PairResolution pairs(gel, kArea_um2, densities, kThreads);
-  std::printf("beads_per_um2,noise_um,predicted_um,drawn_um,ratio\n");
+  std::printf("beads_per_um2,noise_um,predicted_um,drawn_um,drawn_relative_error,ratio\n");
   for (std::size_t i = 0; i < densities.size(); ++i) {
     const double density = densities[i];
     for (const double noise_um : {0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06}) {
+      if (only_um > 0 && noise_um != only_um) continue;
       const auto predicted = pairs.least_distance_um(1, gel.youngs_modulus_kPa, i, noise_um);
       if (!predicted || *predicted > 8 || *predicted <= pairs.touching_um()) continue;
-      constexpr int kExperiments = 100;
-      // the distance that kChance of the experiments tell, between two that bracket it
-      double low = 0.4 * *predicted, high = 2.5 * *predicted;
-      for (int k = 0; k < 5; ++k) {
-        const double middle = std::sqrt(low * high);
-        std::vector<char> told(kExperiments);
-        numerics::parallel_for(kExperiments, kThreads, [&](int draw) {
-          told[static_cast<std::size_t>(draw)] = is_told(gel, radius_um, middle, density, noise_um, draw);
-        });
-        (std::ranges::count(told, 1) < kChance * kExperiments ? low : high) = middle;
-      }
-      const double drawn = std::sqrt(low * high);
-      std::printf("%g,%g,%.3f,%.3f,%.3f\n", density, noise_um, *predicted, drawn, *predicted / drawn);
+      const double first_um =
+          drawn_distance(gel, radius_um, density, noise_um, *predicted, n_experiments / 20).distance_um;
+      const DrawnDistance drawn = drawn_distance(
+          gel, radius_um, density, noise_um, std::clamp(first_um, 0.5 * *predicted, 2 * *predicted), n_experiments / 5);
+      std::printf("%g,%g,%.3f,%.3f,%.3f,%.3f\n", density, noise_um, *predicted, drawn.distance_um, drawn.relative_error,
+                  *predicted / drawn.distance_um);
       std::fflush(stdout);
     }
   }
@@ -272,7 +240,7 @@ void study_scaling() {
 int main(int argc, char** argv) {
   const auto asks = [&](const char* study) { return argc >= 2 && std::strcmp(argv[1], study) == 0; };
   if (asks("errors")) return study_errors(argc > 2 ? std::atoi(argv[2]) : 0), 0;
-  if (asks("pairs")) return study_pairs(), 0;
+  if (asks("pairs")) return study_pairs(argc > 2 ? std::atoi(argv[2]) : 1000, argc > 3 ? std::atof(argv[3]) : 0), 0;
   if (asks("scaling")) return study_scaling(), 0;
-  return std::fprintf(stderr, "plan_accuracy errors [scene] | pairs | scaling\n"), 2;
+  return std::fprintf(stderr, "plan_accuracy errors [scene] | pairs [experiments [noise_um]] | scaling\n"), 2;
 }
