@@ -210,9 +210,7 @@ Noticed network_not_identifiable(const FitOutcome& o) {
 }
 
 Noticed wide_intervals(const FitOutcome& o) {
-  const auto is_wide = [](const Tension& t) {
-    return t.identifiable && t.tension_nN > 0 && t.low_nN && t.high_nN && *t.high_nN - *t.low_nN > 2 * t.tension_nN;
-  };
+  const auto is_wide = [](const Tension& t) { return t.identifiable && t.tension_nN > 0 && is_uncertain(t); };
   return noticed_of_fibres(FindingKind::wide_interval, fibres_whose(o.tensions, is_wide),
                            "tension is uncertain by as much as itself",
                            "tensions are uncertain by as much as themselves");

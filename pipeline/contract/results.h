@@ -16,6 +16,10 @@ struct Tension {
   std::optional<double> sigma_nN{};       ///< standard error
   bool identifiable = true;
 };
+/// Little more is known of it than that it is small: not identifiable, or its interval is wider than twice itself.
+inline bool is_uncertain(const Tension& t) {
+  return !t.identifiable || (t.low_nN && t.high_nN && *t.high_nN - *t.low_nN > 2 * t.tension_nN);
+}
 
 struct AdhesionForce {
   int adhesion_id = 0;

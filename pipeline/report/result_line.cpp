@@ -38,7 +38,7 @@ Result result_of(const Path& cell) {
     OfType& of = result.types[type->second];
     of.mean_nN += (tension.tension_nN - of.mean_nN) / ++of.n;
     ++result.n_fibres;
-    result.n_uncertain += !tension.identifiable;
+    result.n_uncertain += is_uncertain(tension);
   }
   return result;
 }

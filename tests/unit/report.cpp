@@ -13,6 +13,7 @@
 #include "pipeline/report/compare.h"
 #include "pipeline/report/findings.h"
 #include "pipeline/report/page.h"
+#include "pipeline/report/result_line.h"
 #include "pipeline/report/tension_table.h"
 #include "tests/support/fake_cell.h"
 #include "tests/support/temporary_folder.h"
@@ -39,6 +40,28 @@ TEST(Report, names_every_fibre_and_adhesion) {
   for (int adhesion = 1; adhesion <= 12; ++adhesion) {
     EXPECT_NE(html.find("adhesion " + std::to_string(adhesion) + "\\n"), std::string::npos) << adhesion;
   }
+}
+
+TEST(ResultLine, counts_as_uncertain_what_is_not_identifiable_and_what_may_be_nothing_or_twice_as_much) {
+  const FakeCell cell;
+  const Path file = cell.folder / "4_fit/tensions.csv";
+  std::vector<Tension> tensions = files::read_tensions(file);
+  ASSERT_EQ(tensions.size(), 5u) << "the network and four fibres";
+  const auto set = [&](std::size_t i, double tension_nN, double low_nN, double high_nN) {
+    tensions[i].tension_nN = tension_nN;
+    tensions[i].low_nN = low_nN;
+    tensions[i].high_nN = high_nN;
+    tensions[i].identifiable = true;
+  };
+  set(0, 0.05, 0, 0.2);  // the network is no fibre
+  set(1, 2, 0.1, 3.9);
+  set(2, 2, 0, 4.1);
+  set(3, 0, 0, 1);
+  set(4, 2, 1, 3);
+  tensions[4].identifiable = false;
+  files::write_tensions(file, tensions, files::read_cell(cell.folder / "1_segment").fibres);
+  const std::string line = result_line(cell.folder.path());
+  EXPECT_TRUE(line.ends_with("; 3 of 4 uncertain")) << line;
 }
 
 TEST(Report, asks_for_nothing_from_anywhere) {
