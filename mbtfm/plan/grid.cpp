@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "mbtfm/tensions/linear_data.h"
+#include "mbtfm/tractions/fttc_mixtures.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
@@ -137,17 +138,33 @@ std::vector<Expected> at_point(const Scene& scene, const Asked& asked, const Com
   return all;
 }
 
-/// Magnitudes of FTTC's errors in one experiment, on parts of the densest beads. Forces are linear in displacements and
-/// lambda is free of units, so gels and noises with the same product have the same errors.
-std::vector<double> errors_of_fttc(const Scene& scene, const Computed& c, const Asked& asked, const Point& point) {
+/// One experiment with this density, on a part of the densest beads, for FTTC.
+struct FttcExperiment {
+  tractions::FttcMixtures mixtures;
+  double modulus_kPa = 0;
+};
+FttcExperiment fttc_experiment(const Scene& scene, const Computed& c, double share_of_beads) {
   drawing::Random places(scene.experiment.seed, drawing::Stream::beads, kDrawOfFttc),
-      noise(scene.experiment.seed, drawing::Stream::noise, kDrawOfFttc),
+      random(scene.experiment.seed, drawing::Stream::noise, kDrawOfFttc),
       segmentation(scene.experiment.seed, drawing::Stream::specimen, kDrawOfFttc);
-  const BeadsOnGel beads = some_of(c.densest, point.beads_per_um2 / asked.beads_per_um2.back(), places);
-  const Experiment experiment{as_segmented(scene.cell.cell, scene.fit.segmentation, segmentation),
-                              measured(beads, c.cell.forces_nN, point, noise)};
+  const BeadsOnGel beads = some_of(c.densest, share_of_beads, places);
+  const DisplacementField exact = exact_beads(beads.places_um, *beads.response, c.cell.forces_nN, 1);
+  DisplacementField noise = exact;
+  for (Bead& b : noise) {
+    const double x = random.normal(), y = random.normal();
+    b.displacement_um = {x, y};
+  }
+  Gel gel = scene.fit.gel;
+  gel.youngs_modulus_kPa = beads.modulus_kPa;
+  return {tractions::FttcMixtures(exact, noise, gel,
+                                  as_segmented(scene.cell.cell, scene.fit.segmentation, segmentation).adhesions, {}, 1),
+          beads.modulus_kPa};
+}
+
+/// Magnitudes of FTTC's errors. On another gel displacements fall with its modulus, and noise counts the more.
+std::vector<double> errors_of_fttc(const FttcExperiment& e, const Computed& c, const Point& point) {
   std::vector<double> errors_nN;
-  add_errors_along(errors_nN, fttc_forces_nN(scene, experiment, point, 1), c.cell.forces_nN);
+  add_errors_along(errors_nN, e.mixtures.forces_nN(scale_of(point) / e.modulus_kPa), c.cell.forces_nN);
   return errors_nN;
 }
 
@@ -263,9 +280,13 @@ Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c, int thre
   const double force_nN = asked.target_nN / asked.within;
   const std::vector<Point> points = points_of(asked);
   std::vector<std::vector<double>> of_fttc(points.size());
-  numerics::parallel_for(static_cast<int>(points.size()), threads, [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    of_fttc[k] = errors_of_fttc(scene, c, asked, points[k]);
+  const auto n_densities = static_cast<int>(asked.beads_per_um2.size());
+  numerics::parallel_for(n_densities, threads, [&](int i) {
+    // the densest, which takes longest, first
+    const double density = asked.beads_per_um2[static_cast<std::size_t>(n_densities - 1 - i)];
+    const FttcExperiment experiment = fttc_experiment(scene, c, density / asked.beads_per_um2.back());
+    for (std::size_t k = 0; k < points.size(); ++k)
+      if (points[k].beads_per_um2 == density) of_fttc[k] = errors_of_fttc(experiment, c, points[k]);
   });
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point& point = points[i];

@@ -11,18 +11,17 @@ namespace {
 
 using std::numbers::pi;
 
-// The criteria are flat where they are best: a hundredth of the tractions, in energy, moves none of them.
-constexpr double kScanTolerance = 1e-2;
-
 double sinc(double x) { return x == 0 ? 1 : std::sin(x) / x; }
 
 }  // namespace
 
-LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
+std::vector<double> lambdas_of(const LatticeProblem& problem) {
   // From tractions that only the longest waves of the field tell of, to those that its shortest waves tell of: beyond
   // either end nothing changes.
-  const double smallest = problem.spectrum().smallest_um_per_kPa();
-  const double largest = 2 * problem.longest_wave_um_per_kPa();
+  return lambdas_between(2 * problem.longest_wave_um_per_kPa(), problem.spectrum().smallest_um_per_kPa());
+}
+
+LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
   std::optional<TikhonovSolver> probe;
   if (!problem.is_complete()) probe.emplace(problem, problem.pulled_back(problem.spread_signs()), problem.threads());
   const auto degrees_of = [&](double lambda, int power) {
@@ -39,7 +38,7 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
     return power == 1 ? probe->right_hand_side_times_solution() : probe->displaced_squared();
   };
   std::vector<ScanPoint> points;
-  for (const double lambda : lambdas_between(largest, smallest)) {
+  for (const double lambda : lambdas_of(problem)) {
     solver.solve(lambda, kScanTolerance);
     if (probe) probe->solve(lambda, kScanTolerance);
     const double misfit =
@@ -111,7 +110,6 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   r.scan = scan_lambda(problem, solver);
   r.lambda = parameters.lambda_um_per_kPa.value_or(chosen_lambda(*r.scan, parameters.lambda_by));
   r.length_um = *r.lambda * inputs.gel.youngs_modulus_kPa;
-  constexpr double kTolerance = 1e-3;  // in energy: far below any error bar
   solver.solve(*r.lambda, kTolerance);
   const WaveField waves = solver.solution();
   const NodeField displacements = problem.displaced(waves);

@@ -7,6 +7,13 @@
 
 namespace mbtfm::tractions {
 
+// The criteria are flat where they are best: a hundredth of the tractions, in energy, moves none of them.
+inline constexpr double kScanTolerance = 1e-2;
+inline constexpr double kTolerance = 1e-3;  ///< in energy: far below any error bar
+
+/// That this problem can tell apart, falling.
+std::vector<double> lambdas_of(const LatticeProblem& problem);
+
 /// The criteria over the lambdas that this problem can tell apart. @param solver  of the problem's data: left near one
 LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver);
 
