@@ -1,13 +1,18 @@
 #include "continuum/solids/sweep.h"
 
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/words.h"
 
 namespace mbtfm::solids {
 namespace {
+
+enum class Swept { height_um, modulus_ratio };
+constexpr auto words(Swept) { return std::array{"height_um", "modulus_ratio"}; }
 
 constexpr int kMostValues = 1000;  // of a list: a map of a million cases is a slip
 
@@ -65,10 +70,11 @@ std::vector<Case> cases_of(const std::string& sweep, const Case& otherwise) {
   std::istringstream stream(sweep);
   for (std::string word; stream >> word;) {
     const auto equals = word.find('=');
-    const std::string name = word.substr(0, equals);
-    if (equals == word.npos || (name != "height_um" && name != "modulus_ratio"))
+    const auto swept = named<Swept>(word.substr(0, equals));
+    if (equals == word.npos || !swept)
       throw UsageError("sweep: expected height_um=... and modulus_ratio=..., found '" + word + "'");
-    (name == "height_um" ? heights : ratios) = values_in(word.substr(equals + 1), "sweep of " + name, Zero::is_refused);
+    (*swept == Swept::height_um ? heights : ratios) =
+        values_in(word.substr(equals + 1), std::string("sweep of ") + name_of(*swept), Zero::is_refused);
   }
   std::vector<Case> cases;
   for (const double ratio : ratios) {

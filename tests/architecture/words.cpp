@@ -24,6 +24,7 @@ const std::map<std::string, std::string> kReaders = {
     {"pipeline/files/ply.cpp", "words of PLY's header"},
     {"mbtfm/plan/study_scatter.cpp", "rows of a study's tables"},
     {"substrate/surface_main.cpp", "the extension of a height map"},
+    {"continuum/sheet_main.cpp", "extensions of outlines, labels and tables"},
     {"pipeline/files/csv.cpp", "true and false in CSV"},
     {"pipeline/files/fit_summary.cpp", "keys of fit.json"},
     {"pipeline/runner/cell_stages.cpp", "values of cell.toml that other programs declare"},
@@ -59,7 +60,7 @@ std::vector<std::string> comparisons_in(const std::string& name, const std::stri
 
 std::map<std::string, std::vector<std::string>> comparisons() {
   std::map<std::string, std::vector<std::string>> found;
-  for (const char* top : {"pipeline", "segment", "network", "substrate", "mbtfm", "samples"}) {
+  for (const char* top : {"pipeline", "segment", "network", "substrate", "continuum", "mbtfm", "samples"}) {
     for (const auto& entry : fs::recursive_directory_iterator(kRoot / top)) {
       const std::string extension = entry.path().extension();
       if (extension != ".h" && extension != ".cpp") continue;

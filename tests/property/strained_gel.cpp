@@ -81,6 +81,7 @@ TEST(StrainedGel, forces_that_made_a_displacement_on_it_are_found_again) {
   const tensions::EnsembleFit found = fit_on_strained_gel(
       {.on = on, .beads = e.beads}, on_linear_gel,
       [](tensions::LinearData data, const tensions::Trial&) { return free_forces(std::move(data)); }, 1);
+  RecordProperty("errors", std::to_string(1e6 * error(on_linear_gel)) + " " + std::to_string(1e6 * error(found)));
   EXPECT_LT(error(found), 0.01 * error(on_linear_gel));
 }
 
