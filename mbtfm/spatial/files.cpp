@@ -158,6 +158,7 @@ Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const
   if (r.lambda) {
     add("lambda", *r.lambda);
     figures.emplace_back("lambda_by", std::string(how_lambda(r)));
+    if (r.summands && r.summands->lambda) add("lambda_of_sums", *r.summands->lambda);
   }
   figures.emplace_back("tractions_over", problem.expected.where);
   figures.emplace_back("n_unknowns", std::int64_t{problem.n_unknowns()});

@@ -182,8 +182,8 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
     r.weighing =
         weigh(parameters.loss, problem.observed, problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees);
   }
-  r.unshortened_kPa = basis.tractions(posterior.mean);
   r.covariance_kPa2 = basis.covariance(posterior.covariance, threads);
+  r.summands = Summands{basis.tractions(posterior.mean), r.covariance_kPa2, {}};
   const VectorXd seen =
       VectorXd::Ones(3 * n) - posterior.covariance.diagonal().cwiseProduct(posterior.precision_before) / variance;
   r.resolved = (seen.head(n) + seen.segment(n, n) + seen.tail(n)) / 3;

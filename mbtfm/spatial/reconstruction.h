@@ -23,13 +23,21 @@ struct PartForce {
   double magnitude_sigma_nN = 0;  ///< along the force
 };
 
+/// Tractions whose sums over parts of the surface are better than those of the map, which is smoothed or shortened for
+/// the sake of its single places: a sum has less noise than these, and as much of the bias.
+struct Summands {
+  Eigen::VectorXd traction_kPa;
+  Eigen::MatrixXd covariance_kPa2;
+  std::optional<double> lambda;  ///< of the least expected error of the displacement, where the map has one by the risk
+};
+
 struct SpatialReconstruction {
   tractions::TractionMethod method{};
-  Eigen::VectorXd traction_kPa;     ///< three a vertex
-  Eigen::VectorXd unshortened_kPa;  ///< what forces are the sums of; empty: traction_kPa
+  Eigen::VectorXd traction_kPa;  ///< three a vertex
   /// Of tractions: by the noise, and by what is not resolved. Empty: the method tells none.
   Eigen::MatrixXd covariance_kPa2;
-  Eigen::VectorXd resolved;  ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
+  std::optional<Summands> summands;  ///< unset: the map's
+  Eigen::VectorXd resolved;          ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
   std::optional<tractions::LambdaScan> scan;
   std::optional<double> lambda;                         ///< of |S (u − G t)|² + lambda² |s|²
   std::optional<double> length_um;                      ///< lambda times E, the same for every method
@@ -79,9 +87,9 @@ struct ChosenLambda {
   std::optional<tractions::LambdaCriterion> by;  ///< none: given
   std::optional<Finding> finding;                ///< where it is not the criterion that was asked for
 };
-/// The one that is given, or by the criterion. Where the risk's is below a tenth of the evidence's, the evidence's: the
-/// model is then wrong by more than the stated errors in a way that tractions can follow, and the risk has no minimum
-/// but the end of the scan. The finding says so. Cross-validation's is taken for the risk's where that is not sound:
+/// The one that is given, or by the criterion. Where the risk's is below half of the evidence's, the evidence's:
+/// tractions then follow beads that are astray, or what the model has wrong, and the risk has no minimum but the end of
+/// the scan. The finding says so. Cross-validation's is taken for the risk's where that is not sound:
 /// with a robust loss, whose weights hang on the residuals, so that what they leave of large displacements looks like
 /// noise to it; and with traces from random signs, whose errors it divides by lambda². It then smooths most tractions
 /// away.
@@ -131,7 +139,11 @@ SpatialReconstruction reconstruct_green(const Problem& problem, const tractions:
 std::vector<PartForce> forces_beside_background(const Problem& problem, const Eigen::MatrixXd& background,
                                                 const SpatialReconstruction& reconstruction, int threads);
 
-/// The forces of the tractions, and their errors where the reconstruction has a covariance.
+/// What forces, moments and their errors are sums of.
+const Eigen::VectorXd& summed_tractions_kPa(const SpatialReconstruction& reconstruction);
+const Eigen::MatrixXd& covariance_of_summed_kPa2(const SpatialReconstruction& reconstruction);
+
+/// The forces of the tractions to be summed, and their errors where the reconstruction has a covariance.
 std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruction& reconstruction,
                                  const Eigen::MatrixXd& areas_um2);
 

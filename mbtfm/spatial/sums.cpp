@@ -67,6 +67,14 @@ void set_force(PartForce& part, const Vector3d& force_nN, const Matrix3d& covari
 
 }  // namespace
 
+const VectorXd& summed_tractions_kPa(const SpatialReconstruction& r) {
+  return r.summands ? r.summands->traction_kPa : r.traction_kPa;
+}
+
+const MatrixXd& covariance_of_summed_kPa2(const SpatialReconstruction& r) {
+  return r.summands ? r.summands->covariance_kPa2 : r.covariance_kPa2;
+}
+
 std::vector<PartForce> forces_beside_background(const Problem& problem, const MatrixXd& background,
                                                 const SpatialReconstruction& r, int threads) {
   const Rows rows(problem, r.weighing.by_row);
@@ -96,9 +104,10 @@ std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruc
     for (Index v = 0; v < areas_um2.cols(); ++v) {
       for (Index c = 0; c < 3; ++c) sums(c, 3 * v + c) = areas_um2(static_cast<Index>(a), v);
     }
-    const Vector3d f = sums * (r.unshortened_kPa.size() > 0 ? r.unshortened_kPa : r.traction_kPa);
+    const Vector3d f = sums * summed_tractions_kPa(r);
+    const MatrixXd& covariance = covariance_of_summed_kPa2(r);
     forces[a].force_nN = vec(f);
-    if (r.covariance_kPa2.size() > 0) set_force(forces[a], f, sums * r.covariance_kPa2 * sums.transpose());
+    if (covariance.size() > 0) set_force(forces[a], f, sums * covariance * sums.transpose());
   }
   return forces;
 }
@@ -134,14 +143,16 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
       along.segment<3>(3 * v) = mesh.areas_um2[static_cast<std::size_t>(v)] * traction(v).stableNormalized();
     balance.total_force_sigma_nN = std::sqrt(std::max(0.0, along.dot(r.covariance_kPa2 * along)));
   }
-  balance.force_nN = vec(forces * r.traction_kPa);
-  balance.moment_nN_um = vec(moments * r.traction_kPa);
-  balance.force_sigma_nN = errors_of(forces, r.covariance_kPa2);
-  balance.moment_sigma_nN_um = errors_of(moments, r.covariance_kPa2);
-  const VectorXd u = problem.surface_displacement_um(r.traction_kPa);
+  const VectorXd& summed = summed_tractions_kPa(r);
+  const MatrixXd& covariance = covariance_of_summed_kPa2(r);
+  balance.force_nN = vec(forces * summed);
+  balance.moment_nN_um = vec(moments * summed);
+  balance.force_sigma_nN = errors_of(forces, covariance);
+  balance.moment_sigma_nN_um = errors_of(moments, covariance);
+  const VectorXd u = problem.surface_displacement_um(summed);
   for (Index j = 0; j < n; ++j) {
     for (Eigen::SparseMatrix<double>::InnerIterator it(mesh.mass_um2, j); it; ++it)
-      balance.strain_energy_fJ += 0.5 * it.value() * traction(it.row()).dot(u.segment<3>(3 * j));
+      balance.strain_energy_fJ += 0.5 * it.value() * summed.segment<3>(3 * it.row()).dot(u.segment<3>(3 * j));
   }
   return balance;
 }

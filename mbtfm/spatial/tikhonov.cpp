@@ -22,6 +22,10 @@ struct Fit {
   Weighing weighing;
 };
 
+std::optional<double> largest(std::optional<double> a, std::optional<double> b) {
+  return a && b ? std::max(a, b) : a ? a : b;
+}
+
 }  // namespace
 
 double lambda_per_um_per_kPa(const Problem& problem) {
@@ -66,7 +70,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   SpatialReconstruction r;
   const Observed& observed = problem.observed;
   const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
-    return spectrum.scan(stated_variance(problem, parameters.loss, weighing));
+    return spectrum.scan(largest(stated_variance(problem, parameters.loss, weighing), spectrum.variance_felt_least()));
   };
   // The tractions of the weighed beads with the lambda of their own noise, or with that of `judged`: beads far astray
   // that keep some weight would be followed by ever smaller lambdas, so that lambda is chosen without them.
@@ -118,6 +122,11 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
       std::max(parameters.loss == BeadLoss::l2 ? last.scan.variance : r.weighing.variance, problem.least_variance());
   r.traction_kPa = basis.tractions(last.x);
   r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(lambda, r.variance), threads);
+  if (last.chosen.by == tractions::LambdaCriterion::risk) {
+    const double of_sums = last.scan.by_prediction;
+    r.summands = Summands{basis.tractions(last.spectrum->solve(of_sums)),
+                          basis.covariance(last.spectrum->posterior(of_sums, r.variance), threads), of_sums};
+  }
   r.scan = std::move(last.scan);
   r.lambda = lambda;
   r.lambda_by = last.chosen.by;

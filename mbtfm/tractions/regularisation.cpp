@@ -149,6 +149,10 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removabl
     const double misfit = p.removable_misfit.value_or(p.misfit);
     return -(2 * misfit + lambda2 * p.norm - 2 * scan.variance * (n_removable - p.degrees)) / lambda2;
   });
+  // (25b) Mallows 1973: what the tractions displace wants less smoothing than they do
+  std::vector<double> prediction;
+  for (const ScanPoint& p : scan.points) prediction.push_back(log_of(p.misfit + 2 * scan.variance * p.degrees));
+  scan.by_prediction = lambda_at(smallest_at(prediction));
   if (stated_variance) scan.by_discrepancy = lambda_of_misfit(scan.points, n_data * *stated_variance);
   const RiskScale scale(scan.risk);
   std::vector<double> tamed;

@@ -28,6 +28,7 @@ struct LambdaScan {
   std::vector<double> evidence;                     ///< logarithm, less its largest (14), to be large
   std::vector<double> risk;                         ///< expected |t − true|² up to a constant (15), to be small
   double by_gcv = 0, by_evidence = 0, by_risk = 0;  ///< lambda by each
+  double by_prediction = 0;                         ///< of the least expected |G t − G true|² (25b)
   std::optional<double> by_l_curve;                 ///< none where the curve has no corner
   std::optional<double> by_discrepancy;             ///< none where the data state no errors, or are fitted worse
   double variance = 0;                              ///< of one datum, that the risk was found with

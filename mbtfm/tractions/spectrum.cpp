@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "pipeline/numerics/dense.h"
 
@@ -37,6 +39,28 @@ LambdaScan Spectrum::scan(std::optional<double> stated_variance) const {
   // for tractions that follow all but a few, would call most of it signal.)
   return judge(std::move(points), n_data_, static_cast<double>(is_felt(values_).count()), stated_variance,
                [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); });
+}
+
+std::optional<double> Spectrum::variance_felt_least() const {
+  constexpr double kChance = 3;  // standard deviations of the ratio of two variances of Gaussian noise
+  std::vector<std::pair<double, double>> coefficients;  // by value
+  double followed = 0;
+  const Eigen::Array<bool, Eigen::Dynamic, 1> felt = is_felt(values_);
+  for (Eigen::Index k = 0; k < values_.size(); ++k) {
+    if (!felt[k]) continue;
+    const double square = projected_[k] * projected_[k] / values_[k];
+    coefficients.emplace_back(values_[k], square);
+    followed += square;
+  }
+  const auto n_half = static_cast<double>(coefficients.size() / 2);
+  const double n_beside = n_data_ - static_cast<double>(coefficients.size());
+  if (n_half < 1 || n_beside < 1) return std::nullopt;
+  const double beside = std::max(0.0, data_squared_ - followed) / n_beside;
+  std::sort(coefficients.begin(), coefficients.end());
+  double least = 0;
+  for (std::size_t k = 0; k < coefficients.size() / 2; ++k) least += coefficients[k].second / n_half;
+  if (least <= beside * (1 + kChance * std::sqrt(2 / n_half + 2 / n_beside))) return std::nullopt;
+  return least;
 }
 
 ScanPoint Spectrum::point_at(double lambda) const {

@@ -17,6 +17,11 @@ class Spectrum {
 
   /// @param stated_variance  of one datum
   LambdaScan scan(std::optional<double> stated_variance) const;
+  /// Of one datum, of the half of the directions that is felt least, where it is larger than noise alone would have it
+  /// beside what no s can follow: there is an error of A itself then, which s can follow, and which no criterion with
+  /// white noise knows. None where they agree, or no data are left beside. Where a signal reaches so far down it is
+  /// taken for such an error, and lambda is too large.
+  std::optional<double> variance_felt_least() const;
   Eigen::VectorXd solve(double lambda) const;
   /// Of solve(lambda), by the noise alone. @param variance  of one datum
   Eigen::MatrixXd covariance(double lambda, double variance) const;

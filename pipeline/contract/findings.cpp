@@ -243,10 +243,11 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
        "Set traction.loss = biweight."},
-      {lambda_runs_away, "lambda-runs-away", "traction", caution, "lambda by evidence over lambda by risk", 10,
-       "in scenes whose noise is that of the beads it is 0.5 to 0.8; far above, tractions follow what the model has "
-       "wrong, and by risk they would be as many times too large",
-       "Check surface, gel and sigma_um, and whether one stack grew against the other (another focus or temperature): "
+      {lambda_runs_away, "lambda-runs-away", "traction", caution, "lambda by evidence over lambda by risk", 2,
+       "in scenes whose noise is that of the beads it is 0.1 to 0.8; above 1 the two contradict each other, and 2 "
+       "leaves room for chance: tractions follow beads that are astray, or what the model has wrong",
+       "Set traction.loss = biweight if beads may be astray. Check surface, gel and sigma_um, and whether one stack "
+       "grew against the other (another focus or temperature): "
        "the misfit is not the beads' noise. The tractions are those with lambda by "
        "evidence, and may be smoothed too much. To choose yourself, set traction.lambda_by or "
        "traction.lambda_um_per_kPa."},

@@ -89,7 +89,13 @@ std::string how_lambda(const SpaceResults& r) {
   if (!r.find("lambda") || by == r.texts.end()) return {};
   const std::string lambda = readable(r.number("lambda"));
   if (by->second == "given") return "The regularisation was given: lambda = " + lambda + ".";
-  return "The regularisation was chosen by the data (criterion: " + by->second + "): lambda = " + lambda + ".";
+  std::string text =
+      "The regularisation was chosen by the data (criterion: " + by->second + "): lambda = " + lambda + ".";
+  if (const auto of_sums = r.find("lambda_of_sums")) {
+    text += " Net force, moment, strain energy and forces that are sums of the map were taken at lambda = " +
+            readable(*of_sums) + ", where the expected error of the displacement is smallest (Mallows’ criterion).";
+  }
+  return text;
 }
 
 std::string svg_of(const Path& file, const std::string& title, const std::string& caption) {

@@ -59,6 +59,29 @@ TEST(Recurrences, agree_with_the_dense_decomposition_at_every_lambda_and_in_thei
   EXPECT_LE(apart(dense.solve(our_risk), truth), 1.03 * apart(dense.solve(their_risk), truth));
 }
 
+TEST(Spectra, tell_an_error_that_can_be_followed_from_noise_that_is_everywhere) {
+  const MatrixXd A = smoothing_matrix(500, 240);
+  const MatrixXd followed = A.householderQr().householderQ() * MatrixXd::Identity(500, 240);
+  std::normal_distribution<double> normal;
+  constexpr double kNoise = 0.02, kError = 0.05;
+  int n_alarms = 0;
+  constexpr int kSeeds = 20;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    std::mt19937_64 random(seed);
+    const auto draw = [&](int n) { return VectorXd(VectorXd::NullaryExpr(n, [&]() { return normal(random); })); };
+    const auto felt_least = [&](const VectorXd& u) {
+      return tractions::Spectrum(A.transpose() * A, A.transpose() * u, u.squaredNorm(), 500).variance_felt_least();
+    };
+    const VectorXd noise = kNoise * draw(500);
+    n_alarms += felt_least(noise).has_value();
+    const auto found = felt_least(noise + kError * followed * draw(240));
+    ASSERT_TRUE(found) << seed;
+    // of 120 squares the mean varies by 13 %, its root by half of that: three times
+    EXPECT_NEAR(std::sqrt(*found), std::hypot(kNoise, kError), 0.2 * kError) << seed;
+  }
+  EXPECT_EQ(n_alarms, 0);  // three standard deviations one way: one in some hundred
+}
+
 TEST(Losses, weigh_beads_by_the_length_of_their_residual_whatever_its_direction) {
   for (const BeadLoss loss : {BeadLoss::l1, BeadLoss::huber, BeadLoss::biweight}) {
     EXPECT_LE(loss_weight(loss, 4, 3), loss_weight(loss, 1, 3)) << name_of(loss);
@@ -124,18 +147,18 @@ TEST_F(InSpace, a_lambda_by_risk_that_runs_away_is_replaced_and_called_so) {
   const auto named = reconstruct_tikhonov(right, traction, parameters, 1);
   EXPECT_EQ(named.lambda_by, risk);
   tractions::LambdaScan scan = *named.scan;
-  scan.by_evidence = 9 * scan.by_risk;  // the bound is ten
+  scan.by_evidence = 1.9 * scan.by_risk;  // the bound is two
   const auto chosen = choose_lambda(right, scan, traction, true);
   EXPECT_EQ(chosen.by, risk);
   EXPECT_EQ(chosen.lambda, scan.by_risk);
   EXPECT_FALSE(chosen.finding);
-  scan.by_evidence = 11 * scan.by_risk;
+  scan.by_evidence = 2.1 * scan.by_risk;
   const auto replaced = choose_lambda(right, scan, traction, true);
   EXPECT_EQ(replaced.by, evidence);
   EXPECT_EQ(replaced.lambda, scan.by_evidence);
   ASSERT_TRUE(replaced.finding);
   EXPECT_EQ(replaced.finding->id, "lambda-runs-away");
-  EXPECT_NEAR(replaced.finding->number.value_or(0), 11, 1e-9);
+  EXPECT_NEAR(replaced.finding->number.value_or(0), 2.1, 1e-9);
   const auto unsound = choose_lambda(right, scan, traction, false);
   EXPECT_EQ(unsound.by, gcv);
   EXPECT_EQ(unsound.lambda, scan.by_gcv);
@@ -143,6 +166,71 @@ TEST_F(InSpace, a_lambda_by_risk_that_runs_away_is_replaced_and_called_so) {
   EXPECT_EQ(choose_lambda(right, scan, traction, true).by, gcv);
   traction.lambda_um_per_kPa = 0.1;
   EXPECT_FALSE(choose_lambda(right, scan, traction, true).by);
+}
+
+/// Of beads without noise a gel of another Poisson's ratio is all that is wrong.
+TEST_F(InSpace, what_the_gel_has_wrong_is_not_followed_by_tractions) {
+  Problem problem = scene.problem(scene.beads(1e-9), parameters);
+  HalfSpaceScene other = scene;
+  other.gel.poisson_ratio = 0.4;
+  problem.observed = observe(other.beads(1e-9), scene.gel, problem.ground, parameters);
+  VectorXd truth = VectorXd::Zero(problem.n_unknowns());
+  for (std::size_t v = 0; v < problem.vertices_um().size(); ++v) {
+    for (const auto& spot : scene.spots) {
+      const Vec3 at = problem.vertices_um()[v];
+      if (norm(Vec2{at.x, at.y} - spot.centre_um) > spot.radius_um) continue;
+      const double area = M_PI * spot.radius_um * spot.radius_um;
+      truth.segment<3>(3 * static_cast<Eigen::Index>(v)) +=
+          Eigen::Vector3d(spot.force_nN.x, spot.force_nN.y, spot.force_nN.z) / area;
+    }
+  }
+  const auto found = reconstruct_tikhonov(problem, traction, parameters, 1);
+  double best = 1;
+  for (const auto& point : found.scan->points) {
+    traction.lambda_um_per_kPa = point.lambda / lambda_per_um_per_kPa(problem);
+    best = std::min(best, apart(reconstruct_tikhonov(problem, traction, parameters, 1).traction_kPa, truth));
+  }
+  EXPECT_LE(apart(found.traction_kPa, truth), 1.3 * best);
+  // with noise that is the same everywhere
+  const Basis basis = orthonormal_basis(norm_of(problem.mesh, problem.ground, [](Vec2) { return 1.0; }));
+  const VectorXd even = VectorXd::Ones(problem.observed.displacement_um.size());
+  const auto spectrum =
+      spectrum_of(problem, basis.response(problem.response_um_per_kPa, 1), even, static_cast<double>(even.size()), 1);
+  const auto scan = spectrum.scan(problem.least_variance());
+  EXPECT_GT(apart(basis.tractions(spectrum.solve(scan.by_risk)), truth), 2 * best);
+  RecordProperty("over_best", std::to_string(apart(found.traction_kPa, truth) / best) + " by noise alone " +
+                                  std::to_string(apart(basis.tractions(spectrum.solve(scan.by_risk)), truth) / best));
+}
+
+/// A sum over many places has little noise, but all of the smoothing.
+TEST_F(InSpace, sums_are_smoothed_less_than_the_map_and_are_nearer_to_the_forces) {
+  double off_sums = 0, off_map = 0, square_of_sums = 0, square_of_map = 0, shorter = 0;
+  constexpr int kSeeds = 4;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    scene.seed = static_cast<std::uint64_t>(seed);
+    const Problem problem = scene.problem(scene.beads(0.02), parameters);
+    const MatrixXd areas = adhesion_areas_um2(problem.mesh, problem.ground, scene.adhesions(), 4);
+    const auto r = reconstruct_tikhonov(problem, traction, parameters, 1);
+    ASSERT_TRUE(r.summands);
+    shorter += std::log(*r.summands->lambda / *r.lambda) / kSeeds;
+    SpatialReconstruction of_map = r;
+    of_map.summands.reset();
+    const auto compare = [&](const std::vector<PartForce>& forces, double& off_sum, double& square) {
+      for (std::size_t a = 0; a < scene.spots.size(); ++a) {
+        const Vec3 off = forces[a].force_nN - scene.spots[a].force_nN, s = forces[a].sigma_nN;
+        off_sum += norm(off) / norm(scene.spots[a].force_nN) / (3 * kSeeds);
+        square += (std::pow(off.x / s.x, 2) + std::pow(off.y / s.y, 2) + std::pow(off.z / s.z, 2)) / (9 * kSeeds);
+      }
+    };
+    compare(forces_on(problem, r, areas), off_sums, square_of_sums);
+    compare(forces_on(problem, of_map, areas), off_map, square_of_map);
+    EXPECT_EQ(balance_of(problem, r).total_force_nN, balance_of(problem, of_map).total_force_nN) << seed;
+  }
+  RecordProperty("sums", std::to_string(off_sums) + " " + std::to_string(std::sqrt(square_of_sums)));
+  RecordProperty("map", std::to_string(off_map) + " " + std::to_string(std::sqrt(square_of_map)));
+  EXPECT_LT(shorter, 0);
+  EXPECT_LT(off_sums, off_map);
+  EXPECT_LT(square_of_sums, square_of_map);  // nearer to what is stated, too, which is below
 }
 
 TEST_F(InSpace, twice_the_displacement_with_twice_the_errors_is_twice_the_traction) {
@@ -249,7 +337,7 @@ TEST_F(InSpace, beads_that_are_wrong_do_not_pull_with_a_robust_loss) {
     RecordProperty(name_of(loss), std::to_string(apart(robust.traction_kPa, without.traction_kPa)) + " " +
                                       std::to_string(apart(of_good.traction_kPa, without.traction_kPa)) + " " +
                                       std::to_string(by_squares));
-    EXPECT_LE(apart(robust.traction_kPa, without.traction_kPa), 0.35 * by_squares) << name_of(loss);
+    EXPECT_LE(apart(robust.traction_kPa, without.traction_kPa), 0.5 * by_squares) << name_of(loss);
     // no tractions at all are 1 apart
     EXPECT_LE(apart(robust.traction_kPa, without.traction_kPa), 0.5) << name_of(loss);
     EXPECT_LE(apart(of_good.traction_kPa, without.traction_kPa), 0.3) << name_of(loss);

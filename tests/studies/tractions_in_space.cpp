@@ -48,12 +48,16 @@ void tell(const Known& known, const char* what, double noise, double astray, con
           double best) {
   const double error = test::map_error(known.scene, known.problem.mesh, r.traction_kPa);
   const ForceErrors forces = known.forces(r);
+  const spatial::Balance balance = balance_of(known.problem, r);
   std::printf(
-      "%-12s %-11s noise %.2f astray %.1f  map %.3f (%.2f x best)  forces %.3f  error/stated %.2f  degrees %.0f"
-      "  scale %.2f  lambda %.3g (%s; risk %.3g evidence %.3g gcv %.3g)\n",
+      "%-12s %-11s noise %.2f astray %.1f  map %.3f (%.2f x best)  forces %.3f  error/stated %.2f  total %.0f nN  "
+      "net %.0f +- %.0f nN  energy %.0f fJ  degrees %.0f"
+      "  scale %.2f  lambda %.3g (%s; risk %.3g evidence %.3g gcv %.3g; sums %.3g)\n",
       known.scene.name.c_str(), what, noise, astray, error, best > 0 ? error / best : 0.0, forces.mean,
-      forces.over_stated, r.degrees, r.weighing.scale, r.lambda.value_or(0), r.lambda_by ? name_of(*r.lambda_by) : "-",
-      r.scan ? r.scan->by_risk : 0.0, r.scan ? r.scan->by_evidence : 0.0, r.scan ? r.scan->by_gcv : 0.0);
+      forces.over_stated, balance.total_force_nN, norm(balance.force_nN), norm(balance.force_sigma_nN),
+      balance.strain_energy_fJ, r.degrees, r.weighing.scale, r.lambda.value_or(0),
+      r.lambda_by ? name_of(*r.lambda_by) : "-", r.scan ? r.scan->by_risk : 0.0, r.scan ? r.scan->by_evidence : 0.0,
+      r.scan ? r.scan->by_gcv : 0.0, r.summands ? r.summands->lambda.value_or(0) : 0.0);
   std::fflush(stdout);
 }
 
