@@ -506,9 +506,9 @@ struct Words {
 Words words_of(sheets::Quantity quantity) {
   switch (quantity) {
     case sheets::Quantity::contraction:
-      return {"contraction", " nN/um"};
+      return {"contraction", " nN/µm"};
     case sheets::Quantity::stiffness:
-      return {"stiffness", " nN/um"};
+      return {"stiffness", " nN/µm"};
     case sheets::Quantity::line_tension:
       return {"line tension", " nN"};
     case sheets::Quantity::contraction_over_stiffness:
@@ -520,6 +520,7 @@ Words words_of(sheets::Quantity quantity) {
 std::string sentence_of(const sheets::SheetEstimate& e) {
   const auto& [quantity, unit] = words_of(e.quantity);
   const std::string name = quantity + (e.part.empty() ? "" : " of " + e.part);
+  if (e.identifiable && *e.low == *e.high) return name + " " + brief(e.value) + unit + " (given)";
   if (e.identifiable) return name + " " + brief(e.value) + unit + " (" + brief(*e.low) + " to " + brief(*e.high) + ")";
   if (e.low) return name + " > " + brief(*e.low) + unit;
   if (e.high) return name + " < " + brief(*e.high) + unit;
@@ -534,7 +535,7 @@ void notice_expansion(stage::StageContext& context, const sheets::SheetFit& fit,
     const bool is_below = e.high && *e.high < 0;
     is_sure = is_sure || is_below;
     text += std::string(text.empty() ? "By the beads " : "; ") + (e.part.empty() ? std::string("the sheet") : e.part) +
-            " would contract with " + brief(e.value) + " nN/um" +
+            " would contract with " + brief(e.value) + " nN/µm" +
             (e.low && e.high ? " (" + brief(*e.low) + " to " + brief(*e.high) + ")" : std::string());
   }
   if (!text.empty()) text += is_sure ? ": it expands." : ": that is no contraction.";
@@ -689,7 +690,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
   notice_expansion(context, fit, static_cast<int>(n_parts));
   context.notice(noticed(FindingKind::sheet_at_bound, fit.is_at_bound ? 1 : 0,
-                         "The best stiffness, " + brief(fit.stiffness_nN_per_um) + " nN/um, is an end of the range " +
+                         "The best stiffness, " + brief(fit.stiffness_nN_per_um) + " nN/µm, is an end of the range " +
                              brief(table.softest_nN_per_um()) + " to " + brief(table.stiffest_nN_per_um()) + "."));
   result.figures = {{"ground", std::string(name_of(Ground::gel))},
                     {"strain", std::string(name_of(Strain::small))},
@@ -767,7 +768,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   StageReport report;
   report.converged = done.solution.report.converged;
   report.summary = std::to_string(done.solution.elements->n_triangles()) + " triangles, mean tension " +
-                   brief(balance.mean_tension_nN_per_um) + " nN/um over " + brief(balance.area_um2) +
+                   brief(balance.mean_tension_nN_per_um) + " nN/µm over " + brief(balance.area_um2) +
                    " um2, total force " + brief(balance.total_force_nN) + " nN; " + done.solution.report.reason;
   if (!done.told.empty()) report.summary += "; " + done.told;
   if (has_cut(context.input("outline")))

@@ -28,8 +28,8 @@ Frame frame_of(const Elements& elements) {
 }
 
 Chart map_of(const std::string& title, const Frame& frame) {
-  Chart map(title, {.label = "x (um)", .low = frame.low.x, .high = frame.high.x},
-            {.label = "y (um)", .low = frame.high.y, .high = frame.low.y});
+  Chart map(title, {.label = "x (µm)", .low = frame.low.x, .high = frame.high.x},
+            {.label = "y (µm)", .low = frame.high.y, .high = frame.low.y});
   map.same_scales();
   return map;
 }
@@ -109,7 +109,7 @@ void draw_tractions(Chart& map, const Solution& solution, const Frame& frame) {
   const double px_per_kPa = 1.5 * Chart::kFrameWidth_px / kAcross / longest;
   for (const auto& [square, sum] : sums)
     map.arrow(1 / sum.area * sum.place, px_per_kPa / sum.area * sum.force, "stroke:#0072B2;stroke-width:1.5");
-  map.subtitle("longest arrow: a mean of " + charts::readable(1000 * longest) + " Pa", "#555");
+  map.subtitle("longest arrow: a mean of " + charts::readable(longest) + " kPa", "#555");
 }
 
 }  // namespace
@@ -117,7 +117,7 @@ void draw_tractions(Chart& map, const Solution& solution, const Frame& frame) {
 std::string picture_of(const Solution& solution, const std::string& caption) {
   const Frame frame = frame_of(*solution.elements);
   Chart tension = map_of("Mean tension", frame), traction = map_of("Traction on the ground", frame);
-  draw_values(tension, solution, frame, "nN/um", [&](const Locator::Place& place, const Shape& shape) {
+  draw_values(tension, solution, frame, "nN/µm", [&](const Locator::Place& place, const Shape& shape) {
     return mean_of(value_of(solution.at_nodes, solution.elements->nodes(place.triangle), shape));
   });
   draw_values(traction, solution, frame, "kPa", [&](const Locator::Place& place, const Shape&) {

@@ -85,10 +85,10 @@ std::string about_drawn(const Drawn& d) {
   const bool holds = std::abs(d.error_over_predicted - 1) < 2 * d.by_chance + kMargin;
   return "Checked with " + std::to_string(d.n_experiments) +
          (d.n_experiments == 1 ? " simulated experiment" : " simulated experiments") + " at " +
-         brief(d.point.youngs_modulus_kPa) + " kPa, " + brief(d.point.beads_per_um2) + " beads per µm² and " +
-         brief(d.point.noise_um) + " µm: the errors of " + std::to_string(d.tensions.size()) + " tensions were " +
-         about(d.error_over_predicted) + " times those predicted (root mean square; by chance within " +
-         about(2 * d.by_chance) + " of 1). " +
+         brief(d.point.youngs_modulus_kPa) + " kPa, " + brief(d.point.beads_per_um2) +
+         (d.point.beads_per_um2 == 1 ? " bead" : " beads") + " per µm² and " + brief(d.point.noise_um) +
+         " µm: the errors of " + std::to_string(d.tensions.size()) + " tensions were " + about(d.error_over_predicted) +
+         " times those predicted (root mean square; by chance within " + about(2 * d.by_chance) + " of 1). " +
          (holds ? "The plan holds. " : "The plan does not hold well here: allow for that factor. ") +
          "Single adhesions' forces were off by " + about(d.forces.with_network_nN) + " nN with the network, by " +
          about(d.forces.alone_nN) + " nN without it, and by " + about(d.forces.fttc_nN) + " nN with FTTC.";

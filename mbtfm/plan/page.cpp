@@ -106,7 +106,7 @@ report::Table cell_rows(const Plan& plan) {
                                   {"fibres per cell", true},
                                   {"cells of each condition", true}},
                       .rows = {}};
-  for (const int cells : kCells) table.columns.push_back({"chance with " + std::to_string(cells) + " (%)", true});
+  for (const int cells : kCells) table.columns.push_back({"chance with " + std::to_string(cells) + " cells (%)", true});
   for (const CellNumbers& n : plan.cells) {
     std::vector<std::string> row = {
         name_of(n.scatter.type),           brief(n.scatter.mean_nN),
@@ -145,7 +145,8 @@ std::string paragraphs(const std::vector<std::string>& texts) {
 
 constexpr const char* kHow =
     "<p class=\"sub\">The error by the beads is the Cramér–Rao bound of the fit: it grows in proportion to noise and "
-    "modulus and falls with the root of the density. The model's part (meshes, segmentation, what the model lacks) is "
+    "modulus and falls with the root of the density. The model's part (meshes, segmentation, what is missing in the "
+    "model) is "
     "the same for all of them: it is where the curves level off. “Never” means that this part alone is larger than the "
     "target.</p>\n";
 
@@ -177,7 +178,9 @@ std::string html_of(const Plan& plan) {
   if (!plan.grid.needed.empty())
     body += report::section(
         "Beads per µm² that are needed",
-        report::html_of(needed_rows(plan), {"plan_needed.csv", files::text_of(needed_table(), plan.grid.needed)}));
+        report::html_of(needed_rows(plan), {"plan_needed.csv", files::text_of(needed_table(), plan.grid.needed)}) +
+            "<p class=\"sub\">&gt; " + brief(plan.most_beads_per_um2) +
+            ": more beads than can be told apart. “never”: no number of beads suffices.</p>\n");
   if (plan.drawn && !plan.drawn->tensions.empty())
     body += report::section("How well it held",
                             report::figure(drawn_chart(*plan.drawn),

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "pipeline/files/names.h"
 
@@ -173,6 +175,46 @@ void Chart::label(Vec2 at, const std::string& text) {
 
 void Chart::picture(Vec2 corner, Vec2 opposite, const std::string& address) {
   marks_.push_back({.kind = Mark::Kind::picture, .points = {corner, opposite}, .text = address});
+}
+
+namespace {
+
+using Rgb = std::array<int, 3>;
+
+std::optional<Rgb> rgb_of(const std::string& colour) {
+  Rgb rgb{};
+  if (colour.size() != 7 || colour.find_first_not_of("0123456789abcdefABCDEF", 1) != std::string::npos) return {};
+  for (std::size_t i = 0; i < 3; ++i) rgb[i] = std::stoi(colour.substr(1 + 2 * i, 2), nullptr, 16);
+  return colour.front() == '#' ? std::optional(rgb) : std::nullopt;
+}
+
+/// Of light, by the definition in WCAG 2.1.
+double luminance(const Rgb& rgb) {
+  constexpr double kShares[] = {0.2126, 0.7152, 0.0722};
+  double sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double v = rgb[i] / 255.0;
+    sum += kShares[i] * (v <= 0.03928 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+  }
+  return sum;
+}
+
+}  // namespace
+
+double contrast_to_white(const std::string& colour) {
+  const std::optional<Rgb> rgb = rgb_of(colour);
+  return 1.05 / ((rgb ? luminance(*rgb) : 0) + 0.05);
+}
+
+std::string readable_on_white(const std::string& colour) {
+  constexpr double kLeast = 4.5;
+  const std::optional<Rgb> rgb = rgb_of(colour);
+  if (!rgb) return colour;
+  std::string dark = colour;
+  for (int percent = 99; contrast_to_white(dark) < kLeast; --percent)
+    dark = fmt::format("#{:02X}{:02X}{:02X}", percent * (*rgb)[0] / 100, percent * (*rgb)[1] / 100,
+                       percent * (*rgb)[2] / 100);
+  return dark;
 }
 
 void Chart::key(const std::string& text, const std::string& colour) { keys_.emplace_back(text, colour); }

@@ -24,6 +24,11 @@ std::vector<double> ticks(double low, double high);
 inline constexpr const char* kColours[] = {"#0072B2", "#D55E00", "#00805C", "#B87A00",
                                            "#8E4A7E", "#333333", "#4A9CC9", "#8A8A00"};
 
+/// The colour "#rrggbb" as dark as text on white must be for weak eyes: with a contrast of 4.5 (WCAG 2.1, 1.4.3).
+/// Other ways to write a colour come back as they are.
+std::string readable_on_white(const std::string& colour);
+double contrast_to_white(const std::string& colour);
+
 enum class Scale { linear, logarithmic };
 
 struct Axis {

@@ -225,7 +225,7 @@ std::string Chart::str() const {
         "<text x=\"{}\" y=\"{}\" text-anchor=\"{}\" fill=\"{}\" style=\"stroke:#fff;stroke-width:4;"
         "stroke-linejoin:round;paint-order:stroke\">{}</text>\n",
         is_left ? kLeft_px + 10 : right - 10, kTop_px + 20 + 18 * static_cast<double>(i), is_left ? "start" : "end",
-        keys_[i].second, html_escaped(keys_[i].first));
+        readable_on_white(keys_[i].second), html_escaped(keys_[i].first));
   }
   return svg;
 }

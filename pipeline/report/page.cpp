@@ -74,8 +74,8 @@ std::string html_of(const Table& table, const Download& csv) {
              charts::html_escaped(csv.name), files::base64(csv.text));
 }
 
-std::string html_of_pairs(const std::vector<std::pair<std::string, std::string>>& pairs) {
-  std::string html = "<div class=\"scroll\"><table><tbody>\n";
+std::string html_of_pairs(const std::string& caption, const std::vector<std::pair<std::string, std::string>>& pairs) {
+  std::string html = "<div class=\"scroll\"><table>" + caption_of(caption) + "<tbody>\n";
   for (const auto& [name, value] : pairs) {
     html += "<tr><th scope=\"row\">" + charts::html_escaped(name) + "</th><td class=\"long\">" +
             charts::html_escaped(value) + "</td></tr>\n";
@@ -100,13 +100,14 @@ std::string folded(const std::string& title, const std::string& content) {
 std::string figure(const charts::Chart& chart, const std::string& caption, const std::string& legend) {
   std::string html = "<figure><h3>" + charts::html_escaped(chart.title()) + "</h3>\n";
   if (!chart.subtitle().empty()) {
-    html += fmt::format("<div class=\"note\" style=\"color:{}\">{}</div>\n", chart.subtitle_colour(),
-                        charts::html_escaped(chart.subtitle()));
+    html += fmt::format("<div class=\"note\" style=\"color:{}\">{}</div>\n",
+                        charts::readable_on_white(chart.subtitle_colour()), charts::html_escaped(chart.subtitle()));
   }
   if (!chart.keys().empty()) {
     html += "<div class=\"keys\">";
     for (const auto& [text, colour] : chart.keys()) {
-      html += fmt::format("<span style=\"color:{}\">{}</span>", colour, charts::html_escaped(text));
+      html += fmt::format("<span style=\"color:{}\">{}</span>", charts::readable_on_white(colour),
+                          charts::html_escaped(text));
     }
     html += "</div>\n";
   }

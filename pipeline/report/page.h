@@ -32,7 +32,7 @@ std::string html_of(const Table& table);
 /// The same with a link to its numbers, all digits of them.
 std::string html_of(const Table& table, const Download& csv);
 /// Two columns: name, value.
-std::string html_of_pairs(const std::vector<std::pair<std::string, std::string>>& pairs);
+std::string html_of_pairs(const std::string& caption, const std::vector<std::pair<std::string, std::string>>& pairs);
 
 /// A sentence begins so: "Control: ventral fibres".
 std::string capitalised(std::string text);

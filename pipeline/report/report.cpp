@@ -143,7 +143,7 @@ std::string figure_pairs(const CellResults& results) {
       {"iterations", std::to_string(fit.iterations)},
       {"converged", fit.converged ? "yes" : "no"}};
   for (const auto& [name, value] : fit.more) pairs.emplace_back(name, text_of_figure(value));
-  return html_of_pairs(pairs);
+  return html_of_pairs("The fit in numbers", pairs);
 }
 
 std::string effects_table(const Provenance& provenance) {
@@ -180,9 +180,12 @@ std::string provenance_section(const Provenance& provenance, const std::string& 
   if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
   html += figures;
   for (const StageLine& stage : provenance.stages) {
-    if (!stage.parameters.empty()) html += folded("Parameters of " + stage.name, html_of_pairs(stage.parameters));
-    if (!stage.figures.empty()) html += folded("Figures of " + stage.name, html_of_pairs(stage.figures));
-    if (!stage.inputs.empty()) html += folded("Inputs of " + stage.name + " (SHA-256)", html_of_pairs(stage.inputs));
+    if (!stage.parameters.empty())
+      html += folded("Parameters of " + stage.name, html_of_pairs("Parameters of " + stage.name, stage.parameters));
+    if (!stage.figures.empty())
+      html += folded("Figures of " + stage.name, html_of_pairs("Figures of " + stage.name, stage.figures));
+    if (!stage.inputs.empty())
+      html += folded("Inputs of " + stage.name + " (SHA-256)", html_of_pairs("Inputs of " + stage.name, stage.inputs));
   }
   return section("How it was computed", html);
 }

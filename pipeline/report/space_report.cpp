@@ -209,7 +209,7 @@ std::string figure_pairs(const SpaceResults& r) {
   std::vector<std::pair<std::string, std::string>> pairs;
   for (const auto& [name, value] : r.texts) pairs.emplace_back(name, value);
   for (const auto& [name, value] : r.numbers) pairs.emplace_back(name, readable(value));
-  return html_of_pairs(pairs);
+  return html_of_pairs("The reconstruction in numbers", pairs);
 }
 
 }  // namespace

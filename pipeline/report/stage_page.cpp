@@ -29,18 +29,24 @@ std::string section_of(const Listing& listing) {
                                     html_of(table, Download{listing.name, listing.csv}));
 }
 
+/// The file's drawing as a picture with a name, no wider than the page.
+std::string picture_in_page(const std::string& svg_file, const std::string& name) {
+  return "<svg role=\"img\" aria-label=\"" + html_escaped(name) + "\" style=\"max-width:100%;height:auto\"" +
+         svg_file.substr(svg_file.find("<svg") + 4);
+}
+
 }  // namespace
 
 std::string html_of(const StagePage& of) {
   const std::string head =
       "<h1>" + html_escaped(of.title) + "</h1><p class=\"sub\">mbtfm " + std::string(kVersion) + "</p>\n";
   std::string body = section("In short", list_of(of.facts, of.findings));
-  body += section(of.picture_title, of.picture_svg.substr(of.picture_svg.find("<svg")) + "<p class=\"sub\">" +
-                                        html_escaped(of.picture_explained) + "</p>\n");
+  body += section(of.picture_title, picture_in_page(of.picture_svg, of.picture_title + ". " + of.picture_explained) +
+                                        "<p class=\"sub\">" + html_escaped(of.picture_explained) + "</p>\n");
   for (const Listing& listing : of.tables) body += section_of(listing);
   std::vector<std::pair<std::string, std::string>> pairs;
   for (const auto& [name, value] : of.figures) pairs.emplace_back(name, text_of_figure(value));
-  body += section("All figures", html_of_pairs(pairs));
+  body += section("All figures", html_of_pairs("All figures", pairs));
   return page(of.title + " – mbtfm", head, body);
 }
 

@@ -131,7 +131,7 @@ std::optional<Figure> primary_figure(const Study& study, const Analysis& analysi
                            ". Line and bar: mean of the mixed model with its 95 % interval." +
                            (analysis.primary.differences.empty()
                                 ? ""
-                                : " Right: difference of means from the reference, with its 95 % interval."),
+                                : " Second chart: difference of means from the reference, with its 95 % interval."),
                 .charts = {super_plot(study, m, kind, analysis.primary)},
                 .n_columns = 2};
   if (!analysis.primary.differences.empty()) figure.charts.push_back(effect_plot(analysis.primary));

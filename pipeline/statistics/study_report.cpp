@@ -204,9 +204,12 @@ std::string overview(const Study& study, const Analysis& analysis) {
   }
   std::string html = fmt::format(
       "<p>{} cells{} with {} adhesions and {} stress fibres; the tensions of {} of them could be identified and enter "
-      "the statistics. {} cells were left out: see the table of cells.</p>\n",
+      "the statistics. {}</p>\n",
       study.cells.size(), has_conditions(study) ? fmt::format(" under {} conditions", study.conditions.size()) : "",
-      n_adhesions, n_fibres, analysis.tensions.sample.values.size(), study.left_out.size());
+      n_adhesions, n_fibres, analysis.tensions.sample.values.size(),
+      study.left_out.empty() ? "No cell was left out."
+                             : fmt::format("{} {} left out: see the table of cells.", study.left_out.size(),
+                                           study.left_out.size() == 1 ? "cell was" : "cells were"));
   if (!analysis.warnings.empty()) html += "<h3>What to distrust</h3>\n" + list_of(analysis.warnings);
   return html;
 }

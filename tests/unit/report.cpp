@@ -14,6 +14,7 @@
 #include "pipeline/report/findings.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/result_line.h"
+#include "pipeline/report/stage_page.h"
 #include "pipeline/report/tension_table.h"
 #include "tests/support/fake_cell.h"
 #include "tests/support/temporary_folder.h"
@@ -40,6 +41,40 @@ TEST(Report, names_every_fibre_and_adhesion) {
   for (int adhesion = 1; adhesion <= 12; ++adhesion) {
     EXPECT_NE(html.find("adhesion " + std::to_string(adhesion) + "\\n"), std::string::npos) << adhesion;
   }
+}
+
+TEST(Charts, keys_are_dark_enough_to_read_on_white) {
+  EXPECT_NEAR(charts::contrast_to_white("#000000"), 21, 1e-9);
+  EXPECT_NEAR(charts::contrast_to_white("#FFFFFF"), 1, 1e-9);
+  EXPECT_EQ(charts::readable_on_white("#0072B2"), "#0072B2") << "dark already";
+  EXPECT_EQ(charts::readable_on_white("currentColor"), "currentColor");
+  for (const char* colour : charts::kColours) {
+    charts::Chart chart("title", {.label = "x"}, {.label = "y"});
+    chart.key("name", colour);
+    const std::string html = figure(chart, "", "");
+    std::smatch found;
+    ASSERT_TRUE(std::regex_search(html, found, std::regex("color:(#[0-9A-F]{6})\">name")));
+    EXPECT_GE(charts::contrast_to_white(found[1]), 4.5) << colour;
+  }
+}
+
+TEST(StagePage, its_picture_has_a_name_and_keeps_to_the_page_and_its_tables_have_captions) {
+  const std::string html =
+      html_of(StagePage{.title = "t",
+                        .picture_svg = "<?xml version=\"1.0\"?><svg width=\"920\" height=\"5\"></svg>",
+                        .picture_title = "Tension",
+                        .picture_explained = "Left: a \"map\".",
+                        .figures = {{"n", std::int64_t(1)}}});
+  EXPECT_NE(
+      html.find(
+          "<svg role=\"img\" aria-label=\"Tension. Left: a &quot;map&quot;.\" style=\"max-width:100%;height:auto\" "
+          "width=\"920\""),
+      std::string::npos);
+  std::size_t n_tables = 0, n_captions = 0;
+  for (std::size_t at = 0; (at = html.find("<table>", at)) != std::string::npos; ++at) ++n_tables;
+  for (std::size_t at = 0; (at = html.find("<table><caption", at)) != std::string::npos; ++at) ++n_captions;
+  EXPECT_EQ(n_tables, 1u);
+  EXPECT_EQ(n_captions, n_tables);
 }
 
 TEST(ResultLine, counts_as_uncertain_what_is_not_identifiable_and_what_may_be_nothing_or_twice_as_much) {
