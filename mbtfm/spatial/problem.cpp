@@ -119,11 +119,12 @@ Problem Problem::with_response(const MatrixXd& matrix, const VectorXd& displaced
   return other;
 }
 
-double Problem::least_variance() const {
+double Problem::variance_of_model() const {
   const double in_sigma = observed.displacement_um.cwiseQuotient(observed.sigma_um).squaredNorm();
-  const double of_model = model_error * model_error * in_sigma / static_cast<double>(observed.displacement_um.size());
-  return std::max(observed.states_errors ? 1.0 : 0.0, of_model);
+  return model_error * model_error * in_sigma / static_cast<double>(observed.displacement_um.size());
 }
+
+double Problem::least_variance() const { return std::max(observed.states_errors ? 1.0 : 0.0, variance_of_model()); }
 
 Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& parameters, const Meshing& meshing,
                      const substrate::SubstrateParameters& gel, int threads) {

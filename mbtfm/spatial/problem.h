@@ -56,6 +56,7 @@ struct Problem {
                         const Eigen::VectorXd& about_kPa) const;
   /// Of a datum, in units of sigma²: one where errors are stated, or what the model's error leaves if that is more.
   double least_variance() const;
+  double variance_of_model() const;  ///< what the model's error alone leaves of it
 };
 
 struct Meshing {

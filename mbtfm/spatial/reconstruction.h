@@ -48,6 +48,7 @@ struct SpatialReconstruction {
   double chi_squared = 0;  ///< misfit over what the stated errors leave, per datum; 0: not stated
   Weighing weighing;
   double variance = 1;            ///< of one datum as weighed, in units of sigma²
+  double variance_left = 1;       ///< the same as the beads have it, whatever they state
   std::vector<PartForce> forces;  ///< by adhesion
   std::string remark;
   Figures figures;
