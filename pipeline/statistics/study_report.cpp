@@ -38,7 +38,8 @@ std::string embedded(const Figure& figure) {
   if (figure.charts.empty())
     return "<h3>" + charts::html_escaped(figure.title) +
            "</h3>\n<p class=\"sub\">Not drawn: " + charts::html_escaped(figure.caption) + "</p>\n";
-  return "<h3>" + charts::html_escaped(figure.title) + "</h3>\n" + charts_of(figure);
+  const bool is_named = figure.charts.size() == 1 && figure.charts.front().title() == figure.title;
+  return (is_named ? "" : "<h3>" + charts::html_escaped(figure.title) + "</h3>\n") + charts_of(figure);
 }
 
 report::Table types_table(const Study& study, const Analysis& analysis) {

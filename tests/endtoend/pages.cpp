@@ -143,6 +143,16 @@ TEST_F(Pages, charts_zoom_about_the_mouse_move_and_come_back) {
   EXPECT_EQ(ink(), before);
 }
 
+TEST_F(Pages, no_heading_says_again_what_the_one_before_says) {
+  for (const auto& page : {cell_page(), study_page()}) {
+    Browser& browser = opened(page);
+    EXPECT_EQ(browser.evaluate("[...document.querySelectorAll('h2, h3')].map(h => h.textContent).filter((t, i, all) => "
+                               "i > 0 && t === all[i - 1])"),
+              test::json::array())
+        << page;
+  }
+}
+
 TEST_F(Pages, nothing_reaches_beyond_the_window_and_no_text_is_small) {
   for (const auto& page : {cell_page(), study_page()}) {
     Browser& browser = opened(page);
