@@ -10,8 +10,8 @@ namespace mbtfm::tractions {
 
 /// Tractions are linear in the displacements but for lambda. So for each lambda of the scan the equation is solved for
 /// the field, for the noise and for random signs; any mixture of field and noise has its criteria, its lambda and its
-/// forces from these. Between the lambdas of the scan (three a decade) forces and residuals are those of a cubic through
-/// four of them: of a single wave, whose share is 1 / (1 + lambda² / c²), that errs by 1.6 % at most.
+/// forces from these. Between the lambdas of the scan (three a decade) forces and residuals are those of a cubic
+/// through four of them: of a single wave, whose share is 1 / (1 + lambda² / c²), that errs by 1.6 % at most.
 class FttcMixtures {
  public:
   /// @param noise  at the beads of `field`, whose errors are one in both
