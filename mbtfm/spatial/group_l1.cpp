@@ -160,31 +160,21 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   double largest = 0;
   for (Index v = 0; v < n; ++v)
     largest = std::max(largest, std::sqrt(areas[v]) * r.traction_kPa.segment<3>(3 * v).norm());
-  const int n_rounds = parameters.loss == BeadLoss::l2 ? 1 : 3;  // of weights: they hardly change after Tikhonov's
   const double variance = r.variance;
+  const Rows rows(problem, r.weighing.by_row);  // Tikhonov's weights
+  const MatrixXd weighed = rows.of(response);
+  const VectorXd data = rows.of(problem.displacement_um());
+  const MatrixXd normal = numerics::gram(weighed, threads);
+  GroupLasso lasso(normal, weighed.transpose() * data, data.squaredNorm(), weights, largest);
   // The sum of n squares of the noise varies by sqrt(2/n), 2 % for 1 500 beads, and that is half of what the penalty
-  // moves: the misfit aimed at is the one of the noise that these beads have, not of the one they state.
+  // moves: the misfit aimed at is the one of the noise that these beads have, not of the one they state, and of what
+  // their weights leave of it.
   const double aimed = std::max(r.variance_left, problem.variance_of_model());
-  double mu = 0;
-  Posterior posterior;
-  VectorXd at_minimum;
-  int steps = 0;
-  for (int round = 0; round < n_rounds; ++round) {
-    const Rows rows(problem, r.weighing.by_row);
-    const MatrixXd weighed = rows.of(response);
-    const VectorXd data = rows.of(problem.displacement_um());
-    const MatrixXd normal = numerics::gram(weighed, threads);
-    GroupLasso lasso(normal, weighed.transpose() * data, data.squaredNorm(), weights, largest);
-    mu = choose_mu(lasso, aimed * r.weighing.n_data);
-    steps += lasso.steps();
-    at_minimum = lasso.x();
-    r.traction_kPa = basis.tractions(at_minimum);
-    r.relative_l2 = std::sqrt(std::max(0.0, lasso.misfit()) / std::max(data.squaredNorm(), 1e-300));
-    const bool is_last = round + 1 == n_rounds;
-    if (is_last) posterior = posterior_of(lasso, normal, mu, variance, threads);
-    r.weighing =
-        weigh(parameters.loss, problem.observed, problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees);
-  }
+  const double mu = choose_mu(lasso, aimed * r.weighing.n_data);
+  const VectorXd at_minimum = lasso.x();
+  r.traction_kPa = basis.tractions(at_minimum);
+  r.relative_l2 = std::sqrt(std::max(0.0, lasso.misfit()) / std::max(data.squaredNorm(), 1e-300));
+  const Posterior posterior = posterior_of(lasso, normal, mu, variance, threads);
   r.covariance_kPa2 = basis.covariance(posterior.covariance, threads);
   r.summands = Summands{basis.tractions(posterior.mean), r.covariance_kPa2, {}};
   const VectorXd seen =
@@ -199,7 +189,7 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   r.figures = {{"penalty_per_nN", mu},
                {"spot_width_um", width_um},
                {"n_active_spots", static_cast<std::int64_t>((lengths_of(at_minimum) > 0).count())},
-               {"n_steps", std::int64_t{steps}}};
+               {"n_steps", std::int64_t{lasso.steps()}}};
   return r;
 }
 

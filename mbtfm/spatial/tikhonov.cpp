@@ -120,12 +120,8 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   r.weighing = weigh(parameters.loss, observed, residual(last), r.degrees);
   r.variance =
       std::max(parameters.loss == BeadLoss::l2 ? last.scan.variance : r.weighing.variance, problem.least_variance());
-  r.variance_left = r.variance;
-  if (parameters.loss == BeadLoss::l2) {
-    const double loose = last.scan.by_gcv;
-    r.variance_left =
-        last.spectrum->misfit(loose) / (static_cast<double>(displacement_um.size()) - last.spectrum->degrees(loose));
-  }
+  const double loose = last.scan.by_gcv;
+  r.variance_left = last.spectrum->misfit(loose) / (last.weighing.n_data - last.spectrum->degrees(loose));
   r.traction_kPa = basis.tractions(last.x);
   r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(lambda, r.variance), threads);
   if (last.chosen.by == tractions::LambdaCriterion::risk) {

@@ -355,6 +355,19 @@ TEST_F(InSpace, beads_that_are_wrong_do_not_pull_with_a_robust_loss) {
   }
 }
 
+/// Beads under patches that pull lose weight, as what smoothing takes from them looks astray.
+TEST_F(InSpace, weights_of_a_robust_loss_leave_group_l1_its_tractions) {
+  const Problem problem = scene.problem(scene.beads(0.1), parameters);
+  const auto by_squares = reconstruct_group_l1(problem, traction, parameters, 1);
+  for (const BeadLoss loss : {BeadLoss::huber, BeadLoss::biweight}) {
+    parameters.loss = loss;
+    const double off =
+        apart(reconstruct_group_l1(problem, traction, parameters, 1).traction_kPa, by_squares.traction_kPa);
+    RecordProperty(name_of(loss), std::to_string(off));
+    EXPECT_LE(off, 0.4) << name_of(loss);  // no tractions at all are 1 apart
+  }
+}
+
 /// As a stage that has moved and a dish that was put back a little turned do.
 TEST_F(InSpace, what_all_beads_do_together_changes_nothing_and_is_found) {
   const std::vector<BeadInSpace> beads = scene.beads(0.03);
