@@ -47,8 +47,8 @@ struct SpatialReconstruction {
   double noise_um = 0;                                  ///< along the surface, as the beads have it
   double chi_squared = 0;  ///< misfit over what the stated errors leave, per datum; 0: not stated
   Weighing weighing;
-  double variance = 1;            ///< of one datum as weighed, in units of sigma²
-  double variance_left = 1;       ///< the same as the beads have it, whatever they state
+  double variance = 1;       ///< of one datum as weighed, in units of sigma²
+  double variance_left = 1;  ///< the same as weighed beads have it at cross-validation's lambda, whatever they state
   std::vector<PartForce> forces;  ///< by adhesion
   std::string remark;
   Figures figures;

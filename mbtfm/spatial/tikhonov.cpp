@@ -121,7 +121,8 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   r.variance =
       std::max(parameters.loss == BeadLoss::l2 ? last.scan.variance : r.weighing.variance, problem.least_variance());
   const double loose = last.scan.by_gcv;
-  r.variance_left = last.spectrum->misfit(loose) / (last.weighing.n_data - last.spectrum->degrees(loose));
+  const double n_data = last.weighing.n_data;  // less where weights are small; a tenth at least is left, as in `weigh`
+  r.variance_left = last.spectrum->misfit(loose) / std::max(n_data - last.spectrum->degrees(loose), 0.1 * n_data);
   r.traction_kPa = basis.tractions(last.x);
   r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(lambda, r.variance), threads);
   if (last.chosen.by == tractions::LambdaCriterion::risk) {
