@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -16,6 +17,9 @@ namespace {
 
 using CellVector = Eigen::Matrix<double, kUnknowns, 1>;
 using CellPressures = Eigen::Matrix<double, kUnknowns, kPressures>;
+
+/// Pairs of directions, of which a symmetric tangent has the others, too.
+constexpr std::array<std::pair<int, int>, 6> kPairs = {{{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
 
 /// The equations of an element about a state, pressure and dilatation eliminated:
 /// tangent du = -residual, then d theta and dp from du.
@@ -38,7 +42,10 @@ Condensed condensed(const NeoHooke& law, const Element& element, const NodeValue
   c.volume_gap.setZero();
   c.pressure_gap.setZero();
   c.mass_inverse = element.mass.inverse();
-  if (with_tangent) c.tangent = Eigen::MatrixXd::Zero(kUnknowns, kUnknowns);
+  // the tangent's blocks of directions i <= k: slopes_a,J A(iJ, kL) slopes_b,L, summed over all points at once
+  const Eigen::Index n_slopes = with_tangent ? 3 * std::ssize(element.points) : 0;
+  Eigen::MatrixXd slopes(kNodes, n_slopes), weighed(kPairs.size() * kNodes, n_slopes);
+  Eigen::Index at = 0;
   for (const QuadraturePoint& point : element.points) {
     const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + u * point.slopes;
     const double J = F.determinant(), theta = dilatation.dot(point.pressures), p = pressure.dot(point.pressures);
@@ -55,7 +62,7 @@ Condensed condensed(const NeoHooke& law, const Element& element, const NodeValue
     c.pressure_gap += weight * (law.pressure_kPa(theta) - p) * point.pressures;
     c.bulk += weight * law.pressure_slope_kPa(theta) * point.pressures * point.pressures.transpose();
     if (!with_tangent) continue;
-    // A(iJ, kL) = d P_iJ / d F_kL, then slopes_a,J A(iJ, kL) slopes_b,L
+    // A(iJ, kL) = d P_iJ / d F_kL
     Eigen::Matrix<double, 9, 9> A;
     for (int k = 0; k < 3; ++k) {
       for (int L = 0; L < 3; ++L) {
@@ -66,17 +73,27 @@ Condensed condensed(const NeoHooke& law, const Element& element, const NodeValue
         A.col(3 * k + L) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(by_row.data());
       }
     }
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) {
-        c.tangent(Eigen::seqN(i, Eigen::fix<kNodes>, 3), Eigen::seqN(k, Eigen::fix<kNodes>, 3)) +=
-            point.slopes * A.block<3, 3>(3 * i, 3 * k) * point.slopes.transpose();
-      }
+    for (std::size_t pair = 0; pair < kPairs.size(); ++pair) {
+      const auto [i, k] = kPairs[pair];
+      weighed.block<kNodes, 3>(pair * kNodes, at).noalias() = point.slopes.lazyProduct(A.block<3, 3>(3 * i, 3 * k));
     }
+    slopes.middleCols<3>(at) = point.slopes;
+    at += 3;
   }
   c.size = c.residual.norm();
   const CellPressures by_mass = c.divergence * c.mass_inverse;
   c.residual += by_mass * (c.bulk * (c.mass_inverse * c.volume_gap) + c.pressure_gap);
-  if (with_tangent) c.tangent += by_mass * c.bulk * by_mass.transpose();
+  if (with_tangent) {
+    c.tangent = by_mass * c.bulk * by_mass.transpose();
+    const Eigen::MatrixXd blocks = weighed * slopes.transpose();
+    for (std::size_t pair = 0; pair < kPairs.size(); ++pair) {
+      const auto [i, k] = kPairs[pair];
+      const auto block = blocks.middleRows<kNodes>(pair * kNodes);
+      const auto rows = Eigen::seqN(i, Eigen::fix<kNodes>, 3), columns = Eigen::seqN(k, Eigen::fix<kNodes>, 3);
+      c.tangent(rows, columns) += block;
+      if (i != k) c.tangent(columns, rows) += block.transpose();
+    }
+  }
   return c;
 }
 
