@@ -136,9 +136,16 @@ std::string spelled(const toml::node& node, const std::string& where) {
   throw InputError(where, "a number, a text, true or false", "a date or a nested table");
 }
 
-std::string unknown_key_hint(const std::vector<std::string>& known, std::string_view key) {
+/// @param list  of the stage, whose keys of other tables may be meant
+std::string unknown_key_hint(const ParameterList& list, const std::vector<std::string>& known, std::string_view key) {
   const std::string closest = nearest(known, key);
-  return closest.empty() ? "" : did_you_mean(closest);
+  if (!closest.empty() && is_alike(closest, key)) return did_you_mean(closest);
+  if (std::ranges::find(kMoreOfGel, key) != kMoreOfGel.end()) return "it belongs under [gel]";
+  for (const Parameter& p : list.all()) {
+    if (p.name == key)
+      return p.table.empty() ? "it belongs above the first table" : "it belongs under [" + p.table + "]";
+  }
+  return "docs/parameters.md has all keys";
 }
 
 }  // namespace
@@ -223,16 +230,16 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
           if (std::ranges::find(of_other_stages, std::string(inner_key.str())) != of_other_stages.end()) continue;
           throw InputError(place(name, inner), "a known key of [" + key_name + "]",
                            "'" + std::string(inner_key.str()) + "'",
-                           unknown_key_hint(others.empty() ? keys_of[key_name] : others, inner_key.str()));
+                           unknown_key_hint(list, others.empty() ? keys_of[key_name] : others, inner_key.str()));
         }
       } else if (std::find(kTables.begin(), kTables.end(), key_name) == kTables.end()) {
         throw InputError(place(name, node), "a known table", "[" + key_name + "]",
-                         unknown_key_hint({kTables.begin(), kTables.end()}, key_name));
+                         unknown_key_hint(list, {kTables.begin(), kTables.end()}, key_name));
       }
     } else if (!set("", key_name, node) && std::find(kRootKeys.begin(), kRootKeys.end(), key_name) == kRootKeys.end()) {
       std::vector<std::string> known(kRootKeys.begin(), kRootKeys.end());
       throw InputError(place(name, node), "a known key above the first table", "'" + key_name + "'",
-                       unknown_key_hint(known, key_name));
+                       unknown_key_hint(list, known, key_name));
     }
   }
 }
@@ -277,7 +284,8 @@ Parameter& parameter_named(ParameterList& list, const std::string& name) {
     if (p.flag == name) return p;
     known.push_back(p.flag);
   }
-  throw UsageError("no parameter is called '" + name + "': " + unknown_key_hint(known, name));
+  throw UsageError("no parameter is called '" + name +
+                   "': " + (nearest(known, name).empty() ? "" : did_you_mean(nearest(known, name))));
 }
 
 void check_complete(const ParameterList& list) {

@@ -49,6 +49,14 @@ struct Source {
   std::string column = {};  ///< empty: none
 };
 
+/// The column of a form that nobody filled in asks for nothing.
+bool says_anything(const files::CsvTable& table, const std::string& column) {
+  for (int row = 0; row < table.n_rows(); ++row) {
+    if (!table.text(row, column).empty()) return true;
+  }
+  return false;
+}
+
 /// @param usual  columns that count without being asked for
 Source source_of(const std::string& asked, const char* flag, const std::vector<std::string>& usual,
                  const std::optional<files::CsvTable>& table) {
@@ -61,7 +69,7 @@ Source source_of(const std::string& asked, const char* flag, const std::vector<s
     return {.column = asked};
   }
   for (const std::string& column : usual) {
-    if (table && table->has(column)) return {.column = column};
+    if (table && table->has(column) && says_anything(*table, column)) return {.column = column};
   }
   return {};
 }

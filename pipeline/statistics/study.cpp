@@ -154,10 +154,16 @@ bool is_measured(const Tension& t) {
 }
 
 [[noreturn]] void no_cell_left(const Path& folder, const std::vector<LeftOutCell>& left_out) {
-  std::string found = "none of " + std::to_string(left_out.size());
-  if (!left_out.empty()) found += " (" + left_out.front().name + ": " + left_out.front().reason + ")";
-  throw InputError(folder.string(), "at least one finished cell", found,
-                   "run them first: mbtfm batch " + folder.string());
+  std::map<std::string, int> n_of;
+  for (const LeftOutCell& cell : left_out) ++n_of[cell.reason];
+  std::vector<std::string> reasons;
+  for (const auto& [reason, n] : n_of) reasons.push_back(std::to_string(n) + ": " + reason);
+  constexpr std::size_t kTold = 5;
+  if (reasons.size() > kTold) reasons.resize(kTold);
+  throw InputError(folder.string(), "at least one finished cell that enters",
+                   "none of " + std::to_string(left_out.size()) + (reasons.empty() ? "" : " (" + listed(reasons) + ")"),
+                   "cells that are not finished: mbtfm batch " + folder.string() +
+                       "; others: the table, or the parameters of mbtfm stats");
 }
 
 }  // namespace

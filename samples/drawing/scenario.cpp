@@ -182,8 +182,10 @@ fs::path scenario_file(const std::string& name) {
     return name;
   }
   if (const fs::path file = scenario_folder() / (name + ".toml"); fs::is_regular_file(file)) return file;
-  throw UsageError("--scenario: '" + name + "' is unknown; there are " + known_scenarios() +
-                   ", or give the path of a scenario file");
+  const std::string known = known_scenarios();
+  throw UsageError("--scenario: '" + name + "' is unknown; " +
+                   (known.empty() ? "there are none in " + scenario_folder().string() + ": is mbtfm installed whole?"
+                                  : "there are " + known + ", or give the path of a scenario file"));
 }
 
 }  // namespace mbtfm::drawing

@@ -118,6 +118,13 @@ TEST(Parameters, an_unknown_key_names_the_line_and_the_nearest_known_one) {
             "'pixel_size_um'?");
 }
 
+TEST(Parameters, a_key_in_the_wrong_table_is_told_where_it_belongs_and_one_that_is_like_none_is_not_guessed) {
+  EXPECT_EQ(message_of("[network]\nradius_um = 2\n"),
+            "cell.toml:2: expected a known key of [network], found 'radius_um' | it belongs under [gel]");
+  EXPECT_EQ(message_of("[network]\nwhatever = 2\n"),
+            "cell.toml:2: expected a known key of [network], found 'whatever' | docs/parameters.md has all keys");
+}
+
 TEST(Parameters, keys_of_other_stages_are_left_to_them) { EXPECT_EQ(message_of("[fit]\nwhatever = 2\n"), "read"); }
 
 TEST(Parameters, a_repeated_key_a_wrong_type_and_a_value_out_of_range_are_refused) {

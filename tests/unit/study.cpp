@@ -111,6 +111,14 @@ TEST(Study, a_column_called_condition_counts_without_being_asked_for) {
   EXPECT_THROW(fake.read({.conditions = "control"}, fake.folder / "study.csv"), UsageError);
 }
 
+TEST(Study, a_column_called_condition_that_nobody_filled_in_asks_for_nothing) {
+  const FakeStudy fake;
+  files::write_text(fake.folder / "study.csv", "cell,condition,day\ncell_1,,\ncell_2,,\n");
+  const Study study = fake.read({}, fake.folder / "study.csv");
+  EXPECT_EQ(study.conditions, std::vector<std::string>{""});
+  EXPECT_EQ(study.cells.size(), 2u);
+}
+
 TEST(Study, cells_with_a_finding_that_excludes_are_left_out_with_it_as_the_reason) {
   const FakeStudy fake;
   files::write_text(fake.folder / "control/cell_1/run.json",
@@ -141,6 +149,17 @@ TEST(Study, a_folder_without_a_finished_cell_is_an_error) {
   const test::TemporaryFolder folder;
   test::write_given_stages(folder / "cell", test::round_cell());
   EXPECT_THROW(read_study(folder.path(), {}, {}, 1), InputError);
+}
+
+TEST(Study, where_no_cell_enters_each_reason_is_told) {
+  const FakeStudy fake;
+  files::write_text(fake.folder / "study.csv", "cell,exclude\ncell_1,blurred\ncell_2,blurred\ncell_3,dividing\n");
+  try {
+    fake.read({}, fake.folder / "study.csv");
+    FAIL() << "nothing was thrown";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("2: blurred, 1: dividing"), std::string::npos) << error.what();
+  }
 }
 
 TEST(Study, tensions_that_cannot_be_identified_do_not_enter) {
