@@ -24,8 +24,15 @@ Spectrum::Spectrum(MatrixXd normal, VectorXd pulled, double data_squared, double
     : data_squared_(data_squared), n_data_(n_data) {
   auto [values, vectors] = numerics::symmetric_eigen(std::move(normal));
   values_ = values.array().max(0);
-  vectors_ = std::move(vectors);
-  projected_ = vectors_.transpose() * pulled;
+  vectors_ = std::make_shared<const MatrixXd>(std::move(vectors));
+  projected_ = vectors_->transpose() * pulled;
+}
+
+Spectrum Spectrum::with_noise(double variance) const {
+  Spectrum noisy = *this;
+  noisy.projected_ = (projected_.square() + variance * values_).sqrt();
+  noisy.data_squared_ += variance * n_data_;
+  return noisy;
 }
 
 LambdaScan Spectrum::scan(std::optional<double> stated_variance) const {
@@ -74,11 +81,13 @@ ScanPoint Spectrum::point_at(double lambda) const {
 
 double Spectrum::explained(double lambda) const { return (projected_.square() / (values_ + lambda * lambda)).sum(); }
 
-VectorXd Spectrum::solve(double lambda) const { return vectors_ * (projected_ / (values_ + lambda * lambda)).matrix(); }
+VectorXd Spectrum::solve(double lambda) const {
+  return *vectors_ * (projected_ / (values_ + lambda * lambda)).matrix();
+}
 
 MatrixXd Spectrum::outer(const ArrayXd& shares) const {
-  MatrixXd sum = MatrixXd::Zero(vectors_.rows(), vectors_.rows());
-  numerics::add_upper_outer(vectors_ * shares.sqrt().matrix().asDiagonal(), sum);
+  MatrixXd sum = MatrixXd::Zero(vectors_->rows(), vectors_->rows());
+  numerics::add_upper_outer(*vectors_ * shares.sqrt().matrix().asDiagonal(), sum);
   numerics::mirror_upper(sum);
   return sum;
 }
@@ -92,7 +101,7 @@ MatrixXd Spectrum::posterior(double lambda, double variance) const {
 }
 
 VectorXd Spectrum::resolved(double lambda) const {
-  return vectors_.array().square().matrix() * (values_ / (values_ + lambda * lambda)).matrix();
+  return vectors_->array().square().matrix() * (values_ / (values_ + lambda * lambda)).matrix();
 }
 
 double Spectrum::misfit(double lambda) const {

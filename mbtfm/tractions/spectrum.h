@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 
 #include "mbtfm/tractions/regularisation.h"
@@ -14,6 +15,10 @@ class Spectrum {
   /// @param normal  AᵀA; what is below its diagonal does not count
   /// @param pulled  Aᵀu
   Spectrum(Eigen::MatrixXd normal, Eigen::VectorXd pulled, double data_squared, double n_data);
+  /// Data whose squares, and those of Aᵀu by direction, are what they are in the mean with white noise beside: criteria
+  /// then are what they are expected to be. Of solve() nothing holds but the size.
+  /// @param variance  of one datum
+  Spectrum with_noise(double variance) const;
 
   /// @param stated_variance  of one datum
   LambdaScan scan(std::optional<double> stated_variance) const;
@@ -38,14 +43,14 @@ class Spectrum {
   double data_squared() const { return data_squared_; }
 
   /// V with AᵀA = V diag Vᵀ
-  const Eigen::MatrixXd& vectors() const { return vectors_; }
+  const Eigen::MatrixXd& vectors() const { return *vectors_; }
   const Eigen::ArrayXd& values() const { return values_; }
 
  private:
   Eigen::MatrixXd outer(const Eigen::ArrayXd& shares) const;
   double data_squared_, n_data_;
   Eigen::ArrayXd values_, projected_;
-  Eigen::MatrixXd vectors_;
+  std::shared_ptr<const Eigen::MatrixXd> vectors_;
 };
 
 }  // namespace mbtfm::tractions

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "mbtfm/spatial/foresight.h"
 #include "mbtfm/tractions/recurrences.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/half_space_problem.h"
@@ -311,6 +312,94 @@ TEST_F(InSpace, forces_lie_within_their_standard_errors) {
     EXPECT_LE(std::sqrt(square), 1.3) << name_of(method);
     EXPECT_GE(std::sqrt(square), 0.4) << name_of(method);
   }
+}
+
+/// Two ways to one number: from the decomposition for every noise, and by the reconstruction of one experiment.
+TEST_F(InSpace, what_is_foreseen_is_what_a_reconstruction_of_such_beads_states) {
+  constexpr double kNoise_um = 0.03;
+  const SpatialInputs inputs{{}, scene.gel, scene.adhesions(), {}};
+  const Problem exact = scene.problem(scene.beads(1e-9), parameters),
+                seen = scene.problem(scene.beads(kNoise_um), parameters);
+  traction.method = tractions::TractionMethod::tikhonov;
+  const auto foreseen = [&] { return Foresight(exact, traction, 1).at(kNoise_um / 1e-9); };
+  const double lambda_found = *reconstruct(seen, inputs, traction, parameters, 1).lambda;
+  // criteria of one experiment scatter: 80 numbers are told, and lambda follows the tenth or so of their logarithms
+  EXPECT_NEAR(foreseen().lambda / lambda_found, 1, 0.2);
+  traction.lambda_um_per_kPa = lambda_found / lambda_per_um_per_kPa(seen);
+  const auto r = reconstruct(seen, inputs, traction, parameters, 1);
+  const Foreseen f = foreseen();
+  EXPECT_NEAR(f.lambda, lambda_found, 1e-9 * lambda_found);
+  // 1 500 data tell their variance to 4 %, errors to 2 %: three times
+  const double by_variance = std::sqrt(r.variance);
+  EXPECT_NEAR(by_variance, 1, 0.06);
+  for (std::size_t a = 0; a < r.forces.size(); ++a) {
+    const auto at = 3 * static_cast<Eigen::Index>(a);
+    const Vec3 s = r.forces[a].sigma_nN;
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const double stated = std::array{s.x, s.y, s.z}.at(static_cast<std::size_t>(c)) / by_variance;
+      EXPECT_NEAR(std::sqrt(f.covariance_nN2(at + c, at + c)), stated, 1e-6 * stated) << a;
+      EXPECT_LE(f.by_noise_nN2(at + c, at + c), f.covariance_nN2(at + c, at + c)) << a;
+    }
+  }
+  const Balance balance = balance_of(seen, r);
+  EXPECT_NEAR(std::sqrt(f.net_force_nN2(0, 0)), balance.force_sigma_nN.x / by_variance,
+              1e-6 * balance.force_sigma_nN.x);
+  const std::vector<double> resolution = resolution_um(seen, r);
+  for (std::size_t v = 0; v < resolution.size(); ++v)
+    EXPECT_NEAR(f.resolution_um[v], resolution[v], 1e-5 * resolution[v]);
+}
+
+/// Of forces found in many experiments, the scatter is the part by noise: what they have wrong alike is the rest.
+TEST_F(InSpace, the_part_by_noise_is_the_scatter_of_experiments_with_the_same_beads) {
+  constexpr double kNoise_um = 0.03;
+  constexpr int kSeeds = 100;
+  const Problem exact = scene.problem(scene.beads(1e-9), parameters);
+  const Foresight foresight(exact, traction, 1);
+  const Foreseen f = foresight.at(kNoise_um / 1e-9);
+  Problem seen = exact;
+  seen.observed.sigma_um *= kNoise_um / 1e-9;
+  traction.lambda_um_per_kPa = f.lambda / lambda_per_um_per_kPa(seen);
+  std::mt19937_64 random(17);
+  std::normal_distribution<double> normal;
+  MatrixXd found(f.mean_nN.size(), kSeeds);
+  const Basis basis = orthonormal_basis(norm_of(seen.mesh, seen.ground, [](Vec2) { return 1.0; }));
+  const MatrixXd response = basis.response(seen.response_um_per_kPa, 1);
+  SpatialReconstruction r;
+  r.lambda = f.lambda;
+  r.weighing.by_row = VectorXd::Ones(seen.observed.sigma_um.size());
+  for (int k = 0; k < kSeeds; ++k) {
+    seen.observed.displacement_um =
+        exact.observed.displacement_um + seen.observed.sigma_um.cwiseProduct(VectorXd::NullaryExpr(
+                                             seen.observed.sigma_um.size(), [&]() { return normal(random); }));
+    const std::vector<PartForce> forces = forces_beside_background(seen, response, r, 1);
+    for (std::size_t a = 0; a < forces.size(); ++a) {
+      const Vec3 force = forces[a].force_nN;
+      found.col(k).segment<3>(3 * static_cast<Eigen::Index>(a)) << force.x, force.y, force.z;
+    }
+  }
+  const VectorXd mean = found.rowwise().mean();
+  const VectorXd variance = (found.colwise() - mean).rowwise().squaredNorm() / (kSeeds - 1);
+  // a variance of 100 numbers has a standard error of 14 %, the mean of nine one of 5 %
+  EXPECT_NEAR(variance.cwiseQuotient(f.by_noise_nN2.diagonal()).mean(), 1, 0.15);
+  for (Eigen::Index c = 0; c < mean.size(); ++c)
+    EXPECT_NEAR(mean[c], f.mean_nN[c], 4 * std::sqrt(f.by_noise_nN2(c, c) / kSeeds)) << c;
+}
+
+TEST_F(InSpace, noise_and_modulus_count_as_their_product_and_more_of_either_is_foreseen_as_more_error) {
+  const Problem soft = scene.problem(scene.beads(1e-9), parameters);
+  HalfSpaceScene stiff_scene = scene;
+  stiff_scene.gel.youngs_modulus_kPa *= 2;
+  const Problem stiff = stiff_scene.problem(stiff_scene.beads(1e-9), parameters);
+  const Foresight of_soft(soft, traction, 1), of_stiff(stiff, traction, 1);
+  const Foreseen once = of_soft.at(3e7), twice = of_soft.at(6e7), of_modulus = of_stiff.at(3e7);
+  // beads of 1e-9 um have noise of their own: a part in 1e7
+  EXPECT_LE((twice.covariance_nN2 - of_modulus.covariance_nN2).norm(), 1e-5 * twice.covariance_nN2.norm());
+  EXPECT_NEAR(twice.degrees, of_modulus.degrees, 1e-4 * twice.degrees);
+  // at the same lambda twice the noise were twice the error; more is smoothed, so that it is less
+  const VectorXd ratio = twice.covariance_nN2.diagonal().cwiseQuotient(once.covariance_nN2.diagonal()).cwiseSqrt();
+  EXPECT_GT(ratio.minCoeff(), 1);
+  EXPECT_LE(ratio.maxCoeff(), 2);
+  EXPECT_LT(twice.degrees, once.degrees);
 }
 
 /// The standard deviation of a weighted sum lies between those of its terms, added and taken off.
