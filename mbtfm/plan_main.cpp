@@ -1,7 +1,9 @@
 /// mbtfm-plan: how many beads, which gel, how little noise and how many cells a question takes.
 #include "mbtfm/plan/answer.h"
 #include "mbtfm/plan/page.h"
+#include "mbtfm/plan/space_page.h"
 #include "mbtfm/plan/tables.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/stage.h"
@@ -44,31 +46,96 @@ Plan plan_of(const Parameters& parameters, stage::StageContext& context) {
   return plan;
 }
 
+void write_picture(const std::string& svg, std::size_t n_charts, stage::StageContext& context) {
+  files::write_text(context.output("out", "plan.svg"), svg);
+  constexpr double kColumn_mm = 90, kDotsPerInch = 300;  // of a page with two columns
+  statistics::write_png(context.output("out", "plan.png"), svg, kColumn_mm * (n_charts > 1 ? 2 : 1), kDotsPerInch);
+}
+
 void write(const Plan& plan, stage::StageContext& context) {
   const auto out = [&](const char* file) { return context.output("out", file); };
   files::write(out("plan.csv"), expected_table(), plan.grid.expected);
   files::write(out("plan_needed.csv"), needed_table(), plan.grid.needed);
   files::write(out("plan_cells.csv"), cell_table(), plan.cells);
   if (plan.drawn) files::write(out("plan_drawn.csv"), drawn_table(), plan.drawn->tensions);
-  const std::string svg = svg_of(plan);
-  files::write_text(out("plan.svg"), svg);
-  constexpr double kColumn_mm = 90, kDotsPerInch = 300;  // of a page with two columns
-  statistics::write_png(out("plan.png"), svg, kColumn_mm * (plan.asked.noise_um.size() > 1 ? 2 : 1), kDotsPerInch);
+  write_picture(svg_of(plan), plan.asked.noise_um.size(), context);
   files::write_text(out("plan.html"), html_of(plan));
 }
 
+void tell(const std::string& answer, const std::vector<std::string>& further,
+          const std::vector<std::string>& warnings) {
+  stage::print(answer + "\n");
+  for (const std::string& sentence : further) stage::print(sentence + "\n");
+  for (const std::string& warning : warnings) stage::print("Mind: " + warning + "\n");
+}
+
+std::string summary_of(const std::string& name, const Asked& asked, std::size_t n_densities,
+                       const stage::StageContext& context) {
+  return name + ": " + std::to_string(asked.youngs_modulus_kPa.size()) + " gels, " + std::to_string(n_densities) +
+         " densities, " + std::to_string(asked.noise_um.size()) + " noises; plan.html in " +
+         context.outputs_.at("out").string();
+}
+
+SpaceScene space_scene_of(const Parameters& parameters, stage::StageContext& context) {
+  if (!context.has_input("cell")) return simulated_in_space(parameters, context.threads);
+  return measured_in_space(context.input("cell", kFilesOfCellInSpace), parameters);
+}
+
+SpacePlan space_plan_of(const Parameters& parameters, stage::StageContext& context) {
+  const Work work(context.threads, context.progress);
+  const SpaceScene scene = space_scene_of(parameters, context);
+  const Asked asked = asked_in_space(parameters, scene);
+  for (const double E : asked.youngs_modulus_kPa) context.expect_plausible("youngs_modulus_kPa", E);
+  const SpacePool pool = pool_of(scene, asked, work);
+  work.tell(0.4, "what beads tell");
+  const SpaceForeseen foreseen = foresee(scene, asked, pool, work);
+  SpacePlan plan{.name = scene.name,
+                 .own_kPa = scene.gel.youngs_modulus_kPa,
+                 .axial_noise = scene.spatial.axial_sigma_ratio,
+                 .volume_um3 = scene.volume_um3(),
+                 .asked = asked,
+                 .grid = grid_of(scene, asked, pool, foreseen),
+                 .drawn = {}};
+  if (parameters.drawn > 0)
+    plan.drawn =
+        draw_experiments(scene, pool, foreseen, answered_point(asked, plan.grid, plan.own_kPa), parameters.drawn, work);
+  return plan;
+}
+
+StageReport run_in_space(const Parameters& parameters, stage::StageContext& context) {
+  if (context.has_input("study"))
+    throw UsageError("study: the scatter of a study is that of tensions, and a cell in space has none");
+  const SpacePlan plan = space_plan_of(parameters, context);
+  const auto out = [&](const char* file) { return context.output("out", file); };
+  files::write(out("plan.csv"), space_expected_table(), plan.grid.expected);
+  files::write(out("plan_needed.csv"), space_needed_table(), plan.grid.needed);
+  if (plan.drawn) files::write(out("plan_drawn.csv"), space_drawn_table(), plan.drawn->forces);
+  write_picture(svg_of(plan), plan.asked.noise_um.size(), context);
+  files::write_text(out("plan.html"), html_of(plan));
+  context.progress(1, "done");
+  tell(answer_sentence(plan), further_sentences(plan), plan.grid.warnings);
+  StageReport report;
+  report.summary = summary_of(plan.name, plan.asked, plan.asked.beads_per_um3.size(), context);
+  report.figures = {{"target_nN", plan.asked.target_nN}};
+  if (plan.drawn) report.figures.emplace_back("error_over_predicted", plan.drawn->error_over_predicted);
+  return report;
+}
+
+bool is_in_space(const Parameters& parameters, const stage::StageContext& context) {
+  if (context.has_input("cell")) return is_cell_in_space(context.inputs_.at("cell"));
+  return is_in_space(parameters);
+}
+
 StageReport run(const Parameters& parameters, stage::StageContext& context) {
+  if (is_in_space(parameters, context)) return run_in_space(parameters, context);
+  if (!parameters.beads_per_um3.empty())
+    throw UsageError("beads_per_um3: beads of a flat gel lie at its surface: give beads_per_um2");
   const Plan plan = plan_of(parameters, context);
   write(plan, context);
   context.progress(1, "done");
-  stage::print(answer_sentence(plan) + "\n");
-  for (const std::string& sentence : further_sentences(plan)) stage::print(sentence + "\n");
-  for (const std::string& warning : plan.grid.warnings) stage::print("Mind: " + warning + "\n");
+  tell(answer_sentence(plan), further_sentences(plan), plan.grid.warnings);
   StageReport report;
-  report.summary = plan.name + ": " + std::to_string(plan.asked.youngs_modulus_kPa.size()) + " gels, " +
-                   std::to_string(plan.asked.beads_per_um2.size()) + " densities, " +
-                   std::to_string(plan.asked.noise_um.size()) + " noises; plan.html in " +
-                   context.outputs_.at("out").string();
+  report.summary = summary_of(plan.name, plan.asked, plan.asked.beads_per_um2.size(), context);
   report.figures = {{"target_nN", plan.asked.target_nN}, {"model_error_nN", plan.grid.model_error_nN}};
   if (plan.drawn) report.figures.emplace_back("error_over_predicted", plan.drawn->error_over_predicted);
   return report;

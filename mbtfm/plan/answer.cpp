@@ -56,8 +56,7 @@ std::string about_adhesions(const Plan& plan, const Point& p) {
                      " nN without it, and FTTC errs by " +
                      about(expected_of(plan.grid, p, Quantity::fttc_force).standard_error_nN) +
                      " nN; the smallest force seen is three times that. ";
-  const std::string pair =
-      "Without the network two adhesions of " + brief(plan.parameters.tension_nN) + " nN each are ";
+  const std::string pair = "Without the network two adhesions of " + brief(plan.asked.tension_nN) + " nN each are ";
   if (!alone.least_distance_um) return text + pair + "not told apart at any distance in a cell.";
   const std::string distance = about(*alone.least_distance_um) + " µm";
   return text + pair +
@@ -117,7 +116,7 @@ std::string answer_sentence(const Plan& plan) {
   if (plan.grid.needed.empty()) return "The cell has no stress fibre whose tension could be seen.";
   const double gel_kPa = answered_gel_kPa(plan.asked, plan.own_kPa), noise_um = plan.asked.noise_um.front();
   const std::string asked_for =
-      "to see " + brief(plan.parameters.tension_nN) + " nN per fibre to " + percent(plan.asked.within);
+      "to see " + brief(plan.asked.tension_nN) + " nN per fibre to " + percent(plan.asked.within);
   const std::string with = "With " + std::string(gel_kPa == plan.own_kPa ? "your" : "a") + " gel of " + brief(gel_kPa) +
                            " kPa and a noise of " + brief(noise_um) + " µm ";
   const Needed& n = needed_of(plan.grid, gel_kPa, noise_um);

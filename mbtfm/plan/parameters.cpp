@@ -66,9 +66,14 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.add("noise_um", p.noise_um,
            "standard deviations of a displacement component (um), with commas; the answer speaks of the first");
   list.add("beads_per_um2", p.beads_per_um2, "beads by area (1/um²), with commas");
+  list.add("beads_per_um3", p.beads_per_um3,
+           "cells in space: beads by volume (1/um³), with commas; empty: half, once and twice the cell's own");
+  list.add("axial_noise", p.axial_noise, Range::factor(), "cells in space: noise along z over that along x and y");
   list.add("youngs_modulus_kPa", p.youngs_modulus_kPa,
            "Young's moduli of the gel (kPa), with commas; empty: half, once and twice the cell's own");
-  list.add("tension_nN", p.tension_nN, Range::force_nN(), "tension, or force of an adhesion, that is to be seen (nN)");
+  list.add(
+      "tension_nN", p.tension_nN, Range::force_nN(),
+      "tension, or force of an adhesion, that is to be seen (nN); unset: 1, or the middle force of a cell in space");
   list.add("within", p.within, "standard error that it may have, as 20% or 0.2");
   list.add("drawn", p.drawn, Range::between(0, 100), "experiments that are simulated and fitted to check the answer");
   list.add("between_cells", p.between_cells, Range::between(0, 10),
@@ -86,10 +91,14 @@ Asked asked_by(const Parameters& p, double own_kPa) {
   asked.youngs_modulus_kPa = p.youngs_modulus_kPa.empty()
                                  ? std::vector<double>{0.5 * own_kPa, own_kPa, 2 * own_kPa}
                                  : numbers_in("youngs_modulus_kPa", p.youngs_modulus_kPa, Range::modulus_kPa());
+  if (!p.beads_per_um3.empty())
+    asked.beads_per_um3 = numbers_in("beads_per_um3", p.beads_per_um3, Range::between(1e-6, 10));
   std::ranges::sort(asked.beads_per_um2);
+  std::ranges::sort(asked.beads_per_um3);
   std::ranges::sort(asked.youngs_modulus_kPa);
   asked.within = share_in("within", p.within);
-  asked.target_nN = asked.within * p.tension_nN;
+  asked.tension_nN = p.tension_nN.value_or(1);
+  asked.target_nN = asked.within * asked.tension_nN;
   return asked;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,8 +16,10 @@ struct Parameters {
   // lists of numbers, as "0.02,0.05"; the first noise and the cell's own gel are what the answer speaks of
   std::string noise_um = "0.05";
   std::string beads_per_um2 = "0.25,0.5,1";
+  std::string beads_per_um3{};       ///< of a cell in space; empty: half, once and twice its own
+  double axial_noise = 3;            ///< of a cell in space: what confocal microscopes have
   std::string youngs_modulus_kPa{};  ///< empty: half, once and twice the cell's own
-  double tension_nN = 1;
+  std::optional<double> tension_nN;  ///< unset: 1, or the middle force of a cell in space
   std::string within = "20%";
   int drawn = 2;  ///< some forty tensions: their errors' root mean square is then known to a tenth
   // how many cells
@@ -28,8 +31,9 @@ void declare(stage::ParameterList& list, Parameters& parameters);
 
 /// The lists as numbers.
 struct Asked {
-  std::vector<double> noise_um, beads_per_um2, youngs_modulus_kPa;
-  double target_nN = 0;  ///< the standard error that a fibre's tension may have
+  std::vector<double> noise_um, beads_per_um2, beads_per_um3, youngs_modulus_kPa;
+  double tension_nN = 0;  ///< that is to be seen
+  double target_nN = 0;   ///< the standard error that it may have
   double within = 0;
 };
 /// @param own_kPa  the cell's own gel

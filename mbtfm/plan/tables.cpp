@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "mbtfm/plan/space_answer.h"
+
 namespace mbtfm::plan {
 
 using files::Table;
@@ -102,7 +104,8 @@ const Table<CellNumbers>& cell_table() {
 }
 
 std::string pages_of_tables() {
-  return page_of(expected_table()) + page_of(needed_table()) + page_of(drawn_table()) + page_of(cell_table());
+  return page_of(expected_table()) + page_of(needed_table()) + page_of(drawn_table()) + page_of(cell_table()) +
+         page_of(space_expected_table()) + page_of(space_needed_table()) + page_of(space_drawn_table());
 }
 
 }  // namespace mbtfm::plan

@@ -93,9 +93,12 @@ Foreseen Foresight::at(double noise) const {
       .by_noise_nN2 = stated * inverse * heard * inverse,
       .mean_nN = told.solve(pulled_by_patches_ - hidden_.transpose() * (of_background * pulled_.array()).matrix()),
       .net_force_nN2 = {},
+      .net_by_noise_nN2 = {},
       .resolution_um = {}};
   const double of_sums = chosen.by == tractions::LambdaCriterion::risk ? scan.by_prediction : chosen.lambda;
-  f.net_force_nN2 = variance * sums_.transpose() * (values + of_sums * of_sums).inverse().matrix().asDiagonal() * sums_;
+  const ArrayXd of_sum = 1 / (values + of_sums * of_sums);
+  f.net_force_nN2 = variance * sums_.transpose() * of_sum.matrix().asDiagonal() * sums_;
+  f.net_by_noise_nN2 = stated * sums_.transpose() * (values * of_sum.square()).matrix().asDiagonal() * sums_;
   SpatialReconstruction as_resolved;
   as_resolved.resolved = (shown_ * (values * of_background).matrix()).cwiseMax(0).cwiseMin(1);
   f.resolution_um = resolution_um(problem_, as_resolved);

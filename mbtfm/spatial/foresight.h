@@ -16,9 +16,9 @@ struct Foreseen {
   /// Of the forces on adhesions, x, y, z of each in turn: as forces_beside_background() states it, and its part by the
   /// noise of the beads. The rest is the background that they do not tell from the forces.
   Eigen::MatrixXd covariance_nN2, by_noise_nN2;
-  Eigen::VectorXd mean_nN;            ///< those forces, in the mean
-  Eigen::Matrix3d net_force_nN2;      ///< covariance of the sum over the surface
-  std::vector<double> resolution_um;  ///< by vertex
+  Eigen::VectorXd mean_nN;                          ///< those forces, in the mean
+  Eigen::Matrix3d net_force_nN2, net_by_noise_nN2;  ///< the same of the sum over the surface
+  std::vector<double> resolution_um;                ///< by vertex
 };
 
 /// Tikhonov, by whose lambda and variance all standard errors of forces are stated, for every noise from one

@@ -119,6 +119,27 @@ Problem Problem::with_response(const MatrixXd& matrix, const VectorXd& displaced
   return other;
 }
 
+Problem Problem::with_beads(const std::vector<Index>& chosen, Observed of_them) const {
+  MBTFM_ASSERT(!map && offset_um.size() == 0 && of_them.n_beads == std::ssize(chosen));
+  Problem some{.observed = std::move(of_them), .gel = gel, .ground = ground, .expected = expected, .mesh = mesh};
+  const Index n = observed.n_components();
+  const auto rows_of = [&](const MatrixXd& all) {
+    MatrixXd rows(all.size() > 0 ? n * std::ssize(chosen) : 0, all.cols());
+    for (Index b = 0; n * b < rows.rows(); ++b)
+      rows.middleRows(n * b, n) = all.middleRows(n * chosen[static_cast<std::size_t>(b)], n);
+    return rows;
+  };
+  some.response_um_per_kPa = rows_of(response_um_per_kPa);
+  some.patch_response_um_per_nN = rows_of(patch_response_um_per_nN);
+  some.facet_response_um_per_kPa = rows_of(facet_response_um_per_kPa);
+  some.surface_um_per_kPa = surface_um_per_kPa;
+  some.adhesion_areas_um2 = adhesion_areas_um2;
+  if (common_um.cols() > 0) some.common_um = common_motions(some.observed);
+  some.model_error = model_error;
+  some.figures = figures;
+  return some;
+}
+
 double Problem::variance_of_model() const {
   const double in_sigma = observed.displacement_um.cwiseQuotient(observed.sigma_um).squaredNorm();
   return model_error * model_error * in_sigma / static_cast<double>(observed.displacement_um.size());

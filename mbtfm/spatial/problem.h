@@ -54,6 +54,8 @@ struct Problem {
   /// The same with other answers: G = `matrix`, and u = `displacement_um` under the tractions `about_kPa`.
   Problem with_response(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& displaced_um,
                         const Eigen::VectorXd& about_kPa) const;
+  /// The same of some of its beads. @param of_them  what observe() makes of these, in this order
+  Problem with_beads(const std::vector<Eigen::Index>& chosen, Observed of_them) const;
   /// Of a datum, in units of sigma²: one where errors are stated, or what the model's error leaves if that is more.
   double least_variance() const;
   double variance_of_model() const;  ///< what the model's error alone leaves of it

@@ -16,15 +16,6 @@ namespace {
 using drawing::Random;
 using drawing::Stream;
 
-HeightMap map_of(const GelScene& scene) {
-  constexpr int kLines = 93;
-  const double step = scene.field_um / (kLines - 1);
-  HeightMap map{.origin_um = {}, .spacing_um = {step, step}, .n_x = kLines, .n_y = kLines, .z_um = {}, .sigma_um = {}};
-  for (int k = 0; k < kLines * kLines; ++k)
-    map.z_um.push_back(scene.height_um(map.vertex_um(static_cast<std::size_t>(k))));
-  return map;
-}
-
 drawing::StackMicroscope microscope_of(const GelScene& scene, const SpaceParameters& space,
                                        const drawing::ScenarioParameters& p) {
   drawing::StackMicroscope m;

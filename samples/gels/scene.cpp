@@ -424,6 +424,15 @@ void declare(stage::ParameterList& list, SpaceParameters& p) {
            "steps of the stage from slice to slice, standard deviation (um)");
 }
 
+HeightMap map_of(const GelScene& scene) {
+  constexpr int kLines = 93;
+  const double step = scene.field_um / (kLines - 1);
+  HeightMap map{.origin_um = {}, .spacing_um = {step, step}, .n_x = kLines, .n_y = kLines, .z_um = {}, .sigma_um = {}};
+  for (int k = 0; k < kLines * kLines; ++k)
+    map.z_um.push_back(scene.height_um(map.vertex_um(static_cast<std::size_t>(k))));
+  return map;
+}
+
 GelScene simulate(const SpaceParameters& p, const SceneSize& size, int threads, const Progress& progress) {
   MBTFM_ASSERT(p.scene != SpaceScene::none);
   const auto tell = [&](double fraction, const char* what) {

@@ -71,6 +71,9 @@ struct GelScene {
   FieldUnderASurface exact() const { return {sources, gel.youngs_modulus_kPa, gel.poisson_ratio, gel.thickness_um}; }
 };
 
+/// Its surface over the field.
+HeightMap map_of(const GelScene& scene);
+
 /// What is common to all scenarios.
 struct SceneSize {
   double field_um = 0;

@@ -84,8 +84,9 @@ const Graph kMayInclude = {
       "continuum/sheet", "substrate", "substrate/greens"}},
     {"mbtfm/plan",
      {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "pipeline/charts",
-      "pipeline/report", "network/cables", "substrate/greens", "substrate/choice", "mbtfm/tensions", "mbtfm/fit",
-      "mbtfm/tractions", "samples/drawing", "samples/experiment"}},
+      "pipeline/report", "network/cables", "substrate", "substrate/greens", "substrate/choice", "substrate/surface",
+      "mbtfm/tensions", "mbtfm/fit", "mbtfm/tractions", "mbtfm/spatial", "samples/drawing", "samples/experiment",
+      "samples/gels"}},
 };
 
 /// Third-party headers and the nodes that may see them, by the beginning of the include.

@@ -90,6 +90,37 @@ TEST(Plan, a_modulus_in_pascals_is_refused_and_no_end_of_a_search_is_an_answer) 
   EXPECT_TRUE(files::CsvTable(folder / "plan/plan_needed.csv").text(0, "beads_per_um2").empty());
 }
 
+/// The example of docs/planning.md, as it stands there.
+TEST(PlanInSpace, the_example_of_the_page_is_answered_for_each_patch_with_tables_and_a_page) {
+  const test::TemporaryFolder folder;
+  const std::string page = files::read_text(fs::path(MBTFM_SOURCE_DIR) / "docs/planning.md");
+  const auto begin = page.find("mbtfm plan --scenario wave"), end = page.find('\n', begin);
+  ASSERT_NE(begin, page.npos);
+  const Outcome outcome = run_program(page.substr(begin, end - begin) + " --out " + (folder / "plan").string());
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find(" beads per µm³ ("), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("Checked with 2 simulated experiments"), std::string::npos) << outcome.output;
+  for (const char* file : {"plan.html", "plan.csv", "plan_needed.csv", "plan_drawn.csv", "plan.svg", "plan.png"})
+    EXPECT_GT(fs::file_size(folder / "plan" / file), 100u) << file;
+  EXPECT_FALSE(fs::exists(folder / "plan/plan_cells.csv")) << "there are no tensions to compare";
+  const files::CsvTable drawn(folder / "plan/plan_drawn.csv");
+  EXPECT_EQ(drawn.n_rows(), 2 * 6 * 3);
+}
+
+TEST(PlanInSpace, what_is_no_plan_in_space_is_refused_with_the_remedy) {
+  const test::TemporaryFolder folder;
+  const std::string out = " --out " + (folder / "plan").string();
+  const auto refusal = [&](const std::string& arguments) {
+    const Outcome outcome = run_program("mbtfm plan " + arguments + out);
+    EXPECT_EQ(outcome.code, 2) << arguments << ": " << outcome.output;
+    return outcome.output;
+  };
+  EXPECT_NE(refusal("--scenario wave --beads_per_um2 1").find("give beads_per_um3"), std::string::npos);
+  EXPECT_NE(refusal("--scenario two-adhesions --beads_per_um3 1").find("give beads_per_um2"), std::string::npos);
+  EXPECT_NE(refusal("--scenario wave --beads_per_um3 1e-5").find("fewer than 20 beads"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder / "plan"));
+}
+
 /// A cell that hardly pulls, so that the two bead images differ by the noise alone.
 class Unloaded : public ::testing::Test {
  protected:

@@ -168,6 +168,19 @@ TEST(ModelError, a_rough_network_pulls_more_than_a_smooth_one_of_the_same_mean) 
   EXPECT_NEAR(longer_nN, roughness.lacking_nN, 0.04 * roughness.lacking_nN + 0.03);
 }
 
+/// Meshes that agree to the last digit still share their links and their edge, which the cell's network need not have.
+TEST(ModelError, of_the_total_holds_what_networks_of_other_links_and_edges_find) {
+  ModelError none;
+  const Eigen::VectorXd forces_nN = Eigen::VectorXd::LinSpaced(20, 1, 3);
+  none.loads_nN = forces_nN.cwiseAbs();
+  const RoughnessOfTotal roughness = roughness_of_total(forces_nN, none);
+  EXPECT_EQ(roughness.lacking_nN, 0);
+  // `other_network totals`: 1.1 % by the edge, any part of it alike (its root mean square: by the root of 3), and 1.0 %
+  // by links and anchors
+  EXPECT_NEAR(roughness.sigma_nN, std::hypot(0.011 / std::sqrt(3.0), 0.010) * total_nN(forces_nN),
+              0.01 * roughness.sigma_nN);
+}
+
 TEST(ModelError, a_single_adhesion_lacks_what_its_neighbours_have) {
   // Errors that cancel between two adhesions in one place: the beads, and so the misfit, see nothing of them.
   Model model(5);

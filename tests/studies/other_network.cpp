@@ -5,6 +5,7 @@
 ///   that
 ///                  weighs the data by what the meshes tell of each adhesion's error
 ///   edges          sums of the forces' magnitudes by the mesh's edge, tensions alike
+///   totals         total forces as fits of several formulations find them of the same beads
 ///   forces         forces of the adhesions on networks of these truths, found and true, and their stated errors
 ///   meshes         by the number of meshes, with and without noise: error and processor time
 ///   parts          what the error is made of: the beads' noise, the ensemble's size, the truth's own network
@@ -187,6 +188,29 @@ void forces(Cells cells) {
   }
 }
 
+/// The cell's total force as fits of several formulations find it, over the true one; and its stated error.
+void totals(Cells cells) {
+  const std::pair<const char*, mesh::NetworkParameters> fits[] = {
+      {"default", {}},
+      {"edges", {.link_reach = mesh::LinkReach::neighbours}},
+      {"edges and rims",
+       {.link_reach = mesh::LinkReach::neighbours, .adhesion_anchor = mesh::AdhesionAnchor::rim, .rim_points = 12}},
+      {"1.2 um", {.edge_length_um = 1.2}},
+      {"0.9 um", {.edge_length_um = 0.9}}};
+  std::printf("cell,truth,fit,true_nN,found_nN,sigma_nN\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    for (const auto& [name, truth] : true_formulations()) {
+      OtherNetwork o = other_network(c, &truth);
+      for (const auto& [fit_name, formulation] : fits) {
+        const tensions::Estimate total =
+            fit(span(o.experiment.cell, tensions::FitParameters{}.n_meshes, formulation), o.noisy, o).total_force_nN;
+        std::printf("%d,%s,%s,%.5g,%.5g,%.5g\n", int(c), name, fit_name, tensions::total_nN(o.forces_nN), total.value,
+                    total.standard_error);
+      }
+    }
+  }
+}
+
 /// Sums of the forces' magnitudes by the mesh's edge, of the same tensions: of single meshes, and of their mean over
 /// meshes (what of its roughness is left taken off), in all and by kind of adhesion.
 void edges(Cells cells) {
@@ -304,12 +328,13 @@ int main(int argc, char** argv) {
   cells.last = cells.first + static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 20) - 1;
   const std::pair<const char*, void (*)(Cells)> studies[] = {{"edges", edges},   {"formulations", formulations},
                                                              {"truths", truths}, {"forces", forces},
-                                                             {"meshes", meshes}, {"parts", parts}};
+                                                             {"totals", totals}, {"meshes", meshes},
+                                                             {"parts", parts}};
   for (const auto& [name, study] : studies) {
     if (argc < 2 || std::strcmp(argv[1], name) != 0) continue;
     study(cells);
     return 0;
   }
-  std::fprintf(stderr, "other_network edges|formulations|truths|forces|meshes|parts [cells] [first seed]\n");
+  std::fprintf(stderr, "other_network edges|formulations|truths|forces|totals|meshes|parts [cells] [first seed]\n");
   return 2;
 }

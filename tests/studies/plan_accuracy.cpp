@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <optional>
 #include <random>
 
 #include "mbtfm/plan/grid.h"
@@ -52,11 +53,13 @@ tensions::LinearData unit_data(const KnownCell& cell, const BeadsOnGel& beads) {
 }
 
 /// The fit of one experiment, on a network that is not the cell's. @param near  a trial of that network
-Eigen::VectorXd fitted(const KnownCell& cell, const tensions::LinearData& unit, double noise_um, std::uint64_t seed,
-                       const tensions::Trial& near) {
+/// @param seed  of the noise; none: exact beads, weighed as if they had it
+Eigen::VectorXd fitted(const KnownCell& cell, const tensions::LinearData& unit, double noise_um,
+                       std::optional<std::uint64_t> seed, const tensions::Trial& near) {
   tensions::ReducedData drawn = unit.reduced;
-  drawn.target =
-      reduced_target(unit, unit.displacement_um + noise_um * noise_of(unit.displacement_um.size(), seed)) / noise_um;
+  Eigen::VectorXd u_um = unit.displacement_um;
+  if (seed) u_um += noise_um * noise_of(u_um.size(), *seed);
+  drawn.target = reduced_target(unit, u_um) / noise_um;
   drawn.compliance = std::make_shared<const Eigen::MatrixXd>(*unit.reduced.compliance / noise_um);
   drawn.floor_squared = static_cast<double>(unit.n_used);
   const tensions::TensionProblem problem(cell.networks.front(), drawn, cell.adhesion_ids);
@@ -67,6 +70,38 @@ struct Scatters {
   std::vector<double> ratios;  ///< predicted over scatter, of tensions away from their bound
   int n_at_bound = 0;
 };
+
+/// Of the logarithm of a standard deviation that n experiments tell.
+double chance_of(int n) { return 1 / std::sqrt(2.0 * (n - 1)); }
+
+/// Root mean square of the ratios' logarithms about zero, less what chance makes of it.
+double beyond_chance(const Scatters& s) {
+  double squares = 0;
+  for (const double r : s.ratios) squares += std::pow(std::log(r), 2) / static_cast<double>(s.ratios.size());
+  return std::sqrt(std::max(0.0, squares - std::pow(chance_of(kDraws), 2)));
+}
+
+/// Ratios that are 1 but for chance, at 95 %.
+double share_by_chance(const Scatters& s) {
+  const auto n =
+      std::ranges::count_if(s.ratios, [](double r) { return std::abs(std::log(r)) < 1.96 * chance_of(kDraws); });
+  return double(n) / double(s.ratios.size());
+}
+
+/// Variance of the tensions that exact beads give, by the places of the beads: a fit's network is not the cell's, and
+/// what that makes of the tensions hangs on where beads are. With the bound, which is the mean variance of given
+/// places, it is the variance of experiments whose beads lie elsewhere (law of total variance).
+Eigen::VectorXd variance_by_places(const KnownCell& cell, const BeadsOnGel& pool, double share, double noise_um,
+                                   const tensions::Trial& near) {
+  constexpr int kPlaces = 24;
+  Eigen::MatrixXd found(cell.tensions_nN.size(), kPlaces);
+  numerics::parallel_for(kPlaces, kThreads, [&](int k) {
+    drawing::Random random(1000 + static_cast<std::uint64_t>(k), drawing::Stream::beads);
+    found.col(k) = fitted(cell, unit_data(cell, some_of(pool, share, random)), noise_um, {}, near);
+  });
+  const Eigen::VectorXd mean = found.rowwise().mean();
+  return (found.colwise() - mean).rowwise().squaredNorm() / (kPlaces - 1);
+}
 
 /// @param found  a column an experiment
 Scatters scatters_of(const Eigen::MatrixXd& found, const Eigen::VectorXd& predicted_nN) {
@@ -84,9 +119,9 @@ Scatters scatters_of(const Eigen::MatrixXd& found, const Eigen::VectorXd& predic
 void print(const char* what, const char* name, int seed, double noise_percent, double noise_um, const Scatters& s) {
   const auto [low, high] = std::ranges::minmax(s.ratios);
   const auto n_within = std::ranges::count_if(s.ratios, [](double r) { return r >= 0.8 && r <= 1.25; });
-  std::printf("%s,%s,%d,%g,%.4f,%zu,%d,%.3f,%.3f,%.3f,%.3f\n", what, name, seed, noise_percent, noise_um,
+  std::printf("%s,%s,%d,%g,%.4f,%zu,%d,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f\n", what, name, seed, noise_percent, noise_um,
               s.ratios.size(), s.n_at_bound, numerics::median(s.ratios), low, high,
-              double(n_within) / double(s.ratios.size()));
+              double(n_within) / double(s.ratios.size()), share_by_chance(s), beyond_chance(s));
   std::fflush(stdout);
 }
 
@@ -98,18 +133,20 @@ void add(Scatters& all, const Scatters& some) {
 /// Beads at the same places in all experiments, and the bound of these beads; or at others in each, and the plan's.
 /// @param only  a scene, from 1; 0: all
 void study_errors(int only) {
-  std::printf("beads,scenario,seed,noise_percent,noise_um,n,at_bound,median,lowest,highest,share_0.8_to_1.25\n");
+  std::printf(
+      "beads,scenario,seed,noise_percent,noise_um,n,at_bound,median,lowest,highest,share_0.8_to_1.25,"
+      "share_by_chance,beyond_chance\n");
   const std::pair<const char*, int> scenes[] = {{"u2os", 1},  {"u2os", 2},    {"u2os", 3},
                                                 {"dense", 1}, {"crowded", 1}, {"parallel-fibres", 1}};
   constexpr double kDensity = 1, kPool = 2.5;
-  Scatters all_same, all_other;
+  Scatters all_same, all_other, all_with_places;
   int number = 0;
   for (const auto& [name, seed] : scenes) {
     if (++number != only && only > 0) continue;
-    Parameters p;
-    p.scenario = name;
-    p.seed = static_cast<std::uint64_t>(seed);
-    const Scene scene = simulated_scene(p);
+    Parameters parameters;
+    parameters.scenario = name;
+    parameters.seed = static_cast<std::uint64_t>(seed);
+    const Scene scene = simulated_scene(parameters);
     const KnownCell cell = known_cell(scene, kThreads);
     const double own_kPa = scene.fit.gel.youngs_modulus_kPa;
     const Precision plan = precision_at(scene, cell, {kDensity}, kThreads).precision.front();
@@ -135,18 +172,24 @@ void study_errors(int only) {
         with_other[k].col(d) = fitted(cell, data_of_other, shares[k] * largest_um, draw, near);
       }
     });
+    const Eigen::VectorXd of_places = variance_by_places(cell, beads_on_gel(scene, cell, kPool, 12, kThreads),
+                                                         kDensity / kPool, shares[0] * largest_um, near);
     for (std::size_t k = 0; k < 3; ++k) {
       const double noise_um = shares[k] * largest_um, scale = noise_um * own_kPa;
       const Scatters s = scatters_of(with_same[k], scale * of_same.tensions),
-                     o = scatters_of(with_other[k], scale * plan.tensions);
+                     o = scatters_of(with_other[k], scale * plan.tensions),
+                     p = scatters_of(with_other[k], (of_places + (scale * plan.tensions).cwiseAbs2()).cwiseSqrt());
       print("same", name, seed, 100 * shares[k], noise_um, s);
       print("others", name, seed, 100 * shares[k], noise_um, o);
+      print("others, places counted", name, seed, 100 * shares[k], noise_um, p);
       add(all_same, s);
       add(all_other, o);
+      add(all_with_places, p);
     }
   }
   print("same", "all", 0, 0, 0, all_same);
   print("others", "all", 0, 0, 0, all_other);
+  print("others, places counted", "all", 0, 0, 0, all_with_places);
 }
 
 // --- pairs

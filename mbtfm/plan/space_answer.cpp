@@ -1,0 +1,181 @@
+#include "mbtfm/plan/space_answer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mbtfm/plan/answer.h"
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::plan {
+
+using files::Table;
+
+namespace {
+
+constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
+
+/// Two digits: no plan is better than that.
+std::string about(double value) { return significant(value, 2); }
+
+const SpaceNeeded& needed_of(const SpaceGrid& grid, double youngs_modulus_kPa, double noise_um) {
+  return *std::ranges::find_if(grid.needed, [&](const SpaceNeeded& n) {
+    return n.youngs_modulus_kPa == youngs_modulus_kPa && n.noise_um == noise_um;
+  });
+}
+
+const SpaceExpected& expected_of(const SpaceGrid& grid, const SpacePoint& p, SpaceQuantity quantity) {
+  return *std::ranges::find_if(grid.expected, [&](const SpaceExpected& e) {
+    return e.quantity == quantity && e.point.youngs_modulus_kPa == p.youngs_modulus_kPa &&
+           e.point.beads_per_um3 == p.beads_per_um3 && e.point.noise_um == p.noise_um;
+  });
+}
+
+/// Two digits, without an exponent.
+std::string about_count(double n) {
+  const double unit = std::pow(10, std::max(0.0, std::floor(std::log10(std::max(n, 1.0))) - 1));
+  return std::to_string(std::lround(unit * std::round(n / unit)));
+}
+
+/// "0.0024 beads per µm³ (610 in this field)"
+std::string beads_text(const SpacePlan& plan, double beads_per_um3) {
+  return about(beads_per_um3) + " beads per µm³ (" + about_count(beads_per_um3 * plan.volume_um3) + " in this field)";
+}
+
+std::string too_many(const SpacePlan& plan) { return about(4 * plan.asked.beads_per_um3.back()); }
+
+/// Standard errors allow for tractions beside the patches. Where there are none, experiments err by less.
+std::string about_drawn(const SpaceDrawn& d) {
+  constexpr double kMargin = 0.1;  // as of flat plans
+  const double allowed = 2 * d.by_chance + kMargin;
+  const char* verdict = "The plan holds.";
+  if (d.error_over_predicted > 1 + allowed) verdict = "The plan does not hold well here: allow for that factor.";
+  if (d.error_over_predicted < 1 - allowed)
+    verdict =
+        "The plan is on the safe side: it allows for forces beside the patches, as the reconstruction does, and here "
+        "are few.";
+  return "Checked with " + std::to_string(d.n_experiments) +
+         (d.n_experiments == 1 ? " simulated experiment" : " simulated experiments") + " at " +
+         brief(d.point.youngs_modulus_kPa) + " kPa, " + brief(d.point.beads_per_um3) + " beads per µm³ and " +
+         brief(d.point.noise_um) + " µm: the errors of " + std::to_string(d.forces.size()) +
+         " components of forces were " + about(d.error_over_predicted) +
+         " times those predicted (root mean square; by chance within " + about(2 * d.by_chance) + " of 1). " + verdict;
+}
+
+}  // namespace
+
+SpacePoint answered_point(const Asked& asked, const SpaceGrid& grid, double own_kPa) {
+  SpacePoint point{answered_gel_kPa(asked, own_kPa), asked.beads_per_um3.back(), asked.noise_um.front()};
+  const SpaceNeeded& n = needed_of(grid, point.youngs_modulus_kPa, point.noise_um);
+  for (const double density : asked.beads_per_um3) {
+    if (!n.beads_per_um3 || density < *n.beads_per_um3) continue;
+    point.beads_per_um3 = density;
+    break;
+  }
+  return point;
+}
+
+std::string answer_sentence(const SpacePlan& plan) {
+  const double gel_kPa = answered_gel_kPa(plan.asked, plan.own_kPa), noise_um = plan.asked.noise_um.front();
+  const std::string asked_for =
+      " to see " + brief(plan.asked.tension_nN) + " nN per patch to " + brief(100 * plan.asked.within) + " %";
+  std::string text = "With " + std::string(gel_kPa == plan.own_kPa ? "your" : "a") + " gel of " + brief(gel_kPa) +
+                     " kPa and a noise of " + brief(noise_um) + " µm (" + brief(plan.axial_noise * noise_um) +
+                     " µm along z) you need ";
+  const SpaceNeeded& n = needed_of(plan.grid, gel_kPa, noise_um);
+  text += n.beads_per_um3 ? beads_text(plan, *n.beads_per_um3) + asked_for
+                          : "more than " + too_many(plan) + " beads per µm³" + asked_for;
+  bool is_first = true;
+  for (const double E : plan.asked.youngs_modulus_kPa) {
+    if (E == gel_kPa) continue;
+    const SpaceNeeded& other = needed_of(plan.grid, E, noise_um);
+    text += (is_first ? "; a gel of " : ", one of ") + brief(E) + " kPa needs " +
+            (other.beads_per_um3 ? about(*other.beads_per_um3) : "more than " + too_many(plan));
+    is_first = false;
+  }
+  return text + ".";
+}
+
+std::vector<std::string> further_sentences(const SpacePlan& plan) {
+  const SpacePoint point = answered_point(plan.asked, plan.grid, plan.own_kPa);
+  const SpaceNeeded& n = needed_of(plan.grid, point.youngs_modulus_kPa, point.noise_um);
+  const auto error = [&](SpaceQuantity quantity) {
+    return about(expected_of(plan.grid, point, quantity).standard_error_nN) + " nN";
+  };
+  std::vector<std::string> sentences;
+  if (n.beads_per_um3)
+    sentences.push_back("That holds for half of the patches. Nine in ten need " +
+                        (n.of_most ? about(*n.of_most) : "more than " + too_many(plan)) + " beads per µm³.");
+  const SpaceExpected& patch = expected_of(plan.grid, point, SpaceQuantity::force);
+  sentences.push_back("At " + beads_text(plan, point.beads_per_um3) +
+                      " the force of the middle patch has a standard error of " + error(SpaceQuantity::force) + ", " +
+                      error(SpaceQuantity::tangential_force) + " along the surface and " +
+                      error(SpaceQuantity::normal_force) + " normal to it; the total force has " +
+                      error(SpaceQuantity::total_force) + ", the net force " + error(SpaceQuantity::net_force) +
+                      ". The smallest force seen is three times that of the patch. In the map, forces closer than " +
+                      about(*patch.resolution_um) + " µm look like one.");
+  if (plan.drawn) sentences.push_back(about_drawn(*plan.drawn));
+  return sentences;
+}
+
+const Table<SpaceExpected>& space_expected_table() {
+  using Row = SpaceExpected;
+  const auto point = [](auto member) { return [member](const Row& row) { return row.point.*member; }; };
+  static const Table<Row> table{
+      .file = "plan/plan.csv of a cell in space",
+      .row = "each gel, density, noise and quantity",
+      .columns = {
+          {"youngs_modulus_kPa", "of the gel", point(&SpacePoint::youngs_modulus_kPa), kResult},
+          {"beads_per_um3", "beads by volume", point(&SpacePoint::beads_per_um3), kResult},
+          {"noise_um", "standard deviation of a displacement component along x or y", point(&SpacePoint::noise_um),
+           kResult},
+          {"quantity", "what is estimated; total force: the sum of the magnitudes of the patches' forces",
+           &Row::quantity},
+          {"n", "how many of them the cell has; of several, the numbers are medians", &Row::n},
+          {"standard_error_nN", "as the reconstruction states it", &Row::standard_error_nN, kResult},
+          {"from_beads_nN", "by the noise of the beads", &Row::from_beads_nN, kResult},
+          {"from_background_nN", "by tractions beside the patches that the beads do not tell from them",
+           &Row::from_background_nN, kResult},
+          {"target_nN", "standard error that is asked for", &Row::target_nN, kResult},
+          {"share_within", "of the n, whose standard error is the target or less", &Row::share_within, kResult},
+          {"smallest_seen_nN", "three standard errors", &Row::smallest_seen_nN, kResult},
+          {"resolution_um", "how far apart two forces must be to be seen as two in the map, at the middle patch",
+           &Row::resolution_um, kResult},
+          {"numbers_told", "how many numbers of the tractions the beads tell", &Row::degrees, kResult},
+          {"largest_displacement_um", "of all beads", &Row::largest_displacement_um, kResult},
+          {"beyond_linear", "share of the displacement that linear elasticity leaves out", &Row::left_out, kResult}}};
+  return table;
+}
+
+const Table<SpaceNeeded>& space_needed_table() {
+  using Row = SpaceNeeded;
+  static const Table<Row> table{
+      .file = "plan/plan_needed.csv of a cell in space",
+      .row = "each gel and noise",
+      .columns = {
+          {"youngs_modulus_kPa", "of the gel", &Row::youngs_modulus_kPa, kResult},
+          {"noise_um", "standard deviation of a displacement component along x or y", &Row::noise_um, kResult},
+          {"beads_per_um3",
+           "at which half of the patches are within the target; empty: more than four times the densest asked for",
+           &Row::beads_per_um3, kResult},
+          {"beads_per_um3_for_nine_in_ten", "the same for nine patches in ten", &Row::of_most, kResult}}};
+  return table;
+}
+
+const Table<SpaceDrawnForce>& space_drawn_table() {
+  using Row = SpaceDrawnForce;
+  static const Table<Row> table{
+      .file = "plan/plan_drawn.csv of a cell in space",
+      .row = "each component of each patch's force in each drawn experiment",
+      .columns = {
+          {"experiment", "counts from 1", &Row::experiment},
+          {"adhesion_id", "label of the patch", &Row::adhesion_id},
+          {"component",
+           "`along the surface`: as the true force goes there; `normal`: out of the gel; `across`: square to both",
+           &Row::component},
+          {"true_nN", "its true value", &Row::true_nN, kResult},
+          {"found_nN", "as reconstructed", &Row::found_nN, kResult},
+          {"predicted_error_nN", "standard error by the plan", &Row::predicted_error_nN, kResult}}};
+  return table;
+}
+
+}  // namespace mbtfm::plan

@@ -1,0 +1,13 @@
+/// The plan of a cell in space as pictures and as a page that stands alone.
+#pragma once
+
+#include <string>
+
+#include "mbtfm/plan/space_answer.h"
+
+namespace mbtfm::plan {
+
+std::string svg_of(const SpacePlan& plan);
+std::string html_of(const SpacePlan& plan);
+
+}  // namespace mbtfm::plan

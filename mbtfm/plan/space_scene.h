@@ -1,0 +1,65 @@
+/// The cell in space that is planned with: simulated, or one that was measured.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/plan/parameters.h"
+#include "mbtfm/spatial/parameters.h"
+#include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/beads_in_space.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/gel.h"
+#include "samples/drawing/random.h"
+#include "substrate/compliance.h"
+
+namespace mbtfm::plan {
+
+/// A place where the cell pulls, as an image would show it.
+struct SpacePatch {
+  Adhesion adhesion;
+  Vec3 force_nN;
+};
+
+struct SpaceScene {
+  std::string name;  ///< for people
+  std::uint64_t seed = 1;
+  Gel gel;  ///< with its surface
+  std::vector<SpacePatch> patches;
+  Polygon outline_um = {};  ///< may be empty
+  // beads lie anywhere here, down to this depth below the surface
+  Vec2 low_um = {}, high_um = {};
+  double bead_depth_um = 0;
+  double own_beads_per_um3 = 0;
+  std::function<Vec3(const Vec3& at_um)> exact_um = {};  ///< displacement; empty: what the patches alone make of it
+  tractions::TractionParameters traction = {};           ///< how experiments are evaluated
+  spatial::SpatialParameters spatial = {};
+  substrate::SubstrateParameters substrate = {};
+
+  double volume_um3() const { return (high_um.x - low_um.x) * (high_um.y - low_um.y) * bead_depth_um; }
+};
+
+/// Whether the scenario is a cell in space.
+bool is_in_space(const Parameters& parameters);
+/// The scene's own field is exact.
+SpaceScene simulated_in_space(const Parameters& parameters, int threads);
+
+/// Whether the folder is that of a cell in space.
+bool is_cell_in_space(const std::filesystem::path& folder);
+/// Files that are read of such a cell.
+inline const std::vector<std::string> kFilesOfCellInSpace = {"cell.toml", "1_segment/adhesions.csv",
+                                                             "2_track/displacement_3d.csv", "3_surface/surface.vtp",
+                                                             "4_traction/traction_adhesion_forces.csv"};
+/// Of a finished cell: its surface, its adhesions and the forces found, the volume of its beads.
+/// @throws InputError where a file is missing or malformed, or there are no forces on adhesions
+SpaceScene measured_in_space(const std::filesystem::path& folder, const Parameters& parameters);
+
+/// Random places of beads, whose displacements are still to be known.
+std::vector<BeadInSpace> beads_in(const SpaceScene& scene, std::size_t n_beads, drawing::Random& random);
+
+/// What is asked of a cell in space. @throws UsageError as asked_by(), or where beads by area are asked for
+Asked asked_in_space(const Parameters& parameters, const SpaceScene& scene);
+
+}  // namespace mbtfm::plan
