@@ -270,22 +270,20 @@ SpaceScene two_patches_in_space() {
   return scene;
 }
 
+Asked few_points(const SpaceScene& scene) {
+  Parameters p;
+  p.noise_um = "0.02,0.04";
+  p.beads_per_um3 = "0.01,0.04";
+  p.youngs_modulus_kPa = "10,20";
+  return asked_in_space(p, scene);
+}
+
 struct SmallInSpace {
   SpaceScene scene = two_patches_in_space();
-  Asked asked;
-  SpacePool pool;
-  SpaceForeseen foreseen;
-  SpaceGrid grid;
-  SmallInSpace() {
-    Parameters p;
-    p.noise_um = "0.02,0.04";
-    p.beads_per_um3 = "0.01,0.04";
-    p.youngs_modulus_kPa = "10,20";
-    asked = asked_in_space(p, scene);
-    pool = pool_of(scene, asked, kThreads);
-    foreseen = foresee(scene, asked, pool, kThreads);
-    grid = grid_of(scene, asked, pool, foreseen);
-  }
+  Asked asked = few_points(scene);
+  SpacePool pool = pool_of(scene, asked, kThreads);
+  SpaceForeseen foreseen = foresee(scene, asked, pool, kThreads);
+  SpaceGrid grid = grid_of(scene, asked, pool, foreseen);
   const SpaceExpected& of(const SpacePoint& p, SpaceQuantity quantity) const {
     return *std::ranges::find_if(grid.expected, [&](const SpaceExpected& e) {
       return e.quantity == quantity && e.point.youngs_modulus_kPa == p.youngs_modulus_kPa &&
@@ -310,17 +308,15 @@ TEST(PlanInSpace, twice_the_modulus_is_twice_the_noise_and_either_is_more_error_
   }
 }
 
-/// The squares of the beads add up. What is known of the background beforehand stays as it is, so that all in all less
-/// is gained.
-TEST(PlanInSpace, four_times_the_beads_halve_the_error_at_most) {
+/// The squares of the beads add up; lambda, which they choose, moves a little.
+TEST(PlanInSpace, four_times_the_beads_halve_the_error) {
   const SmallInSpace& s = in_space();
   for (const double noise_um : {0.02, 0.04}) {
     const SpaceExpected &thin = s.of({10, 0.01, noise_um}, SpaceQuantity::total_force),
                         &dense = s.of({10, 0.04, noise_um}, SpaceQuantity::total_force);
-    EXPECT_GT(thin.standard_error_nN, 1.2 * dense.standard_error_nN) << noise_um;
-    // of some 30 beads near a patch the number scatters by 18 %, the error by 9 %, and of the mean over two patches and
-    // two draws by 5 %: twice
-    EXPECT_LT(thin.standard_error_nN, 2.2 * dense.standard_error_nN) << noise_um;
+    // of some 24 beads within 8 um of a patch the number scatters by 20 %, the error by 10 %, its mean over two patches
+    // and two draws by 5 %, and that of the dense ones by half of it: 5.6 % of two, three times
+    EXPECT_NEAR(thin.standard_error_nN / dense.standard_error_nN, 2, 0.34) << noise_um;
     EXPECT_GT(dense.degrees, thin.degrees) << noise_um;
     EXPECT_LT(*s.of({10, 0.04, noise_um}, SpaceQuantity::force).resolution_um,
               *s.of({10, 0.01, noise_um}, SpaceQuantity::force).resolution_um);
@@ -346,15 +342,14 @@ TEST(PlanInSpace, at_the_density_that_is_needed_the_error_is_the_target) {
   const SmallInSpace& s = in_space();
   for (const SpaceNeeded& n : s.grid.needed) {
     if (!n.beads_per_um3) continue;
-    Asked asked = s.asked;
     ASSERT_TRUE(n.of_most);
     EXPECT_LE(*n.beads_per_um3, *n.of_most);
     const bool is_between = *n.of_most > 0.01 && *n.of_most < 0.04;
     if (!is_between) continue;
     const double thin = s.of({n.youngs_modulus_kPa, 0.01, n.noise_um}, SpaceQuantity::force).standard_error_nN,
                  dense = s.of({n.youngs_modulus_kPa, 0.04, n.noise_um}, SpaceQuantity::force).standard_error_nN;
-    EXPECT_LT(dense, asked.target_nN * 1.1);
-    EXPECT_GT(thin, asked.target_nN / 1.1);
+    EXPECT_LT(dense, s.asked.target_nN * 1.1);
+    EXPECT_GT(thin, s.asked.target_nN / 1.1);
   }
 }
 
