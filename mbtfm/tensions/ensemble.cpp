@@ -243,7 +243,7 @@ Estimate total_force_of(const EnsembleFit& all) {
   Estimate total = with_own_forces(all, along, value_of).front();
   if (!all.model_error) return total;
   const RoughnessOfTotal roughness = roughness_of_total(forces_nN, *all.model_error);
-  total.value += roughness.lacking_nN;
+  total.value += roughness.lacking_nN - roughness.surplus_nN;
   total.standard_error = std::hypot(total.standard_error, roughness.sigma_nN);
   return total;
 }

@@ -105,14 +105,17 @@ RoughnessOfTotal roughness_of_total(const Eigen::VectorXd& forces_nN, const Mode
   };
   const double of_mean = longer_nN(error.phi_of_mean_nN);
   const double of_cell = longer_nN(std::max(0.0, error.of_single * error.measured_phi_nN - error.phi_of_mean_nN));
-  // The law of the loads holds to a half (model_error.h), for the cell's network and for the mean's. And no one knows
-  // the cell's links: of the same beads, networks of shorter edges find a smaller total, 1.1 % at 0.9 um, so that any
-  // part of that is as likely (a root mean square of 0.64 %), and networks with links along edges, or held at the rims
-  // of adhesions, find one that is off by 1.0 % beyond what two meshes of a kind differ by (`other_network totals`).
-  constexpr double kOfEdge = 0.0064, kOfLinks = 0.010;
+  // The law of the loads holds to a half (model_error.h), for the cell's network and for the mean's.
+  const double of_loads = std::hypot(0.5 * of_cell, 0.5 * of_mean);
+  // No one knows the cell's links. Of the same beads, networks of 0.9 um find a total that is 1.1 % below that of 1.5
+  // um, and any part of that is as likely: its middle is a surplus, and its standard deviation an error. Links along
+  // edges, or to the rims of adhesions, make 1.0 % beyond what two networks of a kind differ by (`other_network
+  // totals`).
+  constexpr double kOfEdge = 0.011, kOfLinks = 0.010;
+  const double total = total_nN(forces_nN);
   return {.lacking_nN = of_cell - of_mean,
-          .sigma_nN = std::hypot(std::hypot(0.5 * of_cell, 0.5 * of_mean),
-                                 std::hypot(kOfEdge, kOfLinks) * total_nN(forces_nN))};
+          .surplus_nN = kOfEdge / 2 * total,
+          .sigma_nN = std::hypot(of_loads, kOfEdge / std::sqrt(12.0) * total, kOfLinks * total)};
 }
 
 ReducedData whitened(const ReducedData& data, const ModelError& error, int threads) {

@@ -43,9 +43,9 @@ struct MeshForces {
 
 /// A rough network has larger adhesion forces than a smooth one of the same tensions: an error e across a force R makes
 /// it longer, on average by sqrt(R² + Var e) − R. What the cell's network has of this and the meshes' mean has not is
-/// lacking in the sum of the magnitudes.
+/// lacking in the sum of the magnitudes. And what nobody knows of the cell's links makes it larger, or in error.
 struct RoughnessOfTotal {
-  double lacking_nN = 0, sigma_nN = 0;
+  double lacking_nN = 0, surplus_nN = 0, sigma_nN = 0;
 };
 RoughnessOfTotal roughness_of_total(const Eigen::VectorXd& forces_nN, const ModelError& error);
 

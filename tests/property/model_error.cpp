@@ -175,10 +175,10 @@ TEST(ModelError, of_the_total_holds_what_networks_of_other_links_and_edges_find)
   none.loads_nN = forces_nN.cwiseAbs();
   const RoughnessOfTotal roughness = roughness_of_total(forces_nN, none);
   EXPECT_EQ(roughness.lacking_nN, 0);
-  // `other_network totals`: 1.1 % by the edge, any part of it alike (its root mean square: by the root of 3), and 1.0 %
-  // by links and anchors
-  EXPECT_NEAR(roughness.sigma_nN, std::hypot(0.011 / std::sqrt(3.0), 0.010) * total_nN(forces_nN),
-              0.01 * roughness.sigma_nN);
+  // `other_network totals`: by the edge from nothing to 1.1 % too much, evenly; by links and anchors 1.0 % either way
+  const double total = total_nN(forces_nN), by_edge = 0.011 * total, by_links = 0.010 * total;
+  EXPECT_NEAR(roughness.surplus_nN, by_edge / 2, 1e-9 * total);
+  EXPECT_NEAR(roughness.sigma_nN, std::hypot(by_edge / std::sqrt(12.0), by_links), 1e-9 * total);
 }
 
 TEST(ModelError, a_single_adhesion_lacks_what_its_neighbours_have) {
