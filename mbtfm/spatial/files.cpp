@@ -147,6 +147,11 @@ Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const
   if (r.covariance_kPa2.size() > 0) {
     add_vector("net_force_sigma", "nN", balance.force_sigma_nN);
     add_vector("moment_sigma", "nN_um", balance.moment_sigma_nN_um);
+    add("net_force_sigma_along_nN", balance.net_force_sigma_nN);
+    add("moment_sigma_along_nN_um", balance.net_moment_sigma_nN_um);
+  }
+  if (balance.imbalance) {
+    add("imbalance_chi_squared", *balance.imbalance);
   }
   add_vector("centre", "um", balance.centre_um);
   add("strain_energy_fJ", balance.strain_energy_fJ);

@@ -58,6 +58,16 @@ double share_astray(const Problem& problem, const Eigen::VectorXd& residual) {
   return scale > 0 ? static_cast<double>(n_far) / problem.observed.n_beads : 0;
 }
 
+/// Whether the answer is that of the beads, or of the loss.
+std::optional<Finding> notice_loss(BeadLoss loss, const Balance& by_loss, const Balance& by_squares) {
+  const double sigma = std::hypot(by_loss.total_force_sigma_nN, by_squares.total_force_sigma_nN);
+  const double apart = std::abs(by_loss.total_force_nN - by_squares.total_force_nN);
+  return noticed(FindingKind::loss_decides, sigma > 0 ? apart / sigma : 0,
+                 "The total force is " + brief(by_loss.total_force_nN) + " +- " + brief(by_loss.total_force_sigma_nN) +
+                     " nN by " + name_of(loss) + ", and " + brief(by_squares.total_force_nN) + " +- " +
+                     brief(by_squares.total_force_sigma_nN) + " nN by l2.");
+}
+
 void find_doubts(const Problem& problem, const SpatialParameters& parameters, SpatialReconstruction& r) {
   const Observed& observed = problem.observed;
   const int n_off = observed.n_above + observed.n_below_base;
@@ -145,6 +155,12 @@ SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& i
                     : 1);
   if (observed.states_errors && r.degrees > 0) r.chi_squared = r.weighing.scale * r.weighing.scale;
   find_doubts(problem, parameters, r);
+  if (parameters.loss != BeadLoss::l2 && r.covariance_kPa2.size() > 0) {
+    SpatialParameters squares = parameters;
+    squares.loss = BeadLoss::l2;
+    const SpatialReconstruction by_squares = by_method(method, problem, traction, squares, threads);
+    r.findings.push_back(notice_loss(parameters.loss, balance_of(problem, r), balance_of(problem, by_squares)));
+  }
   return r;
 }
 

@@ -151,7 +151,11 @@ std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruc
 /// Sums over the surface.
 struct Balance {
   Vec3 force_nN, force_sigma_nN;
-  Vec3 moment_nN_um, moment_sigma_nN_um;  ///< about `centre_um`
+  Vec3 moment_nN_um, moment_sigma_nN_um;                      ///< about `centre_um`
+  double net_force_sigma_nN = 0, net_moment_sigma_nN_um = 0;  ///< along themselves
+  /// Squared distance of net force and net moment from none, in their joint standard errors: of a cell in balance
+  /// chi-squared with six degrees of freedom. Unset: no errors are known.
+  std::optional<double> imbalance;
   Vec3 centre_um;
   double total_force_nN = 0;        ///< ∫ |t| dA
   double total_force_sigma_nN = 0;  ///< along the tractions found

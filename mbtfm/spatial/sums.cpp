@@ -17,11 +17,12 @@ namespace {
 Vec3 vec(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Vector3d vector(const Vec3& v) { return {v.x, v.y, v.z}; }
 
-/// Of three sums over the tractions.
-Vec3 errors_of(const MatrixXd& sums, const MatrixXd& covariance) {
-  if (covariance.size() == 0) return {};
-  const Vector3d variances = (sums * covariance).cwiseProduct(sums).rowwise().sum();
-  return vec(variances.cwiseMax(0).cwiseSqrt());
+Vec3 errors_of(const Matrix3d& covariance) { return vec(covariance.diagonal().cwiseMax(0).cwiseSqrt()); }
+
+/// Standard deviation of a vector along itself.
+double error_along(const Vector3d& v, const Matrix3d& covariance) {
+  const Vector3d along = v.norm() > 0 ? Vector3d(v.normalized()) : Vector3d::UnitX();
+  return std::sqrt(std::max(0.0, along.dot(covariance * along)));
 }
 
 }  // namespace
@@ -60,9 +61,8 @@ std::vector<PartForce> parts_of(const Problem& problem, const MatrixXd& areas_um
 
 void set_force(PartForce& part, const Vector3d& force_nN, const Matrix3d& covariance_nN2) {
   part.force_nN = vec(force_nN);
-  part.sigma_nN = vec(covariance_nN2.diagonal().cwiseMax(0).cwiseSqrt());
-  const Vector3d along = force_nN.norm() > 0 ? Vector3d(force_nN.normalized()) : Vector3d::UnitX();
-  part.magnitude_sigma_nN = std::sqrt(std::max(0.0, along.dot(covariance_nN2 * along)));
+  part.sigma_nN = errors_of(covariance_nN2);
+  part.magnitude_sigma_nN = error_along(force_nN, covariance_nN2);
 }
 
 }  // namespace
@@ -128,14 +128,14 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
                balance.centre_um += size * Vec3{at.x, at.y, problem.ground.height_um(at)};
              });
   if (balance.total_force_nN > 0) balance.centre_um = 1 / balance.total_force_nN * balance.centre_um;
-  MatrixXd forces = MatrixXd::Zero(3, 3 * n), moments = forces;
+  MatrixXd sums = MatrixXd::Zero(6, 3 * n);  // forces, moments
   for (Index v = 0; v < n; ++v) {
     const double area = mesh.areas_um2[static_cast<std::size_t>(v)];
     const Vec3 arm = vertices[static_cast<std::size_t>(v)] - balance.centre_um;
     Matrix3d cross_arm;
     cross_arm << 0, -arm.z, arm.y, arm.z, 0, -arm.x, -arm.y, arm.x, 0;
-    forces.middleCols<3>(3 * v) = area * Matrix3d::Identity();
-    moments.middleCols<3>(3 * v) = area * cross_arm;
+    sums.block<3, 3>(0, 3 * v) = area * Matrix3d::Identity();
+    sums.block<3, 3>(3, 3 * v) = area * cross_arm;
   }
   if (r.covariance_kPa2.size() > 0) {
     VectorXd along(3 * n);
@@ -144,11 +144,18 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
     balance.total_force_sigma_nN = std::sqrt(std::max(0.0, along.dot(r.covariance_kPa2 * along)));
   }
   const VectorXd& summed = summed_tractions_kPa(r);
-  const MatrixXd& covariance = covariance_of_summed_kPa2(r);
-  balance.force_nN = vec(forces * summed);
-  balance.moment_nN_um = vec(moments * summed);
-  balance.force_sigma_nN = errors_of(forces, covariance);
-  balance.moment_sigma_nN_um = errors_of(moments, covariance);
+  const VectorXd net = sums * summed;
+  balance.force_nN = vec(net.head<3>());
+  balance.moment_nN_um = vec(net.tail<3>());
+  if (const MatrixXd& covariance = covariance_of_summed_kPa2(r); covariance.size() > 0) {
+    const MatrixXd of_net = sums * covariance * sums.transpose();
+    const Matrix3d of_force = of_net.topLeftCorner<3, 3>(), of_moment = of_net.bottomRightCorner<3, 3>();
+    balance.force_sigma_nN = errors_of(of_force);
+    balance.moment_sigma_nN_um = errors_of(of_moment);
+    balance.net_force_sigma_nN = error_along(net.head<3>(), of_force);
+    balance.net_moment_sigma_nN_um = error_along(net.tail<3>(), of_moment);
+    balance.imbalance = net.dot(of_net.ldlt().solve(net));
+  }
   const VectorXd u = problem.surface_displacement_um(summed);
   for (Index j = 0; j < n; ++j) {
     for (Eigen::SparseMatrix<double>::InnerIterator it(mesh.mass_um2, j); it; ++it)

@@ -235,14 +235,21 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Use the forces with the background (traction.background above 0), and look for adhesions that are missing in "
        "adhesions.csv."},
       {tractions_out_of_balance, "tractions-out-of-balance", "traction", caution,
-       "length of the net force over its standard error", 4,
-       "a cell at rest pulls as much one way as the other; four standard errors are more than chance",
+       "squared net force and net moment over their joint covariance (chi-squared of six numbers)", 22.5,
+       "a cell at rest pulls as much one way as the other; chance exceeds this once in a thousand cells",
        "Check that the whole cell lies above the beads: forces beyond them are missing in the sum. Look for a cell "
        "beside it, or for a support that holds the cell."},
       {beads_stray, "beads-stray", "traction", caution,
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
        "Set traction.loss = biweight."},
+      {loss_decides, "loss-decides", "traction", caution,
+       "difference of the total forces by this loss and by l2, over their joint standard error", 1,
+       "both are of the same beads, so that chance alone makes 0.2 of it (biweight, huber) to 0.4 (l1); beyond 1 the "
+       "loss moves the answer by more than the errors say",
+       "Beads above strong forces may look astray, and beads that are astray make forces. If a run with l2 has no "
+       "finding beads-stray, take l2. If it has, look at the beads that differ from their neighbours. More beads near "
+       "the surface decide it."},
       {lambda_runs_away, "lambda-runs-away", "traction", caution, "lambda by evidence over lambda by risk", 2,
        "in scenes whose noise is that of the beads it is 0.1 to 0.8; above 1 the two contradict each other, and 2 "
        "leaves room for chance: tractions follow beads that are astray, or what the model has wrong",

@@ -82,6 +82,7 @@ enum class FindingKind {
   patches_do_not_fit,
   tractions_out_of_balance,
   beads_stray,
+  loss_decides,
   lambda_runs_away,
   // fit: the gel
   modulus_error_unknown,

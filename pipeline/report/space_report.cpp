@@ -36,9 +36,7 @@ struct Sum {
 Sum sum_of(const SpaceResults& r, const std::string& name, const std::string& unit) {
   const Vec3 v = r.vector(name, unit);
   Sum sum{.size = norm(v), .sigma = {}};
-  if (!r.find(name + "_sigma_x_" + unit) || !(sum.size > 0)) return sum;
-  const Vec3 s = r.vector(name + "_sigma", unit);
-  sum.sigma = std::hypot(v.x * s.x, v.y * s.y, v.z * s.z) / sum.size;
+  if (sum.size > 0) sum.sigma = r.find(name + "_sigma_along_" + unit);
   return sum;
 }
 
@@ -63,6 +61,12 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
       "nothing else holds has neither.",
       with_error(force.size, force.sigma, "nN"), readable(total > 0 ? force.size / total : 0),
       with_error(moment.size, moment.sigma, "nN µm")));
+  if (const auto imbalance = r.find("imbalance_chi_squared")) {
+    facts.back() += fmt::format(
+        " In their joint errors chi-squared of the six numbers is {}; chance makes more than 22.5 in one cell of a "
+        "thousand.",
+        readable(*imbalance));
+  }
   if (r.find("common_turn_deg")) {
     std::string shifts;
     for (const std::string axis : {"x", "y", "z"}) {

@@ -540,4 +540,47 @@ TEST_F(InSpace, the_resolution_is_finer_with_less_noise) {
   EXPECT_LT(median_um(0.005), 0.8 * median_um(0.1));
 }
 
+/// Of 60 beads one or two tell a force, and their residuals make them look astray.
+TEST_F(InSpace, an_answer_that_hangs_on_the_loss_is_called_so) {
+  scene.n_beads = 60;
+  scene.spots[0].force_nN = {80, 50, -30};
+  const SpatialInputs inputs{{}, scene.gel, {}, {}};
+  const Problem problem = scene.problem(scene.beads(0.05), parameters);
+  const auto is_noticed = [&](BeadLoss loss) {
+    parameters.loss = loss;
+    const auto r = reconstruct(problem, inputs, traction, parameters, 1);
+    RecordProperty(name_of(loss), std::to_string(balance_of(problem, r).total_force_nN));
+    return std::ranges::any_of(r.findings, [](const auto& f) { return f && f->id == "loss-decides"; });
+  };
+  EXPECT_FALSE(is_noticed(BeadLoss::l2));
+  EXPECT_TRUE(is_noticed(BeadLoss::biweight));
+}
+
+TEST_F(InSpace, many_beads_that_are_right_have_one_answer_by_any_loss) {
+  const SpatialInputs inputs{{}, scene.gel, {}, {}};
+  scene.n_beads = 1500;
+  const Problem problem = scene.problem(scene.beads(0.05), parameters);
+  for (const BeadLoss loss : {BeadLoss::huber, BeadLoss::biweight}) {
+    parameters.loss = loss;
+    const auto r = reconstruct(problem, inputs, traction, parameters, 1);
+    EXPECT_FALSE(std::ranges::any_of(r.findings, [](const auto& f) { return f && f->id == "loss-decides"; }))
+        << name_of(loss);
+  }
+}
+
+/// Whatever the axes: the squared distance in the joint errors is at least that along each direction.
+TEST_F(InSpace, an_imbalance_that_one_axis_tells_is_not_hidden_by_the_errors_of_another) {
+  const Problem problem = scene.problem(scene.beads(0.03), parameters);
+  const auto r = reconstruct_tikhonov(problem, traction, parameters, 1);
+  const Balance balance = balance_of(problem, r);
+  ASSERT_TRUE(balance.imbalance);
+  const auto square = [](double value, double sigma) { return value * value / (sigma * sigma); };
+  const double rounding = 1 - 1e-9;
+  EXPECT_GE(*balance.imbalance, rounding * square(balance.force_nN.x, balance.force_sigma_nN.x));
+  EXPECT_GE(*balance.imbalance, rounding * square(balance.force_nN.y, balance.force_sigma_nN.y));
+  EXPECT_GE(*balance.imbalance, rounding * square(balance.force_nN.z, balance.force_sigma_nN.z));
+  EXPECT_GE(*balance.imbalance, rounding * square(norm(balance.force_nN), balance.net_force_sigma_nN));
+  EXPECT_GE(*balance.imbalance, rounding * square(norm(balance.moment_nN_um), balance.net_moment_sigma_nN_um));
+}
+
 }  // namespace
