@@ -12,15 +12,6 @@ namespace {
 
 std::string percent(double share) { return brief(100 * share) + " %"; }
 
-/// Two digits: no plan is better than that.
-std::string about(double value) { return significant(value, 2); }
-
-const Needed& needed_of(const Grid& grid, double youngs_modulus_kPa, double noise_um) {
-  return *std::ranges::find_if(grid.needed, [&](const Needed& n) {
-    return n.youngs_modulus_kPa == youngs_modulus_kPa && n.noise_um == noise_um;
-  });
-}
-
 bool can_be_had(const Needed& n, double most_beads_per_um2) {
   return n.beads_per_um2 && *n.beads_per_um2 <= most_beads_per_um2;
 }
@@ -30,20 +21,6 @@ const Expected& expected_of(const Grid& grid, const Point& p, Quantity quantity)
     return e.quantity == quantity && e.point.youngs_modulus_kPa == p.youngs_modulus_kPa &&
            e.point.beads_per_um2 == p.beads_per_um2 && e.point.noise_um == p.noise_um;
   });
-}
-
-/// "a gel of 4 kPa needs 0.15", of all others.
-std::string of_other_gels(const Plan& plan, double own_kPa, double noise_um) {
-  std::string text;
-  for (const double E : plan.asked.youngs_modulus_kPa) {
-    if (E == own_kPa) continue;
-    const Needed& n = needed_of(plan.grid, E, noise_um);
-    text += text.empty() ? "; a gel of " : ", one of ";
-    text += brief(E) + " kPa ";
-    text += can_be_had(n, plan.most_beads_per_um2) ? "needs " + about(*n.beads_per_um2)
-                                                   : std::string("needs more beads than can be told apart");
-  }
-  return text;
 }
 
 std::string about_adhesions(const Plan& plan, const Point& p) {
@@ -80,14 +57,9 @@ std::string about_cells(const Plan& plan) {
 
 std::string about_drawn(const Drawn& d) {
   if (d.tensions.empty()) return "";
-  constexpr double kMargin = 0.1;  // of what such plans are off by anyway (docs/planning.md)
-  const bool holds = std::abs(d.error_over_predicted - 1) < 2 * d.by_chance + kMargin;
-  return "Checked with " + std::to_string(d.n_experiments) +
-         (d.n_experiments == 1 ? " simulated experiment" : " simulated experiments") + " at " +
-         brief(d.point.youngs_modulus_kPa) + " kPa, " + brief(d.point.beads_per_um2) +
-         (d.point.beads_per_um2 == 1 ? " bead" : " beads") + " per µm² and " + brief(d.point.noise_um) +
-         " µm: the errors of " + std::to_string(d.tensions.size()) + " tensions were " + about(d.error_over_predicted) +
-         " times those predicted (root mean square; by chance within " + about(2 * d.by_chance) + " of 1). " +
+  const bool holds = std::abs(d.error_over_predicted - 1) < 2 * d.by_chance + kDrawnMargin;
+  return checked_with(d, brief(d.point.beads_per_um2) + (d.point.beads_per_um2 == 1 ? " bead" : " beads") + " per µm²",
+                      std::to_string(d.tensions.size()) + " tensions") +
          (holds ? "The plan holds. " : "The plan does not hold well here: allow for that factor. ") +
          "Single adhesions' forces were off by " + about(d.forces.with_network_nN) + " nN with the network, by " +
          about(d.forces.alone_nN) + " nN without it, and by " + about(d.forces.fttc_nN) + " nN with FTTC.";
@@ -100,15 +72,26 @@ double answered_gel_kPa(const Asked& asked, double own_kPa) {
                                    [&](double E) { return std::abs(std::log(E / own_kPa)); });
 }
 
+double density_that_suffices(const std::vector<double>& densities, std::optional<double> needed) {
+  const auto enough = std::ranges::find_if(densities, [&](double density) { return needed && density >= *needed; });
+  return enough == densities.end() ? densities.back() : *enough;
+}
+
+std::string about(double value) { return significant(value, 2); }
+
+std::string of_other_gels(const Asked& asked, double gel_kPa, const std::function<std::string(double)>& needs) {
+  std::string text;
+  for (const double E : asked.youngs_modulus_kPa) {
+    if (E != gel_kPa) text += (text.empty() ? "; a gel of " : ", one of ") + brief(E) + " kPa needs " + needs(E);
+  }
+  return text;
+}
+
 Point answered_point(const Asked& asked, const Grid& grid, double own_kPa) {
   Point point{answered_gel_kPa(asked, own_kPa), asked.beads_per_um2.back(), asked.noise_um.front()};
   if (grid.needed.empty()) return point;
-  const Needed& n = needed_of(grid, point.youngs_modulus_kPa, point.noise_um);
-  for (const double density : asked.beads_per_um2) {
-    if (!n.beads_per_um2 || density < *n.beads_per_um2) continue;
-    point.beads_per_um2 = density;
-    break;
-  }
+  point.beads_per_um2 = density_that_suffices(
+      asked.beads_per_um2, needed_of(grid.needed, point.youngs_modulus_kPa, point.noise_um).beads_per_um2);
   return point;
 }
 
@@ -119,7 +102,12 @@ std::string answer_sentence(const Plan& plan) {
       "to see " + brief(plan.asked.tension_nN) + " nN per fibre to " + percent(plan.asked.within);
   const std::string with = "With " + std::string(gel_kPa == plan.own_kPa ? "your" : "a") + " gel of " + brief(gel_kPa) +
                            " kPa and a noise of " + brief(noise_um) + " µm ";
-  const Needed& n = needed_of(plan.grid, gel_kPa, noise_um);
+  const Needed& n = needed_of(plan.grid.needed, gel_kPa, noise_um);
+  const std::string others = of_other_gels(plan.asked, gel_kPa, [&](double E) {
+    const Needed& other = needed_of(plan.grid.needed, E, noise_um);
+    return can_be_had(other, plan.most_beads_per_um2) ? about(*other.beads_per_um2)
+                                                      : std::string("more beads than can be told apart");
+  });
   if (!n.beads_per_um2)
     return with + "no number of beads suffices " + asked_for +
            (plan.grid.model_error_nN < plan.asked.target_nN
@@ -127,9 +115,8 @@ std::string answer_sentence(const Plan& plan) {
                 : ": networks and segmentation alone make an error of " + about(plan.grid.model_error_nN) + " nN.");
   if (!can_be_had(n, plan.most_beads_per_um2))
     return with + "you would need " + about(*n.beads_per_um2) + " beads per µm² " + asked_for + ", more than the " +
-           about(plan.most_beads_per_um2) + " that can be told apart" + of_other_gels(plan, gel_kPa, noise_um) + ".";
-  return with + "you need " + about(*n.beads_per_um2) + " beads per µm² " + asked_for +
-         of_other_gels(plan, gel_kPa, noise_um) + ".";
+           about(plan.most_beads_per_um2) + " that can be told apart" + others + ".";
+  return with + "you need " + about(*n.beads_per_um2) + " beads per µm² " + asked_for + others + ".";
 }
 
 std::vector<std::string> further_sentences(const Plan& plan) {
@@ -139,7 +126,7 @@ std::vector<std::string> further_sentences(const Plan& plan) {
   };
   const Point point = answered_point(plan.asked, plan.grid, plan.own_kPa);
   if (!plan.grid.needed.empty()) {
-    const Needed& n = needed_of(plan.grid, point.youngs_modulus_kPa, point.noise_um);
+    const Needed& n = needed_of(plan.grid.needed, point.youngs_modulus_kPa, point.noise_um);
     add(std::string("That holds for half of the fibres. ") +
         (n.of_most <= plan.most_beads_per_um2
              ? "Nine in ten need " + about(n.of_most) + " beads per µm²."

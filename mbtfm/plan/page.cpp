@@ -1,18 +1,14 @@
 #include "mbtfm/plan/page.h"
 
-#include <algorithm>
 #include <cmath>
 
+#include "mbtfm/plan/page_parts.h"
 #include "mbtfm/plan/tables.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/contract/version.h"
-#include "pipeline/report/page.h"
 
 namespace mbtfm::plan {
 
 namespace {
-
-std::string colour(std::size_t k) { return charts::kColours[k % std::size(charts::kColours)]; }
 
 std::vector<Expected> rows_of(const Grid& grid, double youngs_modulus_kPa, double noise_um, Quantity quantity) {
   std::vector<Expected> rows;
@@ -27,50 +23,25 @@ Quantity drawn_quantity(const Plan& plan) {
   return plan.grid.needed.empty() ? Quantity::total_force : Quantity::fibres;
 }
 
-charts::Axis density_axis(const Plan& plan) {
-  return charts::axis_over("beads per µm²", plan.asked.beads_per_um2, charts::Scale::logarithmic);
-}
-
-charts::Axis error_axis(const Plan& plan) {
-  std::vector<double> errors = {plan.asked.target_nN};
-  for (const Expected& e : plan.grid.expected)
-    if (e.quantity == drawn_quantity(plan)) errors.push_back(e.standard_error_nN);
-  return charts::axis_over("standard error of the middle fibre (nN)", errors, charts::Scale::logarithmic);
-}
-
 charts::Chart chart_of(const Plan& plan, double noise_um) {
-  charts::Chart chart("Noise " + brief(noise_um) + " µm", density_axis(plan), error_axis(plan));
-  for (std::size_t k = 0; k < plan.asked.youngs_modulus_kPa.size(); ++k) {
-    const double E = plan.asked.youngs_modulus_kPa[k];
-    std::vector<Vec2> points;
-    for (const Expected& e : rows_of(plan.grid, E, noise_um, drawn_quantity(plan))) {
-      points.push_back({e.point.beads_per_um2, e.standard_error_nN});
-      chart.dot(points.back(), 3.5, "fill:" + colour(k) + ";stroke:#fff",
-                brief(E) + " kPa, " + brief(e.point.beads_per_um2) + " beads per µm²: " + brief(e.standard_error_nN) +
-                    " nN, of which " + brief(e.from_beads_nN) + " by the beads; " + brief(100 * e.share_within) +
-                    " % of the fibres are within the target");
-    }
-    chart.curve(points, "fill:none;stroke-width:2;stroke:" + colour(k));
-    chart.key(brief(E) + " kPa", colour(k));
-  }
-  chart.level(plan.asked.target_nN, "stroke:#333;stroke-width:1.5;stroke-dasharray:6 4");
-  return chart;
+  const Quantity quantity = drawn_quantity(plan);
+  std::vector<double> errors;
+  for (const Expected& e : plan.grid.expected)
+    if (e.quantity == quantity) errors.push_back(e.standard_error_nN);
+  return error_chart(
+      plan.asked, noise_um, "beads per µm²", plan.asked.beads_per_um2, "middle fibre", std::move(errors),
+      [&](double E) {
+        std::vector<ErrorDot> dots;
+        for (const Expected& e : rows_of(plan.grid, E, noise_um, quantity))
+          dots.push_back({e.point.beads_per_um2, e.standard_error_nN, e.from_beads_nN,
+                          "; " + brief(100 * e.share_within) + " % of the fibres are within the target"});
+        return dots;
+      });
 }
 
-report::Table needed_rows(const Plan& plan) {
-  report::Table table{.columns = {{"gel (kPa)", true}}, .rows = {}};
-  for (const double noise_um : plan.asked.noise_um) table.columns.push_back({"noise " + brief(noise_um) + " µm", true});
-  for (const double E : plan.asked.youngs_modulus_kPa) {
-    std::vector<std::string> row = {brief(E)};
-    for (const Needed& n : plan.grid.needed) {
-      if (n.youngs_modulus_kPa != E) continue;
-      row.push_back(!n.beads_per_um2                             ? "never"
-                    : *n.beads_per_um2 > plan.most_beads_per_um2 ? "&gt; " + brief(plan.most_beads_per_um2)
-                                                                 : significant(*n.beads_per_um2, 2));
-    }
-    table.rows.push_back(std::move(row));
-  }
-  return table;
+std::string needed_text(const Needed& n, double most_beads_per_um2) {
+  if (!n.beads_per_um2) return "never";
+  return *n.beads_per_um2 > most_beads_per_um2 ? "&gt; " + brief(most_beads_per_um2) : significant(*n.beads_per_um2, 2);
 }
 
 report::Table expected_rows(const Plan& plan) {
@@ -119,28 +90,11 @@ report::Table cell_rows(const Plan& plan) {
   return table;
 }
 
-charts::Chart drawn_chart(const Drawn& drawn) {
-  std::vector<double> both;
-  for (const DrawnTension& t : drawn.tensions) both.insert(both.end(), {t.true_nN, t.found_nN});
-  charts::Chart chart("Drawn experiments", charts::axis_over("true tension (nN)", both, charts::Scale::linear),
-                      charts::axis_over("found, ± predicted standard error (nN)", both, charts::Scale::linear));
-  const double most = *std::ranges::max_element(both);
-  chart.curve({{0, 0}, {most, most}}, "fill:none;stroke:#999;stroke-width:1");
-  for (const DrawnTension& t : drawn.tensions) {
-    const std::string of = colour(static_cast<std::size_t>(t.experiment));
-    chart.error({t.true_nN, t.found_nN - t.predicted_error_nN}, {t.true_nN, t.found_nN + t.predicted_error_nN},
-                "stroke-width:1;stroke:" + of);
-    chart.dot({t.true_nN, t.found_nN}, 3, "fill:" + of + ";stroke:#fff",
-              "fibre " + std::to_string(t.fibre_id) + ": true " + brief(t.true_nN) + " nN, found " + brief(t.found_nN) +
-                  " ± " + brief(t.predicted_error_nN) + " nN");
-  }
-  return chart;
-}
-
-std::string paragraphs(const std::vector<std::string>& texts) {
-  std::string html;
-  for (const std::string& text : texts) html += "<p>" + report::html_escaped(text) + "</p>\n";
-  return html;
+std::vector<DrawnDot> drawn_dots(const Drawn& drawn) {
+  std::vector<DrawnDot> dots;
+  for (const DrawnTension& t : drawn.tensions)
+    dots.push_back({t.true_nN, t.found_nN, t.predicted_error_nN, t.experiment, "fibre " + std::to_string(t.fibre_id)});
+  return dots;
 }
 
 constexpr const char* kHow =
@@ -159,31 +113,25 @@ std::vector<charts::Chart> charts_of(const Plan& plan) {
 }
 
 std::string svg_of(const Plan& plan) {
-  const std::vector<charts::Chart> charts = charts_of(plan);
-  return charts::svg_file(charts, std::min<int>(2, static_cast<int>(charts.size())),
-                          {plan.name + ": standard error of the middle fibre's tension.",
-                           "Dashed: the target of " + brief(plan.asked.target_nN) + " nN."});
+  return svg_of(charts_of(plan), plan.name + ": standard error of the middle fibre's tension.", plan.asked);
 }
 
 std::string html_of(const Plan& plan) {
-  const std::string head = "<h1>Plan: " + report::html_escaped(plan.name) + "</h1><p class=\"sub\">mbtfm " +
-                           std::string(kVersion) + "</p>\n<p><b>" + report::html_escaped(answer_sentence(plan)) +
-                           "</b></p>\n" + paragraphs(further_sentences(plan));
+  const std::string head = head_of(plan.name, answer_sentence(plan), further_sentences(plan));
   std::string body;
   if (!plan.grid.warnings.empty()) body += report::section("What to mind", paragraphs(plan.grid.warnings));
-  std::string curves;
-  for (const charts::Chart& chart : charts_of(plan))
-    curves += report::figure(chart, "Dashed: the target of " + brief(plan.asked.target_nN) + " nN.");
-  body += report::section("Standard error over density", curves + kHow);
+  body += report::section("Standard error over density", figures_of(charts_of(plan), plan.asked) + kHow);
   if (!plan.grid.needed.empty())
     body += report::section(
         "Beads per µm² that are needed",
-        report::html_of(needed_rows(plan), {"plan_needed.csv", files::text_of(needed_table(), plan.grid.needed)}) +
+        report::html_of(needed_rows<Needed>(plan.asked, plan.grid.needed,
+                                            [&](const Needed& n) { return needed_text(n, plan.most_beads_per_um2); }),
+                        {"plan_needed.csv", files::text_of(needed_table(), plan.grid.needed)}) +
             "<p class=\"sub\">&gt; " + brief(plan.most_beads_per_um2) +
             ": more beads than can be told apart. “never”: no number of beads suffices.</p>\n");
   if (plan.drawn && !plan.drawn->tensions.empty())
     body += report::section("How well it held",
-                            report::figure(drawn_chart(*plan.drawn),
+                            report::figure(drawn_chart("tension", drawn_dots(*plan.drawn)),
                                            "Tensions found in simulated experiments beside the true ones. The fits "
                                            "know neither the cell's own network nor its tensions."));
   if (!plan.cells.empty())

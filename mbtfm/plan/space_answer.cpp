@@ -14,15 +14,6 @@ namespace {
 
 constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
 
-/// Two digits: no plan is better than that.
-std::string about(double value) { return significant(value, 2); }
-
-const SpaceNeeded& needed_of(const SpaceGrid& grid, double youngs_modulus_kPa, double noise_um) {
-  return *std::ranges::find_if(grid.needed, [&](const SpaceNeeded& n) {
-    return n.youngs_modulus_kPa == youngs_modulus_kPa && n.noise_um == noise_um;
-  });
-}
-
 const SpaceExpected& expected_of(const SpaceGrid& grid, const SpacePoint& p, SpaceQuantity quantity) {
   return *std::ranges::find_if(grid.expected, [&](const SpaceExpected& e) {
     return e.quantity == quantity && e.point.youngs_modulus_kPa == p.youngs_modulus_kPa &&
@@ -41,36 +32,31 @@ std::string beads_text(const SpacePlan& plan, double beads_per_um3) {
   return about(beads_per_um3) + " beads per µm³ (" + about_count(beads_per_um3 * plan.volume_um3) + " in this field)";
 }
 
-std::string too_many(const SpacePlan& plan) { return about(4 * plan.asked.beads_per_um3.back()); }
+/// "0.0024", or "more than 0.03"
+std::string density_text(const SpacePlan& plan, std::optional<double> beads_per_um3) {
+  return beads_per_um3 ? about(*beads_per_um3) : "more than " + about(most_beads_per_um3(plan.asked.beads_per_um3));
+}
 
 /// Standard errors allow for tractions beside the patches. Where there are none, experiments err by less.
 std::string about_drawn(const SpaceDrawn& d) {
-  constexpr double kMargin = 0.1;  // as of flat plans
-  const double allowed = 2 * d.by_chance + kMargin;
+  const double allowed = 2 * d.by_chance + kDrawnMargin;
   const char* verdict = "The plan holds.";
   if (d.error_over_predicted > 1 + allowed) verdict = "The plan does not hold well here: allow for that factor.";
   if (d.error_over_predicted < 1 - allowed)
     verdict =
         "The plan is on the safe side: it allows for forces beside the patches, as the reconstruction does, and here "
         "are few.";
-  return "Checked with " + std::to_string(d.n_experiments) +
-         (d.n_experiments == 1 ? " simulated experiment" : " simulated experiments") + " at " +
-         brief(d.point.youngs_modulus_kPa) + " kPa, " + brief(d.point.beads_per_um3) + " beads per µm³ and " +
-         brief(d.point.noise_um) + " µm: the errors of " + std::to_string(d.forces.size()) +
-         " components of forces were " + about(d.error_over_predicted) +
-         " times those predicted (root mean square; by chance within " + about(2 * d.by_chance) + " of 1). " + verdict;
+  return checked_with(d, brief(d.point.beads_per_um3) + " beads per µm³",
+                      std::to_string(d.forces.size()) + " components of forces") +
+         verdict;
 }
 
 }  // namespace
 
 SpacePoint answered_point(const Asked& asked, const SpaceGrid& grid, double own_kPa) {
   SpacePoint point{answered_gel_kPa(asked, own_kPa), asked.beads_per_um3.back(), asked.noise_um.front()};
-  const SpaceNeeded& n = needed_of(grid, point.youngs_modulus_kPa, point.noise_um);
-  for (const double density : asked.beads_per_um3) {
-    if (!n.beads_per_um3 || density < *n.beads_per_um3) continue;
-    point.beads_per_um3 = density;
-    break;
-  }
+  point.beads_per_um3 = density_that_suffices(
+      asked.beads_per_um3, needed_of(grid.needed, point.youngs_modulus_kPa, point.noise_um).beads_per_um3);
   return point;
 }
 
@@ -78,33 +64,25 @@ std::string answer_sentence(const SpacePlan& plan) {
   const double gel_kPa = answered_gel_kPa(plan.asked, plan.own_kPa), noise_um = plan.asked.noise_um.front();
   const std::string asked_for =
       " to see " + brief(plan.asked.tension_nN) + " nN per patch to " + brief(100 * plan.asked.within) + " %";
-  std::string text = "With " + std::string(gel_kPa == plan.own_kPa ? "your" : "a") + " gel of " + brief(gel_kPa) +
-                     " kPa and a noise of " + brief(noise_um) + " µm (" + brief(plan.axial_noise * noise_um) +
-                     " µm along z) you need ";
-  const SpaceNeeded& n = needed_of(plan.grid, gel_kPa, noise_um);
-  text += n.beads_per_um3 ? beads_text(plan, *n.beads_per_um3) + asked_for
-                          : "more than " + too_many(plan) + " beads per µm³" + asked_for;
-  bool is_first = true;
-  for (const double E : plan.asked.youngs_modulus_kPa) {
-    if (E == gel_kPa) continue;
-    const SpaceNeeded& other = needed_of(plan.grid, E, noise_um);
-    text += (is_first ? "; a gel of " : ", one of ") + brief(E) + " kPa needs " +
-            (other.beads_per_um3 ? about(*other.beads_per_um3) : "more than " + too_many(plan));
-    is_first = false;
-  }
-  return text + ".";
+  const std::string text = "With " + std::string(gel_kPa == plan.own_kPa ? "your" : "a") + " gel of " + brief(gel_kPa) +
+                           " kPa and a noise of " + brief(noise_um) + " µm (" + brief(plan.axial_noise * noise_um) +
+                           " µm along z) you need ";
+  const auto needed = [&](double E) { return needed_of(plan.grid.needed, E, noise_um).beads_per_um3; };
+  const std::optional<double> n = needed(gel_kPa);
+  return text + (n ? beads_text(plan, *n) : density_text(plan, n) + " beads per µm³") + asked_for +
+         of_other_gels(plan.asked, gel_kPa, [&](double E) { return density_text(plan, needed(E)); }) + ".";
 }
 
 std::vector<std::string> further_sentences(const SpacePlan& plan) {
   const SpacePoint point = answered_point(plan.asked, plan.grid, plan.own_kPa);
-  const SpaceNeeded& n = needed_of(plan.grid, point.youngs_modulus_kPa, point.noise_um);
+  const SpaceNeeded& n = needed_of(plan.grid.needed, point.youngs_modulus_kPa, point.noise_um);
   const auto error = [&](SpaceQuantity quantity) {
     return about(expected_of(plan.grid, point, quantity).standard_error_nN) + " nN";
   };
   std::vector<std::string> sentences;
   if (n.beads_per_um3)
-    sentences.push_back("That holds for half of the patches. Nine in ten need " +
-                        (n.of_most ? about(*n.of_most) : "more than " + too_many(plan)) + " beads per µm³.");
+    sentences.push_back("That holds for half of the patches. Nine in ten need " + density_text(plan, n.of_most) +
+                        " beads per µm³.");
   const SpaceExpected& patch = expected_of(plan.grid, point, SpaceQuantity::force);
   sentences.push_back("At " + beads_text(plan, point.beads_per_um3) +
                       " the force of the middle patch has a standard error of " + error(SpaceQuantity::force) + ", " +

@@ -161,16 +161,15 @@ double left_out(Gel gel, double youngs_modulus_kPa, double traction_kPa) {
 }
 
 /// Density at which a patch's standard error is the target: on the line of logarithms between the densities, beyond
-/// them as the noise of the beads has it. None beyond four times the densest.
+/// them as the noise of the beads has it. None beyond most_beads_per_um3().
 std::optional<double> needed_beads(const std::vector<double>& densities, const std::vector<double>& errors_nN,
                                    double target_nN) {
-  constexpr double kBeyond = 4;
   const auto first = std::ranges::find_if(errors_nN, [&](double e) { return e <= target_nN; });
   const auto by_law = [&](std::size_t k) { return densities[k] * std::pow(errors_nN[k] / target_nN, 2); };
   if (first == errors_nN.begin()) return by_law(0);
   if (first == errors_nN.end()) {
     const double density = by_law(densities.size() - 1);
-    return density <= kBeyond * densities.back() ? std::optional(density) : std::nullopt;
+    return density <= most_beads_per_um3(densities) ? std::optional(density) : std::nullopt;
   }
   const auto k = static_cast<std::size_t>(first - errors_nN.begin());
   const double share = std::log(errors_nN[k - 1] / target_nN) / std::log(errors_nN[k - 1] / errors_nN[k]);
@@ -226,6 +225,8 @@ std::vector<std::string> warnings_of(const Asked& asked, const SpaceGrid& grid) 
 }
 
 }  // namespace
+
+double most_beads_per_um3(const std::vector<double>& densities) { return 4 * densities.back(); }
 
 std::size_t n_beads_of(const SpaceScene& scene, double beads_per_um3) {
   return static_cast<std::size_t>(std::lround(beads_per_um3 * scene.volume_um3()));

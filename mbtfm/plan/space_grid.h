@@ -40,8 +40,9 @@ struct SpaceExpected {
 
 struct SpaceNeeded {
   double youngs_modulus_kPa = 0, noise_um = 0;
-  std::optional<double> beads_per_um3;  ///< so that the middle patch meets the target; none: not four times the densest
-  std::optional<double> of_most;        ///< the same of nine patches in ten
+  std::optional<double>
+      beads_per_um3;              ///< so that the middle patch meets the target; none: most_beads_per_um3() do not
+  std::optional<double> of_most;  ///< the same of nine patches in ten
 };
 
 /// The gel's answer to tractions at the places of many beads: the densities are parts of them, and so are those of
@@ -69,6 +70,8 @@ struct SpaceGrid {
   std::vector<SpaceNeeded> needed;  ///< by gel, then noise
   std::vector<std::string> warnings;
 };
+/// The most of which a plan says whether they suffice: four times the densest asked for.
+double most_beads_per_um3(const std::vector<double>& densities);
 SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const SpacePool& pool, const SpaceForeseen& foreseen);
 
 /// Of a patch: along its force, along the surface as its force goes, along the normal; unit vectors, by column.
