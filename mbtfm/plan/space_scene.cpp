@@ -68,6 +68,10 @@ void set_volume(SpaceScene& scene, const std::vector<BeadInSpace>& beads) {
 
 std::vector<SpacePatch> patches_of(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "4_traction/traction_adhesion_forces.csv";
+  constexpr const char* kRemedy =
+      "a plan asks for the forces of adhesions: give their image, and run the cell again: mbtfm run";
+  if (!std::filesystem::exists(file))
+    throw InputError(file.string(), "forces of the cell's adhesions", "no such file", kRemedy);
   const files::CsvTable table(file);
   table.require({"adhesion_id", "fx_nN", "fy_nN", "fz_nN"});
   std::vector<SpacePatch> patches;
@@ -78,8 +82,7 @@ std::vector<SpacePatch> patches_of(const std::filesystem::path& folder) {
     }
   }
   if (patches.empty())
-    throw InputError(file.string(), "forces of the adhesions of 1_segment/adhesions.csv", "none of them",
-                     "a plan asks for the forces of adhesions: give their image, and run the cell again: mbtfm run");
+    throw InputError(file.string(), "forces of the adhesions of 1_segment/adhesions.csv", "none of them", kRemedy);
   return patches;
 }
 

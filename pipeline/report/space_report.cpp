@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/findings.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/json.h"
@@ -63,9 +64,9 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
       with_error(moment.size, moment.sigma, "nN µm")));
   if (const auto imbalance = r.find("imbalance_chi_squared")) {
     facts.back() += fmt::format(
-        " In their joint errors chi-squared of the six numbers is {}; chance makes more than 22.5 in one cell of a "
+        " In their joint errors chi-squared of the six numbers is {}; chance makes more than {} in one cell of a "
         "thousand.",
-        readable(*imbalance));
+        readable(*imbalance), readable(properties_of(FindingKind::tractions_out_of_balance).threshold));
   }
   if (r.find("common_turn_deg")) {
     std::string shifts;

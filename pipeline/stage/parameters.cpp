@@ -284,8 +284,7 @@ Parameter& parameter_named(ParameterList& list, const std::string& name) {
     if (p.flag == name) return p;
     known.push_back(p.flag);
   }
-  throw UsageError("no parameter is called '" + name +
-                   "': " + (nearest(known, name).empty() ? "" : did_you_mean(nearest(known, name))));
+  throw UsageError("no parameter is called '" + name + "': " + did_you_mean(nearest(known, name)));
 }
 
 void check_complete(const ParameterList& list) {

@@ -120,6 +120,14 @@ TEST(PlanInSpace, what_is_no_plan_in_space_is_refused_with_the_remedy) {
   EXPECT_NE(refusal("--scenario wave --beads_per_um2 1").find("give beads_per_um3"), std::string::npos);
   EXPECT_NE(refusal("--scenario two-adhesions --beads_per_um3 1").find("give beads_per_um2"), std::string::npos);
   EXPECT_NE(refusal("--scenario wave --beads_per_um3 1e-5").find("fewer than 20 beads"), std::string::npos);
+  // a finished cell in space without an image of its adhesions
+  fs::create_directories(folder / "cell/2_track");
+  files::write_text(folder / "cell/cell.toml",
+                    "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8\nthickness_um = 60\n");
+  files::write_text(folder / "cell/2_track/displacement_3d.csv", "");
+  const Outcome outcome = run_program("mbtfm plan --cell " + (folder / "cell").string() + out);
+  EXPECT_EQ(outcome.code, 3) << outcome.output;
+  EXPECT_NE(outcome.output.find("give their image, and run the cell again"), std::string::npos) << outcome.output;
   EXPECT_FALSE(fs::exists(folder / "plan"));
 }
 
