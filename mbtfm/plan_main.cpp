@@ -71,9 +71,12 @@ void tell(const std::string& answer, const std::vector<std::string>& further,
 
 std::string summary_of(const std::string& name, const Asked& asked, std::size_t n_densities,
                        const stage::StageContext& context) {
-  return name + ": " + std::to_string(asked.youngs_modulus_kPa.size()) + " gels, " + std::to_string(n_densities) +
-         " densities, " + std::to_string(asked.noise_um.size()) + " noises; plan.html in " +
-         context.outputs_.at("out").string();
+  const auto counted = [](std::size_t n, const char* one, const char* many) {
+    return std::to_string(n) + " " + (n == 1 ? one : many);
+  };
+  return name + ": " + counted(asked.youngs_modulus_kPa.size(), "gel", "gels") + ", " +
+         counted(n_densities, "density", "densities") + ", " + counted(asked.noise_um.size(), "noise", "noises") +
+         "; plan.html in " + context.outputs_.at("out").string();
 }
 
 SpaceScene space_scene_of(const Parameters& parameters, stage::StageContext& context) {
@@ -86,19 +89,20 @@ SpacePlan space_plan_of(const Parameters& parameters, stage::StageContext& conte
   const SpaceScene scene = space_scene_of(parameters, context);
   const Asked asked = asked_in_space(parameters, scene);
   for (const double E : asked.youngs_modulus_kPa) context.expect_plausible("youngs_modulus_kPa", E);
-  const SpacePool pool = pool_of(scene, asked, work);
+  const std::vector<SpacePool> pools = pools_of(scene, asked, work);
   work.tell(0.4, "what beads tell");
-  const SpaceForeseen foreseen = foresee(scene, asked, pool, work);
+  const SpaceForeseen foreseen = foresee(scene, asked, pools, work);
   SpacePlan plan{.name = scene.name,
                  .own_kPa = scene.gel.youngs_modulus_kPa,
                  .axial_noise = scene.spatial.axial_sigma_ratio,
                  .volume_um3 = scene.volume_um3(),
                  .asked = asked,
-                 .grid = grid_of(scene, asked, pool, foreseen),
+                 .grid = grid_of(scene, asked, pools, foreseen),
                  .drawn = {}};
+  const SpacePoint point = answered_point(asked, plan.grid, plan.own_kPa);
   if (parameters.drawn > 0)
-    plan.drawn =
-        draw_experiments(scene, pool, foreseen, answered_point(asked, plan.grid, plan.own_kPa), parameters.drawn, work);
+    plan.drawn = draw_experiments(scene, pools[foreseen.index_of_density(point.beads_per_um3)], foreseen, point,
+                                  parameters.drawn, work);
   return plan;
 }
 

@@ -44,8 +44,8 @@ std::string about_drawn(const SpaceDrawn& d) {
   if (d.error_over_predicted > 1 + allowed) verdict = "The plan does not hold well here: allow for that factor.";
   if (d.error_over_predicted < 1 - allowed)
     verdict =
-        "The plan is on the safe side: it allows for forces beside the patches, as the reconstruction does, and here "
-        "are few.";
+        "The plan is on the safe side: it allows for forces beside the patches, as the reconstruction does, and there "
+        "are few of them here.";
   return checked_with(d, brief(d.point.beads_per_um3) + " beads per µm³",
                       std::to_string(d.forces.size()) + " components of forces") +
          verdict;
@@ -84,13 +84,13 @@ std::vector<std::string> further_sentences(const SpacePlan& plan) {
     sentences.push_back("That holds for half of the patches. Nine in ten need " + density_text(plan, n.of_most) +
                         " beads per µm³.");
   const SpaceExpected& patch = expected_of(plan.grid, point, SpaceQuantity::force);
-  sentences.push_back("At " + beads_text(plan, point.beads_per_um3) +
-                      " the force of the middle patch has a standard error of " + error(SpaceQuantity::force) + ", " +
-                      error(SpaceQuantity::tangential_force) + " along the surface and " +
-                      error(SpaceQuantity::normal_force) + " normal to it; the total force has " +
-                      error(SpaceQuantity::total_force) + ", the net force " + error(SpaceQuantity::net_force) +
-                      ". The smallest force seen is three times that of the patch. In the map, forces closer than " +
-                      about(*patch.resolution_um) + " µm look like one.");
+  sentences.push_back(
+      "At " + beads_text(plan, point.beads_per_um3) + " the force of the middle patch has a standard error of " +
+      error(SpaceQuantity::force) + ", " + error(SpaceQuantity::tangential_force) + " along the surface and " +
+      error(SpaceQuantity::normal_force) + " normal to it; the total force has " + error(SpaceQuantity::total_force) +
+      ", the net force " + error(SpaceQuantity::net_force) +
+      ". The smallest force that can be seen is three times the patch's error. In the map, forces closer than " +
+      about(*patch.resolution_um) + " µm look like one.");
   if (plan.drawn) sentences.push_back(about_drawn(*plan.drawn));
   return sentences;
 }

@@ -54,6 +54,30 @@ void set_exact(const SpaceScene& scene, SpacePool& pool) {
   pool.problem.observed = spatial::observe(pool.beads, scene.gel, pool.problem.ground, scene.spatial);
 }
 
+SpacePool pool_of(const SpaceScene& scene, double beads_per_um3, const Work& work) {
+  drawing::Random random(scene.seed, drawing::Stream::beads);
+  std::vector<BeadInSpace> beads = beads_in(scene, kDraws * n_beads_of(scene, beads_per_um3), random);
+  for (BeadInSpace& bead : beads) bead.sigma_um = 1, bead.sigma_z_um = scene.spatial.axial_sigma_ratio;
+  // As the reconstruction's own: a lattice for twice to eight times the beads makes errors 10 to 24 % larger. Time
+  // grows as the cube of the vertices, so that a plan allows for fewer of them than a reconstruction.
+  constexpr double kMostVertices = 500;
+  spatial::Meshing meshing{.spacing_um = scene.traction.spacing_um, .has_patches = true};
+  if (!meshing.spacing_um) {
+    const double area_um2 = (scene.high_um.x - scene.low_um.x) * (scene.high_um.y - scene.low_um.y);
+    meshing.spacing_um =
+        std::max(spatial::kSpacingOfBeads / std::cbrt(beads_per_um3), std::sqrt(area_um2 / kMostVertices));
+  }
+  SpacePool pool{.beads = beads,
+                 .problem = spatial::make_problem({beads, scene.gel, adhesions_of(scene), scene.outline_um},
+                                                  scene.spatial, meshing, scene.substrate, work.threads)};
+  if (pool.problem.map)
+    throw UsageError("traction.spacing_um: a plan takes up to " + std::to_string(spatial::kMostVertices) +
+                     " vertices of tractions, not " + std::to_string(pool.problem.mesh.n_vertices()));
+  MBTFM_ASSERT(pool.problem.observed.n_beads == std::ssize(beads));
+  set_exact(scene, pool);
+  return pool;
+}
+
 /// Consecutive beads of the pool, which has them in random order.
 std::vector<Index> run_of(std::size_t first, std::size_t n) {
   std::vector<Index> chosen(n);
@@ -232,7 +256,7 @@ std::size_t n_beads_of(const SpaceScene& scene, double beads_per_um3) {
   return static_cast<std::size_t>(std::lround(beads_per_um3 * scene.volume_um3()));
 }
 
-SpacePool pool_of(const SpaceScene& scene, const Asked& asked, const Work& work) {
+std::vector<SpacePool> pools_of(const SpaceScene& scene, const Asked& asked, const Work& work) {
   work.tell(0.02, "the gel's answer to tractions");
   const std::size_t n_densest = n_beads_of(scene, asked.beads_per_um3.back());
   constexpr std::size_t kFewest = 20;
@@ -243,27 +267,9 @@ SpacePool pool_of(const SpaceScene& scene, const Asked& asked, const Work& work)
   if (kDraws * n_densest > kMost)
     throw UsageError("beads_per_um3: " + brief(asked.beads_per_um3.back()) + " are " + std::to_string(n_densest) +
                      " beads in the " + brief(scene.volume_um3()) + " um³ of the scene; a plan takes up to 10000");
-  drawing::Random random(scene.seed, drawing::Stream::beads);
-  std::vector<BeadInSpace> beads = beads_in(scene, kDraws * n_densest, random);
-  for (BeadInSpace& bead : beads) bead.sigma_um = 1, bead.sigma_z_um = scene.spatial.axial_sigma_ratio;
-  // Tractions of a lattice that is finer than what the beads tell change no error of a force, and cost by the cube.
-  constexpr double kMostVertices = 500;
-  spatial::Meshing meshing{.spacing_um = scene.traction.spacing_um, .has_patches = true};
-  if (!meshing.spacing_um) {
-    constexpr double kSpacingOfBeads = 0.83;  // as the reconstruction's own
-    const double area_um2 = (scene.high_um.x - scene.low_um.x) * (scene.high_um.y - scene.low_um.y);
-    meshing.spacing_um =
-        std::max(kSpacingOfBeads / std::cbrt(asked.beads_per_um3.back()), std::sqrt(area_um2 / kMostVertices));
-  }
-  SpacePool pool{.beads = beads,
-                 .problem = spatial::make_problem({beads, scene.gel, adhesions_of(scene), scene.outline_um},
-                                                  scene.spatial, meshing, scene.substrate, work.threads)};
-  if (pool.problem.map)
-    throw UsageError("traction.spacing_um: a plan takes up to " + std::to_string(spatial::kMostVertices) +
-                     " vertices of tractions, not " + std::to_string(pool.problem.mesh.n_vertices()));
-  MBTFM_ASSERT(pool.problem.observed.n_beads == std::ssize(beads));
-  set_exact(scene, pool);
-  return pool;
+  std::vector<SpacePool> pools;
+  for (const double density : asked.beads_per_um3) pools.push_back(pool_of(scene, density, work));
+  return pools;
 }
 
 spatial::Problem part_of(const SpaceScene& scene, const SpacePool& pool, const std::vector<Index>& chosen, double noise,
@@ -282,21 +288,24 @@ spatial::Problem part_of(const SpaceScene& scene, const SpacePool& pool, const s
   return pool.problem.with_beads(chosen, spatial::observe(beads, scene.gel, pool.problem.ground, scene.spatial));
 }
 
+std::size_t SpaceForeseen::index_of_density(double density) const { return index_of(beads_per_um3, density); }
+
 const spatial::Foreseen& SpaceForeseen::of(const SpacePoint& p) const {
-  return at[index_of(beads_per_um3, p.beads_per_um3)][index_of(noise_kPa_um, p.noise_um * p.youngs_modulus_kPa)];
+  return at[index_of_density(p.beads_per_um3)][index_of(noise_kPa_um, p.noise_um * p.youngs_modulus_kPa)];
 }
 
-SpaceForeseen foresee(const SpaceScene& scene, const Asked& asked, const SpacePool& pool, const Work& work) {
+SpaceForeseen foresee(const SpaceScene& scene, const Asked& asked, const std::vector<SpacePool>& pools,
+                      const Work& work) {
   SpaceForeseen foreseen{.beads_per_um3 = asked.beads_per_um3, .noise_kPa_um = {}, .at = {}};
   for (const double E : asked.youngs_modulus_kPa)
     for (const double noise_um : asked.noise_um) foreseen.noise_kPa_um.push_back(noise_um * E);
-  const std::size_t n_densities = asked.beads_per_um3.size(), n_half = pool.beads.size() / kDraws;
+  const std::size_t n_densities = asked.beads_per_um3.size();
   std::vector<std::vector<spatial::Foreseen>> by_job(kDraws * n_densities);
   numerics::parallel_for(static_cast<int>(by_job.size()), work.threads, [&](int j) {
     // the densest, which takes longest, first
-    const auto job = static_cast<std::size_t>(j), k = n_densities - 1 - job / kDraws, draw = job % kDraws;
-    const spatial::Problem part =
-        part_of(scene, pool, run_of(draw * n_half, n_beads_of(scene, asked.beads_per_um3[k])), 1, nullptr);
+    const auto job = static_cast<std::size_t>(j), k = n_densities - 1 - job / kDraws, draw = job % kDraws,
+               n_beads = pools[k].beads.size() / kDraws;
+    const spatial::Problem part = part_of(scene, pools[k], run_of(draw * n_beads, n_beads), 1, nullptr);
     const spatial::Foresight foresight(part, scene.traction, 1);
     for (const double noise : foreseen.noise_kPa_um)
       by_job[kDraws * k + draw].push_back(foresight.at(noise / scene.gel.youngs_modulus_kPa));
@@ -313,13 +322,16 @@ SpaceForeseen foresee(const SpaceScene& scene, const Asked& asked, const SpacePo
   return foreseen;
 }
 
-SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const SpacePool& pool, const SpaceForeseen& foreseen) {
+SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector<SpacePool>& pools,
+                  const SpaceForeseen& foreseen) {
   using enum SpaceQuantity;
   SpaceGrid grid;
-  const OnOwnGel own = on_own_gel(scene, pool);
+  std::vector<OnOwnGel> own;
+  for (const SpacePool& pool : pools) own.push_back(on_own_gel(scene, pool));
   const double total_nN = total_of(scene);
   for (const double E : asked.youngs_modulus_kPa) {
-    for (const double density : asked.beads_per_um3) {
+    for (std::size_t k = 0; k < pools.size(); ++k) {
+      const double density = asked.beads_per_um3[k];
       for (const double noise_um : asked.noise_um) {
         const SpacePoint point{E, density, noise_um};
         const spatial::Foreseen& f = foreseen.of(point);
@@ -341,10 +353,10 @@ SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const SpacePool& 
                .share_within = static_cast<double>(n_within) / n,
                .smallest_seen_nN = kSeen * error_nN,
                .resolution_um =
-                   quantity == force ? std::optional(resolution_at_patches(scene, pool.problem, f)) : std::nullopt,
+                   quantity == force ? std::optional(resolution_at_patches(scene, pools[k].problem, f)) : std::nullopt,
                .degrees = f.degrees,
-               .largest_displacement_um = own.largest_um * scene.gel.youngs_modulus_kPa / E,
-               .left_out = left_out(scene.gel, E, own.traction_kPa)});
+               .largest_displacement_um = own[k].largest_um * scene.gel.youngs_modulus_kPa / E,
+               .left_out = left_out(scene.gel, E, own[k].traction_kPa)});
         }
       }
     }

@@ -45,13 +45,15 @@ struct SpaceNeeded {
   std::optional<double> of_most;  ///< the same of nine patches in ten
 };
 
-/// The gel's answer to tractions at the places of many beads: the densities are parts of them, and so are those of
-/// drawn experiments. One gel stands for all moduli: see spatial::Foresight.
+/// The gel's answer to tractions at the places of beads, as many as two draws and the drawn experiments are parts of.
+/// One gel stands for all moduli: see spatial::Foresight.
 struct SpacePool {
   std::vector<BeadInSpace> beads;  ///< with exact displacements and errors of 1 um across
   spatial::Problem problem;
 };
-SpacePool pool_of(const SpaceScene& scene, const Asked& asked, const Work& work);
+/// By density, each with the lattice of tractions that a reconstruction of so many beads takes, so that what is said of
+/// a density does not depend on the others.
+std::vector<SpacePool> pools_of(const SpaceScene& scene, const Asked& asked, const Work& work);
 /// Beads of the pool, these by number, with this noise over what they state.
 spatial::Problem part_of(const SpaceScene& scene, const SpacePool& pool, const std::vector<Eigen::Index>& chosen,
                          double noise, drawing::Random* random);
@@ -62,8 +64,10 @@ struct SpaceForeseen {
   std::vector<double> beads_per_um3, noise_kPa_um;
   std::vector<std::vector<spatial::Foreseen>> at;
   const spatial::Foreseen& of(const SpacePoint& point) const;
+  std::size_t index_of_density(double beads_per_um3) const;  ///< of the list's nearest
 };
-SpaceForeseen foresee(const SpaceScene& scene, const Asked& asked, const SpacePool& pool, const Work& work);
+SpaceForeseen foresee(const SpaceScene& scene, const Asked& asked, const std::vector<SpacePool>& pools,
+                      const Work& work);
 
 struct SpaceGrid {
   std::vector<SpaceExpected> expected;
@@ -72,7 +76,8 @@ struct SpaceGrid {
 };
 /// The most of which a plan says whether they suffice: four times the densest asked for.
 double most_beads_per_um3(const std::vector<double>& densities);
-SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const SpacePool& pool, const SpaceForeseen& foreseen);
+SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector<SpacePool>& pools,
+                  const SpaceForeseen& foreseen);
 
 /// Of a patch: along its force, along the surface as its force goes, along the normal; unit vectors, by column.
 Eigen::Matrix3d directions_of(const SpaceScene& scene, const SpacePatch& patch);

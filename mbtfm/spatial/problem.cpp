@@ -17,9 +17,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// Beads closer than that tell no finer tractions apart; at their distance the lattice itself would be felt.
-constexpr double kSpacingOfBeads = 0.83;
-
 TractionMesh lattice_for(const Ground& ground, const Expected& expected, const Meshing& meshing, double beads_um) {
   const Vec2 size = expected.over.high_um - expected.over.low_um;
   const double smallest = std::sqrt(size.x * size.y / kMostVertices);

@@ -258,6 +258,7 @@ SpaceScene two_patches_in_space() {
   HeightMap flat{.origin_um = {-2, -2}, .spacing_um = {4, 4}, .n_x = 11, .n_y = 11, .z_um = {}, .sigma_um = {}};
   flat.z_um.assign(121, 0.0);
   scene.gel.surface = std::make_shared<const HeightMap>(flat);
+  scene.traction.spacing_um = 2.43;  // of all densities, so that the beads alone change the errors
   for (const double side : {-1.0, 1.0}) {
     constexpr double kRadius_um = 3;
     scene.patches.push_back({{.adhesion_id = side < 0 ? 1 : 2,
@@ -281,9 +282,9 @@ Asked few_points(const SpaceScene& scene) {
 struct SmallInSpace {
   SpaceScene scene = two_patches_in_space();
   Asked asked = few_points(scene);
-  SpacePool pool = pool_of(scene, asked, kThreads);
-  SpaceForeseen foreseen = foresee(scene, asked, pool, kThreads);
-  SpaceGrid grid = grid_of(scene, asked, pool, foreseen);
+  std::vector<SpacePool> pools = pools_of(scene, asked, kThreads);
+  SpaceForeseen foreseen = foresee(scene, asked, pools, kThreads);
+  SpaceGrid grid = grid_of(scene, asked, pools, foreseen);
   const SpaceExpected& of(const SpacePoint& p, SpaceQuantity quantity) const {
     return *std::ranges::find_if(grid.expected, [&](const SpaceExpected& e) {
       return e.quantity == quantity && e.point.youngs_modulus_kPa == p.youngs_modulus_kPa &&
@@ -328,7 +329,7 @@ TEST(PlanInSpace, drawn_experiments_scatter_as_the_part_by_beads_says) {
   const SmallInSpace& s = in_space();
   const SpacePoint point{10, 0.04, 0.04};
   constexpr int kExperiments = 24;
-  const SpaceDrawn drawn = draw_experiments(s.scene, s.pool, s.foreseen, point, kExperiments, kThreads);
+  const SpaceDrawn drawn = draw_experiments(s.scene, s.pools.back(), s.foreseen, point, kExperiments, kThreads);
   ASSERT_EQ(drawn.forces.size(), std::size_t{kExperiments} * 6);
   double squares = 0, by_noise = 0;
   for (const SpaceDrawnForce& f : drawn.forces) squares += std::pow(f.found_nN - f.true_nN, 2) / kExperiments;
@@ -353,6 +354,20 @@ TEST(PlanInSpace, at_the_density_that_is_needed_the_error_is_the_target) {
   }
 }
 
+TEST(PlanInSpace, what_is_said_of_a_density_does_not_depend_on_the_others) {
+  SpaceScene scene = two_patches_in_space();
+  scene.traction.spacing_um.reset();  // a reconstruction takes it from its beads
+  const SpacePoint point{10, 0.01, 0.02};
+  const auto said_beside = [&](std::vector<double> densities) {
+    Asked asked = few_points(scene);
+    asked.beads_per_um3 = std::move(densities);
+    return foresee(scene, asked, pools_of(scene, asked, kThreads), kThreads).of(point);
+  };
+  const spatial::Foreseen alone = said_beside({0.01}), beside = said_beside({0.01, 0.03});
+  EXPECT_EQ(alone.covariance_nN2, beside.covariance_nN2);
+  EXPECT_EQ(alone.resolution_um, beside.resolution_um);
+}
+
 TEST(PlanInSpace, beads_by_area_or_too_few_or_too_many_are_refused) {
   const SpaceScene& scene = in_space().scene;
   Parameters p;
@@ -361,7 +376,7 @@ TEST(PlanInSpace, beads_by_area_or_too_few_or_too_many_are_refused) {
   for (const char* bad : {"0.0001,0.04", "5"}) {
     p = {};
     p.beads_per_um3 = bad;
-    EXPECT_THROW(pool_of(scene, asked_in_space(p, scene), kThreads), UsageError) << bad;
+    EXPECT_THROW(pools_of(scene, asked_in_space(p, scene), kThreads), UsageError) << bad;
   }
   p = {};
   const Asked asked = asked_in_space(p, scene);
