@@ -247,9 +247,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "difference of the total forces by this loss and by l2, over their joint standard error", 1,
        "both are of the same beads, so that chance alone makes 0.2 of it (biweight, huber) to 0.4 (l1); beyond 1 the "
        "loss moves the answer by more than the errors say",
-       "Beads above strong forces may look astray, and beads that are astray make forces. If a run with l2 has no "
-       "finding beads-stray, take l2. If it has, look at the beads that differ from their neighbours. More beads near "
-       "the surface decide it."},
+       "Beads near strong forces may look astray, and beads that are astray make forces that are not there. If a run "
+       "with l2 has no finding beads-stray, take l2. If it has, look at the beads that differ from their neighbours. "
+       "More beads near the surface decide it."},
       {lambda_runs_away, "lambda-runs-away", "traction", caution, "lambda by evidence over lambda by risk", 2,
        "in scenes whose noise is that of the beads it is 0.1 to 0.8; above 1 the two contradict each other, and 2 "
        "leaves room for chance: tractions follow beads that are astray, or what the model has wrong",
