@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/spatial/neighbours.h"
 #include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/tractions/recurrences.h"
 #include "pipeline/contract/errors.h"
@@ -52,7 +53,8 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
     return r;
   }
   // as reconstruct_in() has it: from least squares, and to biweight by way of huber
-  const int n_rounds = parameters.loss == BeadLoss::l2 ? 1 : 5;
+  const std::vector<double> good = probabilities_of_good(parameters.loss, observed);
+  const int n_rounds = parameters.loss == BeadLoss::l2 ? 1 : good.empty() ? 5 : 2;
   r.weighing = weigh(BeadLoss::l2, observed, observed.displacement_um.cwiseQuotient(observed.sigma_um), 0);
   for (int round = 0; round < n_rounds; ++round) {
     const Rows rows(problem, r.weighing.by_row);
@@ -67,10 +69,10 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
     r.relative_l2 = recurrences.relative_l2(*r.lambda);
     const bool is_on_its_way = parameters.loss == BeadLoss::biweight && round < 2;
     r.weighing = weigh(is_on_its_way ? BeadLoss::huber : parameters.loss, observed,
-                       problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees);
+                       problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees, good);
   }
   r.variance =
-      std::max(parameters.loss == BeadLoss::l2 ? r.scan->variance : r.weighing.variance, problem.least_variance());
+      std::max(weighs_by_residual(parameters.loss) ? r.weighing.variance : r.scan->variance, problem.least_variance());
   r.length_um = *r.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
   r.remark = "standard errors are computed of up to " + std::to_string(kMostVertices) + " vertices, and there are " +
              std::to_string(problem.mesh.n_vertices());

@@ -32,6 +32,8 @@ double loss_weight(BeadLoss loss, double r, Index n) {
   switch (loss) {
     case BeadLoss::l2:
       return 1;
+    case BeadLoss::mixture:
+      break;  // not by the residual
     case BeadLoss::l1:
     case BeadLoss::l1_by_component:
       return kSmallest / std::max(r, kSmallest);
@@ -45,7 +47,10 @@ double loss_weight(BeadLoss loss, double r, Index n) {
   throw InternalError("unknown loss");
 }
 
-Weighing weigh(BeadLoss loss, const Observed& observed, const Eigen::VectorXd& residual, double degrees) {
+double median_length(Index n_components) { return kMedianLength.at(static_cast<std::size_t>(n_components - 1)); }
+
+Weighing weigh(BeadLoss loss, const Observed& observed, const Eigen::VectorXd& residual, double degrees,
+               const std::vector<double>& good) {
   const bool is_by_component = loss == BeadLoss::l1_by_component;
   const Index n = is_by_component ? 1 : observed.n_components(), n_groups = residual.size() / n;
   std::vector<double> lengths;
@@ -60,7 +65,20 @@ Weighing weigh(BeadLoss loss, const Observed& observed, const Eigen::VectorXd& r
     weighing.variance = weighing.scale * weighing.scale;
     return weighing;
   }
-  weighing.scale = numerics::median(lengths) / kMedianLength.at(static_cast<std::size_t>(n - 1)) / taken;
+  if (loss == BeadLoss::mixture) {
+    double squares = 0, beads = 1e-300;
+    for (Index b = 0; b < n_groups; ++b) {
+      const double p = good.empty() ? 1 : good[static_cast<std::size_t>(b)];
+      weighing.by_row.segment(n * b, n).setConstant(p);
+      squares += p * residual.segment(n * b, n).squaredNorm();
+      beads += p;
+    }
+    weighing.n_data = beads * static_cast<double>(n);
+    weighing.scale = std::sqrt(squares / weighing.n_data) / taken;
+    weighing.variance = weighing.scale * weighing.scale;
+    return weighing;
+  }
+  weighing.scale = numerics::median(lengths) / median_length(n) / taken;
   const double scale = std::max(observed.states_errors ? 1.0 : 0.0, weighing.scale);
   double score = 0, curvature = 0, square = 0, mean = 0;  // means over the groups
   for (Index b = 0; b < n_groups; ++b) {

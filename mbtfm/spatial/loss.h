@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "mbtfm/spatial/observed.h"
 
@@ -12,6 +13,10 @@ namespace mbtfm::spatial {
 /// l2 1 | l1 1/r | huber min(1, k/r) | biweight (1 − (r/c)²)². k and c keep 95 % efficiency where the noise is Gaussian
 /// in so many components (the equation of Maronna, Martin & Yohai, Robust Statistics, 2006, 6.4, solved for each).
 double loss_weight(BeadLoss loss, double residual, Eigen::Index n_components);
+/// Median length of Gaussian vectors with components of variance one.
+double median_length(Eigen::Index n_components);
+/// Of l2 and of mixture, whose weights are given, all formulas for least squares hold as they are.
+constexpr bool weighs_by_residual(BeadLoss loss) { return loss != BeadLoss::l2 && loss != BeadLoss::mixture; }
 
 /// The loss as least squares about a residual.
 struct Weighing {
@@ -23,6 +28,8 @@ struct Weighing {
 
 /// @param residual  S (u − G t)
 /// @param degrees   of freedom that the tractions have taken: what is left of noise where they followed it
-Weighing weigh(BeadLoss loss, const Observed& observed, const Eigen::VectorXd& residual, double degrees);
+/// @param good     by bead, of a mixture: the probability that it is (neighbours.h), which is its weight
+Weighing weigh(BeadLoss loss, const Observed& observed, const Eigen::VectorXd& residual, double degrees,
+               const std::vector<double>& good = {});
 
 }  // namespace mbtfm::spatial

@@ -20,8 +20,8 @@ constexpr auto words(Region) { return std::array{"auto", "all", "outline", "adhe
 
 /// What the misfit of a bead costs. Of the length of its residual over its errors, so that no axis is special; but for
 /// the last.
-enum class BeadLoss { l2, l1, huber, biweight, l1_by_component };
-constexpr auto words(BeadLoss) { return std::array{"l2", "l1", "huber", "biweight", "l1-by-component"}; }
+enum class BeadLoss { l2, mixture, l1, huber, biweight, l1_by_component };
+constexpr auto words(BeadLoss) { return std::array{"l2", "mixture", "l1", "huber", "biweight", "l1-by-component"}; }
 
 struct SpatialParameters {
   Region region = Region::automatic;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/spatial/neighbours.h"
 #include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -40,7 +41,7 @@ double lambda_per_um_per_kPa(const Problem& problem) {
 
 std::optional<double> stated_variance(const Problem& problem, BeadLoss loss, const Weighing& weighing) {
   const double least = problem.least_variance();
-  if (loss != BeadLoss::l2 && problem.observed.states_errors)
+  if (weighs_by_residual(loss) && problem.observed.states_errors)
     return weighing.variance / (weighing.scale * weighing.scale) * least;
   return least > 0 ? std::optional(least) : std::nullopt;
 }
@@ -69,6 +70,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
                                      int threads) {
   SpatialReconstruction r;
   const Observed& observed = problem.observed;
+  const std::vector<double> good = probabilities_of_good(parameters.loss, observed);
   const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
     return spectrum.scan(largest(stated_variance(problem, parameters.loss, weighing), spectrum.variance_felt_least()));
   };
@@ -106,8 +108,9 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
       const VectorXd left = residual(last);
       const double degrees = last.spectrum->degrees(last.chosen.lambda);
       std::optional<Weighing> judged;
-      if (loss != BeadLoss::biweight) judged = weigh(BeadLoss::biweight, observed, left, degrees);
-      Fit next = fit(weigh(loss, observed, left, degrees), judged);
+      if (weighs_by_residual(loss) && loss != BeadLoss::biweight)
+        judged = weigh(BeadLoss::biweight, observed, left, degrees);
+      Fit next = fit(weigh(loss, observed, left, degrees, good), judged);
       change = (next.x - last.x).norm() / std::max(next.x.norm(), 1e-300);
       last = std::move(next);
     }
@@ -117,9 +120,9 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   if (parameters.loss != BeadLoss::l2) settle(parameters.loss);
   const double lambda = last.chosen.lambda;
   r.degrees = last.spectrum->degrees(lambda);
-  r.weighing = weigh(parameters.loss, observed, residual(last), r.degrees);
-  r.variance =
-      std::max(parameters.loss == BeadLoss::l2 ? last.scan.variance : r.weighing.variance, problem.least_variance());
+  r.weighing = weigh(parameters.loss, observed, residual(last), r.degrees, good);
+  r.variance = std::max(weighs_by_residual(parameters.loss) ? r.weighing.variance : last.scan.variance,
+                        problem.least_variance());
   const double loose = last.scan.by_gcv;
   const double n_data = last.weighing.n_data;  // less where weights are small; a tenth at least is left, as in `weigh`
   r.variance_left = last.spectrum->misfit(loose) / std::max(n_data - last.spectrum->degrees(loose), 0.1 * n_data);

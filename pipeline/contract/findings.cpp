@@ -242,7 +242,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {beads_stray, "beads-stray", "traction", caution,
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
-       "Set traction.loss = biweight."},
+       "Set traction.loss = mixture."},
       {loss_decides, "loss-decides", "traction", caution,
        "difference of the total forces by this loss and by l2, over their joint standard error", 1,
        "both are of the same beads, so that chance alone makes 0.2 of it (biweight, huber) to 0.4 (l1); beyond 1 the "
@@ -253,7 +253,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {lambda_runs_away, "lambda-runs-away", "traction", caution, "lambda by evidence over lambda by risk", 2,
        "in scenes whose noise is that of the beads it is 0.1 to 0.8; above 1 the two contradict each other, and 2 "
        "leaves room for chance: tractions follow beads that are astray, or what the model has wrong",
-       "Set traction.loss = biweight if beads may be astray. Check surface, gel and sigma_um, and whether one stack "
+       "Set traction.loss = mixture if beads may be astray. Check surface, gel and sigma_um, and whether one stack "
        "grew against the other (another focus or temperature): "
        "the misfit is not the beads' noise. The tractions are those with lambda by "
        "evidence, and may be smoothed too much. To choose yourself, set traction.lambda_by or "

@@ -141,7 +141,7 @@ std::optional<charts::Chart> tensions_by_type(const CellResults& results) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const auto& column = columns[i];
     types.names.emplace_back(static_cast<double>(i),
-                             fmt::format("{} ({})", full_name_of(column.front()->fibre->type), column.size()));
+                             fmt::format("{} ({})", name_of(column.front()->fibre->type), column.size()));
   }
   const double largest = largest_nN(rows);
   charts::Chart chart("Tensions by type", types, {"tension (nN)", -0.02 * largest, largest});

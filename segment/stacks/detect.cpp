@@ -6,13 +6,13 @@
 #include <numeric>
 #include <string>
 
+#include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 #include "segment/beads/beads.h"
 #include "segment/beads/plane.h"
 #include "segment/beads/track.h"
 #include "segment/stacks/band.h"
-#include "segment/stacks/near.h"
 
 namespace mbtfm::stacks {
 namespace {
@@ -172,7 +172,7 @@ std::vector<Spot> hidden(const SpotFit& fit, double detection_snr, int threads) 
   const double stretch = w.xy / w.z;
   for (const Spot& spot : fit.spots()) places.push_back({spot.place.x, spot.place.y, stretch * spot.place.z});
   constexpr double kNear = 4, kOwnLight = 0.3;  // widths; of the neighbour's height
-  const Near near(places, kNear * w.xy);
+  const numerics::Near near(places, kNear * w.xy);
   std::erase_if(found, [&](const Spot& spot) {
     const Vec3 at{spot.place.x, spot.place.y, stretch * spot.place.z};
     return std::ranges::any_of(near.within(at, kNear * w.xy, 100), [&](int s) {

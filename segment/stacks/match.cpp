@@ -8,10 +8,10 @@
 #include <string>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 #include "segment/beads/track.h"
-#include "segment/stacks/near.h"
 
 namespace mbtfm::stacks {
 namespace {
@@ -35,7 +35,7 @@ struct Constellations {
 
 struct Cloud {
   const std::vector<PlacedBead>& beads;
-  Near near;
+  numerics::Near near;
   double spacing_um = 0;
 };
 
@@ -50,7 +50,7 @@ Cloud cloud_of(const std::vector<PlacedBead>& beads) {
   }
   const Vec3 size = high - low;
   const double spacing = std::cbrt(std::max(1e-9, size.x * size.y * size.z) / static_cast<double>(beads.size()));
-  return {beads, Near(points, spacing), spacing};
+  return {beads, numerics::Near(points, spacing), spacing};
 }
 
 Constellations constellations_of(const Cloud& cloud, int n, int threads) {
@@ -406,7 +406,7 @@ class Matcher {
       good_.push_back(static_cast<int>(bead));
       places.push_back(relaxed_.beads[bead].position_um);
     }
-    near_good_ = Near(places, spacing_um_);
+    near_good_ = numerics::Near(places, spacing_um_);
   }
 
   Vec3 displacement(std::size_t bead) const {
@@ -522,7 +522,7 @@ class Matcher {
   bool is_nearby_ = false;
   double light_ratio_ = 0, light_spread_ = 0;
   std::vector<int> good_;
-  Near near_good_;
+  numerics::Near near_good_;
   Matching result_;
 };
 

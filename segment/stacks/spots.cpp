@@ -8,9 +8,9 @@
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
-#include "segment/stacks/near.h"
 
 namespace mbtfm::stacks {
 namespace {
@@ -163,7 +163,7 @@ void SpotFit::find_neighbours() {
   };
   std::vector<Vec3> places;
   for (const Spot& spot : spots_) places.push_back(stretched(spot));
-  const Near near(places, kTouching * shape_.at(spots_[0].place).xy);
+  const numerics::Near near(places, kTouching * shape_.at(spots_[0].place).xy);
   numerics::parallel_for_each(spots_.size(), threads_, [&](std::size_t s) {
     const double reach = kTouching * shape_.at(spots_[s].place).xy;
     for (const int other : near.within(places[s], reach, kMostNeighbours + 1)) {

@@ -14,7 +14,7 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/space_report.h"
 #include "segment/images/image.h"
-#include "segment/stacks/near.h"
+#include "pipeline/numerics/near.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -68,7 +68,7 @@ TEST_F(Stacks, beads_are_followed_to_the_truth_within_their_errors) {
   const auto truth = files::read_displacement_in_space(cell() / "truth/displacement_3d.csv");
   std::vector<Vec3> places;
   for (const BeadInSpace& bead : truth) places.push_back(bead.position_um);
-  const stacks::Near near(places, 2);
+  const numerics::Near near(places, 2);
   std::vector<double> across, along;
   int n_good = 0, n_wrong = 0;
   for (const BeadInSpace& bead : found) {

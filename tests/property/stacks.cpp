@@ -9,7 +9,7 @@
 #include "segment/beads/track.h"
 #include "segment/stacks/detect.h"
 #include "segment/stacks/mean_by_depth.h"
-#include "segment/stacks/near.h"
+#include "pipeline/numerics/near.h"
 #include "segment/stacks/track.h"
 #include "tests/support/stack_scene.h"
 
@@ -250,7 +250,7 @@ TEST(Stacks, places_have_the_errors_they_claim) {
     const Matching matching = match(found[0], found[1], {}, 2);
     std::vector<Vec3> places;
     for (const auto& bead : scene.relaxed) places.push_back(bead.position_um);
-    const Near near(places, 2);
+    const numerics::Near near(places, 2);
     n_beads += 250;
     for (std::size_t k = 0; k < found[0].size(); ++k) {
       if (near.within(found[0][k].position_um, 0.8, 1).empty()) ++errors.n_spurious;
@@ -332,7 +332,7 @@ TEST(Stacks, beads_whose_light_is_cut_off_are_flagged_and_the_others_are_not) {
   const std::vector<PlacedBead> beads = placed(found, scale);
   std::vector<Vec3> places;
   for (const PlacedBead& bead : beads) places.push_back(bead.position_um);
-  const Near near(places, 2);
+  const numerics::Near near(places, 2);
   int n_flagged = 0, n_inside = 0;
   for (std::size_t k = 0; k < scene.relaxed.size(); ++k) {
     const auto at = near.within(scene.relaxed[k].position_um, 0.8, 1);

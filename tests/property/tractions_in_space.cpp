@@ -6,6 +6,7 @@
 #include <random>
 
 #include "mbtfm/spatial/foresight.h"
+#include "mbtfm/spatial/neighbours.h"
 #include "mbtfm/tractions/recurrences.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/half_space_problem.h"
@@ -109,6 +110,38 @@ TEST(Losses, find_the_scale_of_most_beads_and_their_variance) {
     const double relative = w.variance / w.by_row.sum() * (0.9 * 12000) / 4;
     EXPECT_GE(relative, 0.97) << name_of(loss);
     EXPECT_LE(relative, loss == BeadLoss::biweight ? 1.15 : 1.6) << name_of(loss);
+  }
+}
+
+TEST(Losses, judge_a_bead_by_the_field_around_it_and_not_by_its_size) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> place(0, 40);
+  std::normal_distribution<double> normal;
+  constexpr int kBeads = 600, kAstray = 180;
+  Observed observed;
+  std::vector<Vec3> places;
+  for (int b = 0; b < kBeads; ++b) places.push_back({place(random), place(random), place(random)});
+  observed.sigma_um = VectorXd::Constant(3 * kBeads, 0.1);
+  observed.displacement_um.resize(3 * kBeads);
+  for (int b = 0; b < kBeads; ++b) {
+    const Vec3 p = places[static_cast<std::size_t>(b)];  // up to 120 standard errors
+    observed.displacement_um.segment<3>(3 * b) << 0.3 * p.x, 0.1 * p.y - 0.2 * p.z, 5;
+    for (int c = 0; c < 3; ++c) observed.displacement_um[3 * b + c] += 0.1 * normal(random);
+    if (b < kAstray) observed.displacement_um[3 * b + b % 3] += b % 2 ? 4 : -4;
+  }
+  observed.at = {places, substrate::Components::all};
+  observed.distance_um = 4.7;
+  observed.n_beads = kBeads;
+  for (const bool states_errors : {true, false}) {
+    observed.states_errors = states_errors;
+    const AmongNeighbours among = among_neighbours(observed);
+    // 40 standard errors of a bead are 30 and more of bead and prediction; of Gaussian vectors one of 10 000 is
+    // above 4.7
+    EXPECT_GE(*std::min_element(among.distance.begin(), among.distance.begin() + kAstray), 10) << states_errors;
+    EXPECT_LE(*std::max_element(among.distance.begin() + kAstray, among.distance.end()), 6) << states_errors;
+    const std::vector<double> good = probabilities_of_good(BeadLoss::mixture, observed);
+    EXPECT_LE(*std::max_element(good.begin(), good.begin() + kAstray), 0.05) << states_errors;
+    EXPECT_GE(*std::min_element(good.begin() + kAstray, good.end()), 0.5) << states_errors;
   }
 }
 
@@ -430,7 +463,7 @@ TEST_F(InSpace, beads_that_are_wrong_do_not_pull_with_a_robust_loss) {
   const Problem bad = scene.problem(beads, parameters);
   const double by_squares =
       apart(reconstruct_tikhonov(bad, traction, parameters, 1).traction_kPa, without.traction_kPa);
-  for (const BeadLoss loss : {BeadLoss::l1, BeadLoss::huber, BeadLoss::biweight}) {
+  for (const BeadLoss loss : {BeadLoss::mixture, BeadLoss::l1, BeadLoss::huber, BeadLoss::biweight}) {
     parameters.loss = loss;
     const auto robust = reconstruct_tikhonov(bad, traction, parameters, 1),
                of_good = reconstruct_tikhonov(good, traction, parameters, 1);
@@ -448,7 +481,7 @@ TEST_F(InSpace, beads_that_are_wrong_do_not_pull_with_a_robust_loss) {
 TEST_F(InSpace, weights_of_a_robust_loss_leave_group_l1_its_tractions) {
   const Problem problem = scene.problem(scene.beads(0.1), parameters);
   const auto by_squares = reconstruct_group_l1(problem, traction, parameters, 1);
-  for (const BeadLoss loss : {BeadLoss::huber, BeadLoss::biweight}) {
+  for (const BeadLoss loss : {BeadLoss::mixture, BeadLoss::huber, BeadLoss::biweight}) {
     parameters.loss = loss;
     const double off =
         apart(reconstruct_group_l1(problem, traction, parameters, 1).traction_kPa, by_squares.traction_kPa);
@@ -560,7 +593,7 @@ TEST_F(InSpace, many_beads_that_are_right_have_one_answer_by_any_loss) {
   const SpatialInputs inputs{{}, scene.gel, {}, {}};
   scene.n_beads = 1500;
   const Problem problem = scene.problem(scene.beads(0.05), parameters);
-  for (const BeadLoss loss : {BeadLoss::huber, BeadLoss::biweight}) {
+  for (const BeadLoss loss : {BeadLoss::mixture, BeadLoss::huber, BeadLoss::biweight}) {
     parameters.loss = loss;
     const auto r = reconstruct(problem, inputs, traction, parameters, 1);
     EXPECT_FALSE(std::ranges::any_of(r.findings, [](const auto& f) { return f && f->id == "loss-decides"; }))

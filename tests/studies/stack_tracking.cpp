@@ -20,7 +20,7 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "samples/drawing/stack.h"
 #include "segment/images/png.h"
-#include "segment/stacks/near.h"
+#include "pipeline/numerics/near.h"
 #include "segment/stacks/track.h"
 
 using namespace mbtfm;
@@ -126,7 +126,7 @@ Errors errors_of(const Scene& scene, const stacks::Followed& followed) {
   Errors e;
   std::vector<Vec3> places;
   for (const auto& bead : scene.relaxed) places.push_back(bead.position_um);
-  const stacks::Near near(places, 2);
+  const numerics::Near near(places, 2);
   std::vector<char> is_followed(places.size());
   for (const BeadInSpace& bead : followed.field) {
     const auto at = near.within(bead.position_um, 0.6, 1);

@@ -1,11 +1,18 @@
-/// How exact tractions in space are, on scenes whose truth is exact: tractions_in_space FOLDER SCENE...
-/// The bars beside the numbers are those of an independent dense inversion (docs/developers/tractions_in_space.md).
+/// tractions_in_space STUDY FOLDER SCENE...: how exact tractions in space are, on scenes whose truth is exact.
+///   methods   maps, forces and sums by noise. The bars beside the numbers are those of an
+///             independent dense inversion (docs/developers/tractions_in_space.md).
+///   losses    the same by loss, with beads astray
+///   meshes    three meshes of the gel by three of the tractions: how far the answers differ, over what noise does
+///   surface   with the surface that the beads themselves show, in place of the true one
+///   fttc      beside the usual method, of the beads just below the surface (level scenes)
 #include <cstdio>
 #include <iostream>
 #include <map>
+#include <numbers>
 #include <string>
 
 #include "mbtfm/spatial/reconstruction.h"
+#include "substrate/surface/beads.h"
 #include "tests/support/traction_scene.h"
 
 namespace {
@@ -61,40 +68,207 @@ void tell(const Known& known, const char* what, double noise, double astray, con
   std::fflush(stdout);
 }
 
-void study(const TractionScene& scene) {
-  spatial::SpatialParameters parameters;
-  spatial::SpatialInputs inputs{scene.observed(0.02), scene.gel, {}, {}};
-  substrate::SubstrateParameters gel;
-  Known known{scene, make_problem(inputs, parameters, {}, gel, 2), {}};
+using Method = spatial::SpatialReconstruction (*)(const spatial::Problem&, const tractions::TractionParameters&,
+                                                  const spatial::SpatialParameters&, int);
+constexpr std::pair<const char*, Method> kMethods[] = {{"tikhonov", spatial::reconstruct_tikhonov},
+                                                       {"group-l1", spatial::reconstruct_group_l1}};
+
+/// Its problem, with 2 % of noise and no bead astray.
+Known known_of(const TractionScene& scene) {
+  const spatial::SpatialInputs inputs{scene.observed(0.02), scene.gel, {}, {}};
+  Known known{scene, make_problem(inputs, {}, {}, {}, 2), {}};
   known.areas_um2 = patch_areas_um2(scene, known.problem);
   std::printf("%s: %ld unknowns, spacing %.2f um, beads %.2f um apart, model error %.4f\n", scene.name.c_str(),
               static_cast<long>(known.problem.n_unknowns()), known.problem.mesh.spacing_um.x,
               known.problem.observed.distance_um, known.problem.model_error);
-  const tractions::TractionParameters traction;
+  return known;
+}
+
+void methods(const TractionScene& scene) {
+  Known known = known_of(scene);
   for (const double noise : {0.0, 0.02, 0.05, 0.1, 0.2}) {
-    known.observe(noise, 0, parameters);
+    known.observe(noise, 0, {});
     const double best = best_map_error(known);
-    tell(known, "tikhonov", noise, 0, reconstruct_tikhonov(known.problem, traction, parameters, 2), best);
-    tell(known, "group-l1", noise, 0, reconstruct_group_l1(known.problem, traction, parameters, 2), best);
+    for (const auto& [name, method] : kMethods) tell(known, name, noise, 0, method(known.problem, {}, {}, 2), best);
   }
-  for (const BeadLoss loss :
-       {BeadLoss::l2, BeadLoss::l1, BeadLoss::huber, BeadLoss::biweight, BeadLoss::l1_by_component}) {
+}
+
+void losses(const TractionScene& scene) {
+  Known known = known_of(scene);
+  spatial::SpatialParameters parameters;
+  constexpr double kNoise = 0.1;
+  for (const BeadLoss loss : {BeadLoss::mixture, BeadLoss::l2, BeadLoss::huber, BeadLoss::biweight, BeadLoss::l1,
+                              BeadLoss::l1_by_component}) {
     parameters.loss = loss;
     for (const double astray : {0.0, 0.1, 0.3}) {
-      known.observe(0.1, astray, parameters);
-      tell(known, name_of(loss), 0.1, astray, reconstruct_tikhonov(known.problem, traction, parameters, 2), 0);
-      if (loss == BeadLoss::biweight)
-        tell(known, "group-l1 bw", 0.1, astray, reconstruct_group_l1(known.problem, traction, parameters, 2), 0);
+      known.observe(kNoise, astray, parameters);
+      for (const auto& [name, method] : kMethods) {
+        const std::string what = std::string(name_of(loss)) + " " + name;
+        tell(known, what.c_str(), kNoise, astray, method(known.problem, {}, parameters, 2), 0);
+      }
     }
+  }
+}
+
+// --- meshes
+
+/// At the places of the scene's truth, three a place, each times the root of its area: distances are those of L2.
+Eigen::VectorXd map_of(const TractionScene& scene, const spatial::TractionMesh& mesh, const Eigen::VectorXd& t_kPa) {
+  Eigen::VectorXd map(3 * static_cast<Eigen::Index>(scene.lattice_um.size()));
+  for (std::size_t k = 0; k < scene.lattice_um.size(); ++k) {
+    const Vec3 t = std::sqrt(scene.areas_um2[k]) * test::traction_at(mesh, t_kPa, scene.lattice_um[k]);
+    map.segment<3>(3 * static_cast<Eigen::Index>(k)) << t.x, t.y, t.z;
+  }
+  return map;
+}
+
+/// Of one pair of meshes, with the noise of the scene, and with the same noise of the other sign.
+struct OnMeshes {
+  double tolerance = 0, spacing_um = 0;
+  Eigen::VectorXd map, mirrored;
+  double error = 0, forces = 0;
+};
+
+void meshes(const TractionScene& scene) {
+  constexpr double kNoise = 0.05;
+  constexpr double kTolerances[] = {0.05, 0.02, 0.005}, kSpacings[] = {1.2, 1, 0.75};
+  const spatial::SpatialParameters parameters;
+  std::map<std::string, std::vector<OnMeshes>> found;
+  for (const double tolerance : kTolerances) {
+    for (const double share : kSpacings) {
+      spatial::SpatialInputs inputs{scene.observed(kNoise), scene.gel, {}, {}};
+      substrate::SubstrateParameters gel;
+      gel.displacement_tolerance = tolerance;
+      const double beads_um =
+          observe(inputs.beads, scene.gel, spatial::Ground(scene.gel.surface.get()), parameters).distance_um;
+      Known known{scene,
+                  make_problem(inputs, parameters, {.spacing_um = share * spatial::kSpacingOfBeads * beads_um}, gel, 2),
+                  {}};
+      known.areas_um2 = patch_areas_um2(scene, known.problem);
+      for (const auto& [name, method] : kMethods) {
+        OnMeshes on{tolerance, known.problem.mesh.spacing_um.x, {}, {}, 0, 0};
+        for (const double sign : {-1.0, 1.0}) {
+          known.observe(sign * kNoise, 0, parameters);
+          const auto r = method(known.problem, {}, parameters, 2);
+          (sign < 0 ? on.mirrored : on.map) = map_of(scene, known.problem.mesh, r.traction_kPa);
+          on.error = test::map_error(scene, known.problem.mesh, r.traction_kPa);
+          on.forces = known.forces(r).mean;
+        }
+        std::printf("%-12s %-9s tolerance %.3f (states %.4f) spacing %.2f um (%d vertices)  map %.3f  forces %.3f\n",
+                    scene.name.c_str(), name, tolerance, known.problem.model_error, on.spacing_um,
+                    known.problem.mesh.n_vertices(), on.error, on.forces);
+        std::fflush(stdout);
+        found[name].push_back(on);
+      }
+    }
+  }
+  for (const auto& [name, all] : found) {
+    const OnMeshes& usual = all[4];
+    const double noise = (usual.map - usual.mirrored).norm() / 2;
+    for (const OnMeshes& on : all) {
+      std::printf("%-12s %-9s tolerance %.3f spacing %.2f um: differs by %.3f of what noise does\n", scene.name.c_str(),
+                  name.c_str(), on.tolerance, on.spacing_um, (on.map - usual.map).norm() / noise);
+    }
+  }
+}
+
+// --- the surface of the beads themselves
+
+/// As the beads show it, their places known as well as their displacements.
+TractionScene with_surface_of_beads(TractionScene scene, double noise) {
+  std::vector<Vec3> places = scene.beads_um;
+  const double sigma_um = 3 * noise * scene.largest_um / std::numbers::sqrt2;  // a displacement has two places' errors
+  for (std::size_t b = 0; b < places.size(); ++b) places[b].z += sigma_um * scene.noise[places.size() - 1 - b].z;
+  const surface::SurfaceFit fit = surface::fit_beads(places, std::vector<double>(places.size(), sigma_um));
+  const surface::Height truth(*scene.gel.surface);
+  double squares = 0;
+  for (const Vec2 at : scene.lattice_um) squares += std::pow(fit.height_um(at) - truth(at), 2);
+  std::printf("%-12s surface of %zu beads: rms %.2f um\n", scene.name.c_str(), places.size(),
+              std::sqrt(squares / static_cast<double>(scene.lattice_um.size())));
+  scene.gel.surface = std::make_shared<const HeightMap>(
+      surface::sampled([&](Vec2 at) { return fit.height_um(at); }, {-60, -60}, {60, 60}, 1));
+  return scene;
+}
+
+void with_estimated_surface(const TractionScene& scene) {
+  if (!scene.gel.surface) return;
+  const spatial::SpatialParameters parameters;
+  for (const double noise : {0.02, 0.05, 0.1}) {
+    const TractionScene estimated = with_surface_of_beads(scene, noise);
+    for (const TractionScene* used : {&scene, &estimated}) {
+      Known known{*used, make_problem({used->observed(noise), used->gel, {}, {}}, parameters, {}, {}, 2), {}};
+      known.areas_um2 = patch_areas_um2(*used, known.problem);
+      for (const auto& [name, method] : kMethods)
+        tell(known, name, noise, 0, method(known.problem, {}, parameters, 2), 0);
+    }
+  }
+}
+
+// --- beside FTTC
+
+/// Of the parts along the surface.
+double error_along(const TractionScene& scene, const std::function<Vec2(Vec2)>& found_kPa) {
+  double wrong = 0, size = 0;
+  for (std::size_t k = 0; k < scene.lattice_um.size(); ++k) {
+    const Vec2 truth{scene.traction_kPa[k].x, scene.traction_kPa[k].y};
+    wrong += scene.areas_um2[k] * dot(found_kPa(scene.lattice_um[k]) - truth, found_kPa(scene.lattice_um[k]) - truth);
+    size += scene.areas_um2[k] * dot(truth, truth);
+  }
+  return std::sqrt(wrong / size);
+}
+
+/// The traction of the nearest patch.
+Vec2 nearest_kPa(const std::vector<tractions::Patch>& patches, Vec2 at) {
+  const auto nearer = [&](const auto& a, const auto& b) { return norm(a.position_um - at) < norm(b.position_um - at); };
+  return std::min_element(patches.begin(), patches.end(), nearer)->traction_kPa;
+}
+
+DisplacementField upper_beads(const TractionScene& scene, double noise, double deepest_um) {
+  DisplacementField field;
+  for (const BeadInSpace& b : scene.observed(noise)) {
+    if (b.position_um.z > deepest_um) continue;
+    field.push_back({.position_um = {b.position_um.x, b.position_um.y},
+                     .displacement_um = {b.displacement_um.x, b.displacement_um.y},
+                     .sigma_um = b.sigma_um,
+                     .flag = {}});
+  }
+  return field;
+}
+
+void beside_fttc(const TractionScene& scene) {
+  const spatial::SpatialParameters parameters;
+  for (const double noise : {0.0, 0.02, 0.05, 0.1}) {
+    for (const double deepest_um : {2.0, 4.0, 8.0}) {
+      const DisplacementField field = upper_beads(scene, std::max(noise, 1e-4), deepest_um);
+      const auto fttc = tractions::reconstruct_fttc({field, scene.gel, {}, {}}, {}, 2);
+      std::printf("%-12s fttc      noise %.2f  %zu beads above %.0f um  along the surface %.3f\n", scene.name.c_str(),
+                  noise, field.size(), deepest_um,
+                  error_along(scene, [&](Vec2 at) { return nearest_kPa(fttc.patches, at); }));
+    }
+    Known known{scene, make_problem({scene.observed(noise), scene.gel, {}, {}}, parameters, {}, {}, 2), {}};
+    for (const auto& [name, method] : kMethods) {
+      const auto r = method(known.problem, {}, parameters, 2);
+      std::printf("%-12s %-9s noise %.2f  all beads  along the surface %.3f\n", scene.name.c_str(), name, noise,
+                  error_along(scene, [&](Vec2 at) {
+                    const Vec3 t = test::traction_at(known.problem.mesh, r.traction_kPa, at);
+                    return Vec2{t.x, t.y};
+                  }));
+    }
+    std::fflush(stdout);
   }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 3) {
-    std::cerr << "usage: tractions_in_space FOLDER SCENE...\n";
+  const std::map<std::string, void (*)(const TractionScene&)> studies = {{"methods", methods},
+                                                                         {"losses", losses},
+                                                                         {"meshes", meshes},
+                                                                         {"surface", with_estimated_surface},
+                                                                         {"fttc", beside_fttc}};
+  if (argc < 4 || !studies.contains(argv[1])) {
+    std::cerr << "usage: tractions_in_space methods|losses|meshes|surface|fttc FOLDER SCENE...\n";
     return 2;
   }
-  for (int k = 2; k < argc; ++k) study(test::traction_scene(std::filesystem::path(argv[1]) / argv[k]));
+  for (int k = 3; k < argc; ++k) studies.at(argv[1])(test::traction_scene(std::filesystem::path(argv[2]) / argv[k]));
 }

@@ -1,4 +1,4 @@
-/// Inside of the tracker of beads in stacks: which points lie near a place in space.
+/// Which points lie near a place in space.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 #include "pipeline/contract/geometry.h"
 
-namespace mbtfm::stacks {
+namespace mbtfm::numerics {
 
 /// Points sorted into cubic cells.
 class Near {
@@ -96,4 +96,4 @@ class Near {
   std::vector<int> order_;
 };
 
-}  // namespace mbtfm::stacks
+}  // namespace mbtfm::numerics
