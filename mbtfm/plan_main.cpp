@@ -97,7 +97,7 @@ SpacePlan space_plan_of(const Parameters& parameters, stage::StageContext& conte
                  .axial_noise = scene.spatial.axial_sigma_ratio,
                  .volume_um3 = scene.volume_um3(),
                  .asked = asked,
-                 .grid = grid_of(scene, asked, pools, foreseen),
+                 .grid = grid_of(scene, asked, pools, foreseen, pairs_of(scene, asked, {}, context.threads)),
                  .drawn = {}};
   const SpacePoint point = answered_point(asked, plan.grid, plan.own_kPa);
   if (parameters.drawn > 0)

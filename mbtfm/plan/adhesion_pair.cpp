@@ -7,35 +7,47 @@
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <numbers>
+#include <type_traits>
 
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "samples/drawing/random.h"
 #include "substrate/greens/half_space.h"
+#include "substrate/greens/inside.h"
 
 namespace mbtfm::plan {
 
 namespace {
 
-/// A piece of the surface.
+// D = 2: beads at the surface, which move along it. D = 3: beads below it.
+
+/// A piece of the surface, or of the gel.
 struct Patch {
-  Vec2 at_um;
-  double area_um2 = 0;
+  Vec3 at_um;
+  double measure = 0;  ///< um², um³
 };
 
-/// Squares that grow with the distance to the nearer of two places: a third of the radius near them.
-void divide(const Vec2 centre, double side_um, const std::vector<Vec2>& places, double radius_um,
+/// Squares, or boxes on squares no higher than wide, that grow with the distance to the nearer of two places: a third
+/// of the radius near them.
+template <int D>
+void divide(const Vec3& centre, double side_um, double height_um, const std::vector<Vec2>& places, double radius_um,
             std::vector<Patch>& patches) {
+  constexpr double kNear = D == 2 ? 1.0 / 3 : 0.5, kFar = D == 2 ? 0.2 : 0.35;  // boxes are many
+  constexpr double kHalfDiagonal = D == 2 ? 0.71 : 0.87;
   double nearest = 1e300;
-  for (const Vec2 p : places) nearest = std::min(nearest, norm(centre - p));
-  const double reach = std::max(0.0, nearest - 0.71 * side_um);
-  if (side_um <= std::max(radius_um / 3, 0.2 * reach)) {
-    patches.push_back({centre, side_um * side_um});
+  for (const Vec2 p : places) nearest = std::min(nearest, norm(centre - Vec3{p.x, p.y, 0}));
+  const double reach = std::max(0.0, nearest - kHalfDiagonal * side_um);
+  if (side_um <= std::max(kNear * radius_um, kFar * reach)) {
+    patches.push_back({centre, D == 2 ? side_um * side_um : side_um * side_um * height_um});
     return;
   }
+  const double half_um = 0.5 * side_um;
+  const int n_layers = height_um > half_um ? 2 : 1;
   for (const double dx : {-0.25, 0.25})
     for (const double dy : {-0.25, 0.25})
-      divide(centre + side_um * Vec2{dx, dy}, 0.5 * side_um, places, radius_um, patches);
+      for (int layer = 0; layer < n_layers; ++layer)
+        divide<D>(centre + Vec3{dx * side_um, dy * side_um, height_um * ((layer + 0.5) / n_layers - 0.5)}, half_um,
+                  height_um / n_layers, places, radius_um, patches);
 }
 
 substrate::Ellipse disc(Vec2 centre_um, double radius_um) {
@@ -45,18 +57,56 @@ substrate::Ellipse disc(Vec2 centre_um, double radius_um) {
   return e;
 }
 
-/// Displacement at the patches by a unit force along x, then along y.
-Eigen::MatrixXd field_of(const Gel& gel, const substrate::Ellipse& ellipse, const std::vector<Patch>& patches) {
-  const greens::HalfSpaceEllipse field(gel, ellipse);
-  Eigen::MatrixXd G(2 * static_cast<Eigen::Index>(patches.size()), 2);
-  for (std::size_t i = 0; i < patches.size(); ++i) {
-    const bool is_far = norm(patches[i].at_um - ellipse.centre_um) > 8 * ellipse.semi_major_um;
-    const greens::Sym2 g =
-        is_far ? field.far_compliance_um_per_nN(patches[i].at_um) : field.compliance_um_per_nN(patches[i].at_um);
-    G.middleRows<2>(2 * static_cast<Eigen::Index>(i)) << g.xx, g.xy, g.xy, g.yy;
+constexpr double kFarRadii = 8;  // from a disc: it acts like its centre
+
+/// Displacement at the surface by a unit force along x, then along y.
+class SurfaceField {
+ public:
+  SurfaceField(const Gel& gel, const substrate::Ellipse& ellipse, const BeadVolume&)
+      : field_(gel, ellipse), at_(ellipse) {}
+  Eigen::Matrix2d operator()(const Vec3& place) const {
+    const Vec2 point{place.x, place.y};
+    const bool is_far = norm(point - at_.centre_um) > kFarRadii * at_.semi_major_um;
+    const greens::Sym2 g = is_far ? field_.far_compliance_um_per_nN(point) : field_.compliance_um_per_nN(point);
+    return Eigen::Matrix2d{{g.xx, g.xy}, {g.xy, g.yy}};
   }
-  return G;
-}
+
+ private:
+  greens::HalfSpaceEllipse field_;
+  substrate::Ellipse at_;
+};
+
+/// The same below it, along x, y and z. What moves along z counts by its own noise.
+class InsideField {
+ public:
+  InsideField(const Gel& gel, const substrate::Ellipse& ellipse, const BeadVolume& volume)
+      : gel_(gel), field_(gel, nullptr, ellipse), at_(ellipse), axial_noise_(volume.axial_noise) {}
+  Eigen::Matrix3d operator()(const Vec3& place) const {
+    const Vec2 point{place.x, place.y}, away = point - at_.centre_um;
+    const bool is_far = norm(Vec3{away.x, away.y, place.z}) > kFarFromFour * at_.semi_major_um;
+    Eigen::Matrix3d g = is_far ? of_four(away, place.z) : field_.compliance_um_per_nN(point, place.z);
+    g.row(2) /= axial_noise_;
+    return g;
+  }
+
+ private:
+  /// Four forces have the second moments of the disc: what they lack falls with the fourth power of the distance.
+  static constexpr double kFarFromFour = 2;
+  Eigen::Matrix3d of_four(Vec2 away, double z) const {
+    const double arm_um = at_.semi_major_um / 2;
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    for (const Vec2 way : {Vec2{1, 1}, Vec2{1, -1}, Vec2{-1, 1}, Vec2{-1, -1}})
+      sum += 0.25 * greens::half_space_inside_um_per_nN(gel_, away - arm_um * way, z);
+    return sum;
+  }
+  Gel gel_;
+  greens::EllipseInside field_;
+  substrate::Ellipse at_;
+  double axial_noise_;
+};
+
+template <int D>
+using FieldOf = std::conditional_t<D == 2, SurfaceField, InsideField>;
 
 /// Places of the single adhesion, in distances of the two: on their line to just beyond either, and beside it, where it
 /// goes if no bead is near to say otherwise.
@@ -70,81 +120,109 @@ constexpr int kMiddle = kPlaces / 2, kFirst = kMiddle - 8, kSecond = kMiddle + 8
 /// Two adhesions, and all single ones, at the patches around them.
 struct PairFields {
   std::vector<Patch> patches;
-  Eigen::MatrixXd fields;    ///< 2·patches × 2·places: displacement by a unit force along x, along y
+  Eigen::MatrixXd fields;    ///< D·patches × D·places: displacement by a unit force along each axis
   Eigen::MatrixXd products;  ///< patches × what has to be summed over beads; by the constants below
 };
-/// |u₂|² for forces along x and along y, and G₁ᵀG₂ of the two (xx, xy, yx, yy); then for each place of the single one
-/// GᵀG (xx, xy, yy) and Gᵀu₂ (by column).
-constexpr Eigen::Index kOfPair = 6, kOfPlace = 7;
+/// |u₂|² for forces along each axis, and G₁ᵀG₂ of the two by row; then for each place of the single one GᵀG (by row,
+/// above its diagonal) and Gᵀu₂ (by column).
+template <int D>
+constexpr Eigen::Index kOfPair = D + D* D;
+template <int D>
+constexpr Eigen::Index kOfSquare = D*(D + 1) / 2;
+template <int D>
+constexpr Eigen::Index kOfPlace = kOfSquare<D> + D* D;
+template <int D>
+using Square = Eigen::Matrix<double, D, D>;
 
 double radius_of(double area_um2) { return std::sqrt(area_um2 / std::numbers::pi); }
 
-std::vector<Patch> patches_around(double area_um2, double distance_um) {
+template <int D>
+std::vector<Patch> patches_around(double area_um2, double distance_um, const BeadVolume& volume) {
   const double radius_um = radius_of(area_um2);
   // far away the two less the best one are a quadrupole, whose squares beyond a radius fall with its fourth power:
-  // beyond eight distances lies a thousandth
-  const double side_um = 2 * (8 * distance_um + 12 * radius_um);
+  // beyond eight distances lies a thousandth, beyond five a hundredth
+  const double side_um = D == 2 ? 2 * (8 * distance_um + 12 * radius_um) : 2 * (5 * distance_um + 4 * radius_um);
+  const std::vector<Vec2> places = {{-0.5 * distance_um, 0}, {0.5 * distance_um, 0}};
   std::vector<Patch> patches;
-  divide({0, 0}, side_um, {{-0.5 * distance_um, 0}, {0.5 * distance_um, 0}}, radius_um, patches);
+  const double depth_um = D == 2 ? 0 : std::min(volume.depth_um, side_um);
+  divide<D>({0, 0, 0.5 * depth_um}, side_um, depth_um, places, radius_um, patches);
   return patches;
 }
 
-PairFields fields_of(const Gel& given, double area_um2, double distance_um) {
+template <int D>
+PairFields fields_of(const Gel& given, double area_um2, double distance_um, const BeadVolume& volume) {
   Gel gel = given;
   gel.youngs_modulus_kPa = 1;
   const double radius_um = radius_of(area_um2);
-  PairFields f{.patches = patches_around(area_um2, distance_um), .fields = {}, .products = {}};
+  PairFields f{.patches = patches_around<D>(area_um2, distance_um, volume), .fields = {}, .products = {}};
   const auto n = static_cast<Eigen::Index>(f.patches.size());
-  f.fields.resize(2 * n, 2 * kPlaces);
-  for (int k = 0; k < kPlaces; ++k)
-    f.fields.middleCols<2>(2 * k) = field_of(gel, disc(distance_um * place_of_one(k), radius_um), f.patches);
-  f.products.resize(n, kOfPair + kPlaces * kOfPlace);
+  f.fields.resize(D * n, D * kPlaces);
+  for (int k = 0; k < kPlaces; ++k) {
+    const FieldOf<D> field(gel, disc(distance_um * place_of_one(k), radius_um), volume);
+    for (Eigen::Index i = 0; i < n; ++i)
+      f.fields.block<D, D>(D * i, D * k) = field(f.patches[static_cast<std::size_t>(i)].at_um);
+  }
+  f.products.resize(n, kOfPair<D> + kPlaces * kOfPlace<D>);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const auto rows = f.fields.middleRows<2>(2 * i);
-    const Eigen::Matrix2d first = rows.middleCols<2>(2 * kFirst), second = rows.middleCols<2>(2 * kSecond),
-                          both = first + second, crossed = first.transpose() * second;
-    f.products.row(i).head<kOfPair>() << both.col(0).squaredNorm(), both.col(1).squaredNorm(), crossed(0, 0),
-        crossed(0, 1), crossed(1, 0), crossed(1, 1);
+    const auto rows = f.fields.middleRows<D>(D * i);
+    const Square<D> first = rows.template middleCols<D>(D * kFirst), second = rows.template middleCols<D>(D * kSecond),
+                    both = first + second;
+    auto of_pair = f.products.row(i).head<kOfPair<D>>();
+    of_pair.template head<D>() = both.colwise().squaredNorm();
+    for (int a = 0; a < D; ++a)
+      for (int b = 0; b < D; ++b) of_pair[D + D * a + b] = first.col(a).dot(second.col(b));
     for (int k = 0; k < kPlaces; ++k) {
-      const Eigen::Matrix2d G = rows.middleCols<2>(2 * k), GG = G.transpose() * G, Gu = G.transpose() * both;
-      f.products.row(i).segment<kOfPlace>(kOfPair + k * kOfPlace) << GG(0, 0), GG(0, 1), GG(1, 1), Gu(0, 0), Gu(1, 0),
-          Gu(0, 1), Gu(1, 1);
+      const Square<D> G = rows.template middleCols<D>(D * k);
+      auto of_place = f.products.row(i).segment<kOfPlace<D>>(kOfPair<D> + k * kOfPlace<D>);
+      int next = 0;
+      for (int a = 0; a < D; ++a)
+        for (int b = a; b < D; ++b) of_place[next++] = G.col(a).dot(G.col(b));
+      for (int c = 0; c < D; ++c)
+        for (int a = 0; a < D; ++a) of_place[next++] = G.col(a).dot(both.col(c));
     }
   }
   return f;
 }
 
-/// Of one set of beads, for forces along the line and across it.
+/// Of one set of beads, for forces along each axis: along the line, across it, into the gel.
 /// @param sums      of the products over beads
-/// @param of_noise  Gᵀ times the beads' noise, by place, x and y
-std::array<Excess, 2> excess_of(const Eigen::RowVectorXd& sums, const Eigen::RowVectorXd& of_noise) {
-  std::array<Excess, 2> both;
-  for (Excess& e : both) e.resize(kPlaces, 3);
+/// @param of_noise  Gᵀ times the beads' noise, by place and axis
+template <int D>
+std::array<Excess, D> excess_of(const Eigen::RowVectorXd& sums, const Eigen::RowVectorXd& of_noise) {
+  std::array<Excess, D> all;
+  for (Excess& e : all) e.resize(kPlaces, 3);
   const auto square_at = [&](int k) {
-    const Eigen::Matrix<double, 1, kOfPlace> s = sums.segment<kOfPlace>(kOfPair + k * kOfPlace);
-    return Eigen::Matrix2d{{s[0], s[1]}, {s[1], s[2]}};
+    const auto s = sums.segment<kOfSquare<D>>(kOfPair<D> + k * kOfPlace<D>);
+    Square<D> square;
+    int next = 0;
+    for (int a = 0; a < D; ++a)
+      for (int b = a; b < D; ++b) square(a, b) = square(b, a) = s[next++];
+    return square;
   };
-  Eigen::Matrix4d of_two;
-  of_two << square_at(kFirst), Eigen::Matrix2d{{sums[2], sums[3]}, {sums[4], sums[5]}},
-      Eigen::Matrix2d{{sums[2], sums[4]}, {sums[3], sums[5]}}, square_at(kSecond);
-  Eigen::Vector4d noise_of_two;
-  noise_of_two << of_noise.segment<2>(2 * kFirst).transpose(), of_noise.segment<2>(2 * kSecond).transpose();
+  Square<D> crossed;
+  for (int a = 0; a < D; ++a)
+    for (int b = 0; b < D; ++b) crossed(a, b) = sums[D + D * a + b];
+  Square<2 * D> of_two;
+  of_two << square_at(kFirst), crossed, crossed.transpose(), square_at(kSecond);
+  Eigen::Matrix<double, 2 * D, 1> noise_of_two;
+  noise_of_two << of_noise.segment<D>(D * kFirst).transpose(), of_noise.segment<D>(D * kSecond).transpose();
   const double explained_by_two =
-      noise_of_two.dot(Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix4d>(of_two).solve(noise_of_two));
+      noise_of_two.dot(Eigen::CompleteOrthogonalDecomposition<Square<2 * D>>(of_two).solve(noise_of_two));
   for (int k = 0; k < kPlaces; ++k) {
-    const Eigen::Matrix2d GG = square_at(k);
+    const Square<D> GG = square_at(k);
     // one bead or none: no single force is found
-    const Eigen::Matrix2d inverse = GG.determinant() > 1e-12 * GG.squaredNorm()
-                                        ? Eigen::Matrix2d(GG.inverse())
-                                        : Eigen::Matrix2d(Eigen::Matrix2d::Zero());
-    const Eigen::Vector2d noise = of_noise.segment<2>(2 * k).transpose();
-    for (int c = 0; c < 2; ++c) {
-      const Eigen::Vector2d Gu = sums.segment<2>(kOfPair + k * kOfPlace + 3 + 2 * c).transpose(), found = inverse * Gu;
-      both[static_cast<std::size_t>(c)].row(k) << sums[c] - Gu.dot(found),
-          noise_of_two[c] + noise_of_two[2 + c] - found.dot(noise), explained_by_two - noise.dot(inverse * noise);
+    const bool is_found = std::abs(GG.determinant()) > 1e-12 * std::pow(GG.norm(), D);
+    const Square<D> inverse = is_found ? Square<D>(GG.inverse()) : Square<D>(Square<D>::Zero());
+    const Eigen::Matrix<double, D, 1> noise = of_noise.segment<D>(D * k).transpose();
+    for (int c = 0; c < D; ++c) {
+      const Eigen::Matrix<double, D, 1> Gu =
+          sums.segment<D>(kOfPair<D> + k * kOfPlace<D> + kOfSquare<D> + D * c).transpose();
+      const Eigen::Matrix<double, D, 1> found = inverse * Gu;
+      all[static_cast<std::size_t>(c)].row(k) << sums[c] - Gu.dot(found),
+          noise_of_two[c] + noise_of_two[D + c] - found.dot(noise), explained_by_two - noise.dot(inverse * noise);
     }
   }
-  return both;
+  return all;
 }
 
 /// By how much a parabola through three values at even steps falls below the middle one, the least.
@@ -176,24 +254,26 @@ Eigen::MatrixXd normal_numbers(int n_experiments, Eigen::Index n) {
   return z;
 }
 
-/// Of experiments whose beads lie at random: two each, with forces along the line and across it.
-/// @param normal  a row an experiment
-std::vector<Excess> drawn_excess(const PairFields& f, double beads_per_um2, const Eigen::MatrixXd& normal) {
+/// Of experiments whose beads lie at random: one each for forces along each axis.
+/// @param density  1/um², 1/um³
+/// @param normal   a row an experiment
+template <int D>
+std::vector<Excess> drawn_excess(const PairFields& f, double density, const Eigen::MatrixXd& normal) {
   constexpr double kMany = 10;  // beads far off, where it hardly matters how many there are
   const auto n = static_cast<Eigen::Index>(f.patches.size());
-  Eigen::MatrixXd counts(normal.rows(), n), noise(normal.rows(), 2 * n);
+  Eigen::MatrixXd counts(normal.rows(), n), noise(normal.rows(), D * n);
   for (Eigen::Index k = 0; k < counts.rows(); ++k) {
     drawing::Random random(1, drawing::Stream::beads, static_cast<std::uint64_t>(k));
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double mean = beads_per_um2 * f.patches[static_cast<std::size_t>(i)].area_um2;
+      const double mean = density * f.patches[static_cast<std::size_t>(i)].measure;
       counts(k, i) = mean < kMany ? random.poisson(mean) : mean;
-      noise.block<1, 2>(k, 2 * i) = std::sqrt(counts(k, i)) * normal.block<1, 2>(k, 2 * i);
+      noise.block<1, D>(k, D * i) = std::sqrt(counts(k, i)) * normal.block<1, D>(k, D * i);
     }
   }
   const Eigen::MatrixXd sums = numerics::product(counts, f.products), of_noise = numerics::product(noise, f.fields);
   std::vector<Excess> all;
   for (Eigen::Index k = 0; k < counts.rows(); ++k)
-    for (Excess& e : excess_of(sums.row(k), of_noise.row(k))) all.push_back(std::move(e));
+    for (Excess& e : excess_of<D>(sums.row(k), of_noise.row(k))) all.push_back(std::move(e));
   return all;
 }
 
@@ -207,32 +287,54 @@ double chance_to_tell(const std::vector<Excess>& experiments, double force) {
   return n_told / (2 * static_cast<double>(experiments.size()) + 1);
 }
 
+/// Of all densities, by distance.
+template <int D>
+std::vector<std::vector<std::vector<Excess>>> excess_by_distance(const Gel& gel, double area_um2,
+                                                                 const std::vector<double>& distances_um,
+                                                                 const std::vector<double>& densities,
+                                                                 const BeadVolume& volume, int n_experiments,
+                                                                 int threads) {
+  std::size_t n_most = 0;
+  for (const double distance_um : distances_um)
+    n_most = std::max(n_most, patches_around<D>(area_um2, distance_um, volume).size());
+  const Eigen::MatrixXd normal = normal_numbers(n_experiments / D, D * static_cast<Eigen::Index>(n_most));
+  std::vector<std::vector<std::vector<Excess>>> excess(distances_um.size());
+  numerics::parallel_for(static_cast<int>(distances_um.size()), threads, [&](int k) {
+    const auto i = static_cast<std::size_t>(k);
+    const PairFields fields = fields_of<D>(gel, area_um2, distances_um[i], volume);
+    for (const double density : densities) excess[i].push_back(drawn_excess<D>(fields, density, normal));
+  });
+  return excess;
+}
+
+std::vector<double> distances_um(double area_um2, double farthest_um, int n) {
+  const double least_um = 2 * radius_of(area_um2);
+  std::vector<double> distances;
+  for (int k = 0; k < n; ++k) distances.push_back(least_um * std::pow(farthest_um / least_um, double(k) / (n - 1)));
+  return distances;
+}
+
 }  // namespace
 
 SquaresLeft squares_left(const Gel& gel, double area_um2, double distance_um) {
-  const PairFields f = fields_of(gel, area_um2, distance_um);
+  const PairFields f = fields_of<2>(gel, area_um2, distance_um, {});
   Eigen::RowVectorXd sums = Eigen::RowVectorXd::Zero(f.products.cols());
   for (std::size_t i = 0; i < f.patches.size(); ++i)
-    sums += f.patches[i].area_um2 * f.products.row(static_cast<Eigen::Index>(i));
-  const auto [along, across] = excess_of(sums, Eigen::RowVectorXd::Zero(2 * kPlaces));
+    sums += f.patches[i].measure * f.products.row(static_cast<Eigen::Index>(i));
+  const auto [along, across] = excess_of<2>(sums, Eigen::RowVectorXd::Zero(2 * kPlaces));
   return {.along_um4 = std::max(0.0, least_excess(along, 1)), .across_um4 = std::max(0.0, least_excess(across, 1))};
 }
 
-PairResolution::PairResolution(const Gel& gel, double area_um2, std::vector<double> beads_per_um2, int threads) {
-  constexpr int kDistances = 16;
-  const double least_um = 2 * radius_of(area_um2);
-  excess_.resize(kDistances);
-  for (int k = 0; k < kDistances; ++k)
-    distance_um_.push_back(least_um * std::pow(kFarthest_um / least_um, double(k) / (kDistances - 1)));
-  std::size_t n_most = 0;
-  for (const double distance_um : distance_um_) n_most = std::max(n_most, patches_around(area_um2, distance_um).size());
-  constexpr int kExperiments = 400;  // the distance that four in five tell is then known to some 4 %
-  const Eigen::MatrixXd normal = normal_numbers(kExperiments, 2 * static_cast<Eigen::Index>(n_most));
-  numerics::parallel_for(kDistances, threads, [&](int k) {
-    const auto i = static_cast<std::size_t>(k);
-    const PairFields fields = fields_of(gel, area_um2, distance_um_[i]);
-    for (const double density : beads_per_um2) excess_[i].push_back(drawn_excess(fields, density, normal));
-  });
+PairResolution::PairResolution(const Gel& gel, double area_um2, const std::vector<double>& beads_per_um2, int threads)
+    : distance_um_(distances_um(area_um2, kFarthest_um, 2 * PairDraws{}.n_distances)),
+      excess_(
+          excess_by_distance<2>(gel, area_um2, distance_um_, beads_per_um2, {}, PairDraws{}.n_experiments, threads)) {}
+
+PairResolution::PairResolution(const Gel& gel, double area_um2, const std::vector<double>& beads_per_um3,
+                               const BeadVolume& volume, const PairDraws& draws, int threads)
+    : distance_um_(
+          distances_um(area_um2, std::max(kFarthest_um, kFarthestInSpace * radius_of(area_um2)), draws.n_distances)),
+      excess_(excess_by_distance<3>(gel, area_um2, distance_um_, beads_per_um3, volume, draws.n_experiments, threads)) {
 }
 
 std::optional<double> PairResolution::least_distance_um(double force_nN, double youngs_modulus_kPa, std::size_t density,

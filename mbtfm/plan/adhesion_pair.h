@@ -36,18 +36,36 @@ SquaresLeft squares_left(const Gel& gel, double area_um2, double distance_um);
 /// for the best F₁ without noise; P project on what two forces and one can explain. @see SquaresLeft
 using Excess = Eigen::ArrayX3d;
 
+/// Beads below the surface.
+struct BeadVolume {
+  double depth_um = 0;     ///< down to which they lie
+  double axial_noise = 1;  ///< noise along z over that along the surface
+};
+
+/// How many experiments are drawn, at how many distances. 800: the distance that four in five tell is then known to
+/// some 4 %.
+struct PairDraws {
+  int n_distances = 8, n_experiments = 800;
+};
+
 /// The least distance, over experiments whose beads lie at random and have noise: the place of the one that fits best
 /// is found in each. (Its chi² over the noise cannot be taken at the place that is best without noise: the more so the
 /// flatter chi² is over the places, that is, where noise is large and the two are far apart.) With few beads chance
 /// decides whether one lies between the two, too.
 class PairResolution {
  public:
-  PairResolution(const Gel& gel, double area_um2, std::vector<double> beads_per_um2, int threads);
-  /// At least the distance at which they touch. None where not even kFarthest_um is enough.
-  /// @param density  index in beads_per_um2
+  PairResolution(const Gel& gel, double area_um2, const std::vector<double>& beads_per_um2, int threads);
+  /// Of beads in a volume, which move along z, too, and forces into the gel beside those along it: where nothing else
+  /// pulls.
+  PairResolution(const Gel& gel, double area_um2, const std::vector<double>& beads_per_um3, const BeadVolume& volume,
+                 const PairDraws& draws, int threads);
+  /// At least the distance at which they touch. None where not even farthest_um() is enough.
+  /// @param density  index in the densities
   std::optional<double> least_distance_um(double force_nN, double youngs_modulus_kPa, std::size_t density,
                                           double noise_um) const;
   static constexpr double kFarthest_um = 30;
+  static constexpr double kFarthestInSpace = 12;  ///< in radii, if that is more
+  double farthest_um() const { return distance_um_.back(); }
   double touching_um() const { return distance_um_.front(); }
 
  private:

@@ -42,6 +42,20 @@ std::string about_adhesions(const Plan& plan, const Point& p) {
          ".";
 }
 
+/// Nothing where not even half of the fibres meet the target.
+std::string about_most_fibres(const Plan& plan, const Needed& n) {
+  if (!n.beads_per_um2) return "";
+  const std::string half = "That holds for half of the fibres. ";
+  if (n.of_most <= plan.most_beads_per_um2)
+    return half + "Nine in ten need " + density_text(plan.asked.beads_per_um2, n.of_most) + " beads per µm².";
+  if (std::isfinite(n.of_most))
+    return half + "Nine in ten need " + about(n.of_most) + " beads per µm², more than the " +
+           about(plan.most_beads_per_um2) + " that can be told apart.";
+  return half +
+         "Nine in ten do not reach it with any number of beads: for some of them mesh and segmentation alone make a "
+         "larger error.";
+}
+
 std::string about_cells(const Plan& plan) {
   std::string text;
   for (const CellNumbers& n : plan.cells) {
@@ -57,12 +71,24 @@ std::string about_cells(const Plan& plan) {
 
 std::string about_drawn(const Drawn& d) {
   if (d.tensions.empty()) return "";
-  const bool holds = std::abs(d.error_over_predicted - 1) < 2 * d.by_chance + kDrawnMargin;
+  constexpr double kUseless = 0.5;  // of chance: fewer than eight tensions
+  const char* verdict = 2 * d.by_chance > kUseless ? "So few tensions hardly check the plan. "
+                        : std::abs(d.error_over_predicted - 1) < 2 * d.by_chance + kDrawnMargin
+                            ? "The plan holds. "
+                            : "The plan does not hold well here: allow for that factor. ";
   return checked_with(d, brief(d.point.beads_per_um2) + (d.point.beads_per_um2 == 1 ? " bead" : " beads") + " per µm²",
-                      std::to_string(d.tensions.size()) + " tensions") +
-         (holds ? "The plan holds. " : "The plan does not hold well here: allow for that factor. ") +
-         "Single adhesions' forces were off by " + about(d.forces.with_network_nN) + " nN with the network, by " +
-         about(d.forces.alone_nN) + " nN without it, and by " + about(d.forces.fttc_nN) + " nN with FTTC.";
+                      std::to_string(d.tensions.size()) + (d.tensions.size() == 1 ? " tension" : " tensions")) +
+         verdict + "Single adhesions' forces were off by " + about(d.forces.with_network_nN) +
+         " nN with the network, by " + about(d.forces.alone_nN) + " nN without it, and by " + about(d.forces.fttc_nN) +
+         " nN with FTTC.";
+}
+
+/// Why no number of beads suffices. @param densest  of the points asked for
+std::string why_none(const Plan& plan, const Point& densest) {
+  if (plan.grid.model_error_nN >= plan.asked.target_nN)
+    return "networks and segmentation alone make an error of " + about(plan.grid.model_error_nN) + " nN.";
+  return "with " + brief(densest.beads_per_um2) + " per µm² the noise alone makes an error of " +
+         about(expected_of(plan.grid, densest, Quantity::fibres).from_beads_nN) + " nN.";
 }
 
 }  // namespace
@@ -78,6 +104,10 @@ double density_that_suffices(const std::vector<double>& densities, std::optional
 }
 
 std::string about(double value) { return significant(value, 2); }
+
+std::string density_text(const std::vector<double>& densities, double needed) {
+  return needed <= densities.front() ? "at most " + brief(densities.front()) : about(needed);
+}
 
 std::string of_other_gels(const Asked& asked, double gel_kPa, const std::function<std::string(double)>& needs) {
   std::string text;
@@ -105,18 +135,17 @@ std::string answer_sentence(const Plan& plan) {
   const Needed& n = needed_of(plan.grid.needed, gel_kPa, noise_um);
   const std::string others = of_other_gels(plan.asked, gel_kPa, [&](double E) {
     const Needed& other = needed_of(plan.grid.needed, E, noise_um);
-    return can_be_had(other, plan.most_beads_per_um2) ? about(*other.beads_per_um2)
+    return can_be_had(other, plan.most_beads_per_um2) ? density_text(plan.asked.beads_per_um2, *other.beads_per_um2)
                                                       : std::string("more beads than can be told apart");
   });
   if (!n.beads_per_um2)
-    return with + "no number of beads suffices " + asked_for +
-           (plan.grid.model_error_nN < plan.asked.target_nN
-                ? "."
-                : ": networks and segmentation alone make an error of " + about(plan.grid.model_error_nN) + " nN.");
+    return with + "no number of beads suffices " + asked_for + ": " +
+           why_none(plan, {gel_kPa, plan.asked.beads_per_um2.back(), noise_um});
   if (!can_be_had(n, plan.most_beads_per_um2))
     return with + "you would need " + about(*n.beads_per_um2) + " beads per µm² " + asked_for + ", more than the " +
            about(plan.most_beads_per_um2) + " that can be told apart" + others + ".";
-  return with + "you need " + about(*n.beads_per_um2) + " beads per µm² " + asked_for + others + ".";
+  return with + "you need " + density_text(plan.asked.beads_per_um2, *n.beads_per_um2) + " beads per µm² " + asked_for +
+         others + ".";
 }
 
 std::vector<std::string> further_sentences(const Plan& plan) {
@@ -125,15 +154,8 @@ std::vector<std::string> further_sentences(const Plan& plan) {
     if (!text.empty()) sentences.push_back(text);
   };
   const Point point = answered_point(plan.asked, plan.grid, plan.own_kPa);
-  if (!plan.grid.needed.empty()) {
-    const Needed& n = needed_of(plan.grid.needed, point.youngs_modulus_kPa, point.noise_um);
-    add(std::string("That holds for half of the fibres. ") +
-        (n.of_most <= plan.most_beads_per_um2
-             ? "Nine in ten need " + about(n.of_most) + " beads per µm²."
-             : std::string(
-                   "Nine in ten do not reach it with any number of beads: for some of them mesh and segmentation "
-                   "alone make a larger error.")));
-  }
+  if (!plan.grid.needed.empty())
+    add(about_most_fibres(plan, needed_of(plan.grid.needed, point.youngs_modulus_kPa, point.noise_um)));
   add(about_adhesions(plan, point));
   add(about_cells(plan));
   if (plan.drawn) add(about_drawn(*plan.drawn));

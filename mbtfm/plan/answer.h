@@ -52,6 +52,8 @@ const Needed& needed_of(const std::vector<Needed>& needed, double youngs_modulus
   return *std::ranges::find_if(
       needed, [&](const Needed& n) { return n.youngs_modulus_kPa == youngs_modulus_kPa && n.noise_um == noise_um; });
 }
+/// "2.4", or "at most 0.25" where that is the least asked for.
+std::string density_text(const std::vector<double>& densities, double needed);
 /// The first density of the list that suffices, or else the largest.
 double density_that_suffices(const std::vector<double>& densities, std::optional<double> needed);
 

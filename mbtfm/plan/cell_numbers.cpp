@@ -4,6 +4,7 @@
 #include <boost/math/distributions/non_central_t.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <set>
 
 namespace mbtfm::plan {
 
@@ -84,8 +85,10 @@ std::vector<CellNumbers> cell_numbers(const std::vector<Scatter>& scatter, doubl
   std::vector<CellNumbers> all;
   for (const Scatter& s : scatter) {
     for (const double of : {0.5 * difference, difference, 2 * difference}) {
-      for (const double fibres : {0.5 * s.fibres_per_cell, s.fibres_per_cell, 2 * s.fibres_per_cell}) {
-        const double m = std::max(1.0, std::round(fibres)), d = of * s.mean_nN;
+      std::set<double> numbers;  // half of one fibre is one
+      for (const double factor : {0.5, 1.0, 2.0}) numbers.insert(std::max(1.0, std::round(factor * s.fibres_per_cell)));
+      for (const double m : numbers) {
+        const double d = of * s.mean_nN;
         CellNumbers n{
             .scatter = s, .difference = of, .fibres_per_cell = m, .cells = cells_for(s, d, m, power), .power = {}};
         for (const int cells : kCells) n.power.push_back(power_of(s, d, m, cells));

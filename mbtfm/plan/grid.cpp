@@ -6,6 +6,7 @@
 
 #include "mbtfm/tensions/linear_data.h"
 #include "mbtfm/tractions/fttc_mixtures.h"
+#include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
@@ -211,7 +212,7 @@ double needed_by_share(const Computed& c, double share, double target_nN, double
   for (std::size_t i = 1; i < c.cell.fibre_ids.size(); ++i)
     needed.push_back(needed_beads_per_um2(c, i, target_nN, scale));
   const auto rank = std::min(needed.size() - 1, static_cast<std::size_t>(share * static_cast<double>(needed.size())));
-  return numerics::of_rank_in(needed, rank);
+  return std::max(c.densities.beads_per_um2.front(), numerics::of_rank_in(needed, rank));
 }
 
 std::vector<std::string> warnings_of(const Asked& asked, const Computed& c, const Scene& scene) {
@@ -238,10 +239,11 @@ std::vector<std::string> warnings_of(const Asked& asked, const Computed& c, cons
 }  // namespace
 
 double most_beads_per_um2(const Scene& scene) {
-  // of discs at random that keep this distance: they jam at 0.547 of the area (Feder, J. Theor. Biol. 87, 237 (1980))
-  constexpr double kJammed = 0.547;
+  // of discs at random that keep this distance: they jam at 0.547 of the area (Feder, J. Theor. Biol. 87, 237 (1980)),
+  // but the last of them are hard to place
+  constexpr double kFilled = 0.5;
   const double distance_um = scene.experiment.bead_distance_um;
-  return kJammed * 4 / (3.141592653589793 * distance_um * distance_um);
+  return kFilled * 4 / (3.141592653589793 * distance_um * distance_um);
 }
 
 double unit_error(const Densities& d, std::size_t label, double beads_per_um2) {
@@ -261,7 +263,20 @@ double standard_error_nN(const Computed& c, std::size_t label, const Point& poin
                     c.model.tensions[label].total_nN());
 }
 
+void check_densities(const Scene& scene, const std::vector<double>& beads_per_um2) {
+  const double area_um2 = scene.field.area_um2(), most = most_beads_per_um2(scene);
+  constexpr double kFewest = 20;
+  if (beads_per_um2.front() * area_um2 < kFewest)
+    throw UsageError("beads_per_um2: " + brief(beads_per_um2.front()) + " are fewer than 20 beads in the " +
+                     brief(area_um2) + " um² of the scene");
+  if (beads_per_um2.back() > most)
+    throw UsageError("beads_per_um2: " + brief(beads_per_um2.back()) + " are more than the " + brief(most) +
+                     " that can be told apart: beads nearer than " + brief(scene.experiment.bead_distance_um) +
+                     " um to each other melt together in an image");
+}
+
 Computed compute(const Scene& scene, const Asked& asked, const Work& work) {
+  check_densities(scene, asked.beads_per_um2);
   Computed c{.cell = known_cell(scene, work.part(0, 0.2)), .densest = {}, .densities = {}, .model = {}};
   c.densities = precision_at(scene, c.cell, asked.beads_per_um2, work.part(0.2, 0.3));
   work.tell(0.5, "the model's own error");

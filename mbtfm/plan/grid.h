@@ -45,7 +45,8 @@ struct Expected {
   double left_out = 0;  ///< of the displacement, by linear elasticity
 };
 
-/// What a cell on a gel needs.
+/// What a cell on a gel needs. No less than the least density that was asked for: few beads tell less than the law has
+/// it.
 struct Needed {
   double youngs_modulus_kPa = 0, noise_um = 0;
   std::optional<double> beads_per_um2;  ///< so that the middle fibre meets the target; none: no number of beads does
@@ -65,6 +66,9 @@ struct Grid {
 /// No more beads can be told apart: their images melt together.
 double most_beads_per_um2(const Scene& scene);
 
+/// @throws UsageError where so few beads tell nothing, or so many melt together
+void check_densities(const Scene& scene, const std::vector<double>& beads_per_um2);
+
 /// One gel stands for all: its answer falls with the modulus. @see Precision
 struct Computed {
   KnownCell cell;
@@ -72,6 +76,7 @@ struct Computed {
   Densities densities;
   ModelErrors model;
 };
+/// @throws as check_densities
 Computed compute(const Scene& scene, const Asked& asked, const Work& work);
 
 Grid grid_of(const Scene& scene, const Asked& asked, const Computed& computed, int threads);

@@ -39,9 +39,10 @@ charts::Chart chart_of(const Plan& plan, double noise_um) {
       });
 }
 
-std::string needed_text(const Needed& n, double most_beads_per_um2) {
+std::string needed_text(const Plan& plan, const Needed& n) {
   if (!n.beads_per_um2) return "never";
-  return *n.beads_per_um2 > most_beads_per_um2 ? "&gt; " + brief(most_beads_per_um2) : significant(*n.beads_per_um2, 2);
+  return *n.beads_per_um2 > plan.most_beads_per_um2 ? "&gt; " + brief(plan.most_beads_per_um2)
+                                                    : density_text(plan.asked.beads_per_um2, *n.beads_per_um2);
 }
 
 report::Table expected_rows(const Plan& plan) {
@@ -122,13 +123,12 @@ std::string html_of(const Plan& plan) {
   if (!plan.grid.warnings.empty()) body += report::section("What to mind", paragraphs(plan.grid.warnings));
   body += report::section("Standard error over density", figures_of(charts_of(plan), plan.asked) + kHow);
   if (!plan.grid.needed.empty())
-    body += report::section(
-        "Beads per µm² that are needed",
-        report::html_of(needed_rows<Needed>(plan.asked, plan.grid.needed,
-                                            [&](const Needed& n) { return needed_text(n, plan.most_beads_per_um2); }),
-                        {"plan_needed.csv", files::text_of(needed_table(), plan.grid.needed)}) +
-            "<p class=\"sub\">&gt; " + brief(plan.most_beads_per_um2) +
-            ": more beads than can be told apart. “never”: no number of beads suffices.</p>\n");
+    body += report::section("Beads per µm² that are needed",
+                            report::html_of(needed_rows<Needed>(plan.asked, plan.grid.needed,
+                                                                [&](const Needed& n) { return needed_text(plan, n); }),
+                                            {"plan_needed.csv", files::text_of(needed_table(), plan.grid.needed)}) +
+                                "<p class=\"sub\">&gt; " + brief(plan.most_beads_per_um2) +
+                                ": more beads than can be told apart. “never”: no number of beads suffices.</p>\n");
   if (plan.drawn && !plan.drawn->tensions.empty())
     body += report::section("How well it held",
                             report::figure(drawn_chart("tension", drawn_dots(*plan.drawn)),

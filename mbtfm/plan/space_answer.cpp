@@ -28,13 +28,21 @@ std::string about_count(double n) {
 }
 
 /// "0.0024 beads per µm³ (610 in this field)"
-std::string beads_text(const SpacePlan& plan, double beads_per_um3) {
-  return about(beads_per_um3) + " beads per µm³ (" + about_count(beads_per_um3 * plan.volume_um3) + " in this field)";
+std::string beads_text(const SpacePlan& plan, const std::string& density, double beads_per_um3) {
+  return density + " beads per µm³ (" + about_count(beads_per_um3 * plan.volume_um3) + " in this field)";
 }
 
-/// "0.0024", or "more than 0.03"
-std::string density_text(const SpacePlan& plan, std::optional<double> beads_per_um3) {
-  return beads_per_um3 ? about(*beads_per_um3) : "more than " + about(most_beads_per_um3(plan.asked.beads_per_um3));
+/// "0.0024", or "at most 0.001", or "more than 0.03"
+std::string needed_text(const SpacePlan& plan, std::optional<double> beads_per_um3) {
+  return beads_per_um3 ? density_text(plan.asked.beads_per_um3, *beads_per_um3)
+                       : "more than " + about(most_beads_per_um3(plan.asked.beads_per_um3));
+}
+
+std::string about_pair(const SpacePlan& plan, std::optional<double> least_distance_um) {
+  const std::string pair = "Where the image shows two patches of " + brief(plan.asked.tension_nN) +
+                           " nN each, and nothing else pulls, their forces are ";
+  return pair + (least_distance_um ? "told apart if they are " + about(*least_distance_um) + " µm apart or more."
+                                   : "not told apart at any distance in a cell.");
 }
 
 /// Standard errors allow for tractions beside the patches. Where there are none, experiments err by less.
@@ -69,8 +77,8 @@ std::string answer_sentence(const SpacePlan& plan) {
                            " µm along z) you need ";
   const auto needed = [&](double E) { return needed_of(plan.grid.needed, E, noise_um).beads_per_um3; };
   const std::optional<double> n = needed(gel_kPa);
-  return text + (n ? beads_text(plan, *n) : density_text(plan, n) + " beads per µm³") + asked_for +
-         of_other_gels(plan.asked, gel_kPa, [&](double E) { return density_text(plan, needed(E)); }) + ".";
+  return text + (n ? beads_text(plan, needed_text(plan, n), *n) : needed_text(plan, n) + " beads per µm³") + asked_for +
+         of_other_gels(plan.asked, gel_kPa, [&](double E) { return needed_text(plan, needed(E)); }) + ".";
 }
 
 std::vector<std::string> further_sentences(const SpacePlan& plan) {
@@ -81,16 +89,18 @@ std::vector<std::string> further_sentences(const SpacePlan& plan) {
   };
   std::vector<std::string> sentences;
   if (n.beads_per_um3)
-    sentences.push_back("That holds for half of the patches. Nine in ten need " + density_text(plan, n.of_most) +
+    sentences.push_back("That holds for half of the patches. Nine in ten need " + needed_text(plan, n.of_most) +
                         " beads per µm³.");
   const SpaceExpected& patch = expected_of(plan.grid, point, SpaceQuantity::force);
   sentences.push_back(
-      "At " + beads_text(plan, point.beads_per_um3) + " the force of the middle patch has a standard error of " +
-      error(SpaceQuantity::force) + ", " + error(SpaceQuantity::tangential_force) + " along the surface and " +
-      error(SpaceQuantity::normal_force) + " normal to it; the total force has " + error(SpaceQuantity::total_force) +
-      ", the net force " + error(SpaceQuantity::net_force) +
+      "At " + beads_text(plan, about(point.beads_per_um3), point.beads_per_um3) +
+      " the force of the middle patch has a standard error of " + error(SpaceQuantity::force) + ", " +
+      error(SpaceQuantity::tangential_force) + " along the surface and " + error(SpaceQuantity::normal_force) +
+      " normal to it; the total force has " + error(SpaceQuantity::total_force) + ", the net force " +
+      error(SpaceQuantity::net_force) +
       ". The smallest force that can be seen is three times the patch's error. In the map, forces closer than " +
-      about(*patch.resolution_um) + " µm look like one.");
+      about(*patch.resolution_um) + " µm look like one; from about twice that on they are surely two.");
+  sentences.push_back(about_pair(plan, patch.least_distance_um));
   if (plan.drawn) sentences.push_back(about_drawn(*plan.drawn));
   return sentences;
 }
@@ -116,8 +126,15 @@ const Table<SpaceExpected>& space_expected_table() {
           {"target_nN", "standard error that is asked for", &Row::target_nN, kResult},
           {"share_within", "of the n, whose standard error is the target or less", &Row::share_within, kResult},
           {"smallest_seen_nN", "three standard errors", &Row::smallest_seen_nN, kResult},
-          {"resolution_um", "how far apart two forces must be to be seen as two in the map, at the middle patch",
+          {"resolution_um",
+           "in the map, at the middle patch: forces closer together than this look like one; from about twice that on "
+           "they "
+           "are surely two",
            &Row::resolution_um, kResult},
+          {"least_distance_um",
+           "of two patches of the force asked for, from centre to centre, whose forces are told apart where the image "
+           "shows them and nothing else pulls; empty: of another quantity, or at no distance",
+           &Row::least_distance_um, kResult},
           {"numbers_told", "how many numbers of the tractions the beads tell", &Row::degrees, kResult},
           {"largest_displacement_um", "of all beads", &Row::largest_displacement_um, kResult},
           {"beyond_linear", "share of the displacement that linear elasticity leaves out", &Row::left_out, kResult}}};
@@ -133,7 +150,8 @@ const Table<SpaceNeeded>& space_needed_table() {
           {"youngs_modulus_kPa", "of the gel", &Row::youngs_modulus_kPa, kResult},
           {"noise_um", "standard deviation of a displacement component along x or y", &Row::noise_um, kResult},
           {"beads_per_um3",
-           "at which half of the patches are within the target; empty: more than four times the densest asked for",
+           "at which half of the patches are within the target, and no less than the least asked for; empty: more than "
+           "four times the densest asked for",
            &Row::beads_per_um3, kResult},
           {"beads_per_um3_for_nine_in_ten", "the same for nine patches in ten", &Row::of_most, kResult}}};
   return table;

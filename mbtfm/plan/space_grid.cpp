@@ -1,5 +1,6 @@
 #include "mbtfm/plan/space_grid.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -184,13 +185,13 @@ double left_out(Gel gel, double youngs_modulus_kPa, double traction_kPa) {
   return choice::left_out_in_gel(gel, traction_kPa);
 }
 
-/// Density at which a patch's standard error is the target: on the line of logarithms between the densities, beyond
-/// them as the noise of the beads has it. None beyond most_beads_per_um3().
+/// Density at which a patch's standard error is the target: on the line of logarithms between the densities, above
+/// them as the noise of the beads has it, never below them. None beyond most_beads_per_um3().
 std::optional<double> needed_beads(const std::vector<double>& densities, const std::vector<double>& errors_nN,
                                    double target_nN) {
   const auto first = std::ranges::find_if(errors_nN, [&](double e) { return e <= target_nN; });
   const auto by_law = [&](std::size_t k) { return densities[k] * std::pow(errors_nN[k] / target_nN, 2); };
-  if (first == errors_nN.begin()) return by_law(0);
+  if (first == errors_nN.begin()) return densities.front();
   if (first == errors_nN.end()) {
     const double density = by_law(densities.size() - 1);
     return density <= most_beads_per_um3(densities) ? std::optional(density) : std::nullopt;
@@ -322,8 +323,19 @@ SpaceForeseen foresee(const SpaceScene& scene, const Asked& asked, const std::ve
   return foreseen;
 }
 
+PairResolution pairs_of(const SpaceScene& scene, const Asked& asked, const PairDraws& draws, int threads) {
+  std::vector<double> areas_um2;
+  for (const SpacePatch& patch : scene.patches) areas_um2.push_back(patch.adhesion.area_um2);
+  return {scene.gel,
+          numerics::median_in(areas_um2),
+          asked.beads_per_um3,
+          {.depth_um = scene.bead_depth_um, .axial_noise = scene.spatial.axial_sigma_ratio},
+          draws,
+          threads};
+}
+
 SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector<SpacePool>& pools,
-                  const SpaceForeseen& foreseen) {
+                  const SpaceForeseen& foreseen, const PairResolution& pairs) {
   using enum SpaceQuantity;
   SpaceGrid grid;
   std::vector<OnOwnGel> own;
@@ -354,6 +366,8 @@ SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector
                .smallest_seen_nN = kSeen * error_nN,
                .resolution_um =
                    quantity == force ? std::optional(resolution_at_patches(scene, pools[k].problem, f)) : std::nullopt,
+               .least_distance_um =
+                   quantity == force ? pairs.least_distance_um(asked.tension_nN, E, k, noise_um) : std::nullopt,
                .degrees = f.degrees,
                .largest_displacement_um = own[k].largest_um * scene.gel.youngs_modulus_kPa / E,
                .left_out = left_out(scene.gel, E, own[k].traction_kPa)});

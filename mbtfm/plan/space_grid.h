@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "mbtfm/plan/adhesion_pair.h"
 #include "mbtfm/plan/space_scene.h"
 #include "mbtfm/spatial/foresight.h"
 #include "pipeline/contract/work.h"
@@ -33,7 +34,9 @@ struct SpaceExpected {
   double share_within = 0;  ///< of the n
   double smallest_seen_nN = 0;
   std::optional<double> resolution_um;  ///< at the patches
-  double degrees = 0;                   ///< how many numbers the beads tell
+  std::optional<double>
+      least_distance_um;  ///< of two patches that forces on them alone tell apart; none: they never do
+  double degrees = 0;     ///< how many numbers the beads tell
   double largest_displacement_um = 0;
   double left_out = 0;  ///< of the displacement, by linear elasticity
 };
@@ -76,8 +79,10 @@ struct SpaceGrid {
 };
 /// The most of which a plan says whether they suffice: four times the densest asked for.
 double most_beads_per_um3(const std::vector<double>& densities);
+/// Of two patches of the middle size.
+PairResolution pairs_of(const SpaceScene& scene, const Asked& asked, const PairDraws& draws, int threads);
 SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector<SpacePool>& pools,
-                  const SpaceForeseen& foreseen);
+                  const SpaceForeseen& foreseen, const PairResolution& pairs);
 
 /// Of a patch: along its force, along the surface as its force goes, along the normal; unit vectors, by column.
 Eigen::Matrix3d directions_of(const SpaceScene& scene, const SpacePatch& patch);

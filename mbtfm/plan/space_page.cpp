@@ -1,5 +1,6 @@
 #include "mbtfm/plan/space_page.h"
 
+#include "mbtfm/plan/answer.h"
 #include "mbtfm/plan/page_parts.h"
 #include "pipeline/contract/numbers.h"
 
@@ -40,14 +41,16 @@ report::Table expected_rows(const SpacePlan& plan) {
                                   {"by beads", true},
                                   {"by background", true},
                                   {"within target (%)", true},
-                                  {"two apart from (µm)", true},
+                                  {"two in the map from (µm)", true},
+                                  {"two patches told from (µm)", true},
                                   {"numbers told", true}},
                       .rows = {}};
   for (const SpaceExpected& e : plan.grid.expected) {
     table.rows.push_back({brief(e.point.youngs_modulus_kPa), brief(e.point.beads_per_um3), brief(e.point.noise_um),
                           name_of(e.quantity), std::to_string(e.n), brief(e.standard_error_nN), brief(e.from_beads_nN),
                           brief(e.from_background_nN), brief(100 * e.share_within),
-                          e.resolution_um ? brief(*e.resolution_um) : "–", brief(e.degrees)});
+                          e.resolution_um ? brief(*e.resolution_um) : "–",
+                          e.least_distance_um ? brief(*e.least_distance_um) : "–", brief(e.degrees)});
   }
   return table;
 }
@@ -78,7 +81,7 @@ std::string html_of(const SpacePlan& plan) {
   if (!plan.grid.warnings.empty()) body += report::section("What to mind", paragraphs(plan.grid.warnings));
   body += report::section("Standard error over density", figures_of(charts_of(plan), plan.asked) + kHow);
   const auto needed_text = [&](const SpaceNeeded& n) {
-    return n.beads_per_um3 ? significant(*n.beads_per_um3, 2)
+    return n.beads_per_um3 ? density_text(plan.asked.beads_per_um3, *n.beads_per_um3)
                            : "&gt; " + significant(most_beads_per_um3(plan.asked.beads_per_um3), 2);
   };
   body += report::section("Beads per µm³ that are needed",

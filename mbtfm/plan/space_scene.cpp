@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "continuum/sheet/parameters.h"
 #include "mbtfm/spatial/stage.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -11,6 +12,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "samples/colonies/parameters.h"
 #include "samples/gels/folder.h"
 #include "samples/gels/scene.h"
 #include "substrate/surface/height.h"
@@ -22,6 +24,8 @@ namespace {
 struct Scenario {
   drawing::ScenarioParameters cell;
   gels::SpaceParameters space;
+  colonies::ColonyParameters colony;
+  sheet::SheetParameters sheet;
 };
 
 Scenario scenario_of(const Parameters& parameters) {
@@ -29,6 +33,8 @@ Scenario scenario_of(const Parameters& parameters) {
   stage::ParameterList list;
   declare(list, s.cell);
   declare(list, s.space);
+  declare(list, s.colony);
+  declare(list, s.sheet);
   stage::read_toml(list, drawing::scenario_file(parameters.scenario));
   s.cell.scenario = parameters.scenario;
   s.cell.seed = parameters.seed;
@@ -88,7 +94,15 @@ std::vector<SpacePatch> patches_of(const std::filesystem::path& folder) {
 
 }  // namespace
 
-bool is_in_space(const Parameters& parameters) { return scenario_of(parameters).space.scene != gels::SpaceScene::none; }
+bool is_in_space(const Parameters& parameters) {
+  const Scenario s = scenario_of(parameters);
+  if (s.colony.shape != colonies::Shape::none)
+    throw UsageError("scenario: " + parameters.scenario +
+                     " is a sheet without fibres, and a plan asks for the tensions of fibres. Simulate it with your "
+                     "gel, noise and beads (mbtfm-simulate) and fit it (mbtfm-sheet): sheet_fit.csv then has the "
+                     "standard errors of its contraction and stiffness. The commands are in docs/sheets.md");
+  return s.space.scene != gels::SpaceScene::none;
+}
 
 SpaceScene simulated_in_space(const Parameters& parameters, int threads) {
   Scenario s = scenario_of(parameters);

@@ -41,7 +41,7 @@ struct SpaceScene {
   double volume_um3() const { return (high_um.x - low_um.x) * (high_um.y - low_um.y) * bead_depth_um; }
 };
 
-/// Whether the scenario is a cell in space.
+/// Whether the scenario is a cell in space. @throws UsageError where it is neither that nor a cell with fibres
 bool is_in_space(const Parameters& parameters);
 /// The scene's own field is exact.
 SpaceScene simulated_in_space(const Parameters& parameters, int threads);

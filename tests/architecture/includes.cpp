@@ -83,10 +83,10 @@ const Graph kMayInclude = {
      {"pipeline/contract", "pipeline/files", "pipeline/stage", "samples/drawing", "samples/experiment",
       "continuum/sheet", "substrate", "substrate/greens"}},
     {"mbtfm/plan",
-     {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "pipeline/charts",
-      "pipeline/report", "network/cables", "substrate", "substrate/greens", "substrate/choice", "substrate/surface",
-      "mbtfm/tensions", "mbtfm/fit", "mbtfm/tractions", "mbtfm/spatial", "samples/drawing", "samples/experiment",
-      "samples/gels"}},
+     {"pipeline/contract", "pipeline/files",  "pipeline/numerics",  "pipeline/stage",   "pipeline/charts",
+      "pipeline/report",   "network/cables",  "substrate",          "substrate/greens", "substrate/choice",
+      "substrate/surface", "mbtfm/tensions",  "mbtfm/fit",          "mbtfm/tractions",  "mbtfm/spatial",
+      "continuum/sheet",   "samples/drawing", "samples/experiment", "samples/gels",     "samples/colonies"}},
 };
 
 /// Third-party headers and the nodes that may see them, by the beginning of the include.

@@ -66,11 +66,15 @@ TEST(Plan, a_finished_cell_is_planned_with_by_its_own_tensions_beads_and_gel) {
 TEST(Plan, what_is_no_plan_is_refused_and_leaves_nothing_behind) {
   const test::TemporaryFolder folder;
   const std::string out = " --out " + (folder / "plan").string();
-  for (const char* bad : {"--noise_um 0", "--noise_um a,b", "--beads_per_um2 1,-2", "--youngs_modulus_kPa 8400000000",
-                          "--within never", "--scenario no-such", "--beads_per_um2 20", "--power 2"}) {
+  for (const char* bad :
+       {"--noise_um 0", "--noise_um a,b", "--beads_per_um2 1,-2", "--youngs_modulus_kPa 8400000000", "--within never",
+        "--scenario no-such", "--beads_per_um2 20", "--beads_per_um2 0.001", "--power 2"}) {
     const Outcome outcome = run_program("mbtfm plan --scenario two-adhesions " + std::string(bad) + out);
     EXPECT_EQ(outcome.code, 2) << bad << ": " << outcome.output;
   }
+  const Outcome colony = run_program("mbtfm plan --scenario colony-disc" + out);
+  EXPECT_EQ(colony.code, 2) << colony.output;
+  EXPECT_NE(colony.output.find("is a sheet without fibres"), std::string::npos) << colony.output;
   EXPECT_EQ(run_program("mbtfm plan --cell " + (folder / "nowhere").string() + out).code, 3);
   EXPECT_FALSE(fs::exists(folder / "plan"));
 }
@@ -85,7 +89,8 @@ TEST(Plan, a_modulus_in_pascals_is_refused_and_no_end_of_a_search_is_an_answer) 
   EXPECT_FALSE(fs::exists(folder / "plan"));
   const Outcome stiff = run_program(ask + "900");
   ASSERT_EQ(stiff.code, 0) << stiff.output;
-  EXPECT_NE(stiff.output.find("no number of beads suffices to see 1 nN per fibre to 20 %."), std::string::npos)
+  EXPECT_NE(stiff.output.find("no number of beads suffices to see 1 nN per fibre to 20 %: with 0.5 per µm² the noise"),
+            std::string::npos)
       << stiff.output;
   EXPECT_TRUE(files::CsvTable(folder / "plan/plan_needed.csv").text(0, "beads_per_um2").empty());
 }
@@ -96,9 +101,8 @@ TEST(PlanInSpace, the_example_of_the_page_is_answered_for_each_patch_with_tables
   const std::string page = files::read_text(fs::path(MBTFM_SOURCE_DIR) / "docs/planning.md");
   const auto begin = page.find("mbtfm plan --scenario wave"), end = page.find('\n', begin);
   ASSERT_NE(begin, page.npos);
-  // with fewer beads than the cell has, for the time they take
-  const Outcome outcome = run_program(page.substr(begin, end - begin) +
-                                      " --beads_per_um3 0.001,0.002 --drawn 1 --out " + (folder / "plan").string());
+  const Outcome outcome =
+      run_program(page.substr(begin, end - begin) + " --drawn 1 --out " + (folder / "plan").string());
   ASSERT_EQ(outcome.code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find(" beads per µm³ ("), std::string::npos) << outcome.output;
   EXPECT_NE(outcome.output.find("Checked with 1 simulated experiment"), std::string::npos) << outcome.output;
