@@ -155,6 +155,19 @@ void write_adhesions_seen_from_above(const fs::path& folder) {
   files::write_outline(out / "outline.csv", outline, {}, {});
 }
 
+/// A finished folder is planned with by its own surface, adhesions, forces, beads and parameters.
+void expect_a_plan_of(const fs::path& folder) {
+  const fs::path out = folder.parent_path().parent_path() / "plan";
+  const auto plan = run_program("mbtfm plan --cell " + folder.string() +
+                                " --noise_um 0.05 --beads_per_um3 0.02 --drawn 1 --out " + out.string());
+  ASSERT_EQ(plan.code, 0) << plan.output;
+  EXPECT_NE(plan.output.find("With your gel of 15 kPa"), std::string::npos) << plan.output;
+  const auto n_adhesions = static_cast<int>(files::read_adhesions(folder / "1_segment/adhesions.csv").size());
+  const files::CsvTable expected(out / "plan.csv"), drawn(out / "plan_drawn.csv");
+  EXPECT_EQ(expected.integer(0, "n", 1), n_adhesions);
+  EXPECT_EQ(drawn.n_rows(), 3 * n_adhesions);
+}
+
 TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
   const fs::path folder = *folder_ / "study/cell_1";
   fs::create_directories(folder.parent_path());
@@ -204,6 +217,7 @@ TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
   EXPECT_NE(again.output.find("traction up to date"), std::string::npos) << again.output;
   EXPECT_NE(again.output.find("beads in space, as track.z_points is set"), std::string::npos) << again.output;
   EXPECT_EQ(run_program("mbtfm verify " + folder.string()).code, 0);
+  expect_a_plan_of(folder);
   // beads corrected by hand are the user's, and the tractions follow them
   auto beads = files::read_displacement_in_space(folder / "2_track/displacement_3d.csv");
   beads.pop_back();
