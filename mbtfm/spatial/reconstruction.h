@@ -164,7 +164,8 @@ struct Balance {
 };
 Balance balance_of(const Problem& problem, const SpatialReconstruction& reconstruction);
 
-/// How far apart two forces must be to be seen as two: the side of the area over which the beads tell one number for
+/// Forces closer together than this look like one; from about twice that on they are surely two
+/// (docs/developers/planning.md). The side of the area over which the beads tell one number for
 /// each component.
 std::vector<double> resolution_um(const Problem& problem, const SpatialReconstruction& reconstruction);
 
