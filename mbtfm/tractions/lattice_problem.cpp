@@ -113,8 +113,8 @@ Lattice field_of(const DisplacementField& beads, const LatticeOptions& options) 
 Lattice box_of(const Lattice& field, double padding) {
   Lattice box = field;
   if (padding <= 1) return box;
-  box.n_columns = quick_size(static_cast<int>(std::ceil(padding * field.n_columns)));
-  box.n_rows = quick_size(static_cast<int>(std::ceil(padding * field.n_rows)));
+  box.n_columns = numerics::quick_size(static_cast<int>(std::ceil(padding * field.n_columns)));
+  box.n_rows = numerics::quick_size(static_cast<int>(std::ceil(padding * field.n_rows)));
   return box;
 }
 
@@ -321,7 +321,7 @@ double product(const std::complex<double>& a, const std::complex<double>& b) {
 template <class Body>
 Eigen::Array2d TikhonovSolver::sum_over_waves(const Body& body) const {
   const Eigen::ArrayXd& weights = problem_.transform().weights();
-  return sum_over_parts(weights.size(), threads_, [&](Eigen::Index begin, Eigen::Index end) {
+  return numerics::sum_over_parts(weights.size(), threads_, [&](Eigen::Index begin, Eigen::Index end) {
     Eigen::Array2d sums = Eigen::Array2d::Zero();
     for (Eigen::Index k = begin; k < end; ++k) sums += weights[k] * body(k);
     return sums;

@@ -1,11 +1,16 @@
 /// How an elastic surface answers to waves of traction: its Green's function in Fourier space.
 #pragma once
 
-#include "mbtfm/tractions/waves.h"
 #include "pipeline/contract/gel.h"
+#include "pipeline/numerics/waves.h"
 #include "substrate/greens/wave.h"
 
 namespace mbtfm::tractions {
+
+using numerics::Lattice;
+using numerics::NodeField;
+using numerics::WaveField;
+using numerics::WaveTransform;
 
 /// What lies beyond the lattice.
 enum class Surroundings {

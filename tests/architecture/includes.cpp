@@ -102,7 +102,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
                 "samples/gels",      "substrate",           "substrate/greens", "substrate/boxes", "substrate/choice",
                 "substrate/curved",  "substrate/surface",   "mbtfm/plan",       "mbtfm/sheets",    "mbtfm/spatial",
                 "mbtfm/tensions",    "mbtfm/tractions",     "continuum/mean",   "continuum/sheet", "continuum/solids"}},
-    {"fftw3", {"mbtfm/tractions"}},
+    {"fftw3", {"pipeline/numerics"}},
     {"deal.II/", {"substrate/boxes"}},
     {"cholmod", {}},
     {"metis", {"pipeline/numerics"}},

@@ -1,4 +1,4 @@
-#include "mbtfm/tractions/waves.h"
+#include "pipeline/numerics/waves.h"
 
 #include <fftw3.h>
 
@@ -8,7 +8,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/parallel.h"
 
-namespace mbtfm::tractions {
+namespace mbtfm::numerics {
 
 namespace {
 
@@ -61,7 +61,7 @@ NodeField WaveTransform::no_field() const {
 void WaveTransform::forward(const NodeField& field, WaveField& waves, int threads) const {
   MBTFM_ASSERT(field.x.size() == static_cast<Eigen::Index>(n_columns_) * n_rows_ && field.y.size() == field.x.size() &&
                waves.x.size() == n_waves() && waves.y.size() == n_waves());
-  numerics::parallel_for(2, threads, [&](int component) {
+  parallel_for(2, threads, [&](int component) {
     const Eigen::ArrayXd& from = component == 0 ? field.x : field.y;
     // planned with FFTW_PRESERVE_INPUT
     fftw_execute_dft_r2c(plans_->forward, const_cast<double*>(from.data()),
@@ -73,7 +73,7 @@ void WaveTransform::backward(WaveField& waves, NodeField& field, int threads) co
   MBTFM_ASSERT(field.x.size() == static_cast<Eigen::Index>(n_columns_) * n_rows_ && field.y.size() == field.x.size() &&
                waves.x.size() == n_waves() && waves.y.size() == n_waves());
   const double scale = 1 / (static_cast<double>(n_columns_) * n_rows_);
-  numerics::parallel_for(2, threads, [&](int component) {
+  parallel_for(2, threads, [&](int component) {
     Eigen::ArrayXd& to = component == 0 ? field.x : field.y;
     fftw_execute_dft_c2r(plans_->backward, values_of(component == 0 ? waves.x : waves.y), to.data());
     to *= scale;
@@ -105,7 +105,7 @@ Eigen::Array2d sum_over_parts(Eigen::Index n_waves, int threads,
                               const std::function<Eigen::Array2d(Eigen::Index begin, Eigen::Index end)>& body) {
   constexpr int kParts = 4;  // as many threads as serve: beyond, memory is the limit
   std::array<Eigen::Array2d, kParts> sums;
-  numerics::parallel_for(kParts, threads, [&](int part) {
+  parallel_for(kParts, threads, [&](int part) {
     sums[static_cast<std::size_t>(part)] = body(n_waves * part / kParts, n_waves * (part + 1) / kParts);
   });
   return (sums[0] + sums[1]) + (sums[2] + sums[3]);
@@ -121,4 +121,4 @@ int quick_size(int at_least) {
   }
 }
 
-}  // namespace mbtfm::tractions
+}  // namespace mbtfm::numerics

@@ -7,7 +7,7 @@
 
 #include "pipeline/contract/geometry.h"
 
-namespace mbtfm::tractions {
+namespace mbtfm::numerics {
 
 /// Nodes in rows and columns, one spacing both ways; node (column i, row j) at i + n_columns·j.
 struct Lattice {
@@ -67,4 +67,4 @@ Eigen::Array2d sum_over_parts(Eigen::Index n_waves, int threads,
 /// columns fall on the same lines of the cache (measured: 512 takes five times as long as 540).
 int quick_size(int at_least);
 
-}  // namespace mbtfm::tractions
+}  // namespace mbtfm::numerics
