@@ -46,6 +46,7 @@ struct Parameters {
   std::optional<double> traction_sigma_kPa, traction_correlation_um;
   Parts fit_parts = Parts::none;                  ///< the simplest
   bool fit_line_tension = false;                  ///< most colonies have none
+  bool fit_adhesion_stiffness = false;            ///< few beads tell it beside the sheet's own
   tensions::Loss loss = tensions::Loss::squares;  ///< beads are Gaussian to first order
 };
 
@@ -74,13 +75,28 @@ void declare(stage::ParameterList& list, Parameters& p) {
       "with --displacement: parts with a contraction of their own: none, all of the sheet alike; edge: the band of "
       "edge_band_um and what is inside of it; cells: each cell of the label image --cells");
   list.add("fit_line_tension", p.fit_line_tension, "with --displacement: fit line_tension_nN, too");
+  list.add("fit_adhesion_stiffness", p.fit_adhesion_stiffness,
+           "with --displacement: fit adhesion_stiffness_nN_per_um3, too: springs between sheet and gel");
   list.add("loss", p.loss, "with --displacement: of the residuals; all but squares take beads less that stray");
 }
 
 // --- inputs
 
+/// The outer ring of an outline and its holes, and where the image cuts the outer one.
+struct Rings {
+  std::vector<Polygon> points_um;
+  Cuts cuts = {};
+};
+
+Cuts cuts_of(const Polygon& outline_um, const std::vector<bool>& is_cut) {
+  Cell cell;
+  cell.outline_um = outline_um;
+  cell.is_cut = is_cut;
+  return mbtfm::cuts_of(cell);
+}
+
 /// The largest part of a mask, or an ImageJ selection, in um.
-std::vector<Polygon> rings_of_picture(const Path& file, double pixel_um) {
+Rings rings_of_picture(const Path& file, double pixel_um) {
   constexpr double kAnySize = 1e12;
   cells::OutlineParameters any;
   any.outline_smallest_um2 = 0;
@@ -94,8 +110,8 @@ std::vector<Polygon> rings_of_picture(const Path& file, double pixel_um) {
     const cells::LabelMask mask = cells::read_mask(file);
     outline = cells::mask_outlines(mask, 0, {mask.width, mask.height, pixel_um}, any).front();
   }
-  std::vector<Polygon> rings = {outline.outer_um};
-  rings.insert(rings.end(), outline.holes_um.begin(), outline.holes_um.end());
+  Rings rings{.points_um = {outline.outer_um}, .cuts = cuts_of(outline.outer_um, outline.is_cut)};
+  rings.points_um.insert(rings.points_um.end(), outline.holes_um.begin(), outline.holes_um.end());
   return rings;
 }
 
@@ -108,21 +124,30 @@ Polygon distinct(const Polygon& ring) {
   return points;
 }
 
+Rings rings_of_table(const Path& file) {
+  Rings rings{.points_um = files::read_outline(file)};
+  std::vector<bool> is_cut;
+  for (const files::OutlinePoint& point : files::read(file, files::outline_table()))
+    if (point.ring == 0) is_cut.push_back(point.is_cut);
+  rings.cuts = cuts_of(rings.points_um.front(), is_cut);
+  return rings;
+}
+
 /// @throws InputError where a ring crosses itself or another, or has no area
-std::vector<Polygon> read_rings(const Path& file, const std::optional<double>& pixel_um) {
-  std::vector<Polygon> rings;
+Rings read_rings(const Path& file, const std::optional<double>& pixel_um) {
+  Rings rings;
   if (file.extension() == ".csv") {
-    rings = files::read_outline(file);
+    rings = rings_of_table(file);
   } else {
     if (!pixel_um) throw UsageError("pixel_size_um is missing: " + file.string() + " counts in pixels");
     rings = rings_of_picture(file, *pixel_um);
   }
-  for (Polygon& ring : rings) ring = distinct(ring);
-  const std::string crossing = crossing_of(rings);
+  for (Polygon& ring : rings.points_um) ring = distinct(ring);
+  const std::string crossing = crossing_of(rings.points_um);
   if (!crossing.empty())
     throw InputError(file.string(), "an outline that does not cross itself", crossing + " cross",
                      "a piece runs from a point to the next; remove the loop, or draw the outline again");
-  for (const Polygon& ring : rings) {
+  for (const Polygon& ring : rings.points_um) {
     const double around = ring.size() < 3 ? 0 : length_um(ring) + norm(ring.front() - ring.back());
     constexpr double kThinnest = 1e-6;  // a strip four millionths as wide as long
     if (!(std::abs(signed_area_um2(ring)) > kThinnest * around * around))
@@ -131,22 +156,17 @@ std::vector<Polygon> read_rings(const Path& file, const std::optional<double>& p
   return rings;
 }
 
-/// Whether a piece of it runs along the image's border: the sheet goes on beyond.
-bool has_cut(const Path& file) {
-  if (file.extension() != ".csv") return false;
-  return std::ranges::any_of(files::read(file, files::outline_table()), &files::OutlinePoint::is_cut);
-}
-
-Region region_of(const std::vector<Polygon>& rings) {
+Region region_of(const Rings& rings) {
   Region region;
-  for (const Polygon& ring : rings) region.rims.emplace_back(ring);
+  for (const Polygon& ring : rings.points_um) region.rims.emplace_back(ring);
+  region.cuts = rings.cuts;
   return region;
 }
 
 /// Where the sheet adheres: none where that is everywhere.
 std::vector<Polygon> adhesive_area(const Parameters& p, stage::StageContext& context) {
   if (!context.has_input("adhesive")) return {};
-  return read_rings(context.input("adhesive"), p.pixel_size_um);
+  return read_rings(context.input("adhesive"), p.pixel_size_um).points_um;
 }
 
 /// The triangles end at the border of the adhesive area where it lies inside of the sheet.
@@ -382,19 +402,22 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
     scene.size = size_on_springs(region, l_um);
     result.figures.emplace_back("penetration_um", l_um);
     context.assumed.clear();  // of a gel
-  } else {
-    scene.size = size_on_gel(region, scene.material, *gel, scene.adhesion_nN_per_um3);
+  }
+  std::unique_ptr<substrate::Substrate> model;
+  if (ground == Ground::gel) {
+    model = choice::make_substrate(*gel, p.substrate, context.threads);
+    scene.size = size_on_gel(region, scene.material, *gel, scene.adhesion_nN_per_um3, model->capabilities());
   }
   if (p.sheet.mesh_um) scene.size = with_edge(scene.size, *p.sheet.mesh_um);
   context.progress(0.1, "solving for the sheet");
   if (ground == Ground::springs) {
     result.solution = solve_on_springs(scene, context.threads);
   } else {
-    const auto model = choice::make_substrate(*gel, p.substrate, context.threads);
     result.solution = solve_on_gel(scene, *model, context.threads);
     if (context.has_input("beads"))
       write_beads(context, *model, result.solution, files::read_points(context.input("beads")));
     append(result.figures, model->figures());
+    result.figures.emplace_back("gel_compliance", std::string(name_of(*result.solution.gel_held)));
     result.effects = model->effects();
   }
   const bool slips = ground == Ground::gel && scene.adhesion_nN_per_um3.has_value();
@@ -420,6 +443,28 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
 Region area_around(const Region& region, stage::StageContext& context, const Parameters& p) {
   if (context.has_input("area")) return region_of(read_rings(context.input("area"), p.pixel_size_um));
   return region;
+}
+
+/// What the edge along the cuts makes of the tensions: with that held, clamped or free.
+Figures tell_cut(stage::StageContext& context, const Region& area, const Polygon& outline, const Solution& held,
+                 const CutPull& cut, const std::function<FromTraction(CutEdge)>& with) {
+  constexpr double kSame = 0.05;  // of the mean tension
+  const FromTraction clamped = with(CutEdge::clamped), free = with(CutEdge::free);
+  const double mean = figures_inside(held, outline).mean_nN_per_um,
+               of_clamped = figures_inside(clamped.solution, outline).mean_nN_per_um,
+               of_free = figures_inside(free.solution, outline).mean_nN_per_um;
+  const double reach = reach_of_cuts_um(held, clamped.solution, area.cuts, kSame * std::abs(mean));
+  context.notice(noticed(FindingKind::sheet_cut, std::abs(of_clamped - mean) / std::abs(mean),
+                         "The image cuts the sheet over " + brief(cut.length_um) + " µm. What lies beyond pulls with " +
+                             brief(norm(cut.force_nN)) + " nN. The mean tension is " + brief(mean) +
+                             " nN/µm if the sheet is held across the cut, " + brief(of_clamped) +
+                             " if it is clamped there, " + brief(of_free) + " if its edge is free; beyond " +
+                             brief(reach) + " µm from the cut the first two agree within 5 %."));
+  return {{"cut_length_um", cut.length_um},
+          {"cut_pull_nN", norm(cut.force_nN)},
+          {"cut_reach_um", reach},
+          {"inside_mean_tension_cut_clamped_nN_per_um", of_clamped},
+          {"inside_mean_tension_cut_free_nN_per_um", of_free}};
 }
 
 Run run_from_traction(const Parameters& p, stage::StageContext& context, const Region& region) {
@@ -463,6 +508,12 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
     const FromTraction with_nu = tensions_from(tractions, area, other, size, context.threads, p.most_unbalanced);
     result.figures.emplace_back(nu == 0 ? "inside_mean_tension_nu_0_nN_per_um" : "inside_mean_tension_nu_05_nN_per_um",
                                 figures_inside(with_nu.solution, outline).mean_nN_per_um);
+  }
+  if (found.cut) {
+    const auto with = [&](CutEdge edge) {
+      return tensions_from(tractions, area, material, size, context.threads, 1, {}, edge);
+    };
+    append(result.figures, tell_cut(context, area, outline, result.solution, *found.cut, with));
   }
   const double worst = std::max(found.unbalanced.net_force_share, found.unbalanced.net_torque_share);
   context.notice(noticed(FindingKind::tractions_off_balance, worst,
@@ -513,6 +564,12 @@ Words words_of(sheets::Quantity quantity) {
       return {"line tension", " nN"};
     case sheets::Quantity::contraction_over_stiffness:
       return {"contraction over stiffness", ""};
+    case sheets::Quantity::adhesion_stiffness:
+      return {"adhesion stiffness", " nN/µm³"};
+    case sheets::Quantity::penetration:
+      return {"penetration length", " µm"};
+    case sheets::Quantity::bundle_tension:
+      return {"tension", " nN"};
   }
   throw InternalError("unknown quantity");
 }
@@ -610,6 +667,16 @@ std::vector<Part> parts_on(std::vector<Part> parts, const Elements& elements, co
   return parts;
 }
 
+std::vector<Bundle> read_bundles(stage::StageContext& context) {
+  std::vector<Bundle> bundles;
+  if (!context.has_input("bundles")) return bundles;
+  for (const files::FibrePoint& point : files::read(context.input("bundles"), files::fibre_point_table())) {
+    if (bundles.empty() || bundles.back().fibre_id != point.fibre_id) bundles.push_back({point.fibre_id, {}});
+    bundles.back().points_um.push_back(point.position_um);
+  }
+  return bundles;
+}
+
 Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region) {
   if (!p.gel_modulus_kPa) throw UsageError("[gel] youngs_modulus_kPa is missing: the beads move with the gel");
   if (p.sheet.ground && *p.sheet.ground != Ground::gel)
@@ -619,6 +686,8 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
         "with --displacement the contraction is fitted: leave contraction_nN_per_um and contraction_kPa out");
   if (p.sheet.line_tension_nN > 0)
     throw UsageError("with --displacement a line tension is fitted (fit_line_tension): leave line_tension_nN out");
+  if (p.fit_adhesion_stiffness && p.sheet.adhesion_stiffness_nN_per_um3)
+    throw UsageError("fit_adhesion_stiffness asks for what adhesion_stiffness_nN_per_um3 gives: leave one of them out");
   if (!p.sheet.thickness_um) throw UsageError("[sheet] thickness_um is missing: give it in cell.toml");
   Gel gel = p.gel;
   gel.youngs_modulus_kPa = *p.gel_modulus_kPa;
@@ -636,9 +705,9 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   const auto model = choice::make_substrate(gel, p.substrate, context.threads);
   context.progress(0.1, "solving for the sheet at each stiffness");
   const auto elements = elements_of(scene);
-  const OnGel ground(*elements, *model, scene.adhesion_nN_per_um3, adhering_triangles(*elements, scene.adhesive_um),
-                     context.threads);
+  const OnGel ground(*elements, *model, adhering_triangles(*elements, scene.adhesive_um), context.threads);
   const std::vector<Part> parts = parts_on(parts_of(p, context, region), *elements, region);
+  const std::vector<Bundle> bundles = within(*elements, read_bundles(context));
   std::vector<std::vector<double>> shares;
   std::vector<std::string> names;
   for (const Part& part : parts) {
@@ -649,9 +718,11 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   const sheets::StiffnessTable table({.elements = elements,
                                       .contractions = shares,
                                       .poisson_ratio = nu,
-                                      .thickness_um = *p.sheet.thickness_um,
                                       .n_rims = static_cast<int>(region.rims.size()),
-                                      .has_line = p.fit_line_tension},
+                                      .has_line = p.fit_line_tension,
+                                      .bundles = bundles,
+                                      .bond = p.fit_adhesion_stiffness ? sheets::Bond::fitted : sheets::Bond::known,
+                                      .adhesion_nN_per_um3 = scene.adhesion_nN_per_um3},
                                      ground, gel, narrow, context.threads);
   context.progress(0.7, "fitting");
   std::optional<double> known;
@@ -660,7 +731,8 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   sheets::SheetFit fit = fit_sheet(data_of(beads, table, ground, *model, context.threads), table, p.loss, known, names);
   if (context.has_input("adhesions")) compare_with_adhesions(fit, data_of_adhesions(beads, context, *model));
 
-  scene.material.youngs_modulus_kPa = fit.stiffness_nN_per_um * (1 - nu * nu) / *p.sheet.thickness_um;
+  scene.material.youngs_modulus_kPa = fit.stiffnesses.sheet_nN_per_um * (1 - nu * nu) / *p.sheet.thickness_um;
+  scene.adhesion_nN_per_um3 = fit.stiffnesses.adhesion_nN_per_um3;
   const Eigen::Index n_parts = table.n_contractions();
   scene.contraction.nN_per_um = fit.loads.head(n_parts).maxCoeff();
   if (!parts.empty()) {
@@ -673,6 +745,9 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
     };
   }
   scene.line_tension_nN = p.fit_line_tension ? fit.loads(n_parts) : 0;
+  for (std::size_t k = 0; k < bundles.size(); ++k)
+    scene.bundles.push_back(
+        {bundles[k], fit.loads(fit.loads.size() - std::ssize(bundles) + static_cast<Eigen::Index>(k))});
   Run result{.solution = solve_on(ground, elements, scene), .figures = {}, .effects = model->effects()};
   std::vector<Vec2> places;
   for (const Bead& bead : beads) places.push_back(bead.position_um);
@@ -690,11 +765,12 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
   notice_expansion(context, fit, static_cast<int>(n_parts));
   context.notice(noticed(FindingKind::sheet_at_bound, fit.is_at_bound ? 1 : 0,
-                         "The best stiffness, " + brief(fit.stiffness_nN_per_um) + " nN/µm, is an end of the range " +
-                             brief(table.softest_nN_per_um()) + " to " + brief(table.stiffest_nN_per_um()) + "."));
+                         "The best stiffness, " + brief(fit.stiffnesses.sheet_nN_per_um) +
+                             " nN/µm, is an end of the range " + brief(table.sheet_nN_per_um().low) + " to " +
+                             brief(table.sheet_nN_per_um().high) + "."));
   result.figures = {{"ground", std::string(name_of(Ground::gel))},
                     {"strain", std::string(name_of(Strain::small))},
-                    {"stiffness_nN_per_um", fit.stiffness_nN_per_um},
+                    {"stiffness_nN_per_um", fit.stiffnesses.sheet_nN_per_um},
                     {"contraction_nN_per_um", scene.contraction.nN_per_um},
                     {"youngs_modulus_kPa", scene.material.youngs_modulus_kPa},
                     {"correlation", fit.correlation},
@@ -702,7 +778,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
                     {"expected_relative_l2", fit.expected_relative_l2},
                     {"n_beads", std::int64_t{fit.n_beads}},
                     {"n_down_weighted", std::int64_t{fit.n_down_weighted}},
-                    {"aic", fit.models[parts.empty() ? 1 : 2].aic},
+                    {"aic", fit.models[fit.own_model].aic},
                     {"aic_of_nothing", fit.models.front().aic}};
   const double x = free_contraction(scene.material, scene.contraction.nN_per_um);
   result.effects.push_back(stage::decided(EffectKind::gel_response, Switch::on, true, "the beads move with the gel"));
@@ -751,6 +827,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   if (context.has_input("adhesive") && has_tractions)
     throw UsageError(
         "--adhesive is for a sheet on springs or a gel: with --traction the tractions tell where it adheres");
+  if (context.has_input("bundles") && !has_beads) throw UsageError("--bundles are for a fit: give --displacement");
   if (context.has_input("adhesions") && !has_beads)
     throw UsageError("--adhesions are compared with a fit: give --displacement");
   Run done = has_tractions ? run_from_traction(p, context, region)
@@ -771,7 +848,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
                    brief(balance.mean_tension_nN_per_um) + " nN/µm over " + brief(balance.area_um2) +
                    " um2, total force " + brief(balance.total_force_nN) + " nN; " + done.solution.report.reason;
   if (!done.told.empty()) report.summary += "; " + done.told;
-  if (has_cut(context.input("outline")))
+  if (!region.cuts.empty() && !has_tractions)
     report.summary += "; WARNING: the image cuts the sheet, whose edge there is taken for free";
   if (n_outside > 0) report.summary += "; " + std::to_string(n_outside) + " points lie outside of the sheet";
   report.figures = done.figures;
@@ -798,6 +875,8 @@ int main(int argc, char** argv) {
              "displacement.csv of the beads: contraction and stiffness are fitted to them"},
             {"adhesions", Kind::optional_input,
              "with --displacement: adhesions.csv, whose forces are compared with the sheet in sheet_models.csv"},
+            {"bundles", Kind::optional_input,
+             "with --displacement: fibre_points.csv of stress fibres in the sheet, whose tensions are fitted, too"},
             {"beads", Kind::optional_input,
              "on a gel: points of its surface, x_um, y_um, at which displacement.csv is written"},
             {"cells", Kind::optional_input,

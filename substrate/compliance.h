@@ -99,6 +99,10 @@ struct Capabilities {
   bool incompressible = false;       ///< Poisson's ratio 0.5: where no bulk modulus, which is infinite then, stands
   bool linear = true;                ///< a response is a matrix
 };
+/// Neither sides nor a shape: what a force does depends on the distance alone.
+constexpr bool is_alike_everywhere(const Capabilities& gel) {
+  return !gel.sides && !gel.grading && !gel.surface && gel.linear;
+}
 
 struct Loads;         // see loads.h
 struct Observations;  // see loads.h

@@ -33,6 +33,13 @@ double rim_length_um(const Elements& elements, int n_rims) {
   return length;
 }
 
+NodeVectors load_of(const Solution& solution) {
+  NodeVectors load = forces_of_contraction_nN(*solution.elements, solution.sheet);
+  for (const TautBundle& taut : solution.bundles)
+    load += taut.tension_nN * forces_of_bundle_nN(*solution.elements, taut.bundle);
+  return load;
+}
+
 }  // namespace
 
 std::shared_ptr<const Elements> elements_of(const Scene& scene) {
@@ -108,9 +115,11 @@ Solution solve_on_springs(const Scene& scene, int threads) {
 Solution solve_on(const OnGel& ground, std::shared_ptr<const Elements> triangles, const Scene& scene) {
   Solution solution = prepared(std::move(triangles), scene);
   const Elements& elements = *solution.elements;
-  OnGel::Solution found = ground.solve(scene.material, forces_of_contraction_nN(elements, solution.sheet));
+  solution.bundles = scene.bundles;
+  OnGel::Solution found = ground.solve(scene.material, scene.adhesion_nN_per_um3, load_of(solution));
   solution.u = std::move(found.u);
   solution.report = found.report;
+  solution.gel_held = ground.held();
   solution.at_points = tension_at_points(elements, solution.sheet, solution.u);
   solution.at_nodes = recovered(elements, solution.at_points);
   for (int t = 0; t < elements.n_triangles(); ++t)
@@ -126,9 +135,7 @@ Solution solve_on(const OnGel& ground, std::shared_ptr<const Elements> triangles
 
 Solution solve_on_gel(const Scene& scene, const substrate::Substrate& gel, int threads) {
   const std::shared_ptr<const Elements> elements = elements_of(scene);
-  return solve_on(
-      OnGel(*elements, gel, scene.adhesion_nN_per_um3, adhering_triangles(*elements, scene.adhesive_um), threads),
-      elements, scene);
+  return solve_on(OnGel(*elements, gel, adhering_triangles(*elements, scene.adhesive_um), threads), elements, scene);
 }
 
 Balance balance_of(const Solution& solution) {
@@ -150,10 +157,10 @@ Balance balance_of(const Solution& solution) {
     virial += dot(arm, force);
   }
   balance.mean_tension_nN_per_um = mean_of(mean_over(elements, solution.at_points));
-  balance.virial_tension_nN_per_um =
-      -(virial + solution.sheet.line_tension_nN * rim_length_um(elements, solution.sheet.n_rims)) /
-      (2 * balance.area_um2);
-  balance.elastic_energy_fJ = 0.5 * solution.u.dot(forces_of_contraction_nN(elements, solution.sheet));
+  virial += solution.sheet.line_tension_nN * rim_length_um(elements, solution.sheet.n_rims);
+  for (const TautBundle& taut : solution.bundles) virial += taut.tension_nN * length_um(taut.bundle.points_um);
+  balance.virial_tension_nN_per_um = -virial / (2 * balance.area_um2);
+  balance.elastic_energy_fJ = 0.5 * solution.u.dot(load_of(solution));
   return balance;
 }
 

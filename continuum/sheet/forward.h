@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "continuum/sheet/bundles.h"
 #include "continuum/sheet/on_gel.h"
 #include "continuum/sheet/on_springs.h"
 #include "continuum/sheet/recovery.h"
@@ -32,11 +33,17 @@ struct Contraction {
   std::function<double(Vec2 place_um)> at = {};  ///< in place of nN_per_um, where it differs
 };
 
+struct TautBundle {
+  Bundle bundle;
+  double tension_nN = 0;
+};
+
 struct Scene {
   Region region;
   Material material;
   Contraction contraction;
   double line_tension_nN = 0;
+  std::vector<TautBundle> bundles = {};            ///< on a gel
   std::optional<double> adhesion_nN_per_um3 = {};  ///< unset: bonded, where there is a gel
   std::vector<Polygon> adhesive_um = {};  ///< the sheet adheres where a place lies in an odd number; none: everywhere
   Strain strain = Strain::small;
@@ -59,7 +66,9 @@ struct Solution {
   std::vector<Tensor> at_points, at_nodes;  ///< S
   std::vector<GroundPatch> patches;         ///< by triangle; of one that does not adhere without traction
   Report report;
+  std::vector<TautBundle> bundles = {};
   std::vector<double> sigma_by_triangle = {};  ///< of the mean tension (nN/um); empty: not known
+  std::optional<Held> gel_held = {};           ///< its compliance; unset: there is no gel
 };
 
 /// Contraction at each point of the elements.
@@ -85,7 +94,7 @@ struct Balance {
   double largest_torque_nN_um = 0;      ///< sum of distance times magnitude
   double elastic_energy_fJ = 0;         ///< of sheet and ground at small strains: half of the contraction's work
   double mean_tension_nN_per_um = 0;    ///< ½ tr S, mean over the area
-  double virial_tension_nN_per_um = 0;  ///< −1/(2A) Σ x · F, less Λ × the rim / (2 A)
+  double virial_tension_nN_per_um = 0;  ///< −1/(2A) Σ x · F, less Λ × the rim / (2 A) and the same of bundles
   double area_um2 = 0;
 };
 Balance balance_of(const Solution& solution);

@@ -55,8 +55,8 @@ Parts parts_of(const std::vector<GroundPatch>& tractions, const Elements& elemen
   return parts;
 }
 
-/// Takes net force and torque off. @returns what was there
-Unbalanced balance(Parts& parts) {
+/// Takes off what nothing bears of net force and torque. @param hold  at cuts. @returns what was there
+Unbalanced balance(Parts& parts, const CutHold& hold) {
   Vec2 centre, net;
   double area = 0, sum = 0;
   for (const Part& part : parts.inside) {
@@ -73,11 +73,23 @@ Unbalanced balance(Parts& parts) {
     largest += norm(arm) * norm(part.force_nN);
     inertia += part.area_um2 * dot(arm, arm);
   }
+  if (hold.holds[0]) net.x = 0;
+  if (hold.holds[1]) net.y = 0;
+  if (hold.is_anywhere()) torque = 0;  // a line that may not move across bears a torque, too
   for (Part& part : parts.inside) {
     const Vec2 arm = part.shape.place_um - centre;
     part.force_nN = part.force_nN - part.area_um2 * (1 / area * net + torque / inertia * Vec2{-arm.y, arm.x});
   }
   return {norm(net) / sum, std::abs(torque) / largest, parts.outside_nN / parts.all_nN};
+}
+
+/// With what the cuts leave free of the sheet's motions as a whole held at one node or two, which takes no force.
+std::vector<std::array<bool, 2>> held_nodes(const CutHold& hold, const Elements& elements) {
+  if (!hold.is_anywhere()) return pins(elements);
+  std::vector<std::array<bool, 2>> held = hold.held;
+  for (std::size_t axis = 0; axis < 2; ++axis)
+    if (!hold.holds[axis]) held.front()[axis] = true;
+  return held;
 }
 
 std::vector<GroundPatch> patches_of(const Parts& parts, const Elements& elements) {
@@ -98,8 +110,22 @@ std::vector<GroundPatch> patches_of(const Parts& parts, const Elements& elements
   return patches;
 }
 
-/// As balance_of(), of the parts themselves: exact.
-Balance balance_of_parts(const Parts& parts, const Solution& solution) {
+/// What holds the sheet, on the nodes.
+NodeVectors reactions_nN(const Solution& solution, const NodeVectors& load, const CutHold& hold) {
+  NodeVectors reactions = NodeVectors::Zero(load.size());
+  if (!hold.is_anywhere()) return reactions;
+  const Elements& elements = *solution.elements;
+  for (int t = 0; t < elements.n_triangles(); ++t) {
+    Eigen::Matrix<double, 12, 1> u;
+    for (int i = 0; i < 6; ++i) u.segment<2>(2 * i) = solution.u.segment<2>(2 * elements.nodes(t)[i]);
+    const Eigen::Matrix<double, 12, 1> inside = elastic_stiffness(elements, t, solution.sheet.material) * u;
+    for (int i = 0; i < 6; ++i) reactions.segment<2>(2 * elements.nodes(t)[i]) += inside.segment<2>(2 * i);
+  }
+  return reactions - load;
+}
+
+/// As balance_of(), of the parts themselves and what holds the sheet: exact.
+Balance balance_of_parts(const Parts& parts, const Solution& solution, const NodeVectors& reactions) {
   Balance result = balance_of(solution);
   result.net_force_nN = {};
   result.net_torque_nN_um = result.total_force_nN = result.largest_torque_nN_um = 0;
@@ -111,6 +137,8 @@ Balance balance_of_parts(const Parts& parts, const Solution& solution) {
     result.largest_torque_nN_um += norm(part.shape.place_um) * norm(part.force_nN);
     virial += dot(part.shape.place_um, part.force_nN);
   }
+  for (int i = 0; i < solution.elements->n_nodes(); ++i)
+    virial -= dot(solution.elements->triangles().nodes_um[static_cast<std::size_t>(i)], at_node(reactions, i));
   result.virial_tension_nN_per_um = -virial / (2 * result.area_um2);
   return result;
 }
@@ -127,7 +155,8 @@ NodeVectors load_of(const Parts& parts, const Elements& elements) {
 }
 
 /// Squares of the correlation's side each draw an error; net force and torque are taken off as of the tractions.
-TensionErrors errors_by(const TractionNoise& noise, Parts parts, const Solution& solution, const Stiffness& stiffness) {
+TensionErrors errors_by(const TractionNoise& noise, Parts parts, const Solution& solution, const Stiffness& stiffness,
+                        const CutHold& hold) {
   const Elements& elements = *solution.elements;
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal(0, noise.sigma_kPa);
@@ -145,7 +174,7 @@ TensionErrors errors_by(const TractionNoise& noise, Parts parts, const Solution&
       }
       part.force_nN = part.area_um2 * square->second;
     }
-    balance(parts);
+    balance(parts, hold);
     loads.col(draw) = load_of(parts, elements);
   }
   const Eigen::MatrixXd u = stiffness.solve(loads);
@@ -168,7 +197,7 @@ TensionErrors errors_by(const TractionNoise& noise, Parts parts, const Solution&
 
 FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Region& region, const Material& material,
                            const TriangleSize& size, int threads, double most_unbalanced,
-                           const std::optional<TractionNoise>& noise) {
+                           const std::optional<TractionNoise>& noise, CutEdge at_cuts) {
   constexpr std::size_t kMostTriangles = 200000;
   FromTraction result;
   Solution& solution = result.solution;
@@ -178,7 +207,8 @@ FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Regi
   if (parts.inside.empty())
     throw InputError("the tractions", "some inside of the outline", "none",
                      "outline and tractions must have one origin");
-  result.unbalanced = balance(parts);
+  const CutHold hold = hold_at_cuts(elements, region, at_cuts);
+  result.unbalanced = balance(parts, hold);
   const double worst = std::max(result.unbalanced.net_force_share, result.unbalanced.net_torque_share);
   if (worst > most_unbalanced)
     throw InputError("the tractions inside of the outline",
@@ -191,17 +221,23 @@ FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Regi
   solution.sheet.material = material;
   solution.sheet.contraction_nN_per_um = even(elements, 0);
   solution.sheet.n_rims = static_cast<int>(region.rims.size());
-  Stiffness stiffness(elements, pins(elements));
+  Stiffness stiffness(elements, held_nodes(hold, elements));
   for (int t = 0; t < elements.n_triangles(); ++t) stiffness.add(t, elastic_stiffness(elements, t, material));
   const bool is_definite = stiffness.factorise(0, threads);
   MBTFM_ASSERT(is_definite);
-  solution.u = stiffness.solve(load_of(parts, elements));
+  const NodeVectors load = load_of(parts, elements);
+  solution.u = stiffness.solve(load);
   solution.report = {.converged = true, .iterations = 1, .last_change = 0, .reason = "one linear solve"};
   solution.at_points = tension_at_points(elements, solution.sheet, solution.u);
   solution.at_nodes = recovered(elements, solution.at_points);
   solution.patches = patches_of(parts, elements);
-  result.balance = balance_of_parts(parts, solution);
-  if (noise) result.errors = errors_by(*noise, parts, solution, stiffness);
+  const NodeVectors reactions = reactions_nN(solution, load, hold);
+  result.balance = balance_of_parts(parts, solution, reactions);
+  if (hold.is_anywhere()) {
+    result.cut = {.force_nN = {}, .length_um = hold.length_um};
+    for (int i = 0; i < elements.n_nodes(); ++i) result.cut->force_nN += at_node(reactions, i);
+  }
+  if (noise) result.errors = errors_by(*noise, parts, solution, stiffness, hold);
   return result;
 }
 
@@ -224,6 +260,20 @@ TensionFigures figures_inside(const Solution& solution, const Polygon& outline_u
   figures.variation = std::sqrt(std::max(0.0, variance)) / std::abs(figures.mean_nN_per_um);
   figures.shear_nN_per_um = shear / figures.area_um2;
   return figures;
+}
+
+double reach_of_cuts_um(const Solution& a, const Solution& b, const Cuts& cuts, double difference_nN_per_um) {
+  double reach = 0;
+  for (int t = 0; t < a.elements->n_triangles(); ++t)
+    for (int p = 0; p < Elements::kPoints; ++p) {
+      const auto k = static_cast<std::size_t>(Elements::kPoints * t + p);
+      if (std::abs(mean_of(a.at_points[k]) - mean_of(b.at_points[k])) <= difference_nN_per_um) continue;
+      double distance = std::numeric_limits<double>::infinity();
+      for (const auto& [from, to] : cuts)
+        distance = std::min(distance, distance_to_segment_um(a.elements->at(t, p).place_um, from, to));
+      reach = std::max(reach, distance);
+    }
+  return reach;
 }
 
 }  // namespace mbtfm::sheet

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "continuum/sheet/cut_edge.h"
 #include "continuum/sheet/forward.h"
 
 namespace mbtfm::sheet {
@@ -28,10 +29,17 @@ struct TensionErrors {
   std::vector<double> by_triangle;   ///< of the mean tension there
 };
 
+/// What the sheet beyond the cuts does to what is seen.
+struct CutPull {
+  Vec2 force_nN;
+  double length_um = 0;  ///< of the cuts
+};
+
 struct FromTraction {
   Solution solution;      ///< u is of a sheet with the material's stiffness, up to a motion as a whole
   Unbalanced unbalanced;  ///< before it was taken off
   Balance balance;
+  std::optional<CutPull> cut;  ///< where the sheet is held at cuts
   std::optional<TensionErrors> errors;
 };
 
@@ -40,11 +48,12 @@ inline constexpr double kMostUnbalanced = 0.2;
 
 /// S of a free sheet under −T: div S = T, S n = 0 on the rims. An elastic law decides what balance alone does not; S
 /// does not depend on its modulus. A patch whose centre lies in the region acts as the square of its area; the
-/// others are left out. A net force and torque are taken off by an even traction and an even turn (least squares in T).
+/// others are left out. A net force and torque are taken off by an even traction and an even turn (least squares in T),
+/// as far as no cut can bear them.
 /// @param most_unbalanced  share of net force or torque. @throws InputError where more is out of balance
 FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Region& region, const Material& material,
                            const TriangleSize& size, int threads, double most_unbalanced = kMostUnbalanced,
-                           const std::optional<TractionNoise>& noise = {});
+                           const std::optional<TractionNoise>& noise = {}, CutEdge at_cuts = CutEdge::held);
 
 /// Of ½ tr S and S_xy, over the part of the sheet inside of an outline.
 struct TensionFigures {
@@ -54,5 +63,8 @@ struct TensionFigures {
   double area_um2 = 0;
 };
 TensionFigures figures_inside(const Solution& solution, const Polygon& outline_um);
+
+/// How far from the cuts two solutions on the same triangles differ in ½ tr S by more than this.
+double reach_of_cuts_um(const Solution& a, const Solution& b, const Cuts& cuts, double difference_nN_per_um);
 
 }  // namespace mbtfm::sheet

@@ -1,18 +1,11 @@
 #include "continuum/sheet/on_gel.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "continuum/sheet/stiffness.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/numerics/neighbour_bins.h"
-#include "pipeline/numerics/parallel.h"
-#include "substrate/loads.h"
-#include "substrate/response.h"
 
 namespace mbtfm::sheet {
 namespace {
@@ -83,125 +76,53 @@ constexpr int kMostIterations = 2000;
 
 }  // namespace
 
-substrate::Ellipse ellipse_of(Vec2 a, Vec2 b, Vec2 c) {
-  const Vec2 centre = 1.0 / 3 * (a + b + c);
-  Eigen::Matrix2d inertia = Eigen::Matrix2d::Zero();
-  for (const Vec2 p : {a, b, c}) {
-    const Eigen::Vector2d d(p.x - centre.x, p.y - centre.y);
-    inertia += d * d.transpose() / 12;
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(inertia);
-  const double ratio = std::sqrt(axes.eigenvalues()(1) / axes.eigenvalues()(0));
-  const double product = 0.5 * std::abs(cross(b - a, c - a)) / std::numbers::pi;
-  const Eigen::Vector2d major = axes.eigenvectors().col(1);
-  const double semi_major = std::sqrt(product * ratio);
-  return {centre, semi_major, std::min(semi_major, product / semi_major), std::atan2(major.y(), major.x())};
-}
-
-substrate::Ellipse patch_of(const Elements& elements, int triangle) {
-  const auto corner = [&](std::size_t i) {
-    return elements.triangles().nodes_um[static_cast<std::size_t>(elements.nodes(triangle)[i])];
-  };
-  substrate::Ellipse ellipse = ellipse_of(corner(0), corner(1), corner(2));
-  const double area = elements.area_um2(triangle);  // of the curved triangle
-  const double scale = std::sqrt(area / (std::numbers::pi * ellipse.semi_major_um * ellipse.semi_minor_um));
-  ellipse.semi_major_um *= scale;
-  ellipse.semi_minor_um *= scale;
-  ellipse.centre_um = {};
-  for (int p = 0; p < Elements::kPoints; ++p)
-    ellipse.centre_um += elements.at(triangle, p).weight_um2 / area * elements.at(triangle, p).place_um;
-  return ellipse;
-}
-
-OnGel::OnGel(const Elements& elements, const substrate::Substrate& gel, std::optional<double> adhesion_nN_per_um3,
-             std::vector<int> adhering, int threads)
-    : elements_(elements), threads_(threads), adhesion_(adhesion_nN_per_um3), adhering_(std::move(adhering)) {
-  if (adhering_.size() < 2)
-    throw InvalidData("where the sheet adheres", "two of its triangles or more", std::to_string(adhering_.size()));
-  std::vector<Vec2> centres;
-  for (const int t : adhering_) {
-    ellipses_.push_back(patch_of(elements, t));
-    centres.push_back(ellipses_.back().centre_um);
-    areas_um2_.push_back(elements.area_um2(t));
+OnGel::OnGel(const Elements& elements, const substrate::Substrate& gel, std::vector<int> adhering, int threads,
+             std::optional<Held> held)
+    : patches_(patches_of(elements, std::move(adhering))),
+      threads_(threads),
+      held_(held.value_or(held_for(patches_.n(), gel.capabilities()))),
+      compliance_(compliance_of(patches_, gel, held_, threads)) {
+  for (int k = 0; k < patches_.n(); ++k) {
     std::array<double, 6>& weights = weights_.emplace_back();
     for (int p = 0; p < Elements::kPoints; ++p)
-      for (std::size_t i = 0; i < 6; ++i)
-        weights[i] += elements.at(t, p).weight_um2 / areas_um2_.back() * elements.at(t, p).value[i];
+      for (std::size_t i = 0; i < 6; ++i) weights[i] += patches_.share(k, p) * patches_.at(k, p).value[i];
   }
-  compliance_ = gel.compliance_um_per_nN(centres, ellipses_);
-  average_near(gel, centres);
-  for (Index j = 0; j < compliance_.cols(); ++j)
-    for (Index i = j; i < compliance_.rows(); ++i) compliance_(i, j) = 0.5 * (compliance_(i, j) + compliance_(j, i));
 }
 
-void OnGel::average_near(const substrate::Substrate& gel, const std::vector<Vec2>& centres) {
-  constexpr double kReach = 2.5;  // sizes of the two patches: beyond, the centre's value is the mean to 1 %
-  double largest = 0;
-  for (const double area : areas_um2_) largest = std::max(largest, std::sqrt(area));
-  numerics::Grid grid(centres, largest);
-  for (std::size_t i = 0; i < centres.size(); ++i) grid.add(static_cast<int>(i), centres[i], centres[i]);
-  std::vector<std::vector<int>> near(centres.size());
-  for (std::size_t j = 0; j < centres.size(); ++j)
-    grid.for_each_near(centres[j], centres[j], 2 * kReach * largest, [&](int i) {
-      const double sizes = std::sqrt(areas_um2_[j]) + std::sqrt(areas_um2_[static_cast<std::size_t>(i)]);
-      if (norm(centres[static_cast<std::size_t>(i)] - centres[j]) < kReach * sizes) near[j].push_back(i);
-    });
-  numerics::parallel_for(static_cast<int>(centres.size()), threads_, [&](int j) {
-    std::vector<Vec2> points;
-    for (const int i : near[static_cast<std::size_t>(j)])
-      for (int p = 0; p < Elements::kPoints; ++p)
-        points.push_back(elements_.at(adhering_[static_cast<std::size_t>(i)], p).place_um);
-    const Eigen::MatrixXd field = gel.compliance_um_per_nN(points, {ellipses_[static_cast<std::size_t>(j)]});
-    Index row = 0;
-    for (const int i : near[static_cast<std::size_t>(j)]) {
-      Eigen::Matrix2d mean = Eigen::Matrix2d::Zero();
-      for (int p = 0; p < Elements::kPoints; ++p, row += 2)
-        mean += elements_.at(adhering_[static_cast<std::size_t>(i)], p).weight_um2 /
-                areas_um2_[static_cast<std::size_t>(i)] * field.middleRows<2>(row);
-      compliance_.block<2, 2>(2 * i, 2 * j) = mean;
-    }
-  });
+/// Of each patch's springs.
+VectorXd OnGel::slip_um_per_nN(double adhesion_nN_per_um3) const {
+  VectorXd slip(2 * patches_.n());
+  for (Index i = 0; i < slip.size(); ++i)
+    slip(i) = 1 / (adhesion_nN_per_um3 * patches_.areas_um2[static_cast<std::size_t>(i / 2)]);
+  return slip;
 }
 
-VectorXd OnGel::gel_um(const VectorXd& forces_nN) const {
-  return compliance_.selfadjointView<Eigen::Lower>() * forces_nN;
-}
-
-VectorXd OnGel::ground_um(const VectorXd& forces_nN) const {
-  VectorXd u = gel_um(forces_nN);
-  if (adhesion_)
-    for (Index i = 0; i < u.size(); ++i)
-      u(i) += forces_nN(i) / (*adhesion_ * areas_um2_[static_cast<std::size_t>(i / 2)]);
-  return u;
-}
-
-OnGel::Solution OnGel::solve(const Material& material, const NodeVectors& load_nN) const {
-  const Means means{elements_, adhering_, weights_};
+OnGel::Solution OnGel::solve(const Material& material, std::optional<double> adhesion_nN_per_um3,
+                             const NodeVectors& load_nN) const {
+  const Elements& elements = *patches_.elements;
+  const Means means{elements, patches_.triangles, weights_};
   const Index n = means.n();
-  Stiffness free(elements_, pins(elements_)), held(elements_, {});
-  VectorXd spring(n);  // nN/um of each patch: what the gel under it and its neighbours is like
-  constexpr double kNeighbours = 4;
-  for (Index i = 0; i < n; ++i) {
-    spring(i) = kNeighbours * compliance_(i, i);
-    if (adhesion_) spring(i) += 1 / (*adhesion_ * areas_um2_[static_cast<std::size_t>(i / 2)]);
-    spring(i) = 1 / spring(i);
-  }
-  for (int t = 0; t < elements_.n_triangles(); ++t) {
-    const Stiffness::OfElement K = elastic_stiffness(elements_, t, material);
+  Stiffness free(elements, pins(elements)), held(elements, {});
+  const VectorXd slip = adhesion_nN_per_um3 ? slip_um_per_nN(*adhesion_nN_per_um3) : VectorXd::Zero(n);
+  constexpr double kNeighbours = 4;  // what the gel under a patch and its neighbours is like
+  const VectorXd spring = (kNeighbours * compliance_->diagonal_um_per_nN() + slip).cwiseInverse();
+  const auto ground_um = [&](const VectorXd& forces) -> VectorXd { return gel_um(forces) + slip.cwiseProduct(forces); };
+  for (int t = 0; t < elements.n_triangles(); ++t) {
+    const Stiffness::OfElement K = elastic_stiffness(elements, t, material);
     free.add(t, K);
     held.add(t, K);
   }
-  for (std::size_t k = 0; k < adhering_.size(); ++k) {
+  for (std::size_t k = 0; k < patches_.triangles.size(); ++k) {
     Stiffness::OfElement K = Stiffness::OfElement::Zero();
     const auto& w = weights_[k];
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j < 6; ++j)
         for (int a = 0; a < 2; ++a) K(2 * i + a, 2 * j + a) = spring(2 * static_cast<Index>(k) + a) * w[i] * w[j];
-    held.add(adhering_[k], K);
+    held.add(patches_.triangles[k], K);
   }
   if (!free.factorise(0, threads_) || !held.factorise(0, threads_))
     throw NotSolved({.reason = "the sheet has no stiffness: check its Young's modulus and thickness"});
-  const Eigen::MatrixXd rigid = rigid_motions(elements_);
+  const Eigen::MatrixXd rigid = rigid_motions(elements);
   const Balanced balanced(of_patches(rigid, means), spring);
   const auto preconditioned = [&](const VectorXd& r) -> VectorXd {
     const VectorXd scaled = spring.cwiseProduct(r);
@@ -236,6 +157,29 @@ OnGel::Solution OnGel::solve(const Material& material, const NodeVectors& load_n
   solution.u = at_rest - free.solve(means.spread(solution.forces_nN));
   solution.u += rigid * balanced.motion_in(ground_um(solution.forces_nN) - means.of(solution.u));
   return solution;
+}
+
+OnGel::Reduced OnGel::reduced(const Eigen::MatrixXd& forces_nN, double poisson_ratio,
+                              const NodeVectors& load_nN) const {
+  const Elements& elements = *patches_.elements;
+  const Means means{elements, patches_.triangles, weights_};
+  const Material unit{1 - poisson_ratio * poisson_ratio, poisson_ratio, 1};
+  Stiffness free(elements, pins(elements));
+  for (int t = 0; t < elements.n_triangles(); ++t) free.add(t, elastic_stiffness(elements, t, unit));
+  const bool is_definite = free.factorise(0, threads_);
+  MBTFM_ASSERT(is_definite);
+  Eigen::MatrixXd loads(load_nN.size(), forces_nN.cols() + 1), on_gel(forces_nN.rows(), forces_nN.cols());
+  for (Index k = 0; k < forces_nN.cols(); ++k) {
+    loads.col(k) = means.spread(forces_nN.col(k));
+    on_gel.col(k) = gel_um(forces_nN.col(k));
+  }
+  loads.rightCols(1) = load_nN;
+  const Eigen::MatrixXd u = free.solve(loads);
+  const Eigen::MatrixXd work = loads.leftCols(forces_nN.cols()).transpose() * u;
+  return {.gel = forces_nN.transpose() * on_gel,
+          .slip = forces_nN.transpose() * slip_um_per_nN(1).asDiagonal() * forces_nN,
+          .sheet = work.leftCols(forces_nN.cols()),
+          .pull = work.rightCols(1)};
 }
 
 }  // namespace mbtfm::sheet

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "continuum/sheet/curve.h"
+#include "pipeline/contract/cell.h"
 
 namespace mbtfm::sheet {
 
@@ -35,6 +36,7 @@ struct TriangleSize {
 struct Region {
   std::vector<Curve> rims;   ///< the outer one, then holes in it
   std::vector<Curve> lines;  ///< inside, that sides must follow; rims and lines number the curves
+  Cuts cuts = {};            ///< pieces of the rims along the image's border: the sheet goes on beyond
 };
 
 /// @throws InvalidData where there would be more than `most` triangles or a curve is too fine to be followed

@@ -36,7 +36,6 @@ std::optional<StiffnessTable> table_of(const std::shared_ptr<const sheet::Elemen
     return StiffnessTable({.elements = elements,
                            .contractions = {sheet::even(*elements, 1)},
                            .poisson_ratio = 0.5,
-                           .thickness_um = 1,  // only its product with the modulus counts
                            .n_rims = static_cast<int>(region.rims.size()),
                            .has_line = false},
                           ground, gel, sheet::narrow_um(region), threads);
@@ -50,14 +49,13 @@ std::optional<StiffnessTable> table_of(const std::shared_ptr<const sheet::Elemen
 std::optional<tensions::ModelScore> score_of_sheet(const tensions::LinearData& data,
                                                    const std::vector<Polygon>& outline_um, const Gel& gel,
                                                    const substrate::Substrate& model, int threads) {
-  const substrate::Capabilities can = model.capabilities();
-  if (can.sides || can.grading || can.surface || !can.linear || data.offset_um.size() > 0) return {};
+  if (!substrate::is_alike_everywhere(model.capabilities()) || data.offset_um.size() > 0) return {};
   if (!sheet::crossing_of(outline_um).empty()) return {};
   sheet::Region region;
   for (const Polygon& ring : outline_um) region.rims.emplace_back(ring);
   const std::shared_ptr<const sheet::Elements> elements = coarse_elements(region);
   if (!elements) return {};
-  const sheet::OnGel ground(*elements, model, std::nullopt, sheet::adhering_triangles(*elements, {}), threads);
+  const sheet::OnGel ground(*elements, model, sheet::adhering_triangles(*elements, {}), threads);
   const std::optional<StiffnessTable> table = table_of(elements, ground, gel, region, threads);
   if (!table) return {};
   tensions::LinearData of_sheet = data;

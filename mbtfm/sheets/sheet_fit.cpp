@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "mbtfm/tensions/intervals.h"
@@ -18,148 +19,277 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tensions::LinearData;
 
-constexpr int kScan = 400;  // steps of log M over nine e-folds: 2 %, far below any standard error
+// steps of a logarithm over nine e-folds: 2 %, far below any standard error; of each of two, refined where it matters
+constexpr int kScan = 400, kScanOfTwo = 60;
 
-/// At one stiffness: the best loads.
+/// At one pair of stiffnesses: the best loads.
 struct Profile {
-  double stiffness = 0;
+  Stiffnesses at;
   VectorXd loads;
   double misfit = 0;  ///< |C R − y|², without the floor
   MatrixXd normal;    ///< of the loads
 };
+using ProfileAt = std::function<Profile(double)>;
+using Number = std::function<double(const Profile&)>;
+
+double sheet_of(const Profile& p) { return p.at.sheet_nN_per_um; }
+double adhesion_of(const Profile& p) { return *p.at.adhesion_nN_per_um3; }
 
 /// @param joined  the loads that are fitted as one: loads × fewer
-Profile profile_at(const LinearData& data, const StiffnessTable& table, double stiffness, const MatrixXd& joined) {
-  const MatrixXd columns = tensions::displace(data.reduced, table.shares(stiffness) * joined);
-  Profile profile{.stiffness = stiffness, .loads = {}, .misfit = 0, .normal = columns.transpose() * columns};
+Profile profile_at(const LinearData& data, const StiffnessTable& table, const Stiffnesses& at, const MatrixXd& joined) {
+  const MatrixXd columns = tensions::displace(data.reduced, table.shares(at) * joined);
+  Profile profile{.at = at, .loads = {}, .misfit = 0, .normal = columns.transpose() * columns};
   profile.loads = profile.normal.ldlt().solve(columns.transpose() * data.reduced.target);
   profile.misfit = (columns * profile.loads - data.reduced.target).squaredNorm();
   return profile;
 }
 
-Profile profile_at(const LinearData& data, const StiffnessTable& table, double stiffness) {
-  return profile_at(data, table, stiffness, MatrixXd::Identity(table.n_loads(), table.n_loads()));
-}
+/// Where the misfit is least over one number, by golden section between the neighbours of the scan's least.
+struct Line {
+  std::vector<Profile> scan;
+  Profile best;
+};
 
-/// Of a sheet whose parts all contract alike: the least over the scanned stiffnesses.
-double even_misfit(const LinearData& data, const StiffnessTable& table, const std::vector<Profile>& scan) {
-  const Eigen::Index n = table.n_contractions(), n_others = table.n_loads() - n;
-  MatrixXd joined = MatrixXd::Zero(n + n_others, 1 + n_others);
-  joined.topLeftCorner(n, 1).setOnes();
-  joined.bottomRightCorner(n_others, n_others).setIdentity();
-  double least = std::numeric_limits<double>::infinity();
-  for (const Profile& p : scan) least = std::min(least, profile_at(data, table, p.stiffness, joined).misfit);
-  return least;
-}
-
-/// @param known  the stiffness; unset: all of the table
-std::vector<Profile> scanned(const LinearData& data, const StiffnessTable& table, std::optional<double> known) {
-  if (known) return {profile_at(data, table, *known)};
-  const double low = std::log(table.softest_nN_per_um()), high = std::log(table.stiffest_nN_per_um());
-  std::vector<Profile> profiles;
-  for (int k = 0; k <= kScan; ++k)
-    profiles.push_back(profile_at(data, table, std::exp(low + (high - low) * k / kScan)));
-  return profiles;
-}
-
-/// Golden section between the neighbours of the scan's least.
-Profile least(const LinearData& data, const StiffnessTable& table, const std::vector<Profile>& scan) {
-  if (scan.size() == 1) return scan.front();
-  const auto best = std::ranges::min_element(scan, {}, &Profile::misfit) - scan.begin();
-  const auto at = [&](std::ptrdiff_t k) {
-    return std::log(scan[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, std::ssize(scan) - 1))].stiffness);
+Line searched(const StiffnessRange& range, int n_steps, const ProfileAt& profile_at) {
+  const double low = std::log(range.low), high = std::log(range.high);
+  const auto place = [&](std::ptrdiff_t k) {
+    return low + (high - low) * static_cast<double>(std::clamp<std::ptrdiff_t>(k, 0, n_steps)) / n_steps;
   };
-  double a = at(best - 1), b = at(best + 1);
-  constexpr double kGolden = 0.6180339887498949;
+  Line line;
+  for (int k = 0; k <= n_steps; ++k) line.scan.push_back(profile_at(std::exp(place(k))));
+  const auto least = std::ranges::min_element(line.scan, {}, &Profile::misfit) - line.scan.begin();
+  double a = place(least - 1), b = place(least + 1);
+  constexpr double kGolden = 0.6180339887498949, kClose = 1e-7;
   double x = b - kGolden * (b - a), y = a + kGolden * (b - a);
-  double fx = profile_at(data, table, std::exp(x)).misfit, fy = profile_at(data, table, std::exp(y)).misfit;
-  while (b - a > 1e-9) {
+  double fx = profile_at(std::exp(x)).misfit, fy = profile_at(std::exp(y)).misfit;
+  while (b - a > kClose) {
     if (fx < fy) {
       b = y;
       y = x;
       fy = fx;
       x = b - kGolden * (b - a);
-      fx = profile_at(data, table, std::exp(x)).misfit;
+      fx = profile_at(std::exp(x)).misfit;
     } else {
       a = x;
       x = y;
       fx = fy;
       y = a + kGolden * (b - a);
-      fy = profile_at(data, table, std::exp(y)).misfit;
+      fy = profile_at(std::exp(y)).misfit;
     }
   }
-  const Profile refined = profile_at(data, table, std::exp(0.5 * (a + b)));
-  return refined.misfit < scan[static_cast<std::size_t>(best)].misfit ? refined : scan[static_cast<std::size_t>(best)];
+  line.best = profile_at(std::exp(0.5 * (a + b)));
+  if (line.scan[static_cast<std::size_t>(least)].misfit < line.best.misfit)
+    line.best = line.scan[static_cast<std::size_t>(least)];
+  return line;
 }
 
-/// Of the loads and log M, by the derivatives at the solution.
-/// @param is_known  M: it has no error
-MatrixXd covariance_of(const LinearData& data, const StiffnessTable& table, const Profile& best, double variance,
-                       bool is_known) {
-  constexpr double kStep = 1e-4;  // of log M: the table is a polynomial of it
-  const auto displaced = [&](double log_factor) -> VectorXd {
-    return tensions::displace(data.reduced, table.shares(best.stiffness * std::exp(log_factor))) * best.loads;
-  };
-  MatrixXd covariance = MatrixXd::Zero(table.n_loads() + 1, table.n_loads() + 1);
-  if (is_known) {
-    covariance.topLeftCorner(table.n_loads(), table.n_loads()) = variance * best.normal.inverse();
-    return covariance;
+/// The misfit over the stiffnesses that are not known.
+class Search {
+ public:
+  /// @param known  the sheet's stiffness; unset: any of the table  @param joined  see profile_at()
+  Search(const LinearData& data, const StiffnessTable& table, std::optional<double> known, MatrixXd joined)
+      : data_(data), table_(table), known_(known), joined_(std::move(joined)) {}
+  Search(const LinearData& data, const StiffnessTable& table, std::optional<double> known)
+      : Search(data, table, known, MatrixXd::Identity(table.n_loads(), table.n_loads())) {}
+
+  Profile at(const Stiffnesses& stiffnesses) const { return profile_at(data_, table_, stiffnesses, joined_); }
+  /// Over the sheet's stiffness, on adhesions of this one.
+  Line over_sheet(std::optional<double> adhesion) const {
+    if (known_) {
+      const Profile only = at({*known_, adhesion});
+      return {{only}, only};
+    }
+    return searched(table_.sheet_nN_per_um(), table_.adhesion_nN_per_um3() ? kScanOfTwo : kScan, [&](double M) {
+      return at({M, adhesion});
+    });
   }
-  MatrixXd J(data.reduced.target.size(), table.n_loads() + 1);
-  J.leftCols(table.n_loads()) = tensions::displace(data.reduced, table.shares(best.stiffness));
-  J.rightCols(1) = (displaced(kStep) - displaced(-kStep)) / (2 * kStep);
-  return variance * (J.transpose() * J).ldlt().solve(MatrixXd::Identity(J.cols(), J.cols()));
+  /// Over the adhesions' stiffness, each with the best of the sheet.
+  Line over_adhesion() const {
+    return searched(*table_.adhesion_nN_per_um3(), kScanOfTwo, [&](double kappa) { return over_sheet(kappa).best; });
+  }
+  /// Over the sheet's stiffness, each with the best of the adhesions'.
+  Line over_sheet_with_best_adhesion() const {
+    return searched(table_.sheet_nN_per_um(), kScanOfTwo, [&](double M) {
+      return searched(*table_.adhesion_nN_per_um3(), kScanOfTwo, [&](double kappa) { return at({M, kappa}); }).best;
+    });
+  }
+  /// Of the table's forces.
+  VectorXd amplitudes(const Profile& p) const { return table_.shares(p.at) * (joined_ * p.loads); }
+  Profile best() const {
+    return table_.adhesion_nN_per_um3() ? over_adhesion().best : over_sheet(table_.known_adhesion_nN_per_um3()).best;
+  }
+
+ private:
+  const LinearData& data_;
+  const StiffnessTable& table_;
+  std::optional<double> known_;
+  MatrixXd joined_;
+};
+
+/// The loads of a sheet whose parts all contract alike.
+MatrixXd of_even_parts(const StiffnessTable& table) {
+  const Eigen::Index n = table.n_contractions(), n_others = table.n_loads() - n;
+  MatrixXd joined = MatrixXd::Zero(n + n_others, 1 + n_others);
+  joined.topLeftCorner(n, 1).setOnes();
+  joined.bottomRightCorner(n_others, n_others).setIdentity();
+  return joined;
 }
 
-/// The range of a quantity over all stiffnesses that the beads do not exclude. At each stiffness a load may lie so far
-/// from its best as the misfit has room left.
+/// Those of a sheet without its bundles.
+MatrixXd without_bundles(const StiffnessTable& table) {
+  return MatrixXd::Identity(table.n_loads(), table.n_loads() - std::ssize(table.bundles()));
+}
+
+/// Of the loads, log M and log κ, by the derivatives at the solution; 0 of what is known.
+MatrixXd covariance_of(const LinearData& data, const StiffnessTable& table, const Profile& best, double variance,
+                       bool is_sheet_known) {
+  constexpr double kStep = 1e-4;
+  const auto displaced = [&](double log_sheet, double log_adhesion) -> VectorXd {
+    Stiffnesses at = best.at;
+    at.sheet_nN_per_um *= std::exp(log_sheet);
+    if (at.adhesion_nN_per_um3) *at.adhesion_nN_per_um3 *= std::exp(log_adhesion);
+    return tensions::displace(data.reduced, table.shares(at)) * best.loads;
+  };
+  std::vector<Eigen::Index> unknown;
+  MatrixXd J(data.reduced.target.size(), table.n_loads() + 2);
+  J.leftCols(table.n_loads()) = tensions::displace(data.reduced, table.shares(best.at));
+  for (int k = 0; k < table.n_loads(); ++k) unknown.push_back(k);
+  if (!is_sheet_known) unknown.push_back(table.n_loads());
+  if (table.adhesion_nN_per_um3()) unknown.push_back(table.n_loads() + 1);
+  J.col(table.n_loads()) = (displaced(kStep, 0) - displaced(-kStep, 0)) / (2 * kStep);
+  J.col(table.n_loads() + 1) = (displaced(0, kStep) - displaced(0, -kStep)) / (2 * kStep);
+  const MatrixXd of_unknown = J(Eigen::all, unknown);
+  MatrixXd covariance = MatrixXd::Zero(J.cols(), J.cols());
+  covariance(unknown, unknown) =
+      variance *
+      (of_unknown.transpose() * of_unknown).ldlt().solve(MatrixXd::Identity(of_unknown.cols(), of_unknown.cols()));
+  return covariance;
+}
+
+/// The range of a quantity over all stiffnesses that the beads do not exclude.
 struct Limits {
   double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
   bool is_open_below = false, is_open_above = false;  ///< the table ends before the beads set a limit
-  void take(double a, double b) {
-    low = std::min({low, a, b});
-    high = std::max({high, a, b});
+  /// @param open_below, open_above  where the quantity goes on beyond the table
+  void take(double a, double b, bool open_below = false, bool open_above = false) {
+    if (a < low) is_open_below = open_below;
+    if (b > high) is_open_above = open_above;
+    low = std::min(low, a);
+    high = std::max(high, b);
   }
 };
 
-template <class Body>
-void for_each_allowed(const std::vector<Profile>& scan, const Profile& best, double variance, const Body& body) {
-  const double room = tensions::kNormal95 * tensions::kNormal95 * variance;
-  for (const Profile& p : scan)
-    if (p.misfit - best.misfit <= room) body(p, std::sqrt(room - std::max(0.0, p.misfit - best.misfit)));
-  body(best, std::sqrt(room));
-}
-
-double spread_of(const Profile& p, Eigen::Index load) { return std::sqrt(p.normal.inverse()(load, load)); }
-
-Limits limits_of_load(const std::vector<Profile>& scan, const Profile& best, double variance, Eigen::Index load,
-                      bool over_stiffness) {
-  Limits limits;
-  for_each_allowed(scan, best, variance, [&](const Profile& p, double room) {
-    const double scale = over_stiffness ? 1 / p.stiffness : 1, reach = room * spread_of(p, load);
-    limits.take(scale * (p.loads(load) - reach), scale * (p.loads(load) + reach));
-  });
-  return limits;
-}
-
-/// Where the misfit crosses its limit to both sides, between two steps of the scan.
-Limits limits_of_stiffness(const std::vector<Profile>& scan, const Profile& best, double variance) {
-  const double limit = best.misfit + tensions::kNormal95 * tensions::kNormal95 * variance;
-  const bool is_known = scan.size() == 1;
-  Limits limits{.is_open_below = !is_known && scan.front().misfit <= limit,
-                .is_open_above = !is_known && scan.back().misfit <= limit};
-  limits.take(best.stiffness, best.stiffness);
-  for (std::size_t k = 0; k + 1 < scan.size(); ++k) {
-    const Profile &a = scan[k], &b = scan[k + 1];
-    if (a.misfit <= limit) limits.take(a.stiffness, a.stiffness);
-    if (b.misfit <= limit) limits.take(b.stiffness, b.stiffness);
-    if ((a.misfit <= limit) == (b.misfit <= limit)) continue;
-    const double share = (limit - a.misfit) / (b.misfit - a.misfit);
-    const double edge = std::exp(std::log(a.stiffness) + share * std::log(b.stiffness / a.stiffness));
-    limits.take(edge, edge);
+/// Whether stiffnesses are ends of the table.
+struct Ends {
+  bool is_softest = false, is_stiffest = false, is_weakest = false, is_strongest = false;
+};
+Ends ends_of(const StiffnessTable& table, const Stiffnesses& at, bool is_sheet_known) {
+  constexpr double kRounding = 1e-6;
+  const auto is_at = [](double value, double end) { return std::abs(std::log(value / end)) < kRounding; };
+  Ends ends;
+  if (!is_sheet_known) {
+    ends.is_softest = is_at(at.sheet_nN_per_um, table.sheet_nN_per_um().low);
+    ends.is_stiffest = is_at(at.sheet_nN_per_um, table.sheet_nN_per_um().high);
   }
-  return limits;
+  if (!table.adhesion_nN_per_um3()) return ends;
+  ends.is_weakest = is_at(*at.adhesion_nN_per_um3, table.adhesion_nN_per_um3()->low);
+  ends.is_strongest = is_at(*at.adhesion_nN_per_um3, table.adhesion_nN_per_um3()->high);
+  return ends;
 }
+
+/// All that the beads allow, of what was tried.
+class Allowed {
+ public:
+  Allowed(const StiffnessTable& table, const Search& search, const Profile& best, double variance, bool is_sheet_known)
+      : table_(table),
+        best_(best),
+        room_(tensions::kNormal95 * tensions::kNormal95 * variance),
+        is_sheet_known_(is_sheet_known) {
+    if (!table.adhesion_nN_per_um3()) {
+      tried_ = search.over_sheet(table.known_adhesion_nN_per_um3()).scan;
+      of_sheet_ = limits_along(tried_, sheet_of, is_sheet_known);
+      return;
+    }
+    tried_ = search.over_adhesion().scan;
+    of_adhesion_ = limits_along(tried_, adhesion_of, false);
+    std::vector<Profile> by_sheet;
+    if (!is_sheet_known) by_sheet = search.over_sheet_with_best_adhesion().scan;
+    of_sheet_ = limits_along(by_sheet, sheet_of, is_sheet_known);
+    tried_.insert(tried_.end(), by_sheet.begin(), by_sheet.end());
+    try_between(search);
+  }
+
+  const Limits& of_sheet() const { return of_sheet_; }
+  const Limits& of_adhesion() const { return of_adhesion_; }
+  /// At each pair of stiffnesses a load may lie so far from its best as the misfit has room left.
+  Limits of_load(Eigen::Index load, Quantity quantity) const {
+    Limits limits;
+    for_each([&](const Profile& p, double room) {
+      const bool is_share = quantity == Quantity::contraction_over_stiffness;
+      const double scale = is_share ? 1 / sheet_of(p) : 1, reach = room * std::sqrt(p.normal.inverse()(load, load));
+      const Ends ends = ends_of(table_, p.at, is_sheet_known_);
+      // a stiff sheet pulls as its strain, s over M, has it, a soft one as its contraction; weak springs hold either
+      const bool is_open = ends.is_weakest || (is_share ? ends.is_softest : ends.is_stiffest);
+      limits.take(scale * (p.loads(load) - reach), scale * (p.loads(load) + reach), is_open && p.loads(load) < 0,
+                  is_open && p.loads(load) > 0);
+    });
+    return limits;
+  }
+  Limits of_penetration() const {
+    Limits limits;
+    for_each([&](const Profile& p, double) {
+      const double l = std::sqrt(sheet_of(p) / adhesion_of(p));
+      const Ends ends = ends_of(table_, p.at, is_sheet_known_);
+      limits.take(l, l, ends.is_softest || ends.is_strongest, ends.is_stiffest || ends.is_weakest);
+    });
+    return limits;
+  }
+
+ private:
+  template <class Body>
+  void for_each(const Body& body) const {
+    body(best_, std::sqrt(room_));
+    for (const Profile& p : tried_)
+      if (p.misfit - best_.misfit <= room_) body(p, std::sqrt(room_ - std::max(0.0, p.misfit - best_.misfit)));
+  }
+
+  /// Where the misfit crosses its limit to both sides, between two steps of the scan.
+  Limits limits_along(const std::vector<Profile>& scan, const Number& number, bool is_known) const {
+    const double limit = best_.misfit + room_;
+    Limits limits;
+    limits.take(number(best_), number(best_));
+    for (std::size_t k = 0; k + 1 < scan.size(); ++k) {
+      const Profile &a = scan[k], &b = scan[k + 1];
+      if (a.misfit <= limit) limits.take(number(a), number(a));
+      if (b.misfit <= limit) limits.take(number(b), number(b));
+      if ((a.misfit <= limit) == (b.misfit <= limit)) continue;
+      const double share = (limit - a.misfit) / (b.misfit - a.misfit);
+      const double edge = std::exp(std::log(number(a)) + share * std::log(number(b) / number(a)));
+      limits.take(edge, edge);
+    }
+    if (is_known) return limits;
+    limits.is_open_below = scan.front().misfit <= limit;
+    limits.is_open_above = scan.back().misfit <= limit;
+    return limits;
+  }
+
+  /// A lattice over both intervals.
+  void try_between(const Search& search) {
+    constexpr int kSteps = 40;
+    const auto between = [&](const Limits& limits, int k) {
+      return limits.low * std::pow(limits.high / limits.low, static_cast<double>(k) / kSteps);
+    };
+    for (int i = 0; i <= (is_sheet_known_ ? 0 : kSteps); ++i)
+      for (int j = 0; j <= kSteps; ++j) tried_.push_back(search.at({between(of_sheet_, i), between(of_adhesion_, j)}));
+  }
+
+  const StiffnessTable& table_;
+  const Profile& best_;
+  double room_;
+  bool is_sheet_known_;
+  std::vector<Profile> tried_;
+  Limits of_sheet_, of_adhesion_;
+};
 
 SheetEstimate estimate(Quantity quantity, const std::string& part, double value, double sigma, const Limits& limits) {
   SheetEstimate e{
@@ -177,8 +307,8 @@ LinearData weighed(LinearData data, const StiffnessTable& table, tensions::Loss 
                    std::optional<double> fixed_scale) {
   constexpr int kMost = 30;
   for (int k = 0; k < kMost; ++k) {
-    const Profile best = least(data, table, scanned(data, table, known));
-    const VectorXd residual = tensions::weighted_residual(data, table.shares(best.stiffness) * best.loads);
+    const Profile best = Search(data, table, known).best();
+    const VectorXd residual = tensions::weighted_residual(data, table.shares(best.at) * best.loads);
     const double scale = fixed_scale.value_or(tensions::robust_scale(data, residual));
     if (!(scale > 0)) break;
     VectorXd weight(residual.size() / 2);
@@ -196,10 +326,46 @@ LinearData weighed(LinearData data, const StiffnessTable& table, tensions::Loss 
   if (loss == tensions::Loss::squares) return data;
   if (loss != tensions::Loss::tukey) return weighed(std::move(data), table, loss, known, std::nullopt);
   data = weighed(std::move(data), table, tensions::Loss::huber, known, std::nullopt);
-  const Profile best = least(data, table, scanned(data, table, known));
+  const Profile best = Search(data, table, known).best();
   const double scale =
-      tensions::robust_scale(data, tensions::weighted_residual(data, table.shares(best.stiffness) * best.loads));
+      tensions::robust_scale(data, tensions::weighted_residual(data, table.shares(best.at) * best.loads));
   return weighed(std::move(data), table, loss, known, scale);
+}
+
+/// Those of the stiffnesses, the loads and what they make up.
+std::vector<SheetEstimate> estimates_of(const StiffnessTable& table, const Profile& best, const MatrixXd& covariance,
+                                        const Allowed& allowed, const std::vector<std::string>& parts) {
+  const Eigen::Index at_M = table.n_loads(), at_kappa = at_M + 1;
+  const auto sigma = [&](Eigen::Index k) { return std::sqrt(std::max(0.0, covariance(k, k))); };
+  const double M = sheet_of(best);
+  std::vector<SheetEstimate> estimates = {estimate(Quantity::stiffness, {}, M, M * sigma(at_M), allowed.of_sheet())};
+  for (Eigen::Index k = 0; k < table.n_contractions(); ++k) {
+    const double s = best.loads(k);
+    const std::string part = parts.empty() ? "" : parts[static_cast<std::size_t>(k)];
+    // of s / M, where log M and s are correlated
+    const double of_share =
+        std::sqrt(std::max(0.0, covariance(k, k) + s * s * covariance(at_M, at_M) - 2 * s * covariance(k, at_M))) / M;
+    estimates.insert(estimates.end() - (k == 0 ? 1 : 0),
+                     estimate(Quantity::contraction, part, s, sigma(k), allowed.of_load(k, Quantity::contraction)));
+    estimates.push_back(estimate(Quantity::contraction_over_stiffness, part, s / M, of_share,
+                                 allowed.of_load(k, Quantity::contraction_over_stiffness)));
+  }
+  Eigen::Index load = table.n_contractions();
+  const auto tension = [&](Quantity quantity, const std::string& of) {
+    estimates.push_back(estimate(quantity, of, best.loads(load), sigma(load), allowed.of_load(load, quantity)));
+    ++load;
+  };
+  if (table.has_line()) tension(Quantity::line_tension, {});
+  for (const sheet::Bundle& bundle : table.bundles())
+    tension(Quantity::bundle_tension, "fibre " + std::to_string(bundle.fibre_id));
+  if (!table.adhesion_nN_per_um3()) return estimates;
+  const double kappa = adhesion_of(best), l = std::sqrt(M / kappa);
+  estimates.push_back(
+      estimate(Quantity::adhesion_stiffness, {}, kappa, kappa * sigma(at_kappa), allowed.of_adhesion()));
+  const double of_l = 0.5 * std::sqrt(std::max(0.0, covariance(at_M, at_M) + covariance(at_kappa, at_kappa) -
+                                                        2 * covariance(at_M, at_kappa)));
+  estimates.push_back(estimate(Quantity::penetration, {}, l, l * of_l, allowed.of_penetration()));
+  return estimates;
 }
 
 }  // namespace
@@ -216,42 +382,22 @@ LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, 
 SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known,
                    const std::vector<std::string>& parts) {
   data = weighed(std::move(data), table, loss, known);
-  const Eigen::Index n_unknowns = table.n_loads() + (known ? 0 : 1);
-  const std::vector<Profile> scan = scanned(data, table, known);
-  const Profile best = least(data, table, scan);
+  const Eigen::Index n_unknowns = table.n_loads() + (known ? 0 : 1) + (table.adhesion_nN_per_um3() ? 1 : 0);
+  const Search search(data, table, known);
+  const Profile best = search.best();
   SheetFit fit;
-  fit.stiffness_nN_per_um = best.stiffness;
-  constexpr double kAtBound = 1e-4;  // of log M; the search ends at 1e-9
-  fit.is_at_bound = !known && std::min(std::log(best.stiffness / table.softest_nN_per_um()),
-                                       std::log(table.stiffest_nN_per_um() / best.stiffness)) < kAtBound;
+  fit.stiffnesses = best.at;
+  constexpr double kAtBound = 1e-4;  // of log M; the search ends at 1e-7
+  fit.is_at_bound = !known && std::min(std::log(sheet_of(best) / table.sheet_nN_per_um().low),
+                                       std::log(table.sheet_nN_per_um().high / sheet_of(best))) < kAtBound;
   fit.loads = best.loads;
-  fit.node_amplitudes = table.shares(best.stiffness) * best.loads;
+  fit.node_amplitudes = table.shares(best.at) * best.loads;
   fit.variance = tensions::misfit_variance(data, fit.node_amplitudes, n_unknowns, loss);
   const MatrixXd covariance = covariance_of(data, table, best, fit.variance, known.has_value());
   const Eigen::Index at_M = table.n_loads();
-  const auto sigma = [&](Eigen::Index k) { return std::sqrt(std::max(0.0, covariance(k, k))); };
-  if (!known) fit.correlation = covariance(0, at_M) / (sigma(0) * sigma(at_M));
-  const Limits of_M = limits_of_stiffness(scan, best, fit.variance);
-  const double M = best.stiffness;
-  fit.estimates = {estimate(Quantity::stiffness, {}, M, M * sigma(at_M), of_M)};
-  for (Eigen::Index k = 0; k < table.n_contractions(); ++k) {
-    Limits of_s = limits_of_load(scan, best, fit.variance, k, false),
-           of_ratio = limits_of_load(scan, best, fit.variance, k, true);
-    const double s = best.loads(k);
-    const auto away_from_zero = s < 0 ? &Limits::is_open_below : &Limits::is_open_above;
-    of_s.*away_from_zero = of_M.is_open_above;      // a stiff sheet pulls as its strain, s over M, has it
-    of_ratio.*away_from_zero = of_M.is_open_below;  // a soft one as its contraction
-    const std::string part = parts.empty() ? "" : parts[static_cast<std::size_t>(k)];
-    // of s / M, where log M and s are correlated
-    const double of_share =
-        std::sqrt(std::max(0.0, covariance(k, k) + s * s * covariance(at_M, at_M) - 2 * s * covariance(k, at_M))) / M;
-    fit.estimates.insert(fit.estimates.end() - (k == 0 ? 1 : 0),
-                         estimate(Quantity::contraction, part, s, sigma(k), of_s));
-    fit.estimates.push_back(estimate(Quantity::contraction_over_stiffness, part, s / M, of_share, of_ratio));
-  }
-  if (table.n_loads() > table.n_contractions())
-    fit.estimates.push_back(estimate(Quantity::line_tension, {}, best.loads(at_M - 1), sigma(at_M - 1),
-                                     limits_of_load(scan, best, fit.variance, at_M - 1, false)));
+  if (!known) fit.correlation = covariance(0, at_M) / std::sqrt(covariance(0, 0) * covariance(at_M, at_M));
+  fit.estimates =
+      estimates_of(table, best, covariance, Allowed(table, search, best, fit.variance, known.has_value()), parts);
   fit.relative_l2 = tensions::relative_l2(data, fit.node_amplitudes);
   fit.n_beads = static_cast<int>(data.position_um.size());
   fit.n_down_weighted = static_cast<int>((data.bead_weight.array() < 0.5).count());
@@ -266,15 +412,31 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   };
   const double floor = data.reduced.floor_squared;
   model("nothing", 0, data.reduced.target.squaredNorm() + floor, 1);
-  const bool has_parts = table.n_contractions() > 1;
-  const std::string name = table.n_loads() > table.n_contractions() ? "sheet-with-line" : "sheet";
-  if (has_parts) {
-    const double even = even_misfit(data, table, scan) + floor;
-    const double least = std::max(best.misfit + floor, std::numeric_limits<double>::min());
-    model(name, static_cast<int>(n_unknowns) - table.n_contractions() + 1, even,
-          fit.relative_l2 * std::sqrt(even / least));
+  const bool has_parts = table.n_contractions() > 1, has_springs = table.adhesion_nN_per_um3().has_value(),
+             has_bundles = !table.bundles().empty();
+  struct Has {
+    bool bundles, springs, parts;
+  };
+  const auto name = [&](const Has& has) {
+    return std::string("sheet") + (table.has_line() ? "-with-line" : "") + (has.bundles ? "-with-bundles" : "") +
+           (has.springs ? "-on-springs" : "") + (has.parts ? "-in-parts" : "");
+  };
+  const auto simpler = [&](const Has& has, Eigen::Index n_fewer, const Search& its, const Profile& p) {
+    model(name(has), static_cast<int>(n_unknowns - n_fewer), p.misfit + floor,
+          tensions::relative_l2(data, its.amplitudes(p)));
+  };
+  if (has_bundles) {
+    const Search its(data, table, known, without_bundles(table));
+    simpler({false, has_springs, has_parts}, std::ssize(table.bundles()), its, its.best());
   }
-  model(has_parts ? name + "-in-parts" : name, static_cast<int>(n_unknowns), best.misfit + floor, fit.relative_l2);
+  if (has_springs) simpler({has_bundles, false, has_parts}, 1, search, search.over_sheet(std::nullopt).best);
+  if (has_parts) {
+    const Search its(data, table, known, of_even_parts(table));
+    simpler({has_bundles, has_springs, false}, table.n_contractions() - 1, its, its.best());
+  }
+  fit.own_model = fit.models.size();
+  model(name({has_bundles, has_springs, has_parts}), static_cast<int>(n_unknowns), best.misfit + floor,
+        fit.relative_l2);
   fit.report = {.converged = true, .iterations = kScan, .last_change = 0, .reason = "scanned over the stiffness"};
   return fit;
 }

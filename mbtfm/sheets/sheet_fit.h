@@ -11,22 +11,32 @@
 
 namespace mbtfm::sheets {
 
-enum class Quantity { contraction, stiffness, line_tension, contraction_over_stiffness };
+enum class Quantity {
+  contraction,
+  stiffness,
+  line_tension,
+  contraction_over_stiffness,
+  adhesion_stiffness,
+  penetration,  ///< √(stiffness / adhesion stiffness): how far into the sheet its edge is felt
+  bundle_tension
+};
 constexpr auto words(Quantity) {
-  return std::array{"contraction_nN_per_um", "stiffness_nN_per_um", "line_tension_nN", "contraction_over_stiffness"};
+  return std::array{"contraction_nN_per_um",      "stiffness_nN_per_um",           "line_tension_nN",
+                    "contraction_over_stiffness", "adhesion_stiffness_nN_per_um3", "penetration_um",
+                    "bundle_tension_nN"};
 }
 
 struct SheetEstimate {
   Quantity quantity = Quantity::contraction;
-  std::string part = {};  ///< of the sheet, where it has parts with contractions of their own
+  std::string part = {};  ///< of the sheet, where it has parts with contractions of their own; or the bundle
   double value = 0;
   std::optional<double> sigma;      ///< standard error; none where the beads do not tell the quantity
   std::optional<double> low, high;  ///< 95 %; none where the beads set no limit to that side
   bool identifiable = true;         ///< limited to both sides
 };
 
-/// A model of the gel's motion: nothing, the sheet, the sheet with a cable along its edge, or with parts that contract
-/// each by its own.
+/// A model of the gel's motion: nothing, the sheet, the sheet with a cable along its edge, with bundles in it, on
+/// springs, or with parts that contract each by its own.
 struct SheetModel {
   std::string name;
   int n_parameters = 0;
@@ -35,15 +45,16 @@ struct SheetModel {
 
 struct SheetFit {
   std::vector<SheetEstimate> estimates;
-  double stiffness_nN_per_um = 0;
-  Eigen::VectorXd loads;            ///< contractions by part, line tension
+  Stiffnesses stiffnesses;
+  Eigen::VectorXd loads;            ///< contractions by part, line tension, tensions of bundles
   Eigen::VectorXd node_amplitudes;  ///< of the table's forces: what the sheet does at the solution
-  bool is_at_bound = false;         ///< the best stiffness is the table's first or last
+  bool is_at_bound = false;         ///< the best stiffness of the sheet is the table's first or last
   double correlation = 0;           ///< of the errors of the first contraction and log stiffness
   double variance = 1;              ///< of a weighted component of a bead, that the error bars are made with
   double relative_l2 = 0, expected_relative_l2 = 0;
   int n_beads = 0, n_down_weighted = 0;
   std::vector<SheetModel> models;
+  std::size_t own_model = 0;  ///< of them, the one that was fitted; others are parts of it, or beside it
   Report report;
 };
 
@@ -60,8 +71,8 @@ tensions::LinearData data_of(const DisplacementField& beads, const StiffnessTabl
                              const substrate::Substrate& gel, int threads);
 
 /// Least squares (or a robust loss) over all stiffnesses of the table: of each the best loads are linear, so the misfit
-/// is a function of one number, which is scanned and then refined (variable projection). 95 % intervals: where the
-/// misfit, least over all else, is 1.96² variances above the best.
+/// is a function of one number, or of two where the adhesions are fitted, which are scanned and then refined (variable
+/// projection). 95 % intervals: where the misfit, least over all else, is 1.96² variances above the best.
 /// @param stiffness_nN_per_um  known; unset: fitted
 /// @param parts  names of the table's contractions, where there are several
 SheetFit fit_sheet(tensions::LinearData data, const StiffnessTable& table, tensions::Loss loss,

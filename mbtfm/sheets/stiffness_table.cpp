@@ -1,5 +1,7 @@
 #include "mbtfm/sheets/stiffness_table.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
 
@@ -8,17 +10,26 @@
 namespace mbtfm::sheets {
 namespace {
 
-constexpr double kSoftest = 0.03, kStiffest = 300;  // M / (mu R)
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
-}  // namespace
+constexpr double kSoftest = 0.03, kStiffest = 300;   // M / (mu R)
+constexpr double kWeakest = 0.03, kStrongest = 500;  // kappa R / mu
+constexpr int kSheets = 12;                          // solved for, where the bond is known
+constexpr int kSheetsOfEach = 8, kAdhesions = 6;     // where it is fitted
 
-StiffnessTable::StiffnessTable(const SheetShape& shape, const sheet::OnGel& ground, const Gel& gel, double size_um,
-                               int threads)
-    : n_contractions_(static_cast<int>(shape.contractions.size())),
-      n_loads_(n_contractions_ + (shape.has_line ? 1 : 0)) {
-  scale_nN_per_um_ = gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio)) * size_um;
-  low_ = std::log(kSoftest * scale_nN_per_um_);
-  high_ = std::log(kStiffest * scale_nN_per_um_);
+/// Chebyshev's nodes of the logarithm.
+std::vector<double> nodes_of(const StiffnessRange& range, int n) {
+  std::vector<double> nodes;
+  const double low = std::log(range.low), high = std::log(range.high);
+  for (int k = 0; k < n; ++k)
+    nodes.push_back(std::exp(0.5 * (low + high) - 0.5 * (high - low) * std::cos((k + 0.5) * std::numbers::pi / n)));
+  return nodes;
+}
+
+/// By part, then of the line and the bundles.
+std::vector<sheet::NodeVectors> loads_of(const SheetShape& shape) {
   sheet::Sheet unit;
   unit.n_rims = shape.n_rims;
   std::vector<sheet::NodeVectors> loads;
@@ -31,38 +42,80 @@ StiffnessTable::StiffnessTable(const SheetShape& shape, const sheet::OnGel& grou
     unit.line_tension_nN = 1;
     loads.push_back(sheet::forces_of_contraction_nN(*shape.elements, unit));
   }
-  forces_nN_.resize(2 * std::ssize(ground.patches()), kNodes * n_loads_);
-  for (int k = 0; k < kNodes; ++k)
-    nodes_.push_back(0.5 * (low_ + high_) - 0.5 * (high_ - low_) * std::cos((k + 0.5) * std::numbers::pi / kNodes));
-  numerics::parallel_for(kNodes * n_loads_, threads, [&](int j) {
-    const double M = std::exp(nodes_[static_cast<std::size_t>(j / n_loads_)]);
-    const double nu = shape.poisson_ratio;
-    const sheet::Material material{M * (1 - nu * nu) / shape.thickness_um, nu, shape.thickness_um};
-    forces_nN_.col(j) =
-        (1 + M / scale_nN_per_um_) * ground.solve(material, loads[static_cast<std::size_t>(j % n_loads_)]).forces_nN;
-  });
+  for (const sheet::Bundle& bundle : shape.bundles)
+    loads.push_back(sheet::forces_of_bundle_nN(*shape.elements, bundle));
+  return loads;
 }
 
-double StiffnessTable::softest_nN_per_um() const { return std::exp(low_); }
-double StiffnessTable::stiffest_nN_per_um() const { return std::exp(high_); }
+/// Orthogonal columns that span the others, all taken for equally long, to the tolerance of their solution.
+MatrixXd basis_of(MatrixXd columns) {
+  constexpr double kLeast = 1e-7;
+  columns.colwise().normalize();
+  const Eigen::JacobiSVD<MatrixXd> svd(columns, Eigen::ComputeThinU);
+  const VectorXd& sizes = svd.singularValues();
+  return svd.matrixU().leftCols((sizes.array() > kLeast * sizes(0)).count());
+}
 
-/// Lagrange's polynomials of Chebyshev's nodes, by the barycentric formula (Berrut & Trefethen, SIAM Rev. 46 (2004)
-/// 501).
-Eigen::VectorXd StiffnessTable::basis(double log_stiffness) const {
-  Eigen::VectorXd weights(kNodes);
-  for (int k = 0; k < kNodes; ++k) {
-    const double off = log_stiffness - nodes_[static_cast<std::size_t>(k)];
-    if (off == 0) return Eigen::VectorXd::Unit(kNodes, k);
-    weights(k) = (k % 2 == 0 ? 1 : -1) * std::sin((k + 0.5) * std::numbers::pi / kNodes) / off;
+}  // namespace
+
+std::vector<Stiffnesses> StiffnessTable::examples() const {
+  std::vector<Stiffnesses> examples;
+  if (!adhesion_) {
+    for (const double M : nodes_of(sheet_, kSheets)) examples.push_back({M, known_adhesion_});
+    return examples;
   }
-  return weights / weights.sum();
+  for (const double kappa : nodes_of(*adhesion_, kAdhesions))
+    for (const double M : nodes_of(sheet_, kSheetsOfEach)) examples.push_back({M, kappa});
+  return examples;
 }
 
-Eigen::MatrixXd StiffnessTable::shares(double stiffness_nN_per_um) const {
-  const Eigen::VectorXd weights = basis(std::log(stiffness_nN_per_um)) / (1 + stiffness_nN_per_um / scale_nN_per_um_);
-  Eigen::MatrixXd shares = Eigen::MatrixXd::Zero(kNodes * n_loads_, n_loads_);
-  for (int k = 0; k < kNodes; ++k)
-    for (int load = 0; load < n_loads_; ++load) shares(k * n_loads_ + load, load) = weights(k);
+StiffnessTable::StiffnessTable(const SheetShape& shape, const sheet::OnGel& ground, const Gel& gel, double size_um,
+                               int threads)
+    : n_contractions_(static_cast<int>(shape.contractions.size())),
+      has_line_(shape.has_line),
+      bundles_(shape.bundles),
+      known_adhesion_(shape.adhesion_nN_per_um3) {
+  const double mu = gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio));
+  sheet_ = {kSoftest * mu * size_um, kStiffest * mu * size_um};
+  if (shape.bond == Bond::fitted) adhesion_ = {kWeakest * mu / size_um, kStrongest * mu / size_um};
+  const std::vector<sheet::NodeVectors> loads = loads_of(shape);
+  const std::vector<Stiffnesses> at = examples();
+  const auto n_examples = static_cast<int>(at.size());
+  std::vector<MatrixXd> solved(loads.size(), MatrixXd(2 * std::ssize(ground.patches()), n_examples));
+  numerics::parallel_for(n_examples * static_cast<int>(loads.size()), threads, [&](int j) {
+    const Stiffnesses& of = at[static_cast<std::size_t>(j % n_examples)];
+    const double nu = shape.poisson_ratio;
+    const sheet::Material material{of.sheet_nN_per_um * (1 - nu * nu), nu, 1};  // only its product with the thickness
+    const auto load = static_cast<std::size_t>(j / n_examples);
+    solved[load].col(j % n_examples) = ground.solve(material, of.adhesion_nN_per_um3, loads[load]).forces_nN;
+  });
+  equations_.resize(loads.size());
+  numerics::parallel_for(static_cast<int>(loads.size()), threads, [&](int load) {
+    MatrixXd& basis = solved[static_cast<std::size_t>(load)];
+    basis = basis_of(std::move(basis));
+    equations_[static_cast<std::size_t>(load)] =
+        ground.reduced(basis, shape.poisson_ratio, loads[static_cast<std::size_t>(load)]);
+  });
+  Index n = 0;
+  for (const MatrixXd& basis : solved) n += basis.cols();
+  forces_nN_.resize(2 * std::ssize(ground.patches()), n);
+  n = 0;
+  for (const MatrixXd& basis : solved) {
+    forces_nN_.middleCols(n, basis.cols()) = basis;
+    n += basis.cols();
+  }
+}
+
+MatrixXd StiffnessTable::shares(const Stiffnesses& at) const {
+  MatrixXd shares = MatrixXd::Zero(forces_nN_.cols(), n_loads());
+  Index row = 0;
+  for (int load = 0; load < n_loads(); ++load) {
+    const auto& [gel, slip, sheet, pull] = equations_[static_cast<std::size_t>(load)];
+    MatrixXd matrix = gel + sheet / at.sheet_nN_per_um;
+    if (at.adhesion_nN_per_um3) matrix += slip / *at.adhesion_nN_per_um3;
+    shares.col(load).segment(row, pull.size()) = matrix.ldlt().solve(pull / at.sheet_nN_per_um);
+    row += pull.size();
+  }
   return shares;
 }
 

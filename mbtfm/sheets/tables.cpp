@@ -12,19 +12,20 @@ const files::Table<SheetEstimate>& estimate_table() {
   static const files::Table<Row> table{
       .file = "sheet_fit.csv",
       .row = "each number of a sheet that the beads were asked for (`mbtfm-sheet --displacement`)",
-      .columns = {
-          {"quantity", "with its unit; stiffness is E h / (1 - nu²)", &Row::quantity},
-          {"part",
-           "of the sheet, where parts contract each by its own: inside, edge, or a cell of the label image; else empty",
-           &Row::part},
-          {"value", "where the misfit is least", &Row::value, {.digits = kForPeople}},
-          {"sigma",
-           "standard error; empty if the beads do not determine the quantity",
-           &Row::sigma,
-           {.digits = kForPeople}},
-          {"low", "lower end of the 95 % interval; empty: none", &Row::low, {.digits = kForPeople}},
-          {"high", "upper end of the 95 % interval; empty: none", &Row::high, {.digits = kForPeople}},
-          {"identifiable", "the beads limit it to both sides", &Row::identifiable}}};
+      .columns = {{"quantity", "with its unit; stiffness is E h / (1 - nu²)", &Row::quantity},
+                  {"part",
+                   "of the sheet, where parts contract each by its own: inside, edge, or a cell of the label image; or "
+                   "the bundle; "
+                   "else empty",
+                   &Row::part},
+                  {"value", "where the misfit is least", &Row::value, {.digits = kForPeople}},
+                  {"sigma",
+                   "standard error; empty if the beads do not determine the quantity",
+                   &Row::sigma,
+                   {.digits = kForPeople}},
+                  {"low", "lower end of the 95 % interval; empty: none", &Row::low, {.digits = kForPeople}},
+                  {"high", "upper end of the 95 % interval; empty: none", &Row::high, {.digits = kForPeople}},
+                  {"identifiable", "the beads limit it to both sides", &Row::identifiable}}};
   return table;
 }
 
@@ -33,12 +34,13 @@ const files::Table<SheetModel>& model_table() {
   static const files::Table<Row> table{
       .file = "sheet_models.csv",
       .row = "each model of what moves the beads under a sheet",
-      .columns = {{"model", "nothing, the sheet, the sheet in parts, or each adhesion for itself", &Row::name},
-                  {"n_parameters", "that were fitted", &Row::n_parameters},
-                  {"chi_squared", "of the misfit, in units of the noise", &Row::chi_squared, {.digits = kForPeople}},
-                  {"relative_l2", "of the misfit", &Row::relative_l2, {.digits = kForPeople}},
-                  {"aic", "Akaike's criterion", &Row::aic, {.digits = kForPeople}},
-                  {"bic", "the Bayesian criterion", &Row::bic, {.digits = kForPeople}}}};
+      .columns = {
+          {"model", "nothing, the sheet, the sheet with more or in parts, or each adhesion for itself", &Row::name},
+          {"n_parameters", "that were fitted", &Row::n_parameters},
+          {"chi_squared", "of the misfit, in units of the noise", &Row::chi_squared, {.digits = kForPeople}},
+          {"relative_l2", "of the misfit", &Row::relative_l2, {.digits = kForPeople}},
+          {"aic", "Akaike's criterion", &Row::aic, {.digits = kForPeople}},
+          {"bic", "the Bayesian criterion", &Row::bic, {.digits = kForPeople}}}};
   return table;
 }
 

@@ -306,6 +306,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "1 if the best stiffness is the softest or the stiffest that is looked at", 0,
        "the misfit falls up to the end of the range: the value is the range's end, not what the beads tell",
        "Read sheet_fit.csv for what is limited. If the stiffness is known, give sheet.youngs_modulus_kPa."},
+      {sheet_cut, "sheet-cut", "sheet", caution,
+       "relative difference of the mean tension between a sheet clamped where the image cuts it and one held across "
+       "the "
+       "cut only",
+       0, "nothing is known of the sheet beyond the image's border, and each assumption has other tensions near it",
+       "Take the tensions far from the cut (cut_reach_um in sheet.json), or images that show the whole colony."},
       {tractions_off_balance, "tractions-off-balance", "sheet", caution,
        "net force over the sum of forces, or net torque over its largest possible, whichever is more", 0.05,
        "a colony that nothing else touches pulls with no net force; what is there is noise, or a neighbour's pull",

@@ -100,6 +100,7 @@ enum class FindingKind {
   sheet_not_identifiable,
   sheet_expands,
   sheet_at_bound,
+  sheet_cut,
   tractions_off_balance,
   tractions_outside
 };

@@ -316,6 +316,90 @@ TEST(Sheet, tensions_follow_from_tractions) {
   }
 }
 
+/// An ellipse on springs, its tractions on a lattice, and the part of it right of x = cut_um.
+struct CutEllipse {
+  static constexpr double kHalfLength_um = 30, kHalfWidth_um = 18, kSpacing_um = 0.5;
+  Region whole, right;
+  std::vector<GroundPatch> all, seen;
+  Solution forward;
+
+  explicit CutEllipse(double cut_um) {
+    whole.rims.emplace_back(test::ring(
+        [](double t) { return 1 / std::hypot(std::cos(t) / kHalfLength_um, std::sin(t) / kHalfWidth_um); }, 240));
+    const double end = std::acos(cut_um / kHalfLength_um);
+    Polygon part;
+    for (int i = 0; i <= 120; ++i) {
+      const double t = end * (i / 60.0 - 1);
+      part.push_back({kHalfLength_um * std::cos(t), kHalfWidth_um * std::sin(t)});
+    }
+    part.front().x = part.back().x = cut_um;
+    right.cuts = {{part.back(), part.front()}};
+    right.rims.emplace_back(part);
+    Scene scene;
+    scene.region = whole;
+    scene.material = {1, 0.4, 4};
+    scene.contraction.nN_per_um = 1;
+    scene.adhesion_nN_per_um3 = 0.02;  // l = 15 um
+    scene.size = {.at_curves_um = 1, .largest_um = 2, .growth = 0.3};
+    forward = solve_on_springs(scene, 1);
+    const Locator locator(*forward.elements);
+    for (double x = cut_um - 59.75; x < 31; x += kSpacing_um)
+      for (double y = -19.75; y < 20; y += kSpacing_um) {
+        const auto place = locator.find({x, y}, 0);
+        if (!place) continue;
+        const Vec2 u = value_of(forward.u, forward.elements->nodes(place->triangle),
+                                forward.elements->shape(place->triangle, place->r, place->s));
+        all.push_back({{x, y}, kSpacing_um * kSpacing_um, 0.02 * u, {}});
+        if (x > cut_um) seen.push_back(all.back());
+      }
+  }
+  FromTraction of_part(CutEdge edge) const {
+    return tensions_from(seen, right, {1, 0.4, 4}, {.at_curves_um = 1, .largest_um = 2, .growth = 0.3}, 1, 1, {}, edge);
+  }
+  /// Of the part that is seen, in truth.
+  double mean_nN_per_um() const { return figures_inside(forward, right.rims.front().points_um()).mean_nN_per_um; }
+};
+
+TEST(Sheet, one_that_is_cut_along_its_axis_of_symmetry_has_the_tensions_of_the_whole) {
+  const CutEllipse ellipse(0);
+  const FromTraction half = ellipse.of_part(CutEdge::held);
+  // The lattice's squares end in steps at the rim: 1 % of the area, of which the mean is the sum.
+  EXPECT_NEAR(half.balance.mean_tension_nN_per_um, ellipse.mean_nN_per_um(), 0.01 * ellipse.mean_nN_per_um());
+  EXPECT_NEAR(half.balance.virial_tension_nN_per_um, half.balance.mean_tension_nN_per_um, 1e-9);
+  const FromTraction whole =
+      tensions_from(ellipse.all, ellipse.whole, {1, 0.4, 4}, {.at_curves_um = 1, .largest_um = 2, .growth = 0.3}, 1);
+  const Locator in_half(*half.solution.elements), in_whole(*whole.solution.elements);
+  for (const Vec2 p : {Vec2{1, 0}, {1, 15}, {10, 5}, {25, -3}}) {
+    const auto at = [&](const Solution& solution, const Locator& locator) {
+      const auto place = locator.find(p);
+      return value_of(solution.at_nodes, solution.elements->nodes(place->triangle),
+                      solution.elements->shape(place->triangle, place->r, place->s));
+    };
+    const Tensor a = at(half.solution, in_half), b = at(whole.solution, in_whole);
+    EXPECT_NEAR(a.xx, b.xx, 0.01) << p.x << " " << p.y;  // of s = 1
+    EXPECT_NEAR(a.yy, b.yy, 0.01) << p.x << " " << p.y;
+    EXPECT_NEAR(a.xy, b.xy, 0.01) << p.x << " " << p.y;
+  }
+  // what lies beyond pulls with the tension across the cut: as much as the part pulls on its ground
+  ASSERT_TRUE(half.cut);
+  EXPECT_NEAR(half.cut->length_um, 2 * CutEllipse::kHalfWidth_um, 1e-6);
+  Vec2 on_ground;
+  for (const GroundPatch& patch : ellipse.seen) on_ground += patch.area_um2 * patch.traction_kPa;
+  EXPECT_NEAR(half.cut->force_nN.x, on_ground.x, 1e-9 * std::abs(on_ground.x));
+}
+
+TEST(Sheet, at_a_cut_anywhere_the_edge_that_is_held_errs_less_than_a_free_one_and_less_than_the_spread) {
+  for (const double cut : {-15.0, 8.0, 18.0}) {
+    const CutEllipse ellipse(cut);
+    const double truth = ellipse.mean_nN_per_um();
+    const auto mean = [&](CutEdge edge) { return ellipse.of_part(edge).balance.mean_tension_nN_per_um; };
+    const double held = mean(CutEdge::held), clamped = mean(CutEdge::clamped), free = mean(CutEdge::free);
+    std::printf("cut at %g: truth %.4f, held %.4f, clamped %.4f, free %.4f\n", cut, truth, held, clamped, free);
+    EXPECT_LT(std::abs(held - truth), 0.3 * std::abs(free - truth)) << cut;
+    EXPECT_LE(std::abs(held - truth), std::max(std::abs(clamped - held), std::abs(free - held))) << cut;
+  }
+}
+
 /// Errors drawn here as the errors are said to be: one for each component in each square of the correlation's side.
 TEST(Sheet, errors_of_tensions_are_the_scatter_under_drawn_errors_of_tractions) {
   Region disc;

@@ -1,0 +1,84 @@
+#include "continuum/sheet/patches.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/neighbour_bins.h"
+#include "pipeline/numerics/order_statistics.h"
+
+namespace mbtfm::sheet {
+
+substrate::Ellipse ellipse_of(Vec2 a, Vec2 b, Vec2 c) {
+  const Vec2 centre = 1.0 / 3 * (a + b + c);
+  Eigen::Matrix2d inertia = Eigen::Matrix2d::Zero();
+  for (const Vec2 p : {a, b, c}) {
+    const Eigen::Vector2d d(p.x - centre.x, p.y - centre.y);
+    inertia += d * d.transpose() / 12;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(inertia);
+  const double ratio = std::sqrt(axes.eigenvalues()(1) / axes.eigenvalues()(0));
+  const double product = 0.5 * std::abs(cross(b - a, c - a)) / std::numbers::pi;
+  const Eigen::Vector2d major = axes.eigenvectors().col(1);
+  const double semi_major = std::sqrt(product * ratio);
+  return {centre, semi_major, std::min(semi_major, product / semi_major), std::atan2(major.y(), major.x())};
+}
+
+substrate::Ellipse patch_of(const Elements& elements, int triangle) {
+  const auto corner = [&](std::size_t i) {
+    return elements.triangles().nodes_um[static_cast<std::size_t>(elements.nodes(triangle)[i])];
+  };
+  substrate::Ellipse ellipse = ellipse_of(corner(0), corner(1), corner(2));
+  const double area = elements.area_um2(triangle);  // of the curved triangle
+  const double scale = std::sqrt(area / (std::numbers::pi * ellipse.semi_major_um * ellipse.semi_minor_um));
+  ellipse.semi_major_um *= scale;
+  ellipse.semi_minor_um *= scale;
+  ellipse.centre_um = {};
+  for (int p = 0; p < Elements::kPoints; ++p)
+    ellipse.centre_um += elements.at(triangle, p).weight_um2 / area * elements.at(triangle, p).place_um;
+  return ellipse;
+}
+
+std::vector<Vec2> Patches::centres_um() const {
+  std::vector<Vec2> centres;
+  for (const substrate::Ellipse& ellipse : ellipses) centres.push_back(ellipse.centre_um);
+  return centres;
+}
+
+double Patches::size_um(int patch) const { return std::sqrt(areas_um2[static_cast<std::size_t>(patch)]); }
+
+Patches patches_of(const Elements& elements, std::vector<int> triangles) {
+  if (triangles.size() < 2)
+    throw InvalidData("where the sheet adheres", "two of its triangles or more", std::to_string(triangles.size()));
+  Patches patches{.elements = &elements, .triangles = std::move(triangles), .ellipses = {}, .areas_um2 = {}};
+  for (const int t : patches.triangles) {
+    patches.ellipses.push_back(patch_of(elements, t));
+    patches.areas_um2.push_back(elements.area_um2(t));
+  }
+  return patches;
+}
+
+std::vector<std::vector<int>> neighbours_of(const Patches& patches, const std::function<double(double)>& reach_um) {
+  const std::vector<Vec2> centres = patches.centres_um();
+  numerics::Grid grid(centres, std::sqrt(numerics::median(patches.areas_um2)));
+  for (int i = 0; i < patches.n(); ++i) grid.add(i, patches.centre_um(i), patches.centre_um(i));
+  std::vector<std::vector<int>> near(centres.size());
+  // the larger patch of a pair looks for the smaller one: small ones need not look far
+  for (int j = 0; j < patches.n(); ++j) {
+    const Vec2 at = patches.centre_um(j);
+    const double size = patches.size_um(j);
+    grid.for_each_near(at, at, reach_um(2 * size), [&](int i) {
+      const double other = patches.size_um(i);
+      if (other > size || (other == size && i > j)) return;
+      if (norm(patches.centre_um(i) - at) >= reach_um(size + other)) return;
+      near[static_cast<std::size_t>(j)].push_back(i);
+      if (i != j) near[static_cast<std::size_t>(i)].push_back(j);
+    });
+  }
+  for (std::vector<int>& list : near) std::ranges::sort(list);
+  return near;
+}
+
+}  // namespace mbtfm::sheet
