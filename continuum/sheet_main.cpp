@@ -350,6 +350,7 @@ struct Run {
   Solution solution;
   Figures figures;
   std::vector<Effect> effects;
+  std::optional<Balance> balance = {};       ///< with what holds the sheet at cuts; unset: by the solution alone
   std::string told = {};                     ///< for the last line
   std::vector<report::Listing> tables = {};  ///< of the page
 };
@@ -498,6 +499,7 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
                     {"net_torque_share", found.unbalanced.net_torque_share},
                     {"outside_share", found.unbalanced.outside_share},
                     {"exact_virial_tension_nN_per_um", found.balance.virial_tension_nN_per_um}};
+  result.balance = found.balance;
   if (found.errors) {
     result.figures.emplace_back("mean_tension_sigma_nN_per_um", found.errors->mean_nN_per_um);
     result.solution.sigma_by_triangle = found.errors->by_triangle;
@@ -833,7 +835,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   Run done = has_tractions ? run_from_traction(p, context, region)
              : has_beads   ? run_fit(p, context, region)
                            : run_forward(p, context, region);
-  const Balance balance = balance_of(done.solution);
+  const Balance balance = done.balance.value_or(balance_of(done.solution));
   const std::size_t n_outside = write_solution(context, done.solution);
   append(done.figures, figures_of(done.solution, balance));
   append(done.figures, write_cells(context, done.solution, p.pixel_size_um));

@@ -62,6 +62,38 @@ TEST_F(Sheet, its_tractions_give_its_tensions_back) {
   EXPECT_NEAR(figure("mean_tension_nN_per_um"), figure("exact_virial_tension_nN_per_um"), 1e-9 * mean);
 }
 
+/// The half of a disc that the image shows: what lies beyond pulls on it, and it has the tension of the whole.
+TEST_F(Sheet, one_that_the_image_cuts_is_held_at_the_cut_and_said_to_be) {
+  ASSERT_EQ(run(std::string(kSheet) + "adhesion_stiffness_nN_per_um3 = 0.003\n").code, 0);
+  const double mean = figure("mean_tension_nN_per_um");
+  const files::CsvTable whole(folder_ / "out" / "traction.csv");
+  std::string seen = "x_um,y_um,tx_kPa,ty_kPa,area_um2\n";
+  for (int row = 0; row < whole.n_rows(); ++row) {
+    if (whole.number(row, "x_um") < 0) continue;
+    for (const char* column : {"x_um", "y_um", "tx_kPa", "ty_kPa"}) seen += whole.text(row, column) + ",";
+    seen += whole.text(row, "area_um2") + "\n";
+  }
+  files::write_text(folder_ / "traction.csv", seen);
+  Polygon half;
+  for (int i = -60; i <= 60; ++i) {
+    const double t = std::numbers::pi * i / 120;
+    half.push_back({std::abs(i) == 60 ? 0 : 25 * std::cos(t), 25 * std::sin(t)});
+  }
+  std::vector<bool> is_cut(half.size());
+  is_cut.back() = true;
+  files::write_outline(folder_ / "half.csv", half, {}, is_cut);
+  const auto outcome =
+      run("[sheet]\npoisson_ratio = 0.3\n", "--traction " + (folder_ / "traction.csv").string(), "half.csv");
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(files::read_text(folder_ / "out" / "sheet.html").find("The image cuts the sheet"), std::string::npos);
+  // triangles of the whole lie across the cut: some of the forces are on the other side of it
+  EXPECT_NEAR(figure("inside_mean_tension_nN_per_um"), mean, 0.05 * mean);
+  EXPECT_LT(figure("inside_mean_tension_cut_free_nN_per_um"), 0.8 * mean);
+  EXPECT_NEAR(figure("cut_length_um"), 50, 1e-6);
+  EXPECT_NEAR(figure("virial_tension_nN_per_um"), figure("mean_tension_nN_per_um"), 1e-9 * mean);
+  EXPECT_NEAR(figure("net_force_nN"), figure("cut_pull_nN"), 1e-9 * figure("total_force_nN"));
+}
+
 TEST_F(Sheet, tractions_in_pascals_are_refused) {
   std::ofstream file(folder_ / "traction.csv");
   file << "x_um,y_um,tx_kPa,ty_kPa\n";
