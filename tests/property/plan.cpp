@@ -244,7 +244,7 @@ TEST(AdhesionPair, few_exact_beads_are_worth_less_than_many_poor_ones) {
   EXPECT_GT(*pairs.least_distance_um(1, 8, 0, 0.01), 1.3 * *pairs.least_distance_um(1, 8, 1, 0.1));
 }
 
-/// Drawn experiments are in docs/developers/planning.md: they take minutes.
+/// plan_accuracy pairs-in-space draws experiments: they take minutes.
 TEST(AdhesionPair, by_beads_in_a_volume_the_least_distance_asks_for_force_over_noise_and_modulus) {
   const BeadVolume volume{.depth_um = 12, .axial_noise = 3};
   const PairResolution pairs(kGel, 28, {0.002, 0.008}, volume, {4, 60}, kThreads);
