@@ -41,8 +41,8 @@ report::Table expected_rows(const SpacePlan& plan) {
                                   {"by beads", true},
                                   {"by background", true},
                                   {"within target (%)", true},
-                                  {"two in the map from (µm)", true},
-                                  {"two patches told from (µm)", true},
+                                  {"map resolves (µm)", true},
+                                  {"two told from (µm)", true},
                                   {"numbers told", true}},
                       .rows = {}};
   for (const SpaceExpected& e : plan.grid.expected) {
