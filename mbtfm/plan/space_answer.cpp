@@ -99,7 +99,7 @@ std::vector<std::string> further_sentences(const SpacePlan& plan) {
       " normal to it; the total force has " + error(SpaceQuantity::total_force) + ", the net force " +
       error(SpaceQuantity::net_force) +
       ". The smallest force that can be seen is three times the patch's error. In the map, forces closer than " +
-      about(*patch.resolution_um) + " µm look like one; from about twice that on they are surely two.");
+      about(*patch.resolution_um) + " µm look like one; from about twice that on they are mostly seen as two.");
   sentences.push_back(about_pair(plan, patch.least_distance_um));
   if (plan.drawn) sentences.push_back(about_drawn(*plan.drawn));
   return sentences;
@@ -128,8 +128,7 @@ const Table<SpaceExpected>& space_expected_table() {
           {"smallest_seen_nN", "three standard errors", &Row::smallest_seen_nN, kResult},
           {"resolution_um",
            "in the map, at the middle patch: forces closer together than this look like one; from about twice that on "
-           "they "
-           "are surely two",
+           "they are mostly seen as two",
            &Row::resolution_um, kResult},
           {"least_distance_um",
            "of two patches of the force asked for, from centre to centre, whose forces are told apart where the image "

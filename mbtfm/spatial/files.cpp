@@ -38,7 +38,7 @@ const files::Table<Row>& traction_table() {
           {"sigma_ty_kPa", "the same along y", &Row::sigma_y_kPa, kResult},
           {"sigma_tz_kPa", "the same into the gel", &Row::sigma_z_kPa, kResult},
           {"resolution_um",
-           "forces closer together than this look like one; from about twice that on they are surely two",
+           "forces closer together than this look like one; from about twice that on they are mostly seen as two",
            &Row::resolution_um, kResult},
           {"normal_kPa", "traction along the normal out of the gel: above 0 it pulls", &Row::normal_kPa, kResult},
           {"tangential_kPa", "size of the traction along the surface", &Row::tangential_kPa, kResult},

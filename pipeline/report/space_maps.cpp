@@ -164,7 +164,7 @@ std::optional<Figure> resolution_map(const SpaceResults& r) {
   if (!r.tractions.front().resolution_um) return std::nullopt;
   return scalar_map(
       r, "Resolution", "distance", "µm", [](const SurfaceTraction& t) { return t.resolution_um; },
-      "Forces closer together than this look like one. From about twice that on they are surely two.");
+      "Forces closer together than this look like one. From about twice that on they are mostly seen as two.");
 }
 
 std::vector<Figure> bead_slices(const SpaceResults& r) {

@@ -11,10 +11,10 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
+#include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/space_report.h"
 #include "segment/images/image.h"
-#include "pipeline/numerics/near.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/track.h"
 #include "segment/stacks/detect.h"
 #include "segment/stacks/mean_by_depth.h"
-#include "pipeline/numerics/near.h"
 #include "segment/stacks/track.h"
 #include "tests/support/stack_scene.h"
 

@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "pipeline/files/csv.h"
+#include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "samples/drawing/stack.h"
 #include "segment/images/png.h"
-#include "pipeline/numerics/near.h"
 #include "segment/stacks/track.h"
 
 using namespace mbtfm;
