@@ -95,12 +95,11 @@ AmongNeighbours compared_with(const Observed& observed, const std::vector<int>& 
   return made;
 }
 
-/// Density of Student's distribution with four degrees of freedom at vectors of this length.
-double student_density(double length, double n) {
-  constexpr double kDegrees = 4;
-  const double size = std::tgamma((kDegrees + n) / 2) / std::tgamma(kDegrees / 2);
-  return size / std::pow(kDegrees * std::numbers::pi, n / 2) *
-         std::pow(1 + length * length / kDegrees, -(kDegrees + n) / 2);
+/// Density of Student's distribution with so many degrees of freedom at vectors of n components and this length.
+double student_density(double length, double n, double degrees) {
+  const double size = std::exp(std::lgamma((degrees + n) / 2) - std::lgamma(degrees / 2));
+  return size / std::pow(degrees * std::numbers::pi, n / 2) *
+         std::pow(1 + length * length / degrees, -(degrees + n) / 2);
 }
 
 /// Of a bead that lies anywhere in the box of all displacements, each component over its sigma.
@@ -112,6 +111,31 @@ double density_in_box(const VectorXd& over_sigma, Index n, double least) {
     density /= std::max(component.maxCoeff() - component.minCoeff(), least);
   }
   return density;
+}
+
+struct Judged {
+  std::vector<double> good;  ///< probabilities, by bead
+  double log_likelihood = 0;
+};
+
+Judged judged(const AmongNeighbours& among, double n, double in_box, double degrees) {
+  Judged found{std::vector<double>(among.distance.size(), 1), 0};
+  constexpr int kMost = 200;
+  constexpr double kSettled = 1e-6;
+  double astray = 0.1, before = 0;
+  for (int step = 0; step < kMost && std::abs(astray - before) > kSettled; ++step) {
+    before = std::exchange(astray, 0);
+    found.log_likelihood = 0;
+    for (std::size_t b = 0; b < found.good.size(); ++b) {
+      const double as_good = (1 - before) * student_density(among.distance[b], n, degrees);
+      const double as_astray = before * in_box * std::pow(among.error[b], n);
+      const double both = std::max(as_good + as_astray, 1e-300);
+      found.good[b] = as_good / both;
+      found.log_likelihood += std::log(both);
+      astray += (1 - found.good[b]) / static_cast<double>(found.good.size());
+    }
+  }
+  return found;
 }
 
 }  // namespace
@@ -139,21 +163,14 @@ std::vector<double> probabilities_of_good(BeadLoss loss, const Observed& observe
   const Index n = observed.n_components();
   const double in_box = density_in_box(observed.displacement_um.cwiseQuotient(observed.sigma_um), n,
                                        *std::ranges::min_element(among.error));
-  std::vector<double> good(among.distance.size(), 1);
-  constexpr int kMost = 200;
-  constexpr double kSettled = 1e-6;
-  double astray = 0.1, before = 0;
-  for (int step = 0; step < kMost && std::abs(astray - before) > kSettled; ++step) {
-    before = std::exchange(astray, 0);
-    for (std::size_t b = 0; b < good.size(); ++b) {
-      const double as_good = (1 - before) * student_density(among.distance[b], static_cast<double>(n));
-      const double as_astray = before * in_box * std::pow(among.error[b], static_cast<double>(n));
-      good[b] = as_good / std::max(as_good + as_astray, 1e-300);
-      astray += (1 - good[b]) / static_cast<double>(good.size());
-    }
+  Judged best;
+  for (const double degrees : {1.0, 2.0, 4.0}) {
+    Judged next = judged(among, static_cast<double>(n), in_box, degrees);
+    if (best.good.empty() || next.log_likelihood > best.log_likelihood) best = std::move(next);
   }
-  for (double& p : good) p = p < 0.5 ? 0 : p;  // a hundredth of a bead that is forty errors off would count as many
-  return good;
+  for (double& p : best.good)
+    p = p < 0.5 ? 0 : p;  // a hundredth of a bead that is forty errors off would count as many
+  return best.good;
 }
 
 }  // namespace mbtfm::spatial

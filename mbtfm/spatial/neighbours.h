@@ -21,9 +21,9 @@ struct AmongNeighbours {
 AmongNeighbours among_neighbours(const Observed& observed);
 
 /// By bead, the probability that it is good, 0 if that is below one half: good beads follow their neighbours with
-/// errors of Student's distribution with four degrees of freedom, as fields are not linear; others lie anywhere in the
-/// box of all displacements. Their share is the likeliest (expectation–maximisation; Dempster, Laird & Rubin, J. R.
-/// Stat. Soc. B 39 (1977) 1).
+/// errors of Student's distribution with one, two or four degrees of freedom, whichever is likeliest, as fields are not
+/// linear; others lie anywhere in the box of all displacements. Their share is the likeliest (expectation–maximisation;
+/// Dempster, Laird & Rubin, J. R. Stat. Soc. B 39 (1977) 1).
 /// @return empty where there are 16 beads or fewer, and for losses other than mixture
 std::vector<double> probabilities_of_good(BeadLoss loss, const Observed& observed);
 

@@ -71,6 +71,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   SpatialReconstruction r;
   const Observed& observed = problem.observed;
   const std::vector<double> good = probabilities_of_good(parameters.loss, observed);
+  const bool leaves_none_out = !good.empty() && *std::ranges::min_element(good) > 0;  // then it is least squares
   const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
     return spectrum.scan(largest(stated_variance(problem, parameters.loss, weighing), spectrum.variance_felt_least()));
   };
@@ -81,7 +82,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
     made.scan = judged ? scanned(spectrum_of(problem, response, judged->by_row, judged->n_data, threads), *judged)
                        : scanned(*made.spectrum, weighing);
-    made.chosen = choose_lambda(problem, made.scan, traction, parameters.loss == BeadLoss::l2);
+    made.chosen = choose_lambda(problem, made.scan, traction, parameters.loss == BeadLoss::l2 || leaves_none_out);
     if (judged && made.chosen.by)
       made.chosen.lambda *= std::sqrt(weighing.variance / judged->variance);  // the same prior
     made.x = made.spectrum->solve(made.chosen.lambda);

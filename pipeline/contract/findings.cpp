@@ -242,7 +242,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {beads_stray, "beads-stray", "traction", caution,
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
-       "Set traction.loss = mixture."},
+       "Set traction.loss = mixture, and compare with biweight."},
       {loss_decides, "loss-decides", "traction", caution,
        "difference of the total forces by this loss and by l2, over their joint standard error", 1,
        "both are of the same beads, so that chance alone makes 0.2 of it (biweight, huber) to 0.4 (l1); beyond 1 the "

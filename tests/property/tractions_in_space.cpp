@@ -470,10 +470,15 @@ TEST_F(InSpace, beads_that_are_wrong_do_not_pull_with_a_robust_loss) {
     RecordProperty(name_of(loss), std::to_string(apart(robust.traction_kPa, without.traction_kPa)) + " " +
                                       std::to_string(apart(of_good.traction_kPa, without.traction_kPa)) + " " +
                                       std::to_string(by_squares));
+    EXPECT_LE(apart(of_good.traction_kPa, without.traction_kPa), loss == BeadLoss::mixture ? 1e-5 : 0.3)
+        << name_of(loss) << ": a mixture that leaves none out is least squares";
+    if (loss == BeadLoss::mixture) {  // what it does of outliers hangs on the scene: developers/tractions_in_space.md
+      EXPECT_LE(apart(robust.traction_kPa, without.traction_kPa), by_squares);
+      continue;
+    }
     EXPECT_LE(apart(robust.traction_kPa, without.traction_kPa), 0.5 * by_squares) << name_of(loss);
     // no tractions at all are 1 apart
     EXPECT_LE(apart(robust.traction_kPa, without.traction_kPa), 0.5) << name_of(loss);
-    EXPECT_LE(apart(of_good.traction_kPa, without.traction_kPa), 0.3) << name_of(loss);
   }
 }
 
