@@ -59,22 +59,11 @@ Weighing weigh(BeadLoss loss, const Observed& observed, const Eigen::VectorXd& r
   const double taken = std::sqrt(std::max(1 - degrees / n_rows, 0.1));  // followed noise leaves less
   Weighing weighing;
   weighing.by_row = Eigen::VectorXd::Ones(residual.size());
-  weighing.n_data = n_rows;
-  if (loss == BeadLoss::l2) {
-    weighing.scale = residual.norm() / std::sqrt(n_rows) / taken;
-    weighing.variance = weighing.scale * weighing.scale;
-    return weighing;
-  }
-  if (loss == BeadLoss::mixture) {
-    double squares = 0, beads = 1e-300;
-    for (Index b = 0; b < n_groups; ++b) {
-      const double p = good.empty() ? 1 : good[static_cast<std::size_t>(b)];
-      weighing.by_row.segment(n * b, n).setConstant(p);
-      squares += p * residual.segment(n * b, n).squaredNorm();
-      beads += p;
-    }
-    weighing.n_data = beads * static_cast<double>(n);
-    weighing.scale = std::sqrt(squares / weighing.n_data) / taken;
+  if (!weighs_by_residual(loss)) {
+    for (std::size_t k = 0; k < good.size(); ++k)
+      weighing.by_row.segment(n * static_cast<Index>(k), n).setConstant(good[k]);
+    weighing.n_data = std::max(weighing.by_row.sum(), 1e-300);
+    weighing.scale = weighing.by_row.cwiseSqrt().cwiseProduct(residual).norm() / std::sqrt(weighing.n_data) / taken;
     weighing.variance = weighing.scale * weighing.scale;
     return weighing;
   }

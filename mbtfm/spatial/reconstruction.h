@@ -164,7 +164,7 @@ struct Balance {
 };
 Balance balance_of(const Problem& problem, const SpatialReconstruction& reconstruction);
 
-/// Forces closer together than this look like one; from about twice that on they are surely two
+/// Forces closer together than this look like one; from about twice that on they are mostly seen as two
 /// (docs/developers/planning.md). The side of the area over which the beads tell one number for
 /// each component.
 std::vector<double> resolution_um(const Problem& problem, const SpatialReconstruction& reconstruction);
