@@ -71,7 +71,9 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   SpatialReconstruction r;
   const Observed& observed = problem.observed;
   const std::vector<double> good = probabilities_of_good(parameters.loss, observed);
-  const bool leaves_none_out = !good.empty() && *std::ranges::min_element(good) > 0;  // then it is least squares
+  // a mixture of which no bead is left out is least squares
+  const bool leaves_none_out =
+      parameters.loss == BeadLoss::mixture && std::ranges::none_of(good, [](double p) { return p == 0; });
   const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
     return spectrum.scan(largest(stated_variance(problem, parameters.loss, weighing), spectrum.variance_felt_least()));
   };
