@@ -221,9 +221,9 @@ SpaceNeeded needed_of(const SpaceScene& scene, const Asked& asked, const SpaceFo
   return {E, noise_um, of_share(0.5), of_share(kMost)};
 }
 
-std::vector<std::string> warnings_of(const Asked& asked, const SpaceGrid& grid) {
+std::vector<std::string> warnings_of(const SpaceScene& scene, const Asked& asked, const SpaceGrid& grid) {
   constexpr double kOfNoise = 3, kBeyondLinear = 0.05, kFewNumbers = 24;  // as those of flat gels and of the stage
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings = scene.warnings;
   for (const double E : asked.youngs_modulus_kPa) {
     double told = 0;
     const SpaceExpected* last = nullptr;
@@ -376,7 +376,7 @@ SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector
     }
     for (const double noise_um : asked.noise_um) grid.needed.push_back(needed_of(scene, asked, foreseen, E, noise_um));
   }
-  grid.warnings = warnings_of(asked, grid);
+  grid.warnings = warnings_of(scene, asked, grid);
   return grid;
 }
 

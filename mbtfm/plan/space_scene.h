@@ -37,6 +37,7 @@ struct SpaceScene {
   tractions::TractionParameters traction = {};           ///< how experiments are evaluated
   spatial::SpatialParameters spatial = {};
   substrate::SubstrateParameters substrate = {};
+  std::vector<std::string> warnings = {};  ///< what of a finished cell's settings a plan does not follow
 
   double volume_um3() const { return (high_um.x - low_um.x) * (high_um.y - low_um.y) * bead_depth_um; }
 };

@@ -175,6 +175,16 @@ void expect_a_plan_of(const fs::path& folder) {
   EXPECT_NEAR(scene.own_beads_per_um3 * scene.volume_um3(), static_cast<double>(beads.size()),
               0.3 * static_cast<double>(beads.size()));
   EXPECT_GT(scene.bead_depth_um, 0);
+  EXPECT_TRUE(scene.warnings.empty());
+}
+
+/// In a plan no bead is wrong: what a robust loss is for is not planned with, and said.
+void expect_a_plan_says_that_it_has_no_robust_loss(const fs::path& folder) {
+  files::write_text(folder / "cell.toml", files::read_text(folder / "cell.toml") + "loss = \"huber\"\n");
+  const plan::SpaceScene scene = plan::measured_in_space(folder, {});
+  EXPECT_EQ(scene.spatial.loss, mbtfm::spatial::BeadLoss::l2);
+  ASSERT_EQ(scene.warnings.size(), 1u);
+  EXPECT_NE(scene.warnings.front().find("traction.loss = huber"), std::string::npos) << scene.warnings.front();
 }
 
 TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
@@ -251,6 +261,7 @@ TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
   for (const char* says : {"outline.csv", "all of it elsewhere", "hint:"})
     EXPECT_NE(elsewhere.output.find(says), std::string::npos) << elsewhere.output;
   EXPECT_EQ(files::read_text(folder / "4_traction/traction.csv"), tractions);
+  expect_a_plan_says_that_it_has_no_robust_loss(folder);
 }
 
 TEST_F(Stacks, init_and_check_know_them) {
