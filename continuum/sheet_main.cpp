@@ -11,6 +11,7 @@
 #include "continuum/sheet/parameters.h"
 #include "continuum/sheet/picture.h"
 #include "continuum/sheet/tables.h"
+#include "mbtfm/sheets/field_fit.h"
 #include "mbtfm/sheets/tables.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
@@ -33,8 +34,8 @@ namespace mbtfm::sheet {
 namespace {
 
 /// Which parts of a sheet have a contraction of their own.
-enum class Parts { none, edge, cells };
-constexpr auto words(Parts) { return std::array{"none", "edge", "cells"}; }
+enum class Parts { none, edge, cells, field };
+constexpr auto words(Parts) { return std::array{"none", "edge", "cells", "field"}; }
 
 struct Parameters {
   std::optional<double> pixel_size_um;
@@ -45,6 +46,7 @@ struct Parameters {
   double most_unbalanced = kMostUnbalanced;
   std::optional<double> traction_sigma_kPa, traction_correlation_um;
   Parts fit_parts = Parts::none;                  ///< the simplest
+  int field_points = 40;                          ///< of a colony's beads tell fewer numbers
   bool fit_line_tension = false;                  ///< most colonies have none
   bool fit_adhesion_stiffness = false;            ///< few beads tell it beside the sheet's own
   tensions::Loss loss = tensions::Loss::squares;  ///< beads are Gaussian to first order
@@ -73,7 +75,11 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.add(
       "fit_parts", p.fit_parts,
       "with --displacement: parts with a contraction of their own: none, all of the sheet alike; edge: the band of "
-      "edge_band_um and what is inside of it; cells: each cell of the label image --cells");
+      "edge_band_um and what is inside of it; cells: each cell of the label image --cells; field: the contraction "
+      "varies "
+      "smoothly, as much as the beads call for");
+  list.add("field_points", p.field_points, Range::between(4, 200),
+           "with fit_parts = field: about how many points the contraction is given at, bilinear between them");
   list.add("fit_line_tension", p.fit_line_tension, "with --displacement: fit line_tension_nN, too");
   list.add("fit_adhesion_stiffness", p.fit_adhesion_stiffness,
            "with --displacement: fit adhesion_stiffness_nN_per_um3, too: springs between sheet and gel");
@@ -578,7 +584,8 @@ Words words_of(sheets::Quantity quantity) {
 
 std::string sentence_of(const sheets::SheetEstimate& e) {
   const auto& [quantity, unit] = words_of(e.quantity);
-  const std::string name = quantity + (e.part.empty() ? "" : " of " + e.part);
+  const std::string name =
+      e.part == sheets::kMean ? "mean " + quantity : quantity + (e.part.empty() ? "" : " of " + e.part);
   if (e.identifiable && *e.low == *e.high) return name + " " + brief(e.value) + unit + " (given)";
   if (e.identifiable) return name + " " + brief(e.value) + unit + " (" + brief(*e.low) + " to " + brief(*e.high) + ")";
   if (e.low) return name + " > " + brief(*e.low) + unit;
@@ -600,6 +607,12 @@ void notice_expansion(stage::StageContext& context, const sheets::SheetFit& fit,
   if (!text.empty()) text += is_sure ? ": it expands." : ": that is no contraction.";
   context.notice(noticed(FindingKind::sheet_expands, static_cast<double>(found.size()) / n_parts, text,
                          is_sure ? Severity::bad : Severity::caution));
+}
+
+void add_figures_of(const sheets::FieldFit& field, Figures& figures) {
+  figures.emplace_back("contraction_degrees", field.degrees);
+  figures.emplace_back("contraction_smoothing_um2_per_nN2", field.smoothing);
+  figures.emplace_back("contraction_is_as_smooth_as_tried", field.is_smoothing_at_end);
 }
 
 std::vector<report::Listing> tables_of_fit(const Path& estimates, const Path& models) {
@@ -646,7 +659,7 @@ std::vector<Part> parts_of_cells(const Parameters& p, stage::StageContext& conte
 
 std::vector<Part> parts_of(const Parameters& p, stage::StageContext& context, const Region& region) {
   if (p.fit_parts == Parts::cells) return parts_of_cells(p, context);
-  if (p.fit_parts == Parts::none) return {};
+  if (p.fit_parts == Parts::none || p.fit_parts == Parts::field) return {};
   if (!p.sheet.edge_band_um) throw UsageError("[sheet] edge_band_um is missing: fit_parts = edge asks how wide it is");
   const auto is_edge = [rims = region.rims, band = *p.sheet.edge_band_um](Vec2 place) {
     return std::ranges::any_of(
@@ -690,6 +703,8 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
     throw UsageError("with --displacement a line tension is fitted (fit_line_tension): leave line_tension_nN out");
   if (p.fit_adhesion_stiffness && p.sheet.adhesion_stiffness_nN_per_um3)
     throw UsageError("fit_adhesion_stiffness asks for what adhesion_stiffness_nN_per_um3 gives: leave one of them out");
+  if (p.fit_adhesion_stiffness && p.fit_parts == Parts::field)
+    throw UsageError("fit_parts = field asks for a known bond: leave fit_adhesion_stiffness out");
   if (!p.sheet.thickness_um) throw UsageError("[sheet] thickness_um is missing: give it in cell.toml");
   Gel gel = p.gel;
   gel.youngs_modulus_kPa = *p.gel_modulus_kPa;
@@ -716,7 +731,12 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
     shares.push_back(share_of(part, *elements, region));
     names.push_back(part.name);
   }
-  if (parts.empty()) shares.push_back(contraction_at_points(*elements, region, scene.contraction));
+  std::optional<sheets::ContractionLattice> lattice;
+  if (p.fit_parts == Parts::field) {
+    lattice.emplace(*elements, p.field_points);
+    shares = lattice->shares_on(*elements);
+  }
+  if (shares.empty()) shares.push_back(contraction_at_points(*elements, region, scene.contraction));
   const sheets::StiffnessTable table({.elements = elements,
                                       .contractions = shares,
                                       .poisson_ratio = nu,
@@ -730,13 +750,21 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   std::optional<double> known;
   if (p.sheet.youngs_modulus_kPa)
     known = Material{*p.sheet.youngs_modulus_kPa, nu, *p.sheet.thickness_um}.stiffness_nN_per_um();
-  sheets::SheetFit fit = fit_sheet(data_of(beads, table, ground, *model, context.threads), table, p.loss, known, names);
+  tensions::LinearData data = data_of(beads, table, ground, *model, context.threads);
+  std::optional<sheets::FieldFit> field;
+  if (lattice) field = fit_field(std::move(data), table, p.loss, known, *lattice, means_over(*elements, *lattice));
+  sheets::SheetFit fit = field ? field->sheet : fit_sheet(std::move(data), table, p.loss, known, names);
   if (context.has_input("adhesions")) compare_with_adhesions(fit, data_of_adhesions(beads, context, *model));
 
   scene.material.youngs_modulus_kPa = fit.stiffnesses.sheet_nN_per_um * (1 - nu * nu) / *p.sheet.thickness_um;
   scene.adhesion_nN_per_um3 = fit.stiffnesses.adhesion_nN_per_um3;
   const Eigen::Index n_parts = table.n_contractions();
   scene.contraction.nN_per_um = fit.loads.head(n_parts).maxCoeff();
+  if (field) {
+    scene.contraction = {.nN_per_um = fit.estimates.front().value, .edge_band_um = std::nullopt, .at = [&](Vec2 place) {
+                           return lattice->shares_at(place).dot(field->contractions);
+                         }};
+  }
   if (!parts.empty()) {
     scene.contraction.edge_band_um = std::nullopt;
     scene.contraction.at = [&](Vec2 place) {
@@ -758,6 +786,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
              models_file = context.output("out", "sheet_models.csv");
   write_estimates(estimates_file, fit);
   write_models(models_file, fit);
+  if (field) write_contractions(context.output("out", "contraction.csv"), contractions_at(*elements, *lattice, *field));
   std::string told;
   for (const sheets::SheetEstimate& e : fit.estimates) told += (told.empty() ? "" : "; ") + sentence_of(e);
   result.told = told;
@@ -765,7 +794,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   const auto stiffness =
       std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &sheets::SheetEstimate::quantity);
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
-  notice_expansion(context, fit, static_cast<int>(n_parts));
+  notice_expansion(context, fit, field ? 1 : static_cast<int>(n_parts));
   context.notice(noticed(FindingKind::sheet_at_bound, fit.is_at_bound ? 1 : 0,
                          "The best stiffness, " + brief(fit.stiffnesses.sheet_nN_per_um) +
                              " nN/µm, is an end of the range " + brief(table.sheet_nN_per_um().low) + " to " +
@@ -782,6 +811,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
                     {"n_down_weighted", std::int64_t{fit.n_down_weighted}},
                     {"aic", fit.models[fit.own_model].aic},
                     {"aic_of_nothing", fit.models.front().aic}};
+  if (field) add_figures_of(*field, result.figures);
   const double x = free_contraction(scene.material, scene.contraction.nN_per_um);
   result.effects.push_back(stage::decided(EffectKind::gel_response, Switch::on, true, "the beads move with the gel"));
   result.effects.push_back(decide_strain(p.sheet.strain, x, Ground::gel));

@@ -202,21 +202,25 @@ void LatticeCompliance::set_near(const Patches& patches, const substrate::Substr
   near_.setFromTriplets(all.begin(), all.end());
 }
 
-VectorXd LatticeCompliance::displace(const VectorXd& forces_nN) const {
+Eigen::MatrixXd LatticeCompliance::displace(const Eigen::MatrixXd& forces_nN) const {
   using Component = Eigen::Map<VectorXd, 0, Eigen::InnerStride<2>>;
   using GivenComponent = Eigen::Map<const VectorXd, 0, Eigen::InnerStride<2>>;
   const Index n = means_.rows();
-  numerics::NodeField field;
-  field.x = (means_.transpose() * GivenComponent(forces_nN.data(), n)).array();
-  field.y = (means_.transpose() * GivenComponent(forces_nN.data() + 1, n)).array();
-  numerics::WaveField waves = transform_.forward(field);
-  const Eigen::ArrayXcd along_x = waves_[0] * waves.x + waves_[1] * waves.y;
-  waves.y = waves_[1] * waves.x + waves_[2] * waves.y;
-  waves.x = along_x;
-  field = transform_.backward(std::move(waves));
-  VectorXd u = near_.selfadjointView<Eigen::Lower>() * forces_nN;
-  Component(u.data(), n) += means_ * field.x.matrix();
-  Component(u.data() + 1, n) += means_ * field.y.matrix();
+  Eigen::MatrixXd u = near_.selfadjointView<Eigen::Lower>() * forces_nN;
+  for (Index c = 0; c < forces_nN.cols(); ++c) {
+    const double* forces = forces_nN.col(c).data();
+    numerics::NodeField field;
+    field.x = (means_.transpose() * GivenComponent(forces, n)).array();
+    field.y = (means_.transpose() * GivenComponent(forces + 1, n)).array();
+    numerics::WaveField waves = transform_.forward(field);
+    const Eigen::ArrayXcd along_x = waves_[0] * waves.x + waves_[1] * waves.y;
+    waves.y = waves_[1] * waves.x + waves_[2] * waves.y;
+    waves.x = along_x;
+    field = transform_.backward(std::move(waves));
+    double* moved = u.col(c).data();
+    Component(moved, n) += means_ * field.x.matrix();
+    Component(moved + 1, n) += means_ * field.y.matrix();
+  }
   return u;
 }
 

@@ -20,7 +20,7 @@ class LatticeCompliance final : public PatchCompliance {
  public:
   /// @throws as substrate::Substrate::response
   LatticeCompliance(const Patches& patches, const substrate::Substrate& gel, int threads);
-  Eigen::VectorXd displace(const Eigen::VectorXd& forces_nN) const override;
+  Eigen::MatrixXd displace(const Eigen::MatrixXd& forces_nN) const override;
   Eigen::VectorXd diagonal_um_per_nN() const override { return diagonal_; }
 
   const numerics::Lattice& lattice() const { return lattice_; }  ///< without its padding

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <limits>
 
 #include "continuum/sheet/stiffness.h"
 #include "pipeline/contract/errors.h"
@@ -11,65 +12,65 @@ namespace mbtfm::sheet {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// W u and Wᵀ F.
+/// W u and Wᵀ F, by column.
 struct Means {
   const Elements& elements;
   const std::vector<int>& triangles;
   const std::vector<std::array<double, 6>>& weights;
 
   Index n() const { return 2 * std::ssize(triangles); }
-  VectorXd of(const NodeVectors& u) const {
-    VectorXd means = VectorXd::Zero(n());
-    for (std::size_t k = 0; k < triangles.size(); ++k)
-      for (int i = 0; i < 6; ++i)
-        means.segment<2>(2 * static_cast<Index>(k)) +=
-            weights[k][i] * u.segment<2>(2 * elements.nodes(triangles[k])[i]);
+  MatrixXd of(const MatrixXd& u) const {
+    MatrixXd means = MatrixXd::Zero(n(), u.cols());
+    for (Index c = 0; c < u.cols(); ++c)
+      for (std::size_t k = 0; k < triangles.size(); ++k)
+        for (int i = 0; i < 6; ++i)
+          means.col(c).segment<2>(2 * static_cast<Index>(k)) +=
+              weights[k][i] * u.col(c).segment<2>(2 * elements.nodes(triangles[k])[i]);
     return means;
   }
-  NodeVectors spread(const VectorXd& forces) const {
-    NodeVectors f = NodeVectors::Zero(2 * elements.n_nodes());
-    for (std::size_t k = 0; k < triangles.size(); ++k)
-      for (int i = 0; i < 6; ++i)
-        f.segment<2>(2 * elements.nodes(triangles[k])[i]) +=
-            weights[k][i] * forces.segment<2>(2 * static_cast<Index>(k));
+  MatrixXd spread(const MatrixXd& forces) const {
+    MatrixXd f = MatrixXd::Zero(2 * elements.n_nodes(), forces.cols());
+    for (Index c = 0; c < forces.cols(); ++c)
+      for (std::size_t k = 0; k < triangles.size(); ++k)
+        for (int i = 0; i < 6; ++i)
+          f.col(c).segment<2>(2 * elements.nodes(triangles[k])[i]) +=
+              weights[k][i] * forces.col(c).segment<2>(2 * static_cast<Index>(k));
     return f;
   }
 };
 
 /// Motions of the sheet as a whole: by node, or as the patches' means have them.
-Eigen::MatrixXd rigid_motions(const Elements& elements) {
-  Eigen::MatrixXd rigid = Eigen::MatrixXd::Zero(2 * elements.n_nodes(), 3);
+MatrixXd rigid_motions(const Elements& elements) {
+  MatrixXd rigid = MatrixXd::Zero(2 * elements.n_nodes(), 3);
   for (int i = 0; i < elements.n_nodes(); ++i) {
     const Vec2 x = elements.triangles().nodes_um[static_cast<std::size_t>(i)];
     rigid.block<2, 3>(2 * i, 0) << 1, 0, -x.y, 0, 1, x.x;
   }
   return rigid;
 }
-Eigen::MatrixXd of_patches(const Eigen::MatrixXd& rigid, const Means& means) {
-  Eigen::MatrixXd patches(means.n(), 3);
-  for (int k = 0; k < 3; ++k) patches.col(k) = means.of(rigid.col(k));
-  return patches;
-}
-
 /// Keeps rounding from growing: takes net force and torque off forces, and motions as a whole off displacements.
 class Balanced {
  public:
   /// @param motions  of the patches  @param weight  of their components
-  Balanced(Eigen::MatrixXd motions, const VectorXd& weight)
+  Balanced(MatrixXd motions, const VectorXd& weight)
       : motions_(std::move(motions)),
         weighted_(weight.asDiagonal() * motions_),
         factor_(motions_.transpose() * weighted_) {}
-  VectorXd forces(VectorXd f) const { return f - weighted_ * factor_.solve(motions_.transpose() * f); }
-  VectorXd displacements(VectorXd u) const { return u - motions_ * factor_.solve(weighted_.transpose() * u); }
-  /// The motion in a displacement.
-  Eigen::Vector3d motion_in(const VectorXd& u) const { return factor_.solve(weighted_.transpose() * u); }
+  MatrixXd forces(MatrixXd f) const { return f - weighted_ * factor_.solve(motions_.transpose() * f); }
+  MatrixXd displacements(MatrixXd u) const { return u - motions_ * motion_in(u); }
+  /// The motion in displacements.
+  MatrixXd motion_in(const MatrixXd& u) const { return factor_.solve(weighted_.transpose() * u); }
 
  private:
-  Eigen::MatrixXd motions_, weighted_;
+  MatrixXd motions_, weighted_;
   Eigen::FullPivLU<Eigen::Matrix3d> factor_;
 };
+
+/// By column.
+Eigen::RowVectorXd dots(const MatrixXd& a, const MatrixXd& b) { return a.cwiseProduct(b).colwise().sum(); }
 
 constexpr double kTolerance = 1e-8;  // of the energy norm of the residual: u is asked to 1 %
 constexpr int kMostIterations = 2000;
@@ -99,6 +100,12 @@ VectorXd OnGel::slip_um_per_nN(double adhesion_nN_per_um3) const {
 
 OnGel::Solution OnGel::solve(const Material& material, std::optional<double> adhesion_nN_per_um3,
                              const NodeVectors& load_nN) const {
+  Solutions all = solve_all(material, adhesion_nN_per_um3, load_nN);
+  return {all.u, all.forces_nN, std::move(all.report)};
+}
+
+OnGel::Solutions OnGel::solve_all(const Material& material, std::optional<double> adhesion_nN_per_um3,
+                                  const MatrixXd& loads_nN) const {
   const Elements& elements = *patches_.elements;
   const Means means{elements, patches_.triangles, weights_};
   const Index n = means.n();
@@ -106,7 +113,9 @@ OnGel::Solution OnGel::solve(const Material& material, std::optional<double> adh
   const VectorXd slip = adhesion_nN_per_um3 ? slip_um_per_nN(*adhesion_nN_per_um3) : VectorXd::Zero(n);
   constexpr double kNeighbours = 4;  // what the gel under a patch and its neighbours is like
   const VectorXd spring = (kNeighbours * compliance_->diagonal_um_per_nN() + slip).cwiseInverse();
-  const auto ground_um = [&](const VectorXd& forces) -> VectorXd { return gel_um(forces) + slip.cwiseProduct(forces); };
+  const auto ground_um = [&](const MatrixXd& forces) -> MatrixXd {
+    return gel_um(forces) + slip.asDiagonal() * forces;
+  };
   for (int t = 0; t < elements.n_triangles(); ++t) {
     const Stiffness::OfElement K = elastic_stiffness(elements, t, material);
     free.add(t, K);
@@ -122,45 +131,46 @@ OnGel::Solution OnGel::solve(const Material& material, std::optional<double> adh
   }
   if (!free.factorise(0, threads_) || !held.factorise(0, threads_))
     throw NotSolved({.reason = "the sheet has no stiffness: check its Young's modulus and thickness"});
-  const Eigen::MatrixXd rigid = rigid_motions(elements);
-  const Balanced balanced(of_patches(rigid, means), spring);
-  const auto preconditioned = [&](const VectorXd& r) -> VectorXd {
-    const VectorXd scaled = spring.cwiseProduct(r);
-    const VectorXd taken = means.of(held.solve(means.spread(scaled)));
-    return balanced.forces(scaled - spring.cwiseProduct(taken));
+  const MatrixXd rigid = rigid_motions(elements);
+  const Balanced balanced(means.of(rigid), spring);
+  const auto preconditioned = [&](const MatrixXd& r) -> MatrixXd {
+    const MatrixXd scaled = spring.asDiagonal() * r;
+    return balanced.forces(scaled - spring.asDiagonal() * means.of(held.solve(means.spread(scaled))));
   };
-  const VectorXd at_rest = free.solve(load_nN);
-  Solution solution{{}, VectorXd::Zero(n), {}};
-  VectorXd residual = balanced.displacements(means.of(at_rest)), z = preconditioned(residual), step = z;
-  double energy = residual.dot(z);
-  const double whole = energy;
+  const MatrixXd at_rest = free.solve(loads_nN);
+  Solutions solution{{}, MatrixXd::Zero(n, loads_nN.cols()), {}};
+  MatrixXd residual = balanced.displacements(means.of(at_rest)), z = preconditioned(residual), step = z;
+  Eigen::RowVectorXd energy = dots(residual, z);
+  const Eigen::RowVectorXd whole = energy.cwiseMax(std::numeric_limits<double>::min());
+  const auto left = [&] { return std::sqrt(std::max(0.0, energy.cwiseQuotient(whole).maxCoeff())); };
   Report& report = solution.report;
-  while (energy > kTolerance * kTolerance * whole) {
+  while (left() > kTolerance) {
     if (++report.iterations > kMostIterations)
       throw NotSolved({.converged = false,
                        .iterations = kMostIterations,
-                       .last_change = std::sqrt(energy / whole),
+                       .last_change = left(),
                        .reason = "the sheet and its gel found no balance in " + std::to_string(kMostIterations) +
-                                 " steps; residual " + brief(std::sqrt(energy / whole))});
-    const VectorXd answer = ground_um(step) + means.of(free.solve(means.spread(step)));
-    const double length = energy / step.dot(answer);
-    solution.forces_nN += length * step;
-    residual = balanced.displacements(residual - length * answer);
+                                 " steps; residual " + brief(left())});
+    const MatrixXd answer = ground_um(step) + means.of(free.solve(means.spread(step)));
+    // of a load whose balance is found to the last digit nothing is left to divide by
+    const auto over = [](double a, double b) { return b > 0 ? a / b : 0.0; };
+    const Eigen::RowVectorXd length = energy.binaryExpr(dots(step, answer), over);
+    solution.forces_nN += step * length.asDiagonal();
+    residual = balanced.displacements(residual - answer * length.asDiagonal());
     z = preconditioned(residual);
-    const double next = residual.dot(z);
-    step = z + (next / energy) * step;
+    const Eigen::RowVectorXd next = dots(residual, z);
+    step = z + step * next.binaryExpr(energy, over).asDiagonal();
     energy = next;
   }
   report.converged = true;
-  report.last_change = whole > 0 ? std::sqrt(energy / whole) : 0;
+  report.last_change = left();
   report.reason = std::to_string(report.iterations) + " steps of conjugate gradients";
   solution.u = at_rest - free.solve(means.spread(solution.forces_nN));
   solution.u += rigid * balanced.motion_in(ground_um(solution.forces_nN) - means.of(solution.u));
   return solution;
 }
 
-OnGel::Reduced OnGel::reduced(const Eigen::MatrixXd& forces_nN, double poisson_ratio,
-                              const NodeVectors& load_nN) const {
+OnGel::Reduced OnGel::reduced(const MatrixXd& forces_nN, double poisson_ratio, const MatrixXd& loads_nN) const {
   const Elements& elements = *patches_.elements;
   const Means means{elements, patches_.triangles, weights_};
   const Material unit{1 - poisson_ratio * poisson_ratio, poisson_ratio, 1};
@@ -168,18 +178,11 @@ OnGel::Reduced OnGel::reduced(const Eigen::MatrixXd& forces_nN, double poisson_r
   for (int t = 0; t < elements.n_triangles(); ++t) free.add(t, elastic_stiffness(elements, t, unit));
   const bool is_definite = free.factorise(0, threads_);
   MBTFM_ASSERT(is_definite);
-  Eigen::MatrixXd loads(load_nN.size(), forces_nN.cols() + 1), on_gel(forces_nN.rows(), forces_nN.cols());
-  for (Index k = 0; k < forces_nN.cols(); ++k) {
-    loads.col(k) = means.spread(forces_nN.col(k));
-    on_gel.col(k) = gel_um(forces_nN.col(k));
-  }
-  loads.rightCols(1) = load_nN;
-  const Eigen::MatrixXd u = free.solve(loads);
-  const Eigen::MatrixXd work = loads.leftCols(forces_nN.cols()).transpose() * u;
-  return {.gel = forces_nN.transpose() * on_gel,
+  const MatrixXd spread = means.spread(forces_nN);
+  return {.gel = forces_nN.transpose() * gel_um(forces_nN),
           .slip = forces_nN.transpose() * slip_um_per_nN(1).asDiagonal() * forces_nN,
-          .sheet = work.leftCols(forces_nN.cols()),
-          .pull = work.rightCols(1)};
+          .sheet = spread.transpose() * free.solve(spread),
+          .pull = spread.transpose() * free.solve(loads_nN)};
 }
 
 }  // namespace mbtfm::sheet

@@ -1,6 +1,7 @@
 #include "continuum/sheet/patch_compliance.h"
 
 #include "continuum/sheet/lattice_compliance.h"
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"
@@ -23,15 +24,17 @@ class DenseCompliance final : public PatchCompliance {
         compliance_.block<2, 2>(2 * near[j][k], 2 * static_cast<Index>(j)) =
             columns[j].middleRows<2>(2 * static_cast<Index>(k));
     for (Index j = 0; j < compliance_.cols(); ++j)
-      for (Index i = j; i < compliance_.rows(); ++i) compliance_(i, j) = 0.5 * (compliance_(i, j) + compliance_(j, i));
+      for (Index i = j; i < compliance_.rows(); ++i)
+        compliance_(i, j) = compliance_(j, i) = 0.5 * (compliance_(i, j) + compliance_(j, i));
   }
-  VectorXd displace(const VectorXd& forces_nN) const override {
-    return compliance_.selfadjointView<Eigen::Lower>() * forces_nN;
+  MatrixXd displace(const MatrixXd& forces_nN) const override {
+    if (forces_nN.cols() == 1) return compliance_.selfadjointView<Eigen::Lower>() * forces_nN;  // half the memory read
+    return numerics::product(compliance_, forces_nN, 1);
   }
   VectorXd diagonal_um_per_nN() const override { return compliance_.diagonal(); }
 
  private:
-  MatrixXd compliance_;  ///< lower half
+  MatrixXd compliance_;
 };
 
 }  // namespace

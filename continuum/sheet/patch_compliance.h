@@ -9,12 +9,13 @@
 
 namespace mbtfm::sheet {
 
-/// u = C F, by patch and component: F the forces, u the displacement of the gel. C is symmetric. Of patches so near
-/// that it matters, u is the mean over the patch, of others its centre's or the mean. Calls may run at one time.
+/// u = C F, by patch and component: F the forces, u the displacement of the gel, each column by itself. C is symmetric.
+/// Of patches so near that it matters, u is the mean over the patch, of others its centre's or the mean. Calls may run
+/// at one time.
 class PatchCompliance {
  public:
   virtual ~PatchCompliance() = default;
-  virtual Eigen::VectorXd displace(const Eigen::VectorXd& forces_nN) const = 0;
+  virtual Eigen::MatrixXd displace(const Eigen::MatrixXd& forces_nN) const = 0;
   virtual Eigen::VectorXd diagonal_um_per_nN() const = 0;
 };
 

@@ -114,6 +114,21 @@ void draw_tractions(Chart& map, const Solution& solution, const Frame& frame) {
 
 }  // namespace
 
+namespace {
+
+double mean_contraction_of(const Solution& solution, int triangle) {
+  double sum = 0;
+  for (int p = 0; p < Elements::kPoints; ++p)
+    sum += solution.sheet.contraction_nN_per_um[static_cast<std::size_t>(Elements::kPoints * triangle + p)];
+  return sum / Elements::kPoints;
+}
+
+bool is_even(const std::vector<double>& values) {
+  return std::ranges::all_of(values, [&](double value) { return value == values.front(); });
+}
+
+}  // namespace
+
 std::string picture_of(const Solution& solution, const std::string& caption) {
   const Frame frame = frame_of(*solution.elements);
   Chart tension = map_of("Mean tension", frame), traction = map_of("Traction on the ground", frame);
@@ -126,7 +141,12 @@ std::string picture_of(const Solution& solution, const std::string& caption) {
   draw_rims(tension, solution);
   draw_rims(traction, solution);
   draw_tractions(traction, solution, frame);
-  return charts::svg_file({tension, traction}, 2, {caption});
+  if (is_even(solution.sheet.contraction_nN_per_um)) return charts::svg_file({tension, traction}, 2, {caption});
+  Chart contraction = map_of("Contraction", frame);
+  draw_values(contraction, solution, frame, "nN/µm",
+              [&](const Locator::Place& place, const Shape&) { return mean_contraction_of(solution, place.triangle); });
+  draw_rims(contraction, solution);
+  return charts::svg_file({tension, traction, contraction}, 3, {caption});
 }
 
 }  // namespace mbtfm::sheet

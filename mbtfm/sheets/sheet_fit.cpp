@@ -4,9 +4,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 
+#include "mbtfm/sheets/profile.h"
 #include "mbtfm/tensions/intervals.h"
 #include "mbtfm/tensions/robust.h"
 #include "substrate/loads.h"
@@ -18,127 +18,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tensions::LinearData;
-
-// steps of a logarithm over nine e-folds: 2 %, far below any standard error; of each of two, refined where it matters
-constexpr int kScan = 400, kScanOfTwo = 60;
-
-/// At one pair of stiffnesses: the best loads.
-struct Profile {
-  Stiffnesses at;
-  VectorXd loads;
-  double misfit = 0;  ///< |C R − y|², without the floor
-  MatrixXd normal;    ///< of the loads
-};
-using ProfileAt = std::function<Profile(double)>;
-using Number = std::function<double(const Profile&)>;
-
-double sheet_of(const Profile& p) { return p.at.sheet_nN_per_um; }
-double adhesion_of(const Profile& p) { return *p.at.adhesion_nN_per_um3; }
-
-/// @param joined  the loads that are fitted as one: loads × fewer
-Profile profile_at(const LinearData& data, const StiffnessTable& table, const Stiffnesses& at, const MatrixXd& joined) {
-  const MatrixXd columns = tensions::displace(data.reduced, table.shares(at) * joined);
-  Profile profile{.at = at, .loads = {}, .misfit = 0, .normal = columns.transpose() * columns};
-  profile.loads = profile.normal.ldlt().solve(columns.transpose() * data.reduced.target);
-  profile.misfit = (columns * profile.loads - data.reduced.target).squaredNorm();
-  return profile;
-}
-
-/// Where the misfit is least over one number, by golden section between the neighbours of the scan's least.
-struct Line {
-  std::vector<Profile> scan;
-  Profile best;
-};
-
-Line searched(const StiffnessRange& range, int n_steps, const ProfileAt& profile_at) {
-  const double low = std::log(range.low), high = std::log(range.high);
-  const auto place = [&](std::ptrdiff_t k) {
-    return low + (high - low) * static_cast<double>(std::clamp<std::ptrdiff_t>(k, 0, n_steps)) / n_steps;
-  };
-  Line line;
-  for (int k = 0; k <= n_steps; ++k) line.scan.push_back(profile_at(std::exp(place(k))));
-  const auto least = std::ranges::min_element(line.scan, {}, &Profile::misfit) - line.scan.begin();
-  double a = place(least - 1), b = place(least + 1);
-  constexpr double kGolden = 0.6180339887498949, kClose = 1e-7;
-  double x = b - kGolden * (b - a), y = a + kGolden * (b - a);
-  double fx = profile_at(std::exp(x)).misfit, fy = profile_at(std::exp(y)).misfit;
-  while (b - a > kClose) {
-    if (fx < fy) {
-      b = y;
-      y = x;
-      fy = fx;
-      x = b - kGolden * (b - a);
-      fx = profile_at(std::exp(x)).misfit;
-    } else {
-      a = x;
-      x = y;
-      fx = fy;
-      y = a + kGolden * (b - a);
-      fy = profile_at(std::exp(y)).misfit;
-    }
-  }
-  line.best = profile_at(std::exp(0.5 * (a + b)));
-  if (line.scan[static_cast<std::size_t>(least)].misfit < line.best.misfit)
-    line.best = line.scan[static_cast<std::size_t>(least)];
-  return line;
-}
-
-/// The misfit over the stiffnesses that are not known.
-class Search {
- public:
-  /// @param known  the sheet's stiffness; unset: any of the table  @param joined  see profile_at()
-  Search(const LinearData& data, const StiffnessTable& table, std::optional<double> known, MatrixXd joined)
-      : data_(data), table_(table), known_(known), joined_(std::move(joined)) {}
-  Search(const LinearData& data, const StiffnessTable& table, std::optional<double> known)
-      : Search(data, table, known, MatrixXd::Identity(table.n_loads(), table.n_loads())) {}
-
-  Profile at(const Stiffnesses& stiffnesses) const { return profile_at(data_, table_, stiffnesses, joined_); }
-  /// Over the sheet's stiffness, on adhesions of this one.
-  Line over_sheet(std::optional<double> adhesion) const {
-    if (known_) {
-      const Profile only = at({*known_, adhesion});
-      return {{only}, only};
-    }
-    return searched(table_.sheet_nN_per_um(), table_.adhesion_nN_per_um3() ? kScanOfTwo : kScan, [&](double M) {
-      return at({M, adhesion});
-    });
-  }
-  /// Over the adhesions' stiffness, each with the best of the sheet.
-  Line over_adhesion() const {
-    return searched(*table_.adhesion_nN_per_um3(), kScanOfTwo, [&](double kappa) { return over_sheet(kappa).best; });
-  }
-  /// Over the sheet's stiffness, each with the best of the adhesions'.
-  Line over_sheet_with_best_adhesion() const {
-    return searched(table_.sheet_nN_per_um(), kScanOfTwo, [&](double M) {
-      return searched(*table_.adhesion_nN_per_um3(), kScanOfTwo, [&](double kappa) { return at({M, kappa}); }).best;
-    });
-  }
-  /// Of the table's forces.
-  VectorXd amplitudes(const Profile& p) const { return table_.shares(p.at) * (joined_ * p.loads); }
-  Profile best() const {
-    return table_.adhesion_nN_per_um3() ? over_adhesion().best : over_sheet(table_.known_adhesion_nN_per_um3()).best;
-  }
-
- private:
-  const LinearData& data_;
-  const StiffnessTable& table_;
-  std::optional<double> known_;
-  MatrixXd joined_;
-};
-
-/// The loads of a sheet whose parts all contract alike.
-MatrixXd of_even_parts(const StiffnessTable& table) {
-  const Eigen::Index n = table.n_contractions(), n_others = table.n_loads() - n;
-  MatrixXd joined = MatrixXd::Zero(n + n_others, 1 + n_others);
-  joined.topLeftCorner(n, 1).setOnes();
-  joined.bottomRightCorner(n_others, n_others).setIdentity();
-  return joined;
-}
-
-/// Those of a sheet without its bundles.
-MatrixXd without_bundles(const StiffnessTable& table) {
-  return MatrixXd::Identity(table.n_loads(), table.n_loads() - std::ssize(table.bundles()));
-}
 
 /// Of the loads, log M and log κ, by the derivatives at the solution; 0 of what is known.
 MatrixXd covariance_of(const LinearData& data, const StiffnessTable& table, const Profile& best, double variance,
@@ -197,6 +76,8 @@ Ends ends_of(const StiffnessTable& table, const Stiffnesses& at, bool is_sheet_k
   return ends;
 }
 
+using Number = double (*)(const Profile&);
+
 /// All that the beads allow, of what was tried.
 class Allowed {
  public:
@@ -254,7 +135,7 @@ class Allowed {
   }
 
   /// Where the misfit crosses its limit to both sides, between two steps of the scan.
-  Limits limits_along(const std::vector<Profile>& scan, const Number& number, bool is_known) const {
+  Limits limits_along(const std::vector<Profile>& scan, Number number, bool is_known) const {
     const double limit = best_.misfit + room_;
     Limits limits;
     limits.take(number(best_), number(best_));
@@ -299,37 +180,6 @@ SheetEstimate estimate(Quantity quantity, const std::string& part, double value,
   e.identifiable = e.low && e.high;
   if (!e.identifiable) e.sigma = std::nullopt;
   return e;
-}
-
-/// Weights of the beads by a robust loss, until they stay.
-/// @param fixed_scale  unset: the middle of the residuals, anew each time
-LinearData weighed(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known,
-                   std::optional<double> fixed_scale) {
-  constexpr int kMost = 30;
-  for (int k = 0; k < kMost; ++k) {
-    const Profile best = Search(data, table, known).best();
-    const VectorXd residual = tensions::weighted_residual(data, table.shares(best.at) * best.loads);
-    const double scale = fixed_scale.value_or(tensions::robust_scale(data, residual));
-    if (!(scale > 0)) break;
-    VectorXd weight(residual.size() / 2);
-    for (Eigen::Index b = 0; b < weight.size(); ++b)
-      weight(b) = tensions::robust_weight(loss, residual.segment<2>(2 * b).norm() / scale);
-    const double change = (weight - data.bead_weight).cwiseAbs().maxCoeff();
-    data = tensions::reweighted(std::move(data), weight);
-    if (change < 1e-3) break;
-  }
-  return data;
-}
-
-/// Tukey's loss has several minima: it starts from Huber's, whose scale it keeps.
-LinearData weighed(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known) {
-  if (loss == tensions::Loss::squares) return data;
-  if (loss != tensions::Loss::tukey) return weighed(std::move(data), table, loss, known, std::nullopt);
-  data = weighed(std::move(data), table, tensions::Loss::huber, known, std::nullopt);
-  const Profile best = Search(data, table, known).best();
-  const double scale =
-      tensions::robust_scale(data, tensions::weighted_residual(data, table.shares(best.at) * best.loads));
-  return weighed(std::move(data), table, loss, known, scale);
 }
 
 /// Those of the stiffnesses, the loads and what they make up.
@@ -381,7 +231,10 @@ LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, 
 
 SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known,
                    const std::vector<std::string>& parts) {
-  data = weighed(std::move(data), table, loss, known);
+  data = weighed(std::move(data), loss, [&](const LinearData& of) {
+    const Search search(of, table, known);
+    return search.amplitudes(search.best());
+  });
   const Eigen::Index n_unknowns = table.n_loads() + (known ? 0 : 1) + (table.adhesion_nN_per_um3() ? 1 : 0);
   const Search search(data, table, known);
   const Profile best = search.best();
@@ -404,14 +257,7 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   const double u_squared = (data.weight_per_um.cwiseProduct(data.displacement_um)).squaredNorm();
   fit.expected_relative_l2 =
       data.has_errors ? std::sqrt(static_cast<double>(data.n_used - n_unknowns) / u_squared) : fit.relative_l2;
-  const double noise = std::max(fit.variance, std::numeric_limits<double>::min());
-  const auto model = [&](const std::string& name, int n_parameters, double chi_squared, double l2) {
-    const double chi = chi_squared / noise;
-    fit.models.push_back({name, n_parameters, chi, l2, chi + 2 * n_parameters,
-                          chi + n_parameters * std::log(static_cast<double>(data.n_used))});
-  };
-  const double floor = data.reduced.floor_squared;
-  model("nothing", 0, data.reduced.target.squaredNorm() + floor, 1);
+  Models models(data, fit.variance);
   const bool has_parts = table.n_contractions() > 1, has_springs = table.adhesion_nN_per_um3().has_value(),
              has_bundles = !table.bundles().empty();
   struct Has {
@@ -422,8 +268,7 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
            (has.springs ? "-on-springs" : "") + (has.parts ? "-in-parts" : "");
   };
   const auto simpler = [&](const Has& has, Eigen::Index n_fewer, const Search& its, const Profile& p) {
-    model(name(has), static_cast<int>(n_unknowns - n_fewer), p.misfit + floor,
-          tensions::relative_l2(data, its.amplitudes(p)));
+    models.add(name(has), static_cast<int>(n_unknowns - n_fewer), its.amplitudes(p));
   };
   if (has_bundles) {
     const Search its(data, table, known, without_bundles(table));
@@ -434,9 +279,9 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
     const Search its(data, table, known, of_even_parts(table));
     simpler({has_bundles, has_springs, false}, table.n_contractions() - 1, its, its.best());
   }
-  fit.own_model = fit.models.size();
-  model(name({has_bundles, has_springs, has_parts}), static_cast<int>(n_unknowns), best.misfit + floor,
-        fit.relative_l2);
+  simpler({has_bundles, has_springs, has_parts}, 0, search, best);
+  fit.models = models.all();
+  fit.own_model = fit.models.size() - 1;
   fit.report = {.converged = true, .iterations = kScan, .last_change = 0, .reason = "scanned over the stiffness"};
   return fit;
 }

@@ -17,6 +17,7 @@ using Eigen::VectorXd;
 constexpr double kSoftest = 0.03, kStiffest = 300;   // M / (mu R)
 constexpr double kWeakest = 0.03, kStrongest = 500;  // kappa R / mu
 constexpr int kSheets = 12;                          // solved for, where the bond is known
+constexpr int kManyLoads = 12, kSheetsOfMany = 6;    // solutions of one load serve the others, too
 constexpr int kSheetsOfEach = 8, kAdhesions = 6;     // where it is fitted
 
 /// Chebyshev's nodes of the logarithm.
@@ -29,21 +30,23 @@ std::vector<double> nodes_of(const StiffnessRange& range, int n) {
 }
 
 /// By part, then of the line and the bundles.
-std::vector<sheet::NodeVectors> loads_of(const SheetShape& shape) {
+MatrixXd loads_of(const SheetShape& shape) {
   sheet::Sheet unit;
   unit.n_rims = shape.n_rims;
-  std::vector<sheet::NodeVectors> loads;
+  MatrixXd loads(2 * shape.elements->n_nodes(),
+                 std::ssize(shape.contractions) + (shape.has_line ? 1 : 0) + std::ssize(shape.bundles));
+  Index load = 0;
   for (const std::vector<double>& contraction : shape.contractions) {
     unit.contraction_nN_per_um = contraction;
-    loads.push_back(sheet::forces_of_contraction_nN(*shape.elements, unit));
+    loads.col(load++) = sheet::forces_of_contraction_nN(*shape.elements, unit);
   }
   if (shape.has_line) {
     unit.contraction_nN_per_um = sheet::even(*shape.elements, 0);
     unit.line_tension_nN = 1;
-    loads.push_back(sheet::forces_of_contraction_nN(*shape.elements, unit));
+    loads.col(load++) = sheet::forces_of_contraction_nN(*shape.elements, unit);
   }
   for (const sheet::Bundle& bundle : shape.bundles)
-    loads.push_back(sheet::forces_of_bundle_nN(*shape.elements, bundle));
+    loads.col(load++) = sheet::forces_of_bundle_nN(*shape.elements, bundle);
   return loads;
 }
 
@@ -51,17 +54,18 @@ std::vector<sheet::NodeVectors> loads_of(const SheetShape& shape) {
 MatrixXd basis_of(MatrixXd columns) {
   constexpr double kLeast = 1e-7;
   columns.colwise().normalize();
-  const Eigen::JacobiSVD<MatrixXd> svd(columns, Eigen::ComputeThinU);
+  const Eigen::BDCSVD<MatrixXd> svd(columns, Eigen::ComputeThinU);
   const VectorXd& sizes = svd.singularValues();
   return svd.matrixU().leftCols((sizes.array() > kLeast * sizes(0)).count());
 }
 
 }  // namespace
 
-std::vector<Stiffnesses> StiffnessTable::examples() const {
+std::vector<Stiffnesses> StiffnessTable::examples(Index n_loads) const {
   std::vector<Stiffnesses> examples;
   if (!adhesion_) {
-    for (const double M : nodes_of(sheet_, kSheets)) examples.push_back({M, known_adhesion_});
+    for (const double M : nodes_of(sheet_, n_loads > kManyLoads ? kSheetsOfMany : kSheets))
+      examples.push_back({M, known_adhesion_});
     return examples;
   }
   for (const double kappa : nodes_of(*adhesion_, kAdhesions))
@@ -78,45 +82,25 @@ StiffnessTable::StiffnessTable(const SheetShape& shape, const sheet::OnGel& grou
   const double mu = gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio));
   sheet_ = {kSoftest * mu * size_um, kStiffest * mu * size_um};
   if (shape.bond == Bond::fitted) adhesion_ = {kWeakest * mu / size_um, kStrongest * mu / size_um};
-  const std::vector<sheet::NodeVectors> loads = loads_of(shape);
-  const std::vector<Stiffnesses> at = examples();
+  const MatrixXd loads = loads_of(shape);
+  const std::vector<Stiffnesses> at = examples(loads.cols());
   const auto n_examples = static_cast<int>(at.size());
-  std::vector<MatrixXd> solved(loads.size(), MatrixXd(2 * std::ssize(ground.patches()), n_examples));
-  numerics::parallel_for(n_examples * static_cast<int>(loads.size()), threads, [&](int j) {
-    const Stiffnesses& of = at[static_cast<std::size_t>(j % n_examples)];
+  MatrixXd solved(2 * std::ssize(ground.patches()), n_examples * loads.cols());
+  numerics::parallel_for(n_examples, threads, [&](int j) {
+    const Stiffnesses& of = at[static_cast<std::size_t>(j)];
     const double nu = shape.poisson_ratio;
     const sheet::Material material{of.sheet_nN_per_um * (1 - nu * nu), nu, 1};  // only its product with the thickness
-    const auto load = static_cast<std::size_t>(j / n_examples);
-    solved[load].col(j % n_examples) = ground.solve(material, of.adhesion_nN_per_um3, loads[load]).forces_nN;
+    solved.middleCols(j * loads.cols(), loads.cols()) =
+        ground.solve_all(material, of.adhesion_nN_per_um3, loads).forces_nN;
   });
-  equations_.resize(loads.size());
-  numerics::parallel_for(static_cast<int>(loads.size()), threads, [&](int load) {
-    MatrixXd& basis = solved[static_cast<std::size_t>(load)];
-    basis = basis_of(std::move(basis));
-    equations_[static_cast<std::size_t>(load)] =
-        ground.reduced(basis, shape.poisson_ratio, loads[static_cast<std::size_t>(load)]);
-  });
-  Index n = 0;
-  for (const MatrixXd& basis : solved) n += basis.cols();
-  forces_nN_.resize(2 * std::ssize(ground.patches()), n);
-  n = 0;
-  for (const MatrixXd& basis : solved) {
-    forces_nN_.middleCols(n, basis.cols()) = basis;
-    n += basis.cols();
-  }
+  forces_nN_ = basis_of(std::move(solved));
+  equations_ = ground.reduced(forces_nN_, shape.poisson_ratio, loads);
 }
 
 MatrixXd StiffnessTable::shares(const Stiffnesses& at) const {
-  MatrixXd shares = MatrixXd::Zero(forces_nN_.cols(), n_loads());
-  Index row = 0;
-  for (int load = 0; load < n_loads(); ++load) {
-    const auto& [gel, slip, sheet, pull] = equations_[static_cast<std::size_t>(load)];
-    MatrixXd matrix = gel + sheet / at.sheet_nN_per_um;
-    if (at.adhesion_nN_per_um3) matrix += slip / *at.adhesion_nN_per_um3;
-    shares.col(load).segment(row, pull.size()) = matrix.ldlt().solve(pull / at.sheet_nN_per_um);
-    row += pull.size();
-  }
-  return shares;
+  MatrixXd matrix = equations_.gel + equations_.sheet / at.sheet_nN_per_um;
+  if (at.adhesion_nN_per_um3) matrix += equations_.slip / *at.adhesion_nN_per_um3;
+  return matrix.ldlt().solve(equations_.pull / at.sheet_nN_per_um);
 }
 
 }  // namespace mbtfm::sheets

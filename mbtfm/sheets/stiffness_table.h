@@ -44,8 +44,8 @@ struct StiffnessRange {
 /// Forces of the patches by a contraction of 1 nN/um of each part (and tensions of 1 nN of the line at the rims and of
 /// each bundle, in this order), as a function of the
 /// stiffnesses: reduced bases (Quarteroni, Manzoni & Negri, Reduced Basis Methods for Partial Differential Equations,
-/// 2016). Solved at some stiffnesses; between, the forces are the sum of those solutions that balance best, in the
-/// sense of energy. What they lack falls exponentially with their number, and its energy as the square of it.
+/// 2016). Solved at some stiffnesses; between, the forces are the sum of the solutions of all loads that balances best,
+/// in the sense of energy. What they lack falls exponentially with their number, and its energy as the square of it.
 class StiffnessTable {
  public:
   /// From where the sheet is so soft that its mesh resolves it no more to where it does not strain: M / (mu R) from
@@ -53,7 +53,7 @@ class StiffnessTable {
   /// @param size_um  R  @throws NotSolved
   StiffnessTable(const SheetShape& shape, const sheet::OnGel& ground, const Gel& gel, double size_um, int threads);
 
-  int n_loads() const { return static_cast<int>(equations_.size()); }
+  int n_loads() const { return static_cast<int>(equations_.pull.cols()); }
   int n_contractions() const { return n_contractions_; }  ///< the first of the loads
   bool has_line() const { return has_line_; }
   const std::vector<sheet::Bundle>& bundles() const { return bundles_; }  ///< the last of the loads
@@ -62,20 +62,20 @@ class StiffnessTable {
   const std::optional<StiffnessRange>& adhesion_nN_per_um3() const { return adhesion_; }
   /// Where it is not; unset: bonded.
   std::optional<double> known_adhesion_nN_per_um3() const { return known_adhesion_; }
-  /// Forces of the patches that make up all others, those of a load side by side: 2·patches × any.
+  /// Forces of the patches that make up all others, orthogonal: 2·patches × any.
   const Eigen::MatrixXd& forces_nN() const { return forces_nN_; }
   /// How much of each, by load.
   Eigen::MatrixXd shares(const Stiffnesses& at) const;
 
  private:
-  std::vector<Stiffnesses> examples() const;
+  std::vector<Stiffnesses> examples(Eigen::Index n_loads) const;
   int n_contractions_ = 1;
   bool has_line_ = false;
   std::vector<sheet::Bundle> bundles_;
   StiffnessRange sheet_;
   std::optional<StiffnessRange> adhesion_;
   std::optional<double> known_adhesion_;
-  std::vector<sheet::OnGel::Reduced> equations_;  ///< by load
+  sheet::OnGel::Reduced equations_;
   Eigen::MatrixXd forces_nN_;
 };
 

@@ -12,20 +12,20 @@ const files::Table<SheetEstimate>& estimate_table() {
   static const files::Table<Row> table{
       .file = "sheet_fit.csv",
       .row = "each number of a sheet that the beads were asked for (`mbtfm-sheet --displacement`)",
-      .columns = {{"quantity", "with its unit; stiffness is E h / (1 - nu²)", &Row::quantity},
-                  {"part",
-                   "of the sheet, where parts contract each by its own: inside, edge, or a cell of the label image; or "
-                   "the bundle; "
-                   "else empty",
-                   &Row::part},
-                  {"value", "where the misfit is least", &Row::value, {.digits = kForPeople}},
-                  {"sigma",
-                   "standard error; empty if the beads do not determine the quantity",
-                   &Row::sigma,
-                   {.digits = kForPeople}},
-                  {"low", "lower end of the 95 % interval; empty: none", &Row::low, {.digits = kForPeople}},
-                  {"high", "upper end of the 95 % interval; empty: none", &Row::high, {.digits = kForPeople}},
-                  {"identifiable", "the beads limit it to both sides", &Row::identifiable}}};
+      .columns = {
+          {"quantity", "with its unit; stiffness is E h / (1 - nu²)", &Row::quantity},
+          {"part",
+           "of the sheet, where parts contract each by its own: inside, edge, or a cell of the label image; mean, "
+           "of a contraction that varies; or the bundle; else empty",
+           &Row::part},
+          {"value", "where the misfit is least", &Row::value, {.digits = kForPeople}},
+          {"sigma",
+           "standard error; empty if the beads do not determine the quantity",
+           &Row::sigma,
+           {.digits = kForPeople}},
+          {"low", "lower end of the 95 % interval; empty: none", &Row::low, {.digits = kForPeople}},
+          {"high", "upper end of the 95 % interval; empty: none", &Row::high, {.digits = kForPeople}},
+          {"identifiable", "the beads limit it to both sides", &Row::identifiable}}};
   return table;
 }
 
@@ -44,10 +44,29 @@ const files::Table<SheetModel>& model_table() {
   return table;
 }
 
+const files::Table<ContractionAt>& contraction_table() {
+  using Row = ContractionAt;
+  static const files::Table<Row> table{
+      .file = "contraction.csv",
+      .row = "each node of a sheet whose contraction varies (`mbtfm-sheet --displacement` with `fit_parts = field`)",
+      .columns = {{"x_um", "place of the node", [](const Row& row) { return row.position_um.x; }},
+                  {"y_um", "place of the node", [](const Row& row) { return row.position_um.y; }},
+                  {"contraction_nN_per_um", "contraction there", &Row::nN_per_um, {.digits = kForPeople}},
+                  {"sigma_nN_per_um", "its standard error", &Row::sigma_nN_per_um, {.digits = kForPeople}},
+                  {"low_nN_per_um", "lower end of its 95 % interval", &Row::low_nN_per_um, {.digits = kForPeople}},
+                  {"high_nN_per_um", "upper end of its 95 % interval", &Row::high_nN_per_um, {.digits = kForPeople}}}};
+  return table;
+}
+
 }  // namespace
 
+void write_contractions(const Path& file, const std::vector<ContractionAt>& rows) {
+  files::write(file, contraction_table(), rows);
+}
 void write_estimates(const Path& file, const SheetFit& fit) { files::write(file, estimate_table(), fit.estimates); }
 void write_models(const Path& file, const SheetFit& fit) { files::write(file, model_table(), fit.models); }
-std::string pages_of_tables() { return page_of(estimate_table()) + page_of(model_table()); }
+std::string pages_of_tables() {
+  return page_of(estimate_table()) + page_of(contraction_table()) + page_of(model_table());
+}
 
 }  // namespace mbtfm::sheets

@@ -3,12 +3,13 @@
 
 #include <string>
 
-#include "mbtfm/sheets/sheet_fit.h"
+#include "mbtfm/sheets/field_fit.h"
 #include "pipeline/contract/path.h"
 
 namespace mbtfm::sheets {
 
 void write_estimates(const Path& file, const SheetFit& fit);
+void write_contractions(const Path& file, const std::vector<ContractionAt>& rows);
 void write_models(const Path& file, const SheetFit& fit);
 /// Their part of docs/columns.md.
 std::string pages_of_tables();

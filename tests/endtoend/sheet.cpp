@@ -141,6 +141,18 @@ TEST_F(Sheet, contraction_and_stiffness_come_back_from_beads) {
   EXPECT_EQ(fit.text(1, "quantity"), "stiffness_nN_per_um");
   EXPECT_NEAR(fit.number(1, "value"), 30 * 0.4 / (1 - 0.09), 4 * fit.number(1, "sigma"));
   EXPECT_LT(figure("aic"), figure("aic_of_nothing") - 1000);
+  // a contraction that may vary, and does not
+  const auto varying = run(gel + sheet + "fit_parts = \"field\"\nfield_points = 6\n",
+                           "--displacement " + (folder_ / "displacement.csv").string());
+  ASSERT_EQ(varying.code, 0) << varying.output;
+  const files::CsvTable places(folder_ / "out" / "contraction.csv");
+  for (int row = 0; row < places.n_rows(); ++row)
+    EXPECT_NEAR(places.number(row, "contraction_nN_per_um"), 0.5, 4 * places.number(row, "sigma_nN_per_um"));
+  EXPECT_EQ(files::CsvTable(folder_ / "out" / "sheet_fit.csv").text(0, "part"), "mean");
+  EXPECT_NE(files::read_text(folder_ / "out" / "sheet.svg").find(">Contraction<"), std::string::npos);
+  const auto unknown_bond = run(gel + sheet + "fit_parts = \"field\"\nfit_adhesion_stiffness = true\n",
+                                "--displacement " + (folder_ / "displacement.csv").string());
+  EXPECT_EQ(unknown_bond.code, 2) << unknown_bond.output;
 }
 
 /// Beads that move outward, as if the two images were exchanged, and beads that a rigid sheet moves.

@@ -7,6 +7,7 @@
 
 #include "continuum/sheet/forward.h"
 #include "mbtfm/sheets/beside_fibres.h"
+#include "mbtfm/sheets/field_fit.h"
 #include "mbtfm/sheets/sheet_fit.h"
 #include "substrate/greens/models.h"
 #include "tests/support/sheets.h"
@@ -240,6 +241,99 @@ TEST(SheetFit, bundles_in_the_sheet_have_their_tensions) {
     EXPECT_EQ(fit.models[1].name, "sheet");
     EXPECT_EQ(fit.models[2].name, "sheet-with-bundles");
     EXPECT_EQ(fit.models[2].bic<fit.models[1].bic, tension> 0);
+  }
+}
+
+/// A table for contractions that vary over the disc.
+struct Field {
+  ContractionLattice lattice;
+  StiffnessTable table;
+  Eigen::VectorXd mean;
+
+  Field(const FittedDisc& disc, int n_points)
+      : lattice(*disc.elements, n_points),
+        table({.elements = disc.elements,
+               .contractions = lattice.shares_on(*disc.elements),
+               .poisson_ratio = kRatio,
+               .n_rims = 1,
+               .has_line = false},
+              *disc.ground, disc.gel, disc.radius_um, 1),
+        mean(means_over(*disc.elements, lattice)) {}
+
+  FieldFit fit(const FittedDisc& disc, const DisplacementField& field, std::optional<double> stiffness) const {
+    if (!response) response = data_of(field, table, *disc.ground, *disc.model, 1).response;
+    return fit_field(tensions::reduce(field, response), table, tensions::Loss::squares, stiffness, lattice, mean);
+  }
+  mutable substrate::SharedResponse response;
+};
+
+/// Twice as much to the right as to the left.
+double contraction_at(Vec2 place) { return 1 + place.x / 75; }
+std::vector<double> varying(const Elements& elements) {
+  std::vector<double> contraction;
+  for (int t = 0; t < elements.n_triangles(); ++t)
+    for (int p = 0; p < Elements::kPoints; ++p) contraction.push_back(contraction_at(elements.at(t, p).place_um));
+  return contraction;
+}
+
+/// Places all over the disc.
+std::vector<Vec2> places_on(const FittedDisc& disc, int n) {
+  std::vector<Vec2> places;
+  for (int k = 0; k < n; ++k)
+    places.push_back(0.92 * disc.radius_um * std::sqrt((k + 0.5) / n) * Vec2{std::cos(2.4 * k), std::sin(2.4 * k)});
+  return places;
+}
+
+TEST(SheetField, shares_of_its_lattice_add_up_to_the_sheet) {
+  const FittedDisc disc(25);
+  const ContractionLattice lattice(*disc.elements, 40);
+  const Eigen::VectorXd even = Eigen::VectorXd::Ones(lattice.n_points());
+  for (int t = 0; t < disc.elements->n_triangles(); ++t)
+    for (int p = 0; p < Elements::kPoints; ++p)
+      EXPECT_NEAR(lattice.shares_at(disc.elements->at(t, p).place_um).sum(), 1, 1e-12);
+  EXPECT_NEAR(even.dot(lattice.roughness() * even), 0, 1e-12);
+  EXPECT_NEAR(means_over(*disc.elements, lattice).sum(), 1, 1e-12);
+}
+
+TEST(SheetField, is_found_within_its_errors_and_called_for_where_the_contraction_varies_and_only_there) {
+  const FittedDisc disc(25);
+  const Field field(disc, 16);
+  const double M = disc.stiffness(3);
+  for (const bool varies : {true, false}) {
+    const DisplacementField exact = disc.exact(3, varies ? varying(*disc.elements) : sheet::even(*disc.elements, 1));
+    constexpr int kRuns = 3, kPlaces = 40;
+    std::mt19937_64 random(16);
+    int n_held = 0;
+    for (int run = 0; run < kRuns; ++run) {
+      const FieldFit fit = field.fit(disc, with_noise(exact, random), {});
+      // four standard errors
+      const SheetEstimate &mean = of(fit.sheet, Quantity::contraction), &stiffness = of(fit.sheet, Quantity::stiffness);
+      EXPECT_NEAR(mean.value, 1, 4 * mean.sigma.value_or(0));
+      EXPECT_NEAR(std::log(stiffness.value / M), 0, 4 * stiffness.sigma.value_or(0) / stiffness.value);
+      ASSERT_EQ(fit.sheet.models.size(), 3u);
+      EXPECT_EQ(fit.sheet.models[2].name, "sheet-in-field");
+      EXPECT_EQ(fit.sheet.models[2].bic < fit.sheet.models[1].bic, varies);
+      for (const Vec2 at : places_on(disc, kPlaces)) {
+        const Eigen::VectorXd shares = field.lattice.shares_at(at);
+        const double sigma = std::sqrt(shares.dot(fit.covariance * shares));
+        n_held += std::abs(shares.dot(fit.contractions) - (varies ? contraction_at(at) : 1)) < 1.96 * sigma;
+      }
+    }
+    // Errors of neighbours are alike: of 120 places some 50 tell by themselves, of which 47.5 ± 1.5 are held.
+    EXPECT_GE(n_held, (0.95 - 3 * 0.03) * kRuns * kPlaces) << varies;
+  }
+}
+
+TEST(SheetField, sharp_beads_give_it_back_whatever_the_lattice) {
+  const FittedDisc disc(25);
+  DisplacementField sharp = disc.exact(3, varying(*disc.elements));
+  for (Bead& bead : sharp) bead.sigma_um = 1e-4;
+  for (const int n_points : {9, 25}) {
+    const Field field(disc, n_points);
+    const FieldFit fit = field.fit(disc, sharp, disc.stiffness(3));
+    // the table lacks 1e-4 of the displacement, which is twice the beads' error
+    for (const Vec2 at : places_on(disc, 100))
+      EXPECT_NEAR(field.lattice.shares_at(at).dot(fit.contractions), contraction_at(at), 2e-3) << n_points;
   }
 }
 

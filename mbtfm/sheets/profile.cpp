@@ -1,0 +1,143 @@
+#include "mbtfm/sheets/profile.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mbtfm/tensions/robust.h"
+
+namespace mbtfm::sheets {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using tensions::LinearData;
+
+namespace {
+
+constexpr int kScanOfTwo = 60;  // of each of two stiffnesses; refined where it matters
+
+using ProfileAt = std::function<Profile(double)>;
+
+/// By golden section between the neighbours of the scan's least.
+Line searched(const StiffnessRange& range, int n_steps, const ProfileAt& profile_at) {
+  const double low = std::log(range.low), high = std::log(range.high);
+  const auto place = [&](std::ptrdiff_t k) {
+    return low + (high - low) * static_cast<double>(std::clamp<std::ptrdiff_t>(k, 0, n_steps)) / n_steps;
+  };
+  Line line;
+  for (int k = 0; k <= n_steps; ++k) line.scan.push_back(profile_at(std::exp(place(k))));
+  const auto least = std::ranges::min_element(line.scan, {}, &Profile::misfit) - line.scan.begin();
+  double a = place(least - 1), b = place(least + 1);
+  constexpr double kGolden = 0.6180339887498949, kClose = 1e-7;
+  double x = b - kGolden * (b - a), y = a + kGolden * (b - a);
+  double fx = profile_at(std::exp(x)).misfit, fy = profile_at(std::exp(y)).misfit;
+  while (b - a > kClose) {
+    if (fx < fy) {
+      b = y;
+      y = x;
+      fy = fx;
+      x = b - kGolden * (b - a);
+      fx = profile_at(std::exp(x)).misfit;
+    } else {
+      a = x;
+      x = y;
+      fx = fy;
+      y = a + kGolden * (b - a);
+      fy = profile_at(std::exp(y)).misfit;
+    }
+  }
+  line.best = profile_at(std::exp(0.5 * (a + b)));
+  if (line.scan[static_cast<std::size_t>(least)].misfit < line.best.misfit)
+    line.best = line.scan[static_cast<std::size_t>(least)];
+  return line;
+}
+
+LinearData reweighed(LinearData data, tensions::Loss loss, const std::function<VectorXd(const LinearData&)>& amplitudes,
+                     std::optional<double> fixed_scale) {
+  constexpr int kMost = 30;
+  for (int k = 0; k < kMost; ++k) {
+    const VectorXd residual = tensions::weighted_residual(data, amplitudes(data));
+    const double scale = fixed_scale.value_or(tensions::robust_scale(data, residual));
+    if (!(scale > 0)) break;
+    VectorXd weight(residual.size() / 2);
+    for (Eigen::Index b = 0; b < weight.size(); ++b)
+      weight(b) = tensions::robust_weight(loss, residual.segment<2>(2 * b).norm() / scale);
+    const double change = (weight - data.bead_weight).cwiseAbs().maxCoeff();
+    data = tensions::reweighted(std::move(data), weight);
+    if (change < 1e-3) break;
+  }
+  return data;
+}
+
+}  // namespace
+
+Profile Search::at(const Stiffnesses& stiffnesses) const {
+  const MatrixXd columns = tensions::displace(data_.reduced, table_.shares(stiffnesses) * joined_);
+  Profile profile{.at = stiffnesses, .loads = {}, .misfit = 0, .normal = columns.transpose() * columns};
+  profile.loads = profile.normal.ldlt().solve(columns.transpose() * data_.reduced.target);
+  profile.misfit = (columns * profile.loads - data_.reduced.target).squaredNorm();
+  return profile;
+}
+
+Line Search::over_sheet(std::optional<double> adhesion) const {
+  if (known_) {
+    const Profile only = at({*known_, adhesion});
+    return {{only}, only};
+  }
+  return searched(table_.sheet_nN_per_um(), table_.adhesion_nN_per_um3() ? kScanOfTwo : kScan, [&](double M) {
+    return at({M, adhesion});
+  });
+}
+
+Line Search::over_adhesion() const {
+  return searched(*table_.adhesion_nN_per_um3(), kScanOfTwo, [&](double kappa) { return over_sheet(kappa).best; });
+}
+
+Line Search::over_sheet_with_best_adhesion() const {
+  return searched(table_.sheet_nN_per_um(), kScanOfTwo, [&](double M) {
+    return searched(*table_.adhesion_nN_per_um3(), kScanOfTwo, [&](double kappa) { return at({M, kappa}); }).best;
+  });
+}
+
+Profile Search::best() const {
+  return table_.adhesion_nN_per_um3() ? over_adhesion().best : over_sheet(table_.known_adhesion_nN_per_um3()).best;
+}
+
+MatrixXd of_even_parts(const StiffnessTable& table) {
+  const Eigen::Index n = table.n_contractions(), n_others = table.n_loads() - n;
+  MatrixXd joined = MatrixXd::Zero(n + n_others, 1 + n_others);
+  joined.topLeftCorner(n, 1).setOnes();
+  joined.bottomRightCorner(n_others, n_others).setIdentity();
+  return joined;
+}
+
+MatrixXd without_bundles(const StiffnessTable& table) {
+  return MatrixXd::Identity(table.n_loads(), table.n_loads() - std::ssize(table.bundles()));
+}
+
+LinearData weighed(LinearData data, tensions::Loss loss, const std::function<VectorXd(const LinearData&)>& amplitudes) {
+  if (loss == tensions::Loss::squares) return data;
+  if (loss != tensions::Loss::tukey) return reweighed(std::move(data), loss, amplitudes, std::nullopt);
+  data = reweighed(std::move(data), tensions::Loss::huber, amplitudes, std::nullopt);
+  const double scale = tensions::robust_scale(data, tensions::weighted_residual(data, amplitudes(data)));
+  return reweighed(std::move(data), loss, amplitudes, scale);
+}
+
+Models::Models(const LinearData& data, double noise_variance)
+    : data_(data), noise_(std::max(noise_variance, std::numeric_limits<double>::min())) {
+  add("nothing", 0, data.reduced.target.squaredNorm() + data.reduced.floor_squared, 1);
+}
+
+void Models::add(const std::string& name, int n_parameters, const VectorXd& amplitudes) {
+  const VectorXd left = tensions::displace(data_.reduced, amplitudes) - data_.reduced.target;
+  add(name, n_parameters, left.squaredNorm() + data_.reduced.floor_squared, tensions::relative_l2(data_, amplitudes));
+}
+
+void Models::add(const std::string& name, int n_parameters, double chi_squared, double relative_l2) {
+  const double chi = chi_squared / noise_;
+  all_.push_back({name, n_parameters, chi, relative_l2, chi + 2 * n_parameters,
+                  chi + n_parameters * std::log(static_cast<double>(data_.n_used))});
+}
+
+}  // namespace mbtfm::sheets

@@ -1,0 +1,88 @@
+/// The misfit of a sheet to its beads over the stiffnesses that are not known.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/sheets/sheet_fit.h"
+
+namespace mbtfm::sheets {
+
+/// Steps of a logarithm over nine e-folds: 2 %, far below any standard error.
+inline constexpr int kScan = 400;
+
+/// At one pair of stiffnesses: the best loads.
+struct Profile {
+  Stiffnesses at;
+  Eigen::VectorXd loads;
+  double misfit = 0;       ///< |C R − y|², without the floor
+  Eigen::MatrixXd normal;  ///< of the loads
+};
+
+inline double sheet_of(const Profile& p) { return p.at.sheet_nN_per_um; }
+inline double adhesion_of(const Profile& p) { return *p.at.adhesion_nN_per_um3; }
+
+/// Where the misfit is least over one number.
+struct Line {
+  std::vector<Profile> scan;
+  Profile best;
+};
+
+class Search {
+ public:
+  /// @param known  the sheet's stiffness; unset: any of the table
+  /// @param joined  the loads that are fitted as one: loads × fewer
+  Search(const tensions::LinearData& data, const StiffnessTable& table, std::optional<double> known,
+         Eigen::MatrixXd joined)
+      : data_(data), table_(table), known_(known), joined_(std::move(joined)) {}
+  Search(const tensions::LinearData& data, const StiffnessTable& table, std::optional<double> known)
+      : Search(data, table, known, Eigen::MatrixXd::Identity(table.n_loads(), table.n_loads())) {}
+
+  Profile at(const Stiffnesses& stiffnesses) const;
+  /// Over the sheet's stiffness, on adhesions of this one.
+  Line over_sheet(std::optional<double> adhesion) const;
+  /// Over the adhesions' stiffness, each with the best of the sheet.
+  Line over_adhesion() const;
+  /// Over the sheet's stiffness, each with the best of the adhesions'.
+  Line over_sheet_with_best_adhesion() const;
+  /// Of the table's forces.
+  Eigen::VectorXd amplitudes(const Profile& p) const { return table_.shares(p.at) * (joined_ * p.loads); }
+  Profile best() const;
+
+ private:
+  const tensions::LinearData& data_;
+  const StiffnessTable& table_;
+  std::optional<double> known_;
+  Eigen::MatrixXd joined_;
+};
+
+/// The loads of a sheet whose parts all contract alike.
+Eigen::MatrixXd of_even_parts(const StiffnessTable& table);
+/// Those of a sheet without its bundles.
+Eigen::MatrixXd without_bundles(const StiffnessTable& table);
+
+/// Weights of the beads by a robust loss, until they stay. Tukey's has several minima: it starts from Huber's, whose
+/// scale it keeps.
+/// @param amplitudes  of the table's forces, as the fit to such data has them
+tensions::LinearData weighed(tensions::LinearData data, tensions::Loss loss,
+                             const std::function<Eigen::VectorXd(const tensions::LinearData&)>& amplitudes);
+
+/// Models of the same beads, in units of the noise. The first is nothing.
+class Models {
+ public:
+  Models(const tensions::LinearData& data, double noise_variance);
+  /// @param amplitudes  of the table's forces
+  void add(const std::string& name, int n_parameters, const Eigen::VectorXd& amplitudes);
+  const std::vector<SheetModel>& all() const { return all_; }
+
+ private:
+  void add(const std::string& name, int n_parameters, double chi_squared, double relative_l2);
+  const tensions::LinearData& data_;
+  double noise_;
+  std::vector<SheetModel> all_;
+};
+
+}  // namespace mbtfm::sheets
