@@ -42,9 +42,13 @@ void for_each_square(const Frame& frame, int most_across, const std::function<vo
     for (double x = frame.low.x + 0.5 * side; x < frame.high.x; x += side) body({x, y}, 0.5 * side);
 }
 
-/// Values at places of the sheet, in colours from their least to their largest.
+/// Where a map's colours begin.
+enum class Colours { from_least, from_zero };
+
+/// Values at places of the sheet, in colours up to their largest.
 void draw_values(Chart& map, const Solution& solution, const Frame& frame, const std::string& unit,
-                 const std::function<double(const Locator::Place&, const Shape&)>& value_at) {
+                 const std::function<double(const Locator::Place&, const Shape&)>& value_at,
+                 Colours colours = Colours::from_least) {
   constexpr int kAcross = 80;
   struct Square {
     Vec2 middle;
@@ -61,6 +65,7 @@ void draw_values(Chart& map, const Solution& solution, const Frame& frame, const
     low = std::min(low, value);
     high = std::max(high, value);
   });
+  if (colours == Colours::from_zero) low = std::min(low, 0.0);
   const double range = high > low ? high - low : 1;
   for (const Square& s : squares) {
     const std::string colour = charts::hex(charts::colour_at(charts::ColourMap::plasma, (s.value - low) / range));
@@ -143,8 +148,11 @@ std::string picture_of(const Solution& solution, const std::string& caption) {
   draw_tractions(traction, solution, frame);
   if (is_even(solution.sheet.contraction_nN_per_um)) return charts::svg_file({tension, traction}, 2, {caption});
   Chart contraction = map_of("Contraction", frame);
-  draw_values(contraction, solution, frame, "nN/µm",
-              [&](const Locator::Place& place, const Shape&) { return mean_contraction_of(solution, place.triangle); });
+  // from zero: differences that mean nothing have hardly another colour
+  draw_values(
+      contraction, solution, frame, "nN/µm",
+      [&](const Locator::Place& place, const Shape&) { return mean_contraction_of(solution, place.triangle); },
+      Colours::from_zero);
   draw_rims(contraction, solution);
   return charts::svg_file({tension, traction, contraction}, 3, {caption});
 }
