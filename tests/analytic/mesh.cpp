@@ -245,10 +245,10 @@ TEST(Mesh, straight_fibre_between_two_adhesions_keeps_its_length) {
   fibre.points_um = {{3.2, 5.1}, {10, 8.5}, {16.9, 11.95}};
   cell.fibres.push_back(fibre);
   const GeneratedNetwork generated = generate_network(cell, {});
-  testing::expect_valid(generated, cell, 1.5);
+  test::expect_valid(generated, cell, 1.5);
   // it is drawn to the adhesions' centres, and straight: its points are off by less than the 0.05 edges that matter
-  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 7), std::hypot(14.0, 7.0), 1e-9);
-  EXPECT_EQ(testing::n_ends_of_fibre(generated.network, 7), 2);
+  EXPECT_NEAR(test::length_of_fibre_um(generated.network, 7), std::hypot(14.0, 7.0), 1e-9);
+  EXPECT_EQ(test::n_ends_of_fibre(generated.network, 7), 2);
 }
 
 }  // namespace

@@ -21,8 +21,7 @@ using numerics::SpringMatrix;
 /// A cell of 2 000 um² with 19 fibres on a mesh of about so many vertices. The network's links keep its surface tension
 /// and stiffness: 0.06 nN and 50 nN at an edge of 1.5 um.
 Network make_mesh(int n_vertices) {
-  const Cell cell =
-      testing::random_cell(4, {.radius_um = 27, .n_adhesions = 60, .n_fibres = 19, .least_distance_um = 2});
+  const Cell cell = test::random_cell(4, {.radius_um = 27, .n_adhesions = 60, .n_fibres = 19, .least_distance_um = 2});
   const double edge_um = std::sqrt(std::abs(signed_area_um2(cell.outline_um)) / (std::sqrt(0.75) * n_vertices));
   Network result = mesh::generate_network(cell, {.edge_length_um = edge_um}).network;
   for (Link& link : result.links)

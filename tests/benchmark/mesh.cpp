@@ -13,10 +13,10 @@ using namespace mbtfm;
 Cell cell_of(double n_vertices) {
   const double area_um2 = n_vertices * 0.5 * std::sqrt(3.0) * 1.5 * 1.5;
   const double radius_um = std::sqrt(area_um2 / 3.1416);
-  return testing::random_cell(1, {.radius_um = radius_um,
-                                  .n_adhesions = static_cast<int>(area_um2 / 25),
-                                  .n_fibres = static_cast<int>(std::sqrt(area_um2) / 3),
-                                  .n_outline_points = static_cast<int>(20 * radius_um)});
+  return test::random_cell(1, {.radius_um = radius_um,
+                               .n_adhesions = static_cast<int>(area_um2 / 25),
+                               .n_fibres = static_cast<int>(std::sqrt(area_um2) / 3),
+                               .n_outline_points = static_cast<int>(20 * radius_um)});
 }
 
 void mesh(benchmark::State& state, mesh::AdhesionAnchor anchor) {

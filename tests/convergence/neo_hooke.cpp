@@ -23,7 +23,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using test::CubedSphere;
 
-const numerics::FactorOptions kFactor{.threads = 2, .memory_limit_GB = 8};
+const numerics::FactorOptions kTwoThreads{.threads = 2, .memory_limit_GB = 8};
 
 Matrix3d random_F(unsigned seed) {
   std::srand(seed);
@@ -108,7 +108,7 @@ TEST(NeoHooke, an_even_state_is_exact_in_bent_cells) {
   const Space space(block.mesh(), 2);
   const LargeSolution solution = solve_neo_hooke(
       gel, space, {.traction_kPa = [&](const Vector3d&, const Vector3d& n) -> Vector3d { return P * n; }, .held_um = u},
-      1, kFactor);
+      1, kTwoThreads);
   for (std::size_t k = 0; k < block.mesh().position_um.size(); ++k) {
     EXPECT_LE((solution.state.at_nodes_um[k] - u(block.mesh().position_um[k])).norm(), 1e-8);
   }
@@ -208,7 +208,7 @@ TEST(NeoHooke, a_manufactured_field_on_a_wave_is_met_with_order_at_any_poisson_r
                            },
                            .held_um = [&](const Vector3d& p) { return wavy.u(p); },
                            .force_kPa_per_um = [&](const Vector3d& p) { return wavy.body(p); }},
-                          2, kFactor);
+                          2, kTwoThreads);
       EXPECT_LE(solution.most_iterations, 6);
       errors.push_back(relative_error(space, solution.state.at_nodes_um, [&](const Vector3d& p) { return wavy.u(p); }));
     }
@@ -243,7 +243,7 @@ TEST(NeoHooke, a_blown_up_shell_is_that_of_the_boundary_value_problem_in_the_rad
       const Space space(sphere.mesh, 2);
       const LargeSolution solution = solve_neo_hooke(
           {shell.youngs_modulus_kPa, shell.poisson_ratio, 1}, space,
-          {.held_um = [&](const Vector3d& p) -> Vector3d { return (shell.inner_stretch - 1) * p; }}, 2, kFactor);
+          {.held_um = [&](const Vector3d& p) -> Vector3d { return (shell.inner_stretch - 1) * p; }}, 2, kTwoThreads);
       EXPECT_LE(solution.most_iterations, 6) << name;
       double error = 0, size = 0;
       int n_met = 0;
@@ -314,9 +314,9 @@ TEST(NeoHooke, the_error_of_linear_theory_is_predicted_within_a_factor_of_two) {
     constexpr double kWeak = 1e-4;
     Vectors weak_forces = forces;
     for (Vector3d& force : weak_forces) force *= kWeak;
-    Vectors linear = solve_neo_hooke(gel, space, {.at_nodes_nN = weak_forces}, 1, kFactor).state.at_nodes_um;
+    Vectors linear = solve_neo_hooke(gel, space, {.at_nodes_nN = weak_forces}, 1, kTwoThreads).state.at_nodes_um;
     for (Vector3d& u : linear) u /= kWeak;
-    const LargeSolution large = solve_neo_hooke(gel, space, {.at_nodes_nN = forces}, 1, kFactor);
+    const LargeSolution large = solve_neo_hooke(gel, space, {.at_nodes_nN = forces}, 1, kTwoThreads);
     EXPECT_LE(large.most_iterations, 6) << scene.name;
     double error = 0, size = 0;
     for (int cell = 0; cell < block.mesh().n_cells(); ++cell) {
@@ -344,17 +344,17 @@ TEST(NeoHooke, newton_converges_quadratically_and_a_load_too_large_keeps_the_las
     }};
   };
   for (const double nu : {0.49, 0.4999}) {
-    const LargeSolution solution = solve_neo_hooke({10, nu, 20}, space, pull(3), 1, kFactor);
+    const LargeSolution solution = solve_neo_hooke({10, nu, 20}, space, pull(3), 1, kTwoThreads);
     EXPECT_LE(solution.most_iterations, 6) << nu;
     const std::vector<double>& r = solution.residuals;
     ASSERT_GE(r.size(), 3u);
     // the last step before rounding at least squares the residual, up to a constant
     EXPECT_LE(r[r.size() - 1], std::max(1e-11, 100 * r[r.size() - 2] * r[r.size() - 2])) << nu;
   }
-  const LargeSolution partly = solve_neo_hooke_as_far({10, 0.49, 20}, space, pull(3000), 4, kFactor);
+  const LargeSolution partly = solve_neo_hooke_as_far({10, 0.49, 20}, space, pull(3000), 4, kTwoThreads);
   EXPECT_LT(partly.share, 1);
   for (const Vector3d& u : partly.state.at_nodes_um) EXPECT_TRUE(u.allFinite());
-  EXPECT_THROW(solve_neo_hooke({10, 0.49, 20}, space, pull(3000), 4, kFactor), NotSolved);
+  EXPECT_THROW(solve_neo_hooke({10, 0.49, 20}, space, pull(3000), 4, kTwoThreads), NotSolved);
 }
 
 }  // namespace

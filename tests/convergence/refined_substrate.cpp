@@ -13,10 +13,7 @@ namespace mbtfm::substrate {
 namespace {
 
 using std::numbers::pi;
-
-Gel gel_of(double poisson_ratio, double thickness_um) {
-  return {.youngs_modulus_kPa = 8.4, .poisson_ratio = poisson_ratio, .thickness_um = thickness_um};
-}
+using test::gel_of;
 
 SubstrateParameters refined_to(double tolerance) {
   SubstrateParameters parameters = test::model_named("refined");

@@ -9,7 +9,6 @@ namespace {
 
 using test::TensionScene;
 
-const Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
 constexpr SegmentationErrors kExact{0, 0, 0, 0};
 
 // Of the displacement: the budget is linear about the fit, which is compared with answers about the truth.
@@ -37,7 +36,7 @@ struct Fitted {
   std::vector<cables::CableNetwork> networks;
   EnsembleFit fit;
   ErrorBudget budget(SegmentationErrors errors, double substrate_error = 0, bool lacks_base = false,
-                     const Gel& gel = kGel) const {
+                     const Gel& gel = test::kGel) const {
     const Cell cell = cell_of(scene);
     return error_budget({.fit = fit,
                          .data = fit.data,
@@ -95,7 +94,7 @@ TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
                                            .networks = networks,
                                            .cell = cell,
                                            .beads = scene.beads,
-                                           .gel = kGel,
+                                           .gel = test::kGel,
                                            .segmentation = kExact},
                                           2);
   for (std::size_t i = 0; i < fit.tensions.nN.size(); ++i) {
@@ -149,7 +148,7 @@ TEST(ErrorBudget, states_what_errors_of_the_segmentation_do) {
       link.rest_length_um *= length(network) / length(old);
     }
     truth.cables = cables::CableNetwork(network);
-    truth.compliance_um_per_nN = greens::make_greens(kGel, {.model = substrate::ModelKind::layer}, 2)
+    truth.compliance_um_per_nN = greens::make_greens(test::kGel, {.model = substrate::ModelKind::layer}, 2)
                                      ->compliance_um_per_nN(truth.points_um, truth.ellipses);
     test::contract(truth, f.scene.tensions_nN);
     const Eigen::VectorXd error = answers(f, truth.displacement_um);
@@ -174,7 +173,7 @@ TEST(ErrorBudget, states_what_errors_of_the_segmentation_do) {
 TEST(ErrorBudget, tells_the_bias_of_a_substrate_that_lacks_the_base) {
   TensionScene scene = test::tension_scene("case_21", 1500, kLittleNoise, 3);
   const Eigen::VectorXd on_layer = scene.displacement_um;
-  scene.compliance_um_per_nN = greens::make_greens(kGel, {.model = substrate::ModelKind::half_space}, 2)
+  scene.compliance_um_per_nN = greens::make_greens(test::kGel, {.model = substrate::ModelKind::half_space}, 2)
                                    ->compliance_um_per_nN(scene.points_um, scene.ellipses);
   test::contract(scene, scene.tensions_nN);
   test::measure(scene, kLittleNoise, 3);
@@ -210,7 +209,7 @@ TEST(ErrorBudget, tells_what_a_fit_that_stops_early_leaves_undone) {
                                              .networks = early.networks,
                                              .cell = cell,
                                              .beads = early.scene.beads,
-                                             .gel = kGel,
+                                             .gel = test::kGel,
                                              .segmentation = kExact},
                                             2);
     double stated = 0;
@@ -224,7 +223,7 @@ TEST(ErrorBudget, tells_what_a_fit_that_stops_early_leaves_undone) {
 
 TEST(ErrorBudget, ten_percent_of_the_modulus_are_ten_percent_of_every_tension_and_of_the_force) {
   const Fitted f = fitted(test::tension_scene("case_21", 800, kLittleNoise, 5));
-  Gel gel = kGel;
+  Gel gel = test::kGel;
   gel.youngs_modulus_sigma_kPa = 0.1 * gel.youngs_modulus_kPa;
   const ErrorBudget budget = f.budget(kExact, 0, false, gel);
   for (const TensionError& t : budget.tensions) {
@@ -238,7 +237,7 @@ TEST(ErrorBudget, ten_percent_of_the_modulus_are_ten_percent_of_every_tension_an
 
 TEST(ErrorBudget, an_error_of_the_thickness_or_of_poissons_ratio_does_what_another_gel_would_do_to_the_fit) {
   const Fitted f = fitted(test::tension_scene("case_21", 800, kLittleNoise, 5));
-  Gel thicker = kGel, less_tight = kGel;
+  Gel thicker = test::kGel, less_tight = test::kGel;
   thicker.thickness_sigma_um = 2;  // little: the propagation is linear
   less_tight.poisson_ratio_sigma = 0.01;
   for (Gel gel : {thicker, less_tight}) {

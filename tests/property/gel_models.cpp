@@ -12,14 +12,14 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-const Gel kGel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.45, .thickness_um = 20};
+const Gel kThinGel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.45, .thickness_um = 20};
 
 class GelModels : public testing::TestWithParam<std::string> {
  protected:
   GelModels() {
     SubstrateParameters parameters = test::model_named(GetParam());
     parameters.displacement_tolerance = 0;  // one mesh: a mesh for each question is not linear
-    model = choice::make_substrate(kGel, parameters, 2);
+    model = choice::make_substrate(kThinGel, parameters, 2);
   }
   std::unique_ptr<Substrate> model;
   const std::vector<Vec2> points = test::scattered_points(20, 15);
@@ -116,7 +116,7 @@ INSTANTIATE_TEST_SUITE_P(All, GelModels, testing::ValuesIn(names()),
 
 TEST(Squares, side_by_side_act_as_one_square) {
   for (const char* name : {"half-space", "layer"}) {
-    const auto model = choice::make_substrate(kGel, test::model_named(name), 1);
+    const auto model = choice::make_substrate(kThinGel, test::model_named(name), 1);
     const std::vector<Vec2> points = {{0.3, 0.2}, {5, 1}, {30, -20}};
     const auto of = [&](const std::vector<Square>& squares) { return model->response({squares}, {points})->matrix(); };
     const MatrixXd quarters = of({{{-1, -1}, 2}, {{-1, 1}, 2}, {{1, -1}, 2}, {{1, 1}, 2}}), whole = of({{{0, 0}, 4}});
@@ -128,7 +128,7 @@ TEST(Squares, side_by_side_act_as_one_square) {
 }
 
 TEST(Waves, move_the_gel_along_and_across_as_its_function_says) {
-  const auto model = choice::make_substrate(kGel, test::model_named("layer"), 1);
+  const auto model = choice::make_substrate(kThinGel, test::model_named("layer"), 1);
   const std::vector<Wave> waves = {{{0.3, 0}}, {{0, 0.3}}};
   const std::vector<Vec2> points = {{0, 0}, {std::numbers::pi / 0.3, 0}};
   const MatrixXd u = model->response({waves}, {points})->matrix();

@@ -11,9 +11,9 @@
 namespace mbtfm::mesh {
 namespace {
 
-using testing::expect_valid;
-using testing::random_cell;
-using testing::RandomCellOptions;
+using test::expect_valid;
+using test::random_cell;
+using test::RandomCellOptions;
 
 /// An ordinary cell: gently bent fibres, no two adhesions within an edge length of each other, so that little is
 /// forced.
@@ -79,7 +79,7 @@ TEST(Mesh, two_hundred_random_cells_give_valid_networks) {
                                        .pixel_um = seed % 3 == 0 ? 0.1 : 0.0};
     Cell cell = random_cell(seed, options);
     // adhesions may lie in it, up to an edge length from the cell; fibres span it
-    const Polygon hole = testing::circle({30, 30}, 1.4, 40);
+    const Polygon hole = test::circle({30, 30}, 1.4, 40);
     const bool has_room = std::all_of(hole.begin(), hole.end(), [&](Vec2 p) { return contains(cell.outline_um, p); });
     if (has_room && seed % 4 < 2) cell.holes_um = {hole};
     GeneratedNetwork generated;
@@ -88,7 +88,7 @@ TEST(Mesh, two_hundred_random_cells_give_valid_networks) {
     parameters.free_fibre_ends = std::array{FreeFibreEnds::width, FreeFibreEnds::point}[seed % 2];
     parameters.seeds = values_of<Seeds>()[seed / 2 % 3];
     ASSERT_NO_THROW(generated = generate_network(cell, parameters));
-    expect_valid(generated, cell, testing::finest_edge_um(cell, parameters));
+    expect_valid(generated, cell, test::finest_edge_um(cell, parameters));
     EXPECT_GE(generated.worst_free_quality, 0.3);
     n_triangles += generated.n_triangles;
     n_needles += generated.n_needles;
@@ -146,7 +146,7 @@ TEST(Mesh, fibres_keep_their_lengths) {
       if (std::find(clipped.begin(), clipped.end(), fibre.fibre_id) != clipped.end()) continue;
       // Ends and points move by at most 0.15 edges (flattening and merging) and the line between them is as straight;
       // adhesions moved apart add as much again.
-      EXPECT_NEAR(testing::length_of_fibre_um(generated.network, fibre.fibre_id), length_um(fibre.points_um), 0.4 * 1.5)
+      EXPECT_NEAR(test::length_of_fibre_um(generated.network, fibre.fibre_id), length_um(fibre.points_um), 0.4 * 1.5)
           << "seed " << seed << " fibre " << fibre.fibre_id;
     }
   }

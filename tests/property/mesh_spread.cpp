@@ -32,7 +32,7 @@ double variance_of_forces(const Cell& cell, const NetworkParameters& formulation
 TEST(MeshSpread, links_to_second_neighbours_gain_more_than_a_second_mesh) {
   double with = 0, without = 0;
   for (const std::uint64_t seed : {3, 4, 5}) {
-    const Cell cell = testing::random_cell(seed, {.least_distance_um = 1});
+    const Cell cell = test::random_cell(seed, {.least_distance_um = 1});
     with += variance_of_forces(cell, {.link_reach = LinkReach::second_neighbours}, 10);
     without += variance_of_forces(cell, {.link_reach = LinkReach::neighbours}, 10);
   }

@@ -11,9 +11,8 @@ namespace {
 
 using test::TensionScene;
 
-const Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
 constexpr Vec2 kPlaces[] = {{26, 33}, {35, 27}};  // away from all adhesions
-constexpr Vec2 kForce_nN{1.5, -1};
+constexpr Vec2 kMissing_nN{1.5, -1};
 
 /// A round cell with two fibres and, where asked for, two balanced forces that no adhesion bears.
 struct Hidden {
@@ -35,8 +34,8 @@ struct Hidden {
     for (const Vec2 place : kPlaces) {
       discs.push_back({.centre_um = place, .semi_major_um = 0.6, .semi_minor_um = 0.4, .angle_rad = 1});
     }
-    const auto gel = greens::make_greens(kGel, {.model = substrate::ModelKind::layer}, 1);
-    const Eigen::Vector4d forces(kForce_nN.x, kForce_nN.y, -kForce_nN.x, -kForce_nN.y);
+    const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::layer}, 1);
+    const Eigen::Vector4d forces(kMissing_nN.x, kMissing_nN.y, -kMissing_nN.x, -kMissing_nN.y);
     scene.displacement_um += gel->compliance_um_per_nN(scene.points_um, discs) * forces;
   }
   std::vector<MissingAdhesion> found(unsigned seed, double noise = 0.05) {
@@ -46,7 +45,7 @@ struct Hidden {
     std::vector<cables::CableNetwork> networks;
     networks.emplace_back(scene.cables.network(), scene.cables.parameters());
     const EnsembleFit fit = fit_ensemble(networks, data, scene.adhesion_ids, {}, 1);
-    return missing_adhesions(fit, fit.data, cell, kGel, 1);
+    return missing_adhesions(fit, fit.data, cell, test::kGel, 1);
   }
 };
 
@@ -58,7 +57,8 @@ TEST(MissingAdhesions, forces_that_no_adhesion_bears_are_found_where_they_act) {
   for (const Vec2 place : kPlaces) {
     const auto at = std::ranges::min_element(found, {}, [&](const auto& m) { return norm(m.position_um - place); });
     EXPECT_LE(norm(at->position_um - place), 1.5) << "places are a micrometre apart";
-    EXPECT_NEAR(std::abs(dot(at->force_nN, kForce_nN)), dot(kForce_nN, kForce_nN), 0.5 * dot(kForce_nN, kForce_nN));
+    EXPECT_NEAR(std::abs(dot(at->force_nN, kMissing_nN)), dot(kMissing_nN, kMissing_nN),
+                0.5 * dot(kMissing_nN, kMissing_nN));
   }
 }
 

@@ -16,15 +16,13 @@ namespace {
 
 using test::TensionScene;
 
-const Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
-
 /// A round cell with two fibres whose images lie off its beads.
 struct ShiftedCell {
   Cell cell;  ///< as the images have it
   TensionScene scene;
   Placement truth;
 
-  LinearData data_of(const DisplacementField& beads) const { return test::data_on_layer(beads, cell, kGel); }
+  LinearData data_of(const DisplacementField& beads) const { return test::data_on_layer(beads, cell, test::kGel); }
 
   /// Fitted on the network that made the forces.
   std::pair<EnsembleFit, FoundPlacement> fit(Switch setting = Switch::automatic) const {
@@ -33,8 +31,8 @@ struct ShiftedCell {
     LinearData data = data_of(scene.beads);
     const Trial start = uniform_start({networks.front(), data.reduced, scene.adhesion_ids});
     PlacedCell place = place_cell(
-        cell, networks.front(), scene.beads, data, [&](const DisplacementField& at) { return data_of(at); }, kGel, {},
-        start, setting, 1);
+        cell, networks.front(), scene.beads, data, [&](const DisplacementField& at) { return data_of(at); }, test::kGel,
+        {}, start, setting, 1);
     EnsembleFit found = fit_ensemble(networks, std::move(place.data), scene.adhesion_ids, {}, 1);
     if (!place.effect.is_on) return {std::move(found), {place.placement, Eigen::Vector3d::Zero()}};
     const MotionsBeside motions = motions_beside(found.data, found);
@@ -70,7 +68,7 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
   const auto model = [&](const Placement& at) -> Eigen::VectorXd {
     DisplacementField places;
     for (const Vec2 p : beads) places.push_back({.position_um = p, .displacement_um = {}, .flag = {}});
-    const auto gel = greens::make_greens(kGel, {.model = substrate::ModelKind::half_space}, 1);
+    const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::half_space}, 1);
     const Eigen::VectorXd seen =
         gel->compliance_um_per_nN(points_of(in_cell_frame(places, at)), ellipses_of(cell)) * forces;
     Eigen::VectorXd u(seen.size());
@@ -80,7 +78,7 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
     return u;
   };
   const Vec2 centre{30, 30};
-  const Eigen::MatrixXd motions = placement_motions(kGel, ellipses_of(cell), forces, beads,
+  const Eigen::MatrixXd motions = placement_motions(test::kGel, ellipses_of(cell), forces, beads,
                                                     model({.centre_um = centre, .shift_um = {}}), centre, 2);
   constexpr double kStep = 1e-3;
   const Placement steps[] = {{centre, {kStep, 0}, 0}, {centre, {0, kStep}, 0}, {centre, {}, kStep}};
@@ -104,12 +102,12 @@ TEST(Placement, what_carries_a_bead_changes_its_displacement_by_as_much_as_the_f
     by.segment<2>(2 * i) << way.x, way.y;
   }
   for (int i = 0; i < 14; ++i) forces[i] = std::sin(1 + i);
-  const auto gel = greens::make_greens(kGel, {.model = substrate::ModelKind::half_space}, 1);
+  const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::half_space}, 1);
   const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
   const Eigen::VectorXd wanted =
       (gel->compliance_um_per_nN(carried, ellipses) - gel->compliance_um_per_nN(beads, ellipses)) * forces;
   // Exact near an adhesion. From r = 4 a on by the slope halfway, which leaves way² / (4 r²) of 1/r.
-  EXPECT_LE((carried_um(kGel, ellipses, forces, beads, by, 2) - wanted).norm(), 1.0 / 64 * wanted.norm());
+  EXPECT_LE((carried_um(test::kGel, ellipses, forces, beads, by, 2) - wanted).norm(), 1.0 / 64 * wanted.norm());
 }
 
 TEST(Placement, frames_are_each_others_inverse) {
@@ -156,7 +154,7 @@ TEST(Placement, beads_that_do_not_tell_it_leave_the_cell_where_it_is) {
   const auto place = [&](Switch setting) {
     return place_cell(
         noisy.cell, noisy.scene.cables, noisy.scene.beads, data,
-        [&](const DisplacementField& at) { return noisy.data_of(at); }, kGel, {}, start, setting, 1);
+        [&](const DisplacementField& at) { return noisy.data_of(at); }, test::kGel, {}, start, setting, 1);
   };
   for (const Switch setting : {Switch::automatic, Switch::off}) {
     const PlacedCell stays = place(setting);
@@ -174,7 +172,7 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
   const EnsembleFit with_known = fit_ensemble(networks, known, still.scene.adhesion_ids, {}, 1);
   const Eigen::VectorXd& forces = with_known.forces.nN;
   const LinearData unknown =
-      with_more_motions(known, placement_motions(kGel, still.scene.ellipses, forces, still.scene.points_um,
+      with_more_motions(known, placement_motions(test::kGel, still.scene.ellipses, forces, still.scene.points_um,
                                                  known.response->displace(forces), {30, 30}, 1));
   const EnsembleFit fit = fit_ensemble(networks, unknown, still.scene.adhesion_ids, {}, 1);
   const ErrorBudget budget = error_budget({.fit = fit,
@@ -182,7 +180,7 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
                                            .networks = networks,
                                            .cell = still.cell,
                                            .beads = still.scene.beads,
-                                           .gel = kGel,
+                                           .gel = test::kGel,
                                            .segmentation = {},
                                            .n_of_place = 3},
                                           1);
@@ -213,7 +211,7 @@ TEST(Placement, frames_of_a_series_hold_the_error_of_the_place) {
   };
   const FrameFit held = frame_fit({});
   const FrameFit allowed = frame_fit([&](LinearData frame, const Eigen::VectorXd& forces_nN) {
-    return with_place(std::move(frame), shifted.cell, kGel, forces_nN, known.second.placement.centre_um, 1);
+    return with_place(std::move(frame), shifted.cell, test::kGel, forces_nN, known.second.placement.centre_um, 1);
   });
   for (std::size_t i = 0; i < single.tensions.nN.size(); ++i) {
     // the forces whose motions are allowed are those of a rough fit here, of the fit's end there

@@ -13,7 +13,7 @@
 namespace mbtfm::tensions {
 namespace {
 
-constexpr double kNoise = 0.05;
+constexpr double kNoiseOfFrames = 0.05;
 
 /// Each tension swells and ebbs by half, one after the other.
 Eigen::VectorXd tensions_at(const Eigen::VectorXd& base_nN, int frame) {
@@ -31,13 +31,15 @@ struct Series {
 };
 
 Series make_series(int n_frames) {
-  Series series{
-      .scene = test::tension_scene("case_21", 1500, kNoise, 1), .true_nN = {}, .true_total_nN = {}, .frames = {}};
+  Series series{.scene = test::tension_scene("case_21", 1500, kNoiseOfFrames, 1),
+                .true_nN = {},
+                .true_total_nN = {},
+                .frames = {}};
   const Eigen::VectorXd base_nN = series.scene.tensions_nN;
   for (int f = 1; f <= n_frames; ++f) {
     series.true_nN.push_back(tensions_at(base_nN, f));
     contract(series.scene, series.true_nN.back());
-    measure(series.scene, kNoise, static_cast<unsigned>(f));
+    measure(series.scene, kNoiseOfFrames, static_cast<unsigned>(f));
     series.true_total_nN.push_back(total_nN(series.scene.forces_nN));
     series.frames.push_back({.frame = f, .refused = {}, .beads = series.scene.beads});
   }
@@ -141,7 +143,7 @@ TEST(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
   write_frames(folder / "frames.csv", whole, 30);
   const std::vector<FrameFit> known = read_fits(folder / "");
   contract(series.scene, series.true_nN[0]);
-  measure(series.scene, kNoise, 99);
+  measure(series.scene, kNoiseOfFrames, 99);
   series.frames[1] = {.frame = 2, .refused = {}, .sha256 = "another file", .beads = series.scene.beads};
   const std::vector<FrameFit> again = fit(series, known);
   EXPECT_EQ(again[0].tensions[0].tension_nN, 42);

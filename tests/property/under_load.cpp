@@ -14,7 +14,6 @@ namespace {
 
 using test::TensionScene;
 
-const Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
 constexpr double kSize_um = 1;    // of the adhesions
 constexpr double kNoise = 0.002;  // of the largest displacement, which a lone bead on an adhesion has
 
@@ -24,7 +23,7 @@ struct PullingCell {
   TensionScene scene;
   DisplacementField at_rest;
 
-  LinearData data_of(const DisplacementField& beads) const { return test::data_on_layer(beads, cell, kGel); }
+  LinearData data_of(const DisplacementField& beads) const { return test::data_on_layer(beads, cell, test::kGel); }
   BeadsOfState state(const DisplacementField& beads, Switch setting = Switch::automatic) const {
     return take_state(
         beads, data_of(beads), [&](const DisplacementField& there) { return data_of(there); }, kSize_um, 0.01, setting,
@@ -32,8 +31,8 @@ struct PullingCell {
   }
   Carried carried() const {
     return [this](const LinearData& data) {
-      return carried_um(kGel, ellipses_of(cell), free_forces_nN(data.reduced), data.position_um, data.displacement_um,
-                        1);
+      return carried_um(test::kGel, ellipses_of(cell), free_forces_nN(data.reduced), data.position_um,
+                        data.displacement_um, 1);
     };
   }
   /// Fitted on the network that made the forces.

@@ -15,9 +15,9 @@
 namespace mbtfm::mesh {
 namespace {
 
-using testing::adhesion_at;
-using testing::expect_valid;
-using testing::fibre_along;
+using test::adhesion_at;
+using test::expect_valid;
+using test::fibre_along;
 
 /// A square of 20 um with an adhesion near each corner.
 Cell square_cell() {
@@ -36,7 +36,7 @@ void expect_valid_with(const std::vector<Fibre>& fibres) {
     expect_valid(generated, cell, 1.5);
     for (const Fibre& f : fibres) {
       // merging moves a line by a tenth of an edge at most, each time it does
-      EXPECT_NEAR(testing::length_of_fibre_um(generated.network, f.fibre_id), length_um(f.points_um),
+      EXPECT_NEAR(test::length_of_fibre_um(generated.network, f.fibre_id), length_um(f.points_um),
                   0.4 * 1.5 + 0.02 * length_um(f.points_um));
     }
   }
@@ -96,8 +96,8 @@ TEST(HardMesh, fibres_on_the_same_line_each_keep_their_links) {
   const GeneratedNetwork generated = generate_network(cell, {});
   expect_valid(generated, cell, 1.5);
   EXPECT_GT(generated.n_shared_segments, 0);
-  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 14, 1e-9);
-  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 2), 8, 1e-9);
+  EXPECT_NEAR(test::length_of_fibre_um(generated.network, 1), 14, 1e-9);
+  EXPECT_NEAR(test::length_of_fibre_um(generated.network, 2), 8, 1e-9);
 }
 
 TEST(HardMesh, touching_and_branching_fibres) {
@@ -140,8 +140,8 @@ TEST(HardMesh, fibres_that_leave_the_cell_are_cut_and_named) {
   expect_valid(generated, cell, 1.5);
   EXPECT_EQ(generated.clipped_fibre_ids, (std::vector<int>{1, 3}));
   // cut at the outline, but for merging by a tenth of an edge
-  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), std::hypot(10, 0.625), 0.1 * 1.5);
-  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 3), 20, 0.2 * 1.5);
+  EXPECT_NEAR(test::length_of_fibre_um(generated.network, 1), std::hypot(10, 0.625), 0.1 * 1.5);
+  EXPECT_NEAR(test::length_of_fibre_um(generated.network, 3), 20, 0.2 * 1.5);
   cell.fibres = {fibre_along(4, {{30, 10}, {36, 11}})};
   EXPECT_THROW(generate_network(cell, {}), InvalidData);
 }
@@ -154,8 +154,8 @@ TEST(HardMesh, fibre_that_leaves_and_comes_back_has_two_parts) {
   cell.fibres = {fibre_along(1, {{2, 14}, {18, 14}})};
   const GeneratedNetwork generated = generate_network(cell, {});
   expect_valid(generated, cell, 1.5);
-  EXPECT_EQ(testing::n_ends_of_fibre(generated.network, 1), 4);
-  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 8, 0.8 * 1.5);
+  EXPECT_EQ(test::n_ends_of_fibre(generated.network, 1), 4);
+  EXPECT_NEAR(test::length_of_fibre_um(generated.network, 1), 8, 0.8 * 1.5);
 }
 
 TEST(HardMesh, adhesions_outside_are_included_up_to_an_edge_length) {
@@ -249,10 +249,10 @@ TEST(HardMesh, tip_beyond_a_neck_thinner_than_the_mesh_is_left_out_where_nothing
 
 TEST(HardMesh, outline_of_thousands_of_pixel_steps) {
   test::hard_case("4 000 steps of pixels of 0.05 to 0.3 um", "the smooth outline's area, mean quality >= 0.9");
-  const Cell smooth = testing::random_cell(11, {.n_outline_points = 300});
+  const Cell smooth = test::random_cell(11, {.n_outline_points = 300});
   for (const double pixel : {0.05, 0.1, 0.3}) {
     SCOPED_TRACE("pixel " + std::to_string(pixel));
-    const Cell stepped = testing::random_cell(11, {.n_outline_points = 4000, .pixel_um = pixel});
+    const Cell stepped = test::random_cell(11, {.n_outline_points = 4000, .pixel_um = pixel});
     const GeneratedNetwork generated = generate_network(stepped, {});
     expect_valid(generated, stepped, 1.5);
     // averaging half an edge leaves steps of a fraction of a pixel: area within perimeter · pixel / 2
@@ -290,10 +290,10 @@ TEST(HardMesh, adhesions_of_any_size) {
     cell.fibres = {fibre_along(1, {{2, 2}, {10, 10}}, 1, 5)};
     const NetworkParameters parameters{.adhesion_anchor = AdhesionAnchor::rim};
     const GeneratedNetwork generated = generate_network(cell, parameters);
-    expect_valid(generated, cell, testing::finest_edge_um(cell, parameters));
+    expect_valid(generated, cell, test::finest_edge_um(cell, parameters));
     EXPECT_GE(generated.worst_free_quality, 0.3);
     // the fibre is straight, to the centres of both
-    EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 8 * std::sqrt(2.0), 1e-9);
+    EXPECT_NEAR(test::length_of_fibre_um(generated.network, 1), 8 * std::sqrt(2.0), 1e-9);
   }
 }
 
@@ -304,7 +304,7 @@ TEST(HardMesh, points_that_repeat_and_lines_that_run_back) {
   expect_valid(generate_network(cell, {}), cell, 1.5);
 }
 
-class HardCell : public ::testing::TestWithParam<testing::HardCell> {};
+class HardCell : public ::testing::TestWithParam<test::HardCell> {};
 
 TEST_P(HardCell, gives_a_valid_network_with_good_triangles_away_from_its_lines) {
   test::hard_case("the cell of that name, with each way to anchor adhesions",
@@ -318,7 +318,7 @@ TEST_P(HardCell, gives_a_valid_network_with_good_triangles_away_from_its_lines) 
       parameters.adhesion_anchor = anchor;
       parameters.free_fibre_ends = anchor == AdhesionAnchor::rim ? FreeFibreEnds::width : FreeFibreEnds::point;
       const GeneratedNetwork generated = generate_network(cell, parameters);
-      expect_valid(generated, cell, testing::finest_edge_um(cell, parameters));
+      expect_valid(generated, cell, test::finest_edge_um(cell, parameters));
       EXPECT_GE(generated.worst_free_quality, 0.3);
       worst = std::min(worst, generated.worst_free_quality);
     }
@@ -326,7 +326,7 @@ TEST_P(HardCell, gives_a_valid_network_with_good_triangles_away_from_its_lines) 
   test::came_out("worst triangle away from lines " + test::two_digits(worst));
 }
 
-INSTANTIATE_TEST_SUITE_P(Mesh, HardCell, ::testing::ValuesIn(testing::hard_cells()),
+INSTANTIATE_TEST_SUITE_P(Mesh, HardCell, ::testing::ValuesIn(test::hard_cells()),
                          [](const auto& test) { return test.param.name; });
 
 TEST(HardMesh, rims_hold_the_adhesions_areas) {
@@ -353,11 +353,11 @@ TEST(HardMesh, rims_hold_the_adhesions_areas) {
 TEST(HardMesh, fibre_spans_a_hole) {
   test::hard_case("a fibre crosses a hole of the cell", "it keeps its length; no other link in the hole");
   Cell cell = square_cell();
-  cell.holes_um = {testing::circle({10, 10}, 3, 80)};
+  cell.holes_um = {test::circle({10, 10}, 3, 80)};
   cell.fibres = {fibre_along(1, {{3, 10}, {17, 10}})};
   const GeneratedNetwork generated = generate_network(cell, {});
   expect_valid(generated, cell, 1.5);
-  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 14, 1e-9);
+  EXPECT_NEAR(test::length_of_fibre_um(generated.network, 1), 14, 1e-9);
   for (const Link& link : generated.network.links) {
     const Vec2 middle =
         0.5 * (generated.network.vertices_um[link.vertex_a] + generated.network.vertices_um[link.vertex_b]);
@@ -369,19 +369,19 @@ TEST(HardMesh, fibre_spans_a_hole) {
 TEST(HardMesh, free_end_in_a_hole_is_cut_off_and_named) {
   test::hard_case("a fibre ends in a hole", "cut at the rim and reported");
   Cell cell = square_cell();
-  cell.holes_um = {testing::circle({10, 10}, 3, 80)};
+  cell.holes_um = {test::circle({10, 10}, 3, 80)};
   cell.fibres = {fibre_along(1, {{3, 10}, {10, 10}}), fibre_along(2, {{3, 12}, {17, 12}})};
   const GeneratedNetwork generated = generate_network(cell, {});
   expect_valid(generated, cell, 1.5);
   EXPECT_EQ(generated.clipped_fibre_ids, (std::vector<int>{1}));
   // averaging the rim draws it in by edge² / 96 R, merging by a tenth of an edge
-  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 4, 0.1 * 1.5 + 0.01);
+  EXPECT_NEAR(test::length_of_fibre_um(generated.network, 1), 4, 0.1 * 1.5 + 0.01);
 }
 
 TEST(HardMesh, hole_smaller_than_a_triangle_is_filled) {
   test::hard_case("a hole of 0.8 um, smaller than an edge", "filled and reported");
   Cell cell = square_cell();
-  cell.holes_um = {testing::circle({10, 10}, 0.4, 30), testing::circle({6, 12}, 2, 30)};
+  cell.holes_um = {test::circle({10, 10}, 0.4, 30), test::circle({6, 12}, 2, 30)};
   const GeneratedNetwork generated = generate_network(cell, {});
   expect_valid(generated, cell, 1.5);
   EXPECT_EQ(generated.n_filled_holes, 1);

@@ -33,7 +33,7 @@ void draw_links(const Network& network, bool of_fibres, const char* style) {
   std::printf("\"/>\n");
 }
 
-void draw(const testing::HardCell& hard, const mesh::GeneratedNetwork& generated) {
+void draw(const test::HardCell& hard, const mesh::GeneratedNetwork& generated) {
   const Network& network = generated.network;
   draw_polygon(hard.cell.outline_um, "fill:#f4f1e8;stroke:none");
   for (const Polygon& hole : hard.cell.holes_um) draw_polygon(hole, "fill:#fff;stroke:none");
@@ -50,7 +50,7 @@ void draw(const testing::HardCell& hard, const mesh::GeneratedNetwork& generated
 }  // namespace
 
 int main() {
-  const std::vector<testing::HardCell> cells = testing::hard_cells();
+  const std::vector<test::HardCell> cells = test::hard_cells();
   const int rows = (static_cast<int>(cells.size()) + kColumns - 1) / kColumns;
   std::printf(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%g\" height=\"%g\" font-family=\"sans-serif\" "

@@ -64,10 +64,10 @@ double now_s() {
 drawing::DrawnCell scene(const std::string& name) {
   if (name.starts_with('r')) {
     const auto seed = static_cast<std::uint64_t>(std::atoi(name.c_str() + 1));
-    drawing::DrawnCell drawn{.cell = testing::random_cell(seed, {.least_distance_um = 1}), .tensions_nN = {}};
+    drawing::DrawnCell drawn{.cell = test::random_cell(seed, {.least_distance_um = 1}), .tensions_nN = {}};
     std::mt19937_64 engine(seed);
     for (std::size_t i = 0; i < drawn.cell.fibres.size(); ++i)
-      drawn.tensions_nN.push_back(testing::uniform(engine, 0.3, 6));
+      drawn.tensions_nN.push_back(test::uniform(engine, 0.3, 6));
     return drawn;
   }
   const drawing::ScenarioParameters p;

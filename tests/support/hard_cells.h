@@ -10,7 +10,7 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
 
-namespace mbtfm::testing {
+namespace mbtfm::test {
 
 inline Adhesion adhesion_at(int id, Vec2 position, double angle_rad = 0) {
   Adhesion a;
@@ -133,4 +133,4 @@ inline std::vector<HardCell> hard_cells() {
   };
 }
 
-}  // namespace mbtfm::testing
+}  // namespace mbtfm::test

@@ -11,7 +11,7 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
 
-namespace mbtfm::testing {
+namespace mbtfm::test {
 
 struct RandomCellOptions {
   double radius_um = 20;
@@ -134,4 +134,4 @@ inline Cell random_cell(std::uint64_t seed, const RandomCellOptions& options = {
   return cell;
 }
 
-}  // namespace mbtfm::testing
+}  // namespace mbtfm::test

@@ -10,7 +10,7 @@
 namespace mbtfm::test {
 
 inline constexpr const char* kCopyingStage = R"sh(#!/bin/sh
-made=$(dirname "$0")/../made; name=$(basename "$0"); name=${name#mbtfm-}
+made=${0%/*}/../made; name=${0##*/mbtfm-}
 while [ $# -gt 0 ]; do
   case "$1" in
     --check) exit 0;;

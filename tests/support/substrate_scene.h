@@ -11,6 +11,10 @@
 
 namespace mbtfm::test {
 
+inline Gel gel_of(double poisson_ratio, double thickness_um) {
+  return {.youngs_modulus_kPa = 8.4, .poisson_ratio = poisson_ratio, .thickness_um = thickness_um};
+}
+
 using substrate::Ellipse;
 
 /// Points spread over a square of the given half side about `centre`.

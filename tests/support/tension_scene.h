@@ -17,6 +17,8 @@
 
 namespace mbtfm::test {
 
+inline const Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
+
 struct TensionScene {
   cables::CableNetwork cables;
   Eigen::VectorXd tensions_nN;
@@ -92,8 +94,7 @@ inline TensionScene scene_of(const Network& network, const Eigen::VectorXd& tens
     const double a = std::generate_canonical<double, 53>(random), b = std::generate_canonical<double, 53>(random);
     scene.points_um.push_back({low.x - 15 + a * (high.x - low.x + 30), low.y - 15 + b * (high.y - low.y + 30)});
   }
-  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
-  scene.compliance_um_per_nN = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, 2)
+  scene.compliance_um_per_nN = greens::make_greens(kGel, {.model = substrate::ModelKind::layer}, 2)
                                    ->compliance_um_per_nN(scene.points_um, scene.ellipses);
   contract(scene, tensions_nN);
   return scene;

@@ -11,7 +11,7 @@
 
 #include "network/mesh/mesh.h"
 
-namespace mbtfm::testing {
+namespace mbtfm::test {
 
 inline double length_of_fibre_um(const Network& network, int fibre_id) {
   double length = 0;
@@ -69,4 +69,4 @@ inline void expect_valid(const mesh::GeneratedNetwork& generated, const Cell& ce
   for (const Fibre& f : cell.fibres) EXPECT_GT(length_of_fibre_um(net, f.fibre_id), 0) << "fibre " << f.fibre_id;
 }
 
-}  // namespace mbtfm::testing
+}  // namespace mbtfm::test

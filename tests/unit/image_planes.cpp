@@ -245,10 +245,10 @@ TEST(ImagePlanes, more_than_4_GB_of_imagej_are_planes_after_the_only_page) {
   }
 }
 
-const fs::path kShared = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data";
+const fs::path kSharedImages = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data";
 
 TEST(ImagePlanes, real_hyperstacks_are_read_as_by_another_program) {
-  if (!fs::exists(kShared / "tiff")) GTEST_SKIP() << "the images of other programs are not here";
+  if (!fs::exists(kSharedImages / "tiff")) GTEST_SKIP() << "the images of other programs are not here";
   struct Case {
     const char* file;
     PlaneChoice choice;
@@ -265,7 +265,7 @@ TEST(ImagePlanes, real_hyperstacks_are_read_as_by_another_program) {
                         {"tiff/derived_tiffcp/beads_2ch.ome.tif", {.channel = "ch A"}, 4415260968}};
   for (const Case& c : cases) {
     double sum = 0;
-    for (const float value : read_image(kShared / c.file, c.choice).pixels) sum += value;
+    for (const float value : read_image(kSharedImages / c.file, c.choice).pixels) sum += value;
     EXPECT_EQ(sum, c.sum) << c.file << " channel " << c.choice.channel;
   }
 }

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kSide = 256;
 constexpr double kPixel_um = 0.1;
-constexpr Field kField{kSide, kSide, kPixel_um};
+constexpr Field kMaskField{kSide, kSide, kPixel_um};
 
 template <class IsIn>
 void paint(images::Image& image, float value, const IsIn& is_in) {
@@ -36,7 +36,7 @@ int n_pixels(const LabelMask& m) {
   return static_cast<int>(m.labels.size() - static_cast<std::size_t>(std::ranges::count(m.labels, 0)));
 }
 
-std::string error_of(const auto& body) {
+std::string refusal_of(const auto& body) {
   try {
     body();
   } catch (const InputError& error) {
@@ -59,7 +59,7 @@ TEST(Mask, an_outline_goes_round_its_pixels_without_bias) {
     images::Image image = empty();
     paint_disc(image, 255, {128.3, 127.1}, radius_px);
     const LabelMask m = mask(image);
-    const auto cells = mask_outlines(m, 1, kField, {});
+    const auto cells = mask_outlines(m, 1, kMaskField, {});
     ASSERT_EQ(cells.size(), 1u);
     const double area_um2 = n_pixels(m) * kPixel_um * kPixel_um;
     EXPECT_NEAR(cells[0].area_um2, area_um2, 1e-9);
@@ -91,7 +91,7 @@ TEST(Mask, holes_are_kept_and_pinholes_are_not) {
   paint_disc(image, 255, {128, 128}, 100);
   paint_disc(image, 0, {110, 128}, 25);  // 19.6 um²
   image.at(160, 128) = 0;
-  const auto cell = mask_outlines(mask(image), 1, kField, {}).front();
+  const auto cell = mask_outlines(mask(image), 1, kMaskField, {}).front();
   ASSERT_EQ(cell.holes_um.size(), 1u);
   EXPECT_NEAR(std::abs(signed_area_um2(cell.holes_um[0])), std::numbers::pi * 6.25, 0.2);
   EXPECT_NEAR(cell.area_um2, std::numbers::pi * (100 - 6.25), 1);
@@ -102,27 +102,27 @@ TEST(Mask, of_a_binary_mask_the_largest_part_is_the_cell_and_the_others_follow) 
   paint_disc(image, 255, {60, 60}, 45);
   paint_disc(image, 255, {180, 180}, 60);
   paint_disc(image, 255, {200, 40}, 5);  // a speck
-  const auto area = [&](int cell) { return mask_outlines(mask(image), cell, kField, {}).front().area_um2; };
+  const auto area = [&](int cell) { return mask_outlines(mask(image), cell, kMaskField, {}).front().area_um2; };
   EXPECT_NEAR(area(1), std::numbers::pi * 36, 1);
   EXPECT_NEAR(area(2), std::numbers::pi * 20.25, 1);
-  EXPECT_EQ(mask_outlines(mask(image), 0, kField, {}).size(), 2u);
-  EXPECT_EQ(error_of([&] { area(3); }), "mask.tif: cell 3; 2 in all");
+  EXPECT_EQ(mask_outlines(mask(image), 0, kMaskField, {}).size(), 2u);
+  EXPECT_EQ(refusal_of([&] { area(3); }), "mask.tif: cell 3; 2 in all");
 }
 
 TEST(Mask, of_a_label_image_the_parameter_names_the_label) {
   images::Image image = empty();
   paint_disc(image, 7, {60, 60}, 45);
   paint_disc(image, 1200, {150, 150}, 60);
-  const auto area = [&](int cell) { return mask_outlines(mask(image), cell, kField, {}).front().area_um2; };
+  const auto area = [&](int cell) { return mask_outlines(mask(image), cell, kMaskField, {}).front().area_um2; };
   EXPECT_NEAR(area(7), std::numbers::pi * 20.25, 1);
   EXPECT_NEAR(area(1200), std::numbers::pi * 36, 1);
-  EXPECT_EQ(error_of([&] { area(1); }), "mask.tif: a cell with label 1; labels 7, 1200");
+  EXPECT_EQ(refusal_of([&] { area(1); }), "mask.tif: a cell with label 1; labels 7, 1200");
 }
 
 TEST(Mask, a_cell_at_the_border_is_cut_there_and_nowhere_else) {
   images::Image image = empty();
   paint_disc(image, 1, {20, 128}, 70);
-  const auto cell = mask_outlines(mask(image), 1, kField, {}).front();
+  const auto cell = mask_outlines(mask(image), 1, kMaskField, {}).front();
   ASSERT_TRUE(cell.is_cut_by_border());
   ASSERT_EQ(cell.is_cut.size(), cell.outer_um.size());
   double cut_um = 0;
@@ -142,7 +142,7 @@ TEST(Mask, an_adhesion_has_the_moments_of_its_pixels) {
   paint(image, 3, [&](double x, double y) { return contains(ellipse_polygon(truth, 200), kPixel_um * Vec2{x, y}); });
   paint_disc(image, 9, {50, 200}, 6);
   const LabelMask m = mask(image);
-  const auto found = mask_adhesions(m, std::nullopt, kField);
+  const auto found = mask_adhesions(m, std::nullopt, kMaskField);
   ASSERT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0].adhesion_id, 1);
   EXPECT_EQ(found[0].origin, AdhesionOrigin::image);
@@ -157,16 +157,16 @@ TEST(Mask, each_part_of_a_binary_mask_is_an_adhesion_and_each_label_of_a_label_i
   images::Image image = empty();
   paint_disc(image, 255, {50, 50}, 6);
   paint_disc(image, 255, {90, 50}, 6);
-  EXPECT_EQ(mask_adhesions(mask(image), std::nullopt, kField).size(), 2u);
+  EXPECT_EQ(mask_adhesions(mask(image), std::nullopt, kMaskField).size(), 2u);
   paint_disc(image, 4, {150, 50}, 6);
-  EXPECT_EQ(mask_adhesions(mask(image), std::nullopt, kField).size(), 2u);  // 255 lies in two pieces
+  EXPECT_EQ(mask_adhesions(mask(image), std::nullopt, kMaskField).size(), 2u);  // 255 lies in two pieces
 }
 
 TEST(Mask, an_adhesions_intensity_is_its_height_above_its_surroundings) {
   images::Image image = empty(), light = test::even_image(kSide, kSide, 100);
   paint_disc(image, 1, {80, 80}, 8);
   paint_disc(light, 400, {80, 80}, 8);
-  const auto found = mask_adhesions(mask(image), images::Channel{"paxillin.tif", light}, kField);
+  const auto found = mask_adhesions(mask(image), images::Channel{"paxillin.tif", light}, kMaskField);
   EXPECT_NEAR(found.front().mean_intensity, 300, 1e-4);
 }
 
@@ -174,7 +174,7 @@ TEST(Mask, binning_the_images_leaves_the_mask_as_fine_as_it_is) {
   images::Image image = empty();
   paint_disc(image, 1, {101, 97}, 50);
   LabelMask m = mask(image);
-  const auto fine = mask_outlines(m, 1, kField, {}).front();
+  const auto fine = mask_outlines(m, 1, kMaskField, {}).front();
   m.binning = 2;
   const Field coarse{kSide / 2, kSide / 2, 2 * kPixel_um};
   const auto binned = mask_outlines(m, 1, coarse, {}).front();
@@ -184,17 +184,17 @@ TEST(Mask, binning_the_images_leaves_the_mask_as_fine_as_it_is) {
 
 TEST(Mask, what_is_no_mask_is_told) {
   images::Image image = empty();
-  EXPECT_EQ(error_of([&] { mask(image); }), "mask.tif: pixels above 0 for what the mask covers; 0 everywhere");
+  EXPECT_EQ(refusal_of([&] { mask(image); }), "mask.tif: pixels above 0 for what the mask covers; 0 everywhere");
   image.at(3, 5) = 0.25f;
-  EXPECT_EQ(error_of([&] { mask(image); }), "mask.tif: pixel 3, 5: a whole number, 0 for the background; 0.25");
+  EXPECT_EQ(refusal_of([&] { mask(image); }), "mask.tif: pixel 3, 5: a whole number, 0 for the background; 0.25");
   image.at(3, 5) = -1;
-  EXPECT_EQ(error_of([&] { mask(image); }), "mask.tif: pixel 3, 5: a whole number, 0 for the background; -1");
+  EXPECT_EQ(refusal_of([&] { mask(image); }), "mask.tif: pixel 3, 5: a whole number, 0 for the background; -1");
   image.at(3, 5) = 1;
   image.is_lossy = true;
-  EXPECT_EQ(error_of([&] { mask(image); }), "mask.tif: a mask as TIFF or PNG; a JPEG, which changes labels and rims");
+  EXPECT_EQ(refusal_of([&] { mask(image); }), "mask.tif: a mask as TIFF or PNG; a JPEG, which changes labels and rims");
   images::Image inverted = test::even_image(kSide, kSide, 255);
   paint_disc(inverted, 0, {128, 128}, 80);
-  EXPECT_EQ(error_of([&] { mask_outlines(mask(inverted), 1, kField, {}); }),
+  EXPECT_EQ(refusal_of([&] { mask_outlines(mask(inverted), 1, kMaskField, {}); }),
             "mask.tif: a cell on a background of 0; values above 0 in all four corners of the image");
 }
 
@@ -202,8 +202,8 @@ TEST(Mask, of_a_cell_or_a_pattern_is_not_taken_for_adhesions) {
   images::Image image = empty();
   paint_disc(image, 255, {40, 40}, 5);
   paint_disc(image, 255, {150, 150}, 60);
-  const auto measure = [&] { mask_adhesions(mask(image), std::nullopt, kField); };
-  EXPECT_EQ(error_of(measure), "mask.tif: part at (15, 15) um: an adhesion, of at most 100 um²; 113 um²");
+  const auto measure = [&] { mask_adhesions(mask(image), std::nullopt, kMaskField); };
+  EXPECT_EQ(refusal_of(measure), "mask.tif: part at (15, 15) um: an adhesion, of at most 100 um²; 113 um²");
   for (const char* part : {"segment.adhesions = pattern", "outline_mask"})
     EXPECT_NE(hint_of(measure).find(part), std::string::npos) << hint_of(measure);
 }
@@ -215,7 +215,7 @@ TEST(Mask, of_a_pattern_may_reach_the_corners_but_not_go_all_round) {
   images::Image inverted = test::even_image(kSide, kSide, 255);
   paint_disc(inverted, 0, {128, 128}, 60);
   const auto look = [&] { require_upright_pattern(mask(inverted)); };
-  EXPECT_EQ(error_of(look),
+  EXPECT_EQ(refusal_of(look),
             "mask.tif: a pattern on a background of 0; values above 0 all along the border of the image");
   EXPECT_NE(hint_of(look).find("inverted"), std::string::npos) << hint_of(look);
 }
@@ -228,7 +228,7 @@ TEST(Mask, of_a_pattern_lies_beneath_the_cell_by_the_share_of_the_parts_that_it_
   const auto share = [&](double x_um) {
     const CellOutline cell{
         .outer_um = {{x_um, 5}, {x_um + 12, 5}, {x_um + 12, 17}, {x_um, 17}}, .holes_um = {}, .area_um2 = 144};
-    return pattern_at(pattern, cell, kField).beneath;
+    return pattern_at(pattern, cell, kMaskField).beneath;
   };
   // by columns of points 0.2 um apart, over 10 um
   EXPECT_NEAR(share(5).value(), 1, 0.02);
@@ -236,15 +236,15 @@ TEST(Mask, of_a_pattern_lies_beneath_the_cell_by_the_share_of_the_parts_that_it_
   EXPECT_FALSE(share(-20));
   images::Image whole = test::even_image(kSide, kSide, 255);  // cut by the image
   const CellOutline cell{.outer_um = {{5, 5}, {17, 5}, {17, 17}, {5, 17}}, .holes_um = {}, .area_um2 = 144};
-  EXPECT_FALSE(pattern_at(mask(whole), cell, kField).beneath);
+  EXPECT_FALSE(pattern_at(mask(whole), cell, kMaskField).beneath);
 }
 
 TEST(Mask, a_mask_of_another_size_is_refused_with_both_sizes) {
   images::Image image = test::even_image(250, 256, 0);
   paint_disc(image, 1, {100, 100}, 60);
   const std::string sizes = "mask.tif: a mask of the size of the images, 256 x 256 pixels; 250 x 256 pixels";
-  EXPECT_EQ(error_of([&] { mask_outlines(mask(image), 1, kField, {}); }), sizes);
-  EXPECT_EQ(error_of([&] { mask_adhesions(mask(image), std::nullopt, kField); }), sizes);
+  EXPECT_EQ(refusal_of([&] { mask_outlines(mask(image), 1, kMaskField, {}); }), sizes);
+  EXPECT_EQ(refusal_of([&] { mask_adhesions(mask(image), std::nullopt, kMaskField); }), sizes);
 }
 
 TEST(Mask, a_cell_is_segmented_by_masks_and_selections_count_more) {

@@ -23,11 +23,11 @@ namespace {
 namespace fs = std::filesystem;
 using test::TemporaryFolder;
 
-struct Example {
+struct Lengths {
   double length_um = 1.5;
   bool is_fast = false;
 };
-void declare(stage::ParameterList& list, Example& e) {
+void declare(stage::ParameterList& list, Lengths& e) {
   list.table("network");
   list.add("length_um", e.length_um, Range::positive(), "length (um)");
   list.add("is_fast", e.is_fast, "whether to be fast");
@@ -42,11 +42,11 @@ const stage::StageDescription kDescription = {
 class Stage : public ::testing::Test {
  protected:
   int run(std::vector<std::string> arguments,
-          const std::function<StageReport(const Example&, stage::StageContext&)>& body) {
+          const std::function<StageReport(const Lengths&, stage::StageContext&)>& body) {
     arguments.insert(arguments.begin(), "mbtfm-example");
     std::vector<char*> argv;
     for (std::string& a : arguments) argv.push_back(a.data());
-    return run_stage<Example>(kDescription, static_cast<int>(argv.size()), argv.data(), body);
+    return run_stage<Lengths>(kDescription, static_cast<int>(argv.size()), argv.data(), body);
   }
   std::vector<std::string> files() const {
     return {"--quiet", "--in", (folder_ / "in.txt").string(), "--out", (folder_ / "out").string()};
@@ -60,7 +60,7 @@ class Stage : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-StageReport write_two(const Example&, stage::StageContext& context) {
+StageReport write_two(const Lengths&, stage::StageContext& context) {
   context.input("in");
   files::write_text(context.output("out", "a.csv"), "a");
   files::write_text(context.output("out", "deep/b.csv"), "b");
@@ -69,7 +69,7 @@ StageReport write_two(const Example&, stage::StageContext& context) {
 
 TEST_F(Stage, outputs_and_the_record_are_in_place_when_it_is_done) {
   EXPECT_EQ(run(files_and({"--record", (folder_ / "record.json").string(), "--length_um", "2.5", "--is_fast"}),
-                [](const Example& e, stage::StageContext& context) {
+                [](const Lengths& e, stage::StageContext& context) {
                   EXPECT_EQ(e.length_um, 2.5);
                   EXPECT_TRUE(e.is_fast);
                   return write_two(e, context);
@@ -101,7 +101,7 @@ TEST_F(Stage, a_failure_leaves_no_file_and_no_folder_and_tells_by_its_code) {
   };
   for (const auto& [code, fail] : failures) {
     EXPECT_EQ(run(files(),
-                  [&](const Example& e, stage::StageContext& context) {
+                  [&](const Lengths& e, stage::StageContext& context) {
                     write_two(e, context);
                     fail();
                     return StageReport{};
@@ -141,7 +141,7 @@ TEST_F(Stage, a_folder_among_the_outputs_that_is_a_link_is_refused) {
 
 TEST_F(Stage, what_has_not_converged_is_written_and_marked) {
   EXPECT_EQ(run(files_and({"--record", (folder_ / "record.json").string()}),
-                [](const Example& e, stage::StageContext& context) {
+                [](const Lengths& e, stage::StageContext& context) {
                   StageReport report = write_two(e, context);
                   report.converged = false;
                   return report;
@@ -155,7 +155,7 @@ TEST_F(Stage, flags_win_over_the_file_and_the_file_over_the_default) {
   files::write_text(folder_ / "cell.toml", "[network]\nlength_um = 3\nis_fast = true\n");
   const std::string config = (folder_ / "cell.toml").string();
   const auto expect_length = [](double length_um) {
-    return [length_um](const Example& e, stage::StageContext& context) {
+    return [length_um](const Lengths& e, stage::StageContext& context) {
       EXPECT_EQ(e.length_um, length_um);
       return write_two(e, context);
     };
