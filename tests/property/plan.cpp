@@ -84,9 +84,13 @@ TEST(Plan, twice_the_modulus_is_twice_the_error) {
   EXPECT_NEAR(soft.total_force, hard.total_force, 1e-7 * soft.total_force);
 }
 
+const Densities& thin_and_dense() {
+  static const Densities densities = precision_at(small().scene, small().cell, {0.5, 2}, kThreads);
+  return densities;
+}
+
 TEST(Plan, four_times_the_beads_halve_the_error) {
-  const auto& [scene, cell] = small();
-  const Densities d = precision_at(scene, cell, {0.5, 2}, kThreads);
+  const Densities& d = thin_and_dense();
   const double thin = median_of(d.precision[0].tensions), dense = median_of(d.precision[1].tensions);
   // But for which places few beads have by chance: of a tension the beads near its two adhesions tell half, and of
   // some six of these the number scatters by 40 %, the error by 20 %, the median of five over three draws by 10 %.
@@ -95,8 +99,7 @@ TEST(Plan, four_times_the_beads_halve_the_error) {
 }
 
 TEST(Plan, between_densities_the_error_lies_between_and_beyond_them_it_follows_the_law) {
-  const auto& [scene, cell] = small();
-  const Densities d = precision_at(scene, cell, {0.5, 2}, kThreads);
+  const Densities& d = thin_and_dense();
   const double thin = unit_error(d, 1, 0.5), dense = unit_error(d, 1, 2);
   EXPECT_DOUBLE_EQ(thin, d.precision[0].tensions[1]);
   EXPECT_NEAR(dense, d.precision[1].tensions[1], 1e-12 * dense);
@@ -190,38 +193,44 @@ TEST(AdhesionPair, the_squares_left_rise_with_the_distance_and_far_off_with_its_
   EXPECT_NEAR(step(16) / step(8), 1, 0.1);
 }
 
+/// One of all densities that are asked of: the fields of the pairs, which take the time, are those of each.
+constexpr double kArea_um2 = 0.46;
+enum Density : std::size_t { of_1, of_128, of_512, of_a_tenth, of_10 };
+const PairResolution& resolution() {
+  static const PairResolution pairs(kGel, kArea_um2, {1, 128, 512, 0.1, 10}, kThreads);
+  return pairs;
+}
+
 TEST(AdhesionPair, the_least_distance_asks_for_force_over_noise_and_modulus) {
-  const PairResolution pairs(kGel, 0.46, {1}, kThreads);
-  const auto base = pairs.least_distance_um(1, 8, 0, 0.04);
+  const PairResolution& pairs = resolution();
+  const auto base = pairs.least_distance_um(1, 8, of_1, 0.04);
   ASSERT_TRUE(base);
   EXPECT_GT(*base, pairs.touching_um());
-  EXPECT_NEAR(*pairs.least_distance_um(2, 8, 0, 0.08), *base, 1e-12 * *base);
-  EXPECT_NEAR(*pairs.least_distance_um(1, 4, 0, 0.08), *base, 1e-12 * *base);
-  EXPECT_GT(*pairs.least_distance_um(1, 8, 0, 0.05), *base);
-  EXPECT_DOUBLE_EQ(*pairs.least_distance_um(1, 8, 0, 1e-6), pairs.touching_um());
-  EXPECT_FALSE(pairs.least_distance_um(0.01, 8, 0, 0.1)) << "nothing is seen of such forces";
+  EXPECT_NEAR(*pairs.least_distance_um(2, 8, of_1, 0.08), *base, 1e-12 * *base);
+  EXPECT_NEAR(*pairs.least_distance_um(1, 4, of_1, 0.08), *base, 1e-12 * *base);
+  EXPECT_GT(*pairs.least_distance_um(1, 8, of_1, 0.05), *base);
+  EXPECT_DOUBLE_EQ(*pairs.least_distance_um(1, 8, of_1, 1e-6), pairs.touching_um());
+  EXPECT_FALSE(pairs.least_distance_um(0.01, 8, of_1, 0.1)) << "nothing is seen of such forces";
 }
 
 /// Many beads: four times as many with twice the noise say the same.
 TEST(AdhesionPair, of_many_beads_only_the_density_over_the_squared_noise_counts) {
-  const PairResolution pairs(kGel, 0.46, {128, 512}, kThreads);
+  const PairResolution& pairs = resolution();
   for (const double noise_um : {0.32, 0.48}) {
-    const double few_um = *pairs.least_distance_um(1, 8, 0, noise_um);
+    const double few_um = *pairs.least_distance_um(1, 8, of_128, noise_um);
     EXPECT_GT(few_um, pairs.touching_um());
     // 400 experiments tell either to some 4 %, and they have the same random numbers
-    EXPECT_NEAR(*pairs.least_distance_um(1, 8, 1, 2 * noise_um), few_um, 0.04 * few_um) << noise_um;
+    EXPECT_NEAR(*pairs.least_distance_um(1, 8, of_512, 2 * noise_um), few_um, 0.04 * few_um) << noise_um;
   }
 }
 
 /// Where noise is large the single adhesion goes to the place that the noise likes best, the nearer to the truth the
 /// fewer experiments tell two from one.
 TEST(AdhesionPair, at_the_least_distance_four_in_five_experiments_tell_the_two_apart) {
-  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
-  constexpr double kArea_um2 = 0.46;
+  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = kGel.poisson_ratio, .thickness_um = 60};
   constexpr int kExperiments = 400;
-  const PairResolution pairs(gel, kArea_um2, {1}, kThreads);
   for (const double noise_um : {0.02, 0.04}) {
-    const double distance_um = *pairs.least_distance_um(1, gel.youngs_modulus_kPa, 0, noise_um);
+    const double distance_um = *resolution().least_distance_um(1, gel.youngs_modulus_kPa, of_1, noise_um);
     const test::DrawnPair pair{.gel = gel,
                                .radius_um = std::sqrt(kArea_um2 / std::numbers::pi),
                                .distance_um = distance_um,
@@ -240,8 +249,8 @@ TEST(AdhesionPair, at_the_least_distance_four_in_five_experiments_tell_the_two_a
 /// The mean of what beads tell is the same for a hundredth of the beads with a tenth of the noise. But then chance
 /// decides whether one lies near the two.
 TEST(AdhesionPair, few_exact_beads_are_worth_less_than_many_poor_ones) {
-  const PairResolution pairs(kGel, 0.46, {0.1, 10}, kThreads);
-  EXPECT_GT(*pairs.least_distance_um(1, 8, 0, 0.01), 1.3 * *pairs.least_distance_um(1, 8, 1, 0.1));
+  EXPECT_GT(*resolution().least_distance_um(1, 8, of_a_tenth, 0.01),
+            1.3 * *resolution().least_distance_um(1, 8, of_10, 0.1));
 }
 
 /// plan_accuracy pairs-in-space draws experiments: they take minutes.
