@@ -69,10 +69,8 @@ struct SparseCholesky::Impl {
   int threads = 1;
   std::string cache_note;
 
-  Impl(const BlockMatrix<3>& matrix, const FactorOptions& options)
-      : elimination(std::make_shared<const Elimination>(matrix, Search::quick)),
-        factor(Factor<double>(elimination)),
-        threads(options.threads) {
+  Impl(const BlockMatrix<3>& matrix, const FactorOptions& options, std::shared_ptr<const Elimination> given)
+      : elimination(std::move(given)), factor(Factor<double>(elimination)), threads(options.threads) {
     if (options.precision == Precision::single_) {
       fill(factor.emplace<1>(elimination), matrix, options);
     } else if (options.cache_folder.empty()) {
@@ -88,7 +86,11 @@ struct SparseCholesky::Impl {
 };
 
 SparseCholesky::SparseCholesky(const BlockMatrix<3>& matrix, const FactorOptions& options)
-    : impl_(std::make_unique<Impl>(matrix, options)) {}
+    : SparseCholesky(matrix, options, std::make_shared<const Elimination>(matrix, Search::quick)) {}
+
+SparseCholesky::SparseCholesky(const BlockMatrix<3>& matrix, const FactorOptions& options,
+                               std::shared_ptr<const Elimination> elimination)
+    : impl_(std::make_unique<Impl>(matrix, options, std::move(elimination))) {}
 
 SparseCholesky::~SparseCholesky() = default;
 

@@ -45,6 +45,9 @@ class SparseCholesky {
   /// @throws NotSolved where the factor would take more than the memory allowed (known before it is allocated), or the
   ///         matrix is not positive definite
   SparseCholesky(const BlockMatrix<3>& matrix, const FactorOptions& options);
+  /// @param elimination  of a matrix with the same pattern
+  SparseCholesky(const BlockMatrix<3>& matrix, const FactorOptions& options,
+                 std::shared_ptr<const Elimination> elimination);
   ~SparseCholesky();
   SparseCholesky(const SparseCholesky&) = delete;
   SparseCholesky& operator=(const SparseCholesky&) = delete;

@@ -64,10 +64,7 @@ struct System {
   System(Block made, const Gel& gel, const substrate::Loads& of, const substrate::Observations& at, bool is_factorised,
          const numerics::FactorOptions& options)
       : block(std::move(made)), space(block.mesh(), options.threads), loads(load_weights(block, space, of)) {
-    if (is_factorised) {
-      factor = std::make_shared<const numerics::SparseCholesky>(space.assemble(linear_stiffness_of(gel, block.mesh())),
-                                                                options);
-    }
+    if (is_factorised) factor = space.factorise(linear_stiffness_of(gel, block.mesh()), options);
     if (const auto* on_surface = std::get_if<std::vector<Vec2>>(&at.points_um)) {
       for (const Vec2 p : *on_surface) points.push_back(space.weights_at(block.on_surface(p)));
     } else {
@@ -530,8 +527,7 @@ MatrixXd CurvedResponse::displace_far(const MatrixXd& forces) const {
 /// On a coarse mesh the linear elements differ from these, which project what is left of div u, too: the derivative at
 /// rest is by the same elements as the others.
 std::shared_ptr<const FactoredResponse> CurvedResponse::tangent_at(const LargeState& state) const {
-  auto tangent = std::make_shared<const numerics::SparseCholesky>(
-      system_->space.assemble(large_stiffness_of(gel_.gel(), system_->space, state)), gel_.factor_options());
+  auto tangent = system_->space.factorise(large_stiffness_of(gel_.gel(), system_->space, state), gel_.factor_options());
   return std::make_shared<const FactoredResponse>(system_, std::move(tangent), load_axes(), point_axes());
 }
 

@@ -41,8 +41,7 @@ Field solve_linear(const Gel& gel, std::shared_ptr<const Block> block, const Loa
     });
     for (std::size_t k = 0; k < forces.size(); ++k) forces[k] -= by_held[k];
   }
-  const numerics::SparseCholesky factor(space->assemble(stiffness_of), options);
-  Vectors at_nodes = space->spread(solve(factor, forces), loading.held_um);
+  Vectors at_nodes = space->spread(solve(*space->factorise(stiffness_of, options), forces), loading.held_um);
   return {std::move(block), space, std::move(at_nodes)};
 }
 

@@ -243,9 +243,8 @@ class Solver {
     Vectors forces(residual_nN.size());
     for (std::size_t k = 0; k < forces.size(); ++k) forces[k] = -residual_nN[k];
     try {
-      const numerics::SparseCholesky factor(space_.assemble([&](int cell) { return of_cell(cell, true).tangent; }),
-                                            options_);
-      return space_.spread(curved::solve(factor, forces));
+      const auto factor = space_.factorise([&](int cell) { return of_cell(cell, true).tangent; }, options_);
+      return space_.spread(curved::solve(*factor, forces));
     } catch (const OutOfMemory&) {
       throw;
     } catch (const NotSolved&) {

@@ -35,6 +35,15 @@ numerics::BlockMatrix<3> Space::assemble(const std::function<Eigen::MatrixXd(int
   return matrix;
 }
 
+std::shared_ptr<const numerics::SparseCholesky> Space::factorise(
+    const std::function<Eigen::MatrixXd(int cell)>& stiffness_of, const numerics::FactorOptions& options) const {
+  const numerics::BlockMatrix<3> matrix = assemble(stiffness_of);
+  std::call_once(order_->is_found, [&] {
+    order_->elimination = std::make_shared<const numerics::Elimination>(matrix, numerics::Search::quick);
+  });
+  return std::make_shared<const numerics::SparseCholesky>(matrix, options, order_->elimination);
+}
+
 Vectors Space::gather(const std::function<NodeValues(int cell)>& forces_of) const {
   Vectors forces(nodes_.size(), Eigen::Vector3d::Zero());
   in_batches<NodeValues>(mesh_.n_cells(), threads_, forces_of, [&](int cell, const NodeValues& of_cell) {

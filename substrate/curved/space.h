@@ -2,6 +2,8 @@
 #pragma once
 
 #include <functional>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "pipeline/numerics/cholesky.h"
@@ -28,6 +30,9 @@ class Space {
 
   /// The matrix over the free nodes. `stiffness_of` is called concurrently.
   numerics::BlockMatrix<3> assemble(const std::function<Eigen::MatrixXd(int cell)>& stiffness_of) const;
+  /// Its factor. Any matrix over the nodes has the same order of elimination, which is looked for once.
+  std::shared_ptr<const numerics::SparseCholesky> factorise(
+      const std::function<Eigen::MatrixXd(int cell)>& stiffness_of, const numerics::FactorOptions& options) const;
   /// Forces on the free nodes, by cell and node of it; called concurrently.
   Vectors gather(const std::function<NodeValues(int cell)>& forces_of) const;
   /// Consistent forces (nN) of a traction on the surface.
@@ -46,6 +51,11 @@ class Space {
   Mesh mesh_;
   int threads_;
   boxes::FreeNodes nodes_;
+  struct Order {
+    std::once_flag is_found;
+    std::shared_ptr<const numerics::Elimination> elimination;
+  };
+  std::shared_ptr<Order> order_ = std::make_shared<Order>();
 };
 
 /// Gauss points of the outer face of a cell, n each way.
