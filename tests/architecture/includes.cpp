@@ -93,7 +93,7 @@ const Graph kMayInclude = {
 const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"opencv2/", {"segment/cells", "segment/beads", "continuum/mean", kPrograms}},
     {"tiff", {"segment/images"}},
-    {"png", {"segment/images"}},
+    {"png", {"pipeline/statistics", "segment/images"}},
     {"jpeglib", {"segment/images"}},
     {"zip", {"segment/rois"}},
     {"expat", {"segment/images", "pipeline/files"}},
