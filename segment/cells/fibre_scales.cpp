@@ -29,10 +29,14 @@ RidgeScales scales_of(const FibreParameters& p, double pixel_um) {
 }
 
 TraceRule rule_of(const FibreParameters& p, double pixel_um) {
+  constexpr double kHidden = 3;  // widths: so long a line that crosses at 20° hides this one
   TraceRule rule;
   rule.start_noise = p.fibre_start_noise;
   rule.follow_noise = p.fibre_follow_noise;
-  rule.gap_px = p.fibre_gap_um / pixel_um;
+  const double gap_and_beyond_um = 2 * p.fibre_gap_um;
+  rule.start_gain_px = gap_and_beyond_um / pixel_um;
+  rule.reach_px = std::max(gap_and_beyond_um, kHidden * p.fibre_width_um) / pixel_um;
+  rule.step_px = 0.5 * p.fibre_width_um / pixel_um;
   rule.through_px = 3 * p.fibre_gap_um / pixel_um;
   rule.smallest_radius_px = p.fibre_smallest_radius_um / pixel_um;
   rule.line_radius_px = 0.6 * p.fibre_width_um / pixel_um;

@@ -20,17 +20,19 @@ double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points
 /// Texture hardly makes more significant lines.
 constexpr double kHardlyTexture = 10;
 
+/// Where a line lies: texture makes lines anywhere, fibres lie beside fibres.
+enum class LinePlace { alone, beside_a_fibre };
+
 /// The lines that a cell's texture makes: how many, and how significant they are as a rule.
 struct TextureLines {
   double n = 0;
   double scale = 0;  ///< of their significance
 
-  /// How many at least as significant one finds by chance: the number of false alarms (Desolneux, Moisan & Morel, From
-  /// Gestalt Theory to Image Analysis, Springer 2008, ch. 3).
-  double expected_false(double significance) const;
-  /// The chance that such a line is a fibre: the density of fibres at that significance over that of all lines, where
-  /// those of texture are rarer by a factor.
-  double chance_of_fibre(double significance, double factor = 1) const;
+  /// How many at least as significant one finds at such places by chance: the number of false alarms (Desolneux, Moisan
+  /// & Morel, From Gestalt Theory to Image Analysis, Springer 2008, ch. 3).
+  double expected_false(double significance, LinePlace place = LinePlace::alone) const;
+  /// The chance that such a line is a fibre: the density of fibres at that significance over that of all lines.
+  double chance_of_fibre(double significance, LinePlace place = LinePlace::alone) const;
 };
 /// From the lines of the cell itself, most of which are its texture's.
 TextureLines texture_lines(std::vector<double> significances);

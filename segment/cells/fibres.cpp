@@ -75,7 +75,7 @@ struct Candidate {
   Profile profile;
   double significance = 0;
   double expected_false = 0;  ///< lines as significant as this one that texture would make
-  bool is_beside = false;     ///< a fibre
+  LinePlace place = LinePlace::alone;
 };
 
 double significance_of(const std::vector<cv::Point2d>& points, const std::vector<double>& height, const Ridges& ridges,
@@ -140,7 +140,7 @@ struct Judge {
     points = cut(points);
     c.significance = significance_of(points, cut(trace.own_height()), ridges, field, p);
     c.expected_false = texture.expected_false(c.significance);
-    if (kFalseBeside * c.expected_false > p.fibre_false_per_cell) return std::nullopt;
+    if (texture.expected_false(c.significance, LinePlace::beside_a_fibre) > p.fibre_false_per_cell) return std::nullopt;
     c.profile = profile_across(field.image, points, 1.5 * p.fibre_width_um / field.pixel_um);
     if (!falls_on_both_sides(c.profile, p.fibre_side_ratio)) return std::nullopt;
     if (is_ruffle(c.points_um, outline_um, p.fibre_lamellipodium_um)) return std::nullopt;
@@ -155,10 +155,6 @@ struct Judge {
     for (const cv::Point2d& point : faint.points) way.points_um.push_back(field.in_um(point));
     return way;
   }
-
-  /// Of lines of texture, the share that a fibre lies beside by chance: of those below the limit in 9 simulated cells
-  /// of 20 fibres .12, in 9 of 40 fibres .22.
-  static constexpr double kFalseBeside = 0.15;
 };
 
 /// Those that are more significant than texture, and those beside them that are more significant than the texture that
@@ -177,7 +173,8 @@ std::vector<Candidate> significant(std::vector<Candidate> candidates, const Fibr
   take([&](const Candidate& c) { return c.expected_false <= p.fibre_false_per_cell; });
   while (take([&](Candidate& c) {
     if (bundles.share_beside(c.points_um) < kMostBeside) return false;
-    return c.is_beside = true;
+    c.place = LinePlace::beside_a_fibre;
+    return true;
   })) {
   }
   return kept;
@@ -310,7 +307,7 @@ TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, 
     fibre.points_um = simplified(c.points_um, p.fibre_simplify_um);
     fibre.width_um = c.profile.width_px * field.pixel_um;
     fibre.mean_intensity = c.profile.height;
-    fibre.confidence = judge.texture.chance_of_fibre(c.significance, c.is_beside ? Judge::kFalseBeside : 1);
+    fibre.confidence = judge.texture.chance_of_fibre(c.significance, c.place);
     lines.fibres.push_back({std::move(fibre), std::move(c.before), std::move(c.after)});
   }
   return lines;

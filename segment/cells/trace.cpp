@@ -5,10 +5,13 @@
 #include <functional>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "pipeline/numerics/order_statistics.h"
+#include "segment/cells/claims.h"
 #include "segment/cells/grid.h"
 #include "segment/cells/trace_join.h"
+#include "segment/cells/ways.h"
 
 namespace mbtfm::cells {
 
@@ -19,43 +22,6 @@ using std::numbers::pi;
 cv::Point2d unit(double angle_rad) { return {std::cos(angle_rad), std::sin(angle_rad)}; }
 cv::Point2d left_of(cv::Point2d e) { return {-e.y, e.x}; }
 double length(cv::Point2d d) { return std::hypot(d.x, d.y); }
-
-/// Which directions of lines already pass through each pixel, a bit each.
-class Claims {
- public:
-  Claims(cv::Size size, int n_directions) : bits_(size, CV_32S, cv::Scalar(0)), n_(n_directions) {}
-
-  bool has(cv::Point2d point, double angle_rad) const {
-    const int x = cvRound(point.x), y = cvRound(point.y);
-    if (x < 0 || y < 0 || x >= bits_.cols || y >= bits_.rows) return false;
-    return (bits_.at<int>(y, x) >> index(angle_rad)) & 1;
-  }
-  /// Lines within two of the filter's directions.
-  void add(cv::Point2d point, double angle_rad, double radius_px) {
-    int mask = 0;
-    for (int k = -2; k <= 2; ++k) mask |= 1 << ((index(angle_rad) + k + n_) % n_);
-    add(point, mask, radius_px);
-  }
-  void add_all_directions(cv::Point2d point, double radius_px) { add(point, (1 << n_) - 1, radius_px); }
-
- private:
-  void add(cv::Point2d point, int mask, double radius_px) {
-    const int r = static_cast<int>(std::ceil(radius_px));
-    for (int dy = -r; dy <= r; ++dy)
-      for (int dx = -r; dx <= r; ++dx) {
-        const int x = cvRound(point.x) + dx, y = cvRound(point.y) + dy;
-        if (dx * dx + dy * dy > radius_px * radius_px || x < 0 || y < 0 || x >= bits_.cols || y >= bits_.rows) continue;
-        bits_.at<int>(y, x) |= mask;
-      }
-  }
-
-  int index(double angle_rad) const {
-    const int k = static_cast<int>(std::lround(angle_rad / pi * n_)) % n_;
-    return k < 0 ? k + n_ : k;
-  }
-  cv::Mat bits_;
-  int n_;
-};
 
 /// Offset of the maximum of a parabola through three equidistant values, within ±1; where it has none, on a far flank
 /// of a peak, a whole step uphill.
@@ -72,79 +38,102 @@ struct Step {
   bool is_shared = false;
 };
 
+struct Seed {
+  Step step;
+  Way way;  ///< through it
+};
+
+/// How far a step may be set right.
+struct Correction {
+  double turn_rad, aside_px;
+};
+
 /// Best direction within one filter direction of the present one, then the ridge's centre across it.
-Step settle(const Ridges& ridges, const TraceRule& rule, Step s) {
+Step settled(const Ridges& ridges, Step s, const Correction& most) {
   const double turn = pi / ridges.n_directions();
   const double before = ridges.at(s.point, s.angle - turn), at = ridges.at(s.point, s.angle),
                after = ridges.at(s.point, s.angle + turn);
   // a third of the way a step, so that noise in the direction averages out
-  const double limit = 1 / rule.smallest_radius_px;
-  s.angle += std::clamp(turn / 3 * peak_offset(before, at, after), -limit, limit);
+  s.angle += std::clamp(turn / 3 * peak_offset(before, at, after), -most.turn_rad, most.turn_rad);
   const cv::Point2d across = left_of(unit(s.angle));
   const double offset = peak_offset(ridges.at(s.point - across, s.angle), ridges.at(s.point, s.angle),
                                     ridges.at(s.point + across, s.angle));
-  s.point += 0.5 * offset * across;
+  s.point += std::clamp(0.5 * offset, -most.aside_px, most.aside_px) * across;
   s.height = ridges.at(s.point, s.angle);
   return s;
+}
+
+Step settle(const Ridges& ridges, const TraceRule& rule, const Step& s) {
+  constexpr double kAside_px = 0.5;
+  return settled(ridges, s, {1 / rule.smallest_radius_px, kAside_px});
 }
 
 bool is_on(const cv::Mat& image, cv::Point2d p) {
   return p.x >= 0 && p.y >= 0 && p.x <= image.cols - 1 && p.y <= image.rows - 1;
 }
 
-/// The direction of the last steps, from before the newest ones: where lines touch, the other one has bent those.
-double course_of(const std::vector<Step>& steps, double window_px) {
-  const std::size_t n = steps.size(), window = static_cast<std::size_t>(window_px),
-                    newest = std::min(n / 3, window / 4);
-  const std::size_t last = n - 1 - newest, first = last - std::min(last, window);
-  const cv::Point2d way = steps[last].point - steps[first].point;
-  return length(way) > 0 ? std::atan2(way.y, way.x) : steps.back().angle;
+double over_noise(const Ridges& ridges, const Step& s) {
+  return s.height / std::max<double>(sample(ridges.noise, s.point), 1e-30);
 }
 
-/// Steps from `start` (excluded) until the line is lost for longer than the gap, or runs upon one already traced for
-/// longer than it may; there it goes straight on, for the other's ridge would lead it astray.
-std::vector<Step> follow(const Ridges& ridges, const Claims& claims, const TraceRule& rule, Step start) {
-  constexpr std::size_t kFirst = 3;  // steps before the line has a course of its own
+/// Turned to the ridge and moved to its centre, both gently: where lines cross, the other one draws.
+Step led(const Ridges& ridges, const TraceRule& rule, Step s) {
+  constexpr double kTurn = 0.25, kAside_px = 0.15;
+  return settled(ridges, s, {kTurn / rule.smallest_radius_px, kAside_px});
+}
+
+/// One way from a seed.
+struct Track {
   std::vector<Step> steps;
-  std::size_t last_seen = 0, last_free = 0;
-  Step now = start;
-  double height_so_far = start.height;
-  while (std::abs(now.angle - start.angle) < 2 * pi) {  // a ring ends
-    const bool was_free = last_free == steps.size();
-    now.point += unit(now.angle);
-    if (!is_on(ridges.noise, now.point)) break;
-    if (steps.size() >= kFirst && claims.has(now.point, now.angle)) {
-      if (was_free) {
-        now.angle = course_of(steps, rule.end_window_px);
-        now.point = steps.back().point + unit(now.angle);
-        if (!is_on(ridges.noise, now.point)) break;
-      }
-      now.height = ridges.at(now.point, now.angle);
-      now.is_shared = true;
-    } else {
-      now = settle(ridges, rule, now);
-      now.is_shared = false;
-      last_free = steps.size() + 1;
-    }
-    steps.push_back(now);
-    const double level =
-        std::max(rule.follow_noise * sample(ridges.noise, now.point), rule.follow_share * height_so_far);
-    if (now.height >= level) {
-      last_seen = steps.size();
-      height_so_far += (now.height - height_so_far) / static_cast<double>(steps.size() + 1);
-    }
-    if (static_cast<double>(steps.size() - last_seen) > rule.gap_px) break;
-    if (static_cast<double>(steps.size() - last_free) > rule.through_px) break;
-  }
-  steps.resize(std::min(last_seen, last_free));
-  return steps;
+  double curvature = 0;
+  double over_noise = 0;  ///< mean of what was seen
+  std::size_t n_to_seen = 0, n_to_free = 0;
+};
+
+/// A step of a pixel. @returns whether it is in the image
+bool go(Track& track, Step& now, const Ridges& ridges, const Ways& ways, const Claims& claims, const TraceRule& rule) {
+  now.point += unit(now.angle + track.curvature / 2);
+  now.angle += track.curvature;
+  if (!is_on(ridges.noise, now.point)) return false;
+  now.height = ridges.at(now.point, now.angle);
+  now.is_shared = claims.has(now.point, now.angle);
+  if (!now.is_shared && !ways.is_hidden(now.point, now.angle)) now = led(ridges, rule, now);
+  track.steps.push_back(now);
+  const std::size_t n = track.steps.size();
+  const double height = over_noise(ridges, now);
+  const bool is_seen = height >= std::max(rule.follow_noise, rule.follow_share * track.over_noise);
+  if (is_seen) track.n_to_seen = n;
+  if (!now.is_shared) track.n_to_free = n;
+  if (is_seen && !now.is_shared) track.over_noise += (height - track.over_noise) / static_cast<double>(n + 1);
+  return true;
 }
 
-Trace trace_from(const Ridges& ridges, const Claims& claims, const TraceRule& rule, Step seed) {
-  seed = settle(ridges, rule, settle(ridges, rule, seed));
+/// Steps from `start` (excluded) along the best way on until none gains, or the line is hidden for longer than it may.
+Track follow(const Ridges& ridges, const Ways& ways, const Claims& claims, const TraceRule& rule, const Step& start,
+             double curvature) {
+  Track track{{}, curvature, over_noise(ridges, start)};
+  Step now = start;
+  bool is_in = true;
+  while (is_in && std::abs(now.angle - start.angle) < 2 * pi) {  // a ring ends
+    const Way way = ways.best({now.point, now.angle, track.curvature}, track.over_noise, claims);
+    if (way.gain_px <= 0) break;
+    track.curvature = way.curvature;
+    for (int i = 0; is_in && i < std::max(1, cvRound(rule.step_px)); ++i)
+      is_in = go(track, now, ridges, ways, claims, rule);
+    const std::size_t n_sure = std::min(track.n_to_seen, track.n_to_free);
+    if (static_cast<double>(track.steps.size() - n_sure) > rule.through_px) break;
+  }
+  track.steps.resize(std::min(track.n_to_seen, track.n_to_free));
+  return track;
+}
+
+Trace trace_from(const Ridges& ridges, const Ways& ways, const Claims& claims, const TraceRule& rule,
+                 const Seed& from) {
+  const Step seed = settle(ridges, rule, settle(ridges, rule, from.step));
   Step back = seed;
   back.angle += pi;
-  const std::vector<Step> ahead = follow(ridges, claims, rule, seed), behind = follow(ridges, claims, rule, back);
+  const auto ahead = follow(ridges, ways, claims, rule, seed, from.way.curvature).steps,
+             behind = follow(ridges, ways, claims, rule, back, -from.way.curvature).steps;
   Trace trace;
   const auto add = [&](const Step& s) {
     trace.points.push_back(s.point);
@@ -184,17 +173,44 @@ std::vector<Trace> without_doubles(std::vector<Trace> traces, const Ridges& ridg
   return traces;
 }
 
-/// Local maxima across their own direction that a line may start from, strongest first.
-std::vector<Step> seeds_of(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule) {
-  std::vector<Step> seeds;
-  for (int y = 1; y + 1 < ridges.strongest.rows; ++y)
-    for (int x = 1; x + 1 < ridges.strongest.cols; ++x) {
-      const double height = ridges.strongest.at<float>(y, x);
-      if (height < rule.start_noise * ridges.noise.at<float>(y, x) || height <= 0) continue;
-      if (is_inside.at<std::uint8_t>(y, x) == 0) continue;
-      if (ridges.is_crest(x, y)) seeds.push_back({cv::Point2d(x, y), ridges.angle_rad(x, y), height});
+/// Is a response greatest across its direction, and over the directions?
+bool is_crest(const Ridges& ridges, int k, cv::Point at) {
+  const int n = ridges.n_directions();
+  const auto of = [&](int i) -> const cv::Mat& { return ridges.response[static_cast<std::size_t>((i + n) % n)]; };
+  const float height = of(k).at<float>(at);
+  if (of(k - 1).at<float>(at) > height || of(k + 1).at<float>(at) >= height) return false;
+  const cv::Point2d across = left_of(unit(pi * k / n)), here(at);
+  return sample(of(k), here - across) <= height && sample(of(k), here + across) < height;
+}
+
+std::vector<Seed> seeds_along(int k, const Ridges& ridges, const Ways& ways, const cv::Mat& is_inside,
+                              const TraceRule& rule) {
+  const cv::Mat& response = ridges.response[static_cast<std::size_t>(k)];
+  const double angle = pi * k / ridges.n_directions();
+  std::vector<Seed> seeds;
+  for (int y = 1; y + 1 < response.rows; ++y)
+    for (int x = 1; x + 1 < response.cols; ++x) {
+      const float height = response.at<float>(y, x);
+      if (height <= 0 || height < rule.start_noise * ridges.noise.at<float>(y, x)) continue;
+      if (is_inside.at<std::uint8_t>(y, x) == 0 || ways.is_hidden(cv::Point2d(x, y), angle)) continue;
+      if (!is_crest(ridges, k, {x, y})) continue;
+      const Way way = ways.through({cv::Point2d(x, y), angle, 0});
+      if (way.gain_px >= rule.start_gain_px) seeds.push_back({{cv::Point2d(x, y), angle, height}, way});
     }
-  std::stable_sort(seeds.begin(), seeds.end(), [](const Step& a, const Step& b) { return a.height > b.height; });
+  return seeds;
+}
+
+/// Places that lines start from: crests through which an arc gains enough, both ways together. The best first.
+std::vector<Seed> seeds_of(const Ridges& ridges, const Ways& ways, const cv::Mat& is_inside, const TraceRule& rule) {
+  std::vector<std::vector<Seed>> by_direction(ridges.response.size());
+  cv::parallel_for_(cv::Range(0, ridges.n_directions()), [&](const cv::Range& range) {
+    for (int k = range.start; k < range.end; ++k)
+      by_direction[static_cast<std::size_t>(k)] = seeds_along(k, ridges, ways, is_inside, rule);
+  });
+  std::vector<Seed> seeds;
+  for (const auto& some : by_direction) seeds.insert(seeds.end(), some.begin(), some.end());
+  std::ranges::stable_sort(seeds, std::greater(),
+                           [](const Seed& s) { return std::pair(s.way.gain_px, s.step.height); });
   return seeds;
 }
 
@@ -271,17 +287,19 @@ FaintEnd faint_end(const Ridges& ridges, const TraceRule& rule, const Trace& tra
 }
 
 std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule) {
+  const Ways ways(ridges, {rule.reach_px, rule.step_px, rule.smallest_radius_px, rule.follow_noise});
   Claims claims(ridges.noise.size(), ridges.n_directions());
   std::vector<Trace> traces;
-  for (const Step& seed : seeds_of(ridges, is_inside, rule)) {
-    if (claims.has(seed.point, seed.angle)) continue;
-    Trace trace = trace_from(ridges, claims, rule, seed);
+  for (const Seed& seed : seeds_of(ridges, ways, is_inside, rule)) {
+    if (claims.has(seed.step.point, seed.step.angle)) continue;
+    Trace trace = trace_from(ridges, ways, claims, rule, seed);
     claim(claims, trace, 1.33 * rule.line_radius_px);
-    // at its end a line answers in every direction
+    cut_faded_ends(trace, rule);
+    if (trace.points.size() < 3) continue;
+    // where it ends a line answers in every direction
     for (const cv::Point2d& end : {trace.points.front(), trace.points.back()})
       claims.add_all_directions(end, 1.33 * rule.line_radius_px);
-    cut_faded_ends(trace, rule);
-    if (trace.points.size() >= 3) traces.push_back(std::move(trace));
+    traces.push_back(std::move(trace));
   }
   traces = without_doubles(joined(std::move(traces), ridges, rule), ridges, rule);
   for (Trace& trace : traces) cut_faded_ends(trace, rule);

@@ -27,8 +27,10 @@ struct TraceRule {
   double start_noise = 6;          ///< standard deviations a line must reach somewhere
   double follow_noise = 2.5;       ///< and those it may fall to
   double follow_share = 0.4;       ///< or this share of its height so far, where that is more
-  double gap_px = 10;              ///< a line may be invisible for this long
-  double through_px = 30;          ///< and run upon another one for this long, straight on
+  double start_gain_px = 20;       ///< length of bright line through a place, both ways, that a line starts from
+  double reach_px = 20;            ///< a line looks this far ahead for its best way on
+  double step_px = 3;              ///< and again after each step of this length
+  double through_px = 30;          ///< it may be hidden, or run upon another one, for this long
   double smallest_radius_px = 30;  ///< of curvature
   double line_radius_px = 3;       ///< a second line of the same direction within it is the same
   double shortest_px = 15;
@@ -40,9 +42,9 @@ struct TraceRule {
   double faint_px = 40;       ///< how far beyond its end a line may go on faintly
 };
 
-/// Follow lines from the strongest ridge points down, both ways, in steps of a pixel, re-centred across the line and
-/// turned to the best direction near the present one: other lines that cross have another direction and are not seen.
-/// Then cut ends that fade, join collinear pieces, drop the short ones.
+/// Follow lines from the places through which the best arcs go, both ways, each along its best way on in position,
+/// direction and curvature (`Ways`): lines that cross have another direction, and no line kinks into them. Then cut
+/// ends that fade, join collinear pieces, drop the short ones.
 /// @param is_inside  CV_8U, not 0 where a line may start
 std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule);
 

@@ -52,12 +52,13 @@ bool is_bright_between(cv::Point2d a, cv::Point2d b, const Ridges& ridges, const
 std::optional<double> mismatch(const EndPoint& a, const EndPoint& b, const Ridges& ridges, const TraceRule& rule) {
   constexpr double kTurn = 0.14;   // 8°: by as much a fibre turns from the one to the other
   constexpr double kHeight = 0.5;  // logarithm
+  constexpr double kLowest = 0.2;  // of the other end's height: over the nucleus a fibre falls by a factor of 2 to 5
   constexpr double kWorst = 9;
   const cv::Point2d gap = b.point - a.point;
   const cv::Point2d course = a.outward - b.outward, along = course / std::max(1e-9, std::hypot(course.x, course.y));
   const double distance = std::hypot(gap.x, gap.y), overlap = -gap.dot(along);
   if (distance > rule.join_gap_px || overlap > rule.overlap_px) return std::nullopt;
-  if (std::min(a.height, b.height) < rule.follow_share * std::max(a.height, b.height)) return std::nullopt;
+  if (std::min(a.height, b.height) < kLowest * std::max(a.height, b.height)) return std::nullopt;
   const double turn = angle_between(a.outward, -b.outward) / kTurn;
   const double sideways = std::abs(gap.cross(along)) / (rule.line_radius_px / 2 + (overlap > 0 ? 0 : 0.1 * distance));
   const double far = 2 * distance / rule.join_gap_px;
@@ -149,57 +150,9 @@ void append(Trace& line, Trace piece) {
   line.append(piece.part(n, piece.size()));
 }
 
-/// Where the ends of others lie on a piece: the points to cut it at.
-std::vector<std::size_t> cuts_of(const std::vector<Trace>& traces, std::size_t piece, const std::vector<EndPoint>& ends,
-                                 const std::vector<End>& near, const TraceRule& rule) {
-  constexpr double kAlong = 0.5;  // cosine of 60°: what ends at a steeper angle is no part of this line
-  const Trace& trace = traces[piece];
-  const auto margin = static_cast<std::size_t>(2 * rule.line_radius_px) + 2;
-  std::vector<std::size_t> cuts;
-  if (trace.points.size() <= 2 * margin) return cuts;
-  for (const End end : near) {
-    if (end / 2 == piece) continue;
-    double least = 2 * rule.line_radius_px;
-    std::size_t at = 0;
-    for (std::size_t i = margin; i + margin < trace.points.size(); ++i) {
-      const cv::Point2d d = trace.points[i] - ends[end].point;
-      if (std::hypot(d.x, d.y) < least) least = std::hypot(d.x, d.y), at = i;
-    }
-    if (at == 0) continue;
-    const cv::Point2d along = trace.points[at + 2] - trace.points[at - 2];
-    if (std::abs(along.dot(ends[end].outward)) < kAlong * std::hypot(along.x, along.y)) continue;
-    cuts.push_back(at);
-  }
-  std::sort(cuts.begin(), cuts.end());
-  return cuts;
-}
-
-std::vector<Trace> cut_at_junctions(const std::vector<Trace>& traces, const TraceRule& rule) {
-  constexpr std::size_t kShortest = 3;  // points
-  const auto ends = ends_of(traces, rule.course_px);
-  const EndGrid grid(ends, std::max(1.0, 2 * rule.line_radius_px));
-  std::vector<Trace> pieces;
-  for (std::size_t i = 0; i < traces.size(); ++i) {
-    std::vector<End> near;
-    for (const cv::Point2d& p : traces[i].points) grid.add_near(p, near);
-    std::sort(near.begin(), near.end());
-    near.erase(std::unique(near.begin(), near.end()), near.end());
-    auto cuts = cuts_of(traces, i, ends, near, rule);
-    cuts.push_back(traces[i].points.size());
-    std::size_t from = 0;
-    for (const std::size_t to : cuts) {
-      if (to - from < kShortest) continue;
-      pieces.push_back(traces[i].part(from, to));
-      from = to;
-    }
-  }
-  return pieces;
-}
-
 }  // namespace
 
 std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const TraceRule& rule) {
-  traces = cut_at_junctions(traces, rule);
   const auto ends = ends_of(traces, rule.course_px);
   const auto link = links_of(fits_of(ends, ridges, rule), traces.size());
   std::vector<bool> is_used(traces.size());

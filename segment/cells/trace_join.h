@@ -7,8 +7,7 @@
 
 namespace mbtfm::cells {
 
-/// Pieces put together to lines, each end once and no line to a ring. Where a piece ends on another one, that is cut:
-/// of the three ends that meet there the two that fit best are joined. How well ends fit is told by their turn, their
+/// Pieces put together to lines, each end once and no line to a ring. How well ends fit is told by their turn, their
 /// offset, the gap between them, their heights, and by whether something bright lies in the gap; the best pair first.
 /// Candidates come from a grid of the ends: time grows with the number of pieces.
 std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const TraceRule& rule);

@@ -82,6 +82,22 @@ TEST(Fibres, side_by_side_stay_two) {
   EXPECT_EQ(fibres.size(), 2u);
 }
 
+/// At 20° the brighter one hides the other for w/sin 20°, three widths.
+TEST(Fibres, that_cross_at_20_degrees_go_straight_on) {
+  const Vec2 middle{12.8, 12.8}, half{std::cos(0.349), std::sin(0.349)};
+  const Polyline faint{{3.8, 12.8}, {21.8, 12.8}}, bright{middle - 9 * half, middle + 9 * half};
+  images::Image image = drawn({faint}, 150);
+  draw_line(image, bright, 450, 0.6, 0.1);
+  const auto fibres = fibres_of(image);
+  ASSERT_EQ(fibres.size(), 2u);
+  for (const Polyline& line : {faint, bright})
+    EXPECT_TRUE(std::any_of(fibres.begin(), fibres.end(), [&](const Fibre& f) {
+      constexpr double kHalfWidth_um = 0.3;  // the brighter one's skirt draws the other
+      return covered_share(f.points_um, line, kHalfWidth_um) > 0.95 &&
+             covered_share(line, f.points_um, kHalfWidth_um) > 0.95;
+    }));
+}
+
 TEST(Fibres, without_adhesions_are_arcs) {
   const DrawnScene scene = drawn_scene(10, 3);
   const auto fibres = fibres_of(scene.actin_image);
