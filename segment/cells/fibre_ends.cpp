@@ -68,6 +68,18 @@ double bulge_um(const Polyline& points, const Polygon& outline_um) {
   return norm(outward) > 0 ? dot(middle - chord, outward) / norm(outward) : 0;
 }
 
+/// Or bent inwards.
+bool is_straight(const Polyline& points, const Polygon& outline_um) {
+  constexpr double kStraight = 0.02;
+  return bulge_um(points, outline_um) <= kStraight * length_um(points);
+}
+
+/// Runs along the edge behind the lamellipodium and bulges towards it.
+bool has_shape_of_arc(const Polyline& points, const Polygon& outline_um, double lamellipodium_um) {
+  const AlongEdge along = along_edge(points, outline_um, kInfinite);
+  return along.share >= kMostOfIt && along.nearest_um > lamellipodium_um && bulge_um(points, outline_um) > 0;
+}
+
 /// The adhesion that an end reaches best.
 struct Hold {
   const Adhesion* adhesion = nullptr;
@@ -198,10 +210,10 @@ Polyline to_adhesion(const WayOn& way, const std::vector<Adhesion>& adhesions) {
 
 bool runs_along_free_edge(const Polyline& line, const Polygon& outline_um) {
   if (outline_um.empty() || line.size() < 2) return false;
-  constexpr double kBeside_um = 1.5, kStraight = 0.02;
+  constexpr double kBeside_um = 1.5;
   const Polyline points = last_part(line, length_um(line));
   if (along_edge(points, outline_um, kBeside_um).share < kMostOfIt) return false;
-  return bulge_um(points, outline_um) <= kStraight * length_um(line);
+  return is_straight(points, outline_um);
 }
 
 void lead_on(TracedFibre& traced, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um) {
@@ -224,9 +236,7 @@ EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, do
   if (is_long(line) || line.size() < 2) return {};
   const Polyline points = last_part(line, length_um(line));
   if (points.size() < 2) return {};
-  const AlongEdge along = along_edge(points, outline_um, kInfinite);
-  if (along.share >= kMostOfIt && along.nearest_um > lamellipodium_um && bulge_um(points, outline_um) > 0)
-    return {.start = false, .end = false};
+  if (has_shape_of_arc(points, outline_um, lamellipodium_um)) return {.start = false, .end = false};
   const auto pointing = [&](const Polyline& towards_end) {
     const Polyline last = last_part(towards_end, kCourse_um);
     const Vec2 to_edge = nearest_on_boundary_um(outline_um, last.front()) - last.front();
@@ -301,38 +311,74 @@ void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um) {
   fibre.type_reason += "; leaves the image";
 }
 
-void hold_far_ends(std::vector<Fibre>& fibres, std::vector<Adhesion>& adhesions, const Polygon& outline_um,
-                   const Cuts& cuts, double anchor_area_um2) {
+namespace {
+
+/// Fibres that are held at both ends, wherever adhesions are seen: those that span the cell, and bundles along a free
+/// edge of which one end is held. A long line that nothing seems to hold is either or an arc, and its shape tells
+/// which.
+bool is_held_at_both(const Fibre& fibre, const Polygon& outline_um, double lamellipodium_um) {
+  const Polyline& line = fibre.points_um;
+  if (fibre.start_adhesion_id || fibre.end_adhesion_id) return is_long(line) || runs_along_free_edge(line, outline_um);
+  if (!is_long(line) || outline_um.empty()) return false;
+  const Polyline points = last_part(line, length_um(line));
+  return is_straight(points, outline_um) || !has_shape_of_arc(points, outline_um, lamellipodium_um);
+}
+
+bool is_on_cut(Vec2 end, const Cuts& cuts) {
   constexpr double kOnIt_um = 1e-6;
-  const auto leaves = [&](Vec2 end) {
-    return std::ranges::any_of(
-        cuts, [&](const auto& cut) { return distance_to_segment_um(end, cut.first, cut.second) < kOnIt_um; });
-  };
-  int largest_id = 0;
-  for (const Adhesion& a : adhesions) largest_id = std::max(largest_id, a.adhesion_id);
-  const std::size_t n_seen = adhesions.size();
-  const auto anchor_at = [&](Vec2 end) {
-    const Adhesion made = anchor(end, anchor_area_um2);
-    for (std::size_t i = n_seen; i < adhesions.size(); ++i)
-      if (norm(adhesions[i].position_um - end) < made.major_axis_um / 2) return adhesions[i];
-    adhesions.push_back(made);
-    adhesions.back().adhesion_id = ++largest_id;
-    return adhesions.back();
-  };
+  return std::ranges::any_of(
+      cuts, [&](const auto& cut) { return distance_to_segment_um(end, cut.first, cut.second) < kOnIt_um; });
+}
+
+/// Adds anchors; ends that meet share one.
+class Anchors {
+ public:
+  Anchors(std::vector<Adhesion>& adhesions, double area_um2)
+      : adhesions_(adhesions), n_seen_(adhesions.size()), area_um2_(area_um2) {
+    for (const Adhesion& a : adhesions) largest_id_ = std::max(largest_id_, a.adhesion_id);
+  }
+  Adhesion at(Vec2 end) {
+    const Adhesion made = anchor(end, area_um2_);
+    for (std::size_t i = n_seen_; i < adhesions_.size(); ++i)
+      if (norm(adhesions_[i].position_um - end) < made.major_axis_um / 2) return adhesions_[i];
+    adhesions_.push_back(made);
+    adhesions_.back().adhesion_id = ++largest_id_;
+    return adhesions_.back();
+  }
+
+ private:
+  std::vector<Adhesion>& adhesions_;
+  std::size_t n_seen_;
+  double area_um2_;
+  int largest_id_ = 0;
+};
+
+}  // namespace
+
+void hold_far_ends(std::vector<Fibre>& fibres, std::vector<Adhesion>& adhesions, const Polygon& outline_um,
+                   const Cuts& cuts, const FarEnds& p) {
+  Anchors anchors(adhesions, p.anchor_area_um2);
   for (Fibre& fibre : fibres) {
-    if (fibre.start_adhesion_id.has_value() == fibre.end_adhesion_id.has_value()) continue;
+    struct End {
+      Vec2& point;
+      std::optional<int>& adhesion_id;
+    } ends[] = {{fibre.points_um.front(), fibre.start_adhesion_id}, {fibre.points_um.back(), fibre.end_adhesion_id}};
+    const auto is_free = [](const End& end) { return !end.adhesion_id; };
+    const auto n_free = std::ranges::count_if(ends, is_free);
+    if (n_free == 0 || !is_held_at_both(fibre, outline_um, p.lamellipodium_um)) continue;
+    if (std::ranges::any_of(ends, [&](const End& end) { return is_free(end) && is_on_cut(end.point, cuts); })) continue;
     const bool is_along_edge = runs_along_free_edge(fibre.points_um, outline_um);
-    if (!is_long(fibre.points_um) && !is_along_edge) continue;
-    const bool is_end_free = !fibre.end_adhesion_id;
-    Vec2& free_end = is_end_free ? fibre.points_um.back() : fibre.points_um.front();
-    if (leaves(free_end)) continue;
-    const Adhesion held_by = anchor_at(free_end);
-    free_end = held_by.position_um;
-    (is_end_free ? fibre.end_adhesion_id : fibre.start_adhesion_id) = held_by.adhesion_id;
+    for (End& end : ends) {
+      if (!is_free(end)) continue;
+      const Adhesion held_by = anchors.at(end.point);
+      end.point = held_by.position_um;
+      end.adhesion_id = held_by.adhesion_id;
+    }
     fibre.type = is_along_edge ? FibreType::edge : FibreType::ventral;
-    fibre.type_confidence = 0.9;  // of 23 such lines in a real cell, experts call 22 ventral
-    fibre.type_reason += is_along_edge ? "; along a free edge, held at both ends: an anchor at the far one"
-                                       : "; it spans the cell, held at both ends: an anchor at the far one";
+    if (n_free == 1) fibre.type_confidence = 0.9;  // of 23 such lines in a real cell, experts call 22 ventral
+    fibre.type_reason +=
+        is_along_edge ? "; along a free edge, held at both ends" : "; it spans the cell, held at both ends";
+    fibre.type_reason += n_free == 1 ? ": an anchor at the far one" : ": anchors at both";
   }
 }
 

@@ -57,10 +57,16 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
 /// it. Whether an adhesion holds the fibre out there nobody sees, so its type is as likely wrong as right.
 void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um);
 
+struct FarEnds {
+  double anchor_area_um2 = 1;
+  double lamellipodium_um = 3;  ///< arcs lie behind it
+};
+
 /// Fibres that span the cell, and bundles along a free edge, are held at both ends: where only one of them reaches an
-/// adhesion, an anchor is put at the other one; ends that meet share it. Not where a fibre leaves the image.
+/// adhesion, an anchor is put at the other one; ends that meet share it. Where neither does, anchors are put at both
+/// ends of a fibre that spans the cell, unless it has the shape of an arc. Not where a fibre leaves the image.
 /// @param adhesions  the anchors are added to them, with ids after the largest
 void hold_far_ends(std::vector<Fibre>& fibres, std::vector<Adhesion>& adhesions, const Polygon& outline_um,
-                   const Cuts& cuts, double anchor_area_um2);
+                   const Cuts& cuts, const FarEnds& p);
 
 }  // namespace mbtfm::cells

@@ -254,7 +254,8 @@ void hold(Cell& cell, std::vector<Adhesion> adhesions, Lines lines, const CellOu
   } else if (in.source == AdhesionSource::image) {
     cell.fibres = tied(std::move(lines.traced), cell.adhesions, cell.outline_um, p.fibres, cuts_of(cell));
     if (!cell.adhesions.empty())
-      hold_far_ends(cell.fibres, cell.adhesions, cell.outline_um, cuts_of(cell), p.candidates.anchor_area_um2);
+      hold_far_ends(cell.fibres, cell.adhesions, cell.outline_um, cuts_of(cell),
+                    {p.candidates.anchor_area_um2, p.fibres.fibre_lamellipodium_um});
   } else {
     cell.fibres = tied_one_by_one(std::move(lines.traced), cell, outline, in);
   }

@@ -122,7 +122,7 @@ TEST(FibreParts, a_fibre_that_spans_the_cell_is_held_at_its_far_end_by_an_anchor
   std::vector<Adhesion> adhesions = {adhesion_at({0, 0})};
   std::vector<Fibre> fibres = {line_held_at_start({0, 0}, {30, 3}), line_held_at_start({0, 0}, {30, 3.2}),
                                line_held_at_start({0, 0}, {9, 3})};
-  hold_far_ends(fibres, adhesions, outline, {}, 1);
+  hold_far_ends(fibres, adhesions, outline, {}, {});
   ASSERT_EQ(adhesions.size(), 2u);  // ends that meet share it
   EXPECT_EQ(adhesions[1].origin, AdhesionOrigin::anchor);
   EXPECT_EQ(adhesions[1].adhesion_id, 8);
@@ -135,11 +135,31 @@ TEST(FibreParts, a_fibre_that_spans_the_cell_is_held_at_its_far_end_by_an_anchor
   EXPECT_FALSE(fibres[2].end_adhesion_id);
 }
 
+TEST(FibreParts, a_long_line_that_nothing_seems_to_hold_is_held_at_both_ends_unless_it_is_bent_as_an_arc) {
+  const Polygon outline = {{-5, -20}, {45, -20}, {45, 20}, {-5, 20}};
+  const auto unheld = [](const Polyline& line) {
+    Fibre f;
+    f.points_um = line;
+    f.type = FibreType::arc;
+    return f;
+  };
+  Polyline arc;
+  for (double x = 0; x <= 30; x += 0.5) arc.push_back({x, 16 - 0.02 * (x - 15) * (x - 15)});
+  std::vector<Adhesion> adhesions = {adhesion_at({0, -15})};
+  std::vector<Fibre> fibres = {unheld(straight({0, 5}, {30, 6})), unheld(arc), unheld(straight({0, 5}, {12, 5}))};
+  hold_far_ends(fibres, adhesions, outline, {}, {});
+  ASSERT_EQ(adhesions.size(), 3u);
+  EXPECT_EQ(fibres[0].type, FibreType::ventral);
+  EXPECT_EQ(fibres[0].start_adhesion_id, 8);
+  EXPECT_EQ(fibres[0].end_adhesion_id, 9);
+  for (const std::size_t i : {1u, 2u}) EXPECT_EQ(fibres[i].type, FibreType::arc);
+}
+
 TEST(FibreParts, a_fibre_that_leaves_the_image_is_held_by_no_anchor_there) {
   const Polygon outline = {{-5, -20}, {30, -20}, {30, 20}, {-5, 20}};
   std::vector<Adhesion> adhesions = {adhesion_at({0, 0})};
   std::vector<Fibre> fibres = {line_held_at_start({0, 0}, {30, 3})};
-  hold_far_ends(fibres, adhesions, outline, {{{30, -20}, {30, 20}}}, 1);
+  hold_far_ends(fibres, adhesions, outline, {{{30, -20}, {30, 20}}}, {});
   EXPECT_EQ(adhesions.size(), 1u);
   EXPECT_FALSE(fibres[0].end_adhesion_id);
 }
