@@ -241,7 +241,7 @@ TEST(HardCables, two_hundred_random_cells_converge_within_a_hundred_steps) {
   int most = 0;
   for (unsigned seed = 1; seed <= 200; ++seed) {
     SCOPED_TRACE(seed);
-    const Cell cell = mbtfm::testing::random_cell(
+    const Cell cell = test::random_cell(
         seed, {.radius_um = 12, .n_adhesions = 20, .n_fibres = 6, .roughness = 0.15, .least_distance_um = 2});
     const cables::CableNetwork cables(mesh::generate_network(cell, {.edge_length_um = 2.5, .seed = seed}).network);
     std::vector<double> tensions = test::random_tensions_nN(cables.fibre_ids().size(), seed);

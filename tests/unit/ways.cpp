@@ -9,15 +9,15 @@
 namespace mbtfm::cells {
 namespace {
 
-constexpr int kSide = 200, kDirections = 16;
+constexpr int kSide_px = 200, kDirections = 16;
 constexpr double kHeight = 10;  // standard deviations, far above where a way gains fully
 
 /// No line anywhere, noise of deviation 1.
 Ridges dark() {
   Ridges r;
-  for (int k = 0; k < kDirections; ++k) r.response.push_back(cv::Mat::zeros(kSide, kSide, CV_32F));
-  r.noise = cv::Mat::ones(kSide, kSide, CV_32F);
-  r.strongest = cv::Mat::zeros(kSide, kSide, CV_32F);
+  for (int k = 0; k < kDirections; ++k) r.response.push_back(cv::Mat::zeros(kSide_px, kSide_px, CV_32F));
+  r.noise = cv::Mat::ones(kSide_px, kSide_px, CV_32F);
+  r.strongest = cv::Mat::zeros(kSide_px, kSide_px, CV_32F);
   return r;
 }
 
@@ -39,10 +39,10 @@ Ridges row(int from, int to) {
 Way from(const Ridges& ridges, Course course, const Claims& claims) {
   return Ways(ridges, WayRule{}).best(course, kHeight, claims);
 }
-Claims none() { return Claims({kSide, kSide}, kDirections); }
+Claims none() { return Claims({kSide_px, kSide_px}, kDirections); }
 
 TEST(Ways, along_a_straight_line_the_best_is_straight_and_gains_all_that_is_in_reach) {
-  const Way way = from(row(0, kSide), {{50, 100}, 0, 0}, none());
+  const Way way = from(row(0, kSide_px), {{50, 100}, 0, 0}, none());
   EXPECT_DOUBLE_EQ(way.curvature, 0);
   EXPECT_NEAR(way.gain_px, WayRule{}.reach_px, 1e-4);  // sums in single precision
 }
@@ -54,15 +54,15 @@ TEST(Ways, lead_over_a_gap_of_less_than_half_of_the_reach) {
   const int step = static_cast<int>(WayRule{}.step_px), half = static_cast<int>(WayRule{}.reach_px) / 2;
   for (const int gap : {half - 2 * step, half + 2 * step}) {
     Ridges r = row(0, 50);
-    for (int x = 50 + gap; x < kSide; ++x) light(r, x, 100, 0);
+    for (int x = 50 + gap; x < kSide_px; ++x) light(r, x, 100, 0);
     EXPECT_EQ(from(r, {{49, 100}, 0, 0}, none()).gain_px > 0, gap < half) << gap;
   }
 }
 
 TEST(Ways, gain_nothing_where_a_line_runs_already) {
   Claims claims = none();
-  for (int x = 50; x < kSide; ++x) claims.add({1.0 * x, 100}, 0.0, 3);
-  EXPECT_EQ(from(row(0, kSide), {{50, 100}, 0, 0}, claims).gain_px, 0);
+  for (int x = 50; x < kSide_px; ++x) claims.add({1.0 * x, 100}, 0.0, 3);
+  EXPECT_EQ(from(row(0, kSide_px), {{50, 100}, 0, 0}, claims).gain_px, 0);
 }
 
 /// A line ends where another one crosses it at 34°: the kink costs more than the other line gives.
