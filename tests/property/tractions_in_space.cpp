@@ -81,7 +81,7 @@ TEST(Spectra, tell_an_error_that_can_be_followed_from_noise_that_is_everywhere) 
     // of 120 squares the mean varies by 13 %, its root by half of that: three times
     EXPECT_NEAR(std::sqrt(*found), std::hypot(kNoise, kError), 0.2 * kError) << seed;
   }
-  EXPECT_EQ(n_alarms, 0);  // three standard deviations one way: one in some hundred
+  EXPECT_LE(n_alarms, 1);  // three standard deviations one way: one in some hundred, and two of twenty in some fifty
 }
 
 TEST(Losses, weigh_beads_by_the_length_of_their_residual_whatever_its_direction) {
