@@ -40,12 +40,13 @@ struct TractionScene {
 
   /// @param noise      sigma over the largest displacement; three times as much along z
   /// @param astray     share of the beads that lie somewhere within 10 um instead
+  /// @param noise_level  below zero: the opposite noise
   std::vector<BeadInSpace> observed(double noise_level, double astray = 0) const {
     std::vector<BeadInSpace> seen;
     const double s = noise_level * largest_um;
     for (std::size_t b = 0; b < beads_um.size(); ++b) {
       const Vec3 e = noise[b];
-      seen.push_back({beads_um[b], exact_um[b] + s * Vec3{e.x, e.y, 3 * e.z}, s, 3 * s, {}});
+      seen.push_back({beads_um[b], exact_um[b] + s * Vec3{e.x, e.y, 3 * e.z}, std::abs(s), 3 * std::abs(s), {}});
     }
     for (const Outlier& o : outliers) {
       if (o.rank < astray) seen[o.bead].displacement_um = exact_um[o.bead] + 10 * o.box;
