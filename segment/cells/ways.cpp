@@ -9,7 +9,7 @@ namespace mbtfm::cells {
 
 namespace {
 
-constexpr float kUnit = 4;  // of a standard deviation: a byte holds 64 of them
+constexpr float kUnit = 4, kMost = 255;  // of a standard deviation: a byte holds 64 of them
 
 /// Changes of curvature, as shares of that of the smallest radius.
 constexpr double kChanges[] = {0, 0.25, -0.25, 0.5, -0.5, 1, -1};
@@ -24,7 +24,7 @@ cv::Mat in_units(const cv::Mat& noise, Response response) {
     const auto at = response(y);
     for (int x = 0; x < noise.cols; ++x)
       to[x] = static_cast<std::uint8_t>(
-          std::clamp(kUnit * at(x) / std::max(deviation[x], std::numeric_limits<float>::min()) + 0.5f, 0.0f, 255.0f));
+          std::clamp(kUnit * at(x) / std::max(deviation[x], std::numeric_limits<float>::min()) + 0.5f, 0.0f, kMost));
   }
   return bytes;
 }
@@ -148,7 +148,8 @@ Way Ways::beginning(const Course& from, double curvature, const Line& line, doub
 
 Way Ways::best(const Course& from, double over_noise, const Claims& claims) const {
   constexpr double kOwn = 0.5;  // over the nucleus a fibre is as low as a quarter of its height
-  const Line line{static_cast<float>(kUnit * std::max(2 * rule_.follow_noise, kOwn * over_noise)), &claims};
+  const auto own = static_cast<float>(kUnit * std::max(2 * rule_.follow_noise, kOwn * over_noise));
+  const Line line{std::min(own, kMost), &claims};
   Way best;
   for (const double change : kChanges) {
     const double curvature = from.curvature + change / rule_.smallest_radius_px;

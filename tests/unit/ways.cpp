@@ -47,6 +47,15 @@ TEST(Ways, along_a_straight_line_the_best_is_straight_and_gains_all_that_is_in_r
   EXPECT_NEAR(way.gain_px, WayRule{}.reach_px, 1e-4);  // sums in single precision
 }
 
+/// Far beyond the 64 deviations that are told apart.
+TEST(Ways, gain_along_a_line_however_bright_it_is) {
+  for (const double height : {100.0, 1e3, 1e6}) {
+    Ridges r = dark();
+    for (int x = 0; x < kSide_px; ++x) light(r, x, 100, 0, height);
+    EXPECT_NEAR(Ways(r, WayRule{}).best({{50, 100}, 0, 0}, height, none()).gain_px, WayRule{}.reach_px, 1e-4) << height;
+  }
+}
+
 TEST(Ways, in_the_dark_none_gains) { EXPECT_EQ(from(dark(), {{50, 100}, 0, 0}, none()).gain_px, 0); }
 
 /// Of a reach R a gap g loses g, and what is beyond it gains R − g: something is left where g < R/2.
