@@ -593,6 +593,17 @@ std::string sentence_of(const sheets::SheetEstimate& e) {
   return name + " not known";
 }
 
+/// The same of a contraction that varies: where its interval holds none.
+void notice_expansion(stage::StageContext& context, const std::vector<sheets::ContractionAt>& field) {
+  const auto least = std::ranges::min_element(field, {}, &sheets::ContractionAt::high_nN_per_um);
+  const auto n_below = std::ranges::count_if(field, [](const auto& at) { return at.high_nN_per_um < 0; });
+  const double share = static_cast<double>(n_below) / static_cast<double>(field.size());
+  context.notice(noticed(FindingKind::sheet_expands, share,
+                         "By the beads " + brief(100 * share) + " % of the sheet's nodes push outward; most at (" +
+                             brief(least->position_um.x) + ", " + brief(least->position_um.y) + ") um, with " +
+                             brief(least->nN_per_um) + " +- " + brief(least->sigma_nN_per_um) + " nN/µm."));
+}
+
 void notice_expansion(stage::StageContext& context, const sheets::SheetFit& fit, int n_parts) {
   const std::vector<sheets::SheetEstimate> found = expanding(fit);
   std::string text;
@@ -786,7 +797,11 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
              models_file = context.output("out", "sheet_models.csv");
   write_estimates(estimates_file, fit);
   write_models(models_file, fit);
-  if (field) write_contractions(context.output("out", "contraction.csv"), contractions_at(*elements, *lattice, *field));
+  if (field) {
+    const std::vector<sheets::ContractionAt> at_nodes = contractions_at(*elements, *lattice, *field);
+    write_contractions(context.output("out", "contraction.csv"), at_nodes);
+    notice_expansion(context, at_nodes);
+  }
   std::string told;
   for (const sheets::SheetEstimate& e : fit.estimates) told += (told.empty() ? "" : "; ") + sentence_of(e);
   result.told = told;
@@ -794,7 +809,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   const auto stiffness =
       std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &sheets::SheetEstimate::quantity);
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
-  notice_expansion(context, fit, field ? 1 : static_cast<int>(n_parts));
+  if (!field) notice_expansion(context, fit, static_cast<int>(n_parts));
   context.notice(noticed(FindingKind::sheet_at_bound, fit.is_at_bound ? 1 : 0,
                          "The best stiffness, " + brief(fit.stiffnesses.sheet_nN_per_um) +
                              " nN/µm, is an end of the range " + brief(table.sheet_nN_per_um().low) + " to " +

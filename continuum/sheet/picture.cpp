@@ -117,10 +117,6 @@ void draw_tractions(Chart& map, const Solution& solution, const Frame& frame) {
   map.subtitle("longest arrow: a mean of " + charts::readable(longest) + " kPa", "#555");
 }
 
-}  // namespace
-
-namespace {
-
 double mean_contraction_of(const Solution& solution, int triangle) {
   double sum = 0;
   for (int p = 0; p < Elements::kPoints; ++p)

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "mbtfm/sheets/profile.h"
 #include "mbtfm/tensions/intervals.h"
+#include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::sheets {
@@ -53,10 +55,10 @@ std::vector<double> even_logarithms(double low, double high, int n) {
 class FieldSearch {
  public:
   FieldSearch(const LinearData& data, const StiffnessTable& table, std::optional<double> known,
-              const MatrixXd& roughness)
+              const MatrixXd& roughness, double variance)
       : data_(data),
         table_(table),
-        variance_(tensions::noise_variance(data)),
+        variance_(variance),
         rank_(static_cast<double>(roughness.rows() - 1)),  // all but an even contraction
         roughness_(MatrixXd::Zero(table.n_loads(), table.n_loads())) {
     roughness_.topLeftCorner(roughness.rows(), roughness.cols()) = roughness;
@@ -67,8 +69,6 @@ class FieldSearch {
     const double alike = middle.topLeftCorner(n, n).trace() / variance_ / roughness.trace();
     smoothings_ = even_logarithms(kRoughest * alike, kSmoothest * alike, kSmoothings);
   }
-
-  double variance() const { return variance_; }
 
   /// Over stiffnesses that are closer than the beads tell them.
   Posterior posterior() {
@@ -248,22 +248,20 @@ ContractionLattice::ContractionLattice(const sheet::Elements& elements, int n_po
   low_um_ = elements.triangles().nodes_um.front();
   for (const Vec2 p : elements.triangles().nodes_um) low_um_ = {std::min(low_um_.x, p.x), std::min(low_um_.y, p.y)};
   std::map<std::array<int, 2>, int> point_at;
-  std::map<std::array<int, 2>, bool> is_touched;
+  std::set<std::array<int, 2>> touched;
   for (int t = 0; t < elements.n_triangles(); ++t)
     for (int p = 0; p < sheet::Elements::kPoints; ++p) {
       const Vec2 at = 1 / spacing_um_ * (elements.at(t, p).place_um - low_um_);
-      is_touched[{static_cast<int>(std::floor(at.x)), static_cast<int>(std::floor(at.y))}] = true;
+      touched.insert({static_cast<int>(std::floor(at.x)), static_cast<int>(std::floor(at.y))});
     }
   const auto point = [&](int column, int row) {
     const auto [found, is_new] = point_at.emplace(std::array{column, row}, static_cast<int>(points_.size()));
     if (is_new) points_.push_back({column, row});
     return found->second;
   };
-  for (const auto& [square, touched] : is_touched) {
-    const auto [column, row] = square;
+  for (const auto& [column, row] : touched)
     squares_.push_back(
         {{point(column, row), point(column + 1, row), point(column + 1, row + 1), point(column, row + 1)}});
-  }
 }
 
 double ContractionLattice::share(int point, Vec2 place_um) const {
@@ -323,11 +321,17 @@ FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss 
   MBTFM_ASSERT(table.n_contractions() == lattice.n_points() && !table.adhesion_nN_per_um3());
   const MatrixXd roughness = lattice.roughness();
   const auto amplitudes = [&](const Posterior& p) -> VectorXd { return table.shares(at_mean(p, table)) * p.loads; };
-  data = weighed(std::move(data), loss, [&](const LinearData& of) {
-    return amplitudes(FieldSearch(of, table, known, roughness).posterior());
-  });
-  FieldSearch search(data, table, known, roughness);
-  const Posterior p = search.posterior();
+  const auto found = [&](const LinearData& of, double variance) {
+    return FieldSearch(of, table, known, roughness, variance).posterior();
+  };
+  data = weighed(std::move(data), loss,
+                 [&](const LinearData& of) { return amplitudes(found(of, tensions::noise_variance(of))); });
+  // where the sheet does not explain the beads, what it leaves is noise to it, as in fit_sheet()
+  double variance = tensions::noise_variance(data);
+  Posterior p = found(data, variance);
+  const auto n_unknowns = std::lround(p.degrees) + (known ? 0 : 1);
+  const double of_misfit = tensions::misfit_variance(data, amplitudes(p), n_unknowns, loss);
+  if (of_misfit > variance) p = found(data, variance = of_misfit);
   const Index n = table.n_contractions();
   FieldFit fit{.sheet = {},
                .contractions = p.loads.head(n),
@@ -340,7 +344,7 @@ FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss 
   s.stiffnesses = at_mean(p, table);
   s.loads = p.loads;
   s.node_amplitudes = amplitudes(p);
-  s.variance = search.variance();
+  s.variance = variance;
   s.relative_l2 = tensions::relative_l2(data, s.node_amplitudes);
   s.n_beads = static_cast<int>(data.position_um.size());
   s.n_down_weighted = static_cast<int>((data.bead_weight.array() < 0.5).count());

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -18,7 +17,6 @@ class ContractionLattice {
   ContractionLattice(const sheet::Elements& elements, int n_points);
 
   int n_points() const { return static_cast<int>(points_.size()); }
-  double spacing_um() const { return spacing_um_; }
   /// φ_k, which add up to 1 on the sheet.
   double share(int point, Vec2 place_um) const;
   /// By point, at the points of the elements: for SheetShape::contractions.
@@ -56,7 +54,8 @@ struct FieldFit {
 ///
 ///   log p(y | M, λ) = ½ r log λ − ½ log |N/v + λL| − Q/(2v),   Q = min |A c − y|² + vλ cᵀLc,   N = AᵀA
 ///
-/// r the rank of L, v the variance of a datum. Line tension and bundles are known by nothing before.
+/// r the rank of L, v the variance of a datum: of the noise, or of what the sheet leaves if that is more. Line tension
+/// and bundles are known by nothing before.
 /// @param table  with the shares of the lattice as its contractions; known adhesions
 /// @param mean  of each φ over the sheet's area
 FieldFit fit_field(tensions::LinearData data, const StiffnessTable& table, tensions::Loss loss,
