@@ -620,6 +620,20 @@ void notice_expansion(stage::StageContext& context, const sheets::SheetFit& fit,
                          is_sure ? Severity::bad : Severity::caution));
 }
 
+/// What the beads do and the sheet does not.
+void notice_unexplained(stage::StageContext& context, const sheets::SheetFit& fit) {
+  if (!fit.expected_relative_l2) return;
+  constexpr double kLittle = 0.4;  // as the tension fit has it: explains-little
+  const double left = fit.relative_l2 * fit.relative_l2, noise = *fit.expected_relative_l2 * *fit.expected_relative_l2;
+  const double share = noise < 1 ? std::max(0.0, left - noise) / (1 - noise) : 0;
+  context.notice(noticed(FindingKind::sheet_unexplained, left / noise,
+                         "The sheet explains " + brief(100 * (1 - share)) +
+                             " % of what the beads do beyond their noise: it leaves " + brief(left / noise) +
+                             " times the sum of squares of the noise." +
+                             (share > kLittle ? " It is the wrong model of these beads." : ""),
+                         share > kLittle ? Severity::bad : Severity::caution));
+}
+
 void add_figures_of(const sheets::FieldFit& field, Figures& figures) {
   figures.emplace_back("contraction_degrees", field.degrees);
   figures.emplace_back("contraction_smoothing_um2_per_nN2", field.smoothing);
@@ -809,6 +823,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   const auto stiffness =
       std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &sheets::SheetEstimate::quantity);
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
+  notice_unexplained(context, fit);
   if (!field) notice_expansion(context, fit, static_cast<int>(n_parts));
   context.notice(noticed(FindingKind::sheet_at_bound, fit.is_at_bound ? 1 : 0,
                          "The best stiffness, " + brief(fit.stiffnesses.sheet_nN_per_um) +
@@ -821,7 +836,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
                     {"youngs_modulus_kPa", scene.material.youngs_modulus_kPa},
                     {"correlation", fit.correlation},
                     {"relative_l2", fit.relative_l2},
-                    {"expected_relative_l2", fit.expected_relative_l2},
+                    {"expected_relative_l2", fit.expected_relative_l2.value_or(fit.relative_l2)},
                     {"n_beads", std::int64_t{fit.n_beads}},
                     {"n_down_weighted", std::int64_t{fit.n_down_weighted}},
                     {"aic", fit.models[fit.own_model].aic},

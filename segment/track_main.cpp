@@ -4,6 +4,7 @@
 #include <numbers>
 #include <opencv2/core/utility.hpp>
 
+#include "mbtfm/tractions/field_of_adhesions.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
@@ -255,6 +256,13 @@ void write_picture(stage::StageContext& context, const images::Picture& picture,
                {{{0, 0}, pixel_size_um * Vec2{double(relaxed.width), double(relaxed.height)}}});
 }
 
+/// Of a gel that the adhesions pull, where they are given.
+FieldModel model_of_gel(stage::StageContext& context) {
+  if (!context.has_input("adhesions")) return {};
+  return [adhesions = files::read_adhesions(context.input("adhesions")), threads = context.threads](
+             const DisplacementField& beads) { return tractions::field_of_adhesions_um(adhesions, beads, threads); };
+}
+
 files::FrameRow row_of(int frame, const std::string& image, const Tracking& t) {
   return {.frame = frame,
           .image = image,
@@ -354,8 +362,8 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
   const fs::path relaxed_file = context.input("relaxed");
   const images::Channel relaxed{relaxed_file.string(),
                                 images::binned(images::read_image(relaxed_file, parameters.relaxed_plane), binning)};
-  const RelaxedBeads beads =
-      with_names(relaxed.name, [&] { return RelaxedBeads(relaxed.image, parameters, context.threads); });
+  const RelaxedBeads beads = with_names(
+      relaxed.name, [&] { return RelaxedBeads(relaxed.image, parameters, context.threads, model_of_gel(context)); });
   const auto tracked_frame = [&](const Frame& frame, const Progress& progress) {
     return tracked(relaxed, beads, frame, parameters, binning, progress, context);
   };
@@ -441,6 +449,8 @@ int main(int argc, char** argv) {
             {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF, PNG or JPEG)"},
             {"surface_beads", Kind::optional_input,
              "of stacks: beads of another colour on the gel's surface, relaxed; their places are for mbtfm-surface"},
+            {"adhesions", Kind::optional_input,
+             "adhesions.csv of the cell: where the gel is pulled strongly, their pull tells which bead is which"},
             {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
             {"kept", Kind::optional_input,
              "output folder of an earlier run with the same images and parameters: frames that are there are kept"},

@@ -343,15 +343,9 @@ FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss 
   s.estimates = estimates_of(p, table, mean);
   s.stiffnesses = at_mean(p, table);
   s.loads = p.loads;
-  s.node_amplitudes = amplitudes(p);
   s.variance = variance;
-  s.relative_l2 = tensions::relative_l2(data, s.node_amplitudes);
-  s.n_beads = static_cast<int>(data.position_um.size());
-  s.n_down_weighted = static_cast<int>((data.bead_weight.array() < 0.5).count());
   const double n_numbers = p.degrees + (known ? 0 : 1);
-  const double u_squared = data.weight_per_um.cwiseProduct(data.displacement_um).squaredNorm();
-  s.expected_relative_l2 =
-      data.has_errors ? std::sqrt((static_cast<double>(data.n_used) - n_numbers) / u_squared) : s.relative_l2;
+  add_misfit(s, data, amplitudes(p), n_numbers);
   Models models(data, s.variance);
   const std::string name =
       std::string("sheet") + (table.has_line() ? "-with-line" : "") + (table.bundles().empty() ? "" : "-with-bundles");

@@ -124,6 +124,16 @@ LinearData weighed(LinearData data, tensions::Loss loss, const std::function<Vec
   return reweighed(std::move(data), loss, amplitudes, scale);
 }
 
+void add_misfit(SheetFit& fit, const LinearData& data, VectorXd node_amplitudes, double n_unknowns) {
+  fit.node_amplitudes = std::move(node_amplitudes);
+  fit.relative_l2 = tensions::relative_l2(data, fit.node_amplitudes);
+  fit.n_beads = static_cast<int>(data.position_um.size());
+  fit.n_down_weighted = static_cast<int>((data.bead_weight.array() < 0.5).count());
+  const double u_squared = data.weight_per_um.cwiseProduct(data.displacement_um).squaredNorm();
+  if (data.has_errors)
+    fit.expected_relative_l2 = std::sqrt((static_cast<double>(data.n_used) - n_unknowns) / u_squared);
+}
+
 Models::Models(const LinearData& data, double noise_variance)
     : data_(data), noise_(std::max(noise_variance, std::numeric_limits<double>::min())) {
   add("nothing", 0, data.reduced.target.squaredNorm() + data.reduced.floor_squared, 1);

@@ -70,6 +70,9 @@ Eigen::MatrixXd without_bundles(const StiffnessTable& table);
 tensions::LinearData weighed(tensions::LinearData data, tensions::Loss loss,
                              const std::function<Eigen::VectorXd(const tensions::LinearData&)>& amplitudes);
 
+/// The solution as displacements: node_amplitudes, and how they fit. @param n_unknowns  numbers that the beads told
+void add_misfit(SheetFit& fit, const tensions::LinearData& data, Eigen::VectorXd node_amplitudes, double n_unknowns);
+
 /// Models of the same beads, in units of the noise. The first is nothing.
 class Models {
  public:

@@ -244,19 +244,13 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   fit.is_at_bound = !known && std::min(std::log(sheet_of(best) / table.sheet_nN_per_um().low),
                                        std::log(table.sheet_nN_per_um().high / sheet_of(best))) < kAtBound;
   fit.loads = best.loads;
-  fit.node_amplitudes = table.shares(best.at) * best.loads;
+  add_misfit(fit, data, table.shares(best.at) * best.loads, static_cast<double>(n_unknowns));
   fit.variance = tensions::misfit_variance(data, fit.node_amplitudes, n_unknowns, loss);
   const MatrixXd covariance = covariance_of(data, table, best, fit.variance, known.has_value());
   const Eigen::Index at_M = table.n_loads();
   if (!known) fit.correlation = covariance(0, at_M) / std::sqrt(covariance(0, 0) * covariance(at_M, at_M));
   fit.estimates =
       estimates_of(table, best, covariance, Allowed(table, search, best, fit.variance, known.has_value()), parts);
-  fit.relative_l2 = tensions::relative_l2(data, fit.node_amplitudes);
-  fit.n_beads = static_cast<int>(data.position_um.size());
-  fit.n_down_weighted = static_cast<int>((data.bead_weight.array() < 0.5).count());
-  const double u_squared = (data.weight_per_um.cwiseProduct(data.displacement_um)).squaredNorm();
-  fit.expected_relative_l2 =
-      data.has_errors ? std::sqrt(static_cast<double>(data.n_used - n_unknowns) / u_squared) : fit.relative_l2;
   Models models(data, fit.variance);
   const bool has_parts = table.n_contractions() > 1, has_springs = table.adhesion_nN_per_um3().has_value(),
              has_bundles = !table.bundles().empty();

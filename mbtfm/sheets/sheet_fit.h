@@ -51,7 +51,8 @@ struct SheetFit {
   bool is_at_bound = false;         ///< the best stiffness of the sheet is the table's first or last
   double correlation = 0;           ///< of the errors of the first contraction and log stiffness
   double variance = 1;              ///< of a weighted component of a bead, that the error bars are made with
-  double relative_l2 = 0, expected_relative_l2 = 0;
+  double relative_l2 = 0;
+  std::optional<double> expected_relative_l2;  ///< by the errors that the beads state
   int n_beads = 0, n_down_weighted = 0;
   std::vector<SheetModel> models;
   std::size_t own_model = 0;  ///< of them, the one that was fitted; others are parts of it, or beside it

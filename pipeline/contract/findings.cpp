@@ -295,6 +295,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "a sheet much stiffer than its gel moves it by contraction over stiffness alone, a soft one by its contraction",
        "Read what is limited: contraction_over_stiffness of a stiff sheet, contraction_nN_per_um of a soft one. If the "
        "stiffness is known, give sheet.youngs_modulus_kPa."},
+      {sheet_unexplained, "sheet-unexplained", "sheet", caution,
+       "sum of squares that the sheet leaves of the displacement, over that of the beads' noise", 1.25,
+       "up to half of the noise's standard deviation, the sheet's own error adds less than an eighth to what is left",
+       "Compare the models in sheet_models.csv. If a stress fibre or the edge pulls more than the rest, give bundles, "
+       "fit_line_tension or fit_parts; if the sheet does not adhere everywhere, the area where it does; and check the "
+       "gel and the outline."},
       {sheet_expands, "sheet-expands", "sheet", caution,
        "share of the sheet's parts whose best contraction is below zero, or whose 95 % interval holds no contraction",
        0,

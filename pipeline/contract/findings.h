@@ -98,6 +98,7 @@ enum class FindingKind {
   sheet_strain,
   sheet_coarse,
   sheet_not_identifiable,
+  sheet_unexplained,
   sheet_expands,
   sheet_at_bound,
   sheet_cut,

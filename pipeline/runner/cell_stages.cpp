@@ -22,6 +22,8 @@ const Stage& stage_named(const std::string& name) {
 Stage tracking() {
   Stage stage = stage_named("track");
   stage.instead.reset();
+  stage.arguments.clear();
+  stage.reads_where_there.clear();
   stage.optional_images = {{"surface_beads", "surface_beads"}};
   stage.writes = {kDisplacement};
   stage.series = {kSurfaceBeads};
@@ -127,10 +129,12 @@ std::string stage_names() {
 
 CellStages stages_of(const fs::path& cell, const ImageNames& images) {
   const toml::table toml = files::parse_toml(cell / "cell.toml");
-  CellStages of{.kind = CellKind::space, .why = why_in_space(cell, toml), .stages = {}, .chains = {{0, 2}, {1}}};
+  CellStages of{.kind = CellKind::space, .why = why_in_space(cell, toml), .stages = {}, .chains = {}};
   if (of.why.empty()) {
     of.kind = CellKind::plane;
     of.stages = stages();
+    of.first = {0};  // where the cell holds its gel tells which bead is which
+    of.chains = {{1}, {2}};
     return of;
   }
   Stage surface_stage = surface(), traction_stage = traction();

@@ -24,6 +24,7 @@ struct CellStages {
   CellKind kind = CellKind::plane;
   std::string why;  ///< "track.z_points is set": for people
   std::vector<Stage> stages;
+  std::vector<int> first = {};           ///< before all others
   std::vector<std::vector<int>> chains;  ///< which run beside each other; the last stage needs them all
 };
 

@@ -193,9 +193,11 @@ void CellRun::check_before_start(CellOutcome& now) const {
   for (std::size_t i = 0; i < of_.stages.size(); ++i) {
     const Stage& stage = of_.stages[i];
     const StageState state = now.stages[i].status.state;
-    const bool follows = std::any_of(stage.reads.begin(), stage.reads.end(), [&](const std::string& file) {
+    const auto is_changed = [&](const std::string& file) {
       return contains_name(changed, fs::path(file).begin()->string());
-    });
+    };
+    const bool follows =
+        std::ranges::any_of(stage.reads, is_changed) || std::ranges::any_of(stage.reads_where_there, is_changed);
     if (state != StageState::must_run && !(follows && state == StageState::up_to_date)) continue;
     changed.push_back(stage.folder);
     note_failure(now.stages[i], [&] {
@@ -300,9 +302,10 @@ void CellRun::start(const Stage& stage, const Present& before, int threads, Stag
        .report = report_in(record_file)});
 }
 
-/// Tracking needs nothing of the cell: it runs beside segmentation and network. The last stage needs both.
+/// Tracking runs beside the network, in space beside segmentation. The last stage needs both.
 void CellRun::run_chains(CellOutcome& outcome) {
   const std::vector<Stage>& all = of_.stages;
+  for (const int i : of_.first) bring_up_to_date(all[i], options_.threads, outcome.stages[i]);
   const std::vector<std::vector<int>>& chains = of_.chains;
   const auto is_wanted = [&](const std::vector<int>& chain) {
     return std::any_of(chain.begin(), chain.end(), [&](int i) { return is_asked(all[i], options_.only); });

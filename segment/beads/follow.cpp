@@ -16,13 +16,15 @@ constexpr int kAround = 12;
 
 /// What the good tracks around say of each good one, kept while tracks are found and rejected.
 struct Surroundings {
-  std::vector<Motion> motions;
-  std::vector<char> was_good, is_changed;  ///< changed: a track around is another than at the update before
-  std::vector<std::optional<LocalMotion>> around;
+  std::vector<Vec2> expected = {};  ///< by bead, px: taken off before beads are compared; empty: none
+  std::vector<Motion> motions = {};
+  std::vector<char> was_good = {}, is_changed = {};  ///< changed: a track around is another than at the update before
+  std::vector<std::optional<LocalMotion>> around = {};
 };
 
 void update(const Scene& scene, const std::vector<Track>& tracks, Surroundings& s) {
   const std::vector<Motion> before = std::exchange(s.motions, motions_of(tracks));
+  for (std::size_t k = 0; k < s.expected.size(); ++k) s.motions[k].u += -1 * s.expected[k];
   std::vector<char> is_good, is_other(tracks.size(), 1);
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     is_good.push_back(tracks[k].is_good());
@@ -42,10 +44,13 @@ void update(const Scene& scene, const std::vector<Track>& tracks, Surroundings& 
     if (!tracks[k].is_good()) return;
     const std::vector<int> others = good_around(scene, tracks, k, kAround);
     s.around[k] = local_motion(scene.position(k), others, scene.relaxed->positions, s.motions);
+    if (s.around[k] && !s.expected.empty()) s.around[k]->motion.u += s.expected[k];
   });
 }
 
-int flag_outliers(const std::vector<std::optional<LocalMotion>>& around, double threshold, std::vector<Track>& tracks) {
+/// @param granted_px  by bead, besides; empty: 0
+int flag_outliers(const std::vector<std::optional<LocalMotion>>& around, double threshold,
+                  const std::vector<double>& granted_px, std::vector<Track>& tracks) {
   // Twelve neighbours know their spread to a third: it is no smaller than the picture's.
   const double typical = typical_spread(around);
   int n_outliers = 0;
@@ -56,7 +61,8 @@ int flag_outliers(const std::vector<std::optional<LocalMotion>>& around, double 
       const double spread = std::max(local->spread_px, typical);
       const double misfit = norm(tracks[k].found.motion.u - local->motion.u);
       // The floor is what a field's curvature within the reach may do without being wrong.
-      if (misfit <= threshold * std::hypot(spread, tracks[k].found.sigma_px) + 0.3) continue;
+      const double granted = 0.3 + (granted_px.empty() ? 0 : granted_px[k]);
+      if (misfit <= threshold * std::hypot(spread, tracks[k].found.sigma_px) + granted) continue;
     }
     tracks[k].flag = TrackFlag::neighbours_disagree;
     ++n_outliers;
@@ -120,7 +126,7 @@ void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Su
       ++n_found;
     }
     update(scene, tracks, surroundings);
-    const int n_rejected = flag_outliers(surroundings.around, parameters.outlier_threshold, tracks);
+    const int n_rejected = flag_outliers(surroundings.around, parameters.outlier_threshold, {}, tracks);
     if (n_found <= n_rejected) break;
   }
 }
@@ -140,14 +146,15 @@ Followed follow(const Scene& scene, const GridField& grid, const TrackParameters
   follow_grid(scene, grid, parameters.least_similarity, tracks);
   Surroundings surroundings;
   update(scene, tracks, surroundings);
-  flag_outliers(surroundings.around, parameters.outlier_threshold, tracks);
+  flag_outliers(surroundings.around, parameters.outlier_threshold, {}, tracks);
   const int n_by_grid = n_good(tracks);
   follow_neighbours(scene, parameters, surroundings, tracks);
   return {std::move(tracks), n_by_grid};
 }
 
-std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks) {
-  Surroundings surroundings;
+std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks,
+                                                       const std::vector<Vec2>& expected) {
+  Surroundings surroundings{.expected = expected};
   update(scene, tracks, surroundings);
   return std::move(surroundings.around);
 }
@@ -161,7 +168,19 @@ double typical_spread(const std::vector<std::optional<LocalMotion>>& around) {
 }
 
 int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks) {
-  return flag_outliers(motions_around(scene, tracks), threshold, tracks);
+  return flag_outliers(motions_around(scene, tracks), threshold, {}, tracks);
+}
+
+int flag_outliers_beside(const std::vector<Vec2>& expected, const Scene& scene, double threshold,
+                         std::vector<Track>& tracks) {
+  // An adhesion that is drawn at half its width, or pulls at its rim alone, moves its middle by so much more or less.
+  constexpr double kWrong = 0.5;
+  const auto around = motions_around(scene, tracks), beside = motions_around(scene, tracks, expected);
+  std::vector<double> granted_px(tracks.size(), 0);
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    if (around[k] && beside[k]) granted_px[k] = kWrong * norm(beside[k]->motion.u - around[k]->motion.u);
+  }
+  return flag_outliers(beside, threshold, granted_px, tracks);
 }
 
 }  // namespace mbtfm::beads

@@ -27,12 +27,19 @@ Followed follow(const Scene& scene, const GridField& grid, const TrackParameters
 void require_common_beads(int n_by_grid, int n_in_the_end, int n_beads);
 
 /// What the good tracks around say of each good one.
-std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks);
+/// @param expected  by bead, px: beads are compared in what they do beside it; empty: nothing is
+std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks,
+                                                       const std::vector<Vec2>& expected = {});
 
 /// Median standard deviation (px) of single beads about those around them.
 double typical_spread(const std::vector<std::optional<LocalMotion>>& around);
 
 /// Flag tracks that contradict those around them "neighbours disagree"; how many.
 int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks);
+
+/// The same of what beads do beside their expected motions (px), of which half of what the beads around do not tell
+/// may be wrong.
+int flag_outliers_beside(const std::vector<Vec2>& expected, const Scene& scene, double threshold,
+                         std::vector<Track>& tracks);
 
 }  // namespace mbtfm::beads

@@ -13,13 +13,14 @@ constexpr double kLost = 0.4;        // p0: of the beads that no window finds so
 constexpr double kStranger = 0.05;   // so often a neighbour tells nothing of a bead: it may be wrong itself
 constexpr double kMixedLight = 0.1;  // so often a spot has another bead's light, too
 constexpr double kStrain = 0.3;      // gels are seldom strained by more between two beads
+constexpr double kStrainLeft = 0.1;  // beside what forces on the adhesions explain
 constexpr int kAround = 12;
 constexpr double kWitnesses = 4;  // what the dozen know together, since in part they know it from each other
 constexpr double kCertain = 0.7;
 
 struct Candidate {
   int spot = 0;
-  Vec2 u;
+  Vec2 u;            ///< beside what is expected
   double light = 0;  ///< logarithm of how much likelier than any other bead's the spot's light is
   double odds = 0;
   double probability = 0.1;
@@ -79,15 +80,20 @@ Light light_of(const Scene& scene, const std::vector<Track>& tracks) {
 struct Matching {
   const Scene& scene;
   const std::vector<Track>& tracks;
+  const std::vector<Vec2>& expected;
   double scatter_px = 0;
   double reach_px = 0;
   double free_in_reach = 1;        ///< spots to be expected by chance
   std::vector<int> leftover_of{};  ///< by bead; -1: it has a good track, or has left the picture
   std::vector<Leftover> leftovers{};
+  Vec2 expected_of(int bead) const { return expected.empty() ? Vec2{} : expected[static_cast<std::size_t>(bead)]; }
+  /// Of a good track, beside what is expected.
+  Vec2 step_of(int bead) const { return tracks[bead].found.motion.u - expected_of(bead); }
   double area_px2() const { return std::numbers::pi * reach_px * reach_px; }
   /// A f: density of steps that differ from a neighbour's by this vector, over that of chance.
   double likeness(Vec2 difference, double distance_px) const {
-    const double variance = 2 * scatter_px * scatter_px + std::pow(kStrain * distance_px, 2);
+    const double variance =
+        2 * scatter_px * scatter_px + std::pow((expected.empty() ? kStrain : kStrainLeft) * distance_px, 2);
     const double tail = 1 + dot(difference, difference) / (2 * variance);
     return area_px2() / (2 * std::numbers::pi * variance * tail * tail);
   }
@@ -105,12 +111,13 @@ std::vector<char> free_spots(const Scene& scene, const std::vector<Track>& track
 }
 
 /// Where the good tracks nearby lead on the whole.
-Vec2 middle_step(const std::vector<Witness>& around, const std::vector<Track>& tracks) {
+Vec2 middle_step(const Matching& all, const std::vector<Witness>& around) {
   std::vector<double> x, y;
   for (const Witness& witness : around) {
-    if (!tracks[witness.bead].is_good()) continue;
-    x.push_back(tracks[witness.bead].found.motion.u.x);
-    y.push_back(tracks[witness.bead].found.motion.u.y);
+    if (!all.tracks[witness.bead].is_good()) continue;
+    const Vec2 step = all.step_of(witness.bead);
+    x.push_back(step.x);
+    y.push_back(step.y);
   }
   return {numerics::quantile(std::move(x), 0.5), numerics::quantile(std::move(y), 0.5)};
 }
@@ -127,19 +134,20 @@ Leftover leftover(const Matching& all, int bead, const std::vector<char>& is_fre
     const double weight = std::exp(-0.5 * std::pow(distance / scene.spacing(), 2));
     result.around.push_back({.bead = j, .weight = weight, .distance_px = distance});
   }
-  const Vec2 centre = place + middle_step(result.around, all.tracks);
+  const Vec2 from = place + all.expected_of(bead), centre = from + middle_step(all, result.around);
   constexpr int kMost = 40;  // three times what a reach of two distances holds
   for (const int b : scene.stressed.neighbours.within(centre, all.reach_px, kMost)) {
     if (!is_free[b]) continue;
     const double brighter = log_light(scene.stressed.beads[b]) - log_light(scene.relaxed->beads[bead]);
     result.candidates.push_back(
-        {.spot = b, .u = scene.stressed.positions[b] - place, .light = light.log_ratio(brighter)});
+        {.spot = b, .u = scene.stressed.positions[b] - from, .light = light.log_ratio(brighter)});
   }
   return result;
 }
 
-Matching matching(const Scene& scene, const std::vector<Track>& tracks, double scatter_px) {
-  Matching all{.scene = scene, .tracks = tracks, .scatter_px = scatter_px};
+Matching matching(const Scene& scene, const std::vector<Track>& tracks, double scatter_px,
+                  const std::vector<Vec2>& expected) {
+  Matching all{.scene = scene, .tracks = tracks, .expected = expected, .scatter_px = scatter_px};
   all.reach_px = 2 * scene.spacing();  // a peak is a few beads wide; further away chance offers too many spots
   const std::vector<char> is_free = free_spots(scene, tracks);
   const Plane& plane = scene.stressed.image.plane;
@@ -164,7 +172,7 @@ double log_support(const Matching& all, const Leftover& of, const Candidate& can
   for (const Witness& witness : of.around) {
     double likeness = 0, certainty = 1;
     if (all.tracks[witness.bead].is_good()) {
-      const Vec2 difference = candidate.u - all.tracks[witness.bead].found.motion.u;
+      const Vec2 difference = candidate.u - all.step_of(witness.bead);
       likeness = (1 - kStranger) * all.likeness(difference, witness.distance_px);
     } else {
       const Leftover& other = all.leftovers[all.leftover_of[witness.bead]];
@@ -203,8 +211,9 @@ void iterate(Matching& all) {
 
 }  // namespace
 
-std::vector<std::optional<int>> matched_spots(const Scene& scene, const std::vector<Track>& tracks, double scatter_px) {
-  Matching all = matching(scene, tracks, scatter_px);
+std::vector<std::optional<int>> matched_spots(const Scene& scene, const std::vector<Track>& tracks, double scatter_px,
+                                              const std::vector<Vec2>& expected) {
+  Matching all = matching(scene, tracks, scatter_px, expected);
   constexpr int kRounds = 20;  // halved each time, what is settled is settled to 1e-6
   for (int round = 0; round < kRounds; ++round) iterate(all);
   std::vector<std::optional<int>> spots(tracks.size());

@@ -23,8 +23,12 @@ namespace mbtfm::beads {
 /// expect: a good track's own step, or, of a bead that has none, those of its candidates by their probabilities,
 /// spread by a Student density of two degrees of freedom with the variance 2 scatter² + (strain · distance)². The P
 /// are found by iteration from small values.
+/// Where motions are expected, u_kb is the step beside that, and the strain what is expected wrongly of it.
+///
 /// @param scatter_px  of single beads about their neighbours, a component
+/// @param expected  by bead, px; empty: nothing is
 /// @return by bead of the relaxed image, the index of its spot in the stressed one
-std::vector<std::optional<int>> matched_spots(const Scene& scene, const std::vector<Track>& tracks, double scatter_px);
+std::vector<std::optional<int>> matched_spots(const Scene& scene, const std::vector<Track>& tracks, double scatter_px,
+                                              const std::vector<Vec2>& expected = {});
 
 }  // namespace mbtfm::beads

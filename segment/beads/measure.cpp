@@ -275,10 +275,11 @@ void measure(const Scene& scene, double least_similarity, std::vector<Track>& tr
   flag_changed_light(scene, tracks);
 }
 
-void recover(const Scene& scene, double least_similarity, std::vector<Track>& tracks) {
-  const double scatter = typical_spread(motions_around(scene, tracks));
+void recover(const Scene& scene, double least_similarity, std::vector<Track>& tracks,
+             const std::vector<Vec2>& expected) {
+  const double scatter = typical_spread(motions_around(scene, tracks, expected));
   if (scatter < kLoose * scene.bead_sigma()) return;
-  const auto spots = matched_spots(scene, tracks, scatter);
+  const auto spots = matched_spots(scene, tracks, scatter, expected);
   std::vector<Track> all = tracks;
   std::vector<Motion> starts = motions_of(tracks);
   std::vector<int> matched;

@@ -13,6 +13,8 @@ void verify(const Scene& scene, std::vector<Track>& tracks);
 
 /// Where beads are loose, find again what no window found, or what its neighbours contradicted: matched with the spots
 /// that are left over (match.h), measured without the others' pictures, verified.
-void recover(const Scene& scene, double least_similarity, std::vector<Track>& tracks);
+/// @param expected  by bead, px: its motion, as far as it is known; empty: it is not
+void recover(const Scene& scene, double least_similarity, std::vector<Track>& tracks,
+             const std::vector<Vec2>& expected = {});
 
 }  // namespace mbtfm::beads

@@ -98,14 +98,35 @@ Followed followed_and_measured(const Scene& scene, const std::optional<Turn>& tu
   return followed;
 }
 
+/// Where a pixel lies, um: positions count from the centre of the first pixel.
+Vec2 place_um(Vec2 position_px, double pixel_size_um) { return pixel_size_um * (position_px + Vec2{0.5, 0.5}); }
+
+/// Once more, each bead compared with its neighbours in what they do beside the model.
+void follow_beside(const FieldModel& model, const Scene& scene, const TrackParameters& parameters, double pixel_size_um,
+                   std::vector<Track>& tracks) {
+  DisplacementField beads;
+  for (int k = 0; k < scene.n_beads(); ++k) {
+    beads.push_back({.position_um = place_um(scene.position(k), pixel_size_um),
+                     .displacement_um = pixel_size_um * tracks[k].found.motion.u,
+                     .sigma_um = 0,
+                     .flag = name_of(tracks[k].flag)});
+  }
+  std::vector<Vec2> expected = model(beads);
+  if (expected.empty()) return;
+  for (Vec2& u : expected) u = 1 / pixel_size_um * u;
+  flag_outliers_beside(expected, scene, parameters.outlier_threshold, tracks);
+  recover(scene, parameters.least_similarity, tracks, expected);
+}
+
 Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images::Image& stressed,
                         const std::optional<Turn>& turn, const TrackParameters& parameters, double pixel_size_um,
-                        int threads) {
+                        int threads, const FieldModel& model) {
   const auto scene = std::make_shared<const Scene>(scene_of(
       relaxed, side_of(stressed, relaxed->bead_sigma, parameters.detection_snr, "stressed", threads), threads));
   auto [tracks, n_by_grid] =
       followed_and_measured(*scene, turn, parameters, search_window(4 * scene->spacing(), parameters, pixel_size_um));
   recover(*scene, parameters.least_similarity, tracks);
+  if (model) follow_beside(model, *scene, parameters, pixel_size_um, tracks);
   if (turn) flag_turned_out(*scene, *turn, tracks);  // those found again
   require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
   Pooling pooling = pooled(*scene, tracks);
@@ -200,7 +221,7 @@ Tracking tracking_of(const Measured& measured, const MotionTaken& all, double pi
   for (int k = 0; k < scene.n_beads(); ++k) {
     const Pooled& found = pooling.beads[k];
     const Vec2 place = scene.position(k);
-    result.field.push_back({.position_um = pixel_size_um * (place + Vec2{0.5, 0.5}),
+    result.field.push_back({.position_um = place_um(place, pixel_size_um),
                             .displacement_um = pixel_size_um * (found.u - all.motion.at(place)),
                             .sigma_um = pixel_size_um * found.sigma_px,
                             .flag = name_of(tracks[k].flag)});
@@ -242,8 +263,9 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
            "of --displacement: um, or px (0 at the centre of the first pixel, of pixel_size_um)");
 }
 
-RelaxedBeads::RelaxedBeads(const images::Image& relaxed, const TrackParameters& parameters, int threads)
-    : relaxed_(relaxed), parameters_(parameters), threads_(threads) {
+RelaxedBeads::RelaxedBeads(const images::Image& relaxed, const TrackParameters& parameters, int threads,
+                           FieldModel model)
+    : relaxed_(relaxed), parameters_(parameters), threads_(threads), model_(std::move(model)) {
   require_numbers(relaxed, "relaxed");
   const TrackMethod method = parameters.method;
   const double rough_background = 12;  // px: six sigmas of an ordinary bead; set from the bead itself afterwards
@@ -357,7 +379,7 @@ Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const images
   const images::Image unturned = turn ? turned_back(stressed, *turn, threads_) : stressed;
   tell(0, by_beads ? "following beads" : "following windows");
   const Measured measured = by_beads
-                                ? measured_beads(side_, unturned, turn, parameters_, pixel_size_um, threads_)
+                                ? measured_beads(side_, unturned, turn, parameters_, pixel_size_um, threads_, model_)
                                 : measured_windows(*texture_, unturned, turn, parameters_, pixel_size_um, threads_);
   const MotionTaken all = motion_of_all(measured, setting, parameters_.effect_tolerance);
   require_shift_alone(all);
@@ -379,7 +401,7 @@ std::string RelaxedBeads::remedy(const images::Image& stressed, double pixel_siz
     TrackParameters changed = parameters_;
     change(changed);
     try {
-      RelaxedBeads(relaxed_, changed, threads_).track_by_any(stressed, pixel_size_um, {});
+      RelaxedBeads(relaxed_, changed, threads_, model_).track_by_any(stressed, pixel_size_um, {});
       return true;
     } catch (const InvalidData&) {
       return false;

@@ -1,6 +1,7 @@
 /// Displacement of the substrate from two images of its beads: pulled by the cell, and relaxed.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -110,6 +111,10 @@ struct ExchangedImages : InvalidData {
   using InvalidData::InvalidData;
 };
 
+/// What the good beads tell of the motion of all (um), a common motion beside: as of a gel that is pulled at known
+/// places.
+using FieldModel = std::function<std::vector<Vec2>(const DisplacementField& beads)>;
+
 struct Side;
 struct Texture;
 
@@ -118,8 +123,9 @@ class RelaxedBeads {
  public:
   /// Where no beads stand out, windows are followed if they are asked for and not by themselves: they would follow the
   /// pattern of a camera's pixels, too, which never moves.
+  /// @param model  of the gel, for step 5 below; none: that is left out
   /// @throws NotFollowed where the image shows no beads
-  RelaxedBeads(const images::Image& relaxed, const TrackParameters& parameters, int threads);
+  RelaxedBeads(const images::Image& relaxed, const TrackParameters& parameters, int threads, FieldModel model = {});
 
   /// Displacement of each bead of the relaxed image.
   ///
@@ -133,7 +139,9 @@ class RelaxedBeads {
   ///    flagged where it fails: `no partner`, `ambiguous` (does not come back, goes where another bead goes), `edge`,
   ///    `neighbours disagree`.
   /// 4. Where beads are loose, those that no window found are matched by pattern, light and neighbours (match.h).
-  /// 5. What the beads around predict is weighed in by how well such predictions hold there (pool.h).
+  /// 5. With a model of the gel, beads are compared in what they do beside it: those that contradict their neighbours
+  ///    then are flagged, and step 4 is done once more. Where the pull is strong, a bead's neighbours move otherwise.
+  /// 6. What the beads around predict is weighed in by how well such predictions hold there (pool.h).
   ///
   /// Where beads are dimmer than for 0.02 px, errors are correlated over some bead distances.
   ///
@@ -156,6 +164,7 @@ class RelaxedBeads {
   std::shared_ptr<const Texture> texture_;  ///< unless beads alone are
   TrackParameters parameters_;
   int threads_;
+  FieldModel model_;
 };
 
 /// Both at once.

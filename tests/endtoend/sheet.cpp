@@ -141,6 +141,7 @@ TEST_F(Sheet, contraction_and_stiffness_come_back_from_beads) {
   EXPECT_EQ(fit.text(1, "quantity"), "stiffness_nN_per_um");
   EXPECT_NEAR(fit.number(1, "value"), 30 * 0.4 / (1 - 0.09), 4 * fit.number(1, "sigma"));
   EXPECT_LT(figure("aic"), figure("aic_of_nothing") - 1000);
+  EXPECT_EQ(outcome.output.find("explains"), std::string::npos) << "the sheet explains the beads: " << outcome.output;
   // a contraction that may vary, and does not
   const auto varying = run(gel + sheet + "fit_parts = \"field\"\nfield_points = 6\n",
                            "--displacement " + (folder_ / "displacement.csv").string());
@@ -186,6 +187,7 @@ TEST_F(Sheet, one_that_expands_or_has_the_stiffness_of_a_bound_is_doubted) {
   EXPECT_NE(outward.find("\"bad\""), std::string::npos) << "ten and more standard errors";
   const std::string inward = fitted([&](double r) { return -radial(r); });
   EXPECT_EQ(inward.find("sheet-expands"), std::string::npos) << inward;
+  EXPECT_NE(inward.find("sheet-unexplained"), std::string::npos) << "an even contraction has not this profile";
   // a narrow ring: no sheet, however soft, pulls so near to its edge
   const std::string at_rim = fitted([](double r) { return -0.8 * std::exp(-std::pow((r - 25) / 1.5, 2)); });
   EXPECT_NE(at_rim.find("sheet-at-bound"), std::string::npos) << at_rim;

@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
+#include "mbtfm/tractions/field_of_adhesions.h"
 #include "pipeline/contract/errors.h"
 #include "segment/beads/given_field.h"
 #include "segment/beads/plane.h"
 #include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 #include "tests/support/hard_case.h"
+#include "tests/support/tracked_cell.h"
 
 namespace mbtfm::beads {
 namespace {
@@ -74,30 +77,98 @@ TEST(TrackStability, loose_beads_are_followed_and_their_steps_are_in_the_standar
   EXPECT_LE(squares / n, 1.4);
 }
 
-/// Where a peak falls by half within a bead distance no two loose beads move alike, and windows lose them.
-TEST(TrackStability, loose_beads_in_steep_peaks_are_found) {
-  test::hard_case("beads that step on their own, under adhesions that pull them by many spacings",
-                  "most of them found");
-  const auto peaks = test::ring_of_adhesions(384, 12);
-  double n_steep = 0, n_tracked = 0, n_wrong = 0;
+struct InPeaks {
+  double n = 0, n_right = 0, n_wrong = 0;  ///< beads that the field moves by 5 px and more
+};
+
+/// Beads that step on their own, under adhesions that pull them by many spacings.
+InPeaks followed_in_peaks(const std::vector<test::Peak>& peaks, const FieldModel& model) {
+  InPeaks counts;
   for (const std::uint64_t seed : {101u, 102u, 103u}) {
     const auto pair = test::draw_bead_pair(
         peaks, {.width = 384, .n_beads = 1500, .brightness_spread = 0.25, .jitter = 0.9, .lost = 0.015, .seed = seed});
-    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+    const Tracking tracking = RelaxedBeads(pair.relaxed, {}, 2, model).track(pair.stressed, 1.0);
     const Neighbours truth(pair.positions, 8);
     for (const Bead& bead : tracking.field) {
       const Vec2 place = bead.position_um - Vec2{0.5, 0.5};
       const auto around = truth.within(place, 2, 3);
       if (around.empty() || norm(test::displacement(peaks, place)) < 5) continue;
-      ++n_steep;
+      ++counts.n;
       if (!bead.flag.empty()) continue;
-      ++n_tracked;
-      n_wrong += is_stranger(bead.displacement_um, around, pair);
+      ++(is_stranger(bead.displacement_um, around, pair) ? counts.n_wrong : counts.n_right);
     }
   }
+  return counts;
+}
+
+std::string told(const InPeaks& counts) {
+  return test::two_digits(100 * counts.n_right / counts.n) + " % found, " +
+         test::two_digits(100 * counts.n_wrong / counts.n) + " % wrong";
+}
+
+/// Where a peak falls by half within a bead distance no two loose beads move alike, and windows lose them.
+TEST(TrackStability, loose_beads_in_steep_peaks_are_found) {
+  test::hard_case("beads that step on their own, under adhesions that pull them by many spacings",
+                  "most of them found");
+  const InPeaks counts = followed_in_peaks(test::ring_of_adhesions(384, 12), {});
   // windows alone find two thirds; a share of a hundred beads is good to 0.04
-  EXPECT_GE(n_tracked - n_wrong, 0.75 * n_steep);
-  EXPECT_LE(n_wrong, 0.1 * n_tracked);
+  EXPECT_GE(counts.n_right, 0.75 * counts.n);
+  EXPECT_LE(counts.n_wrong, 0.1 * (counts.n_right + counts.n_wrong));
+  test::came_out(told(counts));
+}
+
+/// Discs; those of twice the peaks' radius move as far.
+std::vector<Adhesion> adhesions_at(const std::vector<test::Peak>& peaks, Vec2 shifted_by, double by_radius) {
+  std::vector<Adhesion> adhesions;
+  for (const test::Peak& peak : peaks) {
+    const double radius_um = by_radius * peak.radius;
+    adhesions.push_back({.adhesion_id = static_cast<int>(adhesions.size()) + 1,
+                         .position_um = peak.centre + shifted_by,
+                         .area_um2 = std::numbers::pi * radius_um * radius_um,
+                         .major_axis_um = 2 * radius_um,
+                         .minor_axis_um = 2 * radius_um});
+  }
+  return adhesions;
+}
+
+FieldModel model_with(const std::vector<Adhesion>& adhesions) {
+  return [adhesions](const DisplacementField& beads) { return tractions::field_of_adhesions_um(adhesions, beads, 2); };
+}
+
+TEST(TrackStability, adhesions_tell_which_loose_bead_is_which) {
+  test::hard_case("a cell whose adhesions pull loose beads by 5 px and more, adhesions known",
+                  "a quarter of those that are lost without adhesions found, no more wrong");
+  drawing::ScenarioParameters p;
+  stage::ParameterList list;
+  declare(list, p);
+  stage::read_toml(list, drawing::scenario_file("u2os"));
+  p.noise = 0.07;
+  p.seed = 1;
+  const test::CellPair pair = test::drawn_pair(p, 2);
+  const auto followed = [&](const FieldModel& model) {
+    const Tracking tracking = RelaxedBeads(pair.relaxed, {}, 2, model).track(pair.stressed, p.microscope.pixel_size_um);
+    return test::counted(tracking, pair, p.microscope).peaks;
+  };
+  const test::Peaks alone = followed({}), guided = followed(model_with(pair.experiment.cell.adhesions));
+  EXPECT_LE(guided.n - guided.n_right, 0.75 * (alone.n - alone.n_right));
+  EXPECT_LE(guided.n_wrong, alone.n_wrong);
+  test::came_out(std::to_string(guided.n_right) + " found and " + std::to_string(guided.n_wrong) + " wrong of " +
+                 std::to_string(guided.n) + "; without adhesions " + std::to_string(alone.n_right) + " and " +
+                 std::to_string(alone.n_wrong));
+}
+
+TEST(TrackStability, adhesions_of_the_wrong_size_or_place_cost_few_beads) {
+  test::hard_case("adhesions drawn at half their width, or where there are none, under loose beads",
+                  "as many beads found in steep peaks as without adhesions, to one in twenty");
+  const auto peaks = test::ring_of_adhesions(384, 12);
+  const InPeaks alone = followed_in_peaks(peaks, {});
+  for (const auto& [name, adhesions] : {std::pair("right", adhesions_at(peaks, {0.5, 0.5}, 2)),
+                                        std::pair("half as wide", adhesions_at(peaks, {0.5, 0.5}, 1)),
+                                        std::pair("elsewhere", adhesions_at(peaks, {30, -20}, 2))}) {
+    const InPeaks guided = followed_in_peaks(peaks, model_with(adhesions));
+    EXPECT_GE(guided.n_right, alone.n_right - 0.05 * alone.n) << name << ": " << told(guided);
+    EXPECT_LE(guided.n_wrong, alone.n_wrong + 0.05 * alone.n) << name << ": " << told(guided);
+  }
 }
 
 /// Good beads that went where none did.
