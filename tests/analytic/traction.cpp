@@ -5,6 +5,7 @@
 #include <functional>
 #include <random>
 
+#include "mbtfm/tractions/field_of_adhesions.h"
 #include "mbtfm/tractions/fttc.h"
 #include "mbtfm/tractions/fttc_mixtures.h"
 #include "mbtfm/tractions/neighbour_noise.h"
@@ -43,6 +44,27 @@ TEST(EllipseScene, is_the_one_of_the_reference_table) {
   for (const Vec2 f : scene.forces_nN) total_nN += norm(f);
   EXPECT_NEAR(total_nN, 89.8, 0.05);
   EXPECT_NEAR(scene.largest_um, 1.03, 0.005);
+}
+
+/// A drift beside, three beads in a hundred that went elsewhere, and three of which nothing is known. The field is that
+/// of a half-space with Poisson's ratio 0.5 as nearly as a layer of 60 um is.
+TEST(FieldOfAdhesions, tells_where_beads_went_that_are_astray_or_flagged) {
+  EllipseScene scene = ellipse_scene(64, 0);
+  const Vec2 drift{0.8, -0.5};
+  const DisplacementField truth = scene.field;
+  for (std::size_t i = 0; i < scene.field.size(); ++i) {
+    Bead& bead = scene.field[i];
+    bead.displacement_um += drift;
+    if (i % 33 == 0) bead.displacement_um += Vec2{2, 3};
+    if (i % 33 == 1) bead = {.position_um = bead.position_um, .displacement_um = {9, 9}, .flag = "no partner"};
+  }
+  const std::vector<Vec2> found = field_of_adhesions_um(scene.adhesions, scene.field, 2);
+  ASSERT_EQ(found.size(), truth.size());
+  for (std::size_t i = 0; i < truth.size(); ++i)
+    EXPECT_LE(norm(found[i] - truth[i].displacement_um - drift), 0.05 * scene.largest_um) << i;
+  // fewer data than twice the unknowns
+  EXPECT_TRUE(field_of_adhesions_um(scene.adhesions, {scene.field.begin(), scene.field.begin() + 20}, 1).empty());
+  EXPECT_TRUE(field_of_adhesions_um({}, scene.field, 1).empty());
 }
 
 TEST(SurfaceSpectrum, its_waves_add_up_to_the_field_of_a_loaded_disc) {
