@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 # Sources of a library are compiled together, so that their headers are read once.
 cmake --preset release -DCMAKE_UNITY_BUILD=ON >build-configure.log 2>&1 || { cat build-configure.log >&2; exit 1; }
 mv build-configure.log build/configure.log
-echo "mbtfm: building (the first time about ten minutes on two cores; log: build/build.log)"
+echo "mbtfm: building (the first time fifteen to twenty minutes on two cores; log: build/build.log)"
 # one line that counts the steps, on a terminal
 count() {
   if [ ! -t 1 ]; then cat >/dev/null; return; fi
