@@ -450,7 +450,8 @@ int main(int argc, char** argv) {
             {"surface_beads", Kind::optional_input,
              "of stacks: beads of another colour on the gel's surface, relaxed; their places are for mbtfm-surface"},
             {"adhesions", Kind::optional_input,
-             "adhesions.csv of the cell: where the gel is pulled strongly, their pull tells which bead is which"},
+             "adhesions.csv of the cell: helps to follow single beads where adhesions pull strongly; not used with "
+             "stacks, windows or --displacement"},
             {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
             {"kept", Kind::optional_input,
              "output folder of an earlier run with the same images and parameters: frames that are there are kept"},
