@@ -43,6 +43,18 @@ Contrast contrast_of(const MixedFit& fit, const VectorXd& weights) {
                        satterthwaite_degrees(fit, weights));
 }
 
+Contrast with_positive_interval(Contrast mean) {
+  if (mean.estimate <= 0) {
+    mean.low = std::max(0.0, mean.low);
+    return mean;
+  }
+  const double relative = (mean.high - mean.estimate) / mean.estimate;
+  const double factor = std::min(std::exp(relative), 1 + 10 * relative);  // of two cells the power may be any
+  mean.low = mean.estimate / factor;
+  mean.high = mean.estimate * factor;
+  return mean;
+}
+
 FTest test_all_zero(const MixedFit& fit, const MatrixXd& contrasts) {
   const MatrixXd spread = contrasts * fit.covariance * contrasts.transpose();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(spread);

@@ -264,15 +264,15 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
       for (std::size_t i = 0; i < c->x.size(); ++i)
         chart.dot({c->x[i], c->y[i]}, 3.2, "fill:" + colour + ";fill-opacity:.7",
                   study.cells[static_cast<std::size_t>(c->cells[i])].name);
-      if (c->line.n < kFewestForALine) {
-        chart.key(prefix_of(c->condition) + fmt::format("n = {}: too few for a line", c->line.n), colour);
+      if (!c->line) {
+        chart.key(prefix_of(c->condition) + fmt::format("n = {}: too few for a line", c->x.size()), colour);
         continue;
       }
-      chart.curve({{0, 0}, {x_end, c->line.slope * x_end}}, "stroke:" + colour + ";stroke-width:1.6");
-      std::string text = prefix_of(c->condition) + charts::readable(c->line.slope);
-      if (c->line.slope_error) text += fmt::format(" ± {:.2g}", *c->line.slope_error);
-      if (c->line.correlation) text += ", r = " + charts::readable(std::round(100 * *c->line.correlation) / 100);
-      chart.key(text + fmt::format(", n = {}", c->line.n), colour);
+      chart.curve({{0, 0}, {x_end, c->line->slope * x_end}}, "stroke:" + colour + ";stroke-width:1.6");
+      std::string text = prefix_of(c->condition) + charts::readable(c->line->slope);
+      if (c->line->slope_error) text += fmt::format(" ± {:.2g}", *c->line->slope_error);
+      if (c->line->correlation) text += ", r = " + charts::readable(std::round(100 * *c->line->correlation) / 100);
+      chart.key(text + fmt::format(", n = {}", c->x.size()), colour);
     }
     figure.charts.push_back(chart);
   }

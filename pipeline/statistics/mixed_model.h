@@ -52,6 +52,10 @@ struct Contrast {
 Contrast by_students_t(double estimate, double standard_error, double degrees);
 /// Source of the degrees: Giesbrecht & Burns, Biometrics 41, 477 (1985).
 Contrast contrast_of(const MixedFit& fit, const Eigen::VectorXd& weights);
+/// The interval of a mean that cannot be negative: Student's on the scale of its logarithm, whose standard error is the
+/// relative one. As it is, from zero on, where the estimate is not positive.
+/// Source: Meeker & Escobar, Statistical Methods for Reliability Data (1998), intervals of positive parameters.
+Contrast with_positive_interval(Contrast mean);
 
 struct FTest {
   double f = 0, numerator_degrees = 0, denominator_degrees = 0, p_value = 1;

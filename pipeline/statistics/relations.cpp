@@ -67,6 +67,7 @@ std::optional<Correlation> correlate(const Study& study, int condition, const Fo
     products[cell] = {c.x.back() * c.y.back(), c.x.back() * c.x.back()};
   }
   if (std::all_of(c.x.begin(), c.x.end(), [](double x) { return x == 0; })) return std::nullopt;
+  if (c.x.size() < kFewestForALine) return c;
   c.line = line_through_origin(c.x, c.y);
   c.slope_interval = ratio_interval(products, draws);
   return c;

@@ -18,12 +18,12 @@ struct Correlation {
   bool is_of_total = false;
   std::string condition;
   std::vector<double> x, y;
-  std::vector<int> cells;  ///< indices into Study::cells
-  LineThroughOrigin line;
-  std::optional<Interval> slope_interval;  ///< 95 %, by the bootstrap of cells
+  std::vector<int> cells;                  ///< indices into Study::cells
+  std::optional<LineThroughOrigin> line;   ///< none below kFewestForALine cells
+  std::optional<Interval> slope_interval;  ///< 95 %, by the bootstrap of cells; none without a line
 };
 /// Below five points a slope and a correlation say next to nothing: the points alone are shown.
-inline constexpr int kFewestForALine = 5;
+inline constexpr std::size_t kFewestForALine = 5;
 std::vector<Correlation> correlate_forces(const Study& study, const std::vector<CellWeights>& draws);
 
 /// Mean force of the adhesions whose area lies between two values (thesis fig. 3.13).

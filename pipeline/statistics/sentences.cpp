@@ -144,12 +144,12 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
 std::vector<std::string> lines(const Analysis& analysis) {
   std::vector<std::string> list;
   for (const Correlation& c : analysis.correlations) {
-    if (!c.is_of_total || c.line.n < kFewestForALine) continue;
-    const std::string error = c.line.slope_error ? " ± " + charts::readable(*c.line.slope_error) : "";
+    if (!c.is_of_total || !c.line) continue;
+    const std::string error = c.line->slope_error ? " ± " + charts::readable(*c.line->slope_error) : "";
     std::string text =
         fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition),
-                    charts::readable(c.line.slope), error, c.size_unit, fmt::format("{} cells", c.line.n));
-    if (c.line.correlation) text += ", r = " + charts::readable(*c.line.correlation);
+                    charts::readable(c.line->slope), error, c.size_unit, fmt::format("{} cells", c.x.size()));
+    if (c.line->correlation) text += ", r = " + charts::readable(*c.line->correlation);
     list.push_back(capitalised(text + ")."));
   }
   return list;

@@ -108,7 +108,7 @@ std::vector<Summary> summarise(const Sample& sample, const std::optional<SampleM
       if (model && s.n_cells > 1) {
         const int g = model->index[static_cast<std::size_t>(sample.group_of(condition, kind))];
         s.model = contrast_of(model->fit, Eigen::VectorXd::Unit(model->fit.mean.size(), g));
-        if (sample.is_never_negative) s.model->low = std::max(0.0, s.model->low);
+        if (sample.is_never_negative) s.model = with_positive_interval(*s.model);
       }
       list.push_back(std::move(s));
     }

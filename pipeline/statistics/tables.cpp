@@ -14,6 +14,8 @@ using files::Table;
 
 constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
 
+using Number = std::optional<double>;
+
 /// Both ends. @param access  of an optional Interval
 template <class Row, class Access>
 std::vector<Column<Row>> ends_of(const std::string& low, const std::string& high, const std::string& of,
@@ -199,7 +201,6 @@ std::vector<Column<Row>> summary_columns(const std::string& counted, const std::
   const auto of = [access](auto get) {
     return [access, get](const Row& row) { return get(std::invoke(access, row)); };
   };
-  using Number = std::optional<double>;
   const auto model = [](const Summary& s) {
     return s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt;
   };
@@ -396,11 +397,14 @@ const Table<Correlation>& correlation_table() {
           {{{"force", "column of cells.csv", &Row::force},
             {"size", "column of cells.csv", &Row::size},
             {"condition", "empty: none was asked for", &Row::condition},
-            {"n_cells", "cells", [](const Row& c) { return c.line.n; }},
-            {"slope", "of the line through the origin", [](const Row& c) { return c.line.slope; }, kResult},
-            {"slope_error", "its standard error", [](const Row& c) { return c.line.slope_error; }, kResult}},
+            {"n_cells", "cells", [](const Row& c) { return static_cast<int>(c.x.size()); }},
+            {"slope", "of the line through the origin; empty below five cells",
+             [](const Row& c) { return c.line ? Number(c.line->slope) : Number(); }, kResult},
+            {"slope_error", "its standard error", [](const Row& c) { return c.line ? c.line->slope_error : Number(); },
+             kResult}},
            ends_of<Row>("slope_low", "slope_high", "the slope, cells resampled", &Row::slope_interval),
-           {{"r", "Pearson's correlation", [](const Row& c) { return c.line.correlation; }, kResult}}})};
+           {{"r", "Pearson's correlation; empty below five cells",
+             [](const Row& c) { return c.line ? c.line->correlation : Number(); }, kResult}}})};
   return table;
 }
 

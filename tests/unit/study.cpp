@@ -224,12 +224,28 @@ TEST(Study, forces_of_a_network_that_cannot_be_identified_do_not_enter) {
   for (const Measure& m : analysis.cells)
     EXPECT_EQ(m.sample.values.size(), m.sample.column == "total_force_nN" ? 4u : 3u) << m.sample.column;
   for (const Correlation& c : analysis.correlations)
-    EXPECT_EQ(c.line.n, c.force == "total_force_nN" ? 4 : 3) << c.force;
+    EXPECT_EQ(c.x.size(), c.force == "total_force_nN" ? 4u : 3u) << c.force;
   const files::CsvTable cells(tables_of(study, analysis)[0].second, "cells.csv");
   EXPECT_FALSE(cells.optional_number(0, "network_force_nN"));
   EXPECT_TRUE(cells.optional_number(1, "network_force_nN"));
   EXPECT_TRUE(std::any_of(analysis.warnings.begin(), analysis.warnings.end(),
                           [](const std::string& w) { return w.find("network's tension of 1 of 4 cells") != w.npos; }));
+}
+
+TEST(Study, four_cells_have_no_line_and_five_have_one) {
+  for (const int n_cells : {4, 5}) {
+    const Study study = test::simulated_study({.n_cells = n_cells});
+    const Analysis analysis = analyse(study, {.bootstrap_draws = 100});
+    ASSERT_FALSE(analysis.correlations.empty());
+    for (const auto& [file, table] : tables_of(study, analysis)) {
+      if (!file.ends_with("correlations.csv")) continue;
+      const files::CsvTable correlations(table, file);
+      int row = 0;
+      while (correlations.text(row, "size") != "n_fibres") ++row;
+      for (const char* column : {"slope", "slope_error", "slope_low", "slope_high", "r"})
+        EXPECT_EQ(correlations.optional_number(row, column).has_value(), n_cells == 5) << column;
+    }
+  }
 }
 
 TEST(Study, the_error_of_a_tension_is_that_of_the_side_zero_does_not_cut) {
