@@ -226,6 +226,7 @@ ordered_json mark_of(Kind kind, const std::string& data, ordered_json& rows) {
   return {{"type", vega_kind(kind)},
           {"from", {{"data", data}}},
           {"clip", true},
+          {"aria", false},  // read aloud is the chart's name; a table beside it has the numbers
           {"interactive", update.contains("tooltip")},
           {"encode", {{"update", update}}}};
 }

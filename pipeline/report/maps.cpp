@@ -110,7 +110,8 @@ void draw_fibre_ids(charts::Chart& map, const CellResults& results) {
   const Box box = map_box(results);
   const double clear_um = 15 * (box.high.x - box.low.x) / charts::Chart::kFrameWidth_px;  // about a label's width
   for (const Fibre& fibre : results.cell.fibres) {
-    map.label(label_places_um(fibre, results.cell.fibres, clear_um).front(), std::to_string(fibre.fibre_id));
+    map.label(label_places_um(fibre, results.cell.fibres, clear_um).front(),
+              letter_of(fibre.type) + std::to_string(fibre.fibre_id));
   }
 }
 
@@ -159,8 +160,9 @@ Figure original_network(const CellResults& results) {
   }
   draw_fibre_ids(map, results);
   return {map,
-          fmt::format("Stress fibres with their numbers, coloured by their fitted tension, in the network of the first "
-                      "mesh before it contracts: {} vertices, {} links (grey: actin network). Blue: {}, which "
+          fmt::format("Stress fibres (dorsal d, arc a, ventral v, edge e) with their numbers, coloured by their fitted "
+                      "tension, in the network of the first mesh before it contracts: {} vertices, {} links (grey: "
+                      "actin network). Blue: {}, which "
                       "hold the vertices inside them.",
                       results.network.vertices_um.size(), results.network.links.size(),
                       has_origin(results.cell, AdhesionOrigin::candidate) ? "candidates for adhesions" : "adhesions") +
@@ -261,8 +263,8 @@ Figure segmentation_map(const CellResults& results) {
   std::string types;
   for (const FibreType type : kFibreTypes) {
     if (type == FibreType::edge && !has_edge_fibres(results.cell)) continue;
-    types +=
-        "<span>" + swatch_of(type, is_dark ? bright_colour_of(type) : colour_of(type)) + full_name_of(type) + "</span>";
+    types += fmt::format("<span>{}{} ({})</span>", swatch_of(type, is_dark ? bright_colour_of(type) : colour_of(type)),
+                         full_name_of(type), letter_of(type));
   }
   for (const Fibre& fibre : results.cell.fibres) {
     map.curve(fibre.points_um,

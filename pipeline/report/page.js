@@ -105,7 +105,7 @@ function draw(box) {
   const caption = box.parentNode.querySelector('figcaption');
   if (caption) {
     caption.id = caption.id || 'caption-' + Array.from(document.querySelectorAll('figcaption')).indexOf(caption);
-    box.firstElementChild.setAttribute('aria-describedby', caption.id);
+    box.setAttribute('aria-describedby', caption.id);
   }
   update();
   new ResizeObserver(function () { requestAnimationFrame(fit); }).observe(box);
@@ -142,7 +142,7 @@ function draw(box) {
     const button = document.createElement('button');
     button.textContent = text;
     button.title = name;
-    button.setAttribute('aria-label', name + ': ' + spec.description);
+    button.setAttribute('aria-label', text + ': ' + name + ': ' + spec.description);
     button.addEventListener('click', act);
     buttons.appendChild(button);
   };

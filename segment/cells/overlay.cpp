@@ -160,8 +160,8 @@ std::vector<Vec2> places_beside(const Adhesion& a, double pixel_um) {
 void draw_labels(Canvas& canvas, const Cell& cell) {
   constexpr double kClear_px = 30;  // about a label's width
   for (const Fibre& f : cell.fibres)
-    canvas.label(label_places_um(f, cell.fibres, kClear_px * canvas.pixel_um()), std::to_string(f.fibre_id),
-                 scalar(colour_of(f.type)), kFibreText);
+    canvas.label(label_places_um(f, cell.fibres, kClear_px * canvas.pixel_um()),
+                 letter_of(f.type) + std::to_string(f.fibre_id), scalar(colour_of(f.type)), kFibreText);
   for (const Adhesion& a : cell.adhesions) canvas.occupy(ellipse_polygon(a, 16));
   std::vector<const Adhesion*> large_first;
   for (const Adhesion& a : cell.adhesions) {
@@ -196,7 +196,8 @@ std::vector<Entry> entries_of(const Segmentation& s, double pixel_um, int width)
     const auto n =
         std::count_if(cell.fibres.begin(), cell.fibres.end(), [&](const Fibre& f) { return f.type == type; });
     if (type == FibreType::edge && n == 0) continue;
-    entries.push_back({std::string(name_of(type)) + " " + std::to_string(n), scalar(colour_of(type))});
+    entries.push_back(
+        {std::string(name_of(type)) + " (" + letter_of(type) + ") " + std::to_string(n), scalar(colour_of(type))});
     entries.back().is_dashed = type == FibreType::edge;
   }
   const auto add_adhesions = [&](const std::string& name, bool is_dashed, const auto& is_one) {
