@@ -74,7 +74,7 @@ done
   cat <<'PAGE'
 # What accuracy costs in time
 
-Made by `docs/make_accuracy_and_cost.sh`. Every fit writes an error budget ([theory](theory.md), section 3) into `fit.json` and
+Made by `docs/make_accuracy_and_cost.sh`. Every fit writes an error budget ([theory](theory/errors.md#error-budget)) into `fit.json` and
 `run.json`. `mbtfm cost CELL` turns one knob at a time, for any cell or several, and says what it gains and costs.
 `mbtfm run --preset fast` (`standard`, `high`) sets several together; `mbtfm run --accuracy 5%` takes the cheapest that the error
 budget finds accurate enough, and says where bead noise and segmentation make that impossible at any price.

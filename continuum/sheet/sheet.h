@@ -1,4 +1,4 @@
-/// A contracting elastic sheet in plane stress, as its equations have it. docs/theory.md, "Contracting sheets".
+/// A contracting elastic sheet in plane stress, as its equations have it. docs/theory/sheets.md.
 ///
 ///   S = M [(1 − nu) eps + nu tr(eps) 1] + s 1,   M = E h / (1 − nu²),   div S = T,   S n = −(Λ / R) n at the edge
 ///

@@ -1,5 +1,5 @@
 /// Tractions that are zero in most places: a sum of smooth spots, least squares with the sum of the spots' forces as
-/// penalty. docs/theory.md (28) and (29).
+/// penalty. docs/theory/tractions-in-space.md (28) and (29).
 #include <algorithm>
 #include <cmath>
 

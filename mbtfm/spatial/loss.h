@@ -1,5 +1,6 @@
 /// What the misfit of a bead costs: sum of rho(|r_b|) with r_b = S (u − G t), S = 1/sigma by direction, so that beads
-/// that are wrong cannot pull the tractions away and no axis of the plane is special. docs/theory.md (26).
+/// that are wrong cannot pull the tractions away and no axis of the plane is special.
+/// docs/theory/tractions-in-space.md (26).
 #pragma once
 
 #include <Eigen/Core>

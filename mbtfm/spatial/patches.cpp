@@ -1,5 +1,5 @@
 /// A force on each adhesion, spread evenly over its part of the surface, and a weak background everywhere else.
-/// docs/theory.md, section 4.
+/// docs/theory/tractions-in-space.md.
 #include <algorithm>
 #include <cmath>
 

@@ -1,5 +1,6 @@
-/// The fit on an ensemble of networks: the mesh is part of the model and its largest hidden error (docs/theory.md), so
-/// every reported tension is the mean over independent meshes, and their spread is part of its error bar.
+/// The fit on an ensemble of networks: the mesh is part of the model and its largest hidden error
+/// (docs/theory/network.md), so every reported tension is the mean over independent meshes, and their spread is part of
+/// its error bar.
 #pragma once
 
 #include <Eigen/Core>

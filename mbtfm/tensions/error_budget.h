@@ -1,4 +1,4 @@
-/// How much of each tension's standard error comes from what: docs/theory.md, section 3, "Error budget".
+/// How much of each tension's standard error comes from what: docs/theory/errors.md, "Error budget".
 #pragma once
 
 #include "mbtfm/tensions/ensemble.h"

@@ -72,7 +72,8 @@ Loads regularised(const TractionInputs& inputs, const TractionParameters& parame
 }
 
 /// Standard errors of the forces' magnitudes, which are `sums` (rows 2a, 2a+1 for adhesion a) of the loads: by the
-/// noise, and by what penalty and model make of forces spread over their adhesions. docs/theory.md (17).
+/// noise, and by what penalty and model make of forces spread over their adhesions.
+/// docs/theory/reconstructions.md (17).
 void state_errors(const Loads& loads, const Eigen::MatrixXd& sums, std::vector<AdhesionForce>& forces) {
   const Eigen::MatrixXd covariance = sums * loads.covariance * sums.transpose();
   const Eigen::MatrixXd missed = sums * loads.response - Eigen::MatrixXd::Identity(sums.rows(), loads.response.cols());

@@ -1,4 +1,4 @@
-/// Forces by adhesion beside the tractions of a lattice. docs/theory.md (16).
+/// Forces by adhesion beside the tractions of a lattice. docs/theory/reconstructions.md (16).
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,5 @@
-/// Bead displacements as the elastic answer to tractions on a lattice, in Fourier space. docs/theory.md (9), (10).
+/// Bead displacements as the elastic answer to tractions on a lattice, in Fourier space.
+/// docs/theory/reconstructions.md (9), (10).
 #pragma once
 
 #include <memory>

@@ -1,4 +1,5 @@
-/// How much to smooth: lambda from the data, by several criteria at once. docs/theory.md, (11) to (15).
+/// How much to smooth: lambda from the data, by several criteria at once.
+/// docs/theory/reconstructions.md, (11) to (15).
 #pragma once
 
 #include <functional>

@@ -327,7 +327,7 @@ GeometryGradient CableNetwork::geometry_gradient(const std::vector<double>& tens
 }
 
 // Of a sheet of links that carry share · t: half the trace of its stress, sigma = t / (2 A) sum share_k l_k. On a
-// regular triangulation of edge h this is sqrt(3) t / h (docs/theory.md, 4).
+// regular triangulation of edge h this is sqrt(3) t / h (docs/theory/network.md, (4)).
 double surface_tension_nN_per_um(const Network& network, const Polygon& outline_um, double tension_nN) {
   double sum_um = 0;
   for (const Link& link : network.links) {

@@ -74,7 +74,7 @@ struct GeneratedNetwork {
 /// ellipse and on its rim, at least the one at its centre; the cut of a cell that its image cuts holds the vertices on
 /// it. A fibre that is said to end on an adhesion ends at its centre. Holes are left out, but fibres span them. Lines
 /// closer than a tenth of the wanted edge length run together; the outline passes through what lies within a quarter of
-/// it. docs/theory.md, "How the mesh is made".
+/// it. docs/theory/network.md, "How the mesh is made".
 /// @throws InvalidData where an adhesion lies more than an edge length outside the cell, or all of a fibre does
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters);
 

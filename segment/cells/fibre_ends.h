@@ -33,9 +33,9 @@ struct EndsToTie {
 bool runs_along_free_edge(const Polyline& line, const Polygon& outline_um);
 
 /// Where nobody sees adhesions: which ends something holds, by the shape of the fibre in the cell (Hotulainen &
-/// Lappalainen 2006; theory.md, section 6). An arc runs along the cell's edge behind the lamellipodium and bulges
-/// towards it: held nowhere. A dorsal fibre rises from an adhesion near the edge straight towards the cell's middle,
-/// and is free there. Any other is taken for ventral, held at both ends, as are fibres that span the cell.
+/// Lappalainen 2006; docs/theory/segmentation.md). An arc runs along the cell's edge behind the lamellipodium and
+/// bulges towards it: held nowhere. A dorsal fibre rises from an adhesion near the edge straight towards the cell's
+/// middle, and is free there. Any other is taken for ventral, held at both ends, as are fibres that span the cell.
 /// @param outline_um  not empty
 /// @param band_um  from the edge inwards, where the adhesions are
 EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, double band_um, double lamellipodium_um);

@@ -27,8 +27,8 @@ namespace {
 
 /// Nothing is traced that is less significant.
 constexpr double kLeast = 3;
-/// The tail of the lines of texture falls as exp(−x^1.4): counted in simulated cells of meshwork alone (docs/theory.md,
-/// (24)).
+/// The tail of the lines of texture falls as exp(−x^1.4): counted in simulated cells of meshwork alone
+/// (docs/theory/segmentation.md, (24)).
 constexpr double kShape = 1.4;
 /// Of lines of texture, the share that a fibre lies beside by chance: of those that are no fibres in 9 simulated cells
 /// of 20 fibres .12, in 9 of 40 fibres .22.

@@ -11,7 +11,7 @@ struct SceneSize {
   double adhesion_radius_um = 0;  ///< mean over the adhesions of the radius of a disc of the same area
 };
 
-/// By the switches and, where these are `auto`, by what each would change of the field (theory.md, section 2):
+/// By the switches and, where these are `auto`, by what each would change of the field (docs/theory/substrate.md):
 ///
 /// - finite thickness: the layer's correction s_0/(2 pi mu h) is largest, and even, near the force, while the field
 ///   falls as 1/r. Over a disc of radius R around a force, R >> a, its share of the field's L2 norm is at most

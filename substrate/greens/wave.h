@@ -9,7 +9,7 @@ namespace mbtfm::greens {
 struct WaveCompliance {
   double along_um_per_kPa = 0, across_um_per_kPa = 0;
 };
-/// docs/theory.md (8). @param wave_number_per_um  > 0
+/// docs/theory/reconstructions.md (8). @param wave_number_per_um  > 0
 WaveCompliance wave_compliance(const Gel& gel, GelModel model, double wave_number_per_um);
 
 }  // namespace mbtfm::greens

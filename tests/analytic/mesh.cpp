@@ -36,7 +36,8 @@ TEST(Mesh, quality_is_one_for_an_equilateral_and_zero_for_a_flat_triangle) {
   EXPECT_NEAR(quality({0, 0}, {3, 0}, {0, 4}), 0.8, 1e-12);
 }
 
-// Poisson discs come to rest as patches of lattice, whose borders cost quality (docs/theory.md): the bar of any mesh.
+// Poisson discs come to rest as patches of lattice, whose borders cost quality (docs/developers/meshes.md): the bar of
+// any mesh.
 TEST(Mesh, unit_circle_is_as_good_as_distmesh_makes_it) {
   for (const auto& [seeds, mean] :
        {std::pair{Seeds::jittered, 0.985}, {Seeds::regular, 0.985}, {Seeds::poisson, 0.95}}) {

@@ -107,7 +107,7 @@ TEST(CutCells, tensions_forces_and_the_force_through_the_cut_are_found_within_th
   EXPECT_LT(std::abs(of_totals / kCells), 1.3);
 }
 
-/// docs/theory.md, "A cell that the image cuts".
+/// docs/theory/fit.md, "A cell that the image cuts".
 TEST(CutCells, own_forces_of_adhesions_are_expected_near_the_cut_and_fade_away_from_it) {
   const Scene s = scene(41);
   const CutFit found = test::fit_cut(s.cut.cell, s.beads, s.gel, 2);
