@@ -375,7 +375,7 @@ std::string open_ids(const std::vector<Finding>& findings) {
 
 std::string findings_page() {
   std::string page =
-      "# Findings\n\nThe program tells what it notices about the images, the beads and its own answer. Each finding "
+      "# Findings\n\nThe program reports what it notices about the images, the beads and its own answer. Each finding "
       "has an identity, a\nnumber, a threshold and a remedy. A finding appears on the terminal, in the report, in "
       "`run.json`, in `run.log`, in\nthe column `findings` of `batch.csv` and in `statistics/findings.csv`.\n\n- "
       "**note**: worth knowing; the results hold.\n- **caution**: the results may be off by more than their error bars "
