@@ -128,7 +128,7 @@ TEST(Documents, the_list_of_planted_faults_fits_the_sources) {
 
 /// Each test of tests/stability says what is hard and what must come out, and has its line in the catalogue.
 TEST(Documents, the_catalogue_lists_every_hard_case) {
-  const std::string page = files::read_text(kDocs / "hard-cases.md");
+  const std::string page = files::read_text(kDocs / "developers/hard-cases.md");
   const std::regex any_test("\nTEST(_P)?\\("), stated("\nTEST(_P)?\\(\\w+, (\\w+)\\) \\{\\s*test::hard_case\\(");
   for (const auto& entry : fs::directory_iterator(fs::path(MBTFM_SOURCE_DIR) / "tests/stability")) {
     const std::string text = files::read_text(entry.path());
@@ -140,7 +140,7 @@ TEST(Documents, the_catalogue_lists_every_hard_case) {
       std::string name = (*at)[2];
       std::replace(name.begin(), name.end(), '_', ' ');
       EXPECT_NE(page.find(name + " |"), page.npos)
-          << name << ": write the page anew with build/tests/hard_cases_page docs/hard-cases.md";
+          << name << ": rewrite the page with build/tests/hard_cases_page docs/developers/hard-cases.md";
     }
   }
 }
