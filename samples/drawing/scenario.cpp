@@ -171,7 +171,7 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   list.add("noise", p.noise, Range::zero_or_factor(),
            "standard deviation of the bead displacements over the largest displacement");
   list.add("noise_um", p.noise_um, Range::zero_or_size_um(),
-           "the same standard deviation as a length (um), in place of `noise`; unset: by `noise`");
+           "standard deviation of the bead displacements as a length (um), in place of `noise`; unset: by `noise`");
   list.add("beads", p.beads, Range::between(1, kMostBeads), "number of beads in the field");
   list.add("beads_per_um2", p.beads_per_um2, Range::between(1e-6, 25),
            "number of beads by area of the field (1/um²), in place of `beads`; unset: by `beads`");
