@@ -20,9 +20,35 @@ install(DIRECTORY ${share}/man ${share}/bash-completion ${share}/zsh ${share}/fi
 install(DIRECTORY samples/scenarios pipeline/profiles pipeline/fiji DESTINATION ${CMAKE_INSTALL_DATADIR}/mbtfm
   USE_SOURCE_PERMISSIONS)
 install(FILES pipeline/Snakefile DESTINATION ${CMAKE_INSTALL_DATADIR}/mbtfm)
-install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+# The pages, and what they link to, at the same places as in the source tree.
+install(FILES README.md CHANGELOG.md CONTRIBUTING.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES python/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/python)
+install(FILES samples/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/samples)
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs FILES_MATCHING
-  PATTERN *.md PATTERN *.R PATTERN *.json PATTERN *.svg PATTERN *.png PATTERN *.csv PATTERN developers EXCLUDE)
+  PATTERN *.md PATTERN *.R PATTERN *.json PATTERN *.svg PATTERN *.png PATTERN *.jpg PATTERN *.csv)
+file(GLOB_RECURSE pages RELATIVE ${CMAKE_SOURCE_DIR} docs/*.md)
+set(linked "")
+foreach(page README.md CHANGELOG.md CONTRIBUTING.md python/README.md samples/README.md ${pages})
+  get_filename_component(folder ${page} DIRECTORY)
+  file(READ ${page} text)
+  string(REPLACE "](" "<link>" text "${text}")
+  string(REGEX REPLACE "[][;]" "" text "${text}")  # which mean something in CMake's lists
+  string(REGEX MATCHALL "<link>[^)#: ]+[)#]" links "${text}")
+  foreach(link ${links})
+    string(REGEX REPLACE "<link>([^)#: ]+)[)#]" "\\1" link "${link}")
+    get_filename_component(file ${CMAKE_SOURCE_DIR}/${folder}/${link} ABSOLUTE)
+    file(RELATIVE_PATH file ${CMAKE_SOURCE_DIR} ${file})
+    if(NOT file MATCHES "^docs/|[.]md$" AND EXISTS ${CMAKE_SOURCE_DIR}/${file})
+      list(APPEND linked ${file})
+    endif()
+  endforeach()
+endforeach()
+list(REMOVE_DUPLICATES linked)
+foreach(file ${linked})
+  get_filename_component(folder ${file} DIRECTORY)
+  install(FILES ${file} DESTINATION ${CMAKE_INSTALL_DOCDIR}/${folder})
+endforeach()
 
 # The libraries that are interfaces: the contract and its files, gels, cables; and what these are made of.
 set(interfaces

@@ -47,11 +47,11 @@ void declare(stage::ParameterList& list, Parameters& p) {
            "the contraction added to the second stress of Piola and Kirchhoff");
   list.add("depths_um", p.depths_um, "depths below the surface at which the displacement is read (um)");
   list.add("sweep", p.sweep,
-           "cases, as 'height_um=5.3..15.8:11 modulus_ratio=0.1,0.5,1,2': each height with each ratio of the gel's "
-           "modulus to the cell's; empty: one case");
-  list.add("order", p.order, Range::between(3, 8), "order of the elements");
+           "cases to compute: each height with each ratio of the gel's modulus to the cell's, as "
+           "'height_um=5.3..15.8:11 modulus_ratio=0.1,0.5,1,2'; empty: one case");
+  list.add("order", p.order, Range::between(3, 8), "order of the finite elements");
   list.add("towards_rim", p.towards_rim, Range::between(2, 12),
-           "elements between the rim of the contact and half its radius, each a fifth of the next");
+           "number of elements between the rim of the contact and half its radius, each a fifth of the next");
 }
 
 Setting setting_of(const Parameters& p) {

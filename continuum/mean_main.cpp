@@ -62,7 +62,7 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.table("mean");
   list.add("reference", p.reference,
            "name of the cell whose outline is the reference; empty: the pattern, or the most typical outline");
-  list.add("register_by", p.register_by, "what cells are laid onto each other by: their outlines, or images of them");
+  list.add("register_by", p.register_by, "what cells are aligned by: their outlines, or images of them");
   list.add("image", p.image, "name of the image in each cell's folder, with register_by = images");
   list.add(
       "symmetry", p.symmetry,
@@ -71,19 +71,20 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.add("mirror", p.mirror, "whether a cell may be mirrored; auto: if the reference is not its own mirror image");
   list.add("largest_misfit", p.largest_misfit, Range::between(1e-3, 1),
            "largest distance of an outline from the reference (root mean square), over the reference's radius");
-  list.add("others", p.others, "what becomes of cells of another shape");
+  list.add("others", p.others, "what is done with cells of another shape: refused, an error; or left out");
   list.add("gel_model", p.gel_model, "layer on a rigid base, or half-space");
   list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::positive(),
            "regularisation of the tractions (um/kPa); unset: that of the least expected error");
   list.add("lambda_for", p.lambda_for,
            "whether all cells have one regularisation, the median of theirs, or each its own");
-  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
-           "distance of the nodes (um); unset: half the mean distance of the first cell's beads");
+  list.add(
+      "spacing_um", p.spacing_um, Range::mesh_um(),
+      "distance of the nodes at which the mean is given (um); unset: half the mean distance of the first cell's beads");
   list.add("margin_um", p.margin_um, Range::zero_or_size_um(),
            "margin of the mean around the reference (um); unset: a fifth of its radius");
   list.add("band_um", p.band_um, Range::size_um(),
            "width of the edge within the outline (um); unset: a tenth of the reference's radius");
-  list.add("seed", p.seed, "of the resampling of cells and of the model's errors of registration");
+  list.add("seed", p.seed, "random seed of the resampling of cells and of the model's errors of registration");
 }
 
 /// The first of some names that a folder has; empty: none.

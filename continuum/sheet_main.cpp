@@ -54,7 +54,7 @@ struct Parameters {
 
 void declare(stage::ParameterList& list, Parameters& p) {
   list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
-           "pixel size of an outline that is a mask or a selection (um)");
+           "side of a pixel of an outline that is a mask or a selection (um)");
   declare(list, p.gel);
   stage::Parameter& modulus = parameter_named(list, "youngs_modulus_kPa");
   modulus.member = &p.gel_modulus_kPa;
@@ -65,25 +65,27 @@ void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.substrate.effects, {"finite_thickness", "finite_sides", "depth_graded_gel", "effect_tolerance"});
   declare(list, p.sheet);
   list.add("most_unbalanced", p.most_unbalanced, Range::between(0, 1),
-           "with --traction: share of net force or torque up to which it is taken off; more is refused");
+           "with --traction: largest net force or torque that is corrected, as a share; more is refused");
   list.add("traction_sigma_kPa", p.traction_sigma_kPa, Range::between(0, 1e4),
            "with --traction: standard error of a traction's component, for errors of the tensions (kPa); unset: none");
-  list.add(
-      "traction_correlation_um", p.traction_correlation_um, Range::size_um(),
-      "with --traction: distance over which neighbours share their error, the resolution of the reconstruction (um); "
-      "unset: each patch has its own");
+  list.add("traction_correlation_um", p.traction_correlation_um, Range::size_um(),
+           "with --traction: distance over which neighbours share their error, the resolution of the reconstruction "
+           "(um); unset: each patch has an error of its own");
   list.add(
       "fit_parts", p.fit_parts,
       "with --displacement: parts with a contraction of their own: none, all of the sheet alike; edge: the band of "
       "edge_band_um and what is inside of it; cells: each cell of the label image --cells; field: the contraction "
       "varies "
       "smoothly, as much as the beads call for");
-  list.add("field_points", p.field_points, Range::between(4, 200),
-           "with fit_parts = field: about how many points the contraction is given at, bilinear between them");
-  list.add("fit_line_tension", p.fit_line_tension, "with --displacement: fit line_tension_nN, too");
+  list.add(
+      "field_points", p.field_points, Range::between(4, 200),
+      "with fit_parts = field: approximate number of points at which the contraction is given, bilinear between them");
+  list.add("fit_line_tension", p.fit_line_tension, "with --displacement: also fit line_tension_nN");
   list.add("fit_adhesion_stiffness", p.fit_adhesion_stiffness,
-           "with --displacement: fit adhesion_stiffness_nN_per_um3, too: springs between sheet and gel");
-  list.add("loss", p.loss, "with --displacement: of the residuals; all but squares take beads less that stray");
+           "with --displacement: also fit adhesion_stiffness_nN_per_um3, of springs between sheet and gel");
+  list.add("loss", p.loss,
+           "with --displacement: loss function of the beads' residuals; all but squares give less weight to beads that "
+           "stray");
 }
 
 // --- inputs

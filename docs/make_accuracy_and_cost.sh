@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Make docs/accuracy-and-cost.md: the error budget against observed errors, the presets, and the cost studies of simulated
-# cells. Run from the project's folder, built, on an idle machine: it counts processor time, which a busy machine
+# Make docs/accuracy-and-cost.md (the presets) and docs/developers/cost-tables.md (the error budget against observed errors, and the
+# cost studies of simulated cells). Run from the project's folder, built, on an idle machine: it counts processor time, which a busy machine
 # lengthens, too. MINUTES (15) is the budget of each of the two cost studies; what was made before is kept in the work
 # folder (build/accuracy-and-cost) and not made again.
 set -euo pipefail
@@ -57,7 +57,7 @@ study() { # name, title, cells
   [ -f "$work/study_$name/cost.md" ] ||
     "$bin/mbtfm" cost --repeats 1 --budget "${MINUTES:-15}" --out "$work/study_$name" "${@/#/$work/}"
   cp "$work/study_$name/cost.svg" "docs/images/cost/$name.svg"
-  sed -e "s|cost.svg|images/cost/$name.svg|" -e "s|^## .*|## $title|" "$work/study_$name/cost.md"
+  sed -e "s|cost.svg|../images/cost/$name.svg|" -e "s|^## .*|## $title|" "$work/study_$name/cost.md"
 }
 
 simulate demo 1 --noise 0.07 --images
@@ -72,32 +72,23 @@ done
 
 {
   cat <<'PAGE'
-# What accuracy costs in time
+# Accuracy and cost: which preset
 
-Made by `docs/make_accuracy_and_cost.sh`. Every fit writes an error budget ([theory](theory/errors.md#error-budget)) into `fit.json` and
-`run.json`. `mbtfm cost CELL` turns one knob at a time, for any cell or several, and says what it gains and costs.
-`mbtfm run --preset fast` (`standard`, `high`) sets several together; `mbtfm run --accuracy 5%` takes the cheapest that the error
-budget finds accurate enough, and says where bead noise and segmentation make that impossible at any price.
-Costs are seconds of processor time on two threads: other programs on the machine lengthen them far less than the time that
-passes.
+`--preset` sets how much the program computes for a cell. The default is `standard`.
 
-## Do the parts add up?
-
-Root sums of squares (nN) over the fibres, or the cells' total forces, of simulated u2os cells with 7 % noise, whose seeds nothing
-was chosen on: what was observed, what the budget stated, and its parts. `build/tests/error_budget 101 110`, `… 101 104 images`.
-
-| | observed | stated | ratio | beads | segmentation | mesh | substrate | solver | model |
-|---|---|---|---|---|---|---|---|---|---|
-PAGE
-  budget_table 101 110 ""
-  budget_table 101 104 images
-  cat <<'PAGE'
+```sh
+mbtfm run CELL --preset fast      # a first look at many cells
+mbtfm run CELL --preset high      # the figures of a paper
+mbtfm run CELL --accuracy 5%      # the cheapest preset that finds the tensions to 5 %
+mbtfm cost CELL                   # for this cell: what each setting gains and costs
+```
 
 ## The presets
 
-From the images to the report. The error is ‖t̂ − t‖/‖t‖ against the truth: of the demo cell (7 % noise), and root mean squares over
-four cells of seeds that nothing was chosen on (101 to 104): from images with 7 % noise, and of beads without noise on the true
-segmentation, where only what computing can mend is left.
+Times are from the images to the report, on two threads: seconds of the processors, and seconds that passed. The error is
+‖t̂ − t‖/‖t‖: the difference of the fitted tensions from the true ones, over the true ones. It is given for the demo cell (7 % noise). The
+last two columns are root mean squares over four other simulated cells: one from images with 7 % noise, one with exact beads on
+the true segmentation. Only the last column shows what more computing can improve.
 
 | preset | demo cell: processor (s) | passed (s) | error | from images, 7 % noise | no noise, true segmentation |
 |---|---|---|---|---|---|
@@ -105,20 +96,54 @@ PAGE
   preset_rows
   cat <<'PAGE'
 
-What each preset sets is in `pipeline/cost/presets.cpp`: `fast` tracks the beads on images of half the scale and fits coarse
-meshes, `high` many: the mean of more meshes is the better network. The last column shows that part of the error. The noise
-of the beads remains in the others, and so does in all that the cell is one network and not the mean of many: where noise is the larger
-part, a single cell's error may be smaller with a coarser preset, by luck. What no computing mends is told by asking for too much, here
-of the demo cell:
+- `fast` tracks the beads on images of half the scale and fits two coarse meshes. Use it to find out whether the images are good.
+- `standard` is right for most cells. The noise of the beads is then the larger part of the error.
+- `high` takes the mean of many meshes. It helps if the beads are exact: strong cells, soft gels, many beads.
+
+With noise, the presets differ little. For a single cell a coarser preset may come out better by luck.
+
+## What computing cannot improve
+
+Every fit writes an error budget into `fit.json` and `run.json`: which part of the error comes from the beads, the segmentation, the mesh
+and so on. The report shows it. `--accuracy` uses this budget. If no preset can reach what you ask for, the program says why:
 
 ```
 $ mbtfm run --accuracy 1% demo
 PAGE
   "$bin/mbtfm" run --threads 2 --accuracy 1% "$work/demo" 2>&1 | grep '^mbtfm: tensions to' | fold -s -w 120
-  echo '```'
+  cat <<'PAGE'
+```
+
+Then better data help: more beads, less noise, a softer gel ([plan an experiment](planning.md)).
+
+This page is made by `docs/make_accuracy_and_cost.sh`. How well the budget agrees with observed errors, and what each
+single setting costs, is in [cost tables](developers/cost-tables.md).
+PAGE
+} >"$work/page.md"
+
+{
+  cat <<'PAGE'
+# Cost tables
+
+Made by `docs/make_accuracy_and_cost.sh`. Costs are seconds of processor time on two threads. Other programs on the machine lengthen
+them far less than the time that passes. What each preset sets is in `pipeline/cost/presets.cpp`; what users need of this
+is in [accuracy and cost](../accuracy-and-cost.md).
+
+## Do the parts of the error budget add up?
+
+Root sums of squares (nN) over the fibres, or the cells' total forces, of simulated u2os cells with 7 % noise, whose seeds nothing
+was chosen on: what was observed, what the budget stated ([theory](../theory/errors.md#error-budget)), and its parts.
+`build/tests/error_budget 101 110`, `… 101 104 images`.
+
+| | observed | stated | ratio | beads | segmentation | mesh | substrate | solver | model |
+|---|---|---|---|---|---|---|---|---|---|
+PAGE
+  budget_table 101 110 ""
+  budget_table 101 104 images
   echo
   study clean "Beads without noise, true segmentation" clean1 clean2 clean3
   echo
   study noisy "Seven per cent of noise, from images" imaged1 imaged2 imaged3
-} >"$work/page.md"
+} >"$work/tables.md"
 cp "$work/page.md" docs/accuracy-and-cost.md
+cp "$work/tables.md" docs/developers/cost-tables.md

@@ -394,7 +394,7 @@ void declare(stage::ParameterList& list, TrackStageParameters& p) {
   declare(list, p.track);
   list.table("track");
   list.add("binning", p.binning, Range::between(1, images::kLargestBinning),
-           "the images are reduced first: means of blocks of so many pixels a side");
+           "side of the blocks of pixels that are averaged before all else (pixels); 1: the images stay as they are");
   declare(list, p.in_space);
   declare(list, p.surface_plane, "surface", "the stack of beads on the surface");
   declare(list, p.effects, {"drift_affine", "effect_tolerance"});

@@ -56,7 +56,8 @@ struct Parameters {
 
 void declare(stage::ParameterList& list, Parameters& p) {
   list.table("surface");
-  list.add("formula", p.formula, "surface by formula, instead of a file: " + formulas_listed() + "; [ ] may lack");
+  list.add("formula", p.formula,
+           "surface by formula, instead of a file: " + formulas_listed() + "; values in [ ] are optional");
   const std::string cut = " of the rectangle; must be given with a formula, else all of the data";
   const Range place = possible_place_um();
   list.add("low_x_um", p.low_x_um, place, "lowest x" + cut);

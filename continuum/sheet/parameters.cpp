@@ -12,9 +12,9 @@ void declare(stage::ParameterList& list, SheetParameters& p) {
   list.add("contraction_nN_per_um", p.contraction_nN_per_um, Range::between(0, 1e4),
            "contraction of the sheet as a tension: the pull on each length of its edge (nN/um, the same as mN/m)");
   list.add("contraction_kPa", p.contraction_kPa, Range::between(0, 1e4),
-           "the same as a stress, times thickness_um (kPa); give one of the two");
+           "contraction of the sheet as a stress (kPa): contraction_nN_per_um over thickness_um; give one of the two");
   list.add("edge_band_um", p.edge_band_um, Range::size_um(),
-           "the sheet contracts only so near to its edge (um); unset: everywhere");
+           "the sheet contracts only within this distance of its edge (um); unset: everywhere");
   list.add("line_tension_nN", p.line_tension_nN, Range::between(0, 1e4), "tension of a cable along the edge (nN)");
   list.add("adhesion_stiffness_nN_per_um3", p.adhesion_stiffness_nN_per_um3, Range::between(1e-9, 1e9),
            "stiffness of the adhesions per area, or of springs that stand for the ground (nN/um3 = kPa/um); unset: the "
@@ -24,8 +24,10 @@ void declare(stage::ParameterList& list, SheetParameters& p) {
            "the adhesions; none: the tractions are given");
   list.add("strain", p.strain, "small strains or large ones; auto: large on springs if the contraction is large");
   list.add("contraction_measure", p.contraction_measure,
-           "large strain: what the contraction is a tension of: the deformed surface, or the material at rest");
-  list.add("mesh_um", p.mesh_um, Range::mesh_um(), "size of the triangles at the edge (um); unset: by the scene");
+           "large strain: the contraction is a tension of the deformed surface (surface-tension), or of the material "
+           "at rest (second-piola)");
+  list.add("mesh_um", p.mesh_um, Range::mesh_um(),
+           "side of the mesh's triangles at the sheet's edge (um); unset: from the sheet's size and lengths");
 }
 
 Material material_of(const SheetParameters& p) {

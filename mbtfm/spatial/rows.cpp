@@ -63,7 +63,8 @@ std::optional<CommonMotionInSpace> common_motion_beside(const Problem& problem, 
 
 Effect common_motion_effect(Switch setting, const Problem& problem, const std::optional<CommonMotionInSpace>& found) {
   if (setting == Switch::off)
-    return stage::decided(EffectKind::common_motion, setting, true, "as told: the beads at rest lie still");
+    return stage::decided(EffectKind::common_motion, setting, true,
+                          "switched off in [effects]: the beads at rest are taken to lie still");
   if (problem.common_um.cols() == 0)
     return stage::decided(EffectKind::common_motion, setting, false, "the displacement is imposed as it was measured");
   if (!found) return stage::decided(EffectKind::common_motion, setting, true, "found with the tractions");

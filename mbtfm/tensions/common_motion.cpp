@@ -98,9 +98,9 @@ CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementFiel
 bool allows_common_motion(const stage::EffectSwitches& switches) { return switches.common_motion != Switch::off; }
 
 Effect common_motion_effect(Switch setting, const std::optional<FoundMotion>& found) {
-  return stage::decided(
-      EffectKind::common_motion, setting, true,
-      found ? "found with the tensions: " + sentence_of(*found) : "as told: the beads at rest lie still");
+  return stage::decided(EffectKind::common_motion, setting, true,
+                        found ? "found with the tensions: " + sentence_of(*found)
+                              : "switched off in [effects]: the beads at rest are taken to lie still");
 }
 
 Figures figures_of(const FoundMotion& found) {

@@ -213,7 +213,7 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
     result.effect = stage::decided(EffectKind::channel_shift, setting, false, why);
     return result;
   };
-  if (setting == Switch::off) return off("as told: cell and beads lie on each other");
+  if (setting == Switch::off) return off("switched off in [effects]: cell and beads are taken to lie on each other");
   FitParameters rough = parameters;
   rough.tolerance = std::max(rough.tolerance, 0.02);  // the pattern of the forces is all that is asked for
   LinearData there = data;

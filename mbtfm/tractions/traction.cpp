@@ -19,26 +19,29 @@ void declare(stage::ParameterList& list, TractionParameters& p) {
   list.add("gel_model", p.gel_model, "elastic model of the gel");
   list.add("lambda_by", p.lambda_by, "criterion that chooses the regularisation (not for adhesion-forces)");
   list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::between(1e-12, 1e12),
-           "regularisation, fixed: |u − G t|² + lambda² |t|² over a lattice (um/kPa); unset: by the criterion");
-  list.add(
-      "spacing_um", p.spacing_um, Range::mesh_um(),
-      "spacing of the lattice (um; not of trpf, bem); unset: that of beads on a lattice, half the mean distance of "
-      "scattered ones, four fifths of it in space");
+           "fixed regularisation: its square weighs the squares of the tractions on a lattice against those of the "
+           "misfit (um/kPa); unset: by the criterion lambda_by");
+  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
+           "spacing of the lattice of tractions (um; not of trpf, bem); unset: that of beads on a lattice, half the "
+           "mean distance of scattered beads, four fifths of it in space");
   list.add("padding", p.padding, Range::between(1, 8),
-           "fttc, sparse: period over the field's size; 1: the field is periodic itself");
+           "fttc, sparse: period of the computed field over the size of the measured one; 1: the measured field is "
+           "periodic");
   list.add("read_out", p.read_out, "fttc: tractions at the nodes, or their means over the cells around them");
   list.add("gaussian_um", p.gaussian_um, Range::zero_or_size_um(),
-           "fttc: the tractions are smoothed by this Gaussian (um)");
+           "fttc: standard deviation of the Gaussian that smooths the tractions (um)");
   list.add("element_um", p.element_um, Range::mesh_um(), "bem: side of the elements that cover the cell (um)");
   list.add("grow_um", p.grow_um, Range::zero_or_size_um(),
-           "sums are taken within this of the outline or of the adhesions; bem: an adhesion's force is that of the "
-           "tractions on its ellipse grown by this (um)");
+           "tractions are summed up to this distance from the outline or from the adhesions (um); bem: an adhesion's "
+           "force is that of the tractions on its ellipse grown by this");
   list.add("shift_error_um", p.shift_error_um, Range::size_um(),
-           "adhesion-forces: shift of an ellipse whose effect on its force is reported (um)");
+           "adhesion-forces: shift of an adhesion's ellipse; what it changes of the adhesion's force is reported (um)");
   list.add("size_error", p.size_error, Range::between(0.001, 10),
-           "adhesion-forces: the same for both axes too long, by this part");
-  list.add("angle_error_deg", p.angle_error_deg, Range::between(0.001, 90),
-           "adhesion-forces: the same for an ellipse turned by this (degrees)");
+           "adhesion-forces: error of both axes of an adhesion's ellipse, as a share; what it changes of the "
+           "adhesion's force is reported");
+  list.add(
+      "angle_error_deg", p.angle_error_deg, Range::between(0.001, 90),
+      "adhesion-forces: turn of an adhesion's ellipse; what it changes of the adhesion's force is reported (degrees)");
 }
 
 namespace {

@@ -68,11 +68,12 @@ void declare(stage::ParameterList& list, CableParameters& p) {
   list.add("smoothing", p.smoothing, Range{.low = 1e-9, .high = 1e-2},
            "length over which the kink of a collapsed cable is rounded off (mean edge lengths)");
   list.add("force_tolerance", p.force_tolerance, Range{.low = 1e-13, .high = 1e-3},
-           "largest net force on a free vertex at equilibrium (of the largest tension)");
+           "largest net force on a free vertex at equilibrium (as a share of the largest tension)");
   list.add("max_iterations", p.max_iterations, Range::between(1, 1e7),
-           "steps at most; unset: " + std::to_string(CableParameters::kNewtonSteps) + " of Newton's method, " +
-               std::to_string(CableParameters::kConjugateSteps) + " of conjugate gradients");
-  list.add("contraction", p.contraction, "how the equilibrium is found; conjugate-gradient: as in the thesis, slow");
+           "most steps to the cables' equilibrium; unset: " + std::to_string(CableParameters::kNewtonSteps) +
+               " of Newton's method, " + std::to_string(CableParameters::kConjugateSteps) + " of conjugate gradients");
+  list.add("contraction", p.contraction,
+           "method that finds the cables' equilibrium; conjugate-gradient is the slow one of the first publication");
 }
 
 struct CableNetwork::Impl {

@@ -385,7 +385,7 @@ void expect_room_for_vertices(double count) {
                              .count = count,
                              .parts = "vertices",
                              .bytes_each = kBytes,
-                             .remedy = "choose a larger edge_length_um (a cell has some thousand vertices as a rule)"});
+                             .remedy = "choose a larger edge_length_um (a cell usually has some thousand vertices)"});
 }
 
 void expect_room_for_mesh(const SizeField& size, const Boundary& boundary) {

@@ -126,11 +126,13 @@ void expect_room_for_even_mesh(const Cell& cell, const NetworkParameters& parame
 
 void declare(stage::ParameterList& list, NetworkParameters& parameters) {
   list.table("network");
-  list.add("edge_length_um", parameters.edge_length_um, Range::mesh_um(), "mean cable length (um)");
+  list.add("edge_length_um", parameters.edge_length_um, Range::mesh_um(), "mean length of the network's cables (um)");
   list.add("edge_growth", parameters.edge_growth, Range{.low = 0.05, .high = 1},
-           "growth of the edge length with distance from what is resolved finer");
-  list.add("seed", parameters.seed, "of the first placement of the vertices");
-  list.add("seeds", parameters.seeds, "first placement of the vertices");
+           "growth of the cables' length with the distance from what is resolved finer (um per um)");
+  list.add("seed", parameters.seed, "random seed of the vertices' first positions");
+  list.add("seeds", parameters.seeds,
+           "first positions of the vertices: on a lattice (regular), moved off it at random (jittered), or at random "
+           "(poisson)");
   list.add(
       "link_weights", parameters.link_weights,
       "tension and stiffness of the actin network's links: the same for all, or by the width of material that each "
@@ -141,9 +143,10 @@ void declare(stage::ParameterList& list, NetworkParameters& parameters) {
   list.add("adhesion_anchor", parameters.adhesion_anchor,
            "what an adhesion holds: its rim, which the mesh resolves; every vertex that happens to lie in its ellipse; "
            "or the one at its centre");
-  list.add("rim_points", parameters.rim_points, Range::between(3, 1000), "vertices round an adhesion's rim, at least");
+  list.add("rim_points", parameters.rim_points, Range::between(3, 1000),
+           "least number of vertices around an adhesion's rim");
   list.add("free_fibre_ends", parameters.free_fibre_ends,
-           "edge length at the free end of a fibre: as elsewhere, or the fibre's width");
+           "length of the cables at the free end of a fibre: as elsewhere (point), or the fibre's width (width)");
 }
 
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters) {

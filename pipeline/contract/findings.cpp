@@ -52,14 +52,14 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Leave segment.adhesions out: each part of the mask is then an adhesion. Or lower "
        "segment.candidate_spacing_um."},
       {pattern_as_cell, "pattern-as-cell", "segment", caution, "share of the cell's area that lies on the pattern", 0.9,
-       "such a pattern tells no more of the adhesions than the outline does; in simulated cells total forces are then "
+       "such a pattern says no more of the adhesions than the outline does; in simulated cells total forces are then "
        "off by four of their standard errors",
        "If the mask shows the cell, it is no pattern: take it as images.outline_mask, and give an adhesion image. If "
        "the pattern is as large as the cell, read sums of forces over neighbours, not single ones."},
       {fibre_ends_anchored, "fibre-ends-anchored", "segment", note,
        "ends of fibres that reach no adhesion and are held by an anchor", 0,
-       "ventral and edge fibres are held at both ends, dorsal ones at one; fibres that span the cell are ventral as a "
-       "rule",
+       "ventral and edge fibres are held at both ends, dorsal ones at one; fibres that span the cell are "
+       "usually ventral",
        "Check these ends in 1_segment/overlay.png (dashed circles). An adhesion that was missed: lower "
        "segment.adhesion_seed_noise, or draw it. A fibre that is not held there: draw it and name it dorsal or arc."},
       {input_not_used, "input-not-used", "segment", note, "inputs that were not used because another one counts more",
@@ -375,7 +375,7 @@ std::string open_ids(const std::vector<Finding>& findings) {
 
 std::string findings_page() {
   std::string page =
-      "# Findings\n\nThe program tells what it notices about the images, the beads and its own answer. Each finding "
+      "# Findings\n\nThe program reports what it notices about the images, the beads and its own answer. Each finding "
       "has an identity, a\nnumber, a threshold and a remedy. A finding appears on the terminal, in the report, in "
       "`run.json`, in `run.log`, in\nthe column `findings` of `batch.csv` and in `statistics/findings.csv`.\n\n- "
       "**note**: worth knowing; the results hold.\n- **caution**: the results may be off by more than their error bars "

@@ -4,7 +4,7 @@
 
 namespace mbtfm::cost {
 
-// What each setting gains and costs: docs/accuracy-and-cost.md.
+// What each setting gains and costs: docs/developers/cost-tables.md.
 const std::vector<Preset>& presets() {
   static const std::vector<Preset> list = {
       {"fast",

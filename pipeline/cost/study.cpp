@@ -80,7 +80,7 @@ class Scratch {
       throw InputError(
           cell.string(), "a cell on a flat gel: the knobs that are turned are those of the tension fit",
           "one in space (" + of.why + ")",
-          "its report tells how long each stage took; traction.spacing_um sets how many tractions there are");
+          "its report lists how long each stage took; traction.spacing_um sets how many tractions there are");
     has_images_ = has_all_images(cell, images_);
     for (const char* file : {"1_segment/adhesions.csv", "2_track/displacement.csv", "cell.toml"}) {
       if (files::is_file(cell / file)) continue;

@@ -169,7 +169,7 @@ TriangleMesh parse_ply(std::string_view whole, const std::string& name) {
       if (element.name == "face") add_face(row, element, where, mesh);
     }
   }
-  if (!text.word().empty()) throw InputError(name, "the end of the file", "more than the header tells");
+  if (!text.word().empty()) throw InputError(name, "the end of the file", "more than the header states");
   return mesh;
 }
 

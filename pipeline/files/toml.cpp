@@ -59,7 +59,7 @@ std::string advice_on(std::string_view text, std::size_t line) {
   if (here.find('\\') != here.npos)
     return "write folders with /, as in \"D:/images/cell 1\", or the text in single quotes";
   if (here.find('=') != here.npos && here.find('"') == here.npos && here.find('\'') == here.npos)
-    return "a text stands in quotes: actin = \"actin.tif\"";
+    return "a text needs quotes: actin = \"actin.tif\"";
   return {};
 }
 

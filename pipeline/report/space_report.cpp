@@ -80,7 +80,7 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   }
   if (const auto resolution = r.find("median_resolution_um")) {
     facts.push_back(fmt::format(
-        "Two forces are told apart where they are {} µm apart or more (median over the surface); {} numbers of {} are "
+        "Two forces are told apart if they are {} µm apart or more (median over the surface); {} numbers of {} are "
         "resolved.",
         readable(*resolution), readable(r.number("effective_unknowns")), readable(r.number("n_unknowns"))));
   }

@@ -18,29 +18,32 @@ const std::vector<Key>& switches() {
   using S = EffectSwitches;
   static const std::vector<Key> list = {
       {"stress_fibres", &S::stress_fibres, "stress fibres in the network; auto: if any was found"},
-      {"finite_thickness", &S::finite_thickness, "the gel's rigid base; auto: if it changes the field"},
-      {"finite_sides", &S::finite_sides, "the gel's sides at side_distance_um; auto: if they change the field"},
-      {"depth_graded_gel", &S::depth_graded_gel, "modulus_profile; auto: if the modulus changes with depth"},
+      {"finite_thickness", &S::finite_thickness, "the rigid base below the gel; auto: if it changes the displacements"},
+      {"finite_sides", &S::finite_sides,
+       "the gel's sides, at substrate.side_distance_um; auto: if they change the displacements"},
+      {"depth_graded_gel", &S::depth_graded_gel,
+       "a modulus that changes with depth, as in substrate.modulus_profile; auto: if it does"},
       {"vertical_displacement", &S::vertical_displacement,
        "displacement into the gel; auto: if a three-dimensional surface is written"},
       {"large_strain", &S::large_strain,
-       "strains that small-strain theory gets wrong; auto: if material = neo-hooke and the tractions are large enough"},
+       "strains that are too large for small-strain theory; auto: if material = neo-hooke and the tractions are large "
+       "enough"},
       {"drift_affine", &S::drift_affine,
-       "turn, growth and shear of the stressed image; auto: if the beads at rest show them"},
+       "correct turn, growth and shear of the stressed image; auto: if the beads at rest show them"},
       {"common_motion", &S::common_motion,
        "shift, turn, growth and shear of all beads, found with the tensions; auto: on, if the beads allow it"},
       {"beads_under_load", &S::beads_under_load,
-       "beads are taken where they lie while the cell pulls, as its images show the cell; auto: if the beads say "
-       "so"},
+       "use the positions of the beads while the cell pulls, as its images show the cell; auto: if the beads fit "
+       "better so"},
       {"channel_shift", &S::channel_shift,
        "shift and turn of the cell against the beads, found with the tensions; auto: on, if the beads determine it"},
       {"beyond_cut", &S::beyond_cut,
-       "forces beyond the cut of a cell that its image cuts; auto: if the outline has a cut"},
+       "forces of the part of a cell that lies outside its image; auto: if the outline has a cut"},
       {"cable_elasticity", &S::cable_elasticity,
-       "cables resist to be longer than at rest; auto: if any would be longer"},
+       "cables resist being stretched beyond their rest length; auto: if any would be longer"},
       {"robust_loss", &S::robust_loss,
        "outlying beads count less; auto: if outliers cost more accuracy than this loss does"},
-      {"time_coupling", &S::time_coupling, "start from the frame before; auto: if one is given"},
+      {"time_coupling", &S::time_coupling, "start from the tensions of the frame before; auto: if there is one"},
   };
   return list;
 }
@@ -66,7 +69,7 @@ void declare(ParameterList& list, EffectSwitches& values, const std::vector<std:
   }
   if (!is_named(kTolerance)) return;
   list.add(kTolerance, values.effect_tolerance, Range{.low = 0, .high = 1, .excludes_low = true},
-           "what leaving an effect out may change, as a share of the displacement");
+           "an effect that changes the displacement by less than this share is left out if its switch is auto");
 }
 
 Effect decided(EffectKind kind, Switch setting, double number, double threshold, const std::string& found) {

@@ -315,7 +315,7 @@ void declare(ParameterList& list, Gel& gel) {
   list.add("youngs_modulus_kPa", gel.youngs_modulus_kPa, Range::modulus_kPa(), "Young's modulus of the gel (kPa)");
   list.required();
   list.add("poisson_ratio", gel.poisson_ratio, Range::between(0, 0.5),
-           "Poisson's ratio of the gel; 0.5, the incompressible limit, for models without finite elements");
+           "Poisson's ratio of the gel; 0.5, the incompressible limit, only for models without finite elements");
   list.add("thickness_um", gel.thickness_um, Range::thickness_um(), "thickness of the gel on its rigid base (um)");
   list.add("youngs_modulus_sigma_kPa", gel.youngs_modulus_sigma_kPa, Range{.low = 0},
            "standard error of Young's modulus, for the error budget (kPa); unset: not known");

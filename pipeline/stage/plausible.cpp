@@ -195,8 +195,8 @@ void require_possible(const Doubt& d, const std::vector<std::string>& allowed, c
 void declare(ParameterList& list, CheckParameters& p) {
   list.table("checks");
   list.add("allow", p.allow,
-           "quantities that may have values which the table of plausible values refuses: their names, with commas "
-           "between them (in cell.toml also an array)");
+           "names of quantities whose implausible values are accepted (docs/plausible.md), with commas between them; "
+           "in cell.toml also an array. Example: \"poisson_ratio\"");
 }
 
 std::vector<std::string> allowed_quantities(const CheckParameters& p) {

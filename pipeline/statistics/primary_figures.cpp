@@ -89,7 +89,7 @@ charts::Chart super_plot(const Study& study, const Measure& m, int kind, const P
                  "mean " + readable(s.model->estimate) + " " + sample.unit);
   }
   for (std::size_t r = 0; r < n_keys; ++r)
-    chart.key(replicates[r].empty() ? "no replicate told" : replicates[r], condition_colour(static_cast<int>(r)));
+    chart.key(replicates[r].empty() ? "no replicate given" : replicates[r], condition_colour(static_cast<int>(r)));
   return chart;
 }
 

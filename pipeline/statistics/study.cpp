@@ -180,22 +180,22 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
            "source of a cell's replicate (day, dish, animal): `folder`, `folder2`, … or the name of a column of "
            "--table; empty: the column `replicate` or `day` if the table has one");
   list.add("exclude_findings", parameters.exclude_findings,
-           "cells with one of these open findings do not enter; identities with commas between them. Example: "
+           "cells with one of these open findings are left out; identities with commas between them. Example: "
            "\"explains-little, cell-cut\"");
   list.add("primary", parameters.primary,
            "what the study compares first between conditions: the tension of the fibres of primary_type, or the total "
            "force of the cells");
   list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
-  list.add("with_not_converged", parameters.with_not_converged, "cells whose fit did not converge enter, too");
+  list.add("with_not_converged", parameters.with_not_converged, "include cells whose fit did not converge");
   list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
-           "the share of fibres above this tension is given (nN)");
+           "a first tension: the share of fibres above it is given (nN)");
   list.add("strong_tension_nN", parameters.strong_tension_nN, Range::force_nN(),
-           "the share of fibres above this tension is given, too (nN)");
+           "a second tension: the share of fibres above it is given (nN)");
   list.add("near_adhesion_um", parameters.near_adhesion_um, Range::size_um(),
-           "beads this near to an adhesion's centre, or on it, show which way it moves (um)");
+           "beads this near to an adhesion's centre, or on it, give the direction in which it moves (um)");
   list.add("bootstrap_draws", parameters.bootstrap_draws, Range::between(100, 1000000),
-           "draws of cells behind the intervals of means and medians");
-  list.add("bootstrap_seed", parameters.bootstrap_seed, "of these draws");
+           "number of draws of cells that give the intervals of means and medians");
+  list.add("bootstrap_seed", parameters.bootstrap_seed, "random seed of the draws of cells");
   list.add("fibre_types", parameters.fibre_types, Range::between(3, 4),
            "number of fibre types; 3: dorsal, arc and ventral, edge fibres count as ventral; 4: edge "
            "fibres are a type of their own");

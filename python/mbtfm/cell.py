@@ -128,13 +128,13 @@ class Cell:
 
     @property
     def pixel_size_um(self) -> float:
-        """Side of a pixel. ValueError if no run has told it, as in a cell without images."""
+        """Side of a pixel. ValueError if no run has recorded it, as in a cell without images."""
         for stage in ("segment", "track"):
             entry = self.run_record["stages"].get(stage, {})
             for figures in (entry.get("figures", {}), entry.get("parameters", {})):
                 if figures.get("pixel_size_um"):
                     return float(figures["pixel_size_um"])
-        raise ValueError(f"{self.folder}: no run has told the pixel size")
+        raise ValueError(f"{self.folder}: no run has recorded the pixel size")
 
     @property
     def images(self) -> Dict[str, Path]:

@@ -16,7 +16,8 @@ constexpr int kMostBeads = 10'000'000;
 void declare_cell(stage::ParameterList& list, CellParameters& p) {
   list.add("layout", p.layout, "spread: a cell at random; dense: with bundles of fibres; ring, line: regular ones");
   list.add("diameter_um", p.diameter_um, Range::size_um(), "diameter of the cell (um)");
-  list.add("n_corners", p.n_corners, Range::between(3, 50), "adhesion-rich corners of the outline");
+  list.add("n_corners", p.n_corners, Range::between(3, 50),
+           "number of the outline's corners, which are rich in adhesions");
   list.add("corner_jitter", p.corner_jitter, Range::between(0, 0.4), "scatter of the corners' radii, relative");
   list.add("edge_concavity", p.edge_concavity, Range::between(0, 0.3),
            "depth of the arc between two corners over their distance");
@@ -25,64 +26,84 @@ void declare_cell(stage::ParameterList& list, CellParameters& p) {
            "raggedness of the outline (standard deviation, um)");
   list.add("free_edge_concavity", p.free_edge_concavity, Range::between(0, 0.3),
            "depth over length of the arcs that an edge bundle draws in");
-  list.add("n_adhesions", p.n_adhesions, Range::between(2, 5000), "adhesions in all");
+  list.add("n_adhesions", p.n_adhesions, Range::between(2, 5000), "number of all adhesions");
   list.add("adhesion_area_um2", p.adhesion_area_um2, Range::area_um2(), "mean area of an adhesion (um²)");
-  list.add("adhesion_area_log_sd", p.adhesion_area_log_sd, Range::between(0, 5), "spread of the areas' logarithm");
+  list.add("adhesion_area_log_sd", p.adhesion_area_log_sd, Range::between(0, 5),
+           "standard deviation of the logarithm of the adhesions' areas");
   list.add("smallest_area_um2", p.smallest_area_um2, Range::area_um2(), "smallest area of an adhesion (um²)");
   list.add("largest_area_um2", p.largest_area_um2, Range::area_um2(), "largest area of an adhesion (um²)");
   list.add("smallest_aspect", p.smallest_aspect, Range::between(1, 1000), "least length over width of an adhesion");
   list.add("largest_aspect", p.largest_aspect, Range::between(1, 1000), "largest length over width of an adhesion");
   list.add("peripheral_fraction", p.peripheral_fraction, Range::between(0, 1),
            "share of the adhesions without a fibre that lie along the outline");
-  list.add("peripheral_band_um", p.peripheral_band_um, Range::size_um(), "width of the band they lie in (um)");
+  list.add("peripheral_band_um", p.peripheral_band_um, Range::size_um(),
+           "width of the band along the outline in which the adhesions of peripheral_fraction lie (um)");
   list.add("adhesion_clearance_um", p.adhesion_clearance_um, Range::zero_or_size_um(),
            "least gap between adhesions, and between an adhesion and a fibre it does not hold (um)");
   list.add("adhesion_stress_kPa", p.adhesion_stress_kPa, Range::modulus_kPa(),
            "an adhesion grows until its fibre pulls no harder than this by area (kPa)");
-  list.add("n_ventral", p.n_ventral, Range::between(0, 1000), "ventral fibres");
-  list.add("n_dorsal", p.n_dorsal, Range::between(0, 1000), "dorsal fibres");
-  list.add("n_arc", p.n_arc, Range::between(0, 1000), "transverse arcs");
-  list.add("n_edge", p.n_edge, Range::between(0, 20), "bundles along concave arcs of the outline (layout dense)");
-  list.add("n_carpets", p.n_carpets, Range::between(1, 20), "groups of ventral fibres side by side (layout dense)");
+  list.add("n_ventral", p.n_ventral, Range::between(0, 1000), "number of ventral fibres");
+  list.add("n_dorsal", p.n_dorsal, Range::between(0, 1000), "number of dorsal fibres");
+  list.add("n_arc", p.n_arc, Range::between(0, 1000), "number of transverse arcs");
+  list.add("n_edge", p.n_edge, Range::between(0, 20),
+           "number of bundles along concave arcs of the outline (layout dense)");
+  list.add("n_carpets", p.n_carpets, Range::between(1, 20),
+           "number of groups of ventral fibres side by side (layout dense)");
   list.add("carpet_smallest_um", p.carpet_smallest_um, Range::size_um(),
-           "least distance of neighbours in such a group, at its narrow end (um)");
-  list.add("carpet_largest_um", p.carpet_largest_um, Range::size_um(), "largest distance of them there (um)");
+           "least distance of neighbours in a group of ventral fibres side by side, at its narrow end (um)");
+  list.add("carpet_largest_um", p.carpet_largest_um, Range::size_um(),
+           "largest distance of neighbours in a group of ventral fibres side by side, at its narrow end (um)");
   list.add("merging_fraction", p.merging_fraction, Range::between(0, 1),
-           "share of them that end on their neighbour's adhesion");
+           "share of the ventral fibres in groups that end on their neighbour's adhesion");
   list.add("fibre_width_um", p.fibre_width_um, Range::size_um(), "median width of a fibre (um)");
-  list.add("fibre_width_log_sd", p.fibre_width_log_sd, Range::between(0, 0.5), "spread of the widths' logarithm");
-  list.add("fibre_spacing_um", p.fibre_spacing_um, Range::size_um(), "least gap of fibres that run alongside (um)");
+  list.add("fibre_width_log_sd", p.fibre_width_log_sd, Range::between(0, 0.5),
+           "standard deviation of the logarithm of the fibres' widths");
+  list.add("fibre_spacing_um", p.fibre_spacing_um, Range::size_um(),
+           "least gap between fibres that run side by side (um)");
   list.add("free_end_clearance_um", p.free_end_clearance_um, Range::zero_or_size_um(),
            "least gap between a fibre's free end and an adhesion (um)");
-  list.add("n_pairs", p.n_pairs, Range::between(0, 1000), "ventral fibres with a parallel neighbour");
-  list.add("pair_spacing_um", p.pair_spacing_um, Range::size_um(), "distance of these neighbours (um)");
+  list.add("n_pairs", p.n_pairs, Range::between(0, 1000), "number of ventral fibres with a parallel neighbour");
+  list.add("pair_spacing_um", p.pair_spacing_um, Range::size_um(),
+           "distance of a ventral fibre and its parallel neighbour (um)");
   list.add("brightness_log_sd", p.brightness_log_sd, Range::between(0, 0.7),
-           "spread of the logarithm of the adhesions' and fibres' brightness");
+           "standard deviation of the logarithm of the adhesions' and fibres' brightness");
 }
 
 void declare_actin(stage::ParameterList& list, ActinParameters& p) {
-  list.add("n_ruffles", p.n_ruffles, Range::between(0, 1000), "folds of the membrane near the edge, bright in actin");
-  list.add("ruffle_brightness", p.ruffle_brightness, Range::zero_or_factor(), "their brightness over adhesions'");
-  list.add("n_filopodia", p.n_filopodia, Range::between(0, 1000), "spikes of actin beyond the outline");
-  list.add("fibre_brightness", p.fibre_brightness, Range::factor(), "median brightness of fibres over adhesions'");
+  list.add("n_ruffles", p.n_ruffles, Range::between(0, 1000),
+           "number of ruffles: folds of the membrane near the edge, bright in actin");
+  list.add("ruffle_brightness", p.ruffle_brightness, Range::zero_or_factor(),
+           "brightness of ruffles over that of adhesions");
+  list.add("n_filopodia", p.n_filopodia, Range::between(0, 1000),
+           "number of filopodia: spikes of actin beyond the outline");
+  list.add("fibre_brightness", p.fibre_brightness, Range::factor(),
+           "median brightness of fibres over that of adhesions");
   list.add("fibre_modulation", p.fibre_modulation, Range::between(0, 0.5),
            "variation of a fibre's brightness over some micrometres, relative");
   list.add("fibre_fading", p.fibre_fading, Range::between(0, 0.5),
-           "variation of it over tens of micrometres, relative");
+           "variation of a fibre's brightness over tens of micrometres, relative");
   list.add("cytosol", p.cytosol, Range::zero_or_factor(), "brightness of actin that is in no fibre");
   list.add("bulge", p.bulge, Range::between(0, 1), "share of the cell's thickness around the nucleus only");
   list.add("lamella", p.lamella, Range::between(0, 1), "least share of the cell's thickness, at its edge");
-  list.add("clouds", p.clouds, Range::between(0, 0.5), "unevenness of that actin over micrometres, relative");
-  list.add("grain", p.grain, Range::between(0, 0.5), "unevenness of it over the resolution of light, relative");
-  list.add("nuclear_shadow", p.nuclear_shadow, Range::between(0, 1), "loss of its brightness over the nucleus");
-  list.add("nuclear_dimming", p.nuclear_dimming, Range::between(0, 1), "loss of fibres' brightness over the nucleus");
-  list.add("nucleus_radius_um", p.nucleus_radius_um, Range::size_um(), "mean radius of that shadow (um)");
-  list.add("filaments_per_um2", p.filaments_per_um2, Range::between(0, 10), "thin filaments of the meshwork, by area");
-  list.add("shortest_filament_um", p.shortest_filament_um, Range::size_um(), "shortest of them (um)");
-  list.add("longest_filament_um", p.longest_filament_um, Range::size_um(), "longest of them (um)");
+  list.add("clouds", p.clouds, Range::between(0, 0.5),
+           "unevenness of the actin that is in no fibre, over micrometres, relative");
+  list.add("grain", p.grain, Range::between(0, 0.5),
+           "unevenness of the actin that is in no fibre, over the resolution of light, relative");
+  list.add("nuclear_shadow", p.nuclear_shadow, Range::between(0, 1),
+           "share of the brightness that actin in no fibre loses over the nucleus");
+  list.add("nuclear_dimming", p.nuclear_dimming, Range::between(0, 1),
+           "share of the brightness that fibres lose over the nucleus");
+  list.add("nucleus_radius_um", p.nucleus_radius_um, Range::size_um(), "mean radius of the nucleus (um)");
+  list.add("filaments_per_um2", p.filaments_per_um2, Range::between(0, 10),
+           "number of thin filaments of the actin meshwork, by area (1/um²)");
+  list.add("shortest_filament_um", p.shortest_filament_um, Range::size_um(),
+           "length of the shortest filament of the meshwork (um)");
+  list.add("longest_filament_um", p.longest_filament_um, Range::size_um(),
+           "length of the longest filament of the meshwork (um)");
   list.add("filament_brightness", p.filament_brightness, Range::zero_or_factor(),
-           "brightness of the brightest of them");
-  list.add("filament_bend", p.filament_bend, Range::between(0, 0.5), "their sag over their length, standard deviation");
+           "brightness of the meshwork's brightest filament");
+  list.add("filament_bend", p.filament_bend, Range::between(0, 0.5),
+           "sag of the meshwork's filaments over their length, standard deviation");
   list.add("edge_brightness", p.edge_brightness, Range::zero_or_factor(), "brightness of the actin along the outline");
 }
 
@@ -104,19 +125,20 @@ void declare_microscope(stage::ParameterList& list, MicroscopeParameters& p) {
   list.add("image_quality", p.image_quality, "light, haze and sharpness of the images");
   list.add("psf_sigma_um", p.psf_sigma_um, Range::size_um(), "standard deviation of the point-spread function (um)");
   list.add("haze", p.haze, Range::zero_or_factor(), "light from out of focus over light in focus");
-  list.add("haze_sigma_um", p.haze_sigma_um, Range::size_um(), "how far that light spreads (um)");
+  list.add("haze_sigma_um", p.haze_sigma_um, Range::size_um(),
+           "standard deviation of the spread of light from out of focus (um)");
   list.add("haze_tail", p.haze_tail, Range::zero_or_factor(),
-           "light that falls with the cube of the distance beyond that, over light in focus");
+           "light out of focus that falls with the cube of the distance beyond haze_sigma_um, over light in focus");
   list.add("unevenness", p.unevenness, Range::between(0, 0.8), "loss of illumination towards the corners, relative");
   list.add("protein_photons", p.protein_photons, Range::between(1e-6, 1e9),
            "photons by pixel of a bright adhesion or fibre");
   list.add("bead_photons", p.bead_photons, Range::between(1e-6, 1e9), "photons of a bead in focus");
   list.add("bead_sigma_um", p.bead_sigma_um, Range::size_um(), "standard deviation of a bead's image (um)");
   list.add("bead_brightness_log_sd", p.bead_brightness_log_sd, Range::between(0, 5),
-           "spread of the logarithm of the beads' brightness");
+           "standard deviation of the logarithm of the beads' brightness");
   list.add("blurred_bead_fraction", p.blurred_bead_fraction, Range::between(0, 1), "share of beads out of focus");
-  list.add("counts_per_photon", p.counts_per_photon, Range::factor(), "gain of the camera");
-  list.add("camera_offset", p.camera_offset, Range::between(0, 65535), "counts in the dark");
+  list.add("counts_per_photon", p.counts_per_photon, Range::factor(), "gain of the camera (counts by photon)");
+  list.add("camera_offset", p.camera_offset, Range::between(0, 65535), "counts of the camera in the dark");
   list.add("read_noise", p.read_noise, Range::between(0, 65535),
            "standard deviation of the camera's own noise (counts)");
 }
@@ -145,17 +167,18 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   for (stage::Parameter& q : list.all()) q.is_required = false;  // a scenario's gel has defaults, a real one has not
   list.table("scenario");
   list.add("scenario", p.scenario, "name of a scenario, or path of a scenario file");
-  list.add("seed", p.seed, "of all that is random");
+  list.add("seed", p.seed, "random seed of the whole experiment");
   list.add("noise", p.noise, Range::zero_or_factor(),
            "standard deviation of the bead displacements over the largest displacement");
   list.add("noise_um", p.noise_um, Range::zero_or_size_um(),
-           "the same standard deviation as a length (um), in place of `noise`; unset: by `noise`");
-  list.add("beads", p.beads, Range::between(1, kMostBeads), "beads in the field");
+           "standard deviation of the bead displacements as a length (um), in place of `noise`; unset: by `noise`");
+  list.add("beads", p.beads, Range::between(1, kMostBeads), "number of beads in the field");
   list.add("beads_per_um2", p.beads_per_um2, Range::between(1e-6, 25),
-           "beads by area of the field (1/um²), in place of `beads`; unset: by `beads`");
+           "number of beads by area of the field (1/um²), in place of `beads`; unset: by `beads`");
   list.add("images", p.images, "render images in place of the segmentation and the displacement");
   list.add("bead_distance_um", p.bead_distance_um, Range::zero_or_size_um(), "least distance of two beads (um)");
-  list.add("lost_bead_fraction", p.lost_bead_fraction, Range::between(0, 1), "share of beads in one image only");
+  list.add("lost_bead_fraction", p.lost_bead_fraction, Range::between(0, 1),
+           "share of beads that are in one of the two images only");
   list.add("drift_x_um", p.drift_x_um, Range::between(-1000, 1000),
            "shift of the stressed bead image to the right (um)");
   list.add("drift_y_um", p.drift_y_um, Range::between(-1000, 1000), "shift of the stressed bead image down (um)");

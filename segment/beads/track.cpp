@@ -244,23 +244,28 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
       "last stressed_time, or stressed_page, of a time series, each tracked against the relaxed image; 0: one image");
   list.add("method", p.method,
            "what is followed: single beads, or the texture in windows (correlation); auto: windows if beads fail");
-  list.add("detection_snr", p.detection_snr, Range::factor(), "height of a bead over the noise (standard deviations)");
+  list.add("detection_snr", p.detection_snr, Range::factor(),
+           "least height of a bead over its background (standard deviations of the noise)");
   list.add("largest_displacement_um", p.largest_displacement_um, Range::between(0, 100),
-           "how far to look for a bead, after the drift (um); 0: 32 pixels, further if beads are sparse");
+           "distance over which a bead is looked for, after the drift (um); 0: 32 pixels, further if beads are sparse");
   list.add("may_push", p.may_push,
-           "the cell may push its gel outward; otherwise that is taken for exchanged images, an error");
+           "accept a cell that pushes its gel outward; false: this is an error, as the two images may be exchanged");
   list.add("least_similarity", p.least_similarity, Range::between(0, 1),
            "least correlation of a bead's surroundings in both images");
   list.add("outlier_threshold", p.outlier_threshold, Range::factor(),
            "difference from the neighbours that flags a bead (robust standard deviations)");
-  list.add("x_column", p.x_column, "column of --displacement: position in the relaxed state");
-  list.add("y_column", p.y_column, "column of --displacement");
-  list.add("ux_column", p.ux_column, "column of --displacement: stressed minus relaxed position");
-  list.add("uy_column", p.uy_column, "column of --displacement");
+  list.add("x_column", p.x_column, "column of --displacement with x of the relaxed position");
+  list.add("y_column", p.y_column, "column of --displacement with y of the relaxed position");
+  list.add("ux_column", p.ux_column,
+           "column of --displacement with x of the displacement: stressed minus relaxed position");
+  list.add("uy_column", p.uy_column,
+           "column of --displacement with y of the displacement: stressed minus relaxed position");
   list.add("sigma_column", p.sigma_column,
-           "column of --displacement: standard error of a component; if there is none, from the neighbours");
-  list.add("length_unit", p.length_unit,
-           "of --displacement: um, or px (0 at the centre of the first pixel, of pixel_size_um)");
+           "column of --displacement with the standard error of a component; if there is none, it is estimated from "
+           "the neighbours");
+  list.add(
+      "length_unit", p.length_unit,
+      "unit of the lengths in --displacement: um, or px (pixels of pixel_size_um; 0 is the centre of the first pixel)");
 }
 
 RelaxedBeads::RelaxedBeads(const images::Image& relaxed, const TrackParameters& parameters, int threads,

@@ -74,29 +74,30 @@ std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<Adhesi
 void declare(stage::ParameterList& list, AdhesionParameters& p) {
   list.table("segment");
   list.add("adhesion_background_um", p.adhesion_background_um, Range::size_um(),
-           "radius of the median that is the background of an adhesion (um); in a noisy image up to 1.6 times larger, "
-           "as the "
-           "smoothing widens the adhesions");
+           "radius of the median filter that finds the background of an adhesion (um); in a noisy image up to 1.6 "
+           "times larger, as the smoothing widens the adhesions");
   list.add("adhesion_smoothing_um", p.adhesion_smoothing_um, Range::between(0, 100),
            "standard deviation of the Gaussian before thresholding (um); unset: the least from 0.05 to 0.2 um at which "
            "the faintest adhesion is above the noise");
   list.add("adhesion_seed_noise", p.adhesion_seed_noise, Range::factor(),
-           "height of an adhesion's brightest pixel over its background (standard deviations of the noise)");
+           "least height of an adhesion's brightest pixel over its background (standard deviations of the noise)");
   list.add("adhesion_rim_noise", p.adhesion_rim_noise, Range::factor(),
-           "least height of its other pixels (standard deviations of the noise)");
+           "least height of an adhesion's other pixels over its background (standard deviations of the noise)");
   list.add("adhesion_rim_level", p.adhesion_rim_level,
            {.low = 0, .high = 1, .excludes_low = true, .excludes_high = true},
-           "height of the rim as a share of the height near it");
-  list.add("adhesion_level_radius_um", p.adhesion_level_radius_um, Range::size_um(), "how near (um)");
+           "height of an adhesion's rim over the background, as a share of the height within adhesion_level_radius_um "
+           "of it");
+  list.add("adhesion_level_radius_um", p.adhesion_level_radius_um, Range::size_um(),
+           "radius within which the rim's reference height is taken (um)");
   list.add("adhesion_blur_um", p.adhesion_blur_um, {.low = 0, .high = 1, .excludes_low = true},
-           "standard deviation of the blurred rim of an adhesion (um); unset: as the widest adhesions show it, between "
+           "standard deviation of the blur at an adhesion's rim (um); unset: measured on the widest adhesions, between "
            "half a pixel and 0.2 um");
   list.add("adhesion_split_depth", p.adhesion_split_depth, Range::between(0, 1),
-           "dip between two adhesions that touch, as a share of the fainter one's height");
-  list.add("adhesion_smallest_um2", p.adhesion_smallest_um2, Range::area_um2(), "smallest area (um²)");
-  list.add("adhesion_largest_um2", p.adhesion_largest_um2, Range::area_um2(), "largest area (um²)");
+           "least dip of the brightness between two adhesions that touch, as a share of the fainter one's height");
+  list.add("adhesion_smallest_um2", p.adhesion_smallest_um2, Range::area_um2(), "smallest area of an adhesion (um²)");
+  list.add("adhesion_largest_um2", p.adhesion_largest_um2, Range::area_um2(), "largest area of an adhesion (um²)");
   list.add("adhesion_faintest", p.adhesion_faintest, Range::between(0, 1),
-           "least height as a share of the mean height of bright pixels");
+           "least height of an adhesion over its background, as a share of the mean height of bright pixels");
 }
 
 std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, double pixel_size_um,

@@ -279,7 +279,7 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
   if (fibre.type == FibreType::edge) fibre.type_reason += "; along a free edge";
   if (n_tied < 2 && is_long(line) && !adhesions.empty()) {
     fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
-    fibre.type_reason += "; fibres as long as this are held at both ends as a rule";
+    fibre.type_reason += "; fibres as long as this are usually held at both ends";
   }
 }
 

@@ -263,30 +263,31 @@ void declare(stage::ParameterList& list, FibreParameters& p) {
   list.add("fibre_averaging_um", p.fibre_averaging_um, Range::between(1e-3, 10),
            "averaging along the fibre (standard deviation, um)");
   list.add("fibre_start_noise", p.fibre_start_noise, Range::factor(),
-           "height a fibre reaches somewhere (standard deviations of the filtered noise)");
+           "height that a fibre must reach somewhere (standard deviations of the filtered noise)");
   list.add("fibre_follow_noise", p.fibre_follow_noise, Range::factor(),
-           "height it may fall to (standard deviations of the filtered noise)");
+           "height that a fibre must keep along its length (standard deviations of the filtered noise)");
   list.add("fibre_false_per_cell", p.fibre_false_per_cell, Range::factor(),
-           "lines of the meshwork that may pass for fibres, expected number in a cell");
+           "expected number of lines in a cell that are taken for fibres but belong to the actin meshwork");
   list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::size_um(),
-           "smallest radius of curvature (um)");
+           "smallest radius of curvature of a fibre (um)");
   list.add("fibre_faintest", p.fibre_faintest, Range::between(0, 1),
-           "least height as a share of the middle one of the cell's fibres");
+           "least height of a fibre, as a share of the median height of the cell's fibres");
   list.add("fibre_edge_um", p.fibre_edge_um, Range::zero_or_size_um(),
            "a line along the outline this near to it is the cell's edge, not a fibre (um)");
   list.add("fibre_edge_height", p.fibre_edge_height, Range::zero_or_factor(),
-           "unless it is by this factor as high as the edge is as a rule");
+           "a line near the edge counts as a fibre if it is this many times as high as the edge usually is");
   list.add("fibre_lamellipodium_um", p.fibre_lamellipodium_um, Range::zero_or_size_um(),
            "a line that winds this near to the outline is a ruffle, not a fibre (um)");
   list.add("fibre_gap_um", p.fibre_gap_um, Range::zero_or_size_um(), "length over which a fibre may be invisible (um)");
   list.add("fibre_shortest_um", p.fibre_shortest_um, Range::size_um(), "shortest fibre (um)");
   list.add("fibre_side_ratio", p.fibre_side_ratio, Range::between(0, 1),
-           "least drop to one side as a share of the drop to the other");
-  list.add("fibre_reach_um", p.fibre_reach_um, Range::size_um(), "an end this near to an adhesion is held by it (um)");
+           "least drop of the brightness to one side of a fibre, as a share of the drop to the other side");
+  list.add("fibre_reach_um", p.fibre_reach_um, Range::size_um(),
+           "a fibre's end this near to an adhesion is held by it (um)");
   list.add("fibre_faint_um", p.fibre_faint_um, Range::zero_or_size_um(),
-           "an end is followed to an adhesion this far while it is brighter than the texture (um)");
+           "distance over which a fibre's end is followed to an adhesion, while it is brighter than the texture (um)");
   list.add("fibre_simplify_um", p.fibre_simplify_um, Range::size_um(),
-           "points are left out if the line moves less than this (um)");
+           "points of a fibre are left out if its line then moves less than this (um)");
 }
 
 TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,

@@ -351,7 +351,7 @@ std::vector<CellOutline> mask_outlines(const LabelMask& mask, int cell, const Fi
   }
   if (mask.is_binary && cell > static_cast<int>(labels.size()))
     throw InputError(mask.name, "cell " + std::to_string(cell), std::to_string(labels.size()) + " in all",
-                     "cells that touch count as one: a label image tells them apart");
+                     "cells that touch count as one: a label image separates them");
   const int label = mask.is_binary ? labels[static_cast<std::size_t>(cell - 1)] : cell;
   if (std::ranges::find(labels, label) == labels.end())
     throw InputError(mask.name, "a cell with label " + std::to_string(label), "labels " + listed(labels),

@@ -17,7 +17,7 @@ void declare(stage::ParameterList& list, SegmentParameters& p) {
            "side of a pixel in the specimen (um); unset: from the image's own calibration");
   list.table("segment");
   list.add("binning", p.binning, Range::between(1, images::kLargestBinning),
-           "the images are reduced first: means of blocks of so many pixels a side");
+           "side of the blocks of pixels that are averaged before all else (pixels); 1: the images stay as they are");
   list.add(
       "cell", p.cell, {.low = 0},
       "which cell of the image, by area from 1, the largest; 0: all, each in a folder cell_1, cell_2, … of its own");
@@ -27,7 +27,8 @@ void declare(stage::ParameterList& list, SegmentParameters& p) {
            "move fibres and outline to where the adhesion image has them; auto: if fibre ends show a shift",
            {Switch::automatic, Switch::off});
   list.add("contact_sheet", p.contact_sheet,
-           "draw contact_sheet.png, overlays over the values of one or two of these parameters: name=a,b,c name=d,e");
+           "one or two parameters of this table whose values are compared as overlays in contact_sheet.png: name=a,b,c "
+           "name=d,e");
   declare(list, p.adhesions);
   declare(list, p.candidates);
   declare(list, p.fibres);

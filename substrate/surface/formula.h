@@ -17,7 +17,7 @@ namespace mbtfm::surface {
 /// - well: depth_um/2 [1 - tanh((r - radius_um)/wall_um)], r from (x_um, y_um)
 /// - cap: a segment of a sphere of radius_um that bulges out of the gel by height_um at (x_um, y_um)
 ///
-/// Numbers that may lack (phase, angle, x, y, z) are 0.
+/// Numbers that may be left out (phase, angle, x, y, z) are 0.
 /// @throws UsageError where it is no such text
 std::function<double(Vec2)> formula_of(const std::string& text);
 /// The names and their numbers, for help.

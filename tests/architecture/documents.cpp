@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <regex>
 #include <sstream>
 
@@ -21,6 +22,7 @@
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/stage/plausible.h"
 #include "pipeline/statistics/study_files.h"
+#include "tests/support/plain_words.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -46,18 +48,83 @@ TEST(Documents, the_examples_of_the_format_page_are_read) {
   EXPECT_EQ(files::read_adhesion_forces(folder / "adhesion_forces.csv").size(), 2u);
 }
 
+constexpr const char* kStages[] = {"segment", "track", "network", "contract", "fit",      "traction",
+                                   "plan",    "sheet", "indent",  "mean",     "simulate", "stats"};
+
+/// What a new user sets first, and then asks for.
+struct Needed {
+  const char *stage, *table, *key;
+};
+constexpr Needed kNeeded[] = {{"segment", "", "pixel_size_um"},    {"fit", "gel", "youngs_modulus_kPa"},
+                              {"fit", "gel", "poisson_ratio"},     {"fit", "gel", "thickness_um"},
+                              {"segment", "segment", "adhesions"}, {"segment", "segment", "fibre_false_per_cell"},
+                              {"track", "track", "method"},        {"track", "track", "z_points"},
+                              {"fit", "substrate", "model"},       {"fit", "fit", "n_meshes"}};
+
+/// The cells of a parameter's row: key, default, value, meaning.
+std::vector<std::string> row_of(const std::string& output, const Needed& needed) {
+  const std::string table = needed.table, key = needed.key;
+  const std::string title = table.empty() ? "### Above the first table" : "### `[" + table + "]`";
+  std::istringstream lines(output);
+  bool is_table = false;
+  std::vector<std::string> cells;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("### ")) is_table = line == title;
+    if (!is_table || !line.starts_with("| `" + key + "` |")) continue;
+    std::string rest = line.substr(2, line.size() - 4);
+    for (auto end = rest.find(" | "); end != rest.npos; end = rest.find(" | ")) {
+      cells.push_back(rest.substr(0, end));
+      rest.erase(0, end + 3);
+    }
+    cells.push_back(rest);
+    break;
+  }
+  EXPECT_EQ(cells.size(), 4u) << needed.stage << ": " << title << ": " << key;
+  cells.resize(4);
+  return cells;
+}
+
+std::string needed_table(const std::map<std::string, std::string>& outputs) {
+  std::string text =
+      "\n## The ten you need\n\nThe first four set the size of every force: check them first. The others help if a "
+      "result is not what you expect.\n\n| key | table | program | default | meaning |\n|---|---|---|---|---|\n";
+  for (const Needed& needed : kNeeded) {
+    const std::vector<std::string> cells = row_of(outputs.at(needed.stage), needed);
+    const std::string table = needed.table;
+    text += "| " + cells[0] + " | " + (table.empty() ? "above the first" : "`[" + table + "]`") + " | `mbtfm-" +
+            needed.stage + "` | " + cells[1] + " | " + cells[3] + " |\n";
+  }
+  return text;
+}
+
 std::string parameter_page() {
-  std::string page =
-      "# Parameters\n\nMade by the programs themselves (`mbtfm-<stage> --parameters`). Each is a key of `cell.toml` "
-      "and a "
-      "flag of its\nprogram; flags win. `mbtfm-simulate` reads its tables from a scenario file.\n";
-  for (const char* stage : {"segment", "track", "network", "contract", "fit", "traction", "plan", "sheet", "indent",
-                            "mean", "simulate", "stats"}) {
+  std::map<std::string, std::string> outputs;
+  for (const char* stage : kStages) {
     const auto outcome = test::run_program("mbtfm-" + std::string(stage) + " --parameters");
     EXPECT_EQ(outcome.code, 0) << outcome.output;
-    page += "\n## `mbtfm-" + std::string(stage) + "`\n" + outcome.output;
+    outputs[stage] = outcome.output;
   }
+  std::string page =
+      "# Parameters\n\nMade by the programs themselves (`mbtfm-<stage> --parameters`). Each is a key of `cell.toml` "
+      "and a flag of its\nprogram; flags win. `mbtfm-simulate` reads its tables from a scenario file. How much is "
+      "computed is set\nby a flag of `mbtfm run`: `--preset` ([accuracy and cost](accuracy-and-cost.md)).\n" +
+      needed_table(outputs);
+  for (const char* stage : kStages) page += "\n## `mbtfm-" + std::string(stage) + "`\n" + outputs[stage];
   return page;
+}
+
+/// Who reads one row, in --help or on the page, needs no other to understand it.
+TEST(Documents, a_parameters_meaning_stands_alone_in_plain_words) {
+  const std::regex leans(R"(^(of|unless|the same|their|its|likewise)\b)");
+  int n_rows = 0;
+  for (const std::string& line : test::lines_of_prose(parameter_page())) {
+    for (const std::string& found : test::unplain_words_in(line)) ADD_FAILURE() << found;
+    const auto last = line.rfind(" | ");
+    if (!line.starts_with("| code |") || last == line.npos) continue;
+    ++n_rows;
+    EXPECT_FALSE(std::regex_search(line.substr(last + 3), leans)) << line;
+  }
+  EXPECT_GE(n_rows, 300);
 }
 
 /// Set MBTFM_WRITE_DOCS to write the page instead.
@@ -128,7 +195,7 @@ TEST(Documents, the_list_of_planted_faults_fits_the_sources) {
 
 /// Each test of tests/stability says what is hard and what must come out, and has its line in the catalogue.
 TEST(Documents, the_catalogue_lists_every_hard_case) {
-  const std::string page = files::read_text(kDocs / "hard-cases.md");
+  const std::string page = files::read_text(kDocs / "developers/hard-cases.md");
   const std::regex any_test("\nTEST(_P)?\\("), stated("\nTEST(_P)?\\(\\w+, (\\w+)\\) \\{\\s*test::hard_case\\(");
   for (const auto& entry : fs::directory_iterator(fs::path(MBTFM_SOURCE_DIR) / "tests/stability")) {
     const std::string text = files::read_text(entry.path());
@@ -140,7 +207,7 @@ TEST(Documents, the_catalogue_lists_every_hard_case) {
       std::string name = (*at)[2];
       std::replace(name.begin(), name.end(), '_', ' ');
       EXPECT_NE(page.find(name + " |"), page.npos)
-          << name << ": write the page anew with build/tests/hard_cases_page docs/hard-cases.md";
+          << name << ": rewrite the page with build/tests/hard_cases_page docs/developers/hard-cases.md";
     }
   }
 }

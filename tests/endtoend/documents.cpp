@@ -2,10 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdlib>
+#include <map>
 #include <regex>
+#include <set>
 #include <sstream>
 
+#include "tests/support/plain_words.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -58,7 +62,8 @@ TEST(CurvedGels, every_command_runs) {
 }
 
 std::vector<fs::path> pages() {
-  std::vector<fs::path> list = {kProject / "README.md", kProject / "CONTRIBUTING.md", kProject / "samples/README.md"};
+  std::vector<fs::path> list = {kProject / "README.md", kProject / "CONTRIBUTING.md", kProject / "python/README.md",
+                                kProject / "samples/README.md"};
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kDocs)) {
     if (entry.path().extension() == ".md") list.push_back(entry.path());
   }
@@ -66,25 +71,98 @@ std::vector<fs::path> pages() {
   return list;
 }
 
-TEST(Pages, every_link_between_them_leads_to_a_file) {
-  const std::regex link(R"(\]\(([^)#:]+)(#[^)]*)?\))");
+/// What GitHub calls a title in links: small letters, "-" for a space, and no punctuation.
+std::string slug_of(const std::string& title) {
+  std::string slug;
+  for (std::size_t i = 0; i < title.size(); ++i) {
+    const auto c = static_cast<unsigned char>(title[i]), next = static_cast<unsigned char>(title.c_str()[i + 1]);
+    if (c == ' ' || c == '-') {
+      slug += '-';
+    } else if (c == '_' || std::isalnum(c) != 0) {
+      slug += static_cast<char>(std::tolower(c));
+    } else if (c == 0xE2) {  // U+2000 to U+2FFF: dashes, quotes, signs, three bytes each
+      i += 2;
+    } else if (c == 0xC2 && next != 0xB5) {  // U+0080 to U+00BF: signs, but for the micro sign, which is a letter
+      i += 1;
+    } else if (c >= 0x80) {
+      slug += title[i];
+    }
+  }
+  return slug;
+}
+
+/// The second of two alike gets "-1".
+std::set<std::string> anchors_of(const fs::path& page) {
+  std::istringstream lines(files::read_text(page));
+  std::map<std::string, int> n_alike;
+  std::set<std::string> anchors;
+  bool is_code = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find("```") != line.npos) is_code = !is_code;
+    const auto begin = line.find_first_not_of('#');
+    if (is_code || begin == 0 || begin == line.npos || line[begin] != ' ') continue;
+    const std::string title = std::regex_replace(line.substr(begin + 1), std::regex(R"(\[([^\]]*)\]\([^)]*\))"), "$1");
+    const std::string slug = slug_of(title);
+    const int n = n_alike[slug]++;
+    anchors.insert(n == 0 ? slug : slug + "-" + std::to_string(n));
+  }
+  return anchors;
+}
+
+TEST(Pages, every_link_between_them_leads_to_a_file_and_a_title_in_it) {
+  const std::regex link(R"(\]\(([^)#:]*)(#[^)]*)?\))");
   for (const fs::path& page : pages()) {
     const std::string text = files::read_text(page);
     for (std::sregex_iterator at(text.begin(), text.end(), link), end; at != end; ++at) {
-      const fs::path target = page.parent_path() / (*at)[1].str();
-      EXPECT_TRUE(fs::exists(target)) << page.lexically_relative(kProject) << " links to " << (*at)[1];
+      const std::string file = (*at)[1], anchor = (*at)[2];
+      const fs::path target = file.empty() ? page : page.parent_path() / file;
+      EXPECT_TRUE(fs::exists(target)) << page.lexically_relative(kProject) << " links to " << file;
+      if (anchor.empty() || target.extension() != ".md" || !fs::exists(target)) continue;
+      EXPECT_TRUE(anchors_of(target).contains(anchor.substr(1)))
+          << page.lexically_relative(kProject) << " links to " << file << anchor;
     }
   }
 }
 
-TEST(Pages, the_index_names_every_page_for_users) {
+TEST(Pages, the_index_names_every_page) {
   const std::string index = files::read_text(kDocs / "README.md");
-  for (const char* folder : {"", "theory/"}) {
-    for (const fs::directory_entry& entry : fs::directory_iterator(kDocs / folder)) {
-      const std::string name = folder + entry.path().filename().string();
-      if (entry.path().extension() != ".md" || name == "README.md") continue;
-      EXPECT_NE(index.find("(" + name + ")"), index.npos) << name << " is not in docs/README.md";
-    }
+  for (const fs::path& page : pages()) {
+    const std::string name = page.lexically_relative(kDocs).generic_string();
+    if (name.starts_with("..") || name == "README.md") continue;
+    EXPECT_NE(index.find("(" + name + ")"), index.npos) << name << " is not in docs/README.md";
+  }
+}
+
+/// Commands as pipeline/mbtfm_main.cpp adds them, programs as they were built, codes as the sources name them.
+TEST(Pages, every_command_and_exit_code_is_on_its_page) {
+  const std::string commands = files::read_text(kDocs / "commands.md");
+  const std::string source = files::read_text(kProject / "pipeline/mbtfm_main.cpp");
+  const std::regex added(R"re(add_(command\(\s*app,\s*line,|subcommand\()\s*"([a-z]+)")re");
+  int n_commands = 0;
+  for (std::sregex_iterator at(source.begin(), source.end(), added), end; at != end; ++at, ++n_commands)
+    EXPECT_NE(commands.find("| `mbtfm " + (*at)[2].str()), commands.npos) << (*at)[2];
+  EXPECT_GE(n_commands, 12);
+  for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(MBTFM_BINARY_DIR) / "bin")) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with("mbtfm-")) continue;
+    EXPECT_NE(commands.find("`" + name + "`"), commands.npos) << name;
+  }
+  const std::string errors = files::read_text(kProject / "pipeline/contract/errors.h");
+  const std::regex code(R"(inline constexpr int k\w+ = (\d+);)");
+  for (const char* name : {"commands.md", "troubleshooting.md", "formats.md"}) {
+    const std::string page = files::read_text(kDocs / name);
+    for (std::sregex_iterator at(errors.begin(), errors.end(), code), end; at != end; ++at)
+      EXPECT_NE(page.find("\n| " + (*at)[1].str() + " |"), page.npos) << name << ": " << (*at)[1];
+  }
+}
+
+/// Those of theory are for readers of equations.
+TEST(Pages, for_users_have_plain_words) {
+  for (const fs::path& page : pages()) {
+    const std::string name = page.lexically_relative(kProject).generic_string();
+    if (name.starts_with("docs/developers/") || name.starts_with("docs/theory") || name == "CONTRIBUTING.md") continue;
+    for (const std::string& line : test::lines_of_prose(files::read_text(page)))
+      for (const std::string& found : test::unplain_words_in(line)) ADD_FAILURE() << name << ": " << found;
   }
 }
 
@@ -110,7 +188,7 @@ std::vector<int> sentence_lengths(const fs::path& page) {
   std::istringstream words(prose);
   for (std::string word; words >> word;) {
     n += std::any_of(word.begin(), word.end(), [](unsigned char c) { return std::isalnum(c); }) ? 1 : 0;
-    if (std::string(".!?:;").find(word.back()) == std::string::npos) continue;
+    if (std::string(".!?").find(word.back()) == std::string::npos) continue;
     if (n > 1) lengths.push_back(n);
     n = 0;
   }
@@ -126,21 +204,25 @@ void expect_short_sentences(const std::string& page, int median, int p90) {
 }
 
 /// For readers whose language is another one. The bars are those of guides for plain English: some 15 words a sentence,
-/// none that one must read twice.
+/// none that one must read twice. What one reads from begin to end has the lower bars, what one looks up the others.
 TEST(Pages, have_short_sentences) {
   struct Bar {
-    const char* page;
     int median, p90;
+    std::vector<const char*> pages;
   };
-  const Bar bars[] = {{"../README.md", 16, 30}, {"tutorial.md", 16, 30},          {"faq.md", 16, 30},
-                      {"acquire.md", 16, 30},   {"correct-by-hand.md", 16, 30},   {"troubleshooting.md", 16, 30},
-                      {"limits.md", 16, 30},    {"statistics.md", 16, 30},        {"batches.md", 16, 30},
-                      {"install.md", 16, 30},   {"planning.md", 16, 30},          {"../python/README.md", 16, 30},
-                      {"sheets.md", 22, 40},    {"effects.md", 22, 40},           {"findings.md", 22, 40},
-                      {"formats.md", 22, 40},   {"resolution.md", 22, 40},        {"accuracy-and-cost.md", 22, 40},
-                      {"theory.md", 22, 40},    {"validation.md", 22, 40},        {"accuracy.md", 22, 40},
-                      {"extending.md", 22, 40}, {"../samples/README.md", 22, 40}, {"../CONTRIBUTING.md", 22, 40}};
-  for (const Bar& bar : bars) expect_short_sentences(bar.page, bar.median, bar.p90);
+  const std::vector<Bar> bars = {
+      {16,
+       30,
+       {"../README.md", "tutorial.md", "faq.md", "glossary.md", "acquire.md", "correct-by-hand.md",
+        "troubleshooting.md", "limits.md", "statistics.md", "batches.md", "install.md", "planning.md", "curved-gels.md",
+        "sheets.md", "accuracy-and-cost.md", "paraview.md", "../python/README.md"}},
+      {22,
+       40,
+       {"README.md", "commands.md", "parameters.md", "columns.md", "plausible.md", "effects.md", "findings.md",
+        "formats.md", "resolution.md", "degradations.md", "theory.md", "validation.md", "accuracy.md", "extending.md",
+        "../samples/README.md", "../CONTRIBUTING.md"}}};
+  for (const Bar& bar : bars)
+    for (const char* page : bar.pages) expect_short_sentences(page, bar.median, bar.p90);
 }
 
 TEST(Pages, of_theory_have_short_sentences) {

@@ -230,7 +230,7 @@ TEST_F(TractionInSpace, says_whether_a_common_motion_was_looked_for) {
   const std::string dense = "--spacing_um 4 --method ";
   EXPECT_NE(run(dense + "tikhonov").output.find("common motion: on (auto): found with the tractions: shift x"),
             std::string::npos);
-  EXPECT_NE(run(dense + "tikhonov --common_motion off").output.find("common motion: off (as switched): as told"),
+  EXPECT_NE(run(dense + "tikhonov --common_motion off").output.find("common motion: off (as switched): switched off"),
             std::string::npos);
   EXPECT_NE(run(dense + "direct").output.find("common motion: off (auto): the displacement is imposed"),
             std::string::npos);

@@ -34,6 +34,21 @@ for file in "$prefix"/share/fish/vendor_completions.d/*; do fish -n "$file"; don
 (. "$prefix/share/bash-completion/completions/mbtfm" && COMP_WORDS=(mbtfm run --pre) COMP_CWORD=2 && _mbtfm && [ "${COMPREPLY[*]}" = --preset ]) ||
   fail "bash does not complete a flag"
 
+python3 - "$prefix" <<'PYTHON' || fail "a page links to what is not installed"
+import pathlib
+import re
+import sys
+
+whole, n_pages = True, 0
+for page in pathlib.Path(sys.argv[1]).rglob("*.md"):
+    n_pages += 1
+    for link in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        if not (page.parent / link).exists():
+            print(page.relative_to(sys.argv[1]), "links to", link, file=sys.stderr)
+            whole = False
+sys.exit(0 if whole and n_pages > 20 else 1)
+PYTHON
+
 cp -r "$source/tests/package/consumer" consumer
 cmake -S consumer -B consumer/build -DCMAKE_PREFIX_PATH="$prefix" >consumer.log 2>&1 || { cat consumer.log >&2; fail "find_package"; }
 cmake --build consumer/build >consumer.log 2>&1 || { cat consumer.log >&2; fail "a program with the libraries"; }

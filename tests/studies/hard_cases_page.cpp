@@ -1,5 +1,5 @@
-/// Runs the stability tests and writes what they state and measure into the tables of docs/hard-cases.md:
-///   hard_cases_page docs/hard-cases.md [NAME]...
+/// Runs the stability tests and writes what they state and measure into the tables of docs/developers/hard-cases.md:
+///   hard_cases_page docs/developers/hard-cases.md [NAME]...
 /// All tables or those named. A table of tests/stability/NAME.cpp stands between the lines <!-- NAME --> and <!-- end
 /// -->.
 #include <cstdio>
@@ -82,7 +82,7 @@ std::string table_of(const std::string& name) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::cerr << "usage: hard_cases_page docs/hard-cases.md [NAME]...\n";
+    std::cerr << "usage: hard_cases_page docs/developers/hard-cases.md [NAME]...\n";
     return 2;
   }
   const std::set<std::string> asked(argv + 2, argv + argc);

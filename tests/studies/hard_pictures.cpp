@@ -1,4 +1,5 @@
-/// hard_pictures FOLDER: pictures of hard cases for docs/hard-cases.md: images (PNG), beads, substrate and fit (SVG).
+/// hard_pictures FOLDER: pictures of hard cases for docs/developers/hard-cases.md: images (PNG), beads, substrate and
+/// fit (SVG).
 #include <cmath>
 #include <cstdio>
 #include <filesystem>

@@ -1,5 +1,5 @@
-/// Lines of the catalogue of hard cases (docs/hard-cases.md), recorded with a test's result; `hard_cases` makes the
-/// page.
+/// Lines of the catalogue of hard cases (docs/developers/hard-cases.md), recorded with a test's result; `hard_cases`
+/// makes the page.
 #pragma once
 
 #include <gtest/gtest.h>
