@@ -105,16 +105,6 @@ double unexplained_um(const Segmentation& s) {
   return sum;
 }
 
-/// Length over width, mean weighed by area; 0 of none.
-double aspect_ratio(const std::vector<Adhesion>& adhesions) {
-  double sum = 0, area_um2 = 0;
-  for (const Adhesion& a : adhesions) {
-    sum += a.area_um2 * a.major_axis_um / a.minor_axis_um;
-    area_um2 += a.area_um2;
-  }
-  return area_um2 > 0 ? sum / area_um2 : 0;
-}
-
 StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
   StageReport report;
   const auto n_of = [&](FibreType type) {
@@ -167,8 +157,8 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                    (n_of(FibreType::edge) > 0 ? ", " + std::to_string(n_of(FibreType::edge)) + " edge)" : ")");
   const double bright_um = unexplained_um(s);
   for (std::optional<Finding> found :
-       {noticed(FindingKind::adhesions_long, aspect_ratio(s.cell.adhesions),
-                "The adhesions are " + brief(aspect_ratio(s.cell.adhesions)) +
+       {noticed(FindingKind::adhesions_long, cells::aspect_ratio(s.cell.adhesions),
+                "The adhesions are " + brief(cells::aspect_ratio(s.cell.adhesions)) +
                     " times as long as wide, on average over their area. Adhesions are 2 to 3 times."),
         noticed(FindingKind::bright_actin, bright_um,
                 brief(bright_um) + " um of actin, as bright as the cell's fibres, is in no fibre."),

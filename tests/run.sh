@@ -3,7 +3,7 @@
 # e.g. ./tests/run.sh -L unit. MBTFM_TIDY=1: clang-tidy on the sources that differ from origin/main, too.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-./cmake/install_packages.sh chromium clang-format doxygen mkdocs python3-numpy python3-pandas man-db strace zsh fish  # chromium: to look at the pages; those tests skip where there is none
+./cmake/install_packages.sh chromium clang-format doxygen imagemagick mkdocs mypy python3-numpy python3-pandas man-db r-base-core strace zsh fish  # for tests that skip where there is none
 find continuum mbtfm network pipeline samples segment substrate tests -name '*.cpp' -o -name '*.h' -o -name '*.inc' |
   xargs clang-format --dry-run -Werror || { echo "mbtfm: run clang-format -i on these files" >&2; exit 1; }
 # Sources of a library are compiled together, and what most tests include is read once: for machines without a cache. The

@@ -1,6 +1,9 @@
 # Repeats the tables of this study in R, from fibres.csv and cells.csv beside it, and compares them with types.csv and
-# tests.csv. Run in this folder: Rscript study.R
+# tests.csv: Rscript study.R
 # The mixed model needs the package metafor (install.packages("metafor")); without it that part is left out.
+
+script <- sub("^--file=", "", grep("^--file=", commandArgs(FALSE), value = TRUE))
+if (length(script) == 1) setwd(dirname(script))  # else: run by source() in this folder
 
 fibres <- read.csv("fibres.csv", colClasses = c(cell = "character", condition = "character"))
 types <- read.csv("types.csv", colClasses = c(cell = "character", condition = "character"))

@@ -133,6 +133,15 @@ std::vector<Adhesion> find_adhesions(const images::Image& image, double pixel_si
   return adhesions;
 }
 
+double aspect_ratio(const std::vector<Adhesion>& adhesions) {
+  double sum = 0, area_um2 = 0;
+  for (const Adhesion& a : adhesions) {
+    sum += a.area_um2 * a.major_axis_um / a.minor_axis_um;
+    area_um2 += a.area_um2;
+  }
+  return area_um2 > 0 ? sum / area_um2 : 0;
+}
+
 std::string why_no_adhesions(const images::Image& image, double pixel_size_um, const AdhesionParameters& p) {
   if (std::string reason = emptiness_of(image); !reason.empty()) return reason;
   const Contrast c = contrast_of(matrix_of(image), pixel_size_um, p);

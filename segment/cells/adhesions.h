@@ -56,6 +56,9 @@ std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, do
 std::vector<Adhesion> find_adhesions(const images::Image& image, double pixel_size_um,
                                      const AdhesionParameters& parameters);
 
+/// Length over width, mean weighed by area; 0 of none.
+double aspect_ratio(const std::vector<Adhesion>& adhesions);
+
 /// Why there is no adhesion in an image in which none is found: what stands out of the noise least short of one.
 std::string why_no_adhesions(const images::Image& image, double pixel_size_um, const AdhesionParameters& parameters);
 

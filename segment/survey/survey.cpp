@@ -8,6 +8,7 @@
 #include "pipeline/stage/plausible.h"
 #include "segment/beads/plane.h"
 #include "segment/beads/track.h"
+#include "segment/cells/adhesions.h"
 #include "segment/cells/outline.h"
 
 namespace mbtfm::survey {
@@ -73,9 +74,11 @@ void look_at_beads(const CellImages& cell, double pixel_um, int threads, Survey&
   if (size_relaxed == 0 || size_stressed == 0) return;
   const double ratio = size_stressed / size_relaxed, unlike = std::max(ratio, 1 / ratio);
   if (unlike > kUnlikeSizes)
-    survey.doubts.push_back("The beads of " + (ratio > 1 ? cell.beads_stressed : cell.beads_relaxed)->name +
-                            " are wider by a factor of " + brief(unlike) + " (limit " + brief(kUnlikeSizes) +
-                            "). Focus both images on the same beads, or take the slice that is as sharp.");
+    survey.doubts.push_back(
+        "The beads of " + (ratio > 1 ? cell.beads_stressed : cell.beads_relaxed)->name + " are wider by a factor of " +
+        brief(unlike) + " (limit " + brief(kUnlikeSizes) +
+        "). Focus both images on the same beads, or take the slice that is as sharp. If one of them shows another "
+        "channel, name the right files in [images] of cell.toml.");
   const std::size_t n_beads = beads::detect_beads(relaxed, beads::TrackParameters{}.detection_snr, threads).size();
   const double field_um2 = relaxed.width * pixel_um * relaxed.height * pixel_um;
   const double spacing_um = std::sqrt(field_um2 / static_cast<double>(std::max<std::size_t>(1, n_beads)));
@@ -111,6 +114,20 @@ void look_at_cell(const CellImages& cell, double pixel_um, Survey& survey) {
         " um): forces beyond the image are then unknown. Take a larger field, or a cell in its middle.");
 }
 
+/// As the finding `adhesions-long` of the stage segment.
+void look_at_adhesions(const CellImages& cell, double pixel_um, Survey& survey) {
+  if (!cell.adhesion) return;
+  constexpr double kCoarse_um = 0.25;  // about the blur of the microscope: shapes are enough here
+  const images::Image& image = cell.adhesion->image;
+  const int binning = std::clamp(static_cast<int>(kCoarse_um / pixel_um), 1, std::min(image.width, image.height));
+  const double ratio =
+      cells::aspect_ratio(cells::find_adhesions(images::binned(image, binning), pixel_um * binning, {}));
+  const KindOfFinding& known = properties_of(FindingKind::adhesions_long);
+  if (ratio > known.threshold)
+    survey.doubts.push_back("What looks like adhesions in " + cell.adhesion->name + " is " + brief(ratio) +
+                            " times as long as wide (limit " + brief(known.threshold) + "). " + known.remedy);
+}
+
 }  // namespace
 
 Survey survey(const CellImages& cell, int threads) {
@@ -130,6 +147,7 @@ Survey survey(const CellImages& cell, int threads) {
   look_for_twins(cell, survey);
   look_at_beads(cell, pixel_um, threads, survey);
   look_at_cell(cell, pixel_um, survey);
+  look_at_adhesions(cell, pixel_um, survey);
   return survey;
 }
 

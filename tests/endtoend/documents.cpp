@@ -46,12 +46,45 @@ TEST(Readme, every_command_runs) {
     EXPECT_TRUE(fs::is_regular_file(folder / file)) << file;
 }
 
+bool has(const char* program) {
+  return std::system(("command -v " + std::string(program) + " >/dev/null").c_str()) == 0;
+}
+
+/// The tutorial's cell as README shows it. Half as large, so that how letters are drawn matters little; pictures of
+/// fits whose dots differ by a width leave 0.02 and more.
+void expect_picture_of_readme(const fs::path& report) {
+  if (!has("chromium") || !has("convert")) return;
+  const test::TemporaryFolder folder;
+  const std::string made = (folder / "made.png").string(), shown = (kDocs / "images/result.png").string();
+  const std::string script = "sh '" + (kDocs / "make_images.sh").string() + "' '" + report.string() + "' '" + made +
+                             "' && convert '" + made + "' '" + shown +
+                             "' -resize 50% -metric RMSE -compare -format '%[distortion]' info: > '" +
+                             (folder / "distance").string() + "'";
+  ASSERT_EQ(std::system(script.c_str()), 0);
+  EXPECT_LT(std::stod(files::read_text(folder / "distance")), 0.01)
+      << "README shows another result: docs/make_images.sh tutorial/cell_1/report.html";
+}
+
+/// The tables of the study again, by R.
+void expect_as_in_r(const fs::path& study) {
+  if (!has("Rscript")) return;
+  const std::string log = (study / "r.log").string();
+  const int status = std::system(("cd / && Rscript '" + (study / "statistics/study.R").string() + "' > '" + log +
+                                  "' 2>&1 && Rscript -e 'source(\"" + (kDocs / "recipes/study.R").string() +
+                                  "\"); stopifnot(nrow(mbtfm_study(\"" + study.string() + "\", conditions = \"" +
+                                  (study / "conditions.csv").string() + "\")) > 40)' >> '" + log + "' 2>&1")
+                                     .c_str());
+  EXPECT_EQ(status, 0) << files::read_text(log);
+}
+
 TEST(Tutorial, every_command_runs) {
   const test::TemporaryFolder folder;
   run_commands_of(kDocs / "tutorial.md", folder.path());
   for (const char* file : {"tutorial/cell_1/report.html", "tutorial/cell_1/1_segment/overlay.png",
                            "tutorial/cell_4/report.html", "tutorial/statistics/report.html"})
     EXPECT_TRUE(fs::is_regular_file(folder / file)) << file;
+  expect_picture_of_readme(folder / "tutorial/cell_1/report.html");
+  expect_as_in_r(folder / "tutorial");
 }
 
 TEST(CurvedGels, every_command_runs) {

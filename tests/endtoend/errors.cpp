@@ -207,6 +207,47 @@ TEST_F(Errors, check_finds_what_would_spoil_a_batch_and_nothing_in_a_good_cell) 
   EXPECT_NE(missing.output.find("expected a file 'actin.tif', found none"), std::string::npos) << missing.output;
 }
 
+TEST_F(Errors, check_knows_channels_that_are_exchanged_blur_few_beads_and_a_cell_at_the_border) {
+  const auto said = [&] { return run_program("mbtfm check " + cell_.string()).output; };
+  const std::string paxillin = files::read_text(cell_ / "paxillin.tif"), actin = files::read_text(cell_ / "actin.tif"),
+                    relaxed = files::read_text(cell_ / "beads_relaxed.tif");
+  files::write_text(cell_ / "paxillin.tif", actin);
+  files::write_text(cell_ / "actin.tif", paxillin);
+  EXPECT_NE(said().find("What looks like adhesions in paxillin.tif"), std::string::npos) << said();
+  files::write_text(cell_ / "paxillin.tif", paxillin);
+  files::write_text(cell_ / "actin.tif", relaxed);
+  files::write_text(cell_ / "beads_relaxed.tif", actin);
+  EXPECT_NE(said().find("If one of them shows another channel"), std::string::npos) << said();
+  files::write_text(cell_ / "actin.tif", actin);
+  files::write_text(cell_ / "beads_relaxed.tif", relaxed);
+  EXPECT_EQ(said().find("caution"), std::string::npos) << said();
+
+  const auto changed = [&](const char* name, const auto& change) {
+    images::Image image = images::read_image(cell_ / name);
+    change(image);
+    images::write_tiff(cell_ / name, image);
+  };
+  // only patches keep their beads
+  for (const char* name : {"beads_relaxed.tif", "beads_stressed.tif"}) {
+    changed(name, [](images::Image& image) {
+      const float dark = *std::ranges::min_element(image.pixels);
+      for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+          if (x % 256 > 40 || y % 256 > 40) image.pixels[static_cast<std::size_t>(y * image.width + x)] = dark;
+    });
+  }
+  EXPECT_NE(said().find("um apart (limit 3 um)"), std::string::npos) << said();
+  for (const char* name : {"paxillin.tif", "actin.tif"}) {
+    changed(name, [](images::Image& image) {  // moved to the left border
+      for (int y = 0; y < image.height; ++y) {
+        const auto row = image.pixels.begin() + static_cast<std::ptrdiff_t>(y) * image.width;
+        std::rotate(row, row + image.width / 5, row + image.width);
+      }
+    });
+  }
+  EXPECT_NE(said().find("of the image's border (limit 5 um)"), std::string::npos) << said();
+}
+
 TEST_F(Errors, a_cell_toml_that_init_wrote_runs_once_the_modulus_is_in_it) {
   fs::remove(cell_ / "cell.toml");
   fs::rename(cell_ / "paxillin.tif", cell_ / "day1_Paxillin.tif");
