@@ -204,7 +204,7 @@ TEST(Parameters, what_other_programs_and_countries_write_is_answered_with_how_to
   EXPECT_EQ(hint("[gel]\nthickness_um = 8,4\n"), "decimals follow a point: 8.4");
   EXPECT_NE(hint("[images]\nactin = \"D:\\images\\cell 1\\actin.tif\"\n").find("write folders with /"),
             std::string::npos);
-  EXPECT_NE(hint("[images]\nactin = actin.tif\n").find("in quotes"), std::string::npos);
+  EXPECT_NE(hint("[images]\nactin = actin.tif\n").find("needs quotes"), std::string::npos);
 }
 
 }  // namespace
