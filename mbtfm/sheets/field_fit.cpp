@@ -120,9 +120,14 @@ class FieldSearch {
     const Normal& normal = normals_[m];
     const Eigen::LLT<MatrixXd> factor = precision(normal, smoothings_[l]);
     Pair p{.stiffness = m, .smoothing = l, .loads = factor.solve(normal.right / variance_)};
+    const Index n_bundles = std::ssize(table_.bundles());
+    if (n_bundles > 0 && p.loads.tail(n_bundles).minCoeff() < 0)
+      p.loads =
+          best_loads(normal.matrix / variance_ + smoothings_[l] * roughness_, normal.right / variance_, n_bundles);
     const double log_determinant = 2 * factor.matrixLLT().diagonal().array().log().sum();
     // Q/v but for |y|²/v, the same for all
-    const double misfit = -normal.right.dot(p.loads) / variance_;
+    const double misfit =
+        p.loads.dot(factor.matrixL() * (factor.matrixU() * p.loads)) - 2 * normal.right.dot(p.loads) / variance_;
     p.log_evidence = 0.5 * rank_ * std::log(smoothings_[l]) - 0.5 * log_determinant - 0.5 * misfit;
     p.degrees = factor.solve(normal.matrix / variance_).trace();
     return p;
@@ -236,8 +241,10 @@ std::vector<SheetEstimate> estimates_of(const Posterior& p, const StiffnessTable
     ++load;
   };
   if (table.has_line()) tension(Quantity::line_tension, {});
-  for (const sheet::Bundle& bundle : table.bundles())
+  for (const sheet::Bundle& bundle : table.bundles()) {
     tension(Quantity::bundle_tension, "fibre " + std::to_string(bundle.fibre_id));
+    estimates.back().low = std::max(0.0, *estimates.back().low);
+  }
   return estimates;
 }
 

@@ -72,11 +72,39 @@ LinearData reweighed(LinearData data, tensions::Loss loss, const std::function<V
 
 }  // namespace
 
+VectorXd best_loads(const MatrixXd& H, const VectorXd& right, Eigen::Index n_bundles) {
+  VectorXd loads = H.ldlt().solve(right);
+  if (n_bundles == 0 || loads.tail(n_bundles).minCoeff() >= 0) return loads;
+  VectorXd low = VectorXd::Constant(loads.size(), -std::numeric_limits<double>::infinity());
+  low.tail(n_bundles).setZero();
+  return tensions::bounded_quadratic_minimum(H, -right, low);
+}
+
+tensions::Sides Profile::reach(Eigen::Index load, double room) const {
+  if (n_bundles == 0) {
+    const double half = std::sqrt(room * normal.inverse()(load, load));
+    return {half, half};
+  }
+  // what may take both signs is given a bound that it never meets
+  tensions::LocalMisfit local{.tensions_nN = loads, .H = normal, .g = gradient};
+  for (Eigen::Index k = 0; k < loads.size() - n_bundles; ++k)
+    local.tensions_nN[k] = 1e3 * (std::abs(loads[k]) + std::sqrt(room / normal(k, k)));
+  constexpr double kNormal95 = tensions::kNormal95;
+  return tensions::profiles_95(local, room / (kNormal95 * kNormal95))[static_cast<std::size_t>(load)];
+}
+
 Profile Search::at(const Stiffnesses& stiffnesses) const {
   const MatrixXd columns = tensions::displace(data_.reduced, table_.shares(stiffnesses) * joined_);
-  Profile profile{.at = stiffnesses, .loads = {}, .misfit = 0, .normal = columns.transpose() * columns};
-  profile.loads = profile.normal.ldlt().solve(columns.transpose() * data_.reduced.target);
-  profile.misfit = (columns * profile.loads - data_.reduced.target).squaredNorm();
+  Profile profile{.at = stiffnesses,
+                  .loads = {},
+                  .misfit = 0,
+                  .normal = columns.transpose() * columns,
+                  .gradient = {},
+                  .n_bundles = n_bundles_};
+  profile.loads = best_loads(profile.normal, columns.transpose() * data_.reduced.target, n_bundles_);
+  const VectorXd left = columns * profile.loads - data_.reduced.target;
+  profile.misfit = left.squaredNorm();
+  profile.gradient = columns.transpose() * left;
   return profile;
 }
 

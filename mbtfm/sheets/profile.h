@@ -8,18 +8,27 @@
 #include <vector>
 
 #include "mbtfm/sheets/sheet_fit.h"
+#include "mbtfm/tensions/intervals.h"
 
 namespace mbtfm::sheets {
 
 /// Steps of a logarithm over nine e-folds: 2 %, far below any standard error.
 inline constexpr int kScan = 400;
 
+/// The minimiser of ½ xᵀ H x − rightᵀ x in which the last n loads are not negative: bundles pull, they never push.
+Eigen::VectorXd best_loads(const Eigen::MatrixXd& H, const Eigen::VectorXd& right, Eigen::Index n_bundles);
+
 /// At one pair of stiffnesses: the best loads.
 struct Profile {
   Stiffnesses at;
   Eigen::VectorXd loads;
-  double misfit = 0;       ///< |C R − y|², without the floor
-  Eigen::MatrixXd normal;  ///< of the loads
+  double misfit = 0;           ///< |C R − y|², without the floor
+  Eigen::MatrixXd normal;      ///< of the loads
+  Eigen::VectorXd gradient;    ///< half of the misfit's, by the loads: above zero where a bundle is at its bound
+  Eigen::Index n_bundles = 0;  ///< the last of the loads
+
+  /// How far a load may go to either side until the misfit, least over the others, has risen by `room`.
+  tensions::Sides reach(Eigen::Index load, double room) const;
 };
 
 inline double sheet_of(const Profile& p) { return p.at.sheet_nN_per_um; }
@@ -37,7 +46,11 @@ class Search {
   /// @param joined  the loads that are fitted as one: loads × fewer
   Search(const tensions::LinearData& data, const StiffnessTable& table, std::optional<double> known,
          Eigen::MatrixXd joined)
-      : data_(data), table_(table), known_(known), joined_(std::move(joined)) {}
+      : data_(data),
+        table_(table),
+        known_(known),
+        joined_(std::move(joined)),
+        n_bundles_(joined_.bottomRows(std::ssize(table.bundles())).isZero() ? 0 : std::ssize(table.bundles())) {}
   Search(const tensions::LinearData& data, const StiffnessTable& table, std::optional<double> known)
       : Search(data, table, known, Eigen::MatrixXd::Identity(table.n_loads(), table.n_loads())) {}
 
@@ -57,6 +70,7 @@ class Search {
   const StiffnessTable& table_;
   std::optional<double> known_;
   Eigen::MatrixXd joined_;
+  Eigen::Index n_bundles_;
 };
 
 /// The loads of a sheet whose parts all contract alike.

@@ -19,7 +19,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tensions::LinearData;
 
-/// Of the loads, log M and log κ, by the derivatives at the solution; 0 of what is known.
+/// Of the loads, log M and log κ, by the derivatives at the solution; 0 of what is known, and of bundles that do not
+/// pull.
 MatrixXd covariance_of(const LinearData& data, const StiffnessTable& table, const Profile& best, double variance,
                        bool is_sheet_known) {
   constexpr double kStep = 1e-4;
@@ -32,7 +33,8 @@ MatrixXd covariance_of(const LinearData& data, const StiffnessTable& table, cons
   std::vector<Eigen::Index> unknown;
   MatrixXd J(data.reduced.target.size(), table.n_loads() + 2);
   J.leftCols(table.n_loads()) = tensions::displace(data.reduced, table.shares(best.at));
-  for (int k = 0; k < table.n_loads(); ++k) unknown.push_back(k);
+  for (int k = 0; k < table.n_loads(); ++k)
+    if (k < table.n_loads() - best.n_bundles || best.loads[k] > 0) unknown.push_back(k);
   if (!is_sheet_known) unknown.push_back(table.n_loads());
   if (table.adhesion_nN_per_um3()) unknown.push_back(table.n_loads() + 1);
   J.col(table.n_loads()) = (displaced(kStep, 0) - displaced(-kStep, 0)) / (2 * kStep);
@@ -107,12 +109,13 @@ class Allowed {
     Limits limits;
     for_each([&](const Profile& p, double room) {
       const bool is_share = quantity == Quantity::contraction_over_stiffness;
-      const double scale = is_share ? 1 / sheet_of(p) : 1, reach = room * std::sqrt(p.normal.inverse()(load, load));
+      const double scale = is_share ? 1 / sheet_of(p) : 1;
+      const tensions::Sides reach = p.reach(load, room);
       const Ends ends = ends_of(table_, p.at, is_sheet_known_);
       // a stiff sheet pulls as its strain, s over M, has it, a soft one as its contraction; weak springs hold either
       const bool is_open = ends.is_weakest || (is_share ? ends.is_softest : ends.is_stiffest);
-      limits.take(scale * (p.loads(load) - reach), scale * (p.loads(load) + reach), is_open && p.loads(load) < 0,
-                  is_open && p.loads(load) > 0);
+      limits.take(scale * (p.loads(load) - reach.below), scale * (p.loads(load) + reach.above),
+                  is_open && p.loads(load) < 0, is_open && p.loads(load) > 0);
     });
     return limits;
   }
@@ -129,9 +132,9 @@ class Allowed {
  private:
   template <class Body>
   void for_each(const Body& body) const {
-    body(best_, std::sqrt(room_));
+    body(best_, room_);
     for (const Profile& p : tried_)
-      if (p.misfit - best_.misfit <= room_) body(p, std::sqrt(room_ - std::max(0.0, p.misfit - best_.misfit)));
+      if (p.misfit - best_.misfit < room_) body(p, room_ - std::max(0.0, p.misfit - best_.misfit));
   }
 
   /// Where the misfit crosses its limit to both sides, between two steps of the scan.
@@ -206,8 +209,11 @@ std::vector<SheetEstimate> estimates_of(const StiffnessTable& table, const Profi
     ++load;
   };
   if (table.has_line()) tension(Quantity::line_tension, {});
-  for (const sheet::Bundle& bundle : table.bundles())
+  for (const sheet::Bundle& bundle : table.bundles()) {
     tension(Quantity::bundle_tension, "fibre " + std::to_string(bundle.fibre_id));
+    SheetEstimate& e = estimates.back();
+    if (e.value == 0 && e.high) e.sigma = *e.high / tensions::kNormal95;  // it is at its bound
+  }
   if (!table.adhesion_nN_per_um3()) return estimates;
   const double kappa = adhesion_of(best), l = std::sqrt(M / kappa);
   estimates.push_back(

@@ -96,6 +96,7 @@ tensions::LocalMisfit about_exact(const KnownCell& cell, const tensions::LinearD
 struct Ratio {
   double value = 0;
   double chance = 0;  ///< standard deviation of its logarithm, as the scatter of so many experiments is not exact
+  bool is_measurable = true;  ///< the bound is below the tension itself: what a plan calls possible
 };
 struct Ratios {
   std::vector<Ratio> all;
@@ -125,7 +126,9 @@ Ratios ratios_of(const Eigen::MatrixXd& found, const Eigen::VectorXd& predicted_
 /// The same where the bounds t >= 0 are predicted with. Of tensions that are above zero in half of the experiments or
 /// more by the prediction: others hang on few experiments.
 /// @param foreseen  a column a draw of the prediction
-Ratios ratios_of_foreseen(const Eigen::MatrixXd& found, const Eigen::MatrixXd& foreseen) {
+/// @param bound_nN  standard errors without the bounds t >= 0
+Ratios ratios_of_foreseen(const Eigen::MatrixXd& found, const Eigen::MatrixXd& foreseen,
+                          const Eigen::VectorXd& bound_nN, const Eigen::VectorXd& tensions_nN) {
   Ratios ratios;
   for (Eigen::Index i = 0; i < found.rows(); ++i) {
     const Eigen::VectorXd of_one = foreseen.row(i);
@@ -135,7 +138,8 @@ Ratios ratios_of_foreseen(const Eigen::MatrixXd& found, const Eigen::MatrixXd& f
     }
     const double predicted_nN = scatter_of(of_one),
                  kurtosis = ((of_one.array() - of_one.mean()) / predicted_nN).pow(4).mean();
-    ratios.all.push_back({predicted_nN / scatter_of(found.row(i)), chance_of(kurtosis, double(found.cols()))});
+    ratios.all.push_back({predicted_nN / scatter_of(found.row(i)), chance_of(kurtosis, double(found.cols())),
+                          bound_nN[i] < tensions_nN[i]});
   }
   return ratios;
 }
@@ -192,15 +196,20 @@ struct Printed {
 };
 
 void print(const char* beads, const Printed& of, const Ratios& ratios) {
-  std::vector<double> values;
-  for (const Ratio& r : ratios.all) values.push_back(r.value);
+  std::vector<double> values, measurable;
+  for (const Ratio& r : ratios.all) {
+    values.push_back(r.value);
+    if (r.is_measurable) measurable.push_back(r.value);
+  }
   const auto [low, high] = std::ranges::minmax(values);
+  const auto [low_of_them, high_of_them] = std::ranges::minmax(measurable);
   const double within = share_of(ratios, [](const Ratio&r) { return r.value >= 0.8 && r.value <= 1.25; }),
                by_chance =
                    share_of(ratios, [](const Ratio&r) { return std::abs(std::log(r.value)) < 1.96 * r.chance; });
-  std::printf("%s,%s,%d,%g,%.4f,%zu,%d,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f\n", beads, of.scenario, of.seed, of.noise_percent,
-              of.noise_um, values.size(), ratios.n_left_out, numerics::median(values), low, high, within, by_chance,
-              beyond_chance(ratios));
+  std::printf("%s,%s,%d,%g,%.4f,%zu,%d,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%zu,%.3f,%.3f,%td\n", beads, of.scenario, of.seed,
+              of.noise_percent, of.noise_um, values.size(), ratios.n_left_out, numerics::median(values), low, high,
+              within, by_chance, beyond_chance(ratios), measurable.size(), low_of_them, high_of_them,
+              std::ranges::count_if(measurable, [](double r) { return r < 0.8 || r > 1.25; }));
   std::fflush(stdout);
 }
 
@@ -286,7 +295,7 @@ std::vector<tensions::LocalMisfit> at_other_places(const Studied& s, double nois
 void study_errors(int only, Beads beads) {
   std::printf(
       "beads,scenario,seed,noise_percent,noise_um,n,left_out,median,lowest,highest,share_0.8_to_1.25,"
-      "share_by_chance,beyond_chance\n");
+      "share_by_chance,beyond_chance,measurable,lowest_of_them,highest_of_them,beyond_0.8_to_1.25_of_them\n");
   const std::pair<const char*, int> scenes[] = {{"u2os", 1},  {"u2os", 2},    {"u2os", 3},
                                                 {"dense", 1}, {"crowded", 1}, {"parallel-fibres", 1}};
   std::map<std::string, Ratios> all;
@@ -311,7 +320,8 @@ void study_errors(int only, Beads beads) {
     each_noise([&](std::size_t k, const Printed& of, double scale) {
       tell("same", of, ratios_of(found.same[k], scale * of_same.tensions));
       tell("same with bounds", of,
-           ratios_of_foreseen(found.same[k], with_bounds_nN(with_noise({at_same}, kShares[k] / kShares.front()))));
+           ratios_of_foreseen(found.same[k], with_bounds_nN(with_noise({at_same}, kShares[k] / kShares.front())),
+                              scale * of_same.tensions, s.cell.tensions_nN));
     });
     if (beads == Beads::same) continue;
     const Precision plan = precision_at(s.scene, s.cell, {kDensity}, kThreads).precision.front();
@@ -322,7 +332,8 @@ void study_errors(int only, Beads beads) {
       tell("others", of, ratios_of(found.others[k], by_beads));
       tell("others with places", of, ratios_of(found.others[k], (of_places + by_beads.cwiseAbs2()).cwiseSqrt()));
       tell("others with places and bounds", of,
-           ratios_of_foreseen(found.others[k], with_bounds_nN(with_noise(at_others, kShares[k] / kShares.front()))));
+           ratios_of_foreseen(found.others[k], with_bounds_nN(with_noise(at_others, kShares[k] / kShares.front())),
+                              by_beads, s.cell.tensions_nN));
     });
   }
   for (const auto& [name, ratios] : all) print(name.c_str(), {"all"}, ratios);
