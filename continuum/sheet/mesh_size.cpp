@@ -19,7 +19,7 @@ double narrow_um(const Region& region) {
 TriangleSize size_on_springs(const Region& region, double penetration_um) {
   const double narrow = narrow_um(region);
   constexpr double kPerPenetration = 8, kPerWidth = 15;  // measured: 1e-4 of the largest displacement and tension
-  constexpr double kMostTriangles = 5e4;                 // some seconds; a penetration length far below the width
+  constexpr double kMostTriangles = 1e5;                 // some seconds; a penetration length far below the width
   TriangleSize size{.at_curves_um = std::min(penetration_um / kPerPenetration, narrow / kPerWidth),
                     .largest_um = narrow / 10,
                     .growth = 0.13,
