@@ -322,8 +322,8 @@ void notice_mesh(stage::StageContext& context, const Solution& solution) {
 }
 
 /// displacement.csv: what the patches' forces make of the gel's surface.
-void write_beads(stage::StageContext& context, const substrate::Substrate& model, const Solution& solution,
-                 const std::vector<Vec2>& points_um) {
+std::vector<Vec2> displacements_um(const substrate::Substrate& model, const Solution& solution,
+                                   const std::vector<Vec2>& points_um) {
   std::vector<substrate::Ellipse> patches;
   std::vector<Vec2> forces;
   for (int t = 0; t < solution.elements->n_triangles(); ++t) {
@@ -331,7 +331,12 @@ void write_beads(stage::StageContext& context, const substrate::Substrate& model
     const GroundPatch& patch = solution.patches[static_cast<std::size_t>(t)];
     forces.push_back(patch.area_um2 * patch.traction_kPa);
   }
-  const std::vector<Vec2> u = model.displacements_um(points_um, patches, forces);
+  return model.displacements_um(points_um, patches, forces);
+}
+
+void write_beads(stage::StageContext& context, const substrate::Substrate& model, const Solution& solution,
+                 const std::vector<Vec2>& points_um) {
+  const std::vector<Vec2> u = displacements_um(model, solution, points_um);
   DisplacementField field;
   for (std::size_t i = 0; i < points_um.size(); ++i)
     field.push_back({.position_um = points_um[i], .displacement_um = u[i], .sigma_um = 0, .flag = {}});
@@ -778,36 +783,58 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   if (p.sheet.youngs_modulus_kPa)
     known = Material{*p.sheet.youngs_modulus_kPa, nu, *p.sheet.thickness_um}.stiffness_nN_per_um();
   tensions::LinearData data = data_of(beads, table, ground, *model, context.threads);
+  std::vector<Vec2> places;
+  for (const Bead& bead : beads) places.push_back(bead.position_um);
+  const Eigen::Index n_parts = table.n_contractions();
+  const auto scene_of = [&](const sheets::Stiffnesses& stiffnesses, const Eigen::VectorXd& loads) {
+    Scene made = scene;
+    made.material.youngs_modulus_kPa = stiffnesses.sheet_nN_per_um * (1 - nu * nu) / *p.sheet.thickness_um;
+    made.adhesion_nN_per_um3 = stiffnesses.adhesion_nN_per_um3;
+    made.contraction.nN_per_um = loads.head(n_parts).maxCoeff();
+    const auto sum_of = [loads, n_parts](const auto& share) {
+      double sum = 0;
+      for (Eigen::Index k = 0; k < n_parts; ++k) sum += loads(k) * share(k);
+      return sum;
+    };
+    if (lattice || !parts.empty()) made.contraction.edge_band_um = std::nullopt;
+    if (lattice)
+      made.contraction.at = [=, &lattice](Vec2 place) {
+        const Eigen::VectorXd shares_there = lattice->shares_at(place);
+        return sum_of([&](Eigen::Index k) { return shares_there(k); });
+      };
+    if (!parts.empty())
+      made.contraction.at = [=, &parts](Vec2 place) {
+        return sum_of([&](Eigen::Index k) { return parts[static_cast<std::size_t>(k)].share(place); });
+      };
+    made.line_tension_nN = p.fit_line_tension ? loads(n_parts) : 0;
+    for (std::size_t k = 0; k < bundles.size(); ++k)
+      made.bundles.push_back({bundles[k], loads(loads.size() - std::ssize(bundles) + static_cast<Eigen::Index>(k))});
+    return made;
+  };
+  // The displacement beside an edge whose tractions are singular converges with the triangles' size to the first power:
+  // the error is what triangles smaller by kFiner change, over 1 - kFiner.
+  const auto mesh_error_um = [&](const sheets::Stiffnesses& stiffnesses, const Eigen::VectorXd& loads) {
+    constexpr double kFiner = 0.7;
+    Scene fine = scene_of(stiffnesses, loads);
+    const std::vector<Vec2> here = displacements_um(*model, solve_on(ground, elements, fine), places);
+    fine.size = with_edge(fine.size, kFiner * fine.size.at_curves_um);
+    const std::vector<Vec2> there = displacements_um(*model, solve_on_gel(fine, *model, context.threads), places);
+    Eigen::VectorXd error(2 * std::ssize(here));
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      const Vec2 of_bead = 1 / (1 - kFiner) * (there[i] - here[i]);
+      error.segment<2>(2 * static_cast<Eigen::Index>(i)) << of_bead.x, of_bead.y;
+    }
+    return error;
+  };
   std::optional<sheets::FieldFit> field;
-  if (lattice) field = fit_field(std::move(data), table, p.loss, known, *lattice, means_over(*elements, *lattice));
+  if (lattice)
+    field = fit_field(std::move(data), table, p.loss, known, *lattice, means_over(*elements, *lattice), mesh_error_um);
   sheets::SheetFit fit = field ? field->sheet : fit_sheet(std::move(data), table, p.loss, known, names);
   if (context.has_input("adhesions")) compare_with_adhesions(fit, data_of_adhesions(beads, context, *model));
 
-  scene.material.youngs_modulus_kPa = fit.stiffnesses.sheet_nN_per_um * (1 - nu * nu) / *p.sheet.thickness_um;
-  scene.adhesion_nN_per_um3 = fit.stiffnesses.adhesion_nN_per_um3;
-  const Eigen::Index n_parts = table.n_contractions();
-  scene.contraction.nN_per_um = fit.loads.head(n_parts).maxCoeff();
-  if (field) {
-    scene.contraction = {.nN_per_um = fit.estimates.front().value, .edge_band_um = std::nullopt, .at = [&](Vec2 place) {
-                           return lattice->shares_at(place).dot(field->contractions);
-                         }};
-  }
-  if (!parts.empty()) {
-    scene.contraction.edge_band_um = std::nullopt;
-    scene.contraction.at = [&](Vec2 place) {
-      double sum = 0;
-      for (std::size_t k = 0; k < parts.size(); ++k)
-        sum += fit.loads(static_cast<Eigen::Index>(k)) * parts[k].share(place);
-      return sum;
-    };
-  }
-  scene.line_tension_nN = p.fit_line_tension ? fit.loads(n_parts) : 0;
-  for (std::size_t k = 0; k < bundles.size(); ++k)
-    scene.bundles.push_back(
-        {bundles[k], fit.loads(fit.loads.size() - std::ssize(bundles) + static_cast<Eigen::Index>(k))});
+  scene = scene_of(fit.stiffnesses, fit.loads);
+  if (field) scene.contraction.nN_per_um = fit.estimates.front().value;
   Run result{.solution = solve_on(ground, elements, scene), .figures = {}, .effects = model->effects()};
-  std::vector<Vec2> places;
-  for (const Bead& bead : beads) places.push_back(bead.position_um);
   write_beads(context, *model, result.solution, places);
   const Path estimates_file = context.output("out", "sheet_fit.csv"),
              models_file = context.output("out", "sheet_models.csv");

@@ -44,6 +44,7 @@ struct Posterior {
   VectorXd loads, loads_over_stiffness;  ///< means
   MatrixXd covariance, covariance_over_stiffness;
   double log_stiffness = 0, log_sigma = 0, log_smoothing = 0, degrees = 0;
+  double log_sigma_of_mesh = 0;  ///< of log M too, beside that
 };
 
 std::vector<double> even_logarithms(double low, double high, int n) {
@@ -181,6 +182,46 @@ Stiffnesses at_mean(const Posterior& posterior, const StiffnessTable& table) {
   return {std::exp(posterior.log_stiffness), table.known_adhesion_nN_per_um3()};
 }
 
+/// How far the loads and, last, log M would move if the beads' displacements changed by this, at the posterior's
+/// middle.
+VectorXd moved_by_change(const LinearData& data, const StiffnessTable& table, const Posterior& p,
+                         const MatrixXd& roughness, double variance, bool is_stiffness_known,
+                         const VectorXd& change_um) {
+  constexpr double kStep = 1e-3;
+  const auto shares_at = [&](double step) {
+    Stiffnesses at = at_mean(p, table);
+    at.sheet_nN_per_um *= std::exp(step);
+    return table.shares(at);
+  };
+  const Index n = table.n_loads();
+  MatrixXd directions(shares_at(0).rows(), n + 1);
+  directions << shares_at(0), (shares_at(kStep) - shares_at(-kStep)) * p.loads / (2 * kStep);
+  const MatrixXd columns = tensions::displace(data.reduced, directions);
+  MatrixXd precision = columns.transpose() * columns / variance;
+  precision.topLeftCorner(roughness.rows(), roughness.cols()) += std::exp(p.log_smoothing) * roughness;
+  VectorXd right = directions.transpose() *
+                   data.response->pull_back(tensions::squared_weights(data).asDiagonal() *
+                                            tensions::less_motion(data, MatrixXd(change_um))) /
+                   variance;
+  if (is_stiffness_known) {
+    precision.row(n).setZero();
+    precision.col(n).setZero();
+    precision(n, n) = 1;
+    right(n) = 0;
+  }
+  return precision.ldlt().solve(right);
+}
+
+/// One more error, of this size in this direction.
+/// @param moved  loads and log M
+void add_error(Posterior& p, const VectorXd& moved) {
+  const double M = std::exp(p.log_stiffness), of_log = moved(moved.size() - 1);
+  const VectorXd loads = moved.head(moved.size() - 1), over_stiffness = (loads - of_log * p.loads) / M;
+  p.covariance += loads * loads.transpose();
+  p.covariance_over_stiffness += over_stiffness * over_stiffness.transpose();
+  p.log_sigma_of_mesh = std::abs(of_log);
+}
+
 /// Whether the posterior ends where the table does, and not before.
 struct Open {
   bool below = false, above = false;
@@ -225,9 +266,11 @@ std::vector<SheetEstimate> estimates_of(const Posterior& p, const StiffnessTable
   const double M = std::exp(p.log_stiffness);
   const double contraction = mean.dot(p.loads.head(n)), share = mean.dot(p.loads_over_stiffness.head(n));
   const auto variance = [&](const MatrixXd& covariance) { return mean.dot(covariance.topLeftCorner(n, n) * mean); };
-  SheetEstimate stiffness = estimate(Quantity::stiffness, {}, M, M * M * p.log_sigma * p.log_sigma, open);
-  if (stiffness.low) stiffness.low = quantile(p, kTail);
-  if (stiffness.high) stiffness.high = quantile(p, 1 - kTail);
+  const double log_sigma = std::hypot(p.log_sigma, p.log_sigma_of_mesh),
+               wider = std::exp(tensions::kNormal95 * (log_sigma - p.log_sigma));
+  SheetEstimate stiffness = estimate(Quantity::stiffness, {}, M, M * M * log_sigma * log_sigma, open);
+  if (stiffness.low) stiffness.low = quantile(p, kTail) / wider;
+  if (stiffness.high) stiffness.high = quantile(p, 1 - kTail) * wider;
   // a stiff sheet pulls as its strain has it, a soft one as its contraction
   std::vector<SheetEstimate> estimates = {
       estimate(Quantity::contraction, kMean, contraction, variance(p.covariance),
@@ -324,7 +367,7 @@ std::vector<ContractionAt> contractions_at(const sheet::Elements& elements, cons
 }
 
 FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known,
-                   const ContractionLattice& lattice, const VectorXd& mean) {
+                   const ContractionLattice& lattice, const VectorXd& mean, const MeshError& mesh_error_um) {
   MBTFM_ASSERT(table.n_contractions() == lattice.n_points() && !table.adhesion_nN_per_um3());
   const MatrixXd roughness = lattice.roughness();
   const auto amplitudes = [&](const Posterior& p) -> VectorXd { return table.shares(at_mean(p, table)) * p.loads; };
@@ -339,6 +382,9 @@ FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss 
   const auto n_unknowns = std::lround(p.degrees) + (known ? 0 : 1);
   const double of_misfit = tensions::misfit_variance(data, amplitudes(p), n_unknowns, loss);
   if (of_misfit > variance) p = found(data, variance = of_misfit);
+  if (mesh_error_um)
+    add_error(p, moved_by_change(data, table, p, roughness, variance, known.has_value(),
+                                 mesh_error_um(at_mean(p, table), p.loads)));
   const Index n = table.n_contractions();
   FieldFit fit{.sheet = {},
                .contractions = p.loads.head(n),
