@@ -177,7 +177,10 @@ class Scratch {
       if (const auto file = runner::resolve_optional_image(cell_, images_, image.key)) add(image.flag, file->string());
     }
     for (const runner::PathArgument& argument : stage.arguments) {
-      if (argument.where.empty()) add(argument.flag, (folder_ / argument.path).string());  // else: of a time series
+      const auto condition = argument.condition();
+      if (argument.given != runner::PathArgument::Given::if_series &&
+          (!condition || files::is_own_file(folder_ / *condition)))
+        add(argument.flag, (folder_ / argument.path).string());
     }
     add("config", (folder_ / "cell.toml").string());
     add(stage.output.flag, (folder_ / stage.output.path).string());

@@ -203,10 +203,9 @@ std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, con
   std::ranges::copy_if(stage.reads_where_there, std::back_inserter(names),
                        [&](const std::string& file) { return files::is_own_file(cell / file); });
   for (const PathArgument& argument : stage.arguments) {
-    const bool is_list = !argument.where.empty() && argument.where != argument.path;  // of frames
-    if (!is_list || !files::is_own_file(cell / argument.where)) continue;
-    names.push_back(argument.where);
-    for (std::string& name : frames_read(cell, argument.where)) names.push_back(std::move(name));
+    if (argument.given != PathArgument::Given::if_series || !files::is_own_file(cell / *argument.condition())) continue;
+    names.push_back(*argument.condition());
+    for (std::string& name : frames_read(cell, *argument.condition())) names.push_back(std::move(name));
   }
   return names;
 }

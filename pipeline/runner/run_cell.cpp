@@ -43,8 +43,8 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
     if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
   }
   for (const PathArgument& argument : stage.arguments) {
-    if (argument.where.empty() || files::is_own_file(cell / argument.where))
-      add(argument.flag, (cell / argument.path).string());
+    const auto condition = argument.condition();
+    if (!condition || files::is_own_file(cell / *condition)) add(argument.flag, (cell / argument.path).string());
   }
   add("config", (cell / "cell.toml").string());
   for (const Setting& setting : stage.settings) add(setting.key, setting.value);

@@ -6,6 +6,18 @@
 
 namespace mbtfm::runner {
 
+std::optional<std::string> PathArgument::condition() const {
+  switch (given) {
+    case Given::always:
+      return std::nullopt;
+    case Given::if_there:
+      return path;
+    case Given::if_series:
+      return path + "/frames.csv";
+  }
+  return std::nullopt;
+}
+
 const std::vector<Stage>& stages() {
   static const std::vector<std::string> cell_files = {"1_segment/adhesions.csv", "1_segment/fibres.csv",
                                                       "1_segment/fibre_points.csv", "1_segment/outline.csv"};
@@ -33,7 +45,7 @@ const std::vector<Stage>& stages() {
        .images = {{"stressed", "beads_stressed"}, {"relaxed", "beads_relaxed"}},
        .instead = ImageInput{"displacement", "displacement"},
        .optional_images = {},
-       .arguments = {{"adhesions", cell_files[0], cell_files[0]}},
+       .arguments = {{"adhesions", cell_files[0], PathArgument::Given::if_there}},
        .output = {"out", "2_track"},
        .reads = {},
        .reads_where_there = {cell_files[0]},
@@ -61,7 +73,7 @@ const std::vector<Stage>& stages() {
        .arguments = {{"cell", "1_segment"},
                      {"network", network},
                      {"displacement", displacement},
-                     {"frames", "2_track", "2_track/frames.csv"}},
+                     {"frames", "2_track", PathArgument::Given::if_series}},
        .output = {"out", "4_fit"},
        .reads = {cell_files[0], cell_files[1], cell_files[2], cell_files[3], displacement, network},
        .reads_where_there = {"1_segment/adhesions_2.csv", "1_segment/fibres_2.csv", "1_segment/fibre_points_2.csv"},

@@ -17,9 +17,13 @@ struct ImageInput {
 
 /// A file or folder of the cell folder, given to the stage as --flag.
 struct PathArgument {
+  enum class Given { always, if_there, if_series };
   std::string flag;
   std::string path;
-  std::string where = {};  ///< a file: the argument is given only where it is there; empty: always
+  Given given = Given::always;  ///< if_series: a folder, if the list of a time series' frames is in it
+
+  /// The file without which it is not given; none: it always is.
+  std::optional<std::string> condition() const;
 };
 
 /// A key of cell.toml and its value, as a flag spells it.
