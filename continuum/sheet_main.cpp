@@ -13,6 +13,7 @@
 #include "continuum/sheet/tables.h"
 #include "mbtfm/sheets/field_fit.h"
 #include "mbtfm/sheets/tables.h"
+#include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/charts/chart.h"
@@ -62,7 +63,8 @@ void declare(stage::ParameterList& list, Parameters& p) {
   modulus.default_value = "";
   modulus.meaning += "; unset: springs carry the sheet, or nothing does";
   declare(list, p.substrate);
-  declare(list, p.substrate.effects, {"finite_thickness", "finite_sides", "depth_graded_gel", "effect_tolerance"});
+  declare(list, p.substrate.effects,
+          {"finite_thickness", "finite_sides", "depth_graded_gel", "common_motion", "effect_tolerance"});
   declare(list, p.sheet);
   list.add("most_unbalanced", p.most_unbalanced, Range::between(0, 1),
            "with --traction: largest net force or torque that is corrected, as a share; more is refused");
@@ -557,13 +559,14 @@ DisplacementField read_beads(stage::StageContext& context) {
 }
 
 tensions::LinearData data_of_adhesions(const DisplacementField& beads, stage::StageContext& context,
-                                       const substrate::Substrate& model) {
+                                       const substrate::Substrate& model, const Eigen::MatrixXd& motions) {
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : files::read_adhesions(context.input("adhesions")))
     ellipses.push_back(substrate::ellipse_of(a));
   std::vector<Vec2> places;
   for (const Bead& bead : beads) places.push_back(bead.position_um);
-  return tensions::reduce(beads, model.compliance_um_per_nN(places, ellipses));
+  return tensions::reduce(beads, substrate::dense_response(model.compliance_um_per_nN(places, ellipses), 1), {}, 1,
+                          motions);
 }
 
 struct Words {
@@ -724,6 +727,22 @@ std::vector<Bundle> read_bundles(stage::StageContext& context) {
   return bundles;
 }
 
+/// By the stated errors. @param with_modulus  where a stiffness is known, and forces are not proportional to the gel's
+std::vector<Gel> gels_an_error_away(const Gel& gel, bool with_modulus) {
+  std::vector<Gel> others;
+  const auto other = [&](std::optional<double> sigma) -> Gel* {
+    if (sigma.value_or(0) <= 0) return nullptr;
+    others.push_back(gel);
+    return &others.back();
+  };
+  if (Gel* thicker = other(gel.thickness_sigma_um)) thicker->thickness_um += *gel.thickness_sigma_um;
+  if (Gel* softer = other(gel.poisson_ratio_sigma))
+    softer->poisson_ratio = std::max(0.0, gel.poisson_ratio - *gel.poisson_ratio_sigma);
+  if (Gel* stiffer = with_modulus ? other(gel.youngs_modulus_sigma_kPa) : nullptr)
+    stiffer->youngs_modulus_kPa += *gel.youngs_modulus_sigma_kPa;
+  return others;
+}
+
 Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region) {
   if (!p.gel_modulus_kPa) throw UsageError("[gel] youngs_modulus_kPa is missing: the beads move with the gel");
   if (p.sheet.ground && *p.sheet.ground != Ground::gel)
@@ -769,20 +788,22 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
     shares = lattice->shares_on(*elements);
   }
   if (shares.empty()) shares.push_back(contraction_at_points(*elements, region, scene.contraction));
-  const sheets::StiffnessTable table({.elements = elements,
-                                      .contractions = shares,
-                                      .poisson_ratio = nu,
-                                      .n_rims = static_cast<int>(region.rims.size()),
-                                      .has_line = p.fit_line_tension,
-                                      .bundles = bundles,
-                                      .bond = p.fit_adhesion_stiffness ? sheets::Bond::fitted : sheets::Bond::known,
-                                      .adhesion_nN_per_um3 = scene.adhesion_nN_per_um3},
-                                     ground, gel, narrow, context.threads);
+  const sheets::SheetShape shape{.elements = elements,
+                                 .contractions = shares,
+                                 .poisson_ratio = nu,
+                                 .n_rims = static_cast<int>(region.rims.size()),
+                                 .has_line = p.fit_line_tension,
+                                 .bundles = bundles,
+                                 .bond = p.fit_adhesion_stiffness ? sheets::Bond::fitted : sheets::Bond::known,
+                                 .adhesion_nN_per_um3 = scene.adhesion_nN_per_um3};
+  const sheets::StiffnessTable table(shape, ground, gel, narrow, context.threads);
   context.progress(0.7, "fitting");
   std::optional<double> known;
   if (p.sheet.youngs_modulus_kPa)
     known = Material{*p.sheet.youngs_modulus_kPa, nu, *p.sheet.thickness_um}.stiffness_nN_per_um();
-  tensions::LinearData data = data_of(beads, table, ground, *model, context.threads);
+  const bool has_motion = tensions::allows_common_motion(p.substrate.effects);
+  const Eigen::MatrixXd motions = has_motion ? tensions::affine_motions(beads) : Eigen::MatrixXd();
+  tensions::LinearData data = data_of(beads, table, ground, *model, context.threads, motions);
   std::vector<Vec2> places;
   for (const Bead& bead : beads) places.push_back(bead.position_um);
   const Eigen::Index n_parts = table.n_contractions();
@@ -830,7 +851,22 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   if (lattice)
     field = fit_field(std::move(data), table, p.loss, known, *lattice, means_over(*elements, *lattice), mesh_error_um);
   sheets::SheetFit fit = field ? field->sheet : fit_sheet(std::move(data), table, p.loss, known, names);
-  if (context.has_input("adhesions")) compare_with_adhesions(fit, data_of_adhesions(beads, context, *model));
+  const auto estimates_on = [&](const Gel& other) {
+    const auto its_model = choice::make_substrate(other, p.substrate, context.threads);
+    const OnGel its_ground(*elements, *its_model, adhering_triangles(*elements, scene.adhesive_um), context.threads);
+    const sheets::StiffnessTable its_table(shape, its_ground, other, narrow, context.threads);
+    tensions::LinearData its_data = data_of(beads, its_table, its_ground, *its_model, context.threads, motions);
+    if (!lattice) return fit_sheet(std::move(its_data), its_table, p.loss, known, names).estimates;
+    return fit_field(std::move(its_data), its_table, p.loss, known, *lattice, means_over(*elements, *lattice))
+        .sheet.estimates;
+  };
+  std::vector<std::vector<sheets::SheetEstimate>> on_other_gel;
+  const bool has_known_stiffness = known || p.sheet.adhesion_stiffness_nN_per_um3;
+  for (const Gel& other : gels_an_error_away(gel, has_known_stiffness)) on_other_gel.push_back(estimates_on(other));
+  add_errors_of_gel(fit.estimates,
+                    has_known_stiffness ? 0 : gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa,
+                    on_other_gel);
+  if (context.has_input("adhesions")) compare_with_adhesions(fit, data_of_adhesions(beads, context, *model, motions));
 
   scene = scene_of(fit.stiffnesses, fit.loads);
   if (field) scene.contraction.nN_per_um = fit.estimates.front().value;
@@ -873,6 +909,8 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   if (field) add_figures_of(*field, result.figures);
   const double x = free_contraction(scene.material, scene.contraction.nN_per_um);
   result.effects.push_back(stage::decided(EffectKind::gel_response, Switch::on, true, "the beads move with the gel"));
+  result.effects.push_back(stage::decided(EffectKind::common_motion, switched(has_motion), has_motion,
+                                          "shift, turn, growth and shear of all beads are found with the sheet"));
   result.effects.push_back(decide_strain(p.sheet.strain, x, Ground::gel));
   result.effects.push_back(thickness_effect(scene.material, region));
   notice_shape(context, scene.material, region);

@@ -157,7 +157,8 @@ void add_misfit(SheetFit& fit, const LinearData& data, VectorXd node_amplitudes,
   fit.relative_l2 = tensions::relative_l2(data, fit.node_amplitudes);
   fit.n_beads = static_cast<int>(data.position_um.size());
   fit.n_down_weighted = static_cast<int>((data.bead_weight.array() < 0.5).count());
-  const double u_squared = data.weight_per_um.cwiseProduct(data.displacement_um).squaredNorm();
+  const VectorXd moved_um = tensions::less_motion(data, MatrixXd(data.displacement_um));
+  const double u_squared = data.weight_per_um.cwiseProduct(moved_um).squaredNorm();
   if (data.has_errors)
     fit.expected_relative_l2 = std::sqrt((static_cast<double>(data.n_used) - n_unknowns) / u_squared);
 }

@@ -227,12 +227,29 @@ std::vector<SheetEstimate> estimates_of(const StiffnessTable& table, const Profi
 }  // namespace
 
 LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
-                   const substrate::Substrate& gel, int threads) {
+                   const substrate::Substrate& gel, int threads, MatrixXd motions) {
   std::vector<Vec2> points;
   for (const Bead& bead : beads) points.push_back(bead.position_um);
   const auto response = gel.response({ground.patches(), 2}, {points});
-  return tensions::reduce(beads, substrate::dense_response(response->displace(table.forces_nN()), threads), {},
-                          threads);
+  return tensions::reduce(beads, substrate::dense_response(response->displace(table.forces_nN()), threads), {}, threads,
+                          std::move(motions));
+}
+
+void add_errors_of_gel(std::vector<SheetEstimate>& estimates, double relative_error_of_modulus,
+                       const std::vector<std::vector<SheetEstimate>>& on_other_gel) {
+  for (std::size_t k = 0; k < estimates.size(); ++k) {
+    SheetEstimate& e = estimates[k];
+    const bool is_force = e.quantity != Quantity::contraction_over_stiffness && e.quantity != Quantity::penetration;
+    double variance = is_force ? std::pow(relative_error_of_modulus * e.value, 2) : 0;
+    for (const std::vector<SheetEstimate>& other : on_other_gel) variance += std::pow(other[k].value - e.value, 2);
+    const double more = tensions::kNormal95 * std::sqrt(variance);
+    if (e.low) {
+      const double wider = e.value - std::hypot(e.value - *e.low, more);
+      e.low = *e.low >= 0 ? std::max(0.0, wider) : wider;  // what cannot be negative stays so
+    }
+    if (e.high) e.high = e.value + std::hypot(*e.high - e.value, more);
+    if (e.sigma) e.sigma = std::hypot(*e.sigma, std::sqrt(variance));
+  }
 }
 
 SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known,

@@ -67,9 +67,17 @@ std::vector<SheetEstimate> expanding(const SheetFit& fit);
 /// @param adhesions  the beads' data in terms of the adhesions' forces
 void compare_with_adhesions(SheetFit& fit, const tensions::LinearData& adhesions);
 
-/// The beads' data in terms of the table. @param ground  whose patches carry the table's forces
+/// The beads' data in terms of the table.
+/// @param ground  whose patches carry the table's forces
+/// @param motions  that the beads may share besides, found with the sheet: 2·beads × some
 tensions::LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
-                             const substrate::Substrate& gel, int threads);
+                             const substrate::Substrate& gel, int threads, Eigen::MatrixXd motions = {});
+
+/// The gel's stated errors are errors of the estimates, too. The beads' displacements are measured, so that all forces
+/// and stiffnesses are proportional to the modulus; the thickness and Poisson's ratio ask for a fit on another gel.
+/// @param on_other_gel  fits to the same beads on a gel that differs by a standard error, one for each
+void add_errors_of_gel(std::vector<SheetEstimate>& estimates, double relative_error_of_modulus,
+                       const std::vector<std::vector<SheetEstimate>>& on_other_gel);
 
 /// Least squares (or a robust loss) over all stiffnesses of the table: of each the best loads are linear, so the misfit
 /// is a function of one number, or of two where the adhesions are fitted, which are scanned and then refined (variable

@@ -10,6 +10,7 @@
 #include "mbtfm/sheets/beside_fibres.h"
 #include "mbtfm/sheets/field_fit.h"
 #include "mbtfm/sheets/sheet_fit.h"
+#include "mbtfm/tensions/common_motion.h"
 #include "substrate/greens/models.h"
 #include "tests/support/sheets.h"
 
@@ -242,6 +243,46 @@ TEST(SheetFit, bundles_in_the_sheet_have_their_tensions) {
     EXPECT_EQ(fit.models[1].name, "sheet");
     EXPECT_EQ(fit.models[2].name, "sheet-with-bundles");
     EXPECT_EQ(fit.models[2].bic<fit.models[1].bic, tension> 0);
+  }
+}
+
+/// 0.3 % of growth, a turn and a shift between the two pictures of the beads.
+TEST(SheetFit, a_motion_that_all_beads_share_is_no_contraction) {
+  const FittedDisc disc(25);
+  std::mt19937_64 random(18);
+  DisplacementField beads = with_noise(disc.exact(3, 1), random);
+  for (Bead& bead : beads) {
+    const Vec2 x = bead.position_um;
+    bead.displacement_um += Vec2{0.1, -0.05} + 0.003 * x + 0.001 * Vec2{-x.y, x.x};
+  }
+  const auto contraction = [&](Eigen::MatrixXd motions) {
+    return of(fit_sheet(data_of(beads, *disc.table, *disc.ground, *disc.model, 1, std::move(motions)), *disc.table,
+                        tensions::Loss::squares),
+              Quantity::contraction);
+  };
+  const SheetEstimate with = contraction(tensions::affine_motions(beads)), without = contraction({});
+  EXPECT_NEAR(with.value, 1, 4 * with.sigma.value_or(0));
+  EXPECT_GT(std::abs(without.value - 1), 4 * without.sigma.value_or(0)) << "then this asks nothing";
+}
+
+/// The same displacements on a gel of another modulus are made by forces and stiffnesses in proportion.
+TEST(SheetFit, the_error_of_the_modulus_is_one_of_forces_and_stiffnesses) {
+  const FittedDisc disc(25);
+  std::mt19937_64 random(19);
+  SheetFit fit = fit_sheet(disc.data(with_noise(disc.exact(3, 1), random)), *disc.table, tensions::Loss::squares);
+  const SheetFit before = fit;
+  constexpr double kRelative = 0.1;
+  std::vector<SheetEstimate> other = before.estimates;
+  other.front().value += 0.3;
+  add_errors_of_gel(fit.estimates, kRelative, {other});
+  for (std::size_t k = 0; k < fit.estimates.size(); ++k) {
+    const SheetEstimate &e = fit.estimates[k], &old = before.estimates[k];
+    const double of_modulus = e.quantity == Quantity::contraction_over_stiffness ? 0 : kRelative * e.value,
+                 of_other = k == 0 ? 0.3 : 0;
+    const double sigma = std::sqrt(std::pow(*old.sigma, 2) + std::pow(of_modulus, 2) + std::pow(of_other, 2));
+    EXPECT_NEAR(*e.sigma, sigma, 1e-9 * sigma) << name_of(e.quantity);
+    EXPECT_LE(*e.low, *old.low);
+    EXPECT_GE(*e.high, *old.high);
   }
 }
 
