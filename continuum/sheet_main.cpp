@@ -832,8 +832,8 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
       made.bundles.push_back({bundles[k], loads(loads.size() - std::ssize(bundles) + static_cast<Eigen::Index>(k))});
     return made;
   };
-  // The displacement beside an edge whose tractions are singular converges with the triangles' size to the first power:
-  // the error is what triangles smaller by kFiner change, over 1 - kFiner.
+  // Triangles fall differently on each mesh, and displacements beside the edge, where tractions are singular, change
+  // without order from one to the next: by their change with smaller triangles they are known.
   const auto mesh_error_um = [&](const sheets::Stiffnesses& stiffnesses, const Eigen::VectorXd& loads) {
     constexpr double kFiner = 0.7;
     Scene fine = scene_of(stiffnesses, loads);
@@ -842,7 +842,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
     const std::vector<Vec2> there = displacements_um(*model, solve_on_gel(fine, *model, context.threads), places);
     Eigen::VectorXd error(2 * std::ssize(here));
     for (std::size_t i = 0; i < here.size(); ++i) {
-      const Vec2 of_bead = 1 / (1 - kFiner) * (there[i] - here[i]);
+      const Vec2 of_bead = there[i] - here[i];
       error.segment<2>(2 * static_cast<Eigen::Index>(i)) << of_bead.x, of_bead.y;
     }
     return error;
@@ -850,7 +850,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   std::optional<sheets::FieldFit> field;
   if (lattice)
     field = fit_field(std::move(data), table, p.loss, known, *lattice, means_over(*elements, *lattice), mesh_error_um);
-  sheets::SheetFit fit = field ? field->sheet : fit_sheet(std::move(data), table, p.loss, known, names);
+  sheets::SheetFit fit = field ? field->sheet : fit_sheet(std::move(data), table, p.loss, known, names, mesh_error_um);
   const auto estimates_on = [&](const Gel& other) {
     const auto its_model = choice::make_substrate(other, p.substrate, context.threads);
     const OnGel its_ground(*elements, *its_model, adhering_triangles(*elements, scene.adhesive_um), context.threads);
@@ -863,9 +863,8 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   std::vector<std::vector<sheets::SheetEstimate>> on_other_gel;
   const bool has_known_stiffness = known || p.sheet.adhesion_stiffness_nN_per_um3;
   for (const Gel& other : gels_an_error_away(gel, has_known_stiffness)) on_other_gel.push_back(estimates_on(other));
-  add_errors_of_gel(fit.estimates,
-                    has_known_stiffness ? 0 : gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa,
-                    on_other_gel);
+  add_errors(fit.estimates, has_known_stiffness ? 0 : gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa,
+             on_other_gel);
   if (context.has_input("adhesions")) compare_with_adhesions(fit, data_of_adhesions(beads, context, *model, motions));
 
   scene = scene_of(fit.stiffnesses, fit.loads);

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <functional>
 #include <optional>
 #include <vector>
 
@@ -59,10 +58,7 @@ struct FieldFit {
 /// and bundles are known by nothing before.
 /// @param table  with the shares of the lattice as its contractions; known adhesions
 /// @param mean  of each φ over the sheet's area
-/// @param mesh_error_um  of the beads' displacements (2·beads), for a sheet of such stiffness and loads: what it makes
-/// of
-///                       the solution is one more standard error; empty: the mesh is taken for exact
-using MeshError = std::function<Eigen::VectorXd(const Stiffnesses&, const Eigen::VectorXd& loads)>;
+/// @param mesh_error_um  as of fit_sheet()
 FieldFit fit_field(tensions::LinearData data, const StiffnessTable& table, tensions::Loss loss,
                    std::optional<double> stiffness_nN_per_um, const ContractionLattice& lattice,
                    const Eigen::VectorXd& mean, const MeshError& mesh_error_um = {});

@@ -19,32 +19,54 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tensions::LinearData;
 
-/// Of the loads, log M and log κ, by the derivatives at the solution; 0 of what is known, and of bundles that do not
-/// pull.
-MatrixXd covariance_of(const LinearData& data, const StiffnessTable& table, const Profile& best, double variance,
-                       bool is_sheet_known) {
+/// About a solution: the loads, log M and log κ as directions of the table's forces, and which of them are unknown. A
+/// stiffness that is given is not, nor a bundle that does not pull.
+struct Directions {
+  MatrixXd forces;  ///< a column each
+  std::vector<Eigen::Index> unknown;
+
+  MatrixXd normal(const LinearData& data) const {  ///< of the unknown ones
+    const MatrixXd J = tensions::displace(data.reduced, forces(Eigen::all, unknown));
+    return J.transpose() * J;
+  }
+};
+Directions directions_about(const StiffnessTable& table, const Profile& best, bool is_sheet_known) {
   constexpr double kStep = 1e-4;
-  const auto displaced = [&](double log_sheet, double log_adhesion) -> VectorXd {
+  const auto forces = [&](double log_sheet, double log_adhesion) -> VectorXd {
     Stiffnesses at = best.at;
     at.sheet_nN_per_um *= std::exp(log_sheet);
     if (at.adhesion_nN_per_um3) *at.adhesion_nN_per_um3 *= std::exp(log_adhesion);
-    return tensions::displace(data.reduced, table.shares(at)) * best.loads;
+    return table.shares(at) * best.loads;
   };
-  std::vector<Eigen::Index> unknown;
-  MatrixXd J(data.reduced.target.size(), table.n_loads() + 2);
-  J.leftCols(table.n_loads()) = tensions::displace(data.reduced, table.shares(best.at));
-  for (int k = 0; k < table.n_loads(); ++k)
-    if (k < table.n_loads() - best.n_bundles || best.loads[k] > 0) unknown.push_back(k);
-  if (!is_sheet_known) unknown.push_back(table.n_loads());
-  if (table.adhesion_nN_per_um3()) unknown.push_back(table.n_loads() + 1);
-  J.col(table.n_loads()) = (displaced(kStep, 0) - displaced(-kStep, 0)) / (2 * kStep);
-  J.col(table.n_loads() + 1) = (displaced(0, kStep) - displaced(0, -kStep)) / (2 * kStep);
-  const MatrixXd of_unknown = J(Eigen::all, unknown);
-  MatrixXd covariance = MatrixXd::Zero(J.cols(), J.cols());
-  covariance(unknown, unknown) =
-      variance *
-      (of_unknown.transpose() * of_unknown).ldlt().solve(MatrixXd::Identity(of_unknown.cols(), of_unknown.cols()));
+  const Eigen::Index n = table.n_loads();
+  Directions all{.forces = MatrixXd(table.shares(best.at).rows(), n + 2), .unknown = {}};
+  all.forces << table.shares(best.at), (forces(kStep, 0) - forces(-kStep, 0)) / (2 * kStep),
+      (forces(0, kStep) - forces(0, -kStep)) / (2 * kStep);
+  for (Eigen::Index k = 0; k < n; ++k)
+    if (k < n - best.n_bundles || best.loads[k] > 0) all.unknown.push_back(k);
+  if (!is_sheet_known) all.unknown.push_back(n);
+  if (table.adhesion_nN_per_um3()) all.unknown.push_back(n + 1);
+  return all;
+}
+
+/// 0 of what is known.
+MatrixXd covariance_of(const LinearData& data, const Directions& about, double variance) {
+  const MatrixXd normal = about.normal(data);
+  MatrixXd covariance = MatrixXd::Zero(about.forces.cols(), about.forces.cols());
+  covariance(about.unknown, about.unknown) =
+      variance * normal.ldlt().solve(MatrixXd::Identity(normal.rows(), normal.cols()));
   return covariance;
+}
+
+/// How the loads, log M and log κ follow a change of the beads' displacements.
+VectorXd moved_by_change(const LinearData& data, const Directions& about, const VectorXd& change_um) {
+  const VectorXd right =
+      about.forces.transpose() * data.response->pull_back(tensions::squared_weights(data).asDiagonal() *
+                                                          tensions::less_motion(data, MatrixXd(change_um)));
+  VectorXd moved = VectorXd::Zero(about.forces.cols());
+  const VectorXd of_unknown = right(about.unknown), found = about.normal(data).ldlt().solve(of_unknown);
+  moved(about.unknown) = found;
+  return moved;
 }
 
 /// The range of a quantity over all stiffnesses that the beads do not exclude.
@@ -224,6 +246,41 @@ std::vector<SheetEstimate> estimates_of(const StiffnessTable& table, const Profi
   return estimates;
 }
 
+/// The estimates where loads and stiffnesses have moved.
+std::vector<SheetEstimate> values_moved(std::vector<SheetEstimate> estimates, const StiffnessTable& table,
+                                        const Profile& best, const VectorXd& moved) {
+  const VectorXd loads = best.loads + moved.head(table.n_loads());
+  const double M = sheet_of(best) * std::exp(moved(table.n_loads())),
+               kappa = best.at.adhesion_nN_per_um3.value_or(1) * std::exp(moved(table.n_loads() + 1));
+  Eigen::Index contraction = 0, share = 0, bundle = table.n_loads() - std::ssize(table.bundles());
+  for (SheetEstimate& e : estimates) {
+    switch (e.quantity) {
+      case Quantity::contraction:
+        e.value = loads(contraction++);
+        break;
+      case Quantity::stiffness:
+        e.value = M;
+        break;
+      case Quantity::line_tension:
+        e.value = loads(table.n_contractions());
+        break;
+      case Quantity::contraction_over_stiffness:
+        e.value = loads(share++) / M;
+        break;
+      case Quantity::adhesion_stiffness:
+        e.value = kappa;
+        break;
+      case Quantity::penetration:
+        e.value = std::sqrt(M / kappa);
+        break;
+      case Quantity::bundle_tension:
+        e.value = loads(bundle++);
+        break;
+    }
+  }
+  return estimates;
+}
+
 }  // namespace
 
 LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
@@ -235,13 +292,13 @@ LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, 
                           std::move(motions));
 }
 
-void add_errors_of_gel(std::vector<SheetEstimate>& estimates, double relative_error_of_modulus,
-                       const std::vector<std::vector<SheetEstimate>>& on_other_gel) {
+void add_errors(std::vector<SheetEstimate>& estimates, double relative_error_of_modulus,
+                const std::vector<std::vector<SheetEstimate>>& others) {
   for (std::size_t k = 0; k < estimates.size(); ++k) {
     SheetEstimate& e = estimates[k];
     const bool is_force = e.quantity != Quantity::contraction_over_stiffness && e.quantity != Quantity::penetration;
     double variance = is_force ? std::pow(relative_error_of_modulus * e.value, 2) : 0;
-    for (const std::vector<SheetEstimate>& other : on_other_gel) variance += std::pow(other[k].value - e.value, 2);
+    for (const std::vector<SheetEstimate>& other : others) variance += std::pow(other[k].value - e.value, 2);
     const double more = tensions::kNormal95 * std::sqrt(variance);
     if (e.low) {
       const double wider = e.value - std::hypot(e.value - *e.low, more);
@@ -253,7 +310,7 @@ void add_errors_of_gel(std::vector<SheetEstimate>& estimates, double relative_er
 }
 
 SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known,
-                   const std::vector<std::string>& parts) {
+                   const std::vector<std::string>& parts, const MeshError& mesh_error_um) {
   data = weighed(std::move(data), loss, [&](const LinearData& of) {
     const Search search(of, table, known);
     return search.amplitudes(search.best());
@@ -269,11 +326,18 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   fit.loads = best.loads;
   add_misfit(fit, data, table.shares(best.at) * best.loads, static_cast<double>(n_unknowns));
   fit.variance = tensions::misfit_variance(data, fit.node_amplitudes, n_unknowns, loss);
-  const MatrixXd covariance = covariance_of(data, table, best, fit.variance, known.has_value());
+  const Directions about = directions_about(table, best, known.has_value());
+  const MatrixXd covariance = covariance_of(data, about, fit.variance);
   const Eigen::Index at_M = table.n_loads();
   if (!known) fit.correlation = covariance(0, at_M) / std::sqrt(covariance(0, 0) * covariance(at_M, at_M));
   fit.estimates =
       estimates_of(table, best, covariance, Allowed(table, search, best, fit.variance, known.has_value()), parts);
+  if (mesh_error_um) {
+    Directions told = about;  // a stiffness that the beads do not tell within a factor of e follows no straight line
+    std::erase_if(told.unknown, [&](Eigen::Index k) { return k >= table.n_loads() && covariance(k, k) > 1; });
+    const VectorXd moved = moved_by_change(data, told, mesh_error_um(best.at, best.loads));
+    add_errors(fit.estimates, 0, {values_moved(fit.estimates, table, best, moved)});
+  }
   Models models(data, fit.variance);
   const bool has_parts = table.n_contractions() > 1, has_springs = table.adhesion_nN_per_um3().has_value(),
              has_bundles = !table.bundles().empty();

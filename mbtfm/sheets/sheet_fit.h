@@ -1,6 +1,7 @@
 /// Contraction, stiffness and line tension of a sheet, from the displacements of the beads under it.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -73,18 +74,23 @@ void compare_with_adhesions(SheetFit& fit, const tensions::LinearData& adhesions
 tensions::LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
                              const substrate::Substrate& gel, int threads, Eigen::MatrixXd motions = {});
 
-/// The gel's stated errors are errors of the estimates, too. The beads' displacements are measured, so that all forces
-/// and stiffnesses are proportional to the modulus; the thickness and Poisson's ratio ask for a fit on another gel.
-/// @param on_other_gel  fits to the same beads on a gel that differs by a standard error, one for each
-void add_errors_of_gel(std::vector<SheetEstimate>& estimates, double relative_error_of_modulus,
-                       const std::vector<std::vector<SheetEstimate>>& on_other_gel);
+/// Of the beads' displacements (2·beads) by the sheet's mesh, for a sheet of such stiffness and loads.
+using MeshError = std::function<Eigen::VectorXd(const Stiffnesses&, const Eigen::VectorXd& loads)>;
+
+/// Further errors, independent of what the estimates state. The beads' displacements are measured, so that all forces
+/// and stiffnesses are proportional to the gel's modulus, if no stiffness is given.
+/// @param others  the same estimates where something else is a standard error away: another gel, another mesh
+void add_errors(std::vector<SheetEstimate>& estimates, double relative_error_of_modulus,
+                const std::vector<std::vector<SheetEstimate>>& others);
 
 /// Least squares (or a robust loss) over all stiffnesses of the table: of each the best loads are linear, so the misfit
 /// is a function of one number, or of two where the adhesions are fitted, which are scanned and then refined (variable
 /// projection). 95 % intervals: where the misfit, least over all else, is 1.96² variances above the best.
 /// @param stiffness_nN_per_um  known; unset: fitted
 /// @param parts  names of the table's contractions, where there are several
+/// @param mesh_error_um  what it makes of the solution is one more standard error; empty: the mesh is taken for exact
 SheetFit fit_sheet(tensions::LinearData data, const StiffnessTable& table, tensions::Loss loss,
-                   std::optional<double> stiffness_nN_per_um = {}, const std::vector<std::string>& parts = {});
+                   std::optional<double> stiffness_nN_per_um = {}, const std::vector<std::string>& parts = {},
+                   const MeshError& mesh_error_um = {});
 
 }  // namespace mbtfm::sheets
