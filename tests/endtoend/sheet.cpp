@@ -142,6 +142,14 @@ TEST_F(Sheet, contraction_and_stiffness_come_back_from_beads) {
   EXPECT_NEAR(fit.number(1, "value"), 30 * 0.4 / (1 - 0.09), 4 * fit.number(1, "sigma"));
   EXPECT_LT(figure("aic"), figure("aic_of_nothing") - 1000);
   EXPECT_EQ(outcome.output.find("explains"), std::string::npos) << "the sheet explains the beads: " << outcome.output;
+  // a gel whose modulus is known to 10 %, and whose thickness to a third
+  const double sigma = fit.number(0, "sigma");
+  const auto on_doubtful = run(gel + "youngs_modulus_sigma_kPa = 0.1\nthickness_sigma_um = 20\n" + sheet,
+                               "--displacement " + (folder_ / "displacement.csv").string());
+  ASSERT_EQ(on_doubtful.code, 0) << on_doubtful.output;
+  const files::CsvTable doubtful(folder_ / "out" / "sheet_fit.csv");
+  EXPECT_GT(doubtful.number(0, "sigma"), std::hypot(sigma, 0.1 * 0.99 * fit.number(0, "value")));
+  EXPECT_LT(doubtful.number(0, "sigma"), std::hypot(sigma, 0.2 * fit.number(0, "value")));
   // a contraction that may vary, and does not
   const auto varying = run(gel + sheet + "fit_parts = \"field\"\nfield_points = 6\n",
                            "--displacement " + (folder_ / "displacement.csv").string());
