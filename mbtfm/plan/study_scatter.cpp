@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "mbtfm/plan/cell_numbers.h"
+#include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 
 namespace mbtfm::plan {
@@ -22,6 +23,8 @@ std::optional<double> variance_named(const files::CsvTable& table, const std::st
   return std::nullopt;
 }
 
+constexpr const char* kOfStudy = "the study's mixed model";
+
 }  // namespace
 
 std::vector<Scatter> scatter_of_study(const std::filesystem::path& statistics, std::vector<Scatter> scatter) {
@@ -40,10 +43,14 @@ std::vector<Scatter> scatter_of_study(const std::filesystem::path& statistics, s
       s.between_cells_nN = std::sqrt(cell + kind_in_cell);
       s.within_nN = std::sqrt(*within);
       s.fibres_per_cell = types.number(row, "n_fibres") / std::max(1.0, types.number(row, "n_cells"));
-      s.source = "the study's mixed model";
+      s.source = kOfStudy;
       break;  // the first condition
     }
   }
+  if (std::ranges::all_of(scatter, [](const Scatter& s) { return s.source != kOfStudy; }))
+    throw InputError((statistics / "variances.csv").string(),
+                     "the scatter of tension_nN within a cell (component 'within: TYPE') of a type of types.csv",
+                     "none", "make the tables with mbtfm stats, of two cells or more");
   return scatter;
 }
 

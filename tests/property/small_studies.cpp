@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "mbtfm/plan/cell_numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/statistics/study_files.h"
 #include "tests/support/small_study.h"
@@ -158,6 +159,30 @@ TEST(SmallStudies, cells_that_lack_files_are_left_out_with_a_reason) {
     for (const LeftOutCell& cell : read.left_out) EXPECT_FALSE(cell.reason.empty());
     expect_whole(read, Page::left_out);
   }
+}
+
+/// What `mbtfm stats` writes is what `mbtfm plan --study` reads.
+TEST(SmallStudies, a_plan_takes_means_and_scatter_from_the_tables) {
+  const Study study = test::simulated_study({.n_cells = 30, .type_in_cell_sd_nN = 0.5});
+  const test::TemporaryFolder folder;
+  for (const auto& [name, text] : tables_of(study, analyse(study, kFewDraws)))
+    files::write_text(folder / std::filesystem::path(name).filename(), text);
+  std::vector<plan::Scatter> scatter(3);
+  scatter[0].type = plan::Quantity::dorsal;
+  scatter[1].type = plan::Quantity::arc;
+  scatter[2].type = plan::Quantity::ventral;
+  scatter = plan::scatter_of_study(folder.path(), scatter);
+  const double means_nN[] = {11.5, 12.5, 14};
+  for (std::size_t k = 0; k < scatter.size(); ++k) {
+    EXPECT_EQ(scatter[k].source, "the study's mixed model") << k;
+    EXPECT_NEAR(scatter[k].mean_nN, means_nN[k], 4 * std::hypot(1, 0.5, 0.5) / std::sqrt(30)) << k;
+    EXPECT_NEAR(scatter[k].between_cells_nN, std::hypot(1, 0.5), 0.5)
+        << k;  // of 30 cells: 13 %, with the two parts' errors
+    EXPECT_NEAR(scatter[k].within_nN, 1, 0.3) << k;
+    EXPECT_NEAR(scatter[k].fibres_per_cell, 4, 1.5) << k;
+  }
+  files::write_text(folder / "variances.csv", "quantity,component,standard_deviation\ntension_nN,another name,1\n");
+  EXPECT_THROW(plan::scatter_of_study(folder.path(), {{.type = plan::Quantity::ventral}}), InputError);
 }
 
 }  // namespace
