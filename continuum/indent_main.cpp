@@ -1,22 +1,28 @@
 /// mbtfm-indent: how deep a contracting cell presses into its gel.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "continuum/sheet/curve.h"
 #include "continuum/solids/outputs.h"
 #include "continuum/solids/sweep.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm::solids {
 namespace {
 
+constexpr double kVolume_um3 = 5000;  ///< where it is not given: of the thesis' cell
+
 struct Parameters {
   Gel gel;
   double radius_um = 100;  ///< of the gel: twice and more what the optimum depends on
-  double volume_um3 = 5000;
+  std::optional<double> volume_um3;
   double height_um = 0;
   double youngs_modulus_kPa = 10;
   double poisson_ratio = 0.49;
@@ -24,8 +30,7 @@ struct Parameters {
   Strain strain = Strain::small;
   std::string depths_um = "0, 5";
   std::string sweep = {};
-  int order = Fineness{}.order;
-  int towards_rim = Fineness{}.towards_rim;
+  std::optional<int> order, towards_rim;
 };
 
 void declare(stage::ParameterList& list, Parameters& p) {
@@ -33,7 +38,9 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.add("radius_um", p.radius_um, Range::thickness_um(),
            "radius of the gel around the cell (um); its side is free, its base held");
   list.table("cell");
-  list.add("volume_um3", p.volume_um3, Range::between(1, 1e7), "volume of the cell (um3)");
+  list.add("volume_um3", p.volume_um3, Range::between(1, 1e7),
+           "volume of the cell (um3); unset: " + brief(kVolume_um3) +
+               ", with --outline it follows from the outline and height_um");
   list.add("height_um", p.height_um, Range::zero_or_size_um(),
            "height of the cell, a section of a sphere (um); must be given, here or in the sweep");
   list.add("youngs_modulus_kPa", p.youngs_modulus_kPa, Range::modulus_kPa(), "Young's modulus of the cell (kPa)");
@@ -49,19 +56,24 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.add("sweep", p.sweep,
            "cases to compute: each height with each ratio of the gel's modulus to the cell's, as "
            "'height_um=5.3..15.8:11 modulus_ratio=0.1,0.5,1,2'; empty: one case");
-  list.add("order", p.order, Range::between(3, 8), "order of the finite elements");
+  list.add("order", p.order, Range::between(3, 8),
+           "order of the finite elements; unset: " + std::to_string(Fineness{}.order) + ", with --outline " +
+               std::to_string(kRevolvedFineness.order));
   list.add("towards_rim", p.towards_rim, Range::between(2, 12),
-           "number of elements between the rim of the contact and half its radius, each a fifth of the next");
+           "number of elements between the rim of the contact and half its radius, each a fifth of the next; unset: " +
+               std::to_string(Fineness{}.towards_rim) + ", with --outline " +
+               std::to_string(kRevolvedFineness.towards_rim));
 }
 
-Setting setting_of(const Parameters& p) {
-  return {.volume_um3 = p.volume_um3,
+/// @param fineness  of what is not given
+Setting setting_of(const Parameters& p, const Fineness& fineness) {
+  return {.volume_um3 = p.volume_um3.value_or(kVolume_um3),
           .cell = {p.youngs_modulus_kPa, p.poisson_ratio, p.contraction_kPa},
           .slab = {p.gel.thickness_um, p.radius_um},
           .gel_poisson_ratio = p.gel.poisson_ratio,
           .depths_um = values_in(p.depths_um, "depths_um", Zero::is_allowed),
           .strain = p.strain,
-          .fineness = {p.order, p.towards_rim}};
+          .fineness = {p.order.value_or(fineness.order), p.towards_rim.value_or(fineness.towards_rim)}};
 }
 
 /// @throws UsageError where a value leaves the model
@@ -171,9 +183,11 @@ std::vector<Indentation> solved_cases(const Setting& setting, const std::vector<
   }
 }
 
-StageReport run(const Parameters& p, stage::StageContext& context) {
-  const Setting setting = setting_of(p);
-  const std::vector<Case> cases = cases_of(p.sweep, {p.height_um, p.gel.youngs_modulus_kPa / p.youngs_modulus_kPa});
+Case case_of(const Parameters& p) { return {p.height_um, p.gel.youngs_modulus_kPa / p.youngs_modulus_kPa}; }
+
+StageReport run_round(const Parameters& p, stage::StageContext& context) {
+  const Setting setting = setting_of(p, Fineness{});
+  const std::vector<Case> cases = cases_of(p.sweep, case_of(p));
   expect_sense(p, setting, cases);
   const std::vector<Indentation> solved = solved_cases(setting, cases, context);
   notice_failures(context, solved);
@@ -195,6 +209,84 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   return report;
 }
 
+/// @throws UsageError of what only round cells have
+void expect_outline_sense(const Parameters& p) {
+  if (!p.sweep.empty())
+    throw UsageError("--sweep: expected none with --outline, which is one case; found '" + p.sweep + "'");
+  if (p.strain != Strain::small)
+    throw UsageError("[indent] strain: expected small with --outline: large strains are solved for round cells alone");
+  if (p.volume_um3)
+    throw UsageError("[cell] volume_um3: expected none with --outline, found " + brief(*p.volume_um3) +
+                     ". The volume follows from the outline and height_um");
+}
+
+/// The outline of a whole contact, without points that repeat the one before.
+Polygon read_whole_outline(const Path& file) {
+  Polygon outline;
+  for (const files::OutlinePoint& point : files::read(file, files::outline_table())) {
+    if (point.ring != 0) throw InputError(file.string(), "one ring: a contact without holes", "a second ring");
+    if (point.is_cut)
+      throw InputError(file.string(), "the outline of a whole contact", "one that the image cuts (is_cut)");
+    if (outline.empty() || !(outline.back() == point.position_um)) outline.push_back(point.position_um);
+  }
+  while (outline.size() > 1 && outline.front() == outline.back()) outline.pop_back();
+  return outline;
+}
+
+/// @throws InputError where it is no contact for this slab
+Contact read_contact(const Path& file, const Setting& setting) {
+  const Polygon outline = read_whole_outline(file);
+  constexpr double kLeast_um2 = 1e-3;
+  if (outline.size() < 3 || !(std::abs(signed_area_um2(outline)) > kLeast_um2))
+    throw InputError(file.string(), "an outline around an area", "one around none");
+  const std::string crossing = sheet::crossing_of({outline});
+  if (!crossing.empty())
+    throw InputError(file.string(), "an outline that does not cross itself", crossing + " cross",
+                     "a piece runs from a point to the next; remove the loop, or draw the outline again");
+  try {
+    Contact contact(outline);
+    expect_on_slab(contact, setting.slab);
+    sectors_of(contact, setting.fineness.order);
+    return contact;
+  } catch (const InvalidData& error) {
+    throw InputError(file.string(), error.expected, error.found);
+  }
+}
+
+OutlinedIndentation solved_case(const Setting& setting, const Case& of, const Contact& contact, int threads) {
+  try {
+    return indentation(setting, of, contact, threads);
+  } catch (const InvalidData& error) {
+    throw UsageError(error.what());  // of height or depths: the contact has been checked
+  }
+}
+
+StageReport run_outlined(const Parameters& p, stage::StageContext& context) {
+  expect_outline_sense(p);
+  Setting setting = setting_of(p, kRevolvedFineness);
+  const Case of = case_of(p);
+  expect_sense(p, setting, {of});
+  const Contact contact = read_contact(context.input("outline"), setting);
+  setting.volume_um3 = section_on(contact, of.height_um).volume_um3;
+  const OutlinedIndentation solved = solved_case(setting, of, contact, context.threads);
+  write_indentations(context.output("out", "indent.csv"), {solved.of}, setting.depths_um);
+  write_deformed_vtu(context.output("out", "indent.vtu"), solved.deformed);
+  StageReport report;
+  report.figures = figures_of(setting, {solved.of});
+  const Sectors& sectors = solved.deformed.mesh.sectors;
+  report.figures.emplace_back("volume_um3", setting.volume_um3);
+  report.figures.emplace_back("n_sectors", std::int64_t{sectors.n()});
+  report.figures.emplace_back("outline_off_um", sectors.off_um);
+  files::write_figures(context.output("out", "indent.json"), report.figures);
+  report.summary = summary_of(setting, {solved.of}, {});
+  notice_large_contraction(context, setting);
+  return report;
+}
+
+StageReport run(const Parameters& p, stage::StageContext& context) {
+  return context.has_input("outline") ? run_outlined(p, context) : run_round(p, context);
+}
+
 }  // namespace
 }  // namespace mbtfm::solids
 
@@ -204,7 +296,9 @@ int main(int argc, char** argv) {
   return mbtfm::stage::run_stage<Parameters>(
       {.name = "indent",
        .purpose = "find how deep a contracting cell presses into its gel",
-       .files = {{"out", Kind::output_folder,
+       .files = {{"outline", Kind::optional_input,
+                  "outline of a contact that is no circle, as outline.csv of a cell: one ring, in um"},
+                 {"out", Kind::output_folder,
                   "indent.csv, indent.json, indent.vtu (of the deepest case); of a sweep optima.csv and the "
                   "map, indent.svg"}}},
       argc, argv, run);

@@ -11,8 +11,6 @@
 namespace mbtfm::solids {
 namespace {
 
-constexpr int kMoreThanOrder = 2;  // points of the rule along a side: exact for what a bent element makes of degree 2 p
-
 /// Legendre's polynomials on [0, 1], 0 to n.
 std::vector<double> legendre(double unit, int n) {
   const double x = 2 * unit - 1;

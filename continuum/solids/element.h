@@ -39,6 +39,8 @@ using Nodes = Eigen::Matrix2Xd;  ///< by node (u fastest, then v): r and z, of a
 class Square {
  public:
   explicit Square(int order);
+  /// Points of the rule along a side: exact for what a bent element makes of degree 2 p.
+  static constexpr int kMoreThanOrder = 2;
 
   int order() const { return order_; }
   int n_nodes() const { return (order_ + 1) * (order_ + 1); }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/parallel.h"
@@ -33,10 +34,15 @@ Fineness coarser(Fineness fineness) {
   return fineness;
 }
 
-Deformed deformed_of(const Setting& setting, const Case& of, const SectionMesh& mesh, const Resolution& at) {
+/// By part.
+std::vector<Solid> solids_of(const Setting& setting, const Case& of) {
   const Solid gel = {.youngs_modulus_kPa = of.modulus_ratio * setting.cell.youngs_modulus_kPa,
                      .poisson_ratio = setting.gel_poisson_ratio};
-  return solve({mesh.mesh, at.unknowns, {gel, setting.cell}}, setting.strain);
+  return {gel, setting.cell};
+}
+
+Deformed deformed_of(const Setting& setting, const Case& of, const SectionMesh& mesh, const Resolution& at) {
+  return solve({mesh.mesh, at.unknowns, solids_of(setting, of)}, setting.strain);
 }
 
 /// A value, and the place where it is.
@@ -71,25 +77,68 @@ Largest largest_along(const std::vector<double>& lines, const F& value) {
   return there > best->value ? Largest{at, there} : *best;
 }
 
-Reading read(const Deformed& deformed, const SectionMesh& mesh, const std::vector<double>& depths_um) {
+/// Along rays from the axis, each cut by the mesh at these distances (of the round cell's half plane).
+struct Rays {
+  std::vector<double> r_lines_um;
+  int n = 1;
+};
+
+/// What lies in the planes of the depths. @param down_um  by ray, distance along it and depth
+template <class Down>
+Reading read_planes(const Rays& rays, const std::vector<double>& depths_um, const Down& down_um) {
   Reading reading;
-  std::vector<double> r_lines = mesh.mesh->patches[kSlabPatch].u_lines;
-  for (double& line : r_lines) line *= mesh.slab.radius_um;
-  const auto down = [&](double r, double depth) { return deformed.displacement_um_at(mesh.in_gel(r, depth)).y; };
+  const auto largest = [&](double depth, double sign) {
+    Largest of_all{0, -HUGE_VAL};
+    for (int ray = 0; ray < rays.n; ++ray) {
+      const Largest along = largest_along(rays.r_lines_um, [&](double r) { return sign * down_um(ray, r, depth); });
+      if (along.value > of_all.value) of_all = along;
+    }
+    return of_all;
+  };
   for (const double depth : depths_um) {
-    const Largest deepest = largest_along(r_lines, [&](double r) { return down(r, depth); });
+    const Largest deepest = largest(depth, 1);
     reading.depth_um.push_back(deepest.value);
     reading.deepest_at_um.push_back(deepest.at);
   }
-  reading.lift_um = std::max(0.0, largest_along(r_lines, [&](double r) { return -down(r, 0); }).value);
-  for (int e = 0; e < mesh.mesh->n_elements(); ++e) {
-    for (int k = 0; k < mesh.mesh->square.n_nodes(); ++k) {
-      const double size = norm(deformed.displacement_um[mesh.mesh->nodes_of(e)[k]]);
-      reading.largest_u_um = std::max(reading.largest_u_um, size);
-      if (mesh.mesh->part[e] == kGel) reading.largest_u_gel_um = std::max(reading.largest_u_gel_um, size);
-    }
+  reading.lift_um = std::max(0.0, largest(0, -1).value);
+  return reading;
+}
+
+/// Of a mesh in the half plane or in space.
+template <class Mesh, class Displacement>
+void read_sizes(const Mesh& mesh, const std::vector<Displacement>& u, Reading& reading) {
+  const std::size_t per_element = mesh.nodes.size() / mesh.part.size();
+  for (std::size_t k = 0; k < mesh.nodes.size(); ++k) {
+    const double size = norm(u[mesh.nodes[k]]);
+    reading.largest_u_um = std::max(reading.largest_u_um, size);
+    if (mesh.part[k / per_element] == kGel) reading.largest_u_gel_um = std::max(reading.largest_u_gel_um, size);
   }
+}
+
+std::vector<double> r_lines_um(const SectionMesh& mesh) {
+  std::vector<double> lines = mesh.mesh->patches[kSlabPatch].u_lines;
+  for (double& line : lines) line *= mesh.slab.radius_um;
+  return lines;
+}
+
+Reading read(const Deformed& deformed, const SectionMesh& mesh, const std::vector<double>& depths_um) {
+  Reading reading = read_planes({r_lines_um(mesh)}, depths_um, [&](int, double r, double depth) {
+    return deformed.displacement_um_at(mesh.in_gel(r, depth)).y;
+  });
+  read_sizes(*mesh.mesh, deformed.displacement_um, reading);
   reading.top_down_um = deformed.displacement_um_at(mesh.top_of_cell()).y;
+  return reading;
+}
+
+Reading read(const RevolvedBody& body, const std::vector<double>& depths_um) {
+  constexpr int kLooks = 8;  // rays a sector: 4 degrees and less, between which a top is missed by 1e-3 of what varies
+  const SectionMesh& plane = body.mesh.half_plane;
+  const Rays rays{r_lines_um(plane), kLooks * body.mesh.sectors.n()};
+  Reading reading = read_planes(rays, depths_um, [&](int ray, double r, double depth) {
+    return body.displacement_um_at(plane.in_gel(r, depth), ray / kLooks, static_cast<double>(ray % kLooks) / kLooks).z;
+  });
+  read_sizes(body.mesh, body.displacement_um, reading);
+  reading.top_down_um = body.displacement_um_at(plane.top_of_cell(), 0, 0).z;
   return reading;
 }
 
@@ -102,17 +151,23 @@ double difference_um(const Reading& a, const Reading& b) {
   return largest;
 }
 
+Vec2 along_axis(Vec2 force) { return {0, force.y}; }
+Vec3 along_axis(Vec3 force) { return force; }  // sideways they need not cancel by themselves
+double depth_of(Vec2 place) { return place.y; }
+double depth_of(Vec3 place) { return place.z; }
+
 /// Net force of the cell on the gel, over the sum of the nodes' forces.
-double imbalance_of(const Deformed& deformed) {
-  const std::vector<Vec2> forces = deformed.forces_nN(kCell);
-  double net = 0, sum = 0;
-  for (std::size_t k = 0; k < forces.size(); ++k) {
+template <class Vector>
+double imbalance_of(const std::vector<Vector>& positions_um, const std::vector<Vector>& forces_nN) {
+  Vector net;
+  double sum = 0;
+  for (std::size_t k = 0; k < forces_nN.size(); ++k) {
     constexpr double kInterface = 1e-9;
-    if (std::abs(deformed.body.mesh->position_um[k].y) > kInterface) continue;
-    net += forces[k].y;
-    sum += norm(forces[k]);
+    if (std::abs(depth_of(positions_um[k])) > kInterface) continue;
+    net += along_axis(forces_nN[k]);
+    sum += norm(forces_nN[k]);
   }
-  return sum > 0 ? std::abs(net) / sum : 0;
+  return sum > 0 ? norm(net) / sum : 0;
 }
 
 struct Resolutions {
@@ -131,7 +186,7 @@ Indentation solve_case(const Setting& setting, const Case& of, const Resolutions
   result.reading = read(fine, fine_mesh, setting.depths_um);
   result.energy_fJ = fine.energy_fJ;
   result.iterations = fine.iterations;
-  result.imbalance = imbalance_of(fine);
+  result.imbalance = imbalance_of(fine_mesh.mesh->position_um, fine.forces_nN(kCell));
   const SectionMesh coarse_mesh = mesh_of(setting, of.height_um, at.coarse.fineness);
   result.coarse = read(deformed_of(setting, of, coarse_mesh, at.coarse), coarse_mesh, setting.depths_um);
   result.error_um = difference_um(result.reading, result.coarse);
@@ -204,6 +259,26 @@ std::optional<Optimum> optimum_of(const Setting& setting, ByHeight solved, doubl
 
 Indentation indentation(const Setting& setting, const Case& of) {
   return solve_case(setting, of, Resolutions(setting, of.height_um));
+}
+
+OutlinedIndentation indentation(const Setting& setting, const Case& of, const Contact& contact, int threads) {
+  const Sectors sectors = sectors_of(contact, setting.fineness.order);
+  const auto solved_with = [&](const Fineness& fineness) {
+    RevolvedMesh mesh = revolved_mesh(contact, sectors, of.height_um, setting.slab, fineness);
+    for (const double depth : setting.depths_um)
+      mesh.half_plane.in_gel(0, depth);  // refused before the work, not after
+    return solved(std::move(mesh), solids_of(setting, of), threads);
+  };
+  OutlinedIndentation result{
+      .of = {.of = of, .contact_radius_um = contact.equal_radius_um(), .contact_area_um2 = contact.area_um2()},
+      .deformed = solved_with(setting.fineness)};
+  const RevolvedBody& fine = result.deformed;
+  result.of.reading = read(fine, setting.depths_um);
+  result.of.coarse = read(solved_with(coarser(setting.fineness)), setting.depths_um);
+  result.of.error_um = difference_um(result.of.reading, result.of.coarse);
+  result.of.energy_fJ = fine.energy_fJ;
+  result.of.imbalance = imbalance_of(fine.mesh.position_um, fine.forces_nN(kCell));
+  return result;
 }
 
 std::vector<Indentation> indentations(const Setting& setting, const std::vector<Case>& cases, int threads,

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "continuum/solids/section.h"
+#include "continuum/solids/revolved.h"
 #include "pipeline/contract/report.h"
 
 namespace mbtfm::solids {
@@ -55,6 +55,15 @@ std::vector<Indentation> indentations(const Setting& setting, const std::vector<
 
 /// The cell itself, deformed, on the fine mesh.
 Deformed deformed_section(const Setting& setting, const Case& of);
+
+/// A cell whose contact is no circle, in full.
+struct OutlinedIndentation {
+  Indentation of = {};  ///< its radius of the contact is that of the circle of the same area
+  RevolvedBody deformed;
+};
+/// The volume follows from the contact and the height; the setting's is not read. Strains are small.
+/// @throws InvalidData as sectors_of and revolved_mesh and where a depth lies below the base; NotSolved as solved
+OutlinedIndentation indentation(const Setting& setting, const Case& of, const Contact& contact, int threads);
 
 /// The height at which a depth of reading is largest, for one stiffness of the gel.
 struct Optimum {

@@ -34,8 +34,10 @@ files::Table<Indentation> table_of_cases(const std::vector<double>& depths_um) {
   add("largest_u_um", "largest displacement anywhere", [](const Indentation& i) { return i.reading.largest_u_um; });
   add("error_um", "largest change of the depths and displacements of the row on a coarser mesh",
       [](const Indentation& i) { return i.error_um; });
-  table.columns.push_back(
-      {"contact_radius_um", "radius of the contact", &Indentation::contact_radius_um, {.digits = kForPeople}});
+  table.columns.push_back({"contact_radius_um",
+                           "radius of the contact, or of the circle of its area",
+                           &Indentation::contact_radius_um,
+                           {.digits = kForPeople}});
   table.columns.push_back(
       {"contact_area_um2", "area of the contact", &Indentation::contact_area_um2, {.digits = kForPeople}});
   add("lift_um", "largest displacement of the gel's surface out of it, near the rim of the contact",
@@ -100,6 +102,33 @@ void write_deformed_vtu(const Path& file, const Deformed& deformed) {
             deformed.stress_kPa_at({e, {0.5 * (nodes[i] + nodes[i + 1]), 0.5 * (nodes[j] + nodes[j + 1])}});
         for (const double value : stress) grid.cell_arrays[1].values.push_back(value);
       }
+    }
+  }
+  files::write_grid_vtu(file, grid);
+}
+
+void write_deformed_vtu(const Path& file, const RevolvedBody& deformed) {
+  const RevolvedMesh& mesh = deformed.mesh;
+  files::Grid grid{.corners = 8, .points_um = {}, .cells = {}, .point_arrays = {}, .cell_arrays = {}};
+  grid.point_arrays = {{"displacement_um", 3, {}}};
+  for (std::size_t k = 0; k < mesh.position_um.size(); ++k) {
+    const Vec3 at = mesh.position_um[k], u = deformed.displacement_um[k];
+    grid.points_um.push_back({at.x, at.y, at.z});
+    for (const double value : {u.x, u.y, u.z}) grid.point_arrays[0].values.push_back(value);
+  }
+  grid.cell_arrays = {{"part", 1, {}}, {"stress_kPa", 6, {}}};
+  for (const auto& stress : deformed.stress_kPa())
+    grid.cell_arrays[1].values.insert(grid.cell_arrays[1].values.end(), stress.begin(), stress.end());
+  const int order = mesh.half_plane.mesh->square.order(), row = order + 1;
+  for (int e = 0; e < mesh.n_elements(); ++e) {
+    for (int first = 0; first < order * row * row; ++first) {
+      if (first % row == order || first / row % row == order) continue;  // the last node of a side begins nothing
+      // (u, v, angle) turn the other way round than (x, y, z): the face further on comes first
+      for (const int face : {first + row * row, first}) {
+        for (const int corner : {face, face + 1, face + row + 1, face + row})
+          grid.cells.push_back(mesh.nodes_of(e)[corner]);
+      }
+      grid.cell_arrays[0].values.push_back(mesh.part[e]);
     }
   }
   files::write_grid_vtu(file, grid);

@@ -17,6 +17,9 @@ void write_optima(const Path& file, const std::vector<Optimum>& optima);
 /// `displacement_um` by point, `part` (0 gel, 1 cell) and `stress_kPa` (rr, tt, zz, rz, contraction included) by
 /// square.
 void write_deformed_vtu(const Path& file, const Deformed& deformed);
+/// The same of a cell whose contact is no circle: hexahedra between the nodes, x and y as the outline's, stress_kPa xx,
+/// yy, zz, xy, yz, xz.
+void write_deformed_vtu(const Path& file, const RevolvedBody& deformed);
 /// For each depth of reading the map over height and stiffness, and the curves over the height: a picture (SVG).
 std::string picture_of(const Setting& setting, const std::vector<Indentation>& solved,
                        const std::vector<Optimum>& optima);

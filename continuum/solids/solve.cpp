@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -193,25 +194,25 @@ void solve_large(Equilibrium& equilibrium, Deformed& deformed) {
 
 }  // namespace
 
-Unknowns::Unknowns(const Mesh& mesh, const std::function<Held(Vec2 place_um)>& held) {
-  const int n = static_cast<int>(mesh.position_um.size()), per_element = mesh.square.n_nodes();
-  std::vector<std::vector<int>> below(n);
-  for (int e = 0; e < mesh.n_elements(); ++e) {
-    const int* nodes = mesh.nodes_of(e);
-    for (int a = 0; a < per_element; ++a) {
-      for (int b = 0; b < per_element; ++b) {
-        if (nodes[b] >= nodes[a]) below[nodes[a]].push_back(nodes[b]);
-      }
+numerics::BlockPattern pattern_of(int n_nodes, const std::vector<int>& nodes, int per_element) {
+  std::vector<std::vector<int>> below(n_nodes);
+  for (auto of = nodes.begin(); of != nodes.end(); of += per_element) {
+    for (auto a = of; a != of + per_element; ++a) {
+      std::copy_if(of, of + per_element, std::back_inserter(below[*a]), [&](int b) { return b >= *a; });
     }
   }
-  pattern_.n = n;
-  pattern_.start.push_back(0);
+  numerics::BlockPattern pattern{.n = n_nodes, .start = {0}, .row = {}};
   for (std::vector<int>& rows : below) {
     std::sort(rows.begin(), rows.end());
     rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-    pattern_.row.insert(pattern_.row.end(), rows.begin(), rows.end());
-    pattern_.start.push_back(static_cast<int>(pattern_.row.size()));
+    pattern.row.insert(pattern.row.end(), rows.begin(), rows.end());
+    pattern.start.push_back(static_cast<int>(pattern.row.size()));
   }
+  return pattern;
+}
+
+Unknowns::Unknowns(const Mesh& mesh, const std::function<Held(Vec2 place_um)>& held)
+    : pattern_(pattern_of(static_cast<int>(mesh.position_um.size()), mesh.nodes, mesh.square.n_nodes())) {
   double size = 0;
   for (const Vec2 at : mesh.position_um) size = std::max(size, at.x);
   constexpr double kOnAxis = 1e-9;  // of the body, as nodes are joined

@@ -15,6 +15,9 @@ struct Held {
   bool along_r = false, along_z = false;
 };
 
+/// Which nodes share an element. @param nodes  those of an element after those of another; a node may be there twice
+numerics::BlockPattern pattern_of(int n_nodes, const std::vector<int>& nodes, int per_element);
+
 /// The unknowns of a mesh: which are held, and in which order they are eliminated. It serves all meshes that are cut
 /// the same way.
 class Unknowns {

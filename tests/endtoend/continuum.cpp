@@ -99,6 +99,50 @@ TEST_F(Continuum, what_is_no_cell_or_no_gel_for_it_is_refused) {
   refused("height_um = 0.3\n", "radius_um");
 }
 
+constexpr const char* kOnOutline =
+    "height_um = 7.5\nyoungs_modulus_kPa = 10\npoisson_ratio = 0.49\ncontraction_kPa = 30\n";
+
+TEST_F(Continuum, a_contact_that_is_an_outline_is_solved_in_space) {
+  Polygon square = {{10, 20}, {46, 20}, {46, 56}, {10, 56}};
+  files::write_outline(file("outline.csv"), square);
+  const auto outcome = test::run_program("mbtfm-indent --config " + settings(kOnOutline) + " --outline " +
+                                         file("outline.csv") + " --towards_rim 2 --out " + file("out"));
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("contraction-beyond-linear"), std::string::npos) << outcome.output;
+  const files::CsvTable table(file("out/indent.csv"));
+  ASSERT_EQ(table.n_rows(), 1);
+  EXPECT_NEAR(table.number(0, "contact_area_um2"), 36 * 36, 0.01);
+  // the circle of this area presses 0.267 um deep; a square's longer rim takes some per cent of it
+  EXPECT_LT(table.number(0, "depth_5_um"), 0.267);
+  EXPECT_GT(table.number(0, "depth_5_um"), 0.9 * 0.267);
+  EXPECT_GT(table.number(0, "error_um"), 0);
+  EXPECT_NE(files::read_text(file("out/indent.json")).find("\"n_sectors\": 16"), std::string::npos);
+  EXPECT_FALSE(files::read_text(file("out/indent.vtu")).empty());
+}
+
+TEST_F(Continuum, outlines_that_are_no_contact_are_refused_with_the_file_and_the_place) {
+  const auto refused = [&](const std::vector<Polygon>& rings, const std::string& flags, int code,
+                           const std::string& words) {
+    files::write_outline(file("outline.csv"), rings.front(), {rings.begin() + 1, rings.end()});
+    const auto outcome = test::run_program("mbtfm-indent --config " + settings(kOnOutline) + " --outline " +
+                                           file("outline.csv") + " --out " + file("out") + flags);
+    EXPECT_EQ(outcome.code, code) << outcome.output;
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << outcome.output;
+    EXPECT_EQ(outcome.output.find("outline.csv") != std::string::npos, code == 3) << outcome.output;
+    EXPECT_FALSE(std::filesystem::exists(file("out/indent.csv")));
+  };
+  const Polygon square = {{0, 0}, {36, 0}, {36, 36}, {0, 36}};
+  refused({{{0, 0}, {40, 40}, {40, 0}, {0, 30}}}, "", 3, "piece 1 of ring 0 and piece 3 of ring 0 cross");
+  refused({{{0, 0}, {40, 0}, {40, 40}, {36, 40}, {36, 4}, {0, 4}}}, "", 3, "from point 3 at (36, 40)");
+  refused({{{0, 0}, {110, 0}, {110, 20}, {0, 20}}}, "", 3, "half the gel's radius_um");
+  refused({square, {{10, 10}, {10, 20}, {20, 20}}}, "", 3, "without holes");
+  refused({{{0, 0}, {36, 0}}}, "", 3, "outline");
+  refused({square}, " --sweep modulus_ratio=1,2", 2, "--sweep");
+  refused({square}, " --strain large", 2, "large strains");
+  refused({square}, " --volume_um3 5000", 2, "volume_um3");
+  refused({square}, " --depths_um 70", 2, "a depth of reading");
+}
+
 /// A cell folder: a spiked outline, turned, with beads that its tips and its edge pull.
 void write_cell(const Path& folder, double angle, std::uint64_t seed, double spike_um) {
   std::filesystem::create_directories(folder);

@@ -1,0 +1,498 @@
+#include "continuum/solids/revolved.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/memory.h"
+#include "pipeline/numerics/parallel.h"
+#include "pipeline/numerics/quadrature.h"
+
+namespace mbtfm::solids {
+namespace {
+
+constexpr double kRound = 2 * std::numbers::pi;
+
+Vec2 centroid_um(const Polygon& outline) {
+  Vec2 sum;
+  for (std::size_t k = 0; k < outline.size(); ++k) {
+    const Vec2 a = outline[k] - outline[0], b = outline[(k + 1) % outline.size()] - outline[0];
+    sum += cross(a, b) * (a + b);
+  }
+  return outline[0] + 1 / (6 * signed_area_um2(outline)) * sum;
+}
+
+double turn_of(Vec2 at) {
+  const double angle = std::atan2(at.y, at.x);
+  return angle < 0 ? angle + kRound : angle;
+}
+
+/// Lagrange's polynomials of the nodes along a side, and their slopes.
+struct AlongSide {
+  Eigen::VectorXd values, slopes;
+};
+AlongSide along_side(const Square& square, double unit) {
+  // at v = 0 the square's shapes are those of its first row of nodes
+  const int n = square.order() + 1;
+  return {square.shapes_at({unit, 0}).head(n), square.slopes_at({unit, 0}).col(0).head(n)};
+}
+
+/// The cube [0, 1]³: a square times a side.
+struct Cube {
+  struct Point {
+    double weight;
+    Eigen::MatrixX3d slopes;  ///< by node: along u, v, the angle
+    Eigen::VectorXd pressures;
+  };
+  std::vector<Point> points;
+  int n_nodes = 0, n_pressures = 0;
+};
+
+Eigen::VectorXd times(const Eigen::VectorXd& of_square, const Eigen::VectorXd& of_side) {
+  return (of_square * of_side.transpose()).reshaped();
+}
+
+/// A basis of the polynomials of total degree below the order.
+Eigen::VectorXd pressures_at(Vec2 unit, double share, int order) {
+  std::vector<double> values;
+  for (int i = 0; i < order; ++i) {
+    for (int j = 0; i + j < order; ++j) {
+      for (int k = 0; i + j + k < order; ++k)
+        values.push_back(std::pow(2 * unit.x - 1, i) * std::pow(2 * unit.y - 1, j) * std::pow(2 * share - 1, k));
+    }
+  }
+  return Eigen::Map<Eigen::VectorXd>(values.data(), std::ssize(values));
+}
+
+/// By node of the cube: along u, v and the angle.
+Eigen::MatrixX3d slopes_at(const Square& square, Vec2 unit, double share) {
+  const Eigen::MatrixX2d of_square = square.slopes_at(unit);
+  const AlongSide side = along_side(square, share);
+  Eigen::MatrixX3d slopes(of_square.rows() * side.values.size(), 3);
+  slopes << times(of_square.col(0), side.values), times(of_square.col(1), side.values),
+      times(square.shapes_at(unit), side.slopes);
+  return slopes;
+}
+
+Cube cube_of(const Square& square) {
+  const numerics::GaussRule rule = numerics::gauss_legendre(square.order() + Square::kMoreThanOrder);
+  const auto at = [&](std::size_t i) { return 0.5 * (1 + rule.nodes[i]); };
+  Cube cube{.points = {}, .n_nodes = square.n_nodes() * (square.order() + 1)};
+  const std::size_t n = rule.nodes.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    for (std::size_t j = 0; j < n; ++j) {
+      for (std::size_t i = 0; i < n; ++i)
+        cube.points.push_back({rule.weights[i] * rule.weights[j] * rule.weights[k] / 8,
+                               slopes_at(square, {at(i), at(j)}, at(k)),
+                               pressures_at({at(i), at(j)}, at(k), square.order())});
+    }
+  }
+  cube.n_pressures = static_cast<int>(cube.points.front().pressures.size());
+  return cube;
+}
+
+/// In the middle between nodes.
+struct Middle {
+  Eigen::MatrixX3d slopes;
+  Eigen::VectorXd pressures;
+};
+std::vector<Middle> middles_of(const Square& square) {
+  const auto at = [&](int i) { return 0.5 * (square.nodes()[i] + square.nodes()[i + 1]); };
+  std::vector<Middle> middles;
+  for (int k = 0; k < square.order(); ++k) {
+    for (int j = 0; j < square.order(); ++j) {
+      for (int i = 0; i < square.order(); ++i)
+        middles.push_back(
+            {slopes_at(square, {at(i), at(j)}, at(k)), pressures_at({at(i), at(j)}, at(k), square.order())});
+    }
+  }
+  return middles;
+}
+
+using Values = Eigen::Matrix3Xd;  ///< by node: x, y, z
+
+/// How much wider space is than the cube. (r, z, angle) turn the other way round than (x, y, z).
+double widened(const Eigen::Matrix3d& jacobian) { return -jacobian.determinant(); }
+
+Values values_of(const RevolvedMesh& mesh, const std::vector<Vec3>& values, int element) {
+  Values of(3, mesh.n_nodes());
+  for (int k = 0; k < mesh.n_nodes(); ++k) {
+    const Vec3 at = values[mesh.nodes_of(element)[k]];
+    of.col(k) << at.x, at.y, at.z;
+  }
+  return of;
+}
+
+/// Slopes of the shapes in space at each point of the rule, times the root of the point's volume.
+struct Slopes {
+  std::array<Eigen::MatrixXd, 3> along;  ///< point × node
+  Eigen::MatrixXd pressures;             ///< point × pressure, times the same root
+};
+Slopes slopes_of(const Cube& cube, const Values& x) {
+  const Eigen::Index n_points = std::ssize(cube.points);
+  Slopes slopes;
+  for (Eigen::MatrixXd& along : slopes.along) along.resize(n_points, cube.n_nodes);
+  slopes.pressures.resize(n_points, cube.n_pressures);
+  for (Eigen::Index q = 0; q < n_points; ++q) {
+    const Cube::Point& point = cube.points[q];
+    const Eigen::Matrix3d jacobian = x * point.slopes;
+    const double root = std::sqrt(point.weight * widened(jacobian));
+    const Eigen::MatrixX3d in_space = root * point.slopes * jacobian.inverse();
+    for (int i = 0; i < 3; ++i) slopes.along[i].row(q) = in_space.col(i);
+    slopes.pressures.row(q) = root * point.pressures;
+  }
+  return slopes;
+}
+
+/// The triangle that makes the pressures orthonormal.
+Eigen::LLT<Eigen::MatrixXd> mass_of(const Slopes& slopes) {
+  return Eigen::LLT<Eigen::MatrixXd>(slopes.pressures.transpose() * slopes.pressures);
+}
+
+/// ∫ pressure d shape / d axis, with the pressures orthonormal: n_pressures × 3 nodes.
+Eigen::MatrixXd divergence_of(const Slopes& slopes) {
+  Eigen::MatrixXd divergence(slopes.pressures.cols(), 3 * slopes.along[0].cols());
+  for (int i = 0; i < 3; ++i)
+    divergence(Eigen::all, Eigen::seqN(i, slopes.along[0].cols(), 3)) = slopes.pressures.transpose() * slopes.along[i];
+  return mass_of(slopes).matrixL().solve(divergence);
+}
+
+/// Of row and column 3 k + i: node k, axis i.
+Eigen::MatrixXd stiffness_of(const Cube& cube, const Values& x, const Solid& solid) {
+  const Slopes slopes = slopes_of(cube, x);
+  const double mu = solid.shear_modulus_kPa();
+  const Eigen::MatrixXd divergence = divergence_of(slopes);
+  Eigen::MatrixXd stiffness(3 * cube.n_nodes, 3 * cube.n_nodes);
+  stiffness.noalias() = solid.lame_modulus_kPa() * divergence.transpose() * divergence;
+  const auto along = [&](int i) { return Eigen::seqN(i, cube.n_nodes, 3); };
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      // 2 mu e:e(v) = mu (grad u : grad v + grad u : (grad v)^T)
+      const Eigen::MatrixXd product = mu * slopes.along[j].transpose() * slopes.along[i];
+      stiffness(along(i), along(j)) += product;
+      if (i != j) {
+        stiffness(along(j), along(i)) += product.transpose();
+        continue;
+      }
+      for (int k = 0; k < 3; ++k) stiffness(along(k), along(k)) += product;
+    }
+  }
+  return stiffness;
+}
+
+struct Forces {
+  Values nN;
+  double energy_fJ = 0;
+};
+Forces forces_of(const Cube& cube, const Values& x, const Values& u, const Solid& solid) {
+  const Slopes slopes = slopes_of(cube, x);
+  const Eigen::MatrixXd divergence = divergence_of(slopes);
+  const Eigen::VectorXd dilatation = divergence * u.reshaped();
+  const double mu = solid.shear_modulus_kPa(), lambda = solid.lame_modulus_kPa();
+  // the contraction is a pressure, too: the first of them is 1
+  const Eigen::VectorXd ones = slopes.pressures.transpose() * slopes.pressures.col(0);
+  const Eigen::VectorXd contraction = solid.contraction_kPa * mass_of(slopes).matrixL().solve(ones);
+  Forces forces{.nN = (divergence.transpose() * (lambda * dilatation + contraction)).reshaped(3, cube.n_nodes),
+                .energy_fJ = 0.5 * lambda * dilatation.squaredNorm() + contraction.dot(dilatation)};
+  for (Eigen::Index q = 0; q < std::ssize(cube.points); ++q) {
+    Eigen::MatrixX3d at(cube.n_nodes, 3);
+    for (int i = 0; i < 3; ++i) at.col(i) = slopes.along[i].row(q);
+    const Eigen::Matrix3d gradient = u * at;  // times the root of the volume
+    const Eigen::Matrix3d strain = 0.5 * (gradient + gradient.transpose());
+    forces.nN += 2 * mu * strain * at.transpose();
+    forces.energy_fJ += mu * strain.squaredNorm();
+  }
+  return forces;
+}
+
+void expect_not_turned_over(const Cube& cube, const RevolvedMesh& mesh) {
+  for (int e = 0; e < mesh.n_elements(); ++e) {
+    const Values x = values_of(mesh, mesh.position_um, e);
+    for (const Cube::Point& point : cube.points) {
+      if (!(widened(x * point.slopes) > 0))
+        throw InvalidData("the outline of the contact", "a mesh whose elements are not turned over",
+                          "an element that is, at the angle " +
+                              brief(360 / kRound * mesh.sectors.angles[e % mesh.sectors.n()]) + " degrees");
+    }
+  }
+}
+
+/// Places of nodes between the sectors' angles: the last is the first again.
+std::vector<double> angles_of_nodes(const std::vector<double>& angles, const std::vector<double>& nodes) {
+  std::vector<double> all;
+  for (std::size_t s = 0; s + 1 < angles.size(); ++s) {
+    for (std::size_t k = 0; k + 1 < nodes.size(); ++k)
+      all.push_back((1 - nodes[k]) * angles[s] + nodes[k] * angles[s + 1]);
+  }
+  return all;
+}
+
+/// Where a place of the half plane goes.
+Vec3 placed(const Contact& contact, const Slab& slab, int part, Vec2 at, double angle) {
+  const double a = contact.equal_radius_um(), rim = contact.radius_um_at(angle), side = slab.radius_um;
+  const bool is_beside = part == kGel && at.x > a;
+  const double r = is_beside ? rim + (at.x - a) * (side - rim) / (side - a) : rim / a * at.x;
+  const Vec2 centre = contact.centroid_um();
+  return {centre.x + r * std::cos(angle), centre.y + r * std::sin(angle), at.y};
+}
+
+/// Largest distance between the outline and what the element makes of it.
+double deviation_um(const Contact& contact, const Square& square, double from, double to) {
+  constexpr int kLooks = 16;  // some four times as many as the polynomial has tops
+  const auto at = [&](double share) { return (1 - share) * from + share * to; };
+  double largest = 0;
+  for (int look = 1; look < kLooks; ++look) {
+    const Eigen::VectorXd shapes = along_side(square, static_cast<double>(look) / kLooks).values;
+    Vec2 place;
+    for (int k = 0; k <= square.order(); ++k) {
+      const double angle = at(square.nodes()[k]);
+      place += shapes[k] * contact.radius_um_at(angle) * Vec2{std::cos(angle), std::sin(angle)};
+    }
+    largest = std::max(largest, std::abs(norm(place) - contact.radius_um_at(turn_of(place))));
+  }
+  return largest;
+}
+
+/// The stiffness of the whole, factorised.
+class Factor {
+ public:
+  Factor(const RevolvedBody& body, const Cube& cube, int threads) : mesh_(body.mesh), factor_(nullptr) {
+    const numerics::BlockPattern pattern =
+        pattern_of(static_cast<int>(mesh_.position_um.size()), mesh_.nodes, mesh_.n_nodes());
+    elimination_ = std::make_shared<const numerics::Elimination>(pattern, numerics::Search::quick);
+    numerics::expect_room_for({.what = "the stiffness of the cell on its gel",
+                               .count = elimination_->most_numbers(3) + 9.0 * static_cast<double>(pattern.row.size()),
+                               .parts = "numbers",
+                               .bytes_each = sizeof(double),
+                               .remedy = "choose a lower indent.order or indent.towards_rim, or smooth the outline"});
+    numerics::BlockMatrix<3> matrix;
+    static_cast<numerics::BlockPattern&>(matrix) = pattern;
+    matrix.value.assign(9 * pattern.row.size(), 0);
+    const int n_sectors = mesh_.sectors.n();
+    for (int e = 0; e < mesh_.n_elements(); e += n_sectors) {
+      std::vector<Eigen::MatrixXd> around(n_sectors);
+      numerics::parallel_for(n_sectors, threads, [&](int s) {
+        around[s] = stiffness_of(cube, values_of(mesh_, mesh_.position_um, e + s), body.solids[mesh_.part[e]]);
+      });
+      for (int s = 0; s < n_sectors; ++s) add(around[s], mesh_.nodes_of(e + s), matrix);
+    }
+    for (int k = 0; k < matrix.n; ++k) {
+      if (!is_held(k)) continue;  // what is held has an equation of its own: no displacement
+      for (int i = 0; i < 3; ++i) matrix.block(k, k)[4 * i] = 1;
+    }
+    factor_ = numerics::BlockCholesky<3, double>(elimination_);
+    if (!factor_.factorise(matrix, {.lost_pivot = numerics::LostPivot::fails, .threads = threads}))
+      throw NotSolved(Report{.reason = "the stiffness of the body is lost in rounding"});
+  }
+
+  /// Moves by what balances these forces.
+  void move(std::vector<Vec3>& u, const std::vector<Vec3>& forces_nN) const {
+    std::vector<double> x(3 * u.size());
+    const auto at = [&](std::size_t k) { return &x[3 * static_cast<std::size_t>(elimination_->place[k])]; };
+    for (std::size_t k = 0; k < u.size(); ++k) {
+      if (is_held(static_cast<int>(k))) continue;
+      const Vec3 f = forces_nN[k];
+      std::ranges::copy(std::array{-f.x, -f.y, -f.z}, at(k));
+    }
+    factor_.solve(x.data(), 1);
+    for (std::size_t k = 0; k < u.size(); ++k) u[k] += Vec3{at(k)[0], at(k)[1], at(k)[2]};
+  }
+
+ private:
+  /// The base is.
+  bool is_held(int node) const { return mesh_.position_um[node].z >= mesh_.half_plane.slab.thickness_um * (1 - 1e-12); }
+
+  void add(const Eigen::MatrixXd& stiffness, const int* nodes, numerics::BlockMatrix<3>& matrix) const {
+    for (int a = 0; a < mesh_.n_nodes(); ++a) {
+      for (int b = 0; b < mesh_.n_nodes(); ++b) {
+        if (nodes[a] < nodes[b] || is_held(nodes[a]) || is_held(nodes[b])) continue;
+        Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(matrix.block(nodes[a], nodes[b])) +=
+            stiffness.block<3, 3>(3 * a, 3 * b);
+      }
+    }
+  }
+
+  const RevolvedMesh& mesh_;
+  std::shared_ptr<const numerics::Elimination> elimination_;
+  numerics::BlockCholesky<3, double> factor_;
+};
+
+/// Of all elements, or of a part's.
+struct TotalForces {
+  std::vector<Vec3> nN;
+  double energy_fJ = 0;
+};
+TotalForces total_forces(const RevolvedBody& body, const Cube& cube, int threads, const std::vector<char>& parts) {
+  const RevolvedMesh& mesh = body.mesh;
+  std::vector<Forces> of(mesh.n_elements());
+  numerics::parallel_for(mesh.n_elements(), threads, [&](int e) {
+    if (parts[mesh.part[e]] != 0)
+      of[e] = forces_of(cube, values_of(mesh, mesh.position_um, e), values_of(mesh, body.displacement_um, e),
+                        body.solids[mesh.part[e]]);
+  });
+  TotalForces sum{.nN = std::vector<Vec3>(mesh.position_um.size())};
+  for (int e = 0; e < mesh.n_elements(); ++e) {
+    sum.energy_fJ += of[e].energy_fJ;
+    for (Eigen::Index k = 0; k < of[e].nN.cols(); ++k)
+      sum.nN[mesh.nodes_of(e)[k]] += {of[e].nN(0, k), of[e].nN(1, k), of[e].nN(2, k)};
+  }
+  return sum;
+}
+
+}  // namespace
+
+Contact::Contact(const Polygon& outline_um) {
+  const double area = signed_area_um2(outline_um);
+  area_um2_ = std::abs(area);
+  centroid_um_ = mbtfm::solids::centroid_um(outline_um);
+  const Vec2 centre = centroid_um_;
+  for (std::size_t k = 0; k < outline_um.size(); ++k) {
+    const std::size_t next = (k + 1) % outline_um.size();
+    if (!(cross(outline_um[k] - centre, outline_um[next] - centre) * (area > 0 ? 1 : -1) > 0))
+      throw InvalidData("the outline of the contact",
+                        "an outline that each ray from its centroid (" + brief(centre.x) + ", " + brief(centre.y) +
+                            ") um meets once (star-shaped)",
+                        "a piece that turns back, from point " + std::to_string(k) + " at (" + brief(outline_um[k].x) +
+                            ", " + brief(outline_um[k].y) + ") um to the next");
+    from_centroid_um_.push_back(outline_um[k] - centre);
+  }
+  std::ranges::sort(from_centroid_um_, {}, turn_of);
+  for (const Vec2 at : from_centroid_um_) angles_.push_back(turn_of(at));
+}
+
+double Contact::equal_radius_um() const { return std::sqrt(area_um2_ / std::numbers::pi); }
+
+double Contact::largest_radius_um() const {
+  return norm(*std::ranges::max_element(from_centroid_um_, {}, [](Vec2 at) { return norm(at); }));
+}
+
+double Contact::radius_um_at(double angle) const {
+  const double turn = turn_of({std::cos(angle), std::sin(angle)});
+  const auto above = std::ranges::upper_bound(angles_, turn) - angles_.begin();
+  const std::size_t n = angles_.size(), next = above % n, before = (above + n - 1) % n;
+  const Vec2 a = from_centroid_um_[before], along = from_centroid_um_[next] - a;
+  return cross(a, along) / cross({std::cos(angle), std::sin(angle)}, along);
+}
+
+Section section_on(const Contact& contact, double height_um) {
+  // the inverse of A = 2 V / h - pi h² / 3
+  return {0.5 * height_um * (contact.area_um2() + std::numbers::pi * height_um * height_um / 3), height_um};
+}
+
+Sectors sectors_of(const Contact& contact, int order) {
+  // Of 30 degrees: a cubic is within 1e-4 of the sines that turn a displacement around.
+  constexpr int kFewest = 12, kMost = 32;
+  constexpr double kNear = 0.01;  // of the radius: as near as outlines are drawn
+  const Square square(order);
+  Sectors sectors;
+  std::vector<double>& angles = sectors.angles;
+  for (int s = 0; s <= kFewest; ++s) angles.push_back(kRound * s / kFewest);
+  for (std::size_t s = 0; s + 1 < angles.size();) {
+    const double off_um = deviation_um(contact, square, angles[s], angles[s + 1]);
+    if (off_um <= kNear * contact.equal_radius_um()) {
+      sectors.off_um = std::max(sectors.off_um, off_um);
+      ++s;
+      continue;
+    }
+    if (sectors.n() >= kMost)
+      throw InvalidData("the outline of the contact",
+                        "an outline that " + std::to_string(kMost) +
+                            " sectors follow within a hundredth of its mean radius; smooth it",
+                        "corners or bays, the next at " + brief(360 / kRound * angles[s]) + " degrees from x to y");
+    angles.insert(angles.begin() + static_cast<std::ptrdiff_t>(s) + 1, 0.5 * (angles[s] + angles[s + 1]));
+  }
+  return sectors;
+}
+
+void expect_on_slab(const Contact& contact, const Slab& slab) {
+  if (contact.largest_radius_um() > 0.5 * slab.radius_um)
+    throw InvalidData("the outline of the contact",
+                      "an outline with points at most " + brief(0.5 * slab.radius_um) +
+                          " um from its centroid, half the gel's radius_um",
+                      "one at " + brief(contact.largest_radius_um()) + " um");
+}
+
+RevolvedMesh revolved_mesh(const Contact& contact, const Sectors& sectors, double height_um, const Slab& slab,
+                           const Fineness& fineness) {
+  expect_on_slab(contact, slab);
+  RevolvedMesh mesh{.half_plane = section_mesh(section_on(contact, height_um), slab, fineness), .sectors = sectors};
+  const Mesh& plane = *mesh.half_plane.mesh;
+  const std::vector<double> around = angles_of_nodes(sectors.angles, plane.square.nodes());
+  const int n_around = static_cast<int>(around.size()), order = plane.square.order();
+  std::vector<int> node_at(plane.position_um.size() * around.size(), -1);
+  const auto node_of = [&](int in_plane, int part, int turn) {
+    const Vec2 at = plane.position_um[in_plane];
+    constexpr double kOnAxis = 1e-9;  // of the body, as nodes are joined
+    if (at.x <= kOnAxis * slab.radius_um) turn = 0;
+    int& node = node_at[static_cast<std::size_t>(in_plane) * around.size() + turn];
+    if (node < 0) {
+      node = static_cast<int>(mesh.position_um.size());
+      mesh.position_um.push_back(placed(contact, slab, part, at, around[turn]));
+    }
+    return node;
+  };
+  for (int e = 0; e < plane.n_elements(); ++e) {
+    for (int s = 0; s < sectors.n(); ++s) {
+      mesh.part.push_back(plane.part[e]);
+      for (int w = 0; w <= order; ++w) {
+        for (int k = 0; k < plane.square.n_nodes(); ++k)
+          mesh.nodes.push_back(node_of(plane.nodes_of(e)[k], plane.part[e], (s * order + w) % n_around));
+      }
+    }
+  }
+  return mesh;
+}
+
+Vec3 RevolvedBody::displacement_um_at(const Mesh::Place& place, int sector, double share) const {
+  const Square& square = mesh.half_plane.mesh->square;
+  const Eigen::Vector3d u = values_of(mesh, displacement_um, place.element * mesh.sectors.n() + sector) *
+                            times(square.shapes_at(place.unit), along_side(square, share).values);
+  return {u[0], u[1], u[2]};
+}
+
+std::vector<std::array<double, 6>> RevolvedBody::stress_kPa() const {
+  const Square& square = mesh.half_plane.mesh->square;
+  const Cube cube = cube_of(square);
+  const std::vector<Middle> middles = middles_of(square);
+  std::vector<std::array<double, 6>> all;
+  for (int e = 0; e < mesh.n_elements(); ++e) {
+    const Values x = values_of(mesh, mesh.position_um, e), u = values_of(mesh, displacement_um, e);
+    const Solid& solid = solids[mesh.part[e]];
+    const Slopes slopes = slopes_of(cube, x);
+    const Eigen::VectorXd dilatation = mass_of(slopes).matrixU().solve(divergence_of(slopes) * u.reshaped());
+    for (const Middle& at : middles) {
+      const Eigen::Matrix3d gradient = u * at.slopes * (x * at.slopes).inverse();
+      Eigen::Matrix3d stress = solid.shear_modulus_kPa() * (gradient + gradient.transpose());
+      stress.diagonal().array() += solid.lame_modulus_kPa() * at.pressures.dot(dilatation) + solid.contraction_kPa;
+      all.push_back({stress(0, 0), stress(1, 1), stress(2, 2), stress(0, 1), stress(1, 2), stress(0, 2)});
+    }
+  }
+  return all;
+}
+
+std::vector<Vec3> RevolvedBody::forces_nN(int part) const {
+  std::vector<char> parts(solids.size(), 0);
+  parts[part] = 1;
+  return total_forces(*this, cube_of(mesh.half_plane.mesh->square), 1, parts).nN;
+}
+
+RevolvedBody solved(RevolvedMesh mesh, const std::vector<Solid>& solids, int threads) {
+  RevolvedBody body{.mesh = std::move(mesh), .solids = solids};
+  body.displacement_um.resize(body.mesh.position_um.size());
+  const Cube cube = cube_of(body.mesh.half_plane.mesh->square);
+  expect_not_turned_over(cube, body.mesh);
+  const std::vector<char> all(solids.size(), 1);
+  const Factor factor(body, cube, threads);
+  factor.move(body.displacement_um, total_forces(body, cube, threads, all).nN);
+  // near Poisson's ratio 1/2 rounding leaves 1e-9 of the forces: one refinement takes it
+  factor.move(body.displacement_um, total_forces(body, cube, threads, all).nN);
+  body.energy_fJ = total_forces(body, cube, threads, all).energy_fJ;
+  return body;
+}
+
+}  // namespace mbtfm::solids
