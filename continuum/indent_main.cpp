@@ -224,9 +224,12 @@ void expect_outline_sense(const Parameters& p) {
 Polygon read_whole_outline(const Path& file) {
   Polygon outline;
   for (const files::OutlinePoint& point : files::read(file, files::outline_table())) {
-    if (point.ring != 0) throw InputError(file.string(), "one ring: a contact without holes", "a second ring");
+    if (point.ring != 0)
+      throw InputError(file.string(), "one ring: a contact without holes", "a second ring",
+                       "leave out the rows of ring 1 and more");
     if (point.is_cut)
-      throw InputError(file.string(), "the outline of a whole contact", "one that the image cuts (is_cut)");
+      throw InputError(file.string(), "the outline of a whole contact", "one that the image cuts (is_cut)",
+                       "what lies beyond the image also pulls: take a cell that is in it as a whole");
     if (outline.empty() || !(outline.back() == point.position_um)) outline.push_back(point.position_um);
   }
   while (outline.size() > 1 && outline.front() == outline.back()) outline.pop_back();
@@ -249,7 +252,8 @@ Contact read_contact(const Path& file, const Setting& setting) {
     sectors_of(contact, setting.fineness.order);
     return contact;
   } catch (const InvalidData& error) {
-    throw InputError(file.string(), error.expected, error.found);
+    throw InputError(file.string(), error.expected, error.found,
+                     "take a smoother outline, such as its convex hull, or a larger radius_um of the gel");
   }
 }
 
