@@ -47,6 +47,10 @@ class Square {
   int n_pressures() const { return order_ * (order_ + 1) / 2; }
   /// Places of the nodes along a side: those of Gauss and Lobatto.
   const std::vector<double>& nodes() const { return nodes_; }
+  struct OneSide {
+    std::vector<double> values, slopes;
+  };
+  OneSide along_side(double unit) const;  ///< Lagrange's polynomials of the nodes along a side
   Eigen::VectorXd shapes_at(Vec2 unit) const;
   Eigen::MatrixX2d slopes_at(Vec2 unit) const;  ///< along u, along v
 
@@ -59,10 +63,6 @@ class Square {
   const std::vector<Point>& points() const { return points_; }
 
  private:
-  struct OneSide {
-    std::vector<double> values, slopes;
-  };
-  OneSide along_side(double unit) const;
   int order_;
   std::vector<double> nodes_;
   std::vector<Point> points_;

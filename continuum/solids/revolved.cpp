@@ -16,32 +16,6 @@
 namespace mbtfm::solids {
 namespace {
 
-constexpr double kRound = 2 * std::numbers::pi;
-
-Vec2 centroid_um(const Polygon& outline) {
-  Vec2 sum;
-  for (std::size_t k = 0; k < outline.size(); ++k) {
-    const Vec2 a = outline[k] - outline[0], b = outline[(k + 1) % outline.size()] - outline[0];
-    sum += cross(a, b) * (a + b);
-  }
-  return outline[0] + 1 / (6 * signed_area_um2(outline)) * sum;
-}
-
-double turn_of(Vec2 at) {
-  const double angle = std::atan2(at.y, at.x);
-  return angle < 0 ? angle + kRound : angle;
-}
-
-/// Lagrange's polynomials of the nodes along a side, and their slopes.
-struct AlongSide {
-  Eigen::VectorXd values, slopes;
-};
-AlongSide along_side(const Square& square, double unit) {
-  // at v = 0 the square's shapes are those of its first row of nodes
-  const int n = square.order() + 1;
-  return {square.shapes_at({unit, 0}).head(n), square.slopes_at({unit, 0}).col(0).head(n)};
-}
-
 /// The cube [0, 1]³: a square times a side.
 struct Cube {
   struct Point {
@@ -53,8 +27,9 @@ struct Cube {
   int n_nodes = 0, n_pressures = 0;
 };
 
-Eigen::VectorXd times(const Eigen::VectorXd& of_square, const Eigen::VectorXd& of_side) {
-  return (of_square * of_side.transpose()).reshaped();
+Eigen::VectorXd times(const Eigen::VectorXd& of_square, const std::vector<double>& of_side) {
+  const Eigen::Map<const Eigen::RowVectorXd> side(of_side.data(), std::ssize(of_side));
+  return (of_square * side).reshaped();
 }
 
 /// A basis of the polynomials of total degree below the order.
@@ -72,8 +47,8 @@ Eigen::VectorXd pressures_at(Vec2 unit, double share, int order) {
 /// By node of the cube: along u, v and the angle.
 Eigen::MatrixX3d slopes_at(const Square& square, Vec2 unit, double share) {
   const Eigen::MatrixX2d of_square = square.slopes_at(unit);
-  const AlongSide side = along_side(square, share);
-  Eigen::MatrixX3d slopes(of_square.rows() * side.values.size(), 3);
+  const Square::OneSide side = square.along_side(share);
+  Eigen::MatrixX3d slopes(of_square.rows() * (square.order() + 1), 3);
   slopes << times(of_square.col(0), side.values), times(of_square.col(1), side.values),
       times(square.shapes_at(unit), side.slopes);
   return slopes;
@@ -217,7 +192,7 @@ void expect_not_turned_over(const Cube& cube, const RevolvedMesh& mesh) {
       if (!(widened(x * point.slopes) > 0))
         throw InvalidData("the outline of the contact", "a mesh whose elements are not turned over",
                           "an element that is, at the angle " +
-                              brief(360 / kRound * mesh.sectors.angles[e % mesh.sectors.n()]) + " degrees");
+                              brief(180 / std::numbers::pi * mesh.sectors.angles[e % mesh.sectors.n()]) + " degrees");
     }
   }
 }
@@ -239,23 +214,6 @@ Vec3 placed(const Contact& contact, const Slab& slab, int part, Vec2 at, double 
   const double r = is_beside ? rim + (at.x - a) * (side - rim) / (side - a) : rim / a * at.x;
   const Vec2 centre = contact.centroid_um();
   return {centre.x + r * std::cos(angle), centre.y + r * std::sin(angle), at.y};
-}
-
-/// Largest distance between the outline and what the element makes of it.
-double deviation_um(const Contact& contact, const Square& square, double from, double to) {
-  constexpr int kLooks = 16;  // some four times as many as the polynomial has tops
-  const auto at = [&](double share) { return (1 - share) * from + share * to; };
-  double largest = 0;
-  for (int look = 1; look < kLooks; ++look) {
-    const Eigen::VectorXd shapes = along_side(square, static_cast<double>(look) / kLooks).values;
-    Vec2 place;
-    for (int k = 0; k <= square.order(); ++k) {
-      const double angle = at(square.nodes()[k]);
-      place += shapes[k] * contact.radius_um_at(angle) * Vec2{std::cos(angle), std::sin(angle)};
-    }
-    largest = std::max(largest, std::abs(norm(place) - contact.radius_um_at(turn_of(place))));
-  }
-  return largest;
 }
 
 /// The stiffness of the whole, factorised.
@@ -346,77 +304,6 @@ TotalForces total_forces(const RevolvedBody& body, const Cube& cube, int threads
 
 }  // namespace
 
-Contact::Contact(const Polygon& outline_um) {
-  const double area = signed_area_um2(outline_um);
-  area_um2_ = std::abs(area);
-  centroid_um_ = mbtfm::solids::centroid_um(outline_um);
-  const Vec2 centre = centroid_um_;
-  for (std::size_t k = 0; k < outline_um.size(); ++k) {
-    const std::size_t next = (k + 1) % outline_um.size();
-    if (!(cross(outline_um[k] - centre, outline_um[next] - centre) * (area > 0 ? 1 : -1) > 0))
-      throw InvalidData("the outline of the contact",
-                        "an outline that each ray from its centroid (" + brief(centre.x) + ", " + brief(centre.y) +
-                            ") um meets once (star-shaped)",
-                        "a piece that turns back, from point " + std::to_string(k) + " at (" + brief(outline_um[k].x) +
-                            ", " + brief(outline_um[k].y) + ") um to the next");
-    from_centroid_um_.push_back(outline_um[k] - centre);
-  }
-  std::ranges::sort(from_centroid_um_, {}, turn_of);
-  for (const Vec2 at : from_centroid_um_) angles_.push_back(turn_of(at));
-}
-
-double Contact::equal_radius_um() const { return std::sqrt(area_um2_ / std::numbers::pi); }
-
-double Contact::largest_radius_um() const {
-  return norm(*std::ranges::max_element(from_centroid_um_, {}, [](Vec2 at) { return norm(at); }));
-}
-
-double Contact::radius_um_at(double angle) const {
-  const double turn = turn_of({std::cos(angle), std::sin(angle)});
-  const auto above = std::ranges::upper_bound(angles_, turn) - angles_.begin();
-  const std::size_t n = angles_.size(), next = above % n, before = (above + n - 1) % n;
-  const Vec2 a = from_centroid_um_[before], along = from_centroid_um_[next] - a;
-  return cross(a, along) / cross({std::cos(angle), std::sin(angle)}, along);
-}
-
-Section section_on(const Contact& contact, double height_um) {
-  // the inverse of A = 2 V / h - pi h² / 3
-  return {0.5 * height_um * (contact.area_um2() + std::numbers::pi * height_um * height_um / 3), height_um};
-}
-
-Sectors sectors_of(const Contact& contact, int order) {
-  // Of 30 degrees: a cubic is within 1e-4 of the sines that turn a displacement around.
-  constexpr int kFewest = 12, kMost = 32;
-  constexpr double kNear = 0.01;  // of the radius: as near as outlines are drawn
-  const Square square(order);
-  Sectors sectors;
-  std::vector<double>& angles = sectors.angles;
-  for (int s = 0; s <= kFewest; ++s) angles.push_back(kRound * s / kFewest);
-  for (std::size_t s = 0; s + 1 < angles.size();) {
-    const double off_um = deviation_um(contact, square, angles[s], angles[s + 1]);
-    if (off_um <= kNear * contact.equal_radius_um()) {
-      sectors.off_um = std::max(sectors.off_um, off_um);
-      ++s;
-      continue;
-    }
-    if (sectors.n() >= kMost)
-      throw InvalidData("the outline of the contact",
-                        "an outline that " + std::to_string(kMost) +
-                            " sectors follow within a hundredth of its mean radius; smooth it",
-                        "corners or bays, the next at " + brief(360 / kRound * angles[s]) + " degrees from x to y");
-    angles.insert(angles.begin() + static_cast<std::ptrdiff_t>(s) + 1, 0.5 * (angles[s] + angles[s + 1]));
-  }
-  return sectors;
-}
-
-void expect_on_slab(const Contact& contact, const Slab& slab) {
-  if (contact.largest_radius_um() > 0.5 * slab.radius_um)
-    throw InvalidData("the outline of the contact",
-                      "an outline with points at most " + brief(0.5 * slab.radius_um) +
-                          " um from its centroid, half the gel's radius_um",
-                      "one at " + brief(contact.largest_radius_um()) + " um");
-}
-
 RevolvedMesh revolved_mesh(const Contact& contact, const Sectors& sectors, double height_um, const Slab& slab,
                            const Fineness& fineness) {
   expect_on_slab(contact, slab);
@@ -451,7 +338,7 @@ RevolvedMesh revolved_mesh(const Contact& contact, const Sectors& sectors, doubl
 Vec3 RevolvedBody::displacement_um_at(const Mesh::Place& place, int sector, double share) const {
   const Square& square = mesh.half_plane.mesh->square;
   const Eigen::Vector3d u = values_of(mesh, displacement_um, place.element * mesh.sectors.n() + sector) *
-                            times(square.shapes_at(place.unit), along_side(square, share).values);
+                            times(square.shapes_at(place.unit), square.along_side(share).values);
   return {u[0], u[1], u[2]};
 }
 
