@@ -94,6 +94,40 @@ TEST_F(Sheet, one_that_the_image_cuts_is_held_at_the_cut_and_said_to_be) {
   EXPECT_NEAR(figure("net_force_nN"), figure("cut_pull_nN"), 1e-9 * figure("total_force_nN"));
 }
 
+/// The limit is 0.02 of the half width, here 25 um: 0.5 um.
+TEST_F(Sheet, one_that_is_too_thick_for_a_sheet_is_doubted_and_a_thin_one_is_not) {
+  for (const double thickness_um : {0.45, 0.55}) {
+    const auto outcome = run("[sheet]\nyoungs_modulus_kPa = 1\nthickness_um = " + std::to_string(thickness_um) +
+                                 "\ncontraction_nN_per_um = 0.02\nadhesion_stiffness_nN_per_um3 = 0.003\n",
+                             "--record " + (folder_ / "record.json").string());
+    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    EXPECT_EQ(files::read_text(folder_ / "record.json").find("sheet-thick") != std::string::npos, thickness_um > 0.5);
+  }
+}
+
+TEST_F(Sheet, a_mask_is_an_outline_and_a_band_contracts_alone) {
+  const std::string springs = std::string(kSheet) + "adhesion_stiffness_nN_per_um3 = 0.003\n";
+  ASSERT_EQ(run(springs).code, 0);
+  const double mean = figure("mean_tension_nN_per_um"), whole_nN = figure("total_force_nN");
+  constexpr double kPixel_um = 0.25;
+  images::Image mask{.width = 240, .height = 240, .pixels = std::vector<float>(240 * 240), .pixel_size_um = {}};
+  for (int j = 0; j < mask.height; ++j)
+    for (int i = 0; i < mask.width; ++i)
+      mask.at(i, j) = std::hypot(i + 0.5 - 120, j + 0.5 - 120) * kPixel_um < 25 ? 1.0F : 0.0F;
+  images::write_tiff(folder_ / "mask.tif", mask);
+  const auto by_mask = run("pixel_size_um = 0.25\n" + springs, {}, "mask.tif");
+  ASSERT_EQ(by_mask.code, 0) << by_mask.output;
+  EXPECT_NEAR(figure("mean_tension_nN_per_um"), mean, 0.02 * mean);  // steps of a pixel in 100 of the radius
+  // a band of the whole width is the even sheet; of a fifth of it, what is inside is drawn outwards and pulls less
+  ASSERT_EQ(run(springs + "edge_band_um = 25.1\n").code, 0);
+  EXPECT_NEAR(figure("mean_tension_nN_per_um"), mean, 1e-9 * mean);
+  ASSERT_EQ(run(springs + "edge_band_um = 5\n").code, 0);
+  EXPECT_LT(figure("mean_tension_nN_per_um"), 0.8 * mean);
+  EXPECT_LT(figure("total_force_nN"), 0.5 * whole_nN);
+  EXPECT_GT(figure("total_force_nN"), 0);
+  EXPECT_LE(figure("net_force_nN"), 1e-9 * figure("total_force_nN"));
+}
+
 TEST_F(Sheet, tractions_in_pascals_are_refused) {
   std::ofstream file(folder_ / "traction.csv");
   file << "x_um,y_um,tx_kPa,ty_kPa\n";

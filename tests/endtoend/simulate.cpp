@@ -156,6 +156,40 @@ TEST(Simulate, colonies_differ_by_place_beads_and_dipoles_alone) {
   }
 }
 
+TEST(Simulate, dipoles_pull_inside_of_a_colony_and_add_to_its_sheet) {
+  const test::TemporaryFolder folder;
+  const auto field = [&](int n_dipoles) {
+    const fs::path out = folder / std::to_string(n_dipoles);
+    const Outcome outcome = simulate("--scenario colony-disc --beads 2000 --noise_um 0 --n_dipoles " +
+                                     std::to_string(n_dipoles) + " --mesh_um 8 --out " + out.string());
+    EXPECT_EQ(outcome.code, 0) << outcome.message;
+    return files::read_displacement(out / "truth" / "displacement.csv");
+  };
+  const DisplacementField without = field(0), with = field(6);
+  const files::CsvTable dipoles(folder / "6" / "truth" / "dipoles.csv");
+  ASSERT_EQ(dipoles.n_rows(), 6);
+  const Polygon rim = files::read_outline(folder / "6" / "1_segment" / "outline.csv").front();
+  ASSERT_EQ(with.size(), without.size());
+  Vec2 mean;
+  double most_um = 0;
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    const Vec2 added = with[i].displacement_um - without[i].displacement_um;
+    mean += 1.0 / static_cast<double>(with.size()) * added;
+    most_um = std::max(most_um, norm(added));
+    double nearest_um = 1e9;
+    for (int k = 0; k < dipoles.n_rows(); ++k) {
+      const Vec2 at{dipoles.number(k, "x_um"), dipoles.number(k, "y_um")};
+      EXPECT_TRUE(contains(rim, at));
+      nearest_um = std::min(nearest_um, norm(with[i].position_um - at));
+    }
+    if (nearest_um > 60) {
+      EXPECT_LT(norm(added), 0.005) << "a pair of opposite forces is not felt far away";
+    }
+  }
+  EXPECT_GT(most_um, 0.02);
+  EXPECT_LT(norm(mean), 0.05 * most_um);
+}
+
 TEST(Simulate, on_springs_what_lies_under_the_sheet_moves_and_nothing_else) {
   const test::TemporaryFolder folder;
   const fs::path cell = folder / "cell";
