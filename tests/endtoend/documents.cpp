@@ -50,8 +50,8 @@ bool has(const char* program) {
   return std::system(("command -v " + std::string(program) + " >/dev/null").c_str()) == 0;
 }
 
-/// The tutorial's cell as README shows it. Half as large, so that how letters are drawn matters little; pictures of
-/// fits whose dots differ by a width leave 0.02 and more.
+/// The tutorial's cell as README shows it. Half as large, so that how letters are drawn matters little: the same cell
+/// with another noise is 0.042 away, the same fit with other labels 0.035, the same program 0.
 void expect_picture_of_readme(const fs::path& report) {
   if (!has("chromium") || !has("convert")) return;
   const test::TemporaryFolder folder;
@@ -61,7 +61,7 @@ void expect_picture_of_readme(const fs::path& report) {
                              "' -resize 50% -metric RMSE -compare -format '%[distortion]' info: > '" +
                              (folder / "distance").string() + "'";
   ASSERT_EQ(std::system(script.c_str()), 0);
-  EXPECT_LT(std::stod(files::read_text(folder / "distance")), 0.01)
+  EXPECT_LT(std::stod(files::read_text(folder / "distance")), 0.03)
       << "README shows another result: docs/make_images.sh tutorial/cell_1/report.html";
 }
 
