@@ -58,7 +58,7 @@ void expect_picture_of_readme(const fs::path& report) {
   const std::string made = (folder / "made.png").string(), shown = (kDocs / "images/result.png").string();
   const std::string script = "sh '" + (kDocs / "make_images.sh").string() + "' '" + report.string() + "' '" + made +
                              "' && convert '" + made + "' '" + shown +
-                             "' -resize 50% -metric RMSE -compare -format '%[distortion]' info: > '" +
+                             "' -resize '690x320!' -metric RMSE -compare -format '%[distortion]' info: > '" +
                              (folder / "distance").string() + "'";
   ASSERT_EQ(std::system(script.c_str()), 0);
   EXPECT_LT(std::stod(files::read_text(folder / "distance")), 0.03)
