@@ -14,6 +14,7 @@
 #include "mbtfm/sheets/field_fit.h"
 #include "mbtfm/sheets/tables.h"
 #include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/charts/chart.h"
@@ -324,18 +325,6 @@ void notice_mesh(stage::StageContext& context, const Solution& solution) {
 }
 
 /// displacement.csv: what the patches' forces make of the gel's surface.
-std::vector<Vec2> displacements_um(const substrate::Substrate& model, const Solution& solution,
-                                   const std::vector<Vec2>& points_um) {
-  std::vector<substrate::Ellipse> patches;
-  std::vector<Vec2> forces;
-  for (int t = 0; t < solution.elements->n_triangles(); ++t) {
-    patches.push_back(patch_of(*solution.elements, t));
-    const GroundPatch& patch = solution.patches[static_cast<std::size_t>(t)];
-    forces.push_back(patch.area_um2 * patch.traction_kPa);
-  }
-  return model.displacements_um(points_um, patches, forces);
-}
-
 void write_beads(stage::StageContext& context, const substrate::Substrate& model, const Solution& solution,
                  const std::vector<Vec2>& points_um) {
   const std::vector<Vec2> u = displacements_um(model, solution, points_um);
@@ -727,22 +716,6 @@ std::vector<Bundle> read_bundles(stage::StageContext& context) {
   return bundles;
 }
 
-/// By the stated errors. @param with_modulus  where a stiffness is known, and forces are not proportional to the gel's
-std::vector<Gel> gels_an_error_away(const Gel& gel, bool with_modulus) {
-  std::vector<Gel> others;
-  const auto other = [&](std::optional<double> sigma) -> Gel* {
-    if (sigma.value_or(0) <= 0) return nullptr;
-    others.push_back(gel);
-    return &others.back();
-  };
-  if (Gel* thicker = other(gel.thickness_sigma_um)) thicker->thickness_um += *gel.thickness_sigma_um;
-  if (Gel* softer = other(gel.poisson_ratio_sigma))
-    softer->poisson_ratio = std::max(0.0, gel.poisson_ratio - *gel.poisson_ratio_sigma);
-  if (Gel* stiffer = with_modulus ? other(gel.youngs_modulus_sigma_kPa) : nullptr)
-    stiffer->youngs_modulus_kPa += *gel.youngs_modulus_sigma_kPa;
-  return others;
-}
-
 Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region) {
   if (!p.gel_modulus_kPa) throw UsageError("[gel] youngs_modulus_kPa is missing: the beads move with the gel");
   if (p.sheet.ground && *p.sheet.ground != Ground::gel)
@@ -832,20 +805,9 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
       made.bundles.push_back({bundles[k], loads(loads.size() - std::ssize(bundles) + static_cast<Eigen::Index>(k))});
     return made;
   };
-  // Triangles fall differently on each mesh, and displacements beside the edge, where tractions are singular, change
-  // without order from one to the next: by their change with smaller triangles they are known.
   const auto mesh_error_um = [&](const sheets::Stiffnesses& stiffnesses, const Eigen::VectorXd& loads) {
-    constexpr double kFiner = 0.7;
-    Scene fine = scene_of(stiffnesses, loads);
-    const std::vector<Vec2> here = displacements_um(*model, solve_on(ground, elements, fine), places);
-    fine.size = with_edge(fine.size, kFiner * fine.size.at_curves_um);
-    const std::vector<Vec2> there = displacements_um(*model, solve_on_gel(fine, *model, context.threads), places);
-    Eigen::VectorXd error(2 * std::ssize(here));
-    for (std::size_t i = 0; i < here.size(); ++i) {
-      const Vec2 of_bead = there[i] - here[i];
-      error.segment<2>(2 * static_cast<Eigen::Index>(i)) << of_bead.x, of_bead.y;
-    }
-    return error;
+    const Scene found = scene_of(stiffnesses, loads);
+    return change_by_finer_mesh_um(found, solve_on(ground, elements, found), *model, places, context.threads);
   };
   std::optional<sheets::FieldFit> field;
   if (lattice)
@@ -862,7 +824,12 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   };
   std::vector<std::vector<sheets::SheetEstimate>> on_other_gel;
   const bool has_known_stiffness = known || p.sheet.adhesion_stiffness_nN_per_um3;
-  for (const Gel& other : gels_an_error_away(gel, has_known_stiffness)) on_other_gel.push_back(estimates_on(other));
+  for (const Gel& other : tensions::gels_an_error_away(gel)) on_other_gel.push_back(estimates_on(other));
+  if (has_known_stiffness && gel.youngs_modulus_sigma_kPa.value_or(0) > 0) {
+    Gel stiffer = gel;  // forces are not proportional to its modulus
+    stiffer.youngs_modulus_kPa += *gel.youngs_modulus_sigma_kPa;
+    on_other_gel.push_back(estimates_on(stiffer));
+  }
   add_errors(fit.estimates, has_known_stiffness ? 0 : gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa,
              on_other_gel);
   if (context.has_input("adhesions")) compare_with_adhesions(fit, data_of_adhesions(beads, context, *model, motions));

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "continuum/sheet/mesh_size.h"
+#include "continuum/sheet/patches.h"
+
 namespace mbtfm::sheet {
 namespace {
 
@@ -136,6 +139,31 @@ Solution solve_on(const OnGel& ground, std::shared_ptr<const Elements> triangles
 Solution solve_on_gel(const Scene& scene, const substrate::Substrate& gel, int threads) {
   const std::shared_ptr<const Elements> elements = elements_of(scene);
   return solve_on(OnGel(*elements, gel, adhering_triangles(*elements, scene.adhesive_um), threads), elements, scene);
+}
+
+std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Solution& solution,
+                                   const std::vector<Vec2>& points_um) {
+  std::vector<substrate::Ellipse> patches;
+  std::vector<Vec2> forces;
+  for (int t = 0; t < solution.elements->n_triangles(); ++t) {
+    patches.push_back(patch_of(*solution.elements, t));
+    const GroundPatch& patch = solution.patches[static_cast<std::size_t>(t)];
+    forces.push_back(patch.area_um2 * patch.traction_kPa);
+  }
+  return gel.displacements_um(points_um, patches, forces);
+}
+
+Eigen::VectorXd change_by_finer_mesh_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,
+                                        const std::vector<Vec2>& points_um, int threads) {
+  constexpr double kFiner = 0.7;
+  Scene fine = scene;
+  fine.size = with_edge(fine.size, kFiner * fine.size.at_curves_um);
+  const std::vector<Vec2> here = displacements_um(gel, solution, points_um),
+                          there = displacements_um(gel, solve_on_gel(fine, gel, threads), points_um);
+  Eigen::VectorXd change(2 * std::ssize(here));
+  for (std::size_t i = 0; i < here.size(); ++i)
+    change.segment<2>(2 * static_cast<Eigen::Index>(i)) << there[i].x - here[i].x, there[i].y - here[i].y;
+  return change;
 }
 
 Balance balance_of(const Solution& solution) {

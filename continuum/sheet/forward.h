@@ -86,6 +86,16 @@ Solution solve_on(const OnGel& ground, std::shared_ptr<const Elements> elements,
 /// Small strains. @throws InvalidData, NotSolved
 Solution solve_on_gel(const Scene& scene, const substrate::Substrate& gel, int threads);
 
+/// What a solution on a gel does to points of its surface.
+std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Solution& solution,
+                                   const std::vector<Vec2>& points_um);
+/// By how much they change (2·points) with triangles of 0.7 of the size. Triangles fall differently on each mesh, and
+/// displacements beside the edge, where tractions are singular, change without order from one to the next: by this
+/// they are known.
+/// @param solution  of this scene
+Eigen::VectorXd change_by_finer_mesh_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,
+                                        const std::vector<Vec2>& points_um, int threads);
+
 /// What must hold of any solution.
 struct Balance {
   double total_force_nN = 0;  ///< sum of magnitudes over the patches

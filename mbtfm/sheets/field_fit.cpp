@@ -182,41 +182,12 @@ Stiffnesses at_mean(const Posterior& posterior, const StiffnessTable& table) {
   return {std::exp(posterior.log_stiffness), table.known_adhesion_nN_per_um3()};
 }
 
-/// How far the loads and, last, log M would move if the beads' displacements changed by this, at the posterior's
-/// middle.
-VectorXd moved_by_change(const LinearData& data, const StiffnessTable& table, const Posterior& p,
-                         const MatrixXd& roughness, double variance, bool is_stiffness_known,
-                         const VectorXd& change_um) {
-  constexpr double kStep = 1e-3;
-  const auto shares_at = [&](double step) {
-    Stiffnesses at = at_mean(p, table);
-    at.sheet_nN_per_um *= std::exp(step);
-    return table.shares(at);
-  };
-  const Index n = table.n_loads();
-  MatrixXd directions(shares_at(0).rows(), n + 1);
-  directions << shares_at(0), (shares_at(kStep) - shares_at(-kStep)) * p.loads / (2 * kStep);
-  const MatrixXd columns = tensions::displace(data.reduced, directions);
-  MatrixXd precision = columns.transpose() * columns / variance;
-  precision.topLeftCorner(roughness.rows(), roughness.cols()) += std::exp(p.log_smoothing) * roughness;
-  VectorXd right = directions.transpose() *
-                   data.response->pull_back(tensions::squared_weights(data).asDiagonal() *
-                                            tensions::less_motion(data, MatrixXd(change_um))) /
-                   variance;
-  if (is_stiffness_known) {
-    precision.row(n).setZero();
-    precision.col(n).setZero();
-    precision(n, n) = 1;
-    right(n) = 0;
-  }
-  return precision.ldlt().solve(right);
-}
-
 /// One more error, of this size in this direction.
-/// @param moved  loads and log M
+/// @param moved  loads, then log M
 void add_error(Posterior& p, const VectorXd& moved) {
-  const double M = std::exp(p.log_stiffness), of_log = moved(moved.size() - 1);
-  const VectorXd loads = moved.head(moved.size() - 1), over_stiffness = (loads - of_log * p.loads) / M;
+  const Index n = p.loads.size();
+  const double M = std::exp(p.log_stiffness), of_log = moved(n);
+  const VectorXd loads = moved.head(n), over_stiffness = (loads - of_log * p.loads) / M;
   p.covariance += loads * loads.transpose();
   p.covariance_over_stiffness += over_stiffness * over_stiffness.transpose();
   p.log_sigma_of_mesh = std::abs(of_log);
@@ -382,9 +353,13 @@ FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss 
   const auto n_unknowns = std::lround(p.degrees) + (known ? 0 : 1);
   const double of_misfit = tensions::misfit_variance(data, amplitudes(p), n_unknowns, loss);
   if (of_misfit > variance) p = found(data, variance = of_misfit);
-  if (mesh_error_um)
-    add_error(p, moved_by_change(data, table, p, roughness, variance, known.has_value(),
-                                 mesh_error_um(at_mean(p, table), p.loads)));
+  if (mesh_error_um) {
+    const Stiffnesses middle = at_mean(p, table);
+    Directions about = directions_about(table, middle, p.loads, known.has_value());
+    if (p.log_sigma > 1) std::erase(about.unknown, table.n_loads());  // as fit_sheet() has it
+    add_error(p, moved_by_change(data, about, mesh_error_um(middle, p.loads),
+                                 variance * std::exp(p.log_smoothing) * roughness));
+  }
   const Index n = table.n_contractions();
   FieldFit fit{.sheet = {},
                .contractions = p.loads.head(n),

@@ -144,6 +144,45 @@ MatrixXd without_bundles(const StiffnessTable& table) {
   return MatrixXd::Identity(table.n_loads(), table.n_loads() - std::ssize(table.bundles()));
 }
 
+MatrixXd Directions::normal(const LinearData& data) const {
+  const MatrixXd J = tensions::displace(data.reduced, forces(Eigen::all, unknown));
+  return J.transpose() * J;
+}
+
+Directions directions_about(const StiffnessTable& table, const Stiffnesses& at, const VectorXd& loads,
+                            bool is_sheet_known) {
+  constexpr double kStep = 1e-4;
+  const auto forces = [&](double log_sheet, double log_adhesion) -> VectorXd {
+    Stiffnesses moved = at;
+    moved.sheet_nN_per_um *= std::exp(log_sheet);
+    if (moved.adhesion_nN_per_um3) *moved.adhesion_nN_per_um3 *= std::exp(log_adhesion);
+    return table.shares(moved) * loads;
+  };
+  const Eigen::Index n = table.n_loads(), first_bundle = n - std::ssize(table.bundles());
+  Directions all{.forces = MatrixXd(table.shares(at).rows(), n + 2), .unknown = {}};
+  all.forces << table.shares(at), (forces(kStep, 0) - forces(-kStep, 0)) / (2 * kStep),
+      (forces(0, kStep) - forces(0, -kStep)) / (2 * kStep);
+  for (Eigen::Index k = 0; k < n; ++k)
+    if (k < first_bundle || loads[k] > 0) all.unknown.push_back(k);
+  if (!is_sheet_known) all.unknown.push_back(n);
+  if (table.adhesion_nN_per_um3()) all.unknown.push_back(n + 1);
+  return all;
+}
+
+VectorXd moved_by_change(const LinearData& data, const Directions& about, const VectorXd& change_um,
+                         const MatrixXd& prior) {
+  MatrixXd of_prior = MatrixXd::Zero(about.forces.cols(), about.forces.cols());
+  of_prior.topLeftCorner(prior.rows(), prior.cols()) = prior;
+  const VectorXd right =
+      about.forces.transpose() * data.response->pull_back(tensions::squared_weights(data).asDiagonal() *
+                                                          tensions::less_motion(data, MatrixXd(change_um)));
+  const MatrixXd normal = about.normal(data) + of_prior(about.unknown, about.unknown);
+  const VectorXd of_unknown = right(about.unknown), found = normal.ldlt().solve(of_unknown);
+  VectorXd moved = VectorXd::Zero(about.forces.cols());
+  moved(about.unknown) = found;
+  return moved;
+}
+
 LinearData weighed(LinearData data, tensions::Loss loss, const std::function<VectorXd(const LinearData&)>& amplitudes) {
   if (loss == tensions::Loss::squares) return data;
   if (loss != tensions::Loss::tukey) return reweighed(std::move(data), loss, amplitudes, std::nullopt);

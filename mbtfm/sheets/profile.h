@@ -78,6 +78,21 @@ Eigen::MatrixXd of_even_parts(const StiffnessTable& table);
 /// Those of a sheet without its bundles.
 Eigen::MatrixXd without_bundles(const StiffnessTable& table);
 
+/// About a solution: the loads, log M and log κ as directions of the table's forces, and which of them are unknown. A
+/// stiffness that is given is not, nor a bundle that does not pull.
+struct Directions {
+  Eigen::MatrixXd forces;  ///< a column each
+  std::vector<Eigen::Index> unknown;
+
+  Eigen::MatrixXd normal(const tensions::LinearData& data) const;  ///< of the unknown ones
+};
+Directions directions_about(const StiffnessTable& table, const Stiffnesses& at, const Eigen::VectorXd& loads,
+                            bool is_sheet_known);
+/// How the loads, log M and log κ follow a change of the beads' displacements (um).
+/// @param prior  beside the normal equations, by the first of the columns; empty: none
+Eigen::VectorXd moved_by_change(const tensions::LinearData& data, const Directions& about,
+                                const Eigen::VectorXd& change_um, const Eigen::MatrixXd& prior = {});
+
 /// Weights of the beads by a robust loss, until they stay. Tukey's has several minima: it starts from Huber's, whose
 /// scale it keeps.
 /// @param amplitudes  of the table's forces, as the fit to such data has them

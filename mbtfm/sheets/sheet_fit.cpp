@@ -19,36 +19,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tensions::LinearData;
 
-/// About a solution: the loads, log M and log κ as directions of the table's forces, and which of them are unknown. A
-/// stiffness that is given is not, nor a bundle that does not pull.
-struct Directions {
-  MatrixXd forces;  ///< a column each
-  std::vector<Eigen::Index> unknown;
-
-  MatrixXd normal(const LinearData& data) const {  ///< of the unknown ones
-    const MatrixXd J = tensions::displace(data.reduced, forces(Eigen::all, unknown));
-    return J.transpose() * J;
-  }
-};
-Directions directions_about(const StiffnessTable& table, const Profile& best, bool is_sheet_known) {
-  constexpr double kStep = 1e-4;
-  const auto forces = [&](double log_sheet, double log_adhesion) -> VectorXd {
-    Stiffnesses at = best.at;
-    at.sheet_nN_per_um *= std::exp(log_sheet);
-    if (at.adhesion_nN_per_um3) *at.adhesion_nN_per_um3 *= std::exp(log_adhesion);
-    return table.shares(at) * best.loads;
-  };
-  const Eigen::Index n = table.n_loads();
-  Directions all{.forces = MatrixXd(table.shares(best.at).rows(), n + 2), .unknown = {}};
-  all.forces << table.shares(best.at), (forces(kStep, 0) - forces(-kStep, 0)) / (2 * kStep),
-      (forces(0, kStep) - forces(0, -kStep)) / (2 * kStep);
-  for (Eigen::Index k = 0; k < n; ++k)
-    if (k < n - best.n_bundles || best.loads[k] > 0) all.unknown.push_back(k);
-  if (!is_sheet_known) all.unknown.push_back(n);
-  if (table.adhesion_nN_per_um3()) all.unknown.push_back(n + 1);
-  return all;
-}
-
 /// 0 of what is known.
 MatrixXd covariance_of(const LinearData& data, const Directions& about, double variance) {
   const MatrixXd normal = about.normal(data);
@@ -56,17 +26,6 @@ MatrixXd covariance_of(const LinearData& data, const Directions& about, double v
   covariance(about.unknown, about.unknown) =
       variance * normal.ldlt().solve(MatrixXd::Identity(normal.rows(), normal.cols()));
   return covariance;
-}
-
-/// How the loads, log M and log κ follow a change of the beads' displacements.
-VectorXd moved_by_change(const LinearData& data, const Directions& about, const VectorXd& change_um) {
-  const VectorXd right =
-      about.forces.transpose() * data.response->pull_back(tensions::squared_weights(data).asDiagonal() *
-                                                          tensions::less_motion(data, MatrixXd(change_um)));
-  VectorXd moved = VectorXd::Zero(about.forces.cols());
-  const VectorXd of_unknown = right(about.unknown), found = about.normal(data).ldlt().solve(of_unknown);
-  moved(about.unknown) = found;
-  return moved;
 }
 
 /// The range of a quantity over all stiffnesses that the beads do not exclude.
@@ -326,7 +285,7 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   fit.loads = best.loads;
   add_misfit(fit, data, table.shares(best.at) * best.loads, static_cast<double>(n_unknowns));
   fit.variance = tensions::misfit_variance(data, fit.node_amplitudes, n_unknowns, loss);
-  const Directions about = directions_about(table, best, known.has_value());
+  const Directions about = directions_about(table, best.at, best.loads, known.has_value());
   const MatrixXd covariance = covariance_of(data, about, fit.variance);
   const Eigen::Index at_M = table.n_loads();
   if (!known) fit.correlation = covariance(0, at_M) / std::sqrt(covariance(0, 0) * covariance(at_M, at_M));

@@ -296,17 +296,7 @@ std::optional<VectorXd> gel_variances(const BudgetInputs& in, const Gain& gain, 
   if (!gel.youngs_modulus_sigma_kPa && !gel.thickness_sigma_um && !gel.poisson_ratio_sigma) return std::nullopt;
   const VectorXd values = gain.of_tensions * in.fit.meshes.front().fit.trial.tensions_nN;
   VectorXd variance = (gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa * values).cwiseAbs2();
-  std::vector<Gel> others;
-  if (gel.thickness_sigma_um.value_or(0) > 0) {
-    others.push_back(gel);
-    others.back().thickness_um += *gel.thickness_sigma_um;
-  }
-  if (gel.poisson_ratio_sigma.value_or(0) > 0) {
-    others.push_back(gel);  // to the side where there is room
-    const double sigma = std::min(*gel.poisson_ratio_sigma, 0.25);
-    others.back().poisson_ratio += gel.poisson_ratio > 0.25 ? -sigma : sigma;
-  }
-  for (const Gel& other : others) {
+  for (const Gel& other : gels_an_error_away(gel)) {
     const VectorXd change = change_by_other_gel_um(in, other, threads);
     answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
       variance.segment(first, of_beads.rows()) += (of_beads * change).cwiseAbs2();
@@ -336,6 +326,20 @@ void add_room_above(const EnsembleFit& fit, MeanVariances& mean) {
 }
 
 }  // namespace
+
+std::vector<Gel> gels_an_error_away(const Gel& gel) {
+  std::vector<Gel> others;
+  if (gel.thickness_sigma_um.value_or(0) > 0) {
+    others.push_back(gel);
+    others.back().thickness_um += *gel.thickness_sigma_um;
+  }
+  if (gel.poisson_ratio_sigma.value_or(0) > 0) {
+    others.push_back(gel);  // to the side where there is room
+    const double sigma = std::min(*gel.poisson_ratio_sigma, 0.25);
+    others.back().poisson_ratio += gel.poisson_ratio > 0.25 ? -sigma : sigma;
+  }
+  return others;
+}
 
 void declare(stage::ParameterList& list, SegmentationErrors& p) {
   list.table("fit");

@@ -1,6 +1,8 @@
 /// How much of each tension's standard error comes from what: docs/theory/errors.md, "Error budget".
 #pragma once
 
+#include <vector>
+
 #include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/results.h"
 #include "substrate/compliance.h"
@@ -30,6 +32,9 @@ struct BudgetInputs {
   SegmentationErrors segmentation;
   Eigen::Index n_of_place = 0;  ///< of the data's motions, the last ones: they are the cell's place
 };
+
+/// The gel with another thickness, and with another Poisson's ratio, by what is stated of their errors: one each.
+std::vector<Gel> gels_an_error_away(const Gel& gel);
 
 /// By linear propagation about the solution: costs about as much as one step of the fit on one mesh.
 ErrorBudget error_budget(const BudgetInputs& inputs, int threads);

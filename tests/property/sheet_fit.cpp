@@ -415,37 +415,18 @@ TEST(SheetField, intervals_hold_what_the_mesh_makes_of_the_contraction) {
   scene.contraction.at = contraction;
   std::vector<Vec2> places;
   for (const Bead& bead : disc.beads) places.push_back(bead.position_um);
-  const auto moved = [&](const sheet::Solution& solution) {
-    std::vector<substrate::Ellipse> patches;
-    std::vector<Vec2> forces;
-    for (int t = 0; t < solution.elements->n_triangles(); ++t) {
-      const sheet::GroundPatch& patch = solution.patches[static_cast<std::size_t>(t)];
-      patches.push_back(sheet::patch_of(*solution.elements, t));
-      forces.push_back(patch.area_um2 * patch.traction_kPa);
-    }
-    return disc.model->displacements_um(places, patches, forces);
+  scene.size = {.at_curves_um = 25.0 / 8, .largest_um = 25.0 / 3, .growth = 0.4, .most_turn_rad = 0.5};
+  const auto on_fine_mesh = [&](sheet::Scene of) {
+    of.size = sheet::with_edge(of.size, of.size.at_curves_um / 3);
+    return sheet::displacements_um(*disc.model, sheet::solve_on_gel(of, *disc.model, 1), places);
   };
-  const sheet::TriangleSize own{.at_curves_um = 25.0 / 8, .largest_um = 25.0 / 3, .growth = 0.4, .most_turn_rad = 0.5};
-  const auto on_mesh = [&](const sheet::Scene& of, double share) {
-    sheet::Scene made = of;
-    made.size = sheet::with_edge(own, share * own.at_curves_um);
-    return moved(sheet::solve_on_gel(made, *disc.model, 1));
-  };
-  const std::vector<Vec2> exact = on_mesh(scene, 1.0 / 3);
+  const std::vector<Vec2> exact = on_fine_mesh(scene);
   constexpr double kSharp_um = 0.005;
-  const auto error_of = [&](const Stiffnesses& stiffnesses,
-                            const std::function<double(Vec2)>& its_contraction) -> Eigen::VectorXd {
-    constexpr double kFiner = 0.7;  // as mbtfm-sheet does
+  const auto error_of = [&](const Stiffnesses& stiffnesses, const std::function<double(Vec2)>& its_contraction) {
     sheet::Scene found = scene;
     found.material.youngs_modulus_kPa = stiffnesses.sheet_nN_per_um * (1 - kRatio * kRatio) / kThickness_um;
     found.contraction.at = its_contraction;
-    const std::vector<Vec2> here = on_mesh(found, 1), there = on_mesh(found, kFiner);
-    Eigen::VectorXd error(2 * std::ssize(here));
-    for (std::size_t i = 0; i < here.size(); ++i) {
-      const Vec2 of_bead = there[i] - here[i];
-      error.segment<2>(2 * static_cast<Eigen::Index>(i)) << of_bead.x, of_bead.y;
-    }
-    return error;
+    return sheet::change_by_finer_mesh_um(found, sheet::solve_on_gel(found, *disc.model, 1), *disc.model, places, 1);
   };
   const auto mesh_error_um = [&](const Stiffnesses& stiffnesses, const Eigen::VectorXd& loads) {
     return error_of(stiffnesses, [&](Vec2 place) { return field.lattice.shares_at(place).dot(loads); });
@@ -483,7 +464,7 @@ TEST(SheetField, intervals_hold_what_the_mesh_makes_of_the_contraction) {
 
   // an even contraction, by beads without noise: what is left is the mesh's
   scene.contraction.at = [](Vec2) { return 2.0; };
-  const std::vector<Vec2> even = on_mesh(scene, 1.0 / 3);
+  const std::vector<Vec2> even = on_fine_mesh(scene);
   DisplacementField beads = disc.beads;
   for (std::size_t i = 0; i < beads.size(); ++i) {
     beads[i].displacement_um = even[i];
