@@ -252,8 +252,9 @@ Contact read_contact(const Path& file, const Setting& setting) {
     sectors_of(contact, setting.fineness.order);
     return contact;
   } catch (const InvalidData& error) {
-    throw InputError(file.string(), error.expected, error.found,
-                     "take a smoother outline, such as its convex hull, or a larger radius_um of the gel");
+    throw InputError(
+        file.string(), error.expected, error.found,
+        "check that it is in um; take a smoother outline, such as its convex hull, or a larger radius_um of the gel");
   }
 }
 
