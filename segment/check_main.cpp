@@ -51,14 +51,16 @@ std::optional<images::Channel> channel(const fs::path& file, const images::Plane
   return images::Channel{.name = file.filename().string(), .image = images::read_image(file, choice)};
 }
 
-survey::CellImages images_of(const fs::path& cell) {
-  const runner::ImageNames names = runner::read_image_names(cell);
+survey::CellImages images_of(const fs::path& cell, const runner::ImageNames& names, CellKind kind) {
   const Chosen chosen = chosen_in(cell / "cell.toml");
   survey::CellImages images;
   images.given_pixel_size_um = chosen.segment.pixel_size_um;
   if (const auto file = runner::resolve_optional_image(cell, names, "adhesion"))
     images.adhesion = channel(*file, chosen.segment.adhesion_plane);
-  images.actin = channel(runner::resolve_image(cell, names, "actin"), chosen.segment.actin_plane);
+  // a sheet's outline may be a mask
+  const auto actin = kind == CellKind::sheet ? runner::resolve_optional_image(cell, names, "actin")
+                                             : runner::resolve_image(cell, names, "actin");
+  if (actin) images.actin = channel(*actin, chosen.segment.actin_plane);
   if (!runner::name_of_image(names, "displacement").empty()) return images;  // of another program
   images.beads_stressed = channel(runner::resolve_image(cell, names, "beads_stressed"), chosen.track.stressed_plane);
   images.beads_relaxed = channel(runner::resolve_image(cell, names, "beads_relaxed"), chosen.track.relaxed_plane);
@@ -85,8 +87,9 @@ survey::Survey survey_in_space(const fs::path& cell, const runner::ImageNames& n
 
 survey::Survey survey_of(const fs::path& cell) {
   const runner::ImageNames names = runner::read_image_names(cell);
-  if (runner::stages_of(cell, names).kind == runner::CellKind::space) return survey_in_space(cell, names);
-  return survey::survey(images_of(cell), 1);
+  const CellKind kind = runner::stages_of(cell, names).kind;
+  if (kind == CellKind::space) return survey_in_space(cell, names);
+  return survey::survey(images_of(cell, names, kind), 1);
 }
 
 struct Seen {

@@ -60,6 +60,7 @@ std::string assumption_of(const Segmentation& s, bool is_by_itself) {
   const std::string placed = why + " are placed on " + std::to_string(n) + " candidates for adhesions, ";
   switch (s.source) {
     case AdhesionSource::image:
+    case AdhesionSource::none:
       return "";
     case AdhesionSource::pattern:
       return placed + "all over the adhesive pattern under the cell." + doubt_about_pattern(s);
@@ -168,6 +169,12 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                                   (s.is_aligned ? " They were moved there." : " They were left where they are.")
                             : std::string(),
                 s.is_aligned ? Severity::note : Severity::caution),
+        noticed(FindingKind::adhesions_off_actin, s.adhesions_off_actin.value_or(0),
+                "The adhesion image shows " + brief(100 * s.adhesions_off_actin.value_or(0)) +
+                    " % of its adhesions, by area, where the actin image shows no cell."),
+        noticed(FindingKind::outline_off_actin, s.outline_off_actin.value_or(0),
+                "In " + brief(100 * s.outline_off_actin.value_or(0)) +
+                    " % of the outline that was given, the actin image shows no cell."),
         noticed(FindingKind::adhesions_left_out, s.n_adhesions_outside,
                 std::to_string(s.n_adhesions_outside) + " adhesions outside the cell were left out."),
         noticed(FindingKind::adhesions_assumed,

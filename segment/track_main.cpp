@@ -120,13 +120,20 @@ std::vector<Finding> findings_of(const Tracking& tracking) {
     add(noticed(FindingKind::tracked_by_correlation, 1,
                 "Windows of " + brief(tracking.window_um) + " um were followed: " + tracking.windows.why + "."));
   }
-  const double ratio = tracking.size_ratio, larger = std::max(ratio, 1 / ratio);
+  const BeadSizes& sizes = tracking.sizes;
+  const double ratio = sizes.ratio, larger = std::max(ratio, 1 / ratio);
   constexpr double kCertain = 3;  // standard errors
-  if (std::abs(ratio - 1) > kCertain * tracking.size_ratio_sigma) {
+  if (std::abs(ratio - 1) > kCertain * sizes.sigma) {
     add(noticed(FindingKind::defocused, larger,
                 "The beads of the " + std::string(ratio > 1 ? "stressed" : "relaxed") +
-                    " image are wider by a factor of " +
-                    with_error(larger, tracking.size_ratio_sigma * larger / ratio) + "."));
+                    " image are wider by a factor of " + with_error(larger, sizes.sigma * larger / ratio) + "."));
+  }
+  if (sizes.elongation - 1 > kCertain * sizes.elongation_sigma) {
+    const double angle_deg = 180 / std::numbers::pi * sizes.angle_rad;
+    add(noticed(FindingKind::beads_not_round, sizes.elongation,
+                "The images of the beads are " + with_error(sizes.elongation, sizes.elongation_sigma) +
+                    " times as long as wide, along " + brief(std::round(angle_deg < 0 ? angle_deg + 180 : angle_deg)) +
+                    " degrees (0: along the rows, 90: along the columns)."));
   }
   return findings;
 }
@@ -145,8 +152,10 @@ StageReport report_of(const Tracking& tracking, double pixel_size_um) {
                         {"scatter_um", tracking.scatter_um},
                         {"method", std::string(name_of(has_windows ? TrackMethod::correlation : TrackMethod::beads))},
                         {"window_sigma_um", tracking.window_um},
-                        {"bead_size_ratio", tracking.size_ratio},
-                        {"bead_size_ratio_sigma", tracking.size_ratio_sigma}};
+                        {"bead_size_ratio", tracking.sizes.ratio},
+                        {"bead_size_ratio_sigma", tracking.sizes.sigma},
+                        {"bead_elongation", tracking.sizes.elongation},
+                        {"bead_elongation_sigma", tracking.sizes.elongation_sigma}};
   report.figures.insert(report.figures.end(), more.begin(), more.end());
   add_figures(report, tracking.common);
   report.effects = {tracking.affine, tracking.windows};

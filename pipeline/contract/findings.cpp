@@ -35,6 +35,21 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "is taken out",
        "Look at the dots in 1_segment/overlay.png. Draw what is missing by hand (images.fibre_rois; begin with "
        "1_segment/RoiSet.zip)."},
+      {adhesions_off_actin, "adhesions-off-actin", "segment", caution,
+       "share of the adhesions, by area, that lie more than 1 um and less than 8 um beyond the cells of the actin "
+       "image",
+       0.03,
+       "in eighteen simulated cells and a real one it is 0 to 0.013; it is 0.05 to 0.36 if the adhesion image is that "
+       "of another cell, or upside down",
+       "Look at 1_segment/overlay.png: do both images show the same cell, the same way up? If the adhesions are those "
+       "of a neighbour without actin, crop the images or draw the adhesions by hand (images.adhesion_rois)."},
+      {outline_off_actin, "outline-off-actin", "segment", caution,
+       "share of a given outline's area that lies more than 1 um beyond the cells of the actin image", 0.02,
+       "the outlines of five simulated cells and of a real doublet have 0.000; those of another cell 0.005 to 0.16, "
+       "nine of eleven above this threshold",
+       "Look at 1_segment/overlay.png: is it the outline of this cell, at its place and the same way up? If the cell "
+       "is "
+       "too dim there for the program, the outline may still be right."},
       {actin_shift, "actin-shift", "segment", note, "1 if the actin image is shifted against the adhesion image", 0,
        "twice the gain in log likelihood is above 16.25 near no shift, which chance makes in one cell of 370, and "
        "above 27 elsewhere",
@@ -81,6 +96,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        1.5,
        "of simulated pairs the errors are 1.0 to 1.1 times sigma up to a ratio of 1.47, and 1.2 to 1.7 times at 1.6",
        "Focus both images on the same plane of beads. Of a stack, choose the plane with relaxed_z or stressed_z."},
+      {beads_not_round, "beads-not-round", "track", note, "length over width of the beads' images", 1.08,
+       "beads of simulated images have 1.00 to 1.01, of images that are 10 % too low 1.11; of six real pairs five are "
+       "between 1.06 and 1.3, as no lens is perfect",
+       "Nothing if it is the lens (astigmatism, coma): displacements stay right. Pixels that are not square, as of an "
+       "image that was resized by different factors, look the same and make tensions wrong: compare the images' width "
+       "and height with the camera's."},
       {beads_lost, "beads-lost", "track", caution, "share of the beads in space that were not followed", 0.2,
        "of simulated stacks of 5 000 and 20 000 beads 2 of a hundred and fewer are lost; if many are, those of the "
        "strained parts are lost first",

@@ -76,11 +76,15 @@ class Scratch {
         folder_(files::inside(cell, "cost/scratch", cell.string())),  // it is emptied
         images_(runner::read_image_names(cell)) {
     files::check_cell_folder(cell);
-    if (const auto of = runner::stages_of(cell, images_); of.kind == runner::CellKind::space)
-      throw InputError(
-          cell.string(), "a cell on a flat gel: the knobs that are turned are those of the tension fit",
-          "one in space (" + of.why + ")",
-          "its report lists how long each stage took; traction.spacing_um sets how many tractions there are");
+    if (const auto of = runner::stages_of(cell, images_); of.kind != CellKind::plane) {
+      const bool is_sheet = of.kind == CellKind::sheet;
+      throw InputError(cell.string(),
+                       "a cell with fibres on a flat gel: the knobs that are turned are those of the tension fit",
+                       (is_sheet ? "a sheet (" : "one in space (") + of.why + ")",
+                       std::string("its report lists how long each stage took; ") +
+                           (is_sheet ? "sheet.mesh_um sets how many triangles there are"
+                                     : "traction.spacing_um sets how many tractions there are"));
+    }
     has_images_ = has_all_images(cell, images_);
     for (const char* file : {"1_segment/adhesions.csv", "2_track/displacement.csv", "cell.toml"}) {
       if (files::is_file(cell / file)) continue;

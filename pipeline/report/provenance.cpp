@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/contract/errors.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
@@ -78,7 +79,11 @@ Provenance read_provenance(const std::filesystem::path& run_file) {
   const files::JsonRecord run(run_file, "a run.json as mbtfm run writes it",
                               "delete it; if that does not help, the record.json of the stage, too");
   provenance.version = run.at("version").text();
-  provenance.kind = run.text_or("kind", provenance.kind);
+  const std::string kind = run.text_or("kind", name_of(provenance.kind));
+  if (!named<CellKind>(kind))
+    throw InputError(run_file.string(), "a kind of cell: plane, space or sheet", "'" + kind + "'",
+                     "delete it and run mbtfm run again");
+  provenance.kind = *named<CellKind>(kind);
   provenance.kind_because = run.text_or("kind_because", "");
   provenance.started = run.text_or("started", "");
   provenance.ended = run.text_or("ended", "");

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/cell_kind.h"
 #include "pipeline/contract/findings.h"
 
 namespace mbtfm::report {
@@ -33,9 +34,10 @@ struct WantedAccuracy {
 
 struct Provenance {
   std::string version;
-  std::string kind = "plane", kind_because;  ///< of the cell
-  std::string started, ended, processor;     ///< of the run; empty: not known
-  std::string preset;                        ///< empty: none was asked for
+  CellKind kind = CellKind::plane;
+  std::string kind_because;
+  std::string started, ended, processor;  ///< of the run; empty: not known
+  std::string preset;                     ///< empty: none was asked for
   std::optional<WantedAccuracy> accuracy;
   std::vector<StageLine> stages;
   std::vector<EffectLine> effects;

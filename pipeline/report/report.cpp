@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "pipeline/contract/errors.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/own_files.h"
@@ -16,6 +17,7 @@
 #include "pipeline/report/page.h"
 #include "pipeline/report/provenance.h"
 #include "pipeline/report/results.h"
+#include "pipeline/report/sheet_report.h"
 #include "pipeline/report/space_report.h"
 #include "pipeline/report/tension_plot.h"
 #include "pipeline/report/tension_table.h"
@@ -197,7 +199,8 @@ namespace {
 std::string fingerprint(const std::filesystem::path& cell) {
   namespace fs = std::filesystem;
   std::vector<fs::path> files = {cell / "cell.toml"};
-  for (const char* folder : {"1_segment", "2_track", "3_network", "4_fit", "3_surface", "4_traction", "truth"}) {
+  for (const char* folder :
+       {"1_segment", "2_track", "3_network", "4_fit", "3_surface", "4_traction", "3_sheet", "truth"}) {
     if (!files::is_folder(cell / folder)) continue;
     for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder)) {
       if (files::is_own_file(entry.path())) files.push_back(entry.path());
@@ -215,14 +218,23 @@ std::string fingerprint(const std::filesystem::path& cell) {
 
 }  // namespace
 
-bool is_in_space(const std::filesystem::path& cell) { return read_provenance(cell / "run.json").kind == "space"; }
+CellKind kind_of(const std::filesystem::path& cell) { return read_provenance(cell / "run.json").kind; }
 
 bool has_results(const std::filesystem::path& cell) {
-  return files::is_own_file(cell / (is_in_space(cell) ? "4_traction/traction.json" : "4_fit/fit.json"));
+  switch (kind_of(cell)) {
+    case CellKind::plane:
+      return files::is_own_file(cell / "4_fit/fit.json");
+    case CellKind::space:
+      return files::is_own_file(cell / "4_traction/traction.json");
+    case CellKind::sheet:
+      return files::is_own_file(cell / "3_sheet/sheet.json");
+  }
+  throw InternalError("unknown kind of cell");
 }
 
 std::string report_html(const std::filesystem::path& cell) {
-  if (is_in_space(cell)) return report_in_space(cell);
+  if (kind_of(cell) == CellKind::space) return report_in_space(cell);
+  if (kind_of(cell) == CellKind::sheet) return report_of_sheet(cell);
   const CellResults results = read_results(cell);
   const Provenance provenance = read_provenance(cell / "run.json");
   const std::string head = fmt::format(
@@ -243,9 +255,11 @@ std::string report_html(const std::filesystem::path& cell) {
 
 void update_report(const std::filesystem::path& cell) {
   files::check_cell_folder(cell);
-  const std::filesystem::path script = cell / "view_in_paraview.py";
-  const std::string view(is_in_space(cell) ? kParaviewScriptInSpace : kParaviewScript);
-  if (!files::is_own_text(script) || files::read_text(script) != view) files::write_whole(script, view);
+  if (const CellKind kind = kind_of(cell); kind != CellKind::sheet) {  // ParaView shows 3_sheet/sheet.vtu as it is
+    const std::filesystem::path script = cell / "view_in_paraview.py";
+    const std::string view(kind == CellKind::space ? kParaviewScriptInSpace : kParaviewScript);
+    if (!files::is_own_text(script) || files::read_text(script) != view) files::write_whole(script, view);
+  }
   const std::filesystem::path file = cell / "report.html";
   const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
   if (files::is_own_text(file) && files::read_text(file).ends_with(signature)) return;

@@ -4,11 +4,13 @@
 #include <filesystem>
 #include <string>
 
+#include "pipeline/contract/cell_kind.h"
+
 namespace mbtfm::report {
 
-/// run.json says that the cell's beads are in space. @throws InputError where it is malformed
-bool is_in_space(const std::filesystem::path& cell);
-/// The last stage of the cell has written: fit, or traction where the beads are in space.
+/// As run.json says. @throws InputError where it is malformed
+CellKind kind_of(const std::filesystem::path& cell);
+/// The last stage of the cell has written: fit; traction where the beads are in space; sheet.
 bool has_results(const std::filesystem::path& cell);
 /// The page, from the files of a cell folder whose stages are done. @throws InputError
 std::string report_html(const std::filesystem::path& cell);

@@ -13,6 +13,8 @@ bool is_number(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789+-.e") == text.npos;
 }
 
+}  // namespace
+
 std::string section_of(const Listing& listing) {
   const files::CsvTable csv(listing.csv, listing.name);
   Table table{.columns = {}, .rows = {}, .caption = listing.title};
@@ -29,13 +31,10 @@ std::string section_of(const Listing& listing) {
                                     html_of(table, Download{listing.name, listing.csv}));
 }
 
-/// The file's drawing as a picture with a name, no wider than the page.
 std::string picture_in_page(const std::string& svg_file, const std::string& name) {
   return "<svg role=\"img\" aria-label=\"" + html_escaped(name) + "\" style=\"max-width:100%;height:auto\"" +
          svg_file.substr(svg_file.find("<svg") + 4);
 }
-
-}  // namespace
 
 std::string html_of(const StagePage& of) {
   const std::string head =

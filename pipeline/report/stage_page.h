@@ -16,6 +16,11 @@ struct Listing {
   std::vector<std::string> columns;
 };
 
+/// A section with the table.
+std::string section_of(const Listing& listing);
+/// A drawing of the program's own as a picture with a name, no wider than the page.
+std::string picture_in_page(const std::string& svg_file, const std::string& name);
+
 struct StagePage {
   std::string title = {};
   std::vector<std::string> facts = {};  ///< sentences: what was found, the most important first

@@ -164,7 +164,8 @@ void check_parameters_once(std::vector<Look>& looks, const BatchOptions& options
   std::map<std::pair<std::string, std::string>, std::vector<Look*>> cells_by_settings;
   for (Look& look : looks) {
     if (look.finding == Look::Finding::done || look.stages.empty()) continue;
-    const Settings settings = read_settings(look.outcome.cell / "cell.toml");
+    const fs::path& cell = look.outcome.cell;
+    const Settings settings = read_settings(cell / "cell.toml", stages_of(cell, read_image_names(cell)).stages);
     for (const std::string& stage : look.stages) cells_by_settings[{stage, settings.at(stage)}].push_back(&look);
   }
   for (const auto& [key, same] : cells_by_settings) {

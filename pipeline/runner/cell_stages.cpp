@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char *kDisplacement = "2_track/displacement_3d.csv", *kSurfaceBeads = "2_track/surface_beads.csv",
-                     *kSurface = "3_surface/surface.vtp";
+                     *kSurface = "3_surface/surface.vtp", *kOutline = "1_segment/outline.csv";
 
 const Stage& stage_named(const std::string& name) {
   const auto stage = std::ranges::find(stages(), name, &Stage::name);
@@ -62,6 +62,23 @@ Stage traction() {
           .effects = {"large_strain", "common_motion", "effect_tolerance"}};
 }
 
+Stage sheet() {
+  return {.name = "sheet",
+          .folder = "3_sheet",
+          .images = {},
+          .optional_images = {{"adhesive", "adhesion_mask"}, {"cells", "cell_labels"}},
+          .arguments = {{"displacement", "2_track/displacement.csv"}},
+          .output = {"out", "3_sheet"},
+          .reads = {"2_track/displacement.csv"},
+          .reads_where_there = {},
+          .writes = {"3_sheet/sheet_fit.csv", "3_sheet/sheet_models.csv", "3_sheet/sheet.csv", "3_sheet/traction.csv",
+                     "3_sheet/displacement.csv", "3_sheet/sheet.json", "3_sheet/sheet.svg", "3_sheet/sheet.html",
+                     "3_sheet/sheet.vtu"},
+          .series = {"3_sheet/contraction.csv", "3_sheet/borders.csv", "3_sheet/cell_tension.csv"},
+          .tables = {"", "gel", "sheet", "substrate", "checks"},
+          .effects = {"finite_thickness", "finite_sides", "depth_graded_gel", "common_motion", "effect_tolerance"}};
+}
+
 /// A value of cell.toml, as text; empty where it is not set.
 std::string text_in(const toml::table& whole, const char* table, const char* key) {
   return whole[table][key].value_or(std::string());
@@ -87,8 +104,7 @@ std::string why_in_space(const fs::path& cell, const toml::table& toml) {
 
 /// What is seen of the cell beside its beads is laid onto the surface from above.
 bool has_cell(const fs::path& cell, const ImageNames& images) {
-  return has_image(cell, images, "adhesion") || has_image(cell, images, "actin") ||
-         files::is_own_file(cell / "1_segment/outline.csv");
+  return has_image(cell, images, "adhesion") || has_image(cell, images, "actin") || files::is_own_file(cell / kOutline);
 }
 /// Somebody saw them; candidates along the rim, which a flat cell may have, are none.
 bool has_adhesions(const fs::path& cell, const ImageNames& images) {
@@ -102,7 +118,76 @@ void read_file(Stage& stage, const std::string& flag, const std::string& file) {
   stage.reads.push_back(file);
 }
 
+/// The sheet's outline where no image of the cell is there: a table, a selection or a mask. @returns whether there is
+/// one
+bool take_given_outline(const fs::path& cell, const ImageNames& images, CellStages& of, Stage& sheet) {
+  if (files::is_own_file(cell / kOutline)) {
+    read_file(sheet, "outline", kOutline);
+    of.why += std::string("; its outline is ") + kOutline;
+    return true;
+  }
+  for (const char* key : {"outline_roi", "outline_mask"}) {
+    if (!has_image(cell, images, key)) continue;
+    sheet.images = {{"outline", key}};
+    of.why += std::string("; its outline is ") + key;
+    return true;
+  }
+  return false;
+}
+
+CellStages stages_as_sheet(const fs::path& cell, const ImageNames& images, const RunSettings& settings) {
+  CellStages of{.kind = CellKind::sheet, .why = "run.model is sheet", .stages = {}, .chains = {}};
+  Stage track = stage_named("track"), last = sheet();
+  track.keeps_frames = false;
+  const bool has_images = has_image(cell, images, "adhesion") || has_image(cell, images, "actin");
+  if (!has_images && take_given_outline(cell, images, of, last)) {
+    if (settings.bundles)
+      throw InputError((cell / "cell.toml").string() + ": [run] bundles", "an image of the cell", "an outline alone",
+                       "leave bundles out, or add the actin image");
+    track.arguments.clear();
+    track.reads_where_there.clear();
+    of.stages = {std::move(track), std::move(last)};
+    of.chains = {{0}};
+    return of;
+  }
+  Stage segment = stage_named("segment");
+  // on a sheet's cell the mask says where the sheet adheres
+  std::erase_if(segment.optional_images, [](const ImageInput& image) { return image.key == "adhesion_mask"; });
+  const bool are_seen = has_image(cell, images, "adhesion") || has_image(cell, images, "adhesion_rois");
+  if (!are_seen) segment.settings = {{"segment", "adhesions", "none"}};
+  read_file(last, "outline", kOutline);
+  if (are_seen) read_file(last, "adhesions", "1_segment/adhesions.csv");
+  if (settings.bundles) read_file(last, "bundles", "1_segment/fibre_points.csv");
+  of.why += "; its outline is found in the images";
+  of.stages = {std::move(segment), std::move(track), std::move(last)};
+  of.first = {0};  // where the cell holds its gel tells which bead is which
+  of.chains = {{1}};
+  return of;
+}
+
 }  // namespace
+
+void declare(stage::ParameterList& list, RunSettings& settings) {
+  list.table("run");
+  list.add("model", settings.model,
+           "what pulls at a flat gel; fibres: cables in a network, fitted by their tensions; sheet: an evenly "
+           "contracting sheet, as [sheet] says");
+  list.add("bundles", settings.bundles,
+           "model = sheet: the fibres that are seen are cables in the sheet, each with a tension of its own");
+}
+
+RunSettings read_run_settings(const fs::path& cell) {
+  RunSettings settings;
+  stage::ParameterList list;
+  declare(list, settings);
+  stage::read_toml(list, cell / "cell.toml");
+  return settings;
+}
+
+const std::vector<Stage>& stages_of_sheet() {
+  static const std::vector<Stage> list = {stage_named("segment"), stage_named("track"), sheet()};
+  return list;
+}
 
 const std::vector<Stage>& stages_in_space() {
   static const std::vector<Stage> list = {stage_named("segment"), tracking(), surface(), traction()};
@@ -112,8 +197,10 @@ const std::vector<Stage>& stages_in_space() {
 const std::vector<Stage>& all_stages() {
   static const std::vector<Stage> list = [] {
     std::vector<Stage> all = stages();
-    for (const Stage& stage : stages_in_space()) {
-      if (std::ranges::find(all, stage.name, &Stage::name) == all.end()) all.push_back(stage);
+    for (const auto& others : {stages_in_space(), stages_of_sheet()}) {
+      for (const Stage& stage : others) {
+        if (std::ranges::find(all, stage.name, &Stage::name) == all.end()) all.push_back(stage);
+      }
     }
     return all;
   }();
@@ -130,6 +217,12 @@ std::string stage_names() {
 CellStages stages_of(const fs::path& cell, const ImageNames& images) {
   const toml::table toml = files::parse_toml(cell / "cell.toml");
   CellStages of{.kind = CellKind::space, .why = why_in_space(cell, toml), .stages = {}, .chains = {}};
+  const RunSettings settings = read_run_settings(cell);
+  if (settings.model == PullModel::sheet) {
+    if (of.why.empty()) return stages_as_sheet(cell, images, settings);
+    throw InputError((cell / "cell.toml").string() + ": [run] model", "fibres: beads in space have no sheet", "sheet",
+                     "leave model out; " + of.why);
+  }
   if (of.why.empty()) {
     of.kind = CellKind::plane;
     of.stages = stages();
@@ -152,7 +245,7 @@ CellStages stages_of(const fs::path& cell, const ImageNames& images) {
   const bool has_images = has_cell(cell, images);
   if (has_images) {
     of.stages.push_back(stage_named("segment"));
-    read_file(traction_stage, "outline", "1_segment/outline.csv");
+    read_file(traction_stage, "outline", kOutline);
     const bool are_seen = has_adhesions(cell, images);
     if (are_seen) read_file(traction_stage, "adhesions", "1_segment/adhesions.csv");
     of.why +=

@@ -1,4 +1,4 @@
-/// Which stages a cell has: that of images in the plane, or that of stacks in space.
+/// Which stages a cell has: those of images in the plane, with fibres or as a sheet, or those of stacks in space.
 #pragma once
 
 #include <array>
@@ -6,19 +6,26 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/cell_kind.h"
 #include "pipeline/contract/words.h"
 #include "pipeline/runner/images.h"
 #include "pipeline/runner/stages.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
 
-/// Where a cell's beads are followed.
-enum class CellKind {
-  plane,  ///< on a flat gel: segment, track, network, fit
-  space   ///< in the volume of a gel, which may be curved: segment where there are images of the cell, track, surface,
-          ///< traction
+/// What pulls at the beads of a flat gel.
+enum class PullModel { fibres, sheet };
+constexpr auto words(PullModel) { return std::array{"fibres", "sheet"}; }
+
+/// The table [run] of cell.toml.
+struct RunSettings {
+  PullModel model = PullModel::fibres;  ///< what the program is for
+  bool bundles = false;                 ///< most sheets have no fibres that pull by themselves
 };
-constexpr auto words(CellKind) { return std::array{"plane", "space"}; }
+void declare(stage::ParameterList& list, RunSettings& settings);
+/// @throws InputError for an unknown key or value, naming file and line
+RunSettings read_run_settings(const std::filesystem::path& cell);
 
 struct CellStages {
   CellKind kind = CellKind::plane;
@@ -35,10 +42,13 @@ CellStages stages_of(const std::filesystem::path& cell, const ImageNames& images
 /// In space, all of them: segment, track, surface, traction.
 const std::vector<Stage>& stages_in_space();
 
-/// Of both kinds, each name once.
+/// Of a sheet, all of them: segment, track, sheet.
+const std::vector<Stage>& stages_of_sheet();
+
+/// Of all kinds, each name once.
 const std::vector<Stage>& all_stages();
 
-/// "segment, track, network, fit, surface or traction"
+/// "segment, track, network, fit, surface, traction or sheet"
 std::string stage_names();
 
 }  // namespace mbtfm::runner

@@ -37,7 +37,10 @@ constexpr ImageKey kImages[] = {
      "mask or label image of the cell (TIFF or PNG), used as its outline, if the file is there"},
     {"adhesion_mask", &N::adhesion_mask,
      "mask or label image used as adhesions, if the file is there; with segment.adhesions = pattern the adhesive "
-     "pattern"},
+     "pattern; of a sheet, where it adheres"},
+    {"cell_labels", &N::cell_labels,
+     "label image of the cells of a colony (TIFF or PNG), if the file is there: the sheet's tensions are then told by "
+     "cell and border"},
     {"displacement", &N::displacement,
      "displacements from another program (CSV), taken instead of the beads' images; columns and unit: [track]"}};
 

@@ -26,6 +26,7 @@ struct ImageNames {
   // masks and label images of other programs, likewise
   std::string outline_mask = "outline_mask.tif|outline_mask.png";
   std::string adhesion_mask = "adhesion_mask.tif|adhesion_mask.png";
+  std::string cell_labels = "cell_labels.tif|cell_labels.png";  ///< of a colony
 };
 void declare(stage::ParameterList& list, ImageNames& names);
 

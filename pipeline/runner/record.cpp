@@ -151,10 +151,11 @@ void complete_record(const fs::path& record_file, const StageRecord& record, con
   files::write_whole(record_file, files::json_text(whole, 1) + "\n");
 }
 
-Settings read_settings(const fs::path& toml_file, const std::vector<Setting>& beneath) {
+Settings read_settings(const fs::path& toml_file, const std::vector<Stage>& stages,
+                       const std::vector<Setting>& beneath) {
   const toml::table whole = files::parse_toml(toml_file);
   Settings settings;
-  for (const Stage& stage : all_stages()) {
+  for (const Stage& stage : stages) {
     toml::table relevant;
     for (const auto& [key, value] : whole) {
       const std::string table = value.is_table() ? std::string(key.str()) : std::string();
@@ -170,13 +171,15 @@ Settings read_settings(const fs::path& toml_file, const std::vector<Setting>& be
     std::ostringstream text;
     text << toml::json_formatter(relevant);
     json values = json::parse(text.str());
-    for (const Setting& setting : beneath) {
-      if (std::find(stage.tables.begin(), stage.tables.end(), setting.table) == stage.tables.end()) continue;
+    const auto set = [&](const Setting& setting) {
+      if (std::find(stage.tables.begin(), stage.tables.end(), setting.table) == stage.tables.end()) return;
       json& table = values[setting.table];
       if (!table.is_null() && !table.is_object())
         throw InputError(toml_file.string(), "a table [" + setting.table + "]", table.dump());
       table[setting.key] = setting.value;
-    }
+    };
+    std::ranges::for_each(beneath, set);
+    std::ranges::for_each(stage.settings, set);
     settings[stage.name] = values.dump();
   }
   return settings;

@@ -56,9 +56,11 @@ void complete_record(const std::filesystem::path& record_file, const StageRecord
 
 /// By stage, the tables of cell.toml that it depends on, as JSON with sorted keys.
 using Settings = std::map<std::string, std::string>;
+/// @param stages   of the cell; settings of their own stand in place of what cell.toml says
 /// @param beneath  values that stand in place of defaults
 /// @throws InputError
-Settings read_settings(const std::filesystem::path& toml_file, const std::vector<Setting>& beneath = {});
+Settings read_settings(const std::filesystem::path& toml_file, const std::vector<Stage>& stages,
+                       const std::vector<Setting>& beneath = {});
 
 /// Paths, relative to the cell folder, of the files that a stage reads: its images as far as they are there, and the
 /// files of earlier stages.

@@ -106,8 +106,11 @@ void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
 /// @throws UsageError where the preset says nothing to this kind of cell
 void expect_fit(const RunOptions& options, const CellStages& of) {
   if (of.kind == CellKind::plane || options.beneath.empty()) return;
-  throw UsageError("--preset " + options.preset + ": presets are for cells on flat gels, and this one is in space (" +
-                   of.why + "): leave it out, and set traction.spacing_um for more or fewer tractions");
+  const bool is_sheet = of.kind == CellKind::sheet;
+  throw UsageError(
+      "--preset " + options.preset + ": presets are for fibres on flat gels, and this one is " +
+      (is_sheet ? "a sheet (" : "in space (") + of.why + "): leave it out, and set " +
+      (is_sheet ? "sheet.mesh_um for finer or coarser triangles" : "traction.spacing_um for more or fewer tractions"));
 }
 
 fs::path checked(fs::path cell) {
@@ -124,7 +127,7 @@ class CellRun {
         images_(read_image_names(cell_)),
         of_(stages_of(cell_, images_)),
         beneath_(unset_in(cell_ / "cell.toml", options.beneath)),
-        settings_(read_settings(cell_ / "cell.toml", beneath_)),
+        settings_(read_settings(cell_ / "cell.toml", of_.stages, beneath_)),
         hashes_(cell_) {
     expect_fit(options, of_);
   }
@@ -334,6 +337,7 @@ CellOutcome CellRun::run() {
   CellOutcome outcome = look();
   outcome.started = numerics::utc_now();
   if (of_.kind == CellKind::space && options_.note) options_.note("beads in space, as " + of_.why);
+  if (of_.kind == CellKind::sheet && options_.note) options_.note("a contracting sheet, as " + of_.why);
   const bool has_work = std::any_of(outcome.stages.begin(), outcome.stages.end(), [](const StageOutcome& stage) {
     return stage.status.state == StageState::must_run;
   });

@@ -141,6 +141,10 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   run["cell"] = fs::weakly_canonical(cell).filename().string();
   run["kind"] = name_of(of.kind);
   if (!of.why.empty()) run["kind_because"] = of.why;
+  if (of.kind == CellKind::sheet) {
+    const RunSettings settings = read_run_settings(cell);
+    run["run"] = {{"model", name_of(settings.model)}, {"bundles", settings.bundles}};
+  }
   run["outcome"] = name_of(outcome_of(entries));
   run["started"] = outcome.started;
   if (!outcome.ended.empty()) run["ended"] = outcome.ended;

@@ -154,6 +154,11 @@ std::string toml_of(const files::JsonRecord& run, const fs::path& inputs, const 
     text += "\n[" + table + "]\n";
     add_values(values, text);
   }
+  if (const auto of_run = run.find("run")) {
+    of_run->expect_object();
+    text += "\n[run]\n";
+    add_values(of_run->json(), text);
+  }
   text += "\n[images]\n";
   for (const auto& [key, file] : images_in(run, inputs)) {
     if (files::is_file(file)) text += key + " = " + files::json_text(fs::proximate(file, out).generic_string()) + "\n";
@@ -196,8 +201,9 @@ Verification verify_cell(const fs::path& cell) {
   const std::vector<fs::path> images = named_images(cell);
   Verification found;
   for (const KnownFile& file : files_in(run, run_json)) compare(file, cell, images, found);
-  const Settings settings = read_settings(cell / "cell.toml");
-  for (const Stage& stage : stages_of(cell, read_image_names(cell)).stages) {
+  const std::vector<Stage> stages = stages_of(cell, read_image_names(cell)).stages;
+  const Settings settings = read_settings(cell / "cell.toml", stages);
+  for (const Stage& stage : stages) {
     const auto entry = run.at("stages").find(stage.name);
     if (is_given(entry)) continue;
     const auto of_runner = entry ? entry->find("run") : std::nullopt;

@@ -55,8 +55,11 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
 
 /// Why a cell cannot enter, as its folder tells; empty: it can.
 std::string obstacle(const Path& cell) {
-  if (runner::stages_of(cell, runner::read_image_names(cell)).kind == runner::CellKind::space)
+  const CellKind kind = runner::stages_of(cell, runner::read_image_names(cell)).kind;
+  if (kind == CellKind::space)
     return "in space: it has tractions and no tensions; its force, strain energy and moment are in batch.csv";
+  if (kind == CellKind::sheet)
+    return "a sheet: it has a contraction and no fibres; its contraction, stiffness and tension are in batch.csv";
   for (const std::string& file : files_of_a_cell()) {
     if (!files::is_own_file(cell / file)) return "no fit: " + file + " is not there";
   }

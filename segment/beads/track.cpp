@@ -50,7 +50,7 @@ struct Measured {
   std::shared_ptr<const Scene> scene;
   std::vector<Track> tracks;
   Pooling pooling;
-  std::optional<SizeRatio> size_ratio = {};
+  BeadSizes sizes = {};
   double window_px = 0;  ///< Gaussian sigma of the windows; 0: beads
 };
 
@@ -130,8 +130,8 @@ Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images
   if (turn) flag_turned_out(*scene, *turn, tracks);  // those found again
   require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
   Pooling pooling = pooled(*scene, tracks);
-  const SizeRatio sizes = size_ratio(*scene, tracks);
-  return {.scene = scene, .tracks = std::move(tracks), .pooling = std::move(pooling), .size_ratio = sizes};
+  const BeadSizes sizes = sizes_of(*scene, tracks);
+  return {.scene = scene, .tracks = std::move(tracks), .pooling = std::move(pooling), .sizes = sizes};
 }
 
 /// What a size of window gives.
@@ -213,10 +213,7 @@ Tracking tracking_of(const Measured& measured, const MotionTaken& all, double pi
   result.bead_sigma_um = pixel_size_um * scene.bead_sigma();
   result.n_beads_stressed = static_cast<int>(scene.stressed.beads.size());
   result.window_um = pixel_size_um * measured.window_px;
-  if (measured.size_ratio) {
-    result.size_ratio = measured.size_ratio->ratio;
-    result.size_ratio_sigma = measured.size_ratio->sigma;
-  }
+  result.sizes = measured.sizes;
   result.affine = all.affine;
   for (int k = 0; k < scene.n_beads(); ++k) {
     const Pooled& found = pooling.beads[k];

@@ -84,6 +84,15 @@ struct CommonMotion {
   double pull_of_border = 0;          ///< largest motion along the border over the largest anywhere
 };
 
+/// How large and how round the beads' images are (focus.h).
+struct BeadSizes {
+  double ratio = 1;             ///< of their size in the stressed image over that in the relaxed one
+  double sigma = 0;             ///< its standard error; 0: not known
+  double elongation = 1;        ///< length over width, mean of both images
+  double elongation_sigma = 0;  ///< its standard error; 0: not known
+  double angle_rad = 0;         ///< of their length, from +x towards +y
+};
+
 struct Tracking {
   DisplacementField field;      ///< one entry for each bead found in the relaxed image, good or flagged
   CommonMotion common;          ///< what all beads do together
@@ -91,8 +100,7 @@ struct Tracking {
   double noise_um = 0;          ///< the same as robust standard deviation
   double bead_sigma_um = 0;     ///< of a bead's picture
   double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
-  double size_ratio = 1;  ///< of the beads in the stressed image over those in the relaxed one (focus.h)
-  double size_ratio_sigma = 0;  ///< its standard error; 0: not known
+  BeadSizes sizes{};
   int n_good = 0;
   Effect affine{};           ///< whether turn, growth and shear were taken off, and why
   Effect windows{};          ///< whether windows were followed in place of single beads, and why

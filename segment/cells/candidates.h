@@ -15,9 +15,10 @@ enum class AdhesionSource {
   image,       ///< an image of them, a mask, or drawn by hand
   pattern,     ///< they may be anywhere on the adhesive pattern beneath the cell
   fibre_ends,  ///< at the ends of the fibres
-  cell         ///< there, and along the rim of the cell
+  cell,        ///< there, and along the rim of the cell
+  none         ///< nowhere: outline and fibres alone, as for a sheet
 };
-constexpr auto words(AdhesionSource) { return std::array{"image", "pattern", "fibre-ends", "cell"}; }
+constexpr auto words(AdhesionSource) { return std::array{"image", "pattern", "fibre-ends", "cell", "none"}; }
 
 struct CandidateParameters {
   std::optional<AdhesionSource> adhesions =

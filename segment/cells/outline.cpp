@@ -97,16 +97,20 @@ cv::Mat moved_edge(const cv::Mat& values, const cv::Mat& mask, double band_px, d
   return without_debris(smoothed(result), smallest);
 }
 
-void add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& adhesions, double pixel_um, double reach_um) {
+/// @returns how far each adhesion's centre lies beyond the mask, before any is added (um)
+std::vector<double> add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& adhesions, double pixel_um,
+                                  double reach_um) {
   cv::Mat distance, labels;
   cv::distanceTransform(~mask, distance, labels, cv::DIST_L2, 5, cv::DIST_LABEL_PIXEL);
   std::vector<cv::Point> cell_pixel(mask.total() + 1);  // the mask's pixel nearest to each point, by label
   for (int y = 0; y < mask.rows; ++y)
     for (int x = 0; x < mask.cols; ++x)
       if (mask.at<uchar>(y, x)) cell_pixel[static_cast<std::size_t>(labels.at<int>(y, x))] = {x, y};
+  std::vector<double> beyond_um;
   for (const Adhesion& adhesion : adhesions) {
     const cv::Point2d centre = to_pixels(adhesion.position_um, pixel_um);
     const cv::Point c(std::clamp(cvRound(centre.x), 0, mask.cols - 1), std::clamp(cvRound(centre.y), 0, mask.rows - 1));
+    beyond_um.push_back(distance.at<float>(c) * pixel_um);
     if (distance.at<float>(c) * pixel_um > reach_um) continue;
     const cv::Size axes(cvRound(adhesion.major_axis_um / 2 / pixel_um), cvRound(adhesion.minor_axis_um / 2 / pixel_um));
     cv::ellipse(mask, c, axes, adhesion.angle_rad * 180 / CV_PI, 0, 360, cv::Scalar(255), cv::FILLED);
@@ -114,6 +118,7 @@ void add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& adhesions, double
     if (distance.at<float>(c) > 0)
       cv::line(mask, c, cell_pixel[static_cast<std::size_t>(labels.at<int>(c))], cv::Scalar(255), 5);
   }
+  return beyond_um;
 }
 
 /// Points at equal distances along a closed line.
@@ -310,15 +315,15 @@ void declare(stage::ParameterList& list, OutlineParameters& p) {
            "least area of a gap in a cell (um²)");
 }
 
-std::vector<CellOutline> find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions,
-                                    double pixel_size_um, const OutlineParameters& p) {
+CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
+                        const OutlineParameters& p) {
   const Scene s = scene_of(matrix_of(image), pixel_size_um, p);
   const double smallest = s.px_of(p.outline_smallest_um2);
   auto [mask, soft] = cells_in(s, smallest, p);
   if (mask.empty() || cv::countNonZero(mask) == 0) return {};
   const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
-  add_adhesions(mask, adhesions, s.pixel_um, p.outline_reach_um);
-  std::vector<CellOutline> cells;
+  CellsInImage found;
+  found.beyond_um = add_adhesions(mask, adhesions, s.pixel_um, p.outline_reach_um);
   const Parts parts = parts_of(filled(mask), smallest);
   for (const Parts::Part& each : parts.parts) {
     CellOutline cell;
@@ -337,11 +342,10 @@ std::vector<CellOutline> find_cells(const images::Image& image, const std::vecto
         cell.area_um2 -= std::abs(signed_area_um2(polygon));
       }
     }
-    cells.push_back(std::move(cell));
+    found.cells.push_back(std::move(cell));
   }
-  std::stable_sort(cells.begin(), cells.end(),
-                   [](const CellOutline& a, const CellOutline& b) { return a.area_um2 > b.area_um2; });
-  return cells;
+  std::ranges::stable_sort(found.cells, std::greater(), &CellOutline::area_um2);
+  return found;
 }
 
 CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um) {
@@ -387,8 +391,31 @@ CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um) {
 
 Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
                      const OutlineParameters& p) {
-  const auto cells = find_cells(image, adhesions, pixel_size_um, p);
+  const auto cells = find_cells(image, adhesions, pixel_size_um, p).cells;
   return cells.empty() ? Polygon{} : cells.front().outer_um;
+}
+
+double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& others, double far_um) {
+  constexpr double kLines = 100;  // across the cell: its area to a per cent
+  const auto [left, right] = std::ranges::minmax(cell.outer_um, {}, &Vec2::x);
+  const auto [top, bottom] = std::ranges::minmax(cell.outer_um, {}, &Vec2::y);
+  const double step = std::max(right.x - left.x, bottom.y - top.y) / kLines;
+  const auto is_in = [](const CellOutline& of, Vec2 p) {
+    return contains(of.outer_um, p) &&
+           std::ranges::none_of(of.holes_um, [&](const Polygon& hole) { return contains(hole, p); });
+  };
+  int n = 0, n_beyond = 0;
+  for (double y = top.y + step / 2; y < bottom.y; y += step) {
+    for (double x = left.x + step / 2; x < right.x; x += step) {
+      const Vec2 p{x, y};
+      if (!is_in(cell, p)) continue;
+      ++n;
+      n_beyond += std::ranges::none_of(others, [&](const CellOutline& other) {
+        return contains(other.outer_um, p) || distance_to_boundary_um(other.outer_um, p) <= far_um;
+      });
+    }
+  }
+  return n == 0 ? 0 : static_cast<double>(n_beyond) / n;
 }
 
 std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions) {

@@ -42,7 +42,15 @@ struct CutRing {
 /// image's corner is put in where the ring goes round it that closely.
 CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um);
 
-/// The cells of an image, the largest first. Cells that touch each other count as one.
+/// The cells that an image shows, the largest first.
+struct CellsInImage {
+  std::vector<CellOutline> cells;
+  /// By adhesion that was given: distance of its centre from the nearest cell as the image itself shows it, before any
+  /// adhesion is added; 0: in it.
+  std::vector<double> beyond_um;
+};
+
+/// The cells of an image. Cells that touch each other count as one.
 ///
 /// A first mask by Otsu's threshold of the smoothed image's logarithm above the darkest region; then each point near
 /// the edge is put to the side, inside or outside, whose mean brightness nearby it resembles more (localised Chan–Vese,
@@ -50,12 +58,15 @@ CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um);
 /// that are as dark as the surroundings are holes. At last each ring is moved to the edge in the unsmoothed image: see
 /// edge_profile.h.
 /// @returns none where there is no cell (constant or noise)
-std::vector<CellOutline> find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions,
-                                    double pixel_size_um, const OutlineParameters& parameters);
+CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
+                        const OutlineParameters& parameters);
 
 /// The largest cell's outer ring; empty where there is no cell.
 Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
                      const OutlineParameters& parameters);
+
+/// Share of a cell's area that lies more than `far_um` beyond all of the others.
+double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& others, double far_um);
 
 /// The adhesions whose centre lies in the cell, with their ids renewed.
 std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions);

@@ -57,10 +57,11 @@ std::vector<Adhesion> adhesions_of(const images::Channel& channel, double pixel_
   return found;
 }
 
-std::vector<CellOutline> outlines_of(const images::Channel& channel, const std::vector<Adhesion>& adhesions,
-                                     double pixel_um, const SegmentParameters& p) {
+CellsInImage outlines_of(const images::Channel& channel, const std::vector<Adhesion>& adhesions, double pixel_um,
+                         const SegmentParameters& p) {
   require_content(channel);
-  std::vector<CellOutline> cells = find_cells(channel.image, adhesions, pixel_um, p.outline);
+  CellsInImage found = find_cells(channel.image, adhesions, pixel_um, p.outline);
+  const std::vector<CellOutline>& cells = found.cells;
   if (cells.empty())
     throw InputError(
         channel.name, "a cell brighter than its surroundings",
@@ -71,7 +72,7 @@ std::vector<CellOutline> outlines_of(const images::Channel& channel, const std::
     throw InputError(
         channel.name, "single cells", "cells that touch over " + brief(cells.front().area_um2) + " um²",
         "crop the image to a single cell; outline_largest_um2 is " + shortest(p.outline.outline_largest_um2));
-  return cells;
+  return found;
 }
 
 /// The cells that the parameters ask for.
@@ -130,20 +131,42 @@ const std::string& name_of_adhesions(const Inputs& in) {
 struct Outlines {
   std::vector<CellOutline> chosen;
   int n_cells = 1;  ///< in the image
+  CellsInImage seen =
+      {};  ///< by the actin image, whatever outline is given; no cells where there is none, or it shows none
 };
+
+/// Of what the adhesion image shows in or near the cells of the actin image, the share by area that lies beyond them.
+/// Nothing where the actin image shows no cell.
+std::optional<double> share_off_actin(const CellsInImage& seen, const std::vector<Adhesion>& adhesions) {
+  constexpr double kBeyond_um = 1;  // channels are shifted by less
+  constexpr double kNear_um = 8;    // what is farther is another cell's, which may show no actin
+  if (seen.cells.empty()) return std::nullopt;
+  double near_um2 = 0, beyond_um2 = 0;
+  for (std::size_t i = 0; i < adhesions.size(); ++i) {
+    if (seen.beyond_um[i] > kNear_um) continue;
+    near_um2 += adhesions[i].area_um2;
+    if (seen.beyond_um[i] > kBeyond_um) beyond_um2 += adhesions[i].area_um2;
+  }
+  return near_um2 > 0 ? std::optional(beyond_um2 / near_um2) : std::nullopt;
+}
 
 Outlines outlines_in(const Inputs& in, const std::vector<Adhesion>& found) {
   const SegmentParameters& p = in.parameters;
-  if (in.drawn.outline) {
-    return {chosen({hand_drawn_outline(*in.drawn.outline, in.field)}, in.actin ? *in.actin : *in.adhesion, p), 1};
-  }
-  if (in.drawn.outline_mask)
+  if (in.drawn.outline || in.drawn.outline_mask) {
+    CellsInImage seen;
+    if (in.actin) seen = find_cells(in.actin->image, found, in.field.pixel_um, p.outline);
+    if (in.drawn.outline)
+      return {chosen({hand_drawn_outline(*in.drawn.outline, in.field)}, in.actin ? *in.actin : *in.adhesion, p), 1,
+              std::move(seen)};
     return {mask_outlines(*in.drawn.outline_mask, p.cell, in.field, p.outline),
-            n_cells_in(*in.drawn.outline_mask, in.field, p.outline)};
+            n_cells_in(*in.drawn.outline_mask, in.field, p.outline), std::move(seen)};
+  }
   const images::Channel& shape = in.actin ? *in.actin : *in.adhesion;
-  std::vector<CellOutline> all = outlines_of(shape, found, in.field.pixel_um, p);
-  const int n_cells = static_cast<int>(all.size());
-  return {chosen(std::move(all), shape, p), n_cells};
+  CellsInImage all = outlines_of(shape, found, in.field.pixel_um, p);
+  const int n_cells = static_cast<int>(all.cells.size());
+  Outlines outlines{chosen(all.cells, shape, p), n_cells};
+  if (in.actin) outlines.seen = std::move(all);
+  return outlines;
 }
 
 /// Fibres before they are tied: traced, or drawn by hand.
@@ -231,7 +254,10 @@ std::vector<Fibre> tied_one_by_one(std::vector<TracedFibre> traced, const Cell& 
     tie_ends(fibre, cell.adhesions, cell.outline_um, p.fibre_reach_um, held);
     lead_to_cut(fibre, cuts_of(cell), p.fibre_reach_um);
     if (length_um(fibre.points_um) < p.fibre_shortest_um) continue;
-    if (in.source != AdhesionSource::pattern) {
+    if (in.source == AdhesionSource::none) {
+      fibre.type_confidence = 0;
+      fibre.type_reason = "no adhesions were looked for";
+    } else if (in.source != AdhesionSource::pattern) {
       fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
       fibre.type_reason += held.start && held.end   ? "; candidates were put at its ends"
                            : held.start || held.end ? "; an end inside the cell, pointing away from the edge, is free"
@@ -298,16 +324,19 @@ Inputs inputs_of(const std::optional<images::Channel>& adhesion, const std::opti
 }
 
 Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std::vector<Adhesion>& found,
-                         int n_cells) {
+                         const Outlines& all) {
   const SegmentParameters& p = in.parameters;
   Segmentation s{.cell = {{}, {}, outline.outer_um, outline.holes_um, outline.is_cut},
                  .pixel_size_um = in.field.pixel_um,
-                 .n_cells = n_cells,
+                 .n_cells = all.n_cells,
                  .area_um2 = outline.area_um2,
                  .is_cut_by_border = outline.is_cut_by_border(),
                  .source = in.source};
   if (!s.is_cut_by_border) s.cell.is_cut.clear();
   const bool is_given = in.drawn.outline || in.drawn.outline_mask;
+  constexpr double kGenerous_um = 1;  // an outline drawn by hand is not false for that
+  if (is_given && !all.seen.cells.empty()) s.outline_off_actin = share_beyond(outline, all.seen.cells, kGenerous_um);
+  s.adhesions_off_actin = share_off_actin(all.seen, found);
   Lines lines{.traced = {}, .drawn = {}, .are_drawn = in.drawn.fibres.has_value()};
   if (in.drawn.fibres)
     lines.drawn = drawn_lines(*in.drawn.fibres, in.actin, in.field, p.fibres);
@@ -326,6 +355,8 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
                        std::to_string(found.size()) + " outside and none inside",
                        "do both channels show the same cell at the same place?");
     hold(s.cell, std::move(own), std::move(lines), around, in);
+  } else if (in.source == AdhesionSource::none) {
+    hold(s.cell, {}, std::move(lines), around, in);
   } else {
     if (in.source != AdhesionSource::fibre_ends) {
       s.second = s.cell;
@@ -352,8 +383,7 @@ std::vector<Segmentation> segment_cells(const std::optional<images::Channel>& ad
   const bool is_given = drawn.outline || drawn.outline_mask;
   if (actin && is_given && !drawn.fibres) require_content(*actin);  // else the outline has asked for it
   std::vector<Segmentation> result;
-  for (const CellOutline& outline : outlines.chosen)
-    result.push_back(segment_one(in, outline, found, outlines.n_cells));
+  for (const CellOutline& outline : outlines.chosen) result.push_back(segment_one(in, outline, found, outlines));
   return result;
 }
 

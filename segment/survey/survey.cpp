@@ -90,7 +90,7 @@ void look_at_beads(const CellImages& cell, double pixel_um, int threads, Survey&
 
 /// From the cell to the nearest side of the image; none where no cell is found.
 std::optional<double> margin_um(const images::Image& image, double pixel_um) {
-  const auto cells = cells::find_cells(image, {}, pixel_um, cells::OutlineParameters{});
+  const auto cells = cells::find_cells(image, {}, pixel_um, cells::OutlineParameters{}).cells;
   if (cells.empty()) return std::nullopt;
   double margin = std::min(image.width, image.height) * pixel_um;
   for (const Vec2 p : cells.front().outer_um)

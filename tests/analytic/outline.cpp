@@ -88,16 +88,48 @@ TEST(Outline, contains_every_adhesion_it_owns) {
   const DrawnScene scene = drawn_scene(10, 5);
   std::vector<Adhesion> adhesions = scene.adhesions;
   adhesions.push_back(ellipse(6, {12.8, 23.6}, 1, 0.5, 0));  // 0.8 um outside
-  const auto cells = find_cells(scene.actin_image, adhesions, scene.kPixel_um, {});
+  const auto cells = find_cells(scene.actin_image, adhesions, scene.kPixel_um, {}).cells;
   ASSERT_EQ(cells.size(), 1u);
   EXPECT_EQ(inside(cells[0], adhesions).size(), adhesions.size());
+}
+
+TEST(Outline, tells_how_far_each_adhesion_lies_beyond_what_the_image_shows) {
+  images::Image image = even_image(400, 400, 100);
+  const Adhesion disc = ellipse(1, {20, 20}, 20, 20, 0);
+  draw_ellipse(image, disc, 200, 0.15, kPixel_um);
+  add_noise(image, 5, 2);
+  std::vector<Adhesion> adhesions;
+  const std::vector<double> beyond_um = {-3, 0.6, 1.5, 4};
+  for (const double beyond : beyond_um)
+    adhesions.push_back(ellipse(1, disc.position_um + Vec2{0, disc.major_axis_um / 2 + beyond}, 0.6, 0.3, 0));
+  const CellsInImage found = find_cells(image, adhesions, kPixel_um, {});
+  ASSERT_EQ(found.beyond_um.size(), adhesions.size());
+  EXPECT_EQ(found.beyond_um[0], 0);
+  for (std::size_t i = 1; i < adhesions.size(); ++i)
+    EXPECT_NEAR(found.beyond_um[i], beyond_um[i], 0.35);  // a pixel of the masks' grid
+}
+
+TEST(Outline, the_share_of_one_that_lies_beyond_others_is_that_of_rings_and_of_what_is_apart) {
+  const auto disc = [](Vec2 middle_um, double radius_um) {
+    CellOutline cell;
+    cell.outer_um = ellipse_polygon(ellipse(1, middle_um, 2 * radius_um, 2 * radius_um, 0), 400);
+    return cell;
+  };
+  const CellOutline one = disc({20, 20}, 12);
+  EXPECT_EQ(share_beyond(one, {one}, 0.01), 0);
+  EXPECT_EQ(share_beyond(one, {disc({60, 60}, 5)}, 1), 1);
+  EXPECT_EQ(share_beyond(one, {disc({20, 20}, 11.5)}, 1), 0);
+  EXPECT_NEAR(share_beyond(one, {disc({20, 20}, 9)}, 1), 1 - 100.0 / 144, 0.01);
+  CellOutline ring = one;
+  ring.holes_um = {disc({20, 20}, 6).outer_um};
+  EXPECT_NEAR(share_beyond(ring, {disc({20, 20}, 9)}, 1), 44.0 / 108, 0.01);
 }
 
 TEST(Outline, a_gap_as_dark_as_outside_is_a_hole_and_what_lies_in_it_is_not_in_the_cell) {
   images::Image image = drawn_disc(5, 3);
   const Adhesion gap = ellipse(1, {21, 19}, 6, 4, 1);
   draw_ellipse(image, gap, -200, 0.15, kPixel_um);
-  const auto cells = find_cells(image, {}, kPixel_um, {});
+  const auto cells = find_cells(image, {}, kPixel_um, {}).cells;
   ASSERT_EQ(cells.size(), 1u);
   ASSERT_EQ(cells[0].holes_um.size(), 1u);
   EXPECT_GT(intersection_over_union(cells[0].holes_um[0], ellipse_polygon(gap, 100)), 0.9);
@@ -110,7 +142,7 @@ TEST(Outline, a_gap_as_dark_as_outside_is_a_hole_and_what_lies_in_it_is_not_in_t
 TEST(Outline, a_dim_middle_is_no_hole) {
   images::Image image = drawn_disc(5, 4);
   draw_ellipse(image, ellipse(1, {21, 19}, 6, 4, 1), -100, 0.15, kPixel_um);  // half as bright as the cell
-  const auto cells = find_cells(image, {}, kPixel_um, {});
+  const auto cells = find_cells(image, {}, kPixel_um, {}).cells;
   ASSERT_EQ(cells.size(), 1u);
   EXPECT_TRUE(cells[0].holes_um.empty());
 }
@@ -121,7 +153,7 @@ TEST(Outline, several_cells_come_by_area_and_the_border_cuts_one) {
                  cut = ellipse(3, {8, 38}, 12, 12, 0);
   for (const Adhesion& a : {small, large, cut}) draw_ellipse(image, a, 200, 0.15, kPixel_um);
   add_noise(image, 10, 5);
-  const auto cells = find_cells(image, {}, kPixel_um, {});
+  const auto cells = find_cells(image, {}, kPixel_um, {}).cells;
   ASSERT_EQ(cells.size(), 3u);
   EXPECT_GT(intersection_over_union(cells[0].outer_um, ellipse_polygon(large, 200)), 0.98);
   EXPECT_GT(intersection_over_union(cells[1].outer_um, ellipse_polygon(small, 200)), 0.97);

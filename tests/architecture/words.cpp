@@ -29,7 +29,6 @@ const std::map<std::string, std::string> kReaders = {
     {"pipeline/files/fit_summary.cpp", "keys of fit.json"},
     {"pipeline/runner/cell_stages.cpp", "values of cell.toml that other programs declare"},
     {"pipeline/report/space_report.cpp", "values of traction.json and of records"},
-    {"pipeline/report/report.cpp", "the kind in run.json"},
     {"pipeline/stage/parameters.cpp", "tables, true and false of cell.toml and flags"},
     {"segment/images/ome.cpp", "elements of OME-XML"},
     {"segment/images/stack.cpp", "the order of axes in OME-XML"},

@@ -106,9 +106,9 @@ done
 : >"$work/snakemake.log"
 workflow "${run[@]}" || { tail -n 40 "$work/snakemake.log"; fail "snakemake failed"; }
 n_cells=$((n_cells + 1)) compare
-# segment, network and fit of the one, fit of the other, table, statistics, and `all`
+# segment, track, network and fit of the one, fit of the other, table, statistics, and `all`
 n_jobs=$(sed -n 's/^total *\([0-9]*\).*/\1/p' "$work/snakemake.log" | head -n 1)
-[ "$n_jobs" -eq 7 ] || fail "$n_jobs jobs, expected the 7 that depend on the changes"
+[ "$n_jobs" -eq 8 ] || fail "$n_jobs jobs, expected the 8 that depend on the changes"
 
 echo "== nothing left to do"
 : >"$work/snakemake.log"

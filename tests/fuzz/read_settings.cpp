@@ -3,6 +3,7 @@
 
 #include "pipeline/contract/range.h"
 #include "pipeline/runner/record.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/runner/settings.h"
 #include "pipeline/stage/parameters.h"
@@ -66,7 +67,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
     declare(list, parameters);
     stage::read_toml(list, file);
   });
-  fuzz::answer([&] { runner::read_settings(file, {{.table = "gel", .key = "thickness_um", .value = "50"}}); });
+  fuzz::answer([&] {
+    runner::read_settings(file, runner::all_stages(), {{.table = "gel", .key = "thickness_um", .value = "50"}});
+  });
+  fuzz::answer([&] { runner::read_run_settings(fuzz::folder()); });
   fuzz::answer([&] { runner::unset_in(file, {{.table = "gel", .key = "thickness_um", .value = "50"}}); });
   fuzz::answer([&] { runner::read_image_names(fuzz::folder()); });
   return 0;

@@ -599,4 +599,41 @@ TEST(SheetFit, intervals_hold_the_truth_and_standard_errors_are_the_scatter) {
   }
 }
 
+/// The truth is solved on a mesh three times as fine, as no real cell knows the fit's.
+TEST(SheetFit, intervals_hold_a_truth_on_another_mesh) {
+  constexpr int kRuns = 200;
+  constexpr double kContraction = 1;
+  const FittedDisc disc(25);
+  sheet::Scene scene;
+  scene.region.rims.emplace_back(test::ring([](double) { return 25.0; }, 360));
+  scene.contraction.at = [](Vec2) { return kContraction; };
+  scene.size = {.at_curves_um = 25.0 / 8, .largest_um = 25.0 / 3, .growth = 0.4, .most_turn_rad = 0.5};
+  std::vector<Vec2> places;
+  for (const Bead& bead : disc.beads) places.push_back(bead.position_um);
+  for (const double E : {1.0, 10.0}) {
+    scene.material = {E, kRatio, kThickness_um};
+    sheet::Scene fine = scene;
+    fine.size = sheet::with_edge(fine.size, fine.size.at_curves_um / 3);
+    DisplacementField exact = disc.beads;
+    const std::vector<Vec2> u = sheet::displacements_um(*disc.model, sheet::solve_on_gel(fine, *disc.model, 1), places);
+    for (std::size_t i = 0; i < exact.size(); ++i) exact[i].displacement_um = u[i];
+    // the change is that of the truth's neighbourhood: it hardly differs between runs, and is found once
+    const Eigen::VectorXd change =
+        sheet::change_by_finer_mesh_um(scene, sheet::solve_on_gel(scene, *disc.model, 1), *disc.model, places, 1);
+    const auto mesh_error = [&](const Stiffnesses&, const Eigen::VectorXd&) { return change; };
+    std::mt19937_64 random(12);
+    int s_held = 0, M_held = 0;
+    for (int run = 0; run < kRuns; ++run) {
+      const SheetFit fit = fit_sheet(disc.data(with_noise(exact, random)), *disc.table, tensions::Loss::squares, {}, {},
+                                     mesh_error);
+      const SheetEstimate &s = of(fit, Quantity::contraction), &stiffness = of(fit, Quantity::stiffness);
+      s_held += s.low.value_or(0) <= kContraction && kContraction <= s.high.value_or(1e300);
+      M_held += stiffness.low.value_or(0) <= disc.stiffness(E) && disc.stiffness(E) <= stiffness.high.value_or(1e300);
+    }
+    std::printf("E %g, truth on a finer mesh: held %d, %d of %d\n", E, s_held, M_held, kRuns);
+    EXPECT_GE(s_held, 181) << E;  // as above
+    EXPECT_GE(M_held, 181) << E;
+  }
+}
+
 }  // namespace

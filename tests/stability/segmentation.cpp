@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/findings.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/hard_case.h"
+#include "tests/support/segmentation_accuracy.h"
 
 namespace mbtfm::cells {
 namespace {
@@ -61,6 +63,49 @@ TEST(Segmentation, says_what_is_missing) {
   one.image.pixel_size_um = 0.1;
   two.image.pixel_size_um = 0.2;
   EXPECT_THROW(images::common_pixel_size_um(one, two, std::nullopt), InputError);
+}
+
+class ImagesOfTwoCells : public testing::Test {
+ protected:
+  static std::shared_ptr<const LabelMask> mask_of(const Polygon& outline_um, const images::Image& like) {
+    LabelMask mask{.name = "mask.png", .width = like.width, .height = like.height, .labels = {}, .is_binary = true};
+    for (int j = 0; j < like.height; ++j)
+      for (int i = 0; i < like.width; ++i)
+        mask.labels.push_back(contains(outline_um, centre_of_pixel_um(i, j, kPixel_um)) ? 1 : 0);
+    return std::make_shared<const LabelMask>(std::move(mask));
+  }
+  static images::Channel upside_down(const images::Channel& channel) {
+    const int height = channel.image.height;
+    return {channel.name,
+            mapped(channel.image, [=](int column, int row) { return std::pair(column, height - 1 - row); })};
+  }
+  Segmentation segmented(const images::Channel& adhesion, const images::Channel& actin,
+                         const HandDrawn& drawn = {}) const {
+    return segment_cell(adhesion, actin, SegmentParameters{}, drawn);
+  }
+  static double threshold(FindingKind kind) { return properties_of(kind).threshold; }
+  static constexpr double kPixel_um = 0.1;
+};
+
+TEST_F(ImagesOfTwoCells, are_told_from_those_of_one) {
+  test::hard_case("the adhesion image upside down, or of another cell; an outline of another cell",
+                  "told in each; of one cell nothing is said");
+  const double most_adhesions = threshold(FindingKind::adhesions_off_actin),
+               most_outline = threshold(FindingKind::outline_off_actin);
+  for (const std::uint64_t seed : {71, 72, 73}) {
+    SCOPED_TRACE(seed);
+    const SimulatedCell cell = simulated_cell("u2os", "ordinary", seed),
+                        other = simulated_cell("u2os", "ordinary", seed + 1000);
+    HandDrawn own, others;
+    own.outline_mask = mask_of(cell.truth.outline_um, cell.actin.image);
+    others.outline_mask = mask_of(other.truth.outline_um, cell.actin.image);
+    const Segmentation sound = segmented(cell.adhesion, cell.actin, own);
+    EXPECT_LT(sound.adhesions_off_actin, 0.7 * most_adhesions);
+    EXPECT_LT(sound.outline_off_actin, 0.5 * most_outline);
+    EXPECT_GT(segmented(cell.adhesion, cell.actin, others).outline_off_actin, most_outline);
+    EXPECT_GT(segmented(upside_down(cell.adhesion), cell.actin).adhesions_off_actin, most_adhesions);
+    EXPECT_GT(segmented(other.adhesion, cell.actin).adhesions_off_actin, most_adhesions);
+  }
 }
 
 }  // namespace

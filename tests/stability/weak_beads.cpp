@@ -111,7 +111,8 @@ TEST(Focus, of_twenty_sound_pairs_is_never_called_different) {
     const auto pair =
         test::draw_bead_pair(test::ring_of_adhesions(192, 4), {.width = 192, .n_beads = 500, .seed = seed});
     const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, by(TrackMethod::beads), 2);
-    EXPECT_NEAR(tracking.size_ratio, 1, 0.05) << "seed " << seed;  // a tenth of what the finding asks
+    EXPECT_NEAR(tracking.sizes.ratio, 1, 0.05) << "seed " << seed;  // a tenth of what the finding asks
+    EXPECT_LT(tracking.sizes.elongation - 1, 0.02 + 3 * tracking.sizes.elongation_sigma) << "seed " << seed;
   }
 }
 
@@ -125,9 +126,25 @@ TEST(Focus, of_equal_images_is_equal_and_a_blurred_one_is_found) {
       const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 1500, .defocus = blur, .seed = seed});
       const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, by(TrackMethod::beads), 2);
       // neighbours in the wider window take a quarter of the difference away at most
-      EXPECT_NEAR(tracking.size_ratio, blur, 0.25 * (blur - 1) + 5 * tracking.size_ratio_sigma);
-      EXPECT_LT(tracking.size_ratio_sigma, 0.02);
+      EXPECT_NEAR(tracking.sizes.ratio, blur, 0.25 * (blur - 1) + 5 * tracking.sizes.sigma);
+      EXPECT_LT(tracking.sizes.sigma, 0.02);
     }
+  }
+}
+
+TEST(Focus, beads_that_are_not_round_are_measured) {
+  test::hard_case("beads' images 1.1 and 1.2 times as high as wide, or as wide as high",
+                  "the ratio within a fifth of what it differs from 1; the direction within 5 degrees");
+  const auto peaks = test::ring_of_adhesions(384, 6);
+  for (const double aspect : {1 / 1.2, 1 / 1.1, 1.1, 1.2}) {
+    SCOPED_TRACE(aspect);
+    const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 1500, .bead_aspect = aspect, .seed = 4});
+    const BeadSizes sizes = track_beads(pair.relaxed, pair.stressed, 1.0, by(TrackMethod::beads), 2).sizes;
+    const double longer = std::max(aspect, 1 / aspect);
+    EXPECT_NEAR(sizes.elongation, longer, 0.2 * (longer - 1) + 3 * sizes.elongation_sigma);
+    EXPECT_LT(sizes.elongation_sigma, 0.02);
+    const double direction = aspect > 1 ? 0.5 * std::numbers::pi : 0;
+    EXPECT_NEAR(std::abs(std::sin(sizes.angle_rad - direction)), 0, 0.087);
   }
 }
 

@@ -58,6 +58,7 @@ struct BeadScene {
   int width = 512;
   int n_beads = 5242;
   double bead_sigma = 1.3;
+  double bead_aspect = 1;          ///< height over width of a bead's picture, of the same light
   double brightness = 1500;        ///< median peak of a bead
   double brightness_spread = 0.4;  ///< of its logarithm
   double background = 150;
@@ -80,13 +81,14 @@ struct BeadPair {
   std::vector<Vec2> displacements;  ///< stressed minus relaxed, without drift
 };
 
-inline void add_bead(images::Image& image, Vec2 at, double peak, double sigma) {
-  const int reach = static_cast<int>(std::ceil(5 * sigma));
+inline void add_bead(images::Image& image, Vec2 at, double peak, double sigma, double aspect = 1) {
+  const double wide = sigma / std::sqrt(aspect), high = sigma * std::sqrt(aspect);
+  const int reach = static_cast<int>(std::ceil(5 * std::max(wide, high)));
   const int i0 = static_cast<int>(std::lround(at.x)), j0 = static_cast<int>(std::lround(at.y));
   for (int j = std::max(0, j0 - reach); j <= std::min(image.height - 1, j0 + reach); ++j) {
     for (int i = std::max(0, i0 - reach); i <= std::min(image.width - 1, i0 + reach); ++i) {
-      const double squared = (i - at.x) * (i - at.x) + (j - at.y) * (j - at.y);
-      image.at(i, j) += static_cast<float>(peak * std::exp(-0.5 * squared / (sigma * sigma)));
+      const double squared = std::pow((i - at.x) / wide, 2) + std::pow((j - at.y) / high, 2);
+      image.at(i, j) += static_cast<float>(peak * std::exp(-0.5 * squared));
     }
   }
 }
@@ -112,13 +114,14 @@ inline BeadPair draw_bead_pair(const std::vector<Peak>& peaks, const BeadScene& 
     const Vec2 moved = displacement(peaks, at) + step;
     const bool is_in_relaxed = uniform(random) >= scene.lost;
     const bool is_in_stressed = uniform(random) >= scene.lost;
-    if (is_in_relaxed) add_bead(pair.relaxed, at, peak, scene.bead_sigma);
+    if (is_in_relaxed) add_bead(pair.relaxed, at, peak, scene.bead_sigma, scene.bead_aspect);
     const Vec2 centre{0.5 * (scene.width - 1), 0.5 * (scene.width - 1)}, d = at + moved - centre;
     const double larger = 1 + scene.growth, c = larger * std::cos(scene.turn_rad),
                  s = larger * std::sin(scene.turn_rad);
     const Vec2 there = centre + scene.drift + Vec2{c * d.x - s * d.y, s * d.x + c * d.y};
     if (is_in_stressed) {
-      add_bead(pair.stressed, there, peak / (scene.defocus * scene.defocus), scene.defocus * scene.bead_sigma);
+      add_bead(pair.stressed, there, peak / (scene.defocus * scene.defocus), scene.defocus * scene.bead_sigma,
+               scene.bead_aspect);
     }
     const bool is_inside = at.x >= 0 && at.y >= 0 && at.x <= scene.width - 1 && at.y <= scene.width - 1;
     if (!is_inside || !is_in_relaxed || !is_in_stressed) continue;

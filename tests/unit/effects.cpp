@@ -59,7 +59,7 @@ TEST(Effects, a_switch_makes_anew_the_stages_that_have_it_and_no_other) {
   const test::TemporaryFolder folder;
   const auto settings = [&](const std::string& toml) {
     files::write_text(folder / "cell.toml", toml);
-    return runner::read_settings(folder / "cell.toml");
+    return runner::read_settings(folder / "cell.toml", runner::stages());
   };
   const auto changed = [&](const std::string& toml) {
     const auto before = settings("[gel]\nyoungs_modulus_kPa = 8\n");

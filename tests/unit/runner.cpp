@@ -63,6 +63,8 @@ case $name in
     fi;;
   network) echo "$sum" > "$out";;
   fit) for f in tensions.csv adhesion_forces.csv fit.json contracted.vtu; do echo "{}" > "$out/$f"; done;;
+  sheet) for f in sheet_fit sheet_models sheet traction displacement; do echo "{}" > "$out/$f.csv"; done
+    for f in sheet.json sheet.svg sheet.html sheet.vtu; do echo "{}" > "$out/$f"; done;;
 esac
 echo "{\"stage\": \"$name\", \"version\": \"1\", \"summary\": \"made by a script\", \"outputs\": [$outputs]}" > "$record"
 exit $code
@@ -221,6 +223,50 @@ TEST_F(Kinds, what_lies_in_the_folder_decides_where_surface_and_cell_come_from) 
   EXPECT_EQ(arguments(without.stages[2]), "points ");
   EXPECT_EQ(arguments(without.stages[3]), "displacement surface outline ");
   EXPECT_EQ(arguments(stages_with(toml + "[surface]\nformula = 'wave'\n").stages[2]), "");
+}
+
+TEST_F(Kinds, a_sheet_has_stages_of_its_own_and_takes_its_outline_from_images_or_from_a_mask) {
+  const std::string toml = "[run]\nmodel = 'sheet'\n";
+  const auto flags = [](const Stage& stage) {
+    std::string all;
+    for (const PathArgument& argument : stage.arguments) all += argument.flag + " ";
+    return all;
+  };
+  CellStages of = stages_with(toml);
+  EXPECT_EQ(told(of), "sheet segment track sheet");
+  EXPECT_EQ(flags(of.stages[2]), "displacement outline adhesions ");
+  EXPECT_TRUE(of.stages[0].settings.empty());
+  EXPECT_EQ(flags(stages_with(toml + "bundles = true\n").stages[2]), "displacement outline adhesions bundles ");
+  fs::remove(cell_ / "paxillin.tif");
+  of = stages_with(toml);
+  EXPECT_EQ(flags(of.stages[2]), "displacement outline ");
+  ASSERT_EQ(of.stages[0].settings.size(), 1u);  // no candidates: a sheet asks for none
+  EXPECT_EQ(of.stages[0].settings[0].value, "none");
+  fs::remove(cell_ / "actin.tif");
+  files::write_text(cell_ / "outline_mask.tif", "mask");
+  of = stages_with(toml);
+  EXPECT_EQ(told(of), "sheet track sheet");
+  ASSERT_EQ(of.stages[1].images.size(), 1u);
+  EXPECT_EQ(of.stages[1].images[0].key, "outline_mask");
+  EXPECT_THROW(stages_with(toml + "bundles = true\n"), InputError);  // nothing shows any
+}
+
+TEST_F(Kinds, what_the_table_run_cannot_mean_is_refused) {
+  EXPECT_THROW(stages_with("[run]\nmodel = 'sheets'\n"), InputError);
+  EXPECT_THROW(stages_with("[run]\nmodle = 'sheet'\n"), InputError);
+  EXPECT_THROW(stages_with("[run]\nmodel = 'sheet'\n[track]\nz_points = 'into-gel'\n"), InputError);
+}
+
+TEST_F(Runner, a_cell_that_becomes_a_sheet_is_segmented_again_only_where_that_differs) {
+  make_executable(bin_ / "mbtfm-sheet", kStageScript);
+  started();
+  write_parameters("[run]\nmodel = 'sheet'\n");
+  EXPECT_EQ(started(), "sheet");  // outline, adhesions and displacement are as they were
+  EXPECT_EQ(started(), "");
+  fs::remove(cell_ / "paxillin.tif");
+  EXPECT_EQ(started(), "segment sheet");  // without candidates: its outputs are those of the script
+  write_parameters("");
+  EXPECT_EQ(started(), "segment");  // with them
 }
 
 TEST_F(Runner, order_and_comments_of_the_parameter_file_do_not_matter) {

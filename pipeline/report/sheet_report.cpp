@@ -1,0 +1,152 @@
+#include "pipeline/report/sheet_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+#include "pipeline/contract/version.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/json_record.h"
+#include "pipeline/files/text.h"
+#include "pipeline/report/findings.h"
+#include "pipeline/report/numbers.h"
+#include "pipeline/report/page.h"
+#include "pipeline/report/provenance.h"
+#include "pipeline/report/space_report.h"
+#include "pipeline/report/stage_page.h"
+
+namespace mbtfm::report {
+namespace fs = std::filesystem;
+namespace {
+
+/// A row of sheet_fit.csv; an end that is not there: the beads set no limit.
+struct Estimate {
+  std::string quantity, part;  ///< the quantity's name with its unit, as the file has it
+  double value = 0;
+  std::optional<double> low, high;
+};
+
+struct SheetResults {
+  std::string name;
+  files::JsonRecord figures;
+  std::vector<Estimate> estimates;
+  double number(const char* figure) const { return figures.at(figure).number(); }
+};
+
+SheetResults read_sheet(const fs::path& cell) {
+  const fs::path folder = cell / "3_sheet";
+  SheetResults r{fs::weakly_canonical(cell).filename().string(),
+                 files::JsonRecord(folder / "sheet.json", "the figures of a sheet", "run the stage sheet again"),
+                 {}};
+  const files::CsvTable table(folder / "sheet_fit.csv");
+  const auto end = [&](int row, const char* column) {
+    return table.text(row, column).empty() ? std::nullopt : std::optional(table.number(row, column));
+  };
+  for (int row = 0; row < table.n_rows(); ++row)
+    r.estimates.push_back({table.text(row, "quantity"), table.text(row, "part"), table.number(row, "value"),
+                           end(row, "low"), end(row, "high")});
+  return r;
+}
+
+/// "line_tension_nN" as "line tension" and " nN".
+std::pair<std::string, std::string> words_and_unit(const std::string& quantity) {
+  constexpr std::pair<const char*, const char*> kUnits[] = {
+      {"_nN_per_um3", " nN/µm³"}, {"_nN_per_um", " nN/µm"}, {"_nN", " nN"}, {"_um", " µm"}};
+  std::string name = quantity, unit;
+  for (const auto& [ending, written] : kUnits) {
+    if (!name.ends_with(ending)) continue;
+    name.resize(name.size() - std::string(ending).size());
+    unit = written;
+    break;
+  }
+  std::ranges::replace(name, '_', ' ');
+  return {name, unit};
+}
+
+std::string text_of(const Estimate& e) {
+  const auto [name, unit] = words_and_unit(e.quantity);
+  const std::string of = name + (e.part.empty() ? "" : " of " + e.part);
+  if (e.low && e.high && *e.low < *e.high)
+    return of + " " + readable(e.value) + " (" + readable(*e.low) + " to " + readable(*e.high) + ")" + unit;
+  if (e.low && e.high) return of + " " + readable(e.value) + unit + " (given)";
+  if (e.low) return of + " above " + readable(*e.low) + unit;
+  if (e.high) return of + " below " + readable(*e.high) + unit;
+  return of + " not known";
+}
+
+std::string estimates_in_words(const SheetResults& r) {
+  std::string text;
+  for (const Estimate& e : r.estimates) text += (text.empty() ? "" : "; ") + text_of(e);
+  return text;
+}
+
+std::vector<std::string> facts_of(const SheetResults& r) {
+  return {
+      "Fitted to the beads: " + estimates_in_words(r) + ". In brackets: 95 % intervals.",
+      fmt::format("The mean tension is {} nN/µm over {} µm². The forces on the gel add up to {} nN in size.",
+                  readable(r.number("mean_tension_nN_per_um")), readable(r.number("area_um2")),
+                  readable(r.number("total_force_nN"))),
+      fmt::format("The sheet leaves {} of the displacement (relative L2); the noise of the beads alone would leave {}.",
+                  readable(r.number("relative_l2")), readable(r.number("expected_relative_l2")))};
+}
+
+}  // namespace
+
+std::string report_of_sheet(const fs::path& cell) {
+  const SheetResults r = read_sheet(cell);
+  const Provenance provenance = read_provenance(cell / "run.json");
+  const fs::path folder = cell / "3_sheet";
+  const std::string head = fmt::format(
+      "<h1>{}</h1><p class=\"what\">Contraction and tensions of one cell or colony, taken as a contracting "
+      "sheet</p>\n<p class=\"sub\">{} · mbtfm {}</p>\n",
+      html_escaped(r.name), html_escaped(provenance.kind_because), kVersion);
+  constexpr const char* kTitle = "Tension and traction";
+  constexpr const char* kExplained =
+      "Left: mean of the two principal tensions. Right: traction on the gel; arrows are means over squares. x to the "
+      "right, y down.";
+  std::string body = findings_section(facts_of(r), provenance);
+  body +=
+      section(kTitle, picture_in_page(files::read_text(folder / "sheet.svg"), std::string(kTitle) + ". " + kExplained) +
+                          "<p class=\"sub\">" + kExplained + "</p>\n");
+  body += section_of({"What the beads tell",
+                      "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).",
+                      r.name + "_sheet_fit.csv",
+                      files::read_text(folder / "sheet_fit.csv"),
+                      {"quantity", "part", "value", "sigma", "low", "high", "identifiable"}});
+  body += section_of({"Does the scene call for the sheet?",
+                      "The beads call for the model of the smallest bic. chi_squared is in units of the noise.",
+                      r.name + "_sheet_models.csv",
+                      files::read_text(folder / "sheet_models.csv"),
+                      {"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"}});
+  std::vector<std::pair<std::string, std::string>> pairs;
+  for (const auto& [name, value] : r.figures.members()) pairs.emplace_back(name, text_of_figure(value.figure()));
+  body += provenance_section(provenance, folded("Figures of the sheet", html_of_pairs("Figures of the sheet", pairs)));
+  return page(r.name + " – mbtfm", head, body);
+}
+
+std::string result_line_of_sheet(const fs::path& cell) {
+  const SheetResults r = read_sheet(cell);
+  return estimates_in_words(r) + "; mean tension " + readable(r.number("mean_tension_nN_per_um")) +
+         " nN/µm; total force " + readable(r.number("total_force_nN")) + " nN";
+}
+
+std::string result_event_of_sheet(const fs::path& cell, const fs::path& report) {
+  const SheetResults r = read_sheet(cell);
+  nlohmann::ordered_json event = {{"event", "result"},
+                                  {"total_force_nN", r.number("total_force_nN")},
+                                  {"mean_tension_nN_per_um", r.number("mean_tension_nN_per_um")},
+                                  {"estimates", nlohmann::ordered_json::array()},
+                                  {"report", report.string()}};
+  for (const Estimate& e : r.estimates) {
+    nlohmann::ordered_json one = {{"quantity", e.quantity}, {"part", e.part}, {"value", e.value}};
+    one["low"] = e.low ? nlohmann::ordered_json(*e.low) : nullptr;
+    one["high"] = e.high ? nlohmann::ordered_json(*e.high) : nullptr;
+    event["estimates"].push_back(std::move(one));
+  }
+  return files::json_text(event) + "\n";
+}
+
+}  // namespace mbtfm::report
