@@ -848,7 +848,19 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
     notice_expansion(context, at_nodes);
   }
   std::string told;
-  for (const sheets::SheetEstimate& e : fit.estimates) told += (told.empty() ? "" : "; ") + sentence_of(e);
+  std::vector<double> bundles_nN;
+  for (const sheets::SheetEstimate& e : fit.estimates) {
+    if (e.quantity == sheets::Quantity::bundle_tension) {
+      bundles_nN.push_back(e.value);
+    } else {
+      told += (told.empty() ? "" : "; ") + sentence_of(e);
+    }
+  }
+  if (!bundles_nN.empty()) {  // sheet_fit.csv has each
+    const auto [least, most] = std::ranges::minmax(bundles_nN);
+    told += "; tensions of " + std::to_string(bundles_nN.size()) + " bundles " + brief(least) + " to " + brief(most) +
+            " nN";
+  }
   result.told = told;
   result.tables = tables_of_fit(estimates_file, models_file);
   const auto stiffness =

@@ -133,7 +133,9 @@ std::vector<Finding> findings_of(const Tracking& tracking) {
     add(noticed(FindingKind::beads_not_round, sizes.elongation,
                 "The images of the beads are " + with_error(sizes.elongation, sizes.elongation_sigma) +
                     " times as long as wide, along " + brief(std::round(angle_deg < 0 ? angle_deg + 180 : angle_deg)) +
-                    " degrees (0: along the rows, 90: along the columns)."));
+                    " degrees (0: along the rows, 90: along the columns)" +
+                    (sizes.is_of_pixels ? ", the same in both. Pixels that are not square make them so." : "."),
+                sizes.is_of_pixels ? Severity::caution : Severity::note));
   }
   return findings;
 }

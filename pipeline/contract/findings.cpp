@@ -97,11 +97,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "of simulated pairs the errors are 1.0 to 1.1 times sigma up to a ratio of 1.47, and 1.2 to 1.7 times at 1.6",
        "Focus both images on the same plane of beads. Of a stack, choose the plane with relaxed_z or stressed_z."},
       {beads_not_round, "beads-not-round", "track", note, "length over width of the beads' images", 1.08,
-       "beads of simulated images have 1.00 to 1.01, of images that are 10 % too low 1.11; of six real pairs five are "
-       "between 1.06 and 1.3, as no lens is perfect",
-       "Nothing if it is the lens (astigmatism, coma): displacements stay right. Pixels that are not square, as of an "
-       "image that was resized by different factors, look the same and make tensions wrong: compare the images' width "
-       "and height with the camera's."},
+       "beads of simulated images have 1.00 to 1.01, of images that are 10 % too low 1.14; of five real pairs 1.06 to "
+       "1.26, as no lens is perfect. It is a caution if both images have the same, along rows or columns: none of "
+       "these five",
+       "Compare the images' width and height with the camera's: pixels that are not square, as of an image that was "
+       "resized by different factors, make tensions wrong. If it is the lens (astigmatism, coma), displacements stay "
+       "right."},
       {beads_lost, "beads-lost", "track", caution, "share of the beads in space that were not followed", 0.2,
        "of simulated stacks of 5 000 and 20 000 beads 2 of a hundred and fewer are lost; if many are, those of the "
        "strained parts are lost first",

@@ -77,10 +77,21 @@ std::string text_of(const Estimate& e) {
   return of + " not known";
 }
 
+/// Of bundles, their number and range: a table has each.
 std::string estimates_in_words(const SheetResults& r) {
   std::string text;
-  for (const Estimate& e : r.estimates) text += (text.empty() ? "" : "; ") + text_of(e);
-  return text;
+  std::vector<double> bundles_nN;
+  for (const Estimate& e : r.estimates) {
+    if (e.quantity == "bundle_tension_nN") {
+      bundles_nN.push_back(e.value);
+    } else {
+      text += (text.empty() ? "" : "; ") + text_of(e);
+    }
+  }
+  if (bundles_nN.empty()) return text;
+  const auto [least, most] = std::ranges::minmax(bundles_nN);
+  return text + "; tensions of " + std::to_string(bundles_nN.size()) + " bundles " + readable(least) + " to " +
+         readable(most) + " nN";
 }
 
 std::vector<std::string> facts_of(const SheetResults& r) {
@@ -91,6 +102,34 @@ std::vector<std::string> facts_of(const SheetResults& r) {
                   readable(r.number("total_force_nN"))),
       fmt::format("The sheet leaves {} of the displacement (relative L2); the noise of the beads alone would leave {}.",
                   readable(r.number("relative_l2")), readable(r.number("expected_relative_l2")))};
+}
+
+/// A parameter of the stage that fitted the sheet, as run.json has it.
+std::string parameter(const Provenance& provenance, const std::string& name) {
+  for (const StageLine& stage : provenance.stages) {
+    if (stage.name != "sheet") continue;
+    for (const auto& [key, value] : stage.parameters) {
+      if (key == name) return value;
+    }
+  }
+  return "?";
+}
+
+std::string methods(const SheetResults& r, const Provenance& provenance) {
+  const bool has_motion = parameter(provenance, "effects.common_motion") != "off";
+  const std::string text = fmt::format(
+      "The contraction was found with the program mbtfm{}. The cell was taken as an even elastic sheet in plane stress "
+      "({} µm thick, Poisson’s ratio {}) that contracts on the gel (Young’s modulus {} kPa, Poisson’s ratio {}, "
+      "thickness {} µm) and was solved by finite elements ({} quadratic triangles). Contraction and stiffness of the "
+      "sheet{} were fitted to the displacements of {} beads. The fit left {} of the displacement (relative L2; the "
+      "noise alone would leave {}). Intervals are 95 % intervals.",
+      provenance.version.empty() ? "" : " " + provenance.version, parameter(provenance, "sheet.thickness_um"),
+      parameter(provenance, "sheet.poisson_ratio"), parameter(provenance, "gel.youngs_modulus_kPa"),
+      parameter(provenance, "gel.poisson_ratio"), parameter(provenance, "gel.thickness_um"),
+      r.figures.at("n_triangles").number(),
+      has_motion ? " and a common motion of all beads (shift, turn, growth, shear)" : "",
+      r.figures.at("n_beads").number(), readable(r.number("relative_l2")), readable(r.number("expected_relative_l2")));
+  return "<p class=\"cite\">" + html_escaped(text) + "</p>\n";
 }
 
 }  // namespace
@@ -121,6 +160,7 @@ std::string report_of_sheet(const fs::path& cell) {
                       r.name + "_sheet_models.csv",
                       files::read_text(folder / "sheet_models.csv"),
                       {"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"}});
+  body += section("For your methods section", methods(r, provenance));
   std::vector<std::pair<std::string, std::string>> pairs;
   for (const auto& [name, value] : r.figures.members()) pairs.emplace_back(name, text_of_figure(value.figure()));
   body += provenance_section(provenance, folded("Figures of the sheet", html_of_pairs("Figures of the sheet", pairs)));

@@ -182,8 +182,13 @@ void prepare(const files::JsonRecord& run, const std::vector<KnownFile>& files, 
                      "--inputs names the folder where they are");
   }
   fs::create_directories(out);
+  const auto is_put_in_place = [&](const KnownFile& file) {  // of a stage that the cell does not have
+    return file.kind == FileKind::input && !is_output(file, files) &&
+           std::ranges::any_of(all_stages(),
+                               [&](const Stage& stage) { return *file.path.begin() == fs::path(stage.folder); });
+  };
   for (const KnownFile& file : files) {
-    if (file.kind != FileKind::output || !is_given(run, file.stage)) continue;
+    if (!is_put_in_place(file) && (file.kind != FileKind::output || !is_given(run, file.stage))) continue;
     fs::create_directories((out / file.path).parent_path());
     fs::copy_file(inputs / file.path, out / file.path);
   }

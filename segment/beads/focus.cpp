@@ -82,12 +82,18 @@ BeadSizes sizes_of(const Scene& scene, const std::vector<Track>& tracks) {
   }
   const double ratio = std::sqrt(squared_size(q) / squared_size(p));
   const Vec2 shape = 0.5 * (e_relaxed * of_relaxed.shape + e_stressed * of_stressed.shape);
+  // within 3 degrees of an axis; of each image's ellipticity some per cent are the beads' arrangement
+  constexpr double kAlong = 0.105, kAlike = 0.02;
+  const Vec2 difference = e_stressed * of_stressed.shape - e_relaxed * of_relaxed.shape;
+  const double sigma = std::sqrt(shape_variance);
   const double e = std::min(0.9, norm(shape));  // the formula is linear: beyond it says no more than "much"
   return {.ratio = ratio,
           .sigma = ratio * std::sqrt(variance),
           .elongation = std::sqrt((1 + e) / (1 - e)),
-          .elongation_sigma = std::sqrt(shape_variance),  // d sqrt((1 + e)/(1 − e)) = de to first order
-          .angle_rad = 0.5 * std::atan2(shape.y, shape.x)};
+          .elongation_sigma = sigma,  // d sqrt((1 + e)/(1 − e)) = de to first order
+          .angle_rad = 0.5 * std::atan2(shape.y, shape.x),
+          .is_of_pixels = norm(difference) < kAlike + 3 * 2 * sigma &&  // twice: of a difference, not of a mean
+                          std::abs(shape.y) < kAlong * std::abs(shape.x) + 2 * sigma};
 }
 
 }  // namespace mbtfm::beads

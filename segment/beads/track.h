@@ -91,6 +91,8 @@ struct BeadSizes {
   double elongation = 1;        ///< length over width, mean of both images
   double elongation_sigma = 0;  ///< its standard error; 0: not known
   double angle_rad = 0;         ///< of their length, from +x towards +y
+  /// The same in both images, along rows or columns: as pixels that are not square make it, and lenses seldom.
+  bool is_of_pixels = false;
 };
 
 struct Tracking {

@@ -28,6 +28,7 @@ const std::map<std::string, std::string> kReaders = {
     {"pipeline/files/csv.cpp", "true and false in CSV"},
     {"pipeline/files/fit_summary.cpp", "keys of fit.json"},
     {"pipeline/runner/cell_stages.cpp", "values of cell.toml that other programs declare"},
+    {"pipeline/report/sheet_report.cpp", "values of sheet_fit.csv and of records"},
     {"pipeline/report/space_report.cpp", "values of traction.json and of records"},
     {"pipeline/stage/parameters.cpp", "tables, true and false of cell.toml and flags"},
     {"segment/images/ome.cpp", "elements of OME-XML"},

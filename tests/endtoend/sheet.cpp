@@ -270,21 +270,35 @@ TEST_F(Sheet, what_cannot_be_is_refused_by_name) {
   EXPECT_NE(outcome.output.find("piece 1 of ring 0 and piece 3 of ring 0 cross"), std::string::npos) << outcome.output;
 }
 
-TEST_F(Sheet, images_of_a_contracting_cell_give_its_contraction_and_stiffness_back) {
-  const std::string cell = (folder_ / "cell").string();
-  const auto run_step = [&](const std::string& command) {
+/// The folder of a cell whose images were simulated, to be run as a sheet.
+class SheetsOfImages : public Sheet {
+ protected:
+  void SetUp() override {
+    done(
+        "mbtfm-simulate --quiet --scenario contracting-disc --images --radius_um 14 --image_size_px 480 --beads 2500 "
+        "--mesh_um 0.7 --out " +
+        cell_.string());
+    add("[run]\nmodel = \"sheet\"\n");
+    std::string toml = files::read_text(cell_ / "cell.toml");
+    toml.insert(toml.find("[sheet]\n") + 8, "mesh_um = 0.6\n");
+    files::write_text(cell_ / "cell.toml", toml);
+  }
+  static std::string done(const std::string& command) {
     const auto outcome = test::run_program(command);
-    ASSERT_EQ(outcome.code, 0) << outcome.output;
-  };
-  run_step(
-      "mbtfm-simulate --quiet --scenario contracting-disc --images --radius_um 14 --image_size_px 480 --beads 2500 "
-      "--mesh_um 0.7 --out " +
-      cell);
-  run_step("mbtfm-track --quiet --stressed " + cell + "/beads_stressed.tif --relaxed " + cell +
-           "/beads_relaxed.tif --config " + cell + "/cell.toml --out " + cell + "/2_track");
-  run_step("mbtfm-sheet --quiet --outline " + cell + "/1_segment/outline.csv --displacement " + cell +
-           "/2_track/displacement.csv --mesh_um 0.6 --config " + cell + "/cell.toml --out " + cell + "/sheet");
-  const files::CsvTable truth(folder_ / "cell/truth/sheet.csv"), fitted(folder_ / "cell/sheet/sheet_fit.csv");
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    return outcome.output;
+  }
+  void add(const std::string& text) {
+    files::write_text(cell_ / "cell.toml", files::read_text(cell_ / "cell.toml") + "\n" + text);
+  }
+  const std::filesystem::path study_ = folder_ / "study", cell_ = study_ / "cell";
+};
+
+TEST_F(SheetsOfImages, give_contraction_and_stiffness_back_in_one_command_and_in_a_batch) {
+  const std::string told = done("mbtfm run " + cell_.string());
+  EXPECT_NE(told.find("a contracting sheet, as run.model is sheet"), std::string::npos) << told;
+  EXPECT_NE(told.find("mbtfm: contraction 2"), std::string::npos) << told;
+  const files::CsvTable truth(cell_ / "truth/sheet.csv"), fitted(cell_ / "3_sheet/sheet_fit.csv");
   for (int row = 0; row < 2; ++row) {
     ASSERT_EQ(truth.text(row, "quantity"), fitted.text(row, "quantity"));
     // three standard errors, and what these triangles leave of the sheet: 2 %
@@ -293,9 +307,41 @@ TEST_F(Sheet, images_of_a_contracting_cell_give_its_contraction_and_stiffness_ba
         << truth.text(row, "quantity");
     EXPECT_LT(fitted.number(row, "sigma"), 0.15 * value);
   }
-  const std::string page = files::read_text(folder_ / "cell/sheet/sheet.html");
-  for (const char* words : {"In short", "Caution:", "What the beads tell", "stiffness_nN_per_um", "<svg"})
-    EXPECT_NE(page.find(words), std::string::npos) << words;
+  for (const char* page : {"report.html", "3_sheet/sheet.html"})
+    for (const char* words : {"In short", "Caution:", "What the beads tell", "stiffness_nN_per_um", "<svg"})
+      EXPECT_NE(files::read_text(cell_ / page).find(words), std::string::npos) << page << ": " << words;
+
+  const std::string study = study_.string();
+  EXPECT_NE(done("mbtfm batch " + study + " --list").find("sheet,up to date"), std::string::npos);
+  done("mbtfm batch " + study + " --quiet");
+  const files::CsvTable batch(study_ / "batch.csv");
+  ASSERT_EQ(batch.n_rows(), 1);
+  EXPECT_NEAR(batch.number(0, "sheet.contraction_nN_per_um"), fitted.number(0, "value"), 1e-4);
+  done("mbtfm verify " + cell_.string());
+  done("mbtfm repeat " + cell_.string() + " --quiet --out " + (folder_ / "again").string());
+  const auto stats = test::run_program("mbtfm stats " + study);
+  EXPECT_EQ(stats.code, 3);
+  EXPECT_NE(stats.output.find("a sheet: it has a contraction and no fibres"), std::string::npos) << stats.output;
+  add("[effects]\ncommon_motion = \"off\"\n");
+  EXPECT_NE(done("mbtfm batch " + study + " --list").find("track,up to date"), std::string::npos);
+  EXPECT_NE(done("mbtfm batch " + study + " --list").find("sheet,run"), std::string::npos);
+}
+
+TEST_F(SheetsOfImages, take_a_mask_for_the_outline_and_say_what_lacks) {
+  std::filesystem::remove(cell_ / "1_segment/outline.csv");
+  std::filesystem::remove(cell_ / "1_segment");
+  const auto nothing = test::run_program("mbtfm run " + cell_.string());
+  EXPECT_EQ(nothing.code, 3);
+  EXPECT_NE(nothing.output.find("actin.tif"), std::string::npos) << nothing.output;
+  images::Image mask{.width = 480, .height = 480, .pixels = std::vector<float>(480 * 480, 0), .pixel_size_um = {}};
+  for (int j = 0; j < 480; ++j)
+    for (int i = 0; i < 480; ++i)
+      if (std::hypot(i + 0.5 - 240, j + 0.5 - 240) < 140) mask.at(i, j) = 255;
+  images::write_tiff(cell_ / "outline_mask.tif", mask);
+  const std::string told = done("mbtfm run " + cell_.string());
+  EXPECT_NE(told.find("its outline is outline_mask"), std::string::npos) << told;
+  const files::CsvTable truth(cell_ / "truth/sheet.csv"), fitted(cell_ / "3_sheet/sheet_fit.csv");
+  EXPECT_NEAR(fitted.number(0, "value"), truth.number(0, "value"), 0.1 * truth.number(0, "value"));
 }
 
 TEST_F(Sheet, a_sheet_pulls_only_where_it_adheres) {

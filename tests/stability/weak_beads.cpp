@@ -145,6 +145,7 @@ TEST(Focus, beads_that_are_not_round_are_measured) {
     EXPECT_LT(sizes.elongation_sigma, 0.02);
     const double direction = aspect > 1 ? 0.5 * std::numbers::pi : 0;
     EXPECT_NEAR(std::abs(std::sin(sizes.angle_rad - direction)), 0, 0.087);
+    EXPECT_TRUE(sizes.is_of_pixels);
   }
 }
 
