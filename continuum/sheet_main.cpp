@@ -175,9 +175,19 @@ Region region_of(const Rings& rings) {
 }
 
 /// Where the sheet adheres: none where that is everywhere.
-std::vector<Polygon> adhesive_area(const Parameters& p, stage::StageContext& context) {
+/// @throws InputError where that is nowhere
+std::vector<Polygon> adhesive_area(const Parameters& p, stage::StageContext& context, const Region& sheet) {
   if (!context.has_input("adhesive")) return {};
-  return read_rings(context.input("adhesive"), p.pixel_size_um).points_um;
+  const Path file = context.input("adhesive");
+  const std::vector<Polygon> rings = read_rings(file, p.pixel_size_um).points_um;
+  const Polygon& outline = sheet.rims.front().points_um();
+  const auto any_in = [](const Polygon& points, const Polygon& area) {
+    return std::ranges::any_of(points, [&](Vec2 point) { return contains(area, point); });
+  };
+  if (!any_in(rings.front(), outline) && !any_in(outline, rings.front()))
+    throw InputError(file.string(), "an area beneath the sheet, where it adheres", "one beside it",
+                     "do the outline and the adhesive area lie in the same image, in the same unit?");
+  return rings;
 }
 
 /// The triangles end at the border of the adhesive area where it lies inside of the sheet.
@@ -371,7 +381,7 @@ Contraction contraction_asked(const Parameters& p, stage::StageContext& context)
 
 Run run_forward(const Parameters& p, stage::StageContext& context, const Region& region) {
   Scene scene;
-  scene.adhesive_um = adhesive_area(p, context);
+  scene.adhesive_um = adhesive_area(p, context, region);
   scene.region = with_borders_of(region, scene.adhesive_um);
   scene.material = material_of(p.sheet);
   scene.contraction = contraction_asked(p, context);
@@ -391,7 +401,10 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
     check(*gel);
   }
   const auto [ground, response] = decide_ground(p.sheet.ground, scene.material, scene.adhesion_nN_per_um3, gel);
-  const Effect strain = decide_strain(p.sheet.strain, x, ground);
+  // the edge's tension is known for small strains alone: the finding sheet-strain then says what that costs
+  const bool has_line = scene.line_tension_nN > 0;
+  const auto asked_strain = !p.sheet.strain && has_line ? std::optional(Strain::small) : p.sheet.strain;
+  const Effect strain = decide_strain(asked_strain, x, ground);
   scene.strain = strain.is_on ? Strain::large : Strain::small;
   Run result;
   const double M = scene.material.stiffness_nN_per_um();
@@ -736,7 +749,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   const DisplacementField beads = read_beads(context);
   const double narrow = narrow_um(region), nu = p.sheet.poisson_ratio;
   Scene scene;
-  scene.adhesive_um = adhesive_area(p, context);
+  scene.adhesive_um = adhesive_area(p, context, region);
   scene.region = with_borders_of(region, scene.adhesive_um);
   scene.material = {1, nu, *p.sheet.thickness_um};
   scene.contraction = {1, p.sheet.edge_band_um, {}};

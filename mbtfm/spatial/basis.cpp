@@ -63,14 +63,12 @@ MatrixXd Basis::covariance(const MatrixXd& of_x, int threads) const {
 MatrixXd norm_of(const TractionMesh& mesh, const Ground& ground, const std::function<double(Vec2)>& amplitude) {
   constexpr int kParts = 6;  // of a side: the amplitude jumps at a rim
   MatrixXd norm = MatrixXd::Zero(mesh.n_vertices(), mesh.n_vertices());
-  over_faces(mesh, ground, kParts, Places::even,
-             [&](Vec2 at, const std::array<int, 4>& vertices, const std::array<double, 4>& shares, double area_um2) {
-               const double a = amplitude(at);
-               for (std::size_t i = 0; i < 4; ++i) {
-                 for (std::size_t j = 0; j < 4; ++j)
-                   norm(vertices[i], vertices[j]) += shares[i] * shares[j] * area_um2 / (a * a);
-               }
-             });
+  over_faces(mesh, ground, kParts, Places::even, [&](Vec2 at, std::span<const VertexShare> shares, double area_um2) {
+    const double a = amplitude(at);
+    for (const auto& [v, of_v] : shares) {
+      for (const auto& [w, of_w] : shares) norm(v, w) += of_v * of_w * area_um2 / (a * a);
+    }
+  });
   return norm;
 }
 

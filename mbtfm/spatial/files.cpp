@@ -24,7 +24,9 @@ struct Row {
 const files::Table<Row>& traction_table() {
   static const files::Table<Row> table{
       .file = "traction_3d.csv",
-      .row = "each vertex of the tractions of `mbtfm-traction` in space, which are bilinear between them",
+      .row =
+          "each vertex of the smallest faces of the tractions of `mbtfm-traction` in space, which are bilinear between "
+          "them",
       .columns = {
           {"x_um", "the vertex", files::x_of(&Row::position_um)},
           {"y_um", "the vertex", files::y_of(&Row::position_um)},
@@ -49,30 +51,54 @@ const files::Table<Row>& traction_table() {
   return table;
 }
 
-std::vector<Row> rows_of(const Problem& problem, const SpatialReconstruction& r) {
-  const std::vector<Vec3> vertices = problem.vertices_um();
+/// As an even lattice of the smallest faces, which every reader understands.
+struct Shown {
+  TractionMesh lattice;
+  std::vector<Row> rows;
+};
+
+Shown shown(const Problem& problem, const SpatialReconstruction& r) {
   const Eigen::VectorXd u = problem.surface_displacement_um(r.traction_kPa);
   const std::vector<double> resolution = resolution_um(problem, r);
-  std::vector<Row> rows;
-  for (std::size_t v = 0; v < vertices.size(); ++v) {
-    const auto at = 3 * static_cast<Eigen::Index>(v);
-    const auto vector = [at](const Eigen::VectorXd& of) { return Vec3{of[at], of[at + 1], of[at + 2]}; };
-    Row& row = rows.emplace_back();
-    row.position_um = vertices[v];
+  const bool is_even = problem.mesh.finest_level() == 0;
+  Shown all{evened(problem.mesh, problem.ground), {}};
+  for (std::size_t v = 0; v < all.lattice.quads.points_um.size(); ++v) {
+    const Vec2 place = all.lattice.quads.points_um[v];
+    const std::vector<VertexShare> shares =
+        is_even ? std::vector<VertexShare>{{static_cast<int>(v), 1}} : shares_at(problem.mesh, place);
+    const auto vector = [&](const Eigen::VectorXd& of) {
+      Vec3 sum;
+      for (const auto& [vertex, share] : shares)
+        sum += share * Vec3{of[3 * vertex], of[3 * vertex + 1], of[3 * vertex + 2]};
+      return sum;
+    };
+    Row& row = all.rows.emplace_back();
+    row.position_um = {place.x, place.y, problem.ground.height_um(place)};
     row.traction_kPa = vector(r.traction_kPa);
     row.displacement_um = vector(u);
-    row.area_um2 = problem.mesh.areas_um2[v];
-    const Vec3 normal = problem.ground.normal(problem.mesh.quads.points_um[v]);
+    row.area_um2 = all.lattice.areas_um2[v];
+    const Vec3 normal = problem.ground.normal(place);
     row.normal_kPa = dot(row.traction_kPa, normal);
     row.tangential_kPa = norm(row.traction_kPa - row.normal_kPa * normal);
-    if (!resolution.empty()) row.resolution_um = resolution[v];
+    if (!resolution.empty()) {
+      row.resolution_um = 0;
+      for (const auto& [vertex, share] : shares)
+        *row.resolution_um += share * resolution[static_cast<std::size_t>(vertex)];
+    }
     if (r.covariance_kPa2.size() == 0) continue;
-    const auto sigma = [&](Eigen::Index c) { return std::sqrt(std::max(0.0, r.covariance_kPa2(at + c, at + c))); };
+    const auto sigma = [&](Eigen::Index c) {
+      double variance = 0;
+      for (const VertexShare& a : shares) {
+        for (const VertexShare& b : shares)
+          variance += a.share * b.share * r.covariance_kPa2(3 * a.vertex + c, 3 * b.vertex + c);
+      }
+      return std::sqrt(std::max(0.0, variance));
+    };
     row.sigma_x_kPa = sigma(0);
     row.sigma_y_kPa = sigma(1);
     row.sigma_z_kPa = sigma(2);
   }
-  return rows;
+  return all;
 }
 
 const files::Table<PartForce>& force_table() {
@@ -101,14 +127,15 @@ const files::Table<PartForce>& force_table() {
 std::string pages_of_tables() { return page_of(traction_table()) + page_of(force_table()); }
 
 void write_tractions(const Path& file, const Problem& problem, const SpatialReconstruction& reconstruction) {
-  write(file, traction_table(), rows_of(problem, reconstruction));
+  write(file, traction_table(), shown(problem, reconstruction).rows);
 }
 
 void write_part_forces(const Path& file, const std::vector<PartForce>& forces) { write(file, force_table(), forces); }
 
 void write_tractions_vtp(const Path& file, const Problem& problem, const SpatialReconstruction& reconstruction) {
+  const Shown all = shown(problem, reconstruction);
   files::Grid grid;
-  for (const auto& face : problem.mesh.quads.faces) grid.cells.insert(grid.cells.end(), face.begin(), face.end());
+  for (const auto& face : all.lattice.quads.faces) grid.cells.insert(grid.cells.end(), face.begin(), face.end());
   const auto array = [&](const char* name, int components) -> std::vector<double>& {
     return grid.point_arrays.emplace_back(files::GridArray{name, components, {}}).values;
   };
@@ -118,7 +145,7 @@ void write_tractions_vtp(const Path& file, const Problem& problem, const Spatial
   const bool has_errors = reconstruction.covariance_kPa2.size() > 0, is_resolved = reconstruction.resolved.size() > 0;
   auto* sigma = has_errors ? &array("sigma_traction_kPa", 3) : nullptr;
   auto* resolution = is_resolved ? &array("resolution_um", 1) : nullptr;
-  for (const Row& row : rows_of(problem, reconstruction)) {
+  for (const Row& row : all.rows) {
     grid.points_um.push_back({row.position_um.x, row.position_um.y, row.position_um.z});
     traction.insert(traction.end(), {row.traction_kPa.x, row.traction_kPa.y, row.traction_kPa.z});
     displacement.insert(displacement.end(), {row.displacement_um.x, row.displacement_um.y, row.displacement_um.z});
@@ -169,8 +196,11 @@ Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const
   }
   figures.emplace_back("tractions_over", problem.expected.where);
   figures.emplace_back("n_unknowns", std::int64_t{problem.n_unknowns()});
-  add("spacing_x_um", problem.mesh.spacing_um.x);
-  add("spacing_y_um", problem.mesh.spacing_um.y);
+  const int finest = problem.mesh.finest_level();
+  add("spacing_x_um", std::ldexp(problem.mesh.spacing_um.x, -finest));
+  add("spacing_y_um", std::ldexp(problem.mesh.spacing_um.y, -finest));
+  const Vec2 largest = problem.mesh.size_um(*std::ranges::min_element(problem.mesh.leaves, {}, &Leaf::level));
+  add("largest_spacing_um", std::max(largest.x, largest.y));
   figures.emplace_back("n_beads", std::int64_t{problem.observed.n_beads});
   figures.emplace_back("n_beads_flagged", std::int64_t{problem.observed.n_flagged});
   figures.emplace_back("n_beads_above", std::int64_t{problem.observed.n_above});

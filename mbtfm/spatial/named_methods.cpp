@@ -145,13 +145,14 @@ SpatialReconstruction reconstruct_green(const Problem& problem, const tractions:
   const auto n_faces = static_cast<Index>(faces.size());
   MBTFM_ASSERT(problem.facet_response_um_per_kPa.cols() == 3 * n_faces);
   // for people, the traction of a vertex is the mean over its facets; |x|² the sum of squares times area
-  const double area = problem.mesh.spacing_um.x * problem.mesh.spacing_um.y;
   VectorXd roots(n_faces), n_at = VectorXd::Zero(problem.mesh.n_vertices());
   MatrixXd shapes = MatrixXd::Zero(problem.mesh.n_vertices(), n_faces);
   for (Index f = 0; f < n_faces; ++f) {
-    const Vec2 middle = problem.mesh.low_corners_um[static_cast<std::size_t>(f)] + 0.5 * problem.mesh.spacing_um;
-    roots[f] = problem.expected.amplitude(middle) / std::sqrt(area * problem.ground.stretch(middle));
+    const Leaf& leaf = problem.mesh.leaves[static_cast<std::size_t>(f)];
+    const Vec2 size = problem.mesh.size_um(leaf), middle = problem.mesh.low_corner_um(leaf) + 0.5 * size;
+    roots[f] = problem.expected.amplitude(middle) / std::sqrt(size.x * size.y * problem.ground.stretch(middle));
     for (const int v : faces[static_cast<std::size_t>(f)]) {
+      if (v >= problem.mesh.n_vertices()) continue;  // it hangs
       shapes(v, f) = 1;
       n_at[v] += 1;
     }

@@ -7,6 +7,10 @@ void declare(stage::ParameterList& list, SpatialParameters& p) {
   list.add("region", p.region,
            "beads in space: where the cell pulls; auto: in the outline grown by two distances of beads, or everywhere "
            "if there is no outline");
+  list.add("refine", p.refine,
+           "beads in space: faces of tractions are all alike (none), or a quarter as wide in the region as outside "
+           "(region), or begin twice as wide and are split once where the beads resolve more and tractions exceed "
+           "their errors (resolved), or the two fifths with the largest tractions (threshold)");
   list.add("background", p.background, Range::between(0, 1),
            "beads in space: traction expected outside of the region, over the traction within it; 0: none");
   list.add("loss", p.loss,

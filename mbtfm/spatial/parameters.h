@@ -23,9 +23,20 @@ constexpr auto words(Region) { return std::array{"auto", "all", "outline", "adhe
 enum class BeadLoss { l2, mixture, l1, huber, biweight, l1_by_component };
 constexpr auto words(BeadLoss) { return std::array{"l2", "mixture", "l1", "huber", "biweight", "l1-by-component"}; }
 
+/// Where the faces on which tractions are bilinear are smaller.
+enum class Refine {
+  none,      ///< all alike
+  region,    ///< where the cell pulls
+  resolved,  ///< begun twice as large, split where the beads resolve more and tractions exceed their errors
+  threshold  ///< begun twice as large, split where tractions are largest (thesis 2.3.3)
+};
+constexpr auto words(Refine) { return std::array{"none", "region", "resolved", "threshold"}; }
+constexpr bool starts_coarse(Refine refine) { return refine == Refine::resolved || refine == Refine::threshold; }
+
 struct SpatialParameters {
   Region region = Region::automatic;
-  double background = 0.1;  ///< a tenth: a patch left out is seen, noise far from the cell is not
+  Refine refine = Refine::none;  ///< errors of all methods were measured so
+  double background = 0.1;       ///< a tenth: a patch left out is seen, noise far from the cell is not
   BeadLoss loss = BeadLoss::l2;
   double axial_sigma_ratio = 3;  ///< of confocal stacks (thesis 2.3.2)
   bool with_axial = true;        ///< displacement along z counts

@@ -17,10 +17,36 @@ using Eigen::VectorXd;
 
 namespace {
 
+/// Whether a face has a part in the region.
+bool touches(const TractionMesh& mesh, const Leaf& leaf, const Expected& expected) {
+  constexpr int kParts = 8;  // of a side
+  const Vec2 low = mesh.low_corner_um(leaf), size = mesh.size_um(leaf);
+  for (int k = 0; k < (kParts + 1) * (kParts + 1); ++k) {
+    const double x = k % (kParts + 1), y = k / (kParts + 1);
+    if (expected.is_part(low + Vec2{x / kParts * size.x, y / kParts * size.y})) return true;
+  }
+  return false;
+}
+
+/// Small faces in the region, and larger ones where little is expected.
+TractionMesh graded_lattice(const Ground& ground, const Expected& expected, double spacing_um) {
+  constexpr int kLevels = 2;
+  TractionMesh mesh =
+      make_traction_mesh(ground, expected.over, std::ldexp(spacing_um, kLevels), [](Vec2) { return true; });
+  for (int level = 0; level < kLevels; ++level) {
+    std::vector<bool> is_split;
+    for (const Leaf& leaf : mesh.leaves) is_split.push_back(touches(mesh, leaf, expected));
+    mesh = with_split(mesh, ground, is_split);
+  }
+  return mesh;
+}
+
 TractionMesh lattice_for(const Ground& ground, const Expected& expected, const Meshing& meshing, double beads_um) {
   const Vec2 size = expected.over.high_um - expected.over.low_um;
-  const double smallest = std::sqrt(size.x * size.y / kMostVertices);
-  const double spacing = meshing.spacing_um.value_or(std::max(kSpacingOfBeads * beads_um, smallest));
+  const bool is_graded = meshing.refine == Refine::region && expected.background > 0 && expected.background < 1;
+  double spacing = meshing.spacing_um.value_or(kSpacingOfBeads * beads_um);
+  if (starts_coarse(meshing.refine)) spacing *= 2;
+  if (!meshing.spacing_um && !is_graded) spacing = std::max(spacing, std::sqrt(size.x * size.y / kMostVertices));
   if (spacing > std::max(size.x, size.y)) {
     throw UsageError("traction.spacing_um = " + brief(spacing) + ": the beads lie over " + brief(size.x) + " x " +
                      brief(size.y) + " um");
@@ -32,10 +58,14 @@ TractionMesh lattice_for(const Ground& ground, const Expected& expected, const M
                      std::to_string(kMostAtAll) +
                      " are the most: choose a wider spacing, or a region with traction.background = 0");
   };
-  constexpr double kMostLooked = 1e6;  // of all places, where those of a region are wanted alone
+  constexpr double kWider = 1.05, kMostLooked = 1e6;  // of all places, where those of a region are wanted alone
   require_few(size.x * size.y / (spacing * spacing), kMostLooked);
-  TractionMesh mesh = make_traction_mesh(
-      ground, expected.over, spacing, [&](Vec2 middle) { return expected.background > 0 || expected.is_part(middle); });
+  TractionMesh mesh = is_graded ? graded_lattice(ground, expected, spacing)
+                                : make_traction_mesh(ground, expected.over, spacing, [&](Vec2 middle) {
+                                    return expected.background > 0 || expected.is_part(middle);
+                                  });
+  for (; is_graded && !meshing.spacing_um && mesh.n_vertices() > kMostVertices; spacing *= kWider)
+    mesh = graded_lattice(ground, expected, kWider * spacing);
   require_few(mesh.n_vertices(), kMostAtAll);
   return mesh;
 }
@@ -59,12 +89,63 @@ MatrixXd facet_response(const substrate::Substrate& model, const TractionMesh& m
   return model.response({apart, 3}, at)->displace(even);
 }
 
+/// To tractions at the free vertices alone.
+class OfFreeVertices final : public substrate::Response {
+ public:
+  OfFreeVertices(substrate::LazyResponse of_all, const TractionMesh& mesh)
+      : OfFreeVertices(std::move(of_all), by_component(mesh)) {}
+
+  Index rows() const override { return of_all_->rows(); }
+  Index cols() const override { return constraint_.cols(); }
+  MatrixXd displace(const MatrixXd& tractions) const override { return of_all_->displace(constraint_ * tractions); }
+  MatrixXd pull_back(const MatrixXd& displacements) const override {
+    return constraint_.transpose() * of_all_->pull_back(displacements);
+  }
+  MatrixXd matrix() const override { return of_all_->displace(MatrixXd(constraint_)); }
+  substrate::SharedResponse kept() const override { return substrate::dense_response(matrix()); }
+  substrate::Tangent about(const VectorXd& tractions) const override {
+    substrate::Tangent tangent = of_all_->about(constraint_ * tractions);
+    tangent.response = std::make_shared<OfFreeVertices>(tangent.response, constraint_);
+    return tangent;
+  }
+
+  using Constraint = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+  OfFreeVertices(substrate::LazyResponse of_all, Constraint constraint)
+      : of_all_(std::move(of_all)), constraint_(std::move(constraint)) {}
+
+ private:
+  static Constraint by_component(const TractionMesh& mesh) {
+    std::vector<Eigen::Triplet<double>> shares;
+    for (Index row = 0; row < mesh.constraint.rows(); ++row) {
+      for (Constraint::InnerIterator it(mesh.constraint, row); it; ++it) {
+        for (Index c = 0; c < 3; ++c)
+          shares.emplace_back(static_cast<int>(3 * row + c), static_cast<int>(3 * it.col() + c), it.value());
+      }
+    }
+    Constraint all(3 * mesh.constraint.rows(), 3 * mesh.constraint.cols());
+    all.setFromTriplets(shares.begin(), shares.end());
+    return all;
+  }
+
+  substrate::LazyResponse of_all_;
+  Constraint constraint_;
+};
+
 }  // namespace
 
 std::vector<Vec3> Problem::vertices_um() const {
   std::vector<Vec3> places;
-  for (const Vec2 p : mesh.quads.points_um) places.push_back({p.x, p.y, ground.height_um(p)});
+  for (int v = 0; v < mesh.n_vertices(); ++v) {
+    const Vec2 p = mesh.quads.points_um[static_cast<std::size_t>(v)];
+    places.push_back({p.x, p.y, ground.height_um(p)});
+  }
   return places;
+}
+
+substrate::LazyResponse response_of_vertices(const substrate::Substrate& model, const Problem& problem) {
+  auto of_all = model.response({problem.mesh.quads, 3}, problem.all_observed());
+  if (problem.mesh.constraint.rows() == problem.mesh.constraint.cols()) return of_all;
+  return std::make_shared<OfFreeVertices>(std::move(of_all), problem.mesh);
 }
 
 substrate::Observations Problem::all_observed() const {
@@ -149,7 +230,7 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
   const Ground ground(inputs.gel.surface.get());
   Observed observed = observe(inputs.beads, inputs.gel, ground, parameters);
   Expected expected = expected_tractions(inputs, observed, ground, parameters, meshing.grow_um);
-  TractionMesh mesh = lattice_for(ground, expected, meshing, observed.distance_um);
+  TractionMesh mesh = meshing.mesh ? *meshing.mesh : lattice_for(ground, expected, meshing, observed.distance_um);
   substrate::SubstrateParameters of_model = gel;
   of_model.model = substrate::ModelKind::curved;  // the one that takes quads
   const std::shared_ptr<const substrate::Substrate> model = choice::make_substrate(inputs.gel, of_model, threads);
@@ -159,7 +240,7 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
                   .expected = std::move(expected),
                   .mesh = std::move(mesh)};
   // beads and vertices at once: the gel's factor is made once
-  const auto map = model->response({problem.mesh.quads, 3}, problem.all_observed());
+  const auto map = response_of_vertices(*model, problem);
   if (problem.mesh.n_vertices() <= kMostVertices) {
     problem = problem.with_response(map->matrix(), {}, {});
   } else {

@@ -64,11 +64,16 @@ struct Problem {
   double variance_of_model() const;  ///< what the model's error alone leaves of it
 };
 
+/// Of beads and vertices, to tractions at the vertices.
+substrate::LazyResponse response_of_vertices(const substrate::Substrate& model, const Problem& problem);
+
 struct Meshing {
   std::optional<double> spacing_um;  ///< unset: four fifths of the distance of the beads, or what memory takes
-  double grow_um = 0;                ///< of adhesions
-  bool has_patches = false;          ///< forces on adhesions are asked for
-  bool has_facets = false;           ///< even tractions on faces are asked for
+  Refine refine = Refine::none;
+  std::optional<TractionMesh> mesh = {};  ///< instead of these
+  double grow_um = 0;                     ///< of adhesions
+  bool has_patches = false;               ///< forces on adhesions are asked for
+  bool has_facets = false;                ///< even tractions on faces are asked for
 };
 
 /// Lattice of tractions, mesh of the gel, and the displacement of each bead under each traction.

@@ -107,20 +107,18 @@ Eigen::MatrixXd adhesion_areas_um2(const TractionMesh& mesh, const Ground& groun
   constexpr int kParts = 8;  // of a face's side: a rim is met to an eighth of it
   std::vector<Vec2> places;
   struct Share {
-    std::array<int, 4> vertices;
-    std::array<double, 4> shares;
+    std::vector<VertexShare> of_vertices;
     double area_um2;
   };
   std::vector<Share> all;
-  over_faces(mesh, ground, kParts, Places::even,
-             [&](Vec2 at, const std::array<int, 4>& vertices, const std::array<double, 4>& shares, double area_um2) {
-               places.push_back(at);
-               all.push_back({vertices, shares, area_um2});
-             });
+  over_faces(mesh, ground, kParts, Places::even, [&](Vec2 at, std::span<const VertexShare> shares, double area_um2) {
+    places.push_back(at);
+    all.push_back({{shares.begin(), shares.end()}, area_um2});
+  });
   const std::vector<int> owner = tractions::adhesion_of_patches(places, adhesions, grow_um);
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (owner[k] < 0) continue;
-    for (std::size_t i = 0; i < 4; ++i) areas(owner[k], all[k].vertices[i]) += all[k].shares[i] * all[k].area_um2;
+    for (const auto& [vertex, share] : all[k].of_vertices) areas(owner[k], vertex) += share * all[k].area_um2;
   }
   for (Eigen::Index a = 0; a < areas.rows(); ++a) {
     if (areas.row(a).sum() > 0) continue;  // else smaller than what is sampled: all of it where its middle is

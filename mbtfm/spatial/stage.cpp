@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mbtfm/spatial/files.h"
+#include "mbtfm/spatial/refine.h"
 #include "mbtfm/spatial/strained.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -96,9 +97,18 @@ Problem problem_of(const StageParameters& p, const SpatialInputs& inputs, const 
 Meshing meshing_of(const StageParameters& p, tractions::TractionMethod method) {
   using enum tractions::TractionMethod;
   return {.spacing_um = p.traction.spacing_um,
+          .refine = p.spatial.refine,
           .grow_um = p.traction.grow_um,
           .has_patches = method == patches || method == tikhonov || method == group_l1,
           .has_facets = method == green};
+}
+
+/// @throws UsageError where faces are to be split by errors that the reconstruction does not know
+void require_errors(Refine refine, const SpatialReconstruction& r) {
+  if (refine != Refine::resolved || r.resolved.size() > 0) return;
+  throw UsageError("traction.refine = resolved: " + std::string(name_of(r.method)) +
+                   " states no resolution with these beads: choose tikhonov or group-l1, a wider traction.spacing_um, "
+                   "or another traction.refine");
 }
 
 /// Strains are small until tractions are known that make them large; and `direct` has no place for a common motion.
@@ -133,10 +143,23 @@ StageReport run_in_space(const StageParameters& p, stage::StageContext& context)
   const SpatialInputs inputs = read_inputs(p, context);
   const tractions::TractionMethod method = checked_method(p.traction, inputs);
   context.progress(0.05, "displacing the gel");
-  Problem problem = problem_of(p, inputs, meshing_of(p, method), gel_to_begin_with(p.substrate, method), context);
+  const auto made = [&](std::optional<TractionMesh> mesh) {
+    Meshing meshing = meshing_of(p, method);
+    meshing.mesh = std::move(mesh);
+    return problem_of(p, inputs, meshing, gel_to_begin_with(p.substrate, method), context);
+  };
+  Problem problem = made({});
   context.progress(0.6, "reconstructing tractions");
   const auto find = [&](const Problem& of) { return reconstruct(of, inputs, p.traction, p.spatial, context.threads); };
   SpatialReconstruction r = find(problem);
+  if (starts_coarse(p.spatial.refine)) {
+    require_errors(p.spatial.refine, r);
+    context.progress(0.65, "on smaller faces");
+    Refined on_smaller = refined(std::move(problem), std::move(r), p.spatial.refine, made, find);
+    problem = std::move(on_smaller.problem);
+    r = std::move(on_smaller.reconstruction);
+    r.figures.emplace_back("n_faces_split", std::int64_t{on_smaller.n_split});
+  }
   StageReport report;
   Effect strain = decide_strain(problem, r.traction_kPa, p.substrate);
   if (strain.is_on && !has_tangent(problem, r.method)) {

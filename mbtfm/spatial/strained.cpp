@@ -37,7 +37,7 @@ Strained on_strained_gel(const Problem& at_rest, SpatialReconstruction found, co
   of_model.model = substrate::ModelKind::curved;
   of_model.effects.large_strain = Switch::on;
   const auto model = choice::make_substrate(at_rest.gel, of_model, threads);
-  const auto response = model->response({at_rest.mesh.quads, 3}, at_rest.all_observed());
+  const auto response = response_of_vertices(*model, at_rest);
   Strained strained{at_rest, std::move(found), 0};
   double change = 1;
   for (; change > kSettled && strained.steps < kMostSteps; ++strained.steps) {

@@ -119,9 +119,9 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
   Balance balance;
   const auto traction = [&](Index v) { return Vector3d(r.traction_kPa.segment<3>(3 * v)); };
   over_faces(mesh, problem.ground, 3, Places::gauss,
-             [&](Vec2 at, const std::array<int, 4>& corners, const std::array<double, 4>& shares, double area_um2) {
+             [&](Vec2 at, std::span<const VertexShare> shares, double area_um2) {
                Vector3d t = Vector3d::Zero();
-               for (std::size_t i = 0; i < 4; ++i) t += shares[i] * traction(corners[i]);
+               for (const auto& [vertex, share] : shares) t += share * traction(vertex);
                const double size = t.norm() * area_um2;
                balance.total_force_nN += size;
                balance.normal_force_nN += std::abs(t.dot(vector(problem.ground.normal(at)))) * area_um2;

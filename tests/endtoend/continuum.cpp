@@ -187,6 +187,9 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
   }
   const files::CsvTable table(file("mean/mean.csv"));
   table.require({"x_um", "y_um", "ux_um", "uy_um", "tx_kPa", "ty_kPa", "tx_sigma_kPa", "ty_sigma_kPa", "n_cells"});
+  const std::string page = files::read_text(file("mean/mean.html"));
+  for (const char* words : {"In short", "5 cells", "<svg"})
+    EXPECT_NE(page.find(words), std::string::npos) << words;
   for (const char* name : {"mean.vtp", "mean.json", "mean.svg", "blur.csv", "reference.csv"})
     EXPECT_FALSE(files::read_text(file("mean/") + name).empty()) << name;
   // its own mean as a model is blurred once more

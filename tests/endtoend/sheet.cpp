@@ -11,6 +11,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json_record.h"
 #include "segment/images/image.h"
+#include "segment/rois/roi.h"
 #include "tests/support/program.h"
 #include "tests/support/sheets.h"
 
@@ -235,6 +236,165 @@ TEST_F(Sheet, one_that_expands_or_has_the_stiffness_of_a_bound_is_doubted) {
   EXPECT_NE(at_rim.find("sheet-at-bound"), std::string::npos) << at_rim;
 }
 
+/// Beads on a lattice about a sheet that pulls on its gel, with noise of 10 nm.
+class FittedSheet : public Sheet {
+ protected:
+  /// @param more  of [sheet]
+  void move_beads(const std::string& more, const std::string& arguments = {}) {
+    std::string points = "x_um,y_um\n";
+    for (int i = -20; i <= 20; ++i)
+      for (int j = -20; j <= 20; ++j) points += std::to_string(2 * i) + "," + std::to_string(2 * j) + "\n";
+    files::write_text(folder_ / "beads.csv", points);
+    const auto made = run(gel_ + sheet_ + "youngs_modulus_kPa = 30\n" + more,
+                          "--beads " + (folder_ / "beads.csv").string() + " " + arguments, outline_);
+    ASSERT_EQ(made.code, 0) << made.output;
+    DisplacementField beads = files::read_displacement(folder_ / "out" / "displacement.csv");
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> noise(0, 0.01);
+    for (Bead& bead : beads) {
+      bead.displacement_um += Vec2{noise(random), noise(random)};
+      bead.sigma_um = 0.01;
+    }
+    files::write_displacement(folder_ / "displacement.csv", beads);
+  }
+  void fit(const std::string& more, const std::string& arguments = {}) {
+    const auto outcome = run(gel_ + sheet_ + more,
+                             "--displacement " + (folder_ / "displacement.csv").string() + " " + arguments, outline_);
+    ASSERT_EQ(outcome.code, 0) << outcome.output;
+  }
+  /// A row of sheet_fit.csv lies within four of its errors of the truth, or has a limit on the right side of it.
+  void expect(const std::string& quantity, const std::string& part, double truth) {
+    const files::CsvTable table(folder_ / "out" / "sheet_fit.csv");
+    for (int row = 0; row < table.n_rows(); ++row) {
+      if (table.text(row, "quantity") != quantity || table.text(row, "part") != part) continue;
+      const std::optional<double> sigma = table.optional_number(row, "sigma"), low = table.optional_number(row, "low"),
+                                  high = table.optional_number(row, "high");
+      if (sigma)
+        EXPECT_NEAR(table.number(row, "value"), truth, 4 * *sigma) << quantity << part;
+      else
+        EXPECT_TRUE(low.value_or(0) <= truth && truth <= high.value_or(1e300)) << quantity << part;
+      return;
+    }
+    ADD_FAILURE() << "no row " << quantity << " " << part;
+  }
+  std::string gel_ = "[gel]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.49\nthickness_um = 60\n";
+  std::string sheet_ = "[sheet]\npoisson_ratio = 0.3\nthickness_um = 0.4\nmesh_um = 2\n", outline_ = "outline.csv";
+};
+
+TEST_F(FittedSheet, a_line_tension_comes_back_beside_the_contraction) {
+  // around a disc a line pulls as its contraction does: an ellipse tells the two apart
+  files::write_outline(folder_ / "ellipse.csv",
+                       test::ring([](double t) { return 12 / std::hypot(0.5 * std::cos(t), std::sin(t)); }, 180));
+  outline_ = "ellipse.csv";
+  move_beads("contraction_nN_per_um = 0.5\nline_tension_nN = 4\n");
+  fit("fit_line_tension = true\n");
+  expect("contraction_nN_per_um", "", 0.5);
+  expect("line_tension_nN", "", 4);
+}
+
+TEST_F(FittedSheet, the_stiffness_of_the_adhesions_comes_back_and_is_called_for) {
+  move_beads("contraction_nN_per_um = 0.5\nadhesion_stiffness_nN_per_um3 = 0.05\n");
+  fit("fit_adhesion_stiffness = true\n");
+  expect("contraction_nN_per_um", "", 0.5);
+  expect("adhesion_stiffness_nN_per_um3", "", 0.05);
+  const files::CsvTable models(folder_ / "out" / "sheet_models.csv");
+  ASSERT_EQ(models.text(models.n_rows() - 1, "model"), "sheet-on-springs");
+  EXPECT_LT(models.number(models.n_rows() - 1, "bic"), models.number(models.n_rows() - 2, "bic"));
+}
+
+TEST_F(FittedSheet, a_band_and_cells_contract_each_by_their_own) {
+  move_beads("contraction_nN_per_um = 0.5\nedge_band_um = 6\n");
+  fit("fit_parts = \"edge\"\nedge_band_um = 6\n");
+  expect("contraction_nN_per_um", "edge", 0.5);
+  expect("contraction_nN_per_um", "inside", 0);
+  const files::CsvTable models(folder_ / "out" / "sheet_models.csv");
+  EXPECT_EQ(models.text(models.n_rows() - 1, "model"), "sheet-in-parts");
+}
+
+TEST_F(FittedSheet, bundles_in_it_have_their_tensions) {
+  // none pulls: each is bounded at zero, and the sheet is as without them
+  files::write_text(folder_ / "fibre_points.csv", "fibre_id,point,x_um,y_um\n7,0,-15,5\n7,1,15,5\n9,0,-10,-8\n9,1,12,-8\n");
+  move_beads("contraction_nN_per_um = 0.5\n");
+  fit("", "--bundles " + (folder_ / "fibre_points.csv").string());
+  expect("contraction_nN_per_um", "", 0.5);
+  const files::CsvTable table(folder_ / "out" / "sheet_fit.csv");
+  int n_bundles = 0;
+  for (int row = 0; row < table.n_rows(); ++row) {
+    if (table.text(row, "quantity") != "bundle_tension_nN") continue;
+    ++n_bundles;
+    EXPECT_GE(table.number(row, "value"), 0);
+    EXPECT_EQ(table.number(row, "low"), 0);
+  }
+  EXPECT_EQ(n_bundles, 2);
+}
+
+TEST_F(Sheet, an_imagej_selection_is_an_outline_and_a_stress_times_thickness_a_contraction) {
+  const std::string springs = "adhesion_stiffness_nN_per_um3 = 0.003\n";
+  ASSERT_EQ(run(std::string(kSheet) + springs).code, 0);
+  const double mean = figure("mean_tension_nN_per_um");
+  rois::Roi roi;
+  roi.name = "sheet";
+  for (const Vec2 p : test::circle(25, 180)) roi.points_px.push_back(4 * (p + Vec2{30, 30}));
+  files::write_text(folder_ / "outline.roi", rois::encode_roi(roi));
+  // 0.05 kPa x 0.4 um
+  ASSERT_EQ(run("pixel_size_um = 0.25\n[sheet]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.3\nthickness_um = 0.4\n"
+                "contraction_kPa = 0.05\n" +
+                    springs,
+                {}, "outline.roi")
+                .code,
+            0);
+  EXPECT_NEAR(figure("contraction_nN_per_um"), 0.02, 1e-12);
+  EXPECT_NEAR(figure("mean_tension_nN_per_um"), mean, 2e-3 * mean);
+}
+
+TEST_F(Sheet, tractions_of_a_larger_area_tell_both_means_their_errors_and_what_is_out_of_balance) {
+  ASSERT_EQ(run(std::string(kSheet) + "adhesion_stiffness_nN_per_um3 = 0.003\n").code, 0);
+  const double mean = figure("mean_tension_nN_per_um");
+  std::filesystem::rename(folder_ / "out" / "traction.csv", folder_ / "traction.csv");
+  files::write_outline(folder_ / "area.csv", test::circle(32, 180));
+  const std::string traction = "--traction " + (folder_ / "traction.csv").string();
+  const auto wider = run("[sheet]\npoisson_ratio = 0.3\ntraction_sigma_kPa = 0.0005\n",
+                         traction + " --area " + (folder_ / "area.csv").string());
+  ASSERT_EQ(wider.code, 0) << wider.output;
+  // beyond what pulls a sheet of no traction bears what its inner edge has: the mean inside is higher
+  EXPECT_GT(figure("inside_mean_tension_nN_per_um"), figure("mean_tension_nN_per_um"));
+  EXPECT_NEAR(figure("virial_tension_nN_per_um"), figure("mean_tension_nN_per_um"), 1e-9 * mean);
+  EXPECT_GT(figure("mean_tension_sigma_nN_per_um"), 0);
+  EXPECT_LT(figure("mean_tension_sigma_nN_per_um"), 0.2 * mean);
+  EXPECT_NE(figure("inside_mean_tension_nu_0_nN_per_um"), figure("inside_mean_tension_nu_05_nN_per_um"));
+  // half of the forces: those of one side
+  const files::CsvTable whole(folder_ / "traction.csv");
+  std::string one_side = "x_um,y_um,tx_kPa,ty_kPa,area_um2\n";
+  for (int row = 0; row < whole.n_rows(); ++row) {
+    if (whole.number(row, "x_um") < 0) continue;
+    for (const char* column : {"x_um", "y_um", "tx_kPa", "ty_kPa"}) one_side += whole.text(row, column) + ",";
+    one_side += whole.text(row, "area_um2") + "\n";
+  }
+  files::write_text(folder_ / "traction.csv", one_side);
+  std::filesystem::remove_all(folder_ / "out");
+  const auto refused = run("[sheet]\npoisson_ratio = 0.3\n", traction);
+  EXPECT_EQ(refused.code, 3) << refused.output;
+  EXPECT_NE(refused.output.find("most_unbalanced"), std::string::npos) << refused.output;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+  const auto allowed = run("[sheet]\npoisson_ratio = 0.3\nmost_unbalanced = 1\n",
+                           traction + " --record " + (folder_ / "record.json").string());
+  EXPECT_EQ(allowed.code, 0) << allowed.output;
+  EXPECT_NE(files::read_text(folder_ / "record.json").find("tractions-off-balance"), std::string::npos);
+}
+
+TEST_F(Sheet, a_line_tension_keeps_strains_small_and_the_finding_says_what_that_costs) {
+  // a free sheet would contract by 0.07: above the limit of 0.05
+  const std::string strong =
+      "[sheet]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.3\nthickness_um = 0.4\ncontraction_nN_per_um = 0.04\n"
+      "adhesion_stiffness_nN_per_um3 = 0.003\n";
+  const std::string record = "--record " + (folder_ / "record.json").string();
+  for (const bool has_line : {false, true}) {
+    const auto outcome = run(strong + (has_line ? "line_tension_nN = 0.1\n" : ""), record);
+    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    EXPECT_EQ(files::read_text(folder_ / "record.json").find("\"sheet-strain\"") != std::string::npos, has_line);
+  }
+}
+
 struct Refused {
   const char* name;
   std::string settings, says;
@@ -260,6 +420,11 @@ TEST_F(Sheet, what_cannot_be_is_refused_by_name) {
     EXPECT_NE(outcome.output.find(refused.says), std::string::npos) << refused.name << ": " << outcome.output;
     EXPECT_FALSE(std::filesystem::exists(folder_ / "out")) << refused.name << ": something was written";
   }
+  files::write_outline(folder_ / "beside.csv", {{40, 0}, {60, 0}, {60, 20}, {40, 20}});
+  const auto beside = run(std::string(kSheet) + springs, "--adhesive " + (folder_ / "beside.csv").string());
+  EXPECT_EQ(beside.code, 3) << beside.output;
+  EXPECT_NE(beside.output.find("beside.csv: expected an area beneath the sheet"), std::string::npos) << beside.output;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
   files::write_outline(folder_ / "eight.csv", {{0, 0}, {40, 40}, {40, 0}, {0, 40}});
   files::write_text(folder_ / "line.csv", "x_um,y_um\n0,1e-300\n20,2e-300\n40,1e-300\n20,0\n");
   const auto line = run(std::string(kSheet) + springs, "", "line.csv");

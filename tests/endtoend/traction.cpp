@@ -198,6 +198,42 @@ TEST_F(TractionInSpace, finds_forces_of_adhesions_on_a_wave_with_their_errors) {
   }
 }
 
+/// The files are of an even lattice of the smallest faces, whatever the faces.
+TEST_F(TractionInSpace, splits_faces_by_each_rule_and_writes_an_even_lattice) {
+  files::write_text(folder_ / "outline.csv", "x_um,y_um\n-12,-2\n12,-2\n12,2\n-12,2\n");
+  const auto number = [&](const std::string& name) {
+    return nlohmann::json::parse(files::read_text(folder_ / "traction_3d.json")).at(name).get<double>();
+  };
+  for (const std::string rule : {"none", "region", "resolved", "threshold"}) {
+    const auto outcome = run("--spacing_um 3 --method tikhonov --outline " + at("outline.csv") + " --refine " + rule);
+    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    const files::CsvTable map(folder_ / "traction_3d.csv");
+    Vec3 sum;
+    for (int row = 0; row < map.n_rows(); ++row)
+      sum += map.number(row, "area_um2") *
+             Vec3{map.number(row, "tx_kPa"), map.number(row, "ty_kPa"), map.number(row, "tz_kPa")};
+    // two opposite forces of 63 nN
+    EXPECT_LE(norm(sum), 20) << rule;
+    const double spacing = number("spacing_x_um");
+    for (int row = 0; row < map.n_rows(); ++row) {
+      const double steps = (map.number(row, "x_um") - map.number(0, "x_um")) / spacing;
+      EXPECT_NEAR(steps, std::round(steps), 1e-3) << rule;
+    }
+    if (rule == "none") {
+      EXPECT_EQ(number("n_unknowns"), 3 * map.n_rows());
+    } else {
+      // the beads may resolve no more than the large faces show
+      const bool is_split = rule == "region" || number("n_faces_split") > 0;
+      EXPECT_TRUE(is_split || rule != "threshold");
+      EXPECT_EQ(number("n_unknowns") < 3 * map.n_rows(), is_split) << rule;
+      EXPECT_EQ(number("largest_spacing_um") > 1.5 * spacing, is_split) << rule;
+    }
+  }
+  const auto refused = run("--spacing_um 4 --method direct --refine resolved");
+  EXPECT_EQ(refused.code, exit_code::kUsage) << refused.output;
+  EXPECT_NE(refused.output.find("direct states no resolution"), std::string::npos) << refused.output;
+}
+
 /// A gel of another Poisson's ratio, by beads so exact that it shows, is an error that the risk knows of; beads astray,
 /// a third of them here, are none: it would let tractions follow them.
 TEST_F(TractionInSpace, says_which_criterion_chose_lambda_in_the_end) {

@@ -101,21 +101,13 @@ spatial::Problem experiment(const Pool& pool, const std::vector<Index>& chosen, 
 
 /// The map along a direction at a place.
 double at(const spatial::TractionMesh& mesh, const Eigen::VectorXd& traction_kPa, Vec2 place_um, const Vec3& e) {
-  for (std::size_t f = 0; f < mesh.quads.faces.size(); ++f) {
-    const Vec2 from = place_um - mesh.low_corners_um[f];
-    const double x = from.x / mesh.spacing_um.x, y = from.y / mesh.spacing_um.y;
-    if (x < 0 || x >= 1 || y < 0 || y >= 1) continue;
-    double along = 0;
-    for (const int v : mesh.quads.faces[f]) {
-      const Vec2 to = mesh.quads.points_um[static_cast<std::size_t>(v)] - mesh.low_corners_um[f];
-      const double share_x = to.x > 0.5 * mesh.spacing_um.x ? x : 1 - x,
-                   share_y = to.y > 0.5 * mesh.spacing_um.y ? y : 1 - y;
-      const Eigen::Vector3d t = traction_kPa.segment<3>(3 * v);
-      along += share_x * share_y * (t.x() * e.x + t.y() * e.y + t.z() * e.z);
-    }
-    return along;
+  const std::vector<spatial::VertexShare> shares = shares_at(mesh, place_um);
+  double along = shares.empty() ? std::nan("") : 0;
+  for (const auto& [vertex, share] : shares) {
+    const Eigen::Vector3d t = traction_kPa.segment<3>(3 * vertex);
+    along += share * (t.x() * e.x + t.y() * e.y + t.z() * e.z);
   }
-  return std::nan("");
+  return along;
 }
 
 /// The map midway over the map at the lower of the two places.

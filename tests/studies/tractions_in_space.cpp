@@ -3,8 +3,10 @@
 ///             independent dense inversion (docs/developers/tractions_in_space.md).
 ///   losses    the same by loss, with beads astray
 ///   meshes    three meshes of the gel by three of the tractions: how far the answers differ, over what noise does
+///   refine    faces split by each rule, beside even lattices
 ///   surface   with the surface that the beads themselves show, in place of the true one
 ///   fttc      beside the usual method, of the beads just below the surface (level scenes)
+#include <chrono>
 #include <cstdio>
 #include <iostream>
 #include <map>
@@ -12,6 +14,7 @@
 #include <string>
 
 #include "mbtfm/spatial/reconstruction.h"
+#include "mbtfm/spatial/refine.h"
 #include "substrate/surface/beads.h"
 #include "tests/support/traction_scene.h"
 
@@ -172,6 +175,72 @@ void meshes(const TractionScene& scene) {
   }
 }
 
+// --- faces that are split
+
+/// The problem with other faces, which lie on the lattice of `fine`: the same tractions displace the beads alike.
+spatial::Problem on_faces(const spatial::Problem& fine, const spatial::TractionMesh& mesh) {
+  Eigen::MatrixXd by_component = Eigen::MatrixXd::Zero(fine.n_unknowns(), 3 * mesh.n_vertices());
+  for (Eigen::Index v = 0; v < fine.mesh.n_vertices(); ++v) {
+    for (const auto& [vertex, share] : shares_at(mesh, fine.mesh.quads.points_um[static_cast<std::size_t>(v)])) {
+      for (Eigen::Index c = 0; c < 3; ++c) by_component(3 * v + c, 3 * vertex + c) += share;
+    }
+  }
+  spatial::Problem other = fine;
+  other.mesh = mesh;
+  other.response_um_per_kPa = fine.response_um_per_kPa * by_component;
+  other.surface_um_per_kPa.resize(0, 0);
+  return other;
+}
+
+void refine(const TractionScene& scene) {
+  const spatial::SpatialParameters parameters;
+  const std::vector<BeadInSpace> beads = scene.observed(0.02);
+  const auto problem_with = [&](spatial::Meshing meshing) {
+    return make_problem({beads, scene.gel, {}, {}}, parameters, meshing, {}, 2);
+  };
+  const spatial::Ground ground(scene.gel.surface.get());
+  const spatial::Observed observed = observe(beads, scene.gel, ground, parameters);
+  const double d = observed.distance_um;
+  const auto compare = [&](Known& known, const char* what, double noise) {
+    for (const auto& [name, method] : kMethods) {
+      known.areas_um2 = patch_areas_um2(scene, known.problem);
+      known.observe(noise, 0, parameters);
+      const auto begin = std::chrono::steady_clock::now();
+      const auto r = method(known.problem, {}, parameters, 2);
+      const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+      std::printf("%-12s %-10s %-9s noise %.2f  %d vertices, %.2f um  map %.3f  forces %.3f (%.2f)  %.1f s\n",
+                  scene.name.c_str(), what, name, noise, known.problem.mesh.n_vertices(),
+                  std::ldexp(known.problem.mesh.spacing_um.x, -known.problem.mesh.finest_level()),
+                  test::map_error(scene, known.problem.mesh, r.traction_kPa), known.forces(r).mean,
+                  known.forces(r).over_stated, seconds.count());
+      std::fflush(stdout);
+    }
+  };
+  constexpr double kNoises[] = {0.0, 0.02, 0.05, 0.1, 0.2};
+  constexpr double kEven = 1.06, kLargest = 1.66;  // of the distance of the beads; even: about as many as `resolved`
+  Known even{scene, problem_with({.spacing_um = kEven * d}), {}};
+  for (const double noise : kNoises) compare(even, "even", noise);
+  const spatial::Rectangle over = expected_tractions({beads, scene.gel, {}, {}}, observed, ground, parameters, 0).over;
+  const spatial::TractionMesh large = make_traction_mesh(ground, over, kLargest * d, [](Vec2) { return true; });
+  const spatial::Meshing all_split{.spacing_um = {},
+                                   .mesh = with_split(large, ground, std::vector<bool>(large.leaves.size(), true))};
+  const Known fine{scene, problem_with(all_split), {}};
+  for (const double noise : kNoises) {
+    Known unsplit{scene, on_faces(fine.problem, large), {}};
+    compare(unsplit, "large", noise);
+    Known all{scene, fine.problem, {}};
+    compare(all, "all split", noise);
+    const auto first = spatial::reconstruct_tikhonov(unsplit.problem, {}, parameters, 2);
+    for (const spatial::Refine rule : {spatial::Refine::resolved, spatial::Refine::threshold}) {
+      Known split{
+          scene,
+          on_faces(fine.problem, with_split(large, fine.problem.ground, faces_to_split(unsplit.problem, first, rule))),
+          {}};
+      compare(split, name_of(rule), noise);
+    }
+  }
+}
+
 // --- the surface of the beads themselves
 
 /// As the beads show it, their places known as well as their displacements.
@@ -264,10 +333,11 @@ int main(int argc, char** argv) {
   const std::map<std::string, void (*)(const TractionScene&)> studies = {{"methods", methods},
                                                                          {"losses", losses},
                                                                          {"meshes", meshes},
+                                                                         {"refine", refine},
                                                                          {"surface", with_estimated_surface},
                                                                          {"fttc", beside_fttc}};
   if (argc < 4 || !studies.contains(argv[1])) {
-    std::cerr << "usage: tractions_in_space methods|losses|meshes|surface|fttc FOLDER SCENE...\n";
+    std::cerr << "usage: tractions_in_space methods|losses|meshes|refine|surface|fttc FOLDER SCENE...\n";
     return 2;
   }
   for (int k = 3; k < argc; ++k) studies.at(argv[1])(test::traction_scene(std::filesystem::path(argv[2]) / argv[k]));

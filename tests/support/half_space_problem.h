@@ -74,25 +74,32 @@ struct HalfSpaceScene {
   Eigen::MatrixXd response(const spatial::TractionMesh& mesh, const std::vector<Vec3>& points) const {
     Eigen::MatrixXd G = Eigen::MatrixXd::Zero(3 * std::ssize(points), 3 * Eigen::Index{mesh.n_vertices()});
     over_faces(mesh, spatial::Ground(nullptr), 3, spatial::Places::gauss,
-               [&](Vec2 at, const std::array<int, 4>& vertices, const std::array<double, 4>& shares, double area_um2) {
+               [&](Vec2 at, std::span<const spatial::VertexShare> shares, double area_um2) {
                  for (std::size_t b = 0; b < points.size(); ++b) {
                    const Vec2 offset{points[b].x - at.x, points[b].y - at.y};
                    const Eigen::Matrix3d g = area_um2 * greens::half_space_inside_um_per_nN(gel, offset, points[b].z);
-                   for (std::size_t i = 0; i < 4; ++i)
-                     G.block<3, 3>(3 * static_cast<Eigen::Index>(b), 3 * vertices[i]) += shares[i] * g;
+                   for (const auto& [vertex, share] : shares)
+                     G.block<3, 3>(3 * static_cast<Eigen::Index>(b), 3 * vertex) += share * g;
                  }
                });
     return G;
   }
 
+  spatial::Rectangle over() const { return {{-half_um, -half_um}, {half_um, half_um}}; }
+
   spatial::Problem problem(const std::vector<BeadInSpace>& seen, const spatial::SpatialParameters& parameters) const {
     const spatial::Ground ground(nullptr);
-    const spatial::Rectangle over{{-half_um, -half_um}, {half_um, half_um}};
+    return problem_on(make_traction_mesh(ground, over(), spacing_um, [](Vec2) { return true; }), seen, parameters);
+  }
+
+  spatial::Problem problem_on(spatial::TractionMesh mesh, const std::vector<BeadInSpace>& seen,
+                              const spatial::SpatialParameters& parameters) const {
+    const spatial::Ground ground(nullptr);
     spatial::Problem made{.observed = observe(seen, gel, ground, parameters),
                           .gel = gel,
                           .ground = ground,
-                          .expected = {over, [](Vec2) { return true; }, "all", 1},
-                          .mesh = make_traction_mesh(ground, over, spacing_um, [](Vec2) { return true; })};
+                          .expected = {over(), [](Vec2) { return true; }, "all", 1},
+                          .mesh = std::move(mesh)};
     const auto& points = std::get<std::vector<Vec3>>(made.observed.at.points_um);
     made.response_um_per_kPa = response(made.mesh, points);
     std::vector<Vec3> below = made.vertices_um();

@@ -120,25 +120,15 @@ inline TractionScene traction_scene(const std::filesystem::path& folder) {
 
 /// Bilinear tractions at a place; those of the rim beyond it.
 inline Vec3 traction_at(const spatial::TractionMesh& mesh, const Eigen::VectorXd& traction_kPa, Vec2 at) {
-  Vec2 low = mesh.low_corners_um.front(), high = low;
+  Vec2 low = mesh.quads.points_um.front(), high = low;
   for (const Vec2 p : mesh.quads.points_um) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y)};
   }
   at = {std::clamp(at.x, low.x, high.x), std::clamp(at.y, low.y, high.y)};
   Vec3 sum;
-  for (std::size_t f = 0; f < mesh.quads.faces.size(); ++f) {
-    const double x = (at.x - mesh.low_corners_um[f].x) / mesh.spacing_um.x;
-    const double y = (at.y - mesh.low_corners_um[f].y) / mesh.spacing_um.y;
-    constexpr double kRim = 1e-9;
-    if (x < -kRim || x > 1 + kRim || y < -kRim || y > 1 + kRim) continue;
-    const double shares[] = {(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y};
-    for (std::size_t i = 0; i < 4; ++i) {
-      const Eigen::Index row = 3 * mesh.quads.faces[f][i];
-      sum += shares[i] * Vec3{traction_kPa[row], traction_kPa[row + 1], traction_kPa[row + 2]};
-    }
-    return sum;
-  }
+  for (const auto& [vertex, share] : shares_at(mesh, at))
+    sum += share * Vec3{traction_kPa[3 * vertex], traction_kPa[3 * vertex + 1], traction_kPa[3 * vertex + 2]};
   return sum;
 }
 
@@ -161,11 +151,11 @@ inline Eigen::MatrixXd patch_areas_um2(const TractionScene& scene, const spatial
   Eigen::MatrixXd areas =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(scene.patches.size()), problem.mesh.n_vertices());
   over_faces(problem.mesh, problem.ground, kParts, spatial::Places::even,
-             [&](Vec2 at, const std::array<int, 4>& vertices, const std::array<double, 4>& shares, double area_um2) {
+             [&](Vec2 at, std::span<const spatial::VertexShare> shares, double area_um2) {
                for (std::size_t p = 0; p < scene.patches.size(); ++p) {
                  if (norm(at - scene.patches[p].centre_um) > 1.5 * scene.patches[p].radius_um) continue;
-                 for (std::size_t i = 0; i < 4; ++i)
-                   areas(static_cast<Eigen::Index>(p), vertices[i]) += shares[i] * area_um2;
+                 for (const auto& [vertex, share] : shares)
+                   areas(static_cast<Eigen::Index>(p), vertex) += share * area_um2;
                }
              });
   return areas;
