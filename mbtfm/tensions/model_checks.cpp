@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <numbers>
@@ -166,6 +167,73 @@ Eigen::VectorXd segmentation_variance_nN2(const Eigen::VectorXd& forces_nN, cons
   return variance;
 }
 
+namespace {
+
+/// Fibres from adhesion to adhesion, all found together: what the beads tell of each beside the others.
+class FibresTogether {
+ public:
+  using Pair = std::array<std::size_t, 2>;  ///< of adhesions, by their place in the list
+
+  /// @param K, q  curvature and slope of the misfit by the forces on these adhesions, in units of the noise
+  FibresTogether(std::vector<Vec2> places_um, Eigen::MatrixXd K, Eigen::VectorXd q)
+      : places_um_(std::move(places_um)), K_(std::move(K)), q_(std::move(q)) {}
+
+  struct Told {
+    std::vector<Pair> pairs;               ///< those that pull
+    Eigen::VectorXd tension_nN, sigma_nN;  ///< of each
+    double gain = 0;                       ///< how much less misfit all of them leave
+  };
+  /// Least squares with tensions of zero or more; those that would push are left out, the hardest pushing first.
+  Told told_of(std::vector<Pair> pairs) const {
+    while (!pairs.empty()) {
+      const auto n = static_cast<Eigen::Index>(pairs.size());
+      Eigen::MatrixXd chords = Eigen::MatrixXd::Zero(K_.rows(), n);
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const auto [a, b] = pairs[static_cast<std::size_t>(k)];
+        const Vec2 chord = places_um_[b] - places_um_[a], unit = (1 / norm(chord)) * chord;
+        chords.col(k).segment<2>(2 * static_cast<Eigen::Index>(a)) << unit.x, unit.y;
+        chords.col(k).segment<2>(2 * static_cast<Eigen::Index>(b)) << -unit.x, -unit.y;
+      }
+      const Eigen::MatrixXd inverse = (chords.transpose() * K_ * chords).ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+      const Eigen::VectorXd slopes = chords.transpose() * q_, t = inverse * slopes;
+      Eigen::Index least = 0;
+      if (t.minCoeff(&least) > 0)
+        return {std::move(pairs), t, inverse.diagonal().cwiseMax(0).cwiseSqrt(), slopes.dot(t)};
+      pairs.erase(pairs.begin() + least);
+    }
+    return {};
+  }
+  /// Crossing fibres pull at the same four adhesions whichever two belong together: partners are exchanged between two
+  /// pairs as long as all of them together then leave less misfit.
+  Told with_best_partners(std::vector<Pair> pairs) const {
+    double best = told_of(pairs).gain;
+    for (bool has_changed = true; has_changed;) {
+      has_changed = false;
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        for (std::size_t j = 0; j < i; ++j) {
+          for (const std::size_t end : {std::size_t{0}, std::size_t{1}}) {
+            std::vector<Pair> exchanged = pairs;
+            std::swap(exchanged[i][1], exchanged[j][end]);
+            const double gain = told_of(exchanged).gain;
+            if (gain <= best * (1 + 1e-9)) continue;
+            best = gain;
+            pairs = std::move(exchanged);
+            has_changed = true;
+          }
+        }
+      }
+    }
+    return told_of(std::move(pairs));
+  }
+
+ private:
+  std::vector<Vec2> places_um_;
+  Eigen::MatrixXd K_;
+  Eigen::VectorXd q_;
+};
+
+}  // namespace
+
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
                                          const SegmentationErrors& segmentation, int threads) {
   const double n_pairs = 0.5 * static_cast<double>(adhesions.size()) * (static_cast<double>(adhesions.size()) - 1);
@@ -218,14 +286,46 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   std::stable_sort(found.begin(), found.end(), [](const MissingFibre& x, const MissingFibre& y) {
     return x.chi_squared_gain > y.chi_squared_gain;
   });
-  std::vector<MissingFibre> best;
+  if (found.empty()) return {};
+  using Pair = FibresTogether::Pair;
+  std::vector<std::size_t> ends;  // adhesions, each once: two for each fibre
+  const auto is_end = [&](std::size_t a) { return std::ranges::find(ends, a) != ends.end(); };
   for (const MissingFibre& f : found) {
-    const bool is_taken = std::any_of(best.begin(), best.end(), [&](const MissingFibre& other) {
-      return f.start_adhesion_id == other.start_adhesion_id || f.start_adhesion_id == other.end_adhesion_id ||
-             f.end_adhesion_id == other.start_adhesion_id || f.end_adhesion_id == other.end_adhesion_id;
-    });
-    if (!is_taken) best.push_back(f);
+    const auto place = [&](int id) {
+      return static_cast<std::size_t>(std::ranges::find(adhesions, id, &Adhesion::adhesion_id) - adhesions.begin());
+    };
+    const std::size_t a = place(f.start_adhesion_id), b = place(f.end_adhesion_id);
+    if (!is_end(a) && !is_end(b)) ends.insert(ends.end(), {a, b});
   }
+  std::vector<Eigen::Index> components;
+  std::vector<Vec2> places_um;
+  std::vector<Pair> pairs;
+  for (std::size_t k = 0; k < ends.size(); ++k) {
+    for (const Eigen::Index c : {0, 1}) components.push_back(2 * static_cast<Eigen::Index>(ends[k]) + c);
+    places_um.push_back(adhesions[ends[k]].position_um);
+    if (k % 2 == 1) pairs.push_back({k - 1, k});
+  }
+  const Eigen::MatrixXd C_there = C(Eigen::all, components), explained_there = explained(Eigen::all, components);
+  const FibresTogether together(
+      std::move(places_um),
+      (C_there.transpose() * C_there - explained_there.transpose() * explained_there) / fit.misfit.variance,
+      q(components) / fit.misfit.variance);
+  FibresTogether::Told told = together.with_best_partners(std::move(pairs));
+  const auto gains = [&] { return Eigen::VectorXd(told.tension_nN.cwiseQuotient(told.sigma_nN).cwiseAbs2()); };
+  for (Eigen::Index least = 0; !told.pairs.empty() && gains().minCoeff(&least) < limit * limit;) {
+    told.pairs.erase(told.pairs.begin() + least);
+    told = together.told_of(std::move(told.pairs));
+  }
+  std::vector<MissingFibre> best;
+  for (std::size_t k = 0; k < told.pairs.size(); ++k) {
+    const auto [a, b] = told.pairs[k];
+    const auto [first, second] = std::minmax(ends[a], ends[b]);
+    best.push_back({.start_adhesion_id = adhesions[first].adhesion_id,
+                    .end_adhesion_id = adhesions[second].adhesion_id,
+                    .tension_nN = told.tension_nN[static_cast<Eigen::Index>(k)],
+                    .chi_squared_gain = gains()[static_cast<Eigen::Index>(k)]});
+  }
+  std::ranges::stable_sort(best, std::greater(), &MissingFibre::chi_squared_gain);
   return best;
 }
 

@@ -53,8 +53,9 @@ struct FibreLeftOut {
 };
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence);
 
-/// The best ones, no adhesion twice. A gain is kept where chance would reach it in one cell of twenty, all pairs tried
-/// (Bonferroni), errors of the model and of the segmentation counted.
+/// The best ones, no adhesion twice, found together: tensions and gains are of each beside the others. A gain is kept
+/// where chance would reach it in one cell of twenty, all pairs tried (Bonferroni), errors of the model and of the
+/// segmentation counted.
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
                                          const SegmentationErrors& segmentation = {}, int threads = 1);
 

@@ -464,6 +464,39 @@ TEST(ModelChecks, a_missing_fibre_is_hinted_at_its_adhesions_and_the_full_model_
   EXPECT_NEAR(missing[0].tension_nN, 5, 1);
 }
 
+/// Each of two fibres that cross at a small angle pulls nearly along the line to the other's end, too.
+TEST(ModelChecks, missing_fibres_that_cross_have_their_own_ends) {
+  for (const auto& [second_start, second_end] : {std::pair{4, 13}, {4, 11}, {2, 13}}) {
+    SCOPED_TRACE(second_start);
+    Cell cell = test::round_cell(15, 16);
+    test::add_ventral(cell, 1, 7);
+    // large adhesions hardly move the gel: beads tell them less well, and the pair of the two small ones stands out
+    for (const int large : {12, second_start}) {
+      Adhesion& a = cell.adhesions[static_cast<std::size_t>(large - 1)];
+      a.area_um2 *= 36, a.major_axis_um *= 6, a.minor_axis_um *= 6;
+    }
+    test::add_ventral(cell, 3, 12);
+    test::add_ventral(cell, second_start, second_end);
+    TensionScene lacking = test::scene_of(cell, Eigen::Vector4d(0.06, 4, 6, 6), 3000, 0.05, 10);
+    Network network = lacking.cables.network();
+    for (Link& link : network.links) {
+      if (link.fibre_id > 1) link.fibre_id = 0;
+    }
+    lacking.cables = cables::CableNetwork(network);
+    const std::vector<MissingFibre> missing = missing_fibres(fit_own_network(lacking), cell.adhesions);
+    ASSERT_EQ(missing.size(), 2u);
+    std::vector<std::pair<int, int>> pairs;
+    for (const MissingFibre& f : missing) {
+      pairs.emplace_back(f.start_adhesion_id, f.end_adhesion_id);
+      EXPECT_NEAR(f.tension_nN, 6, 1);
+    }
+    std::ranges::sort(pairs);
+    std::vector<std::pair<int, int>> wanted = {{3, 12}, {second_start, second_end}};
+    std::ranges::sort(wanted);
+    EXPECT_EQ(pairs, wanted);
+  }
+}
+
 TEST(ModelChecks, fewer_fibres_are_called_for_at_strong_adhesions_where_errors_of_the_segmentation_are_counted) {
   Cell cell = test::round_cell(15, 16);
   for (const auto& [a, b] : {std::pair{1, 7}, {3, 12}, {5, 14}}) test::add_ventral(cell, a, b);
