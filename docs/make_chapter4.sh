@@ -11,7 +11,7 @@ picture() { # SVG, PNG, width, height
   convert "$work/page.png" -trim -bordercolor white -border 12 +dither -colors 128 -strip "PNG8:$2"
 }
 for shape in disc spikes; do
-  [ -d "$work/$shape" ] || "$bin/mbtfm-simulate" --quiet --scenario "colony-$shape" --n_colonies 17 --out "$work/$shape"
+  [ -d "$work/$shape" ] || "$bin/mbtfm-simulate" --quiet --scenario "colony-$shape" --n_colonies 17 --scatter_um 4 --out "$work/$shape"
   symmetry=C4v
   [ "$shape" = disc ] && symmetry=Cinfv
   "$bin/mbtfm-mean" --cells "$work/$shape" --symmetry "$symmetry" --config "$work/$shape/colony_001/cell.toml" --out "$work/mean_$shape"
