@@ -8,6 +8,7 @@
 #include <set>
 
 #include "continuum/mean/align.h"
+#include "continuum/rings.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -39,6 +40,7 @@ enum class LambdaFor { all, each };
 constexpr auto words(LambdaFor) { return std::array{"all", "each"}; }
 
 struct Parameters {
+  std::optional<double> pixel_size_um;
   Gel gel;
   std::string reference = {};
   By register_by = By::outlines;
@@ -57,6 +59,8 @@ struct Parameters {
 };
 
 void declare(stage::ParameterList& list, Parameters& p) {
+  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
+           "side of a pixel of outlines that are masks or selections (um), if a cell's own cell.toml does not give it");
   declare(list, p.gel);
   for (stage::Parameter& of_gel : list.all()) of_gel.is_required = false;  // a cell's own cell.toml has it, too
   list.table("mean");
@@ -95,7 +99,10 @@ Path first_of(const Path& folder, std::initializer_list<const char*> names) {
   return {};
 }
 
-Path outline_in(const Path& folder) { return first_of(folder, {"1_segment/outline.csv", "outline.csv"}); }
+Path outline_in(const Path& folder) {
+  return first_of(folder, {"1_segment/outline.csv", "outline.csv", "outline.roi", "outline.zip", "outline_mask.tif",
+                           "outline_mask.png"});
+}
 Path displacement_in(const Path& folder) { return first_of(folder, {"2_track/displacement.csv", "displacement.csv"}); }
 
 /// Folders that hold an outline and a displacement, by name.
@@ -114,13 +121,19 @@ std::vector<Path> folders_of_cells(const Path& top) {
   return {found.begin(), found.end()};
 }
 
-Gel gel_of(const Path& cell, const Gel& otherwise) {
-  Gel gel = otherwise;
-  if (!files::is_file(cell / "cell.toml")) return gel;
+/// What a cell's own cell.toml says, in the place of what holds for all.
+struct OwnSettings {
+  Gel gel;
+  std::optional<double> pixel_size_um;
+};
+OwnSettings settings_of(const Path& cell, const Parameters& otherwise) {
+  OwnSettings own{otherwise.gel, otherwise.pixel_size_um};
+  if (!files::is_file(cell / "cell.toml")) return own;
   stage::ParameterList list;
-  declare(list, gel);
+  list.add("pixel_size_um", own.pixel_size_um, Range::pixel_um(), "side of a pixel");
+  declare(list, own.gel);
   read_toml(list, cell / "cell.toml");
-  return gel;
+  return own;
 }
 
 /// @throws InputError where the image has no calibration: that of beads and outline is not known here
@@ -138,12 +151,13 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Parameters& p) 
   std::vector<Cell> cells;
   for (const Path& name : folders_of_cells(top)) {
     const Path folder = top / name;
+    const OwnSettings own = settings_of(folder, p);
     Cell cell{.name = name.generic_string(),
               .outline_file = folder / outline_in(folder),
               .outline_um = {},
               .beads = {},
-              .gel = gel_of(folder, p.gel)};
-    cell.outline_um = files::read_outline(cell.outline_file).front();
+              .gel = own.gel};
+    cell.outline_um = continuum::read_rings(cell.outline_file, own.pixel_size_um).points_um.front();
     cell.beads = files::read_displacement(folder / displacement_in(folder));
     std::erase_if(cell.beads, [](const Bead& bead) { return !bead.flag.empty(); });
     tractions::assume_noise_um(cell.beads);
@@ -160,8 +174,8 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Parameters& p) 
   }
   if (cells.size() < 2)
     throw InputError(top.string(),
-                     "two cells or more, each a folder with outline.csv (or 1_segment/outline.csv) and "
-                     "displacement.csv (or 2_track/displacement.csv)",
+                     "two cells or more, each a folder with outline.csv (or 1_segment/outline.csv, or a mask or "
+                     "selection as of mbtfm run) and displacement.csv (or 2_track/displacement.csv)",
                      std::to_string(cells.size()));
   context.input("cells", read);
   return cells;
@@ -177,7 +191,7 @@ Reference reference_of(stage::StageContext& context, const Parameters& p, const 
     if (!p.reference.empty()) throw UsageError("expected --pattern or --reference, found both");
     if (p.register_by == By::images)
       throw UsageError("expected --reference with register_by = images: a pattern has no image");
-    return {files::read_outline(context.input("pattern")).front()};
+    return {continuum::read_rings(context.input("pattern"), p.pixel_size_um).points_um.front()};
   }
   if (!p.reference.empty()) {
     const auto named = std::ranges::find(cells, p.reference, &Cell::name);
@@ -459,8 +473,12 @@ int main(int argc, char** argv) {
   return mbtfm::stage::run_stage<Parameters>(
       {.name = "mean",
        .purpose = "average displacements and tractions over cells of one shape",
-       .files = {{"cells", Kind::input, "folder of cell folders, each with outline.csv and displacement.csv", true},
-                 {"pattern", Kind::optional_input, "outline.csv of the reference shape"},
+       .files = {{"cells", Kind::input,
+                  "folder of cell folders, each with an outline (outline.csv, or a mask or selection as of mbtfm run) "
+                  "and displacement.csv",
+                  true},
+                 {"pattern", Kind::optional_input,
+                  "outline of the reference shape: outline.csv, a mask or an ImageJ selection"},
                  {"model", Kind::optional_input,
                   "traction.csv of a model on a lattice in the frame of the reference: it is blurred as the cells are"},
                  {"out", Kind::output_folder,

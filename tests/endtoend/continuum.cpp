@@ -9,6 +9,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
+#include "segment/images/image.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -188,10 +189,34 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
   const files::CsvTable table(file("mean/mean.csv"));
   table.require({"x_um", "y_um", "ux_um", "uy_um", "tx_kPa", "ty_kPa", "tx_sigma_kPa", "ty_sigma_kPa", "n_cells"});
   const std::string page = files::read_text(file("mean/mean.html"));
-  for (const char* words : {"In short", "5 cells", "<svg"})
-    EXPECT_NE(page.find(words), std::string::npos) << words;
+  for (const char* words : {"In short", "5 cells", "<svg"}) EXPECT_NE(page.find(words), std::string::npos) << words;
   for (const char* name : {"mean.vtp", "mean.json", "mean.svg", "blur.csv", "reference.csv"})
     EXPECT_FALSE(files::read_text(file("mean/") + name).empty()) << name;
+  // the same cells, of which two have their outline as a mask alone
+  constexpr int kSide = 480;
+  for (const int k : {1, 3}) {
+    const Path cell = folder_ / ("cells/cell_" + std::to_string(k));
+    const Polygon outline = files::read_outline(cell / "outline.csv").front();
+    images::Image mask{
+        .width = kSide, .height = kSide, .pixels = std::vector<float>(kSide * kSide, 0), .pixel_size_um = {}};
+    for (int j = 0; j < kSide; ++j)
+      for (int i = 0; i < kSide; ++i)
+        if (contains(outline, 0.25 * Vec2{i + 0.5, j + 0.5})) mask.at(i, j) = 255;
+    images::write_tiff(cell / "outline_mask.tif", mask);
+    std::filesystem::rename(cell / "outline.csv", cell / "was_outline.csv");
+  }
+  const auto unknown = test::run_program(mean + " --out " + file("unknown"));
+  EXPECT_EQ(unknown.code, 2) << unknown.output;
+  EXPECT_NE(unknown.output.find("pixel_size_um is missing"), std::string::npos) << unknown.output;
+  const auto by_mask = test::run_program(mean + " --pixel_size_um 0.25 --out " + file("by_mask"));
+  ASSERT_EQ(by_mask.code, 0) << by_mask.output;
+  const files::CsvTable of_masks(file("by_mask/registration.csv"));
+  ASSERT_EQ(of_masks.n_rows(), 5);
+  for (int row = 0; row < 5; ++row) EXPECT_LT(of_masks.number(row, "misfit_um"), 0.4);
+  for (const int k : {1, 3}) {
+    const Path cell = folder_ / ("cells/cell_" + std::to_string(k));
+    std::filesystem::rename(cell / "was_outline.csv", cell / "outline.csv");
+  }
   // its own mean as a model is blurred once more
   const std::string pattern = mean + " --pattern " + file("mean/reference.csv") + " --lambda_um_per_kPa 0.1";
   const auto again = test::run_program(pattern + " --model " + file("mean/mean.csv") + " --out " + file("again"));
