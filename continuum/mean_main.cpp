@@ -8,7 +8,7 @@
 #include <set>
 
 #include "continuum/mean/align.h"
-#include "continuum/rings.h"
+#include "continuum/outlines/rings.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -157,7 +157,7 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Parameters& p) 
               .outline_um = {},
               .beads = {},
               .gel = own.gel};
-    cell.outline_um = continuum::read_rings(cell.outline_file, own.pixel_size_um).points_um.front();
+    cell.outline_um = outlines::read_rings(cell.outline_file, own.pixel_size_um).points_um.front();
     cell.beads = files::read_displacement(folder / displacement_in(folder));
     std::erase_if(cell.beads, [](const Bead& bead) { return !bead.flag.empty(); });
     tractions::assume_noise_um(cell.beads);
@@ -191,7 +191,7 @@ Reference reference_of(stage::StageContext& context, const Parameters& p, const 
     if (!p.reference.empty()) throw UsageError("expected --pattern or --reference, found both");
     if (p.register_by == By::images)
       throw UsageError("expected --reference with register_by = images: a pattern has no image");
-    return {continuum::read_rings(context.input("pattern"), p.pixel_size_um).points_um.front()};
+    return {outlines::read_rings(context.input("pattern"), p.pixel_size_um).points_um.front()};
   }
   if (!p.reference.empty()) {
     const auto named = std::ranges::find(cells, p.reference, &Cell::name);

@@ -4,7 +4,7 @@
 #include <memory>
 #include <set>
 
-#include "continuum/rings.h"
+#include "continuum/outlines/rings.h"
 #include "continuum/sheet/borders.h"
 #include "continuum/sheet/decide.h"
 #include "continuum/sheet/from_traction.h"
@@ -35,8 +35,8 @@
 namespace mbtfm::sheet {
 namespace {
 
-using continuum::read_rings;
-using continuum::Rings;
+using outlines::read_rings;
+using outlines::Rings;
 
 /// Which parts of a sheet have a contraction of their own.
 enum class Parts { none, edge, cells, field };

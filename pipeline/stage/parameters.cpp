@@ -22,7 +22,7 @@ namespace {
 /// The tables of cell.toml. Each stage reads its own and leaves the others' keys to them.
 constexpr std::array kTables = {"gel",       "images", "segment", "track",    "network", "cables",   "effects",
                                 "substrate", "fit",    "stats",   "scenario", "space",   "traction", "surface",
-                                "checks",    "cell",   "indent",  "mean",     "sheet",   "plan",  "run"};
+                                "checks",    "cell",   "indent",  "mean",     "sheet",   "plan",     "run"};
 /// Keys of [gel] that not every program has.
 const std::vector<std::string> kMoreOfGel = {"radius_um"};
 /// The keys above the first table.

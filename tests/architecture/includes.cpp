@@ -70,6 +70,7 @@ const Graph kMayInclude = {
     {"mbtfm/spatial",
      {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "substrate", "substrate/choice",
       "substrate/surface", "mbtfm/tractions"}},
+    {"continuum/outlines", {"pipeline/contract", "pipeline/files", "continuum/sheet", "segment/cells", "segment/rois"}},
     {"continuum/mean",
      {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/charts", "substrate/greens",
       "mbtfm/tractions"}},

@@ -24,7 +24,7 @@ const std::map<std::string, std::string> kReaders = {
     {"pipeline/files/ply.cpp", "words of PLY's header"},
     {"mbtfm/plan/study_scatter.cpp", "rows of a study's tables"},
     {"substrate/surface_main.cpp", "the extension of a height map"},
-    {"continuum/rings.cpp", "extensions of outlines"},
+    {"continuum/outlines/rings.cpp", "extensions of outlines"},
     {"pipeline/files/csv.cpp", "true and false in CSV"},
     {"pipeline/files/fit_summary.cpp", "keys of fit.json"},
     {"pipeline/runner/cell_stages.cpp", "values of cell.toml that other programs declare"},

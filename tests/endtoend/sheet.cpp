@@ -313,7 +313,8 @@ TEST_F(FittedSheet, a_band_and_cells_contract_each_by_their_own) {
 
 TEST_F(FittedSheet, bundles_in_it_have_their_tensions) {
   // none pulls: each is bounded at zero, and the sheet is as without them
-  files::write_text(folder_ / "fibre_points.csv", "fibre_id,point,x_um,y_um\n7,0,-15,5\n7,1,15,5\n9,0,-10,-8\n9,1,12,-8\n");
+  files::write_text(folder_ / "fibre_points.csv",
+                    "fibre_id,point,x_um,y_um\n7,0,-15,5\n7,1,15,5\n9,0,-10,-8\n9,1,12,-8\n");
   move_beads("contraction_nN_per_um = 0.5\n");
   fit("", "--bundles " + (folder_ / "fibre_points.csv").string());
   expect("contraction_nN_per_um", "", 0.5);

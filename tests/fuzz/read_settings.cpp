@@ -2,8 +2,8 @@
 #include <optional>
 
 #include "pipeline/contract/range.h"
-#include "pipeline/runner/record.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/runner/record.h"
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/runner/settings.h"
 #include "pipeline/stage/parameters.h"

@@ -624,8 +624,8 @@ TEST(SheetFit, intervals_hold_a_truth_on_another_mesh) {
     std::mt19937_64 random(12);
     int s_held = 0, M_held = 0;
     for (int run = 0; run < kRuns; ++run) {
-      const SheetFit fit = fit_sheet(disc.data(with_noise(exact, random)), *disc.table, tensions::Loss::squares, {}, {},
-                                     mesh_error);
+      const SheetFit fit =
+          fit_sheet(disc.data(with_noise(exact, random)), *disc.table, tensions::Loss::squares, {}, {}, mesh_error);
       const SheetEstimate &s = of(fit, Quantity::contraction), &stiffness = of(fit, Quantity::stiffness);
       s_held += s.low.value_or(0) <= kContraction && kContraction <= s.high.value_or(1e300);
       M_held += stiffness.low.value_or(0) <= disc.stiffness(E) && disc.stiffness(E) <= stiffness.high.value_or(1e300);

@@ -8,7 +8,7 @@
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/path.h"
 
-namespace mbtfm::continuum {
+namespace mbtfm::outlines {
 
 /// The outer ring of an outline and its holes, and where the image cuts the outer one.
 struct Rings {
@@ -21,4 +21,4 @@ struct Rings {
 /// @throws UsageError where it lacks; InputError where a ring crosses itself or another, or has no area
 Rings read_rings(const Path& file, const std::optional<double>& pixel_um);
 
-}  // namespace mbtfm::continuum
+}  // namespace mbtfm::outlines

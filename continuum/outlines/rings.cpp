@@ -1,4 +1,4 @@
-#include "continuum/rings.h"
+#include "continuum/outlines/rings.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include "segment/cells/mask.h"
 #include "segment/rois/roi.h"
 
-namespace mbtfm::continuum {
+namespace mbtfm::outlines {
 namespace {
 
 Cuts cuts_of(const Polygon& outline_um, const std::vector<bool>& is_cut) {
@@ -83,4 +83,4 @@ Rings read_rings(const Path& file, const std::optional<double>& pixel_um) {
   return rings;
 }
 
-}  // namespace mbtfm::continuum
+}  // namespace mbtfm::outlines
