@@ -198,7 +198,7 @@ TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
   const std::string run = "mbtfm run " + folder.string();
   const auto refused = run_program(run + " --preset fast");
   EXPECT_EQ(refused.code, 2) << refused.output;
-  EXPECT_NE(refused.output.find("presets are for cells on flat gels"), std::string::npos) << refused.output;
+  EXPECT_NE(refused.output.find("presets are for fibres on flat gels"), std::string::npos) << refused.output;
   EXPECT_FALSE(fs::exists(folder / "run.json"));
   const auto first = run_program(run);
   ASSERT_EQ(first.code, 0) << first.output;
