@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/track.h"
 
@@ -29,26 +30,75 @@ void require_enough(std::size_t n, const char* which) {
                            "40 beads or more: twenty neighbours of each, and as many at rest", std::to_string(n));
 }
 
-/// How far beads are from what their neighbours tell, over what standard errors explain: medians, so that what is wrong
-/// does not count. Strain that is no affine map counts as error; it is one of the neighbours' prediction.
+/// How far beads are from what their neighbours tell: medians, so that what is wrong does not count. Strain that is no
+/// affine map counts there. The ratio is over what standard errors explain, of the differences between beads and the
+/// ones nearest to them, at no distance: the strain that the neighbours' affine map misses is the same for both there,
+/// their errors are not.
 struct Agreement {
   double across_um = 0, along_um = 0, ratio = 1, ratio_z = 1;
 };
-Agreement agreement_of(const std::vector<Match>& matches) {
-  std::vector<double> across, along, over, over_z;
-  for (const Match& m : matches) {
+
+/// A difference between two beads, over what their errors explain.
+struct Pair {
+  double distance_um, over;
+};
+/// The median difference at no distance: what grows with its square between the nearer and the farther half is strain.
+double median_at_no_distance(std::vector<Pair> pairs) {
+  std::ranges::sort(pairs, {}, &Pair::distance_um);
+  const auto half = pairs.begin() + std::ssize(pairs) / 2;
+  const auto median_of = [](auto first, auto last, double Pair::*what) {
+    std::vector<double> values;
+    for (auto pair = first; pair != last; ++pair) values.push_back((*pair).*what);
+    return numerics::median(values);
+  };
+  if (half == pairs.begin()) return median_of(pairs.begin(), pairs.end(), &Pair::over);
+  const double near2 = std::pow(median_of(pairs.begin(), half, &Pair::over), 2),
+               far2 = std::pow(median_of(half, pairs.end(), &Pair::over), 2),
+               d2 = std::pow(median_of(pairs.begin(), half, &Pair::distance_um), 2),
+               D2 = std::pow(median_of(half, pairs.end(), &Pair::distance_um), 2);
+  if (!(D2 > d2)) return std::sqrt(near2);
+  return std::sqrt(std::max(0.0, near2 - std::max(0.0, far2 - near2) * d2 / (D2 - d2)));
+}
+Agreement agreement_of(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
+                       const std::vector<Match>& matches, double spacing_um) {
+  std::vector<double> across, along;
+  std::vector<Pair> over, over_z;
+  std::vector<Vec3> places;
+  std::vector<std::size_t> good;
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    const Match& m = matches[k];
     if (m.flag != TrackFlag::none || !m.has_neighbours) continue;
     across.push_back(std::hypot(m.from_neighbours_um.x, m.from_neighbours_um.y));
     along.push_back(std::abs(m.from_neighbours_um.z));
-    if (m.sigma_um > 0) over.push_back(across.back() / m.sigma_um);
-    if (m.sigma_z_um > 0) over_z.push_back(along.back() / m.sigma_z_um);
+    good.push_back(k);
+    places.push_back(relaxed[k].position_um);
   }
   if (across.empty()) return {};
+  const auto own = [&](std::size_t k, double PlacedBead::*sigma) {
+    return std::hypot(relaxed[k].*sigma, stressed[static_cast<std::size_t>(matches[k].partner)].*sigma);
+  };
+  const numerics::Near near(places, spacing_um);
+  for (std::size_t g = 0; g < good.size(); ++g) {
+    for (const int other : near.within(places[g], spacing_um, 2)) {
+      if (static_cast<std::size_t>(other) == g) continue;
+      const std::size_t k = good[g], l = good[static_cast<std::size_t>(other)];
+      const Vec3 off = matches[k].from_neighbours_um - matches[l].from_neighbours_um;
+      // each is among the other's neighbours, with the share by which these raise its error
+      const double s = own(k, &PlacedBead::sigma_um), s_z = own(k, &PlacedBead::sigma_z_um);
+      const double of_both = std::hypot(s, own(l, &PlacedBead::sigma_um)),
+                   of_both_z = std::hypot(s_z, own(l, &PlacedBead::sigma_z_um));
+      const double apart_um = norm(relaxed[k].position_um - relaxed[l].position_um);
+      if (s > 0)
+        over.push_back({apart_um, std::hypot(off.x, off.y) / (of_both * std::pow(matches[k].sigma_um / s, 2))});
+      if (s_z > 0)
+        over_z.push_back({apart_um, std::abs(off.z) / (of_both_z * std::pow(matches[k].sigma_z_um / s_z, 2))});
+    }
+  }
   // medians of a Rayleigh and of a folded normal variable
   constexpr double kRayleigh = 1.1774, kNormal = 0.6745;
   Agreement result{numerics::median(across) / kRayleigh, numerics::median(along) / kNormal};
-  if (!over.empty()) result.ratio = numerics::median(over) / kRayleigh;
-  if (!over_z.empty()) result.ratio_z = numerics::median(over_z) / kNormal;
+  if (!over.empty()) result.ratio = median_at_no_distance(std::move(over)) / kRayleigh;
+  if (!over_z.empty()) result.ratio_z = median_at_no_distance(std::move(over_z)) / kNormal;
   return result;
 }
 
@@ -96,7 +146,7 @@ Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<Placed
   require_enough(relaxed.size(), "relaxed");
   require_enough(stressed.size(), "stressed");
   const Matching matching = match(relaxed, stressed, parameters, threads);
-  const Agreement agreement = agreement_of(matching.matches);
+  const Agreement agreement = agreement_of(relaxed, stressed, matching.matches, matching.spacing_um);
   Followed result;
   result.first = matching.first;
   result.spacing_um = matching.spacing_um;
