@@ -118,9 +118,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "scatter there counts as the gel's",
        "Nothing if it was taken off (track.slice_drift); slices.csv has it. If it recurs, let the stage settle."},
       {beads_scatter, "beads-scatter", "track", note,
-       "scatter of beads in space about their neighbours over their standard errors", 1.5,
+       "how far beads in space that lie together differ, over their standard errors", 1.5,
        "the standard errors of simulated pictures hold to a seventh; what is beyond comes from pictures that are not "
-       "those of beads, or from strains that neighbours do not share",
+       "those of beads, or from strains that change from bead to bead",
        "Nothing: the standard errors hold it. Look for clumps of beads and for motion while a stack was recorded."},
       {light_lost, "light-lost", "track", caution, "share of the light that is missing in the dimmer stack", 0.5,
        "beads are distinguished by their light, too; with half of it the dim ones are lost in the noise",

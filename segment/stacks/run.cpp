@@ -228,7 +228,7 @@ std::vector<Finding> findings_of(const Followed& f, const FieldFigures& figures,
               "The slices of one stack moved against those of the other by " + brief(rms_drift_um(f.common)) +
                   " um (root mean square); it was " + (f.common.has_slice_drift ? "" : "not ") + "taken off."));
   add(noticed(FindingKind::beads_scatter, std::max(f.error_ratio, f.error_ratio_z),
-              "Beads scatter about their neighbours by " + brief(f.error_ratio) + " times their errors across and " +
+              "Beads that lie together differ by " + brief(f.error_ratio) + " times their errors across and " +
                   brief(f.error_ratio_z) + " times along z; the standard errors were raised by that."));
   add(noticed(FindingKind::defocused, widths.larger(),
               "The beads of the stressed stack are " + brief(widths.across) + " times as wide and " +
