@@ -26,6 +26,7 @@
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
+#include "pipeline/report/sheet_report.h"
 #include "pipeline/report/stage_page.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/stage.h"
@@ -581,19 +582,6 @@ void add_figures_of(const sheets::FieldFit& field, Figures& figures) {
   figures.emplace_back("contraction_is_as_smooth_as_tried", field.is_smoothing_at_end);
 }
 
-std::vector<report::Listing> tables_of_fit(const Path& estimates, const Path& models) {
-  return {{"What the beads tell",
-           "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).",
-           "sheet_fit.csv",
-           files::read_text(estimates),
-           {"quantity", "part", "value", "sigma", "low", "high", "identifiable"}},
-          {"Does the scene call for the sheet?",
-           "The beads call for the model of the smallest bic. chi_squared is in units of the noise.",
-           "sheet_models.csv",
-           files::read_text(models),
-           {"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"}}};
-}
-
 /// A part of the sheet: 1 there, 0 elsewhere. All parts add up to the sheet.
 struct Part {
   std::string name;
@@ -804,7 +792,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
             " nN";
   }
   result.told = told;
-  result.tables = tables_of_fit(estimates_file, models_file);
+  result.tables = report::tables_of_sheet(estimates_file, models_file);
   const auto stiffness =
       std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &sheets::SheetEstimate::quantity);
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
@@ -819,6 +807,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
                     {"stiffness_nN_per_um", fit.stiffnesses.sheet_nN_per_um},
                     {"contraction_nN_per_um", scene.contraction.nN_per_um},
                     {"youngs_modulus_kPa", scene.material.youngs_modulus_kPa},
+                    {"fitted", told},
                     {"correlation", fit.correlation},
                     {"relative_l2", fit.relative_l2},
                     {"expected_relative_l2", fit.expected_relative_l2.value_or(fit.relative_l2)},

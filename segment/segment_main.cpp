@@ -170,8 +170,8 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                             : std::string(),
                 s.is_aligned ? Severity::note : Severity::caution),
         noticed(FindingKind::adhesions_off_actin, s.adhesions_off_actin.value_or(0),
-                "The adhesion image shows " + brief(100 * s.adhesions_off_actin.value_or(0)) +
-                    " % of its adhesions, by area, where the actin image shows no cell."),
+                brief(100 * s.adhesions_off_actin.value_or(0)) +
+                    " % of the adhesions, by area, lie where the actin image shows no cell."),
         noticed(FindingKind::outline_off_actin, s.outline_off_actin.value_or(0),
                 "In " + brief(100 * s.outline_off_actin.value_or(0)) +
                     " % of the outline that was given, the actin image shows no cell."),

@@ -233,10 +233,10 @@ bool has_results(const std::filesystem::path& cell) {
 }
 
 std::string report_html(const std::filesystem::path& cell) {
-  if (kind_of(cell) == CellKind::space) return report_in_space(cell);
-  if (kind_of(cell) == CellKind::sheet) return report_of_sheet(cell);
-  const CellResults results = read_results(cell);
   const Provenance provenance = read_provenance(cell / "run.json");
+  if (provenance.kind == CellKind::space) return report_in_space(cell);
+  if (provenance.kind == CellKind::sheet) return report_of_sheet(cell);
+  const CellResults results = read_results(cell);
   const std::string head = fmt::format(
       "<h1>{}</h1><p class=\"what\">Tensions of the stress fibres and forces of the adhesions of one cell, by "
       "model-based traction force microscopy</p>\n<p class=\"sub\">Gel: Young’s modulus {} kPa, Poisson’s ratio {}, {} "

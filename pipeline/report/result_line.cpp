@@ -47,8 +47,9 @@ Result result_of(const Path& cell) {
 }  // namespace
 
 std::string result_line(const Path& cell) {
-  if (kind_of(cell) == CellKind::space) return result_line_in_space(cell);
-  if (kind_of(cell) == CellKind::sheet) return result_line_of_sheet(cell);
+  const CellKind kind = kind_of(cell);
+  if (kind == CellKind::space) return result_line_in_space(cell);
+  if (kind == CellKind::sheet) return result_line_of_sheet(cell);
   const Result result = result_of(cell);
   std::optional<int> decimals;
   if (result.total_error_nN && *result.total_error_nN > 0) decimals = decimals_for(*result.total_error_nN);
@@ -66,8 +67,9 @@ std::string result_line(const Path& cell) {
 }
 
 std::string result_event(const Path& cell, const Path& report) {
-  if (kind_of(cell) == CellKind::space) return result_event_in_space(cell, report);
-  if (kind_of(cell) == CellKind::sheet) return result_event_of_sheet(cell, report);
+  const CellKind kind = kind_of(cell);
+  if (kind == CellKind::space) return result_event_in_space(cell, report);
+  if (kind == CellKind::sheet) return result_event_of_sheet(cell, report);
   const Result result = result_of(cell);
   nlohmann::ordered_json event = {{"event", "result"},
                                   {"total_force_nN", result.fit.total_force_nN},

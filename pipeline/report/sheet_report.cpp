@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -16,7 +15,6 @@
 #include "pipeline/report/page.h"
 #include "pipeline/report/provenance.h"
 #include "pipeline/report/space_report.h"
-#include "pipeline/report/stage_page.h"
 
 namespace mbtfm::report {
 namespace fs = std::filesystem;
@@ -42,61 +40,15 @@ SheetResults read_sheet(const fs::path& cell) {
                  files::JsonRecord(folder / "sheet.json", "the figures of a sheet", "run the stage sheet again"),
                  {}};
   const files::CsvTable table(folder / "sheet_fit.csv");
-  const auto end = [&](int row, const char* column) {
-    return table.text(row, column).empty() ? std::nullopt : std::optional(table.number(row, column));
-  };
   for (int row = 0; row < table.n_rows(); ++row)
     r.estimates.push_back({table.text(row, "quantity"), table.text(row, "part"), table.number(row, "value"),
-                           end(row, "low"), end(row, "high")});
+                           table.optional_number(row, "low"), table.optional_number(row, "high")});
   return r;
-}
-
-/// "line_tension_nN" as "line tension" and " nN".
-std::pair<std::string, std::string> words_and_unit(const std::string& quantity) {
-  constexpr std::pair<const char*, const char*> kUnits[] = {
-      {"_nN_per_um3", " nN/µm³"}, {"_nN_per_um", " nN/µm"}, {"_nN", " nN"}, {"_um", " µm"}};
-  std::string name = quantity, unit;
-  for (const auto& [ending, written] : kUnits) {
-    if (!name.ends_with(ending)) continue;
-    name.resize(name.size() - std::string(ending).size());
-    unit = written;
-    break;
-  }
-  std::ranges::replace(name, '_', ' ');
-  return {name, unit};
-}
-
-std::string text_of(const Estimate& e) {
-  const auto [name, unit] = words_and_unit(e.quantity);
-  const std::string of = name + (e.part.empty() ? "" : " of " + e.part);
-  if (e.low && e.high && *e.low < *e.high)
-    return of + " " + readable(e.value) + " (" + readable(*e.low) + " to " + readable(*e.high) + ")" + unit;
-  if (e.low && e.high) return of + " " + readable(e.value) + unit + " (given)";
-  if (e.low) return of + " above " + readable(*e.low) + unit;
-  if (e.high) return of + " below " + readable(*e.high) + unit;
-  return of + " not known";
-}
-
-/// Of bundles, their number and range: a table has each.
-std::string estimates_in_words(const SheetResults& r) {
-  std::string text;
-  std::vector<double> bundles_nN;
-  for (const Estimate& e : r.estimates) {
-    if (e.quantity == "bundle_tension_nN") {
-      bundles_nN.push_back(e.value);
-    } else {
-      text += (text.empty() ? "" : "; ") + text_of(e);
-    }
-  }
-  if (bundles_nN.empty()) return text;
-  const auto [least, most] = std::ranges::minmax(bundles_nN);
-  return text + "; tensions of " + std::to_string(bundles_nN.size()) + " bundles " + readable(least) + " to " +
-         readable(most) + " nN";
 }
 
 std::vector<std::string> facts_of(const SheetResults& r) {
   return {
-      "Fitted to the beads: " + estimates_in_words(r) + ". In brackets: 95 % intervals.",
+      "Fitted to the beads: " + r.figures.at("fitted").text() + ". In brackets: 95 % intervals.",
       fmt::format("The mean tension is {} nN/µm over {} µm². The forces on the gel add up to {} nN in size.",
                   readable(r.number("mean_tension_nN_per_um")), readable(r.number("area_um2")),
                   readable(r.number("total_force_nN"))),
@@ -134,6 +86,19 @@ std::string methods(const SheetResults& r, const Provenance& provenance) {
 
 }  // namespace
 
+std::vector<Listing> tables_of_sheet(const fs::path& estimates, const fs::path& models, const std::string& of) {
+  return {{"What the beads tell",
+           "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).",
+           of + "sheet_fit.csv",
+           files::read_text(estimates),
+           {"quantity", "part", "value", "sigma", "low", "high", "identifiable"}},
+          {"Does the scene call for the sheet?",
+           "The beads call for the model of the smallest bic. chi_squared is in units of the noise.",
+           of + "sheet_models.csv",
+           files::read_text(models),
+           {"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"}}};
+}
+
 std::string report_of_sheet(const fs::path& cell) {
   const SheetResults r = read_sheet(cell);
   const Provenance provenance = read_provenance(cell / "run.json");
@@ -150,16 +115,8 @@ std::string report_of_sheet(const fs::path& cell) {
   body +=
       section(kTitle, picture_in_page(files::read_text(folder / "sheet.svg"), std::string(kTitle) + ". " + kExplained) +
                           "<p class=\"sub\">" + kExplained + "</p>\n");
-  body += section_of({"What the beads tell",
-                      "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).",
-                      r.name + "_sheet_fit.csv",
-                      files::read_text(folder / "sheet_fit.csv"),
-                      {"quantity", "part", "value", "sigma", "low", "high", "identifiable"}});
-  body += section_of({"Does the scene call for the sheet?",
-                      "The beads call for the model of the smallest bic. chi_squared is in units of the noise.",
-                      r.name + "_sheet_models.csv",
-                      files::read_text(folder / "sheet_models.csv"),
-                      {"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"}});
+  for (const Listing& table : tables_of_sheet(folder / "sheet_fit.csv", folder / "sheet_models.csv", r.name + "_"))
+    body += section_of(table);
   body += section("For your methods section", methods(r, provenance));
   std::vector<std::pair<std::string, std::string>> pairs;
   for (const auto& [name, value] : r.figures.members()) pairs.emplace_back(name, text_of_figure(value.figure()));
@@ -169,7 +126,7 @@ std::string report_of_sheet(const fs::path& cell) {
 
 std::string result_line_of_sheet(const fs::path& cell) {
   const SheetResults r = read_sheet(cell);
-  return estimates_in_words(r) + "; mean tension " + readable(r.number("mean_tension_nN_per_um")) +
+  return r.figures.at("fitted").text() + "; mean tension " + readable(r.number("mean_tension_nN_per_um")) +
          " nN/µm; total force " + readable(r.number("total_force_nN")) + " nN";
 }
 

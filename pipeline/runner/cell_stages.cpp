@@ -217,7 +217,7 @@ std::string stage_names() {
 CellStages stages_of(const fs::path& cell, const ImageNames& images) {
   const toml::table toml = files::parse_toml(cell / "cell.toml");
   CellStages of{.kind = CellKind::space, .why = why_in_space(cell, toml), .stages = {}, .chains = {}};
-  const RunSettings settings = read_run_settings(cell);
+  const RunSettings settings = toml.contains("run") ? read_run_settings(cell) : RunSettings{};  // most have none
   if (settings.model == PullModel::sheet) {
     if (of.why.empty()) return stages_as_sheet(cell, images, settings);
     throw InputError((cell / "cell.toml").string() + ": [run] model", "fibres: beads in space have no sheet", "sheet",

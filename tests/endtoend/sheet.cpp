@@ -149,44 +149,73 @@ TEST_F(Sheet, a_bonded_sheet_pulls_on_its_gel_without_net_force) {
   EXPECT_GT(figure("total_force_nN"), 0);
 }
 
-/// Beads of a computed gel, with noise, are fitted: the sheet that moved them comes back within its errors.
-TEST_F(Sheet, contraction_and_stiffness_come_back_from_beads) {
-  std::string points = "x_um,y_um\n";
-  for (int i = -20; i <= 20; ++i)
-    for (int j = -20; j <= 20; ++j) points += std::to_string(2 * i) + "," + std::to_string(2 * j) + "\n";
-  files::write_text(folder_ / "beads.csv", points);
-  const std::string gel = "[gel]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.49\nthickness_um = 60\n";
-  const std::string sheet = "[sheet]\npoisson_ratio = 0.3\nthickness_um = 0.4\nmesh_um = 2\n";
-  const auto made = run(gel + sheet + "youngs_modulus_kPa = 30\ncontraction_nN_per_um = 0.5\n",
-                        "--beads " + (folder_ / "beads.csv").string());
-  ASSERT_EQ(made.code, 0) << made.output;
-  DisplacementField beads = files::read_displacement(folder_ / "out" / "displacement.csv");
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> noise(0, 0.01);
-  for (Bead& bead : beads) {
-    bead.displacement_um += Vec2{noise(random), noise(random)};
-    bead.sigma_um = 0.01;
+/// Beads on a lattice about a sheet that pulls on its gel, with noise of 10 nm.
+class FittedSheet : public Sheet {
+ protected:
+  /// @param more  of [sheet]
+  void move_beads(const std::string& more, const std::string& arguments = {}) {
+    std::string points = "x_um,y_um\n";
+    for (int i = -20; i <= 20; ++i)
+      for (int j = -20; j <= 20; ++j) points += std::to_string(2 * i) + "," + std::to_string(2 * j) + "\n";
+    files::write_text(folder_ / "beads.csv", points);
+    const auto made = run(gel_ + sheet_ + "youngs_modulus_kPa = 30\n" + more,
+                          "--beads " + (folder_ / "beads.csv").string() + " " + arguments, outline_);
+    ASSERT_EQ(made.code, 0) << made.output;
+    DisplacementField beads = files::read_displacement(folder_ / "out" / "displacement.csv");
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> noise(0, 0.01);
+    for (Bead& bead : beads) {
+      bead.displacement_um += Vec2{noise(random), noise(random)};
+      bead.sigma_um = 0.01;
+    }
+    files::write_displacement(folder_ / "displacement.csv", beads);
   }
-  files::write_displacement(folder_ / "displacement.csv", beads);
-  const auto outcome = run(gel + sheet, "--displacement " + (folder_ / "displacement.csv").string());
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  const files::CsvTable fit(folder_ / "out" / "sheet_fit.csv");
-  EXPECT_EQ(fit.text(0, "quantity"), "contraction_nN_per_um");
-  EXPECT_NEAR(fit.number(0, "value"), 0.5, 4 * fit.number(0, "sigma"));
-  EXPECT_EQ(fit.text(1, "quantity"), "stiffness_nN_per_um");
-  EXPECT_NEAR(fit.number(1, "value"), 30 * 0.4 / (1 - 0.09), 4 * fit.number(1, "sigma"));
+  test::Outcome fit(const std::string& more, const std::string& arguments = {}) {
+    const auto outcome = run(gel_ + sheet_ + more,
+                             "--displacement " + (folder_ / "displacement.csv").string() + " " + arguments, outline_);
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    return outcome;
+  }
+  /// A row of sheet_fit.csv lies within four of its errors of the truth, or has a limit on the right side of it.
+  void expect(const std::string& quantity, const std::string& part, double truth) {
+    const files::CsvTable table(folder_ / "out" / "sheet_fit.csv");
+    for (int row = 0; row < table.n_rows(); ++row) {
+      if (table.text(row, "quantity") != quantity || table.text(row, "part") != part) continue;
+      const std::optional<double> sigma = table.optional_number(row, "sigma"), low = table.optional_number(row, "low"),
+                                  high = table.optional_number(row, "high");
+      if (sigma)
+        EXPECT_NEAR(table.number(row, "value"), truth, 4 * *sigma) << quantity << part;
+      else
+        EXPECT_TRUE(low.value_or(0) <= truth && truth <= high.value_or(1e300)) << quantity << part;
+      return;
+    }
+    ADD_FAILURE() << "no row " << quantity << " " << part;
+  }
+  std::string gel_ = "[gel]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.49\nthickness_um = 60\n";
+  std::string sheet_ = "[sheet]\npoisson_ratio = 0.3\nthickness_um = 0.4\nmesh_um = 2\n", outline_ = "outline.csv";
+};
+
+/// Beads of a computed gel, with noise, are fitted: the sheet that moved them comes back within its errors.
+TEST_F(FittedSheet, contraction_and_stiffness_come_back_from_beads) {
+  move_beads("contraction_nN_per_um = 0.5\n");
+  const test::Outcome outcome = fit("");
+  const files::CsvTable found(folder_ / "out" / "sheet_fit.csv");
+  EXPECT_EQ(found.text(0, "quantity"), "contraction_nN_per_um");
+  EXPECT_NEAR(found.number(0, "value"), 0.5, 4 * found.number(0, "sigma"));
+  EXPECT_EQ(found.text(1, "quantity"), "stiffness_nN_per_um");
+  EXPECT_NEAR(found.number(1, "value"), 30 * 0.4 / (1 - 0.09), 4 * found.number(1, "sigma"));
   EXPECT_LT(figure("aic"), figure("aic_of_nothing") - 1000);
   EXPECT_EQ(outcome.output.find("explains"), std::string::npos) << "the sheet explains the beads: " << outcome.output;
   // a gel whose modulus is known to 10 %, and whose thickness to a third
-  const double sigma = fit.number(0, "sigma");
-  const auto on_doubtful = run(gel + "youngs_modulus_sigma_kPa = 0.1\nthickness_sigma_um = 20\n" + sheet,
+  const double sigma = found.number(0, "sigma");
+  const auto on_doubtful = run(gel_ + "youngs_modulus_sigma_kPa = 0.1\nthickness_sigma_um = 20\n" + sheet_,
                                "--displacement " + (folder_ / "displacement.csv").string());
   ASSERT_EQ(on_doubtful.code, 0) << on_doubtful.output;
   const files::CsvTable doubtful(folder_ / "out" / "sheet_fit.csv");
-  EXPECT_GT(doubtful.number(0, "sigma"), std::hypot(sigma, 0.1 * 0.99 * fit.number(0, "value")));
-  EXPECT_LT(doubtful.number(0, "sigma"), std::hypot(sigma, 0.2 * fit.number(0, "value")));
+  EXPECT_GT(doubtful.number(0, "sigma"), std::hypot(sigma, 0.1 * 0.99 * found.number(0, "value")));
+  EXPECT_LT(doubtful.number(0, "sigma"), std::hypot(sigma, 0.2 * found.number(0, "value")));
   // a contraction that may vary, and does not
-  const auto varying = run(gel + sheet + "fit_parts = \"field\"\nfield_points = 6\n",
+  const auto varying = run(gel_ + sheet_ + "fit_parts = \"field\"\nfield_points = 6\n",
                            "--displacement " + (folder_ / "displacement.csv").string());
   ASSERT_EQ(varying.code, 0) << varying.output;
   const files::CsvTable places(folder_ / "out" / "contraction.csv");
@@ -194,7 +223,7 @@ TEST_F(Sheet, contraction_and_stiffness_come_back_from_beads) {
     EXPECT_NEAR(places.number(row, "contraction_nN_per_um"), 0.5, 4 * places.number(row, "sigma_nN_per_um"));
   EXPECT_EQ(files::CsvTable(folder_ / "out" / "sheet_fit.csv").text(0, "part"), "mean");
   EXPECT_NE(files::read_text(folder_ / "out" / "sheet.svg").find(">Contraction<"), std::string::npos);
-  const auto unknown_bond = run(gel + sheet + "fit_parts = \"field\"\nfit_adhesion_stiffness = true\n",
+  const auto unknown_bond = run(gel_ + sheet_ + "fit_parts = \"field\"\nfit_adhesion_stiffness = true\n",
                                 "--displacement " + (folder_ / "displacement.csv").string());
   EXPECT_EQ(unknown_bond.code, 2) << unknown_bond.output;
 }
@@ -235,51 +264,6 @@ TEST_F(Sheet, one_that_expands_or_has_the_stiffness_of_a_bound_is_doubted) {
   const std::string at_rim = fitted([](double r) { return -0.8 * std::exp(-std::pow((r - 25) / 1.5, 2)); });
   EXPECT_NE(at_rim.find("sheet-at-bound"), std::string::npos) << at_rim;
 }
-
-/// Beads on a lattice about a sheet that pulls on its gel, with noise of 10 nm.
-class FittedSheet : public Sheet {
- protected:
-  /// @param more  of [sheet]
-  void move_beads(const std::string& more, const std::string& arguments = {}) {
-    std::string points = "x_um,y_um\n";
-    for (int i = -20; i <= 20; ++i)
-      for (int j = -20; j <= 20; ++j) points += std::to_string(2 * i) + "," + std::to_string(2 * j) + "\n";
-    files::write_text(folder_ / "beads.csv", points);
-    const auto made = run(gel_ + sheet_ + "youngs_modulus_kPa = 30\n" + more,
-                          "--beads " + (folder_ / "beads.csv").string() + " " + arguments, outline_);
-    ASSERT_EQ(made.code, 0) << made.output;
-    DisplacementField beads = files::read_displacement(folder_ / "out" / "displacement.csv");
-    std::mt19937_64 random(3);
-    std::normal_distribution<double> noise(0, 0.01);
-    for (Bead& bead : beads) {
-      bead.displacement_um += Vec2{noise(random), noise(random)};
-      bead.sigma_um = 0.01;
-    }
-    files::write_displacement(folder_ / "displacement.csv", beads);
-  }
-  void fit(const std::string& more, const std::string& arguments = {}) {
-    const auto outcome = run(gel_ + sheet_ + more,
-                             "--displacement " + (folder_ / "displacement.csv").string() + " " + arguments, outline_);
-    ASSERT_EQ(outcome.code, 0) << outcome.output;
-  }
-  /// A row of sheet_fit.csv lies within four of its errors of the truth, or has a limit on the right side of it.
-  void expect(const std::string& quantity, const std::string& part, double truth) {
-    const files::CsvTable table(folder_ / "out" / "sheet_fit.csv");
-    for (int row = 0; row < table.n_rows(); ++row) {
-      if (table.text(row, "quantity") != quantity || table.text(row, "part") != part) continue;
-      const std::optional<double> sigma = table.optional_number(row, "sigma"), low = table.optional_number(row, "low"),
-                                  high = table.optional_number(row, "high");
-      if (sigma)
-        EXPECT_NEAR(table.number(row, "value"), truth, 4 * *sigma) << quantity << part;
-      else
-        EXPECT_TRUE(low.value_or(0) <= truth && truth <= high.value_or(1e300)) << quantity << part;
-      return;
-    }
-    ADD_FAILURE() << "no row " << quantity << " " << part;
-  }
-  std::string gel_ = "[gel]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.49\nthickness_um = 60\n";
-  std::string sheet_ = "[sheet]\npoisson_ratio = 0.3\nthickness_um = 0.4\nmesh_um = 2\n", outline_ = "outline.csv";
-};
 
 TEST_F(FittedSheet, a_line_tension_comes_back_beside_the_contraction) {
   // around a disc a line pulls as its contraction does: an ellipse tells the two apart

@@ -193,6 +193,11 @@ class Kinds : public Runner {
     for (const Stage& stage : of.stages) names += " " + stage.name;
     return names;
   }
+  static std::string arguments(const Stage& stage) {
+    std::string flags;
+    for (const PathArgument& argument : stage.arguments) flags += argument.flag + " ";
+    return flags;
+  }
 };
 
 TEST_F(Kinds, beads_are_in_space_where_the_tracker_follows_them_there) {
@@ -208,11 +213,6 @@ TEST_F(Kinds, beads_are_in_space_where_the_tracker_follows_them_there) {
 
 TEST_F(Kinds, what_lies_in_the_folder_decides_where_surface_and_cell_come_from) {
   const std::string toml = "[track]\nz_points = 'into-gel'\n";
-  const auto arguments = [](const Stage& stage) {
-    std::string flags;
-    for (const PathArgument& argument : stage.arguments) flags += argument.flag + " ";
-    return flags;
-  };
   const CellStages whole = stages_with(toml);
   EXPECT_EQ(told(whole), "space segment track surface traction");
   EXPECT_EQ(arguments(whole.stages[2]), "beads ");
@@ -227,19 +227,14 @@ TEST_F(Kinds, what_lies_in_the_folder_decides_where_surface_and_cell_come_from) 
 
 TEST_F(Kinds, a_sheet_has_stages_of_its_own_and_takes_its_outline_from_images_or_from_a_mask) {
   const std::string toml = "[run]\nmodel = 'sheet'\n";
-  const auto flags = [](const Stage& stage) {
-    std::string all;
-    for (const PathArgument& argument : stage.arguments) all += argument.flag + " ";
-    return all;
-  };
   CellStages of = stages_with(toml);
   EXPECT_EQ(told(of), "sheet segment track sheet");
-  EXPECT_EQ(flags(of.stages[2]), "displacement outline adhesions ");
+  EXPECT_EQ(arguments(of.stages[2]), "displacement outline adhesions ");
   EXPECT_TRUE(of.stages[0].settings.empty());
-  EXPECT_EQ(flags(stages_with(toml + "bundles = true\n").stages[2]), "displacement outline adhesions bundles ");
+  EXPECT_EQ(arguments(stages_with(toml + "bundles = true\n").stages[2]), "displacement outline adhesions bundles ");
   fs::remove(cell_ / "paxillin.tif");
   of = stages_with(toml);
-  EXPECT_EQ(flags(of.stages[2]), "displacement outline ");
+  EXPECT_EQ(arguments(of.stages[2]), "displacement outline ");
   ASSERT_EQ(of.stages[0].settings.size(), 1u);  // no candidates: a sheet asks for none
   EXPECT_EQ(of.stages[0].settings[0].value, "none");
   fs::remove(cell_ / "actin.tif");
