@@ -72,15 +72,14 @@ std::string methods(const SheetResults& r, const Provenance& provenance) {
   const std::string text = fmt::format(
       "The contraction was found with the program mbtfm{}. The cell was taken as an even elastic sheet in plane stress "
       "({} µm thick, Poisson’s ratio {}) that contracts on the gel (Young’s modulus {} kPa, Poisson’s ratio {}, "
-      "thickness {} µm) and was solved by finite elements ({} quadratic triangles). Contraction and stiffness of the "
-      "sheet{} were fitted to the displacements of {} beads. The fit left {} of the displacement (relative L2; the "
-      "noise alone would leave {}). Intervals are 95 % intervals.",
+      "thickness {} µm) and was solved by finite elements ({} quadratic triangles). Fitted to the displacements of {} "
+      "beads{}: {}. The fit left {} of the displacement (relative L2; the noise alone would leave {}). Intervals are "
+      "95 % intervals.",
       provenance.version.empty() ? "" : " " + provenance.version, parameter(provenance, "sheet.thickness_um"),
       parameter(provenance, "sheet.poisson_ratio"), parameter(provenance, "gel.youngs_modulus_kPa"),
-      parameter(provenance, "gel.poisson_ratio"), parameter(provenance, "gel.thickness_um"),
-      r.figures.at("n_triangles").number(),
-      has_motion ? " and a common motion of all beads (shift, turn, growth, shear)" : "",
-      r.figures.at("n_beads").number(), readable(r.number("relative_l2")), readable(r.number("expected_relative_l2")));
+      parameter(provenance, "gel.poisson_ratio"), parameter(provenance, "gel.thickness_um"), r.number("n_triangles"),
+      r.number("n_beads"), has_motion ? ", beside a common motion of all beads (shift, turn, growth, shear)" : "",
+      r.figures.at("fitted").text(), readable(r.number("relative_l2")), readable(r.number("expected_relative_l2")));
   return "<p class=\"cite\">" + html_escaped(text) + "</p>\n";
 }
 
