@@ -138,6 +138,7 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                     {"n_holes", static_cast<std::int64_t>(s.cell.holes_um.size())},
                     {"is_cut_by_border", s.is_cut_by_border},
                     {"n_cells_in_image", static_cast<std::int64_t>(s.n_cells)}};
+  if (s.bleed_through) report.figures.emplace_back("bleed_through", *s.bleed_through);
   if (s.alignment) {
     const ChannelAlignment& a = *s.alignment;
     report.figures.insert(report.figures.end(),
@@ -161,6 +162,9 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
        {noticed(FindingKind::adhesions_long, cells::aspect_ratio(s.cell.adhesions),
                 "The adhesions are " + brief(cells::aspect_ratio(s.cell.adhesions)) +
                     " times as long as wide, on average over their area. Adhesions are 2 to 3 times."),
+        noticed(FindingKind::bleed_through, s.bleed_through.value_or(0),
+                "The adhesion image shows the fibres with " + brief(100 * s.bleed_through.value_or(0)) +
+                    " % of the adhesions' contrast."),
         noticed(FindingKind::bright_actin, bright_um,
                 brief(bright_um) + " um of actin, as bright as the cell's fibres, is in no fibre."),
         noticed(FindingKind::actin_shift, s.alignment && s.alignment->is_significant() ? 1 : 0,
@@ -287,6 +291,10 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
     context.notice(images::noticed_loss(*image));
     context.notice(images::noticed_saturation(*image));
   }
+  std::vector<const images::Channel*> seen;
+  for (const auto* image : {&adhesion, &actin})
+    if (*image) seen.push_back(&**image);
+  if (parameters.pixel_size_um) context.notice(images::noticed_unchecked(seen, *parameters.pixel_size_um));
   const bool is_one = adhesion && actin && adhesion->image.pixels == actin->image.pixels;
   if (is_one && adhesion->name != actin->name) {  // one file for both is by intent: no image of the actin is there
     throw InputError(adhesion->name + ", " + actin->name, "images of adhesions and of actin", "the same pixels in both",

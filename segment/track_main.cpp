@@ -120,6 +120,12 @@ std::vector<Finding> findings_of(const Tracking& tracking) {
     add(noticed(FindingKind::tracked_by_correlation, 1,
                 "Windows of " + brief(tracking.window_um) + " um were followed: " + tracking.windows.why + "."));
   }
+  if (tracking.n_windows > 0) {
+    add(noticed(FindingKind::tracked_by_correlation, 1,
+                "In " + brief(100 * tracking.share_of_gaps) + " % of the image single beads cannot be followed. " +
+                    std::to_string(tracking.n_windows) + " windows of " + brief(tracking.window_um) +
+                    " um were followed there."));
+  }
   const BeadSizes& sizes = tracking.sizes;
   const double ratio = sizes.ratio, larger = std::max(ratio, 1 / ratio);
   constexpr double kCertain = 3;  // standard errors
@@ -154,6 +160,8 @@ StageReport report_of(const Tracking& tracking, double pixel_size_um) {
                         {"scatter_um", tracking.scatter_um},
                         {"method", std::string(name_of(has_windows ? TrackMethod::correlation : TrackMethod::beads))},
                         {"window_sigma_um", tracking.window_um},
+                        {"n_windows_in_gaps", static_cast<std::int64_t>(tracking.n_windows)},
+                        {"share_of_gaps", tracking.share_of_gaps},
                         {"bead_size_ratio", tracking.sizes.ratio},
                         {"bead_size_ratio_sigma", tracking.sizes.sigma},
                         {"bead_elongation", tracking.sizes.elongation},
@@ -370,9 +378,11 @@ StageReport complete_series(const std::vector<Frame>& frames, stage::StageContex
 StageReport track(TrackParameters parameters, int binning, stage::StageContext& context) {
   if (parameters.pixel_size_um) *parameters.pixel_size_um *= binning;
   const std::vector<Frame> frames = frames_of(context, parameters);
+  parameters.is_series = frames.size() > 1;
   const fs::path relaxed_file = context.input("relaxed");
   const images::Channel relaxed{relaxed_file.string(),
                                 images::binned(images::read_image(relaxed_file, parameters.relaxed_plane), binning)};
+  if (parameters.pixel_size_um) context.notice(images::noticed_unchecked({&relaxed}, *parameters.pixel_size_um));
   const RelaxedBeads beads = with_names(
       relaxed.name, [&] { return RelaxedBeads(relaxed.image, parameters, context.threads, model_of_gel(context)); });
   const auto tracked_frame = [&](const Frame& frame, const Progress& progress) {

@@ -4,6 +4,7 @@
 #include "mbtfm/fit/strained_gel.h"
 #include "mbtfm/tensions/energy.h"
 #include "mbtfm/tensions/error_budget.h"
+#include "mbtfm/tensions/findings.h"
 #include "mbtfm/tensions/second_placement.h"
 #include "mbtfm/tensions/solved_misfit.h"
 #include "pipeline/contract/errors.h"
@@ -186,6 +187,16 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
   append(found.summary.more, figures_of(motions));
   append(found.summary.more, figures_of(checks, fit));
   ModelFields fields = fields_of(ready, fit, checks, inputs.beads);
+  std::optional<Reading> reading, smoothing;
+  if (unexplained_share(found.summary) > kMuchUnexplained) {
+    const Eigen::MatrixXd& by_tension = fit.meshes.front().force_derivatives;
+    reading = best_reading(under(ready, p, work.threads), inputs.beads, by_tension, found.summary.noise_um);
+    smoothing = best_smoothing(fit.data, by_tension, found.summary.noise_um);
+    append(found.summary.more, {{"best_reading_leaves", reading->unexplained_share},
+                                {"given_reading_leaves", reading->unexplained_as_is},
+                                {"best_smoothing_leaves", smoothing->unexplained_share},
+                                {"unsmoothed_leaves", smoothing->unexplained_as_is}});
+  }
   std::vector<FrameFit> frames = fit_frames(ready, fit, inputs, p, work.part(0.6, 0.35));
   FittedCell cell{.seen = inputs.cell,
                   .parameters = p,
@@ -195,6 +206,8 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
                   .motions = std::move(motions),
                   .checks = std::move(checks),
                   .fields = std::move(fields),
+                  .reading = std::move(reading),
+                  .smoothing = std::move(smoothing),
                   .frames = std::move(frames)};
   return with_effects(std::move(cell), work);
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mbtfm/fit/checks.h"
+#include "mbtfm/fit/readings.h"
 #include "mbtfm/tensions/explain.h"
 
 namespace mbtfm::fit {
@@ -31,9 +32,10 @@ struct FittedCell {
   FoundMotions motions;
   ModelChecks checks;
   ModelFields fields;
-  std::vector<tensions::FrameFit> frames = {};  ///< of a time series
-  std::vector<Effect> effects = {};             ///< of table_of_effects()
-  std::vector<tensions::Change> changes = {};   ///< by effects that are off, where that was asked
+  std::optional<Reading> reading = {}, smoothing = {};  ///< that explain the beads best; none: not looked for
+  std::vector<tensions::FrameFit> frames = {};          ///< of a time series
+  std::vector<Effect> effects = {};                     ///< of table_of_effects()
+  std::vector<tensions::Change> changes = {};           ///< by effects that are off, where that was asked
 };
 
 /// @throws InputError, InvalidData, UsageError, NotSolved

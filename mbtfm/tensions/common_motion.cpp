@@ -103,6 +103,12 @@ Effect common_motion_effect(Switch setting, const std::optional<FoundMotion>& fo
                               : "switched off in [effects]: the beads at rest are taken to lie still");
 }
 
+double rms_um(const AffineMotion& motion, const std::vector<Vec2>& places_um) {
+  double squares = 0;
+  for (const Vec2 place : places_um) squares += dot(motion.at(place), motion.at(place));
+  return std::sqrt(0.5 * squares / std::max(1.0, static_cast<double>(places_um.size())));
+}
+
 Figures figures_of(const FoundMotion& found) {
   const AffineMotion& m = found.motion;
   constexpr double kDegree = 180 / std::numbers::pi;

@@ -39,6 +39,9 @@ struct FoundMotion {
 /// @param motions  the first six those of affine_motions()
 FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um);
 
+/// Of a component, over these places.
+double rms_um(const AffineMotion& motion, const std::vector<Vec2>& places_um);
+
 /// What all beads do together that is not affine, as stitched tiles, a rolling shutter or a lens make it: displacements
 /// of second and third degree in x and y, fourteen numbers. A score test (Rao, Math Proc Camb Phil Soc 44:50, 1948):
 /// what the fit leaves of the beads is compared with them, and with what noise and the model's error leave of them.

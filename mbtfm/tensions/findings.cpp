@@ -32,10 +32,9 @@ double squared_ratio(const FitSummary& summary) {
 }
 
 Noticed explains_little(const FitOutcome& o) {
-  const double left = o.summary.relative_l2 * o.summary.relative_l2;
   const double noise = o.summary.expected_relative_l2 * o.summary.expected_relative_l2;  // of the beads' own squares
   if (noise <= 0 || noise >= 1) return {};
-  const double share = (left - noise) / (1 - noise);
+  const double share = unexplained_share(o.summary);
   // of the noise's squares, which far beads tell, and of what is left
   const double sigma =
       2 * noise / (1 - noise) / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, o.data.n_used)));
@@ -80,9 +79,13 @@ Noticed noise_disagrees(const FitOutcome& o) {
   const double stated = stated_noise_um(o.data);
   if (!o.data.has_errors || stated <= 0) return {};
   const double ratio = o.summary.noise_um / stated;
-  return noticed(FindingKind::noise_disagrees, ratio,
-                 "Far from the cell the beads scatter by " + brief(1000 * o.summary.noise_um) +
-                     " nm about what the model says; their stated standard error is " + brief(1000 * stated) + " nm.");
+  std::string text = "Far from the cell the beads scatter by " + brief(1000 * o.summary.noise_um) +
+                     " nm about what the model says; their stated standard error is " + brief(1000 * stated) + " nm.";
+  if (o.motion) {
+    text += " The common motion of all beads, " + brief(1000 * rms_um(o.motion->motion, o.data.position_um)) +
+            " nm, is not part of it: it was taken off.";
+  }
+  return noticed(FindingKind::noise_disagrees, ratio, text);
 }
 
 /// A square of the picture with some sixty beads.
@@ -282,6 +285,12 @@ Noticed channel_shift(const FitOutcome& o) {
 }
 
 }  // namespace
+
+double unexplained_share(const FitSummary& summary) {
+  const double left = summary.relative_l2 * summary.relative_l2;
+  const double noise = summary.expected_relative_l2 * summary.expected_relative_l2;
+  return noise < 1 ? (left - noise) / (1 - noise) : 0;
+}
 
 std::vector<int> adhesions_without_beads(const std::vector<Adhesion>& adhesions, const std::vector<Vec2>& beads_um) {
   constexpr double kFar = 3;  // distances of beads: at random the chance is exp(−9 pi)

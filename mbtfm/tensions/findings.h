@@ -33,6 +33,10 @@ struct FitOutcome {
 /// In the order in which a user should read them.
 std::vector<Finding> findings_of(const FitOutcome& outcome);
 
+/// Of what the beads do beyond their noise (squares, as far as the noise is known), the share that the fit leaves; 0 if
+/// they do nothing beyond it.
+double unexplained_share(const FitSummary& summary);
+
 /// Adhesions (their ids) whose nearest bead is three times the beads' distance away or further: the beads' distance is
 /// that of as many on a lattice over the field that they span.
 std::vector<int> adhesions_without_beads(const std::vector<Adhesion>& adhesions, const std::vector<Vec2>& beads_um);

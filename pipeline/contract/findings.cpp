@@ -23,6 +23,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "in an image that is not saturated one or two pixels have it; adhesions cover 0.01 of an image",
        "Areas, positions and intensities of what is saturated are wrong. Record with less light or a shorter "
        "exposure."},
+      {pixel_size_unchecked, "pixel-size-unchecked", "any stage", note, "1 if no image states its pixel size", 0,
+       "all lengths are proportional to it, and all forces to its square",
+       "Compare it with the microscope's own record, and with the binning of the camera: 10 % of it are 20 % of every "
+       "force. Keep the TIFF files that the microscope writes: most state it."},
       {adhesions_left_out, "adhesions-left-out", "segment", note, "adhesions that were found outside of the cell", 0,
        "only what lies in the outline can hold the network", "Check the outline in 1_segment/overlay.png."},
       {adhesions_long, "adhesions-long", "segment", caution, "length over width of the adhesions, mean weighed by area",
@@ -35,6 +39,14 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "is taken out",
        "Look at the dots in 1_segment/overlay.png. Draw what is missing by hand (images.fibre_rois; begin with "
        "1_segment/RoiSet.zip)."},
+      {bleed_through, "bleed-through", "segment", caution,
+       "contrast of the fibres in the adhesion image, over that of the adhesions", 0.1,
+       "two simulated cells have 0.00 and a real paxillin image 0.03; a tenth of the actin's light makes it 0.12, with "
+       "7 "
+       "to 12 adhesions of 170 that are none, a fifth 0.25, with 70",
+       "Look at the adhesion image: fibres that it shows are taken for adhesions. Record with other filters or one "
+       "channel after the other, subtract the actin image's share, or draw the adhesions by hand "
+       "(images.adhesion_rois)."},
       {adhesions_off_actin, "adhesions-off-actin", "segment", caution,
        "share of the adhesions, by area, that lie more than 1 um and less than 8 um beyond the cells of the actin "
        "image",
@@ -146,6 +158,20 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "another cell's beads, mirrored or transposed ones leave 0.5 and more, other networks than the model's 0.2",
        "Check that all images show the same cell the same way round: no pair of another cell, none mirrored, rows and "
        "columns as they are, no channels exchanged. Disregard the results."},
+      {read_otherwise, "read-otherwise", "fit", bad,
+       "what the model leaves of the displacement as it is, over what it leaves if the displacement is read in another "
+       "way",
+       2,
+       "it is 2.4 to 13 in simulated cells with images mirrored or transposed, components exchanged or places in "
+       "pixels; "
+       "1.0 if there is another reason, as adhesions of another cell",
+       "Correct the images or the table in the way that is named, and run again. Disregard these results."},
+      {field_smoothed, "field-smoothed", "fit", caution,
+       "what the model leaves of the displacement, over what it leaves if it is smoothed like the displacement", 2,
+       "it is some hundred for fields smoothed over 4 um, and 1.0 to 1.6 for all that were not",
+       "Take a displacement field that was not smoothed: smaller windows, no filter. Or give the two bead images, "
+       "which "
+       "this program tracks itself. Tensions of a smoothed field are wrong by more than their error bars."},
       {unexplained_displacement, "unexplained-displacement", "fit", caution,
        "sum of squares that the model leaves of the displacement, over that of the beads' noise", 1.25,
        "up to half of the noise's standard deviation, the model's own error adds less than an eighth to what is left",

@@ -14,6 +14,7 @@
 #include "segment/beads/common_motion.h"
 #include "segment/beads/focus.h"
 #include "segment/beads/follow.h"
+#include "segment/beads/gaps.h"
 #include "segment/beads/given_field.h"
 #include "segment/beads/measure.h"
 #include "segment/beads/pool.h"
@@ -88,9 +89,13 @@ void flag_turned_out(const Scene& scene, const Turn& turn, std::vector<Track>& t
 /// Found from the grid with the wide window, measured in the narrow one, even where beads are loose or not resolved and
 /// single ones scatter: a wider window would hide the scatter and flatten the peaks.
 Followed followed_and_measured(const Scene& scene, const std::optional<Turn>& turn, const TrackParameters& parameters,
-                               int window) {
+                               int window, const Gaps* gaps = nullptr) {
   const GridField grid = coarse_field(scene.relaxed->image.plane, scene.stressed.image.plane, window, scene.threads);
   Followed followed = follow(scene, grid, parameters);
+  // beside windows that are far more alike those in gaps would seem to show something else
+  for (int k = 0; gaps && k < scene.n_beads(); ++k) {
+    if (!gaps->hold(scene.position(k))) followed.tracks[k].flag = TrackFlag::no_partner;
+  }
   measure(scene, parameters.least_similarity, followed.tracks);
   verify(scene, followed.tracks);
   if (turn) flag_turned_out(scene, *turn, followed.tracks);
@@ -143,25 +148,29 @@ struct Tried {
   double knowledge = 0;  ///< sum of 1/sigma²
 };
 
+/// @param gaps  whose windows alone count; none: all do
 Tried tried_windows(const Texture& relaxed, const Texture& stressed, double window_px, const std::optional<Turn>& turn,
-                    TrackParameters parameters, double pixel_size_um, int threads) {
+                    TrackParameters parameters, double pixel_size_um, int threads, const Gaps* gaps) {
   const Windows windows = windows_on(relaxed, stressed, window_px, threads);
   const auto scene = std::make_shared<const Scene>(windows.scene);
   parameters.least_similarity = least_similarity(relaxed, window_px);
   // a square of seven Gaussian sigmas is halved on the finer grid, and holds as much as the Gaussian then
   auto [tracks, n_by_grid] =
-      followed_and_measured(*scene, turn, parameters, search_window(7 * window_px, parameters, pixel_size_um));
+      followed_and_measured(*scene, turn, parameters, search_window(7 * window_px, parameters, pixel_size_um), gaps);
   Tried result{.measured = {scene, std::move(tracks), {}, {}, window_px}, .n_by_grid = n_by_grid};
   auto pooling = calibrated(windows, result.measured.tracks);
   if (!pooling) return result;
   std::vector<double> sigmas;
+  std::size_t n_counted = 0;
   for (int k = 0; k < scene->n_beads(); ++k) {
+    if (gaps && !gaps->hold(scene->position(k))) continue;
+    ++n_counted;
     if (!result.measured.tracks[k].is_good()) continue;
     const double sigma_px = pooling->beads[k].sigma_px;
     sigmas.push_back(sigma_px);
     result.knowledge += 1 / (sigma_px * sigma_px);
   }
-  result.is_sound = 3 * sigmas.size() >= 2 * result.measured.tracks.size();
+  result.is_sound = !sigmas.empty() && 3 * sigmas.size() >= 2 * n_counted;
   result.median_sigma_px = numerics::quantile(std::move(sigmas), 0.5);
   result.measured.pooling = std::move(*pooling);
   return result;
@@ -169,12 +178,13 @@ Tried tried_windows(const Texture& relaxed, const Texture& stressed, double wind
 
 /// In the smallest windows that are fine enough; where none are, in those that know most together.
 Measured measured_windows(const Texture& relaxed, const images::Image& stressed, const std::optional<Turn>& turn,
-                          const TrackParameters& parameters, double pixel_size_um, int threads) {
+                          const TrackParameters& parameters, double pixel_size_um, int threads,
+                          const Gaps* gaps = nullptr) {
   const Texture moved = texture_of(stressed, relaxed.spot_sigma_px, "stressed");
   std::optional<Tried> best;
   int n_by_grid = 0, n_found = 0, n_tried = 0;
   for (const double window_px : window_sigmas(relaxed)) {
-    Tried tried = tried_windows(relaxed, moved, window_px, turn, parameters, pixel_size_um, threads);
+    Tried tried = tried_windows(relaxed, moved, window_px, turn, parameters, pixel_size_um, threads, gaps);
     constexpr double kFineEnough = 0.1;  // px: a tenth of what moves in a picture worth tracking
     const bool is_fine = tried.is_sound && tried.median_sigma_px <= kFineEnough;
     n_by_grid = tried.n_by_grid, n_found = n_good(tried.measured.tracks), n_tried = tried.measured.scene->n_beads();
@@ -202,6 +212,16 @@ CommonMotion turned_as_before(CommonMotion common, const Turn& turn, Vec2 centre
   return common;
 }
 
+/// @param motion  of all, px: taken off
+Bead entry_of(const Measured& measured, int k, const AffineMotion& motion, double pixel_size_um) {
+  const Pooled& found = measured.pooling.beads[k];
+  const Vec2 place = measured.scene->position(k);
+  return {.position_um = place_um(place, pixel_size_um),
+          .displacement_um = pixel_size_um * (found.u - motion.at(place)),
+          .sigma_um = pixel_size_um * found.sigma_px,
+          .flag = name_of(measured.tracks[k].flag)};
+}
+
 Tracking tracking_of(const Measured& measured, const MotionTaken& all, double pixel_size_um) {
   const Scene& scene = *measured.scene;
   const std::vector<Track>& tracks = measured.tracks;
@@ -216,12 +236,7 @@ Tracking tracking_of(const Measured& measured, const MotionTaken& all, double pi
   result.sizes = measured.sizes;
   result.affine = all.affine;
   for (int k = 0; k < scene.n_beads(); ++k) {
-    const Pooled& found = pooling.beads[k];
-    const Vec2 place = scene.position(k);
-    result.field.push_back({.position_um = place_um(place, pixel_size_um),
-                            .displacement_um = pixel_size_um * (found.u - all.motion.at(place)),
-                            .sigma_um = pixel_size_um * found.sigma_px,
-                            .flag = name_of(tracks[k].flag)});
+    result.field.push_back(entry_of(measured, k, all.motion, pixel_size_um));
     if (tracks[k].is_good()) ++result.n_good;
   }
   return result;
@@ -386,6 +401,14 @@ Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const images
   const MotionTaken all = motion_of_all(measured, setting, parameters_.effect_tolerance);
   require_shift_alone(all);
   Tracking result = tracking_of(measured, all, pixel_size_um);
+  if (by_beads && texture_ && !parameters_.is_series) {
+    const Gaps gaps(*measured.scene, measured.tracks);
+    result.share_of_gaps = gaps.share();
+    if (gaps.are_large()) {
+      tell(0.9, "following windows where beads fail");
+      fill(gaps, unturned, turn, all.motion, pixel_size_um, result);
+    }
+  }
   const CommonMotion common = turn ? turned_as_before(all.common, *turn, all.motion.centre) : all.common;
   result.common = in_um(common, pixel_size_um);
   const bool is_affine_left = all.is_affine && !all.affine.is_on;
@@ -395,6 +418,24 @@ Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const images
                               " of -1, inward, to 1), as if the stressed and the relaxed image were exchanged");
   }
   return result;
+}
+
+/// Windows in the gaps, beside the beads.
+void RelaxedBeads::fill(const Gaps& gaps, const images::Image& stressed, const std::optional<Turn>& turn,
+                        const AffineMotion& motion, double pixel_size_um, Tracking& tracking) const {
+  std::optional<Measured> windows;
+  try {
+    windows = measured_windows(*texture_, stressed, turn, parameters_, pixel_size_um, threads_, &gaps);
+  } catch (const NotFollowed&) {
+    return;  // there is no texture either
+  }
+  tracking.window_um = pixel_size_um * windows->window_px;
+  for (int k = 0; k < windows->scene->n_beads(); ++k) {
+    if (!windows->tracks[k].is_good() || !gaps.hold(windows->scene->position(k))) continue;
+    tracking.field.push_back(entry_of(*windows, k, motion, pixel_size_um));
+    ++tracking.n_windows;
+    ++tracking.n_good;
+  }
 }
 
 /// Tried out one by one: an error has the time, and a hint that does not help costs the reader more.

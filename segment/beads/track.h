@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "pipeline/contract/affine_motion.h"
 #include "pipeline/contract/beads.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/geometry.h"
@@ -17,7 +18,7 @@ namespace mbtfm::beads {
 
 /// What is followed from one image to the other.
 enum class TrackMethod {
-  automatic,   ///< single beads; where they cannot be followed, windows
+  automatic,   ///< single beads; where they cannot be followed, in parts of the picture or all of it, windows
   beads,       ///< each bead by itself
   correlation  ///< the texture in windows on a lattice, whatever it shows
 };
@@ -40,6 +41,7 @@ struct TrackParameters {
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
   /// A stage drifts; a dish put back on it is turned, a gel swells, a stage tilts or heats, too.
   Switch drift_affine = Switch::off;
+  bool is_series = false;          ///< all frames have the same beads, so that no gaps are filled
   bool may_push = false;           ///< a gel that is pushed outward is no sign of exchanged images
   double effect_tolerance = 0.01;  ///< auto: what displaces the border by less, of the largest displacement, stays
   double least_similarity = 0.6;   ///< correlation of a bead's neighbourhoods below which it is no match
@@ -107,6 +109,8 @@ struct Tracking {
   Effect affine{};           ///< whether turn, growth and shear were taken off, and why
   Effect windows{};          ///< whether windows were followed in place of single beads, and why
   double window_um = 0;      ///< Gaussian sigma of the windows; 0: single beads
+  int n_windows = 0;         ///< among the field's entries, the last ones: in gaps between the beads
+  double share_of_gaps = 0;  ///< of the picture, where single beads cannot be followed
   int n_beads_stressed = 0;  ///< found in the stressed image
 };
 
@@ -127,6 +131,8 @@ using FieldModel = std::function<std::vector<Vec2>(const DisplacementField& bead
 
 struct Side;
 struct Texture;
+struct Turn;
+class Gaps;
 
 /// The beads, and the texture, of the relaxed image, found once for any number of stressed ones.
 class RelaxedBeads {
@@ -156,7 +162,8 @@ class RelaxedBeads {
   /// Where beads are dimmer than for 0.02 px, errors are correlated over some bead distances.
   ///
   /// By correlation, steps 1 to 3 are those of windows on a lattice in place of beads (windows.h): the smallest whose
-  /// standard error is a tenth of a pixel. Nothing is weighed in.
+  /// standard error is a tenth of a pixel. Nothing is weighed in. With `auto` such windows fill the gaps between the
+  /// beads, too (gaps.h).
   /// @throws NotFollowed where the stressed image shows no beads, or others than the relaxed one
   /// @throws InvalidData where the sizes differ, or a turn is found and must not be taken off
   /// @throws ExchangedImages where the gel is pushed outward as if the images were exchanged (given_field.h)
@@ -168,6 +175,8 @@ class RelaxedBeads {
                     const Progress& progress) const;
   Tracking track_as(TrackMethod method, Switch setting, const images::Image& stressed, double pixel_size_um,
                     const Progress& progress) const;
+  void fill(const Gaps& gaps, const images::Image& stressed, const std::optional<Turn>& turn,
+            const AffineMotion& motion, double pixel_size_um, Tracking& tracking) const;
   std::string remedy(const images::Image& stressed, double pixel_size_um) const;
   images::Image relaxed_;
   std::shared_ptr<const Side> side_;        ///< unless windows alone are asked for

@@ -283,6 +283,12 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
   }
 }
 
+bool is_on_cut(Vec2 end, const Cuts& cuts) {
+  constexpr double kOnIt_um = 1e-6;
+  return std::ranges::any_of(
+      cuts, [&](const auto& cut) { return distance_to_segment_um(end, cut.first, cut.second) < kOnIt_um; });
+}
+
 void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um) {
   if (cuts.empty()) return;
   constexpr double kCourse_um = 1;   // of the line's end tells where it points
@@ -322,12 +328,6 @@ bool is_held_at_both(const Fibre& fibre, const Polygon& outline_um, double lamel
   if (!is_long(line) || outline_um.empty()) return false;
   const Polyline points = last_part(line, length_um(line));
   return is_straight(points, outline_um) || !has_shape_of_arc(points, outline_um, lamellipodium_um);
-}
-
-bool is_on_cut(Vec2 end, const Cuts& cuts) {
-  constexpr double kOnIt_um = 1e-6;
-  return std::ranges::any_of(
-      cuts, [&](const auto& cut) { return distance_to_segment_um(end, cut.first, cut.second) < kOnIt_um; });
 }
 
 /// Adds anchors; ends that meet share one.

@@ -56,6 +56,8 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
 /// A fibre that leaves the image: a free end that points at a cut of the outline from at most `reach_um` away is led to
 /// it. Whether an adhesion holds the fibre out there nobody sees, so its type is as likely wrong as right.
 void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um);
+/// Where lead_to_cut() leads.
+bool is_on_cut(Vec2 end, const Cuts& cuts);
 
 struct FarEnds {
   double anchor_area_um2 = 1;

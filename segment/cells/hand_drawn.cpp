@@ -292,12 +292,6 @@ EndsToTie ends_of(const DrawnLine& line, const std::vector<Adhesion>& adhesions,
   return {.start = !is_end, .end = is_end};
 }
 
-bool is_on_cut(Vec2 point_um, const Cuts& cuts) {
-  constexpr double kOnIt_um = 1e-6;  // led there
-  return std::ranges::any_of(
-      cuts, [&](const auto& cut) { return distance_to_segment_um(point_um, cut.first, cut.second) < kOnIt_um; });
-}
-
 /// The end of a fibre where an anchor can be: in the cell, or on its edge where it was drawn a little outside.
 Vec2 place_of_anchor(Vec2 end_um, const CellOutline& cell, const std::string& where) {
   if (cell.outer_um.empty()) return end_um;

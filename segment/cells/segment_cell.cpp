@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "segment/cells/bleed_through.h"
 #include "segment/cells/emptiness.h"
 #include "segment/cells/fibre_ends.h"
 
@@ -139,11 +140,11 @@ struct Outlines {
 /// Nothing where the actin image shows no cell.
 std::optional<double> share_off_actin(const CellsInImage& seen, const std::vector<Adhesion>& adhesions) {
   constexpr double kBeyond_um = 1;  // channels are shifted by less
-  constexpr double kNear_um = 8;    // what is farther is another cell's, which may show no actin
+  constexpr double kOwn_um = 8;    // what is farther is another cell's, which may show no actin
   if (seen.cells.empty()) return std::nullopt;
   double near_um2 = 0, beyond_um2 = 0;
   for (std::size_t i = 0; i < adhesions.size(); ++i) {
-    if (seen.beyond_um[i] > kNear_um) continue;
+    if (seen.beyond_um[i] > kOwn_um) continue;
     near_um2 += adhesions[i].area_um2;
     if (seen.beyond_um[i] > kBeyond_um) beyond_um2 += adhesions[i].area_um2;
   }
@@ -367,6 +368,8 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
     require_candidates(in, s.cell);
     if (in.source == AdhesionSource::pattern) s.pattern = pattern_at(*in.drawn.adhesion_mask, around, in.field);
   }
+  if (in.source == AdhesionSource::image && in.adhesion)
+    s.bleed_through = contrast_of_fibres(in.adhesion->image, s.cell, in.field.pixel_um);
   s.n_anchors = static_cast<int>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::anchor, &Adhesion::origin));
   s.unused = unused_in(in);
   return s;

@@ -43,6 +43,7 @@ struct Segmentation {
   /// Share of the adhesions' area, in all cells, that lies beyond the cells which the actin image shows.
   std::optional<double> adhesions_off_actin{};
   std::optional<double> outline_off_actin{};    ///< share of a given outline's area beyond them
+  std::optional<double> bleed_through{};        ///< contrast of the fibres over that of the adhesions, in their image
   std::optional<ChannelAlignment> alignment{};  ///< of the actin image on the adhesion image, where fibre ends tell it
   std::vector<Polyline> unexplained_um{};       ///< actin as bright as the fibres that is in none of them
   bool is_aligned = false;                      ///< fibres and outline were moved by it

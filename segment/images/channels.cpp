@@ -57,6 +57,16 @@ std::optional<Finding> noticed_saturation(const Channel& channel) {
                  channel.name + " is saturated: " + brief(100 * share) + " % of its pixels have its largest value.");
 }
 
+std::optional<Finding> noticed_unchecked(const std::vector<const Channel*>& channels, double pixel_size_um) {
+  std::string names;
+  for (const Channel* channel : channels) {
+    if (channel->image.pixel_size_um) return std::nullopt;
+    names += (names.empty() ? "" : ", ") + channel->name;
+  }
+  return noticed(FindingKind::pixel_size_unchecked, channels.empty() ? 0 : 1,
+                 names + ": no pixel size is stated. The given " + brief(pixel_size_um) + " um cannot be checked.");
+}
+
 std::optional<stage::Doubt> doubt_about_calibration(const Channel& channel, std::optional<double> given_um) {
   if (!given_um || !channel.image.pixel_size_um) return std::nullopt;
   return stage::doubt_about_pixel_size(*given_um, *channel.image.pixel_size_um);

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pipeline/contract/findings.h"
 #include "pipeline/stage/plausible.h"
@@ -32,6 +33,9 @@ std::optional<Finding> noticed_loss(const Channel& channel);
 double share_at_brightest(const Image& image);
 /// A finding where the detector was saturated.
 std::optional<Finding> noticed_saturation(const Channel& channel);
+
+/// A note where none of these images states its pixel size: nothing contradicts the one that was given.
+std::optional<Finding> noticed_unchecked(const std::vector<const Channel*>& channels, double pixel_size_um);
 
 /// Where the pixel size given is not that of the image's own calibration. Both are of the image as it is, binned or
 /// not.

@@ -86,6 +86,42 @@ TEST(WeakBeads, are_followed_by_windows_of_themselves_and_strong_ones_are_not) {
   EXPECT_NE(by_windows.windows.why.find("single beads cannot be followed"), std::string::npos);
 }
 
+TEST(WeakBeads, in_a_part_of_the_image_are_followed_by_windows_beside_the_strong_ones) {
+  test::hard_case("beads of 25 electrons over noise of 13 in the left part of the image, of 1500 in the rest",
+                  "windows there, with rms of error over sigma 0.8 to 1.3; none in an image of strong beads alone");
+  const auto peaks = wide_adhesions();
+  constexpr int kWeak_px = 200;
+  const auto strong = test::draw_bead_pair(peaks, {.seed = 3});
+  const auto weak = test::draw_bead_pair(peaks, {.brightness = 25, .seed = 4});
+  auto mixed = strong;
+  for (const auto& [into, from] :
+       {std::pair(&mixed.relaxed, &weak.relaxed), std::pair(&mixed.stressed, &weak.stressed)}) {
+    for (int j = 0; j < into->height; ++j)
+      for (int i = 0; i < kWeak_px; ++i) into->at(i, j) = from->at(i, j);
+  }
+  const auto followed = [&](TrackMethod method) {
+    return track_beads(mixed.relaxed, mixed.stressed, 1.0, by(method), 2);
+  };
+  const auto good_at_left = [&](const Tracking& tracking) {
+    return std::ranges::count_if(tracking.field,
+                                 [&](const Bead& b) { return b.flag.empty() && b.position_um.x < kWeak_px - 20; });
+  };
+  const Tracking beads = followed(TrackMethod::beads), both = followed(TrackMethod::automatic);
+  EXPECT_EQ(beads.n_windows, 0);
+  EXPECT_FALSE(both.windows.is_on);
+  ASSERT_GT(both.n_windows, 20);
+  EXPECT_GT(good_at_left(both), 2 * good_at_left(beads) + 20);
+  EXPECT_NEAR(both.share_of_gaps, kWeak_px / 512.0, 0.15);
+  Tracking windows = both;
+  windows.field.erase(windows.field.begin(), windows.field.end() - both.n_windows);
+  windows.n_good = both.n_windows;
+  const double ratio = std::sqrt(squared_over_variance(windows, peaks, {}));
+  test::came_out(std::to_string(both.n_windows) + " windows, " + test::two_digits(ratio));
+  EXPECT_GE(ratio, 0.8);
+  EXPECT_LE(ratio, 1.3);
+  EXPECT_EQ(track_beads(strong.relaxed, strong.stressed, 1.0, by(TrackMethod::automatic), 2).n_windows, 0);
+}
+
 TEST(WeakBeads, the_hint_of_what_cannot_be_followed_names_what_helps) {
   test::hard_case("weak beads as single ones; pictures of two places",
                   "an error; its hint names track.method, or nothing");
