@@ -12,10 +12,9 @@
 #include "continuum/sheet/parameters.h"
 #include "continuum/sheet/picture.h"
 #include "continuum/sheet/tables.h"
-#include "mbtfm/sheets/field_fit.h"
+#include "mbtfm/sheets/bead_fit.h"
 #include "mbtfm/sheets/tables.h"
 #include "mbtfm/tensions/common_motion.h"
-#include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/charts/chart.h"
@@ -55,6 +54,7 @@ struct Parameters {
   int field_points = 40;                          ///< of a colony's beads tell fewer numbers
   bool fit_line_tension = false;                  ///< most colonies have none
   bool fit_adhesion_stiffness = false;            ///< few beads tell it beside the sheet's own
+  double outline_error_um = 0.05;                 ///< half a pixel, of outlines that mbtfm-segment finds
   tensions::Loss loss = tensions::Loss::squares;  ///< beads are Gaussian to first order
 };
 
@@ -69,7 +69,11 @@ void declare(stage::ParameterList& list, Parameters& p) {
   modulus.meaning += "; unset: springs carry the sheet, or nothing does";
   declare(list, p.substrate);
   declare(list, p.substrate.effects,
-          {"finite_thickness", "finite_sides", "depth_graded_gel", "common_motion", "effect_tolerance"});
+          {"finite_thickness", "finite_sides", "depth_graded_gel", "common_motion", "beads_under_load",
+           "effect_tolerance"});
+  parameter_named(list, "beads_under_load").meaning =
+      "with --displacement: use the positions of the beads while the cell pulls, as its images show the outline; auto: "
+      "off";
   declare(list, p.sheet);
   list.add("most_unbalanced", p.most_unbalanced, Range::between(0, 1),
            "with --traction: largest net force or torque that is corrected, as a share; more is refused");
@@ -90,6 +94,10 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.add("fit_line_tension", p.fit_line_tension, "with --displacement: also fit line_tension_nN");
   list.add("fit_adhesion_stiffness", p.fit_adhesion_stiffness,
            "with --displacement: also fit adhesion_stiffness_nN_per_um3, of springs between sheet and gel");
+  list.add(
+      "outline_error_um", p.outline_error_um, Range::zero_or_size_um(),
+      "with --displacement: standard error of the outline's place, outward, along x and along y (um); it is part of "
+      "the intervals");
   list.add("loss", p.loss,
            "with --displacement: loss function of the beads' residuals; all but squares give less weight to beads that "
            "stray");
@@ -265,9 +273,10 @@ void notice_mesh(stage::StageContext& context, const Solution& solution) {
 }
 
 /// displacement.csv: what the patches' forces make of the gel's surface.
+/// @param points_um  of the file  @param taken_um  where these lie on the gel that is computed
 void write_beads(stage::StageContext& context, const substrate::Substrate& model, const Solution& solution,
-                 const std::vector<Vec2>& points_um) {
-  const std::vector<Vec2> u = displacements_um(model, solution, points_um);
+                 const std::vector<Vec2>& points_um, const std::vector<Vec2>& taken_um) {
+  const std::vector<Vec2> u = displacements_um(model, solution, taken_um);
   DisplacementField field;
   for (std::size_t i = 0; i < points_um.size(); ++i)
     field.push_back({.position_um = points_um[i], .displacement_um = u[i], .sigma_um = 0, .flag = {}});
@@ -354,7 +363,8 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
   std::unique_ptr<substrate::Substrate> model;
   if (ground == Ground::gel) {
     model = choice::make_substrate(*gel, p.substrate, context.threads);
-    scene.size = size_on_gel(region, scene.material, *gel, scene.adhesion_nN_per_um3, model->capabilities());
+    scene.size =
+        size_on_gel(region, scene.material, *gel, scene.adhesion_nN_per_um3, model->capabilities(), scene.strain);
   }
   if (p.sheet.mesh_um) scene.size = with_edge(scene.size, *p.sheet.mesh_um);
   context.progress(0.1, "solving for the sheet");
@@ -362,8 +372,10 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
     result.solution = solve_on_springs(scene, context.threads);
   } else {
     result.solution = solve_on_gel(scene, *model, context.threads);
-    if (context.has_input("beads"))
-      write_beads(context, *model, result.solution, files::read_points(context.input("beads")));
+    if (context.has_input("beads")) {
+      const std::vector<Vec2> points = files::read_points(context.input("beads"));
+      write_beads(context, *model, result.solution, points, points);
+    }
     append(result.figures, model->figures());
     result.figures.emplace_back("gel_compliance", std::string(name_of(*result.solution.gel_held)));
     result.effects = model->effects();
@@ -419,7 +431,7 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
   if (p.sheet.ground && *p.sheet.ground != Ground::none)
     throw UsageError("with --traction the ground is the tractions: leave ground out, or set ground = none");
   if (p.sheet.strain == Strain::large)
-    throw UsageError("strain = large is for sheets on springs: tensions from tractions have small ones");
+    throw UsageError("strain = large is for a sheet of given contraction: tensions from tractions have small strains");
   context.assumed.clear();  // of a gel: none takes part
   const std::vector<GroundPatch> tractions = read_tractions(context.input("traction"));
   context.doubt(doubt_about_tractions(tractions), context.input("traction").string() + ": tractions");
@@ -490,15 +502,20 @@ DisplacementField read_beads(stage::StageContext& context) {
   return beads;
 }
 
+std::vector<Vec2> places_of(const DisplacementField& beads) {
+  std::vector<Vec2> places;
+  for (const Bead& bead : beads) places.push_back(bead.position_um);
+  return places;
+}
+
 tensions::LinearData data_of_adhesions(const DisplacementField& beads, stage::StageContext& context,
-                                       const substrate::Substrate& model, const Eigen::MatrixXd& motions) {
+                                       const substrate::Substrate& model, bool has_motion) {
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : files::read_adhesions(context.input("adhesions")))
     ellipses.push_back(substrate::ellipse_of(a));
-  std::vector<Vec2> places;
-  for (const Bead& bead : beads) places.push_back(bead.position_um);
+  const std::vector<Vec2> places = places_of(beads);
   return tensions::reduce(beads, substrate::dense_response(model.compliance_um_per_nN(places, ellipses), 1), {}, 1,
-                          motions);
+                          has_motion ? tensions::affine_motions(beads) : Eigen::MatrixXd());
 }
 
 struct Words {
@@ -582,11 +599,7 @@ void add_figures_of(const sheets::FieldFit& field, Figures& figures) {
   figures.emplace_back("contraction_is_as_smooth_as_tried", field.is_smoothing_at_end);
 }
 
-/// A part of the sheet: 1 there, 0 elsewhere. All parts add up to the sheet.
-struct Part {
-  std::string name;
-  std::function<double(Vec2)> share;
-};
+using sheets::Part;
 
 std::vector<Part> parts_of_cells(const Parameters& p, stage::StageContext& context) {
   if (!context.has_input("cells")) throw UsageError("fit_parts = cells: give the label image of the cells as --cells");
@@ -623,19 +636,6 @@ std::vector<Part> parts_of(const Parameters& p, stage::StageContext& context, co
           {"edge", [=](Vec2 place) { return is_edge(place) ? 1.0 : 0.0; }}};
 }
 
-/// At the points of the elements.
-std::vector<double> share_of(const Part& part, const Elements& elements, const Region& region) {
-  return contraction_at_points(elements, region, {1, {}, part.share});
-}
-
-/// Those of them that lie on the sheet.
-std::vector<Part> parts_on(std::vector<Part> parts, const Elements& elements, const Region& region) {
-  std::erase_if(parts, [&](const Part& part) {
-    return std::ranges::all_of(share_of(part, elements, region), [](double s) { return s == 0; });
-  });
-  return parts;
-}
-
 std::vector<Bundle> read_bundles(stage::StageContext& context) {
   std::vector<Bundle> bundles;
   if (!context.has_input("bundles")) return bundles;
@@ -646,10 +646,15 @@ std::vector<Bundle> read_bundles(stage::StageContext& context) {
   return bundles;
 }
 
-Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region) {
+/// @throws UsageError where what is given is what is asked for
+void check_fit(const Parameters& p) {
   if (!p.gel_modulus_kPa) throw UsageError("[gel] youngs_modulus_kPa is missing: the beads move with the gel");
   if (p.sheet.ground && *p.sheet.ground != Ground::gel)
     throw UsageError("with --displacement the ground is the gel: leave ground out, or set ground = gel");
+  if (p.sheet.strain == Strain::large)
+    throw UsageError(
+        "with --displacement strains are small: the beads' motion is linear in the contraction. Leave strain out, and "
+        "run the sheet that was found with strain = large to see what it changes");
   if (p.sheet.contraction_nN_per_um || p.sheet.contraction_kPa)
     throw UsageError(
         "with --displacement the contraction is fitted: leave contraction_nN_per_um and contraction_kPa out");
@@ -660,123 +665,36 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   if (p.fit_adhesion_stiffness && p.fit_parts == Parts::field)
     throw UsageError("fit_parts = field asks for a known bond: leave fit_adhesion_stiffness out");
   if (!p.sheet.thickness_um) throw UsageError("[sheet] thickness_um is missing: give it in cell.toml");
-  Gel gel = p.gel;
-  gel.youngs_modulus_kPa = *p.gel_modulus_kPa;
-  check(gel);
-  const DisplacementField beads = read_beads(context);
-  const double narrow = narrow_um(region), nu = p.sheet.poisson_ratio;
+}
+
+sheets::Question question_of(const Parameters& p, stage::StageContext& context, const Region& region) {
   Scene scene;
   scene.adhesive_um = adhesive_area(p, context, region);
   scene.region = with_borders_of(region, scene.adhesive_um);
-  scene.material = {1, nu, *p.sheet.thickness_um};
+  scene.material = {1, p.sheet.poisson_ratio, *p.sheet.thickness_um};
   scene.contraction = {1, p.sheet.edge_band_um, {}};
   scene.adhesion_nN_per_um3 = p.sheet.adhesion_stiffness_nN_per_um3;
   scene.size = size_for_fit(region);
   if (p.sheet.mesh_um) scene.size = with_edge(scene.size, *p.sheet.mesh_um);
-  const auto model = choice::make_substrate(gel, p.substrate, context.threads);
-  context.progress(0.1, "solving for the sheet at each stiffness");
-  const auto elements = elements_of(scene);
-  const OnGel ground(*elements, *model, adhering_triangles(*elements, scene.adhesive_um), context.threads);
-  const std::vector<Part> parts = parts_on(parts_of(p, context, region), *elements, region);
-  const std::vector<Bundle> bundles = within(*elements, read_bundles(context));
-  std::vector<std::vector<double>> shares;
-  std::vector<std::string> names;
-  for (const Part& part : parts) {
-    shares.push_back(share_of(part, *elements, region));
-    names.push_back(part.name);
-  }
-  std::optional<sheets::ContractionLattice> lattice;
-  if (p.fit_parts == Parts::field) {
-    lattice.emplace(*elements, p.field_points);
-    shares = lattice->shares_on(*elements);
-  }
-  if (shares.empty()) shares.push_back(contraction_at_points(*elements, region, scene.contraction));
-  const sheets::SheetShape shape{.elements = elements,
-                                 .contractions = shares,
-                                 .poisson_ratio = nu,
-                                 .n_rims = static_cast<int>(region.rims.size()),
-                                 .has_line = p.fit_line_tension,
-                                 .bundles = bundles,
-                                 .bond = p.fit_adhesion_stiffness ? sheets::Bond::fitted : sheets::Bond::known,
-                                 .adhesion_nN_per_um3 = scene.adhesion_nN_per_um3};
-  const sheets::StiffnessTable table(shape, ground, gel, narrow, context.threads);
-  context.progress(0.7, "fitting");
-  std::optional<double> known;
+  sheets::Question q{.scene = std::move(scene),
+                     .parts = parts_of(p, context, region),
+                     .has_line = p.fit_line_tension,
+                     .bundles = read_bundles(context),
+                     .bond = p.fit_adhesion_stiffness ? sheets::Bond::fitted : sheets::Bond::known,
+                     .loss = p.loss,
+                     .has_motion = tensions::allows_common_motion(p.substrate.effects),
+                     .outline_error_um = p.outline_error_um,
+                     .under_load = p.substrate.effects.beads_under_load,
+                     .tolerance = p.substrate.effects.effect_tolerance};
+  if (p.fit_parts == Parts::field) q.field_points = p.field_points;
   if (p.sheet.youngs_modulus_kPa)
-    known = Material{*p.sheet.youngs_modulus_kPa, nu, *p.sheet.thickness_um}.stiffness_nN_per_um();
-  const bool has_motion = tensions::allows_common_motion(p.substrate.effects);
-  const Eigen::MatrixXd motions = has_motion ? tensions::affine_motions(beads) : Eigen::MatrixXd();
-  tensions::LinearData data = data_of(beads, table, ground, *model, context.threads, motions);
-  std::vector<Vec2> places;
-  for (const Bead& bead : beads) places.push_back(bead.position_um);
-  const Eigen::Index n_parts = table.n_contractions();
-  const auto scene_of = [&](const sheets::Stiffnesses& stiffnesses, const Eigen::VectorXd& loads) {
-    Scene made = scene;
-    made.material.youngs_modulus_kPa = stiffnesses.sheet_nN_per_um * (1 - nu * nu) / *p.sheet.thickness_um;
-    made.adhesion_nN_per_um3 = stiffnesses.adhesion_nN_per_um3;
-    made.contraction.nN_per_um = loads.head(n_parts).maxCoeff();
-    const auto sum_of = [loads, n_parts](const auto& share) {
-      double sum = 0;
-      for (Eigen::Index k = 0; k < n_parts; ++k) sum += loads(k) * share(k);
-      return sum;
-    };
-    if (lattice || !parts.empty()) made.contraction.edge_band_um = std::nullopt;
-    if (lattice)
-      made.contraction.at = [=, &lattice](Vec2 place) {
-        const Eigen::VectorXd shares_there = lattice->shares_at(place);
-        return sum_of([&](Eigen::Index k) { return shares_there(k); });
-      };
-    if (!parts.empty())
-      made.contraction.at = [=, &parts](Vec2 place) {
-        return sum_of([&](Eigen::Index k) { return parts[static_cast<std::size_t>(k)].share(place); });
-      };
-    made.line_tension_nN = p.fit_line_tension ? loads(n_parts) : 0;
-    for (std::size_t k = 0; k < bundles.size(); ++k)
-      made.bundles.push_back({bundles[k], loads(loads.size() - std::ssize(bundles) + static_cast<Eigen::Index>(k))});
-    return made;
-  };
-  const auto mesh_error_um = [&](const sheets::Stiffnesses& stiffnesses, const Eigen::VectorXd& loads) {
-    const Scene found = scene_of(stiffnesses, loads);
-    return change_by_finer_mesh_um(found, solve_on(ground, elements, found), *model, places, context.threads);
-  };
-  std::optional<sheets::FieldFit> field;
-  if (lattice)
-    field = fit_field(std::move(data), table, p.loss, known, *lattice, means_over(*elements, *lattice), mesh_error_um);
-  sheets::SheetFit fit = field ? field->sheet : fit_sheet(std::move(data), table, p.loss, known, names, mesh_error_um);
-  const auto estimates_on = [&](const Gel& other) {
-    const auto its_model = choice::make_substrate(other, p.substrate, context.threads);
-    const OnGel its_ground(*elements, *its_model, adhering_triangles(*elements, scene.adhesive_um), context.threads);
-    const sheets::StiffnessTable its_table(shape, its_ground, other, narrow, context.threads);
-    tensions::LinearData its_data = data_of(beads, its_table, its_ground, *its_model, context.threads, motions);
-    if (!lattice) return fit_sheet(std::move(its_data), its_table, p.loss, known, names).estimates;
-    return fit_field(std::move(its_data), its_table, p.loss, known, *lattice, means_over(*elements, *lattice))
-        .sheet.estimates;
-  };
-  std::vector<std::vector<sheets::SheetEstimate>> on_other_gel;
-  const bool has_known_stiffness = known || p.sheet.adhesion_stiffness_nN_per_um3;
-  for (const Gel& other : tensions::gels_an_error_away(gel)) on_other_gel.push_back(estimates_on(other));
-  if (has_known_stiffness && gel.youngs_modulus_sigma_kPa.value_or(0) > 0) {
-    Gel stiffer = gel;  // forces are not proportional to its modulus
-    stiffer.youngs_modulus_kPa += *gel.youngs_modulus_sigma_kPa;
-    on_other_gel.push_back(estimates_on(stiffer));
-  }
-  add_errors(fit.estimates, has_known_stiffness ? 0 : gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa,
-             on_other_gel);
-  if (context.has_input("adhesions")) compare_with_adhesions(fit, data_of_adhesions(beads, context, *model, motions));
+    q.stiffness_nN_per_um =
+        Material{*p.sheet.youngs_modulus_kPa, p.sheet.poisson_ratio, *p.sheet.thickness_um}.stiffness_nN_per_um();
+  return q;
+}
 
-  scene = scene_of(fit.stiffnesses, fit.loads);
-  if (field) scene.contraction.nN_per_um = fit.estimates.front().value;
-  Run result{.solution = solve_on(ground, elements, scene), .figures = {}, .effects = model->effects()};
-  write_beads(context, *model, result.solution, places);
-  const Path estimates_file = context.output("out", "sheet_fit.csv"),
-             models_file = context.output("out", "sheet_models.csv");
-  write_estimates(estimates_file, fit);
-  write_models(models_file, fit);
-  if (field) {
-    const std::vector<sheets::ContractionAt> at_nodes = contractions_at(*elements, *lattice, *field);
-    write_contractions(context.output("out", "contraction.csv"), at_nodes);
-    notice_expansion(context, at_nodes);
-  }
+/// "contraction 1.8 nN/µm (1.7 to 1.9); …"
+std::string told_by(const sheets::SheetFit& fit) {
   std::string told;
   std::vector<double> bundles_nN;
   for (const sheets::SheetEstimate& e : fit.estimates) {
@@ -786,28 +704,69 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
       told += (told.empty() ? "" : "; ") + sentence_of(e);
     }
   }
-  if (!bundles_nN.empty()) {  // sheet_fit.csv has each
-    const auto [least, most] = std::ranges::minmax(bundles_nN);
-    told += "; tensions of " + std::to_string(bundles_nN.size()) + " bundles " + brief(least) + " to " + brief(most) +
-            " nN";
-  }
-  result.told = told;
-  result.tables = report::tables_of_sheet(estimates_file, models_file);
+  if (bundles_nN.empty()) return told;
+  const auto [least, most] = std::ranges::minmax(bundles_nN);  // sheet_fit.csv has each
+  return told + "; tensions of " + std::to_string(bundles_nN.size()) + " bundles " + brief(least) + " to " +
+         brief(most) + " nN";
+}
+
+/// What a reader must know of the fit.
+void notice_fit(stage::StageContext& context, const sheets::BeadFit& found, const std::string& told) {
+  const sheets::SheetFit& fit = found.fit;
   const auto stiffness =
       std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &sheets::SheetEstimate::quantity);
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
   notice_unexplained(context, fit);
-  if (!field) notice_expansion(context, fit, static_cast<int>(n_parts));
+  if (!found.field) notice_expansion(context, fit, found.n_parts);
   context.notice(noticed(FindingKind::sheet_at_bound, fit.is_at_bound ? 1 : 0,
                          "The best stiffness, " + brief(fit.stiffnesses.sheet_nN_per_um) +
-                             " nN/µm, is an end of the range " + brief(table.sheet_nN_per_um().low) + " to " +
-                             brief(table.sheet_nN_per_um().high) + "."));
+                             " nN/µm, is an end of the range " + brief(found.tried_nN_per_um.low) + " to " +
+                             brief(found.tried_nN_per_um.high) + "."));
+}
+
+Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region) {
+  check_fit(p);
+  Gel gel = p.gel;
+  gel.youngs_modulus_kPa = *p.gel_modulus_kPa;
+  check(gel);
+  const sheets::GelModels models{
+      .usual = [&](const Gel& of) { return choice::make_substrate(of, p.substrate, context.threads); },
+      .with_base =
+          [&](const Gel& of) {
+            substrate::SubstrateParameters layer = p.substrate;
+            layer.model = substrate::ModelKind::layer;
+            return choice::make_substrate(of, layer, context.threads);
+          }};
+  const auto model = models.usual(gel);
+  const sheets::Question question = question_of(p, context, region);
+  const DisplacementField beads = read_beads(context);
+  sheets::BeadFit found = fit_beads(question, beads, gel, *model, models, context.threads,
+                                    [&](double share, const char* doing) { context.progress(share, doing); });
+  sheets::SheetFit& fit = found.fit;
+  const Scene& scene = found.scene;
+  if (context.has_input("adhesions"))
+    compare_with_adhesions(fit, data_of_adhesions(found.beads, context, *model, question.has_motion));
+  Run result{.solution = std::move(found.solution), .figures = {}, .effects = model->effects()};
+  write_beads(context, *model, result.solution, places_of(beads), places_of(found.beads));
+  const Path estimates_file = context.output("out", "sheet_fit.csv"),
+             models_file = context.output("out", "sheet_models.csv");
+  write_estimates(estimates_file, fit);
+  write_models(models_file, fit);
+  if (found.field) {
+    const std::vector<sheets::ContractionAt> at_nodes =
+        contractions_at(*result.solution.elements, *found.lattice, *found.field);
+    write_contractions(context.output("out", "contraction.csv"), at_nodes);
+    notice_expansion(context, at_nodes);
+  }
+  result.told = told_by(fit);
+  result.tables = report::tables_of_sheet(estimates_file, models_file);
+  notice_fit(context, found, result.told);
   result.figures = {{"ground", std::string(name_of(Ground::gel))},
                     {"strain", std::string(name_of(Strain::small))},
                     {"stiffness_nN_per_um", fit.stiffnesses.sheet_nN_per_um},
                     {"contraction_nN_per_um", scene.contraction.nN_per_um},
                     {"youngs_modulus_kPa", scene.material.youngs_modulus_kPa},
-                    {"fitted", told},
+                    {"fitted", result.told},
                     {"correlation", fit.correlation},
                     {"relative_l2", fit.relative_l2},
                     {"expected_relative_l2", fit.expected_relative_l2.value_or(fit.relative_l2)},
@@ -815,12 +774,15 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
                     {"n_down_weighted", std::int64_t{fit.n_down_weighted}},
                     {"aic", fit.models[fit.own_model].aic},
                     {"aic_of_nothing", fit.models.front().aic}};
-  if (field) add_figures_of(*field, result.figures);
+  if (found.field) add_figures_of(*found.field, result.figures);
   const double x = free_contraction(scene.material, scene.contraction.nN_per_um);
   result.effects.push_back(stage::decided(EffectKind::gel_response, Switch::on, true, "the beads move with the gel"));
-  result.effects.push_back(stage::decided(EffectKind::common_motion, switched(has_motion), has_motion,
+  result.effects.push_back(stage::decided(EffectKind::common_motion, switched(question.has_motion), question.has_motion,
                                           "shift, turn, growth and shear of all beads are found with the sheet"));
-  result.effects.push_back(decide_strain(p.sheet.strain, x, Ground::gel));
+  result.effects.push_back(found.under_load);
+  result.effects.push_back(
+      stage::decided(EffectKind::large_strain, Switch::off, x, kLargestStrain,
+                     "the beads' motion is linear in the contraction; a free sheet would contract by"));
   result.effects.push_back(thickness_effect(scene.material, region));
   notice_shape(context, scene.material, region);
   context.notice(

@@ -42,15 +42,12 @@ GroundChoice decide_ground(std::optional<Ground> asked, const Material& material
 }
 
 Effect decide_strain(std::optional<Strain> asked, double contraction, Ground ground) {
-  if (ground == Ground::springs) {
-    const Switch setting = asked ? switched(*asked == Strain::large) : Switch::automatic;
+  const Switch setting = asked ? switched(*asked == Strain::large) : Switch::automatic;
+  if (ground == Ground::springs || asked == Strain::large)
     return stage::decided(EffectKind::large_strain, setting, contraction, kLargestStrain,
                           "a sheet that nothing holds would contract by");
-  }
-  if (asked == Strain::large)
-    throw UsageError("strain = large is for sheets on springs: on a gel, and of tractions, strains are small");
   return stage::decided(EffectKind::large_strain, switched(false), false,
-                        "small strains: a free sheet would contract by " + brief(contraction));
+                        "small strains, unless strain = large: a free sheet would contract by " + brief(contraction));
 }
 
 }  // namespace mbtfm::sheet

@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "continuum/sheet/mesh_size.h"
+#include "continuum/sheet/moved_rims.h"
 #include "continuum/sheet/patches.h"
+#include "pipeline/contract/errors.h"
 
 namespace mbtfm::sheet {
 namespace {
@@ -41,6 +43,39 @@ NodeVectors load_of(const Solution& solution) {
   for (const TautBundle& taut : solution.bundles)
     load += taut.tension_nN * forces_of_bundle_nN(*solution.elements, taut.bundle);
   return load;
+}
+
+/// @param solution  prepared
+Solution solved_on(const OnGel& ground, Solution solution, const Scene& scene) {
+  const Elements& elements = *solution.elements;
+  for (const TautBundle& taut : scene.bundles)  // each mesh ends a little elsewhere
+    solution.bundles.push_back({within(elements, {taut.bundle}).front(), taut.tension_nN});
+  solution.strain = scene.strain;
+  const bool is_large = scene.strain == Strain::large;
+  MBTFM_ASSERT(!is_large || scene.bundles.empty());
+  OnGel::Solution found = is_large ? ground.solve_large(solution.sheet, scene.measure, scene.adhesion_nN_per_um3)
+                                   : ground.solve(scene.material, scene.adhesion_nN_per_um3, load_of(solution));
+  solution.u = std::move(found.u);
+  solution.report = found.report;
+  solution.gel_held = ground.held();
+  solution.at_points = is_large ? large_tension_at_points(elements, solution.sheet, scene.measure, solution.u)
+                                : tension_at_points(elements, solution.sheet, solution.u);
+  solution.at_nodes = recovered(elements, solution.at_points);
+  for (int t = 0; t < elements.n_triangles(); ++t)
+    solution.patches.push_back({patch_of(elements, t).centre_um, elements.area_um2(t), {}, {}});
+  const Eigen::VectorXd gel_um = ground.gel_um(found.forces_nN);
+  for (std::size_t k = 0; k < ground.triangles().size(); ++k) {
+    GroundPatch& patch = solution.patches[static_cast<std::size_t>(ground.triangles()[k])];
+    patch.traction_kPa = 1 / patch.area_um2 * at_node(found.forces_nN, static_cast<int>(k));
+    patch.displacement_um = at_node(gel_um, static_cast<int>(k));
+  }
+  return solution;
+}
+
+Eigen::VectorXd as_vector(const std::vector<Vec2>& u) {
+  Eigen::VectorXd all(2 * std::ssize(u));
+  for (std::size_t i = 0; i < u.size(); ++i) all.segment<2>(2 * static_cast<Eigen::Index>(i)) << u[i].x, u[i].y;
+  return all;
 }
 
 }  // namespace
@@ -80,6 +115,7 @@ std::vector<int> adhering_triangles(const Elements& elements, const std::vector<
 
 Solution solve_on_springs(const Scene& scene, int threads) {
   Solution solution = prepared(elements_of(scene), scene);
+  solution.strain = scene.strain;
   const Elements& elements = *solution.elements;
   solution.sheet.spring_nN_per_um3 = even(elements, 0);
   for (const int t : adhering_triangles(elements, scene.adhesive_um))
@@ -116,29 +152,14 @@ Solution solve_on_springs(const Scene& scene, int threads) {
 }
 
 Solution solve_on(const OnGel& ground, std::shared_ptr<const Elements> triangles, const Scene& scene) {
-  Solution solution = prepared(std::move(triangles), scene);
-  const Elements& elements = *solution.elements;
-  solution.bundles = scene.bundles;
-  OnGel::Solution found = ground.solve(scene.material, scene.adhesion_nN_per_um3, load_of(solution));
-  solution.u = std::move(found.u);
-  solution.report = found.report;
-  solution.gel_held = ground.held();
-  solution.at_points = tension_at_points(elements, solution.sheet, solution.u);
-  solution.at_nodes = recovered(elements, solution.at_points);
-  for (int t = 0; t < elements.n_triangles(); ++t)
-    solution.patches.push_back({patch_of(elements, t).centre_um, elements.area_um2(t), {}, {}});
-  const Eigen::VectorXd gel_um = ground.gel_um(found.forces_nN);
-  for (std::size_t k = 0; k < ground.triangles().size(); ++k) {
-    GroundPatch& patch = solution.patches[static_cast<std::size_t>(ground.triangles()[k])];
-    patch.traction_kPa = 1 / patch.area_um2 * at_node(found.forces_nN, static_cast<int>(k));
-    patch.displacement_um = at_node(gel_um, static_cast<int>(k));
-  }
-  return solution;
+  return solved_on(ground, prepared(std::move(triangles), scene), scene);
 }
 
 Solution solve_on_gel(const Scene& scene, const substrate::Substrate& gel, int threads) {
   const std::shared_ptr<const Elements> elements = elements_of(scene);
-  return solve_on(OnGel(*elements, gel, adhering_triangles(*elements, scene.adhesive_um), threads), elements, scene);
+  const std::optional<Held> held = scene.strain == Strain::large ? std::optional(Held::dense) : std::nullopt;
+  return solve_on(OnGel(*elements, gel, adhering_triangles(*elements, scene.adhesive_um), threads, held), elements,
+                  scene);
 }
 
 std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Solution& solution,
@@ -153,17 +174,30 @@ std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Soluti
   return gel.displacements_um(points_um, patches, forces);
 }
 
-Eigen::VectorXd change_by_finer_mesh_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,
-                                        const std::vector<Vec2>& points_um, int threads) {
-  constexpr double kFiner = 0.7;
-  Scene fine = scene;
-  fine.size = with_edge(fine.size, kFiner * fine.size.at_curves_um);
-  const std::vector<Vec2> here = displacements_um(gel, solution, points_um),
-                          there = displacements_um(gel, solve_on_gel(fine, gel, threads), points_um);
-  Eigen::VectorXd change(2 * std::ssize(here));
-  for (std::size_t i = 0; i < here.size(); ++i)
-    change.segment<2>(2 * static_cast<Eigen::Index>(i)) << there[i].x - here[i].x, there[i].y - here[i].y;
-  return change;
+Eigen::VectorXd displacements_on_finer_mesh_um(Scene scene, double share, const substrate::Substrate& gel,
+                                               const std::vector<Vec2>& points_um, int threads) {
+  scene.size = with_edge(scene.size, share * scene.size.at_curves_um);
+  return as_vector(displacements_um(gel, solve_on_gel(scene, gel, threads), points_um));
+}
+
+Eigen::MatrixXd changes_by_outline_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,
+                                      const std::vector<Vec2>& points_um, double error_um, int threads) {
+  Solution larger;
+  larger.elements =
+      std::make_shared<const Elements>(with_rims_further_out(*solution.elements, solution.sheet.n_rims, error_um));
+  larger.sheet = solution.sheet;
+  const OnGel ground(*larger.elements, gel, adhering_triangles(*solution.elements, scene.adhesive_um), threads);
+  larger = solved_on(ground, std::move(larger), scene);
+  const auto seen_from = [&](Vec2 shift_um) {
+    std::vector<Vec2> places = points_um;
+    for (Vec2& place : places) place = place - shift_um;
+    return as_vector(displacements_um(gel, solution, places));
+  };
+  const Eigen::VectorXd here = seen_from({});
+  Eigen::MatrixXd changes(here.size(), 3);
+  changes << as_vector(displacements_um(gel, larger, points_um)) - here, seen_from({error_um, 0}) - here,
+      seen_from({0, error_um}) - here;
+  return changes;
 }
 
 Balance balance_of(const Solution& solution) {
@@ -178,9 +212,11 @@ Balance balance_of(const Solution& solution) {
   double virial = 0;
   for (const GroundPatch& patch : solution.patches) {
     const Vec2 force = patch.area_um2 * patch.traction_kPa, arm = patch.position_um - centre;
+    // of large strains the sheet is in balance where it has moved to; springs lengthen along their forces
+    const Vec2 moved = solution.strain == Strain::large ? patch.displacement_um : Vec2{};
     balance.total_force_nN += norm(force);
     balance.net_force_nN += force;
-    balance.net_torque_nN_um += cross(arm, force);
+    balance.net_torque_nN_um += cross(arm + moved, force);
     balance.largest_torque_nN_um += norm(arm) * norm(force);
     virial += dot(arm, force);
   }

@@ -43,7 +43,7 @@ struct Scene {
   Material material;
   Contraction contraction;
   double line_tension_nN = 0;
-  std::vector<TautBundle> bundles = {};            ///< on a gel
+  std::vector<TautBundle> bundles = {};            ///< on a gel, of small strains
   std::optional<double> adhesion_nN_per_um3 = {};  ///< unset: bonded, where there is a gel
   std::vector<Polygon> adhesive_um = {};  ///< the sheet adheres where a place lies in an odd number; none: everywhere
   Strain strain = Strain::small;
@@ -66,6 +66,7 @@ struct Solution {
   std::vector<Tensor> at_points, at_nodes;  ///< S
   std::vector<GroundPatch> patches;         ///< by triangle; of one that does not adhere without traction
   Report report;
+  Strain strain = Strain::small;
   std::vector<TautBundle> bundles = {};
   std::vector<double> sigma_by_triangle = {};  ///< of the mean tension (nN/um); empty: not known
   std::optional<Held> gel_held = {};           ///< its compliance; unset: there is no gel
@@ -83,18 +84,21 @@ Solution solve_on_springs(const Scene& scene, int threads);
 /// The same in two steps, to solve for several sheets on one ground.
 std::shared_ptr<const Elements> elements_of(const Scene& scene);
 Solution solve_on(const OnGel& ground, std::shared_ptr<const Elements> elements, const Scene& scene);
-/// Small strains. @throws InvalidData, NotSolved
+/// @throws InvalidData, NotSolved
 Solution solve_on_gel(const Scene& scene, const substrate::Substrate& gel, int threads);
 
 /// What a solution on a gel does to points of its surface.
 std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Solution& solution,
                                    const std::vector<Vec2>& points_um);
-/// By how much they change (2·points) with triangles of 0.7 of the size. Triangles fall differently on each mesh, and
-/// displacements beside the edge, where tractions are singular, change without order from one to the next: by this
-/// they are known.
-/// @param solution  of this scene
-Eigen::VectorXd change_by_finer_mesh_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,
-                                        const std::vector<Vec2>& points_um, int threads);
+/// The same (2·points) by this scene on triangles of a share of their size. Triangles fall differently on each mesh,
+/// and displacements beside the edge, where tractions are singular, change without order from one to the next.
+Eigen::VectorXd displacements_on_finer_mesh_um(Scene scene, double share, const substrate::Substrate& gel,
+                                               const std::vector<Vec2>& points_um, int threads);
+/// What errors of the outline's place change of them (2·points × 3), on the same triangles: the rims lie further out by
+/// this much, or the sheet further along x, or along y.
+/// @param solution  of this scene on a gel
+Eigen::MatrixXd changes_by_outline_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,
+                                      const std::vector<Vec2>& points_um, double error_um, int threads);
 
 /// What must hold of any solution.
 struct Balance {

@@ -30,7 +30,7 @@ TriangleSize size_on_springs(const Region& region, double penetration_um) {
 }
 
 TriangleSize size_on_gel(const Region& region, const Material& material, const Gel& gel,
-                         std::optional<double> adhesion_nN_per_um3, const substrate::Capabilities& can) {
+                         std::optional<double> adhesion_nN_per_um3, const substrate::Capabilities& can, Strain strain) {
   const double narrow = narrow_um(region);
   const double mu = gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio));
   // how far into the sheet its edge is felt: the gel's counterpart of a penetration length
@@ -39,7 +39,7 @@ TriangleSize size_on_gel(const Region& region, const Material& material, const G
   // measured: 1 % of the largest displacement, which lies at the edge; finer where a soft sheet gives way near it alone
   const double per_width = std::clamp(1.6 * narrow / reach, 60.0, 90.0);
   // as expected_triangles() counts: half a GB of compliances at the most, or some seconds where a lattice has them
-  const double most = substrate::is_alike_everywhere(can) ? 4000 : 1500;
+  const double most = substrate::is_alike_everywhere(can) && strain == Strain::small ? 4000 : 1500;
   TriangleSize size{.at_curves_um = narrow / per_width, .largest_um = narrow / 4, .growth = 0.9, .most_turn_rad = 0.35};
   while (expected_triangles(region, size) > most) size = with_edge(size, 1.1 * size.at_curves_um);
   return size;

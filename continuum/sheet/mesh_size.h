@@ -16,7 +16,8 @@ TriangleSize size_on_springs(const Region& region, double penetration_um);
 /// On a gel: tractions rise as 1/√distance towards the edge.
 /// @param can  of the gel: how many patches there may be
 TriangleSize size_on_gel(const Region& region, const Material& material, const Gel& gel,
-                         std::optional<double> adhesion_nN_per_um3, const substrate::Capabilities& can = {});
+                         std::optional<double> adhesion_nN_per_um3, const substrate::Capabilities& can = {},
+                         Strain strain = Strain::small);
 
 /// Of a sheet of any stiffness.
 TriangleSize size_for_fit(const Region& region);

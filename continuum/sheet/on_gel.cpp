@@ -7,6 +7,7 @@
 #include "continuum/sheet/stiffness.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::sheet {
 namespace {
@@ -72,6 +73,31 @@ class Balanced {
 /// By column.
 Eigen::RowVectorXd dots(const MatrixXd& a, const MatrixXd& b) { return a.cwiseProduct(b).colwise().sum(); }
 
+/// Newton's step by conjugate gradients, to what its neighbours need; where the energy bends down along a step, what
+/// was found before.
+NodeVectors downhill(const std::function<NodeVectors(const NodeVectors&)>& stiffness, const Stiffness& preconditioner,
+                     const NodeVectors& left_nN) {
+  constexpr double kClose = 1e-5;  // of the energy norm
+  constexpr int kMost = 300;
+  NodeVectors found = NodeVectors::Zero(left_nN.size()), residual = left_nN, z = preconditioner.solve(residual),
+              step = z;
+  double energy = residual.dot(z);
+  const double whole = energy;
+  for (int k = 0; k < kMost && energy > kClose * kClose * whole; ++k) {
+    const NodeVectors answer = stiffness(step);
+    const double curvature = step.dot(answer);
+    if (curvature <= 0) return k == 0 ? step : found;
+    const double length = energy / curvature;
+    found += length * step;
+    residual -= length * answer;
+    z = preconditioner.solve(residual);
+    const double next = residual.dot(z);
+    step = z + next / energy * step;
+    energy = next;
+  }
+  return found;
+}
+
 constexpr double kTolerance = 1e-8;  // of the energy norm of the residual: u is asked to 1 %
 constexpr int kMostIterations = 2000;
 
@@ -90,12 +116,31 @@ OnGel::OnGel(const Elements& elements, const substrate::Substrate& gel, std::vec
   }
 }
 
-/// Of each patch's springs.
-VectorXd OnGel::slip_um_per_nN(double adhesion_nN_per_um3) const {
-  VectorXd slip(2 * patches_.n());
+/// Of each patch's springs; 0 where it is bonded.
+VectorXd OnGel::slip_um_per_nN(std::optional<double> adhesion_nN_per_um3) const {
+  VectorXd slip = VectorXd::Zero(2 * patches_.n());
+  if (!adhesion_nN_per_um3) return slip;
   for (Index i = 0; i < slip.size(); ++i)
-    slip(i) = 1 / (adhesion_nN_per_um3 * patches_.areas_um2[static_cast<std::size_t>(i / 2)]);
+    slip(i) = 1 / (*adhesion_nN_per_um3 * patches_.areas_um2[static_cast<std::size_t>(i / 2)]);
   return slip;
+}
+
+/// What the gel under a patch and its neighbours is like.
+VectorXd OnGel::spring_nN_per_um(const VectorXd& slip) const {
+  constexpr double kNeighbours = 4;
+  return (kNeighbours * compliance_->diagonal_um_per_nN() + slip).cwiseInverse();
+}
+
+/// Springs that stand for the ground: by patch and component.
+void OnGel::add_springs(Stiffness& stiffness, const VectorXd& spring) const {
+  for (std::size_t k = 0; k < patches_.triangles.size(); ++k) {
+    Stiffness::OfElement K = Stiffness::OfElement::Zero();
+    const auto& w = weights_[k];
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j)
+        for (int a = 0; a < 2; ++a) K(2 * i + a, 2 * j + a) = spring(2 * static_cast<Index>(k) + a) * w[i] * w[j];
+    stiffness.add(patches_.triangles[k], K);
+  }
 }
 
 OnGel::Solution OnGel::solve(const Material& material, std::optional<double> adhesion_nN_per_um3,
@@ -110,9 +155,7 @@ OnGel::Solutions OnGel::solve_all(const Material& material, std::optional<double
   const Means means{elements, patches_.triangles, weights_};
   const Index n = means.n();
   Stiffness free(elements, pins(elements)), held(elements, {});
-  const VectorXd slip = adhesion_nN_per_um3 ? slip_um_per_nN(*adhesion_nN_per_um3) : VectorXd::Zero(n);
-  constexpr double kNeighbours = 4;  // what the gel under a patch and its neighbours is like
-  const VectorXd spring = (kNeighbours * compliance_->diagonal_um_per_nN() + slip).cwiseInverse();
+  const VectorXd slip = slip_um_per_nN(adhesion_nN_per_um3), spring = spring_nN_per_um(slip);
   const auto ground_um = [&](const MatrixXd& forces) -> MatrixXd {
     return gel_um(forces) + slip.asDiagonal() * forces;
   };
@@ -121,14 +164,7 @@ OnGel::Solutions OnGel::solve_all(const Material& material, std::optional<double
     free.add(t, K);
     held.add(t, K);
   }
-  for (std::size_t k = 0; k < patches_.triangles.size(); ++k) {
-    Stiffness::OfElement K = Stiffness::OfElement::Zero();
-    const auto& w = weights_[k];
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j)
-        for (int a = 0; a < 2; ++a) K(2 * i + a, 2 * j + a) = spring(2 * static_cast<Index>(k) + a) * w[i] * w[j];
-    held.add(patches_.triangles[k], K);
-  }
+  add_springs(held, spring);
   if (!free.factorise(0, threads_) || !held.factorise(0, threads_))
     throw NotSolved({.reason = "the sheet has no stiffness: check its Young's modulus and thickness"});
   const MatrixXd rigid = rigid_motions(elements);
@@ -170,6 +206,48 @@ OnGel::Solutions OnGel::solve_all(const Material& material, std::optional<double
   return solution;
 }
 
+OnGel::Solution OnGel::solve_large(const Sheet& sheet, ContractionMeasure measure,
+                                   std::optional<double> adhesion_nN_per_um3) const {
+  const Elements& elements = *patches_.elements;
+  const Means means{elements, patches_.triangles, weights_};
+  const LargeSheet large(elements, sheet, measure);
+  const VectorXd slip = slip_um_per_nN(adhesion_nN_per_um3), spring = spring_nN_per_um(slip);
+  MatrixXd ground = compliance_->matrix_um_per_nN();
+  ground.diagonal() += slip;
+  if (!numerics::upper_cholesky(ground, threads_))
+    throw NotSolved({.reason = "the gel's answer to the patches is not definite; strain = small"});
+  const auto forces_of = [&](const NodeVectors& u) -> VectorXd {
+    MatrixXd forces = means.of(u);
+    numerics::solve_upper_transposed(ground, forces);
+    numerics::solve_upper(ground, forces);
+    return forces;
+  };
+  Stiffness held(elements, {});
+  const LoadedSheet loaded{
+      .energy_fJ =
+          [&](const NodeVectors& u, double share) {
+            return large.energy_fJ(u, share) + 0.5 * forces_of(u).dot(VectorXd(means.of(u)));
+          },
+      .left_nN = [&](const NodeVectors& u, double share) -> NodeVectors {
+        return large.left_nN(u, share) - means.spread(forces_of(u));
+      },
+      .move = [&](const NodeVectors& u, double share, const NodeVectors& left) -> std::optional<NodeVectors> {
+        held.set_zero();
+        large.add_to(held, u, share);
+        add_springs(held, spring);
+        if (!factorise_shifted(held, threads_)) return std::nullopt;
+        return downhill(
+            [&](const NodeVectors& step) -> NodeVectors {
+              return large.change_nN(u, share, step) + means.spread(forces_of(step));
+            },
+            held, left);
+      },
+      .force_scale_nN = forces_of_contraction_nN(elements, sheet).norm()};
+  LargeStrain found = in_load_steps(loaded, 2 * elements.n_nodes());
+  VectorXd forces_nN = forces_of(found.u);
+  return {std::move(found.u), std::move(forces_nN), std::move(found.report)};
+}
+
 OnGel::Reduced OnGel::reduced(const MatrixXd& forces_nN, double poisson_ratio, const MatrixXd& loads_nN) const {
   const Elements& elements = *patches_.elements;
   const Means means{elements, patches_.triangles, weights_};
@@ -180,7 +258,7 @@ OnGel::Reduced OnGel::reduced(const MatrixXd& forces_nN, double poisson_ratio, c
   MBTFM_ASSERT(is_definite);
   const MatrixXd spread = means.spread(forces_nN);
   return {.gel = forces_nN.transpose() * gel_um(forces_nN),
-          .slip = forces_nN.transpose() * slip_um_per_nN(1).asDiagonal() * forces_nN,
+          .slip = forces_nN.transpose() * slip_um_per_nN(1.0).asDiagonal() * forces_nN,
           .sheet = spread.transpose() * free.solve(spread),
           .pull = spread.transpose() * free.solve(loads_nN)};
 }

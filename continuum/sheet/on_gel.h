@@ -6,9 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "continuum/sheet/large_strain.h"
 #include "continuum/sheet/patch_compliance.h"
-#include "continuum/sheet/sheet.h"
-#include "pipeline/contract/report.h"
 
 namespace mbtfm::sheet {
 
@@ -45,6 +44,11 @@ class OnGel {
   Solutions solve_all(const Material& material, std::optional<double> adhesion_nN_per_um3,
                       const Eigen::MatrixXd& loads_nN) const;
 
+  /// Large strains of the sheet; those of the gel are small, and its forces act where its surface is at rest. Energy of
+  /// the sheet and ½ (W u)ᵀ (C + 1 / κA)⁻¹ W u of what holds it, by Newton's method in load steps.
+  /// @throws as in_load_steps; NotSolved where the gel's compliance is not definite
+  Solution solve_large(const Sheet& sheet, ContractionMeasure measure, std::optional<double> adhesion_nN_per_um3) const;
+
   /// For sheets of any stiffness on adhesions of any stiffness, the equations of forces F = V a, V balanced:
   ///
   ///   (Vᵀ C V + Vᵀ A⁻¹ V / κ + Vᵀ W K₁⁻¹ Wᵀ V / M) a = Vᵀ W K₁⁻¹ f / M,   K₁ of a sheet with M = 1
@@ -62,7 +66,9 @@ class OnGel {
   Eigen::MatrixXd gel_um(const Eigen::MatrixXd& forces_nN) const { return compliance_->displace(forces_nN); }
 
  private:
-  Eigen::VectorXd slip_um_per_nN(double adhesion_nN_per_um3) const;
+  Eigen::VectorXd slip_um_per_nN(std::optional<double> adhesion_nN_per_um3) const;
+  Eigen::VectorXd spring_nN_per_um(const Eigen::VectorXd& slip_um_per_nN) const;
+  void add_springs(Stiffness& stiffness, const Eigen::VectorXd& spring_nN_per_um) const;
   Patches patches_;
   int threads_;
   Held held_;

@@ -1,213 +1,34 @@
 #include "continuum/sheet/on_springs.h"
 
-#include <Eigen/LU>
-#include <cmath>
-
 #include "continuum/sheet/stiffness.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/numbers.h"
 
 namespace mbtfm::sheet {
-namespace {
-
-using Eigen::Matrix2d;
-
-const double* springs_of(const Sheet& sheet, int triangle) {
-  return sheet.spring_nN_per_um3.data() + Elements::kPoints * triangle;
-}
-
-/// First Piola–Kirchhoff stress, and its derivative along a change of the gradient.
-struct PointLaw {
-  Matrix2d F, S;
-  double s, M, nu;
-  ContractionMeasure measure;
-
-  PointLaw(const Material& material, double contraction, ContractionMeasure how, const Matrix2d& gradient)
-      : F(Matrix2d::Identity() + gradient),
-        s(contraction),
-        M(material.stiffness_nN_per_um()),
-        nu(material.poisson_ratio),
-        measure(how) {
-    S = law(0.5 * (F.transpose() * F - Matrix2d::Identity()));
-    if (measure == ContractionMeasure::second_piola) S += s * Matrix2d::Identity();
-  }
-  Matrix2d law(const Matrix2d& E) const { return M * ((1 - nu) * E + nu * E.trace() * Matrix2d::Identity()); }
-  static Matrix2d cofactor(const Matrix2d& A) {
-    return (Matrix2d() << A(1, 1), -A(1, 0), -A(0, 1), A(0, 0)).finished();
-  }
-  Matrix2d stress() const {
-    Matrix2d P = F * S;
-    if (measure == ContractionMeasure::surface_tension) P += s * cofactor(F);
-    return P;
-  }
-  Matrix2d change(const Matrix2d& dF) const {
-    const Matrix2d dE = 0.5 * (F.transpose() * dF + dF.transpose() * F);
-    Matrix2d dP = dF * S + F * law(dE);
-    if (measure == ContractionMeasure::surface_tension) dP += s * cofactor(dF);
-    return dP;
-  }
-  double energy() const {
-    const Matrix2d E = 0.5 * (F.transpose() * F - Matrix2d::Identity());
-    const double elastic = 0.5 * M * ((1 - nu) * E.squaredNorm() + nu * E.trace() * E.trace());
-    return elastic + s * (measure == ContractionMeasure::surface_tension ? F.determinant() - 1 : E.trace());
-  }
-};
-
-/// Energy of the sheet, the forces that are left, and the stiffness, with its contraction times a share.
-class Equilibrium {
- public:
-  Equilibrium(const Elements& elements, const Sheet& sheet, ContractionMeasure measure)
-      : elements_(elements), sheet_(sheet), measure_(measure) {}
-
-  double energy_fJ(const NodeVectors& u, double share) const {
-    double energy = 0;
-    for (int t = 0; t < elements_.n_triangles(); ++t)
-      for (int p = 0; p < Elements::kPoints; ++p) {
-        const Shape& shape = elements_.at(t, p);
-        const Matrix2d gradient = gradient_of(u, elements_.nodes(t), shape);
-        if ((Matrix2d::Identity() + gradient).determinant() <= 0) return std::numeric_limits<double>::infinity();
-        const Vec2 at = value_of(u, elements_.nodes(t), shape);
-        energy +=
-            shape.weight_um2 * (law_at(t, p, share, gradient).energy() + 0.5 * springs_of(sheet_, t)[p] * dot(at, at));
-      }
-    return energy;
-  }
-
-  NodeVectors left_nN(const NodeVectors& u, double share) const {
-    NodeVectors f = NodeVectors::Zero(u.size());
-    for (int t = 0; t < elements_.n_triangles(); ++t)
-      for (int p = 0; p < Elements::kPoints; ++p) {
-        const Shape& shape = elements_.at(t, p);
-        const Matrix2d P = law_at(t, p, share, gradient_of(u, elements_.nodes(t), shape)).stress();
-        const Vec2 at = value_of(u, elements_.nodes(t), shape);
-        const double k = springs_of(sheet_, t)[p];
-        for (int i = 0; i < 6; ++i) {
-          const Eigen::Vector2d g(shape.gradient_per_um[i].x, shape.gradient_per_um[i].y);
-          f.segment<2>(2 * elements_.nodes(t)[i]) -=
-              shape.weight_um2 * (P * g + k * shape.value[i] * Eigen::Vector2d(at.x, at.y));
-        }
-      }
-    for (std::size_t i = 0; i < sheet_.held.size(); ++i)
-      for (int a = 0; a < 2; ++a)
-        if (sheet_.held[i][a]) f(2 * static_cast<Eigen::Index>(i) + a) = 0;
-    return f;
-  }
-
-  void assemble(const NodeVectors& u, double share, Stiffness& stiffness) const {
-    stiffness.set_zero();
-    for (int t = 0; t < elements_.n_triangles(); ++t) {
-      Stiffness::OfElement K = spring_stiffness(elements_, t, springs_of(sheet_, t));
-      for (int p = 0; p < Elements::kPoints; ++p) {
-        const Shape& shape = elements_.at(t, p);
-        const PointLaw law = law_at(t, p, share, gradient_of(u, elements_.nodes(t), shape));
-        for (int j = 0; j < 6; ++j)
-          for (int b = 0; b < 2; ++b) {
-            Matrix2d dF = Matrix2d::Zero();
-            dF.row(b) << shape.gradient_per_um[j].x, shape.gradient_per_um[j].y;
-            const Matrix2d dP = shape.weight_um2 * law.change(dF);
-            for (int i = 0; i < 6; ++i)
-              K.block<2, 1>(2 * i, 2 * j + b) +=
-                  dP * Eigen::Vector2d(shape.gradient_per_um[i].x, shape.gradient_per_um[i].y);
-          }
-      }
-      stiffness.add(t, K);
-    }
-  }
-
- private:
-  PointLaw law_at(int triangle, int point, double share, const Matrix2d& gradient) const {
-    const double s = sheet_.contraction_nN_per_um[static_cast<std::size_t>(Elements::kPoints * triangle + point)];
-    return {sheet_.material, share * s, measure_, gradient};
-  }
-  const Elements& elements_;
-  const Sheet& sheet_;
-  ContractionMeasure measure_;
-};
-
-constexpr double kForceTolerance = 1e-9;  // of the contraction's: the targets ask for 1e-3 of u
-
-/// Newton's method at one load. @returns the steps taken; none where they lead nowhere
-std::optional<int> newton(const Equilibrium& equilibrium, Stiffness& stiffness, double share, double force_scale,
-                          NodeVectors& u, int threads) {
-  constexpr int kMostSteps = 30;
-  double energy = equilibrium.energy_fJ(u, share);
-  for (int step = 0; step < kMostSteps; ++step) {
-    const NodeVectors left = equilibrium.left_nN(u, share);
-    if (left.norm() <= kForceTolerance * force_scale) return step;
-    equilibrium.assemble(u, share, stiffness);
-    bool is_definite = stiffness.factorise(0, threads);
-    for (double shift = 1e-4; !is_definite && shift < 10; shift *= 10)
-      is_definite = stiffness.factorise(shift, threads);
-    if (!is_definite) return std::nullopt;
-    const NodeVectors move = stiffness.solve(left);
-    const double slope = left.dot(move);
-    double length = 1, next = equilibrium.energy_fJ(u + move, share);
-    const double rounding = 1e-13 * std::abs(energy);
-    while (!(next <= energy - 1e-4 * length * slope + rounding)) {
-      length *= 0.5;
-      if (length < 1e-6) return std::nullopt;
-      next = equilibrium.energy_fJ(u + length * move, share);
-    }
-    u += length * move;
-    energy = next;
-  }
-  return std::nullopt;
-}
-
-}  // namespace
 
 NodeVectors on_springs(const Elements& elements, const Sheet& sheet, int threads) {
   Stiffness stiffness(elements, sheet.held);
   for (int t = 0; t < elements.n_triangles(); ++t)
-    stiffness.add(t,
-                  elastic_stiffness(elements, t, sheet.material) + spring_stiffness(elements, t, springs_of(sheet, t)));
+    stiffness.add(t, elastic_stiffness(elements, t, sheet.material) +
+                         spring_stiffness(elements, t, sheet.spring_nN_per_um3.data() + Elements::kPoints * t));
   if (!stiffness.factorise(0, threads))
     throw NotSolved({.reason = "nothing holds the sheet: its springs have no stiffness"});
   return stiffness.solve(forces_of_contraction_nN(elements, sheet));
 }
 
 LargeStrain on_springs_large(const Elements& elements, const Sheet& sheet, ContractionMeasure measure, int threads) {
-  if (sheet.line_tension_nN != 0)
-    throw UsageError(
-        "expected no line_tension_nN at large strain: the line's own turn is not followed; strain = small takes it");
-  constexpr double kSmallestStep = 1.0 / 256;
-  const Equilibrium equilibrium(elements, sheet, measure);
+  const LargeSheet large(elements, sheet, measure);
   Stiffness stiffness(elements, sheet.held);
-  const double scale = forces_of_contraction_nN(elements, sheet).norm();
-  LargeStrain result{NodeVectors::Zero(2 * elements.n_nodes()), {}};
-  double share = 0, step = 1;
-  while (share < 1) {
-    NodeVectors u = result.u;
-    const double next = std::min(1.0, share + step);
-    const std::optional<int> steps = newton(equilibrium, stiffness, next, scale, u, threads);
-    if (steps) {
-      result.report.iterations += *steps;
-      result.u = std::move(u);
-      share = next;
-      continue;
-    }
-    step *= 0.5;
-    if (step < kSmallestStep)
-      throw NotSolved({.reason = "the sheet has no equilibrium beyond " + brief(100 * share) +
-                                 " % of the contraction: it collapses; strain = small, or a smaller contraction"});
-  }
-  result.report.converged = true;
-  result.report.last_change = equilibrium.left_nN(result.u, 1).norm() / scale;
-  result.report.reason = std::to_string(result.report.iterations) + " Newton steps";
-  return result;
-}
-
-std::vector<Tensor> large_tension_at_points(const Elements& elements, const Sheet& sheet, ContractionMeasure measure,
-                                            const NodeVectors& u) {
-  std::vector<Tensor> tension;
-  for (int t = 0; t < elements.n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const double s = sheet.contraction_nN_per_um[static_cast<std::size_t>(Elements::kPoints * t + p)];
-      const PointLaw law(sheet.material, s, measure, gradient_of(u, elements.nodes(t), elements.at(t, p)));
-      const Matrix2d cauchy = law.stress() * law.F.transpose() / law.F.determinant();
-      tension.push_back({cauchy(0, 0), cauchy(1, 1), 0.5 * (cauchy(0, 1) + cauchy(1, 0))});
-    }
-  return tension;
+  const LoadedSheet loaded{
+      .energy_fJ = [&](const NodeVectors& u, double share) { return large.energy_fJ(u, share); },
+      .left_nN = [&](const NodeVectors& u, double share) { return large.left_nN(u, share); },
+      .move = [&](const NodeVectors& u, double share, const NodeVectors& left) -> std::optional<NodeVectors> {
+        stiffness.set_zero();
+        large.add_to(stiffness, u, share);
+        if (!factorise_shifted(stiffness, threads)) return std::nullopt;
+        return stiffness.solve(left);
+      },
+      .force_scale_nN = forces_of_contraction_nN(elements, sheet).norm()};
+  return in_load_steps(loaded, 2 * elements.n_nodes());
 }
 
 }  // namespace mbtfm::sheet

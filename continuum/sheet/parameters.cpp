@@ -22,7 +22,9 @@ void declare(stage::ParameterList& list, SheetParameters& p) {
   list.add("ground", p.ground,
            "what carries the sheet; auto: the gel, or springs if no gel is given or the gel is much stiffer than "
            "the adhesions; none: the tractions are given");
-  list.add("strain", p.strain, "small strains or large ones; auto: large on springs if the contraction is large");
+  list.add(
+      "strain", p.strain,
+      "small strains of the sheet or large ones; auto: large on springs if the contraction is large, small on a gel");
   list.add("contraction_measure", p.contraction_measure,
            "large strain: the contraction is a tension of the deformed surface (surface-tension), or of the material "
            "at rest (second-piola)");

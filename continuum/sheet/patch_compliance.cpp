@@ -32,12 +32,18 @@ class DenseCompliance final : public PatchCompliance {
     return numerics::product(compliance_, forces_nN, 1);
   }
   VectorXd diagonal_um_per_nN() const override { return compliance_.diagonal(); }
+  MatrixXd matrix_um_per_nN() const override { return compliance_; }
 
  private:
   MatrixXd compliance_;
 };
 
 }  // namespace
+
+MatrixXd PatchCompliance::matrix_um_per_nN() const {
+  const Index n = diagonal_um_per_nN().size();
+  return displace(MatrixXd::Identity(n, n));
+}
 
 Held held_for(int n_patches, const substrate::Capabilities& gel) {
   constexpr int kMostDense = 2000;

@@ -17,6 +17,7 @@ class PatchCompliance {
   virtual ~PatchCompliance() = default;
   virtual Eigen::MatrixXd displace(const Eigen::MatrixXd& forces_nN) const = 0;
   virtual Eigen::VectorXd diagonal_um_per_nN() const = 0;
+  virtual Eigen::MatrixXd matrix_um_per_nN() const;  ///< C itself: of few patches
 };
 
 /// How C is held.

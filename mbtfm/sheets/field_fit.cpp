@@ -44,7 +44,6 @@ struct Posterior {
   VectorXd loads, loads_over_stiffness;  ///< means
   MatrixXd covariance, covariance_over_stiffness;
   double log_stiffness = 0, log_sigma = 0, log_smoothing = 0, degrees = 0;
-  double log_sigma_of_mesh = 0;  ///< of log M too, beside that
 };
 
 std::vector<double> even_logarithms(double low, double high, int n) {
@@ -182,17 +181,6 @@ Stiffnesses at_mean(const Posterior& posterior, const StiffnessTable& table) {
   return {std::exp(posterior.log_stiffness), table.known_adhesion_nN_per_um3()};
 }
 
-/// One more error, of this size in this direction.
-/// @param moved  loads, then log M
-void add_error(Posterior& p, const VectorXd& moved) {
-  const Index n = p.loads.size();
-  const double M = std::exp(p.log_stiffness), of_log = moved(n);
-  const VectorXd loads = moved.head(n), over_stiffness = (loads - of_log * p.loads) / M;
-  p.covariance += loads * loads.transpose();
-  p.covariance_over_stiffness += over_stiffness * over_stiffness.transpose();
-  p.log_sigma_of_mesh = std::abs(of_log);
-}
-
 /// Whether the posterior ends where the table does, and not before.
 struct Open {
   bool below = false, above = false;
@@ -216,14 +204,16 @@ double quantile(const Posterior& posterior, double share) {
   return M.back();
 }
 
-SheetEstimate estimate(Quantity quantity, const std::string& part, double value, double variance, Open open) {
+SheetEstimate estimate(Quantity quantity, const std::string& part, double value, double variance, Open open,
+                       VectorXd by_unknown) {
   const double sigma = std::sqrt(std::max(0.0, variance));
   SheetEstimate e{.quantity = quantity,
                   .part = part,
                   .value = value,
                   .sigma = sigma,
                   .low = value - tensions::kNormal95 * sigma,
-                  .high = value + tensions::kNormal95 * sigma};
+                  .high = value + tensions::kNormal95 * sigma,
+                  .by_unknown = std::move(by_unknown)};
   if (open.below) e.low = std::nullopt;
   if (open.above) e.high = std::nullopt;
   e.identifiable = e.low && e.high;
@@ -232,26 +222,27 @@ SheetEstimate estimate(Quantity quantity, const std::string& part, double value,
 }
 
 std::vector<SheetEstimate> estimates_of(const Posterior& p, const StiffnessTable& table, const VectorXd& mean) {
-  const Index n = table.n_contractions();
+  const Index n = table.n_contractions(), at_M = table.n_loads();
   const Open open = open_ends(p);
   const double M = std::exp(p.log_stiffness);
   const double contraction = mean.dot(p.loads.head(n)), share = mean.dot(p.loads_over_stiffness.head(n));
   const auto variance = [&](const MatrixXd& covariance) { return mean.dot(covariance.topLeftCorner(n, n) * mean); };
-  const double log_sigma = std::hypot(p.log_sigma, p.log_sigma_of_mesh),
-               wider = std::exp(tensions::kNormal95 * (log_sigma - p.log_sigma));
-  SheetEstimate stiffness = estimate(Quantity::stiffness, {}, M, M * M * log_sigma * log_sigma, open);
-  if (stiffness.low) stiffness.low = quantile(p, kTail) / wider;
-  if (stiffness.high) stiffness.high = quantile(p, 1 - kTail) * wider;
+  const auto by = [&](Index unknown, double factor) -> VectorXd { return factor * VectorXd::Unit(at_M + 2, unknown); };
+  VectorXd by_mean = VectorXd::Zero(at_M + 2);
+  by_mean.head(n) = mean;
+  SheetEstimate stiffness = estimate(Quantity::stiffness, {}, M, std::pow(M * p.log_sigma, 2), open, by(at_M, M));
+  if (stiffness.low) stiffness.low = quantile(p, kTail);
+  if (stiffness.high) stiffness.high = quantile(p, 1 - kTail);
   // a stiff sheet pulls as its strain has it, a soft one as its contraction
   std::vector<SheetEstimate> estimates = {
       estimate(Quantity::contraction, kMean, contraction, variance(p.covariance),
-               {open.above && contraction < 0, open.above && contraction > 0}),
+               {open.above && contraction < 0, open.above && contraction > 0}, by_mean),
       stiffness,
       estimate(Quantity::contraction_over_stiffness, kMean, share, variance(p.covariance_over_stiffness),
-               {open.below && share < 0, open.below && share > 0})};
+               {open.below && share < 0, open.below && share > 0}, by_mean / M - by(at_M, share))};
   Index load = n;
   const auto tension = [&](Quantity quantity, const std::string& of) {
-    estimates.push_back(estimate(quantity, of, p.loads(load), p.covariance(load, load), {}));
+    estimates.push_back(estimate(quantity, of, p.loads(load), p.covariance(load, load), {}, by(load, 1)));
     ++load;
   };
   if (table.has_line()) tension(Quantity::line_tension, {});
@@ -337,8 +328,14 @@ std::vector<ContractionAt> contractions_at(const sheet::Elements& elements, cons
   return rows;
 }
 
+void add_error(FieldFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um) {
+  const MatrixXd of_contractions = fit.sheet.answers.topRows(fit.contractions.size()) * changes_um;
+  fit.covariance += of_contractions * of_contractions.transpose();
+  add_error(fit.sheet, part, changes_um);
+}
+
 FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known,
-                   const ContractionLattice& lattice, const VectorXd& mean, const MeshError& mesh_error_um) {
+                   const ContractionLattice& lattice, const VectorXd& mean) {
   MBTFM_ASSERT(table.n_contractions() == lattice.n_points() && !table.adhesion_nN_per_um3());
   const MatrixXd roughness = lattice.roughness();
   const auto amplitudes = [&](const Posterior& p) -> VectorXd { return table.shares(at_mean(p, table)) * p.loads; };
@@ -353,13 +350,6 @@ FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss 
   const auto n_unknowns = std::lround(p.degrees) + (known ? 0 : 1);
   const double of_misfit = tensions::misfit_variance(data, amplitudes(p), n_unknowns, loss);
   if (of_misfit > variance) p = found(data, variance = of_misfit);
-  if (mesh_error_um) {
-    const Stiffnesses middle = at_mean(p, table);
-    Directions about = directions_about(table, middle, p.loads, known.has_value());
-    if (p.log_sigma > 1) std::erase(about.unknown, table.n_loads());  // as fit_sheet() has it
-    add_error(p, moved_by_change(data, about, mesh_error_um(middle, p.loads),
-                                 variance * std::exp(p.log_smoothing) * roughness));
-  }
   const Index n = table.n_contractions();
   FieldFit fit{.sheet = {},
                .contractions = p.loads.head(n),
@@ -372,6 +362,10 @@ FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss 
   s.stiffnesses = at_mean(p, table);
   s.loads = p.loads;
   s.variance = variance;
+  Linearised about = linearised(data, directions_about(table, s.stiffnesses, p.loads, known.has_value()), variance,
+                                variance * std::exp(p.log_smoothing) * roughness);
+  split_by_noise(s.estimates, about, variance, data);
+  s.answers = std::move(about.answers);
   const double n_numbers = p.degrees + (known ? 0 : 1);
   add_misfit(s, data, amplitudes(p), n_numbers);
   Models models(data, s.variance);

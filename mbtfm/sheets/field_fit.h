@@ -58,10 +58,12 @@ struct FieldFit {
 /// and bundles are known by nothing before.
 /// @param table  with the shares of the lattice as its contractions; known adhesions
 /// @param mean  of each φ over the sheet's area
-/// @param mesh_error_um  as of fit_sheet()
 FieldFit fit_field(tensions::LinearData data, const StiffnessTable& table, tensions::Loss loss,
                    std::optional<double> stiffness_nN_per_um, const ContractionLattice& lattice,
-                   const Eigen::VectorXd& mean, const MeshError& mesh_error_um = {});
+                   const Eigen::VectorXd& mean);
+
+/// As of a SheetFit, also of the contraction at each place.
+void add_error(FieldFit& fit, std::optional<double> SheetErrorParts::*part, const Eigen::MatrixXd& changes_um);
 
 /// The contraction at a place.
 struct ContractionAt {

@@ -1,6 +1,7 @@
 #include "mbtfm/sheets/profile.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -149,6 +150,11 @@ MatrixXd Directions::normal(const LinearData& data) const {
   return J.transpose() * J;
 }
 
+MatrixXd Directions::normal_without_motion(const LinearData& data) const {
+  const MatrixXd J = data.response->displace(forces(Eigen::all, unknown));
+  return J.transpose() * (tensions::squared_weights(data).asDiagonal() * J);
+}
+
 Directions directions_about(const StiffnessTable& table, const Stiffnesses& at, const VectorXd& loads,
                             bool is_sheet_known) {
   constexpr double kStep = 1e-4;
@@ -169,18 +175,53 @@ Directions directions_about(const StiffnessTable& table, const Stiffnesses& at, 
   return all;
 }
 
-VectorXd moved_by_change(const LinearData& data, const Directions& about, const VectorXd& change_um,
-                         const MatrixXd& prior) {
+namespace {
+
+/// 0 of what is known.
+MatrixXd padded(const MatrixXd& of_unknown, const Directions& about) {
+  MatrixXd whole = MatrixXd::Zero(about.forces.cols(), about.forces.cols());
+  whole(about.unknown, about.unknown) = of_unknown;
+  return whole;
+}
+
+MatrixXd inverse_of(const MatrixXd& normal) {
+  return normal.ldlt().solve(MatrixXd::Identity(normal.rows(), normal.cols()));
+}
+
+}  // namespace
+
+Linearised linearised(const LinearData& data, const Directions& about, double variance, const MatrixXd& prior) {
   MatrixXd of_prior = MatrixXd::Zero(about.forces.cols(), about.forces.cols());
   of_prior.topLeftCorner(prior.rows(), prior.cols()) = prior;
-  const VectorXd right =
-      about.forces.transpose() * data.response->pull_back(tensions::squared_weights(data).asDiagonal() *
-                                                          tensions::less_motion(data, MatrixXd(change_um)));
-  const MatrixXd normal = about.normal(data) + of_prior(about.unknown, about.unknown);
-  const VectorXd of_unknown = right(about.unknown), found = normal.ldlt().solve(of_unknown);
-  VectorXd moved = VectorXd::Zero(about.forces.cols());
-  moved(about.unknown) = found;
-  return moved;
+  const auto solved = [&](const Directions& of) -> MatrixXd {
+    return padded(inverse_of(of.normal(data) + of_prior(of.unknown, of.unknown)), of);
+  };
+  const MatrixXd inverse = solved(about);
+  // a stiffness that the beads do not tell within a factor of e follows no straight line
+  Directions told = about;
+  const Eigen::Index n_loads = about.forces.cols() - 2;
+  std::erase_if(told.unknown, [&](Eigen::Index k) { return k >= n_loads && variance * inverse(k, k) > 1; });
+  const MatrixXd forces = about.forces * solved(told);
+  return {.covariance = variance * inverse,
+          .without_motion =
+              variance *
+              padded(inverse_of(about.normal_without_motion(data) + of_prior(about.unknown, about.unknown)), about),
+          .answers = tensions::less_motion(data, data.response->displace(forces)).transpose() *
+                     tensions::squared_weights(data).asDiagonal()};
+}
+
+void split_by_noise(std::vector<SheetEstimate>& estimates, const Linearised& about, double variance,
+                    const LinearData& data) {
+  const double by_beads = data.has_errors ? std::min(1.0, tensions::noise_variance(data) / variance) : 1;
+  for (SheetEstimate& e : estimates) {
+    if (!e.sigma) continue;
+    const double whole = e.by_unknown.dot(about.covariance * e.by_unknown),
+                 without = e.by_unknown.dot(about.without_motion * e.by_unknown);
+    const double by_motion = whole > 0 ? std::clamp(1 - without / whole, 0.0, 1.0) : 0;
+    e.parts.beads = *e.sigma * std::sqrt(by_beads * (1 - by_motion));
+    if (data.motions.shapes.cols() > 0) e.parts.motion = *e.sigma * std::sqrt(by_beads * by_motion);
+    e.parts.model = *e.sigma * std::sqrt(1 - by_beads);
+  }
 }
 
 LinearData weighed(LinearData data, tensions::Loss loss, const std::function<VectorXd(const LinearData&)>& amplitudes) {

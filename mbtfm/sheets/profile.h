@@ -85,13 +85,24 @@ struct Directions {
   std::vector<Eigen::Index> unknown;
 
   Eigen::MatrixXd normal(const tensions::LinearData& data) const;  ///< of the unknown ones
+  /// The same if the beads shared no motion.
+  Eigen::MatrixXd normal_without_motion(const tensions::LinearData& data) const;
 };
 Directions directions_about(const StiffnessTable& table, const Stiffnesses& at, const Eigen::VectorXd& loads,
                             bool is_sheet_known);
-/// How the loads, log M and log κ follow a change of the beads' displacements (um).
+
+/// Standard errors about a solution, and how it follows the beads.
+struct Linearised {
+  Eigen::MatrixXd covariance;      ///< of the loads, log M and log κ; 0 of what is known
+  Eigen::MatrixXd without_motion;  ///< the same if the beads shared no motion
+  Eigen::MatrixXd answers;         ///< SheetFit::answers: of a stiffness that is not told none
+};
 /// @param prior  beside the normal equations, by the first of the columns; empty: none
-Eigen::VectorXd moved_by_change(const tensions::LinearData& data, const Directions& about,
-                                const Eigen::VectorXd& change_um, const Eigen::MatrixXd& prior = {});
+Linearised linearised(const tensions::LinearData& data, const Directions& about, double variance,
+                      const Eigen::MatrixXd& prior = {});
+/// Splits the standard errors that noise and misfit give. @param noise_variance  the beads' share of the variance
+void split_by_noise(std::vector<SheetEstimate>& estimates, const Linearised& about, double variance,
+                    const tensions::LinearData& data);
 
 /// Weights of the beads by a robust loss, until they stay. Tukey's has several minima: it starts from Huber's, whose
 /// scale it keeps.

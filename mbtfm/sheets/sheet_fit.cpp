@@ -19,15 +19,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using tensions::LinearData;
 
-/// 0 of what is known.
-MatrixXd covariance_of(const LinearData& data, const Directions& about, double variance) {
-  const MatrixXd normal = about.normal(data);
-  MatrixXd covariance = MatrixXd::Zero(about.forces.cols(), about.forces.cols());
-  covariance(about.unknown, about.unknown) =
-      variance * normal.ldlt().solve(MatrixXd::Identity(normal.rows(), normal.cols()));
-  return covariance;
-}
-
 /// The range of a quantity over all stiffnesses that the beads do not exclude.
 struct Limits {
   double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
@@ -156,89 +147,68 @@ class Allowed {
   Limits of_sheet_, of_adhesion_;
 };
 
-SheetEstimate estimate(Quantity quantity, const std::string& part, double value, double sigma, const Limits& limits) {
-  SheetEstimate e{
-      .quantity = quantity, .part = part, .value = value, .sigma = sigma, .low = limits.low, .high = limits.high};
-  if (limits.is_open_below) e.low = std::nullopt;
-  if (limits.is_open_above) e.high = std::nullopt;
-  e.identifiable = e.low && e.high;
-  if (!e.identifiable) e.sigma = std::nullopt;
-  return e;
-}
-
 /// Those of the stiffnesses, the loads and what they make up.
-std::vector<SheetEstimate> estimates_of(const StiffnessTable& table, const Profile& best, const MatrixXd& covariance,
-                                        const Allowed& allowed, const std::vector<std::string>& parts) {
-  const Eigen::Index at_M = table.n_loads(), at_kappa = at_M + 1;
-  const auto sigma = [&](Eigen::Index k) { return std::sqrt(std::max(0.0, covariance(k, k))); };
-  const double M = sheet_of(best);
-  std::vector<SheetEstimate> estimates = {estimate(Quantity::stiffness, {}, M, M * sigma(at_M), allowed.of_sheet())};
-  for (Eigen::Index k = 0; k < table.n_contractions(); ++k) {
-    const double s = best.loads(k);
-    const std::string part = parts.empty() ? "" : parts[static_cast<std::size_t>(k)];
-    // of s / M, where log M and s are correlated
-    const double of_share =
-        std::sqrt(std::max(0.0, covariance(k, k) + s * s * covariance(at_M, at_M) - 2 * s * covariance(k, at_M))) / M;
-    estimates.insert(estimates.end() - (k == 0 ? 1 : 0),
-                     estimate(Quantity::contraction, part, s, sigma(k), allowed.of_load(k, Quantity::contraction)));
-    estimates.push_back(estimate(Quantity::contraction_over_stiffness, part, s / M, of_share,
-                                 allowed.of_load(k, Quantity::contraction_over_stiffness)));
-  }
-  Eigen::Index load = table.n_contractions();
-  const auto tension = [&](Quantity quantity, const std::string& of) {
-    estimates.push_back(estimate(quantity, of, best.loads(load), sigma(load), allowed.of_load(load, quantity)));
-    ++load;
-  };
-  if (table.has_line()) tension(Quantity::line_tension, {});
-  for (const sheet::Bundle& bundle : table.bundles()) {
-    tension(Quantity::bundle_tension, "fibre " + std::to_string(bundle.fibre_id));
-    SheetEstimate& e = estimates.back();
-    if (e.value == 0 && e.high) e.sigma = *e.high / tensions::kNormal95;  // it is at its bound
-  }
-  if (!table.adhesion_nN_per_um3()) return estimates;
-  const double kappa = adhesion_of(best), l = std::sqrt(M / kappa);
-  estimates.push_back(
-      estimate(Quantity::adhesion_stiffness, {}, kappa, kappa * sigma(at_kappa), allowed.of_adhesion()));
-  const double of_l = 0.5 * std::sqrt(std::max(0.0, covariance(at_M, at_M) + covariance(at_kappa, at_kappa) -
-                                                        2 * covariance(at_M, at_kappa)));
-  estimates.push_back(estimate(Quantity::penetration, {}, l, l * of_l, allowed.of_penetration()));
-  return estimates;
-}
+class Estimates {
+ public:
+  Estimates(const StiffnessTable& table, const Profile& best, const MatrixXd& covariance, const Allowed& allowed)
+      : table_(table), best_(best), covariance_(covariance), allowed_(allowed) {}
 
-/// The estimates where loads and stiffnesses have moved.
-std::vector<SheetEstimate> values_moved(std::vector<SheetEstimate> estimates, const StiffnessTable& table,
-                                        const Profile& best, const VectorXd& moved) {
-  const VectorXd loads = best.loads + moved.head(table.n_loads());
-  const double M = sheet_of(best) * std::exp(moved(table.n_loads())),
-               kappa = best.at.adhesion_nN_per_um3.value_or(1) * std::exp(moved(table.n_loads() + 1));
-  Eigen::Index contraction = 0, share = 0, bundle = table.n_loads() - std::ssize(table.bundles());
-  for (SheetEstimate& e : estimates) {
-    switch (e.quantity) {
-      case Quantity::contraction:
-        e.value = loads(contraction++);
-        break;
-      case Quantity::stiffness:
-        e.value = M;
-        break;
-      case Quantity::line_tension:
-        e.value = loads(table.n_contractions());
-        break;
-      case Quantity::contraction_over_stiffness:
-        e.value = loads(share++) / M;
-        break;
-      case Quantity::adhesion_stiffness:
-        e.value = kappa;
-        break;
-      case Quantity::penetration:
-        e.value = std::sqrt(M / kappa);
-        break;
-      case Quantity::bundle_tension:
-        e.value = loads(bundle++);
-        break;
+  std::vector<SheetEstimate> of(const std::vector<std::string>& parts) const {
+    const Eigen::Index at_M = table_.n_loads(), at_kappa = at_M + 1;
+    const double M = sheet_of(best_);
+    std::vector<SheetEstimate> all;
+    const auto add = [&](Quantity quantity, const std::string& part, double value, const VectorXd& by_unknown,
+                         const Limits& limits) { all.push_back(one(quantity, part, value, by_unknown, limits)); };
+    const auto part_of = [&](Eigen::Index k) { return parts.empty() ? "" : parts[static_cast<std::size_t>(k)]; };
+    for (Eigen::Index k = 0; k < table_.n_contractions(); ++k)
+      add(Quantity::contraction, part_of(k), best_.loads(k), by(k, 1), allowed_.of_load(k, Quantity::contraction));
+    add(Quantity::stiffness, {}, M, by(at_M, M), allowed_.of_sheet());
+    for (Eigen::Index k = 0; k < table_.n_contractions(); ++k)
+      add(Quantity::contraction_over_stiffness, part_of(k), best_.loads(k) / M,
+          by(k, 1 / M) - by(at_M, best_.loads(k) / M), allowed_.of_load(k, Quantity::contraction_over_stiffness));
+    Eigen::Index load = table_.n_contractions();
+    const auto tension = [&](Quantity quantity, const std::string& of_what) {
+      add(quantity, of_what, best_.loads(load), by(load, 1), allowed_.of_load(load, quantity));
+      ++load;
+    };
+    if (table_.has_line()) tension(Quantity::line_tension, {});
+    for (const sheet::Bundle& bundle : table_.bundles()) {
+      tension(Quantity::bundle_tension, "fibre " + std::to_string(bundle.fibre_id));
+      SheetEstimate& e = all.back();
+      if (e.value == 0 && e.high) e.sigma = *e.high / tensions::kNormal95;  // it is at its bound
     }
+    if (!table_.adhesion_nN_per_um3()) return all;
+    const double kappa = adhesion_of(best_), l = std::sqrt(M / kappa);
+    add(Quantity::adhesion_stiffness, {}, kappa, by(at_kappa, kappa), allowed_.of_adhesion());
+    add(Quantity::penetration, {}, l, by(at_M, l / 2) - by(at_kappa, l / 2), allowed_.of_penetration());
+    return all;
   }
-  return estimates;
-}
+
+ private:
+  VectorXd by(Eigen::Index unknown, double factor) const {
+    return factor * VectorXd::Unit(table_.n_loads() + 2, unknown);
+  }
+  SheetEstimate one(Quantity quantity, const std::string& part, double value, const VectorXd& by_unknown,
+                    const Limits& limits) const {
+    SheetEstimate e{.quantity = quantity,
+                    .part = part,
+                    .value = value,
+                    .sigma = std::sqrt(std::max(0.0, by_unknown.dot(covariance_ * by_unknown))),
+                    .low = limits.low,
+                    .high = limits.high,
+                    .by_unknown = by_unknown};
+    if (limits.is_open_below) e.low = std::nullopt;
+    if (limits.is_open_above) e.high = std::nullopt;
+    e.identifiable = e.low && e.high;
+    if (!e.identifiable) e.sigma = std::nullopt;
+    return e;
+  }
+
+  const StiffnessTable& table_;
+  const Profile& best_;
+  const MatrixXd& covariance_;
+  const Allowed& allowed_;
+};
 
 }  // namespace
 
@@ -251,25 +221,42 @@ LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, 
                           std::move(motions));
 }
 
-void add_errors(std::vector<SheetEstimate>& estimates, double relative_error_of_modulus,
-                const std::vector<std::vector<SheetEstimate>>& others) {
+void add_error(std::vector<SheetEstimate>& estimates, std::optional<double> SheetErrorParts::*part,
+               const VectorXd& sizes) {
   for (std::size_t k = 0; k < estimates.size(); ++k) {
     SheetEstimate& e = estimates[k];
-    const bool is_force = e.quantity != Quantity::contraction_over_stiffness && e.quantity != Quantity::penetration;
-    double variance = is_force ? std::pow(relative_error_of_modulus * e.value, 2) : 0;
-    for (const std::vector<SheetEstimate>& other : others) variance += std::pow(other[k].value - e.value, 2);
-    const double more = tensions::kNormal95 * std::sqrt(variance);
+    const double size = sizes(static_cast<Eigen::Index>(k)), more = tensions::kNormal95 * size;
     if (e.low) {
       const double wider = e.value - std::hypot(e.value - *e.low, more);
       e.low = *e.low >= 0 ? std::max(0.0, wider) : wider;  // what cannot be negative stays so
     }
     if (e.high) e.high = e.value + std::hypot(*e.high - e.value, more);
-    if (e.sigma) e.sigma = std::hypot(*e.sigma, std::sqrt(variance));
+    if (!e.sigma) continue;
+    e.sigma = std::hypot(*e.sigma, size);
+    e.parts.*part = std::hypot((e.parts.*part).value_or(0), size);
   }
 }
 
+void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um) {
+  const MatrixXd moved = fit.answers * changes_um;
+  VectorXd sizes(std::ssize(fit.estimates));
+  for (Eigen::Index k = 0; k < sizes.size(); ++k)
+    sizes(k) = (fit.estimates[static_cast<std::size_t>(k)].by_unknown.transpose() * moved).norm();
+  add_error(fit.estimates, part, sizes);
+}
+
+VectorXd changes_by_modulus(const std::vector<SheetEstimate>& estimates, double share) {
+  VectorXd changes(std::ssize(estimates));
+  for (Eigen::Index k = 0; k < changes.size(); ++k) {
+    const SheetEstimate& e = estimates[static_cast<std::size_t>(k)];
+    const bool is_force = e.quantity != Quantity::contraction_over_stiffness && e.quantity != Quantity::penetration;
+    changes(k) = is_force ? share * e.value : 0;
+  }
+  return changes;
+}
+
 SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known,
-                   const std::vector<std::string>& parts, const MeshError& mesh_error_um) {
+                   const std::vector<std::string>& parts) {
   data = weighed(std::move(data), loss, [&](const LinearData& of) {
     const Search search(of, table, known);
     return search.amplitudes(search.best());
@@ -285,18 +272,14 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   fit.loads = best.loads;
   add_misfit(fit, data, table.shares(best.at) * best.loads, static_cast<double>(n_unknowns));
   fit.variance = tensions::misfit_variance(data, fit.node_amplitudes, n_unknowns, loss);
-  const Directions about = directions_about(table, best.at, best.loads, known.has_value());
-  const MatrixXd covariance = covariance_of(data, about, fit.variance);
+  Linearised about = linearised(data, directions_about(table, best.at, best.loads, known.has_value()), fit.variance);
+  const MatrixXd& covariance = about.covariance;
   const Eigen::Index at_M = table.n_loads();
   if (!known) fit.correlation = covariance(0, at_M) / std::sqrt(covariance(0, 0) * covariance(at_M, at_M));
-  fit.estimates =
-      estimates_of(table, best, covariance, Allowed(table, search, best, fit.variance, known.has_value()), parts);
-  if (mesh_error_um) {
-    Directions told = about;  // a stiffness that the beads do not tell within a factor of e follows no straight line
-    std::erase_if(told.unknown, [&](Eigen::Index k) { return k >= table.n_loads() && covariance(k, k) > 1; });
-    const VectorXd moved = moved_by_change(data, told, mesh_error_um(best.at, best.loads));
-    add_errors(fit.estimates, 0, {values_moved(fit.estimates, table, best, moved)});
-  }
+  const Allowed allowed(table, search, best, fit.variance, known.has_value());
+  fit.estimates = Estimates(table, best, covariance, allowed).of(parts);
+  split_by_noise(fit.estimates, about, fit.variance, data);
+  fit.answers = std::move(about.answers);
   Models models(data, fit.variance);
   const bool has_parts = table.n_contractions() > 1, has_springs = table.adhesion_nN_per_um3().has_value(),
              has_bundles = !table.bundles().empty();

@@ -1,7 +1,7 @@
 /// Contraction, stiffness and line tension of a sheet, from the displacements of the beads under it.
 #pragma once
 
-#include <functional>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,6 +27,28 @@ constexpr auto words(Quantity) {
                     "bundle_tension_nN"};
 }
 
+/// What each source adds to a standard error. In squares they add up to it; none: it was not asked for.
+struct SheetErrorParts {
+  std::optional<double> beads = {};      ///< noise of the displacements
+  std::optional<double> motion = {};     ///< that all beads share: how much less they tell beside it
+  std::optional<double> model = {};      ///< what the misfit calls for beyond the beads' noise
+  std::optional<double> mesh = {};       ///< what is left of it once a finer one has corrected the fit
+  std::optional<double> outline = {};    ///< its place
+  std::optional<double> gel = {};        ///< modulus, thickness and Poisson's ratio, where their errors are stated
+  std::optional<double> substrate = {};  ///< what the gel's model leaves out
+};
+/// The one list of the parts. @param visit  of name and part
+template <class Visit>
+void for_each_part(const SheetErrorParts& p, const Visit& visit) {
+  visit("beads", p.beads);
+  visit("motion", p.motion);
+  visit("model", p.model);
+  visit("mesh", p.mesh);
+  visit("outline", p.outline);
+  visit("gel", p.gel);
+  visit("substrate", p.substrate);
+}
+
 struct SheetEstimate {
   Quantity quantity = Quantity::contraction;
   std::string part = {};  ///< of the sheet, where it has parts with contractions of their own; or the bundle
@@ -34,6 +56,8 @@ struct SheetEstimate {
   std::optional<double> sigma;      ///< standard error; none where the beads do not tell the quantity
   std::optional<double> low, high;  ///< 95 %; none where the beads set no limit to that side
   bool identifiable = true;         ///< limited to both sides
+  SheetErrorParts parts = {};       ///< of sigma
+  Eigen::VectorXd by_unknown = {};  ///< how it follows the loads, log M and log κ
 };
 
 /// A model of the gel's motion: nothing, the sheet, the sheet with a cable along its edge, with bundles in it, on
@@ -49,9 +73,10 @@ struct SheetFit {
   Stiffnesses stiffnesses;
   Eigen::VectorXd loads;            ///< contractions by part, line tension, tensions of bundles
   Eigen::VectorXd node_amplitudes;  ///< of the table's forces: what the sheet does at the solution
-  bool is_at_bound = false;         ///< the best stiffness of the sheet is the table's first or last
-  double correlation = 0;           ///< of the errors of the first contraction and log stiffness
-  double variance = 1;              ///< of a weighted component of a bead, that the error bars are made with
+  Eigen::MatrixXd answers;   ///< how the loads, log M and log κ follow the beads' displacements (2·beads), by row
+  bool is_at_bound = false;  ///< the best stiffness of the sheet is the table's first or last
+  double correlation = 0;    ///< of the errors of the first contraction and log stiffness
+  double variance = 1;       ///< of a weighted component of a bead, that the error bars are made with
   double relative_l2 = 0;
   std::optional<double> expected_relative_l2;  ///< by the errors that the beads state
   int n_beads = 0, n_down_weighted = 0;
@@ -74,23 +99,24 @@ void compare_with_adhesions(SheetFit& fit, const tensions::LinearData& adhesions
 tensions::LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
                              const substrate::Substrate& gel, int threads, Eigen::MatrixXd motions = {});
 
-/// Of the beads' displacements (2·beads) by the sheet's mesh, for a sheet of such stiffness and loads.
-using MeshError = std::function<Eigen::VectorXd(const Stiffnesses&, const Eigen::VectorXd& loads)>;
-
-/// Further errors, independent of what the estimates state. The beads' displacements are measured, so that all forces
-/// and stiffnesses are proportional to the gel's modulus, if no stiffness is given.
-/// @param others  the same estimates where something else is a standard error away: another gel, another mesh
-void add_errors(std::vector<SheetEstimate>& estimates, double relative_error_of_modulus,
-                const std::vector<std::vector<SheetEstimate>>& others);
+/// One more error of the estimates, independent of the others: their standard errors and intervals grow by it.
+/// @param part  the source, whose part grows, too
+/// @param sizes  a standard error each
+void add_error(std::vector<SheetEstimate>& estimates, std::optional<double> SheetErrorParts::*part,
+               const Eigen::VectorXd& sizes);
+/// The same by what they change if the beads moved otherwise.
+/// @param changes_um  2·beads × errors that are independent of each other
+void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const Eigen::MatrixXd& changes_um);
+/// What they change by if all forces and stiffnesses grow by a share: the beads' displacements are measured, so that is
+/// what another modulus of the gel does, if no stiffness is given.
+Eigen::VectorXd changes_by_modulus(const std::vector<SheetEstimate>& estimates, double share);
 
 /// Least squares (or a robust loss) over all stiffnesses of the table: of each the best loads are linear, so the misfit
 /// is a function of one number, or of two where the adhesions are fitted, which are scanned and then refined (variable
 /// projection). 95 % intervals: where the misfit, least over all else, is 1.96² variances above the best.
 /// @param stiffness_nN_per_um  known; unset: fitted
 /// @param parts  names of the table's contractions, where there are several
-/// @param mesh_error_um  what it makes of the solution is one more standard error; empty: the mesh is taken for exact
 SheetFit fit_sheet(tensions::LinearData data, const StiffnessTable& table, tensions::Loss loss,
-                   std::optional<double> stiffness_nN_per_um = {}, const std::vector<std::string>& parts = {},
-                   const MeshError& mesh_error_um = {});
+                   std::optional<double> stiffness_nN_per_um = {}, const std::vector<std::string>& parts = {});
 
 }  // namespace mbtfm::sheets

@@ -7,6 +7,10 @@ namespace {
 
 using files::kForPeople;
 
+files::Column<SheetEstimate> part(const char* name, const char* meaning, std::optional<double> SheetErrorParts::*of) {
+  return {name, meaning, [of](const SheetEstimate& row) { return row.parts.*of; }, {.digits = kForPeople}};
+}
+
 const files::Table<SheetEstimate>& estimate_table() {
   using Row = SheetEstimate;
   static const files::Table<Row> table{
@@ -25,7 +29,20 @@ const files::Table<SheetEstimate>& estimate_table() {
            {.digits = kForPeople}},
           {"low", "lower end of the 95 % interval; empty: none", &Row::low, {.digits = kForPeople}},
           {"high", "upper end of the 95 % interval; empty: none", &Row::high, {.digits = kForPeople}},
-          {"identifiable", "the beads limit it to both sides", &Row::identifiable}}};
+          {"identifiable", "the beads limit it to both sides", &Row::identifiable},
+          part("by_beads",
+               "part of sigma by noise of the beads' displacements; the squares of all parts add up to that "
+               "of sigma",
+               &SheetErrorParts::beads),
+          part("by_motion", "part by the motion that all beads share; empty: none was allowed for",
+               &SheetErrorParts::motion),
+          part("by_model", "part by what the sheet leaves of the beads beyond their noise", &SheetErrorParts::model),
+          part("by_mesh", "part by the sheet's triangles", &SheetErrorParts::mesh),
+          part("by_outline", "part by the place of the outline (`outline_error_um`)", &SheetErrorParts::outline),
+          part("by_gel",
+               "part by the gel's modulus, thickness and Poisson's ratio; empty: no errors of these were given",
+               &SheetErrorParts::gel),
+          part("by_substrate", "part by what the model leaves out of the gel", &SheetErrorParts::substrate)}};
   return table;
 }
 

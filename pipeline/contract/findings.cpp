@@ -333,8 +333,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {sheet_strain, "sheet-strain", "sheet", caution,
        "contraction of the sheet if nothing held it, s (1 - nu) / (E h), if small strains are computed", 0.05,
        "on springs large strains change the displacement by 0.8 % at 0.05 and by 5 % at 0.15",
-       "On springs set sheet.strain = large. On a gel displacements and tensions are then known to some per cent "
-       "only."},
+       "Set sheet.strain = large, without a line tension. In a fit, run mbtfm-sheet with what was found and strain = "
+       "large: the fit's contraction is off by about as much as the displacement changes."},
       {sheet_coarse, "sheet-coarse", "sheet", caution, "estimated relative error of the tensions, by the mesh", 0.05,
        "the estimate is the difference between the triangles' own tensions and smooth ones; those written are better",
        "Set a smaller sheet.mesh_um."},

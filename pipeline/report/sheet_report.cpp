@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "pipeline/contract/version.h"
@@ -24,8 +26,18 @@ namespace {
 struct Estimate {
   std::string quantity, part;  ///< the quantity's name with its unit, as the file has it
   double value = 0;
-  std::optional<double> low, high;
+  std::optional<double> sigma, low, high;
+  std::vector<std::pair<std::string, double>> parts;  ///< of sigma, those that there are
 };
+
+/// Columns of sheet_fit.csv, and what they are called in events.
+constexpr std::array<std::pair<const char*, const char*>, 7> kParts = {{{"by_beads", "beads"},
+                                                                        {"by_motion", "motion"},
+                                                                        {"by_model", "model"},
+                                                                        {"by_mesh", "mesh"},
+                                                                        {"by_outline", "outline"},
+                                                                        {"by_gel", "gel"},
+                                                                        {"by_substrate", "substrate"}}};
 
 struct SheetResults {
   std::string name;
@@ -40,9 +52,18 @@ SheetResults read_sheet(const fs::path& cell) {
                  files::JsonRecord(folder / "sheet.json", "the figures of a sheet", "run the stage sheet again"),
                  {}};
   const files::CsvTable table(folder / "sheet_fit.csv");
-  for (int row = 0; row < table.n_rows(); ++row)
-    r.estimates.push_back({table.text(row, "quantity"), table.text(row, "part"), table.number(row, "value"),
-                           table.optional_number(row, "low"), table.optional_number(row, "high")});
+  for (int row = 0; row < table.n_rows(); ++row) {
+    Estimate& e = r.estimates.emplace_back();
+    e = {table.text(row, "quantity"),
+         table.text(row, "part"),
+         table.number(row, "value"),
+         table.optional_number(row, "sigma"),
+         table.optional_number(row, "low"),
+         table.optional_number(row, "high"),
+         {}};
+    for (const auto& [column, name] : kParts)
+      if (const auto size = table.optional_number(row, column)) e.parts.emplace_back(name, *size);
+  }
   return r;
 }
 
@@ -86,16 +107,25 @@ std::string methods(const SheetResults& r, const Provenance& provenance) {
 }  // namespace
 
 std::vector<Listing> tables_of_sheet(const fs::path& estimates, const fs::path& models, const std::string& of) {
-  return {{"What the beads tell",
-           "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).",
-           of + "sheet_fit.csv",
-           files::read_text(estimates),
-           {"quantity", "part", "value", "sigma", "low", "high", "identifiable"}},
-          {"Does the scene call for the sheet?",
-           "The beads call for the model of the smallest bic. chi_squared is in units of the noise.",
-           of + "sheet_models.csv",
-           files::read_text(models),
-           {"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"}}};
+  return {
+      {"What the beads tell",
+       "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).",
+       of + "sheet_fit.csv",
+       files::read_text(estimates),
+       {"quantity", "part", "value", "sigma", "low", "high", "identifiable"}},
+      {"Does the scene call for the sheet?",
+       "The beads call for the model of the smallest bic. chi_squared is in units of the noise.",
+       of + "sheet_models.csv",
+       files::read_text(models),
+       {"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"}},
+      {"Where the errors come from",
+       "Parts of each standard error: noise of the beads, the motion that all beads share, what the sheet leaves "
+       "beyond noise, its triangles, the place of its outline, the gel's stated errors, the model of the gel. Their "
+       "squares add up to that of sigma; an empty part was not asked for.",
+       of + "sheet_fit.csv",
+       files::read_text(estimates),
+       {"quantity", "part", "sigma", "by_beads", "by_motion", "by_model", "by_mesh", "by_outline", "by_gel",
+        "by_substrate"}}};
 }
 
 std::string report_of_sheet(const fs::path& cell) {
@@ -138,8 +168,11 @@ std::string result_event_of_sheet(const fs::path& cell, const fs::path& report) 
                                   {"report", report.string()}};
   for (const Estimate& e : r.estimates) {
     nlohmann::ordered_json one = {{"quantity", e.quantity}, {"part", e.part}, {"value", e.value}};
+    one["sigma"] = e.sigma ? nlohmann::ordered_json(*e.sigma) : nullptr;
     one["low"] = e.low ? nlohmann::ordered_json(*e.low) : nullptr;
     one["high"] = e.high ? nlohmann::ordered_json(*e.high) : nullptr;
+    one["sigma_parts"] = nlohmann::ordered_json::object();
+    for (const auto& [name, size] : e.parts) one["sigma_parts"][name] = size;
     event["estimates"].push_back(std::move(one));
   }
   return files::json_text(event) + "\n";

@@ -76,7 +76,8 @@ Stage sheet() {
                      "3_sheet/sheet.vtu"},
           .series = {"3_sheet/contraction.csv", "3_sheet/borders.csv", "3_sheet/cell_tension.csv"},
           .tables = {"", "gel", "sheet", "substrate", "checks"},
-          .effects = {"finite_thickness", "finite_sides", "depth_graded_gel", "common_motion", "effect_tolerance"}};
+          .effects = {"finite_thickness", "finite_sides", "depth_graded_gel", "common_motion", "beads_under_load",
+                      "effect_tolerance"}};
 }
 
 /// A value of cell.toml, as text; empty where it is not set.

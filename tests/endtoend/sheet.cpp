@@ -158,7 +158,7 @@ class FittedSheet : public Sheet {
     for (int i = -20; i <= 20; ++i)
       for (int j = -20; j <= 20; ++j) points += std::to_string(2 * i) + "," + std::to_string(2 * j) + "\n";
     files::write_text(folder_ / "beads.csv", points);
-    const auto made = run(gel_ + sheet_ + "youngs_modulus_kPa = 30\n" + more,
+    const auto made = run(gel_ + sheet_ + "mesh_um = 0.8\nyoungs_modulus_kPa = 30\n" + more,
                           "--beads " + (folder_ / "beads.csv").string() + " " + arguments, outline_);
     ASSERT_EQ(made.code, 0) << made.output;
     DisplacementField beads = files::read_displacement(folder_ / "out" / "displacement.csv");
@@ -171,7 +171,7 @@ class FittedSheet : public Sheet {
     files::write_displacement(folder_ / "displacement.csv", beads);
   }
   test::Outcome fit(const std::string& more, const std::string& arguments = {}) {
-    const auto outcome = run(gel_ + sheet_ + more,
+    const auto outcome = run(gel_ + sheet_ + mesh_ + more,
                              "--displacement " + (folder_ / "displacement.csv").string() + " " + arguments, outline_);
     EXPECT_EQ(outcome.code, 0) << outcome.output;
     return outcome;
@@ -192,7 +192,8 @@ class FittedSheet : public Sheet {
     ADD_FAILURE() << "no row " << quantity << " " << part;
   }
   std::string gel_ = "[gel]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.49\nthickness_um = 60\n";
-  std::string sheet_ = "[sheet]\npoisson_ratio = 0.3\nthickness_um = 0.4\nmesh_um = 2\n", outline_ = "outline.csv";
+  std::string sheet_ = "[sheet]\npoisson_ratio = 0.3\nthickness_um = 0.4\n", mesh_ = "mesh_um = 2\n",
+              outline_ = "outline.csv";
 };
 
 /// Beads of a computed gel, with noise, are fitted: the sheet that moved them comes back within its errors.
@@ -200,6 +201,14 @@ TEST_F(FittedSheet, contraction_and_stiffness_come_back_from_beads) {
   move_beads("contraction_nN_per_um = 0.5\n");
   const test::Outcome outcome = fit("");
   const files::CsvTable found(folder_ / "out" / "sheet_fit.csv");
+  for (int row = 0; row < found.n_rows(); ++row) {
+    double squares = 0;
+    for (const char* part : {"by_beads", "by_motion", "by_model", "by_mesh", "by_outline", "by_substrate"})
+      squares += std::pow(found.number(row, part), 2);
+    EXPECT_NEAR(std::sqrt(squares) / found.number(row, "sigma"), 1, 1e-4) << "six digits each";
+    EXPECT_FALSE(found.optional_number(row, "by_gel")) << "nothing is said of its errors";
+  }
+  EXPECT_NE(files::read_text(folder_ / "out" / "sheet.html").find("Where the errors come from"), std::string::npos);
   EXPECT_EQ(found.text(0, "quantity"), "contraction_nN_per_um");
   EXPECT_NEAR(found.number(0, "value"), 0.5, 4 * found.number(0, "sigma"));
   EXPECT_EQ(found.text(1, "quantity"), "stiffness_nN_per_um");
@@ -208,14 +217,17 @@ TEST_F(FittedSheet, contraction_and_stiffness_come_back_from_beads) {
   EXPECT_EQ(outcome.output.find("explains"), std::string::npos) << "the sheet explains the beads: " << outcome.output;
   // a gel whose modulus is known to 10 %, and whose thickness to a third
   const double sigma = found.number(0, "sigma");
-  const auto on_doubtful = run(gel_ + "youngs_modulus_sigma_kPa = 0.1\nthickness_sigma_um = 20\n" + sheet_,
+  const auto on_doubtful = run(gel_ + "youngs_modulus_sigma_kPa = 0.1\nthickness_sigma_um = 20\n" + sheet_ + mesh_,
                                "--displacement " + (folder_ / "displacement.csv").string());
   ASSERT_EQ(on_doubtful.code, 0) << on_doubtful.output;
   const files::CsvTable doubtful(folder_ / "out" / "sheet_fit.csv");
   EXPECT_GT(doubtful.number(0, "sigma"), std::hypot(sigma, 0.1 * 0.99 * found.number(0, "value")));
   EXPECT_LT(doubtful.number(0, "sigma"), std::hypot(sigma, 0.2 * found.number(0, "value")));
+  EXPECT_GT(doubtful.number(0, "by_gel"), 0.1 * 0.99 * found.number(0, "value"));
+  EXPECT_EQ(
+      run(gel_ + sheet_ + "strain = \"large\"\n", "--displacement " + (folder_ / "displacement.csv").string()).code, 2);
   // a contraction that may vary, and does not
-  const auto varying = run(gel_ + sheet_ + "fit_parts = \"field\"\nfield_points = 6\n",
+  const auto varying = run(gel_ + sheet_ + mesh_ + "fit_parts = \"field\"\nfield_points = 6\n",
                            "--displacement " + (folder_ / "displacement.csv").string());
   ASSERT_EQ(varying.code, 0) << varying.output;
   const files::CsvTable places(folder_ / "out" / "contraction.csv");
@@ -223,7 +235,7 @@ TEST_F(FittedSheet, contraction_and_stiffness_come_back_from_beads) {
     EXPECT_NEAR(places.number(row, "contraction_nN_per_um"), 0.5, 4 * places.number(row, "sigma_nN_per_um"));
   EXPECT_EQ(files::CsvTable(folder_ / "out" / "sheet_fit.csv").text(0, "part"), "mean");
   EXPECT_NE(files::read_text(folder_ / "out" / "sheet.svg").find(">Contraction<"), std::string::npos);
-  const auto unknown_bond = run(gel_ + sheet_ + "fit_parts = \"field\"\nfit_adhesion_stiffness = true\n",
+  const auto unknown_bond = run(gel_ + sheet_ + mesh_ + "fit_parts = \"field\"\nfit_adhesion_stiffness = true\n",
                                 "--displacement " + (folder_ / "displacement.csv").string());
   EXPECT_EQ(unknown_bond.code, 2) << unknown_bond.output;
 }
@@ -286,7 +298,7 @@ TEST_F(FittedSheet, the_stiffness_of_the_adhesions_comes_back_and_is_called_for)
   EXPECT_LT(models.number(models.n_rows() - 1, "bic"), models.number(models.n_rows() - 2, "bic"));
 }
 
-TEST_F(FittedSheet, a_band_and_cells_contract_each_by_their_own) {
+TEST_F(FittedSheet, a_band_contracts_by_its_own) {
   move_beads("contraction_nN_per_um = 0.5\nedge_band_um = 6\n");
   fit("fit_parts = \"edge\"\nedge_band_um = 6\n");
   expect("contraction_nN_per_um", "edge", 0.5);
