@@ -29,7 +29,9 @@ RidgeScales scales_of(const FibreParameters& p, double pixel_um) {
 }
 
 TraceRule rule_of(const FibreParameters& p, double pixel_um) {
-  constexpr double kHidden = 3;  // widths: so long a line that crosses at 20° hides this one
+  constexpr double kHidden = 3;      // widths: so long a line that crosses at 20° hides this one
+  constexpr double kStraight = 0.2;  // noise and waves of a fibre, of its radius
+  constexpr double kGentle = 8;      // long fibres bend less than the smallest radius by so much
   TraceRule rule;
   rule.start_noise = p.fibre_start_noise;
   rule.follow_noise = p.fibre_follow_noise;
@@ -45,6 +47,10 @@ TraceRule rule_of(const FibreParameters& p, double pixel_um) {
   rule.course_px = 3.4 * p.fibre_averaging_um / pixel_um;
   rule.join_gap_px = 3 * p.fibre_gap_um / pixel_um;
   rule.overlap_px = 1.92 * p.fibre_gap_um / pixel_um;
+  rule.bridge_px = 6 * p.fibre_gap_um / pixel_um;
+  rule.bridge_course_px = 2 * p.fibre_shortest_um / pixel_um;
+  rule.bridge_misfit_px = kStraight * rule.line_radius_px;
+  rule.bridge_radius_px = kGentle * rule.smallest_radius_px;
   rule.faint_px = p.fibre_faint_um / pixel_um;
   return rule;
 }

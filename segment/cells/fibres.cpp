@@ -16,7 +16,9 @@
 #include "segment/cells/fibre_scales.h"
 #include "segment/cells/fibre_significance.h"
 #include "segment/cells/grid.h"
+#include "segment/cells/take_over.h"
 #include "segment/cells/trace.h"
+#include "segment/cells/trace_join.h"
 
 namespace mbtfm::cells {
 
@@ -70,6 +72,7 @@ constexpr double kMostBeside = 0.5;
 
 /// A traced line that may be a fibre.
 struct Candidate {
+  Trace trace;  ///< away from the cell's edge
   Polyline points_um;
   WayOn before, after;
   Profile profile;
@@ -138,7 +141,8 @@ struct Judge {
     };
     c.points_um = cut(c.points_um);
     points = cut(points);
-    c.significance = significance_of(points, cut(trace.own_height()), ridges, field, p);
+    c.trace = trace.part(piece.first, piece.first + piece.n);
+    c.significance = significance_of(points, c.trace.own_height(), ridges, field, p);
     c.expected_false = texture.expected_false(c.significance);
     if (texture.expected_false(c.significance, LinePlace::beside_a_fibre) > p.fibre_false_per_cell) return std::nullopt;
     c.profile = profile_across(field.image, points, 1.5 * p.fibre_width_um / field.pixel_um);
@@ -234,6 +238,23 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
   return significant(std::move(candidates), judge.p);
 }
 
+/// Put right where fibres cross, and put together where their pieces lie far apart.
+std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Judge& judge) {
+  std::vector<Trace> traces;
+  for (const Candidate& c : fibres) traces.push_back(c.trace);
+  traces = with_own_courses(std::move(traces), judge.ridges, judge.rule);
+  std::vector<Candidate> result;
+  const auto keep = [&](const Trace& trace) {
+    auto c = judge.candidate(trace, 0);
+    if (c) result.push_back(std::move(*c));
+    return c.has_value();
+  };
+  for (const BridgedLine& line : bridged(traces, judge.ridges, judge.rule))
+    if (!keep(line.trace))
+      for (const std::size_t i : line.pieces) keep(traces[i]);
+  return result;
+}
+
 /// Actin as bright as these fibres, away from them and from the folds at the cell's edge.
 std::vector<Polyline> unexplained(const std::vector<Candidate>& fibres, const Judge& judge) {
   const Crop& field = judge.field;
@@ -301,7 +322,7 @@ TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, 
   set_noise(ridges, is_free, scales.noise_radius_px);
   const auto traces = trace_lines(ridges, field.is_inside, rule);
   const Judge judge{field, ridges, rule, outline_um, texture_lines_of(traces, ridges, field, p), p};
-  std::vector<Candidate> fibres = judged(traces, judge);
+  std::vector<Candidate> fibres = regrouped(judged(traces, judge), judge);
   TracedLines lines{{}, unexplained(fibres, judge)};
   for (Candidate& c : fibres) {
     Fibre fibre;

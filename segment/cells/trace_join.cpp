@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "segment/cells/grid.h"
+#include "segment/cells/parabola.h"
 
 namespace mbtfm::cells {
 
@@ -19,7 +20,8 @@ End opposite(End end) { return end ^ 1; }
 
 struct EndPoint {
   cv::Point2d point, outward;
-  double height = 0;  ///< mean of the last part
+  double height = 0;                   ///< mean of the last part
+  std::vector<cv::Point2d> part = {};  ///< from the end inwards
 };
 
 std::vector<EndPoint> ends_of(const std::vector<Trace>& traces, double reach_px) {
@@ -69,6 +71,37 @@ std::optional<double> mismatch(const EndPoint& a, const EndPoint& b, const Ridge
   return sum;
 }
 
+double over_noise_at(const Ridges& ridges, cv::Point2d p, double angle_rad) {
+  return ridges.at(p, angle_rad) / std::max<double>(sample(ridges.noise, p), 1e-30);
+}
+
+/// By how much the way over a gap is brighter than texture, in standard deviations.
+double over_noise_between(const Parabola& way, const Ridges& ridges) {
+  double sum = 0;
+  int n = 0;
+  for (double s = way.from; s <= way.to; ++s, ++n) sum += over_noise_at(ridges, way.at(s), way.angle_rad(s));
+  return sum / std::max(1, n);
+}
+
+/// How badly two fibres fit to one across a gap; nothing where they do not. Fibres that lie on one parabola to a
+/// fraction of their width, with something brighter than texture between them, are nearly always one: measured in
+/// docs/developers/dense_fibres.md.
+std::optional<double> mismatch_across(const EndPoint& a, const EndPoint& b, const Ridges& ridges,
+                                      const TraceRule& rule) {
+  constexpr double kBrighter = 1;  // half-way from texture to what a line is followed by
+  constexpr double kHeight = 1;    // logarithm: 19 of 20 pairs of pieces of one fibre differ by less
+  if (a.outward.dot(b.outward) > 0) return std::nullopt;
+  const Parabola way = parabola_through(a.part, b.part);
+  const double gap = way.to - way.from;
+  if (gap < 0 || gap > rule.bridge_px) return std::nullopt;
+  const double misfit = way.misfit_px / rule.bridge_misfit_px, bend = way.curvature() * rule.bridge_radius_px;
+  const double height = std::abs(std::log(a.height / b.height)) / kHeight;
+  if (misfit > 1 || bend > 1 || !(height <= 1)) return std::nullopt;
+  if (over_noise_between(way, ridges) < kBrighter) return std::nullopt;
+  const double far = gap / rule.bridge_px;
+  return misfit * misfit + bend * bend + far * far + height * height;
+}
+
 struct Fit {
   double mismatch;
   End a, b;
@@ -100,16 +133,17 @@ class EndGrid {
   std::map<std::pair<int, int>, std::vector<End>> grid_;
 };
 
-/// All pairs of ends that fit, the best first.
-std::vector<Fit> fits_of(const std::vector<EndPoint>& ends, const Ridges& ridges, const TraceRule& rule) {
-  const EndGrid grid(ends, std::max(1.0, rule.join_gap_px));
+/// All pairs of ends nearer than `within_px` that fit, the best first.
+template <class Mismatch>
+std::vector<Fit> fits_of(const std::vector<EndPoint>& ends, double within_px, Mismatch mismatch_of) {
+  const EndGrid grid(ends, std::max(1.0, within_px));
   std::vector<Fit> fits;
   for (End a = 0; a < ends.size(); ++a) {
     std::vector<End> near;
     grid.add_near(ends[a].point, near);
     for (const End b : near)
       if (a < b && b != opposite(a))
-        if (const auto m = mismatch(ends[a], ends[b], ridges, rule)) fits.push_back({*m, a, b});
+        if (const auto m = mismatch_of(a, b)) fits.push_back({*m, a, b});
   }
   std::sort(fits.begin(), fits.end());
   return fits;
@@ -150,21 +184,56 @@ void append(Trace& line, Trace piece) {
   line.append(piece.part(n, piece.size()));
 }
 
+/// Chains of linked pieces from end to end, as the ends at which one enters each piece.
+std::vector<std::vector<End>> chains_of(const std::vector<std::optional<End>>& link) {
+  std::vector<bool> is_used(link.size() / 2);
+  std::vector<std::vector<End>> chains;
+  for (End start = 0; start < link.size(); ++start) {
+    if (link[start] || is_used[start / 2]) continue;  // begin at a free end
+    chains.emplace_back();
+    for (std::optional<End> entry = start; entry; entry = link[opposite(*entry)]) {
+      is_used[*entry / 2] = true;
+      chains.back().push_back(*entry);
+    }
+  }
+  return chains;
+}
+
+Trace entered(Trace piece, End entry) {
+  if (entry % 2 == 1) piece.reverse();
+  return piece;
+}
+
 }  // namespace
 
 std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const TraceRule& rule) {
   const auto ends = ends_of(traces, rule.course_px);
-  const auto link = links_of(fits_of(ends, ridges, rule), traces.size());
-  std::vector<bool> is_used(traces.size());
+  const auto fits =
+      fits_of(ends, rule.join_gap_px, [&](End a, End b) { return mismatch(ends[a], ends[b], ridges, rule); });
   std::vector<Trace> result;
-  for (End start = 0; start < link.size(); ++start) {
-    if (link[start] || is_used[start / 2]) continue;  // begin at a free end
+  for (const std::vector<End>& chain : chains_of(links_of(fits, traces.size()))) {
     Trace line;
-    for (std::optional<End> entry = start; entry; entry = link[opposite(*entry)]) {
-      is_used[*entry / 2] = true;
-      Trace& piece = traces[*entry / 2];
-      if (*entry % 2 == 1) piece.reverse();
-      append(line, std::move(piece));
+    for (const End entry : chain) append(line, entered(std::move(traces[entry / 2]), entry));
+    result.push_back(std::move(line));
+  }
+  return result;
+}
+
+std::vector<BridgedLine> bridged(const std::vector<Trace>& fibres, const Ridges& ridges, const TraceRule& rule) {
+  auto ends = ends_of(fibres, rule.course_px);
+  for (End e = 0; e < ends.size(); ++e)
+    ends[e].part = last_part(fibres[e / 2], e % 2 == 0 ? LineEnd::first : LineEnd::last, rule.bridge_course_px);
+  const auto fits =
+      fits_of(ends, rule.bridge_px, [&](End a, End b) { return mismatch_across(ends[a], ends[b], ridges, rule); });
+  std::vector<BridgedLine> result;
+  for (const std::vector<End>& chain : chains_of(links_of(fits, fibres.size()))) {
+    BridgedLine line;
+    std::optional<End> left;  // of the piece before
+    for (const End entry : chain) {
+      if (left) line.trace.append(bridge_of(parabola_through(ends[*left].part, ends[entry].part), ridges));
+      left = opposite(entry);
+      line.trace.append(entered(fibres[entry / 2], entry));
+      line.pieces.push_back(entry / 2);
     }
     result.push_back(std::move(line));
   }

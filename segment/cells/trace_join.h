@@ -12,4 +12,14 @@ namespace mbtfm::cells {
 /// Candidates come from a grid of the ends: time grows with the number of pieces.
 std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const TraceRule& rule);
 
+struct BridgedLine {
+  Trace trace;
+  std::vector<std::size_t> pieces;  ///< by place among the fibres, in the order of the line
+};
+
+/// Fibres put together across gaps that are longer than a hidden line's: over the rim of the nucleus, or where a
+/// neighbour in the same carpet outshines them. Both must be long and lie on one slightly bent parabola, and the way
+/// between must be brighter than texture. The best pair first.
+std::vector<BridgedLine> bridged(const std::vector<Trace>& fibres, const Ridges& ridges, const TraceRule& rule);
+
 }  // namespace mbtfm::cells
