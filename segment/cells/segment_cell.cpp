@@ -58,17 +58,32 @@ std::vector<Adhesion> adhesions_of(const images::Channel& channel, double pixel_
   return found;
 }
 
+/// Nothing bright, or something that is too small for a cell.
+[[noreturn]] void no_cell(const images::Channel& channel, const std::vector<Adhesion>& adhesions, double pixel_um,
+                          OutlineParameters p) {
+  const std::string expected = "a cell brighter than its surroundings",
+                    size = "pixel_size_um (" + images::in_um(pixel_um) + ")";
+  const double least_um2 = p.outline_smallest_um2;
+  constexpr double kSpeck = 0.02;  // 1 um² by default: less is noise
+  p.outline_smallest_um2 *= kSpeck;
+  const CellsInImage small = find_cells(channel.image, adhesions, pixel_um, p);
+  if (small.cells.empty())
+    throw InputError(channel.name, expected,
+                     "no cell: nothing of " + shortest(least_um2) + " um² or more stands out of the noise",
+                     "is this the right channel and page? Check " + size + " and outline_smallest_um2");
+  throw InputError(channel.name, expected,
+                   "only smaller things: the largest covers " + brief(small.cells.front().area_um2) +
+                       " um², and a cell at least " + shortest(least_um2) + " um² (outline_smallest_um2)",
+                   "is it the cell? Then set outline_smallest_um2 in [segment] below its area. Else check " + size +
+                       ": a number that is too small makes cells small");
+}
+
 CellsInImage outlines_of(const images::Channel& channel, const std::vector<Adhesion>& adhesions, double pixel_um,
                          const SegmentParameters& p) {
   require_content(channel);
   CellsInImage found = find_cells(channel.image, adhesions, pixel_um, p.outline);
   const std::vector<CellOutline>& cells = found.cells;
-  if (cells.empty())
-    throw InputError(
-        channel.name, "a cell brighter than its surroundings",
-        "no cell: nothing of " + shortest(p.outline.outline_smallest_um2) + " um² or more stands out of the noise",
-        "is this the right channel and page? Check pixel_size_um (" + images::in_um(pixel_um) +
-            ") and outline_smallest_um2");
+  if (cells.empty()) no_cell(channel, adhesions, pixel_um, p.outline);
   if (cells.front().is_sheet)
     throw InputError(
         channel.name, "single cells", "cells that touch over " + brief(cells.front().area_um2) + " um²",

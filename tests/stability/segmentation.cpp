@@ -1,6 +1,8 @@
 /// Images without a cell give none, and say why.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/findings.h"
 #include "segment/cells/segment_cell.h"
@@ -37,6 +39,27 @@ TEST(Segmentation, finds_nothing_in_noise_alone) {
 TEST(Segmentation, takes_images_of_few_pixels) {
   test::hard_case("images of 1 to 17 pixels", "nothing, no error");
   for (const int side : {1, 2, 5, 17}) expect_nothing(even_image(side, side, 3));
+}
+
+TEST(Segmentation, says_how_small_a_thing_is_that_is_too_small_for_a_cell) {
+  test::hard_case("a cell smaller than the smallest", "an error that gives its area and names both numbers");
+  images::Image image = even_image(300, 300, 100);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      if (std::hypot(x - 150, y - 150) < 30) image.at(x, y) = 400;  // 28 um²
+  add_noise(image, 5, 1);
+  SegmentParameters p;
+  p.pixel_size_um = 0.1;
+  p.candidates.adhesions = AdhesionSource::none;
+  try {
+    segment_cell({}, images::Channel{"small.tif", image}, p);
+    FAIL() << "a cell of 28 um2";
+  } catch (const InputError& error) {
+    EXPECT_NE(error.found.find("the largest covers 2"), std::string::npos) << error.found;
+    EXPECT_NE(error.found.find("at least 50 um²"), std::string::npos) << error.found;
+    EXPECT_NE(error.hint.find("outline_smallest_um2"), std::string::npos);
+    EXPECT_NE(error.hint.find("pixel_size_um"), std::string::npos);
+  }
 }
 
 TEST(Segmentation, says_what_is_missing) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "segment/cells/bright_actin.h"
@@ -107,6 +108,21 @@ TEST(FibreParts, a_long_fibre_is_led_on_along_its_faint_end_to_the_adhesion_ther
   tie_ends(bright.fibre, adhesions, {}, 1);
   EXPECT_EQ(bright.fibre.end_adhesion_id, 7);
   EXPECT_NEAR(norm(bright.fibre.points_um.back() - adhesions[0].position_um), 0, 1e-9);
+}
+
+/// An adhesion's centre is 1.2 um aside of the end, and its rim reaches the line.
+TEST(FibreParts, an_end_is_not_tied_where_the_fibre_would_end_in_a_hook) {
+  Adhesion across = adhesion_at({10, 1.2}), ahead = adhesion_at({11, 0.2});
+  across.major_axis_um = 2.4;
+  across.angle_rad = std::numbers::pi / 2;
+  ahead.adhesion_id = 8;
+  Fibre alone, both;
+  alone.points_um = both.points_um = straight({0, 0}, {10, 0});
+  tie_ends(alone, {across}, {}, 1);
+  EXPECT_FALSE(alone.end_adhesion_id);
+  EXPECT_NEAR(norm(alone.points_um.back() - Vec2{10, 0}), 0, 1e-9);
+  tie_ends(both, {across, ahead}, {}, 1);
+  EXPECT_EQ(both.end_adhesion_id, 8);
 }
 
 Fibre line_held_at_start(Vec2 from, Vec2 to) {
