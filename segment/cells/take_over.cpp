@@ -17,14 +17,14 @@ namespace {
 using Points = std::vector<cv::Point2d>;
 
 /// A point of a line.
-struct Place {
+struct PointOf {
   std::size_t line, point;
 };
 
 /// Points of lines by squares of the image.
-class PlaceGrid {
+class PointGrid {
  public:
-  PlaceGrid(const std::vector<Trace>& lines, double side) : side_(side) {
+  PointGrid(const std::vector<Trace>& lines, double side) : side_(side) {
     for (std::size_t i = 0; i < lines.size(); ++i)
       for (std::size_t k = 0; k < lines[i].size(); ++k) squares_[square(lines[i].points[k], 0, 0)].push_back({i, k});
   }
@@ -34,7 +34,7 @@ class PlaceGrid {
     for (int dy = -1; dy <= 1; ++dy)
       for (int dx = -1; dx <= 1; ++dx)
         if (const auto found = squares_.find(square(point, dx, dy)); found != squares_.end())
-          for (const Place& place : found->second) use(place);
+          for (const PointOf& place : found->second) use(place);
   }
 
  private:
@@ -42,7 +42,7 @@ class PlaceGrid {
     return {static_cast<int>(std::floor(p.x / side_)) + dx, static_cast<int>(std::floor(p.y / side_)) + dy};
   }
   double side_;
-  std::map<std::pair<int, int>, std::vector<Place>> squares_;
+  std::map<std::pair<int, int>, std::vector<PointOf>> squares_;
 };
 
 /// Where the course of a line's end meets another line: points of that one, and steps of the course.
@@ -106,7 +106,7 @@ class Search {
     const Points course = course_of(lines_[line], end);
     std::map<std::size_t, Meeting> meetings;
     for (std::size_t i = 0; i < course.size(); ++i)
-      grid_.each_near(course[i], [&](const Place& place) {
+      grid_.each_near(course[i], [&](const PointOf& place) {
         const Points& other = lines_[place.line].points;
         const cv::Point2d d = other[place.point] - course[i];
         if (place.line == line || std::hypot(d.x, d.y) > near_px_) return;
@@ -144,7 +144,7 @@ class Search {
   const std::vector<Trace>& lines_;
   const TraceRule& rule_;
   double near_px_;
-  PlaceGrid grid_;
+  PointGrid grid_;
 };
 
 /// The owner with the part that it gets back, and what is left of the other line.

@@ -89,8 +89,9 @@ double over_noise_between(const Parabola& way, const Ridges& ridges) {
 std::optional<double> mismatch_across(const EndPoint& a, const EndPoint& b, const Ridges& ridges,
                                       const TraceRule& rule) {
   constexpr double kBrighter = 1;  // half-way from texture to what a line is followed by
+  constexpr double kTurn = 0.5;    // rad: parabolas of that radius turn less
   constexpr double kHeight = 1;    // logarithm: 19 of 20 pairs of pieces of one fibre differ by less
-  if (a.outward.dot(b.outward) > 0) return std::nullopt;
+  if (angle_between(a.outward, -b.outward) > kTurn) return std::nullopt;
   const Parabola way = parabola_through(a.part, b.part);
   const double gap = way.to - way.from;
   if (gap < 0 || gap > rule.bridge_px) return std::nullopt;

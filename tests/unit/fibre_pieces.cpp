@@ -12,17 +12,17 @@
 namespace mbtfm::cells {
 namespace {
 
-constexpr int kSide_px = 300, kDirections = 16;
+constexpr int kField_px = 300, kSheets = 16;
 
 /// The same response everywhere and in all directions.
-Ridges even(double response) {
+Ridges even_ridges(double response) {
   Ridges r;
-  for (int k = 0; k < kDirections; ++k) r.response.emplace_back(kSide_px, kSide_px, CV_32F, cv::Scalar(response));
-  r.noise = cv::Mat::ones(kSide_px, kSide_px, CV_32F);
+  for (int k = 0; k < kSheets; ++k) r.response.emplace_back(kField_px, kField_px, CV_32F, cv::Scalar(response));
+  r.noise = cv::Mat::ones(kField_px, kField_px, CV_32F);
   return r;
 }
 
-Trace trace(double from, double to, const std::function<double(double)>& y, double height = 8) {
+Trace trace_of(double from, double to, const std::function<double(double)>& y, double height = 8) {
   Trace t;
   for (double x = from; x < to; ++x) t.points.emplace_back(x, y(x));
   t.height.assign(t.points.size(), height);
@@ -33,32 +33,32 @@ Trace trace(double from, double to, const std::function<double(double)>& y, doub
 double level(double) { return 150; }
 
 std::size_t n_lines(const Trace& a, const Trace& b, double response = 2) {
-  return bridged({a, b}, even(response), TraceRule{}).size();
+  return bridged({a, b}, even_ridges(response), TraceRule{}).size();
 }
 
 TEST(FibrePieces, on_one_line_are_put_together_across_a_gap_as_long_as_a_bridge_may_be) {
   const double longest = TraceRule{}.bridge_px;
-  const Trace left = trace(20, 90, level);
-  EXPECT_EQ(n_lines(left, trace(90 + longest - 5, 280, level)), 1);
-  EXPECT_EQ(n_lines(left, trace(90 + longest + 5, 280, level)), 2);
+  const Trace left = trace_of(20, 90, level);
+  EXPECT_EQ(n_lines(left, trace_of(90 + longest - 5, 280, level)), 1);
+  EXPECT_EQ(n_lines(left, trace_of(90 + longest + 5, 280, level)), 2);
 }
 
 TEST(FibrePieces, stay_apart_where_the_gap_is_as_dark_as_texture) {
-  EXPECT_EQ(n_lines(trace(20, 110, level), trace(150, 280, level), 0.5), 2);
+  EXPECT_EQ(n_lines(trace_of(20, 110, level), trace_of(150, 280, level), 0.5), 2);
 }
 
 TEST(FibrePieces, stay_apart_beside_each_other_at_an_angle_and_where_one_is_far_brighter) {
-  const Trace left = trace(20, 110, level);
-  EXPECT_EQ(n_lines(left, trace(150, 280, [](double) { return 156.0; })), 2);  // two of a fibre's radii aside
-  EXPECT_EQ(n_lines(left, trace(150, 280, [](double x) { return 150 + 0.36 * (x - 130); })), 2);  // 20°
-  EXPECT_EQ(n_lines(left, trace(150, 280, level, 8 * 3)), 2);
+  const Trace left = trace_of(20, 110, level);
+  EXPECT_EQ(n_lines(left, trace_of(150, 280, [](double) { return 156.0; })), 2);  // two of a fibre's radii aside
+  EXPECT_EQ(n_lines(left, trace_of(150, 280, [](double x) { return 150 + 0.36 * (x - 130); })), 2);  // 20°
+  EXPECT_EQ(n_lines(left, trace_of(150, 280, level, 8 * 3)), 2);
 }
 
 /// The order and the direction of pieces mean nothing.
 TEST(FibrePieces, make_one_line_from_end_to_end_with_points_a_pixel_apart) {
-  Trace right = trace(180, 280, level), middle = trace(105, 150, level);
+  Trace right = trace_of(180, 280, level), middle = trace_of(105, 150, level);
   right.reverse();
-  const auto lines = bridged({right, trace(20, 80, level), middle}, even(2), TraceRule{});
+  const auto lines = bridged({right, trace_of(20, 80, level), middle}, even_ridges(2), TraceRule{});
   ASSERT_EQ(lines.size(), 1);
   EXPECT_EQ(lines[0].pieces.size(), 3);
   const auto& points = lines[0].trace.points;
@@ -72,9 +72,9 @@ TEST(FibrePieces, make_one_line_from_end_to_end_with_points_a_pixel_apart) {
 /// Two straight lines cross at 24°; one of them was led on over the other's course from there on.
 TEST(FibrePieces, get_back_what_another_line_took_over_at_a_crossing) {
   const auto slope = [](double x) { return 150 + 0.45 * (x - 150); };
-  const Trace owner = trace(20, 138, level);
-  const Trace other = trace(60, 280, [&](double x) { return x < 150 ? slope(x) : level(x); });
-  const auto lines = with_own_courses({owner, other}, even(2), TraceRule{});
+  const Trace owner = trace_of(20, 138, level);
+  const Trace other = trace_of(60, 280, [&](double x) { return x < 150 ? slope(x) : level(x); });
+  const auto lines = with_own_courses({owner, other}, even_ridges(2), TraceRule{});
   ASSERT_EQ(lines.size(), 2);
   const auto is_level = [](const Trace& t) {
     return std::ranges::all_of(t.points, [](cv::Point2d p) { return std::abs(p.y - 150) < 1; });
@@ -86,9 +86,9 @@ TEST(FibrePieces, get_back_what_another_line_took_over_at_a_crossing) {
 }
 
 TEST(FibrePieces, take_nothing_from_a_line_that_goes_straight_on) {
-  const Trace across = trace(60, 280, level);
-  const Trace ends_on_it = trace(60, 145, [](double x) { return 150 + 0.45 * (x - 150); });
-  const auto lines = with_own_courses({ends_on_it, across}, even(2), TraceRule{});
+  const Trace across = trace_of(60, 280, level);
+  const Trace ends_on_it = trace_of(60, 145, [](double x) { return 150 + 0.45 * (x - 150); });
+  const auto lines = with_own_courses({ends_on_it, across}, even_ridges(2), TraceRule{});
   ASSERT_EQ(lines.size(), 2);
   EXPECT_EQ(lines[0].size(), ends_on_it.size());
   EXPECT_EQ(lines[1].size(), across.size());
