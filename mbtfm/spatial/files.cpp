@@ -126,14 +126,12 @@ const files::Table<PartForce>& force_table() {
 
 std::string pages_of_tables() { return page_of(traction_table()) + page_of(force_table()); }
 
-void write_tractions(const Path& file, const Problem& problem, const SpatialReconstruction& reconstruction) {
-  write(file, traction_table(), shown(problem, reconstruction).rows);
-}
-
 void write_part_forces(const Path& file, const std::vector<PartForce>& forces) { write(file, force_table(), forces); }
 
-void write_tractions_vtp(const Path& file, const Problem& problem, const SpatialReconstruction& reconstruction) {
+void write_tractions(const Path& csv, const Path& vtp, const Problem& problem,
+                     const SpatialReconstruction& reconstruction) {
   const Shown all = shown(problem, reconstruction);
+  write(csv, traction_table(), all.rows);
   files::Grid grid;
   for (const auto& face : all.lattice.quads.faces) grid.cells.insert(grid.cells.end(), face.begin(), face.end());
   const auto array = [&](const char* name, int components) -> std::vector<double>& {
@@ -154,7 +152,7 @@ void write_tractions_vtp(const Path& file, const Problem& problem, const Spatial
     if (sigma) sigma->insert(sigma->end(), {*row.sigma_x_kPa, *row.sigma_y_kPa, *row.sigma_z_kPa});
     if (resolution) resolution->push_back(*row.resolution_um);
   }
-  files::write_quads_vtp(file, grid);
+  files::write_quads_vtp(vtp, grid);
 }
 
 const char* how_lambda(const SpatialReconstruction& r) { return r.lambda_by ? name_of(*r.lambda_by) : "given"; }

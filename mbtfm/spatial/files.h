@@ -8,10 +8,9 @@
 
 namespace mbtfm::spatial {
 
-/// traction_3d.csv: a row for each vertex.
-void write_tractions(const Path& file, const Problem& problem, const SpatialReconstruction& reconstruction);
-/// traction.vtp: the surface with the same.
-void write_tractions_vtp(const Path& file, const Problem& problem, const SpatialReconstruction& reconstruction);
+/// A table with a row for each vertex, and the surface with the same.
+void write_tractions(const Path& csv, const Path& vtp, const Problem& problem,
+                     const SpatialReconstruction& reconstruction);
 void write_part_forces(const Path& file, const std::vector<PartForce>& forces);
 /// Their part of docs/columns.md.
 std::string pages_of_tables();

@@ -40,8 +40,7 @@ void write_scan(stage::StageContext& context, const SpatialReconstruction& r) {
 
 void write_outputs(stage::StageContext& context, const Problem& problem, const SpatialReconstruction& r,
                    const Figures& summary) {
-  write_tractions(context.output("out"), problem, r);
-  write_tractions_vtp(context.output_beside("out", ".vtp"), problem, r);
+  write_tractions(context.output("out"), context.output_beside("out", ".vtp"), problem, r);
   files::write_figures(context.output_beside("out", ".json"), summary);
   if (r.scan) write_scan(context, r);
   if (!r.forces.empty()) write_part_forces(context.output_beside("out", "_adhesion_forces.csv"), r.forces);

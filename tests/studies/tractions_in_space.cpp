@@ -254,8 +254,9 @@ TractionScene with_surface_of_beads(TractionScene scene, double noise) {
   for (const Vec2 at : scene.lattice_um) squares += std::pow(fit.height_um(at) - truth(at), 2);
   std::printf("%-12s surface of %zu beads: rms %.2f um\n", scene.name.c_str(), places.size(),
               std::sqrt(squares / static_cast<double>(scene.lattice_um.size())));
-  scene.gel.surface = std::make_shared<const HeightMap>(
-      surface::sampled([&](Vec2 at) { return fit.height_um(at); }, {-60, -60}, {60, 60}, 1));
+  const surface::Lattice& l = fit.lattice;  // as mbtfm-surface has it: where beads are
+  scene.gel.surface = std::make_shared<const HeightMap>(surface::sampled(
+      [&](Vec2 at) { return fit.height_um(at); }, l.corner_um, at_place(l, {1.0 * l.n_x, 1.0 * l.n_y}), 1));
   return scene;
 }
 
