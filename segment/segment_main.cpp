@@ -180,7 +180,9 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                 "In " + brief(100 * s.outline_off_actin.value_or(0)) +
                     " % of the outline that was given, the actin image shows no cell."),
         noticed(FindingKind::adhesions_left_out, s.n_adhesions_outside,
-                std::to_string(s.n_adhesions_outside) + " adhesions outside the cell were left out."),
+                s.n_adhesions_outside == 1
+                    ? "One adhesion outside the cell was left out."
+                    : std::to_string(s.n_adhesions_outside) + " adhesions outside the cell were left out."),
         noticed(FindingKind::adhesions_assumed,
                 static_cast<double>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::candidate, &Adhesion::origin)),
                 assumption_of(s, is_assumed_by_itself), severity_of(s)),

@@ -47,7 +47,7 @@ void write_field(stage::StageContext& context, const DisplacementField& field, c
 }
 
 struct FieldFigures {
-  std::int64_t n_good = 0, n_moving = 0;
+  std::int64_t n_good = 0, n_moving = 0, n_surely_moving = 0;  ///< by more than three and six standard errors
   double largest_um = 0, sigma_um = 0;
 };
 
@@ -58,6 +58,7 @@ FieldFigures figures_of(const DisplacementField& field) {
     if (!bead.flag.empty()) continue;
     ++result.n_good;
     if (norm(bead.displacement_um) > 3 * bead.sigma_um) ++result.n_moving;
+    if (norm(bead.displacement_um) > 6 * bead.sigma_um) ++result.n_surely_moving;
     result.largest_um = std::max(result.largest_um, norm(bead.displacement_um));
     squares += bead.sigma_um * bead.sigma_um;
   }
@@ -78,11 +79,11 @@ StageReport report_of(const DisplacementField& field) {
                     {"outwardness", outwardness(field)}};
   if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged in displacement.csv";
   const double still =
-      1 - static_cast<double>(figures.n_moving) / static_cast<double>(std::max<std::int64_t>(1, figures.n_good));
+      1 - static_cast<double>(figures.n_surely_moving) / static_cast<double>(std::max<std::int64_t>(1, figures.n_good));
   for (std::optional<Finding> found :
        {noticed(FindingKind::nothing_moves, still,
-                "Nothing moves: " + std::to_string(figures.n_moving) + " of " + std::to_string(figures.n_good) +
-                    " beads by more than three standard errors."),
+                "Nothing moves: " + std::to_string(figures.n_surely_moving) + " of " + std::to_string(figures.n_good) +
+                    " beads by more than six standard errors."),
         noticed(FindingKind::moves_outward, outwardness(field), "The gel is pushed outward everywhere.")}) {
     if (found) report.findings.push_back(std::move(*found));
   }

@@ -34,16 +34,26 @@ cables::CableParameters inelastic(cables::CableParameters cables) {
   return cables;
 }
 
+/// Without the fibres that came after the network: all networks of an ensemble have the same.
+Cell with_fibres_of(const Network& network, Cell cell) {
+  const auto is_new = [&](const Fibre& f) {
+    return std::ranges::none_of(network.links, [&](const Link& link) { return link.fibre_id == f.fibre_id; });
+  };
+  std::erase_if(cell.fibres, is_new);
+  return cell;
+}
+
 }  // namespace
 
 std::vector<cables::CableNetwork> span_ensemble(const Network& first, const Cell& cell, const Parameters& p,
                                                 int threads) {
+  const Cell same = with_fibres_of(first, cell);
   std::vector<Network> networks(static_cast<std::size_t>(p.fit.n_meshes));
   networks.front() = first;
   numerics::parallel_for(p.fit.n_meshes - 1, threads, [&](int m) {
     mesh::NetworkParameters parameters = p.network;
     parameters.seed += static_cast<std::uint64_t>(m) + 1;
-    networks[static_cast<std::size_t>(m) + 1] = mesh::generate_network(cell, parameters).network;
+    networks[static_cast<std::size_t>(m) + 1] = mesh::generate_network(same, parameters).network;
   });
   std::vector<cables::CableNetwork> cables;
   for (Network& network : networks) cables.emplace_back(std::move(network), p.cables);

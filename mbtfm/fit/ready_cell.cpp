@@ -28,6 +28,13 @@ TakenCell take_cell(const Inputs& inputs, const stage::EffectSwitches& switches)
     throw InputError(inputs.network_file, "a network without stress fibres, as effects.stress_fibres says", "fibres",
                      "make it again: mbtfm-network with the same cell.toml");
   }
+  for (const Link& link : inputs.network.links) {
+    const auto is_it = [&](const Fibre& f) { return f.fibre_id == link.fibre_id; };
+    if (link.fibre_id == 0 || std::ranges::any_of(taken.cell.fibres, is_it)) continue;
+    throw InputError(inputs.network_file, "a network of the fibres in fibres.csv",
+                     "fibre " + std::to_string(link.fibre_id) + ", which is not among them",
+                     "make it again: mbtfm-network with the same cell");
+  }
   if (cuts_of(taken.cell).empty() != inputs.network.held_by_cut.empty()) {
     throw InputError(inputs.network_file, "a network that the cut of outline.csv holds",
                      "of an outline with another cut", "make it again: mbtfm-network with the same cell");

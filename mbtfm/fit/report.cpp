@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mbtfm/tensions/findings.h"
+#include "mbtfm/tensions/noise.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 
@@ -46,10 +47,11 @@ std::optional<Finding> noticed_reading(FindingKind kind, const std::optional<Rea
 }
 
 std::vector<Finding> all_findings(const FittedCell& c) {
-  std::vector<Finding> findings =
-      findings_of({c.fit, c.fit.data, c.seen, c.found.summary, c.found.tensions, c.checks.missing_fibres,
-                   c.checks.missing_adhesions, c.motions.common, c.motions.curved, c.motions.placement, c.ready.beyond,
-                   c.ready.decisions.strain});
+  std::vector<Finding> findings = findings_of(
+      {c.fit, c.fit.data, c.seen, c.found.summary, c.found.tensions, c.checks.missing_fibres,
+       c.checks.missing_adhesions, c.motions.common, c.motions.curved, c.motions.placement, c.ready.beyond,
+       c.ready.decisions.strain,
+       has_far_beads(c.fit.data.position_um, c.ready.scene.cell.outline_um, c.parameters.fit.far_distance_um)});
   for (std::optional<Finding> found : {noticed_reading(FindingKind::field_smoothed, c.smoothing),
                                        noticed_reading(FindingKind::read_otherwise, c.reading)})
     if (found) findings.insert(findings.begin(), std::move(*found));

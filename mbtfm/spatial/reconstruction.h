@@ -163,6 +163,8 @@ struct Balance {
   double strain_energy_fJ = 0;
 };
 Balance balance_of(const Problem& problem, const SpatialReconstruction& reconstruction);
+/// Where its errors are known.
+std::optional<Finding> noticed_imbalance(const Balance& balance);
 
 /// Forces closer together than this look like one; from about twice that on they are mostly seen as two
 /// (docs/developers/planning.md). The side of the area over which the beads tell one number for

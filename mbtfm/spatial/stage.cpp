@@ -69,15 +69,6 @@ std::string left_out_of(const Observed& observed) {
   return text;
 }
 
-void notice_balance(stage::StageContext& context, const Balance& balance) {
-  if (!balance.imbalance) return;
-  context.notice(noticed(FindingKind::tractions_out_of_balance, *balance.imbalance,
-                         "The tractions add up to " + brief(norm(balance.force_nN)) + " +- " +
-                             brief(balance.net_force_sigma_nN) + " nN, their moments to " +
-                             brief(norm(balance.moment_nN_um)) + " +- " + brief(balance.net_moment_sigma_nN_um) +
-                             " nN um; the sum of their sizes is " + brief(balance.total_force_nN) + " nN."));
-}
-
 /// What does not go together is told with the names of the files.
 Problem problem_of(const StageParameters& p, const SpatialInputs& inputs, const Meshing& meshing,
                    const substrate::SubstrateParameters& gel, const stage::StageContext& context) {
@@ -187,7 +178,7 @@ StageReport run_in_space(const StageParameters& p, stage::StageContext& context)
   const Balance balance = balance_of(problem, r);
   if (!inputs.outline_um.empty() || !inputs.adhesions.empty())  // of one cell: a whole field may hold many
     context.expect_plausible("total_force_nN", balance.total_force_nN);
-  notice_balance(context, balance);
+  context.notice(noticed_imbalance(balance));
   const Figures summary = summary_of(problem, r, balance);
   write_outputs(context, problem, r, summary);
   context.progress(1, "done");

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "mbtfm/spatial/reconstruction.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
 
 namespace mbtfm::spatial {
@@ -162,6 +163,15 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
       balance.strain_energy_fJ += 0.5 * it.value() * summed.segment<3>(3 * it.row()).dot(u.segment<3>(3 * j));
   }
   return balance;
+}
+
+std::optional<Finding> noticed_imbalance(const Balance& balance) {
+  if (!balance.imbalance) return std::nullopt;
+  return noticed(FindingKind::tractions_out_of_balance, *balance.imbalance,
+                 "The tractions add up to " + brief(norm(balance.force_nN)) + " +- " +
+                     brief(balance.net_force_sigma_nN) + " nN, their moments to " + brief(norm(balance.moment_nN_um)) +
+                     " +- " + brief(balance.net_moment_sigma_nN_um) + " nN um; the sum of their sizes is " +
+                     brief(balance.total_force_nN) + " nN.");
 }
 
 std::vector<double> resolution_um(const Problem& problem, const SpatialReconstruction& r) {

@@ -60,9 +60,11 @@ Noticed strain_beyond_linear(const FitOutcome& o) {
 }
 
 Noticed noise_unknown(const FitOutcome& o) {
-  const bool is_known = o.summary.expected_relative_l2 > 0;
-  return noticed(FindingKind::noise_unknown, is_known ? 0 : static_cast<double>(o.data.displacement_um.size() / 2),
-                 "The noise of the beads is not known.");
+  const bool is_known = o.data.has_errors || o.has_far_beads;
+  return noticed(
+      FindingKind::noise_unknown, is_known ? 0 : static_cast<double>(o.data.position_um.size()),
+      "The noise of the beads is not known: the displacement states no errors, and too few beads lie far from "
+      "the cell. What the model leaves unexplained is taken for noise.");
 }
 
 double stated_noise_um(const LinearData& data) {
@@ -79,8 +81,10 @@ Noticed noise_disagrees(const FitOutcome& o) {
   const double stated = stated_noise_um(o.data);
   if (!o.data.has_errors || stated <= 0) return {};
   const double ratio = o.summary.noise_um / stated;
-  std::string text = "Far from the cell the beads scatter by " + brief(1000 * o.summary.noise_um) +
-                     " nm about what the model says; their stated standard error is " + brief(1000 * stated) + " nm.";
+  std::string text =
+      std::string(o.has_far_beads ? "Far from the cell the beads scatter by " : "The beads scatter by ") +
+      brief(1000 * o.summary.noise_um) + " nm about what the model says; their stated standard error is " +
+      brief(1000 * stated) + " nm.";
   if (o.motion) {
     text += " The common motion of all beads, " + brief(1000 * rms_um(o.motion->motion, o.data.position_um)) +
             " nm, is not part of it: it was taken off.";

@@ -7,22 +7,29 @@
 
 namespace mbtfm::tensions {
 
+namespace {
+
+bool is_far(Vec2 bead_um, const Polygon& outline_um, double far_distance_um) {
+  return !contains(outline_um, bead_um) && distance_to_boundary_um(outline_um, bead_um) >= far_distance_um;
+}
+
+}  // namespace
+
+bool has_far_beads(const std::vector<Vec2>& beads_um, const Polygon& outline_um, double far_distance_um) {
+  constexpr std::ptrdiff_t kFewest = 30;
+  return std::ranges::count_if(beads_um, [&](Vec2 b) { return is_far(b, outline_um, far_distance_um); }) >= kFewest;
+}
+
 NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const Eigen::VectorXd& forces_nN,
                        const Polygon& outline_um, double far_distance_um) {
-  constexpr std::size_t kFewest = 30;  // of beads: 60 components tell a standard deviation to about 10 %
   const Eigen::VectorXd residual = residual_um(data, forces_nN);
-  std::vector<double> far, all;
+  const bool has_far = has_far_beads(data.position_um, outline_um, far_distance_um);
+  std::vector<double> used;
   for (std::size_t i = 0; i < beads.size(); ++i) {
+    if (has_far && !is_far(beads[i].position_um, outline_um, far_distance_um)) continue;
     const auto row = 2 * static_cast<Eigen::Index>(i);
-    const bool is_far = !contains(outline_um, beads[i].position_um) &&
-                        distance_to_boundary_um(outline_um, beads[i].position_um) >= far_distance_um;
-    for (const double r : {residual[row], residual[row + 1]}) {
-      all.push_back(std::abs(r));
-      if (is_far) far.push_back(std::abs(r));
-    }
+    for (const double r : {residual[row], residual[row + 1]}) used.push_back(std::abs(r));
   }
-  const bool has_far = far.size() >= 2 * kFewest;
-  std::vector<double>& used = has_far ? far : all;
   if (used.empty()) return {};
   const std::string source = std::to_string(used.size() / 2) +
                              (has_far ? " beads far from the cell" : " beads, too few of them far from the cell");

@@ -7,13 +7,16 @@
 
 namespace mbtfm::tensions {
 
+/// At least 30 lie that far outside the outline: 60 components tell a standard deviation to about 10 %.
+bool has_far_beads(const std::vector<Vec2>& beads_um, const Polygon& outline_um, double far_distance_um);
+
 struct NoiseLevel {
   double sigma_um = 0;  ///< standard deviation of a component
   std::string source;
 };
 
 /// From what the model leaves unexplained at beads further than `far_distance_um` outside the outline: 1.4826 × the
-/// median magnitude of a component, which outliers do not move. Where fewer than 30 beads are that far: of all beads.
+/// median magnitude of a component, which outliers do not move. Without far beads: of all beads.
 NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const Eigen::VectorXd& forces_nN,
                        const Polygon& outline_um, double far_distance_um);
 

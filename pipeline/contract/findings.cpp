@@ -92,8 +92,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {input_not_used, "input-not-used", "segment", note, "inputs that were not used because another one counts more",
        0, "a selection drawn by hand counts more than a mask, and a choice in [segment] counts more than both",
        "Remove the input that you do not want."},
-      {nothing_moves, "nothing-moves", "track", caution, "share of the beads that do not move by three standard errors",
-       0.98, "chance moves 1 bead in 90 by that much",
+      {nothing_moves, "nothing-moves", "track", caution, "share of the beads that do not move by six standard errors",
+       0.999,
+       "of simulated pairs at rest at most 6 beads in 10 000 move by that much; of cells whose noise is 7 % of the "
+       "largest displacement 16 and more",
        "Check that the two bead images belong to this cell, and that the cell was removed between them."},
       {moves_outward, "moves-outward", "track", caution,
        "mean cosine between a bead's displacement and the direction away from the centre", 0.3,
@@ -183,7 +185,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "If the gel is rubber-like (polyacrylamide, silicone), set substrate.material = \"neo-hooke\" in cell.toml. "
        "Check the pixel size, and that no adhesion is drawn too small: the strain does not depend on the modulus."},
       {noise_unknown, "noise-unknown", "fit", caution, "beads whose noise is not known", 0,
-       "without the noise one cannot tell whether the model fits", "Give sigma_um in displacement.csv."},
+       "without the noise one cannot tell whether the model fits",
+       "Give sigma_um in displacement.csv, or beads that lie fit.far_distance_um and more beside the cell."},
       {noise_disagrees, "noise-disagrees", "fit", caution,
        "scatter of the beads far from the cell about the model, over their stated standard error", 1.3,
        "the error bars take the larger of both: a third more than stated is more than chance and model explain",

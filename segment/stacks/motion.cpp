@@ -44,6 +44,7 @@ struct Fit {
   Eigen::VectorXd solution;
   Eigen::MatrixXd covariance;
   std::vector<double> weights;
+  double scale = 1;  ///< of the beads at rest over their standard errors
 };
 
 Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 centre) {
@@ -113,6 +114,7 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
     normal.diagonal().array() += 1e-12;
     const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
     fit.solution += factor.solve(right);
+    fit.scale = scale;
     if (round + 1 == kRounds) fit.covariance = scale * scale * factor.solve(Eigen::MatrixXd::Identity(n, n));
   }
   return fit;
@@ -190,6 +192,15 @@ Means means_by_depth(const std::vector<Moved>& beads, const std::vector<double>&
   return means;
 }
 
+/// What a bead's weight is above where it moves with the others: as far as standard errors explain it. Where more beads
+/// move than two in three, the scale is that of these, and no measure of rest.
+double weight_at_rest(double scale) {
+  constexpr double kHalf = 0.5;    // (1 - r²)² of a bead at 4.2 standard errors, where the scale is theirs
+  constexpr double kRaised = 1.5;  // what errors that are stated too small make of it: beads-scatter
+  const double r_squared = kHalf * std::pow(std::min(1.0, kRaised / scale), 2);
+  return (1 - r_squared) * (1 - r_squared);
+}
+
 }  // namespace
 
 Vec3 CommonMotion::at(Vec3 place_um) const {
@@ -212,7 +223,7 @@ CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, 
   const Fit fit = fitted(beads, motion.z_um, motion.centre_um);
   motion.turn_rad = fit.solution[0];
   motion.turn_sigma_rad = std::sqrt(std::max(0.0, fit.covariance(0, 0)));
-  const auto at_rest = std::ranges::count_if(fit.weights, [](double w) { return w > 0.25; });
+  const auto at_rest = std::ranges::count_if(fit.weights, [&](double w) { return w > weight_at_rest(fit.scale); });
   motion.share_at_rest = static_cast<double>(at_rest) / static_cast<double>(beads.size());
 
   const Means means = means_by_depth(beads, motion.z_um, motion.centre_um, fit);

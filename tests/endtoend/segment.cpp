@@ -8,7 +8,9 @@
 #include "segment/images/image.h"
 #include "segment/rois/roi.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/findings.h"
 #include "tests/support/program.h"
+#include "tests/support/segmentation_accuracy.h"
 
 namespace mbtfm {
 namespace {
@@ -16,6 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using rois::Roi;
 using rois::RoiShape;
+using test::fires;
 
 /// A 16-bit TIFF of one page an image.
 void write_pages(const fs::path& file, const std::vector<images::Image>& pages, const std::string& description) {
@@ -131,10 +134,113 @@ TEST_F(Segment, what_is_drawn_by_hand_takes_the_place_of_what_would_be_found) {
   EXPECT_NEAR(cell.adhesions[0].area_um2, 2, 1e-9);
   EXPECT_NEAR(norm(cell.adhesions[0].position_um - Vec2{7, 8}), 0, 1e-9);
   EXPECT_NEAR(signed_area_um2(cell.outline_um), 21.6 * 21.6, 1e-9);
+  EXPECT_TRUE(fires("outline-off-actin", outcome.output)) << "a square about a disc: " << outcome.output;
 
   const test::Outcome swapped = segment("swapped", both() + " --fibre-rois " + path("adhesions.zip"));
   EXPECT_EQ(swapped.code, 3);
   EXPECT_NE(swapped.output.find("'mine': expected a line"), std::string::npos) << swapped.output;
+}
+
+/// Of 255 where `is_in` has a place, in um.
+template <class IsIn>
+images::Image mask_of(const IsIn& is_in) {
+  images::Image mask = test::even_image(256, 256, 0);
+  for (int j = 0; j < mask.height; ++j)
+    for (int i = 0; i < mask.width; ++i)
+      if (is_in(test::centre_of_pixel_um(i, j, test::DrawnScene::kPixel_um))) mask.at(i, j) = 255;
+  return mask;
+}
+
+double radius_um(Vec2 place) { return norm(place - Vec2{12.8, 12.8}); }
+
+TEST_F(Segment, a_sound_cell_has_no_findings) {
+  const std::string said = segment("out", both()).output;
+  test::expect_silent({"lossy-image", "saturated", "unusual-value", "adhesions-left-out", "adhesions-long",
+                       "bright-actin", "adhesions-off-actin", "outline-off-actin", "actin-shift", "adhesions-assumed",
+                       "fibre-ends-anchored", "input-not-used"},
+                      said);
+}
+
+TEST_F(Segment, an_adhesion_beside_the_cell_is_left_out_and_told) {
+  test::draw_ellipse(scene_.adhesion_image, test::ellipse(6, {23, 23}, 1.6, 0.6, 0.6), 500, 0.13, scene_.kPixel_um);
+  images::write_tiff(folder_ / "paxillin.tif", scene_.adhesion_image);
+  const std::string said = segment("out", both()).output;
+  EXPECT_TRUE(fires("adhesions-left-out", said)) << said;
+  EXPECT_TRUE(fires("adhesions-off-actin", said)) << said;
+}
+
+TEST_F(Segment, an_end_that_no_adhesion_holds_and_an_input_that_does_not_count_are_told) {
+  rois::Roi fibre, outline;
+  fibre.name = "ventral 1";
+  fibre.shape = rois::RoiShape::polyline;
+  fibre.points_px = {{70, 80}, {120, 128}};
+  outline.name = "outline";
+  for (const Vec2 p : {Vec2{30, 128}, {128, 30}, {226, 128}, {128, 226}}) outline.points_px.push_back(p);
+  rois::write_roi_set(folder_ / "fibres.zip", {fibre});
+  rois::write_roi_set(folder_ / "outline.zip", {outline});
+  images::write_tiff(folder_ / "mask.tif", mask_of([](Vec2 p) { return radius_um(p) < 10; }));
+  const std::string said = segment("out", both() + " --fibre-rois " + path("fibres.zip") + " --outline-roi " +
+                                              path("outline.zip") + " --outline-mask " + path("mask.tif"))
+                               .output;
+  EXPECT_TRUE(fires("fibre-ends-anchored", said)) << said;
+  EXPECT_TRUE(fires("input-not-used", said)) << said;
+  EXPECT_FALSE(fires("outline-off-actin", said)) << said;
+}
+
+/// An adhesive ring is a pattern; the adhesions themselves and the whole cell are none.
+TEST_F(Segment, a_mask_that_is_no_pattern_is_told) {
+  const auto with = [&](const images::Image& mask) {
+    images::write_tiff(folder_ / "mask.tif", mask);
+    return segment("out",
+                   "--actin-image " + path("actin.tif") + " --adhesions pattern --adhesion-mask " + path("mask.tif"))
+        .output;
+  };
+  const std::string ring = with(mask_of([](Vec2 p) { return std::abs(radius_um(p) - 7.5) < 2; }));
+  test::expect_silent({"pattern-too-fine", "pattern-as-cell"}, ring);
+  EXPECT_TRUE(fires("adhesions-assumed", ring)) << ring;
+  const std::string fine = with(mask_of([](Vec2 p) {  // dots of 0.6 um, 1.2 um apart
+    return norm(Vec2{std::remainder(p.x, 1.2), std::remainder(p.y, 1.2)}) < 0.3;
+  }));
+  EXPECT_TRUE(fires("pattern-too-fine", fine)) << fine;
+  const std::string cell = with(mask_of([](Vec2 p) { return radius_um(p) < 10; }));
+  EXPECT_TRUE(fires("pattern-as-cell", cell)) << cell;
+}
+
+/// A small cell with ten fibres, as the simulator draws it.
+TEST_F(Segment, images_that_are_shifted_or_exchanged_and_actin_that_is_no_fibre_are_told) {
+  constexpr std::uint64_t kSeed = 1;
+  constexpr int kSide_px = 420;
+  files::write_text(folder_ / "scenario.toml",
+                    "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\n[scenario]\ndiameter_um = 30\n"
+                    "n_adhesions = 30\nn_ventral = 6\nn_dorsal = 4\nn_arc = 0\n");
+  const test::SimulatedCell cell =
+      test::simulated_cell((folder_ / "scenario.toml").string(), "ordinary", kSeed, kSide_px);
+  const auto found = [&](const images::Image& adhesion, const images::Image& actin) {
+    images::write_tiff(folder_ / "paxillin.tif", adhesion);
+    images::write_tiff(folder_ / "actin.tif", actin);
+    return segment("out", both()).output;
+  };
+  const images::Image &adhesion = cell.adhesion.image, &actin = cell.actin.image;
+  test::expect_silent({"actin-shift", "adhesions-long", "bright-actin"}, found(adhesion, actin));
+  const std::string shifted = found(adhesion, test::mapped(actin, [&](int column, int row) {
+                                      return std::pair((column + 4) % actin.width, (row + 3) % actin.height);
+                                    }));
+  EXPECT_TRUE(fires("actin-shift", shifted)) << shifted;
+  const std::string exchanged = found(actin, adhesion);
+  EXPECT_TRUE(fires("adhesions-long", exchanged)) << exchanged;
+  // a ring as of a podosome rosette: a line for the eye, too bent for a fibre
+  images::Image with_ring = actin;
+  const float bright = *std::ranges::max_element(actin.pixels);
+  Vec2 middle;
+  for (const Vec2 p : cell.truth.outline_um) middle += 1.0 / static_cast<double>(cell.truth.outline_um.size()) * p;
+  Polyline ring;
+  for (int k = 0; k <= 60; ++k) {
+    const double angle = 2 * std::numbers::pi * k / 60;
+    ring.push_back(middle + 1.5 * Vec2{std::cos(angle), std::sin(angle)});
+  }
+  test::draw_line(with_ring, ring, 2 * bright, 0.5, cell.actin.image.pixel_size_um.value());
+  const std::string rosette = found(adhesion, with_ring);
+  EXPECT_TRUE(fires("bright-actin", rosette)) << rosette;
 }
 
 }  // namespace

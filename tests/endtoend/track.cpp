@@ -11,10 +11,14 @@
 #include "pipeline/files/text.h"
 #include "segment/images/image.h"
 #include "tests/support/bead_pair.h"
+#include "tests/support/findings.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/weak_beads.h"
 
 namespace mbtfm {
 namespace {
+
+using test::fires;
 
 struct Ended {
   int code = 0;
@@ -232,11 +236,17 @@ TEST(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
   const auto pair = test::draw_bead_pair(test::ring_of_adhesions(384, 6), {.width = 384, .n_beads = 2950});
   write(folder / "r.tif", pair.relaxed, 0.2);
   write(folder / "s.tif", pair.stressed, 0.2);
-  EXPECT_EQ(run_track(folder, files(folder, "r.tif", "s.tif")).code, 0);
+  const Ended sound = run_track(folder, files(folder, "r.tif", "s.tif"));
+  EXPECT_EQ(sound.code, 0);
+  test::expect_silent({"nothing-moves", "moves-outward", "tracked-by-correlation", "defocused", "beads-not-round",
+                       "saturated", "lossy-image", "unusual-value"},
+                      sound.said);
   const Ended swapped = run_track(folder, files(folder, "s.tif", "r.tif"));
   EXPECT_EQ(swapped.code, 3);
   EXPECT_NE(swapped.said.find("exchange the files of --stressed and --relaxed"), std::string::npos) << swapped.said;
-  EXPECT_EQ(run_track(folder, files(folder, "s.tif", "r.tif") + " --may_push").code, 0);
+  const Ended pushed = run_track(folder, files(folder, "s.tif", "r.tif") + " --may_push");
+  EXPECT_EQ(pushed.code, 0);
+  EXPECT_TRUE(fires("moves-outward", pushed.said)) << pushed.said;
 }
 
 TEST(TrackEndToEnd, images_that_cannot_be_a_pair_are_refused_with_the_reason) {
@@ -280,7 +290,32 @@ TEST(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_told_of) {
     const Ended ended = run_track(folder, files(folder, "r.tif", "s.tif"));
     EXPECT_EQ(ended.code, 0) << ended.said;
     EXPECT_EQ(ended.said.find("of the beads in the images is 0.0") != std::string::npos, pixel_um < 0.1) << ended.said;
+    EXPECT_EQ(fires("unusual-value", ended.said), pixel_um < 0.1) << ended.said;
   }
+}
+
+TEST(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_told) {
+  const test::TemporaryFolder folder;
+  const auto told = [&](const test::BeadPair& pair) {
+    write(folder / "r.tif", pair.relaxed, 0.2);
+    write(folder / "s.tif", pair.stressed, 0.2);
+    const Ended ended = run_track(folder, files(folder, "r.tif", "s.tif"));
+    EXPECT_EQ(ended.code, 0) << ended.said;
+    return ended.said;
+  };
+  test::BeadScene scene{.width = 256, .n_beads = 1300, .drift = {2, 1}};
+  std::vector<test::Peak> peaks = test::ring_of_adhesions(scene.width, 3);
+  test::BeadScene defocused = scene, oblong = scene, weak = scene;
+  defocused.defocus = 1.8;
+  oblong.bead_aspect = 1.2;
+  weak.brightness = 25;
+  EXPECT_TRUE(fires("defocused", told(test::draw_bead_pair(peaks, defocused))));
+  const std::string of_oblong = told(test::draw_bead_pair(peaks, oblong));
+  EXPECT_TRUE(fires("beads-not-round", of_oblong)) << of_oblong;
+  EXPECT_NE(of_oblong.find("caution (beads-not-round)"), std::string::npos) << of_oblong;
+  for (test::Peak& peak : peaks) peak.radius *= 4;  // narrower ones no window shows
+  const std::string of_weak = told(test::weakened(test::draw_bead_pair(peaks, weak), {.levels = 40}, 1));
+  EXPECT_TRUE(fires("tracked-by-correlation", of_weak)) << of_weak;
 }
 
 TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_told_of) {
@@ -298,7 +333,8 @@ TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_
   };
   const Ended of_still = given("still.csv");
   EXPECT_EQ(of_still.code, 0);
-  EXPECT_NE(of_still.said.find("nothing-moves): Nothing moves: 0 of 64 beads"), std::string::npos) << of_still.said;
+  EXPECT_TRUE(fires("nothing-moves", of_still.said)) << of_still.said;
+  EXPECT_NE(of_still.said.find("Nothing moves: 0 of 64 beads"), std::string::npos) << of_still.said;
   const Ended of_twice = given("twice.csv");
   EXPECT_EQ(of_twice.code, 0);
   EXPECT_NE(of_twice.said.find("1 flagged"), std::string::npos) << of_twice.said;

@@ -9,8 +9,10 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/track.h"
 #include "segment/stacks/detect.h"
+#include "segment/stacks/findings.h"
 #include "segment/stacks/mean_by_depth.h"
 #include "segment/stacks/track.h"
+#include "tests/support/findings.h"
 #include "tests/support/stack_scene.h"
 
 namespace mbtfm::stacks {
@@ -246,6 +248,50 @@ TEST(Stacks, jumps_of_the_stage_under_a_cell_that_fills_the_view_are_taken_off) 
   EXPECT_TRUE(followed.common.has_slice_drift);
   // errors of two places, 0.028 um, and of the depth, 0.06 um where the stage jumps by some 0.6 um per um
   EXPECT_LT(rms_beyond_a_shift(clouds, followed), 1.25 * std::hypot(0.028, 0.036));
+}
+
+// --- findings
+
+using test::fires;
+
+std::vector<Finding> found_of(const BeadClouds& clouds) {
+  return findings_of(follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 2), {}, 0);
+}
+
+/// One cell under which the gel is at rest, and what may be wrong with its stacks.
+TEST(StackFindings, a_sound_pair_has_none_and_each_fault_its_own) {
+  constexpr double kError_um = 0.03;
+  const BeadClouds sound = bead_clouds(1200, kError_um, 0.03, 1, pull);
+  const std::vector<Finding> of_sound = found_of(sound);
+  EXPECT_TRUE(of_sound.empty()) << test::ids_of(of_sound);
+  test::expect_silent({"nothing-moves", "beads-lost", "little-at-rest", "slices-moved", "beads-scatter", "light-lost"},
+                      of_sound);
+
+  EXPECT_TRUE(fires("nothing-moves", found_of(bead_clouds(1200, kError_um, 0.03, 2, [](Vec3) { return Vec3{}; }))));
+  // a third of the beads of each stack are not in the other
+  EXPECT_TRUE(fires("beads-lost", found_of(bead_clouds(1000, kError_um, 0.5, 3, pull))));
+  // a cell that fills the field: its pull is 30 standard errors and more nearly everywhere
+  const auto everywhere = [](Vec3 x) { return Vec3{2 * std::sin(x.x / 12), 2 * std::sin(x.y / 9), std::sin(x.x / 7)}; };
+  EXPECT_TRUE(fires("little-at-rest", found_of(bead_clouds(1200, kError_um, 0.03, 4, everywhere))));
+  const auto drift = [](Vec3 x) { return pull(x) + Vec3{0.4 * std::sin(x.z / 8), 0, 0}; };
+  EXPECT_TRUE(fires("slices-moved", found_of(bead_clouds(1200, kError_um, 0.03, 5, drift))));
+
+  BeadClouds too_sure = sound;
+  for (auto* cloud : {&too_sure.relaxed, &too_sure.stressed}) {
+    for (PlacedBead& bead : *cloud) bead.sigma_um /= 2, bead.sigma_z_um /= 2;
+  }
+  EXPECT_TRUE(fires("beads-scatter", found_of(too_sure)));
+  for (const double left : {0.8, 0.3}) {
+    BeadClouds bleached = sound;
+    for (PlacedBead& bead : bleached.relaxed) bead.brightness = 1000;
+    for (PlacedBead& bead : bleached.stressed) bead.brightness = 1000 * left;
+    EXPECT_EQ(fires("light-lost", found_of(bleached)), left < 0.5) << left;
+  }
+  // of the pictures themselves
+  const Followed followed = follow(sound.relaxed, sound.stressed, {}, Switch::automatic, {}, 2);
+  EXPECT_TRUE(fires("defocused", findings_of(followed, {.across = 1.1, .along = 1.6}, 0)));
+  EXPECT_FALSE(fires("defocused", findings_of(followed, {.across = 1.1, .along = 1 / 1.4}, 0)));
+  EXPECT_TRUE(fires("saturated", findings_of(followed, {}, 0.002)));
 }
 
 // --- pictures

@@ -10,6 +10,7 @@
 #include "mbtfm/spatial/refine.h"
 #include "mbtfm/tractions/recurrences.h"
 #include "pipeline/contract/errors.h"
+#include "tests/support/findings.h"
 #include "tests/support/half_space_problem.h"
 
 namespace {
@@ -18,6 +19,7 @@ using namespace mbtfm;
 using namespace mbtfm::spatial;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test::fires;
 using test::HalfSpaceScene;
 using tractions::TractionParameters;
 
@@ -278,13 +280,12 @@ TEST_F(InSpace, a_lambda_by_risk_that_runs_away_is_replaced_and_called_so) {
   const auto chosen = choose_lambda(right, scan, traction, true);
   EXPECT_EQ(chosen.by, risk);
   EXPECT_EQ(chosen.lambda, scan.by_risk);
-  EXPECT_FALSE(chosen.finding);
+  EXPECT_FALSE(fires("lambda-runs-away", chosen.finding));
   scan.by_evidence = 2.1 * scan.by_risk;
   const auto replaced = choose_lambda(right, scan, traction, true);
   EXPECT_EQ(replaced.by, evidence);
   EXPECT_EQ(replaced.lambda, scan.by_evidence);
-  ASSERT_TRUE(replaced.finding);
-  EXPECT_EQ(replaced.finding->id, "lambda-runs-away");
+  ASSERT_TRUE(fires("lambda-runs-away", replaced.finding));
   EXPECT_NEAR(replaced.finding->number.value_or(0), 2.1, 1e-9);
   const auto unsound = choose_lambda(right, scan, traction, false);
   EXPECT_EQ(unsound.by, gcv);
@@ -754,14 +755,14 @@ TEST_F(InSpace, an_answer_that_hangs_on_the_loss_is_called_so) {
   scene.spots[0].force_nN = {80, 50, -30};
   const SpatialInputs inputs{{}, scene.gel, {}, {}};
   const Problem problem = scene.problem(scene.beads(0.05), parameters);
-  const auto is_noticed = [&](BeadLoss loss) {
+  const auto by = [&](BeadLoss loss) {
     parameters.loss = loss;
-    const auto r = reconstruct(problem, inputs, traction, parameters, 1);
+    auto r = reconstruct(problem, inputs, traction, parameters, 1);
     RecordProperty(name_of(loss), std::to_string(balance_of(problem, r).total_force_nN));
-    return std::ranges::any_of(r.findings, [](const auto& f) { return f && f->id == "loss-decides"; });
+    return r.findings;
   };
-  EXPECT_FALSE(is_noticed(BeadLoss::l2));
-  EXPECT_TRUE(is_noticed(BeadLoss::biweight));
+  EXPECT_FALSE(fires("loss-decides", by(BeadLoss::l2)));
+  EXPECT_TRUE(fires("loss-decides", by(BeadLoss::biweight)));
 }
 
 TEST_F(InSpace, many_beads_that_are_right_have_one_answer_by_any_loss) {
@@ -771,8 +772,75 @@ TEST_F(InSpace, many_beads_that_are_right_have_one_answer_by_any_loss) {
   for (const BeadLoss loss : {BeadLoss::mixture, BeadLoss::huber, BeadLoss::biweight}) {
     parameters.loss = loss;
     const auto r = reconstruct(problem, inputs, traction, parameters, 1);
-    EXPECT_FALSE(std::ranges::any_of(r.findings, [](const auto& f) { return f && f->id == "loss-decides"; }))
-        << name_of(loss);
+    EXPECT_FALSE(fires("loss-decides", r.findings)) << name_of(loss);
+  }
+}
+
+/// Two patches that pull at each other, and beads with the errors that they state.
+class FindingsInSpace : public InSpace {
+ protected:
+  void SetUp() override { scene.spots = {{{-10, 0}, 4, {40, 0, 0}}, {{10, 0}, 4, {-40, 0, 0}}}; }
+  SpatialReconstruction found(const Problem& problem) const {
+    return reconstruct(problem, {{}, scene.gel, {}, {}}, traction, parameters, 1);
+  }
+  SpatialReconstruction found(const std::vector<BeadInSpace>& beads) const {
+    return found(scene.problem(beads, parameters));
+  }
+  static constexpr double kSigma_um = 0.03;
+};
+
+TEST_F(FindingsInSpace, are_none_of_a_sound_scene) {
+  const Problem problem = scene.problem(scene.beads(kSigma_um), parameters);
+  const SpatialReconstruction r = found(problem);
+  test::expect_silent({"beads-off-the-gel", "beads-far", "beads-tell-little", "misfit-in-space", "beads-stray"},
+                      r.findings);
+  EXPECT_FALSE(fires("tractions-out-of-balance", noticed_imbalance(balance_of(problem, r))));
+}
+
+TEST_F(FindingsInSpace, tell_beads_above_the_surface_and_below_the_base) {
+  std::vector<BeadInSpace> beads = scene.beads(kSigma_um);
+  for (int b = 0; b < 10; ++b) beads[b].position_um.z = b % 2 ? -2 : scene.gel.thickness_um + 2;
+  EXPECT_TRUE(fires("beads-off-the-gel", found(beads).findings));
+}
+
+TEST_F(FindingsInSpace, tell_beads_that_lie_deep) {
+  scene.shallowest_um = 12;
+  scene.depth_um = 22;
+  EXPECT_TRUE(fires("beads-far", found(scene.beads(kSigma_um)).findings));
+}
+
+TEST_F(FindingsInSpace, tell_few_beads_of_much_noise) {
+  scene.n_beads = 80;
+  EXPECT_TRUE(fires("beads-tell-little", found(scene.beads(0.3)).findings));
+}
+
+TEST_F(FindingsInSpace, tell_stated_errors_that_are_too_small) {
+  std::vector<BeadInSpace> beads = scene.beads(kSigma_um);
+  for (BeadInSpace& b : beads) b.sigma_um /= 1.5, b.sigma_z_um /= 1.5;
+  EXPECT_TRUE(fires("misfit-in-space", found(beads).findings));
+}
+
+TEST_F(FindingsInSpace, tell_beads_that_were_followed_to_another) {
+  std::vector<BeadInSpace> beads = scene.beads(kSigma_um);
+  for (std::size_t b = 0; b < beads.size(); b += 50) beads[b].displacement_um += Vec3{1.5, -1, 0.5};
+  EXPECT_TRUE(fires("beads-stray", found(beads).findings));
+}
+
+TEST_F(FindingsInSpace, tell_a_force_that_nothing_balances) {
+  scene.spots.pop_back();
+  const Problem problem = scene.problem(scene.beads(kSigma_um), parameters);
+  EXPECT_TRUE(fires("tractions-out-of-balance", noticed_imbalance(balance_of(problem, found(problem)))));
+}
+
+TEST_F(FindingsInSpace, tell_a_patch_that_is_missing) {
+  traction.method = tractions::TractionMethod::patches;
+  scene.spots.push_back({{0, 12}, 4, {0, -40, 0}});
+  const std::vector<BeadInSpace> beads = scene.beads(kSigma_um);
+  for (const bool is_missing : {false, true}) {
+    if (is_missing) scene.spots.pop_back();
+    const SpatialInputs inputs{{}, scene.gel, scene.adhesions(), {}};
+    const auto r = reconstruct(scene.problem(beads, parameters), inputs, traction, parameters, 1);
+    EXPECT_EQ(fires("patches-do-not-fit", r.findings), is_missing);
   }
 }
 

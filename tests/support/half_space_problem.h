@@ -15,7 +15,7 @@ struct HalfSpaceScene {
   Gel gel{.youngs_modulus_kPa = 10, .poisson_ratio = 0.45, .thickness_um = 1000};
   double half_um = 24;  ///< of the field
   int n_beads = 500;
-  double depth_um = 12;
+  double shallowest_um = 2, depth_um = 12;  ///< of the beads
   double spacing_um = 4;
   std::uint64_t seed = 1;
 
@@ -53,7 +53,7 @@ struct HalfSpaceScene {
   /// @param sigma_um  three times as much along z
   std::vector<BeadInSpace> beads(double sigma_um) const {
     std::mt19937_64 random(seed);
-    std::uniform_real_distribution<double> across(-half_um, half_um), down(2, depth_um);
+    std::uniform_real_distribution<double> across(-half_um, half_um), down(shallowest_um, depth_um);
     std::normal_distribution<double> noise;
     std::vector<BeadInSpace> made;
     for (int b = 0; b < n_beads; ++b) {

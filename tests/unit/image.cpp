@@ -13,12 +13,14 @@
 #include "segment/images/channels.h"
 #include "segment/images/image_file.h"
 #include "segment/images/png.h"
+#include "tests/support/findings.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::images {
 namespace {
 
 namespace fs = std::filesystem;
+using test::fires;
 using test::TemporaryFolder;
 
 Image ramp(int width, int height) {
@@ -330,6 +332,9 @@ TEST(Jpeg, is_read_as_what_it_shows_and_marked_as_lossy) {
     for (int i = 0; i < 64; ++i) EXPECT_NEAR(image.at(i, j), 2 * i + 40, 6) << i << ", " << j;
   }
   EXPECT_TRUE(binned(image, 2).is_lossy);
+  EXPECT_TRUE(fires("lossy-image", noticed_loss({"a.jpg", image})));
+  write_tiff(folder / "a.tif", image);
+  EXPECT_FALSE(fires("lossy-image", noticed_loss({"a.tif", read_image(folder / "a.tif")})));
   EXPECT_EQ(read_image(folder / "a.jpg", {.channel = "red"}).width, 64);
   EXPECT_THROW(read_image(folder / "a.jpg", {.channel = "4"}), InputError);
   EXPECT_THROW(read_image(folder / "a.jpg", {.page = 2}), InputError);
@@ -348,11 +353,11 @@ TEST(Channels, a_pixel_size_given_is_compared_with_each_images_own_binned_or_not
 
 TEST(Channels, a_saturated_image_is_noticed_by_the_share_of_its_pixels_at_the_largest_value) {
   Image image = ramp(100, 100);
-  EXPECT_FALSE(noticed_saturation({"a.tif", image}));
+  EXPECT_FALSE(fires("saturated", noticed_saturation({"a.tif", image})));
   const float brightest = *std::max_element(image.pixels.begin(), image.pixels.end());
   for (int i = 0; i < 50; ++i) image.at(i, 7) = brightest + 1;
   const auto found = noticed_saturation({"a.tif", image});
-  ASSERT_TRUE(found);
+  ASSERT_TRUE(fires("saturated", found));
   EXPECT_NEAR(*found->number, 0.005, 1e-12);
   EXPECT_NE(found->text.find("a.tif is saturated: 0.5 % of its pixels"), std::string::npos) << found->text;
 }

@@ -15,6 +15,7 @@
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/manual.h"
 #include "pipeline/stage/suggest.h"
+#include "tests/support/findings.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm {
@@ -82,6 +83,30 @@ TEST_F(Stage, outputs_and_the_record_are_in_place_when_it_is_done) {
                            "\"n\": 2", "\"summary\": \"two files\""}) {
     EXPECT_NE(record.find(word), std::string::npos) << word << " is not in " << record;
   }
+}
+
+struct OnGel {
+  Gel gel;
+};
+void declare(stage::ParameterList& list, OnGel& p) { declare(list, p.gel); }
+
+TEST_F(Stage, what_was_assumed_and_what_is_unusual_are_findings_in_the_record) {
+  const auto record_of = [&](std::vector<std::string> flags) {
+    flags.insert(flags.begin(), {"mbtfm-example", "--record", (folder_ / "record.json").string()});
+    for (const std::string& file : files()) flags.push_back(file);
+    std::vector<char*> argv;
+    for (std::string& a : flags) argv.push_back(a.data());
+    EXPECT_EQ(stage::run_stage<OnGel>(kDescription, static_cast<int>(argv.size()), argv.data(),
+                                      [](const OnGel&, stage::StageContext&) { return StageReport{}; }),
+              0);
+    return files::read_text(folder_ / "record.json");
+  };
+  const std::string sound =
+      record_of({"--youngs_modulus_kPa", "8.4", "--poisson_ratio", "0.49", "--thickness_um", "60"});
+  test::expect_silent({"assumed-input", "unusual-value"}, sound);
+  const std::string doubtful = record_of({"--youngs_modulus_kPa", "300", "--poisson_ratio", "0.49"});
+  EXPECT_TRUE(test::fires("assumed-input", doubtful)) << doubtful;
+  EXPECT_TRUE(test::fires("unusual-value", doubtful)) << doubtful;
 }
 
 TEST_F(Stage, a_failure_leaves_no_file_and_no_folder_and_tells_by_its_code) {
