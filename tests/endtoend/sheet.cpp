@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <numbers>
 #include <random>
 
@@ -331,6 +332,21 @@ TEST_F(FittedSheet, the_stiffness_of_the_adhesions_comes_back_and_is_called_for)
   EXPECT_LT(models.number(models.n_rows() - 1, "bic"), models.number(models.n_rows() - 2, "bic"));
 }
 
+TEST_F(FittedSheet, cells_contract_each_by_their_own) {
+  // a cell in one quarter; the rest is no cell
+  images::Image label{.width = 30, .height = 30, .pixels = std::vector<float>(30 * 30, 1), .pixel_size_um = 1};
+  images::write_tiff(folder_ / "cells.tif", label);
+  files::write_text(folder_ / "contractions.csv", "cell,contraction_nN_per_um\n1,0.8\n");
+  const std::string cells = "--pixel_size_um 1 --cells " + (folder_ / "cells.tif").string();
+  move_beads("contraction_nN_per_um = 0.3\n", cells + " --contractions " + (folder_ / "contractions.csv").string());
+  fit("fit_parts = \"cells\"\n", cells);
+  expect("contraction_nN_per_um", "cell 1", 0.8);
+  expect("contraction_nN_per_um", "no cell", 0.3);
+  const files::CsvTable models(folder_ / "out" / "sheet_models.csv");
+  ASSERT_EQ(models.text(models.n_rows() - 1, "model"), "sheet-in-parts");
+  EXPECT_LT(models.number(models.n_rows() - 1, "bic"), models.number(models.n_rows() - 2, "bic") - 10);
+}
+
 TEST_F(FittedSheet, a_band_contracts_by_its_own) {
   move_beads("contraction_nN_per_um = 0.5\nedge_band_um = 6\n");
   fit("fit_parts = \"edge\"\nedge_band_um = 6\n");
@@ -409,6 +425,22 @@ TEST_F(Sheet, tractions_of_a_larger_area_tell_both_means_their_errors_and_what_i
   const auto allowed = run("[sheet]\npoisson_ratio = 0.3\nmost_unbalanced = 1\n", record() + traction);
   EXPECT_EQ(allowed.code, 0) << allowed.output;
   EXPECT_TRUE(fires("tractions-off-balance"));
+}
+
+TEST_F(Sheet, large_strains_are_computed_on_a_gel_if_they_are_asked_for) {
+  const std::string gel = "[gel]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.45\nthickness_um = 60\n",
+                    soft =
+                        "[sheet]\nyoungs_modulus_kPa = 20\npoisson_ratio = 0.3\nthickness_um = 0.4\nmesh_um = 2\n"
+                        "contraction_nN_per_um = 2\n";  // a free sheet would contract by 0.17
+  std::map<std::string, double> largest_um;
+  for (const std::string strain : {"auto", "small", "large"}) {
+    const auto outcome = run(gel + soft + "strain = \"" + strain + "\"\n");
+    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    largest_um[strain] = figure("largest_displacement_um");
+    EXPECT_LE(figure("net_force_nN"), 1e-7 * figure("total_force_nN"));
+  }
+  EXPECT_EQ(largest_um["auto"], largest_um["small"]);
+  EXPECT_GT(std::abs(largest_um["large"] / largest_um["small"] - 1), 5e-3);
 }
 
 TEST_F(Sheet, a_line_tension_keeps_strains_small_and_the_finding_says_what_that_costs) {
