@@ -21,6 +21,7 @@
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/stage_page.h"
+#include "pipeline/runner/images.h"
 #include "pipeline/stage/stage.h"
 #include "segment/images/image.h"
 
@@ -67,7 +68,8 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.add("reference", p.reference,
            "name of the cell whose outline is the reference; empty: the pattern, or the most typical outline");
   list.add("register_by", p.register_by, "what cells are aligned by: their outlines, or images of them");
-  list.add("image", p.image, "name of the image in each cell's folder, with register_by = images");
+  list.add("image", p.image,
+           "image in each cell's folder, with register_by = images: its name, or a key of [images] such as actin");
   list.add(
       "symmetry", p.symmetry,
       "motions that leave the shape as it is: C1 none, C4 turns by a quarter, C4v with mirrors, Cinfv a circle; the "
@@ -99,41 +101,56 @@ Path first_of(const Path& folder, std::initializer_list<const char*> names) {
   return {};
 }
 
-Path outline_in(const Path& folder) {
-  return first_of(folder, {"1_segment/outline.csv", "outline.csv", "outline.roi", "outline.zip", "outline_mask.tif",
-                           "outline_mask.png"});
-}
 Path displacement_in(const Path& folder) { return first_of(folder, {"2_track/displacement.csv", "displacement.csv"}); }
 
+/// What a cell's own cell.toml says, in the place of what holds for all.
+struct OwnSettings {
+  Gel gel;
+  std::optional<double> pixel_size_um;
+  runner::ImageNames images;
+};
+OwnSettings settings_of(const Path& cell, const Parameters& otherwise) {
+  OwnSettings own{otherwise.gel, otherwise.pixel_size_um, {}};
+  if (!files::is_file(cell / "cell.toml")) return own;
+  stage::ParameterList list;
+  list.add("pixel_size_um", own.pixel_size_um, Range::pixel_um(), "side of a pixel");
+  declare(list, own.gel);
+  declare(list, own.images);
+  read_toml(list, cell / "cell.toml");
+  return own;
+}
+
+/// The outline that was found, or that is given, as mbtfm run takes it; empty: none.
+/// @throws InputError where [images] names one that is not there
+Path outline_in(const Path& folder, const runner::ImageNames& names) {
+  const Path found = first_of(folder, {"1_segment/outline.csv", "outline.csv"});
+  if (!found.empty()) return found;
+  for (const char* key : {"outline_roi", "outline_mask"}) {
+    if (const auto given = resolve_optional_image(folder, names, key)) return given->lexically_relative(folder);
+  }
+  return {};
+}
+
+/// The image that cells are laid onto each other by: of this name, or what a key of [images] stands for.
+Path image_in(const Path& folder, const runner::ImageNames& names, const std::string& name_or_key) {
+  return runner::is_image_key(name_or_key) ? resolve_image(folder, names, name_or_key) : folder / name_or_key;
+}
+
 /// Folders that hold an outline and a displacement, by name.
-std::vector<Path> folders_of_cells(const Path& top) {
+std::vector<Path> folders_of_cells(const Path& top, const Parameters& p) {
   if (!files::is_folder(top)) throw InputError(top.string(), "a folder of cell folders", "none of that name");
   std::set<Path> found;
   std::error_code error;
   const auto how = fs::directory_options::skip_permission_denied;  // lost+found
   for (fs::recursive_directory_iterator entry(top, how, error), end; !error && entry != end; entry.increment(error)) {
     if (!files::is_folder(entry->path())) continue;  // a link that leads round in a circle is none
-    if (outline_in(entry->path()).empty() || displacement_in(entry->path()).empty()) continue;
+    if (displacement_in(entry->path()).empty()) continue;
+    if (outline_in(entry->path(), settings_of(entry->path(), p).images).empty()) continue;
     found.insert(entry->path().lexically_relative(top));
     entry.disable_recursion_pending();
   }
   if (error) throw InputError(top.string(), "folders that can be read", error.message());
   return {found.begin(), found.end()};
-}
-
-/// What a cell's own cell.toml says, in the place of what holds for all.
-struct OwnSettings {
-  Gel gel;
-  std::optional<double> pixel_size_um;
-};
-OwnSettings settings_of(const Path& cell, const Parameters& otherwise) {
-  OwnSettings own{otherwise.gel, otherwise.pixel_size_um};
-  if (!files::is_file(cell / "cell.toml")) return own;
-  stage::ParameterList list;
-  list.add("pixel_size_um", own.pixel_size_um, Range::pixel_um(), "side of a pixel");
-  declare(list, own.gel);
-  read_toml(list, cell / "cell.toml");
-  return own;
 }
 
 /// @throws InputError where the image has no calibration: that of beads and outline is not known here
@@ -149,14 +166,12 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Parameters& p) 
   const Path top = context.input("cells", {});
   std::vector<std::string> read;
   std::vector<Cell> cells;
-  for (const Path& name : folders_of_cells(top)) {
+  for (const Path& name : folders_of_cells(top, p)) {
     const Path folder = top / name;
     const OwnSettings own = settings_of(folder, p);
-    Cell cell{.name = name.generic_string(),
-              .outline_file = folder / outline_in(folder),
-              .outline_um = {},
-              .beads = {},
-              .gel = own.gel};
+    const Path outline = outline_in(folder, own.images);
+    Cell cell{
+        .name = name.generic_string(), .outline_file = folder / outline, .outline_um = {}, .beads = {}, .gel = own.gel};
     cell.outline_um = outlines::read_rings(cell.outline_file, own.pixel_size_um).points_um.front();
     cell.beads = files::read_displacement(folder / displacement_in(folder));
     std::erase_if(cell.beads, [](const Bead& bead) { return !bead.flag.empty(); });
@@ -165,10 +180,11 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Parameters& p) 
       throw InputError((folder / "cell.toml").string(), "[gel] youngs_modulus_kPa", "none",
                        "give it there, or for all cells in --config or as --youngs_modulus_kPa");
     if (p.register_by == By::images) {
-      cell.image = read_brightness(folder / p.image);
-      read.push_back((name / p.image).generic_string());
+      const Path image = image_in(folder, own.images, p.image);
+      cell.image = read_brightness(image);
+      read.push_back((name / image.lexically_relative(folder)).generic_string());
     }
-    read.push_back((name / outline_in(folder)).generic_string());
+    read.push_back((name / outline).generic_string());
     read.push_back((name / displacement_in(folder)).generic_string());
     cells.push_back(std::move(cell));
   }

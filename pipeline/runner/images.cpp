@@ -51,6 +51,10 @@ void declare(stage::ParameterList& list, ImageNames& names) {
   for (const ImageKey& image : kImages) list.add(image.key, names.*image.member, image.meaning);
 }
 
+bool is_image_key(const std::string& key) {
+  return std::ranges::find(kImages, key, &ImageKey::key) != std::end(kImages);
+}
+
 const std::string& name_of_image(const ImageNames& names, const std::string& key) {
   const auto image = std::ranges::find(kImages, key, &ImageKey::key);
   MBTFM_ASSERT(image != std::end(kImages));

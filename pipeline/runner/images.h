@@ -30,6 +30,7 @@ struct ImageNames {
 };
 void declare(stage::ParameterList& list, ImageNames& names);
 
+bool is_image_key(const std::string& key);
 /// The name or glob of a key of [images]. @throws InternalError for any other key
 const std::string& name_of_image(const ImageNames& names, const std::string& key);
 

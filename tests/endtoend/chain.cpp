@@ -109,10 +109,11 @@ TEST(Chain, noise_free_tensions_on_the_simulations_own_network_come_back) {
   const Outcome made =
       run_program("mbtfm-simulate --scenario u2os --seed 2 --noise 0 --beads 3000 --quiet --out " + cell.string());
   ASSERT_EQ(made.code, 0) << made.output;
-  const Outcome fit = run_program(
-      "mbtfm-fit --model layer --n_meshes 1 --tolerance 1e-9 --cell " + (cell / "1_segment").string() + " --network " +
-      (cell / "truth/network.vtu").string() + " --displacement " + (cell / "2_track/displacement.csv").string() +
-      " --config " + (cell / "cell.toml").string() + " --out " + (cell / "4_fit").string());
+  const Outcome fit =
+      run_program("mbtfm-fit --model layer --n_meshes 1 --tolerance 1e-9 --compare_sheet on --cell " +
+                  (cell / "1_segment").string() + " --network " + (cell / "truth/network.vtu").string() +
+                  " --displacement " + (cell / "2_track/displacement.csv").string() + " --config " +
+                  (cell / "cell.toml").string() + " --out " + (cell / "4_fit").string());
   ASSERT_EQ(fit.code, 0) << fit.output;
   const auto found = files::read_tensions(cell / "4_fit/tensions.csv");
   const auto truth = files::read_tensions(cell / "truth/tensions.csv");
@@ -124,6 +125,16 @@ TEST(Chain, noise_free_tensions_on_the_simulations_own_network_come_back) {
     size += std::pow(truth[i].tension_nN, 2);
   }
   EXPECT_LE(std::sqrt(error / size), 1e-6);
+  // a cell with fibres is no even sheet, and a sheet is more than nothing
+  const files::CsvTable models(cell / "4_fit/models.csv");
+  double of_sheet = 0, of_fibres = 0;
+  for (int row = 0; row < models.n_rows(); ++row) {
+    if (models.text(row, "model") == "sheet") of_sheet = models.number(row, "relative_l2");
+    if (models.text(row, "model") == "full") of_fibres = models.number(row, "relative_l2");
+  }
+  EXPECT_GT(of_sheet, 10 * of_fibres);
+  EXPECT_GT(of_sheet, 0.1);
+  EXPECT_LT(of_sheet, 1);
 }
 
 TEST(Chain, a_second_run_does_nothing_and_a_changed_input_runs_what_depends_on_it) {

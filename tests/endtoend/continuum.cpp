@@ -249,5 +249,58 @@ TEST_F(Continuum, a_mean_of_few_cells_that_lie_on_each_other_in_several_ways_say
   EXPECT_TRUE(fires("registration-ambiguous", outcome.output)) << outcome.output;
 }
 
+/// Spots that turn with the cell, of 0.5 um a pixel.
+void write_picture(const Path& file, double angle) {
+  constexpr int kSide = 240;
+  images::Image image{
+      .width = kSide, .height = kSide, .pixels = std::vector<float>(kSide * kSide, 100), .pixel_size_um = 0.5};
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> along(3, 24), around(0, 2 * std::numbers::pi);
+  for (int spot = 0; spot < 14; ++spot) {
+    const double r = along(random), t = around(random) + angle;
+    const Vec2 at{60 + r * std::cos(t), 60 + r * std::sin(t)};
+    for (int j = 0; j < kSide; ++j)
+      for (int i = 0; i < kSide; ++i) {
+        const Vec2 d = 0.5 * Vec2{i + 0.5, j + 0.5} - at;
+        image.at(i, j) += static_cast<float>(400 * std::exp(-dot(d, d) / 8));
+      }
+  }
+  images::write_tiff(file, image);
+}
+
+TEST_F(Continuum, cells_are_laid_onto_each_other_by_images_that_their_settings_name) {
+  constexpr int kCells = 4;
+  for (int k = 0; k < kCells; ++k) {
+    const Path cell = folder_ / ("cells/cell_" + std::to_string(k));
+    write_cell(cell, 0.4 * k, k, 12);
+    write_picture(cell / ("day_" + std::to_string(k) + "_C2.tif"), 0.4 * k);
+    files::write_text(cell / "cell.toml", "[images]\nactin = \"day_*_C2.tif\"\noutline_mask = \"cell_shape.tif\"\n");
+  }
+  // the outline of one is a mask with a name of its own
+  const Path last = folder_ / "cells/cell_3";
+  const Polygon outline = files::read_outline(last / "outline.csv").front();
+  images::Image mask{.width = 480, .height = 480, .pixels = std::vector<float>(480 * 480, 0), .pixel_size_um = {}};
+  for (int j = 0; j < 480; ++j)
+    for (int i = 0; i < 480; ++i)
+      if (contains(outline, 0.25 * Vec2{i + 0.5, j + 0.5})) mask.at(i, j) = 255;
+  images::write_tiff(last / "cell_shape.tif", mask);
+  std::filesystem::remove(last / "outline.csv");
+  for (int k = 0; k + 1 < kCells; ++k)  // a name that is given must be there
+    std::filesystem::copy(last / "cell_shape.tif", folder_ / ("cells/cell_" + std::to_string(k)) / "cell_shape.tif");
+  const auto outcome = test::run_program("mbtfm-mean " + file("cells") + " --config " + settings("") +
+                                         " --register_by images --image actin --reference cell_0 --pixel_size_um 0.25 "
+                                         "--spacing_um 3 --out " +
+                                         file("mean"));
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  const files::CsvTable registration(file("mean/registration.csv"));
+  ASSERT_EQ(registration.n_rows(), kCells);
+  for (int row = 0; row < kCells; ++row) {
+    // by its outline a cell with four spikes fits in four ways; by its spots in one
+    EXPECT_FALSE(registration.truth(row, "ambiguous"));
+    const double turn = std::abs(std::remainder(registration.number(row, "angle_deg"), 360));
+    EXPECT_NEAR(turn, 0.4 * row * 180 / std::numbers::pi, 0.5) << row;
+  }
+}
+
 }  // namespace
 }  // namespace mbtfm

@@ -3,10 +3,12 @@
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
 
+#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/vtk_files.h"
 #include "samples/drawing/scenario.h"
@@ -91,6 +93,39 @@ TEST(Simulate, images_stand_in_for_segmentation_and_displacement) {
   EXPECT_TRUE(fs::exists(cell / "truth" / "beads.csv"));
   EXPECT_FALSE(fs::exists(cell / "1_segment"));
   EXPECT_FALSE(fs::exists(cell / "2_track"));
+}
+
+TEST(Simulate, colonies_have_images_of_their_beads_and_of_themselves) {
+  const test::TemporaryFolder folder;
+  const Outcome outcome = simulate(
+      "--scenario colony-disc --images --radius_um 12 --image_size_px 400 --beads 800 --n_colonies 2 --n_dipoles 0 "
+      "--mesh_um 3 --out " +
+      (folder / "all").string());
+  ASSERT_EQ(outcome.code, 0) << outcome.message;
+  for (const char* name : {"colony_001", "colony_002"}) {
+    const fs::path colony = folder / "all" / name;
+    const Polygon rim = files::read_outline(colony / "1_segment" / "outline.csv").front();
+    for (const char* file : {"beads_relaxed.tif", "beads_stressed.tif", "phase.tif"}) {
+      const images::Image image = images::read_image(colony / file);
+      ASSERT_TRUE(image.pixel_size_um) << file;
+      EXPECT_EQ(image.width, 400);
+      const auto [low, high] = std::ranges::minmax(image.pixels);
+      EXPECT_GT(high, low + 200) << file;
+      if (std::string(file) != "phase.tif") continue;
+      double inside = 0, outside = 0, n_inside = 0, n_outside = 0;  // variances: cells are seen by their texture
+      for (int j = 0; j + 1 < image.height; ++j)
+        for (int i = 0; i + 1 < image.width; ++i) {
+          const bool is_inside = contains(rim, *image.pixel_size_um * Vec2{i + 0.5, j + 0.5});
+          (is_inside ? inside : outside) += std::pow(image.at(i, j) - image.at(i + 1, j), 2);
+          (is_inside ? n_inside : n_outside) += 1;
+        }
+      ASSERT_GT(n_inside, 1000);
+      EXPECT_GT(inside / n_inside, 1.5 * outside / n_outside) << "the colony is not seen";
+    }
+    EXPECT_FALSE(fs::exists(colony / "2_track"));
+  }
+  EXPECT_FALSE(content_of(folder / "all/colony_001/beads_stressed.tif") ==
+               content_of(folder / "all/colony_002/beads_stressed.tif"));
 }
 
 TEST(Simulate, images_do_not_join_the_segmentation_of_another_experiment) {
