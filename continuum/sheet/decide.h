@@ -29,8 +29,8 @@ struct GroundChoice {
 GroundChoice decide_ground(std::optional<Ground> asked, const Material& material,
                            std::optional<double> adhesion_nN_per_um3, const std::optional<Gel>& gel);
 
-/// Large strain: by x on springs, on a gel where it is asked for. It takes several times as long there, and a sheet that
-/// is bonded to a soft gel may collapse at its free edge, under the law that is used, from x = 0.13 on.
+/// Large strain: by x on springs, on a gel where it is asked for. It takes several times as long there, and a sheet
+/// that is bonded to a soft gel may collapse at its free edge, under the law that is used, from x = 0.13 on.
 Effect decide_strain(std::optional<Strain> asked, double free_contraction, Ground ground);
 
 }  // namespace mbtfm::sheet

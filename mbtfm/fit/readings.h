@@ -3,9 +3,11 @@
 /// another scale, a field that was smoothed. One that explains much more names the mistake.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "mbtfm/fit/data_of_beads.h"
+#include "pipeline/contract/findings.h"
 
 namespace mbtfm::fit {
 
@@ -30,5 +32,8 @@ Reading best_reading(const GelUnderCell& on, const DisplacementField& beads, con
 /// The smoothing under which the model explains the displacement best: a Gaussian of 0.5 to 6 um over its beads.
 /// @param force_derivatives, noise_um  as above
 Reading best_smoothing(const tensions::LinearData& data, const Eigen::MatrixXd& force_derivatives, double noise_um);
+
+/// @param kind  read_otherwise or field_smoothed
+std::optional<Finding> noticed_reading(FindingKind kind, const Reading& reading);
 
 }  // namespace mbtfm::fit

@@ -37,24 +37,17 @@ std::string summary_line(const FittedCell& cell) {
   return line;
 }
 
-std::optional<Finding> noticed_reading(FindingKind kind, const std::optional<Reading>& reading) {
-  if (!reading) return std::nullopt;
-  const auto explained = [](double unexplained) { return brief(100 * std::clamp(1 - unexplained, 0.0, 1.0)); };
-  return noticed(kind, reading->unexplained_as_is / reading->unexplained_share,
-                 "As the displacement was read, the model explains " + explained(reading->unexplained_as_is) +
-                     " % of what the beads do beyond their noise. It explains " +
-                     explained(reading->unexplained_share) + " % " + reading->what + ".");
-}
-
 std::vector<Finding> all_findings(const FittedCell& c) {
   std::vector<Finding> findings = findings_of(
       {c.fit, c.fit.data, c.seen, c.found.summary, c.found.tensions, c.checks.missing_fibres,
        c.checks.missing_adhesions, c.motions.common, c.motions.curved, c.motions.placement, c.ready.beyond,
        c.ready.decisions.strain,
        has_far_beads(c.fit.data.position_um, c.ready.scene.cell.outline_um, c.parameters.fit.far_distance_um)});
-  for (std::optional<Finding> found : {noticed_reading(FindingKind::field_smoothed, c.smoothing),
-                                       noticed_reading(FindingKind::read_otherwise, c.reading)})
-    if (found) findings.insert(findings.begin(), std::move(*found));
+  for (const auto& [kind, reading] :
+       {std::pair(FindingKind::field_smoothed, c.smoothing), std::pair(FindingKind::read_otherwise, c.reading)}) {
+    if (!reading) continue;
+    if (auto found = noticed_reading(kind, *reading)) findings.insert(findings.begin(), std::move(*found));
+  }
   const bool has_error = c.parameters.gel.youngs_modulus_sigma_kPa.has_value();
   if (const auto unknown =
           noticed(FindingKind::modulus_error_unknown, has_error ? 0 : 1,

@@ -100,7 +100,7 @@ struct Linearised {
 /// @param prior  beside the normal equations, by the first of the columns; empty: none
 Linearised linearised(const tensions::LinearData& data, const Directions& about, double variance,
                       const Eigen::MatrixXd& prior = {});
-/// Splits the standard errors that noise and misfit give. @param noise_variance  the beads' share of the variance
+/// Splits the standard errors that noise and misfit give. @param variance  the beads' share of the variance
 void split_by_noise(std::vector<SheetEstimate>& estimates, const Linearised& about, double variance,
                     const tensions::LinearData& data);
 

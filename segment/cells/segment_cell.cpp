@@ -155,7 +155,7 @@ struct Outlines {
 /// Nothing where the actin image shows no cell.
 std::optional<double> share_off_actin(const CellsInImage& seen, const std::vector<Adhesion>& adhesions) {
   constexpr double kBeyond_um = 1;  // channels are shifted by less
-  constexpr double kOwn_um = 8;    // what is farther is another cell's, which may show no actin
+  constexpr double kOwn_um = 8;     // what is farther is another cell's, which may show no actin
   if (seen.cells.empty()) return std::nullopt;
   double near_um2 = 0, beyond_um2 = 0;
   for (std::size_t i = 0; i < adhesions.size(); ++i) {

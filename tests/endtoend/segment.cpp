@@ -221,13 +221,17 @@ TEST_F(Segment, images_that_are_shifted_or_exchanged_and_actin_that_is_no_fibre_
     return segment("out", both()).output;
   };
   const images::Image &adhesion = cell.adhesion.image, &actin = cell.actin.image;
-  test::expect_silent({"actin-shift", "adhesions-long", "bright-actin"}, found(adhesion, actin));
+  test::expect_silent({"actin-shift", "adhesions-long", "bright-actin", "bleed-through"}, found(adhesion, actin));
   const std::string shifted = found(adhesion, test::mapped(actin, [&](int column, int row) {
                                       return std::pair((column + 4) % actin.width, (row + 3) % actin.height);
                                     }));
   EXPECT_TRUE(fires("actin-shift", shifted)) << shifted;
   const std::string exchanged = found(actin, adhesion);
   EXPECT_TRUE(fires("adhesions-long", exchanged)) << exchanged;
+  images::Image bled = adhesion;
+  for (std::size_t k = 0; k < bled.pixels.size(); ++k) bled.pixels[k] += 0.3f * actin.pixels[k];
+  const std::string through = found(bled, actin);
+  EXPECT_TRUE(fires("bleed-through", through)) << through;
   // a ring as of a podosome rosette: a line for the eye, too bent for a fibre
   images::Image with_ring = actin;
   const float bright = *std::ranges::max_element(actin.pixels);

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "substrate/choice/factory.h"
+#include "tests/support/findings.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::fit {
@@ -106,7 +107,7 @@ TEST(Readings, name_the_way_in_which_images_or_tables_lie_wrong) {
   for (const Case& c : cases) {
     const Reading reading = best_reading(scene.on(), changed(scene.beads, c.wrong), scene.forces_nN, scene.noise_um);
     EXPECT_NE(reading.what.find(c.says), std::string::npos) << c.says << ", but: " << reading.what;
-    EXPECT_GT(reading.unexplained_as_is, 2 * reading.unexplained_share) << c.says;
+    EXPECT_TRUE(test::fires("read-otherwise", noticed_reading(FindingKind::read_otherwise, reading))) << c.says;
   }
 }
 
@@ -144,9 +145,9 @@ TEST(Readings, name_a_field_that_was_smoothed) {
   };
   const Reading reading = of(smooth);
   EXPECT_NE(reading.what.find("over 4 um"), std::string::npos) << reading.what;
-  EXPECT_GT(reading.unexplained_as_is, 2 * reading.unexplained_share);
+  EXPECT_TRUE(test::fires("field-smoothed", noticed_reading(FindingKind::field_smoothed, reading)));
   const Reading of_sharp = of(scene.beads);
-  EXPECT_LT(of_sharp.unexplained_as_is, 2 * of_sharp.unexplained_share) << of_sharp.what;
+  EXPECT_FALSE(test::fires("field-smoothed", noticed_reading(FindingKind::field_smoothed, of_sharp))) << of_sharp.what;
 }
 
 TEST(Readings, find_nothing_better_where_the_reading_is_right_and_the_model_lacks_an_adhesion) {
@@ -155,7 +156,7 @@ TEST(Readings, find_nothing_better_where_the_reading_is_right_and_the_model_lack
   const Reading reading =
       best_reading(scene.on(), scene.beads,
                    scene.forces_nN.head(2 * static_cast<Eigen::Index>(scene.cell.adhesions.size())), scene.noise_um);
-  EXPECT_LT(reading.unexplained_as_is, 2 * reading.unexplained_share) << reading.what;
+  EXPECT_FALSE(test::fires("read-otherwise", noticed_reading(FindingKind::read_otherwise, reading))) << reading.what;
 }
 
 }  // namespace

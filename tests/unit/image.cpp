@@ -340,6 +340,14 @@ TEST(Jpeg, is_read_as_what_it_shows_and_marked_as_lossy) {
   EXPECT_THROW(read_image(folder / "a.jpg", {.page = 2}), InputError);
 }
 
+TEST(Channels, a_pixel_size_that_no_image_states_is_told) {
+  const Channel with{"a.tif", {.width = 1, .height = 1, .pixels = {0}, .pixel_size_um = 0.1}},
+      without{"b.tif", {.width = 1, .height = 1, .pixels = {0}, .pixel_size_um = {}}};
+  EXPECT_TRUE(fires("pixel-size-unchecked", noticed_unchecked({&without}, 0.2)));
+  EXPECT_FALSE(fires("pixel-size-unchecked", noticed_unchecked({&without, &with}, 0.2)));
+  EXPECT_FALSE(fires("pixel-size-unchecked", noticed_unchecked({}, 0.2)));
+}
+
 TEST(Channels, a_pixel_size_given_is_compared_with_each_images_own_binned_or_not) {
   Image image = ramp(64, 48);
   EXPECT_FALSE(doubt_about_calibration({"a.tif", image}, 0.1)) << "the image has none";
