@@ -97,7 +97,6 @@ double similarity_of(const Eigen::Vector3f* a, int n_a, const Eigen::Vector3f* b
 }
 
 constexpr int kMostAround = 21;
-constexpr int kAround = 20;  ///< neighbours that tell a bead's motion
 
 /// Displacement about a place as an affine function, by robust least squares over beads.
 struct LocalMotion {
@@ -167,18 +166,6 @@ LocalMotion local_motion(Vec3 place, const std::vector<Sample>& samples, double 
   motion.gradient = solution.bottomRows<3>().transpose() / scale_um;
   motion.is_sound = motion.at_place.allFinite() && motion.gradient.allFinite();
   return motion;
-}
-
-Sample sample_of(const PlacedBead& relaxed, const PlacedBead& stressed) {
-  return {relaxed.position_um, stressed.position_um - relaxed.position_um,
-          std::hypot(relaxed.sigma_um, stressed.sigma_um), std::hypot(relaxed.sigma_z_um, stressed.sigma_z_um)};
-}
-
-void compare(Match& match, const Sample& own, const LocalMotion& around) {
-  match.has_neighbours = true;
-  match.from_neighbours_um = own.displacement - as_vec(around.at_place);
-  match.sigma_um = std::sqrt(own.sigma * own.sigma + around.variance);
-  match.sigma_z_um = std::sqrt(own.sigma_z * own.sigma_z + around.variance_z);
 }
 
 /// The matcher's state.
@@ -427,8 +414,11 @@ class Matcher {
     return stressed_.beads[static_cast<std::size_t>(m.partner)].position_um - relaxed_.beads[bead].position_um;
   }
 
-  Sample own_sample(std::size_t bead) const {
-    return sample_of(relaxed_.beads[bead], stressed_.beads[static_cast<std::size_t>(result_.matches[bead].partner)]);
+  Sample sample_of(std::size_t bead) const {
+    const PlacedBead &a = relaxed_.beads[bead],
+                     &b = stressed_.beads[static_cast<std::size_t>(result_.matches[bead].partner)];
+    return {a.position_um, displacement(bead), std::hypot(a.sigma_um, b.sigma_um),
+            std::hypot(a.sigma_z_um, b.sigma_z_um)};
   }
 
   /// From the good beads around one, without itself.
@@ -436,14 +426,16 @@ class Matcher {
     std::vector<Sample> samples;
     for (const int k : near_good_.nearest(relaxed_.beads[bead].position_um, n + 1)) {
       const auto other = static_cast<std::size_t>(good_[static_cast<std::size_t>(k)]);
-      if (other != bead) samples.push_back(own_sample(other));
+      if (other != bead) samples.push_back(sample_of(other));
     }
     return local_motion(relaxed_.beads[bead].position_um, samples, spacing_um_);
   }
 
+  static constexpr int kAround = 20;
+
   /// How far a bead's displacement is from what its neighbours tell, in standard deviations of both.
   double contradiction(std::size_t bead, const LocalMotion& around) const {
-    const Sample own = own_sample(bead);
+    const Sample own = sample_of(bead);
     const Eigen::Vector3d off = as_eigen(own.displacement) - around.at_place;
     const double across = own.sigma * own.sigma + around.variance + around.scatter_um * around.scatter_um;
     const double along = own.sigma_z * own.sigma_z + around.variance_z + around.scatter_z_um * around.scatter_z_um;
@@ -512,7 +504,11 @@ class Matcher {
       const bool agrees = contradiction(bead, motions[bead]) <= limit();
       if (m.flag == TrackFlag::none && !agrees) m.flag = TrackFlag::neighbours_disagree;
       if (m.flag == TrackFlag::neighbours_disagree && agrees) m.flag = TrackFlag::none;
-      compare(m, own_sample(bead), motions[bead]);
+      const Sample own = sample_of(bead);
+      m.has_neighbours = true;
+      m.from_neighbours_um = own.displacement - as_vec(motions[bead].at_place);
+      m.sigma_um = std::sqrt(own.sigma * own.sigma + motions[bead].variance);
+      m.sigma_z_um = std::sqrt(own.sigma_z * own.sigma_z + motions[bead].variance_z);
     }
     gather_good();
   }
@@ -533,32 +529,6 @@ class Matcher {
 }  // namespace
 
 Vec3 RigidMotion::at(Vec3 x) const { return as_vec(turn_matrix(turn_rad) * as_eigen(x - centre)) + centre + shift_um; }
-
-std::vector<Match> compared_with_neighbours(const std::vector<PlacedBead>& relaxed,
-                                            const std::vector<PlacedBead>& stressed, const Matching& matching,
-                                            int threads) {
-  std::vector<Match> matches = matching.matches;
-  std::vector<std::size_t> good;
-  std::vector<Vec3> places;
-  for (std::size_t bead = 0; bead < matches.size(); ++bead) {
-    if (matches[bead].flag != TrackFlag::none) continue;
-    good.push_back(bead);
-    places.push_back(relaxed[bead].position_um);
-  }
-  const numerics::Near near(places, matching.spacing_um);
-  const auto sample = [&](std::size_t g) {
-    return sample_of(relaxed[good[g]], stressed[static_cast<std::size_t>(matching.matches[good[g]].partner)]);
-  };
-  numerics::parallel_for_each(good.size(), threads, [&](std::size_t g) {
-    std::vector<Sample> samples;
-    for (const int k : near.nearest(places[g], kAround + 1)) {
-      if (static_cast<std::size_t>(k) != g) samples.push_back(sample(static_cast<std::size_t>(k)));
-    }
-    const LocalMotion around = local_motion(places[g], samples, matching.spacing_um);
-    if (around.is_sound) compare(matches[good[g]], sample(g), around);
-  });
-  return matches;
-}
 
 Matching match(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
                const MatchParameters& parameters, int threads) {

@@ -51,12 +51,6 @@ struct Matching {
   double spacing_um = 0;       ///< mean distance of beads
 };
 
-/// The same pairs, compared with what their neighbours tell anew: of stressed beads whose places were corrected. Pairs
-/// that are flagged stay as they are.
-std::vector<Match> compared_with_neighbours(const std::vector<PlacedBead>& relaxed,
-                                            const std::vector<PlacedBead>& stressed, const Matching& matching,
-                                            int threads);
-
 /// Match by the pattern of the nearest neighbours, which is one of a kind, and by light.
 ///
 /// 1. Some hundred beads are looked for everywhere: where the vectors to a bead's nearest neighbours are met with again

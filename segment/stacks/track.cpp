@@ -102,18 +102,6 @@ Agreement agreement_of(const std::vector<PlacedBead>& relaxed, const std::vector
   return result;
 }
 
-/// Stressed beads without what is common to all but the cell's pull, the relaxed stack's frame.
-std::vector<PlacedBead> steadied(const std::vector<PlacedBead>& relaxed, std::vector<PlacedBead> stressed,
-                                 const std::vector<Match>& matches, const std::vector<BeadInSpace>& field,
-                                 const CommonMotion& common) {
-  for (std::size_t k = 0; k < matches.size(); ++k) {
-    if (matches[k].partner < 0) continue;
-    const Vec3 at = relaxed[k].position_um;
-    stressed[static_cast<std::size_t>(matches[k].partner)].position_um = at + field[k].displacement_um - common.at(at);
-  }
-  return stressed;
-}
-
 }  // namespace
 
 void declare(stage::ParameterList& list, StackParameters& p) {
@@ -158,10 +146,14 @@ Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<Placed
   require_enough(relaxed.size(), "relaxed");
   require_enough(stressed.size(), "stressed");
   const Matching matching = match(relaxed, stressed, parameters, threads);
+  const Agreement agreement = agreement_of(relaxed, stressed, matching.matches, matching.spacing_um);
   Followed result;
   result.first = matching.first;
   result.spacing_um = matching.spacing_um;
   result.n_stressed = static_cast<int>(stressed.size());
+  result.neighbours_um = agreement.across_um, result.neighbours_z_um = agreement.along_um;
+  result.error_ratio = agreement.ratio, result.error_ratio_z = agreement.ratio_z;
+  const double scale = std::max(1.0, agreement.ratio), scale_z = std::max(1.0, agreement.ratio_z);
   std::vector<Moved> moved;
   std::vector<double> light;
   for (std::size_t k = 0; k < relaxed.size(); ++k) {
@@ -169,7 +161,7 @@ Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<Placed
     const Match& m = matching.matches[k];
     TrackFlag flag = m.flag;
     BeadInSpace bead{.position_um = a.position_um, .displacement_um = {}, .flag = {}};
-    bead.sigma_um = a.sigma_um, bead.sigma_z_um = a.sigma_z_um;
+    bead.sigma_um = scale * a.sigma_um, bead.sigma_z_um = scale_z * a.sigma_z_um;
     if (m.partner >= 0) {
       const PlacedBead& b = stressed[static_cast<std::size_t>(m.partner)];
       // in the frame of the relaxed stack: the common turn and shift are taken back before
@@ -177,8 +169,8 @@ Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<Placed
       back.turn_rad = -back.turn_rad, back.centre = matching.first.centre + matching.first.shift_um;
       back.shift_um = -1 * matching.first.shift_um;
       bead.displacement_um = back.at(b.position_um) - a.position_um;
-      bead.sigma_um = std::hypot(a.sigma_um, b.sigma_um);
-      bead.sigma_z_um = std::hypot(a.sigma_z_um, b.sigma_z_um);
+      bead.sigma_um = scale * std::hypot(a.sigma_um, b.sigma_um);
+      bead.sigma_z_um = scale_z * std::hypot(a.sigma_z_um, b.sigma_z_um);
       if (flag == TrackFlag::none) flag = a.flag != TrackFlag::none ? a.flag : b.flag;
       if (flag == TrackFlag::none) {
         moved.push_back({bead.position_um, bead.displacement_um, bead.sigma_um, bead.sigma_z_um});
@@ -196,18 +188,6 @@ Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<Placed
     throw beads::NotFollowed("the stressed stack", "40 of the relaxed stack's beads or more, displaced",
                              std::to_string(moved.size()) + " of " + std::to_string(relaxed.size()));
   }
-  // Where beads are few, their neighbours lie many slices off: the drift of these is no error of the beads.
-  const CommonMotion as_stated = common_motion(moved, slice_drift, slices);
-  const std::vector<PlacedBead> steady = steadied(relaxed, stressed, matching.matches, result.field, as_stated);
-  const Agreement agreement =
-      agreement_of(relaxed, steady, compared_with_neighbours(relaxed, steady, matching, threads), matching.spacing_um);
-  result.neighbours_um = agreement.across_um, result.neighbours_z_um = agreement.along_um;
-  result.error_ratio = agreement.ratio, result.error_ratio_z = agreement.ratio_z;
-  const auto raise = [scale = std::max(1.0, agreement.ratio), scale_z = std::max(1.0, agreement.ratio_z)](auto& bead) {
-    bead.sigma_um *= scale, bead.sigma_z_um *= scale_z;
-  };
-  std::ranges::for_each(moved, raise);
-  std::ranges::for_each(result.field, raise);
   result.common = common_motion(moved, slice_drift, slices);
   for (BeadInSpace& bead : result.field) {
     if (!(bead.displacement_um == Vec3{}))

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
@@ -161,24 +160,6 @@ TEST(Stacks, errors_are_raised_where_beads_state_too_little_and_not_where_the_ge
       EXPECT_LT(ratio * stated, 1.3);
     }
   }
-}
-
-/// Neighbours of few beads lie many slices off, and the stage has gone on between.
-TEST(Stacks, errors_of_few_beads_are_not_raised_by_the_drift_of_slices) {
-  constexpr double kStep_um = 0.5;
-  std::mt19937_64 random(4);
-  std::normal_distribution<double> normal;
-  std::vector<Vec2> drift(200);
-  for (std::size_t k = 1; k < drift.size(); ++k) drift[k] = drift[k - 1] + 0.03 * Vec2{normal(random), normal(random)};
-  const auto drifting = [&](Vec3 x) {
-    const Vec2 d = drift[static_cast<std::size_t>(std::clamp(x.z / kStep_um, 0.0, 199.0))];
-    return pull(x) + Vec3{d.x, d.y, 0};
-  };
-  const BeadClouds clouds = bead_clouds(2000, 0.02, 0.03, 9, drifting);
-  const Followed followed =
-      follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {0.5 * kStep_um, kStep_um}, 2);
-  EXPECT_LT(followed.error_ratio, 1.25);
-  EXPECT_LT(followed.error_ratio_z, 1.25);
 }
 
 TEST(Stacks, without_drift_of_slices_none_is_taken_off) {
