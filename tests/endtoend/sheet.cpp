@@ -530,7 +530,9 @@ TEST_F(SheetsOfImages, give_contraction_and_stiffness_back_in_one_command_and_in
     const double value = truth.number(row, "value");
     EXPECT_NEAR(fitted.number(row, "value"), value, 3 * fitted.number(row, "sigma") + 0.02 * value)
         << truth.text(row, "quantity");
-    EXPECT_LT(fitted.number(row, "sigma"), 0.15 * value);
+    // the beads' noise gives a tenth; outline, triangles and the gel come on top
+    EXPECT_LT(fitted.number(row, "sigma"), 0.2 * value);
+    EXPECT_LT(fitted.number(row, "by_beads"), 0.15 * value);
   }
   for (const char* page : {"report.html", "3_sheet/sheet.html"})
     for (const char* words : {"In short", "Caution:", "What the beads tell", "stiffness_nN_per_um", "<svg"})
