@@ -15,6 +15,7 @@
 #include "mbtfm/sheets/bead_fit.h"
 #include "mbtfm/sheets/tables.h"
 #include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/charts/chart.h"
@@ -502,18 +503,12 @@ DisplacementField read_beads(stage::StageContext& context) {
   return beads;
 }
 
-std::vector<Vec2> places_of(const DisplacementField& beads) {
-  std::vector<Vec2> places;
-  for (const Bead& bead : beads) places.push_back(bead.position_um);
-  return places;
-}
-
 tensions::LinearData data_of_adhesions(const DisplacementField& beads, stage::StageContext& context,
                                        const substrate::Substrate& model, bool has_motion) {
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : files::read_adhesions(context.input("adhesions")))
     ellipses.push_back(substrate::ellipse_of(a));
-  const std::vector<Vec2> places = places_of(beads);
+  const std::vector<Vec2> places = tensions::points_of(beads);
   return tensions::reduce(beads, substrate::dense_response(model.compliance_um_per_nN(places, ellipses), 1), {}, 1,
                           has_motion ? tensions::affine_motions(beads) : Eigen::MatrixXd());
 }
@@ -747,7 +742,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   if (context.has_input("adhesions"))
     compare_with_adhesions(fit, data_of_adhesions(found.beads, context, *model, question.has_motion));
   Run result{.solution = std::move(found.solution), .figures = {}, .effects = model->effects()};
-  write_beads(context, *model, result.solution, places_of(beads), places_of(found.beads));
+  write_beads(context, *model, result.solution, tensions::points_of(beads), tensions::points_of(found.beads));
   const Path estimates_file = context.output("out", "sheet_fit.csv"),
              models_file = context.output("out", "sheet_models.csv");
   write_estimates(estimates_file, fit);

@@ -72,12 +72,6 @@ Solution solved_on(const OnGel& ground, Solution solution, const Scene& scene) {
   return solution;
 }
 
-Eigen::VectorXd as_vector(const std::vector<Vec2>& u) {
-  Eigen::VectorXd all(2 * std::ssize(u));
-  for (std::size_t i = 0; i < u.size(); ++i) all.segment<2>(2 * static_cast<Eigen::Index>(i)) << u[i].x, u[i].y;
-  return all;
-}
-
 }  // namespace
 
 std::shared_ptr<const Elements> elements_of(const Scene& scene) {
@@ -172,6 +166,12 @@ std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Soluti
     forces.push_back(patch.area_um2 * patch.traction_kPa);
   }
   return gel.displacements_um(points_um, patches, forces);
+}
+
+Eigen::VectorXd as_vector(const std::vector<Vec2>& u) {
+  Eigen::VectorXd all(2 * std::ssize(u));
+  for (std::size_t i = 0; i < u.size(); ++i) all.segment<2>(2 * static_cast<Eigen::Index>(i)) << u[i].x, u[i].y;
+  return all;
 }
 
 Eigen::VectorXd displacements_on_finer_mesh_um(Scene scene, double share, const substrate::Substrate& gel,

@@ -90,6 +90,8 @@ Solution solve_on_gel(const Scene& scene, const substrate::Substrate& gel, int t
 /// What a solution on a gel does to points of its surface.
 std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Solution& solution,
                                    const std::vector<Vec2>& points_um);
+/// x and y of each in turn: 2·points.
+Eigen::VectorXd as_vector(const std::vector<Vec2>& displacements_um);
 /// The same (2·points) by this scene on triangles of a share of their size. Triangles fall differently on each mesh,
 /// and displacements beside the edge, where tractions are singular, change without order from one to the next.
 Eigen::VectorXd displacements_on_finer_mesh_um(Scene scene, double share, const substrate::Substrate& gel,

@@ -6,6 +6,7 @@
 #include "continuum/sheet/mesh_size.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/error_budget.h"
+#include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/under_load.h"
 #include "substrate/compliance.h"
 
@@ -15,12 +16,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-std::vector<Vec2> places_of(const DisplacementField& beads) {
-  std::vector<Vec2> places;
-  for (const Bead& bead : beads) places.push_back(bead.position_um);
-  return places;
-}
 
 /// The sheet of a question on triangles, and what of it is fitted.
 struct Unknowns {
@@ -151,12 +146,6 @@ class Errors {
   Fitter::Found& found_;
 };
 
-VectorXd as_vector(const std::vector<Vec2>& u) {
-  VectorXd all(2 * std::ssize(u));
-  for (std::size_t i = 0; i < u.size(); ++i) all.segment<2>(2 * static_cast<Index>(i)) << u[i].x, u[i].y;
-  return all;
-}
-
 /// At rest, unless it is asked for: on coarse triangles the odds of the other state mistake their error for it
 /// (docs/developers/sheets.md).
 tensions::BeadsOfState state_of(const Question& q, const Fitter& fitter, const DisplacementField& beads) {
@@ -171,7 +160,7 @@ tensions::BeadsOfState state_of(const Question& q, const Fitter& fitter, const D
 MeshChange change_by_finer_meshes(const sheet::Scene& scene, const sheet::Solution& solution,
                                   const substrate::Substrate& gel, const std::vector<Vec2>& points_um, int threads) {
   constexpr double kFiner = 0.7, kFinest = 0.5;
-  const VectorXd here = as_vector(displacements_um(gel, solution, points_um)),
+  const VectorXd here = sheet::as_vector(displacements_um(gel, solution, points_um)),
                  finer = displacements_on_finer_mesh_um(scene, kFiner, gel, points_um, threads),
                  finest = displacements_on_finer_mesh_um(scene, kFinest, gel, points_um, threads);
   MatrixXd left(here.size(), 3);
@@ -194,7 +183,7 @@ BeadFit fit_beads(const Question& q, const DisplacementField& beads, const Gel& 
   const Fitter fitter(q, unknowns, gel, model, threads);
   tell(0.5, "fitting");
   tensions::BeadsOfState state = state_of(q, fitter, beads);
-  const std::vector<Vec2> places = places_of(state.beads);
+  const std::vector<Vec2> places = tensions::points_of(state.beads);
   Fitter::Found found = fitter.fit(state.data);
   const std::vector<SheetEstimate> on_own_mesh = found.fit.estimates;
 
@@ -216,8 +205,9 @@ BeadFit fit_beads(const Question& q, const DisplacementField& beads, const Gel& 
                changes_by_outline_um(scene, solution, model, places, q.outline_error_um, threads));
   errors.add_sizes(&SheetErrorParts::substrate, changes_by_modulus(found.fit.estimates, model.stated_error()));
   if (!model.capabilities().base)
-    errors.add(&SheetErrorParts::substrate, as_vector(displacements_um(*models.with_base(gel), solution, places)) -
-                                                as_vector(displacements_um(model, solution, places)));
+    errors.add(&SheetErrorParts::substrate,
+               sheet::as_vector(displacements_um(*models.with_base(gel), solution, places)) -
+                   sheet::as_vector(displacements_um(model, solution, places)));
   const auto on_other_gel = [&](const Gel& other) {
     const auto its_model = models.usual(other);
     const Fitter its(q, unknowns, other, *its_model, threads);

@@ -431,7 +431,7 @@ void RelaxedBeads::fill(const Gaps& gaps, const images::Image& stressed, const s
   }
   tracking.window_um = pixel_size_um * windows->window_px;
   for (int k = 0; k < windows->scene->n_beads(); ++k) {
-    if (!windows->tracks[k].is_good() || !gaps.hold(windows->scene->position(k))) continue;
+    if (!windows->tracks[k].is_good()) continue;
     tracking.field.push_back(entry_of(*windows, k, motion, pixel_size_um));
     ++tracking.n_windows;
     ++tracking.n_good;
