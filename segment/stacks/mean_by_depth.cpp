@@ -100,6 +100,8 @@ StageByDepth stage_by_depth(const MeanByDepth& mean, bool may_drift) {
   result.shift_um = result.um.colwise().mean().transpose();
   result.shift_sigma_um = std::sqrt(std::max(0.0, covariance.mean()));
   result.drift_um = result.um.rowwise() - result.shift_um.transpose();
+  const VectorXd with_shift = covariance.rowwise().mean();
+  result.drift_sigma_um = ((covariance.diagonal() - 2 * with_shift).array() + covariance.mean()).cwiseMax(0).sqrt();
   return result;
 }
 

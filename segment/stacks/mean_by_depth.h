@@ -22,6 +22,7 @@ struct StageByDepth {
   double shift_sigma_um = 0;       ///< of each component
   double log_likelihood_gain = 0;  ///< of a stage that moved from slice to slice over one that did not
   Eigen::MatrixX2d drift_um;       ///< um less shift_um; zero where the stage is taken for still
+  Eigen::VectorXd drift_sigma_um;  ///< of each component of that, by place
 };
 
 /// Where a cell fills the view its gel moves on the average, too, the more the nearer to the surface. That mean changes

@@ -205,14 +205,26 @@ double weight_at_rest(double scale) {
 
 Vec3 CommonMotion::at(Vec3 place_um) const {
   const Vec3 d = place_um - centre_um;
-  Vec3 u = shift_um + Vec3{-turn_rad * d.y, turn_rad * d.x, 0};
-  if (!has_slice_drift || z_um.empty()) return u;
-  const Between b = between(z_um, place_um.z);
+  return shift_um + Vec3{-turn_rad * d.y, turn_rad * d.x, 0} + drift_um_at(place_um.z);
+}
+
+Vec3 CommonMotion::drift_um_at(double at_um) const {
+  if (!has_slice_drift || z_um.empty()) return {};
+  const Between b = between(z_um, at_um);
+  Vec3 u;
   for (int p = 0; p < 2; ++p) {
     const Vec2 drift = slices_um[static_cast<std::size_t>(b.place[p])];
     u += b.share[p] * Vec3{drift.x, drift.y, 0};
   }
   return u;
+}
+
+double CommonMotion::drift_sigma_um_at(double at_um) const {
+  if (!has_slice_drift || z_um.empty()) return 0;
+  const Between b = between(z_um, at_um);
+  double sigma_um = 0;  // as if both places were off alike
+  for (int p = 0; p < 2; ++p) sigma_um += b.share[p] * drift_sigma_um[static_cast<std::size_t>(b.place[p])];
+  return sigma_um;
 }
 
 CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, const Slices& slices) {
@@ -235,6 +247,7 @@ CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, 
   for (Eigen::Index k = 0; k < across.um.rows(); ++k) {
     motion.slices_um.push_back({across.drift_um(k, 0), across.drift_um(k, 1)});
     motion.slices_sigma_um.push_back(across.sigma_um[k]);
+    motion.drift_sigma_um.push_back(across.drift_sigma_um[k]);
   }
   if (!motion.has_slice_drift) across = stage_by_depth(means.across, false);
   const StageByDepth along = stage_by_depth(means.along, false);

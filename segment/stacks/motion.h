@@ -20,12 +20,15 @@ struct CommonMotion {
   double turn_rad = 0, turn_sigma_rad = 0;  ///< about z, from +x towards +y
   std::vector<double> z_um;                 ///< places along z, rising
   std::vector<Vec2> slices_um;              ///< drift there beyond the shift; linear between
-  std::vector<double> slices_sigma_um;      ///< standard error of each component
+  std::vector<double> slices_sigma_um;      ///< standard error of each component, with that of the shift
+  std::vector<double> drift_sigma_um;       ///< without it
   double slice_drift_ratio = 0;             ///< square root of twice the gain in log likelihood by that drift
   bool has_slice_drift = false;             ///< it is part of the motion; otherwise only told
   double share_at_rest = 0;                 ///< of the beads
 
   Vec3 at(Vec3 place_um) const;
+  Vec3 drift_um_at(double z_um) const;          ///< zero where it is not part of the motion
+  double drift_sigma_um_at(double z_um) const;  ///< of a component
 };
 
 /// Where the slices lie. step_um = 0: not known.

@@ -102,6 +102,54 @@ Agreement agreement_of(const std::vector<PlacedBead>& relaxed, const std::vector
   return result;
 }
 
+RigidMotion back(const RigidMotion& there) {
+  return {.centre = there.centre + there.shift_um, .shift_um = -1 * there.shift_um, .turn_rad = -there.turn_rad};
+}
+
+TrackFlag flag_of(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
+                  const Matching& matching, std::size_t k) {
+  const Match& m = matching.matches[k];
+  const TrackFlag own = relaxed[k].flag;
+  if (m.partner < 0) return own != TrackFlag::none ? own : m.flag;
+  if (m.flag != TrackFlag::none) return m.flag;
+  return own != TrackFlag::none ? own : stressed[static_cast<std::size_t>(m.partner)].flag;
+}
+
+/// In the frame of the relaxed stack: the turn and shift that begin the match are taken back.
+Moved moved_bead(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
+                 const Matching& matching, const Agreement& agreement, std::size_t k) {
+  const double scale = std::max(1.0, agreement.ratio), scale_z = std::max(1.0, agreement.ratio_z);
+  const PlacedBead& a = relaxed[k];
+  const int partner = matching.matches[k].partner;
+  if (partner < 0) return {a.position_um, {}, scale * a.sigma_um, scale_z * a.sigma_z_um};
+  const PlacedBead& b = stressed[static_cast<std::size_t>(partner)];
+  return {a.position_um, back(matching.first).at(b.position_um) - a.position_um,
+          scale * std::hypot(a.sigma_um, b.sigma_um), scale_z * std::hypot(a.sigma_z_um, b.sigma_z_um)};
+}
+
+/// Those that are followed, and not flagged.
+std::vector<Moved> moved_beads(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
+                               const Matching& matching, const Agreement& agreement) {
+  std::vector<Moved> moved;
+  for (std::size_t k = 0; k < relaxed.size(); ++k)
+    if (flag_of(relaxed, stressed, matching, k) == TrackFlag::none)
+      moved.push_back(moved_bead(relaxed, stressed, matching, agreement, k));
+  if (moved.size() >= 40) return moved;
+  throw beads::NotFollowed("the stressed stack", "40 of the relaxed stack's beads or more, displaced",
+                           std::to_string(moved.size()) + " of " + std::to_string(relaxed.size()));
+}
+
+/// The stressed beads where they were without the drift of their slices, with its error in theirs.
+std::vector<PlacedBead> without_drift(std::vector<PlacedBead> stressed, const RigidMotion& first,
+                                      const CommonMotion& motion) {
+  for (PlacedBead& bead : stressed) {
+    const Vec3 place = back(first).at(bead.position_um);
+    bead.sigma_um = std::hypot(bead.sigma_um, motion.drift_sigma_um_at(place.z));
+    bead.position_um = first.at(place - motion.drift_um_at(place.z));
+  }
+  return stressed;
+}
+
 }  // namespace
 
 void declare(stage::ParameterList& list, StackParameters& p) {
@@ -145,53 +193,38 @@ Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<Placed
                 const MatchParameters& parameters, Switch slice_drift, const Slices& slices, int threads) {
   require_enough(relaxed.size(), "relaxed");
   require_enough(stressed.size(), "stressed");
-  const Matching matching = match(relaxed, stressed, parameters, threads);
-  const Agreement agreement = agreement_of(relaxed, stressed, matching.matches, matching.spacing_um);
+  Matching matching = match(relaxed, stressed, parameters, threads);
+  Agreement agreement = agreement_of(relaxed, stressed, matching.matches, matching.spacing_um);
+  const CommonMotion drifted = common_motion(moved_beads(relaxed, stressed, matching, {}), slice_drift, slices);
+  if (drifted.has_slice_drift) {
+    // neighbours lie some slices off, and the stage has moved between: they are compared where it is taken back
+    const std::vector<PlacedBead> steady = without_drift(stressed, matching.first, drifted);
+    matching = match(relaxed, steady, parameters, threads);
+    agreement = agreement_of(relaxed, steady, matching.matches, matching.spacing_um);
+  }
   Followed result;
   result.first = matching.first;
   result.spacing_um = matching.spacing_um;
   result.n_stressed = static_cast<int>(stressed.size());
   result.neighbours_um = agreement.across_um, result.neighbours_z_um = agreement.along_um;
   result.error_ratio = agreement.ratio, result.error_ratio_z = agreement.ratio_z;
-  const double scale = std::max(1.0, agreement.ratio), scale_z = std::max(1.0, agreement.ratio_z);
-  std::vector<Moved> moved;
+  const std::vector<Moved> moved = moved_beads(relaxed, stressed, matching, agreement);
+  result.common = common_motion(moved, slice_drift, slices);
+  result.n_good = static_cast<int>(moved.size());
   std::vector<double> light;
   for (std::size_t k = 0; k < relaxed.size(); ++k) {
-    const PlacedBead& a = relaxed[k];
-    const Match& m = matching.matches[k];
-    TrackFlag flag = m.flag;
-    BeadInSpace bead{.position_um = a.position_um, .displacement_um = {}, .flag = {}};
-    bead.sigma_um = scale * a.sigma_um, bead.sigma_z_um = scale_z * a.sigma_z_um;
-    if (m.partner >= 0) {
-      const PlacedBead& b = stressed[static_cast<std::size_t>(m.partner)];
-      // in the frame of the relaxed stack: the common turn and shift are taken back before
-      RigidMotion back = matching.first;
-      back.turn_rad = -back.turn_rad, back.centre = matching.first.centre + matching.first.shift_um;
-      back.shift_um = -1 * matching.first.shift_um;
-      bead.displacement_um = back.at(b.position_um) - a.position_um;
-      bead.sigma_um = scale * std::hypot(a.sigma_um, b.sigma_um);
-      bead.sigma_z_um = scale_z * std::hypot(a.sigma_z_um, b.sigma_z_um);
-      if (flag == TrackFlag::none) flag = a.flag != TrackFlag::none ? a.flag : b.flag;
-      if (flag == TrackFlag::none) {
-        moved.push_back({bead.position_um, bead.displacement_um, bead.sigma_um, bead.sigma_z_um});
-        if (a.brightness > 0 && b.brightness > 0) light.push_back(b.brightness / a.brightness);
-      }
-    } else if (a.flag != TrackFlag::none) {
-      flag = a.flag;
-    }
-    bead.flag = name_of(flag);
-    ++result.flags[bead.flag];
-    result.field.push_back(std::move(bead));
-  }
-  result.n_good = static_cast<int>(moved.size());
-  if (moved.size() < 40) {
-    throw beads::NotFollowed("the stressed stack", "40 of the relaxed stack's beads or more, displaced",
-                             std::to_string(moved.size()) + " of " + std::to_string(relaxed.size()));
-  }
-  result.common = common_motion(moved, slice_drift, slices);
-  for (BeadInSpace& bead : result.field) {
-    if (!(bead.displacement_um == Vec3{}))
-      bead.displacement_um = bead.displacement_um - result.common.at(bead.position_um);
+    const TrackFlag flag = flag_of(relaxed, stressed, matching, k);
+    const int partner = matching.matches[k].partner;
+    const Moved bead = moved_bead(relaxed, stressed, matching, agreement, k);
+    ++result.flags[name_of(flag)];
+    result.field.push_back({.position_um = bead.place_um, .displacement_um = {}, .flag = name_of(flag)});
+    BeadInSpace& entry = result.field.back();
+    entry.sigma_um = std::hypot(bead.sigma_um, result.common.drift_sigma_um_at(bead.place_um.z));
+    entry.sigma_z_um = bead.sigma_z_um;
+    if (partner < 0) continue;
+    entry.displacement_um = bead.displacement_um - result.common.at(bead.place_um);
+    const double before = relaxed[k].brightness, after = stressed[static_cast<std::size_t>(partner)].brightness;
+    if (flag == TrackFlag::none && before > 0 && after > 0) light.push_back(after / before);
   }
   if (!light.empty()) result.light_ratio = numerics::median(light);
   return result;
