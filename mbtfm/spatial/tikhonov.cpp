@@ -71,9 +71,6 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   SpatialReconstruction r;
   const Observed& observed = problem.observed;
   const std::vector<double> good = probabilities_of_good(parameters.loss, observed);
-  // a mixture of which no bead is left out is least squares
-  const bool leaves_none_out =
-      parameters.loss == BeadLoss::mixture && std::ranges::none_of(good, [](double p) { return p == 0; });
   const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
     return spectrum.scan(largest(stated_variance(problem, parameters.loss, weighing), spectrum.variance_felt_least()));
   };
@@ -84,7 +81,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
     made.scan = judged ? scanned(spectrum_of(problem, response, judged->by_row, judged->n_data, threads), *judged)
                        : scanned(*made.spectrum, weighing);
-    made.chosen = choose_lambda(problem, made.scan, traction, parameters.loss == BeadLoss::l2 || leaves_none_out);
+    made.chosen = choose_lambda(problem, made.scan, traction, !weighs_by_residual(parameters.loss));
     if (judged && made.chosen.by)
       made.chosen.lambda *= std::sqrt(weighing.variance / judged->variance);  // the same prior
     made.x = made.spectrum->solve(made.chosen.lambda);

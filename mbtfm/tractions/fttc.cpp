@@ -43,18 +43,17 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
     if (probe) probe->solve(lambda, kScanTolerance);
     const double misfit =
         problem.data_squared() - 2 * solver.right_hand_side_times_solution() + solver.displaced_squared();
-    points.push_back({.lambda = lambda,
-                      .misfit = misfit,
-                      .norm = solver.solution_squared(),
-                      .degrees = degrees_of(lambda, 1),
-                      .removable_misfit = {}});
+    points.push_back(
+        {.lambda = lambda, .misfit = misfit, .norm = solver.solution_squared(), .degrees = degrees_of(lambda, 1)});
   }
-  return judge(std::move(points), problem.n_data(), problem.n_data(), problem.stated_variance(), [&](double lambda) {
+  const auto variance_left_at = [&](double lambda) {
     solver.solve(lambda, kScanTolerance);
     if (probe) probe->solve(lambda, kScanTolerance);
     return robust_variance(problem.residuals(problem.displaced(solver.solution())), degrees_of(lambda, 1),
                            degrees_of(lambda, 2));
-  });
+  };
+  return judge(std::move(points), problem.n_data(), problem.stated_variance(), variance_left_at,
+               unbiased_risks(problem.n_data()));
 }
 
 LatticeOptions lattice_options(const TractionParameters& p, int threads) {

@@ -102,14 +102,14 @@ Eigen::VectorXd FttcMixtures::forces_nN(double factor) const {
     points.push_back({.lambda = at.lambda,
                       .misfit = (at.residuals * mixture).squaredNorm() / (factor * factor),
                       .norm = mixture.dot(at.norms * mixture) / (factor * factor),
-                      .degrees = at.degrees,
-                      .removable_misfit = {}});
-  const LambdaScan scan = judge(std::move(points), n_data_, n_data_, unit_variance_, [&](double lambda) {
+                      .degrees = at.degrees});
+  const auto variance_left_at = [&](double lambda) {
     const Eigen::VectorXd left =
         between(lambda, [&](const AtLambda& at) -> Eigen::VectorXd { return at.residuals * mixture / factor; });
     return robust_variance({left.begin(), left.end()}, between(lambda, [](const AtLambda& at) { return at.degrees; }),
                            between(lambda, [](const AtLambda& at) { return at.degrees_of_square; }));
-  });
+  };
+  const LambdaScan scan = judge(std::move(points), n_data_, unit_variance_, variance_left_at, unbiased_risks(n_data_));
   const double lambda = parameters_.lambda_um_per_kPa.value_or(chosen_lambda(scan, parameters_.lambda_by));
   return between(lambda, [&](const AtLambda& at) -> Eigen::VectorXd { return at.forces_nN * mixture; });
 }

@@ -107,8 +107,15 @@ LambdaScan Recurrences::scan(std::optional<double> stated_variance) const {
     point.degrees = degrees(lambda);
     points.push_back(point);
   }
-  return judge(std::move(points), n_data_, n_felt_, stated_variance,
-               [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); });
+  const Risks risks = [&](const std::vector<ScanPoint>& scanned, double variance) {
+    std::vector<double> values;
+    for (const ScanPoint& p : scanned)
+      values.push_back(unbiased_risk(p, data.removable_misfit(p.lambda), n_felt_, variance));
+    return values;
+  };
+  return judge(
+      std::move(points), n_data_, stated_variance,
+      [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); }, risks);
 }
 
 }  // namespace mbtfm::tractions

@@ -91,8 +91,19 @@ std::vector<double> log_determinants_of(const std::vector<ScanPoint>& points) {
   return values;
 }
 
-LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removable,
-                 std::optional<double> stated_variance, const std::function<double(double lambda)>& variance_left_at) {
+double unbiased_risk(const ScanPoint& point, double misfit, double n_data, double variance) {
+  const double lambda2 = point.lambda * point.lambda;
+  return -(2 * misfit + lambda2 * point.norm - 2 * variance * (n_data - point.degrees)) / lambda2;
+}
+
+Risks unbiased_risks(double n_data) {
+  return [n_data](const std::vector<ScanPoint>& points, double variance) {
+    return over_points(points, [&](const ScanPoint& p) { return unbiased_risk(p, p.misfit, n_data, variance); });
+  };
+}
+
+LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<double> stated_variance,
+                 const std::function<double(double lambda)>& variance_left_at, const Risks& risks) {
   MBTFM_ASSERT(points.size() >= 5);
   LambdaScan scan;
   scan.points = std::move(points);
@@ -140,15 +151,11 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removabl
   for (const double e : scan.evidence) against.push_back(-e);
   scan.by_evidence = lambda_at(smallest_at(against));
 
-  // (15) With the errors that the data state, or with the misfit's where it tells of larger ones.
+  // With the errors that the data state, or with the misfit's where it tells of larger ones.
   const double left = variance_left_at(scan.by_gcv);
   scan.variance = std::max(left, stated_variance.value_or(0));
   scan.variance_source = scan.variance > left ? "the errors that the data state" : "the misfit";
-  scan.risk = over_points(scan.points, [&](const ScanPoint& p) {
-    const double lambda2 = p.lambda * p.lambda;
-    const double misfit = p.removable_misfit.value_or(p.misfit);
-    return -(2 * misfit + lambda2 * p.norm - 2 * scan.variance * (n_removable - p.degrees)) / lambda2;
-  });
+  scan.risk = risks(scan.points, scan.variance);
   // (25b) Mallows 1973: what the tractions displace wants less smoothing than they do
   std::vector<double> prediction;
   for (const ScanPoint& p : scan.points) prediction.push_back(log_of(p.misfit + 2 * scan.variance * p.degrees));

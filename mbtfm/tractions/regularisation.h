@@ -1,5 +1,5 @@
 /// How much to smooth: lambda from the data, by several criteria at once.
-/// docs/theory/reconstructions.md, (11) to (15).
+/// docs/theory/reconstructions.md, (11) to (15b).
 #pragma once
 
 #include <functional>
@@ -17,8 +17,6 @@ struct ScanPoint {
   double misfit = 0;   ///< |u − G t|²
   double norm = 0;     ///< |t|²
   double degrees = 0;  ///< trace of the matrix that takes u to G t: how many data the tractions use up
-  /// The part of the misfit that other tractions could remove; unset: all of it, where there are as many as data.
-  std::optional<double> removable_misfit;
 };
 
 /// The scan with its criteria; each array by point.
@@ -27,7 +25,7 @@ struct LambdaScan {
   std::vector<double> gcv;                          ///< (12), to be small
   std::vector<double> curvature;                    ///< of the L-curve (13), to be large
   std::vector<double> evidence;                     ///< logarithm, less its largest (14), to be large
-  std::vector<double> risk;                         ///< expected |t − true|² up to a constant (15), to be small
+  std::vector<double> risk;                         ///< expected |t − true|² up to a constant (15, 15b), to be small
   double by_gcv = 0, by_evidence = 0, by_risk = 0;  ///< lambda by each
   double by_prediction = 0;                         ///< of the least expected |G t − G true|² (25b)
   std::optional<double> by_l_curve;                 ///< none where the curve has no corner
@@ -39,13 +37,19 @@ struct LambdaScan {
 enum class LambdaCriterion { risk, gcv, l_curve, evidence, discrepancy };
 constexpr auto words(LambdaCriterion) { return std::array{"risk", "gcv", "l-curve", "evidence", "discrepancy"}; }
 
+/// Expected |t − true|² of each point, up to a constant. @param variance  of one datum
+using Risks = std::function<std::vector<double>(const std::vector<ScanPoint>&, double variance)>;
+/// (15) of one point. @param misfit, n_data  of the data that tractions can follow: the others tell the risk nothing
+double unbiased_risk(const ScanPoint& point, double misfit, double n_data, double variance);
+/// (15), where tractions can follow all data.
+Risks unbiased_risks(double n_data);
+
 /// @param points           at least 5, evenly spaced in log lambda, falling
 /// @param n_data           components of displacement
-/// @param n_removable      of them as many as the tractions could follow: what lies beyond tells the risk nothing
 /// @param stated_variance  of one datum in the same weights, where the data state their errors
 /// @param variance_left_at what the residual for one lambda tells of the same: robust_variance()
-LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removable,
-                 std::optional<double> stated_variance, const std::function<double(double lambda)>& variance_left_at);
+LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<double> stated_variance,
+                 const std::function<double(double lambda)>& variance_left_at, const Risks& risks);
 
 /// By point, log det(1 + G Gᵀ / lambda²) but for a constant: d log det / d log lambda² = −degrees.
 std::vector<double> log_determinants_of(const std::vector<ScanPoint>& points);

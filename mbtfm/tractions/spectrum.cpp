@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -44,8 +45,46 @@ LambdaScan Spectrum::scan(std::optional<double> stated_variance) const {
   for (const double lambda : lambdas_between(largest, smallest)) points.push_back(point_at(lambda));
   // Few loads follow many beads nowhere quite: what they leave, noise or not, is the error of each bead. (Its median,
   // for tractions that follow all but a few, would call most of it signal.)
-  return judge(std::move(points), n_data_, static_cast<double>(is_felt(values_).count()), stated_variance,
-               [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); });
+  return judge(
+      std::move(points), n_data_, stated_variance,
+      [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); },
+      [&](const std::vector<ScanPoint>& scanned, double variance) { return risks(scanned, variance); });
+}
+
+Eigen::Array<bool, Eigen::Dynamic, 1> Spectrum::is_told(double variance) const {
+  constexpr Eigen::Index kLeast = 30;  // squares of noise whose sum is nearly Gaussian
+  constexpr double kChance = 3;        // standard deviations of that sum
+  const Eigen::Array<bool, Eigen::Dynamic, 1> felt = is_felt(values_);
+  std::vector<Eigen::Index> order;  // felt most first
+  for (Eigen::Index k = 0; k < values_.size(); ++k)
+    if (felt[k]) order.push_back(k);
+  std::ranges::sort(order, std::greater{}, [&](Eigen::Index k) { return values_[k]; });
+  const auto n = std::ssize(order);
+  std::vector<double> up_to = {0};  // sums of squares, each with this variance if it is noise
+  for (const Eigen::Index k : order) up_to.push_back(up_to.back() + projected_[k] * projected_[k] / values_[k]);
+  Eigen::Array<bool, Eigen::Dynamic, 1> told(values_.size());
+  told.setConstant(false);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Eigen::Index next = std::min(std::max(k, kLeast), n - k);
+    const double squares = up_to[static_cast<std::size_t>(k + next)] - up_to[static_cast<std::size_t>(k)];
+    const auto m = static_cast<double>(next);
+    if (squares <= variance * (m + kChance * std::sqrt(2 * m))) break;
+    told[order[static_cast<std::size_t>(k)]] = true;
+  }
+  return told;
+}
+
+std::vector<double> Spectrum::risks(const std::vector<ScanPoint>& points, double variance) const {
+  const Eigen::Array<bool, Eigen::Dynamic, 1> told = is_told(variance), felt = is_felt(values_);
+  const ArrayXd signal = told.select(projected_.square() / values_ - variance, 0);  // expected s sqrt(value), squared
+  const ArrayXd squares =
+      told.select(projected_.square(), felt.select(variance * values_, ArrayXd::Zero(values_.size())));
+  std::vector<double> of_points;
+  for (const ScanPoint& p : points) {
+    const ArrayXd stiffness = values_ + p.lambda * p.lambda;
+    of_points.push_back((squares / stiffness.square() - 2 * signal / stiffness).sum());
+  }
+  return of_points;
 }
 
 std::optional<double> Spectrum::variance_felt_least() const {
@@ -72,11 +111,12 @@ std::optional<double> Spectrum::variance_felt_least() const {
 
 ScanPoint Spectrum::point_at(double lambda) const {
   const ArrayXd shares = projected_ / (values_ + lambda * lambda);
-  return {.lambda = lambda,
-          .misfit = misfit(lambda),
-          .norm = shares.square().sum(),
-          .degrees = degrees(lambda),
-          .removable_misfit = is_felt(values_).select(shares.square() / values_, 0).sum() * std::pow(lambda, 4)};
+  return {.lambda = lambda, .misfit = misfit(lambda), .norm = shares.square().sum(), .degrees = degrees(lambda)};
+}
+
+double Spectrum::removable_misfit(double lambda) const {
+  const ArrayXd shares = projected_ / (values_ + lambda * lambda);
+  return is_felt(values_).select(shares.square() / values_, 0).sum() * std::pow(lambda, 4);
 }
 
 double Spectrum::explained(double lambda) const { return (projected_.square() / (values_ + lambda * lambda)).sum(); }

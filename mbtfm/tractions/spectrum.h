@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "mbtfm/tractions/regularisation.h"
 
@@ -37,9 +38,10 @@ class Spectrum {
   double explained(double lambda) const;  ///< uᵀ H u, H the matrix that takes u to A s
   /// What a scan tells of one lambda.
   ScanPoint point_at(double lambda) const;
-  double misfit(double lambda) const;       ///< |u − A s|² of solve(lambda)
-  double degrees(double lambda) const;      ///< trace of the matrix that takes u to A s
-  double relative_l2(double lambda) const;  ///< |u − A s| / |u|
+  double misfit(double lambda) const;            ///< |u − A s|² of solve(lambda)
+  double removable_misfit(double lambda) const;  ///< the part of it that another s could remove
+  double degrees(double lambda) const;           ///< trace of the matrix that takes u to A s
+  double relative_l2(double lambda) const;       ///< |u − A s| / |u|
   double data_squared() const { return data_squared_; }
 
   /// V with AᵀA = V diag Vᵀ
@@ -48,6 +50,9 @@ class Spectrum {
 
  private:
   Eigen::MatrixXd outer(const Eigen::ArrayXd& shares) const;
+  /// Directions that the data tell from noise. @param variance  of one datum
+  Eigen::Array<bool, Eigen::Dynamic, 1> is_told(double variance) const;
+  std::vector<double> risks(const std::vector<ScanPoint>& points, double variance) const;  ///< (15b)
   double data_squared_, n_data_;
   Eigen::ArrayXd values_, projected_;
   std::shared_ptr<const Eigen::MatrixXd> vectors_;

@@ -9,6 +9,7 @@
 
 #include "mbtfm/tractions/dense_problem.h"
 #include "mbtfm/tractions/regularisation.h"
+#include "mbtfm/tractions/spectrum.h"
 
 namespace mbtfm::tractions {
 namespace {
@@ -59,17 +60,15 @@ std::vector<ScanPoint> scan_of(const MatrixXd& G, const VectorXd& u) {
   for (const double lambda : lambdas_between(10, 1e-2)) {
     const MatrixXd K = solver_of(G, lambda);
     const VectorXd t = K * u;
-    points.push_back({.lambda = lambda,
-                      .misfit = (u - G * t).squaredNorm(),
-                      .norm = t.squaredNorm(),
-                      .degrees = (G * K).trace(),
-                      .removable_misfit = {}});
+    points.push_back(
+        {.lambda = lambda, .misfit = (u - G * t).squaredNorm(), .norm = t.squaredNorm(), .degrees = (G * K).trace()});
   }
   return points;
 }
 
 LambdaScan judged(const MatrixXd& G, const VectorXd& u, double variance) {
-  return judge(scan_of(G, u), kN, kN, variance, [](double) { return 0; });
+  return judge(
+      scan_of(G, u), kN, variance, [](double) { return 0; }, unbiased_risks(kN));
 }
 
 /// Mean square of the error with which the others predict each datum.
@@ -168,6 +167,63 @@ TEST(Criteria, risk_is_the_squared_error_of_the_tractions_on_average_up_to_a_con
     const double standard_error = std::sqrt((squares[i] - sums[i] * sums[i]) / kDraws);
     EXPECT_LE(std::abs(sums[i]), 4 * standard_error) << "lambda " << lambdas[i];
   }
+}
+
+/// Tractions whose answers fall by `fall` from one direction to the next, of length one but for that.
+MatrixXd falling(int n_data, int n_unknowns, double fall, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  MatrixXd any(n_data, n_unknowns);
+  for (double& a : any.reshaped()) a = normal(random);
+  MatrixXd G = any.householderQr().householderQ() * MatrixXd::Identity(n_data, n_unknowns);
+  for (int k = 0; k < n_unknowns; ++k) G.col(k) *= std::pow(fall, k);
+  return G;
+}
+
+LambdaScan scan_by_direction(const MatrixXd& G, const VectorXd& u, double variance) {
+  return Spectrum(G.transpose() * G, G.transpose() * u, u.squaredNorm(), static_cast<double>(u.size())).scan(variance);
+}
+
+TEST(Criteria, risk_by_direction_is_that_of_all_where_each_direction_is_told) {
+  const MatrixXd G = falling(120, 40, 0.9, 1);
+  const VectorXd u = G * VectorXd::Constant(40, 1) + noise_of(1e-4, 120, 4);
+  const LambdaScan scan = scan_by_direction(G, u, 1e-8);
+  const Spectrum spectrum(G.transpose() * G, G.transpose() * u, u.squaredNorm(), 120);
+  std::vector<double> all;
+  for (const ScanPoint& p : scan.points)
+    all.push_back(unbiased_risk(p, spectrum.removable_misfit(p.lambda), 40, scan.variance));
+  for (std::size_t i = 1; i < all.size(); ++i)
+    EXPECT_NEAR(scan.risk[i] - scan.risk[0], all[i] - all[0], 1e-6 * std::abs(all[0] - all.back()));
+}
+
+TEST(Criteria, risk_by_direction_does_not_follow_directions_of_noise_alone) {
+  // 40 directions have a signal, 260 more are felt so little that noise is all they show. Error of the tractions over
+  // that of the best lambda, in each draw.
+  constexpr int kDraws = 60, kUnknowns = 300, kData = 400;
+  const MatrixXd G = falling(kData, kUnknowns, 0.97, 2);
+  VectorXd t = VectorXd::Zero(kUnknowns);
+  t.head(40).setOnes();
+  const Eigen::ArrayXd values = (G.transpose() * G).diagonal();
+  double worst = 0, worst_of_all = 0;
+  for (unsigned draw = 0; draw < kDraws; ++draw) {
+    const VectorXd u = G * t + noise_of(0.1, kData, 3000 + draw);
+    const LambdaScan scan = scan_by_direction(G, u, 0.01);
+    const VectorXd pulled = G.transpose() * u;
+    const auto error_at = [&](double lambda) {
+      return ((pulled.array() / (values + lambda * lambda)).matrix() - t).norm();
+    };
+    const Spectrum spectrum(G.transpose() * G, pulled, u.squaredNorm(), kData);
+    double best = 1e300, by_all = 0, least = 1e300;
+    for (const ScanPoint& p : scan.points) {
+      best = std::min(best, error_at(p.lambda));
+      const double risk = unbiased_risk(p, spectrum.removable_misfit(p.lambda), kUnknowns, scan.variance);
+      if (risk < least) least = risk, by_all = p.lambda;
+    }
+    worst = std::max(worst, error_at(scan.by_risk) / best);
+    worst_of_all = std::max(worst_of_all, error_at(by_all) / best);
+  }
+  EXPECT_LE(worst, 1.15);
+  EXPECT_GE(worst_of_all, 3) << "the scene is one in which the risk of all directions runs away";
 }
 
 TEST(Criteria, do_not_depend_on_the_unit_of_the_displacements) {

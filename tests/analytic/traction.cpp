@@ -204,10 +204,10 @@ TEST(Criteria, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_
       points.push_back({.lambda = lambda,
                         .misfit = is_l ? 1 + up : up / (1 + up),
                         .norm = is_l ? 1 + 1 / up : 1 / (1 + up),
-                        .degrees = 50 / (1 + up),
-                        .removable_misfit = {}});
+                        .degrees = 50 / (1 + up)});
     }
-    const LambdaScan scan = judge(points, 100, 100, {}, [](double) { return 0.01; });
+    const LambdaScan scan = judge(
+        points, 100, {}, [](double) { return 0.01; }, unbiased_risks(100));
     ASSERT_EQ(scan.by_l_curve.has_value(), is_l);
     if (is_l) {
       EXPECT_NEAR(std::log(*scan.by_l_curve / kCorner), 0, std::log(1.2));  // a tenth of the scan's step
