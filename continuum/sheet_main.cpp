@@ -249,19 +249,21 @@ Figures figures_of(const Solution& solution, const Balance& balance) {
     largest_um = std::max(largest_um, norm(at_node(solution.u, i)));
   double largest_kPa = 0;
   for (const GroundPatch& patch : solution.patches) largest_kPa = std::max(largest_kPa, norm(patch.traction_kPa));
-  return {{"n_triangles", std::int64_t{solution.elements->n_triangles()}},
-          {"n_nodes", std::int64_t{solution.elements->n_nodes()}},
-          {"area_um2", balance.area_um2},
-          {"mean_tension_nN_per_um", balance.mean_tension_nN_per_um},
-          {"virial_tension_nN_per_um", balance.virial_tension_nN_per_um},
-          {"largest_displacement_um", largest_um},
-          {"largest_traction_kPa", largest_kPa},
-          {"total_force_nN", balance.total_force_nN},
-          {"net_force_nN", norm(balance.net_force_nN)},
-          {"net_torque_nN_um", balance.net_torque_nN_um},
-          {"energy_fJ", balance.elastic_energy_fJ},
-          {"mesh_relative_error", relative_error(*solution.elements, solution.at_points, solution.at_nodes)},
-          {"iterations", std::int64_t{solution.report.iterations}}};
+  Figures figures = {{"n_triangles", std::int64_t{solution.elements->n_triangles()}},
+                     {"n_nodes", std::int64_t{solution.elements->n_nodes()}},
+                     {"area_um2", balance.area_um2},
+                     {"mean_tension_nN_per_um", balance.mean_tension_nN_per_um},
+                     {"virial_tension_nN_per_um", balance.virial_tension_nN_per_um},
+                     {"largest_displacement_um", largest_um},
+                     {"largest_traction_kPa", largest_kPa},
+                     {"total_force_nN", balance.total_force_nN},
+                     {"net_force_nN", norm(balance.net_force_nN)},
+                     {"net_torque_nN_um", balance.net_torque_nN_um},
+                     {"energy_fJ", balance.elastic_energy_fJ},
+                     {"mesh_relative_error", relative_error(*solution.elements, solution.at_points, solution.at_nodes)},
+                     {"iterations", std::int64_t{solution.report.iterations}}};
+  if (solution.gel_held) figures.emplace_back("strain_energy_fJ", balance.ground_energy_fJ);
+  return figures;
 }
 
 void append(Figures& to, const Figures& more) { to.insert(to.end(), more.begin(), more.end()); }
@@ -513,34 +515,12 @@ tensions::LinearData data_of_adhesions(const DisplacementField& beads, stage::St
                           has_motion ? tensions::affine_motions(beads) : Eigen::MatrixXd());
 }
 
-struct Words {
-  std::string name, unit;
-};
-Words words_of(sheets::Quantity quantity) {
-  switch (quantity) {
-    case sheets::Quantity::contraction:
-      return {"contraction", " nN/µm"};
-    case sheets::Quantity::stiffness:
-      return {"stiffness", " nN/µm"};
-    case sheets::Quantity::line_tension:
-      return {"line tension", " nN"};
-    case sheets::Quantity::contraction_over_stiffness:
-      return {"contraction over stiffness", ""};
-    case sheets::Quantity::adhesion_stiffness:
-      return {"adhesion stiffness", " nN/µm³"};
-    case sheets::Quantity::penetration:
-      return {"penetration length", " µm"};
-    case sheets::Quantity::bundle_tension:
-      return {"tension", " nN"};
-  }
-  throw InternalError("unknown quantity");
-}
-
-std::string sentence_of(const sheets::SheetEstimate& e) {
-  const auto& [quantity, unit] = words_of(e.quantity);
+std::string sentence_of(const SheetEstimate& e) {
+  const std::string quantity = for_people(e.quantity).name, of = for_people(e.quantity).unit,
+                    unit = of.empty() ? "" : " " + of;
   const std::string name =
-      e.part == sheets::kMean ? "mean " + quantity : quantity + (e.part.empty() ? "" : " of " + e.part);
-  if (e.identifiable && *e.low == *e.high) return name + " " + brief(e.value) + unit + " (given)";
+      e.part == kMeanPart ? "mean " + quantity : quantity + (e.part.empty() ? "" : " of " + e.part);
+  if (is_given(e)) return name + " " + brief(e.value) + unit + " (given)";
   if (e.identifiable) return name + " " + brief(e.value) + unit + " (" + brief(*e.low) + " to " + brief(*e.high) + ")";
   if (e.low) return name + " > " + brief(*e.low) + unit;
   if (e.high) return name + " < " + brief(*e.high) + unit;
@@ -559,10 +539,10 @@ void notice_expansion(stage::StageContext& context, const std::vector<sheets::Co
 }
 
 void notice_expansion(stage::StageContext& context, const sheets::SheetFit& fit, int n_parts) {
-  const std::vector<sheets::SheetEstimate> found = expanding(fit);
+  const std::vector<sheets::FittedEstimate> found = expanding(fit);
   std::string text;
   bool is_sure = false;  // the interval holds no contraction
-  for (const sheets::SheetEstimate& e : found) {
+  for (const SheetEstimate& e : found) {
     const bool is_below = e.high && *e.high < 0;
     is_sure = is_sure || is_below;
     text += std::string(text.empty() ? "By the beads " : "; ") + (e.part.empty() ? std::string("the sheet") : e.part) +
@@ -692,7 +672,7 @@ sheets::Question question_of(const Parameters& p, stage::StageContext& context, 
 std::string told_by(const sheets::SheetFit& fit) {
   std::string told;
   std::vector<double> bundles_nN;
-  for (const sheets::SheetEstimate& e : fit.estimates) {
+  for (const SheetEstimate& e : fit.estimates) {
     if (e.quantity == sheets::Quantity::bundle_tension) {
       bundles_nN.push_back(e.value);
     } else {
@@ -708,8 +688,7 @@ std::string told_by(const sheets::SheetFit& fit) {
 /// What a reader must know of the fit.
 void notice_fit(stage::StageContext& context, const sheets::BeadFit& found, const std::string& told) {
   const sheets::SheetFit& fit = found.fit;
-  const auto stiffness =
-      std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &sheets::SheetEstimate::quantity);
+  const auto stiffness = std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &SheetEstimate::quantity);
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
   notice_unexplained(context, fit);
   if (!found.field) notice_expansion(context, fit, found.n_parts);

@@ -17,8 +17,9 @@ Study read_study(const StudyParameters& parameters, stage::StageContext& context
   const std::optional<Path> table = context.has_input("table") ? std::optional(context.input("table")) : std::nullopt;
   Study study = read_study(folder, parameters, table, context.threads);
   for (const StudyCell& cell : study.cells) {
-    for (const std::string& file : files_of_a_cell()) context.input("cells", {cell.name + "/" + file});
-    for (const std::string& file : further_files_of_a_cell()) {
+    const CellKind kind = cell.sheet ? CellKind::sheet : CellKind::plane;
+    for (const std::string& file : files_of_a_cell(kind)) context.input("cells", {cell.name + "/" + file});
+    for (const std::string& file : further_files_of_a_cell(kind)) {
       const std::string name = cell.name + "/" + file;
       if (files::is_own_file(folder / name)) context.input("cells", {name});
     }
@@ -51,10 +52,12 @@ StageReport statistics(const StudyParameters& parameters, stage::StageContext& c
                     study_html(study, analysis, figures, parameters, context.outputs_.at("out")));
   files::write_text(context.output("out", "study.R"), std::string(kStudyScript));
   StageReport report;
-  report.summary = std::to_string(study.cells.size()) + " cells, " +
-                   std::to_string(analysis.tensions.sample.values.size()) + " tensions; " +
-                   std::to_string(study.left_out.size()) + " cells left out, " +
-                   std::to_string(analysis.warnings.size()) + " warnings: see report.html";
+  if (analysis.has_fibres)
+    report.summary = std::to_string(n_with_fibres(study)) + " cells, " +
+                     std::to_string(analysis.tensions.sample.values.size()) + " tensions; ";
+  if (n_sheets(study) > 0) report.summary += std::to_string(n_sheets(study)) + " sheets; ";
+  report.summary += std::to_string(study.left_out.size()) + " cells left out, " +
+                    std::to_string(analysis.warnings.size()) + " warnings: see report.html";
   return report;
 }
 
@@ -66,7 +69,9 @@ int main(int argc, char** argv) {
   using namespace mbtfm::statistics;
   return stage::run_stage<StudyParameters>(
       {.name = "stats",
-       .purpose = "statistics of stress-fibre tensions and adhesion forces over all finished cells of a folder",
+       .purpose =
+           "statistics of stress-fibre tensions, adhesion forces and contracting sheets over all finished cells of "
+           "a folder",
        .files = {{"cells", stage::FileArgument::Kind::input, "folder with cell folders"},
                  {"table", stage::FileArgument::Kind::optional_input,
                   "CSV with a row for each cell: column cell, columns of conditions, column exclude with the reason"},

@@ -219,6 +219,7 @@ Balance balance_of(const Solution& solution) {
     balance.net_torque_nN_um += cross(arm + moved, force);
     balance.largest_torque_nN_um += norm(arm) * norm(force);
     virial += dot(arm, force);
+    balance.ground_energy_fJ += 0.5 * dot(force, patch.displacement_um);
   }
   balance.mean_tension_nN_per_um = mean_of(mean_over(elements, solution.at_points));
   virial += solution.sheet.line_tension_nN * rim_length_um(elements, solution.sheet.n_rims);

@@ -109,6 +109,7 @@ struct Balance {
   double net_torque_nN_um = 0;          ///< about the centre of area
   double largest_torque_nN_um = 0;      ///< sum of distance times magnitude
   double elastic_energy_fJ = 0;         ///< of sheet and ground at small strains: half of the contraction's work
+  double ground_energy_fJ = 0;          ///< of the gel, or of the springs: ½ Σ F · u over the patches
   double mean_tension_nN_per_um = 0;    ///< ½ tr S, mean over the area
   double virial_tension_nN_per_um = 0;  ///< −1/(2A) Σ x · F, less Λ × the rim / (2 A) and the same of bundles
   double area_um2 = 0;

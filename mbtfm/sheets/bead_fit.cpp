@@ -122,7 +122,7 @@ class Fitter {
   StiffnessTable table_;
 };
 
-VectorXd differences(const std::vector<SheetEstimate>& others, const std::vector<SheetEstimate>& from) {
+VectorXd differences(const std::vector<FittedEstimate>& others, const std::vector<FittedEstimate>& from) {
   VectorXd d(std::ssize(from));
   for (std::size_t k = 0; k < from.size(); ++k) d(static_cast<Index>(k)) = others[k].value - from[k].value;
   return d;
@@ -185,7 +185,7 @@ BeadFit fit_beads(const Question& q, const DisplacementField& beads, const Gel& 
   tensions::BeadsOfState state = state_of(q, fitter, beads);
   const std::vector<Vec2> places = tensions::points_of(state.beads);
   Fitter::Found found = fitter.fit(state.data);
-  const std::vector<SheetEstimate> on_own_mesh = found.fit.estimates;
+  const std::vector<FittedEstimate> on_own_mesh = found.fit.estimates;
 
   tell(0.6, "solving on finer triangles");
   const auto solved = [&](const sheet::Scene& scene) {

@@ -204,16 +204,16 @@ double quantile(const Posterior& posterior, double share) {
   return M.back();
 }
 
-SheetEstimate estimate(Quantity quantity, const std::string& part, double value, double variance, Open open,
-                       VectorXd by_unknown) {
+FittedEstimate estimate(Quantity quantity, const std::string& part, double value, double variance, Open open,
+                        VectorXd by_unknown) {
   const double sigma = std::sqrt(std::max(0.0, variance));
-  SheetEstimate e{.quantity = quantity,
-                  .part = part,
-                  .value = value,
-                  .sigma = sigma,
-                  .low = value - tensions::kNormal95 * sigma,
-                  .high = value + tensions::kNormal95 * sigma,
-                  .by_unknown = std::move(by_unknown)};
+  FittedEstimate e{{.quantity = quantity,
+                    .part = part,
+                    .value = value,
+                    .sigma = sigma,
+                    .low = value - tensions::kNormal95 * sigma,
+                    .high = value + tensions::kNormal95 * sigma},
+                   std::move(by_unknown)};
   if (open.below) e.low = std::nullopt;
   if (open.above) e.high = std::nullopt;
   e.identifiable = e.low && e.high;
@@ -221,7 +221,7 @@ SheetEstimate estimate(Quantity quantity, const std::string& part, double value,
   return e;
 }
 
-std::vector<SheetEstimate> estimates_of(const Posterior& p, const StiffnessTable& table, const VectorXd& mean) {
+std::vector<FittedEstimate> estimates_of(const Posterior& p, const StiffnessTable& table, const VectorXd& mean) {
   const Index n = table.n_contractions(), at_M = table.n_loads();
   const Open open = open_ends(p);
   const double M = std::exp(p.log_stiffness);
@@ -230,15 +230,15 @@ std::vector<SheetEstimate> estimates_of(const Posterior& p, const StiffnessTable
   const auto by = [&](Index unknown, double factor) -> VectorXd { return factor * VectorXd::Unit(at_M + 2, unknown); };
   VectorXd by_mean = VectorXd::Zero(at_M + 2);
   by_mean.head(n) = mean;
-  SheetEstimate stiffness = estimate(Quantity::stiffness, {}, M, std::pow(M * p.log_sigma, 2), open, by(at_M, M));
+  FittedEstimate stiffness = estimate(Quantity::stiffness, {}, M, std::pow(M * p.log_sigma, 2), open, by(at_M, M));
   if (stiffness.low) stiffness.low = quantile(p, kTail);
   if (stiffness.high) stiffness.high = quantile(p, 1 - kTail);
   // a stiff sheet pulls as its strain has it, a soft one as its contraction
-  std::vector<SheetEstimate> estimates = {
-      estimate(Quantity::contraction, kMean, contraction, variance(p.covariance),
+  std::vector<FittedEstimate> estimates = {
+      estimate(Quantity::contraction, kMeanPart, contraction, variance(p.covariance),
                {open.above && contraction < 0, open.above && contraction > 0}, by_mean),
       stiffness,
-      estimate(Quantity::contraction_over_stiffness, kMean, share, variance(p.covariance_over_stiffness),
+      estimate(Quantity::contraction_over_stiffness, kMeanPart, share, variance(p.covariance_over_stiffness),
                {open.below && share < 0, open.below && share > 0}, by_mean / M - by(at_M, share))};
   Index load = n;
   const auto tension = [&](Quantity quantity, const std::string& of) {

@@ -36,8 +36,6 @@ class ContractionLattice {
   std::vector<Square> squares_;
 };
 
-inline constexpr const char* kMean = "mean";  ///< in place of a part of the sheet
-
 /// A sheet whose contraction varies.
 struct FieldFit {
   SheetFit sheet;                    ///< its contractions are means over the sheet

@@ -210,10 +210,10 @@ Linearised linearised(const LinearData& data, const Directions& about, double va
                      tensions::squared_weights(data).asDiagonal()};
 }
 
-void split_by_noise(std::vector<SheetEstimate>& estimates, const Linearised& about, double variance,
+void split_by_noise(std::vector<FittedEstimate>& estimates, const Linearised& about, double variance,
                     const LinearData& data) {
   const double by_beads = data.has_errors ? std::min(1.0, tensions::noise_variance(data) / variance) : 1;
-  for (SheetEstimate& e : estimates) {
+  for (FittedEstimate& e : estimates) {
     if (!e.sigma) continue;
     const double whole = e.by_unknown.dot(about.covariance * e.by_unknown),
                  without = e.by_unknown.dot(about.without_motion * e.by_unknown);

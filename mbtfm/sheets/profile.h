@@ -101,7 +101,7 @@ struct Linearised {
 Linearised linearised(const tensions::LinearData& data, const Directions& about, double variance,
                       const Eigen::MatrixXd& prior = {});
 /// Splits the standard errors that noise and misfit give. @param variance  the beads' share of the variance
-void split_by_noise(std::vector<SheetEstimate>& estimates, const Linearised& about, double variance,
+void split_by_noise(std::vector<FittedEstimate>& estimates, const Linearised& about, double variance,
                     const tensions::LinearData& data);
 
 /// Weights of the beads by a robust loss, until they stay. Tukey's has several minima: it starts from Huber's, whose

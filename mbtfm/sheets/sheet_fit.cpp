@@ -153,10 +153,10 @@ class Estimates {
   Estimates(const StiffnessTable& table, const Profile& best, const MatrixXd& covariance, const Allowed& allowed)
       : table_(table), best_(best), covariance_(covariance), allowed_(allowed) {}
 
-  std::vector<SheetEstimate> of(const std::vector<std::string>& parts) const {
+  std::vector<FittedEstimate> of(const std::vector<std::string>& parts) const {
     const Eigen::Index at_M = table_.n_loads(), at_kappa = at_M + 1;
     const double M = sheet_of(best_);
-    std::vector<SheetEstimate> all;
+    std::vector<FittedEstimate> all;
     const auto add = [&](Quantity quantity, const std::string& part, double value, const VectorXd& by_unknown,
                          const Limits& limits) { all.push_back(one(quantity, part, value, by_unknown, limits)); };
     const auto part_of = [&](Eigen::Index k) { return parts.empty() ? "" : parts[static_cast<std::size_t>(k)]; };
@@ -174,7 +174,7 @@ class Estimates {
     if (table_.has_line()) tension(Quantity::line_tension, {});
     for (const sheet::Bundle& bundle : table_.bundles()) {
       tension(Quantity::bundle_tension, "fibre " + std::to_string(bundle.fibre_id));
-      SheetEstimate& e = all.back();
+      FittedEstimate& e = all.back();
       if (e.value == 0 && e.high) e.sigma = *e.high / tensions::kNormal95;  // it is at its bound
     }
     if (!table_.adhesion_nN_per_um3()) return all;
@@ -188,15 +188,15 @@ class Estimates {
   VectorXd by(Eigen::Index unknown, double factor) const {
     return factor * VectorXd::Unit(table_.n_loads() + 2, unknown);
   }
-  SheetEstimate one(Quantity quantity, const std::string& part, double value, const VectorXd& by_unknown,
-                    const Limits& limits) const {
-    SheetEstimate e{.quantity = quantity,
-                    .part = part,
-                    .value = value,
-                    .sigma = std::sqrt(std::max(0.0, by_unknown.dot(covariance_ * by_unknown))),
-                    .low = limits.low,
-                    .high = limits.high,
-                    .by_unknown = by_unknown};
+  FittedEstimate one(Quantity quantity, const std::string& part, double value, const VectorXd& by_unknown,
+                     const Limits& limits) const {
+    FittedEstimate e{{.quantity = quantity,
+                      .part = part,
+                      .value = value,
+                      .sigma = std::sqrt(std::max(0.0, by_unknown.dot(covariance_ * by_unknown))),
+                      .low = limits.low,
+                      .high = limits.high},
+                     by_unknown};
     if (limits.is_open_below) e.low = std::nullopt;
     if (limits.is_open_above) e.high = std::nullopt;
     e.identifiable = e.low && e.high;
@@ -221,10 +221,10 @@ LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, 
                           std::move(motions));
 }
 
-void add_error(std::vector<SheetEstimate>& estimates, std::optional<double> SheetErrorParts::*part,
+void add_error(std::vector<FittedEstimate>& estimates, std::optional<double> SheetErrorParts::*part,
                const VectorXd& sizes) {
   for (std::size_t k = 0; k < estimates.size(); ++k) {
-    SheetEstimate& e = estimates[k];
+    FittedEstimate& e = estimates[k];
     const double size = sizes(static_cast<Eigen::Index>(k)), more = tensions::kNormal95 * size;
     if (e.low) {
       const double wider = e.value - std::hypot(e.value - *e.low, more);
@@ -245,10 +245,10 @@ void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, cons
   add_error(fit.estimates, part, sizes);
 }
 
-VectorXd changes_by_modulus(const std::vector<SheetEstimate>& estimates, double share) {
+VectorXd changes_by_modulus(const std::vector<FittedEstimate>& estimates, double share) {
   VectorXd changes(std::ssize(estimates));
   for (Eigen::Index k = 0; k < changes.size(); ++k) {
-    const SheetEstimate& e = estimates[static_cast<std::size_t>(k)];
+    const FittedEstimate& e = estimates[static_cast<std::size_t>(k)];
     const bool is_force = e.quantity != Quantity::contraction_over_stiffness && e.quantity != Quantity::penetration;
     changes(k) = is_force ? share * e.value : 0;
   }
@@ -309,9 +309,9 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   return fit;
 }
 
-std::vector<SheetEstimate> expanding(const SheetFit& fit) {
-  std::vector<SheetEstimate> found;
-  for (const SheetEstimate& e : fit.estimates) {
+std::vector<FittedEstimate> expanding(const SheetFit& fit) {
+  std::vector<FittedEstimate> found;
+  for (const FittedEstimate& e : fit.estimates) {
     if (e.quantity == Quantity::contraction && (e.value < 0 || (e.high && *e.high < 0))) found.push_back(e);
   }
   return found;

@@ -1,7 +1,6 @@
 /// Contraction, stiffness and line tension of a sheet, from the displacements of the beads under it.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,54 +8,13 @@
 #include "mbtfm/sheets/stiffness_table.h"
 #include "mbtfm/tensions/linear_data.h"
 #include "mbtfm/tensions/tension_fit.h"
+#include "pipeline/contract/sheet_results.h"
 
 namespace mbtfm::sheets {
 
-enum class Quantity {
-  contraction,
-  stiffness,
-  line_tension,
-  contraction_over_stiffness,
-  adhesion_stiffness,
-  penetration,  ///< √(stiffness / adhesion stiffness): how far into the sheet its edge is felt
-  bundle_tension
-};
-constexpr auto words(Quantity) {
-  return std::array{"contraction_nN_per_um",      "stiffness_nN_per_um",           "line_tension_nN",
-                    "contraction_over_stiffness", "adhesion_stiffness_nN_per_um3", "penetration_um",
-                    "bundle_tension_nN"};
-}
+using Quantity = SheetQuantity;
 
-/// What each source adds to a standard error. In squares they add up to it; none: it was not asked for.
-struct SheetErrorParts {
-  std::optional<double> beads = {};      ///< noise of the displacements
-  std::optional<double> motion = {};     ///< that all beads share: how much less they tell beside it
-  std::optional<double> model = {};      ///< what the misfit calls for beyond the beads' noise
-  std::optional<double> mesh = {};       ///< what is left of it once a finer one has corrected the fit
-  std::optional<double> outline = {};    ///< its place
-  std::optional<double> gel = {};        ///< modulus, thickness and Poisson's ratio, where their errors are stated
-  std::optional<double> substrate = {};  ///< what the gel's model leaves out
-};
-/// The one list of the parts. @param visit  of name and part
-template <class Visit>
-void for_each_part(const SheetErrorParts& p, const Visit& visit) {
-  visit("beads", p.beads);
-  visit("motion", p.motion);
-  visit("model", p.model);
-  visit("mesh", p.mesh);
-  visit("outline", p.outline);
-  visit("gel", p.gel);
-  visit("substrate", p.substrate);
-}
-
-struct SheetEstimate {
-  Quantity quantity = Quantity::contraction;
-  std::string part = {};  ///< of the sheet, where it has parts with contractions of their own; or the bundle
-  double value = 0;
-  std::optional<double> sigma;      ///< standard error; none where the beads do not tell the quantity
-  std::optional<double> low, high;  ///< 95 %; none where the beads set no limit to that side
-  bool identifiable = true;         ///< limited to both sides
-  SheetErrorParts parts = {};       ///< of sigma
+struct FittedEstimate : SheetEstimate {
   Eigen::VectorXd by_unknown = {};  ///< how it follows the loads, log M and log κ
 };
 
@@ -69,7 +27,7 @@ struct SheetModel {
 };
 
 struct SheetFit {
-  std::vector<SheetEstimate> estimates;
+  std::vector<FittedEstimate> estimates;
   Stiffnesses stiffnesses;
   Eigen::VectorXd loads;            ///< contractions by part, line tension, tensions of bundles
   Eigen::VectorXd node_amplitudes;  ///< of the table's forces: what the sheet does at the solution
@@ -86,7 +44,7 @@ struct SheetFit {
 };
 
 /// The contractions that no cell has: best below zero, or with an interval that holds no value above.
-std::vector<SheetEstimate> expanding(const SheetFit& fit);
+std::vector<FittedEstimate> expanding(const SheetFit& fit);
 
 /// One more model: forces of the adhesions, each for itself. chi² of all models is then in units of the noise that
 /// these leave, or of the stated errors where these are larger.
@@ -102,14 +60,14 @@ tensions::LinearData data_of(const DisplacementField& beads, const StiffnessTabl
 /// One more error of the estimates, independent of the others: their standard errors and intervals grow by it.
 /// @param part  the source, whose part grows, too
 /// @param sizes  a standard error each
-void add_error(std::vector<SheetEstimate>& estimates, std::optional<double> SheetErrorParts::*part,
+void add_error(std::vector<FittedEstimate>& estimates, std::optional<double> SheetErrorParts::*part,
                const Eigen::VectorXd& sizes);
 /// The same by what they change if the beads moved otherwise.
 /// @param changes_um  2·beads × errors that are independent of each other
 void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const Eigen::MatrixXd& changes_um);
 /// What they change by if all forces and stiffnesses grow by a share: the beads' displacements are measured, so that is
 /// what another modulus of the gel does, if no stiffness is given.
-Eigen::VectorXd changes_by_modulus(const std::vector<SheetEstimate>& estimates, double share);
+Eigen::VectorXd changes_by_modulus(const std::vector<FittedEstimate>& estimates, double share);
 
 /// Least squares (or a robust loss) over all stiffnesses of the table: of each the best loads are linear, so the misfit
 /// is a function of one number, or of two where the adhesions are fitted, which are scanned and then refined (variable

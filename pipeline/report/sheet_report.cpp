@@ -2,15 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "pipeline/contract/version.h"
-#include "pipeline/files/csv.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/json_record.h"
+#include "pipeline/files/sheet_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/findings.h"
 #include "pipeline/report/numbers.h"
@@ -22,49 +21,18 @@ namespace mbtfm::report {
 namespace fs = std::filesystem;
 namespace {
 
-/// A row of sheet_fit.csv; an end that is not there: the beads set no limit.
-struct Estimate {
-  std::string quantity, part;  ///< the quantity's name with its unit, as the file has it
-  double value = 0;
-  std::optional<double> sigma, low, high;
-  std::vector<std::pair<std::string, double>> parts;  ///< of sigma, those that there are
-};
-
-/// Columns of sheet_fit.csv, and what they are called in events.
-constexpr std::array<std::pair<const char*, const char*>, 7> kParts = {{{"by_beads", "beads"},
-                                                                        {"by_motion", "motion"},
-                                                                        {"by_model", "model"},
-                                                                        {"by_mesh", "mesh"},
-                                                                        {"by_outline", "outline"},
-                                                                        {"by_gel", "gel"},
-                                                                        {"by_substrate", "substrate"}}};
-
 struct SheetResults {
   std::string name;
   files::JsonRecord figures;
-  std::vector<Estimate> estimates;
+  std::vector<SheetEstimate> estimates;
   double number(const char* figure) const { return figures.at(figure).number(); }
 };
 
 SheetResults read_sheet(const fs::path& cell) {
   const fs::path folder = cell / "3_sheet";
-  SheetResults r{fs::weakly_canonical(cell).filename().string(),
-                 files::JsonRecord(folder / "sheet.json", "the figures of a sheet", "run the stage sheet again"),
-                 {}};
-  const files::CsvTable table(folder / "sheet_fit.csv");
-  for (int row = 0; row < table.n_rows(); ++row) {
-    Estimate& e = r.estimates.emplace_back();
-    e = {table.text(row, "quantity"),
-         table.text(row, "part"),
-         table.number(row, "value"),
-         table.optional_number(row, "sigma"),
-         table.optional_number(row, "low"),
-         table.optional_number(row, "high"),
-         {}};
-    for (const auto& [column, name] : kParts)
-      if (const auto size = table.optional_number(row, column)) e.parts.emplace_back(name, *size);
-  }
-  return r;
+  return {fs::weakly_canonical(cell).filename().string(),
+          files::JsonRecord(folder / "sheet.json", "the figures of a sheet", "run the stage sheet again"),
+          files::read(folder / "sheet_fit.csv", files::sheet_estimate_table())};
 }
 
 std::vector<std::string> facts_of(const SheetResults& r) {
@@ -166,13 +134,15 @@ std::string result_event_of_sheet(const fs::path& cell, const fs::path& report) 
                                   {"mean_tension_nN_per_um", r.number("mean_tension_nN_per_um")},
                                   {"estimates", nlohmann::ordered_json::array()},
                                   {"report", report.string()}};
-  for (const Estimate& e : r.estimates) {
-    nlohmann::ordered_json one = {{"quantity", e.quantity}, {"part", e.part}, {"value", e.value}};
+  for (const SheetEstimate& e : r.estimates) {
+    nlohmann::ordered_json one = {{"quantity", name_of(e.quantity)}, {"part", e.part}, {"value", e.value}};
     one["sigma"] = e.sigma ? nlohmann::ordered_json(*e.sigma) : nullptr;
     one["low"] = e.low ? nlohmann::ordered_json(*e.low) : nullptr;
     one["high"] = e.high ? nlohmann::ordered_json(*e.high) : nullptr;
     one["sigma_parts"] = nlohmann::ordered_json::object();
-    for (const auto& [name, size] : e.parts) one["sigma_parts"][name] = size;
+    for_each_part(e.parts, [&](const char* name, const std::optional<double>& size) {
+      if (size) one["sigma_parts"][name] = *size;
+    });
     event["estimates"].push_back(std::move(one));
   }
   return files::json_text(event) + "\n";

@@ -26,17 +26,22 @@ Measure measure(Sample sample, const std::vector<CellWeights>& draws) {
 
 void warn_of_few_cells(const Study& study, std::vector<std::string>& warnings) {
   constexpr int kFew = 6;  // medians of five cells and five others cannot differ at p < 0.05 after correction
-  std::vector<int> n_of(study.conditions.size(), 0);
-  for (const StudyCell& cell : study.cells) ++n_of[static_cast<std::size_t>(cell.condition)];
-  for (std::size_t i = 0; i < n_of.size(); ++i) {
-    const std::string where = prefix_of(study.conditions[i]);
-    if (n_of[i] == 1) {
-      warnings.push_back(where + "a single cell: nothing can be said of how cells differ, and no test counts it.");
-    } else if (n_of[i] < kFew) {
-      warnings.push_back(
-          fmt::format("{}{} cells only: intervals with the cell as the unit are wide, and rest on the "
-                      "assumption that cells scatter normally.",
-                      where, n_of[i]));
+  for (const bool is_sheet : {false, true}) {
+    std::vector<int> n_of(study.conditions.size(), 0);
+    for (const StudyCell& cell : study.cells)
+      n_of[static_cast<std::size_t>(cell.condition)] += cell.sheet.has_value() == is_sheet ? 1 : 0;
+    const std::string name = is_sheet ? "sheet" : "cell";
+    for (std::size_t i = 0; i < n_of.size(); ++i) {
+      const std::string where = prefix_of(study.conditions[i]);
+      if (n_of[i] == 1) {
+        warnings.push_back(fmt::format(
+            "{0}a single {1}: nothing can be said of how {1}s differ, and no test counts it.", where, name));
+      } else if (n_of[i] > 0 && n_of[i] < kFew) {
+        warnings.push_back(
+            fmt::format("{0}{1} {2}s only: intervals with the {2} as the unit are wide, and rest on the "
+                        "assumption that {2}s scatter normally.",
+                        where, n_of[i], name));
+      }
     }
   }
 }
@@ -57,11 +62,11 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
         "means of the others are too large.",
         n_unknown, n_fibres));
   }
-  if (with.size() < study.cells.size()) {
+  if (const int n_without = n_with_fibres(study) - static_cast<int>(with.size()); n_without > 0) {
     warnings.push_back(
         fmt::format("{} cells have no fibre with a known tension: they enter the forces, not the "
                     "tensions.",
-                    study.cells.size() - with.size()));
+                    n_without));
   }
   const int n_tensions = static_cast<int>(tensions.sample.values.size());
   if (tensions.sample.n_without_error > 0) {
@@ -97,7 +102,26 @@ void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
   warnings.push_back(fmt::format(
       "The network's tension of {} of {} cells could not be identified: how their total force is shared out "
       "to network and fibres is not known and does not enter, nor does the network's surface tension.",
-      n, study.cells.size()));
+      n, n_with_fibres(study)));
+}
+
+/// What the beads do not limit to both sides.
+void warn_of_sheets(const Study& study, std::vector<std::string>& warnings) {
+  for (const SheetQuantity quantity : mbtfm::values_of<SheetQuantity>()) {
+    int n_unknown = 0, n = 0;
+    for (const StudyCell& cell : study.cells) {
+      if (!cell.sheet) continue;
+      for (const SheetEstimate& e : cell.sheet->estimates) {
+        n += e.quantity == quantity && !is_given(e) ? 1 : 0;
+        n_unknown += e.quantity == quantity && !e.identifiable ? 1 : 0;
+      }
+    }
+    if (n_unknown == 0) continue;
+    warnings.push_back(fmt::format(
+        "The beads limit the {} of sheets to one side only, or not at all, in {} of {} fits. These values do not "
+        "enter: the mean of the others may be biased.",
+        for_people(quantity).name, n_unknown, n));
+  }
 }
 
 /// Tests by observation that no test by cell bears out.
@@ -132,28 +156,60 @@ std::string kind_for_people(const std::string& kind) {
 }
 
 std::vector<const Measure*> Analysis::measures() const {
-  std::vector<const Measure*> all = {&tensions, &adhesion_forces, &adhesion_areas};
-  for (const Measure& m : cells) all.push_back(&m);
+  std::vector<const Measure*> all;
+  if (has_fibres) all = {&tensions, &adhesion_forces, &adhesion_areas};
+  for (const std::vector<Measure>* list : {&cells, &sheets})
+    for (const Measure& m : *list) all.push_back(&m);
   return all;
+}
+
+PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
+  const auto of_sheets = [&](const std::string& column, const std::string& name) {
+    const auto at = std::ranges::find_if(analysis.sheets, [&](const Measure& m) { return m.sample.column == column; });
+    return PrimaryChoice{at == analysis.sheets.end() ? nullptr : &*at, 0, name + " of sheets"};
+  };
+  PrimaryMeasure asked = parameters.primary;
+  if (asked == PrimaryMeasure::automatic)
+    asked = analysis.has_fibres ? PrimaryMeasure::tension : PrimaryMeasure::contraction;
+  if (asked == PrimaryMeasure::contraction) return of_sheets(name_of(SheetQuantity::contraction), "contraction");
+  if (asked == PrimaryMeasure::mean_tension) return of_sheets("mean_tension_nN_per_um", "mean tension");
+  if (asked == PrimaryMeasure::total_force)
+    return analysis.has_fibres ? PrimaryChoice{&analysis.cells.front(), 0, "total force of cells"}
+                               : of_sheets("sheet_force_nN", "total force");
+  const std::string name = "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres";
+  if (!analysis.has_fibres) return {nullptr, 0, name};
+  const Sample& sample = analysis.tensions.sample;
+  const auto kind = std::ranges::find(sample.kinds, name_of(counted_type(study, parameters.primary_type)));
+  return {&analysis.tensions, static_cast<int>(kind - sample.kinds.begin()), name};
 }
 
 Analysis analyse(const Study& study, const StudyParameters& parameters) {
   const std::vector<CellWeights> draws = draw_cells(study, parameters);
   Analysis a;
+  a.has_fibres = n_with_fibres(study) > 0;
   a.tensions = measure(sample_tensions(study), draws);
   a.tensions_by_cell = summarise_by_cell(a.tensions.sample, study);
   a.shares = shares_above(a.tensions.sample, thresholds_nN(parameters));
   a.adhesion_forces = measure(sample_adhesion_forces(study), draws);
   a.adhesion_areas = measure(sample_adhesion_areas(study), draws);
-  for (Sample& sample : sample_cells(study)) a.cells.push_back(measure(std::move(sample), draws));
-  const Measure& primary = parameters.primary == PrimaryMeasure::tension ? a.tensions : a.cells.front();
-  a.primary = primary_of(study, primary.sample, primary.model, primary.comparisons, parameters);
+  if (a.has_fibres)
+    for (Sample& sample : sample_cells(study)) a.cells.push_back(measure(std::move(sample), draws));
+  for (Sample& sample : sample_sheets(study)) a.sheets.push_back(measure(std::move(sample), draws));
+  const PrimaryChoice primary = primary_choice(study, a, parameters);
+  if (primary.measure == nullptr) {
+    a.primary.measure = primary.name;
+    a.primary.obstacle = "no cell of the study has a known one";
+  } else {
+    a.primary = primary_of(study, primary.name, primary.measure->sample, primary.kind, primary.measure->model,
+                           primary.measure->comparisons);
+  }
   a.correlations = correlate_forces(study, draws);
   a.area_bins = bin_by_area(study, draws);
   a.directions = summarise_directions(study, draws);
   warn_of_few_cells(study, a.warnings);
-  warn_of_tensions(study, a.tensions, a.warnings);
+  if (a.has_fibres) warn_of_tensions(study, a.tensions, a.warnings);
   warn_of_networks(study, a.warnings);
+  warn_of_sheets(study, a.warnings);
   for (const Measure* m : a.measures()) warn_of_pseudo_replication(*m, a.warnings);
   return a;
 }

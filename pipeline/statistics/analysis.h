@@ -21,20 +21,29 @@ struct Measure {
 };
 
 struct Analysis {
+  bool has_fibres = true;  ///< some cells are no sheets: else nothing is said of fibres and adhesions
   Primary primary;
   Measure tensions;
   std::vector<Summary> tensions_by_cell;
   std::vector<ShareAbove> shares;
   Measure adhesion_forces, adhesion_areas;
-  std::vector<Measure> cells;
+  std::vector<Measure> cells, sheets;
   std::vector<Correlation> correlations;
   std::vector<AreaBin> area_bins;
   std::vector<DirectionSummary> directions;
   std::vector<std::string> warnings;  ///< sentences on what the numbers cannot carry
 
-  /// Those of every sample: tensions, adhesions, cells.
+  /// Those of every sample of which the study has cells: tensions, adhesions, cells, sheets.
   std::vector<const Measure*> measures() const;
 };
+
+/// What the primary comparison compares; none: no cell of the study has it.
+struct PrimaryChoice {
+  const Measure* measure = nullptr;
+  int kind = 0;      ///< of the measure's sample
+  std::string name;  ///< "tension of ventral fibres"
+};
+PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const StudyParameters& parameters);
 
 Analysis analyse(const Study& study, const StudyParameters& parameters);
 

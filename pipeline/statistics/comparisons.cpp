@@ -154,7 +154,7 @@ void add_model_tests(const Sample& sample, const Family& family, const SampleMod
       pair.degrees = c.degrees;
       pair.p_value = c.p_value;
       pair.effect = c.estimate;
-      pair.effect_name = "difference of means (" + sample.unit + ")";
+      pair.effect_name = "difference of means" + (sample.unit.empty() ? "" : " (" + sample.unit + ")");
       pair.interval = Interval{c.low, c.high};
       list.push_back(std::move(pair));
     }
@@ -214,7 +214,7 @@ std::vector<Family> families_of(const Sample& sample) {
 }  // namespace
 
 std::vector<Comparison> compare(const Sample& sample, const std::optional<SampleModel>& model) {
-  const bool is_one_a_cell = n_cells_of(sample.values) == static_cast<int>(sample.values.size());
+  const bool is_one_a_cell = sample.is_one_a_cell();
   std::vector<Comparison> list;
   for (const Family& family : families_of(sample)) {
     add_corrected(list, [&](auto& tests) {

@@ -11,8 +11,6 @@
 namespace mbtfm::statistics {
 namespace {
 
-const double kNormal95 = quantile(boost::math::normal(), 0.975);
-
 void need_values(const std::vector<double>& values) {
   if (values.empty()) throw InvalidData("a sample", "at least one value", "none");
 }

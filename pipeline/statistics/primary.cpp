@@ -71,13 +71,13 @@ void compare_replicates(const Study& study, const Sample& sample, int kind, Prim
                                    .replicates = static_cast<int>(n)});
   }
   if (primary.differences.empty())
-    primary.obstacle = "each condition needs two replicates that have cells of the reference, too";
+    primary.obstacle = "each condition needs two replicates that have " + primary.cells + " of the reference, too";
 }
 
 /// Of two groups with two cells each at least.
 void compare_cells(const Sample& sample, int kind, const std::optional<SampleModel>& model,
                    const std::vector<Comparison>& comparisons, Primary& primary) {
-  primary.test = "mixed model with the cell as the unit (Student’s t)";
+  primary.test = fmt::format("mixed model with the {} as the unit (Student’s t)", sample.cell_name());
   if (const int group = sample.group_of(0, kind); model && model->index[static_cast<std::size_t>(group)] >= 0)
     primary.reference_mean = model->fit.mean[model->index[static_cast<std::size_t>(group)]];
   for (const Comparison& c : comparisons) {
@@ -93,7 +93,7 @@ void compare_cells(const Sample& sample, int kind, const std::optional<SampleMod
                                    .cells_before = c.cells_a});
   }
   if (primary.differences.empty())
-    primary.obstacle = "the reference and one other condition need two cells each with a known value";
+    primary.obstacle = "the reference and one other condition need two " + primary.cells + " each with a known value";
 }
 
 }  // namespace
@@ -110,15 +110,14 @@ std::string sentence_of(const Primary& primary, const PrimaryDifference& d) {
   text += fmt::format(" [95 % CI {} to {} {}], {}; ", readable(low), readable(high), primary.unit,
                       d.p_holm < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", d.p_holm));
   if (d.replicates > 0) text += fmt::format("{} replicates, ", d.replicates);
-  return text + fmt::format("{} and {} cells", d.cells, d.cells_before);
+  return text + fmt::format("{} and {} {}", d.cells, d.cells_before, primary.cells);
 }
 
-Primary primary_of(const Study& study, const Sample& sample, const std::optional<SampleModel>& model,
-                   const std::vector<Comparison>& comparisons, const StudyParameters& parameters) {
-  const bool is_tension = parameters.primary == PrimaryMeasure::tension;
-  Primary primary{.measure = is_tension ? "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres"
-                                        : "total force of cells",
+Primary primary_of(const Study& study, const std::string& name, const Sample& sample, int kind,
+                   const std::optional<SampleModel>& model, const std::vector<Comparison>& comparisons) {
+  Primary primary{.measure = name,
                   .unit = sample.unit,
+                  .cells = sample.cells_name(),
                   .reference = study.conditions.front(),
                   .test = {},
                   .differences = {}};
@@ -126,13 +125,11 @@ Primary primary_of(const Study& study, const Sample& sample, const std::optional
     primary.obstacle = "the study has one condition";
     return primary;
   }
-  const std::string kind_name = is_tension ? name_of(counted_type(study, parameters.primary_type)) : sample.kinds[0];
-  const auto kind = std::ranges::find(sample.kinds, kind_name) - sample.kinds.begin();
-  MBTFM_ASSERT(kind < std::ssize(sample.kinds));
+  MBTFM_ASSERT(kind < sample.n_kinds());
   if (has_replicates(study)) {
-    compare_replicates(study, sample, static_cast<int>(kind), primary);
+    compare_replicates(study, sample, kind, primary);
   } else {
-    compare_cells(sample, static_cast<int>(kind), model, comparisons, primary);
+    compare_cells(sample, kind, model, comparisons, primary);
   }
   std::vector<double> p_values;
   for (const PrimaryDifference& d : primary.differences) p_values.push_back(d.difference.p_value);

@@ -23,6 +23,7 @@ struct PrimaryDifference {
 struct Primary {
   std::string measure;  ///< "tension of ventral fibres", "total force of cells"
   std::string unit;
+  std::string cells = "cells";  ///< what they are called: "sheets"
   std::string reference;
   std::string test;  ///< in words, with its source
   std::vector<PrimaryDifference> differences;
@@ -38,8 +39,8 @@ std::string sentence_of(const Primary& primary, const PrimaryDifference& differe
 /// the cells of one day are no more independent than the fibres of one cell: the means of the replicates are compared,
 /// in pairs (Student's t of their differences). Source: Lord, Velle, Mullins, Fritz-Laylin, J. Cell Biol. 219 (2020)
 /// e202001064.
-/// @param sample  of the measure that the parameters name, and its model
-Primary primary_of(const Study& study, const Sample& sample, const std::optional<SampleModel>& model,
-                   const std::vector<Comparison>& comparisons, const StudyParameters& parameters);
+/// @param name  of what is compared  @param sample  that has it, with its model and its comparisons
+Primary primary_of(const Study& study, const std::string& name, const Sample& sample, int kind,
+                   const std::optional<SampleModel>& model, const std::vector<Comparison>& comparisons);
 
 }  // namespace mbtfm::statistics

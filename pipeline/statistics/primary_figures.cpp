@@ -20,12 +20,6 @@ double place_in_column(int i) {
   return std::fmod((i + 1) * kGolden, 1.0) - 0.5;
 }
 
-/// The measure's kind in the sample: of cells the only one.
-int kind_of(const Study& study, const Sample& sample, const StudyParameters& parameters) {
-  if (parameters.primary == PrimaryMeasure::total_force) return 0;
-  return index_of(sample.kinds, name_of(counted_type(study, parameters.primary_type)));
-}
-
 /// By replicate, in the order of the alphabet; one without a name where none are told.
 std::vector<std::string> replicates_of(const Study& study) {
   std::set<std::string> names;
@@ -40,6 +34,9 @@ charts::Axis condition_axis(const Sample& sample) {
   return axis;
 }
 
+/// Of the interval by its own error; zero of one without an error.
+double half_of_95(const Observation& o) { return kNormal95 * std::sqrt(o.error_variance); }
+
 /// What lies in one condition's column.
 void draw_column(charts::Chart& chart, const Study& study, const Sample& sample, int condition, int kind,
                  const std::vector<std::string>& replicates) {
@@ -47,46 +44,51 @@ void draw_column(charts::Chart& chart, const Study& study, const Sample& sample,
   const auto colour = [&](const StudyCell& cell) {
     return replicates.size() > 1 ? condition_colour(index_of(replicates, cell.replicate)) : condition_colour(condition);
   };
-  std::map<int, std::vector<double>> by_cell;
-  for (const Observation& o : sample.of_group(condition, kind)) by_cell[o.cell].push_back(o.value);
+  std::map<int, std::vector<Observation>> by_cell;
+  for (const Observation& o : sample.of_group(condition, kind)) by_cell[o.cell].push_back(o);
+  const bool is_one_a_cell = sample.is_one_a_cell();
   int n = 0;
   for (const auto& [index, values] : by_cell) {
     const StudyCell& cell = study.cells[static_cast<std::size_t>(index)];
-    if (values.size() < 2 && sample.each == Observed::cells) continue;  // its mean says it all
-    for (const double value : values)
-      chart.dot({condition + kWidth * place_in_column(n++), value}, 2, "fill:" + colour(cell) + ";fill-opacity:.35",
-                cell.name + ": " + readable(value) + " " + sample.unit);
+    if (is_one_a_cell) break;  // its mean says it all
+    for (const Observation& o : values)
+      chart.dot({condition + kWidth * place_in_column(n++), o.value}, 2, "fill:" + colour(cell) + ";fill-opacity:.35",
+                cell.name + ": " + sample.amount(o.value));
   }
   n = 0;
   for (const auto& [index, values] : by_cell) {
     const StudyCell& cell = study.cells[static_cast<std::size_t>(index)];
-    const double mean = describe(values).mean;
-    chart.dot({condition + kWidth * place_in_column(n++), mean}, 5.5,
-              "stroke:#1a1d21;stroke-width:1;fill:" + colour(cell),
-              fmt::format("{}{}{}: {} {}", cell.name, cell.replicate.empty() ? "" : ", ", cell.replicate,
-                          readable(mean), sample.unit));
+    const double mean = describe(values_of(values)).mean, x = condition + kWidth * place_in_column(n++);
+    if (const double half = half_of_95(values.front()); is_one_a_cell && half > 0)
+      chart.error({x, mean - half}, {x, mean + half}, "stroke-width:1;stroke:" + colour(cell));
+    chart.dot(
+        {x, mean}, 5.5, "stroke:#1a1d21;stroke-width:1;fill:" + colour(cell),
+        fmt::format("{}{}{}: {}", cell.name, cell.replicate.empty() ? "" : ", ", cell.replicate, sample.amount(mean)));
   }
 }
 
-charts::Chart super_plot(const Study& study, const Measure& m, int kind, const Primary& primary) {
+charts::Chart super_plot(const Study& study, const Measure& m, int kind, const std::string& title) {
   const Sample& sample = m.sample;
   const std::vector<std::string> replicates = replicates_of(study);
-  double largest = 0;
+  const bool has_bars = sample.is_one_a_cell();
+  double least = 0, largest = 0;
   for (const Observation& o : sample.values) {
-    if (o.kind == kind) largest = std::max(largest, o.value);
+    if (o.kind != kind) continue;
+    const double half = has_bars ? half_of_95(o) : 0;
+    if (!sample.is_never_negative) least = std::min(least, o.value - half);
+    largest = std::max(largest, o.value + half);
   }
   const std::size_t n_keys = replicates.size() > 1 ? replicates.size() : 0;
   charts::Chart chart(
-      primary.measure, condition_axis(sample),
-      charts::Axis{
-          .label = sample.name + " (" + primary.unit + ")", .low = 0, .high = end_below_keys(largest, n_keys)});
+      title, condition_axis(sample),
+      charts::Axis{.label = sample.label(), .low = 1.05 * least, .high = end_below_keys(largest, n_keys)});
   for (int c = 0; c < sample.n_conditions(); ++c) draw_column(chart, study, sample, c, kind, replicates);
   for (const Summary& s : m.summaries) {
     if (s.kind != sample.kinds[static_cast<std::size_t>(kind)] || !s.model) continue;
     const double x = index_of(sample.conditions, s.condition);
     chart.error({x + 0.4, s.model->low}, {x + 0.4, s.model->high}, "stroke:#1a1d21;stroke-width:2");
     chart.pieces({{{x + 0.34, s.model->estimate}, {x + 0.46, s.model->estimate}}}, "stroke:#1a1d21;stroke-width:2.4",
-                 "mean " + readable(s.model->estimate) + " " + sample.unit);
+                 "mean " + sample.amount(s.model->estimate));
   }
   for (std::size_t r = 0; r < n_keys; ++r)
     chart.key(replicates[r].empty() ? "no replicate given" : replicates[r], condition_colour(static_cast<int>(r)));
@@ -116,25 +118,49 @@ charts::Chart effect_plot(const Primary& primary) {
   return chart;
 }
 
+/// What the dots are.
+std::string dots_of(const Sample& sample) {
+  if (sample.is_one_a_cell()) return std::string("A dot is a ") + sample.cell_name();
+  return fmt::format("Small dots: {}; large dots: {}",
+                     sample.each == Observed::sheets ? "parts of sheets" : name_of(sample.each), sample.cells_name());
+}
+
 }  // namespace
 
 std::optional<Figure> primary_figure(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
   if (study.conditions.size() < 2) return {};
-  const Measure& m = parameters.primary == PrimaryMeasure::tension ? analysis.tensions : analysis.cells.front();
-  if (m.sample.values.empty()) return {};
-  const int kind = kind_of(study, m.sample, parameters);
+  const PrimaryChoice choice = primary_choice(study, analysis, parameters);
+  if (choice.measure == nullptr || choice.measure->sample.values.empty()) return {};
+  const Measure& m = *choice.measure;
   Figure figure{.name = kPrimaryFigure,
                 .title = "Primary comparison",
-                .caption = std::string(m.sample.each == Observed::cells ? "A dot is a cell"
-                                                                        : "Small dots: fibres; large dots: cells") +
-                           (replicates_of(study).size() > 1 ? ", coloured by replicate" : "") +
+                .caption = dots_of(m.sample) + (replicates_of(study).size() > 1 ? ", coloured by replicate" : "") +
                            ". Line and bar: mean of the mixed model with its 95 % interval." +
                            (analysis.primary.differences.empty()
                                 ? ""
                                 : " Second chart: difference of means from the reference, with its 95 % interval."),
-                .charts = {super_plot(study, m, kind, analysis.primary)},
+                .charts = {super_plot(study, m, choice.kind, choice.name)},
                 .n_columns = 2};
   if (!analysis.primary.differences.empty()) figure.charts.push_back(effect_plot(analysis.primary));
+  return figure;
+}
+
+Figure sheet_figure(const Study& study, const Analysis& analysis) {
+  Figure figure{.name = "sheets",
+                .title = "Sheets",
+                .caption =
+                    "A dot with its 95 % interval is a sheet. Where a sheet has several parts of a kind, these are "
+                    "small dots, and the large one is their mean. Black: mean of the mixed model with its 95 % "
+                    "interval.",
+                .charts = {},
+                .n_columns = 3};
+  for (const Measure& m : analysis.sheets) {
+    for (int kind = 0; kind < m.sample.n_kinds(); ++kind) {
+      const std::string& of = m.sample.kinds[static_cast<std::size_t>(kind)];
+      figure.charts.push_back(
+          super_plot(study, m, kind, m.sample.n_kinds() > 1 ? m.sample.name + ": " + of : m.sample.name));
+    }
+  }
   return figure;
 }
 

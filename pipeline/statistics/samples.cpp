@@ -1,8 +1,12 @@
 #include "pipeline/statistics/samples.h"
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <map>
 #include <set>
+
+#include "pipeline/charts/chart.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -57,6 +61,41 @@ void for_each_adhesion(const Study& study, Visit&& visit) {
   }
 }
 
+std::vector<int> cells_of(const Study& study, bool are_sheets) {
+  std::vector<int> indices;
+  for (std::size_t i = 0; i < study.cells.size(); ++i) {
+    if (study.cells[i].sheet.has_value() == are_sheets) indices.push_back(static_cast<int>(i));
+  }
+  return indices;
+}
+
+bool is_never_negative(SheetQuantity quantity) {
+  return quantity != SheetQuantity::contraction && quantity != SheetQuantity::contraction_over_stiffness;
+}
+
+/// Of one quantity of sheet_fit.csv; kinds are the parts of the sheets, in the order in which they are first met.
+Sample sample_estimates(const Study& study, SheetQuantity quantity) {
+  const auto& [name, unit] = for_people(quantity);
+  Sample sample = empty_sample(study, name_of(quantity), name, unit,
+                               quantity == SheetQuantity::bundle_tension ? Observed::bundles : Observed::sheets, {});
+  sample.is_never_negative = is_never_negative(quantity);
+  const auto visit = [&](const auto& body) {
+    for (const int i : cells_of(study, true)) {
+      const StudyCell& cell = study.cells[static_cast<std::size_t>(i)];
+      for (const SheetEstimate& e : cell.sheet->estimates)
+        if (e.quantity == quantity && enters(e)) body(cell, i, e, kind_of_part(e));
+    }
+  };
+  visit([&](const StudyCell&, int, const SheetEstimate&, const std::string& kind) {
+    if (std::ranges::find(sample.kinds, kind) == sample.kinds.end()) sample.kinds.push_back(kind);
+  });
+  visit([&](const StudyCell& cell, int i, const SheetEstimate& e, const std::string& kind) {
+    const auto at = std::ranges::find(sample.kinds, kind) - sample.kinds.begin();
+    add(sample, cell, i, static_cast<int>(at), e.value, own_error(e));
+  });
+  return with_typical_errors(std::move(sample));
+}
+
 const std::vector<std::string> kConnection = {"connected", "unconnected"};
 
 }  // namespace
@@ -68,6 +107,10 @@ std::vector<Observation> Sample::of_group(int condition, int kind) const {
   }
   return own;
 }
+
+std::string Sample::amount(double value) const { return charts::readable(value) + (unit.empty() ? "" : " " + unit); }
+
+bool Sample::is_one_a_cell() const { return n_cells_of(values) == static_cast<int>(values.size()); }
 
 Sample sample_tensions(const Study& study) {
   std::vector<std::string> kinds;
@@ -112,13 +155,49 @@ std::vector<Sample> sample_cells(const Study& study) {
   for (const Quantity& q : kQuantities) {
     Sample sample = empty_sample(study, q.column, q.name, q.unit, Observed::cells, {"cell"});
     sample.is_never_negative = q.member != &FitSummary::fibre_force_nN;  // a difference: total less network
-    for (std::size_t i = 0; i < study.cells.size(); ++i) {
-      if (q.member != &FitSummary::total_force_nN && !is_network_known(study.cells[i])) continue;
-      add(sample, study.cells[i], static_cast<int>(i), 0, study.cells[i].fit.*q.member, 0.0);
+    for (const int i : cells_of(study, false)) {
+      const StudyCell& cell = study.cells[static_cast<std::size_t>(i)];
+      if (q.member != &FitSummary::total_force_nN && !is_network_known(cell)) continue;
+      add(sample, cell, i, 0, cell.fit.*q.member, 0.0);
     }
     samples.push_back(std::move(sample));
   }
   return samples;
+}
+
+std::vector<Sample> sample_sheets(const Study& study) {
+  struct Figure {
+    const char *column, *name, *unit;
+    std::function<std::optional<double>(const SheetSummary&)> of;
+    bool is_never_negative = true;
+  };
+  const Figure figures[] = {
+      {"mean_tension_nN_per_um", "mean tension", "nN/µm", &SheetSummary::mean_tension_nN_per_um, false},
+      {"sheet_force_nN", "total force", "nN", &SheetSummary::total_force_nN},
+      {"strain_energy_fJ", "strain energy", "fJ", &SheetSummary::strain_energy_fJ},
+      {"sheet_area_um2", "area", "µm²", &SheetSummary::area_um2}};
+  std::vector<Sample> samples = {sample_estimates(study, SheetQuantity::contraction)};
+  for (const Figure& figure : figures) {
+    Sample sample = empty_sample(study, figure.column, figure.name, figure.unit, Observed::sheets, {kWholeSheet});
+    sample.is_never_negative = figure.is_never_negative;
+    for (const int i : cells_of(study, true)) {
+      const StudyCell& cell = study.cells[static_cast<std::size_t>(i)];
+      if (const auto value = figure.of(*cell.sheet)) add(sample, cell, i, 0, *value, 0.0);
+    }
+    samples.push_back(std::move(sample));
+  }
+  for (const SheetQuantity quantity : mbtfm::values_of<SheetQuantity>())
+    if (quantity != SheetQuantity::contraction) samples.push_back(sample_estimates(study, quantity));
+  std::erase_if(samples, [](const Sample& s) { return s.values.empty(); });
+  return samples;
+}
+
+bool enters(const SheetEstimate& e) { return e.identifiable && !is_given(e); }
+
+std::optional<double> own_error(const SheetEstimate& e) {
+  if (!e.sigma) return std::nullopt;
+  const double shared = std::hypot(e.parts.gel.value_or(0), e.parts.substrate.value_or(0));
+  return std::sqrt(std::max(0.0, *e.sigma * *e.sigma - shared * shared));
 }
 
 CellFigures figures_of(const StudyCell& cell) {

@@ -9,8 +9,14 @@
 
 namespace mbtfm::statistics {
 
-enum class Observed { fibres, adhesions, cells };
-constexpr auto words(Observed) { return std::array{"fibres", "adhesions", "cells"}; }
+enum class Observed {
+  fibres,
+  adhesions,
+  cells,   ///< with fibres
+  sheets,  ///< or their parts, where these have contractions of their own
+  bundles  ///< in the sheets
+};
+constexpr auto words(Observed) { return std::array{"fibres", "adhesions", "cells", "sheets", "bundles"}; }
 
 /// `group` of an observation is condition · n kinds + kind; `cell` is its index in the study.
 struct Sample {
@@ -22,18 +28,38 @@ struct Sample {
   int n_without_error = 0;  ///< observations whose error is not known: that of the others is taken, or zero if none is
   bool is_never_negative = true;
 
+  /// Whether no cell has two: then the observation is the cell's.
+  bool is_one_a_cell() const;
+  /// Its cells are sheets.
+  bool is_of_sheets() const { return each == Observed::sheets || each == Observed::bundles; }
+  const char* cell_name() const { return is_of_sheets() ? "sheet" : "cell"; }
+  /// What its cells are called.
+  const char* cells_name() const { return name_of(is_of_sheets() ? Observed::sheets : Observed::cells); }
   int n_kinds() const { return static_cast<int>(kinds.size()); }
   int n_conditions() const { return static_cast<int>(conditions.size()); }
   int group_of(int condition, int kind) const { return condition * n_kinds() + kind; }
   std::vector<Observation> of_group(int condition, int kind) const;
+  /// "4.1 nN"
+  std::string amount(double value) const;
+  /// "tension (nN)"
+  std::string label() const { return unit.empty() ? name : name + " (" + unit + ")"; }
 };
 
 Sample sample_tensions(const Study& study);
 Sample sample_adhesion_forces(const Study& study);
 Sample sample_adhesion_areas(const Study& study);
-/// Total, fibre and network force, surface tension of the network: one value a cell, all but the first of those whose
-/// network's tension is known.
+/// Total, fibre and network force, surface tension of the network: one value a cell with fibres, all but the first of
+/// those whose network's tension is known.
 std::vector<Sample> sample_cells(const Study& study);
+/// Of the sheets: what the beads tell of each, and its mean tension, total force, strain energy and area; without what
+/// no sheet was asked for.
+std::vector<Sample> sample_sheets(const Study& study);
+
+/// Whether it is a measurement: not given by the user, and limited to both sides by the beads.
+bool enters(const SheetEstimate& estimate);
+/// The standard error without what all sheets on gels of one kind share: errors of the gel's numbers and of its model
+/// are no scatter of sheets.
+std::optional<double> own_error(const SheetEstimate& estimate);
 
 /// What a cell's force may depend on.
 struct CellFigures {

@@ -16,18 +16,23 @@ using charts::readable;
 std::string p_text(double p) { return p < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", p); }
 
 std::string plural_of(const Sample& sample, const std::string& kind) {
-  if (sample.each == Observed::cells) return name_of(sample.each);
+  if (sample.each == Observed::cells || sample.each == Observed::bundles) return name_of(sample.each);
+  if (sample.each == Observed::sheets) return sample.n_kinds() == 1 ? "sheets" : "sheets (" + kind + ")";
   return named<FibreType>(kind) == FibreType::arc ? "transverse arcs" : kind + " " + name_of(sample.each);
 }
 
+/// What its observations are, where a cell may have several.
+const char* counted_name(const Sample& sample) {
+  return sample.each == Observed::sheets ? "parts" : name_of(sample.each);
+}
+
 std::string mean_text(const Summary& s, const Measure& m) {
-  const std::string& unit = m.sample.unit;
   if (!s.model) {
-    const std::string reason = s.n_cells == 1 ? "there is a single cell" : m.obstacle;
-    return fmt::format("{} {} (no interval: {})", charts::readable(s.plain.mean), unit, reason);
+    const std::string reason = s.n_cells == 1 ? std::string("there is a single ") + m.sample.cell_name() : m.obstacle;
+    return fmt::format("{} (no interval: {})", m.sample.amount(s.plain.mean), reason);
   }
-  return fmt::format("{} {} [95 % CI {} to {}]", charts::readable(s.model->estimate), unit,
-                     charts::readable(s.model->low), charts::readable(s.model->high));
+  return fmt::format("{} [95 % CI {} to {}]", m.sample.amount(s.model->estimate), charts::readable(s.model->low),
+                     charts::readable(s.model->high));
 }
 
 /// "ventral fibres carry a tension of 4.1 nN [95 % CI …; the cell as the unit, 12 cells, 80 fibres]".
@@ -40,13 +45,13 @@ std::vector<std::string> means(const Measure& m) {
   for (const Summary& s : m.summaries) {
     std::string text = fmt::format("{}the mean {} of {} is {}", prefix_of(s.condition), m.sample.name,
                                    plural_of(m.sample, s.kind), mean_text(s, m));
-    text += fmt::format(", the cell being the unit ({} cells", s.n_cells);
-    if (m.sample.each != Observed::cells) text += fmt::format(", {} {}", s.n, name_of(m.sample.each));
+    text += fmt::format(", the {} being the unit ({} {}", m.sample.cell_name(), s.n_cells, m.sample.cells_name());
+    if (!m.sample.is_one_a_cell()) text += fmt::format(", {} {}", s.n, counted_name(m.sample));
     text += ")";
     if (m.sample.each != Observed::cells && s.typical_error && s.n > 2) {
-      text += fmt::format("; they scatter by {} {}, of which {} {} remain without the error of their measurement",
-                          charts::readable(*s.plain.standard_deviation), m.sample.unit,
-                          charts::readable(s.without_error->standard_deviation), m.sample.unit);
+      text += fmt::format("; they scatter by {}, of which {} remain without the error of their measurement",
+                          m.sample.amount(*s.plain.standard_deviation),
+                          m.sample.amount(s.without_error->standard_deviation));
     }
     list.push_back(capitalised(text + "."));
   }
@@ -75,12 +80,14 @@ void add_unanswered(const Measure& m, Findings& findings) {
       return c.question == question && c.test == Test::mixed_model;
     });
     if (is_answered) return;
-    findings.sentences.push_back(fmt::format("Whether the {} of {} differs between {} cannot be said: {}.",
-                                             m.sample.name, name_of(m.sample.each), who,
-                                             m.model ? "each needs values of two cells" : m.obstacle));
+    findings.sentences.push_back(fmt::format(
+        "Whether the {} of {} differs between {} cannot be said: {}.", m.sample.name, name_of(m.sample.each), who,
+        m.model ? fmt::format("each needs values of two {}", m.sample.cells_name()) : m.obstacle));
   };
   if (n_different(m.summaries, &Summary::kind) > 1)
-    add(Question::between_kinds, m.sample.each == Observed::fibres ? "types" : "connected and unconnected ones");
+    add(Question::between_kinds, m.sample.each == Observed::fibres   ? "types"
+                                 : m.sample.each == Observed::sheets ? "parts"
+                                                                     : "connected and unconnected ones");
   if (n_different(m.summaries, &Summary::condition) > 1) add(Question::between_conditions, "conditions");
 }
 
@@ -99,29 +106,26 @@ void add_differences(const Measure& m, Findings& findings) {
     constexpr double kLevel = 0.05;
     const bool is_clear = *c.p_holm < kLevel;
     std::string text =
-        is_of_kinds
-            ? fmt::format("{}the {} of {} is {} larger than that of {}", prefix_of(c.within), m.sample.name,
-                          plural_of(m.sample, larger),
-                          is_clear ? charts::readable(std::abs(c.effect)) + " " + m.sample.unit : "not demonstrably",
-                          plural_of(m.sample, smaller))
-            : fmt::format("the {} of {} is {} larger under {} than under {}", m.sample.name,
-                          plural_of(m.sample, c.within),
-                          is_clear ? charts::readable(std::abs(c.effect)) + " " + m.sample.unit : "not demonstrably",
-                          larger, smaller);
-    text +=
-        fmt::format(" (difference {} {} [95 % CI {} to {}]; mixed model, t({}) = {}, {}",
-                    charts::readable(std::abs(c.effect)), m.sample.unit, charts::readable(low), charts::readable(high),
-                    charts::readable(*c.degrees), charts::readable(std::abs(c.statistic)), p_text(*c.p_holm));
-    const Comparison* ranks =
-        same_pair(m, c, m.sample.each == Observed::cells ? Test::mann_whitney : Test::clustered_rank_sum);
+        is_of_kinds ? fmt::format("{}the {} of {} is {} larger than that of {}", prefix_of(c.within), m.sample.name,
+                                  plural_of(m.sample, larger),
+                                  is_clear ? m.sample.amount(std::abs(c.effect)) : "not demonstrably",
+                                  plural_of(m.sample, smaller))
+                    : fmt::format("the {} of {} is {} larger under {} than under {}", m.sample.name,
+                                  plural_of(m.sample, c.within),
+                                  is_clear ? m.sample.amount(std::abs(c.effect)) : "not demonstrably", larger, smaller);
+    text += fmt::format(" (difference {} [95 % CI {} to {}]; mixed model, t({}) = {}, {}",
+                        m.sample.amount(std::abs(c.effect)), charts::readable(low), charts::readable(high),
+                        charts::readable(*c.degrees), charts::readable(std::abs(c.statistic)), p_text(*c.p_holm));
+    const bool is_one_a_cell = m.sample.is_one_a_cell();
+    const Comparison* ranks = same_pair(m, c, is_one_a_cell ? Test::mann_whitney : Test::clustered_rank_sum);
     if (ranks != nullptr)
-      text += fmt::format("; {}, {}", m.sample.each == Observed::cells ? "Mann–Whitney" : "clustered rank-sum test",
-                          p_text(*ranks->p_holm));
-    const int cells_a = is_turned ? c.cells_b : c.cells_a, cells_b = is_turned ? c.cells_a : c.cells_b;
-    text += fmt::format("; {} and {} cells", cells_a, cells_b);
-    if (m.sample.each != Observed::cells)
       text +=
-          fmt::format(", {} and {} {}", is_turned ? c.n_b : c.n_a, is_turned ? c.n_a : c.n_b, name_of(m.sample.each));
+          fmt::format("; {}, {}", is_one_a_cell ? "Mann–Whitney" : "clustered rank-sum test", p_text(*ranks->p_holm));
+    const int cells_a = is_turned ? c.cells_b : c.cells_a, cells_b = is_turned ? c.cells_a : c.cells_b;
+    text += fmt::format("; {} and {} {}", cells_a, cells_b, m.sample.cells_name());
+    if (!is_one_a_cell)
+      text +=
+          fmt::format(", {} and {} {}", is_turned ? c.n_b : c.n_a, is_turned ? c.n_a : c.n_b, counted_name(m.sample));
     (is_clear ? findings.sentences : findings.unclear).push_back(capitalised(text + ")."));
   }
 }
@@ -179,18 +183,26 @@ void append(std::vector<std::string>& list, const std::vector<std::string>& more
 }  // namespace
 
 std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameters& parameters) {
-  Findings tensions{"Tensions", means(analysis.tensions), {}}, cells{"Cells", {}, {}};
+  const auto of_all = [](const char* title, const std::vector<Measure>& measures) {
+    Findings findings{title, {}, {}};
+    for (const Measure& m : measures) {
+      append(findings.sentences, means(m));
+      add_differences(m, findings);
+    }
+    return findings;
+  };
+  std::vector<Findings> all;
+  if (!analysis.sheets.empty()) all.push_back(of_all("Sheets", analysis.sheets));
+  if (!analysis.has_fibres) return all;
+  Findings tensions{"Tensions", means(analysis.tensions), {}}, cells = of_all("Cells", analysis.cells);
   Findings adhesions{"Adhesions", means(analysis.adhesion_forces), {}};
   add_differences(analysis.tensions, tensions);
   append(tensions.sentences, shares(analysis, parameters));
   add_differences(analysis.adhesion_forces, adhesions);
   add_differences(analysis.adhesion_areas, adhesions);
-  for (const Measure& m : analysis.cells) {
-    append(cells.sentences, means(m));
-    add_differences(m, cells);
-  }
   append(cells.sentences, lines(analysis));
-  return {tensions, adhesions, cells, {"Directions", directions(analysis), {}}};
+  all.insert(all.end(), {tensions, adhesions, cells, {"Directions", directions(analysis), {}}});
+  return all;
 }
 
 }  // namespace mbtfm::statistics

@@ -1,5 +1,5 @@
-# Repeats the tables of this study in R, from fibres.csv and cells.csv beside it, and compares them with types.csv and
-# tests.csv: Rscript study.R
+# Repeats the tables of this study in R, from fibres.csv, sheets.csv and cells.csv beside it, and compares them with
+# types.csv, summaries.csv and tests.csv: Rscript study.R
 # The mixed model needs the package metafor (install.packages("metafor")); without it that part is left out.
 
 script <- sub("^--file=", "", grep("^--file=", commandArgs(FALSE), value = TRUE))
@@ -52,7 +52,47 @@ for (i in seq_len(nrow(rank))) {
   }
 }
 
-if (requireNamespace("metafor", quietly = TRUE) && !anyNA(known$sigma_nN)) {
+sheets <- read.csv("sheets.csv", colClasses = c(cell = "character", condition = "character"))
+cells <- read.csv("cells.csv", colClasses = c(cell = "character", condition = "character"))
+of_sheets <- subset(cells, model == "sheet")
+values <- sheets[sheets$enters %in% c(TRUE, "TRUE"), c("condition", "quantity", "kind", "value")]
+figures <- c(mean_tension_nN_per_um = "mean_tension_nN_per_um", sheet_force_nN = "sheet_force_nN",
+             strain_energy_fJ = "strain_energy_fJ", sheet_area_um2 = "cell_area_um2")
+for (figure in names(figures)) {
+  own <- of_sheets[!is.na(of_sheets[[figures[figure]]]), ]
+  if (nrow(own) > 0) {
+    values <- rbind(values, data.frame(condition = own$condition, quantity = figure, kind = "sheet",
+                                       value = own[[figures[figure]]]))
+  }
+}
+if (nrow(values) > 0) {
+  cat("\nFigures of the sheets (summaries.csv)\n")
+  values$condition[is.na(values$condition)] <- ""
+  summaries <- read.csv("summaries.csv", colClasses = c(condition = "character"))
+  summaries$condition[is.na(summaries$condition)] <- ""
+  for (i in which(summaries$quantity %in% values$quantity)) {
+    row <- summaries[i, ]
+    own <- values$value[values$quantity == row$quantity & values$condition == row$condition & values$kind == row$kind]
+    name <- paste(row$condition, row$kind, row$quantity)
+    compare(paste(name, "n"), length(own), row$n_observations)
+    compare(paste(name, "mean"), mean(own), row$mean)
+    if (length(own) > 1) compare(paste(name, "SD"), sd(own), row$sd)
+  }
+  cat("\nRank tests of the sheets between conditions (tests.csv)\n")
+  rank <- subset(tests, quantity %in% values$quantity & test == "Mann-Whitney" & question == "between conditions" &
+                   unit != "cell median")
+  for (i in seq_len(nrow(rank))) {
+    row <- rank[i, ]
+    own <- subset(values, quantity == row$quantity & kind == row$within)
+    u <- suppressWarnings(wilcox.test(own$value[own$condition == row$group_a], own$value[own$condition == row$group_b],
+                                      exact = FALSE, correct = TRUE))
+    name <- paste(row$quantity, row$group_a, "-", row$group_b)
+    compare(paste(name, "Mann-Whitney U"), unname(u$statistic), row$statistic)
+    compare(paste(name, "Mann-Whitney p"), u$p.value, row$p)
+  }
+}
+
+if (requireNamespace("metafor", quietly = TRUE) && nrow(known) > 0 && !anyNA(known$sigma_nN)) {
   cat("\nMeans of the mixed model (types.csv; other optimiser, small differences are expected)\n")
   known$group <- factor(paste(known$condition, known$type))
   known$cell_type <- paste(known$cell, known$type)

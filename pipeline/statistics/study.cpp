@@ -1,6 +1,7 @@
 #include "pipeline/statistics/study.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <sstream>
@@ -8,14 +9,18 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/findings.h"
 #include "pipeline/contract/listed.h"
+#include "pipeline/files/csv.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/own_files.h"
+#include "pipeline/files/sheet_files.h"
+#include "pipeline/files/tables.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/statistics/conditions.h"
+#include "pipeline/statistics/descriptive.h"
 
 namespace mbtfm::statistics {
 namespace fs = std::filesystem;
@@ -24,6 +29,56 @@ namespace {
 std::optional<DisplacementField> field_where_there(const Path& file) {
   if (!files::is_own_file(file)) return std::nullopt;
   return files::read_displacement(file);
+}
+
+constexpr const char* kDisplacement = "2_track/displacement.csv";
+constexpr const char* kOutline = "1_segment/outline.csv";
+constexpr const char* kRun = "run.json";
+constexpr const char* kFitted = "4_fit/fitted_displacement.csv";
+constexpr const char* kWithoutFibres = "4_fit/displacement_without_fibres.csv";
+
+std::optional<files::JsonRecord> run_of(const Path& folder) {
+  if (!files::is_own_file(folder / kRun)) return std::nullopt;
+  return files::JsonRecord(folder / kRun, "a run.json of mbtfm run");
+}
+
+/// The segmented one; of a mask or a selection, which are read by the stages alone, the box around the sheet.
+Polygon outline_of_sheet(const Path& folder) {
+  if (files::is_own_file(folder / kOutline)) {
+    Polygon outer;
+    for (const files::OutlinePoint& p : files::read(folder / kOutline, files::outline_table()))
+      if (p.ring == 0) outer.push_back(p.position_um);
+    return outer;
+  }
+  const files::CsvTable nodes(folder / "3_sheet/sheet.csv");
+  Vec2 low{INFINITY, INFINITY}, high{-INFINITY, -INFINITY};
+  for (int row = 0; row < nodes.n_rows(); ++row) {
+    const Vec2 at{nodes.number(row, "x_um"), nodes.number(row, "y_um")};
+    low = {std::min(low.x, at.x), std::min(low.y, at.y)};
+    high = {std::max(high.x, at.x), std::max(high.y, at.y)};
+  }
+  return {low, {high.x, low.y}, high, {low.x, high.y}};
+}
+
+StudyCell read_study_sheet(const Path& folder, const std::string& name) {
+  StudyCell c{.name = name,
+              .condition = 0,
+              .cell = {},
+              .forces = {},
+              .tensions = {},
+              .fit = {},
+              .directions = {},
+              .findings = {},
+              .sheet = files::read_sheet_summary(folder / "3_sheet")};
+  c.cell.outline_um = outline_of_sheet(folder);
+  c.fit.relative_l2 = c.sheet->relative_l2;
+  c.fit.expected_relative_l2 = c.sheet->expected_relative_l2;
+  c.fit.converged = true;  // where nobody says otherwise: without run.json the stage was run by hand
+  if (const auto run = run_of(folder)) {
+    c.findings = findings_of(*run);
+    c.fit.converged = run->at("stages").at("sheet").is_true_or("converged", true);
+  }
+  return c;
 }
 
 StudyCell read_study_cell(const Path& folder, const std::string& name, const StudyParameters& parameters) {
@@ -43,24 +98,20 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
                      "adhesion " + std::to_string(f.adhesion_id),
                      "the segmentation changed after the fit: mbtfm run " + folder.string());
   }
-  const Path run = folder / further_files_of_a_cell()[3];
-  if (files::is_own_file(run)) c.findings = findings_of(files::JsonRecord(run, "a run.json of mbtfm run"));
-  c.directions = directions_of(c.cell, {.measured = field_where_there(folder / further_files_of_a_cell()[0]),
-                                        .fitted = field_where_there(folder / further_files_of_a_cell()[1]),
-                                        .without_fibres = field_where_there(folder / further_files_of_a_cell()[2]),
+  if (const auto run = run_of(folder)) c.findings = findings_of(*run);
+  c.directions = directions_of(c.cell, {.measured = field_where_there(folder / kDisplacement),
+                                        .fitted = field_where_there(folder / kFitted),
+                                        .without_fibres = field_where_there(folder / kWithoutFibres),
                                         .noise_um = c.fit.noise_um,
                                         .near_um = parameters.near_adhesion_um});
   return c;
 }
 
 /// Why a cell cannot enter, as its folder tells; empty: it can.
-std::string obstacle(const Path& cell) {
-  const CellKind kind = runner::stages_of(cell, runner::read_image_names(cell)).kind;
+std::string obstacle(const Path& cell, CellKind kind) {
   if (kind == CellKind::space)
     return "in space: it has tractions and no tensions; its force, strain energy and moment are in batch.csv";
-  if (kind == CellKind::sheet)
-    return "a sheet: it has a contraction and no fibres; its contraction, stiffness and tension are in batch.csv";
-  for (const std::string& file : files_of_a_cell()) {
+  for (const std::string& file : files_of_a_cell(kind)) {
     if (!files::is_own_file(cell / file)) return "no fit: " + file + " is not there";
   }
   return {};
@@ -86,7 +137,7 @@ void leave_out_copies(const std::vector<Path>& folders, const std::vector<std::s
                       const std::vector<std::optional<StudyCell>>& read, std::vector<std::string>& reasons) {
   std::multimap<std::string, std::size_t> by_field;
   for (std::size_t i = 0; i < folders.size(); ++i) {
-    const Path field = folders[i] / further_files_of_a_cell()[0];
+    const Path field = folders[i] / kDisplacement;
     if (!reasons[i].empty() || !files::is_own_file(field)) continue;
     const std::string hash = files::sha256_of_file(field);
     const auto [first, last] = by_field.equal_range(hash);
@@ -96,7 +147,7 @@ void leave_out_copies(const std::vector<Path>& folders, const std::vector<std::s
     if (same == last) {
       by_field.emplace(hash, i);
     } else {
-      reasons[i] = "the same cell as " + names[same->second] + ": their " + further_files_of_a_cell()[0] +
+      reasons[i] = "the same cell as " + names[same->second] + ": their " + kDisplacement +
                    " are the same bytes and their outlines overlap";
     }
   }
@@ -185,9 +236,10 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
   list.add("exclude_findings", parameters.exclude_findings,
            "cells with one of these open findings are left out; identities with commas between them. Example: "
            "\"explains-little, cell-cut\"");
-  list.add("primary", parameters.primary,
-           "what the study compares first between conditions: the tension of the fibres of primary_type, or the total "
-           "force of the cells");
+  list.add(
+      "primary", parameters.primary,
+      "what the study compares first between conditions; tension: of the fibres of primary_type; total-force: of "
+      "the cells; contraction, mean-tension: of the sheets; auto: tension, or contraction if all cells are sheets");
   list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
   list.add("with_not_converged", parameters.with_not_converged, "include cells whose fit did not converge");
   list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
@@ -209,18 +261,24 @@ std::vector<double> thresholds_nN(const StudyParameters& parameters) {
   return {parameters.weak_tension_nN, parameters.strong_tension_nN};
 }
 
-const std::vector<std::string>& files_of_a_cell() {
-  static const std::vector<std::string> files = {
-      "1_segment/adhesions.csv", "1_segment/fibres.csv", "1_segment/fibre_points.csv",
-      "1_segment/outline.csv",   "4_fit/tensions.csv",   "4_fit/adhesion_forces.csv",
-      "4_fit/fit.json"};
-  return files;
+int n_sheets(const Study& study) {
+  return static_cast<int>(std::ranges::count_if(study.cells, [](const StudyCell& c) { return c.sheet.has_value(); }));
 }
 
-const std::vector<std::string>& further_files_of_a_cell() {
-  static const std::vector<std::string> files = {"2_track/displacement.csv", "4_fit/fitted_displacement.csv",
-                                                 "4_fit/displacement_without_fibres.csv", "run.json"};
-  return files;
+int n_with_fibres(const Study& study) { return static_cast<int>(study.cells.size()) - n_sheets(study); }
+
+const std::vector<std::string>& files_of_a_cell(CellKind kind) {
+  static const std::vector<std::string> with_fibres = {
+      "1_segment/adhesions.csv",   "1_segment/fibres.csv", "1_segment/fibre_points.csv", kOutline, "4_fit/tensions.csv",
+      "4_fit/adhesion_forces.csv", "4_fit/fit.json"};
+  static const std::vector<std::string> of_sheet = {"3_sheet/sheet_fit.csv", "3_sheet/sheet.json", "3_sheet/sheet.csv"};
+  return kind == CellKind::sheet ? of_sheet : with_fibres;
+}
+
+const std::vector<std::string>& further_files_of_a_cell(CellKind kind) {
+  static const std::vector<std::string> with_fibres = {kDisplacement, kFitted, kWithoutFibres, kRun};
+  static const std::vector<std::string> of_sheet = {kDisplacement, kOutline, kRun};
+  return kind == CellKind::sheet ? of_sheet : with_fibres;
 }
 
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads) {
@@ -241,8 +299,11 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
     if (!reasons[i].empty()) return;
     try {
       files::check_cell_folder(folders[i]);
-      reasons[i] = obstacle(folders[i]);
-      if (reasons[i].empty()) read[i] = read_study_cell(folders[i], names[i], parameters);
+      const CellKind kind = runner::stages_of(folders[i], runner::read_image_names(folders[i])).kind;
+      reasons[i] = obstacle(folders[i], kind);
+      if (!reasons[i].empty()) return;
+      read[i] = kind == CellKind::sheet ? read_study_sheet(folders[i], names[i])
+                                        : read_study_cell(folders[i], names[i], parameters);
     } catch (const InputError& error) {
       reasons[i] = error.what();  // that cell's matter, not the study's
     }
@@ -271,6 +332,10 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
   return study;
 }
 
+const std::string& condition_of(const Study& study, const StudyCell& cell) {
+  return study.conditions[static_cast<std::size_t>(cell.condition)];
+}
+
 FibreType counted_type(const Study& study, FibreType type) {
   return study.n_fibre_types < 4 && type == FibreType::edge ? FibreType::ventral : type;
 }
@@ -294,11 +359,9 @@ bool is_network_known(const StudyCell& cell) {
 }
 
 std::optional<double> standard_error_nN(const Tension& t) {
-  constexpr double kQuantile95 = 1.959964;  // of the normal distribution
   if (!t.high_nN) return std::nullopt;
   const bool is_whole = t.low_nN && *t.low_nN > 0;
-  const double error =
-      is_whole ? (*t.high_nN - *t.low_nN) / (2 * kQuantile95) : (*t.high_nN - t.tension_nN) / kQuantile95;
+  const double error = is_whole ? (*t.high_nN - *t.low_nN) / (2 * kNormal95) : (*t.high_nN - t.tension_nN) / kNormal95;
   return error > 0 ? std::optional(error) : std::nullopt;
 }
 

@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/cell_kind.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/contract/results.h"
+#include "pipeline/contract/sheet_results.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/statistics/directions.h"
 
@@ -14,17 +16,22 @@ namespace mbtfm::statistics {
 
 /// What the study was made to compare between conditions.
 enum class PrimaryMeasure {
-  tension,     ///< of the fibres of one type
-  total_force  ///< of the cells
+  automatic,    ///< tension; contraction where all cells are sheets
+  tension,      ///< of the fibres of one type
+  total_force,  ///< of the cells; of the sheets where all cells are sheets
+  contraction,  ///< of the sheets
+  mean_tension  ///< of the sheets
 };
-constexpr auto words(PrimaryMeasure) { return std::array{"tension", "total-force"}; }
+constexpr auto words(PrimaryMeasure) {
+  return std::array{"auto", "tension", "total-force", "contraction", "mean-tension"};
+}
 
 struct StudyParameters {
   std::string condition_from{};    ///< empty: the table's column `condition`, else all cells are of one condition
   std::string conditions{};        ///< their order, with commas between them: the first is the reference
   std::string replicate_from{};    ///< empty: the table's column `replicate` or `day`, else none
   std::string exclude_findings{};  ///< cells with these open findings do not enter: ids with commas between them
-  PrimaryMeasure primary = PrimaryMeasure::tension;
+  PrimaryMeasure primary = PrimaryMeasure::automatic;
   FibreType primary_type = FibreType::ventral;  ///< the strongest, and those that most experiments are about
   bool with_not_converged = false;              ///< a fit that did not converge is no measurement
   double weak_tension_nN = 1;                   ///< most dorsal fibres of U2OS cells are below it (thesis 3.5)
@@ -48,7 +55,9 @@ struct StudyCell {
   std::vector<Tension> tensions;
   FitSummary fit;
   std::vector<Direction> directions;
-  std::vector<Finding> findings = {};  ///< of all its stages
+  std::vector<Finding> findings = {};      ///< of all its stages
+  std::optional<SheetSummary> sheet = {};  ///< of a sheet, or a colony: it has no fibres, no adhesions, and of `fit` no
+                                           ///< more than what the fit leaves and whether it converged
 };
 
 /// A cell that cannot be used, or a folder that cannot be searched for cells.
@@ -65,12 +74,19 @@ struct Study {
   Path folder = {};       ///< names are relative to it
   int n_fibre_types = 3;  ///< 4: edge fibres are a type of their own; 3: they count as ventral
 };
+/// The name of its condition.
+const std::string& condition_of(const Study& study, const StudyCell& cell);
 /// The type as which a fibre counts.
 FibreType counted_type(const Study& study, FibreType type);
 
+/// Those with fibres, and the others.
+int n_with_fibres(const Study& study);
+int n_sheets(const Study& study);
+
 /// Files that must be there of each finished cell, and those that are read where they are, relative to its folder.
-const std::vector<std::string>& files_of_a_cell();
-const std::vector<std::string>& further_files_of_a_cell();
+/// @param kind  plane or sheet
+const std::vector<std::string>& files_of_a_cell(CellKind kind);
+const std::vector<std::string>& further_files_of_a_cell(CellKind kind);
 
 /// @param table  column `cell` (a cell's folder), any columns of conditions, and `exclude` with the reason why a cell
 ///               must not enter, empty for those that do; or none

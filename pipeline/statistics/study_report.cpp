@@ -42,6 +42,11 @@ std::string embedded(const Figure& figure) {
   return (is_named ? "" : "<h3>" + charts::html_escaped(figure.title) + "</h3>\n") + charts_of(figure);
 }
 
+void without_column(report::Table& table, std::ptrdiff_t column) {
+  table.columns.erase(table.columns.begin() + column);
+  for (auto& row : table.rows) row.erase(row.begin() + column);
+}
+
 report::Table types_table(const Study& study, const Analysis& analysis) {
   report::Table table{{{"condition"},
                        {"type"},
@@ -65,10 +70,38 @@ report::Table types_table(const Study& study, const Analysis& analysis) {
          number_text(s.plain.standard_deviation),
          number_text(s.without_error ? std::optional(s.without_error->standard_deviation) : std::nullopt)});
   }
-  if (!has_conditions(study)) {
-    table.columns.erase(table.columns.begin());
-    for (auto& row : table.rows) row.erase(row.begin());
+  if (!has_conditions(study)) without_column(table, 0);
+  return table;
+}
+
+/// What the sheets are like, a row for each figure, kind of part and condition.
+report::Table sheets_summary_table(const Study& study, const Analysis& analysis) {
+  report::Table table{{{"figure"},
+                       {"condition"},
+                       {"of"},
+                       {"sheets", true},
+                       {"mean, mixed model", true},
+                       {"95 %", true},
+                       {"plain mean", true},
+                       {"95 %, sheets resampled", true},
+                       {"median", true},
+                       {"SD", true},
+                       {"SD without error", true}},
+                      {},
+                      "Figures of the sheets"};
+  for (const Measure& m : analysis.sheets) {
+    for (const Summary& s : m.summaries) {
+      table.rows.push_back(
+          {html_escaped(m.sample.each == Observed::bundles ? "tension of bundles (nN)" : m.sample.label()),
+           html_escaped(s.condition), html_escaped(s.kind), std::to_string(s.n_cells),
+           s.model ? readable(s.model->estimate) : "–",
+           interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
+           readable(s.plain.mean), interval_text(s.mean_interval), readable(s.plain.median),
+           number_text(s.plain.standard_deviation),
+           s.typical_error && s.without_error ? readable(s.without_error->standard_deviation) : "–"});
+    }
   }
+  if (!has_conditions(study)) without_column(table, 1);
   return table;
 }
 
@@ -102,6 +135,8 @@ report::Table tests_table(const Measure& m) {
   return table;
 }
 
+std::string enters_text(const StudyCell& c) { return c.fit.converged ? "yes" : "yes, not converged"; }
+
 report::Table cells_table(const Study& study) {
   report::Table table{{{"cell"},
                        {"condition"},
@@ -114,19 +149,66 @@ report::Table cells_table(const Study& study) {
                        {"expected", true},
                        {"enters"}},
                       {},
-                      "Cells"};
+                      "Cells with fibres"};
   for (const StudyCell& c : study.cells) {
+    if (c.sheet) continue;
     table.rows.push_back(
-        {charts::html_escaped(c.name), charts::html_escaped(study.conditions[static_cast<std::size_t>(c.condition)]),
+        {charts::html_escaped(c.name), charts::html_escaped(condition_of(study, c)),
          std::to_string(c.cell.fibres.size()), std::to_string(c.cell.adhesions.size()),
          charts::readable(c.fit.total_force_nN), is_network_known(c) ? charts::readable(c.fit.fibre_force_nN) : "–",
          is_network_known(c) ? charts::readable(c.fit.network_force_nN) : "–", charts::readable(c.fit.relative_l2),
-         charts::readable(c.fit.expected_relative_l2), c.fit.converged ? "yes" : "yes, not converged"});
+         charts::readable(c.fit.expected_relative_l2), enters_text(c)});
   }
-  for (const LeftOutCell& c : study.left_out) {
-    table.rows.push_back({charts::html_escaped(c.name), charts::html_escaped(c.condition), "", "", "", "", "", "", "",
-                          "<b>no:</b> " + charts::html_escaped(c.reason)});
+  return table;
+}
+
+/// "2.0 (1.9 to 2.2)", "> 30", or nothing of what nobody asked for; with the part's name where it is not the sheet.
+std::string estimates_text(const StudyCell& c, SheetQuantity quantity) {
+  std::string text;
+  for (const SheetEstimate& e : c.sheet->estimates) {
+    if (e.quantity != quantity) continue;
+    text += (text.empty() ? "" : "; ") + (kind_of_part(e) == kWholeSheet ? std::string() : e.part + ": ");
+    if (is_given(e)) {
+      text += readable(e.value) + " (given)";
+    } else if (e.identifiable) {
+      text += fmt::format("{} ({} to {})", readable(e.value), readable(*e.low), readable(*e.high));
+    } else {
+      text += e.low ? "> " + readable(*e.low) : e.high ? "< " + readable(*e.high) : "not known";
+    }
   }
+  return text.empty() ? "–" : text;
+}
+
+report::Table sheets_table(const Study& study) {
+  report::Table table{{{"sheet"},
+                       {"condition"},
+                       {"contraction (nN/µm)", true},
+                       {"stiffness (nN/µm)", true},
+                       {"mean tension (nN/µm)", true},
+                       {"total force (nN)", true},
+                       {"strain energy (fJ)", true},
+                       {"area (µm²)", true},
+                       {"relative L2", true},
+                       {"expected", true},
+                       {"enters"}},
+                      {},
+                      "Sheets"};
+  for (const StudyCell& c : study.cells) {
+    if (!c.sheet) continue;
+    table.rows.push_back({html_escaped(c.name), html_escaped(condition_of(study, c)),
+                          html_escaped(estimates_text(c, SheetQuantity::contraction)),
+                          html_escaped(estimates_text(c, SheetQuantity::stiffness)),
+                          readable(c.sheet->mean_tension_nN_per_um), readable(c.sheet->total_force_nN),
+                          number_text(c.sheet->strain_energy_fJ), readable(c.sheet->area_um2),
+                          readable(c.sheet->relative_l2), readable(c.sheet->expected_relative_l2), enters_text(c)});
+  }
+  return table;
+}
+
+report::Table left_out_table(const Study& study) {
+  report::Table table{{{"cell"}, {"condition"}, {"why"}}, {}, "Left out"};
+  for (const LeftOutCell& c : study.left_out)
+    table.rows.push_back({html_escaped(c.name), html_escaped(c.condition), html_escaped(c.reason)});
   return table;
 }
 
@@ -174,9 +256,10 @@ std::string gallery(const Study& study, const Path& page_folder) {
   for (const StudyCell& c : study.cells) {
     const Path folder = study.folder / c.name, picture = folder / "1_segment/thumbnail.jpg";
     const std::string link = (folder / "report.html").lexically_relative(page_folder).generic_string();
-    const std::string& condition = study.conditions[static_cast<std::size_t>(c.condition)];
-    const std::string text =
-        fmt::format("{}{}{}: {} nN", c.name, condition.empty() ? "" : ", ", condition, readable(c.fit.total_force_nN));
+    const std::string& condition = condition_of(study, c);
+    const double force_nN = c.sheet ? c.sheet->total_force_nN : c.fit.total_force_nN;
+    const std::string text = fmt::format("{}{}{}: {}{} nN", c.name, condition.empty() ? "" : ", ", condition,
+                                         c.sheet ? "sheet, " : "", readable(force_nN));
     html += fmt::format("<a href=\"{}\">{}<span>{}{}</span></a>\n", html_escaped(link),
                         files::is_own_file(picture) ? fmt::format("<img alt=\"\" src=\"data:image/jpeg;base64,{}\">",
                                                                   files::base64(files::read_text(picture)))
@@ -196,21 +279,44 @@ std::string list_of(const std::vector<std::string>& sentences) {
   return html + "</ul>\n";
 }
 
+/// "8 sheets", "1 cell"
+std::string counted(std::size_t n, const std::string& name) {
+  return std::to_string(n) + " " + name + (n == 1 ? "" : "s");
+}
+
 std::string overview(const Study& study, const Analysis& analysis) {
-  std::size_t n_fibres = 0, n_adhesions = 0;
+  std::size_t n_fibres = 0, n_adhesions = 0, n_contractions = 0;
   for (const StudyCell& c : study.cells) {
     n_fibres += c.cell.fibres.size();
     n_adhesions += static_cast<std::size_t>(
         std::ranges::count_if(c.cell.adhesions, [](const Adhesion& a) { return !is_assumed(a.origin); }));
+    n_contractions += c.sheet && std::ranges::any_of(c.sheet->estimates, [](const SheetEstimate& e) {
+                        return e.quantity == SheetQuantity::contraction && enters(e);
+                      });
   }
-  std::string html = fmt::format(
-      "<p>{} cells{} with {} adhesions and {} stress fibres; the tensions of {} of them could be identified and enter "
-      "the statistics. {}</p>\n",
-      study.cells.size(), has_conditions(study) ? fmt::format(" under {} conditions", study.conditions.size()) : "",
-      n_adhesions, n_fibres, analysis.tensions.sample.values.size(),
-      study.left_out.empty() ? "No cell was left out."
-                             : fmt::format("{} {} left out: see the table of cells.", study.left_out.size(),
-                                           study.left_out.size() == 1 ? "cell was" : "cells were"));
+  const auto with_fibres = static_cast<std::size_t>(n_with_fibres(study)), sheets = study.cells.size() - with_fibres;
+  std::string html = "<p>";
+  if (with_fibres > 0) {
+    html += fmt::format(
+        "{} with {} adhesions and {} stress fibres; the tensions of {} of them could be identified and enter the "
+        "statistics. ",
+        counted(with_fibres, "cell"), n_adhesions, n_fibres, analysis.tensions.sample.values.size());
+  }
+  if (sheets > 0) {
+    html += fmt::format(
+        "{}: cells or colonies that are taken as contracting sheets, without fibres. The contraction of {} of them "
+        "could be identified and enters the statistics. ",
+        counted(sheets, "sheet"), n_contractions);
+  }
+  if (with_fibres > 0 && sheets > 0)
+    html += "Figures of sheets and of cells with fibres are kept apart: they have different meanings. ";
+  if (has_conditions(study)) html += counted(study.conditions.size(), "condition") + ". ";
+  html +=
+      (study.left_out.empty()
+           ? "No cell was left out."
+           : fmt::format("{} left out: see the table of cells.",
+                         counted(study.left_out.size(), "cell") + (study.left_out.size() == 1 ? " was" : " were"))) +
+      "</p>\n";
   if (!analysis.warnings.empty()) html += "<h3>What to distrust</h3>\n" + list_of(analysis.warnings);
   return html;
 }
@@ -262,12 +368,27 @@ std::string on_edge_fibres(const Study& study) {
                          : "Here they are a type of their own.");
 }
 
+constexpr const char* kHowToReadSheets =
+    "<p class=\"sub\">Errors of the fit are known of what the beads were asked for; the others have none. What the "
+    "gel’s "
+    "numbers and its model add to them is left out: sheets on gels of one kind share it. A number that the beads limit "
+    "to one side only, or that was given, does not enter.</p>\n";
+
+/// "Stress-fibre tensions of 8 cells and contraction of 4 sheets"
+std::string title_of(const Study& study) {
+  const auto with_fibres = static_cast<std::size_t>(n_with_fibres(study)), sheets = study.cells.size() - with_fibres;
+  std::string title;
+  if (with_fibres > 0) title = "Stress-fibre tensions of " + counted(with_fibres, "cell");
+  if (sheets > 0) title += (title.empty() ? "Contraction of " : " and contraction of ") + counted(sheets, "sheet");
+  return title;
+}
+
 }  // namespace
 
 std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
                        const StudyParameters& parameters, const Path& page_folder) {
-  const std::string head = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
-                                       study.cells.size(), kVersion);
+  const std::string title = title_of(study);
+  const std::string head = fmt::format("<h1>{}</h1><p class=\"sub\">mbtfm {}</p>\n", title, kVersion);
   std::string body = report::section("Primary comparison", primary_section(study, analysis, figures)) +
                      report::section("In short", overview(study, analysis));
   std::string found;
@@ -290,8 +411,12 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   body += report::section("What the program noticed",
                           findings_text(study, with_file(findings_table(study), "findings.csv")));
   body += report::section("Figures", pictures);
-  body += report::section("Tension by fibre type",
-                          on_edge_fibres(study) + with_file(types_table(study, analysis), "types.csv"));
+  if (!analysis.sheets.empty())
+    body += report::section("Figures of the sheets",
+                            kHowToReadSheets + with_file(sheets_summary_table(study, analysis), "summaries.csv"));
+  if (analysis.has_fibres)
+    body += report::section("Tension by fibre type",
+                            on_edge_fibres(study) + with_file(types_table(study, analysis), "types.csv"));
   std::string tests;
   for (const Measure* m : analysis.measures()) {
     if (!m->comparisons.empty())
@@ -299,8 +424,11 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
                               report::html_of(tests_table(*m)));
   }
   body += report::section("Exploratory tests", tests + kHowToRead);
-  body += report::section("Cells", gallery(study, page_folder) + with_file(cells_table(study), "cells.csv"));
-  return report::page("Stress-fibre tensions – mbtfm", head, body);
+  std::string cells = gallery(study, page_folder);
+  for (const report::Table& table : {cells_table(study), sheets_table(study), left_out_table(study)})
+    if (!table.rows.empty()) cells += with_file(table, "cells.csv");
+  body += report::section("Cells", cells);
+  return report::page(title + " – mbtfm", head, body);
 }
 
 }  // namespace mbtfm::statistics

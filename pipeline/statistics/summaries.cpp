@@ -78,7 +78,8 @@ std::vector<CellWeights> draw_cells(const Study& study, const StudyParameters& p
 
 ModelResult model_of(const Sample& sample) {
   if (sample.values.empty()) return {.model = {}, .obstacle = "no value is known"};
-  if (n_cells_of(sample.values) < 2) return {.model = {}, .obstacle = "there is a single cell"};
+  if (n_cells_of(sample.values) < 2)
+    return {.model = {}, .obstacle = std::string("there is a single ") + sample.cell_name()};
   std::vector<int> index(static_cast<std::size_t>(sample.n_conditions() * sample.n_kinds()), -1);
   for (const Observation& o : sample.values) index[static_cast<std::size_t>(o.group)] = 0;
   int n = 0;

@@ -1,9 +1,12 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
 #include <map>
 
+#include "pipeline/files/sheet_files.h"
 #include "pipeline/files/tables.h"
+#include "pipeline/runner/cell_stages.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
@@ -30,10 +33,6 @@ std::vector<Column<Row>> ends_of(const std::string& low, const std::string& high
           {high, "upper end of the 95 % interval of " + of, end(&Interval::high), kResult}};
 }
 
-const std::string& condition_of(const Study& study, const StudyCell& cell) {
-  return study.conditions[static_cast<std::size_t>(cell.condition)];
-}
-
 /// A row of what belongs to a cell.
 template <class Of>
 struct InCell {
@@ -52,14 +51,14 @@ struct CellRow {
   const StudyCell* cell = nullptr;  ///< none where it was
 
   std::optional<int> n_fibres(std::optional<FibreType> type = {}) const {
-    if (!cell) return std::nullopt;
+    if (!cell || cell->sheet) return std::nullopt;
     const auto& fibres = cell->cell.fibres;
     return static_cast<int>(
         std::count_if(fibres.begin(), fibres.end(), [&](const Fibre& f) { return !type || f.type == *type; }));
   }
   /// What has no meaning where the network's tension is not known.
   std::optional<double> of_network(double FitSummary::*figure) const {
-    return cell && is_network_known(*cell) ? std::optional(cell->fit.*figure) : std::nullopt;
+    return cell && !cell->sheet && is_network_known(*cell) ? std::optional(cell->fit.*figure) : std::nullopt;
   }
   std::optional<double> network_tension_nN() const {
     if (!cell) return std::nullopt;
@@ -77,13 +76,32 @@ auto of_cell(Of of) {
     return of(*row.of.cell);
   };
 }
+/// The same of what a sheet has not.
+template <class Of>
+auto of_cell_with_fibres(Of of) {
+  return [of](const InCell<CellRow>& row) -> std::optional<std::remove_cvref_t<decltype(of(*row.of.cell))>> {
+    if (!row.of.cell || row.of.cell->sheet) return std::nullopt;
+    return of(*row.of.cell);
+  };
+}
+/// The same of what a sheet has alone.
+auto of_sheet(std::function<Number(const SheetSummary&)> of) {
+  return [of](const InCell<CellRow>& row) {
+    return row.of.cell && row.of.cell->sheet ? of(*row.of.cell->sheet) : std::nullopt;
+  };
+}
+
+/// Of the whole sheet; none where it is not known, or where parts contract each by their own.
+Number contraction_of(const SheetSummary& sheet) {
+  const auto at = std::ranges::find_if(sheet.estimates, [](const SheetEstimate& e) {
+    return e.quantity == SheetQuantity::contraction && enters(e) && kind_of_part(e) == kWholeSheet;
+  });
+  return at == sheet.estimates.end() ? std::nullopt : Number(at->value);
+}
 
 const Table<InCell<CellRow>>& cell_table() {
   using Row = InCell<CellRow>;
-  const auto fit = [](auto member) { return of_cell([member](const StudyCell& c) { return c.fit.*member; }); };
-  const auto figure = [](auto member) {
-    return of_cell([member](const StudyCell& c) { return figures_of(c).*member; });
-  };
+  const auto of_fit = [](auto member) { return [member](const StudyCell& c) { return c.fit.*member; }; };
   const auto network = [](auto member) { return [member](const Row& row) { return row.of.of_network(member); }; };
   const auto n_of = [](std::optional<FibreType> type) {
     return [type](const Row& row) { return row.of.n_fibres(type); };
@@ -96,28 +114,44 @@ const Table<InCell<CellRow>>& cell_table() {
            {{"included", "it enters the statistics", [](const Row& row) { return row.of.cell != nullptr; }},
             {"reason", "why it does not", [](const Row& row) { return row.of.reason; }},
             {"n_adhesions", "without anchors and candidates",
-             of_cell([](const StudyCell& c) { return static_cast<int>(figures_of(c).n_adhesions); })},
+             of_cell_with_fibres([](const StudyCell& c) { return static_cast<int>(figures_of(c).n_adhesions); })},
             {"n_fibres", "of all types", n_of({})},
             {"n_dorsal", "dorsal fibres", n_of(FibreType::dorsal)},
             {"n_arc", "transverse arcs", n_of(FibreType::arc)},
             {"n_ventral", "ventral fibres, without edge fibres", n_of(FibreType::ventral)},
-            {"cell_area_um2", "inside the outline", figure(&CellFigures::cell_area_um2), kResult},
-            {"adhesion_area_um2", "of all its adhesions", figure(&CellFigures::adhesion_area_um2), kResult},
-            {"total_force_nN", "sum of the adhesions' force magnitudes", fit(&FitSummary::total_force_nN), kResult},
+            {"cell_area_um2", "inside the outline",
+             of_cell([](const StudyCell& c) { return c.sheet ? c.sheet->area_um2 : figures_of(c).cell_area_um2; }),
+             kResult},
+            {"adhesion_area_um2", "of all its adhesions",
+             of_cell_with_fibres([](const StudyCell& c) { return figures_of(c).adhesion_area_um2; }), kResult},
+            {"total_force_nN", "sum of the adhesions' force magnitudes; of a sheet see sheet_force_nN",
+             of_cell_with_fibres(of_fit(&FitSummary::total_force_nN)), kResult},
             {"network_force_nN", "the same of the network alone", network(&FitSummary::network_force_nN), kResult},
             {"fibre_force_nN", "what the fibres add", network(&FitSummary::fibre_force_nN), kResult},
             {"network_tension_nN", "of a link of the actin network",
              [](const Row& row) { return row.of.network_tension_nN(); }, kResult},
             {"network_surface_tension_nN_per_um", "of the actin network as a sheet",
              network(&FitSummary::network_surface_tension_nN_per_um), kResult},
-            {"relative_l2", "‖measured − model‖ / ‖measured‖", fit(&FitSummary::relative_l2), kResult},
-            {"expected_relative_l2", "what the beads' noise alone would leave", fit(&FitSummary::expected_relative_l2),
+            {"relative_l2", "‖measured − model‖ / ‖measured‖", of_cell(of_fit(&FitSummary::relative_l2)), kResult},
+            {"expected_relative_l2", "what the beads' noise alone would leave",
+             of_cell(of_fit(&FitSummary::expected_relative_l2)), kResult},
+            {"noise_um", "of a component of the displacement", of_cell_with_fibres(of_fit(&FitSummary::noise_um)),
              kResult},
-            {"noise_um", "of a component of the displacement", fit(&FitSummary::noise_um), kResult},
-            {"n_meshes", "that the fit is the mean of", fit(&FitSummary::n_meshes)},
-            {"converged", "the fit came to its end", fit(&FitSummary::converged)},
+            {"n_meshes", "that the fit is the mean of", of_cell_with_fibres(of_fit(&FitSummary::n_meshes))},
+            {"converged", "the fit came to its end", of_cell(of_fit(&FitSummary::converged))},
             {"findings", "that are open", of_cell([](const StudyCell& c) { return open_ids(c.findings); })},
-            {"n_edge", "edge fibres", n_of(FibreType::edge)}}})};
+            {"n_edge", "edge fibres", n_of(FibreType::edge)},
+            {"model", "what pulls at its beads: fibres or a sheet; empty if it was left out",
+             of_cell(
+                 [](const StudyCell& c) { return c.sheet ? runner::PullModel::sheet : runner::PullModel::fibres; })},
+            {"contraction_nN_per_um", "of a sheet, or the mean over a sheet whose contraction varies",
+             of_sheet(contraction_of), kResult},
+            {"mean_tension_nN_per_um", "in a sheet: half the trace, mean over its area",
+             of_sheet(&SheetSummary::mean_tension_nN_per_um), kResult},
+            {"sheet_force_nN", "sum of the force magnitudes under a sheet's triangles",
+             of_sheet(&SheetSummary::total_force_nN), kResult},
+            {"strain_energy_fJ", "of the gel under a sheet: half the sum of force times displacement",
+             of_sheet(&SheetSummary::strain_energy_fJ), kResult}}})};
   return table;
 }
 
@@ -191,6 +225,35 @@ std::vector<FibreRow> fibre_rows(const Study& study) {
       const auto t = tension.find(fibre.fibre_id);
       if (t != tension.end()) rows.push_back({c.name, condition_of(study, c), {&fibre, {*t->second, fibre.type}}});
     }
+  }
+  return rows;
+}
+
+using EstimateRow = InCell<SheetEstimate>;
+const Table<EstimateRow>& estimate_table() {
+  static const Table<EstimateRow> table{
+      .file = "statistics/sheets.csv",
+      .row = "each number of a sheet that its beads were asked for",
+      .columns = files::joined<EstimateRow>(
+          {cell_columns<SheetEstimate>(),
+           files::columns_of<EstimateRow>(files::sheet_estimate_table(), &EstimateRow::of,
+                                          {"quantity", "part", "value", "low", "high", "identifiable"}),
+           {{"kind", "as which it counts: the sheet, or the kind of part, without its label",
+             [](const EstimateRow& row) { return kind_of_part(row.of); }},
+            {"enters", "the statistics: the beads limit it to both sides, and it was not given",
+             [](const EstimateRow& row) { return enters(row.of); }},
+            {"sigma",
+             "standard error that the statistics take: that of the fit without what the gel's numbers and its model "
+             "add, which sheets share",
+             [](const EstimateRow& row) { return own_error(row.of); }, kResult}}})};
+  return table;
+}
+
+std::vector<EstimateRow> estimate_rows(const Study& study) {
+  std::vector<EstimateRow> rows;
+  for (const StudyCell& c : study.cells) {
+    if (!c.sheet) continue;
+    for (const SheetEstimate& e : c.sheet->estimates) rows.push_back({c.name, condition_of(study, c), e});
   }
   return rows;
 }
@@ -310,7 +373,8 @@ const Table<QuantityRow>& summary_table() {
       .columns = files::joined<Row>(
           {{{"quantity", "with its unit", &Row::quantity},
             {"condition", "empty: none was asked for", [](const Row& row) { return row.summary.condition; }},
-            {"kind", "of fibres, adhesions or cells", [](const Row& row) { return row.summary.kind; }}},
+            {"kind", "of fibres, adhesions, cells, sheets or bundles",
+             [](const Row& row) { return row.summary.kind; }}},
            summary_columns<Row>("observations", "", &Row::summary)})};
   return table;
 }
@@ -503,6 +567,7 @@ std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, c
   add(finding_table(), rows_by_cell(study, &StudyCell::findings));
   add(adhesion_table(), adhesion_rows(study));
   add(fibre_table(), fibre_rows(study));
+  add(estimate_table(), estimate_rows(study));
   add(type_table(thresholds_of(analysis)), type_rows(study, analysis));
   add(test_table(), test_rows(analysis));
   add(summary_table(), summary_rows(analysis));
@@ -516,9 +581,9 @@ std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, c
 
 std::string pages_of_tables() {
   return page_of(cell_table()) + page_of(finding_table()) + page_of(adhesion_table()) + page_of(fibre_table()) +
-         page_of(type_table({StudyParameters{}.weak_tension_nN})) + page_of(test_table()) + page_of(summary_table()) +
-         page_of(variance_table()) + page_of(correlation_table()) + page_of(area_bin_table()) +
-         page_of(direction_table()) + page_of(direction_mean_table());
+         page_of(estimate_table()) + page_of(type_table({StudyParameters{}.weak_tension_nN})) + page_of(test_table()) +
+         page_of(summary_table()) + page_of(variance_table()) + page_of(correlation_table()) +
+         page_of(area_bin_table()) + page_of(direction_table()) + page_of(direction_mean_table());
 }
 
 }  // namespace mbtfm::statistics

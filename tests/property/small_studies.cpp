@@ -55,10 +55,12 @@ std::vector<std::string> header_of(const std::string& text) {
   return header;
 }
 
-/// The fibres' force is a difference.
+/// The fibres' force is a difference, and a fit may find that a sheet expands.
 bool may_be_negative(const files::CsvTable& table, int row) {
+  const std::set<std::string> signed_ones = {"fibre_force_nN", "contraction_nN_per_um", "mean_tension_nN_per_um",
+                                             "contraction_over_stiffness"};
   for (const char* column : {"quantity", "force"}) {
-    if (table.has(column) && table.text(row, column) == "fibre_force_nN") return true;
+    if (table.has(column) && signed_ones.contains(table.text(row, column))) return true;
   }
   return false;
 }
@@ -138,6 +140,42 @@ TEST(SmallStudies, whatever_lacks_every_number_is_finite_or_its_field_empty) {
   }
 }
 
+/// Sheets alone, and beside cells with fibres; of some the beads do not tell the contraction, of some nobody asked for
+/// it.
+TEST(SmallStudies, whatever_sheets_lack_every_number_is_finite_or_its_field_empty) {
+  for (int seed = 1; seed <= 60; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(static_cast<std::uint64_t>(seed));
+    const auto once_in = [&](unsigned n) { return random() % n == 0; };
+    Study study = test::simulated_sheets({.n_sheets = 1 + static_cast<int>(random() % 5),
+                                          .n_conditions = 1,
+                                          .contraction_nN_per_um = once_in(3) ? 0.0 : 2.0,
+                                          .sheet_sd_nN_per_um = once_in(3) ? 0.0 : 1.0,
+                                          .error_nN_per_um = once_in(3) ? 0.0 : 0.1,
+                                          .seed = static_cast<std::uint64_t>(seed)});
+    for (StudyCell& cell : study.cells) {
+      for (SheetEstimate& e : cell.sheet->estimates) {
+        if (once_in(4)) e.sigma = e.high = std::nullopt, e.identifiable = false;
+        if (once_in(6)) e.low = e.high = e.value, e.sigma = 0;
+        if (once_in(6)) e.part = once_in(2) ? "edge" : "cell 4";
+      }
+      if (once_in(4)) cell.sheet->estimates.clear();
+      if (once_in(4)) cell.sheet->strain_energy_fJ = std::nullopt;
+    }
+    if (once_in(2)) {
+      study.conditions = {"a", "b"};
+      for (StudyCell& cell : study.cells) cell.condition = static_cast<int>(random() % 2);
+    }
+    if (once_in(2)) {
+      for (StudyCell& cell : test::small_study(test::drawn_lack(static_cast<std::uint64_t>(seed)), 3).cells) {
+        cell.condition = 0;
+        study.cells.push_back(std::move(cell));
+      }
+    }
+    expect_whole(study, are_all() || seed % 10 == 1 ? Page::made : Page::left_out);
+  }
+}
+
 /// One file, or several, of each second cell gone.
 TEST(SmallStudies, cells_that_lack_files_are_left_out_with_a_reason) {
   for (int seed = 1; seed <= kStudies; seed += are_all() ? 1 : 10) {
@@ -151,7 +189,7 @@ TEST(SmallStudies, cells_that_lack_files_are_left_out_with_a_reason) {
       test::write_finished_cell(folder / cell.name, cell);
       if (&cell == &whole.cells.front() || random() % 2 == 0) continue;
       ++n_damaged;
-      const auto& files = files_of_a_cell();
+      const auto& files = files_of_a_cell(CellKind::plane);
       std::filesystem::remove(folder / cell.name / files[random() % files.size()]);
     }
     const Study read = read_study(folder.path(), kFewDraws, {}, 2);

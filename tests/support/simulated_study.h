@@ -76,4 +76,68 @@ inline statistics::Study simulated_study(const StudySettings& s) {
   return study;
 }
 
+struct SheetStudySettings {
+  int n_sheets = 12;
+  int n_conditions = 2;
+  double contraction_nN_per_um = 2;
+  double condition_effect_nN_per_um = 0;  ///< from each condition to the next
+  double sheet_sd_nN_per_um = 0.2;
+  double error_nN_per_um = 0.1;      ///< standard error of a contraction, its own
+  double gel_error_nN_per_um = 0.5;  ///< that of the gel's modulus, which all share; it moves none of them here
+  std::uint64_t seed = 1;
+};
+
+/// Square sheets in a row, whose other figures follow the contraction.
+inline statistics::Study simulated_sheets(const SheetStudySettings& s) {
+  std::mt19937_64 random(s.seed);
+  std::normal_distribution<double> normal;
+  statistics::Study study;
+  for (int c = 0; c < s.n_conditions; ++c)
+    study.conditions.push_back(s.n_conditions == 1 ? "" : std::string(1, static_cast<char>('a' + c)));
+  for (int i = 0; i < s.n_sheets; ++i) {
+    statistics::StudyCell cell{.name = "sheet_" + std::to_string(i),
+                               .condition = i * s.n_conditions / s.n_sheets,
+                               .cell = {},
+                               .forces = {},
+                               .tensions = {},
+                               .fit = {},
+                               .directions = {}};
+    const double x = 50.0 * i;
+    cell.cell.outline_um = {{x, 0}, {x + 40, 0}, {x + 40, 40}, {x, 40}};
+    const double value = s.contraction_nN_per_um + cell.condition * s.condition_effect_nN_per_um +
+                         s.sheet_sd_nN_per_um * normal(random) + s.error_nN_per_um * normal(random),
+                 sigma = std::hypot(s.error_nN_per_um, s.gel_error_nN_per_um);
+    const double stiffness = 20 * std::exp(0.2 * normal(random));
+    cell.sheet = SheetSummary{.estimates = {{.quantity = SheetQuantity::contraction,
+                                             .value = value,
+                                             .sigma = sigma,
+                                             .low = value - 1.96 * sigma,
+                                             .high = value + 1.96 * sigma,
+                                             .parts = {.beads = s.error_nN_per_um, .gel = s.gel_error_nN_per_um}},
+                                            {.quantity = SheetQuantity::stiffness,
+                                             .value = stiffness,
+                                             .sigma = 4.0,
+                                             .low = stiffness - 8,
+                                             .high = stiffness + 8,
+                                             .parts = {.beads = 4.0}},
+                                            {.quantity = SheetQuantity::contraction_over_stiffness,
+                                             .value = value / stiffness,
+                                             .sigma = 0.02,
+                                             .low = value / stiffness - 0.04,
+                                             .high = value / stiffness + 0.04,
+                                             .parts = {.beads = 0.02}}},
+                              .mean_tension_nN_per_um = 0.8 * value,
+                              .total_force_nN = 100 * value,
+                              .strain_energy_fJ = 30 * value * value,
+                              .area_um2 = 1600 * std::exp(0.1 * normal(random)),
+                              .relative_l2 = 0.3,
+                              .expected_relative_l2 = 0.25};
+    cell.fit.relative_l2 = 0.3;
+    cell.fit.expected_relative_l2 = 0.25;
+    cell.fit.converged = true;
+    study.cells.push_back(std::move(cell));
+  }
+  return study;
+}
+
 }  // namespace mbtfm::test

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <string>
 
+#include "pipeline/files/sheet_files.h"
 #include "tests/support/simulated_study.h"
 
 namespace mbtfm::test {
@@ -132,6 +133,26 @@ inline void write_finished_cell(const fs::path& folder, const statistics::StudyC
   files::write_tensions(folder / "4_fit/tensions.csv", cell.tensions, cell.cell.fibres);
   files::write_adhesion_forces(folder / "4_fit/adhesion_forces.csv", cell.forces, cell.cell.adhesions);
   files::write_fit_summary(folder / "4_fit/fit.json", cell.fit);
+}
+
+/// A sheet of a study as the folder that it was read from.
+inline void write_finished_sheet(const fs::path& folder, const statistics::StudyCell& cell) {
+  fs::create_directories(folder / "1_segment");
+  fs::create_directories(folder / "3_sheet");
+  files::write_text(folder / "cell.toml",
+                    "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\n[run]\nmodel = \"sheet\"\n");
+  files::write_outline(folder / "1_segment/outline.csv", cell.cell.outline_um);
+  std::string nodes = "x_um,y_um\n";
+  for (const Vec2& at : cell.cell.outline_um) nodes += std::to_string(at.x) + "," + std::to_string(at.y) + "\n";
+  files::write_text(folder / "3_sheet/sheet.csv", nodes);
+  files::write(folder / "3_sheet/sheet_fit.csv", files::sheet_estimate_table(), cell.sheet->estimates);
+  Figures figures = {{"mean_tension_nN_per_um", cell.sheet->mean_tension_nN_per_um},
+                     {"total_force_nN", cell.sheet->total_force_nN},
+                     {"area_um2", cell.sheet->area_um2},
+                     {"relative_l2", cell.sheet->relative_l2},
+                     {"expected_relative_l2", cell.sheet->expected_relative_l2}};
+  if (cell.sheet->strain_energy_fJ) figures.emplace_back("strain_energy_fJ", *cell.sheet->strain_energy_fJ);
+  files::write_figures(folder / "3_sheet/sheet.json", figures);
 }
 
 }  // namespace mbtfm::test

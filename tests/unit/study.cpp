@@ -9,13 +9,15 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
+#include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/conditions.h"
 #include "pipeline/statistics/picture.h"
 #include "pipeline/statistics/relations.h"
+#include "pipeline/statistics/samples.h"
 #include "pipeline/statistics/study_files.h"
 #include "pipeline/statistics/summaries.h"
 #include "tests/support/fake_cell.h"
-#include "tests/support/simulated_study.h"
+#include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::statistics {
@@ -528,6 +530,208 @@ TEST(Figures, are_drawn_into_pixels) {
   const std::string pdf = files::read_text(folder / "figure.pdf");
   EXPECT_EQ(pdf.substr(0, 5), "%PDF-");
   EXPECT_EQ(pdf, files::read_text(folder / "again.pdf"));
+}
+
+/// Row of a table where these columns have these texts.
+int row_with(const files::CsvTable& table, const std::map<std::string, std::string>& texts) {
+  for (int row = 0; row < table.n_rows(); ++row) {
+    if (std::ranges::all_of(texts, [&](const auto& t) { return table.text(row, t.first) == t.second; })) return row;
+  }
+  ADD_FAILURE() << "no row " << texts.begin()->second;
+  return 0;
+}
+
+files::CsvTable table_of(const Study& study, const std::string& name) {
+  const auto tables = tables_of(study, analyse(study, {}));
+  const auto at = std::ranges::find_if(tables, [&](const auto& t) { return t.first == name; });
+  return {at->second, name};
+}
+
+/// Written as folders and read again.
+Study read_again(const Study& study, const test::TemporaryFolder& folder, const StudyParameters& parameters = {}) {
+  for (const StudyCell& cell : study.cells) {
+    const Path at = folder / study.conditions[static_cast<std::size_t>(cell.condition)] / cell.name;
+    cell.sheet ? test::write_finished_sheet(at, cell) : test::write_finished_cell(at, cell);
+  }
+  StudyParameters by_folder = parameters;
+  by_folder.condition_from = "folder";
+  return read_study(folder.path(), by_folder, {}, 2);
+}
+
+const Sample* sample_named(const Analysis& analysis, const std::string& column) {
+  for (const Measure* m : analysis.measures())
+    if (m->sample.column == column) return &m->sample;
+  return nullptr;
+}
+
+TEST(SheetStudy, has_what_the_fit_found_and_compares_the_contraction_first) {
+  const Study made = test::simulated_sheets({.condition_effect_nN_per_um = 1});
+  const test::TemporaryFolder folder;
+  const Study study = read_again(made, folder);
+  ASSERT_EQ(study.cells.size(), 12u);
+  EXPECT_EQ(n_sheets(study), 12);
+  const Analysis analysis = analyse(study, {});
+  EXPECT_EQ(analysis.primary.measure, "contraction of sheets");
+  ASSERT_EQ(analysis.primary.differences.size(), 1u) << analysis.primary.obstacle;
+  const Contrast& found = analysis.primary.differences[0].difference;
+  // two conditions of six: scatter and error of 0.22 make 0.13 of the difference; four of these
+  EXPECT_NEAR(found.estimate, 1, 0.52);
+  EXPECT_LT(analysis.primary.differences[0].p_holm, 0.01);
+  for (const char* column : {"contraction_nN_per_um", "mean_tension_nN_per_um", "sheet_force_nN", "strain_energy_fJ",
+                             "sheet_area_um2", "stiffness_nN_per_um", "contraction_over_stiffness"}) {
+    const Sample* sample = sample_named(analysis, column);
+    ASSERT_NE(sample, nullptr) << column;
+    EXPECT_EQ(sample->values.size(), 12u) << column;
+  }
+  EXPECT_EQ(sample_named(analysis, "line_tension_nN"), nullptr) << "nobody asked for it";
+  EXPECT_EQ(sample_named(analysis, "tension_nN"), nullptr) << "there is no fibre";
+  for (const auto& [name, text] : tables_of(study, analysis)) EXPECT_FALSE(text.empty()) << name;
+  const std::string page = study_html(study, analysis, figures_of(study, analysis, {}), {}, folder.path());
+  EXPECT_NE(page.find("<h1>Contraction of 12 sheets</h1>"), std::string::npos);
+  for (const char* of_fibres : {"ibre type", "Stress-fibre", "transverse", "No tension", "Not drawn"})
+    EXPECT_EQ(page.find(of_fibres), std::string::npos) << of_fibres;
+}
+
+/// The error of the gel's modulus is larger than all scatter here. Counted as one of each sheet, it would hide the
+/// difference: nearly all intervals would hold the truth, and many no difference, too.
+TEST(SheetStudy, intervals_of_the_difference_hold_it_and_leave_out_what_sheets_share) {
+  constexpr int kStudies = 200;
+  int n_held = 0, n_found = 0;
+  for (int seed = 1; seed <= kStudies; ++seed) {
+    const Study study = test::simulated_sheets(
+        {.condition_effect_nN_per_um = -0.6, .seed = static_cast<std::uint64_t>(seed)});
+    const Sample sample = sample_sheets(study).front();
+    ASSERT_EQ(sample.column, "contraction_nN_per_um");
+    const SampleModel model = *model_of(sample).model;
+    const Contrast c = contrast_of(model.fit, Eigen::Vector2d(-1, 1));
+    n_held += c.low <= -0.6 && -0.6 <= c.high ? 1 : 0;
+    n_found += c.high < 0 ? 1 : 0;
+  }
+  std::printf("held %d, found %d of %d\n", n_held, n_found, kStudies);
+  // 95 % of 200 are 190 ± 3.1: three standard deviations of the count
+  EXPECT_GE(n_held, 181);
+  EXPECT_LE(n_held, 199);
+  // -0.6 is 4.6 standard errors of 0.13, with ten degrees of freedom: found in 98 % and more
+  EXPECT_GE(n_found, 190);
+}
+
+TEST(SheetStudy, other_primary_comparisons_are_made_if_they_are_asked_for) {
+  const Study study = test::simulated_sheets({.condition_effect_nN_per_um = 1});
+  EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::mean_tension}).primary.measure, "mean tension of sheets");
+  EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::total_force}).primary.measure, "total force of sheets");
+  const Primary of_fibres = analyse(study, {.primary = PrimaryMeasure::tension}).primary;
+  EXPECT_EQ(of_fibres.measure, "tension of ventral fibres");
+  EXPECT_TRUE(of_fibres.differences.empty());
+  EXPECT_FALSE(of_fibres.obstacle.empty());
+  EXPECT_EQ(analyse(test::simulated_study({.n_conditions = 2}), {}).primary.measure, "tension of ventral fibres");
+}
+
+/// A mean tension of a sheet is no tension of a fibre, and the forces of a sheet's triangles are none of adhesions.
+TEST(SheetStudy, beside_cells_with_fibres_no_figure_mixes_the_two) {
+  Study made = test::simulated_sheets({.n_sheets = 6});
+  for (StudyCell& cell : test::simulated_study({.n_cells = 5, .n_conditions = 2}).cells)
+    made.cells.push_back(std::move(cell));
+  const test::TemporaryFolder folder;
+  const Study study = read_again(made, folder);
+  ASSERT_EQ(study.cells.size(), 11u);
+  EXPECT_EQ(n_with_fibres(study), 5);
+  const Analysis analysis = analyse(study, {});
+  for (const Measure* m : analysis.measures()) {
+    for (const Observation& o : m->sample.values)
+      EXPECT_EQ(study.cells[static_cast<std::size_t>(o.cell)].sheet.has_value(), m->sample.is_of_sheets())
+          << m->sample.column;
+  }
+  EXPECT_EQ(sample_named(analysis, "total_force_nN")->values.size(), 5u);
+  EXPECT_EQ(sample_named(analysis, "sheet_force_nN")->values.size(), 6u);
+  for (const Correlation& c : analysis.correlations)
+    for (const int cell : c.cells) EXPECT_FALSE(study.cells[static_cast<std::size_t>(cell)].sheet) << c.force;
+  const files::CsvTable cells = table_of(study, "cells.csv");
+  int n_of_sheets = 0;
+  for (int row = 0; row < cells.n_rows(); ++row) {
+    const bool is_sheet = cells.text(row, "model") == "sheet";
+    n_of_sheets += is_sheet ? 1 : 0;
+    for (const char* of_fibres : {"total_force_nN", "n_fibres", "network_force_nN", "n_adhesions", "n_meshes"})
+      EXPECT_EQ(cells.text(row, of_fibres).empty(), is_sheet) << row << of_fibres;
+    for (const char* of_sheet :
+         {"contraction_nN_per_um", "mean_tension_nN_per_um", "sheet_force_nN", "strain_energy_fJ"})
+      EXPECT_EQ(cells.text(row, of_sheet).empty(), !is_sheet) << row << of_sheet;
+    EXPECT_FALSE(cells.text(row, "cell_area_um2").empty());
+  }
+  EXPECT_EQ(n_of_sheets, 6);
+  const std::string page = study_html(study, analysis, figures_of(study, analysis, {}), {}, folder.path());
+  EXPECT_NE(page.find("Stress-fibre tensions of 5 cells and contraction of 6 sheets"), std::string::npos);
+}
+
+TEST(SheetStudy, takes_no_value_that_was_given_or_that_the_beads_limit_to_one_side) {
+  Study made = test::simulated_sheets({.n_sheets = 6, .n_conditions = 2});
+  SheetEstimate& given = made.cells[0].sheet->estimates[1];
+  given.low = given.high = given.value;
+  given.sigma = 0;
+  SheetEstimate& open = made.cells[1].sheet->estimates[1];
+  open.high = open.sigma = std::nullopt;
+  open.identifiable = false;
+  const test::TemporaryFolder folder;
+  const Study study = read_again(made, folder);
+  const Analysis analysis = analyse(study, {});
+  EXPECT_EQ(sample_named(analysis, "stiffness_nN_per_um")->values.size(), 4u);
+  EXPECT_EQ(sample_named(analysis, "contraction_nN_per_um")->values.size(), 6u);
+  EXPECT_TRUE(std::ranges::any_of(analysis.warnings, [](const std::string& w) {
+    return w.find("limit the stiffness of sheets") != w.npos && w.find("in 1 of 5 fits") != w.npos;
+  }));
+  const files::CsvTable sheets = table_of(study, "sheets.csv");
+  EXPECT_EQ(sheets.text(row_with(sheets, {{"cell", "a/sheet_0"}, {"quantity", "stiffness_nN_per_um"}}), "enters"),
+            "FALSE");
+  const int row = row_with(sheets, {{"cell", "a/sheet_0"}, {"quantity", "contraction_nN_per_um"}});
+  EXPECT_EQ(sheets.text(row, "enters"), "TRUE");
+  EXPECT_NEAR(sheets.number(row, "sigma"), 0.1, 1e-6) << "without the part of the gel";
+}
+
+/// Edges and insides are kinds, which are compared within sheets; labels of cells are not the same from sheet to sheet.
+TEST(SheetStudy, parts_of_sheets_are_kinds_and_cells_in_it_one_kind) {
+  Study study = test::simulated_sheets({.n_sheets = 8, .n_conditions = 1});
+  for (StudyCell& cell : study.cells) {
+    std::vector<SheetEstimate> parts;
+    for (const char* part : {"edge", "inside", "cell 3", "cell 17", "no cell"}) {
+      parts.push_back(cell.sheet->estimates[0]);
+      parts.back().part = part;
+      if (std::string(part) == "edge") parts.back().value += 2;
+    }
+    cell.sheet->estimates = parts;
+  }
+  const Analysis analysis = analyse(study, {});
+  const Sample* contraction = sample_named(analysis, "contraction_nN_per_um");
+  EXPECT_EQ(contraction->kinds, (std::vector<std::string>{"edge", "inside", "cell", "no cell"}));
+  EXPECT_EQ(contraction->of_group(0, 2).size(), 16u);
+  const files::CsvTable tests = table_of(study, "tests.csv");
+  const int row = row_with(tests, {{"quantity", "contraction_nN_per_um"},
+                                   {"question", "between kinds"},
+                                   {"test", "mixed model"},
+                                   {"group_a", "edge"},
+                                   {"group_b", "inside"}});
+  EXPECT_LT(tests.number(row, "p_holm"), 0.01);
+  EXPECT_GT(tests.number(row, "effect"), 1);
+}
+
+TEST(SheetStudy, leaves_out_a_copy_a_sheet_without_its_fit_and_one_that_did_not_converge) {
+  const Study made = test::simulated_sheets({.n_sheets = 6});
+  const test::TemporaryFolder folder;
+  read_again(made, folder);
+  const DisplacementField field = {{.position_um = {1, 2}, .displacement_um = {}, .sigma_um = 1, .flag = {}}};
+  const auto a = [&](const char* name) { return folder / "a" / name; };
+  for (const char* name : {"sheet_0", "sheet_1"}) {
+    std::filesystem::create_directories(a(name) / "2_track");
+    files::write_displacement(a(name) / "2_track/displacement.csv", field);  // beside each other in one picture
+  }
+  std::filesystem::remove(a("sheet_0") / "1_segment/outline.csv");  // of a mask: its nodes tell where it is
+  std::filesystem::copy(a("sheet_0"), a("sheet_9"), std::filesystem::copy_options::recursive);
+  std::filesystem::remove(a("sheet_2") / "3_sheet/sheet.json");
+  files::write_text(folder / "b/sheet_3/run.json",
+                    "{\"stages\": {\"sheet\": {\"converged\": false}}, \"findings\": []}");
+  const Study study = read_study(folder.path(), {.condition_from = "folder"}, {}, 2);
+  EXPECT_EQ(reason_of(study, "a/sheet_9").substr(0, 30), "the same cell as a/sheet_0: th");
+  EXPECT_EQ(reason_of(study, "a/sheet_2"), "no fit: 3_sheet/sheet.json is not there");
+  EXPECT_EQ(reason_of(study, "b/sheet_3"), "the fit did not converge");
+  EXPECT_EQ(study.cells.size(), 4u);
 }
 
 }  // namespace
