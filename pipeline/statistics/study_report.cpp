@@ -84,7 +84,6 @@ report::Table sheets_summary_table(const Study& study, const Analysis& analysis)
                        {"95 %", true},
                        {"plain mean", true},
                        {"95 %, sheets resampled", true},
-                       {"median", true},
                        {"SD", true},
                        {"SD without error", true}},
                       {},
@@ -96,11 +95,12 @@ report::Table sheets_summary_table(const Study& study, const Analysis& analysis)
            html_escaped(s.condition), html_escaped(s.kind), std::to_string(s.n_cells),
            s.model ? readable(s.model->estimate) : "–",
            interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
-           readable(s.plain.mean), interval_text(s.mean_interval), readable(s.plain.median),
-           number_text(s.plain.standard_deviation),
+           readable(s.plain.mean), interval_text(s.mean_interval), number_text(s.plain.standard_deviation),
            s.typical_error && s.without_error ? readable(s.without_error->standard_deviation) : "–"});
     }
   }
+  const auto has_parts = [](const Measure& m) { return m.sample.n_kinds() > 1; };
+  if (std::ranges::none_of(analysis.sheets, has_parts)) without_column(table, 2);
   if (!has_conditions(study)) without_column(table, 1);
   return table;
 }

@@ -598,8 +598,8 @@ TEST(SheetStudy, intervals_of_the_difference_hold_it_and_leave_out_what_sheets_s
   constexpr int kStudies = 200;
   int n_held = 0, n_found = 0;
   for (int seed = 1; seed <= kStudies; ++seed) {
-    const Study study = test::simulated_sheets(
-        {.condition_effect_nN_per_um = -0.6, .seed = static_cast<std::uint64_t>(seed)});
+    const Study study =
+        test::simulated_sheets({.condition_effect_nN_per_um = -0.6, .seed = static_cast<std::uint64_t>(seed)});
     const Sample sample = sample_sheets(study).front();
     ASSERT_EQ(sample.column, "contraction_nN_per_um");
     const SampleModel model = *model_of(sample).model;
