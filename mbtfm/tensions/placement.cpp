@@ -98,6 +98,11 @@ std::string in_words(Vec2 shift_um, const Eigen::Vector3d& sigma) {
          ") um";
 }
 
+/// How far a step moves the adhesions, root mean square: about their centre shift and turn add by squares.
+double way_um(const Eigen::Vector3d& step, double lever_um) {
+  return std::hypot(step[0], step[1], step[2] * lever_um);
+}
+
 /// The placement, then a small step in the cell's frame.
 Placement moved(Placement placement, const Eigen::Vector3d& step) {
   placement.shift_um += placement.turned({step[0], step[1]});
@@ -109,6 +114,13 @@ Vec2 centre_of(const Cell& cell) {
   Vec2 sum;
   for (const Adhesion& a : cell.adhesions) sum += a.position_um;
   return (1 / std::max<double>(1, static_cast<double>(cell.adhesions.size()))) * sum;
+}
+
+/// Of the adhesions about their centre, root mean square.
+double lever_of(const Cell& cell, Vec2 centre_um) {
+  double squares = 0;
+  for (const Adhesion& a : cell.adhesions) squares += dot(a.position_um - centre_um, a.position_um - centre_um);
+  return std::sqrt(squares / std::max<double>(1, static_cast<double>(cell.adhesions.size())));
 }
 
 }  // namespace
@@ -202,10 +214,14 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
   const stage::Stopwatch watch;
   constexpr double kFarthest_um = 5;  // filters are off by a micrometre at most, a stage that comes back by some
   constexpr double kLinear = 0.25;    // semi-minor axes: what its square adds is as a shift by an eighth of that
-  constexpr int kMostPasses = 12;     // far off it takes four
+  // Standard errors by noise. A step is a tenth to a third too short (docs/theory/fit.md), so that the rest of one is
+  // not found: of a cell that has moved to a sixth of a standard error, of one that lies where it should to 0.6.
+  constexpr double kSmall = 0.5, kSmallAtRest = 2;
+  constexpr int kMostPasses = 12;  // far off it takes four
   const double width_um = mean_semi_minor_um(cell);
   const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
   const Placement none{.centre_um = centre_of(cell), .shift_um = {}};
+  const double lever_um = lever_of(cell, none.centre_um);
   PlacedCell result{.placement = none, .data = {}, .start = start, .effect = {}};
   const auto off = [&](const std::string& why) {
     result.placement = none;
@@ -227,11 +243,13 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
     const Eigen::MatrixXd motions =
         placement_motions(gel, ellipses, fit.trial.forces_nN, there.position_um, model_um, none.centre_um, threads);
     const Step step = step_of(there, fit.trial, problem.force_derivatives(fit.trial), motions);
-    const double length_um = step.value.head<2>().norm(), sigma_um = std::max(step.sigma[0], step.sigma[1]);
+    const double length_um = way_um(step.value, lever_um), sigma_um = std::max(step.sigma[0], step.sigma[1]);
     if (setting == Switch::automatic && !(sigma_um < 0.5 * width_um)) {
       return off("the beads do not tell it: " + in_words(moved(result.placement, step.value).shift_um, step.sigma));
     }
-    if (length_um < kLinear * width_um) {
+    const double small = pass == 0 ? kSmallAtRest : kSmall;
+    const bool is_found = (step.value.array().abs() < small * step.sigma.array()).all() || pass + 1 == kMostPasses;
+    if (is_found && length_um < kLinear * width_um) {
       result.data = with_more_motions(std::move(there), motions);
       result.effect = stage::decided(EffectKind::channel_shift, setting, true, "found with the tensions");
       result.effect.seconds = watch.seconds();

@@ -26,8 +26,12 @@ struct ShiftedCell {
 
   /// Fitted on the network that made the forces.
   std::pair<EnsembleFit, FoundPlacement> fit(Switch setting = Switch::automatic) const {
+    return fit_on(scene.cables.network(), setting);
+  }
+
+  std::pair<EnsembleFit, FoundPlacement> fit_on(const Network& network, Switch setting = Switch::automatic) const {
     std::vector<cables::CableNetwork> networks;
-    networks.emplace_back(scene.cables.network(), scene.cables.parameters());
+    networks.emplace_back(network, scene.cables.parameters());
     LinearData data = data_of(scene.beads);
     const Trial start = uniform_start({networks.front(), data.reduced, scene.adhesion_ids});
     PlacedCell place = place_cell(
@@ -128,6 +132,27 @@ TEST(Placement, wherever_the_images_say_the_cell_lies_the_tensions_are_the_same)
         << "what is left of the shift is linear to a fraction of the error";
     EXPECT_LE(norm(found.placement.shift_um - shift - no_shift.placement.shift_um), 0.5 * found.sigma.head(2).norm());
     EXPECT_NEAR(found.placement.turn_rad, 0.01 + no_shift.placement.turn_rad, 0.5 * found.sigma[2]);
+  }
+}
+
+/// Forces that are not the truth's make a field that tells too little of each step: the rest is found by further ones.
+/// A cell where it should be tells what noise and the other network make of its place.
+TEST(Placement, is_found_whole_on_a_network_that_is_not_the_cells_own) {
+  mesh::NetworkParameters other = test::thesis_network();
+  other.edge_length_um = 2;
+  constexpr unsigned kSeeds = 4;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    const ShiftedCell still = shifted_cell({}, 0, 0.03, seed);
+    const Network network = mesh::generate_network(still.cell, other).network;
+    const FoundPlacement at_rest = still.fit_on(network).second;
+    for (const double turn_rad : {0.02, -0.05}) {
+      const FoundPlacement found = shifted_cell({0.1, 0}, turn_rad, 0.03, seed).fit_on(network).second;
+      const Vec2 shift = found.placement.of({30, 30}) - at_rest.placement.of({30, 30});
+      // at rest up to two standard errors by noise are left to one step, which misses a third of them at most
+      EXPECT_NEAR(found.placement.turn_rad - at_rest.placement.turn_rad, turn_rad, 2.0 / 3 * found.sigma[2]) << seed;
+      EXPECT_NEAR(shift.x, 0.1, 2.0 / 3 * found.sigma[0]) << seed;
+      EXPECT_NEAR(shift.y, 0, 2.0 / 3 * found.sigma[1]) << seed;
+    }
   }
 }
 
