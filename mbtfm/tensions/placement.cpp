@@ -99,9 +99,7 @@ std::string in_words(Vec2 shift_um, const Eigen::Vector3d& sigma) {
 }
 
 /// How far a step moves the adhesions, root mean square: about their centre shift and turn add by squares.
-double way_um(const Eigen::Vector3d& step, double lever_um) {
-  return std::hypot(step[0], step[1], step[2] * lever_um);
-}
+double way_um(const Eigen::Vector3d& step, double lever_um) { return std::hypot(step[0], step[1], step[2] * lever_um); }
 
 /// The placement, then a small step in the cell's frame.
 Placement moved(Placement placement, const Eigen::Vector3d& step) {

@@ -326,7 +326,7 @@ TEST(SheetFit, the_outlines_part_is_what_a_larger_sheet_makes_of_the_fit) {
   const sheet::Scene scene = disc.scene(3, 1);
   const Eigen::MatrixXd changes = changes_by_outline_um(scene, sheet::solve_on(*disc.ground, disc.elements, scene),
                                                         *disc.model, places, kFurther_um, 1);
-  const std::vector<SheetEstimate> before = fit.estimates;
+  const auto before = fit.estimates;
   add_error(fit, &SheetErrorParts::outline, changes.leftCols(1));
   for (std::size_t i = 0; i < beads.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);

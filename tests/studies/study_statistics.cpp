@@ -180,7 +180,9 @@ void study_primary(int n_simulations) {
           study.cells[i].replicate = std::to_string(i % 4);
         const Sample sample = sample_tensions(study);
         const ModelResult model = model_of(sample);
-        const Primary primary = primary_of(study, sample, model.model, compare(sample, model.model), {});
+        const auto kind = std::ranges::find(sample.kinds, name_of(FibreType::ventral)) - sample.kinds.begin();
+        const Primary primary = primary_of(study, "tension of ventral fibres", sample, static_cast<int>(kind),
+                                           model.model, compare(sample, model.model));
         for (const PrimaryDifference& d : primary.differences) ++n, n_found += d.p_holm < 0.05 ? 1 : 0;
       }
       const double share = static_cast<double>(n_found) / n;
