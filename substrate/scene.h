@@ -3,13 +3,12 @@
 
 #include <cstdint>
 
+#include "pipeline/contract/extent.h"
 #include "substrate/ellipse.h"
 
 namespace mbtfm::substrate {
 
-struct Extent {
-  Vec2 low_um, high_um;
-};
+using mbtfm::Extent;
 
 /// The smallest axis-parallel rectangle around points and ellipses. @throws InvalidData where there are none
 Extent extent_of(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses);

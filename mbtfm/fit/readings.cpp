@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/fit_results.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 #include "substrate/response.h"
 
@@ -83,16 +85,6 @@ DisplacementField some_of(const DisplacementField& beads) {
   DisplacementField some;
   for (std::size_t i = 0; i < beads.size(); i += step) some.push_back(beads[i]);
   return some;
-}
-
-/// Of the rectangle that the beads fill: the middle of their images.
-Vec2 middle_of(const DisplacementField& beads) {
-  Vec2 low = beads.front().position_um, high = low;
-  for (const Bead& b : beads) {
-    low = {std::min(low.x, b.position_um.x), std::min(low.y, b.position_um.y)};
-    high = {std::max(high.x, b.position_um.x), std::max(high.y, b.position_um.y)};
-  }
-  return 0.5 * (low + high);
 }
 
 DisplacementField changed(DisplacementField beads, const Change& by, Vec2 middle) {
@@ -209,7 +201,7 @@ Reading best_reading(const GelUnderCell& on, const DisplacementField& given, con
                           noise_um);
   };
   Best best(left_of(beads));
-  const Vec2 middle = middle_of(given);
+  const Vec2 middle = extent_of(points_of(given)).middle_um();  // of the images, which the beads fill
   for (const Change& change : changes()) best.consider(change.what, left_of(changed(beads, change, middle)));
   if (best.reading.unexplained_share < 0.5 * best.reading.unexplained_as_is) return best.reading;
   const Scale scale = best_scale(rough_scale(on.cell, beads), [&](double s) { return left_of(scaled(beads, s)); });

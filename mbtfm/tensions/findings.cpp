@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::tensions {
@@ -102,13 +103,10 @@ struct Region {
 Region worst_region(const LinearData& data, const Eigen::VectorXd& forces_nN, double noise_um) {
   constexpr double kBeads = 60, kFewest = 30;
   const Eigen::VectorXd residual = residual_um(data, forces_nN);
-  Vec2 low{1e300, 1e300}, high{-1e300, -1e300};
-  for (const Vec2 p : data.position_um) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
+  const Extent field = extent_of(data.position_um);
+  const Vec2 low = field.low_um;
   const double n = static_cast<double>(data.position_um.size());
-  const double side_um = std::sqrt(kBeads / std::max(1.0, n) * (high.x - low.x) * (high.y - low.y));
+  const double side_um = std::sqrt(kBeads / std::max(1.0, n) * field.area_um2());
   if (!(side_um > 0) || noise_um <= 0) return {};
   struct Sum {
     double squares = 0, n = 0;
@@ -298,13 +296,8 @@ double unexplained_share(const FitSummary& summary) {
 
 std::vector<int> adhesions_without_beads(const std::vector<Adhesion>& adhesions, const std::vector<Vec2>& beads_um) {
   constexpr double kFar = 3;  // distances of beads: at random the chance is exp(−9 pi)
-  Vec2 low{1e300, 1e300}, high{-1e300, -1e300};
-  for (const Vec2 p : beads_um) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
-  const double field_um2 = (high.x - low.x) * (high.y - low.y);
-  const double far_um = kFar * std::sqrt(field_um2 / std::max(1.0, static_cast<double>(beads_um.size())));
+  const double far_um =
+      kFar * std::sqrt(extent_of(beads_um).area_um2() / std::max(1.0, static_cast<double>(beads_um.size())));
   std::vector<int> ids;
   for (const Adhesion& a : adhesions) {
     const auto is_near = [&](Vec2 bead) { return norm(bead - a.position_um) <= far_um; };

@@ -5,17 +5,14 @@
 
 #include "pipeline/contract/beads_in_space.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 
 namespace mbtfm {
 
 double beads_per_um2(const DisplacementField& beads) {
-  if (beads.empty()) return 0;
-  Vec2 low = beads.front().position_um, high = low;
-  for (const Bead& b : beads) {
-    low = {std::min(low.x, b.position_um.x), std::min(low.y, b.position_um.y)};
-    high = {std::max(high.x, b.position_um.x), std::max(high.y, b.position_um.y)};
-  }
-  const double area_um2 = (high.x - low.x) * (high.y - low.y);
+  std::vector<Vec2> places_um;
+  for (const Bead& b : beads) places_um.push_back(b.position_um);
+  const double area_um2 = extent_of(places_um).area_um2();
   return area_um2 > 0 ? static_cast<double>(beads.size()) / area_um2 : 0;
 }
 

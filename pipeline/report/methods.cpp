@@ -23,18 +23,11 @@ std::string of_the_gel(const Gel& gel) {
 
 /// Beads in the area that they cover.
 std::string of_the_beads(const CellResults& results) {
-  std::size_t n_used = 0;
-  Vec2 low{}, high{};
-  for (const Bead& bead : results.displacement) {
-    if (!bead.flag.empty()) continue;
-    const Vec2 p = bead.position_um;
-    low = n_used == 0 ? p : Vec2{std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = n_used == 0 ? p : Vec2{std::max(high.x, p.x), std::max(high.y, p.y)};
-    ++n_used;
-  }
-  const double area_um2 = (high.x - low.x) * (high.y - low.y);
-  std::string text = fmt::format("Displacements were known at {} beads", n_used);
-  if (area_um2 > 0) text += fmt::format(" ({} per µm²)", charts::readable(static_cast<double>(n_used) / area_um2));
+  DisplacementField used = results.displacement;
+  std::erase_if(used, [](const Bead& bead) { return !bead.flag.empty(); });
+  const double density = beads_per_um2(used);
+  std::string text = fmt::format("Displacements were known at {} beads", used.size());
+  if (density > 0) text += fmt::format(" ({} per µm²)", charts::readable(density));
   return text +
          fmt::format(", with a noise of {} nm for each component.", charts::readable(1000 * results.fit.noise_um));
 }
