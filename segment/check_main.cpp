@@ -55,6 +55,7 @@ survey::CellImages images_of(const fs::path& cell, const runner::ImageNames& nam
   const Chosen chosen = chosen_in(cell / "cell.toml");
   survey::CellImages images;
   images.given_pixel_size_um = chosen.segment.pixel_size_um;
+  images.given_beads_pixel_size_um = chosen.track.beads_pixel_size_um;
   if (const auto file = runner::resolve_optional_image(cell, names, "adhesion"))
     images.adhesion = channel(*file, chosen.segment.adhesion_plane);
   // a sheet's outline may be a mask

@@ -427,11 +427,26 @@ TrackParameters switched(const TrackStageParameters& given) {
   TrackParameters parameters = given.track;
   parameters.drift_affine = given.effects.drift_affine;
   parameters.effect_tolerance = given.effects.effect_tolerance;
+  if (parameters.beads_pixel_size_um) parameters.pixel_size_um = parameters.beads_pixel_size_um;
   return parameters;
+}
+
+/// What is wrong with the images at first sight.
+void look(const TrackStageParameters& given, stage::StageContext& context) {
+  if (!context.has_input("cell_image") || !context.has_input("relaxed")) return;
+  const auto field = [&](const char* name, std::optional<double> pixel_size_um) {
+    const fs::path file = context.input(name);
+    images::NamedField result{.name = file.string(), .field = images::read_field(file)};
+    if (pixel_size_um) result.field.pixel_size_um = pixel_size_um;
+    return result;
+  };
+  images::require_same_field(field("cell_image", given.track.pixel_size_um),
+                             field("relaxed", switched(given).pixel_size_um));
 }
 
 StageReport run(const TrackStageParameters& given, stage::StageContext& context) {
   const TrackParameters parameters = switched(given);
+  look(given, context);
   cv::setNumThreads(context.threads);
   const bool has_images = context.has_input("stressed") || context.has_input("relaxed");
   if (context.has_input("displacement")) {
@@ -475,9 +490,11 @@ int main(int argc, char** argv) {
              "adhesions.csv of the cell: helps to follow single beads where adhesions pull strongly; not used with "
              "stacks, windows or --displacement"},
             {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
+            {"cell_image", Kind::optional_input,
+             "image of the cell: it must show the same field as the bead images, which its size tells"},
             {"kept", Kind::optional_input,
              "output folder of an earlier run with the same images and parameters: frames that are there are kept"},
             {"out", Kind::output_folder,
              "folder for displacement.csv, displacement.vtp, beads.jpg; of stacks for displacement_3d.csv, .vtp"}}},
-      argc, argv, mbtfm::beads::run);
+      argc, argv, mbtfm::beads::run, mbtfm::beads::look);
 }

@@ -22,6 +22,7 @@ const Stage& stage_named(const std::string& name) {
 Stage tracking() {
   Stage stage = stage_named("track");
   stage.instead.reset();
+  stage.beside.clear();
   stage.arguments.clear();
   stage.reads_where_there.clear();
   stage.optional_images = {{"surface_beads", "surface_beads"}};

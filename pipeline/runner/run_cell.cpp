@@ -56,6 +56,23 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
   return command;
 }
 
+/// Flags and files of the images that a stage compares with those of others; none where it looks at no others.
+std::vector<std::string> to_look_at(const Stage& stage, const fs::path& cell, const ImageNames& images) {
+  std::vector<std::string> flags;
+  for (const ImageInput& other : stage.beside) {
+    const auto file = resolve_optional_image(cell, images, other.key);
+    if (file && flags.empty()) flags = {"--" + other.flag, file->string()};  // they are of one size
+  }
+  if (flags.empty()) return {};
+  for (const ImageInput& image : images_of(stage, images)) {
+    if (const auto file = resolve_image(cell, images, image)) {
+      flags.push_back("--" + image.flag);
+      flags.push_back(file->string());
+    }
+  }
+  return flags;
+}
+
 /// The command as run.json tells it: paths relative to the cell folder, the program by its name.
 std::vector<std::string> command_to_tell(std::vector<std::string> command, const fs::path& cell) {
   command.front() = fs::path(command.front()).filename().string();
@@ -206,7 +223,9 @@ void CellRun::check_before_start(CellOutcome& now) const {
     note_failure(now.stages[i], [&] {
       for (const ImageInput& image : images_of(stage, images_)) resolve_image(cell_, images_, image);
       for (const ImageInput& image : stage.optional_images) resolve_optional_image(cell_, images_, image.key);
-      if (!options_.is_checked) check_parameters(stage, cell_ / "cell.toml", options_);
+      const std::vector<std::string> inputs = to_look_at(stage, cell_, images_);
+      if (!options_.is_checked || !inputs.empty())
+        check_parameters(stage, cell_ / "cell.toml", options_, print_on, inputs);
     });
   }
 }
@@ -386,14 +405,17 @@ std::string CellOutcome::not_converged() const {
   return names;
 }
 
-void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOptions& options, const Sink& sink) {
-  const ProcessResult check =
-      run_process({executable_of(stage, options), "--check", "--config", toml_file.string()}, options.limits, sink);
+void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOptions& options, const Sink& sink,
+                      const std::vector<std::string>& inputs) {
+  std::vector<std::string> command = {executable_of(stage, options), "--check", "--config", toml_file.string()};
+  command.insert(command.end(), inputs.begin(), inputs.end());
+  const ProcessResult check = run_process(command, options.limits, sink);
   if (check.exit_code == 0 && !check.signal) return;
   StageFailure failure = failure_of(check);
   const bool is_refusal =
       !check.signal && (check.exit_code == exit_code::kUsage || check.exit_code == exit_code::kInput);
-  failure.how = is_refusal ? "does not accept cell.toml" : failure.how + " while it read cell.toml";
+  const std::string looked_at = inputs.empty() ? "cell.toml" : "cell.toml and the images";
+  failure.how = is_refusal ? "does not accept " + looked_at : failure.how + " while it read " + looked_at;
   throw StageFailed(stage.name, std::move(failure));
 }
 

@@ -75,8 +75,9 @@ CellOutcome look_at_cell(const std::filesystem::path& cell, const RunOptions& op
 bool is_done(const std::filesystem::path& cell, const RunOptions& options, const CellOutcome& now);
 
 /// Does the stage accept this cell.toml? It prints why not. @throws StageFailed where it does not
+/// @param inputs  flags and files that it looks at, too
 void check_parameters(const Stage& stage, const std::filesystem::path& toml_file, const RunOptions& options,
-                      const Sink& sink = print_on);
+                      const Sink& sink = print_on, const std::vector<std::string>& inputs = {});
 
 /// Names of [images] from cell.toml. @throws InputError where there is no cell.toml, or for an unknown table or key
 ImageNames read_image_names(const std::filesystem::path& cell);

@@ -45,6 +45,7 @@ const std::vector<Stage>& stages() {
        .images = {{"stressed", "beads_stressed"}, {"relaxed", "beads_relaxed"}},
        .instead = ImageInput{"displacement", "displacement"},
        .optional_images = {},
+       .beside = {{"cell_image", "adhesion"}, {"cell_image", "actin"}},
        .arguments = {{"adhesions", cell_files[0], PathArgument::Given::if_there}},
        .output = {"out", "2_track"},
        .reads = {},

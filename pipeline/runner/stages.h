@@ -37,6 +37,7 @@ struct Stage {
   std::vector<ImageInput> images;
   std::optional<ImageInput> instead = {};   ///< of the images, where [images] names it
   std::vector<ImageInput> optional_images;  ///< used where they are there
+  std::vector<ImageInput> beside = {};      ///< of others, which it looks at where they are there before anything runs
   std::vector<PathArgument> arguments;      ///< further inputs that earlier stages write
   PathArgument output;
   std::vector<std::string> reads;              ///< files behind `arguments`, relative to the cell folder

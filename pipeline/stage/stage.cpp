@@ -62,7 +62,7 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
   app.add_option("--threads", line.threads, "processors to use")->check(CLI::Range(1, 1024))->capture_default_str();
   app.add_flag("--quiet", line.is_quiet, "print errors only");
   app.add_flag("--json", line.is_json, "print progress, findings and effects as JSON, one object a line");
-  app.add_flag("--check", line.only_check, "read the parameters, run nothing");
+  app.add_flag("--check", line.only_check, "read the parameters, look at the inputs that are given, run nothing");
   app.add_flag("--parameters", line.only_parameters, "print the table of parameters (Markdown)");
   app.add_flag("--version", line.only_version, "print the version");
   app.add_option("--manuals", line.manuals, "write manual page and completions below this folder")->group("");
@@ -94,12 +94,14 @@ void set_parameters(ParameterList& list, const CommandLine& line, const CLI::App
   check_complete(list);
 }
 
-void set_files(StageContext& context, const StageDescription& description, const CommandLine& line) {
+enum class Need { as_described, where_given };
+
+void set_files(StageContext& context, const StageDescription& description, const CommandLine& line, Need need) {
   using Kind = FileArgument::Kind;
   for (const FileArgument& file : description.files) {
     const std::string& path = line.files.at(file.name);
     const bool is_output = file.kind == Kind::output || file.kind == Kind::output_folder;
-    if (path.empty() && file.kind != Kind::optional_input) {
+    if (path.empty() && file.kind != Kind::optional_input && need == Need::as_described) {
       throw UsageError("--" + file.name + " is missing: " + file.meaning);
     }
     if (path.empty()) continue;
@@ -284,7 +286,7 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
         const std::function<StageReport(StageContext&)>& body) {
   const auto begin = std::chrono::steady_clock::now();
   const std::string started = numerics::utc_now();
-  set_files(context, description, line);
+  set_files(context, description, line, Need::as_described);
   context.threads = line.threads;
   const Reader whose = reader(line.is_quiet, line.is_json);
   context.progress = progress_for(description.name, whose);
@@ -380,7 +382,7 @@ void StageContext::make_folder(const fs::path& folder) {
 
 int run_stage(const StageDescription& description, int argc, char** argv,
               const std::function<void(ParameterList&)>& declare_parameters,
-              const std::function<StageReport(StageContext&)>& body) {
+              const std::function<StageReport(StageContext&)>& body, const std::function<void(StageContext&)>& look) {
   const std::string& stage = description.name;
   numerics::restart_as_blas_needs(argv);
   watch_signals(SecondSignal::ends_at_once);
@@ -414,7 +416,11 @@ int run_stage(const StageDescription& description, int argc, char** argv,
     context.allowed_ = allowed_quantities(checks);
     context.doubts = doubts_about(list, context.allowed_);
     context.assumed = assumed_inputs(list);
-    if (line.only_check) return kDone;
+    if (line.only_check) {
+      set_files(context, description, line, Need::where_given);
+      if (look) look(context);
+      return kDone;
+    }
     numerics::reserve_blas_buffers(line.threads);
     return run(description, list, line, std::move(context), body);
   } catch (...) {

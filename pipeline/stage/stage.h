@@ -81,18 +81,25 @@ StageReport read_report(const std::filesystem::path& record_file);
 /// Parse the arguments, read the parameters, call `body`, put the outputs in place, write the record, return the exit
 /// code. Flags of every stage: --help --version --threads --quiet --config (or --gel)
 /// --record --check --parameters.
+/// @param look  at the inputs that are given with --check: what the body would refuse at once. None: --check reads the
+///              parameters alone
 int run_stage(const StageDescription& description, int argc, char** argv,
               const std::function<void(ParameterList&)>& declare_parameters,
-              const std::function<StageReport(StageContext&)>& body);
+              const std::function<StageReport(StageContext&)>& body,
+              const std::function<void(StageContext&)>& look = {});
 
 /// The same for a struct with a `declare(ParameterList&, Parameters&)` beside it.
 template <class Parameters>
 int run_stage(const StageDescription& description, int argc, char** argv,
-              const std::function<StageReport(const Parameters&, StageContext&)>& body) {
+              const std::function<StageReport(const Parameters&, StageContext&)>& body,
+              const std::function<void(const Parameters&, StageContext&)>& look = {}) {
   Parameters parameters;
   return run_stage(
       description, argc, argv, [&](ParameterList& list) { declare(list, parameters); },
-      [&](StageContext& context) { return body(parameters, context); });
+      [&](StageContext& context) { return body(parameters, context); },
+      [&](StageContext& context) {
+        if (look) look(parameters, context);
+      });
 }
 
 }  // namespace mbtfm::stage

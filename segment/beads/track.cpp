@@ -251,6 +251,9 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
   list.table("track");
   declare(list, p.stressed_plane, "stressed", "the stressed bead image");
   declare(list, p.relaxed_plane, "relaxed", "the relaxed bead image");
+  list.add("beads_pixel_size_um", p.beads_pixel_size_um, Range::pixel_um(),
+           "side of a pixel of the bead images in the specimen (um), if it is another than that of the cell's images, "
+           "as of beads that were binned; unset: pixel_size_um");
   list.add(
       "stressed_last", p.stressed_last, {.low = 0},
       "last stressed_time, or stressed_page, of a time series, each tracked against the relaxed image; 0: one image");

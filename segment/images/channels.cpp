@@ -8,20 +8,62 @@
 
 namespace mbtfm::images {
 
+std::string in_um(double length_um) { return shortest(length_um) + " um"; }
+
 namespace {
 
-std::string size_of(const Image& image) {
+template <class Sized>
+std::string size_of(const Sized& image) {
   return std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels";
 }
 
-}  // namespace
+/// How many pixels of `fine` are one of `coarse`, if it is the same number in both directions.
+std::optional<double> pixels_in_one(const ImageField& fine, const ImageField& coarse) {
+  const double across = double(fine.width) / coarse.width, down = double(fine.height) / coarse.height;
+  const double of_a_pixel = across / std::min(coarse.width, coarse.height);  // what fills no block is left out
+  if (std::abs(across - down) > 2 * of_a_pixel) return std::nullopt;
+  const double whole = std::round(across);
+  return std::abs(across - whole) <= 2 * of_a_pixel ? whole : across;
+}
 
-std::string in_um(double length_um) { return shortest(length_um) + " um"; }
+/// "1024 x 1024 pixels of 0.1 um, 102.4 x 102.4 um".
+std::string in_words(const ImageField& field) {
+  if (!field.pixel_size_um) return size_of(field);
+  return size_of(field) + " of " + in_um(*field.pixel_size_um) + ", " + brief(field.width * *field.pixel_size_um) +
+         " x " + brief(field.height * *field.pixel_size_um) + " um";
+}
+
+std::string remedy_of(const ImageField& cell, const ImageField& beads) {
+  const std::string cropped = "if they were cropped, crop all images of the cell to one field, from one corner on";
+  const bool is_same_count = cell.width == beads.width && cell.height == beads.height;
+  if (is_same_count) return "set pixel_size_um to the right one; " + cropped;
+  const std::optional<double> times = pixels_in_one(cell, beads);
+  if (!times || !cell.pixel_size_um) return cropped;
+  return "if both show one field, as images that were binned do, set track.beads_pixel_size_um = " +
+         shortest(*times * *cell.pixel_size_um) + "; " + cropped;
+}
+
+}  // namespace
 
 void require_equal_sizes(const Channel& first, const Channel& second) {
   if (first.image.width == second.image.width && first.image.height == second.image.height) return;
   throw InputError(second.name, size_of(first.image) + " as in " + first.name, size_of(second.image),
                    "both images must show the same field at the same magnification");
+}
+
+void require_same_field(const NamedField& cell, const NamedField& beads) {
+  ImageField c = cell.field, b = beads.field;
+  if (!c.pixel_size_um) c.pixel_size_um = b.pixel_size_um;
+  if (!b.pixel_size_um) b.pixel_size_um = c.pixel_size_um;
+  const double of_cell = c.pixel_size_um.value_or(1), of_beads = b.pixel_size_um.value_or(1);
+  constexpr double kSame = 2e-3;  // calibrations are written with three digits or more
+  const auto is_same = [&](int n_cell, int n_beads) {
+    const double side = n_cell * of_cell;
+    // of a side that is no multiple of the binning a pixel is left out
+    return std::abs(side - n_beads * of_beads) <= kSame * side + 1.001 * std::max(of_cell, of_beads);
+  };
+  if (is_same(c.width, b.width) && is_same(c.height, b.height)) return;
+  throw InputError(beads.name, "the field of " + cell.name + ", " + in_words(c), in_words(b), remedy_of(c, b));
 }
 
 double common_pixel_size_um(const Channel& first, const Channel& second, std::optional<double> given_um) {

@@ -23,6 +23,16 @@ std::string in_um(double length_um);
 /// @throws InputError where the two are not of one size
 void require_equal_sizes(const Channel& first, const Channel& second);
 
+/// Size and calibration of an image, and the name by which errors call it.
+struct NamedField {
+  std::string name;
+  ImageField field;
+};
+/// The images of the beads and those of the cell must show one field from one corner on: all places are counted from
+/// there. Pixels may differ, as of images that were binned, if they are stated.
+/// @throws InputError where they do not
+void require_same_field(const NamedField& cell, const NamedField& beads);
+
 /// The pixel size of two images of one field: the one given, or else the calibration that they have.
 /// @throws InputError where neither tells it, or they contradict each other
 double common_pixel_size_um(const Channel& first, const Channel& second, std::optional<double> given_um);

@@ -140,6 +140,12 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
   throw InputError(file.string(), kExpected, head.empty() ? "an empty file" : "bytes of neither");
 }
 
+ImageField read_field(const std::filesystem::path& file) {
+  if (is_tiff(file)) return read_tiff_field(file);
+  const Image image = read_image(file);
+  return {image.width, image.height, image.pixel_size_um};
+}
+
 bool is_tiff(const std::filesystem::path& file) { return begins_as_tiff(head_of(file)); }
 
 std::vector<Image> read_slices(const std::filesystem::path& file, const PlaneChoice& choice) {

@@ -48,6 +48,14 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice = 
 /// A page, from 0, as it lies in the file.
 inline Image read_image(const std::filesystem::path& file, int page) { return read_image(file, {.page = page + 1}); }
 
+/// Size and calibration, of a file of several planes those of the first page: of a TIFF without its pixels.
+struct ImageField {
+  int width = 0, height = 0;
+  std::optional<double> pixel_size_um;
+};
+/// @throws InputError as read_image
+ImageField read_field(const std::filesystem::path& file);
+
 /// By its first bytes. @throws InputError where the file cannot be read
 bool is_tiff(const std::filesystem::path& file);
 

@@ -14,6 +14,9 @@ namespace mbtfm::images {
 /// Read a plane of a file that begins as a TIFF. @throws InputError
 Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice);
 
+/// Of its first page. @throws InputError
+ImageField read_tiff_field(const std::filesystem::path& file);
+
 /// All its slices. @throws InputError
 std::vector<Image> read_tiff_slices(const std::filesystem::path& file, const PlaneChoice& choice);
 

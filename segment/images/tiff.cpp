@@ -50,6 +50,11 @@ class TiffReader {
     return image;
   }
 
+  ImageField field() {
+    const Layout first = layout();
+    return {static_cast<int>(first.width), static_cast<int>(first.height), calibration_};
+  }
+
   std::vector<Image> read_slices(PlaneChoice all) {
     all.z = kProjection;
     std::vector<int> pages(static_cast<std::size_t>(n_pages()));
@@ -424,6 +429,8 @@ class TiffReader {
 std::vector<Image> read_tiff_slices(const std::filesystem::path& file, const PlaneChoice& choice) {
   return TiffReader(file).read_slices(choice);
 }
+
+ImageField read_tiff_field(const std::filesystem::path& file) { return TiffReader(file).field(); }
 
 Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice) { return TiffReader(file).read(choice); }
 

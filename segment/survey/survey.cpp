@@ -32,6 +32,16 @@ std::vector<const Channel*> all_of(const CellImages& cell) {
   return all;
 }
 
+/// Of the bead images, as cell.toml has it.
+std::optional<double> given_for_beads(const CellImages& cell) {
+  return cell.given_beads_pixel_size_um ? cell.given_beads_pixel_size_um : cell.given_pixel_size_um;
+}
+
+images::NamedField field_of(const Channel& channel, std::optional<double> given_um) {
+  const images::Image& image = channel.image;
+  return {channel.name, {image.width, image.height, given_um ? given_um : image.pixel_size_um}};
+}
+
 double pixel_size_um(const CellImages& cell) {
   std::optional<double> size = cell.given_pixel_size_um;
   const std::vector<const Channel*> all = all_of(cell);
@@ -63,8 +73,10 @@ double bead_size_px(const images::Image& image) {
   return beads::bead_sigma_of(beads::without_background(image, kWide_px));
 }
 
-void look_at_beads(const CellImages& cell, double pixel_um, int threads, Survey& survey) {
+void look_at_beads(const CellImages& cell, int threads, Survey& survey) {
   if (!cell.beads_stressed || !cell.beads_relaxed) return;
+  const double pixel_um =
+      images::common_pixel_size_um(*cell.beads_relaxed, *cell.beads_stressed, given_for_beads(cell));
   const images::Image& relaxed = cell.beads_relaxed->image;
   const double size_relaxed = bead_size_px(relaxed), size_stressed = bead_size_px(cell.beads_stressed->image);
   for (const Channel* channel : {&*cell.beads_relaxed, &*cell.beads_stressed}) {
@@ -136,16 +148,24 @@ Survey survey(const CellImages& cell, int threads) {
   if (all.empty()) return {.facts = "no images", .doubts = {}};
   if (cell.adhesion && cell.actin) images::require_equal_sizes(*cell.adhesion, *cell.actin);
   if (cell.beads_stressed && cell.beads_relaxed) images::require_equal_sizes(*cell.beads_stressed, *cell.beads_relaxed);
+  for (const auto* of_cell : {&cell.adhesion, &cell.actin}) {
+    if (*of_cell && cell.beads_relaxed)
+      images::require_same_field(field_of(**of_cell, cell.given_pixel_size_um),
+                                 field_of(*cell.beads_relaxed, given_for_beads(cell)));
+  }
   const double pixel_um = pixel_size_um(cell);
   survey.facts = std::to_string(all[0]->image.width) + " x " + std::to_string(all[0]->image.height) + " pixels of " +
                  images::in_um(pixel_um);
   for (const Channel* image : all) {
-    if (const auto doubt = images::doubt_about_calibration(*image, cell.given_pixel_size_um))
+    const auto is_it = [&](const std::optional<Channel>& channel) { return channel && image == &*channel; };
+    const bool is_of_beads = is_it(cell.beads_relaxed) || is_it(cell.beads_stressed);
+    if (const auto doubt = images::doubt_about_calibration(
+            *image, is_of_beads ? given_for_beads(cell) : cell.given_pixel_size_um))
       survey.doubts.push_back(image->name + ": " + stage::sentence_of(*doubt) + ". " + doubt->remedy);
   }
   look_at_each(cell, survey);
   look_for_twins(cell, survey);
-  look_at_beads(cell, pixel_um, threads, survey);
+  look_at_beads(cell, threads, survey);
   look_at_cell(cell, pixel_um, survey);
   look_at_adhesions(cell, pixel_um, survey);
   return survey;
