@@ -32,9 +32,9 @@ enum class LengthUnit {
 constexpr auto words(LengthUnit) { return std::array{"um", "px"}; }
 
 struct TrackParameters {
-  std::optional<double> pixel_size_um;  ///< unset: from the images' own calibration
+  std::optional<double> pixel_size_um;        ///< unset: from the images' own calibration
   std::optional<double> beads_pixel_size_um;  ///< of the bead images alone; unset: as all
-  images::PlaneChoice stressed_plane;   ///< of a time series the first
+  images::PlaneChoice stressed_plane;         ///< of a time series the first
   images::PlaneChoice relaxed_plane;
   int stressed_last = 0;                        ///< of a time series the last time or page; 0: a single image
   TrackMethod method = TrackMethod::automatic;  ///< single beads know most where they can be told apart

@@ -159,8 +159,8 @@ Survey survey(const CellImages& cell, int threads) {
   for (const Channel* image : all) {
     const auto is_it = [&](const std::optional<Channel>& channel) { return channel && image == &*channel; };
     const bool is_of_beads = is_it(cell.beads_relaxed) || is_it(cell.beads_stressed);
-    if (const auto doubt = images::doubt_about_calibration(
-            *image, is_of_beads ? given_for_beads(cell) : cell.given_pixel_size_um))
+    if (const auto doubt =
+            images::doubt_about_calibration(*image, is_of_beads ? given_for_beads(cell) : cell.given_pixel_size_um))
       survey.doubts.push_back(image->name + ": " + stage::sentence_of(*doubt) + ". " + doubt->remedy);
   }
   look_at_each(cell, survey);

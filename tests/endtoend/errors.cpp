@@ -5,6 +5,7 @@
 #include <fstream>
 #include <random>
 
+#include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "segment/images/image.h"
@@ -89,6 +90,42 @@ TEST_F(Errors, bead_images_of_different_sizes_are_named_with_their_sizes) {
   small.pixels.resize(static_cast<std::size_t>(small.width) * small.height);
   images::write_tiff(cell_ / "beads_relaxed.tif", small);
   expect_error(kInput, {"beads_relaxed.tif", std::to_string(small.height)}, "2_track");
+}
+
+/// As a camera binds 2 x 2 pixels, and a program keeps half of an image.
+images::Image binned(const images::Image& fine) {
+  images::Image coarse = fine;
+  coarse.width /= 2, coarse.height /= 2;
+  coarse.pixels.assign(static_cast<std::size_t>(coarse.width) * coarse.height, 0);
+  coarse.pixel_size_um.reset();
+  for (int j = 0; j < coarse.height; ++j)
+    for (int i = 0; i < coarse.width; ++i)
+      coarse.at(i, j) = 0.25F * (fine.at(2 * i, 2 * j) + fine.at(2 * i + 1, 2 * j) + fine.at(2 * i, 2 * j + 1) +
+                                 fine.at(2 * i + 1, 2 * j + 1));
+  return coarse;
+}
+
+TEST_F(Errors, bead_images_of_another_field_are_refused_before_anything_runs_and_with_their_own_pixels_taken) {
+  for (const char* name : {"beads_relaxed.tif", "beads_stressed.tif"})
+    images::write_tiff(cell_ / name, binned(images::read_image(cell_ / name)));
+  const images::Image actin = images::read_image(cell_ / "actin.tif");
+  const std::string pixel = shortest(2 * actin.pixel_size_um.value());
+  const std::vector<std::string> words = {"beads_relaxed.tif", std::to_string(actin.width) + " x",
+                                          std::to_string(actin.width / 2) + " x",
+                                          "track.beads_pixel_size_um = " + pixel};
+  expect_error(kInput, words, "1_segment");
+  const Outcome check = run_program("mbtfm check " + cell_.string());
+  EXPECT_NE(check.code, 0);
+  EXPECT_NE(check.output.find(words.back()), std::string::npos) << check.output;
+
+  files::write_text(cell_ / "cell.toml",
+                    files::read_text(cell_ / "cell.toml") + "\n[track]\nbeads_pixel_size_um = " + pixel + "\n");
+  const Outcome run = run_program("mbtfm run " + cell_.string());
+  ASSERT_EQ(run.code, 0) << run.output;
+  double farthest_um = 0;
+  for (const Bead& bead : files::read_displacement(cell_ / "2_track/displacement.csv"))
+    farthest_um = std::max(farthest_um, bead.position_um.x);
+  EXPECT_NEAR(farthest_um / (actin.width * actin.pixel_size_um.value()), 1, 0.05) << "places in the cell's own um";
 }
 
 TEST_F(Errors, an_image_without_adhesions_says_so) {

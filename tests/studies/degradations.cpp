@@ -668,7 +668,7 @@ std::vector<std::string> names_of_cause(const std::string& degradation) {
       {"modulus-in-pascal", {"kPa"}},
       {"binned", {"pixel-size-unchecked"}},
       {"pixel-size-double", {"pixel-size-unchecked"}},
-      {"beads-binned", {"read-otherwise", "adhesions-without-beads"}},
+      {"beads-binned", {"track.beads_pixel_size_um"}},
       {"stretched", {"beads-not-round"}},
       {"beads-inverted", {"dark"}},
       {"actin-inverted", {"dark"}},

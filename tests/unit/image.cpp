@@ -370,5 +370,39 @@ TEST(Channels, a_saturated_image_is_noticed_by_the_share_of_its_pixels_at_the_la
   EXPECT_NE(found->text.find("a.tif is saturated: 0.5 % of its pixels"), std::string::npos) << found->text;
 }
 
+TEST(Channels, beads_of_another_field_are_refused_with_what_would_make_it_one) {
+  struct Case {
+    const char* what;
+    ImageField cell, beads;
+    const char* remedy;  ///< none: it is one field
+  };
+  const std::vector<Case> cases = {
+      {"alike", {1024, 1024, 0.1}, {1024, 1024, 0.1}, nullptr},
+      {"no pixel sizes known", {1024, 800, {}}, {1024, 800, {}}, nullptr},
+      {"binned, and both say so", {1024, 1024, 0.1}, {512, 512, 0.2}, nullptr},
+      {"binned, a column over", {1025, 1024, 0.1}, {512, 512, 0.2}, nullptr},
+      {"calibrations as a file rounds them", {1024, 1024, 0.1}, {1024, 1024, 0.1001}, nullptr},
+      {"binned untold", {1024, 1024, 0.1}, {512, 512, {}}, "track.beads_pixel_size_um = 0.2"},
+      {"binned by three, rows over", {1024, 1022, 0.1}, {341, 340, {}}, "track.beads_pixel_size_um = 0.3"},
+      {"twice as many", {512, 512, 0.2}, {1024, 1024, {}}, "track.beads_pixel_size_um = 0.1"},
+      {"half of the image", {1024, 1024, 0.1}, {1024, 512, {}}, "crop all images"},
+      {"a border cut off", {1024, 1024, 0.1}, {1000, 1000, 0.1}, "crop all images"},
+      {"another pixel size", {1024, 1024, 0.1}, {1024, 1024, 0.2}, "set pixel_size_um"},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.what);
+    try {
+      require_same_field({"actin.tif", c.cell}, {"beads.tif", c.beads});
+      EXPECT_EQ(c.remedy, nullptr) << "not refused";
+    } catch (const InputError& error) {
+      const std::string said = error.what();
+      ASSERT_NE(c.remedy, nullptr) << said;
+      for (const std::string& word : {std::string(c.remedy), std::string("beads.tif"), std::string("actin.tif"),
+                                      std::to_string(c.beads.width) + " x " + std::to_string(c.beads.height)})
+        EXPECT_NE(said.find(word), std::string::npos) << "'" << word << "' is not in: " << said;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace mbtfm::images
