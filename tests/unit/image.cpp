@@ -395,7 +395,7 @@ TEST(Channels, beads_of_another_field_are_refused_with_what_would_make_it_one) {
       require_same_field({"actin.tif", c.cell}, {"beads.tif", c.beads});
       EXPECT_EQ(c.remedy, nullptr) << "not refused";
     } catch (const InputError& error) {
-      const std::string said = error.what();
+      const std::string said = error.what() + error.hint;
       ASSERT_NE(c.remedy, nullptr) << said;
       for (const std::string& word : {std::string(c.remedy), std::string("beads.tif"), std::string("actin.tif"),
                                       std::to_string(c.beads.width) + " x " + std::to_string(c.beads.height)})
