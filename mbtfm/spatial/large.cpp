@@ -60,7 +60,7 @@ SpatialReconstruction reconstruct_large(const Problem& problem, const tractions:
     const Rows rows(problem, r.weighing.by_row);
     const tractions::Recurrences recurrences(map_of(problem, basis, rows), rows.of(observed.displacement_um), {});
     r.scan = recurrences.scan(stated_variance(problem, parameters.loss, r.weighing));
-    const ChosenLambda chosen = choose_lambda(problem, *r.scan, traction, false);
+    const ChosenLambda chosen = choose_lambda(problem, *r.scan, traction, RiskIs::unsound);
     r.lambda = chosen.lambda;
     r.lambda_by = chosen.by;
     r.findings = {chosen.finding};

@@ -88,14 +88,22 @@ struct ChosenLambda {
   std::optional<tractions::LambdaCriterion> by;  ///< none: given
   std::optional<Finding> finding;                ///< where it is not the criterion that was asked for
 };
+/// What the risk is worth.
+enum class RiskIs {
+  sound,
+  /// Few beads that are astray have stayed: that of the directions that are told from noise (15b), which these do not
+  /// move.
+  sound_where_told,
+  /// Cross-validation's lambda is taken. With a robust loss weights hang on the residuals, so that what they leave of
+  /// large displacements looks like noise to the risk. With traces from random signs it divides their errors by
+  /// lambda². It then smooths most tractions away.
+  unsound
+};
 /// The one that is given, or by the criterion. Where the risk's is below half of the evidence's, the evidence's:
 /// tractions then follow beads that are astray, or what the model has wrong, and the risk has no minimum but the end of
-/// the scan. The finding says so. Cross-validation's is taken for the risk's where that is not sound:
-/// with a robust loss, whose weights hang on the residuals, so that what they leave of large displacements looks like
-/// noise to it; and with traces from random signs, whose errors it divides by lambda². It then smooths most tractions
-/// away.
+/// the scan. The finding says so.
 ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
-                           const tractions::TractionParameters& traction, bool is_risk_sound);
+                           const tractions::TractionParameters& traction, RiskIs risk_is);
 
 /// The same as tikhonov where the problem has no matrix. No standard errors.
 SpatialReconstruction reconstruct_large(const Problem& problem, const tractions::TractionParameters& traction,

@@ -47,11 +47,13 @@ std::optional<double> stated_variance(const Problem& problem, BeadLoss loss, con
 }
 
 ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
-                           const tractions::TractionParameters& traction, bool is_risk_sound) {
+                           const tractions::TractionParameters& traction, RiskIs risk_is) {
   using enum tractions::LambdaCriterion;
   const double unit = lambda_per_um_per_kPa(problem);
   if (traction.lambda_um_per_kPa) return {*traction.lambda_um_per_kPa * unit, {}, {}};
-  const tractions::LambdaCriterion by = traction.lambda_by == risk && !is_risk_sound ? gcv : traction.lambda_by;
+  const tractions::LambdaCriterion by =
+      traction.lambda_by == risk && risk_is == RiskIs::unsound ? gcv : traction.lambda_by;
+  if (by == risk && risk_is == RiskIs::sound_where_told) return {scan.by_told_risk.value(), by, {}};
   ChosenLambda chosen{chosen_lambda(scan, by), by, {}};
   if (by != risk) return chosen;
   const auto length = [&](double lambda) { return brief(lambda / unit * problem.gel.youngs_modulus_kPa) + " um"; };
@@ -71,6 +73,11 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   SpatialReconstruction r;
   const Observed& observed = problem.observed;
   const std::vector<double> good = probabilities_of_good(parameters.loss, observed);
+  // a mixture of which no bead is left out is least squares
+  const bool leaves_none_out = std::ranges::none_of(good, [](double p) { return p == 0; });
+  const RiskIs risk_is = weighs_by_residual(parameters.loss)                        ? RiskIs::unsound
+                         : parameters.loss == BeadLoss::mixture && !leaves_none_out ? RiskIs::sound_where_told
+                                                                                    : RiskIs::sound;
   const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
     return spectrum.scan(largest(stated_variance(problem, parameters.loss, weighing), spectrum.variance_felt_least()));
   };
@@ -81,7 +88,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
     made.scan = judged ? scanned(spectrum_of(problem, response, judged->by_row, judged->n_data, threads), *judged)
                        : scanned(*made.spectrum, weighing);
-    made.chosen = choose_lambda(problem, made.scan, traction, !weighs_by_residual(parameters.loss));
+    made.chosen = choose_lambda(problem, made.scan, traction, risk_is);
     if (judged && made.chosen.by)
       made.chosen.lambda *= std::sqrt(weighing.variance / judged->variance);  // the same prior
     made.x = made.spectrum->solve(made.chosen.lambda);

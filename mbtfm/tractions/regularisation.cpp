@@ -42,6 +42,12 @@ double smallest_at(const std::vector<double>& values) {
   return smallest_at(values.size(), [&](double at) { return spline(at); });
 }
 
+/// At an index of the points, fractions too.
+double lambda_at(const std::vector<ScanPoint>& points, double at) {
+  const double first = std::log(points.front().lambda), last = std::log(points.back().lambda);
+  return std::exp(first + (last - first) * at / (static_cast<double>(points.size()) - 1));
+}
+
 std::vector<double> over_points(const std::vector<ScanPoint>& points,
                                 const std::function<double(const ScanPoint&)>& f) {
   std::vector<double> values;
@@ -102,16 +108,18 @@ Risks unbiased_risks(double n_data) {
   };
 }
 
+double lambda_of_least_risk(const std::vector<ScanPoint>& points, const std::vector<double>& risk) {
+  const RiskScale scale(risk);
+  std::vector<double> tamed;
+  for (const double r : risk) tamed.push_back(scale.to(r));
+  return lambda_at(points, smallest_at(tamed));
+}
+
 LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<double> stated_variance,
                  const std::function<double(double lambda)>& variance_left_at, const Risks& risks) {
   MBTFM_ASSERT(points.size() >= 5);
   LambdaScan scan;
   scan.points = std::move(points);
-  const auto lambda_at = [&](double at) {
-    const double first = std::log(scan.points.front().lambda), last = std::log(scan.points.back().lambda);
-    return std::exp(first + (last - first) * at / (static_cast<double>(scan.points.size()) - 1));
-  };
-
   // (12) Golub, Heath & Wahba 1979
   scan.gcv = over_points(scan.points, [&](const ScanPoint& p) {
     return n_data * p.misfit / std::pow(std::max(n_data - p.degrees, 1e-6 * n_data), 2);
@@ -119,7 +127,7 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
   std::vector<double> log_gcv;
   for (const double g : scan.gcv) log_gcv.push_back(log_of(g));
   const double gcv_at = smallest_at(log_gcv);
-  scan.by_gcv = lambda_at(gcv_at);
+  scan.by_gcv = lambda_at(scan.points, gcv_at);
 
   // (13) Hansen & O'Leary 1993. As lambda falls the L-curve runs left, then up: its corner turns clockwise.
   const auto x = spline_of(over_points(scan.points, [](const ScanPoint& p) { return log_of(p.misfit); }));
@@ -136,7 +144,7 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
   const double corner_at = std::clamp(
       smallest_at(scan.points.size(), [&](double at) { return -curvature_at(std::clamp(at, 2.0, n_last - 2)); }), 2.0,
       n_last - 2);
-  if (curvature_at(corner_at) > kLeastCurvature) scan.by_l_curve = lambda_at(corner_at);
+  if (curvature_at(corner_at) > kLeastCurvature) scan.by_l_curve = lambda_at(scan.points, corner_at);
 
   // (14)
   const std::vector<double> log_determinants = log_determinants_of(scan.points);
@@ -149,7 +157,7 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
   for (double& e : scan.evidence) e -= highest;
   std::vector<double> against;
   for (const double e : scan.evidence) against.push_back(-e);
-  scan.by_evidence = lambda_at(smallest_at(against));
+  scan.by_evidence = lambda_at(scan.points, smallest_at(against));
 
   // With the errors that the data state, or with the misfit's where it tells of larger ones.
   const double left = variance_left_at(scan.by_gcv);
@@ -159,12 +167,9 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
   // (25b) Mallows 1973: what the tractions displace wants less smoothing than they do
   std::vector<double> prediction;
   for (const ScanPoint& p : scan.points) prediction.push_back(log_of(p.misfit + 2 * scan.variance * p.degrees));
-  scan.by_prediction = lambda_at(smallest_at(prediction));
+  scan.by_prediction = lambda_at(scan.points, smallest_at(prediction));
   if (stated_variance) scan.by_discrepancy = lambda_of_misfit(scan.points, n_data * *stated_variance);
-  const RiskScale scale(scan.risk);
-  std::vector<double> tamed;
-  for (const double r : scan.risk) tamed.push_back(scale.to(r));
-  scan.by_risk = lambda_at(smallest_at(tamed));
+  scan.by_risk = lambda_of_least_risk(scan.points, scan.risk);
   return scan;
 }
 

@@ -45,10 +45,18 @@ LambdaScan Spectrum::scan(std::optional<double> stated_variance) const {
   for (const double lambda : lambdas_between(largest, smallest)) points.push_back(point_at(lambda));
   // Few loads follow many beads nowhere quite: what they leave, noise or not, is the error of each bead. (Its median,
   // for tractions that follow all but a few, would call most of it signal.)
-  return judge(
+  const auto n_felt = static_cast<double>(is_felt(values_).count());
+  const Risks risks = [&](const std::vector<ScanPoint>& scanned, double variance) {
+    std::vector<double> of_points;
+    for (const ScanPoint& p : scanned)
+      of_points.push_back(unbiased_risk(p, removable_misfit(p.lambda), n_felt, variance));
+    return of_points;
+  };
+  LambdaScan scan = judge(
       std::move(points), n_data_, stated_variance,
-      [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); },
-      [&](const std::vector<ScanPoint>& scanned, double variance) { return risks(scanned, variance); });
+      [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); }, risks);
+  scan.by_told_risk = lambda_of_least_risk(scan.points, told_risks(scan.points, scan.variance));
+  return scan;
 }
 
 Eigen::Array<bool, Eigen::Dynamic, 1> Spectrum::is_told(double variance) const {
@@ -74,7 +82,7 @@ Eigen::Array<bool, Eigen::Dynamic, 1> Spectrum::is_told(double variance) const {
   return told;
 }
 
-std::vector<double> Spectrum::risks(const std::vector<ScanPoint>& points, double variance) const {
+std::vector<double> Spectrum::told_risks(const std::vector<ScanPoint>& points, double variance) const {
   const Eigen::Array<bool, Eigen::Dynamic, 1> told = is_told(variance), felt = is_felt(values_);
   const ArrayXd signal = told.select(projected_.square() / values_ - variance, 0);  // expected s sqrt(value), squared
   const ArrayXd squares =

@@ -52,7 +52,7 @@ class Spectrum {
   Eigen::MatrixXd outer(const Eigen::ArrayXd& shares) const;
   /// Directions that the data tell from noise. @param variance  of one datum
   Eigen::Array<bool, Eigen::Dynamic, 1> is_told(double variance) const;
-  std::vector<double> risks(const std::vector<ScanPoint>& points, double variance) const;  ///< (15b)
+  std::vector<double> told_risks(const std::vector<ScanPoint>& points, double variance) const;  ///< (15b)
   double data_squared_, n_data_;
   Eigen::ArrayXd values_, projected_;
   std::shared_ptr<const Eigen::MatrixXd> vectors_;

@@ -12,7 +12,7 @@ namespace mbtfm::survey {
 struct CellImages {
   std::optional<images::Channel> adhesion, actin, beads_stressed, beads_relaxed;  ///< as far as they are there
   std::optional<double> given_pixel_size_um;                                      ///< by cell.toml
-  std::optional<double> given_beads_pixel_size_um;  ///< the same of the bead images alone
+  std::optional<double> given_beads_pixel_size_um;                                ///< the same of the bead images alone
 };
 
 struct Survey {

@@ -277,23 +277,26 @@ TEST_F(InSpace, a_lambda_by_risk_that_runs_away_is_replaced_and_called_so) {
   EXPECT_EQ(named.lambda_by, risk);
   tractions::LambdaScan scan = *named.scan;
   scan.by_evidence = 1.9 * scan.by_risk;  // the bound is two
-  const auto chosen = choose_lambda(right, scan, traction, true);
+  const auto chosen = choose_lambda(right, scan, traction, RiskIs::sound);
   EXPECT_EQ(chosen.by, risk);
   EXPECT_EQ(chosen.lambda, scan.by_risk);
   EXPECT_FALSE(fires("lambda-runs-away", chosen.finding));
   scan.by_evidence = 2.1 * scan.by_risk;
-  const auto replaced = choose_lambda(right, scan, traction, true);
+  const auto replaced = choose_lambda(right, scan, traction, RiskIs::sound);
   EXPECT_EQ(replaced.by, evidence);
   EXPECT_EQ(replaced.lambda, scan.by_evidence);
   ASSERT_TRUE(fires("lambda-runs-away", replaced.finding));
   EXPECT_NEAR(replaced.finding->number.value_or(0), 2.1, 1e-9);
-  const auto unsound = choose_lambda(right, scan, traction, false);
+  const auto unsound = choose_lambda(right, scan, traction, RiskIs::unsound);
   EXPECT_EQ(unsound.by, gcv);
   EXPECT_EQ(unsound.lambda, scan.by_gcv);
+  const auto where_told = choose_lambda(right, scan, traction, RiskIs::sound_where_told);
+  EXPECT_EQ(where_told.by, risk);
+  EXPECT_EQ(where_told.lambda, scan.by_told_risk);
   traction.lambda_by = gcv;  // what was asked for by name is taken
-  EXPECT_EQ(choose_lambda(right, scan, traction, true).by, gcv);
+  EXPECT_EQ(choose_lambda(right, scan, traction, RiskIs::sound).by, gcv);
   traction.lambda_um_per_kPa = 0.1;
-  EXPECT_FALSE(choose_lambda(right, scan, traction, true).by);
+  EXPECT_FALSE(choose_lambda(right, scan, traction, RiskIs::sound).by);
 }
 
 /// Of beads without noise a gel of another Poisson's ratio is all that is wrong.
