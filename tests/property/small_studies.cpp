@@ -23,10 +23,10 @@ bool are_all() { return std::getenv("MBTFM_ALL_STUDIES") != nullptr; }
 const StudyParameters kFewDraws{.bootstrap_draws = 200};
 
 /// Columns of a table that hold words.
-const std::set<std::string> kWords = {"included",  "model",     "converged", "connected", "identifiable", "origin",
-                                      "cell",      "condition", "reason",    "type",      "kind",         "quantity",
-                                      "component", "force",     "size",      "remark",    "question",     "within",
-                                      "test",      "unit",      "group_a",   "group_b",   "effect_is",    "relation"};
+const std::set<std::string> kWords = {
+    "included",  "enters", "part", "model", "converged", "connected", "identifiable", "origin",  "cell",
+    "condition", "reason", "type", "kind",  "quantity",  "component", "force",        "size",    "remark",
+    "question",  "within", "test", "unit",  "group_a",   "group_b",   "effect_is",    "relation"};
 
 /// An estimate with the columns of its interval. Sums, means and medians of what has no negative values have none.
 struct Bounded {

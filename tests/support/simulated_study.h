@@ -127,7 +127,7 @@ inline statistics::Study simulated_sheets(const SheetStudySettings& s) {
                                              .high = value / stiffness + 0.04,
                                              .parts = {.beads = 0.02}}},
                               .mean_tension_nN_per_um = 0.8 * value,
-                              .total_force_nN = 100 * value,
+                              .total_force_nN = 100 * std::abs(value),
                               .strain_energy_fJ = 30 * value * value,
                               .area_um2 = 1600 * std::exp(0.1 * normal(random)),
                               .relative_l2 = 0.3,
