@@ -6,11 +6,9 @@ namespace mbtfm::files {
 namespace {
 
 Column<SheetEstimate> part(const char* name, const char* meaning, std::optional<double> SheetErrorParts::*of) {
-  return {name, meaning, [of](auto& row) -> auto& {return row.parts.*of;
+  const auto member = [of](auto& row) -> decltype(auto) { return (row.parts.*of); };
+  return {name, meaning, member, {.digits = kForPeople, .may_lack = true}};
 }
-, { .digits = kForPeople, .may_lack = true }
-};  // namespace
-}  // namespace mbtfm::files
 
 }  // namespace
 
