@@ -40,7 +40,8 @@ std::string remedy_of(const ImageField& cell, const ImageField& beads) {
   const std::optional<double> times = pixels_in_one(cell, beads);
   if (!times || !cell.pixel_size_um) return cropped;
   return "if both show one field, as images that were binned do, set track.beads_pixel_size_um = " +
-         shortest(*times * *cell.pixel_size_um) + "; " + cropped;
+         shortest(*times * *cell.pixel_size_um) + " (pixel_size_um is that of the cell's images, here taken for " +
+         in_um(*cell.pixel_size_um) + "); " + cropped;
 }
 
 }  // namespace
