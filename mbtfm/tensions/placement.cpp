@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
@@ -96,6 +97,15 @@ double mean_semi_minor_um(const Cell& cell) {
 std::string in_words(Vec2 shift_um, const Eigen::Vector3d& sigma) {
   return "(" + brief(shift_um.x) + ", " + brief(shift_um.y) + ") +- (" + brief(sigma[0]) + ", " + brief(sigma[1]) +
          ") um";
+}
+
+/// A stray bead near an adhesion, where the field is steep, moves a cell by several of its errors.
+LinearData without_strays(LinearData data, const Eigen::VectorXd& forces_nN) {
+  const std::vector<Eigen::Index> strays = stray_beads(data, weighted_residual(data, forces_nN));
+  if (strays.empty()) return data;
+  Eigen::VectorXd weight = Eigen::VectorXd::Ones(data.weight_per_um.size() / 2);
+  for (const Eigen::Index bead : strays) weight[bead] = 0;
+  return reweighted(std::move(data), weight);
 }
 
 /// How far a step moves the adhesions, root mean square: about their centre shift and turn add by squares.
@@ -237,6 +247,7 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
         problem, rough, threads, pass == 0 ? start : scaled_to_data(problem, result.start.tensions_nN, &result.start),
         Search::nearest);
     result.start = fit.trial;
+    if (parameters.loss != Loss::squares) there = without_strays(std::move(there), fit.trial.forces_nN);
     const Eigen::VectorXd model_um = there.response->displace(fit.trial.forces_nN);
     const Eigen::MatrixXd motions =
         placement_motions(gel, ellipses, fit.trial.forces_nN, there.position_um, model_um, none.centre_um, threads);
@@ -248,7 +259,7 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
     const double small = pass == 0 ? kSmallAtRest : kSmall;
     const bool is_found = (step.value.array().abs() < small * step.sigma.array()).all() || pass + 1 == kMostPasses;
     if (is_found && length_um < kLinear * width_um) {
-      result.data = with_more_motions(std::move(there), motions);
+      result.data = with_more_motions(unweighted(std::move(there)), motions);
       result.effect = stage::decided(EffectKind::channel_shift, setting, true, "found with the tensions");
       result.effect.seconds = watch.seconds();
       return result;
