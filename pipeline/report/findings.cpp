@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <regex>
 #include <string>
 
 #include "pipeline/contract/stage_state.h"
@@ -178,8 +180,15 @@ std::vector<std::string> on_outputs(const Provenance& provenance) {
 constexpr const char* kNothingOpen =
     "No finding is open: nothing that the program checks speaks against these results.";
 
+/// Findings are written for terminals too, in plain characters: a page has µ and ±.
+std::string printed(const std::string& text) {
+  static const std::regex micro(R"(\bum(2?)\b)"), plus_minus(R"(\+-)"), square("µm2");
+  const std::string micrometres = std::regex_replace(text, micro, "µm$1");
+  return charts::html_escaped(std::regex_replace(std::regex_replace(micrometres, square, "µm²"), plus_minus, "±"));
+}
+
 std::string item(const char* kind, const char* mark, const std::string& text, const std::string& more = {}) {
-  return fmt::format("<li class=\"{}\">{}{}{}</li>\n", kind, mark, charts::html_escaped(text), more);
+  return fmt::format("<li class=\"{}\">{}{}{}</li>\n", kind, mark, printed(text), more);
 }
 
 constexpr const char* kPage = "docs/findings.md";
@@ -188,12 +197,11 @@ constexpr const char* kPage = "docs/findings.md";
 /// pages do not: it names them, and links to none.
 std::string details_of(const Finding& f) {
   std::string html;
-  if (is_open(f) && !f.remedy.empty()) html += "<br><i>What to do:</i> " + charts::html_escaped(f.remedy);
+  if (is_open(f) && !f.remedy.empty()) html += "<br><i>What to do:</i> " + printed(f.remedy);
   if (f.number && f.threshold) {
-    html +=
-        fmt::format("<details><summary>{}</summary>{}: {}. Threshold: {}; {}.{}</details>", charts::html_escaped(f.id),
-                    charts::html_escaped(f.number_is), charts::readable(*f.number), charts::readable(*f.threshold),
-                    charts::html_escaped(f.reason), is_open(f) ? "" : " " + charts::html_escaped(f.remedy));
+    html += fmt::format("<details><summary>{}</summary>{}: {}. Threshold: {}; {}.{}</details>",
+                        charts::html_escaped(f.id), printed(f.number_is), charts::readable(*f.number),
+                        charts::readable(*f.threshold), printed(f.reason), is_open(f) ? "" : " " + printed(f.remedy));
   }
   return html +
          (is_open(f) ? fmt::format(" <span class=\"page\">({}: “{}”)</span>", kPage, charts::html_escaped(f.id)) : "");
@@ -209,6 +217,17 @@ std::string item_of(const Finding& f) {
       return item("bad", "<b>Distrust:</b> ", f.text, details_of(f));
   }
   return {};
+}
+
+/// Open ones, the gravest first, and notes, each as the stages gave them.
+struct Items {
+  std::string open, notes;
+};
+Items items_of(std::vector<Finding> findings) {
+  std::ranges::stable_sort(findings, std::ranges::greater(), &Finding::severity);
+  Items items;
+  for (const Finding& f : findings) (is_open(f) ? items.open : items.notes) += item_of(f);
+  return items;
 }
 
 /// Stages that compare a model with the beads.
@@ -234,14 +253,15 @@ std::vector<std::string> facts_of(const CellResults& results) {
 }
 
 std::string findings_section(const std::vector<std::string>& facts, const Provenance& provenance) {
-  std::string html = "<ul class=\"findings\">\n", open, notes;
+  std::string html = "<ul class=\"findings\">\n", open;
   for (const std::string& fact : facts) html += item("fact", "", fact);
   for (const StageLine& stage : provenance.stages) {
     if (!stage.converged)
       open += item("bad", "<b>Distrust:</b> ",
                    "The stage " + stage.name + " did not converge: what follows from it is provisional.");
   }
-  for (const Finding& finding : provenance.findings) (is_open(finding) ? open : notes) += item_of(finding);
+  auto [of_findings, notes] = items_of(provenance.findings);
+  open += of_findings;
   if (const auto& accuracy = provenance.accuracy) {
     (accuracy->is_met ? notes : open) +=
         item(accuracy->is_met ? "fact" : "caution", accuracy->is_met ? "" : "<b>Caution:</b> ",
@@ -253,9 +273,9 @@ std::string findings_section(const std::vector<std::string>& facts, const Proven
 }
 
 std::string list_of(const std::vector<std::string>& facts, const std::vector<Finding>& findings) {
-  std::string html = "<ul class=\"findings\">\n", open, notes;
+  std::string html = "<ul class=\"findings\">\n";
   for (const std::string& fact : facts) html += item("fact", "", fact);
-  for (const Finding& finding : findings) (is_open(finding) ? open : notes) += item_of(finding);
+  auto [open, notes] = items_of(findings);
   if (open.empty()) open = item("good", "<b>✓</b> ", kNothingOpen);
   return html + open + notes + "</ul>\n";
 }

@@ -270,6 +270,20 @@ TEST(Report, an_open_finding_shows_its_text_number_threshold_and_remedy) {
     EXPECT_NE(html.find(part), std::string::npos) << part;
 }
 
+TEST(Report, shows_the_gravest_finding_first_and_prints_units_as_papers_do) {
+  const FakeCell cell;
+  Finding caution =
+      *noticed(FindingKind::missing_fibre, 3, "off by 0.3 +- 0.1 um over 4 um2, see track.beads_pixel_size_um");
+  caution.severity = Severity::caution;
+  Finding bad = caution;
+  bad.severity = Severity::bad;
+  bad.text = "must not be used";
+  const std::string html = findings_section(facts_of(read_results(cell.folder.path())), fitted_here({caution, bad}));
+  const std::string printed = "off by 0.3 ± 0.1 µm over 4 µm², see track.beads_pixel_size_um";
+  ASSERT_NE(html.find(printed), std::string::npos) << html;
+  EXPECT_LT(html.find(bad.text), html.find(printed));
+}
+
 TEST(Report, tells_the_noise_from_the_models_error) {
   const FakeCell cell;
   CellResults results = read_results(cell.folder.path());
