@@ -76,7 +76,8 @@ Foreseen Foresight::at(double noise) const {
   const double stated = noise * noise;
   const double least = std::max(problem_.observed.states_errors ? stated : 0.0, problem_.variance_of_model());
   const tractions::Spectrum noisy = spectrum_->with_noise(stated);
-  const tractions::LambdaScan scan = noisy.scan(std::max(least, noisy.variance_felt_least().value_or(0)));
+  const tractions::LambdaScan scan =
+      noisy.scan(std::max(least, noisy.variance_felt_least().value_or(0)), tractions::SignalIn::told);
   const ChosenLambda chosen = choose_lambda(problem_, scan, traction_, RiskIs::sound);
   const double variance = std::max(scan.variance, least), lambda2 = chosen.lambda * chosen.lambda;
   const ArrayXd& values = spectrum_->values();

@@ -158,7 +158,9 @@ SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& i
   if (parameters.loss != BeadLoss::l2 && r.covariance_kPa2.size() > 0) {
     SpatialParameters squares = parameters;
     squares.loss = BeadLoss::l2;
-    const SpatialReconstruction by_squares = by_method(method, problem, traction, squares, threads);
+    tractions::TractionParameters by_the_same = traction;  // else the criteria of lambda are compared
+    if (r.lambda_by) by_the_same.lambda_by = *r.lambda_by;
+    const SpatialReconstruction by_squares = by_method(method, problem, by_the_same, squares, threads);
     r.findings.push_back(notice_loss(parameters.loss, balance_of(problem, r), balance_of(problem, by_squares)));
   }
   return r;

@@ -91,9 +91,6 @@ struct ChosenLambda {
 /// What the risk is worth.
 enum class RiskIs {
   sound,
-  /// Few beads that are astray have stayed: that of the directions that are told from noise (15b), which these do not
-  /// move.
-  sound_where_told,
   /// Cross-validation's lambda is taken. With a robust loss weights hang on the residuals, so that what they leave of
   /// large displacements looks like noise to the risk. With traces from random signs it divides their errors by
   /// lambda². It then smooths most tractions away.

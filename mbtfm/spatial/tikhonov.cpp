@@ -53,9 +53,8 @@ ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& 
   if (traction.lambda_um_per_kPa) return {*traction.lambda_um_per_kPa * unit, {}, {}};
   const tractions::LambdaCriterion by =
       traction.lambda_by == risk && risk_is == RiskIs::unsound ? gcv : traction.lambda_by;
-  if (by == risk && risk_is == RiskIs::sound_where_told) return {scan.by_told_risk.value(), by, {}};
-  ChosenLambda chosen{chosen_lambda(scan, by), by, {}};
-  if (by != risk) return chosen;
+  if (by != risk) return {chosen_lambda(scan, by), by, {}};
+  ChosenLambda chosen{scan.by_risk, by, {}};
   const auto length = [&](double lambda) { return brief(lambda / unit * problem.gel.youngs_modulus_kPa) + " um"; };
   chosen.finding = noticed(FindingKind::lambda_runs_away, scan.by_evidence / scan.by_risk,
                            "By risk lambda E is " + length(scan.by_risk) + ", by evidence " + length(scan.by_evidence) +
@@ -73,13 +72,10 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   SpatialReconstruction r;
   const Observed& observed = problem.observed;
   const std::vector<double> good = probabilities_of_good(parameters.loss, observed);
-  // a mixture of which no bead is left out is least squares
-  const bool leaves_none_out = std::ranges::none_of(good, [](double p) { return p == 0; });
-  const RiskIs risk_is = weighs_by_residual(parameters.loss)                        ? RiskIs::unsound
-                         : parameters.loss == BeadLoss::mixture && !leaves_none_out ? RiskIs::sound_where_told
-                                                                                    : RiskIs::sound;
+  const RiskIs risk_is = weighs_by_residual(parameters.loss) ? RiskIs::unsound : RiskIs::sound;
   const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
-    return spectrum.scan(largest(stated_variance(problem, parameters.loss, weighing), spectrum.variance_felt_least()));
+    return spectrum.scan(largest(stated_variance(problem, parameters.loss, weighing), spectrum.variance_felt_least()),
+                         tractions::SignalIn::told);
   };
   // The tractions of the weighed beads with the lambda of their own noise, or with that of `judged`: beads far astray
   // that keep some weight would be followed by ever smaller lambdas, so that lambda is chosen without them.

@@ -24,7 +24,7 @@ class DenseProblem {
   DenseProblem(const DisplacementField& beads, Compliance compliance, Eigen::Index n_loads, const Compliance& truth,
                Eigen::Index n_true);
 
-  LambdaScan scan() const { return spectrum_->scan(stated_variance_); }
+  LambdaScan scan() const { return spectrum_->scan(stated_variance_, SignalIn::felt); }
   const Spectrum& spectrum() const { return *spectrum_; }
   /// What solve(lambda) makes of each true load of one, without noise.
   Eigen::MatrixXd response_to_truth(double lambda) const;

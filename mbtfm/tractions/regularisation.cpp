@@ -108,13 +108,6 @@ Risks unbiased_risks(double n_data) {
   };
 }
 
-double lambda_of_least_risk(const std::vector<ScanPoint>& points, const std::vector<double>& risk) {
-  const RiskScale scale(risk);
-  std::vector<double> tamed;
-  for (const double r : risk) tamed.push_back(scale.to(r));
-  return lambda_at(points, smallest_at(tamed));
-}
-
 LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<double> stated_variance,
                  const std::function<double(double lambda)>& variance_left_at, const Risks& risks) {
   MBTFM_ASSERT(points.size() >= 5);
@@ -169,7 +162,10 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
   for (const ScanPoint& p : scan.points) prediction.push_back(log_of(p.misfit + 2 * scan.variance * p.degrees));
   scan.by_prediction = lambda_at(scan.points, smallest_at(prediction));
   if (stated_variance) scan.by_discrepancy = lambda_of_misfit(scan.points, n_data * *stated_variance);
-  scan.by_risk = lambda_of_least_risk(scan.points, scan.risk);
+  const RiskScale scale(scan.risk);
+  std::vector<double> tamed;
+  for (const double r : scan.risk) tamed.push_back(scale.to(r));
+  scan.by_risk = lambda_at(scan.points, smallest_at(tamed));
   return scan;
 }
 

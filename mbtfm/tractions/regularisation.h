@@ -21,18 +21,16 @@ struct ScanPoint {
 
 /// The scan with its criteria; each array by point.
 struct LambdaScan {
-  std::vector<ScanPoint> points;                    ///< evenly spaced in log lambda, falling
-  std::vector<double> gcv;                          ///< (12), to be small
-  std::vector<double> curvature;                    ///< of the L-curve (13), to be large
-  std::vector<double> evidence;                     ///< logarithm, less its largest (14), to be large
-  std::vector<double> risk;                         ///< expected |t − true|² up to a constant (15), to be small
+  std::vector<ScanPoint> points;  ///< evenly spaced in log lambda, falling
+  std::vector<double> gcv;        ///< (12), to be small
+  std::vector<double> curvature;  ///< of the L-curve (13), to be large
+  std::vector<double> evidence;   ///< logarithm, less its largest (14), to be large
+  std::vector<double> risk;       ///< expected |t − true|² but for a constant, (15) or (15b), to be small
   double by_gcv = 0, by_evidence = 0, by_risk = 0;  ///< lambda by each
   double by_prediction = 0;                         ///< of the least expected |G t − G true|² (25b)
-  /// Of the risk of the directions that are told from noise (15b); none where directions are not at hand.
-  std::optional<double> by_told_risk;
-  std::optional<double> by_l_curve;      ///< none where the curve has no corner
-  std::optional<double> by_discrepancy;  ///< none where the data state no errors, or are fitted worse
-  double variance = 0;                   ///< of one datum, that the risk was found with
+  std::optional<double> by_l_curve;                 ///< none where the curve has no corner
+  std::optional<double> by_discrepancy;             ///< none where the data state no errors, or are fitted worse
+  double variance = 0;                              ///< of one datum, that the risk was found with
   std::string variance_source;
 };
 
@@ -45,9 +43,6 @@ using Risks = std::function<std::vector<double>(const std::vector<ScanPoint>&, d
 double unbiased_risk(const ScanPoint& point, double misfit, double n_data, double variance);
 /// (15), where tractions can follow all data.
 Risks unbiased_risks(double n_data);
-
-/// Between the points, too. @param risk  by point
-double lambda_of_least_risk(const std::vector<ScanPoint>& points, const std::vector<double>& risk);
 
 /// @param points           at least 5, evenly spaced in log lambda, falling
 /// @param n_data           components of displacement

@@ -16,17 +16,21 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// Below, rounding of the normal matrix is all there is.
-Eigen::Array<bool, Eigen::Dynamic, 1> is_felt(const ArrayXd& values) { return values > 1e-12 * values.maxCoeff(); }
+constexpr double kRounding = 1e-12;  // of the largest value of AᵀA: what is below is rounding
+
+Eigen::Array<bool, Eigen::Dynamic, 1> is_felt(const ArrayXd& values) { return values > 0; }
 
 }  // namespace
 
 Spectrum::Spectrum(MatrixXd normal, VectorXd pulled, double data_squared, double n_data)
     : data_squared_(data_squared), n_data_(n_data) {
   auto [values, vectors] = numerics::symmetric_eigen(std::move(normal));
-  values_ = values.array().max(0);
   vectors_ = std::make_shared<const MatrixXd>(std::move(vectors));
   projected_ = vectors_->transpose() * pulled;
+  // Of fewer data than unknowns the other directions have values of rounding. The risk has them over lambda².
+  const Eigen::Array<bool, Eigen::Dynamic, 1> felt = values.array() > kRounding * values.maxCoeff();
+  values_ = felt.select(values.array(), 0);
+  projected_ = felt.select(projected_, 0);
 }
 
 Spectrum Spectrum::with_noise(double variance) const {
@@ -36,27 +40,25 @@ Spectrum Spectrum::with_noise(double variance) const {
   return noisy;
 }
 
-LambdaScan Spectrum::scan(std::optional<double> stated_variance) const {
+LambdaScan Spectrum::scan(std::optional<double> stated_variance, SignalIn signal_in) const {
   const double largest = std::sqrt(values_.maxCoeff());
-  // At a tenth of the smallest singular value nothing is smoothed any more; below a millionth of the largest, rounding
-  // of the normal matrix is all there is.
-  const double smallest = std::max(0.1 * std::sqrt(values_.minCoeff()), 1e-6 * largest);
+  // At a tenth of the smallest singular value nothing is smoothed any more; where there are others it ends with them.
+  const double smallest = std::max(0.1 * std::sqrt(values_.minCoeff()), std::sqrt(kRounding) * largest);
   std::vector<ScanPoint> points;
   for (const double lambda : lambdas_between(largest, smallest)) points.push_back(point_at(lambda));
   // Few loads follow many beads nowhere quite: what they leave, noise or not, is the error of each bead. (Its median,
   // for tractions that follow all but a few, would call most of it signal.)
   const auto n_felt = static_cast<double>(is_felt(values_).count());
   const Risks risks = [&](const std::vector<ScanPoint>& scanned, double variance) {
+    if (signal_in == SignalIn::told) return told_risks(scanned, variance);
     std::vector<double> of_points;
     for (const ScanPoint& p : scanned)
       of_points.push_back(unbiased_risk(p, removable_misfit(p.lambda), n_felt, variance));
     return of_points;
   };
-  LambdaScan scan = judge(
+  return judge(
       std::move(points), n_data_, stated_variance,
       [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); }, risks);
-  scan.by_told_risk = lambda_of_least_risk(scan.points, told_risks(scan.points, scan.variance));
-  return scan;
 }
 
 Eigen::Array<bool, Eigen::Dynamic, 1> Spectrum::is_told(double variance) const {

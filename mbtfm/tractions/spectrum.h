@@ -10,7 +10,13 @@
 
 namespace mbtfm::tractions {
 
-/// |A s − u|² + lambda² |s|², from AᵀA and Aᵀu.
+/// Directions in which the risk looks for a signal.
+enum class SignalIn {
+  felt,  ///< all that move the data: (15)
+  told   ///< those that the data tell from noise: (15b)
+};
+
+/// |A s − u|² + lambda² |s|², from AᵀA and Aᵀu. Values of AᵀA below 1e-12 of the largest are rounding, and none here.
 class Spectrum {
  public:
   /// @param normal  AᵀA; what is below its diagonal does not count
@@ -22,7 +28,7 @@ class Spectrum {
   Spectrum with_noise(double variance) const;
 
   /// @param stated_variance  of one datum
-  LambdaScan scan(std::optional<double> stated_variance) const;
+  LambdaScan scan(std::optional<double> stated_variance, SignalIn signal_in) const;
   /// Of one datum, of the half of the directions that is felt least, where it is larger than noise alone would have it
   /// beside what no s can follow: there is an error of A itself then, which s can follow, and which no criterion with
   /// white noise knows. None where they agree, or no data are left beside. Where a signal reaches so far down it is

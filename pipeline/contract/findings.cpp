@@ -302,8 +302,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "with l2 has no finding beads-stray, take l2. If it has, look at the beads that differ from their neighbours. "
        "More beads near the surface decide it."},
       {lambda_runs_away, "lambda-runs-away", "traction", caution, "lambda by evidence over lambda by risk", 2,
-       "in scenes whose noise is that of the beads it is 0.1 to 0.8; above 1 the two contradict each other, and 2 "
-       "leaves room for chance: tractions follow beads that are astray, or what the model has wrong",
+       "in simulated scenes it is 0.1 to 0.9, of a hundred beads up to 1.4; beyond that the two contradict each other, "
+       "and 2 leaves room for chance: tractions follow beads that are astray, or what the model has wrong",
        "Set traction.loss = mixture if beads may be astray. Check surface, gel and sigma_um, and whether one stack "
        "grew against the other (another focus or temperature): "
        "the misfit is not the beads' noise. The tractions are those with lambda by "

@@ -180,15 +180,17 @@ MatrixXd falling(int n_data, int n_unknowns, double fall, unsigned seed) {
   return G;
 }
 
-LambdaScan scan_by_direction(const MatrixXd& G, const VectorXd& u, double variance) {
-  return Spectrum(G.transpose() * G, G.transpose() * u, u.squaredNorm(), static_cast<double>(u.size())).scan(variance);
+LambdaScan scan_by_direction(const MatrixXd& G, const VectorXd& u, double variance, SignalIn signal_in) {
+  return Spectrum(G.transpose() * G, G.transpose() * u, u.squaredNorm(), static_cast<double>(u.size()))
+      .scan(variance, signal_in);
 }
 
 TEST(Criteria, risk_by_direction_is_that_of_all_where_each_direction_is_told) {
   const MatrixXd G = falling(120, 40, 0.9, 1);
   const VectorXd u = G * VectorXd::Constant(40, 1) + noise_of(1e-2, 120, 4);
-  const LambdaScan scan = scan_by_direction(G, u, 1e-4);
-  EXPECT_NEAR(scan.by_told_risk.value() / scan.by_risk, 1, 1e-6);
+  EXPECT_NEAR(
+      scan_by_direction(G, u, 1e-4, SignalIn::told).by_risk / scan_by_direction(G, u, 1e-4, SignalIn::felt).by_risk, 1,
+      1e-6);
 }
 
 TEST(Criteria, risk_by_direction_does_not_follow_directions_of_noise_alone) {
@@ -202,18 +204,39 @@ TEST(Criteria, risk_by_direction_does_not_follow_directions_of_noise_alone) {
   double worst = 0, worst_of_all = 0;
   for (unsigned draw = 0; draw < kDraws; ++draw) {
     const VectorXd u = G * t + noise_of(0.1, kData, 3000 + draw);
-    const LambdaScan scan = scan_by_direction(G, u, 0.01);
+    const LambdaScan scan = scan_by_direction(G, u, 0.01, SignalIn::told);
     const VectorXd pulled = G.transpose() * u;
     const auto error_at = [&](double lambda) {
       return ((pulled.array() / (values + lambda * lambda)).matrix() - t).norm();
     };
     double best = 1e300;
     for (const ScanPoint& p : scan.points) best = std::min(best, error_at(p.lambda));
-    worst = std::max(worst, error_at(scan.by_told_risk.value()) / best);
-    worst_of_all = std::max(worst_of_all, error_at(scan.by_risk) / best);
+    worst = std::max(worst, error_at(scan.by_risk) / best);
+    worst_of_all = std::max(worst_of_all, error_at(scan_by_direction(G, u, 0.01, SignalIn::felt).by_risk) / best);
   }
   EXPECT_LE(worst, 1.15);
   EXPECT_GE(worst_of_all, 3) << "the scene is one in which the risk of all directions runs away";
+}
+
+TEST(Criteria, risk_of_fewer_data_than_unknowns_has_no_directions_of_rounding) {
+  constexpr int kFelt = 30, kUnknowns = 50;
+  const MatrixXd left = falling(kFelt, kFelt, 1, 5);  // both orthogonal
+  const MatrixXd right = falling(kUnknowns, kFelt, 1, 6);
+  const Eigen::ArrayXd s = Eigen::pow(0.8, Eigen::ArrayXd::LinSpaced(kFelt, 0, kFelt - 1));
+  const MatrixXd G = left * s.matrix().asDiagonal() * right.transpose();
+  const VectorXd u = noise_of(1, kFelt, 7);
+  const Eigen::ArrayXd squares = (left.transpose() * u).array().square();
+  const LambdaScan scan = scan_by_direction(G, u, 0.01, SignalIn::felt);
+  EXPECT_LE(scan.points.back().lambda, 0.2 * s.minCoeff()) << "the scan goes to where nothing is smoothed";
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const double lambda2 = std::pow(scan.points[i].lambda, 2);
+    const Eigen::ArrayXd stiffness = s.square() + lambda2;
+    // (15) by direction, from the values of G itself
+    const double risk =
+        (2 * scan.variance / stiffness - (2 * lambda2 + s.square()) * squares / stiffness.square()).sum();
+    EXPECT_NEAR(scan.risk[i] / risk, 1, 1e-6) << "lambda " << scan.points[i].lambda;
+    EXPECT_NEAR(scan.points[i].degrees, (s.square() / stiffness).sum(), 1e-9);
+  }
 }
 
 TEST(Criteria, do_not_depend_on_the_unit_of_the_displacements) {

@@ -332,34 +332,39 @@ TEST(PlanInSpace, twice_the_modulus_is_twice_the_noise_and_either_is_more_error_
   }
 }
 
-/// The squares of the beads add up; lambda, which they choose, moves a little.
-TEST(PlanInSpace, four_times_the_beads_halve_the_error) {
+/// Four times the beads would halve the error of patches alone. Beside a background that is only known to be weak they
+/// do less: with as much smoothing, what it explains of the patches' displacement grows with the beads, too.
+TEST(PlanInSpace, more_beads_err_less_but_four_times_as_many_not_by_half) {
   const SmallInSpace& s = in_space();
   for (const double noise_um : {0.02, 0.04}) {
     const SpaceExpected &thin = s.of({10, 0.01, noise_um}, SpaceQuantity::total_force),
                         &dense = s.of({10, 0.04, noise_um}, SpaceQuantity::total_force);
-    // of some 24 beads within 8 um of a patch the number scatters by 20 %, the error by 10 %, its mean over two patches
-    // and two draws by 5 %, and that of the dense ones by half of it: 5.6 % of two, three times
-    EXPECT_NEAR(thin.standard_error_nN / dense.standard_error_nN, 2, 0.34) << noise_um;
+    EXPECT_LT(dense.standard_error_nN, thin.standard_error_nN) << noise_um;
+    EXPECT_GT(2 * dense.standard_error_nN, thin.standard_error_nN) << noise_um;
     EXPECT_GT(dense.degrees, thin.degrees) << noise_um;
     EXPECT_LT(*s.of({10, 0.04, noise_um}, SpaceQuantity::force).resolution_um,
               *s.of({10, 0.01, noise_um}, SpaceQuantity::force).resolution_um);
   }
 }
 
-/// Where patches are all that pulls, the part by the noise of the beads is all that experiments scatter by.
+/// Where patches are all that pulls, the part by the noise of the beads is all that experiments scatter by: at every
+/// density, so that what more beads are said to gain is gained.
 TEST(PlanInSpace, drawn_experiments_scatter_as_the_part_by_beads_says) {
   const SmallInSpace& s = in_space();
-  const SpacePoint point{10, 0.04, 0.04};
   constexpr int kExperiments = 24;
-  const SpaceDrawn drawn = draw_experiments(s.scene, s.pools.back(), s.foreseen, point, kExperiments, kThreads);
-  ASSERT_EQ(drawn.forces.size(), std::size_t{kExperiments} * 6);
-  double squares = 0, by_noise = 0;
-  for (const SpaceDrawnForce& f : drawn.forces) squares += std::pow(f.found_nN - f.true_nN, 2) / kExperiments;
-  by_noise = s.foreseen.of(point).by_noise_nN2.trace();
-  // 144 numbers: their root mean square is known to 6 %; the places of the beads add 5 %; three times both
-  EXPECT_NEAR(std::sqrt(squares / by_noise), 1, 0.24);
-  EXPECT_LT(drawn.error_over_predicted, 1.2) << "what is stated holds the background, too";
+  for (const double density : {0.01, 0.04}) {
+    const SpacePoint point{10, density, 0.04};
+    const SpacePool& pool = density < 0.02 ? s.pools.front() : s.pools.back();
+    const SpaceDrawn drawn = draw_experiments(s.scene, pool, s.foreseen, point, kExperiments, kThreads);
+    ASSERT_EQ(drawn.forces.size(), std::size_t{kExperiments} * 6);
+    double squares = 0;
+    for (const SpaceDrawnForce& f : drawn.forces) squares += std::pow(f.found_nN - f.true_nN, 2) / kExperiments;
+    // 144 numbers: their root mean square is known to 6 %; the places of the beads add 5 %, of the thin ones 10 %;
+    // three times both
+    EXPECT_NEAR(std::sqrt(squares / s.foreseen.of(point).by_noise_nN2.trace()), 1, density < 0.02 ? 0.35 : 0.24)
+        << density;
+    EXPECT_LT(drawn.error_over_predicted, 1.2) << "what is stated holds the background, too";
+  }
 }
 
 TEST(PlanInSpace, at_the_density_that_is_needed_the_error_is_the_target) {
