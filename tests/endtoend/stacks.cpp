@@ -42,9 +42,10 @@ class Stacks : public testing::Test {
     folder_ = nullptr;
   }
   static fs::path cell() { return *folder_ / "cell"; }
-  static std::string track(const std::string& relaxed, const std::string& stressed, const std::string& more = {}) {
+  static std::string track(const std::string& relaxed, const std::string& stressed, const std::string& more = {},
+                           const char* out = "out") {
     return "mbtfm-track --config " + (cell() / "cell.toml").string() + " --relaxed " + relaxed + " --stressed " +
-           stressed + " --out " + (*folder_ / "out").string() + " " + more;
+           stressed + " --out " + (*folder_ / out).string() + " " + more;
   }
   static std::string relaxed() { return (cell() / "beads_relaxed.tif").string(); }
   static std::string stressed() { return (cell() / "beads_stressed.tif").string(); }
@@ -105,29 +106,41 @@ TEST_F(Stacks, what_does_not_go_together_is_refused_with_the_remedy) {
   struct Case {
     std::string command, says;
     int code = 3;
+    std::string of = {};  ///< the file that is not as expected
   };
+  const std::string narrower = changed("narrower.tif", [](auto& s) {
+    for (auto& slice : s) {
+      --slice.height;
+      slice.pixels.resize(slice.pixels.size() - static_cast<std::size_t>(slice.width));
+    }
+  });
   const std::string shorter = changed("shorter.tif", [](auto& s) { s.resize(s.size() - 2); });
   const std::string unscaled = changed("unscaled.tif", [](auto& s) { s.front().z_step_um.reset(); });
   const std::string coarser = changed("coarser.tif", [](auto& s) { s.front().z_step_um = 0.7; });
   const std::string dark = changed("dark.tif", [](auto& s) {
     for (auto& slice : s) std::ranges::fill(slice.pixels, 100.0f);
   });
+  const auto into_out2 = [](const std::string& one, const std::string& other, const std::string& more = {}) {
+    return track(one, other, more, "out2");
+  };
   const std::vector<Case> cases = {
-      {track(relaxed(), shorter), "slices"},
-      {track(unscaled, unscaled), "track.z_step_um"},
-      {track(relaxed(), coarser), "track.z_step_um"},
-      {track(dark, stressed()), "bright beads"},
-      {track(relaxed(), relaxed()), "two stacks"},
+      {into_out2(relaxed(), narrower), "the same field at the same magnification", 3, narrower},
+      {into_out2(relaxed(), shorter), "slices", 3, shorter},
+      {into_out2(unscaled, unscaled), "track.z_step_um", 3, unscaled},
+      {into_out2(relaxed(), coarser), "track.z_step_um", 3, coarser},
+      {into_out2(dark, stressed()), "bright beads", 3, dark},
+      {into_out2(relaxed(), relaxed()), "two stacks", 3, relaxed()},
       {"mbtfm-track --relaxed " + relaxed() + " --stressed " + stressed() + " --dimensions space --out " +
            (*folder_ / "out2").string(),
        "track.z_points", 2},
-      {track(relaxed(), stressed(), "--dimensions space --relaxed_z 3"), "leave relaxed_z", 2},
+      {into_out2(relaxed(), stressed(), "--dimensions space --relaxed_z 3"), "leave relaxed_z", 2},
   };
   for (const Case& c : cases) {
     SCOPED_TRACE(c.command);
     const auto outcome = run_program(c.command);
     EXPECT_EQ(outcome.code, c.code) << outcome.output;
     EXPECT_NE(outcome.output.find(c.says), std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find(c.of), std::string::npos) << outcome.output;
     EXPECT_FALSE(fs::exists(*folder_ / "out2"));
   }
 }
