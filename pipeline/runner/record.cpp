@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <ranges>
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
@@ -213,27 +214,45 @@ std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, con
   return names;
 }
 
-StageSurroundings surroundings_of(const Stage& stage, const CellNow& now, const std::optional<StageRecord>& record) {
+Hashes outputs_now(const Stage& stage, const std::optional<StageRecord>& record, HashCache& hashes) {
   std::vector<std::string> outputs = stage.writes;
   if (record) {
     for (const auto& [name, hash] : record->outputs) {
       if (std::find(outputs.begin(), outputs.end(), name) == outputs.end()) outputs.push_back(name);
     }
   }
+  return hashes.hash(outputs);
+}
+
+StageSurroundings surroundings_of(const Stage& stage, const CellNow& now, const std::optional<StageRecord>& record) {
   return {.version = now.version,
           .settings = now.settings.at(stage.name),
           .inputs = now.hashes.hash(inputs_of(stage, now.cell, now.images)),
-          .outputs = now.hashes.hash(outputs),
+          .outputs = outputs_now(stage, record, now.hashes),
           .has_images = !files_of(images_of(stage, now.images), now.cell, now.images).empty()};
 }
 
+std::optional<StageStatus> changed_by_hand(const Stage& stage, const std::optional<StageRecord>& record,
+                                           const Hashes& outputs) {
+  const auto is_there = [&](const std::string& name) { return outputs.contains(name); };
+  if (!std::ranges::all_of(stage.writes, is_there)) return {};
+  if (!record) return StageStatus{StageState::given, "its outputs were there before the first run"};
+  if (!record->finished || !std::ranges::all_of(std::views::keys(record->outputs), is_there)) return {};
+  for (const auto& [name, hash] : outputs) {
+    const auto ours = record->outputs.find(name);
+    if (ours == record->outputs.end() || ours->second != hash)
+      return StageStatus{StageState::replaced, name + " was changed by hand: kept"};
+  }
+  return {};
+}
+
 StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& record, const StageSurroundings& now) {
+  if (const auto by_hand = changed_by_hand(stage, record, now.outputs)) return *by_hand;
   std::vector<std::string> missing;
   for (const std::string& name : stage.writes) {
     if (!now.outputs.contains(name)) missing.push_back(name);
   }
   if (!record) {
-    if (missing.empty()) return {StageState::given, "its outputs were there before the first run"};
     if (missing.size() == stage.writes.size()) return {StageState::must_run, "not run yet"};
     throw InputError(stage.folder, "all outputs of the stage, or none", "no " + missing.front(),
                      "add the missing files, or remove the others and let mbtfm make them");
@@ -245,12 +264,6 @@ StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& reco
   const bool keeps_frames = stage.keeps_frames && is_same && are_of_series(of_inputs);
   for (const auto& [name, hash] : record->outputs) {
     if (!now.outputs.contains(name)) return {StageState::must_run, name + " is gone", keeps_frames};
-  }
-  for (const auto& [name, hash] : now.outputs) {
-    const auto ours = record->outputs.find(name);
-    if (ours == record->outputs.end() || ours->second != hash) {
-      return {StageState::replaced, name + " was changed by hand: kept"};
-    }
   }
   if (!stage.images.empty() && !now.has_images) return {StageState::given, "its images are gone: outputs kept"};
   if (record->version != now.version) return {StageState::must_run, "was made by version " + record->version};

@@ -89,6 +89,12 @@ struct StageSurroundings {
 };
 StageSurroundings surroundings_of(const Stage& stage, const CellNow& now, const std::optional<StageRecord>& record);
 
+/// Given or replaced where outputs of a stage that is not asked for were put there or changed by hand; else none.
+std::optional<StageStatus> changed_by_hand(const Stage& stage, const std::optional<StageRecord>& record,
+                                           const Hashes& outputs);
+/// The stage's outputs that are there: what it always writes, and what its record names.
+Hashes outputs_now(const Stage& stage, const std::optional<StageRecord>& record, HashCache& hashes);
+
 /// @throws InputError where some of the outputs were given and others lack
 StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& record, const StageSurroundings& now);
 

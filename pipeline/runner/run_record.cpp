@@ -12,6 +12,7 @@
 #include "pipeline/numerics/machine.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
+#include "pipeline/runner/record.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -54,8 +55,19 @@ std::optional<StageFailure> failure_in(const files::JsonRecord& entry) {
                       .message = failure->text_or("message", "")};
 }
 
-ordered_json stage_entry(const Stage& stage, const StageOutcome& outcome, const fs::path& cell,
+/// Of a stage that is not asked for: what was given or changed by hand is so without a run of that stage.
+StageOutcome completed(StageOutcome outcome, const Stage& stage, const fs::path& cell) {
+  if (outcome.status.state != StageState::not_asked) return outcome;
+  const std::optional<StageRecord> record = read_record(cell, stage);
+  HashCache hashes(cell);
+  if (const auto by_hand = changed_by_hand(stage, record, outputs_now(stage, record, hashes)))
+    outcome.status = *by_hand;
+  return outcome;
+}
+
+ordered_json stage_entry(const Stage& stage, const StageOutcome& told, const fs::path& cell,
                          const std::optional<files::JsonRecord>& before) {
+  const StageOutcome outcome = completed(told, stage, cell);
   ordered_json entry;
   entry["state"] = state_of(outcome);
   entry["why"] = outcome.status.why;

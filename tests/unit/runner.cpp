@@ -16,6 +16,7 @@
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/runner/stages.h"
 #include "pipeline/runner/told.h"
+#include "pipeline/runner/verify.h"
 #include "pipeline/stage/effects.h"
 #include "tests/support/temporary_folder.h"
 
@@ -436,6 +437,34 @@ TEST_F(Runner, stages_that_are_run_one_by_one_leave_the_same_record) {
   const auto run = run_record(cell_);
   EXPECT_EQ(run["outcome"], "done");
   for (const auto& stage : run["stages"]) EXPECT_EQ(stage["state"], "run");
+}
+
+/// As the workflow runs a sheet of given beads: it has no job for the stage `track`.
+TEST_F(Runner, what_was_given_is_told_though_no_run_asked_for_its_stage) {
+  make_executable(bin_ / "mbtfm-sheet", kStageScript);
+  for (const char* image : {"beads_stressed.tif", "beads_relaxed.tif"}) fs::remove(cell_ / image);
+  fs::create_directories(cell_ / "2_track");
+  files::write_text(cell_ / "2_track/displacement.csv", "given");
+  write_parameters("[run]\nmodel = 'sheet'\n");
+  for (const char* stage : {"segment", "sheet"}) {
+    options_.only = {stage};
+    EXPECT_EQ(started(), stage);
+  }
+  EXPECT_EQ(run_record(cell_)["stages"]["track"]["state"], "given");
+  EXPECT_EQ(run_record(cell_)["outcome"], "done");
+  EXPECT_EQ(verify_cell(cell_).differences, std::vector<std::string>());
+  files::write_text(cell_ / "2_track/displacement.csv", "another");
+  EXPECT_EQ(verify_cell(cell_).differences,
+            std::vector<std::string>{"2_track/displacement.csv differs (output of track)"});
+}
+
+TEST_F(Runner, what_was_changed_by_hand_is_told_though_no_run_asked_for_its_stage) {
+  started();
+  files::write_text(cell_ / "2_track/displacement.csv", "by hand");
+  options_.only = {"fit"};
+  EXPECT_EQ(started(), "fit");
+  EXPECT_EQ(run_record(cell_)["stages"]["track"]["state"], "replaced");
+  EXPECT_EQ(verify_cell(cell_).differences, std::vector<std::string>());
 }
 
 TEST_F(Runner, kills_a_stage_and_what_it_started_when_its_time_is_over) {
