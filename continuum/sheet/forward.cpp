@@ -174,10 +174,23 @@ Eigen::VectorXd as_vector(const std::vector<Vec2>& u) {
   return all;
 }
 
-Eigen::VectorXd displacements_on_finer_mesh_um(Scene scene, double share, const substrate::Substrate& gel,
-                                               const std::vector<Vec2>& points_um, int threads) {
+namespace {
+
+Scene on_finer_triangles(Scene scene, double share) {
   scene.size = with_edge(scene.size, share * scene.size.at_curves_um);
-  return as_vector(displacements_um(gel, solve_on_gel(scene, gel, threads), points_um));
+  return scene;
+}
+
+}  // namespace
+
+FinerMesh::FinerMesh(const Scene& scene, double share, const substrate::Substrate& gel, int threads)
+    : gel_(gel),
+      elements_(elements_of(on_finer_triangles(scene, share))),
+      ground_(*elements_, gel, adhering_triangles(*elements_, scene.adhesive_um), threads) {}
+
+Eigen::VectorXd FinerMesh::displacements_um(const Scene& scene, const std::vector<Vec2>& points_um) const {
+  MBTFM_ASSERT(scene.strain == Strain::small);
+  return as_vector(sheet::displacements_um(gel_, solve_on(ground_, elements_, scene), points_um));
 }
 
 Eigen::MatrixXd changes_by_outline_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,

@@ -92,10 +92,21 @@ std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Soluti
                                    const std::vector<Vec2>& points_um);
 /// x and y of each in turn: 2·points.
 Eigen::VectorXd as_vector(const std::vector<Vec2>& displacements_um);
-/// The same (2·points) by this scene on triangles of a share of their size. Triangles fall differently on each mesh,
-/// and displacements beside the edge, where tractions are singular, change without order from one to the next.
-Eigen::VectorXd displacements_on_finer_mesh_um(Scene scene, double share, const substrate::Substrate& gel,
-                                               const std::vector<Vec2>& points_um, int threads);
+/// A scene on triangles of a share of their size, for sheets of any stiffness and contraction. Triangles fall
+/// differently on each mesh, and displacements beside the edge, where tractions are singular, change without order from
+/// one to the next.
+class FinerMesh {
+ public:
+  /// @param gel  must outlive it
+  FinerMesh(const Scene& scene, double share, const substrate::Substrate& gel, int threads);
+  /// 2·points. @param scene  of the same outline and adhesive area, of small strains @throws NotSolved
+  Eigen::VectorXd displacements_um(const Scene& scene, const std::vector<Vec2>& points_um) const;
+
+ private:
+  const substrate::Substrate& gel_;
+  std::shared_ptr<const Elements> elements_;
+  OnGel ground_;
+};
 /// What errors of the outline's place change of them (2·points × 3), on the same triangles: the rims lie further out by
 /// this much, or the sheet further along x, or along y.
 /// @param solution  of this scene on a gel

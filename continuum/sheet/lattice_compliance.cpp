@@ -65,14 +65,6 @@ LatticeCompliance::LatticeCompliance(const Patches& patches, const substrate::Su
   set_near(patches, gel, stencils, kernel, threads);
 }
 
-std::array<double, 3> LatticeCompliance::Kernel::between(int columns, int rows) const {
-  std::array<double, 3> value =
-      um_per_nN[static_cast<std::size_t>(std::abs(rows)) * static_cast<std::size_t>(n_columns) +
-                static_cast<std::size_t>(std::abs(columns))];
-  if ((columns < 0) != (rows < 0)) value[1] = -value[1];
-  return value;
-}
-
 LatticeCompliance::Kernel LatticeCompliance::kernel_of(const substrate::Substrate& gel) const {
   constexpr double kPoint = 0.05;  // spacings: at the nearest nodes 3e-4 off a point force, where N has the pair anyway
   std::vector<Vec2> offsets;
@@ -82,8 +74,16 @@ LatticeCompliance::Kernel LatticeCompliance::kernel_of(const substrate::Substrat
   const double radius = kPoint * lattice_.spacing_um;
   const MatrixXd field = gel.compliance_um_per_nN(
       offsets, {{.centre_um = {}, .semi_major_um = radius, .semi_minor_um = radius, .angle_rad = 0}});
-  Kernel kernel{.n_columns = lattice_.n_columns, .um_per_nN = {}};
-  for (Index i = 0; i < field.rows(); i += 2) kernel.um_per_nN.push_back({field(i, 0), field(i, 1), field(i + 1, 1)});
+  Kernel kernel{.most_columns = lattice_.n_columns - 1, .most_rows = lattice_.n_rows - 1, .components = {}};
+  for (std::vector<double>& component : kernel.components)
+    component.resize(kernel.at(kernel.most_columns, kernel.most_rows) + 1);
+  for (int row = -kernel.most_rows; row <= kernel.most_rows; ++row)
+    for (int column = -kernel.most_columns; column <= kernel.most_columns; ++column) {
+      const Index i = 2 * (static_cast<Index>(std::abs(row)) * lattice_.n_columns + std::abs(column));
+      const double sign = (column < 0) != (row < 0) ? -1 : 1;
+      const std::array<double, 3> value = {field(i, 0), sign * field(i, 1), field(i + 1, 1)};
+      for (std::size_t c = 0; c < 3; ++c) kernel.components[c][kernel.at(column, row)] = value[c];
+    }
   return kernel;
 }
 
@@ -118,24 +118,34 @@ MatrixXd LatticeCompliance::by_lattice(const std::vector<Stencil>& stencils, con
         high[axis] = std::max(high[axis], node[axis]);
       }
   const int n_columns = high[0] - low[0] + 1, n_rows = high[1] - low[1] + 1;
-  std::vector<std::array<double, 3>> field(static_cast<std::size_t>(n_columns) * static_cast<std::size_t>(n_rows));
-  for (int row = 0; row < n_rows; ++row)
-    for (int column = 0; column < n_columns; ++column) {
-      std::array<double, 3>& sum = field[static_cast<std::size_t>(row * n_columns + column)];
+  const auto at = [&](const std::array<int, 2>& node) { return (node[1] - low[1]) * n_columns + node[0] - low[0]; };
+  std::vector<char> is_asked(static_cast<std::size_t>(n_columns * n_rows));
+  for (const int i : of)
+    for (const std::array<int, 2>& node : stencils[static_cast<std::size_t>(i)].node)
+      is_asked[static_cast<std::size_t>(at(node))] = 1;
+  Eigen::ArrayXXd field = Eigen::ArrayXXd::Zero(n_columns * n_rows, 3);
+  for (int row = 0; row < n_rows; ++row) {
+    const auto first = is_asked.begin() + row * n_columns, end = first + n_columns;
+    for (auto from = std::find(first, end, 1); from != end;) {  // a run of nodes side by side
+      const auto to = std::find(from, end, 0);
+      const auto column = static_cast<int>(from - first), n = static_cast<int>(to - from);
       for (std::size_t k = 0; k < source.node.size(); ++k) {
-        const auto value = kernel.between(low[0] + column - source.node[k][0], low[1] + row - source.node[k][1]);
-        for (std::size_t c = 0; c < 3; ++c) sum[c] += source.weight[k] * value[c];
+        const std::size_t there = kernel.at(low[0] + column - source.node[k][0], low[1] + row - source.node[k][1]);
+        for (std::size_t c = 0; c < 3; ++c)
+          field.col(static_cast<Index>(c)).segment(row * n_columns + column, n) +=
+              source.weight[k] * Eigen::Map<const Eigen::ArrayXd>(kernel.components[c].data() + there, n);
       }
+      from = std::find(to, end, 1);
     }
+  }
   MatrixXd blocks(2 * std::ssize(of), 2);
   Index to = 0;
   for (const int i : of) {
     const Stencil& stencil = stencils[static_cast<std::size_t>(i)];
     std::array<double, 3> sum{};
-    for (std::size_t k = 0; k < stencil.node.size(); ++k) {
-      const int at = (stencil.node[k][1] - low[1]) * n_columns + stencil.node[k][0] - low[0];
-      for (std::size_t c = 0; c < 3; ++c) sum[c] += stencil.weight[k] * field[static_cast<std::size_t>(at)][c];
-    }
+    for (std::size_t k = 0; k < stencil.node.size(); ++k)
+      for (std::size_t c = 0; c < 3; ++c)
+        sum[c] += stencil.weight[k] * field(at(stencil.node[k]), static_cast<Index>(c));
     blocks.middleRows<2>(to) << sum[0], sum[1], sum[1], sum[2];
     to += 2;
   }
@@ -158,10 +168,10 @@ void LatticeCompliance::set_waves(const Kernel& kernel) {
     for (int column = 1 - lattice_.n_columns; column < lattice_.n_columns; ++column) {
       const Index to = (column + padded_columns_) % padded_columns_ +
                        static_cast<Index>(padded_columns_) * ((row + padded_rows_) % padded_rows_);
-      const std::array<double, 3> k = kernel.between(column, row);
-      direct.x[to] = k[0];
-      direct.y[to] = k[2];
-      mixed.x[to] = k[1];
+      const std::size_t from = kernel.at(column, row);
+      direct.x[to] = kernel.components[0][from];
+      direct.y[to] = kernel.components[2][from];
+      mixed.x[to] = kernel.components[1][from];
     }
   const numerics::WaveField of_direct = transform_.forward(direct), of_mixed = transform_.forward(mixed);
   waves_ = {of_direct.x.real(), of_mixed.x.real(), of_direct.y.real()};

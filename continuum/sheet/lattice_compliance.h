@@ -26,11 +26,14 @@ class LatticeCompliance final : public PatchCompliance {
   const numerics::Lattice& lattice() const { return lattice_; }  ///< without its padding
 
  private:
-  /// K by the distance in columns and rows, xx, xy, yy: of a force and a point both of whose differences are positive.
+  /// K (um/nN) of a point so many columns and rows beside the force, to both sides: xx, xy, yy, row by row.
   struct Kernel {
-    int n_columns = 0;
-    std::vector<std::array<double, 3>> um_per_nN;
-    std::array<double, 3> between(int columns, int rows) const;
+    int most_columns = 0, most_rows = 0;
+    std::array<std::vector<double>, 3> components;
+    std::size_t at(int columns, int rows) const {
+      return static_cast<std::size_t>(rows + most_rows) * static_cast<std::size_t>(2 * most_columns + 1) +
+             static_cast<std::size_t>(columns + most_columns);
+    }
   };
   struct Stencil {
     std::vector<std::array<int, 2>> node;  ///< column, row

@@ -28,7 +28,8 @@ class DenseCompliance final : public PatchCompliance {
         compliance_(i, j) = compliance_(j, i) = 0.5 * (compliance_(i, j) + compliance_(j, i));
   }
   MatrixXd displace(const MatrixXd& forces_nN) const override {
-    if (forces_nN.cols() == 1) return compliance_.selfadjointView<Eigen::Lower>() * forces_nN;  // half the memory read
+    if (forces_nN.cols() == 1)  // half the memory read
+      return compliance_.selfadjointView<Eigen::Lower>() * forces_nN.col(0);
     return numerics::product(compliance_, forces_nN, 1);
   }
   VectorXd diagonal_um_per_nN() const override { return compliance_.diagonal(); }

@@ -155,14 +155,17 @@ tensions::BeadsOfState state_of(const Question& q, const Fitter& fitter, const D
       narrow_um(q.scene.region), q.tolerance, setting);
 }
 
+constexpr double kFiner = 0.7, kFinest = 0.5;  // of the triangles' size
+
 }  // namespace
 
-MeshChange change_by_finer_meshes(const sheet::Scene& scene, const sheet::Solution& solution,
-                                  const substrate::Substrate& gel, const std::vector<Vec2>& points_um, int threads) {
-  constexpr double kFiner = 0.7, kFinest = 0.5;
-  const VectorXd here = sheet::as_vector(displacements_um(gel, solution, points_um)),
-                 finer = displacements_on_finer_mesh_um(scene, kFiner, gel, points_um, threads),
-                 finest = displacements_on_finer_mesh_um(scene, kFinest, gel, points_um, threads);
+FinerMeshes::FinerMeshes(const sheet::Scene& scene, const substrate::Substrate& gel, int threads)
+    : gel_(gel), finer_(scene, kFiner, gel, threads), finest_(scene, kFinest, gel, threads) {}
+
+MeshChange FinerMeshes::change(const sheet::Scene& scene, const sheet::Solution& solution,
+                               const std::vector<Vec2>& points_um) const {
+  const VectorXd here = sheet::as_vector(displacements_um(gel_, solution, points_um)),
+                 finer = finer_.displacements_um(scene, points_um), finest = finest_.displacements_um(scene, points_um);
   MatrixXd left(here.size(), 3);
   left << finer - here, finest - finer, finest - here;
   return {.um = finest - here,
@@ -192,7 +195,7 @@ BeadFit fit_beads(const Question& q, const DisplacementField& beads, const Gel& 
     return solve_on(fitter.ground(), unknowns.shape.elements, scene);
   };
   sheet::Scene scene = scene_of(q, unknowns, found.fit);
-  const MeshChange by_mesh = change_by_finer_meshes(scene, solved(scene), model, places, threads);
+  const MeshChange by_mesh = FinerMeshes(scene, model, threads).change(scene, solved(scene), places);
   found = fitter.fit(corrected(std::move(state.data), by_mesh));
   Errors errors(found);
   errors.add(&SheetErrorParts::mesh, by_mesh.left_um);

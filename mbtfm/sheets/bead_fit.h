@@ -70,8 +70,19 @@ struct MeshChange {
   Eigen::MatrixXd left_um;
   sheet::TriangleSize size;  ///< of the finest triangles
 };
-MeshChange change_by_finer_meshes(const sheet::Scene& scene, const sheet::Solution& solution,
-                                  const substrate::Substrate& gel, const std::vector<Vec2>& points_um, int threads);
+/// The finer meshes of an outline, for what is found on it.
+class FinerMeshes {
+ public:
+  /// @param gel  must outlive them
+  FinerMeshes(const sheet::Scene& scene, const substrate::Substrate& gel, int threads);
+  /// @param solution  of the scene on its own triangles
+  MeshChange change(const sheet::Scene& scene, const sheet::Solution& solution,
+                    const std::vector<Vec2>& points_um) const;
+
+ private:
+  const substrate::Substrate& gel_;
+  sheet::FinerMesh finer_, finest_;
+};
 /// The table's answer and this change together move the beads.
 tensions::LinearData corrected(tensions::LinearData data, const MeshChange& change);
 

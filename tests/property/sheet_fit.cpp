@@ -538,12 +538,13 @@ TEST(SheetField, intervals_hold_what_the_mesh_makes_of_the_contraction) {
     return sheet::displacements_um(*disc.model, sheet::solve_on_gel(of, *disc.model, 1), places);
   };
   const std::vector<Vec2> exact = on_fine_mesh(scene);
+  const FinerMeshes finer(scene, *disc.model, 1);
   constexpr double kSharp_um = 0.005;
   const auto change_for = [&](double sheet_nN_per_um, const std::function<double(Vec2)>& its_contraction) {
     sheet::Scene found = scene;
     found.material.youngs_modulus_kPa = sheet_nN_per_um * (1 - kRatio * kRatio) / kThickness_um;
     found.contraction.at = its_contraction;
-    return change_by_finer_meshes(found, sheet::solve_on_gel(found, *disc.model, 1), *disc.model, places, 1);
+    return finer.change(found, sheet::solve_on(*disc.ground, disc.elements, found), places);
   };
   int n_held = 0, n_held_without = 0;
   constexpr int kRuns = 3, kPlaces = 40;
@@ -741,15 +742,17 @@ TEST(SheetFit, intervals_hold_a_truth_on_another_mesh) {
         sheet::TriangleSize{.at_curves_um = R / 20, .largest_um = R / 4, .growth = 0.9, .most_turn_rad = 0.35});
     std::vector<Vec2> places;
     for (const Bead& bead : disc.beads) places.push_back(bead.position_um);
+    // a mesh and the gel under it are those of sheets of any stiffness
+    const sheet::FinerMesh of_truth(disc.scene(1, kContraction), 1.0 / 3, *disc.model, 1);
+    const FinerMeshes finer(disc.scene(1, kContraction), *disc.model, 1);
     for (const double E : {1.0, 10.0}) {
       const sheet::Scene scene = disc.scene(E, kContraction);
       DisplacementField exact = disc.beads;
-      const Eigen::VectorXd u = displacements_on_finer_mesh_um(scene, 1.0 / 3, *disc.model, places, 1);
+      const Eigen::VectorXd u = of_truth.displacements_um(scene, places);
       for (std::size_t i = 0; i < exact.size(); ++i)
         exact[i].displacement_um = {u(2 * static_cast<Eigen::Index>(i)), u(2 * static_cast<Eigen::Index>(i) + 1)};
       // the change is that of the truth's neighbourhood: it hardly differs between runs, and is found once
-      const MeshChange change =
-          change_by_finer_meshes(scene, sheet::solve_on(*disc.ground, disc.elements, scene), *disc.model, places, 1);
+      const MeshChange change = finer.change(scene, sheet::solve_on(*disc.ground, disc.elements, scene), places);
       Count& count = by_modulus[E];
       for (int run = 0; run < kRuns; ++run) {
         SheetFit fit =
