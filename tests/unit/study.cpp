@@ -592,6 +592,57 @@ TEST(SheetStudy, has_what_the_fit_found_and_compares_the_contraction_first) {
     EXPECT_EQ(page.find(of_fibres), std::string::npos) << of_fibres;
 }
 
+TEST(SheetStudy, its_figures_are_those_of_each_sheet_under_their_names_units_and_conditions) {
+  const Study study = test::simulated_sheets({.condition_effect_nN_per_um = 1});
+  const Analysis analysis = analyse(study, {});
+  const files::CsvTable cells = table_of(study, "cells.csv");
+  struct Expected {
+    const char *column, *in_cells, *unit;
+    std::function<double(const SheetSummary&)> of;
+  };
+  const Expected all[] = {
+      {"contraction_nN_per_um", "contraction_nN_per_um", "nN/µm",
+       [](const SheetSummary& s) { return s.estimates[0].value; }},
+      {"mean_tension_nN_per_um", "mean_tension_nN_per_um", "nN/µm",
+       [](const SheetSummary& s) { return s.mean_tension_nN_per_um; }},
+      {"sheet_force_nN", "sheet_force_nN", "nN", [](const SheetSummary& s) { return s.total_force_nN; }},
+      {"strain_energy_fJ", "strain_energy_fJ", "fJ", [](const SheetSummary& s) { return *s.strain_energy_fJ; }},
+      {"sheet_area_um2", "cell_area_um2", "µm²", [](const SheetSummary& s) { return s.area_um2; }},
+      {"stiffness_nN_per_um", "", "nN/µm", [](const SheetSummary& s) { return s.estimates[1].value; }}};
+  for (const Expected& e : all) {
+    const Sample* sample = sample_named(analysis, e.column);
+    ASSERT_NE(sample, nullptr) << e.column;
+    EXPECT_EQ(sample->unit, e.unit) << e.column;
+    ASSERT_EQ(sample->values.size(), study.cells.size());
+    for (const Observation& o : sample->values) {
+      const StudyCell& cell = study.cells[static_cast<std::size_t>(o.cell)];
+      const double value = e.of(*cell.sheet);
+      EXPECT_EQ(o.value, value) << e.column;
+      EXPECT_EQ(o.group, cell.condition) << e.column;
+      const int row = row_with(cells, {{"cell", cell.name}});
+      EXPECT_EQ(cells.text(row, "condition"), study.conditions[static_cast<std::size_t>(cell.condition)]);
+      if (*e.in_cells) {
+        EXPECT_NEAR(cells.number(row, e.in_cells), value, 1e-5 * value) << e.column << ": six digits";
+      }
+    }
+  }
+}
+
+/// Of twelve sheets of 2 nN/um one says 22 ± 20: the plain mean is off by 1.7.
+TEST(SheetStudy, a_sheet_that_the_beads_hardly_tell_counts_little_in_the_mean) {
+  Study study = test::simulated_sheets({.n_conditions = 1});
+  SheetEstimate& poor = study.cells[3].sheet->estimates[0];
+  poor.value += 20;
+  poor.parts.beads = 20;
+  poor.sigma = 20;
+  poor.low = poor.value - 39;
+  poor.high = poor.value + 39;
+  const Sample sample = sample_sheets(study).front();
+  const Contrast mean = contrast_of(model_of(sample).model->fit, Eigen::VectorXd::Ones(1));
+  EXPECT_NEAR(mean.estimate, 2, 0.3) << "scatter and error of 0.22 make 0.07 of the mean of eleven; four of these";
+  EXPECT_LT(mean.standard_error, 0.15);
+}
+
 /// The error of the gel's modulus is larger than all scatter here. Counted as one of each sheet, it would hide the
 /// difference: nearly all intervals would hold the truth, and many no difference, too.
 TEST(SheetStudy, intervals_of_the_difference_hold_it_and_leave_out_what_sheets_share) {
