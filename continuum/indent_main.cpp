@@ -6,6 +6,7 @@
 #include "continuum/sheet/curve.h"
 #include "continuum/solids/outputs.h"
 #include "continuum/solids/sweep.h"
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
@@ -149,9 +150,9 @@ std::string summary_of(const Setting& setting, const std::vector<Indentation>& s
            brief(solved.front().error_um) + " um";
   }
   const auto n_failed = std::ranges::count_if(solved, [](const Indentation& i) { return i.failure.has_value(); });
-  return std::to_string(solved.size()) + " cases, " +
+  return counted(std::ssize(solved), "cases") + ", " +
          (n_failed > 0 ? std::to_string(n_failed) + " of them without an equilibrium, " : std::string()) +
-         std::to_string(optima.size()) + " best heights";
+         counted(std::ssize(optima), "best heights");
 }
 
 /// Cases that are not solved: all of them, or some of a sweep.
@@ -169,9 +170,10 @@ void notice_failures(stage::StageContext& context, const std::vector<Indentation
                                                         " cases has an equilibrium; the first: " + *first.failure});
   }
   context.notice(noticed(FindingKind::cases_not_solved, static_cast<double>(failed.size()),
-                         std::to_string(failed.size()) + " of " + std::to_string(solved.size()) +
-                             " cases have no equilibrium. The first has height " + brief(first.of.height_um) +
-                             " um and modulus ratio " + brief(first.of.modulus_ratio) + ": " + *first.failure + "."));
+                         "There is no equilibrium in " + std::to_string(failed.size()) + " of " +
+                             counted(std::ssize(solved), "cases") + ". The first has height " +
+                             brief(first.of.height_um) + " um and modulus ratio " + brief(first.of.modulus_ratio) +
+                             ": " + *first.failure + "."));
 }
 
 std::vector<Indentation> solved_cases(const Setting& setting, const std::vector<Case>& cases,

@@ -10,6 +10,7 @@
 #include "continuum/mean/align.h"
 #include "continuum/outlines/rings.h"
 #include "mbtfm/tractions/neighbour_noise.h"
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
@@ -246,14 +247,15 @@ std::vector<CellRow> rows_of(stage::StageContext& context, const Parameters& p, 
   if (n_kept < 2)
     throw InputError(context.inputs_.at("cells").string(), "two cells of the reference's shape",
                      std::to_string(n_kept));
-  context.notice(noticed(FindingKind::cells_left_out, n_left_out,
-                         std::to_string(n_left_out) + " of " + std::to_string(rows.size()) +
-                             " cells are not in the mean: their outlines do not fit the reference."));
+  context.notice(noticed(
+      FindingKind::cells_left_out, n_left_out,
+      std::to_string(n_left_out) + " of " + counted(std::ssize(rows), "cells") +
+          (n_left_out == 1 ? " is not in the mean: its outline does" : " are not in the mean: their outlines do") +
+          " not fit the reference."));
   context.notice(noticed(FindingKind::registration_ambiguous, n_ambiguous,
-                         std::to_string(n_ambiguous) + " of " + std::to_string(n_kept) +
-                             " cells fit the reference in more than one way."));
-  context.notice(
-      noticed(FindingKind::few_cells, 5.0 / n_kept, "The mean is over " + std::to_string(n_kept) + " cells."));
+                         std::to_string(n_ambiguous) + " of " + counted(n_kept, "cells") +
+                             (n_ambiguous == 1 ? " fits" : " fit") + " the reference in more than one way."));
+  context.notice(noticed(FindingKind::few_cells, 5.0 / n_kept, "The mean is over " + counted(n_kept, "cells") + "."));
   return rows;
 }
 
@@ -470,9 +472,9 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   StageReport report;
   report.figures = figures_of(p, rows, means, ratio, blur, size);
   files::write_figures(context.output("out", "mean.json"), report.figures);
-  report.summary = "mean of " + std::to_string(kept.size()) + " cells at " + std::to_string(means.size()) +
-                   " nodes; blurred by " + brief(blur.fttc_um) + " um (tractions) and " + brief(blur.registration_um) +
-                   " um (registration)";
+  report.summary = "mean of " + counted(std::ssize(kept), "cells") + " at " + std::to_string(means.size()) +
+                   " nodes; blurred by " + brief(blur.fttc_um) + " µm (tractions) and " + brief(blur.registration_um) +
+                   " µm (registration)";
   if (ratio)
     report.summary += "; tips over the rest of the edge " + brief(ratio->ratio) + " (" + brief(ratio->low) + " to " +
                       brief(ratio->high) + ")";

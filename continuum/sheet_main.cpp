@@ -19,6 +19,7 @@
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
@@ -302,6 +303,13 @@ void notice_shape(stage::StageContext& context, const Material& material, const 
               "The cells are " + brief(ratio) + " of their half width thick: a sheet moves less than they."));
 }
 
+/// Of the gel; how large the strains are is the sheet's own question.
+std::vector<Effect> effects_of(const substrate::Substrate& gel) {
+  std::vector<Effect> effects = gel.effects();
+  std::erase_if(effects, [](const Effect& e) { return e.kind == EffectKind::large_strain; });
+  return effects;
+}
+
 struct Run {
   Solution solution;
   Figures figures;
@@ -381,7 +389,7 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
     }
     append(result.figures, model->figures());
     result.figures.emplace_back("gel_compliance", std::string(name_of(*result.solution.gel_held)));
-    result.effects = model->effects();
+    result.effects = effects_of(*model);
   }
   const bool slips = ground == Ground::gel && scene.adhesion_nN_per_um3.has_value();
   const double line = scene.line_tension_nN / (narrow_um(region) * std::max(scene.contraction.nN_per_um, 1e-300));
@@ -681,8 +689,11 @@ std::string told_by(const sheets::SheetFit& fit) {
   }
   if (bundles_nN.empty()) return told;
   const auto [least, most] = std::ranges::minmax(bundles_nN);  // sheet_fit.csv has each
-  return told + "; tensions of " + std::to_string(bundles_nN.size()) + " bundles " + brief(least) + " to " +
-         brief(most) + " nN";
+  return told +
+         (bundles_nN.size() == 1 ? "; tension of a bundle " + brief(least)
+                                 : "; tensions of " + counted(std::ssize(bundles_nN), "bundles") + " " + brief(least) +
+                                       " to " + brief(most)) +
+         " nN";
 }
 
 /// What a reader must know of the fit.
@@ -720,7 +731,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   const Scene& scene = found.scene;
   if (context.has_input("adhesions"))
     compare_with_adhesions(fit, data_of_adhesions(found.beads, context, *model, question.has_motion));
-  Run result{.solution = std::move(found.solution), .figures = {}, .effects = model->effects()};
+  Run result{.solution = std::move(found.solution), .figures = {}, .effects = effects_of(*model)};
   write_beads(context, *model, result.solution, tensions::points_of(beads), tensions::points_of(found.beads));
   const Path estimates_file = context.output("out", "sheet_fit.csv"),
              models_file = context.output("out", "sheet_models.csv");
@@ -820,11 +831,11 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   report.converged = done.solution.report.converged;
   report.summary = std::to_string(done.solution.elements->n_triangles()) + " triangles, mean tension " +
                    brief(balance.mean_tension_nN_per_um) + " nN/µm over " + brief(balance.area_um2) +
-                   " um2, total force " + brief(balance.total_force_nN) + " nN; " + done.solution.report.reason;
+                   " µm², total force " + brief(balance.total_force_nN) + " nN; " + done.solution.report.reason;
   if (!done.told.empty()) report.summary += "; " + done.told;
   if (!region.cuts.empty() && !has_tractions)
     report.summary += "; WARNING: the image cuts the sheet, whose edge there is taken for free";
-  if (n_outside > 0) report.summary += "; " + std::to_string(n_outside) + " points lie outside of the sheet";
+  if (n_outside > 0) report.summary += "; " + counted(n_outside, "point lies", "points lie") + " outside of the sheet";
   report.figures = done.figures;
   report.effects = done.effects;
   return report;

@@ -3,6 +3,7 @@
 #include "mbtfm/plan/page.h"
 #include "mbtfm/plan/space_page.h"
 #include "mbtfm/plan/tables.h"
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/console.h"
@@ -71,9 +72,6 @@ void tell(const std::string& answer, const std::vector<std::string>& further,
 
 std::string summary_of(const std::string& name, const Asked& asked, std::size_t n_densities,
                        const stage::StageContext& context) {
-  const auto counted = [](std::size_t n, const char* one, const char* many) {
-    return std::to_string(n) + " " + (n == 1 ? one : many);
-  };
   return name + ": " + counted(asked.youngs_modulus_kPa.size(), "gel", "gels") + ", " +
          counted(n_densities, "density", "densities") + ", " + counted(asked.noise_um.size(), "noise", "noises") +
          "; plan.html in " + context.outputs_.at("out").string();

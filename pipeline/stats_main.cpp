@@ -1,4 +1,5 @@
 /// mbtfm-stats: tables, tests and figures over all finished cells of a folder.
+#include "pipeline/contract/counted.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/stage.h"
@@ -53,11 +54,11 @@ StageReport statistics(const StudyParameters& parameters, stage::StageContext& c
   files::write_text(context.output("out", "study.R"), std::string(kStudyScript));
   StageReport report;
   if (analysis.has_fibres)
-    report.summary = std::to_string(n_with_fibres(study)) + " cells, " +
-                     std::to_string(analysis.tensions.sample.values.size()) + " tensions; ";
-  if (n_sheets(study) > 0) report.summary += std::to_string(n_sheets(study)) + " sheets; ";
-  report.summary += std::to_string(study.left_out.size()) + " cells left out, " +
-                    std::to_string(analysis.warnings.size()) + " warnings: see report.html";
+    report.summary = counted(n_with_fibres(study), "cells") + ", " +
+                     counted(std::ssize(analysis.tensions.sample.values), "tensions") + "; ";
+  if (n_sheets(study) > 0) report.summary += counted(n_sheets(study), "sheets") + "; ";
+  report.summary += counted(std::ssize(study.left_out), "cells") + " left out, " +
+                    counted(std::ssize(analysis.warnings), "warnings") + ": see report.html";
   return report;
 }
 

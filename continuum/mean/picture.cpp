@@ -5,6 +5,7 @@
 #include "continuum/mean/outputs.h"
 #include "pipeline/charts/chart.h"
 #include "pipeline/charts/colour_map.h"
+#include "pipeline/contract/counted.h"
 
 namespace mbtfm::mean {
 namespace {
@@ -110,7 +111,7 @@ charts::Chart edge_chart(const Scene& scene) {
 std::string picture_of(const Scene& scene) {
   return charts::svg_file(
       {traction_chart(scene), outlines_chart(scene), edge_chart(scene)}, 2,
-      {std::to_string(scene.outlines_um.size()) + " cells. Bars: the standard error, from the scatter of the cells.",
+      {counted(std::ssize(scene.outlines_um), "cells") + ". Bars: the standard error, from the scatter of the cells.",
        "Edge: the part of the reference within " + charts::readable(scene.band_um) + " µm of its outline."});
 }
 

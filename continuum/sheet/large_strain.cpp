@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 
@@ -194,7 +195,7 @@ LargeStrain in_load_steps(const LoadedSheet& sheet, Eigen::Index n_unknowns) {
   }
   result.report.converged = true;
   result.report.last_change = sheet.left_nN(result.u, 1).norm() / sheet.force_scale_nN;
-  result.report.reason = std::to_string(result.report.iterations) + " Newton steps";
+  result.report.reason = counted(result.report.iterations, "Newton steps");
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "continuum/sheet/stiffness.h"
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
@@ -200,7 +201,7 @@ OnGel::Solutions OnGel::solve_all(const Material& material, std::optional<double
   }
   report.converged = true;
   report.last_change = left();
-  report.reason = std::to_string(report.iterations) + " steps of conjugate gradients";
+  report.reason = counted(report.iterations, "step", "steps") + " of conjugate gradients";
   solution.u = at_rest - free.solve(means.spread(solution.forces_nN));
   solution.u += rigid * balanced.motion_in(ground_um(solution.forces_nN) - means.of(solution.u));
   return solution;

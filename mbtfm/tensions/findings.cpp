@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 
@@ -12,10 +13,6 @@ namespace mbtfm::tensions {
 namespace {
 
 using Noticed = std::optional<Finding>;
-
-std::string counted(std::int64_t n, const std::string& one, const std::string& many) {
-  return std::to_string(n) + " " + (n == 1 ? one : many);
-}
 
 /// "3, 7 and 12"; of many the first ones.
 std::string listed(const std::vector<int>& ids) {

@@ -9,6 +9,7 @@
 #include <regex>
 #include <string>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/stage_state.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
@@ -25,10 +26,6 @@ std::string two_digits(double value) {
 }
 
 std::string percent(double share) { return two_digits(100 * share) + " %"; }
-
-std::string counted(std::size_t n, const std::string& one, const std::string& many) {
-  return fmt::format("{} {}", n, n == 1 ? one : many);
-}
 
 /// Empty where the image shows the whole cell.
 std::string of_cut(const FitSummary& fit) {

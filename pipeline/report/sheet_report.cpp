@@ -89,7 +89,7 @@ std::vector<Listing> tables_of_sheet(const fs::path& estimates, const fs::path& 
       {"Where the errors come from",
        "Parts of each standard error: noise of the beads, the motion that all beads share, what the sheet leaves "
        "beyond noise, its triangles, the place of its outline, the gel's stated errors, the model of the gel. Their "
-       "squares add up to that of sigma; an empty part was not asked for.",
+       "squares add up to that of sigma; a part that is not there was not asked for.",
        of + "sheet_fit.csv",
        files::read_text(estimates),
        {"quantity", "part", "sigma", "by_beads", "by_motion", "by_model", "by_mesh", "by_outline", "by_gel",
@@ -115,9 +115,7 @@ std::string report_of_sheet(const fs::path& cell) {
   for (const Listing& table : tables_of_sheet(folder / "sheet_fit.csv", folder / "sheet_models.csv", r.name + "_"))
     body += section_of(table);
   body += section("For your methods section", methods(r, provenance));
-  std::vector<std::pair<std::string, std::string>> pairs;
-  for (const auto& [name, value] : r.figures.members()) pairs.emplace_back(name, text_of_figure(value.figure()));
-  body += provenance_section(provenance, folded("Figures of the sheet", html_of_pairs("Figures of the sheet", pairs)));
+  body += provenance_section(provenance, "");
   return page(r.name + " – mbtfm", head, body);
 }
 

@@ -1,6 +1,13 @@
 #include "pipeline/report/stage_page.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
 #include "pipeline/contract/version.h"
+#include "pipeline/contract/words.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/report/findings.h"
 #include "pipeline/report/numbers.h"
@@ -13,19 +20,31 @@ bool is_number(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789+-.e") == text.npos;
 }
 
+enum class Truth { no, yes };
+constexpr auto words(Truth) { return std::array{"FALSE", "TRUE"}; }  // as tables have it
+
+/// As people read it: all digits before the point, three at least, and no more. The file has the others.
+std::string shown(const std::string& text) {
+  if (const auto truth = named<Truth>(text)) return *truth == Truth::yes ? "yes" : "no";
+  if (!is_number(text) || text.find_first_of(".e") == text.npos) return text;
+  const double value = std::stod(text);
+  return std::abs(value) >= 100 ? fmt::format("{:.0f}", value) : fmt::format("{:#.3g}", value);
+}
+
 }  // namespace
 
 std::string section_of(const Listing& listing) {
   const files::CsvTable csv(listing.csv, listing.name);
   Table table{.columns = {}, .rows = {}, .caption = listing.title};
-  for (const std::string& column : listing.columns) table.columns.push_back({html_escaped(column), true});
-  for (int row = 0; row < csv.n_rows(); ++row) {
-    std::vector<std::string>& cells = table.rows.emplace_back();
-    for (std::size_t k = 0; k < listing.columns.size(); ++k) {
-      const std::string text = csv.text(row, listing.columns[k]);
-      if (!text.empty() && !is_number(text)) table.columns[k].is_number = false;
-      cells.push_back(html_escaped(text));
-    }
+  table.rows.resize(static_cast<std::size_t>(csv.n_rows()));
+  for (const std::string& column : listing.columns) {
+    std::vector<std::string> texts;
+    for (int row = 0; row < csv.n_rows(); ++row) texts.push_back(csv.text(row, column));
+    const auto is_empty = [](const std::string& text) { return text.empty(); };
+    if (std::ranges::all_of(texts, is_empty)) continue;
+    const auto may_be_number = [](const std::string& text) { return text.empty() || is_number(text); };
+    table.columns.push_back({html_escaped(column), std::ranges::all_of(texts, may_be_number)});
+    for (std::size_t row = 0; row < texts.size(); ++row) table.rows[row].push_back(html_escaped(shown(texts[row])));
   }
   return section(listing.title, "<p class=\"sub\">" + html_escaped(listing.explained) + "</p>\n" +
                                     html_of(table, Download{listing.name, listing.csv}));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/statistics/drawing.h"
 
@@ -104,12 +105,12 @@ charts::Chart distribution_of(const Sample& sample, const std::string& label) {
       const std::vector<Observation> own = sample.of_group(c, kind);
       if (own.empty()) continue;
       const std::string name = sample.kinds[static_cast<std::size_t>(kind)];
-      all.push_back({.label = fmt::format("{}{}: {} adhesions, {} cells",
-                                          prefix_of(sample.conditions[static_cast<std::size_t>(c)]), name, own.size(),
-                                          n_cells_of(own)),
-                     .colour = sample.n_conditions() == 1 ? condition_colour(kind) : condition_colour(c),
-                     .values = values_of(own),
-                     .is_dashed = kind == 1});
+      all.push_back(
+          {.label = fmt::format("{}{}: {}, {}", prefix_of(sample.conditions[static_cast<std::size_t>(c)]), name,
+                                counted(std::ssize(own), "adhesions"), counted(n_cells_of(own), "cells")),
+           .colour = sample.n_conditions() == 1 ? condition_colour(kind) : condition_colour(c),
+           .values = values_of(own),
+           .is_dashed = kind == 1});
     }
   }
   return histogram_chart(label, label + " (" + sample.unit + ")", "share of the adhesions", all, low, 1.001 * high,
@@ -153,14 +154,15 @@ Figure force_by_area(const Analysis& analysis) {
         }
         chart.dot(line.back(), 3.6,
                   "fill:" + std::string(is_connected ? colour : "#fff") + ";stroke:" + colour + ";stroke-width:1.6",
-                  fmt::format("{} adhesions of {} cells: {} nN", b.n_adhesions, b.n_cells,
+                  fmt::format("{} of {}: {} nN", counted(b.n_adhesions, "adhesions"), counted(b.n_cells, "cells"),
                               charts::readable(b.mean_force_nN)));
       }
       if (line.empty()) continue;
       chart.curve(line, "stroke:" + colour + ";stroke-width:1.4" + (is_connected ? "" : ";stroke-dasharray:5 3"));
-      chart.key(fmt::format("{}{}{}: {} adhesions, {} cells", is_connected ? "" : "- - ",
-                            prefix_of(sample.conditions[c]), is_connected ? "connected" : "unconnected", n, n_cells),
-                colour);
+      chart.key(
+          fmt::format("{}{}{}: {}, {}", is_connected ? "" : "- - ", prefix_of(sample.conditions[c]),
+                      is_connected ? "connected" : "unconnected", counted(n, "adhesions"), counted(n_cells, "cells")),
+          colour);
     }
   }
   return {.name = "adhesion_force_by_area",
@@ -185,7 +187,7 @@ Figure directions(const Analysis& analysis) {
       std::string label = fmt::format("{}{:.0f}°", prefix_of(s.condition), s.mean_angle_deg);
       if (s.angle_interval_deg)
         label += fmt::format(" [{:.0f}, {:.0f}]", s.angle_interval_deg->low, s.angle_interval_deg->high);
-      all.push_back({.label = label + fmt::format(", {} of {} cells", s.n, s.n_cells),
+      all.push_back({.label = label + fmt::format(", {} of {}", s.n, counted(s.n_cells, "cells")),
                      .colour = condition_colour(index_of(conditions, s.condition)),
                      .values = s.angles_deg});
     }

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/counted.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -58,23 +59,22 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
   }
   if (n_unknown > 0) {
     warnings.push_back(fmt::format(
-        "The tensions of {} of {} fibres could not be identified and do not enter: if these are the weak ones, the "
+        "The tensions of {} of {} could not be identified and do not enter: if these are the weak ones, the "
         "means of the others are too large.",
-        n_unknown, n_fibres));
+        n_unknown, counted(n_fibres, "fibres")));
   }
   if (const int n_without = n_with_fibres(study) - static_cast<int>(with.size()); n_without > 0) {
     warnings.push_back(
-        fmt::format("{} cells have no fibre with a known tension: they enter the forces, not the "
-                    "tensions.",
-                    n_without));
+        fmt::format("{} no fibre with a known tension: of these only the forces enter, not the tensions.",
+                    counted(n_without, "cell has", "cells have")));
   }
   const int n_tensions = static_cast<int>(tensions.sample.values.size());
   if (tensions.sample.n_without_error > 0) {
     warnings.push_back(
         tensions.sample.n_without_error < n_tensions
             ? fmt::format(
-                  "{} of {} tensions have no error bar; their error is taken to be as large as that of the others.",
-                  tensions.sample.n_without_error, n_tensions)
+                  "{} of {} tensions {} no error bar; their error is taken to be as large as that of the others.",
+                  tensions.sample.n_without_error, n_tensions, tensions.sample.n_without_error == 1 ? "has" : "have")
             : "No tension has an error bar: what is scatter of the fibres and what error cannot be told.");
   }
   for (const Summary& s : tensions.summaries) {
@@ -99,10 +99,10 @@ void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
   const auto n = std::count_if(study.cells.begin(), study.cells.end(),
                                [](const StudyCell& cell) { return !is_network_known(cell); });
   if (n == 0) return;
-  warnings.push_back(fmt::format(
-      "The network's tension of {} of {} cells could not be identified: how their total force is shared out "
-      "to network and fibres is not known and does not enter, nor does the network's surface tension.",
-      n, n_with_fibres(study)));
+  warnings.push_back(
+      fmt::format("The network's tension of {} of {} could not be identified: how their total force is shared out "
+                  "to network and fibres is not known and does not enter, nor does the network's surface tension.",
+                  n, counted(n_with_fibres(study), "cells")));
 }
 
 /// What the beads do not limit to both sides.
@@ -118,9 +118,9 @@ void warn_of_sheets(const Study& study, std::vector<std::string>& warnings) {
     }
     if (n_unknown == 0) continue;
     warnings.push_back(fmt::format(
-        "The beads limit the {} of sheets to one side only, or not at all, in {} of {} fits. These values do not "
-        "enter: the mean of the others may be biased.",
-        for_people(quantity).name, n_unknown, n));
+        "The beads limit the {} of sheets to one side only, or not at all, in {} of {}. What is not known does "
+        "not enter, and the mean of the rest may be biased.",
+        for_people(quantity).name, n_unknown, counted(n, "fits")));
   }
 }
 

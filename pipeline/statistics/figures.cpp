@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/report/tension_plot.h"
 #include "pipeline/statistics/drawing.h"
 #include "pipeline/statistics/study_files.h"
@@ -30,7 +31,7 @@ double largest_of(const Sample& sample) {
 }
 
 std::string counts(const std::vector<Observation>& own, Observed each) {
-  return fmt::format("{} {}, {} cells", own.size(), name_of(each), n_cells_of(own));
+  return counted(std::ssize(own), name_of(each)) + ", " + counted(n_cells_of(own), "cells");
 }
 
 /// Where a condition's column is drawn beside the kind's place.
@@ -75,8 +76,8 @@ void add_condition_keys(charts::Chart& chart, const Sample& sample) {
       cells.insert(o.cell);
       ++n;
     }
-    chart.key(fmt::format("{}: {} {}, {} cells", sample.conditions[static_cast<std::size_t>(c)], n,
-                          name_of(sample.each), cells.size()),
+    chart.key(fmt::format("{}: {}, {}", sample.conditions[static_cast<std::size_t>(c)],
+                          counted(n, name_of(sample.each)), counted(std::ssize(cells), "cells")),
               condition_colour(c));
   }
 }
@@ -170,8 +171,8 @@ Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters
       chart.error({x, 100 * s.share.interval.low}, {x, 100 * s.share.interval.high},
                   "stroke:" + colour + ";stroke-width:1.6");
       chart.dot({x, 100 * s.share.value}, 4, "fill:" + colour,
-                fmt::format("{}{}: {} % of {} fibres", prefix_of(s.condition), kind_for_people(s.kind),
-                            charts::readable(100 * s.share.value), s.n));
+                fmt::format("{}{}: {} % of {}", prefix_of(s.condition), kind_for_people(s.kind),
+                            charts::readable(100 * s.share.value), counted(s.n, "fibres")));
       const double y = 100 * s.without_error, r = 0.04;
       chart.curve({{x + 2 * r, y - 1.5}, {x + 4 * r, y + 1.5}}, "stroke:#000;stroke-width:1.6");
       chart.curve({{x + 2 * r, y + 1.5}, {x + 4 * r, y - 1.5}}, "stroke:#000;stroke-width:1.6");
@@ -196,7 +197,7 @@ Figure forces_by_cell(const Study& study) {
   const double n = static_cast<double>(cells.size());
   charts::Chart chart(
       "Total force of each cell",
-      charts::Axis{.label = fmt::format("{} cells", cells.size()), .low = 0, .high = n, .names = {{n / 2, ""}}},
+      charts::Axis{.label = counted(std::ssize(cells), "cells"), .low = 0, .high = n, .names = {{n / 2, ""}}},
       charts::Axis{.label = "force (nN)", .low = 0, .high = end_below_keys(largest, study.conditions.size() + 1)});
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const FitSummary& fit = cells[i]->fit;

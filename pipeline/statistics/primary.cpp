@@ -7,6 +7,7 @@
 #include <map>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/rank_tests.h"
@@ -109,7 +110,7 @@ std::string sentence_of(const Primary& primary, const PrimaryDifference& d) {
     text += fmt::format(" ({:.0f} %)", 100 * std::abs(c.estimate) / primary.reference_mean);
   text += fmt::format(" [95 % CI {} to {} {}], {}; ", readable(low), readable(high), primary.unit,
                       d.p_holm < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", d.p_holm));
-  if (d.replicates > 0) text += fmt::format("{} replicates, ", d.replicates);
+  if (d.replicates > 0) text += counted(d.replicates, "replicates") + ", ";
   return text + fmt::format("{} and {} {}", d.cells, d.cells_before, primary.cells);
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/report/page.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -45,8 +46,8 @@ std::vector<std::string> means(const Measure& m) {
   for (const Summary& s : m.summaries) {
     std::string text = fmt::format("{}the mean {} of {} is {}", prefix_of(s.condition), m.sample.name,
                                    plural_of(m.sample, s.kind), mean_text(s, m));
-    text += fmt::format(", the {} being the unit ({} {}", m.sample.cell_name(), s.n_cells, m.sample.cells_name());
-    if (!m.sample.is_one_a_cell()) text += fmt::format(", {} {}", s.n, counted_name(m.sample));
+    text += fmt::format(", the {} being the unit ({}", m.sample.cell_name(), counted(s.n_cells, m.sample.cells_name()));
+    if (!m.sample.is_one_a_cell()) text += ", " + counted(s.n, counted_name(m.sample));
     text += ")";
     if (m.sample.each != Observed::cells && s.typical_error && s.n > 2) {
       text += fmt::format("; they scatter by {}, of which {} remain without the error of their measurement",
@@ -135,12 +136,12 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
   for (const ShareAbove& s : analysis.shares) {
     if (s.threshold_nN != parameters.strong_tension_nN) continue;
     list.push_back(capitalised(
-        fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %; {} fibres of {} "
-                    "cells], {:.0f} % "
+        fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %; {} of {}], "
+                    "{:.0f} % "
                     "without the blur of the measurement.",
                     prefix_of(s.condition), 100 * s.share.value, plural_of(analysis.tensions.sample, s.kind),
-                    charts::readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high, s.n,
-                    s.n_cells, 100 * s.without_error)));
+                    charts::readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high,
+                    counted(s.n, "fibres"), counted(s.n_cells, "cells"), 100 * s.without_error)));
   }
   return list;
 }
@@ -152,7 +153,7 @@ std::vector<std::string> lines(const Analysis& analysis) {
     const std::string error = c.line->slope_error ? " ± " + charts::readable(*c.line->slope_error) : "";
     std::string text =
         fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition),
-                    charts::readable(c.line->slope), error, c.size_unit, fmt::format("{} cells", c.x.size()));
+                    charts::readable(c.line->slope), error, c.size_unit, counted(std::ssize(c.x), "cells"));
     if (c.line->correlation) text += ", r = " + charts::readable(*c.line->correlation);
     list.push_back(capitalised(text + ")."));
   }
@@ -170,8 +171,9 @@ std::vector<std::string> directions(const Analysis& analysis) {
                                    full_name_of(s.relation), s.mean_angle_deg);
     if (s.angle_interval_deg)
       text += fmt::format(" [95 % CI {:.0f}° to {:.0f}°]", s.angle_interval_deg->low, s.angle_interval_deg->high);
-    list.push_back(capitalised(text + fmt::format(", where chance would give {:.0f}° ({} angles of {} cells).",
-                                                  largest_angle_deg(s.relation) / 2, s.n, s.n_cells)));
+    list.push_back(capitalised(text + fmt::format(", where chance would give {:.0f}° ({} of {}).",
+                                                  largest_angle_deg(s.relation) / 2, counted(s.n, "angles"),
+                                                  counted(s.n_cells, "cells"))));
   }
   return list;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/own_files.h"
@@ -244,9 +245,9 @@ std::string findings_text(const Study& study, const std::string& table_html) {
   const auto n_open = std::ranges::count_if(study.cells, [](const StudyCell& c) { return has_open(c.findings); });
   if (n_open == 0) return "<p><b>✓</b> No finding is open in any cell that enters.</p>\n";
   return fmt::format(
-             "<p>{} of {} cells have open findings: what they name may be off by more than the error bars say. The "
+             "<p>Findings are open in {} of {}: what they name may be off by more than the error bars say. The "
              "column <code>exclude</code> of the table of conditions leaves a cell out.</p>\n",
-             n_open, study.cells.size()) +
+             n_open, counted(study.cells.size(), "cells")) +
          table_html;
 }
 
@@ -279,11 +280,6 @@ std::string list_of(const std::vector<std::string>& sentences) {
   return html + "</ul>\n";
 }
 
-/// "8 sheets", "1 cell"
-std::string counted(std::size_t n, const std::string& name) {
-  return std::to_string(n) + " " + name + (n == 1 ? "" : "s");
-}
-
 std::string overview(const Study& study, const Analysis& analysis) {
   std::size_t n_fibres = 0, n_adhesions = 0, n_contractions = 0;
   for (const StudyCell& c : study.cells) {
@@ -298,25 +294,24 @@ std::string overview(const Study& study, const Analysis& analysis) {
   std::string html = "<p>";
   if (with_fibres > 0) {
     html += fmt::format(
-        "{} with {} adhesions and {} stress fibres; the tensions of {} of them could be identified and enter the "
+        "{} with {} and {}; the tensions of {} of them could be identified and enter the "
         "statistics. ",
-        counted(with_fibres, "cell"), n_adhesions, n_fibres, analysis.tensions.sample.values.size());
+        counted(with_fibres, "cells"), counted(n_adhesions, "adhesions"), counted(n_fibres, "stress fibres"),
+        analysis.tensions.sample.values.size());
   }
   if (sheets > 0) {
     html += fmt::format(
         "{}: cells or colonies that are taken as contracting sheets, without fibres. The contraction of {} of them "
         "could be identified and enters the statistics. ",
-        counted(sheets, "sheet"), n_contractions);
+        counted(sheets, "sheets"), n_contractions);
   }
   if (with_fibres > 0 && sheets > 0)
     html += "Figures of sheets and of cells with fibres are kept apart: they have different meanings. ";
-  if (has_conditions(study)) html += counted(study.conditions.size(), "condition") + ". ";
-  html +=
-      (study.left_out.empty()
-           ? "No cell was left out."
-           : fmt::format("{} left out: see the table of cells.",
-                         counted(study.left_out.size(), "cell") + (study.left_out.size() == 1 ? " was" : " were"))) +
-      "</p>\n";
+  if (has_conditions(study)) html += counted(study.conditions.size(), "conditions") + ". ";
+  html += (study.left_out.empty() ? "No cell was left out."
+                                  : fmt::format("{} left out: see the table of cells.",
+                                                counted(study.left_out.size(), "cell was", "cells were"))) +
+          "</p>\n";
   if (!analysis.warnings.empty()) html += "<h3>What to distrust</h3>\n" + list_of(analysis.warnings);
   return html;
 }
@@ -361,8 +356,8 @@ std::string on_edge_fibres(const Study& study) {
     n += static_cast<std::size_t>(
         std::ranges::count_if(cell.cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; }));
   if (n == 0) return "";
-  return fmt::format("<p class=\"sub\">{} edge {} a free piece of the outline and {} held at both ends. {}</p>\n", n,
-                     n == 1 ? "fibre runs along" : "fibres run along", n == 1 ? "is" : "are",
+  return fmt::format("<p class=\"sub\">{} a free piece of the outline and {} held at both ends. {}</p>\n",
+                     counted(n, "edge fibre runs along", "edge fibres run along"), n == 1 ? "is" : "are",
                      study.n_fibre_types < 4
                          ? "Here they count as ventral fibres; stats.fibre_types = 4 shows them as a type of their own."
                          : "Here they are a type of their own.");
@@ -378,8 +373,8 @@ constexpr const char* kHowToReadSheets =
 std::string title_of(const Study& study) {
   const auto with_fibres = static_cast<std::size_t>(n_with_fibres(study)), sheets = study.cells.size() - with_fibres;
   std::string title;
-  if (with_fibres > 0) title = "Stress-fibre tensions of " + counted(with_fibres, "cell");
-  if (sheets > 0) title += (title.empty() ? "Contraction of " : " and contraction of ") + counted(sheets, "sheet");
+  if (with_fibres > 0) title = "Stress-fibre tensions of " + counted(with_fibres, "cells");
+  if (sheets > 0) title += (title.empty() ? "Contraction of " : " and contraction of ") + counted(sheets, "sheets");
   return title;
 }
 
@@ -395,8 +390,8 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   for (const Findings& f : findings_of(analysis, parameters)) {
     if (!f.sentences.empty()) found += "<h3>" + f.title + "</h3>\n" + list_of(f.sentences);
     if (f.unclear.empty()) continue;
-    found += fmt::format("<details><summary>{} pairs that do not demonstrably differ</summary>\n{}</details>\n",
-                         f.unclear.size(), list_of(f.unclear));
+    found += fmt::format("<details><summary>{} not demonstrably differ</summary>\n{}</details>\n",
+                         counted(f.unclear.size(), "pair that does", "pairs that do"), list_of(f.unclear));
   }
   body += report::section("What was found, exploratory", found);
   std::string pictures;

@@ -333,6 +333,20 @@ TEST(Report, averages_arrows_over_squares_and_drops_those_of_few_beads) {
   EXPECT_DOUBLE_EQ(mean.means.vectors[0].y, 3);
 }
 
+TEST(StagePage, a_table_shows_three_digits_words_for_truth_and_no_empty_columns) {
+  const std::string html = section_of({.title = "T",
+                                       .explained = "",
+                                       .name = "t.csv",
+                                       .csv = "cell,part,angle_deg,misfit_um,bic,n,kept\n"
+                                              "a,,122.3690627118605,0.0123456,3008.01,24629,TRUE\n"
+                                              "b,,-16.919751115106486,,2996.4,3,FALSE\n",
+                                       .columns = {"cell", "part", "angle_deg", "misfit_um", "bic", "n", "kept"}});
+  const std::string table = html.substr(0, html.find("download"));
+  for (const char* shown : {">122<", ">-16.9<", ">0.0123<", ">3008<", ">2996<", ">24629<", ">yes<", ">no<"})
+    EXPECT_NE(table.find(shown), std::string::npos) << shown << html;
+  EXPECT_EQ(table.find("part"), std::string::npos);
+}
+
 TEST(Compare, without_true_fibres_ids_are_the_same) {
   const FakeCell cell;
   std::filesystem::create_directories(cell.folder / "truth");
