@@ -572,7 +572,7 @@ TEST_F(SheetsOfImages, give_contraction_and_stiffness_back_in_one_command_and_in
   EXPECT_NEAR(batch.number(0, "sheet.contraction_nN_per_um"), fitted.number(0, "value"), 1e-4);
   done("mbtfm verify " + cell_.string());
   done("mbtfm repeat " + cell_.string() + " --quiet --out " + (folder_ / "again").string());
-  EXPECT_NE(done("mbtfm stats " + study).find("1 sheets; 0 cells left out"), std::string::npos);
+  EXPECT_NE(done("mbtfm stats " + study).find("1 sheet; 0 cells left out"), std::string::npos);
   add("[effects]\ncommon_motion = \"off\"\n");
   EXPECT_NE(done("mbtfm batch " + study + " --list").find("track,up to date"), std::string::npos);
   EXPECT_NE(done("mbtfm batch " + study + " --list").find("sheet,run"), std::string::npos);
