@@ -19,6 +19,7 @@
 #include "segment/cells/take_over.h"
 #include "segment/cells/trace.h"
 #include "segment/cells/trace_join.h"
+#include "segment/cells/without_lines.h"
 
 namespace mbtfm::cells {
 
@@ -238,8 +239,46 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
   return significant(std::move(candidates), judge.p);
 }
 
+/// What is left without the fibres found so far.
+struct Rest {
+  Crop field;
+  Ridges ridges;
+};
+
+Rest rest_of(const std::vector<Candidate>& fibres, const Judge& judge) {
+  constexpr double kNarrowest = 0.5, kWidest = 1.67;  // of the usual width: beside neighbours profiles mislead
+  constexpr double kLeft = 0.15;                      // of what is taken away, at most: profiles are not Gaussian
+  const FibreParameters& p = judge.p;
+  const double usual_px = p.fibre_width_um / judge.field.pixel_um;
+  std::vector<SeenLine> seen;
+  for (const Candidate& c : fibres)
+    seen.push_back({c.trace.points, std::clamp(c.profile.width_px, kNarrowest * usual_px, kWidest * usual_px)});
+  Rest rest{judge.field, {}};
+  rest.field.image = without_lines(judge.field.image, seen, p.fibre_averaging_um / judge.field.pixel_um);
+  rest.ridges = find_ridges(rest.field.image, rest.field.is_inside, scales_of(p, rest.field.pixel_um));
+  cv::magnitude(judge.ridges.noise, kLeft * (judge.ridges.strongest - rest.ridges.strongest), rest.ridges.noise);
+  return rest;
+}
+
+/// Also the fainter ones, which brighter ones beside or across them hide.
+std::vector<Candidate> with_hidden(std::vector<Candidate> fibres, const Rest& rest, const Judge& judge) {
+  std::vector<Trace> known;
+  std::vector<double> heights;
+  for (const Candidate& c : fibres) {
+    known.push_back(c.trace);
+    heights.push_back(c.profile.height);
+  }
+  const double faint = judge.p.fibre_faintest * numerics::quantile(std::move(heights), 0.5);
+  const Judge hidden{rest.field, rest.ridges, judge.rule, judge.outline_um, judge.texture, judge.p};
+  for (const Trace& trace : trace_lines(rest.ridges, rest.field.is_inside, judge.rule, known)) {
+    auto c = hidden.candidate(trace, judge.p.fibre_edge_um);
+    if (c && c->profile.height >= faint) fibres.push_back(std::move(*c));
+  }
+  return significant(std::move(fibres), judge.p);
+}
+
 /// Put right where fibres cross, and put together where their pieces lie far apart.
-std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Judge& judge) {
+std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Rest& rest, const Judge& judge) {
   std::vector<Trace> traces;
   for (const Candidate& c : fibres) traces.push_back(c.trace);
   traces = with_own_courses(std::move(traces), judge.ridges, judge.rule);
@@ -249,7 +288,7 @@ std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Judge& jud
     if (c) result.push_back(std::move(*c));
     return c.has_value();
   };
-  for (const BridgedLine& line : bridged(traces, judge.ridges, judge.rule))
+  for (const BridgedLine& line : bridged(traces, rest.ridges, judge.rule))
     if (!keep(line.trace))
       for (const std::size_t i : line.pieces) keep(traces[i]);
   return result;
@@ -322,7 +361,11 @@ TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, 
   set_noise(ridges, is_free, scales.noise_radius_px);
   const auto traces = trace_lines(ridges, field.is_inside, rule);
   const Judge judge{field, ridges, rule, outline_um, texture_lines_of(traces, ridges, field, p), p};
-  std::vector<Candidate> fibres = regrouped(judged(traces, judge), judge);
+  std::vector<Candidate> fibres = judged(traces, judge);
+  if (!fibres.empty()) {
+    const Rest rest = rest_of(fibres, judge);
+    fibres = regrouped(with_hidden(std::move(fibres), rest, judge), rest, judge);
+  }
   TracedLines lines{{}, unexplained(fibres, judge)};
   for (Candidate& c : fibres) {
     Fibre fibre;

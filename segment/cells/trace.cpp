@@ -286,9 +286,11 @@ FaintEnd faint_end(const Ridges& ridges, const TraceRule& rule, const Trace& tra
   return faint;
 }
 
-std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule) {
+std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule,
+                               const std::vector<Trace>& known) {
   const Ways ways(ridges, {rule.reach_px, rule.step_px, rule.smallest_radius_px, rule.follow_noise});
   Claims claims(ridges.noise.size(), ridges.n_directions());
+  for (const Trace& trace : known) claim(claims, trace, 1.33 * rule.line_radius_px);
   std::vector<Trace> traces;
   for (const Seed& seed : seeds_of(ridges, ways, is_inside, rule)) {
     if (claims.has(seed.step.point, seed.step.angle)) continue;

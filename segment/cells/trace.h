@@ -50,7 +50,9 @@ struct TraceRule {
 /// direction and curvature (`Ways`): lines that cross have another direction, and no line kinks into them. Then cut
 /// ends that fade, join collinear pieces, drop the short ones.
 /// @param is_inside  CV_8U, not 0 where a line may start
-std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule);
+/// @param known  lines found before: nothing is traced along them
+std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule,
+                               const std::vector<Trace>& known = {});
 
 /// Where a line would go on beyond its end: points a pixel apart from there outwards, and by point the response in
 /// standard deviations of the noise, which may be none.

@@ -83,24 +83,25 @@ double over_noise_between(const Parabola& way, const Ridges& ridges) {
   return sum / std::max(1, n);
 }
 
-/// How badly two fibres fit to one across a gap; nothing where they do not. Fibres that lie on one parabola to a
-/// fraction of their width, with something brighter than texture between them, are nearly always one: measured in
-/// docs/developers/dense_fibres.md.
+/// How badly two fibres fit to one across a gap, over how bright the way between them is; nothing where they do not.
+/// Fibres that lie on one parabola to a fraction of their width, with something brighter than texture between them, are
+/// nearly always one; the brighter the way, the less they need to fit: measured in docs/developers/dense_fibres.md.
 std::optional<double> mismatch_across(const EndPoint& a, const EndPoint& b, const Ridges& ridges,
                                       const TraceRule& rule) {
-  constexpr double kBrighter = 1;  // half-way from texture to what a line is followed by
-  constexpr double kTurn = 0.5;    // rad: parabolas of that radius turn less
-  constexpr double kHeight = 1;    // logarithm: 19 of 20 pairs of pieces of one fibre differ by less
+  constexpr double kBrighter = 0.4;  // the way between two fibres that are not one is rarely so bright
+  constexpr double kTurn = 0.5;      // rad: parabolas of that radius turn less
+  constexpr double kHeight = 1;      // logarithm: 19 of 20 pairs of pieces of one fibre differ by less
+  constexpr double kMisfit = 1.3, kWorst = 2;
   if (angle_between(a.outward, -b.outward) > kTurn) return std::nullopt;
   const Parabola way = parabola_through(a.part, b.part);
   const double gap = way.to - way.from;
   if (gap < 0 || gap > rule.bridge_px) return std::nullopt;
   const double misfit = way.misfit_px / rule.bridge_misfit_px, bend = way.curvature() * rule.bridge_radius_px;
-  const double height = std::abs(std::log(a.height / b.height)) / kHeight;
-  if (misfit > 1 || bend > 1 || !(height <= 1)) return std::nullopt;
-  if (over_noise_between(way, ridges) < kBrighter) return std::nullopt;
-  const double far = gap / rule.bridge_px;
-  return misfit * misfit + bend * bend + far * far + height * height;
+  const double height = std::abs(std::log(a.height / b.height));
+  if (misfit > kMisfit || bend > 1 || !(height <= kHeight)) return std::nullopt;
+  const double bright = over_noise_between(way, ridges), far = gap / rule.bridge_px;
+  const double mismatch = (misfit * misfit + bend * bend + far * far + height * height) / bright;
+  return bright >= kBrighter && mismatch <= kWorst ? std::optional(mismatch) : std::nullopt;
 }
 
 struct Fit {

@@ -20,6 +20,7 @@ struct BridgedLine {
 /// Fibres put together across gaps that are longer than a hidden line's: over the rim of the nucleus, or where a
 /// neighbour in the same carpet outshines them. Both must be long and lie on one slightly bent parabola, and the way
 /// between must be brighter than texture. The best pair first.
+/// @param ridges  of the image without these fibres: what is bright in a gap is no neighbour
 std::vector<BridgedLine> bridged(const std::vector<Trace>& fibres, const Ridges& ridges, const TraceRule& rule);
 
 }  // namespace mbtfm::cells

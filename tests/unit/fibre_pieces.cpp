@@ -44,7 +44,14 @@ TEST(FibrePieces, on_one_line_are_put_together_across_a_gap_as_long_as_a_bridge_
 }
 
 TEST(FibrePieces, stay_apart_where_the_gap_is_as_dark_as_texture) {
-  EXPECT_EQ(n_lines(trace_of(20, 110, level), trace_of(150, 280, level), 0.5), 2);
+  EXPECT_EQ(n_lines(trace_of(20, 110, level), trace_of(150, 280, level), 0.2), 2);
+}
+
+TEST(FibrePieces, need_to_fit_the_less_the_brighter_the_way_between_them_is) {
+  const Trace left = trace_of(20, 110, level), aside = trace_of(150, 280, [](double) { return 155.0; });
+  EXPECT_EQ(n_lines(left, aside, 0.5), 2);
+  EXPECT_EQ(n_lines(left, aside, 3), 1);
+  EXPECT_EQ(n_lines(left, trace_of(150, 280, level), 0.5), 1);
 }
 
 TEST(FibrePieces, stay_apart_beside_each_other_at_an_angle_and_where_one_is_far_brighter) {
