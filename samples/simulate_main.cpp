@@ -104,8 +104,17 @@ StageReport run_colonies(const SimulateParameters& p, stage::StageContext& conte
   return report;
 }
 
+/// Fields of gels in space are exact ones of linear elasticity, and sheets pull at a linear gel.
+void refuse_large_strain(const SimulateParameters& p) {
+  const bool is_flat_cell = p.colony.shape == colonies::Shape::none && p.space.scene == gels::SpaceScene::none;
+  if (!is_flat_cell && p.cell.mechanics.simulation_material != MaterialLaw::linear)
+    throw UsageError("expected simulation_material = linear with the scenario " + p.cell.scenario + ", found " +
+                     name_of(p.cell.mechanics.simulation_material) + ": its gel is simulated with small strains only");
+}
+
 StageReport run(const SimulateParameters& all, stage::StageContext& context) {
   const drawing::ScenarioParameters& parameters = all.cell;
+  refuse_large_strain(all);
   if (all.colony.shape != colonies::Shape::none) return run_colonies(all, context);
   if (parameters.images) refuse_given_segmentation(context.outputs_.at("out"));
   if (all.space.scene != gels::SpaceScene::none) return run_in_space(all, context);

@@ -252,6 +252,11 @@ TEST(Simulate, wrong_arguments_are_explained_and_leave_nothing_behind) {
   EXPECT_EQ(simulate("--youngs_modulus_kPa 0" + out).code, 2);
   EXPECT_EQ(simulate("--poisson_ratio 0.51" + out).code, 2);
   EXPECT_EQ(simulate(kSmall + "--bead_distance_um 9" + out).code, 2);
+  for (const char* scenario : {"wave", "contracting-disc"}) {
+    const Outcome strained = simulate("--simulation_material neo-hooke --scenario " + std::string(scenario) + out);
+    EXPECT_EQ(strained.code, 2) << scenario;
+    EXPECT_NE(strained.message.find("simulation_material"), std::string::npos) << strained.message;
+  }
   EXPECT_FALSE(fs::exists(folder / "cell"));
 
   const fs::path file = folder / "mine.toml";
