@@ -179,9 +179,9 @@ constexpr const char* kNothingOpen =
 
 /// Findings are written for terminals too, in plain characters: a page has µ and ±.
 std::string printed(const std::string& text) {
-  static const std::regex micro(R"(\bum(2?)\b)"), plus_minus(R"(\+-)"), square("µm2");
-  const std::string micrometres = std::regex_replace(text, micro, "µm$1");
-  return charts::html_escaped(std::regex_replace(std::regex_replace(micrometres, square, "µm²"), plus_minus, "±"));
+  static const std::regex length(R"(\bum\b)"), area(R"(\bum2\b)"), plus_minus(R"(\+-)");
+  const std::string lengths = std::regex_replace(text, length, "µm"), all = std::regex_replace(lengths, area, "µm²");
+  return charts::html_escaped(std::regex_replace(all, plus_minus, "±"));
 }
 
 std::string item(const char* kind, const char* mark, const std::string& text, const std::string& more = {}) {

@@ -290,17 +290,18 @@ std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, c
                                const std::vector<Trace>& known) {
   const Ways ways(ridges, {rule.reach_px, rule.step_px, rule.smallest_radius_px, rule.follow_noise});
   Claims claims(ridges.noise.size(), ridges.n_directions());
-  for (const Trace& trace : known) claim(claims, trace, 1.33 * rule.line_radius_px);
+  const double beside_px = 1.33 * rule.line_radius_px;
+  for (const Trace& trace : known) claim(claims, trace, beside_px);
   std::vector<Trace> traces;
   for (const Seed& seed : seeds_of(ridges, ways, is_inside, rule)) {
     if (claims.has(seed.step.point, seed.step.angle)) continue;
     Trace trace = trace_from(ridges, ways, claims, rule, seed);
-    claim(claims, trace, 1.33 * rule.line_radius_px);
+    claim(claims, trace, beside_px);
     cut_faded_ends(trace, rule);
     if (trace.points.size() < 3) continue;
     // where it ends a line answers in every direction
     for (const cv::Point2d& end : {trace.points.front(), trace.points.back()})
-      claims.add_all_directions(end, 1.33 * rule.line_radius_px);
+      claims.add_all_directions(end, beside_px);
     traces.push_back(std::move(trace));
   }
   traces = without_doubles(joined(std::move(traces), ridges, rule), ridges, rule);
