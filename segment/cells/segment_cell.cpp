@@ -85,9 +85,10 @@ CellsInImage outlines_of(const images::Channel& channel, const std::vector<Adhes
   const std::vector<CellOutline>& cells = found.cells;
   if (cells.empty()) no_cell(channel, adhesions, pixel_um, p.outline);
   if (cells.front().is_sheet)
-    throw InputError(
-        channel.name, "single cells", "cells that touch over " + brief(cells.front().area_um2) + " um²",
-        "crop the image to a single cell; outline_largest_um2 is " + shortest(p.outline.outline_largest_um2));
+    throw InputError(channel.name, "single cells", "cells that touch over " + brief(cells.front().area_um2) + " um²",
+                     "crop the image to a single cell; outline_largest_um2 is " +
+                         shortest(p.outline.outline_largest_um2) +
+                         ". If the image shows one cell, pixel_size_um is too large");
   return found;
 }
 
