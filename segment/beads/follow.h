@@ -37,6 +37,11 @@ double typical_spread(const std::vector<std::optional<LocalMotion>>& around);
 /// Flag tracks that contradict those around them "neighbours disagree"; how many.
 int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks);
 
+/// By bead, px: how far those around it miss its expected motion, which are compared in all that they do; 0 without
+/// a good track.
+std::vector<double> missed_around(const Scene& scene, const std::vector<Track>& tracks,
+                                  const std::vector<Vec2>& expected);
+
 /// The same of what beads do beside their expected motions (px), of which half of what the beads around do not tell
 /// may be wrong.
 int flag_outliers_beside(const std::vector<Vec2>& expected, const Scene& scene, double threshold,

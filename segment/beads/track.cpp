@@ -131,7 +131,10 @@ Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images
   auto [tracks, n_by_grid] =
       followed_and_measured(*scene, turn, parameters, search_window(4 * scene->spacing(), parameters, pixel_size_um));
   recover(*scene, parameters.least_similarity, tracks);
-  if (model) follow_beside(model, *scene, parameters, pixel_size_um, tracks);
+  constexpr int kRounds = 2;  // what the first one mends makes the model better
+  for (int round = 0; model && round < kRounds; ++round) {
+    follow_beside(model, *scene, parameters, pixel_size_um, tracks);
+  }
   if (turn) flag_turned_out(*scene, *turn, tracks);  // those found again
   require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
   Pooling pooling = pooled(*scene, tracks);
