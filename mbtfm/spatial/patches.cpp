@@ -34,6 +34,14 @@ double misfit_alone(const Problem& problem, const MatrixXd& response, const Vect
   return spectrum.misfit(least) / std::max(1.0, n_data - static_cast<double>(response.cols()));
 }
 
+/// Of a datum, where tractions may be anywhere: patches alone leave what lies outside of them as if it were noise.
+double variance_under_any_tractions(const Problem& problem, const tractions::TractionParameters& traction,
+                                    const SpatialParameters& parameters, int threads) {
+  const Basis basis = orthonormal_basis(norm_of(problem.mesh, problem.ground, [](Vec2) { return 1.0; }));
+  const MatrixXd response = basis.response(problem.response_um_per_kPa, threads);
+  return reconstruct_in(basis, response, problem, traction, parameters, threads).variance;
+}
+
 }  // namespace
 
 SpatialReconstruction reconstruct_patches(const Problem& problem, const tractions::TractionParameters& traction,
@@ -68,10 +76,12 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
   if (r.covariance_kPa2.size() == 0) return r;  // nothing has moved
   r.forces = forces_beside_background(problem, of_background, r, threads);
   const double alone = misfit_alone(problem, of_patches, r.weighing.by_row, r.weighing.n_data, threads);
-  r.figures.emplace_back("misfit_of_patches_alone", alone / r.variance);
-  r.findings.push_back(noticed(
-      FindingKind::patches_do_not_fit, alone / r.variance,
-      "Forces on the patches alone leave " + brief(alone / r.variance) + " times the squares that the noise has."));
+  const double noise =
+      has_background ? r.variance : variance_under_any_tractions(problem, traction, parameters, threads);
+  r.figures.emplace_back("misfit_of_patches_alone", alone / noise);
+  r.findings.push_back(
+      noticed(FindingKind::patches_do_not_fit, alone / noise,
+              "Forces on the patches alone leave " + brief(alone / noise) + " times the squares that the noise has."));
   return r;
 }
 

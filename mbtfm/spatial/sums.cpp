@@ -149,7 +149,13 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
   balance.force_nN = vec(net.head<3>());
   balance.moment_nN_um = vec(net.tail<3>());
   if (const MatrixXd& covariance = covariance_of_summed_kPa2(r); covariance.size() > 0) {
-    const MatrixXd of_net = sums * covariance * sums.transpose();
+    MatrixXd of_net = sums * covariance * sums.transpose();
+    const double of_gel = problem.model_error * problem.model_error * balance.total_force_nN;
+    for (Index v = 0; v < n; ++v) {
+      const auto of_vertex = sums.middleCols<3>(3 * v);  // of a traction there
+      const double area = mesh.areas_um2[static_cast<std::size_t>(v)];
+      of_net += of_gel * traction(v).norm() / area * of_vertex * of_vertex.transpose();
+    }
     const Matrix3d of_force = of_net.topLeftCorner<3, 3>(), of_moment = of_net.bottomRightCorner<3, 3>();
     balance.force_sigma_nN = errors_of(of_force);
     balance.moment_sigma_nN_um = errors_of(of_moment);

@@ -741,6 +741,38 @@ TEST_F(InSpace, a_region_that_covers_no_bead_is_refused) {
   EXPECT_THROW(expected_tractions(inputs, observed, ground, parameters, 0), InvalidData);
 }
 
+/// Fewer data than unknowns, so that tractions can follow anything: where beads move as no traction has it, the risk
+/// has no minimum but the end of the scan.
+TEST_F(InSpace, lambda_runs_away_where_few_beads_are_astray_or_a_stack_grew) {
+  scene.n_beads = 60;
+  const auto problem_of = [&](const std::vector<BeadInSpace>& beads) {
+    Problem problem = scene.problem(beads, parameters);
+    problem.common_um = common_motions(problem.observed);
+    return problem;
+  };
+  for (scene.seed = 1; scene.seed <= 4; ++scene.seed) {
+    const std::vector<BeadInSpace> sound = scene.beads(0.03);
+    EXPECT_FALSE(fires("lambda-runs-away", reconstruct_tikhonov(problem_of(sound), traction, parameters, 1).findings));
+    std::vector<BeadInSpace> astray = sound, grown = sound;
+    std::mt19937_64 random(scene.seed);
+    std::uniform_real_distribution<double> in_box(-5, 5);
+    for (std::size_t b = 0; b < sound.size(); b += 10)
+      astray[b].displacement_um = {in_box(random), in_box(random), in_box(random)};
+    for (BeadInSpace& bead : grown) bead.displacement_um += 0.05 * bead.position_um;
+    for (const auto& beads : {astray, grown}) {
+      const Problem problem = problem_of(beads);
+      const auto r = reconstruct_tikhonov(problem, traction, parameters, 1);
+      EXPECT_TRUE(fires("lambda-runs-away", r.findings)) << scene.seed;
+      EXPECT_EQ(r.lambda_by, tractions::LambdaCriterion::evidence) << scene.seed;
+      TractionParameters of_risk = traction;
+      of_risk.lambda_um_per_kPa = r.scan->by_risk / lambda_per_um_per_kPa(problem);
+      const auto followed = reconstruct_tikhonov(problem, of_risk, parameters, 1);
+      const VectorXd truth_kPa = truth_at(problem);
+      EXPECT_LT(apart(r.traction_kPa, truth_kPa), 0.5 * apart(followed.traction_kPa, truth_kPa)) << scene.seed;
+    }
+  }
+}
+
 TEST_F(InSpace, the_resolution_is_finer_with_less_noise) {
   const auto median_um = [&](double sigma_um) {
     const Problem problem = scene.problem(scene.beads(sigma_um), parameters);
@@ -834,6 +866,26 @@ TEST_F(FindingsInSpace, tell_a_force_that_nothing_balances) {
   EXPECT_TRUE(fires("tractions-out-of-balance", noticed_imbalance(balance_of(problem, found(problem)))));
 }
 
+/// Forces that the gel's model has wrong by its error need not be wrong alike: their sum is off, and nothing is out of
+/// balance.
+TEST_F(FindingsInSpace, are_none_of_a_balance_that_the_error_of_the_gel_disturbs) {
+  constexpr double kError = 0.01, kSmall_um = 0.0003;
+  for (const bool is_balanced : {true, false}) {
+    if (!is_balanced) scene.spots[1].force_nN.x *= 0.8;
+    Problem problem = scene.problem(scene.beads(kSmall_um), parameters);
+    const std::vector<Vec3> vertices = problem.vertices_um();
+    for (std::size_t v = 0; v < vertices.size(); ++v) {
+      if (vertices[v].x < 0) problem.response_um_per_kPa.middleCols<3>(3 * static_cast<Eigen::Index>(v)) *= 1 + kError;
+    }
+    problem.model_error = kError;
+    EXPECT_EQ(fires("tractions-out-of-balance", noticed_imbalance(balance_of(problem, found(problem)))), !is_balanced);
+    if (!is_balanced) continue;
+    SpatialReconstruction r = found(problem);
+    problem.model_error = 0;  // the same tractions: the sum is off by more than their own errors say
+    EXPECT_TRUE(fires("tractions-out-of-balance", noticed_imbalance(balance_of(problem, r))));
+  }
+}
+
 TEST_F(FindingsInSpace, tell_a_patch_that_is_missing) {
   traction.method = tractions::TractionMethod::patches;
   scene.spots.push_back({{0, 12}, 4, {0, -40, 0}});
@@ -841,8 +893,11 @@ TEST_F(FindingsInSpace, tell_a_patch_that_is_missing) {
   for (const bool is_missing : {false, true}) {
     if (is_missing) scene.spots.pop_back();
     const SpatialInputs inputs{{}, scene.gel, scene.adhesions(), {}};
-    const auto r = reconstruct(scene.problem(beads, parameters), inputs, traction, parameters, 1);
-    EXPECT_EQ(fires("patches-do-not-fit", r.findings), is_missing);
+    for (const double background : {0.1, 0.0}) {
+      parameters.background = background;
+      const auto r = reconstruct(scene.problem(beads, parameters), inputs, traction, parameters, 1);
+      EXPECT_EQ(fires("patches-do-not-fit", r.findings), is_missing) << background;
+    }
   }
 }
 

@@ -2,12 +2,15 @@
 ///   methods   maps, forces and sums by noise. The bars beside the numbers are those of an
 ///             independent dense inversion (docs/developers/tractions_in_space.md).
 ///   losses    the same by loss, with beads astray
+///   patches   forces on patches that are known: with a background, without, and as sums of maps that know of none
+///   thesis    the minimiser of the thesis: how near to the minimum, and at what price
 ///   meshes    three meshes of the gel by three of the tractions: how far the answers differ, over what noise does
 ///   refine    faces split by each rule, beside even lattices
 ///   surface   with the surface that the beads themselves show, in place of the true one
 ///   fttc      beside the usual method, of the beads just below the surface (level scenes)
 #include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <iostream>
 #include <map>
 #include <numbers>
@@ -15,6 +18,7 @@
 
 #include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/spatial/refine.h"
+#include "substrate/choice/factory.h"
 #include "substrate/surface/beads.h"
 #include "tests/support/traction_scene.h"
 
@@ -111,6 +115,99 @@ void losses(const TractionScene& scene) {
       }
     }
   }
+}
+
+// --- patches that are known
+
+/// The same scene with another draw of its noise: each bead has that of another.
+TractionScene with_draw(TractionScene scene, int draw) {
+  constexpr int kApart = 397;
+  std::rotate(scene.noise.begin(), scene.noise.begin() + draw * kApart, scene.noise.end());
+  return scene;
+}
+
+/// Of patches as wide as the bumps are, and of such whose second moment is that of the bumps.
+void patches(const TractionScene& scene) {
+  using enum tractions::TractionMethod;
+  constexpr int kDraws = 2;
+  const double weak = spatial::SpatialParameters{}.background;
+  for (const double radii : {std::numbers::sqrt2 / 2, 1.0}) {
+    const spatial::SpatialInputs inputs{scene.observed(0.02), scene.gel, scene.adhesions(radii), {}};
+    spatial::Problem problem = make_problem(inputs, {}, {.spacing_um = {}, .has_patches = true}, {}, 2);
+    const auto areas_um2 = patch_areas_um2(scene, problem);
+    const auto measure = [&](double noise, int draw, const char* what, tractions::TractionMethod method,
+                             double background) {
+      tractions::TractionParameters traction;
+      traction.method = method;
+      spatial::SpatialParameters parameters;
+      parameters.background = background;
+      const auto r = reconstruct(problem, inputs, traction, parameters, 2);
+      const ForceErrors sums = force_errors(scene, forces_on(problem, r, areas_um2)),
+                        as_told = force_errors(scene, r.forces);
+      std::printf("%-12s radii %.2f noise %.2f draw %d %-19s map %.3f  sums %.3f (%.2f)  as told %.3f (%.2f) ",
+                  scene.name.c_str(), radii, noise, draw, what, test::map_error(scene, problem.mesh, r.traction_kPa),
+                  sums.mean, sums.over_stated, as_told.mean, as_told.over_stated);
+      for (const auto& [name, value] : r.figures) {
+        if (name == "misfit_of_patches_alone") std::printf(" patches alone leave %.2f", std::get<double>(value));
+      }
+      for (const auto& f : r.findings) std::printf(f ? " [%s]" : "", f ? f->id.c_str() : "");
+      std::printf("\n");
+      std::fflush(stdout);
+    };
+    for (const double noise : {0.02, 0.05, 0.1}) {
+      for (int draw = 0; draw < kDraws; ++draw) {
+        problem.observed = spatial::observe(with_draw(scene, draw).observed(noise), scene.gel, problem.ground, {});
+        measure(noise, draw, "patches alone", tractions::TractionMethod::patches, 0);
+        measure(noise, draw, "patches, background", tractions::TractionMethod::patches, weak);
+        if (radii < 1) continue;
+        measure(noise, draw, "tikhonov", tikhonov, weak);
+        measure(noise, draw, "group-l1", group_l1, weak);
+      }
+    }
+  }
+}
+
+// --- the thesis' minimiser
+
+/// Processor time of what is done, all threads together.
+double seconds_of(const std::function<void()>& work) {
+  const std::clock_t begin = std::clock();
+  work();
+  return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+}
+
+void thesis(const TractionScene& scene) {
+  const spatial::SpatialInputs inputs{scene.observed(0.05), scene.gel, {}, {}};
+  std::optional<spatial::Problem> problem;
+  spatial::SpatialReconstruction ours, theirs;
+  const double whole_s = seconds_of([&]() {
+    problem = make_problem(inputs, {}, {}, {}, 2);
+    ours = reconstruct_tikhonov(*problem, {}, {}, 2);
+  });
+  theirs = reconstruct_thesis_cg(*problem, {}, {}, 2);
+  substrate::SubstrateParameters curved;
+  curved.model = substrate::ModelKind::curved;
+  const auto model = choice::make_substrate(scene.gel, curved, 2);
+  const auto response = response_of_vertices(*model, *problem);
+  response->displace(ours.traction_kPa);  // makes mesh and factor
+  constexpr int kSolves = 10;
+  const double solve_s = seconds_of([&]() {
+                           for (int k = 0; k < kSolves; ++k) response->displace(ours.traction_kPa);
+                         }) /
+                         kSolves;
+  std::int64_t steps = 0, solves = 0;
+  for (const auto& [name, value] : theirs.figures) {
+    if (name == "thesis_steps") steps = std::get<std::int64_t>(value);
+    if (name == "thesis_direct_solves") solves = std::get<std::int64_t>(value);
+  }
+  std::printf(
+      "%-12s %ld unknowns  apart %.1e  %ld steps, %ld solves of %.3f s: %.3g s for %.1f s of ours (with mesh, factor, "
+      "lambda and errors), %.0f times\n",
+      scene.name.c_str(), static_cast<long>(problem->n_unknowns()),
+      (theirs.traction_kPa - ours.traction_kPa).norm() / ours.traction_kPa.norm(), static_cast<long>(steps),
+      static_cast<long>(solves), solve_s, static_cast<double>(solves) * solve_s, whole_s,
+      static_cast<double>(solves) * solve_s / whole_s);
+  std::fflush(stdout);
 }
 
 // --- meshes
@@ -333,12 +430,14 @@ void beside_fttc(const TractionScene& scene) {
 int main(int argc, char** argv) {
   const std::map<std::string, void (*)(const TractionScene&)> studies = {{"methods", methods},
                                                                          {"losses", losses},
+                                                                         {"patches", patches},
+                                                                         {"thesis", thesis},
                                                                          {"meshes", meshes},
                                                                          {"refine", refine},
                                                                          {"surface", with_estimated_surface},
                                                                          {"fttc", beside_fttc}};
   if (argc < 4 || !studies.contains(argv[1])) {
-    std::cerr << "usage: tractions_in_space methods|losses|meshes|refine|surface|fttc FOLDER SCENE...\n";
+    std::cerr << "usage: tractions_in_space methods|losses|patches|thesis|meshes|refine|surface|fttc FOLDER SCENE...\n";
     return 2;
   }
   for (int k = 3; k < argc; ++k) studies.at(argv[1])(test::traction_scene(std::filesystem::path(argv[2]) / argv[k]));
