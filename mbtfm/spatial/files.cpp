@@ -188,9 +188,10 @@ Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const
   if (r.degrees > 0) add("effective_unknowns", r.degrees);
   if (r.resolved.size() > 0) add("median_resolution_um", numerics::median(resolution_um(problem, r)));
   if (r.lambda) {
-    add("lambda", *r.lambda);
+    const double unit = lambda_per_um_per_kPa(problem);
+    add("lambda_um_per_kPa", *r.lambda / unit);
     figures.emplace_back("lambda_by", std::string(how_lambda(r)));
-    if (r.summands && r.summands->lambda) add("lambda_of_sums", *r.summands->lambda);
+    if (r.summands && r.summands->lambda) add("lambda_of_sums_um_per_kPa", *r.summands->lambda / unit);
   }
   figures.emplace_back("tractions_over", problem.expected.where);
   figures.emplace_back("n_unknowns", std::int64_t{problem.n_unknowns()});

@@ -27,13 +27,20 @@ SpatialInputs read_inputs(const StageParameters& p, stage::StageContext& context
   return inputs;
 }
 
-/// The criteria by lambda: files and picture of the flat methods.
-void write_scan(stage::StageContext& context, const SpatialReconstruction& r) {
+/// The criteria by lambda, in um/kPa: files and picture of the flat methods.
+void write_scan(stage::StageContext& context, const SpatialReconstruction& r, double youngs_modulus_kPa) {
   tractions::Reconstruction shown;
   shown.scan = r.scan;
-  shown.lambda = r.lambda;
+  shown.lambda = *r.length_um / youngs_modulus_kPa;
   shown.length_um = r.length_um;
-  tractions::write_lambda_scan(context.output_beside("out", "_lambda.csv"), *r.scan, *r.length_um / *r.lambda);
+  const double unit = *shown.lambda / *r.lambda;
+  tractions::LambdaScan& scan = *shown.scan;
+  for (tractions::ScanPoint& point : scan.points) point.lambda *= unit;
+  for (double* by : {&scan.by_gcv, &scan.by_evidence, &scan.by_risk, &scan.by_prediction}) *by *= unit;
+  for (std::optional<double>* by : {&scan.by_l_curve, &scan.by_discrepancy}) {
+    if (*by) **by *= unit;
+  }
+  tractions::write_lambda_scan(context.output_beside("out", "_lambda.csv"), scan, youngs_modulus_kPa);
   tractions::write_lambda_picture(context.output_beside("out", "_lambda.svg"), shown,
                                   r.lambda_by ? std::string("by ") + name_of(*r.lambda_by) : "as given");
 }
@@ -42,7 +49,7 @@ void write_outputs(stage::StageContext& context, const Problem& problem, const S
                    const Figures& summary) {
   write_tractions(context.output("out"), context.output_beside("out", ".vtp"), problem, r);
   files::write_figures(context.output_beside("out", ".json"), summary);
-  if (r.scan) write_scan(context, r);
+  if (r.scan) write_scan(context, r, problem.gel.youngs_modulus_kPa);
   if (!r.forces.empty()) write_part_forces(context.output_beside("out", "_adhesion_forces.csv"), r.forces);
 }
 

@@ -57,11 +57,12 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
       with_error(total, r.find("total_force_sigma_nN"), "nN"), r.texts.at("tractions_over"),
       readable(r.number("normal_force_nN")), readable(largest_traction_kPa(r))));
   facts.push_back(fmt::format("The strain energy of the gel is {} fJ.", readable(r.number("strain_energy_fJ"))));
-  facts.push_back(fmt::format(
-      "Balance: the forces add up to {} ({} of their sum of sizes), the moments about their centre to {}. A cell that "
-      "nothing else holds has neither.",
-      with_error(force.size, force.sigma, "nN"), readable(total > 0 ? force.size / total : 0),
-      with_error(moment.size, moment.sigma, "nN µm")));
+  facts.push_back(
+      fmt::format("Balance: the forces add up to {} ({} % of the sum of their sizes), the moments about their centre "
+                  "to {}. A cell that "
+                  "nothing else holds has neither.",
+                  with_error(force.size, force.sigma, "nN"), readable(total > 0 ? 100 * force.size / total : 0),
+                  with_error(moment.size, moment.sigma, "nN µm")));
   if (const auto imbalance = r.find("imbalance_chi_squared")) {
     facts.back() += fmt::format(
         " In their joint errors chi-squared of the six numbers is {}; chance makes more than {} in one cell of a "
@@ -80,8 +81,8 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   }
   if (const auto resolution = r.find("median_resolution_um")) {
     facts.push_back(fmt::format(
-        "Two forces are told apart if they are {} µm apart or more (median over the surface); {} numbers of {} are "
-        "resolved.",
+        "Forces closer together than {} µm look like one (median over the surface); from about twice that on they are "
+        "mostly seen as two. {} numbers of {} are resolved.",
         readable(*resolution), readable(r.number("effective_unknowns")), readable(r.number("n_unknowns"))));
   }
   return facts;
@@ -91,14 +92,15 @@ std::string how_lambda(const SpaceResults& r) {
   if (r.texts.at("method") == "group-l1")
     return "The weight of the penalty was the one at which the misfit is what the noise of the beads leaves.";
   const auto by = r.texts.find("lambda_by");
-  if (!r.find("lambda") || by == r.texts.end()) return {};
-  const std::string lambda = readable(r.number("lambda"));
+  if (!r.find("lambda_um_per_kPa") || by == r.texts.end()) return {};
+  const std::string lambda = readable(r.number("lambda_um_per_kPa")) + " µm/kPa";
   if (by->second == "given") return "The regularisation was given: lambda = " + lambda + ".";
   std::string text =
       "The regularisation was chosen by the data (criterion: " + by->second + "): lambda = " + lambda + ".";
-  if (const auto of_sums = r.find("lambda_of_sums")) {
+  if (const auto of_sums = r.find("lambda_of_sums_um_per_kPa")) {
     text += " Net force, moment, strain energy and forces that are sums of the map were taken at lambda = " +
-            readable(*of_sums) + ", where the expected error of the displacement is smallest (Mallows’ criterion).";
+            readable(*of_sums) +
+            " µm/kPa, where the expected error of the displacement is smallest (Mallows’ criterion).";
   }
   return text;
 }

@@ -235,6 +235,32 @@ TEST_F(TractionInSpace, splits_faces_by_each_rule_and_writes_an_even_lattice) {
   EXPECT_NE(refused.output.find("direct states no resolution"), std::string::npos) << refused.output;
 }
 
+TEST_F(TractionInSpace, lambda_that_it_tells_is_the_one_to_be_given) {
+  const std::string dense = "--spacing_um 5 --method tikhonov ";
+  const auto lambda = [&]() {
+    return nlohmann::json::parse(files::read_text(folder_ / "traction_3d.json")).at("lambda_um_per_kPa").get<double>();
+  };
+  ASSERT_EQ(run(dense).code, 0);
+  const double chosen = lambda();
+  const std::string map = files::read_text(folder_ / "traction_3d.csv");
+  const files::CsvTable scan(folder_ / "traction_3d_lambda.csv");
+  for (int row = 0; row < scan.n_rows(); ++row) {
+    const double length_um = scan.number(row, "length_um");
+    EXPECT_NEAR(scan.number(row, "lambda") * 10, length_um, 1e-3 * length_um) << "times Young's modulus";
+  }
+  ASSERT_EQ(run(dense + "--lambda_um_per_kPa " + std::to_string(chosen)).code, 0);
+  EXPECT_NEAR(lambda(), chosen, 1e-5);
+  const files::CsvTable again(folder_ / "traction_3d.csv");
+  files::write_text(folder_ / "first.csv", map);
+  const files::CsvTable first(folder_ / "first.csv");
+  double apart = 0, size = 0;
+  for (int row = 0; row < first.n_rows(); ++row) {
+    apart += std::abs(again.number(row, "tx_kPa") - first.number(row, "tx_kPa"));
+    size += std::abs(first.number(row, "tx_kPa"));
+  }
+  EXPECT_LE(apart, 0.01 * size) << "lambda is written with six digits";
+}
+
 /// A gel of another Poisson's ratio, by beads so exact that it shows, is an error that the risk knows of. Of beads
 /// astray, a third of them here, l2 can tell no direction from noise: little is left, and no end of the scan followed.
 TEST_F(TractionInSpace, says_which_criterion_chose_lambda_in_the_end) {
