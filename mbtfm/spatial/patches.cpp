@@ -72,10 +72,29 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
       response.middleCols(c * m + n, n_patches) = of_patches.middleCols(c * n_patches, n_patches);
     }
   }
-  r = reconstruct_in(Basis(std::move(shapes)), response, problem, traction, parameters, threads);
+  tractions::TractionParameters penalised = traction;
+  if (!has_background && !traction.lambda_um_per_kPa) {
+    // Few numbers that the beads tell well: least squares. Criteria of lambda take the half of them that is felt least
+    // for noise, with whatever pulls there.
+    constexpr double kNone = 1e-6;
+    const VectorXd even = VectorXd::Ones(response.rows());
+    const auto spectrum = spectrum_of(problem, response, even, static_cast<double>(response.rows()), threads);
+    penalised.lambda_um_per_kPa = kNone * std::sqrt(spectrum.values().maxCoeff()) / lambda_per_um_per_kPa(problem);
+  }
+  r = reconstruct_in(Basis(std::move(shapes)), response, problem, penalised, parameters, threads);
   if (r.covariance_kPa2.size() == 0) return r;  // nothing has moved
-  r.forces = forces_beside_background(problem, of_background, r, threads);
   const double alone = misfit_alone(problem, of_patches, r.weighing.by_row, r.weighing.n_data, threads);
+  if (!has_background && !weighs_by_residual(parameters.loss)) {
+    const double variance = std::max(alone, problem.least_variance());
+    r.covariance_kPa2 *= variance / r.variance;
+    r.variance = variance;
+  }
+  r.forces = forces_beside_background(problem, of_background, r, threads);
+  if (!has_background && !traction.lambda_um_per_kPa) {
+    r.lambda.reset();
+    r.length_um.reset();
+    r.scan.reset();
+  }
   const double noise =
       has_background ? r.variance : variance_under_any_tractions(problem, traction, parameters, threads);
   r.figures.emplace_back("misfit_of_patches_alone", alone / noise);

@@ -79,7 +79,8 @@ void find_doubts(const Problem& problem, const SpatialParameters& parameters, Sp
   r.findings.push_back(noticed(FindingKind::beads_far, away_um / observed.distance_um,
                                "The nearest beads lie " + brief(away_um) + " um from the surface, and " +
                                    brief(observed.distance_um) + " um from each other."));
-  if (r.degrees > 0) {
+  const bool has_few_unknowns = r.method == TractionMethod::patches && parameters.background == 0;  // by choice
+  if (r.degrees > 0 && !has_few_unknowns) {
     constexpr double kEnough = 24;  // as the table of findings has it
     // Ten times the noise tells 4.5 times fewer numbers, and noise falls as the root of the number of beads: they grow
     // about as its cube root. Measured (docs/developers/tractions_in_space.md).

@@ -901,6 +901,33 @@ TEST_F(FindingsInSpace, tell_a_patch_that_is_missing) {
   }
 }
 
+/// Nothing is smoothed of a few forces that the beads tell well, so that their errors are those of the noise.
+TEST_F(FindingsInSpace, patches_that_are_all_there_is_have_the_errors_of_least_squares) {
+  traction.method = tractions::TractionMethod::patches;
+  parameters.background = 0;
+  constexpr int kDraws = 12;
+  double squares = 0;
+  for (scene.seed = 1; scene.seed <= kDraws; ++scene.seed) {
+    const Problem problem = scene.problem(scene.beads(kSigma_um), parameters);
+    const auto r = reconstruct(problem, {{}, scene.gel, scene.adhesions(), {}}, traction, parameters, 1);
+    EXPECT_FALSE(fires("beads-tell-little", r.findings));
+    EXPECT_FALSE(fires("misfit-in-space", r.findings));
+    EXPECT_FALSE(r.lambda);
+    double left_nN = 0;  // of the map
+    for (int v = 0; v < problem.mesh.n_vertices(); ++v) {
+      if (problem.mesh.quads.points_um[static_cast<std::size_t>(v)].x < 0)
+        left_nN += problem.mesh.areas_um2[static_cast<std::size_t>(v)] * r.traction_kPa[3 * v];
+    }
+    EXPECT_NEAR(left_nN, r.forces[0].force_nN.x, 1e-3 * left_nN);
+    for (std::size_t s = 0; s < scene.spots.size(); ++s) {
+      const Vec3 off = r.forces[s].force_nN - scene.spots[s].force_nN, sigma = r.forces[s].sigma_nN;
+      for (const auto& [error, by] : {std::pair{off.x, sigma.x}, {off.y, sigma.y}, {off.z, sigma.z}})
+        squares += error * error / (by * by) / (6 * kDraws);
+    }
+  }
+  EXPECT_NEAR(std::sqrt(squares), 1, 0.25) << "of 72 numbers the root mean square is known to 8 %: three times that";
+}
+
 /// Whatever the axes: the squared distance in the joint errors is at least that along each direction.
 TEST_F(InSpace, an_imbalance_that_one_axis_tells_is_not_hidden_by_the_errors_of_another) {
   const Problem problem = scene.problem(scene.beads(0.03), parameters);
