@@ -287,7 +287,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "adhesions.csv."},
       {tractions_out_of_balance, "tractions-out-of-balance", "traction", caution,
        "squared net force and net moment over their joint covariance (chi-squared of six numbers)", 22.5,
-       "a cell at rest pulls as much one way as the other; chance exceeds this once in a thousand cells",
+       "a cell at rest pulls as much one way as the other; chance exceeds this once in a thousand cells. "
+       "The errors hold that of the gel's model",
        "Check that the whole cell lies above the beads: forces beyond them are missing in the sum. Look for a cell "
        "beside it, or for a support that holds the cell."},
       {beads_stray, "beads-stray", "traction", caution,
@@ -302,9 +303,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "with l2 has no finding beads-stray, take l2. If it has, look at the beads that differ from their neighbours. "
        "More beads near the surface decide it."},
       {lambda_runs_away, "lambda-runs-away", "traction", caution, "lambda by evidence over lambda by risk", 2,
-       "in simulated scenes it is 0.1 to 0.9, of a hundred beads up to 1.4; beyond that the two contradict each other, "
-       "and 2 leaves room for chance: tractions follow beads that are astray, or what the model has wrong",
-       "Set traction.loss = mixture if beads may be astray. Check surface, gel and sigma_um, and whether one stack "
+       "in sound simulated scenes it is 0.1 to 1.4; of 60 to 100 beads of which some are astray, or of stacks of which "
+       "one grew, it is tens to thousands: tractions follow what is not theirs",
+       "Use more beads: of 500 it was never so. Set traction.loss = mixture if beads may be astray. Check surface, gel "
+       "and sigma_um, and whether one stack "
        "grew against the other (another focus or temperature): "
        "the misfit is not the beads' noise. The tractions are those with lambda by "
        "evidence, and may be smoothed too much. To choose yourself, set traction.lambda_by or "
