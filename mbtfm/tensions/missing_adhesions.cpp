@@ -7,7 +7,6 @@
 #include <limits>
 #include <map>
 
-#include "mbtfm/tensions/robust.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/half_space.h"
 
@@ -173,18 +172,6 @@ MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const Linear
           .chi_squared_gain = q.score.dot(covariance.ldlt().solve(q.score))};
 }
 
-/// W², less of what is further off than noise: one bead that went astray says no more than some do together.
-Eigen::VectorXd bounded_weights(const LinearData& data, const Eigen::VectorXd& residual) {
-  Eigen::VectorXd weight = data.weight_per_um.cwiseAbs2();
-  const Eigen::VectorXd weighted = data.weight_per_um.cwiseProduct(residual);
-  const double scale = robust_scale(data, weighted);
-  if (!(scale > 0)) return weight;
-  for (Eigen::Index row = 0; row < weight.size(); row += 2) {
-    weight.segment<2>(row) *= robust_weight(Loss::huber, weighted.segment<2>(row).norm() / scale);
-  }
-  return weight;
-}
-
 }  // namespace
 
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const LinearData& data, const Cell& cell,
@@ -192,7 +179,7 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
   const std::vector<Vec2> places = free_places(cell);
   const BeadSquares beads(data);
   const DiscField disc(gel);
-  const Eigen::VectorXd residual = residual_um(data, fit.forces.nN), weight = bounded_weights(data, residual);
+  const Eigen::VectorXd weight = squared_weights(data), residual = residual_um(data, fit.forces.nN);
   const auto ask_at = [&](Vec2 place_um) {
     return ask(place_um, beads, disc, data, weight, residual, fit.misfit.variance);
   };
