@@ -288,7 +288,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {tractions_out_of_balance, "tractions-out-of-balance", "traction", caution,
        "squared net force and net moment over their joint covariance (chi-squared of six numbers)", 22.5,
        "a cell at rest pulls as much one way as the other; chance exceeds this once in a thousand cells. "
-       "The errors hold that of the gel's model",
+       "The standard errors contain the error of the gel's model",
        "Check that the whole cell lies above the beads: forces beyond them are missing in the sum. Look for a cell "
        "beside it, or for a support that holds the cell."},
       {beads_stray, "beads-stray", "traction", caution,
@@ -304,8 +304,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "More beads near the surface decide it."},
       {lambda_runs_away, "lambda-runs-away", "traction", caution, "lambda by evidence over lambda by risk", 2,
        "in sound simulated scenes it is 0.1 to 1.4; of 60 to 100 beads of which some are astray, or of stacks of which "
-       "one grew, it is tens to thousands: tractions follow what is not theirs",
-       "Use more beads: of 500 it was never so. Set traction.loss = mixture if beads may be astray. Check surface, gel "
+       "one grew, it is tens to thousands: then the tractions follow errors of the beads, not forces",
+       "Use more beads: with 500 it never happened. Set traction.loss = mixture if beads may be astray. Check surface, "
+       "gel "
        "and sigma_um, and whether one stack "
        "grew against the other (another focus or temperature): "
        "the misfit is not the beads' noise. The tractions are those with lambda by "

@@ -172,8 +172,8 @@ int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& trac
 }
 
 std::vector<double> missed_around(const Scene& scene, const std::vector<Track>& tracks,
-                                  const std::vector<Vec2>& expected) {
-  const auto around = motions_around(scene, tracks), beside = motions_around(scene, tracks, expected);
+                                  const std::vector<std::optional<LocalMotion>>& beside) {
+  const auto around = motions_around(scene, tracks);
   std::vector<double> missed_px(tracks.size(), 0);
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     if (around[k] && beside[k]) missed_px[k] = norm(beside[k]->motion.u - around[k]->motion.u);
@@ -185,9 +185,10 @@ int flag_outliers_beside(const std::vector<Vec2>& expected, const Scene& scene, 
                          std::vector<Track>& tracks) {
   // An adhesion that is drawn at half its width, or pulls at its rim alone, moves its middle by so much more or less.
   constexpr double kWrong = 0.5;
-  std::vector<double> granted_px = missed_around(scene, tracks, expected);
+  const auto beside = motions_around(scene, tracks, expected);
+  std::vector<double> granted_px = missed_around(scene, tracks, beside);
   for (double& granted : granted_px) granted *= kWrong;
-  return flag_outliers(motions_around(scene, tracks, expected), threshold, granted_px, tracks);
+  return flag_outliers(beside, threshold, granted_px, tracks);
 }
 
 }  // namespace mbtfm::beads

@@ -39,8 +39,9 @@ int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& trac
 
 /// By bead, px: how far those around it miss its expected motion, which are compared in all that they do; 0 without
 /// a good track.
+/// @param beside  motions_around() with what is expected
 std::vector<double> missed_around(const Scene& scene, const std::vector<Track>& tracks,
-                                  const std::vector<Vec2>& expected);
+                                  const std::vector<std::optional<LocalMotion>>& beside);
 
 /// The same of what beads do beside their expected motions (px), of which half of what the beads around do not tell
 /// may be wrong.

@@ -264,11 +264,11 @@ void check_claims(const Scene& scene, std::vector<Track>& tracks) {
 
 /// Where the beads around miss the expected motion by a third of what beads scatter by or more, a window may have taken
 /// a neighbour's picture, and neighbours are no witnesses of it: such beads are matched anew, too.
+/// @param beside  motions_around() with what is expected
 std::vector<Track> without_doubtful(const Scene& scene, std::vector<Track> tracks, double scatter_px,
-                                    const std::vector<Vec2>& expected) {
-  if (expected.empty()) return tracks;
+                                    const std::vector<std::optional<LocalMotion>>& beside) {
   constexpr double kDoubtful = 0.3;  // 0.1 finds as many; to doubt all of them finds fewer
-  const std::vector<double> missed_px = missed_around(scene, tracks, expected);
+  const std::vector<double> missed_px = missed_around(scene, tracks, beside);
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     if (tracks[k].is_good() && missed_px[k] > kDoubtful * scatter_px) tracks[k].flag = TrackFlag::no_partner;
   }
@@ -290,9 +290,11 @@ void measure(const Scene& scene, double least_similarity, std::vector<Track>& tr
 
 void recover(const Scene& scene, double least_similarity, std::vector<Track>& tracks,
              const std::vector<Vec2>& expected) {
-  const double scatter = typical_spread(motions_around(scene, tracks, expected));
+  const auto beside = motions_around(scene, tracks, expected);
+  const double scatter = typical_spread(beside);
   if (scatter < kLoose * scene.bead_sigma()) return;
-  auto spots = matched_spots(scene, without_doubtful(scene, tracks, scatter, expected), scatter, expected);
+  auto spots = matched_spots(scene, expected.empty() ? tracks : without_doubtful(scene, tracks, scatter, beside),
+                             scatter, expected);
   std::vector<Track> all = tracks;
   std::vector<Motion> starts = motions_of(tracks);
   std::vector<int> matched;
