@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <numbers>
 #include <opencv2/core/utility.hpp>
 
@@ -279,8 +280,9 @@ void write_picture(stage::StageContext& context, const images::Picture& picture,
 /// Of a gel that the adhesions pull, where they are given.
 FieldModel model_of_gel(stage::StageContext& context) {
   if (!context.has_input("adhesions")) return {};
-  return [adhesions = files::read_adhesions(context.input("adhesions")), threads = context.threads](
-             const DisplacementField& beads) { return tractions::field_of_adhesions_um(adhesions, beads, threads); };
+  const auto field =
+      std::make_shared<tractions::FieldOfAdhesions>(files::read_adhesions(context.input("adhesions")), context.threads);
+  return [field](const DisplacementField& beads) { return field->um(beads); };
 }
 
 files::FrameRow row_of(int frame, const std::string& image, const Tracking& t) {

@@ -312,9 +312,10 @@ Loss loss_called_for(std::optional<Loss> loss, const LinearData& data, const Ten
                      const Trial& trial) {
   if (loss) return *loss;
   constexpr double kHarm = 0.1;  // of a standard error
-  const Eigen::VectorXd residual = weighted_residual(data, trial.forces_nN);
-  const std::vector<Eigen::Index> strays = stray_beads(data, residual);
-  const bool harm = !strays.empty() && harm_done_by(strays, data, residual, problem.force_derivatives(trial)) > kHarm;
+  const Eigen::MatrixXd derivatives = problem.force_derivatives(trial);
+  const std::vector<Eigen::Index> strays = stray_beads(data, studentized(data, trial, derivatives));
+  const bool harm =
+      !strays.empty() && harm_done_by(strays, data, weighted_residual(data, trial.forces_nN), derivatives) > kHarm;
   return harm ? Loss::huber : Loss::squares;
 }
 

@@ -189,7 +189,7 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
     if (asked[static_cast<std::size_t>(i)].gain < 1) asked[static_cast<std::size_t>(i)].fields = {};
   });
   // chi squared of two numbers exceeds x by chance exp(-x/2)
-  const double limit = 2 * std::log(std::max<double>(1, static_cast<double>(places.size())) / 0.05);
+  const double limit = 2 * std::log(std::max<double>(1, static_cast<double>(places.size())) / 0.01);
   std::erase_if(asked, [&](const Question& q) { return q.gain < limit; });
   std::ranges::sort(asked, std::greater(), &Question::gain);
   std::vector<MissingAdhesion> found;

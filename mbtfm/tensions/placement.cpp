@@ -100,8 +100,11 @@ std::string in_words(Vec2 shift_um, const Eigen::Vector3d& sigma) {
 }
 
 /// A stray bead near an adhesion, where the field is steep, moves a cell by several of its errors.
-LinearData without_strays(LinearData data, const Eigen::VectorXd& forces_nN) {
-  const std::vector<Eigen::Index> strays = stray_beads(data, weighted_residual(data, forces_nN));
+/// @param motions  by the placement, which follow such a bead as the tensions do
+LinearData without_strays(LinearData data, const Trial& trial, const Eigen::MatrixXd& derivatives,
+                          const Eigen::MatrixXd& motions) {
+  const std::vector<Eigen::Index> strays =
+      stray_beads(data, studentized(with_more_motions(data, motions), trial, derivatives));
   if (strays.empty()) return data;
   Eigen::VectorXd weight = Eigen::VectorXd::Ones(data.weight_per_um.size() / 2);
   for (const Eigen::Index bead : strays) weight[bead] = 0;
@@ -247,11 +250,12 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
         problem, rough, threads, pass == 0 ? start : scaled_to_data(problem, result.start.tensions_nN, &result.start),
         Search::nearest);
     result.start = fit.trial;
-    if (parameters.loss != Loss::squares) there = without_strays(std::move(there), fit.trial.forces_nN);
     const Eigen::VectorXd model_um = there.response->displace(fit.trial.forces_nN);
     const Eigen::MatrixXd motions =
         placement_motions(gel, ellipses, fit.trial.forces_nN, there.position_um, model_um, none.centre_um, threads);
-    const Step step = step_of(there, fit.trial, problem.force_derivatives(fit.trial), motions);
+    const Eigen::MatrixXd derivatives = problem.force_derivatives(fit.trial);
+    if (parameters.loss != Loss::squares) there = without_strays(std::move(there), fit.trial, derivatives, motions);
+    const Step step = step_of(there, fit.trial, derivatives, motions);
     const double length_um = way_um(step.value, lever_um), sigma_um = std::max(step.sigma[0], step.sigma[1]);
     if (setting == Switch::automatic && !(sigma_um < 0.5 * width_um)) {
       return off("the beads do not tell it: " + in_words(moved(result.placement, step.value).shift_um, step.sigma));

@@ -1,6 +1,7 @@
 #include "mbtfm/tensions/robust.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -156,6 +157,12 @@ WeighedFit fit_with_loss(LinearData data, const network::Contractile& network, c
   return {std::move(fit), std::move(data)};
 }
 
+/// R with R Rᵀ this covariance.
+Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
 /// Whether the nearest bead's residual does not go along with that of the bead of this row, by half of it at least.
 bool stands_alone(const LinearData& data, const Eigen::VectorXd& residual, Eigen::Index row) {
   const Vec2 place = data.position_um[static_cast<std::size_t>(row / 2)];
@@ -172,17 +179,56 @@ bool stands_alone(const LinearData& data, const Eigen::VectorXd& residual, Eigen
 
 }  // namespace
 
-std::vector<Eigen::Index> stray_beads(const LinearData& data, const Eigen::VectorXd& weighted_residual) {
-  const double scale = robust_scale(data, weighted_residual);
+Studentized studentized(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& force_derivatives) {
+  std::vector<Eigen::Index> free;  // not at its bound
+  for (Eigen::Index i = 0; i < force_derivatives.cols(); ++i) {
+    if (trial.tensions_nN[i] > 0) free.push_back(i);
+  }
+  const Eigen::MatrixXd of_free = force_derivatives(Eigen::all, free);
+  const Eigen::VectorXd weight = squared_weights(data).cwiseSqrt();
+  Eigen::Matrix3Xd hat = Eigen::Matrix3Xd::Zero(3, weight.size() / 2);  // its blocks: xx, xy, yy
+  const auto add = [&](const Eigen::MatrixXd& independent) {            // columns Z of a part Z Zᵀ
+    for (Eigen::Index b = 0; b < hat.cols(); ++b) {
+      const auto x = independent.row(2 * b), y = independent.row(2 * b + 1);
+      hat.col(b) += Eigen::Vector3d(x.squaredNorm(), x.dot(y), y.squaredNorm());
+    }
+  };
+  if (data.motions.shapes.cols() > 0) add(weight.asDiagonal() * data.motions.shapes * root_of(data.motions.inverse));
+  const Eigen::MatrixXd unit = of_free * root_of(numerics::gram(displace(data.reduced, of_free, data.threads))
+                                                     .completeOrthogonalDecomposition()
+                                                     .pseudoInverse());
+  constexpr Eigen::Index kColumns = 64;  // at a time: beads × tensions are too many numbers
+  for (Eigen::Index first = 0; first < unit.cols(); first += kColumns) {
+    const Eigen::Index count = std::min(kColumns, unit.cols() - first);
+    add(weight.asDiagonal() * less_motion(data, data.response->displace(unit.middleCols(first, count))));
+  }
+  Eigen::VectorXd residual = weighted_residual(data, trial.forces_nN);
+  for (Eigen::Index b = 0; b < hat.cols(); ++b) {
+    Eigen::Matrix2d left;
+    left << 1 - hat(0, b), -hat(1, b), -hat(1, b), 1 - hat(2, b);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(left);
+    constexpr double kLeast = 0.01;  // a bead that tells all by itself leaves rounding, not a residual
+    residual.segment<2>(2 * b) = eigen.eigenvectors() *
+                                 eigen.eigenvalues().cwiseMax(kLeast).cwiseSqrt().cwiseInverse().asDiagonal() *
+                                 eigen.eigenvectors().transpose() * residual.segment<2>(2 * b);
+  }
+  return {.residual = std::move(residual), .leverage = (hat.row(0) + hat.row(2)).transpose()};
+}
+
+std::vector<Eigen::Index> stray_beads(const LinearData& data, const Studentized& beads) {
+  const Eigen::VectorXd& residual = beads.residual;
+  const double scale = robust_scale(data, residual);
   if (is_exact(data, scale)) return {};
   constexpr double kChance = 0.05;
-  const double limit = scale * std::sqrt(2 * std::log(0.5 * static_cast<double>(data.n_used) / kChance));
+  const double n_beads = 0.5 * static_cast<double>(data.n_used), all = beads.leverage.sum();
   std::vector<Eigen::Index> strays;
   std::size_t n_large = 0;
-  for (Eigen::Index i = 0; i < weighted_residual.size(); i += 2) {
-    if (data.weight_per_um[i] == 0 || weighted_residual.segment<2>(i).norm() <= limit) continue;
+  for (Eigen::Index b = 0; b < beads.leverage.size(); ++b) {
+    if (data.weight_per_um[2 * b] == 0) continue;
+    const double share = 0.5 / n_beads + 0.5 * (all > 0 ? beads.leverage[b] / all : 1 / n_beads);
+    if (residual.segment<2>(2 * b).norm() <= scale * std::sqrt(-2 * std::log(kChance * share))) continue;
     ++n_large;
-    if (stands_alone(data, weighted_residual, i)) strays.push_back(i / 2);
+    if (stands_alone(data, residual, 2 * b)) strays.push_back(b);
   }
   return 2 * strays.size() > n_large ? strays : std::vector<Eigen::Index>();
 }

@@ -10,11 +10,23 @@
 
 namespace mbtfm::tensions {
 
-/// Beads whose residuals Gaussian noise has in less than one case in twenty, n exp(−r²/2) < 0.05 (Rayleigh, Bonferroni;
-/// r in robust standard deviations), and that stand alone: the nearest bead does not go along by half. None where most
-/// of the large ones go along: then the model and not the beads are wrong there, and to discount them would explain the
-/// still part of the gel only.
-std::vector<Eigen::Index> stray_beads(const LinearData& data, const Eigen::VectorXd& weighted_residual);
+/// The weighted residuals of a trial, each made as large as if the fit did not follow its bead: (1 − H)^(−1/2) r, H the
+/// bead's 2 × 2 block of the hat matrix of motions and tensions, those at zero held there (Cook & Weisberg, Residuals
+/// and Influence in Regression, 1982, 2.2). Beside an adhesion a single bead may tell half of its force.
+struct Studentized {
+  Eigen::VectorXd residual;  ///< 2·beads
+  Eigen::VectorXd leverage;  ///< by bead: trace of H; they add up to the number of unknowns
+};
+/// @param force_derivatives  dR/dt: 2·adhesions × tensions
+Studentized studentized(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& force_derivatives);
+
+/// Beads whose residuals Gaussian noise has in less than one case in twenty, exp(−r²/2) < 0.05 q (Rayleigh, r in robust
+/// standard deviations), and that stand alone: the nearest bead does not go along by half. The chance q that a bead is
+/// given adds up to 1: half goes to all alike, half by leverage, as a bead that the fit follows can do more harm
+/// (weighted Bonferroni: Genovese, Roeder & Wasserman, Biometrika 93:509, 2006). None where most of the large ones go
+/// along: then the model and not the beads are wrong there, and to discount them would explain the still part of the
+/// gel only.
+std::vector<Eigen::Index> stray_beads(const LinearData& data, const Studentized& beads);
 
 /// What these beads do to the fit by least squares, in standard errors: by how many the tension moves most that does if
 /// they lose all their weight (the forces taken as linear in the tensions), or by what share they widen all of them,

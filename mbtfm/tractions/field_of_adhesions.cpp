@@ -48,10 +48,11 @@ VectorXd weights_of(const VectorXd& residual) {
 
 }  // namespace
 
-std::vector<Vec2> field_of_adhesions_um(const std::vector<Adhesion>& adhesions, const DisplacementField& beads,
-                                        int threads) {
-  std::vector<substrate::Ellipse> ellipses;
-  for (const Adhesion& a : adhesions) ellipses.push_back(substrate::ellipse_of(a));
+FieldOfAdhesions::FieldOfAdhesions(const std::vector<Adhesion>& adhesions, int threads) : threads_(threads) {
+  for (const Adhesion& a : adhesions) ellipses_.push_back(substrate::ellipse_of(a));
+}
+
+std::vector<Vec2> FieldOfAdhesions::um(const DisplacementField& beads) {
   std::vector<Vec2> places_um;
   std::vector<Index> rows;  // of beads without a flag
   VectorXd displacement_um(2 * std::ssize(beads));
@@ -61,30 +62,33 @@ std::vector<Vec2> field_of_adhesions_um(const std::vector<Adhesion>& adhesions, 
     displacement_um.segment<2>(2 * i) << bead.displacement_um.x, bead.displacement_um.y;
     if (bead.flag.empty()) rows.insert(rows.end(), {2 * i, 2 * i + 1});
   }
-  const Index n_forces = 2 * std::ssize(ellipses), n_unknowns = n_forces + 6;
-  if (ellipses.empty() || std::ssize(rows) < 2 * n_unknowns) return {};
-  const Gel gel{.youngs_modulus_kPa = 1, .poisson_ratio = 0.5};  // whatever its modulus: forces are not asked for
-  MatrixXd shapes(displacement_um.size(), n_unknowns);
-  shapes << greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads)
-                ->compliance_um_per_nN(places_um, ellipses),
-      affine_motions(places_um);
-  const MatrixXd used = shapes(rows, Eigen::all);
+  const Index n_forces = 2 * std::ssize(ellipses_), n_unknowns = n_forces + 6;
+  if (ellipses_.empty() || std::ssize(rows) < 10 * n_unknowns) return {};
+  if (places_um != places_um_) {
+    const Gel gel{.youngs_modulus_kPa = 1, .poisson_ratio = 0.5};  // whatever its modulus: forces are not asked for
+    shapes_.resize(displacement_um.size(), n_unknowns);
+    shapes_ << greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads_)
+                   ->compliance_um_per_nN(places_um, ellipses_),
+        affine_motions(places_um);
+    places_um_ = std::move(places_um);
+  }
+  const MatrixXd used = shapes_(rows, Eigen::all);
   const VectorXd target = displacement_um(rows);
   VectorXd weights = VectorXd::Ones(target.size()), found;
   constexpr int kRounds = 4;
   for (int round = 0; round < kRounds; ++round) {
     MatrixXd normal = MatrixXd::Zero(n_unknowns, n_unknowns);
-    numerics::add_upper_gram(weights.cwiseSqrt().asDiagonal() * used, normal, threads);
+    numerics::add_upper_gram(weights.cwiseSqrt().asDiagonal() * used, normal, threads_);
     constexpr double kRidge = 1e-4;  // of forces that no bead feels, or that two adhesions share
     normal.diagonal().head(n_forces).array() += kRidge * normal.diagonal().head(n_forces).mean();
-    if (!numerics::upper_cholesky(normal, threads)) return {};
+    if (!numerics::upper_cholesky(normal, threads_)) return {};
     MatrixXd x = used.transpose() * weights.cwiseProduct(target);
     numerics::solve_upper_transposed(normal, x);
     numerics::solve_upper(normal, x);
     found = x;
     weights = weights_of(target - used * found);
   }
-  const VectorXd field = shapes * found;
+  const VectorXd field = shapes_ * found;
   std::vector<Vec2> all;
   for (Index row = 0; row < field.size(); row += 2) all.push_back({field[row], field[row + 1]});
   return all;

@@ -1,17 +1,30 @@
 /// What adhesions that pull make of all beads, as far as some of the beads tell.
 #pragma once
 
+#include <Eigen/Core>
 #include <vector>
 
 #include "pipeline/contract/beads.h"
 #include "pipeline/contract/cell.h"
+#include "substrate/ellipse.h"
 
 namespace mbtfm::tractions {
 
-/// Displacements (um) of all beads by a force on each adhesion and a common affine motion, which explain those without
-/// a flag best: Tukey's loss, so that beads that are astray do not count. To guess by, near adhesions: the gel is taken
-/// for a thick, incompressible layer. Empty where there are not twice as many data as unknowns.
-std::vector<Vec2> field_of_adhesions_um(const std::vector<Adhesion>& adhesions, const DisplacementField& beads,
-                                        int threads);
+/// Displacements of all beads by a force on each adhesion and a common affine motion, which explain those without a
+/// flag best: Tukey's loss, so that beads that are astray do not count. To guess by, near adhesions: the gel is taken
+/// for a thick, incompressible layer.
+class FieldOfAdhesions {
+ public:
+  FieldOfAdhesions(const std::vector<Adhesion>& adhesions, int threads);
+  /// um, of all beads. Empty where there are not ten data for each unknown: a bead would tell much of its own guess.
+  /// Quicker for the places of the last call.
+  std::vector<Vec2> um(const DisplacementField& beads);
+
+ private:
+  std::vector<substrate::Ellipse> ellipses_;
+  int threads_;
+  std::vector<Vec2> places_um_;  ///< of the last call
+  Eigen::MatrixXd shapes_;       ///< there, 2·beads × unknowns: by forces of 1 nN, and six motions
+};
 
 }  // namespace mbtfm::tractions

@@ -58,13 +58,18 @@ TEST(FieldOfAdhesions, tells_where_beads_went_that_are_astray_or_flagged) {
     if (i % 33 == 0) bead.displacement_um += Vec2{2, 3};
     if (i % 33 == 1) bead = {.position_um = bead.position_um, .displacement_um = {9, 9}, .flag = "no partner"};
   }
-  const std::vector<Vec2> found = field_of_adhesions_um(scene.adhesions, scene.field, 2);
+  FieldOfAdhesions field(scene.adhesions, 2);
+  const std::vector<Vec2> found = field.um(scene.field);
   ASSERT_EQ(found.size(), truth.size());
   for (std::size_t i = 0; i < truth.size(); ++i)
     EXPECT_LE(norm(found[i] - truth[i].displacement_um - drift), 0.05 * scene.largest_um) << i;
-  // fewer data than twice the unknowns
-  EXPECT_TRUE(field_of_adhesions_um(scene.adhesions, {scene.field.begin(), scene.field.begin() + 20}, 1).empty());
-  EXPECT_TRUE(field_of_adhesions_um({}, scene.field, 1).empty());
+  // other beads, then the first ones again
+  const DisplacementField half(scene.field.begin(), scene.field.begin() + std::ssize(scene.field) / 2);
+  EXPECT_EQ(field.um(half), FieldOfAdhesions(scene.adhesions, 2).um(half));
+  EXPECT_EQ(field.um(scene.field), found);
+  // fewer data than ten times the unknowns
+  EXPECT_TRUE(field.um({scene.field.begin(), scene.field.begin() + 20}).empty());
+  EXPECT_TRUE(FieldOfAdhesions({}, 1).um(scene.field).empty());
 }
 
 TEST(SurfaceSpectrum, its_waves_add_up_to_the_field_of_a_loaded_disc) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
 
 #include "mbtfm/tractions/field_of_adhesions.h"
@@ -132,7 +133,8 @@ std::vector<Adhesion> adhesions_at(const std::vector<test::Peak>& peaks, Vec2 sh
 }
 
 FieldModel model_with(const std::vector<Adhesion>& adhesions) {
-  return [adhesions](const DisplacementField& beads) { return tractions::field_of_adhesions_um(adhesions, beads, 2); };
+  const auto field = std::make_shared<tractions::FieldOfAdhesions>(adhesions, 2);
+  return [field](const DisplacementField& beads) { return field->um(beads); };
 }
 
 /// Of a simulated cell: what is found of beads that move by 5 px and more.

@@ -54,9 +54,8 @@ int main(int argc, char** argv) {
   for (int seed = static_cast<int>(argument(2, 101)); seed <= argument(3, 105); ++seed) {
     p.seed = static_cast<std::uint64_t>(seed);
     const test::CellPair pair = test::drawn_pair(p, threads);
-    const beads::FieldModel model = [&](const DisplacementField& found) {
-      return tractions::field_of_adhesions_um(pair.experiment.cell.adhesions, found, threads);
-    };
+    tractions::FieldOfAdhesions field(pair.experiment.cell.adhesions, threads);
+    const beads::FieldModel model = [&](const DisplacementField& found) { return field.um(found); };
     const auto tracking = beads::RelaxedBeads(pair.relaxed, {}, threads, is_alone ? beads::FieldModel{} : model)
                               .track(pair.stressed, p.microscope.pixel_size_um);
     const test::Counts counts = test::counted(tracking, pair, p.microscope);
