@@ -22,6 +22,7 @@
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/with_error.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
@@ -543,7 +544,7 @@ void notice_expansion(stage::StageContext& context, const std::vector<sheets::Co
   context.notice(noticed(FindingKind::sheet_expands, share,
                          "By the beads " + brief(100 * share) + " % of the sheet's nodes push outward; most at (" +
                              brief(least->position_um.x) + ", " + brief(least->position_um.y) + ") um, with " +
-                             brief(least->nN_per_um) + " +- " + brief(least->sigma_nN_per_um) + " nN/µm."));
+                             with_error(least->nN_per_um, least->sigma_nN_per_um) + " nN/µm."));
 }
 
 void notice_expansion(stage::StageContext& context, const sheets::SheetFit& fit, int n_parts) {

@@ -8,6 +8,7 @@
 #include "mbtfm/tractions/field_of_adhesions.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/with_error.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/named_array.h"
 #include "pipeline/files/own_files.h"
@@ -109,8 +110,6 @@ void add_figures(StageReport& report, const CommonMotion& c) {
                            {"pull_of_border", c.pull_of_border}};
   report.figures.insert(report.figures.end(), figures.begin(), figures.end());
 }
-
-std::string with_error(double value, double error) { return brief(value) + " +- " + brief(error); }
 
 /// What the images themselves call for.
 std::vector<Finding> findings_of(const Tracking& tracking) {

@@ -5,6 +5,7 @@
 #include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::spatial {
@@ -63,9 +64,9 @@ std::optional<Finding> notice_loss(BeadLoss loss, const Balance& by_loss, const 
   const double sigma = std::hypot(by_loss.total_force_sigma_nN, by_squares.total_force_sigma_nN);
   const double apart = std::abs(by_loss.total_force_nN - by_squares.total_force_nN);
   return noticed(FindingKind::loss_decides, sigma > 0 ? apart / sigma : 0,
-                 "The total force is " + brief(by_loss.total_force_nN) + " +- " + brief(by_loss.total_force_sigma_nN) +
-                     " nN by " + name_of(loss) + ", and " + brief(by_squares.total_force_nN) + " +- " +
-                     brief(by_squares.total_force_sigma_nN) + " nN by l2.");
+                 "The total force is " + with_error(by_loss.total_force_nN, by_loss.total_force_sigma_nN) + " nN by " +
+                     name_of(loss) + ", and " + with_error(by_squares.total_force_nN, by_squares.total_force_sigma_nN) +
+                     " nN by l2.");
 }
 
 void find_doubts(const Problem& problem, const SpatialParameters& parameters, SpatialReconstruction& r) {

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "mbtfm/spatial/reconstruction.h"
-#include "pipeline/contract/numbers.h"
+#include "pipeline/contract/with_error.h"
 
 namespace mbtfm::spatial {
 
@@ -71,11 +71,11 @@ Effect common_motion_effect(Switch setting, const Problem& problem, const std::o
   std::string why = "found with the tractions: shift";
   const Index n = found->values.size() - 1;
   constexpr std::array kAxes = {" x ", " y ", " z "};
-  const auto with_error = [&](Index k, double unit) {
-    return brief(unit * found->values[k]) + " +- " + brief(unit * found->sigma[k]);
+  const auto in_unit = [&](Index k, double unit) {
+    return with_error(unit * found->values[k], unit * found->sigma[k]);
   };
-  for (Index k = 0; k < n; ++k) why += kAxes.at(static_cast<std::size_t>(k)) + with_error(k, 1) + " um,";
-  why += " turn " + with_error(n, 180 / std::numbers::pi) + " degrees";
+  for (Index k = 0; k < n; ++k) why += kAxes.at(static_cast<std::size_t>(k)) + in_unit(k, 1) + " um,";
+  why += " turn " + in_unit(n, 180 / std::numbers::pi) + " degrees";
   return stage::decided(EffectKind::common_motion, setting, true, why);
 }
 

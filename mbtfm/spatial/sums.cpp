@@ -3,6 +3,7 @@
 
 #include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/dense.h"
 
 namespace mbtfm::spatial {
@@ -174,10 +175,9 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
 std::optional<Finding> noticed_imbalance(const Balance& balance) {
   if (!balance.imbalance) return std::nullopt;
   return noticed(FindingKind::tractions_out_of_balance, *balance.imbalance,
-                 "The tractions add up to " + brief(norm(balance.force_nN)) + " +- " +
-                     brief(balance.net_force_sigma_nN) + " nN, their moments to " + brief(norm(balance.moment_nN_um)) +
-                     " +- " + brief(balance.net_moment_sigma_nN_um) + " nN um; the sum of their sizes is " +
-                     brief(balance.total_force_nN) + " nN.");
+                 "The tractions add up to " + with_error(norm(balance.force_nN), balance.net_force_sigma_nN) +
+                     " nN, their moments to " + with_error(norm(balance.moment_nN_um), balance.net_moment_sigma_nN_um) +
+                     " nN um; the sum of their sizes is " + brief(balance.total_force_nN) + " nN.");
 }
 
 std::vector<double> resolution_um(const Problem& problem, const SpatialReconstruction& r) {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "pipeline/contract/numbers.h"
+#include "pipeline/contract/with_error.h"
 
 namespace mbtfm::tensions {
 
@@ -15,10 +15,6 @@ Vec2 centre_of(const std::vector<Vec2>& places) {
   Vec2 sum;
   for (const Vec2 place : places) sum += place;
   return (1 / std::max(1.0, static_cast<double>(places.size()))) * sum;
-}
-
-std::string with_error(double value, double sigma, const std::string& unit) {
-  return brief(value) + " +- " + brief(sigma) + " " + unit;
 }
 
 }  // namespace
@@ -125,9 +121,9 @@ Figures figures_of(const FoundMotion& found) {
 std::string sentence_of(const FoundMotion& found) {
   const AffineMotion& m = found.motion;
   constexpr double kDegree = 180 / std::numbers::pi;
-  return "growth " + with_error(100 * m.growth, 100 * found.sigma[3], "%") + ", turn " +
-         with_error(kDegree * m.turn_rad, kDegree * found.sigma[2], "degrees") + ", shear " +
-         with_error(100 * m.shear(), 100 * std::max(found.sigma[4], found.sigma[5]), "%");
+  return "growth " + with_error(100 * m.growth, 100 * found.sigma[3]) + " %, turn " +
+         with_error(kDegree * m.turn_rad, kDegree * found.sigma[2]) + " degrees, shear " +
+         with_error(100 * m.shear(), 100 * std::max(found.sigma[4], found.sigma[5])) + " %";
 }
 
 }  // namespace mbtfm::tensions

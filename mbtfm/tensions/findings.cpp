@@ -7,6 +7,7 @@
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/with_error.h"
 
 namespace mbtfm::tensions {
 
@@ -149,8 +150,8 @@ Noticed missing_fibres_noticed(const FitOutcome& o) {
   for (std::size_t i = 0; i < std::min(kMost, o.missing.size()); ++i) {
     const MissingFibre& f = o.missing[i];
     text += (i > 0 ? "; " : "") + std::string("from adhesion ") + std::to_string(f.start_adhesion_id) + " to " +
-            std::to_string(f.end_adhesion_id) + " with " + brief(f.tension_nN) + " +- " +
-            brief(f.tension_nN / std::sqrt(f.chi_squared_gain)) + " nN";
+            std::to_string(f.end_adhesion_id) + " with " +
+            with_error(f.tension_nN, f.tension_nN / std::sqrt(f.chi_squared_gain)) + " nN";
   }
   if (o.missing.size() > kMost) text += "; ... (missing_fibres.csv)";
   return noticed(FindingKind::missing_fibre, static_cast<double>(o.missing.size()), text + ".");
@@ -239,8 +240,8 @@ Noticed cell_cut(const FitOutcome& o) {
   const Estimate& force = o.fit.cut->magnitude_nN;
   return noticed(
       FindingKind::cell_cut, 1,
-      "The image's border cuts the cell. The fit holds the network along the cut; " + brief(force.value) + " +- " +
-          brief(force.standard_error) + " nN pass through it. " +
+      "The image's border cuts the cell. The fit holds the network along the cut; " +
+          with_error(force.value, force.standard_error) + " nN pass through it. " +
           (o.beyond ? "Forces beyond the cut were allowed for; fibres and adhesions near it have larger errors."
                     : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are "
                       "taken for forces of the adhesions near it."),

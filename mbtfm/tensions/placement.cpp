@@ -8,6 +8,7 @@
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/effects.h"
@@ -95,8 +96,7 @@ double mean_semi_minor_um(const Cell& cell) {
 }
 
 std::string in_words(Vec2 shift_um, const Eigen::Vector3d& sigma) {
-  return "(" + brief(shift_um.x) + ", " + brief(shift_um.y) + ") +- (" + brief(sigma[0]) + ", " + brief(sigma[1]) +
-         ") um";
+  return with_error(shift_um, {sigma[0], sigma[1]}) + " um";
 }
 
 /// A stray bead near an adhesion, where the field is steep, moves a cell by several of its errors.
@@ -289,8 +289,8 @@ Figures figures_of(const FoundPlacement& found) {
 }
 
 std::string sentence_of(const FoundPlacement& found) {
-  return in_words(found.placement.shift_um, found.sigma) + ", turned by " + brief(kDegree * found.placement.turn_rad) +
-         " +- " + brief(kDegree * found.sigma[2]) + " degrees";
+  return in_words(found.placement.shift_um, found.sigma) + ", turned by " +
+         with_error(kDegree * found.placement.turn_rad, kDegree * found.sigma[2]) + " degrees";
 }
 
 }  // namespace mbtfm::tensions

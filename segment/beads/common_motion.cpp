@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "pipeline/contract/numbers.h"
+#include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
 #include "segment/beads/plane.h"
@@ -48,9 +48,9 @@ double misfit_of(const RestingField& rest, bool is_at_rest, const AffineMotion& 
 
 std::string affine_in_words(const CommonMotion& c) {
   const double degrees = 180 / std::numbers::pi;
-  return "a turn of " + brief(degrees * c.turn_rad) + " +- " + brief(degrees * c.turn_sigma_rad) +
-         " degrees, growth of " + brief(100 * c.growth) + " +- " + brief(100 * c.growth_sigma) + " % and shear of " +
-         brief(100 * c.shear) + " +- " + brief(100 * c.shear_sigma) + " %";
+  return "a turn of " + with_error(degrees * c.turn_rad, degrees * c.turn_sigma_rad) + " degrees, growth of " +
+         with_error(100 * c.growth, 100 * c.growth_sigma) + " % and shear of " +
+         with_error(100 * c.shear, 100 * c.shear_sigma) + " %";
 }
 
 MotionTaken motion_taken(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, Vec2 corner,

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
-#include "pipeline/contract/numbers.h"
 #include "pipeline/contract/polyline.h"
+#include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::cells {
@@ -190,10 +190,9 @@ std::optional<ChannelAlignment> align_channels(const std::vector<Fibre>& fibres,
 
 std::string sentence_of(const ChannelAlignment& a) {
   constexpr double kDegree = 180 / std::numbers::pi;
-  return "(" + brief(a.shift_um.x) + ", " + brief(a.shift_um.y) + ") +- (" + brief(a.shift_sigma_um.x) + ", " +
-         brief(a.shift_sigma_um.y) + ") um, turned by " + brief(kDegree * a.turn_rad) + " +- " +
-         brief(kDegree * a.turn_sigma_rad) + " degrees and grown by " + brief(100 * a.growth) + " +- " +
-         brief(100 * a.growth_sigma) + " %";
+  return with_error(a.shift_um, a.shift_sigma_um) + " um, turned by " +
+         with_error(kDegree * a.turn_rad, kDegree * a.turn_sigma_rad) + " degrees and grown by " +
+         with_error(100 * a.growth, 100 * a.growth_sigma) + " %";
 }
 
 }  // namespace mbtfm::cells

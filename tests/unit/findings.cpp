@@ -6,6 +6,7 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/with_error.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
@@ -55,6 +56,21 @@ TEST(Findings, pass_through_a_record_unchanged) {
   EXPECT_THROW(files::findings_of(files::JsonRecord(folder / "b.json", "a record")), InputError);
   files::write_text(folder / "c.json", "{}");  // as older versions wrote it
   EXPECT_TRUE(files::findings_of(files::JsonRecord(folder / "c.json", "a record")).empty());
+}
+
+TEST(WithError, a_number_ends_where_its_error_does) {
+  EXPECT_EQ(with_error(2.3512, 0.4231), "2.35 +- 0.42");
+  EXPECT_EQ(with_error(2.3512, 0.0996), "2.35 +- 0.10");
+  EXPECT_EQ(with_error(-0.0004, 0.023), "0.000 +- 0.023");
+  EXPECT_EQ(with_error(1234.5, 0.37), "1234.50 +- 0.37");
+  EXPECT_EQ(with_error(1234.5, 37), "1235 +- 37");
+  EXPECT_EQ(with_error(1234.5, 372), "1230 +- 370");
+  EXPECT_EQ(with_error(1234.5, 999), "1200 +- 1000");
+  EXPECT_EQ(with_error(Vec2{0.3021, -0.2456}, Vec2{0.0181, 0.2}), "(0.302, -0.25) +- (0.018, 0.20)");
+  // without an error to go by
+  EXPECT_EQ(with_error(2.3512, 0), "2.35 +- 0");
+  EXPECT_EQ(with_error(2.3512, std::numeric_limits<double>::infinity()), "2.35 +- inf");
+  EXPECT_EQ(with_error(2e9, 1e7), "2e+09 +- 1e+07");
 }
 
 }  // namespace
