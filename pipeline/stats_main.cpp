@@ -18,9 +18,8 @@ Study read_study(const StudyParameters& parameters, stage::StageContext& context
   const std::optional<Path> table = context.has_input("table") ? std::optional(context.input("table")) : std::nullopt;
   Study study = read_study(folder, parameters, table, context.threads);
   for (const StudyCell& cell : study.cells) {
-    const CellKind kind = cell.sheet ? CellKind::sheet : CellKind::plane;
-    for (const std::string& file : files_of_a_cell(kind)) context.input("cells", {cell.name + "/" + file});
-    for (const std::string& file : further_files_of_a_cell(kind)) {
+    for (const std::string& file : files_of_a_cell(cell.kind())) context.input("cells", {cell.name + "/" + file});
+    for (const std::string& file : further_files_of_a_cell(cell.kind())) {
       const std::string name = cell.name + "/" + file;
       if (files::is_own_file(folder / name)) context.input("cells", {name});
     }
@@ -54,9 +53,11 @@ StageReport statistics(const StudyParameters& parameters, stage::StageContext& c
   files::write_text(context.output("out", "study.R"), std::string(kStudyScript));
   StageReport report;
   if (analysis.has_fibres)
-    report.summary = counted(n_with_fibres(study), "cells") + ", " +
+    report.summary = counted(n_of_kind(study, CellKind::plane), "cells") + ", " +
                      counted(std::ssize(analysis.tensions.sample.values), "tensions") + "; ";
-  if (n_sheets(study) > 0) report.summary += counted(n_sheets(study), "sheets") + "; ";
+  if (const int n = n_of_kind(study, CellKind::sheet); n > 0) report.summary += counted(n, "sheets") + "; ";
+  if (const int n = n_of_kind(study, CellKind::space); n > 0)
+    report.summary += counted(n, "cell in space", "cells in space") + "; ";
   report.summary += counted(std::ssize(study.left_out), "cells") + " left out, " +
                     counted(std::ssize(analysis.warnings), "warnings") + ": see report.html";
   return report;
@@ -71,8 +72,8 @@ int main(int argc, char** argv) {
   return stage::run_stage<StudyParameters>(
       {.name = "stats",
        .purpose =
-           "statistics of stress-fibre tensions, adhesion forces and contracting sheets over all finished cells of "
-           "a folder",
+           "statistics of stress-fibre tensions, adhesion forces, contracting sheets and forces in space over all "
+           "finished cells of a folder",
        .files = {{"cells", stage::FileArgument::Kind::input, "folder with cell folders"},
                  {"table", stage::FileArgument::Kind::optional_input,
                   "CSV with a row for each cell: column cell, columns of conditions, column exclude with the reason"},

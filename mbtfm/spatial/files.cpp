@@ -182,6 +182,8 @@ Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const
   }
   add_vector("centre", "um", balance.centre_um);
   add("strain_energy_fJ", balance.strain_energy_fJ);
+  add("contractile_moment_nN_um", balance.contractile_moment_nN_um);
+  if (r.covariance_kPa2.size() > 0) add("contractile_moment_sigma_nN_um", balance.contractile_moment_sigma_nN_um);
   add("relative_l2", r.relative_l2);
   add("noise_um", r.noise_um);
   if (r.chi_squared > 0) add("chi_squared_per_datum", r.chi_squared);

@@ -166,6 +166,9 @@ struct Balance {
   double total_force_sigma_nN = 0;  ///< along the tractions found
   double normal_force_nN = 0;       ///< ∫ |t . n| dA
   double strain_energy_fJ = 0;
+  /// −∫ (x − centre) . t dA, above zero where the cell contracts, with its standard error (Butler et al., Am. J.
+  /// Physiol. Cell Physiol. 282 (2002) C595, with the third direction).
+  double contractile_moment_nN_um = 0, contractile_moment_sigma_nN_um = 0;
 };
 Balance balance_of(const Problem& problem, const SpatialReconstruction& reconstruction);
 /// Where its errors are known.

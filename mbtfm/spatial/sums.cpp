@@ -131,6 +131,7 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
              });
   if (balance.total_force_nN > 0) balance.centre_um = 1 / balance.total_force_nN * balance.centre_um;
   MatrixXd sums = MatrixXd::Zero(6, 3 * n);  // forces, moments
+  VectorXd inwards(3 * n);                   // contractile moment
   for (Index v = 0; v < n; ++v) {
     const double area = mesh.areas_um2[static_cast<std::size_t>(v)];
     const Vec3 arm = vertices[static_cast<std::size_t>(v)] - balance.centre_um;
@@ -138,6 +139,7 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
     cross_arm << 0, -arm.z, arm.y, arm.z, 0, -arm.x, -arm.y, arm.x, 0;
     sums.block<3, 3>(0, 3 * v) = area * Matrix3d::Identity();
     sums.block<3, 3>(3, 3 * v) = area * cross_arm;
+    inwards.segment<3>(3 * v) = -area * vector(arm);
   }
   if (r.covariance_kPa2.size() > 0) {
     VectorXd along(3 * n);
@@ -149,6 +151,7 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
   const VectorXd net = sums * summed;
   balance.force_nN = vec(net.head<3>());
   balance.moment_nN_um = vec(net.tail<3>());
+  balance.contractile_moment_nN_um = inwards.dot(summed);
   if (const MatrixXd& covariance = covariance_of_summed_kPa2(r); covariance.size() > 0) {
     MatrixXd of_net = sums * covariance * sums.transpose();
     const double of_gel = problem.model_error * problem.model_error * balance.total_force_nN;
@@ -163,6 +166,7 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
     balance.net_force_sigma_nN = error_along(net.head<3>(), of_force);
     balance.net_moment_sigma_nN_um = error_along(net.tail<3>(), of_moment);
     balance.imbalance = net.dot(of_net.ldlt().solve(net));
+    balance.contractile_moment_sigma_nN_um = std::sqrt(std::max(0.0, inwards.dot(covariance * inwards)));
   }
   const VectorXd u = problem.surface_displacement_um(summed);
   for (Index j = 0; j < n; ++j) {

@@ -9,6 +9,7 @@
 
 #include "pipeline/charts/chart.h"
 #include "pipeline/contract/counted.h"
+#include "pipeline/contract/listed.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -27,11 +28,11 @@ Measure measure(Sample sample, const std::vector<CellWeights>& draws) {
 
 void warn_of_few_cells(const Study& study, std::vector<std::string>& warnings) {
   constexpr int kFew = 6;  // medians of five cells and five others cannot differ at p < 0.05 after correction
-  for (const bool is_sheet : {false, true}) {
+  for (const CellKind kind : mbtfm::values_of<CellKind>()) {
     std::vector<int> n_of(study.conditions.size(), 0);
     for (const StudyCell& cell : study.cells)
-      n_of[static_cast<std::size_t>(cell.condition)] += cell.sheet.has_value() == is_sheet ? 1 : 0;
-    const std::string name = is_sheet ? "sheet" : "cell";
+      n_of[static_cast<std::size_t>(cell.condition)] += cell.kind() == kind ? 1 : 0;
+    const std::string name = kind == CellKind::sheet ? "sheet" : "cell";
     for (std::size_t i = 0; i < n_of.size(); ++i) {
       const std::string where = prefix_of(study.conditions[i]);
       if (n_of[i] == 1) {
@@ -63,7 +64,7 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
         "means of the others are too large.",
         n_unknown, counted(n_fibres, "fibres")));
   }
-  if (const int n_without = n_with_fibres(study) - static_cast<int>(with.size()); n_without > 0) {
+  if (const int n_without = n_of_kind(study, CellKind::plane) - static_cast<int>(with.size()); n_without > 0) {
     warnings.push_back(
         fmt::format("{} no fibre with a known tension: of these only the forces enter, not the tensions.",
                     counted(n_without, "cell has", "cells have")));
@@ -102,7 +103,7 @@ void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
   warnings.push_back(
       fmt::format("The network's tension of {} of {} could not be identified: how their total force is shared out "
                   "to network and fibres is not known and does not enter, nor does the network's surface tension.",
-                  n, counted(n_with_fibres(study), "cells")));
+                  n, counted(n_of_kind(study, CellKind::plane), "cells")));
 }
 
 /// What the beads do not limit to both sides.
@@ -121,6 +122,34 @@ void warn_of_sheets(const Study& study, std::vector<std::string>& warnings) {
         "The beads limit the {} of sheets to one side only, or not at all, in {} of {}. What is not known does "
         "not enter, and the mean of the rest may be biased.",
         for_people(quantity).name, n_unknown, counted(n, "fits")));
+  }
+}
+
+/// What makes maps of cells in space differ although the cells do not.
+void warn_of_space(const Study& study, const std::vector<Measure>& in_space, std::vector<std::string>& warnings) {
+  std::map<std::string, int> n_by_method;
+  for (const StudyCell& cell : study.cells)
+    if (cell.space) ++n_by_method[cell.space->method];
+  if (n_by_method.size() > 1) {
+    std::vector<std::string> methods;
+    for (const auto& [method, n] : n_by_method) methods.push_back(fmt::format("{} ({})", method, counted(n, "cells")));
+    warnings.push_back(
+        fmt::format("Tractions in space were found by different methods: {}. Each smooths in its own way, so their "
+                    "forces and energies differ although the cells may not. Set traction.method, and run all again.",
+                    listed(methods)));
+  }
+  constexpr double kLevel = 0.05;
+  for (const Measure& m : in_space) {
+    if (m.sample.column != kResolution) continue;
+    for (const Comparison& c : m.comparisons) {
+      if (c.test != Test::mixed_model || c.group_b.empty() || *c.p_holm >= kLevel) continue;
+      const bool is_first_coarser = c.effect > 0;
+      warnings.push_back(
+          fmt::format("The maps of cells in space are coarser under {} than under {}, by {} on average: fewer beads, "
+                      "more noise or weaker cells. What smoothing takes from force and strain energy differs with it.",
+                      is_first_coarser ? c.group_a : c.group_b, is_first_coarser ? c.group_b : c.group_a,
+                      m.sample.amount(std::abs(c.effect))));
+    }
   }
 }
 
@@ -158,24 +187,39 @@ std::string kind_for_people(const std::string& kind) {
 std::vector<const Measure*> Analysis::measures() const {
   std::vector<const Measure*> all;
   if (has_fibres) all = {&tensions, &adhesion_forces, &adhesion_areas};
-  for (const std::vector<Measure>* list : {&cells, &sheets})
+  for (const std::vector<Measure>* list : {&cells, &sheets, &in_space})
     for (const Measure& m : *list) all.push_back(&m);
   return all;
 }
 
 PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
-  const auto of_sheets = [&](const std::string& column, const std::string& name) {
-    const auto at = std::ranges::find_if(analysis.sheets, [&](const Measure& m) { return m.sample.column == column; });
-    return PrimaryChoice{at == analysis.sheets.end() ? nullptr : &*at, 0, name + " of sheets"};
+  const auto among = [](const std::vector<Measure>& measures, const std::string& column, const std::string& name) {
+    const auto at = std::ranges::find_if(measures, [&](const Measure& m) { return m.sample.column == column; });
+    return PrimaryChoice{at == measures.end() ? nullptr : &*at, 0, name};
   };
+  const auto of_sheets = [&](const std::string& column, const std::string& name) {
+    return among(analysis.sheets, column, name + " of sheets");
+  };
+  const auto in_space = [&](const std::string& column, const std::string& name) {
+    return among(analysis.in_space, column, name + " of cells in space");
+  };
+  const bool has_space = !analysis.in_space.empty(), has_sheets = n_of_kind(study, CellKind::sheet) > 0;
   PrimaryMeasure asked = parameters.primary;
   if (asked == PrimaryMeasure::automatic)
-    asked = analysis.has_fibres ? PrimaryMeasure::tension : PrimaryMeasure::contraction;
+    asked = analysis.has_fibres ? PrimaryMeasure::tension
+            : has_sheets        ? PrimaryMeasure::contraction
+                                : PrimaryMeasure::total_force;
   if (asked == PrimaryMeasure::contraction) return of_sheets(name_of(SheetQuantity::contraction), "contraction");
   if (asked == PrimaryMeasure::mean_tension) return of_sheets("mean_tension_nN_per_um", "mean tension");
-  if (asked == PrimaryMeasure::total_force)
-    return analysis.has_fibres ? PrimaryChoice{&analysis.cells.front(), 0, "total force of cells"}
-                               : of_sheets("sheet_force_nN", "total force");
+  if (asked == PrimaryMeasure::contractile_moment)
+    return in_space("space_contractile_moment_nN_um", "contractile moment");
+  if (asked == PrimaryMeasure::strain_energy)
+    return has_space ? in_space("space_strain_energy_fJ", "strain energy")
+                     : of_sheets("strain_energy_fJ", "strain energy");
+  if (asked == PrimaryMeasure::total_force) {
+    if (analysis.has_fibres) return {&analysis.cells.front(), 0, "total force of cells"};
+    return has_sheets ? of_sheets("sheet_force_nN", "total force") : in_space("space_force_nN", "total force");
+  }
   const std::string name = "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres";
   if (!analysis.has_fibres) return {nullptr, 0, name};
   const Sample& sample = analysis.tensions.sample;
@@ -186,7 +230,7 @@ PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const
 Analysis analyse(const Study& study, const StudyParameters& parameters) {
   const std::vector<CellWeights> draws = draw_cells(study, parameters);
   Analysis a;
-  a.has_fibres = n_with_fibres(study) > 0;
+  a.has_fibres = n_of_kind(study, CellKind::plane) > 0;
   a.tensions = measure(sample_tensions(study), draws);
   a.tensions_by_cell = summarise_by_cell(a.tensions.sample, study);
   a.shares = shares_above(a.tensions.sample, thresholds_nN(parameters));
@@ -195,6 +239,7 @@ Analysis analyse(const Study& study, const StudyParameters& parameters) {
   if (a.has_fibres)
     for (Sample& sample : sample_cells(study)) a.cells.push_back(measure(std::move(sample), draws));
   for (Sample& sample : sample_sheets(study)) a.sheets.push_back(measure(std::move(sample), draws));
+  for (Sample& sample : sample_in_space(study)) a.in_space.push_back(measure(std::move(sample), draws));
   const PrimaryChoice primary = primary_choice(study, a, parameters);
   if (primary.measure == nullptr) {
     a.primary.measure = primary.name;
@@ -210,6 +255,7 @@ Analysis analyse(const Study& study, const StudyParameters& parameters) {
   if (a.has_fibres) warn_of_tensions(study, a.tensions, a.warnings);
   warn_of_networks(study, a.warnings);
   warn_of_sheets(study, a.warnings);
+  warn_of_space(study, a.in_space, a.warnings);
   for (const Measure* m : a.measures()) warn_of_pseudo_replication(*m, a.warnings);
   return a;
 }

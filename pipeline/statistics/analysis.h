@@ -21,19 +21,19 @@ struct Measure {
 };
 
 struct Analysis {
-  bool has_fibres = true;  ///< some cells are no sheets: else nothing is said of fibres and adhesions
+  bool has_fibres = true;  ///< some cells have them: else nothing is said of fibres and adhesions on flat gels
   Primary primary;
   Measure tensions;
   std::vector<Summary> tensions_by_cell;
   std::vector<ShareAbove> shares;
   Measure adhesion_forces, adhesion_areas;
-  std::vector<Measure> cells, sheets;
+  std::vector<Measure> cells, sheets, in_space;
   std::vector<Correlation> correlations;
   std::vector<AreaBin> area_bins;
   std::vector<DirectionSummary> directions;
   std::vector<std::string> warnings;  ///< sentences on what the numbers cannot carry
 
-  /// Those of every sample of which the study has cells: tensions, adhesions, cells, sheets.
+  /// Those of every sample of which the study has cells: tensions, adhesions, cells, sheets, cells in space.
   std::vector<const Measure*> measures() const;
 };
 

@@ -33,6 +33,8 @@ charts::Chart histogram_chart(const std::string& title, const std::string& x_lab
 std::optional<Figure> primary_figure(const Study& study, const Analysis& analysis, const StudyParameters& parameters);
 /// Each figure of the sheets by condition.
 Figure sheet_figure(const Study& study, const Analysis& analysis);
+/// The same of the cells in space.
+Figure space_figure(const Study& study, const Analysis& analysis);
 std::vector<Figure> adhesion_figures_of(const Analysis& analysis);
 
 }  // namespace mbtfm::statistics

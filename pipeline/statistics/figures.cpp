@@ -187,7 +187,7 @@ Figure forces_by_cell(const Study& study) {
   std::vector<const StudyCell*> cells;
   double largest = 0;
   for (const StudyCell& cell : study.cells) {
-    if (cell.sheet) continue;
+    if (cell.kind() != CellKind::plane) continue;
     cells.push_back(&cell);
     largest = std::max(largest, cell.fit.total_force_nN);
   }
@@ -287,6 +287,7 @@ std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, con
   std::vector<Figure> figures;
   if (auto primary = primary_figure(study, analysis, parameters)) figures.push_back(std::move(*primary));
   if (!analysis.sheets.empty()) figures.push_back(sheet_figure(study, analysis));
+  if (!analysis.in_space.empty()) figures.push_back(space_figure(study, analysis));
   if (!analysis.has_fibres) return figures;
   if (analysis.tensions.sample.values.empty()) {
     figures.push_back({.name = "tensions_by_type",

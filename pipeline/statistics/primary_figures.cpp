@@ -118,6 +118,19 @@ charts::Chart effect_plot(const Primary& primary) {
   return chart;
 }
 
+std::vector<charts::Chart> super_plots(const Study& study, const std::vector<Measure>& measures) {
+  std::vector<charts::Chart> list;
+  for (const Measure& m : measures) {
+    for (int kind = 0; kind < m.sample.n_kinds(); ++kind) {
+      std::string title = m.sample.name;
+      if (m.sample.n_kinds() > 1) title += ": " + m.sample.kinds[static_cast<std::size_t>(kind)];
+      if (m.sample.each == Observed::adhesions_in_space) title += " of an adhesion";
+      list.push_back(super_plot(study, m, kind, title));
+    }
+  }
+  return list;
+}
+
 /// What the dots are.
 std::string dots_of(const Sample& sample) {
   if (sample.is_one_a_cell()) return std::string("A dot is a ") + sample.cell_name();
@@ -152,16 +165,19 @@ Figure sheet_figure(const Study& study, const Analysis& analysis) {
                     "A dot with its 95 % interval is a sheet. Where a sheet has several parts of a kind, these are "
                     "small dots, and the large one is their mean. Black: mean of the mixed model with its 95 % "
                     "interval.",
-                .charts = {},
+                .charts = super_plots(study, analysis.sheets),
                 .n_columns = 3};
-  for (const Measure& m : analysis.sheets) {
-    for (int kind = 0; kind < m.sample.n_kinds(); ++kind) {
-      const std::string& of = m.sample.kinds[static_cast<std::size_t>(kind)];
-      figure.charts.push_back(
-          super_plot(study, m, kind, m.sample.n_kinds() > 1 ? m.sample.name + ": " + of : m.sample.name));
-    }
-  }
   return figure;
+}
+
+Figure space_figure(const Study& study, const Analysis& analysis) {
+  return {.name = "cells_in_space",
+          .title = "Cells in space",
+          .caption =
+              "A dot is a cell, with the 95 % interval of its own error if that is known. Forces of adhesions: small "
+              "dots, and the large one is the mean of a cell. Black: mean of the mixed model with its 95 % interval.",
+          .charts = super_plots(study, analysis.in_space),
+          .n_columns = 3};
 }
 
 }  // namespace mbtfm::statistics

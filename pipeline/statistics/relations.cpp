@@ -58,7 +58,7 @@ std::optional<Correlation> correlate(const Study& study, int condition, const Fo
                 .slope_interval = {}};
   std::map<int, std::pair<double, double>> products;
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
-    if (study.cells[i].condition != condition || study.cells[i].sheet) continue;
+    if (study.cells[i].condition != condition || study.cells[i].kind() != CellKind::plane) continue;
     if (!is_of_total && !is_network_known(study.cells[i])) continue;
     const int cell = static_cast<int>(i);
     c.cells.push_back(cell);

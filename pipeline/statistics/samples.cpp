@@ -61,10 +61,10 @@ void for_each_adhesion(const Study& study, Visit&& visit) {
   }
 }
 
-std::vector<int> cells_of(const Study& study, bool are_sheets) {
+std::vector<int> cells_of(const Study& study, CellKind kind) {
   std::vector<int> indices;
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
-    if (study.cells[i].sheet.has_value() == are_sheets) indices.push_back(static_cast<int>(i));
+    if (study.cells[i].kind() == kind) indices.push_back(static_cast<int>(i));
   }
   return indices;
 }
@@ -80,7 +80,7 @@ Sample sample_estimates(const Study& study, SheetQuantity quantity) {
                                quantity == SheetQuantity::bundle_tension ? Observed::bundles : Observed::sheets, {});
   sample.is_never_negative = is_never_negative(quantity);
   const auto visit = [&](const auto& body) {
-    for (const int i : cells_of(study, true)) {
+    for (const int i : cells_of(study, CellKind::sheet)) {
       const StudyCell& cell = study.cells[static_cast<std::size_t>(i)];
       for (const SheetEstimate& e : cell.sheet->estimates)
         if (e.quantity == quantity && enters(e)) body(cell, i, e, kind_of_part(e));
@@ -109,6 +109,12 @@ std::vector<Observation> Sample::of_group(int condition, int kind) const {
 }
 
 std::string Sample::amount(double value) const { return charts::readable(value) + (unit.empty() ? "" : " " + unit); }
+
+CellKind Sample::of_cells() const {
+  if (each == Observed::sheets || each == Observed::bundles) return CellKind::sheet;
+  if (each == Observed::cells_in_space || each == Observed::adhesions_in_space) return CellKind::space;
+  return CellKind::plane;
+}
 
 bool Sample::is_one_a_cell() const { return n_cells_of(values) == static_cast<int>(values.size()); }
 
@@ -155,7 +161,7 @@ std::vector<Sample> sample_cells(const Study& study) {
   for (const Quantity& q : kQuantities) {
     Sample sample = empty_sample(study, q.column, q.name, q.unit, Observed::cells, {"cell"});
     sample.is_never_negative = q.member != &FitSummary::fibre_force_nN;  // a difference: total less network
-    for (const int i : cells_of(study, false)) {
+    for (const int i : cells_of(study, CellKind::plane)) {
       const StudyCell& cell = study.cells[static_cast<std::size_t>(i)];
       if (q.member != &FitSummary::total_force_nN && !is_network_known(cell)) continue;
       add(sample, cell, i, 0, cell.fit.*q.member, 0.0);
@@ -180,7 +186,7 @@ std::vector<Sample> sample_sheets(const Study& study) {
   for (const Figure& figure : figures) {
     Sample sample = empty_sample(study, figure.column, figure.name, figure.unit, Observed::sheets, {kWholeSheet});
     sample.is_never_negative = figure.is_never_negative;
-    for (const int i : cells_of(study, true)) {
+    for (const int i : cells_of(study, CellKind::sheet)) {
       const StudyCell& cell = study.cells[static_cast<std::size_t>(i)];
       if (const auto value = figure.of(*cell.sheet)) add(sample, cell, i, 0, *value, 0.0);
     }
@@ -188,6 +194,46 @@ std::vector<Sample> sample_sheets(const Study& study) {
   }
   for (const SheetQuantity quantity : mbtfm::values_of<SheetQuantity>())
     if (quantity != SheetQuantity::contraction) samples.push_back(sample_estimates(study, quantity));
+  std::erase_if(samples, [](const Sample& s) { return s.values.empty(); });
+  return samples;
+}
+
+std::vector<Sample> sample_in_space(const Study& study) {
+  using Number = std::optional<double>;
+  struct Figure {
+    const char *column, *name, *unit;
+    std::function<Number(const SpaceFigures&)> of;
+    Number SpaceFigures::*sigma = nullptr;
+    bool is_never_negative = true;
+  };
+  const Figure figures[] = {
+      {"space_force_nN", "total force", "nN", &SpaceFigures::total_force_nN, &SpaceFigures::total_force_sigma_nN},
+      {"space_strain_energy_fJ", "strain energy", "fJ", &SpaceFigures::strain_energy_fJ},
+      {"space_contractile_moment_nN_um", "contractile moment", "nN µm", &SpaceFigures::contractile_moment_nN_um,
+       &SpaceFigures::contractile_moment_sigma_nN_um, false},
+      {"space_normal_share", "share of the normal force", "", &SpaceFigures::normal_share},
+      {"space_largest_traction_kPa", "largest traction", "kPa", &SpaceFigures::largest_traction_kPa},
+      {kResolution, "resolution", "µm", &SpaceFigures::resolution_um}};
+  std::vector<Sample> samples;
+  const std::vector<int> cells = cells_of(study, CellKind::space);
+  const auto figures_in = [&](int i) -> const SpaceFigures& { return *study.cells[static_cast<std::size_t>(i)].space; };
+  for (const Figure& figure : figures) {
+    Sample sample = empty_sample(study, figure.column, figure.name, figure.unit, Observed::cells_in_space, {"cell"});
+    sample.is_never_negative = figure.is_never_negative;
+    for (const int i : cells) {
+      const SpaceFigures& s = figures_in(i);
+      if (const Number value = figure.of(s))
+        add(sample, study.cells[static_cast<std::size_t>(i)], i, 0, *value, figure.sigma ? s.*figure.sigma : Number());
+    }
+    samples.push_back(with_typical_errors(std::move(sample)));
+  }
+  Sample forces =
+      empty_sample(study, "space_adhesion_force_nN", "force", "nN", Observed::adhesions_in_space, {"adhesion"});
+  for (const int i : cells) {
+    for (const SpaceFigures::OfAdhesion& a : figures_in(i).adhesions)
+      add(forces, study.cells[static_cast<std::size_t>(i)], i, 0, a.force_nN, a.sigma_nN);
+  }
+  samples.push_back(with_typical_errors(std::move(forces)));
   std::erase_if(samples, [](const Sample& s) { return s.values.empty(); });
   return samples;
 }

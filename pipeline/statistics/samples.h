@@ -12,11 +12,15 @@ namespace mbtfm::statistics {
 enum class Observed {
   fibres,
   adhesions,
-  cells,   ///< with fibres
-  sheets,  ///< or their parts, where these have contractions of their own
-  bundles  ///< in the sheets
+  cells,    ///< with fibres
+  sheets,   ///< or their parts, where these have contractions of their own
+  bundles,  ///< in the sheets
+  cells_in_space,
+  adhesions_in_space  ///< of these
 };
-constexpr auto words(Observed) { return std::array{"fibres", "adhesions", "cells", "sheets", "bundles"}; }
+constexpr auto words(Observed) {
+  return std::array{"fibres", "adhesions", "cells", "sheets", "bundles", "cells in space", "adhesions in space"};
+}
 
 /// `group` of an observation is condition · n kinds + kind; `cell` is its index in the study.
 struct Sample {
@@ -30,11 +34,11 @@ struct Sample {
 
   /// Whether no cell has two: then the observation is the cell's.
   bool is_one_a_cell() const;
-  /// Its cells are sheets.
-  bool is_of_sheets() const { return each == Observed::sheets || each == Observed::bundles; }
-  const char* cell_name() const { return is_of_sheets() ? "sheet" : "cell"; }
+  /// Of which kind its cells are.
+  CellKind of_cells() const;
+  const char* cell_name() const { return of_cells() == CellKind::sheet ? "sheet" : "cell"; }
   /// What its cells are called.
-  const char* cells_name() const { return name_of(is_of_sheets() ? Observed::sheets : Observed::cells); }
+  const char* cells_name() const { return of_cells() == CellKind::sheet ? "sheets" : "cells"; }
   int n_kinds() const { return static_cast<int>(kinds.size()); }
   int n_conditions() const { return static_cast<int>(conditions.size()); }
   int group_of(int condition, int kind) const { return condition * n_kinds() + kind; }
@@ -54,6 +58,11 @@ std::vector<Sample> sample_cells(const Study& study);
 /// Of the sheets: what the beads tell of each, and its mean tension, total force, strain energy and area; without what
 /// no sheet was asked for.
 std::vector<Sample> sample_sheets(const Study& study);
+
+/// Of the cells in space: total force, strain energy, contractile moment, share of the normal force, largest traction,
+/// the forces of their adhesions, and the resolution of their maps; without what no cell has.
+std::vector<Sample> sample_in_space(const Study& study);
+inline constexpr const char* kResolution = "space_resolution_um";
 
 /// Whether it is a measurement: not given by the user, and limited to both sides by the beads.
 bool enters(const SheetEstimate& estimate);

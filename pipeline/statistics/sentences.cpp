@@ -17,13 +17,15 @@ using charts::readable;
 std::string p_text(double p) { return p < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", p); }
 
 std::string plural_of(const Sample& sample, const std::string& kind) {
-  if (sample.each == Observed::cells || sample.each == Observed::bundles) return name_of(sample.each);
+  if (sample.each == Observed::cells || sample.each == Observed::bundles || sample.of_cells() == CellKind::space)
+    return name_of(sample.each);
   if (sample.each == Observed::sheets) return sample.n_kinds() == 1 ? "sheets" : "sheets (" + kind + ")";
   return named<FibreType>(kind) == FibreType::arc ? "transverse arcs" : kind + " " + name_of(sample.each);
 }
 
 /// What its observations are, where a cell may have several.
 const char* counted_name(const Sample& sample) {
+  if (sample.each == Observed::adhesions_in_space) return "adhesions";
   return sample.each == Observed::sheets ? "parts" : name_of(sample.each);
 }
 
@@ -195,6 +197,7 @@ std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameter
   };
   std::vector<Findings> all;
   if (!analysis.sheets.empty()) all.push_back(of_all("Sheets", analysis.sheets));
+  if (!analysis.in_space.empty()) all.push_back(of_all("Cells in space", analysis.in_space));
   if (!analysis.has_fibres) return all;
   Findings tensions{"Tensions", means(analysis.tensions), {}}, cells = of_all("Cells", analysis.cells);
   Findings adhesions{"Adhesions", means(analysis.adhesion_forces), {}};

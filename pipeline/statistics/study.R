@@ -1,4 +1,4 @@
-# Repeats the tables of this study in R, from fibres.csv, sheets.csv and cells.csv beside it, and compares them with
+# Repeats the tables of this study in R, from fibres.csv, sheets.csv, adhesions_in_space.csv and cells.csv beside it, and compares them with
 # types.csv, summaries.csv and tests.csv: Rscript study.R
 # The mixed model needs the package metafor (install.packages("metafor")); without it that part is left out.
 
@@ -65,8 +65,22 @@ for (figure in names(figures)) {
                                        value = own[[figures[figure]]]))
   }
 }
+in_space <- subset(cells, model == "space")
+for (figure in c("space_force_nN", "space_strain_energy_fJ", "space_contractile_moment_nN_um", "space_normal_share",
+                 "space_largest_traction_kPa", "space_resolution_um")) {
+  own <- in_space[!is.na(in_space[[figure]]), ]
+  if (nrow(own) > 0) {
+    values <- rbind(values, data.frame(condition = own$condition, quantity = figure, kind = "cell",
+                                       value = own[[figure]]))
+  }
+}
+adhesions <- read.csv("adhesions_in_space.csv", colClasses = c(cell = "character", condition = "character"))
+if (nrow(adhesions) > 0) {
+  values <- rbind(values, data.frame(condition = adhesions$condition, quantity = "space_adhesion_force_nN",
+                                     kind = "adhesion", value = adhesions$force_nN))
+}
 if (nrow(values) > 0) {
-  cat("\nFigures of the sheets (summaries.csv)\n")
+  cat("\nFigures of the sheets and of the cells in space (summaries.csv)\n")
   values$condition[is.na(values$condition)] <- ""
   summaries <- read.csv("summaries.csv", colClasses = c(condition = "character"))
   summaries$condition[is.na(summaries$condition)] <- ""
@@ -78,7 +92,7 @@ if (nrow(values) > 0) {
     compare(paste(name, "mean"), mean(own), row$mean)
     if (length(own) > 1) compare(paste(name, "SD"), sd(own), row$sd)
   }
-  cat("\nRank tests of the sheets between conditions (tests.csv)\n")
+  cat("\nRank tests of these between conditions (tests.csv)\n")
   rank <- subset(tests, quantity %in% values$quantity & test == "Mann-Whitney" & question == "between conditions" &
                    unit != "cell median")
   for (i in seq_len(nrow(rank))) {

@@ -17,6 +17,7 @@
 #include "pipeline/files/sheet_files.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/report/space_results.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/statistics/conditions.h"
@@ -32,6 +33,7 @@ std::optional<DisplacementField> field_where_there(const Path& file) {
 }
 
 constexpr const char* kDisplacement = "2_track/displacement.csv";
+constexpr const char* kDisplacementInSpace = "2_track/displacement_3d.csv";
 constexpr const char* kOutline = "1_segment/outline.csv";
 constexpr const char* kRun = "run.json";
 constexpr const char* kFitted = "4_fit/fitted_displacement.csv";
@@ -60,6 +62,15 @@ Polygon outline_of_sheet(const Path& folder) {
   return {low, {high.x, low.y}, high, {low.x, high.y}};
 }
 
+/// Findings, and whether the last stage came to its end.
+void read_end(const Path& folder, const char* stage, StudyCell& cell) {
+  cell.fit.converged = true;  // where nobody says otherwise: without run.json the stage was run by hand
+  if (const auto run = run_of(folder)) {
+    cell.findings = findings_of(*run);
+    cell.fit.converged = run->at("stages").at(stage).is_true_or("converged", true);
+  }
+}
+
 StudyCell read_study_sheet(const Path& folder, const std::string& name) {
   StudyCell c{.name = name,
               .condition = 0,
@@ -73,11 +84,39 @@ StudyCell read_study_sheet(const Path& folder, const std::string& name) {
   c.cell.outline_um = outline_of_sheet(folder);
   c.fit.relative_l2 = c.sheet->relative_l2;
   c.fit.expected_relative_l2 = c.sheet->expected_relative_l2;
-  c.fit.converged = true;  // where nobody says otherwise: without run.json the stage was run by hand
-  if (const auto run = run_of(folder)) {
-    c.findings = findings_of(*run);
-    c.fit.converged = run->at("stages").at("sheet").is_true_or("converged", true);
-  }
+  read_end(folder, "sheet", c);
+  return c;
+}
+
+StudyCell read_study_cell_in_space(const Path& folder, const std::string& name) {
+  const report::SpaceResults results = report::read_space_results(folder);
+  StudyCell c{.name = name,
+              .condition = 0,
+              .cell = {},
+              .forces = {},
+              .tensions = {},
+              .fit = {},
+              .directions = {},
+              .findings = {},
+              .sheet = {},
+              .space = SpaceFigures{.method = results.texts.at("method"),
+                                    .total_force_nN = results.number("total_force_nN"),
+                                    .total_force_sigma_nN = results.find("total_force_sigma_nN"),
+                                    .strain_energy_fJ = results.number("strain_energy_fJ"),
+                                    .contractile_moment_nN_um = results.find("contractile_moment_nN_um"),
+                                    .contractile_moment_sigma_nN_um = results.find("contractile_moment_sigma_nN_um"),
+                                    .normal_force_nN = results.number("normal_force_nN"),
+                                    .net_force_nN = norm(results.vector("net_force", "nN")),
+                                    .net_moment_nN_um = norm(results.vector("moment", "nN_um")),
+                                    .resolution_um = results.find("median_resolution_um")}};
+  for (const report::SurfaceTraction& t : results.tractions)
+    c.space->largest_traction_kPa = std::max(c.space->largest_traction_kPa, norm(t.traction_kPa));
+  for (const report::ForceInSpace& f : results.forces)
+    c.space->adhesions.push_back({f.adhesion_id, norm(f.force_nN), f.sigma_nN});
+  c.cell.outline_um = results.outline_um;
+  c.fit.relative_l2 = results.number("relative_l2");
+  c.fit.noise_um = results.number("noise_um");
+  read_end(folder, "traction", c);
   return c;
 }
 
@@ -109,12 +148,22 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
 
 /// Why a cell cannot enter, as its folder tells; empty: it can.
 std::string obstacle(const Path& cell, CellKind kind) {
-  if (kind == CellKind::space)
-    return "in space: it has tractions and no tensions; its force, strain energy and moment are in batch.csv";
   for (const std::string& file : files_of_a_cell(kind)) {
     if (!files::is_own_file(cell / file)) return "no fit: " + file + " is not there";
   }
   return {};
+}
+
+StudyCell read_cell_of_kind(CellKind kind, const Path& folder, const std::string& name,
+                            const StudyParameters& parameters) {
+  if (kind == CellKind::sheet) return read_study_sheet(folder, name);
+  if (kind == CellKind::space) return read_study_cell_in_space(folder, name);
+  return read_study_cell(folder, name, parameters);
+}
+
+/// The field of beads that it was found from.
+Path field_of(const Path& folder, const StudyCell& cell) {
+  return folder / (cell.kind() == CellKind::space ? kDisplacementInSpace : kDisplacement);
 }
 
 /// By half of the smaller one. Two cells of one picture share the field, and lie beside each other.
@@ -137,18 +186,23 @@ void leave_out_copies(const std::vector<Path>& folders, const std::vector<std::s
                       const std::vector<std::optional<StudyCell>>& read, std::vector<std::string>& reasons) {
   std::multimap<std::string, std::size_t> by_field;
   for (std::size_t i = 0; i < folders.size(); ++i) {
-    const Path field = folders[i] / kDisplacement;
-    if (!reasons[i].empty() || !files::is_own_file(field)) continue;
+    if (!reasons[i].empty()) continue;
+    const Path field = field_of(folders[i], *read[i]);
+    if (!files::is_own_file(field)) continue;
     const std::string hash = files::sha256_of_file(field);
     const auto [first, last] = by_field.equal_range(hash);
+    const Polygon& outline = read[i]->cell.outline_um;
     const auto same = std::find_if(first, last, [&](const auto& other) {
-      return overlap(read[i]->cell.outline_um, read[other.second]->cell.outline_um);
+      const Polygon& of_other = read[other.second]->cell.outline_um;
+      const bool are_whole_fields = read[i]->space && (outline.empty() || of_other.empty());
+      return are_whole_fields || overlap(outline, of_other);
     });
     if (same == last) {
       by_field.emplace(hash, i);
     } else {
-      reasons[i] = "the same cell as " + names[same->second] + ": their " + kDisplacement +
-                   " are the same bytes and their outlines overlap";
+      reasons[i] = "the same cell as " + names[same->second] + ": their " +
+                   field.lexically_relative(folders[i]).generic_string() + " are the same bytes" +
+                   (outline.empty() ? "" : " and their outlines overlap");
     }
   }
 }
@@ -239,7 +293,9 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
   list.add(
       "primary", parameters.primary,
       "what the study compares first between conditions; tension: of the fibres of primary_type; total-force: of "
-      "the cells; contraction, mean-tension: of the sheets; auto: tension, or contraction if all cells are sheets");
+      "the cells; contraction, mean-tension: of the sheets; strain-energy: of the cells in space, or of the sheets; "
+      "contractile-moment: of the cells in space; auto: tension, contraction if there are no fibres, total-force if "
+      "there are only cells in space");
   list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
   list.add("with_not_converged", parameters.with_not_converged, "include cells whose fit did not converge");
   list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
@@ -261,24 +317,26 @@ std::vector<double> thresholds_nN(const StudyParameters& parameters) {
   return {parameters.weak_tension_nN, parameters.strong_tension_nN};
 }
 
-int n_sheets(const Study& study) {
-  return static_cast<int>(std::ranges::count_if(study.cells, [](const StudyCell& c) { return c.sheet.has_value(); }));
+int n_of_kind(const Study& study, CellKind kind) {
+  return static_cast<int>(std::ranges::count_if(study.cells, [&](const StudyCell& c) { return c.kind() == kind; }));
 }
-
-int n_with_fibres(const Study& study) { return static_cast<int>(study.cells.size()) - n_sheets(study); }
 
 const std::vector<std::string>& files_of_a_cell(CellKind kind) {
   static const std::vector<std::string> with_fibres = {
       "1_segment/adhesions.csv",   "1_segment/fibres.csv", "1_segment/fibre_points.csv", kOutline, "4_fit/tensions.csv",
       "4_fit/adhesion_forces.csv", "4_fit/fit.json"};
   static const std::vector<std::string> of_sheet = {"3_sheet/sheet_fit.csv", "3_sheet/sheet.json", "3_sheet/sheet.csv"};
-  return kind == CellKind::sheet ? of_sheet : with_fibres;
+  static const std::vector<std::string> in_space = {kDisplacementInSpace, "3_surface/surface.vtp",
+                                                    "4_traction/traction.csv", "4_traction/traction.json"};
+  return kind == CellKind::sheet ? of_sheet : kind == CellKind::space ? in_space : with_fibres;
 }
 
 const std::vector<std::string>& further_files_of_a_cell(CellKind kind) {
   static const std::vector<std::string> with_fibres = {kDisplacement, kFitted, kWithoutFibres, kRun};
   static const std::vector<std::string> of_sheet = {kDisplacement, kOutline, kRun};
-  return kind == CellKind::sheet ? of_sheet : with_fibres;
+  static const std::vector<std::string> in_space = {"4_traction/traction_adhesion_forces.csv",
+                                                    "1_segment/adhesions.csv", kOutline, kRun};
+  return kind == CellKind::sheet ? of_sheet : kind == CellKind::space ? in_space : with_fibres;
 }
 
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads) {
@@ -302,8 +360,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
       const CellKind kind = runner::stages_of(folders[i], runner::read_image_names(folders[i])).kind;
       reasons[i] = obstacle(folders[i], kind);
       if (!reasons[i].empty()) return;
-      read[i] = kind == CellKind::sheet ? read_study_sheet(folders[i], names[i])
-                                        : read_study_cell(folders[i], names[i], parameters);
+      read[i] = read_cell_of_kind(kind, folders[i], names[i], parameters);
     } catch (const InputError& error) {
       reasons[i] = error.what();  // that cell's matter, not the study's
     }

@@ -16,14 +16,17 @@ namespace mbtfm::statistics {
 
 /// What the study was made to compare between conditions.
 enum class PrimaryMeasure {
-  automatic,    ///< tension; contraction where all cells are sheets
-  tension,      ///< of the fibres of one type
-  total_force,  ///< of the cells; of the sheets where all cells are sheets
-  contraction,  ///< of the sheets
-  mean_tension  ///< of the sheets
+  automatic,      ///< tension; without fibres the contraction of the sheets; without these the force of cells in space
+  tension,        ///< of the fibres of one type
+  total_force,    ///< of the cells with fibres; without any of the sheets; without these of the cells in space
+  contraction,    ///< of the sheets
+  mean_tension,   ///< of the sheets
+  strain_energy,  ///< of the cells in space; of the sheets where there are none
+  contractile_moment  ///< of the cells in space
 };
 constexpr auto words(PrimaryMeasure) {
-  return std::array{"auto", "tension", "total-force", "contraction", "mean-tension"};
+  return std::array{"auto",         "tension",       "total-force",       "contraction",
+                    "mean-tension", "strain-energy", "contractile-moment"};
 }
 
 struct StudyParameters {
@@ -45,6 +48,28 @@ void declare(stage::ParameterList& list, StudyParameters& parameters);
 /// The tensions above which shares are given, each once.
 std::vector<double> thresholds_nN(const StudyParameters& parameters);
 
+/// What was found of a cell in space.
+struct SpaceFigures {
+  std::string method;         ///< of the tractions: each smooths in its way
+  double total_force_nN = 0;  ///< sum of the sizes of all tractions
+  std::optional<double> total_force_sigma_nN = {};
+  double strain_energy_fJ = 0;  ///< of the gel
+  /// > 0: inward. None: made by a version that did not give it.
+  std::optional<double> contractile_moment_nN_um = {}, contractile_moment_sigma_nN_um = {};
+  double normal_force_nN = 0;  ///< sum of the sizes of their normal parts
+  double largest_traction_kPa = 0;
+  double net_force_nN = 0, net_moment_nN_um = 0;  ///< of a cell that nothing else holds: errors alone
+  std::optional<double> resolution_um = {};       ///< median over the surface
+  struct OfAdhesion {
+    int adhesion_id = 0;
+    double force_nN = 0;
+    std::optional<double> sigma_nN = {};
+  };
+  std::vector<OfAdhesion> adhesions = {};  ///< where an image shows them
+
+  double normal_share() const { return total_force_nN > 0 ? normal_force_nN / total_force_nN : 0; }
+};
+
 /// A finished cell.
 struct StudyCell {
   std::string name;            ///< its folder, relative to the study's
@@ -58,6 +83,9 @@ struct StudyCell {
   std::vector<Finding> findings = {};      ///< of all its stages
   std::optional<SheetSummary> sheet = {};  ///< of a sheet, or a colony: it has no fibres, no adhesions, and of `fit` no
                                            ///< more than what the fit leaves and whether it converged
+  std::optional<SpaceFigures> space = {};  ///< of a cell in space, likewise
+
+  CellKind kind() const { return sheet ? CellKind::sheet : space ? CellKind::space : CellKind::plane; }
 };
 
 /// A cell that cannot be used, or a folder that cannot be searched for cells.
@@ -79,12 +107,10 @@ const std::string& condition_of(const Study& study, const StudyCell& cell);
 /// The type as which a fibre counts.
 FibreType counted_type(const Study& study, FibreType type);
 
-/// Those with fibres, and the others.
-int n_with_fibres(const Study& study);
-int n_sheets(const Study& study);
+/// Those of one kind: with fibres (plane), sheets, or in space.
+int n_of_kind(const Study& study, CellKind kind);
 
 /// Files that must be there of each finished cell, and those that are read where they are, relative to its folder.
-/// @param kind  plane or sheet
 const std::vector<std::string>& files_of_a_cell(CellKind kind);
 const std::vector<std::string>& further_files_of_a_cell(CellKind kind);
 

@@ -75,33 +75,40 @@ report::Table types_table(const Study& study, const Analysis& analysis) {
   return table;
 }
 
-/// What the sheets are like, a row for each figure, kind of part and condition.
-report::Table sheets_summary_table(const Study& study, const Analysis& analysis) {
+std::string figure_name(const Sample& sample) {
+  if (sample.each == Observed::bundles) return "tension of bundles (nN)";
+  if (sample.each == Observed::adhesions_in_space) return "force of an adhesion (nN)";
+  return sample.label();
+}
+
+/// What the sheets, or the cells in space, are like: a row for each figure, kind of part and condition.
+/// @param cells  what they are called
+report::Table figures_table(const Study& study, const std::vector<Measure>& measures, const std::string& title,
+                            const std::string& cells) {
   report::Table table{{{"figure"},
                        {"condition"},
                        {"of"},
-                       {"sheets", true},
+                       {cells, true},
                        {"mean, mixed model", true},
                        {"95 %", true},
                        {"plain mean", true},
-                       {"95 %, sheets resampled", true},
+                       {"95 %, " + cells + " resampled", true},
                        {"SD", true},
                        {"SD without error", true}},
                       {},
-                      "Figures of the sheets"};
-  for (const Measure& m : analysis.sheets) {
+                      title};
+  for (const Measure& m : measures) {
     for (const Summary& s : m.summaries) {
       table.rows.push_back(
-          {html_escaped(m.sample.each == Observed::bundles ? "tension of bundles (nN)" : m.sample.label()),
-           html_escaped(s.condition), html_escaped(s.kind), std::to_string(s.n_cells),
-           s.model ? readable(s.model->estimate) : "–",
+          {html_escaped(figure_name(m.sample)), html_escaped(s.condition), html_escaped(s.kind),
+           std::to_string(s.n_cells), s.model ? readable(s.model->estimate) : "–",
            interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
            readable(s.plain.mean), interval_text(s.mean_interval), number_text(s.plain.standard_deviation),
            s.typical_error && s.without_error ? readable(s.without_error->standard_deviation) : "–"});
     }
   }
   const auto has_parts = [](const Measure& m) { return m.sample.n_kinds() > 1; };
-  if (std::ranges::none_of(analysis.sheets, has_parts)) without_column(table, 2);
+  if (std::ranges::none_of(measures, has_parts)) without_column(table, 2);
   if (!has_conditions(study)) without_column(table, 1);
   return table;
 }
@@ -152,7 +159,7 @@ report::Table cells_table(const Study& study) {
                       {},
                       "Cells with fibres"};
   for (const StudyCell& c : study.cells) {
-    if (c.sheet) continue;
+    if (c.kind() != CellKind::plane) continue;
     table.rows.push_back(
         {charts::html_escaped(c.name), charts::html_escaped(condition_of(study, c)),
          std::to_string(c.cell.fibres.size()), std::to_string(c.cell.adhesions.size()),
@@ -202,6 +209,41 @@ report::Table sheets_table(const Study& study) {
                           readable(c.sheet->mean_tension_nN_per_um), readable(c.sheet->total_force_nN),
                           number_text(c.sheet->strain_energy_fJ), readable(c.sheet->area_um2),
                           readable(c.sheet->relative_l2), readable(c.sheet->expected_relative_l2), enters_text(c)});
+  }
+  return table;
+}
+
+std::string with_error(double value, const std::optional<double>& sigma) {
+  return sigma && *sigma > 0 ? readable(value) + " ± " + readable(*sigma) : readable(value);
+}
+
+report::Table cells_in_space_table(const Study& study) {
+  report::Table table{{{"cell"},
+                       {"condition"},
+                       {"method"},
+                       {"total force (nN)", true},
+                       {"strain energy (fJ)", true},
+                       {"contractile moment (nN µm)", true},
+                       {"normal share", true},
+                       {"largest traction (kPa)", true},
+                       {"net force (nN)", true},
+                       {"net moment (nN µm)", true},
+                       {"resolution (µm)", true},
+                       {"adhesions", true},
+                       {"relative L2", true},
+                       {"enters"}},
+                      {},
+                      "Cells in space"};
+  for (const StudyCell& c : study.cells) {
+    if (!c.space) continue;
+    const SpaceFigures& s = *c.space;
+    table.rows.push_back(
+        {html_escaped(c.name), html_escaped(condition_of(study, c)), html_escaped(s.method),
+         with_error(s.total_force_nN, s.total_force_sigma_nN), readable(s.strain_energy_fJ),
+         s.contractile_moment_nN_um ? with_error(*s.contractile_moment_nN_um, s.contractile_moment_sigma_nN_um) : "–",
+         readable(s.normal_share()), readable(s.largest_traction_kPa), readable(s.net_force_nN),
+         readable(s.net_moment_nN_um), number_text(s.resolution_um),
+         s.adhesions.empty() ? "–" : std::to_string(s.adhesions.size()), readable(c.fit.relative_l2), enters_text(c)});
   }
   return table;
 }
@@ -258,9 +300,14 @@ std::string gallery(const Study& study, const Path& page_folder) {
     const Path folder = study.folder / c.name, picture = folder / "1_segment/thumbnail.jpg";
     const std::string link = (folder / "report.html").lexically_relative(page_folder).generic_string();
     const std::string& condition = condition_of(study, c);
-    const double force_nN = c.sheet ? c.sheet->total_force_nN : c.fit.total_force_nN;
+    const double force_nN = c.sheet   ? c.sheet->total_force_nN
+                            : c.space ? c.space->total_force_nN
+                                      : c.fit.total_force_nN;
     const std::string text = fmt::format("{}{}{}: {}{} nN", c.name, condition.empty() ? "" : ", ", condition,
-                                         c.sheet ? "sheet, " : "", readable(force_nN));
+                                         c.sheet   ? "sheet, "
+                                         : c.space ? "in space, "
+                                                   : "",
+                                         readable(force_nN));
     html += fmt::format("<a href=\"{}\">{}<span>{}{}</span></a>\n", html_escaped(link),
                         files::is_own_file(picture) ? fmt::format("<img alt=\"\" src=\"data:image/jpeg;base64,{}\">",
                                                                   files::base64(files::read_text(picture)))
@@ -290,7 +337,8 @@ std::string overview(const Study& study, const Analysis& analysis) {
                         return e.quantity == SheetQuantity::contraction && enters(e);
                       });
   }
-  const auto with_fibres = static_cast<std::size_t>(n_with_fibres(study)), sheets = study.cells.size() - with_fibres;
+  const int with_fibres = n_of_kind(study, CellKind::plane), sheets = n_of_kind(study, CellKind::sheet),
+            in_space = n_of_kind(study, CellKind::space);
   std::string html = "<p>";
   if (with_fibres > 0) {
     html += fmt::format(
@@ -305,8 +353,14 @@ std::string overview(const Study& study, const Analysis& analysis) {
         "could be identified and enters the statistics. ",
         counted(sheets, "sheets"), n_contractions);
   }
-  if (with_fibres > 0 && sheets > 0)
-    html += "Figures of sheets and of cells with fibres are kept apart: they have different meanings. ";
+  if (in_space > 0)
+    html += fmt::format(
+        "{} in space, of beads in the gel’s volume: their tractions are compared by total force, strain energy, "
+        "contractile moment and what the tables below list. ",
+        counted(in_space, "cells"));
+  if ((with_fibres > 0) + (sheets > 0) + (in_space > 0) > 1)
+    html +=
+        "Figures of cells with fibres, of sheets and of cells in space are kept apart: they have different meanings. ";
   if (has_conditions(study)) html += counted(study.conditions.size(), "conditions") + ". ";
   html += (study.left_out.empty() ? "No cell was left out."
                                   : fmt::format("{} left out: see the table of cells.",
@@ -369,13 +423,25 @@ constexpr const char* kHowToReadSheets =
     "numbers and its model add to them is left out: sheets on gels of one kind share it. A number that the beads limit "
     "to one side only, or that was given, does not enter.</p>\n";
 
-/// "Stress-fibre tensions of 8 cells and contraction of 4 sheets"
+constexpr const char* kHowToReadSpace =
+    "<p class=\"sub\">Total force: sum of the sizes of all tractions. Contractile moment: −∫ (x − centre) · t dA, "
+    "above "
+    "zero where the cell contracts. Share of the normal force: of the sizes. Smoothing takes from force, energy and "
+    "largest traction, the more the coarser the maps are: compare the resolution first. Net force and net moment of a "
+    "cell that nothing else holds are errors alone; they are listed with the cells and not compared.</p>\n";
+
+/// "Stress-fibre tensions of 8 cells, contraction of 4 sheets and forces of 6 cells in space"
 std::string title_of(const Study& study) {
-  const auto with_fibres = static_cast<std::size_t>(n_with_fibres(study)), sheets = study.cells.size() - with_fibres;
-  std::string title;
-  if (with_fibres > 0) title = "Stress-fibre tensions of " + counted(with_fibres, "cells");
-  if (sheets > 0) title += (title.empty() ? "Contraction of " : " and contraction of ") + counted(sheets, "sheets");
-  return title;
+  std::vector<std::string> parts;
+  const auto add = [&](CellKind kind, const std::string& what, const std::string& one, const std::string& many) {
+    if (const int n = n_of_kind(study, kind); n > 0) parts.push_back(what + " of " + counted(n, one, many));
+  };
+  add(CellKind::plane, "stress-fibre tensions", "cell", "cells");
+  add(CellKind::sheet, "contraction", "sheet", "sheets");
+  add(CellKind::space, "forces", "cell in space", "cells in space");
+  std::string title = parts.front();
+  for (std::size_t i = 1; i < parts.size(); ++i) title += (i + 1 < parts.size() ? ", " : " and ") + parts[i];
+  return report::capitalised(title);
 }
 
 }  // namespace
@@ -407,8 +473,15 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
                           findings_text(study, with_file(findings_table(study), "findings.csv")));
   body += report::section("Figures", pictures);
   if (!analysis.sheets.empty())
-    body += report::section("Figures of the sheets",
-                            kHowToReadSheets + with_file(sheets_summary_table(study, analysis), "summaries.csv"));
+    body += report::section(
+        "Figures of the sheets",
+        kHowToReadSheets +
+            with_file(figures_table(study, analysis.sheets, "Figures of the sheets", "sheets"), "summaries.csv"));
+  if (!analysis.in_space.empty())
+    body += report::section(
+        "Figures of the cells in space",
+        kHowToReadSpace + with_file(figures_table(study, analysis.in_space, "Figures of the cells in space", "cells"),
+                                    "summaries.csv"));
   if (analysis.has_fibres)
     body += report::section("Tension by fibre type",
                             on_edge_fibres(study) + with_file(types_table(study, analysis), "types.csv"));
@@ -420,7 +493,8 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   }
   body += report::section("Exploratory tests", tests + kHowToRead);
   std::string cells = gallery(study, page_folder);
-  for (const report::Table& table : {cells_table(study), sheets_table(study), left_out_table(study)})
+  for (const report::Table& table :
+       {cells_table(study), sheets_table(study), cells_in_space_table(study), left_out_table(study)})
     if (!table.rows.empty()) cells += with_file(table, "cells.csv");
   body += report::section("Cells", cells);
   return report::page(title + " – mbtfm", head, body);

@@ -51,14 +51,15 @@ struct CellRow {
   const StudyCell* cell = nullptr;  ///< none where it was
 
   std::optional<int> n_fibres(std::optional<FibreType> type = {}) const {
-    if (!cell || cell->sheet) return std::nullopt;
+    if (!cell || cell->kind() != CellKind::plane) return std::nullopt;
     const auto& fibres = cell->cell.fibres;
     return static_cast<int>(
         std::count_if(fibres.begin(), fibres.end(), [&](const Fibre& f) { return !type || f.type == *type; }));
   }
   /// What has no meaning where the network's tension is not known.
   std::optional<double> of_network(double FitSummary::*figure) const {
-    return cell && !cell->sheet && is_network_known(*cell) ? std::optional(cell->fit.*figure) : std::nullopt;
+    return cell && cell->kind() == CellKind::plane && is_network_known(*cell) ? std::optional(cell->fit.*figure)
+                                                                              : std::nullopt;
   }
   std::optional<double> network_tension_nN() const {
     if (!cell) return std::nullopt;
@@ -76,11 +77,11 @@ auto of_cell(Of of) {
     return of(*row.of.cell);
   };
 }
-/// The same of what a sheet has not.
+/// The same of what cells with fibres have alone.
 template <class Of>
 auto of_cell_with_fibres(Of of) {
   return [of](const InCell<CellRow>& row) -> std::optional<std::remove_cvref_t<decltype(of(*row.of.cell))>> {
-    if (!row.of.cell || row.of.cell->sheet) return std::nullopt;
+    if (!row.of.cell || row.of.cell->kind() != CellKind::plane) return std::nullopt;
     return of(*row.of.cell);
   };
 }
@@ -90,6 +91,28 @@ auto of_sheet(std::function<Number(const SheetSummary&)> of) {
     return row.of.cell && row.of.cell->sheet ? of(*row.of.cell->sheet) : std::nullopt;
   };
 }
+
+/// The same of what a cell in space has alone.
+auto in_space(std::function<Number(const SpaceFigures&)> of) {
+  return [of](const InCell<CellRow>& row) {
+    return row.of.cell && row.of.cell->space ? of(*row.of.cell->space) : std::nullopt;
+  };
+}
+
+/// None where no image shows the cell's outline.
+Number area_of(const StudyCell& c) {
+  if (c.sheet) return c.sheet->area_um2;
+  return c.cell.outline_um.empty() ? Number() : Number(figures_of(c).cell_area_um2);
+}
+
+/// A cell in space does not say what its noise alone would leave.
+Number expected_of(const StudyCell& c) { return c.space ? Number() : Number(c.fit.expected_relative_l2); }
+Number noise_of(const StudyCell& c) { return c.sheet ? Number() : Number(c.fit.noise_um); }
+
+/// What a row of cells.csv is of.
+enum class Model { fibres, sheet, space };
+constexpr auto words(Model) { return std::array{"fibres", "sheet", "space"}; }
+Model model_of(const StudyCell& c) { return c.sheet ? Model::sheet : c.space ? Model::space : Model::fibres; }
 
 /// Of the whole sheet; none where it is not known, or where parts contract each by their own.
 Number contraction_of(const SheetSummary& sheet) {
@@ -120,11 +143,11 @@ const Table<InCell<CellRow>>& cell_table() {
             {"n_arc", "transverse arcs", n_of(FibreType::arc)},
             {"n_ventral", "ventral fibres, without edge fibres", n_of(FibreType::ventral)},
             {"cell_area_um2", "inside the outline",
-             of_cell([](const StudyCell& c) { return c.sheet ? c.sheet->area_um2 : figures_of(c).cell_area_um2; }),
-             kResult},
+             [](const Row& row) { return row.of.cell ? area_of(*row.of.cell) : Number(); }, kResult},
             {"adhesion_area_um2", "of all its adhesions",
              of_cell_with_fibres([](const StudyCell& c) { return figures_of(c).adhesion_area_um2; }), kResult},
-            {"total_force_nN", "sum of the adhesions' force magnitudes; of a sheet see sheet_force_nN",
+            {"total_force_nN",
+             "sum of the adhesions' force magnitudes; of a sheet see sheet_force_nN, in space space_force_nN",
              of_cell_with_fibres(of_fit(&FitSummary::total_force_nN)), kResult},
             {"network_force_nN", "the same of the network alone", network(&FitSummary::network_force_nN), kResult},
             {"fibre_force_nN", "what the fibres add", network(&FitSummary::fibre_force_nN), kResult},
@@ -134,16 +157,15 @@ const Table<InCell<CellRow>>& cell_table() {
              network(&FitSummary::network_surface_tension_nN_per_um), kResult},
             {"relative_l2", "‖measured − model‖ / ‖measured‖", of_cell(of_fit(&FitSummary::relative_l2)), kResult},
             {"expected_relative_l2", "what the beads' noise alone would leave",
-             of_cell(of_fit(&FitSummary::expected_relative_l2)), kResult},
-            {"noise_um", "of a component of the displacement", of_cell_with_fibres(of_fit(&FitSummary::noise_um)),
-             kResult},
+             [](const Row& row) { return row.of.cell ? expected_of(*row.of.cell) : Number(); }, kResult},
+            {"noise_um", "of a component of the displacement; in space of one along the surface",
+             [](const Row& row) { return row.of.cell ? noise_of(*row.of.cell) : Number(); }, kResult},
             {"n_meshes", "that the fit is the mean of", of_cell_with_fibres(of_fit(&FitSummary::n_meshes))},
             {"converged", "the fit came to its end", of_cell(of_fit(&FitSummary::converged))},
             {"findings", "that are open", of_cell([](const StudyCell& c) { return open_ids(c.findings); })},
             {"n_edge", "edge fibres", n_of(FibreType::edge)},
-            {"model", "what pulls at its beads: fibres or a sheet; empty if it was left out",
-             of_cell(
-                 [](const StudyCell& c) { return c.sheet ? runner::PullModel::sheet : runner::PullModel::fibres; })},
+            {"model", "what its row is of: fibres, a sheet, or a cell in space; empty if it was left out",
+             of_cell(model_of)},
             {"contraction_nN_per_um", "of a sheet, or the mean over a sheet whose contraction varies",
              of_sheet(contraction_of), kResult},
             {"mean_tension_nN_per_um", "in a sheet: half the trace, mean over its area",
@@ -151,7 +173,29 @@ const Table<InCell<CellRow>>& cell_table() {
             {"sheet_force_nN", "sum of the force magnitudes under a sheet's triangles",
              of_sheet(&SheetSummary::total_force_nN), kResult},
             {"strain_energy_fJ", "of the gel under a sheet: half the sum of force times displacement",
-             of_sheet(&SheetSummary::strain_energy_fJ), kResult}}})};
+             of_sheet(&SheetSummary::strain_energy_fJ), kResult},
+            {"space_method", "that found the tractions of a cell in space",
+             of_cell([](const StudyCell& c) { return c.space ? c.space->method : std::string(); })},
+            {"space_force_nN", "sum of the sizes of the tractions of a cell in space",
+             in_space(&SpaceFigures::total_force_nN), kResult},
+            {"space_force_sigma_nN", "standard error of space_force_nN", in_space(&SpaceFigures::total_force_sigma_nN),
+             kResult},
+            {"space_strain_energy_fJ", "of the gel of a cell in space", in_space(&SpaceFigures::strain_energy_fJ),
+             kResult},
+            {"space_contractile_moment_nN_um",
+             "of a cell in space: minus the integral of place times traction about the cell's centre; above 0: inward",
+             in_space(&SpaceFigures::contractile_moment_nN_um), kResult},
+            {"space_contractile_moment_sigma_nN_um", "standard error of space_contractile_moment_nN_um",
+             in_space(&SpaceFigures::contractile_moment_sigma_nN_um), kResult},
+            {"space_normal_share", "sizes of the tractions' parts along the normal over their sizes (0 to 1)",
+             in_space(&SpaceFigures::normal_share), kResult},
+            {"space_largest_traction_kPa", "of the map of a cell in space",
+             in_space(&SpaceFigures::largest_traction_kPa), kResult},
+            {"space_net_force_nN", "size of the sum of the forces; of a cell that nothing else holds: errors alone",
+             in_space(&SpaceFigures::net_force_nN), kResult},
+            {"space_net_moment_nN_um", "the same of the moments", in_space(&SpaceFigures::net_moment_nN_um), kResult},
+            {"space_resolution_um", "forces closer together than this look like one; median over the surface",
+             in_space(&SpaceFigures::resolution_um), kResult}}})};
   return table;
 }
 
@@ -225,6 +269,30 @@ std::vector<FibreRow> fibre_rows(const Study& study) {
       const auto t = tension.find(fibre.fibre_id);
       if (t != tension.end()) rows.push_back({c.name, condition_of(study, c), {&fibre, {*t->second, fibre.type}}});
     }
+  }
+  return rows;
+}
+
+using SpaceForceRow = InCell<SpaceFigures::OfAdhesion>;
+const Table<SpaceForceRow>& space_force_table() {
+  using Of = SpaceFigures::OfAdhesion;
+  const auto of = [](auto member) { return [member](const SpaceForceRow& row) { return row.of.*member; }; };
+  static const Table<SpaceForceRow> table{
+      .file = "statistics/adhesions_in_space.csv",
+      .row = "each adhesion of a cell in space",
+      .columns =
+          files::joined<SpaceForceRow>({cell_columns<Of>(),
+                                        {{"adhesion_id", "label of the adhesion", of(&Of::adhesion_id)},
+                                         {"force_nN", "size of its force", of(&Of::force_nN), kResult},
+                                         {"sigma_nN", "standard error along the force", of(&Of::sigma_nN), kResult}}})};
+  return table;
+}
+
+std::vector<SpaceForceRow> space_force_rows(const Study& study) {
+  std::vector<SpaceForceRow> rows;
+  for (const StudyCell& c : study.cells) {
+    if (!c.space) continue;
+    for (const SpaceFigures::OfAdhesion& a : c.space->adhesions) rows.push_back({c.name, condition_of(study, c), a});
   }
   return rows;
 }
@@ -568,6 +636,7 @@ std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, c
   add(adhesion_table(), adhesion_rows(study));
   add(fibre_table(), fibre_rows(study));
   add(estimate_table(), estimate_rows(study));
+  add(space_force_table(), space_force_rows(study));
   add(type_table(thresholds_of(analysis)), type_rows(study, analysis));
   add(test_table(), test_rows(analysis));
   add(summary_table(), summary_rows(analysis));
@@ -581,9 +650,10 @@ std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, c
 
 std::string pages_of_tables() {
   return page_of(cell_table()) + page_of(finding_table()) + page_of(adhesion_table()) + page_of(fibre_table()) +
-         page_of(estimate_table()) + page_of(type_table({StudyParameters{}.weak_tension_nN})) + page_of(test_table()) +
-         page_of(summary_table()) + page_of(variance_table()) + page_of(correlation_table()) +
-         page_of(area_bin_table()) + page_of(direction_table()) + page_of(direction_mean_table());
+         page_of(estimate_table()) + page_of(space_force_table()) +
+         page_of(type_table({StudyParameters{}.weak_tension_nN})) + page_of(test_table()) + page_of(summary_table()) +
+         page_of(variance_table()) + page_of(correlation_table()) + page_of(area_bin_table()) +
+         page_of(direction_table()) + page_of(direction_mean_table());
 }
 
 }  // namespace mbtfm::statistics

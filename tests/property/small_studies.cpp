@@ -24,9 +24,9 @@ const StudyParameters kFewDraws{.bootstrap_draws = 200};
 
 /// Columns of a table that hold words.
 const std::set<std::string> kWords = {
-    "included",  "enters", "part", "model", "converged", "connected", "identifiable", "origin",  "cell",
-    "condition", "reason", "type", "kind",  "quantity",  "component", "force",        "size",    "remark",
-    "question",  "within", "test", "unit",  "group_a",   "group_b",   "effect_is",    "relation"};
+    "included", "enters",    "part",   "model", "space_method", "converged", "connected", "identifiable", "origin",
+    "cell",     "condition", "reason", "type",  "kind",         "quantity",  "component", "force",        "size",
+    "remark",   "question",  "within", "test",  "unit",         "group_a",   "group_b",   "effect_is",    "relation"};
 
 /// An estimate with the columns of its interval. Sums, means and medians of what has no negative values have none.
 struct Bounded {
@@ -58,7 +58,7 @@ std::vector<std::string> header_of(const std::string& text) {
 /// The fibres' force is a difference, and a fit may find that a sheet expands.
 bool may_be_negative(const files::CsvTable& table, int row) {
   const std::set<std::string> signed_ones = {"fibre_force_nN", "contraction_nN_per_um", "mean_tension_nN_per_um",
-                                             "contraction_over_stiffness"};
+                                             "contraction_over_stiffness", "space_contractile_moment_nN_um"};
   for (const char* column : {"quantity", "force"}) {
     if (table.has(column) && signed_ones.contains(table.text(row, column))) return true;
   }
@@ -161,6 +161,44 @@ TEST(SmallStudies, whatever_sheets_lack_every_number_is_finite_or_its_field_empt
       }
       if (once_in(4)) cell.sheet->estimates.clear();
       if (once_in(4)) cell.sheet->strain_energy_fJ = std::nullopt;
+    }
+    if (once_in(2)) {
+      study.conditions = {"a", "b"};
+      for (StudyCell& cell : study.cells) cell.condition = static_cast<int>(random() % 2);
+    }
+    if (once_in(2)) {
+      for (StudyCell& cell : test::small_study(test::drawn_lack(static_cast<std::uint64_t>(seed)), 3).cells) {
+        cell.condition = 0;
+        study.cells.push_back(std::move(cell));
+      }
+    }
+    expect_whole(study, are_all() || seed % 10 == 1 ? Page::made : Page::left_out);
+  }
+}
+
+/// Cells in space alone, and beside others; of some the figures are equal, or not known, or zero.
+TEST(SmallStudies, whatever_cells_in_space_lack_every_number_is_finite_or_its_field_empty) {
+  for (int seed = 1; seed <= 60; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(static_cast<std::uint64_t>(seed));
+    const auto once_in = [&](unsigned n) { return random() % n == 0; };
+    Study study = test::simulated_cells_in_space({.n_cells = 1 + static_cast<int>(random() % 5),
+                                                  .n_conditions = 1,
+                                                  .force_nN = 400,
+                                                  .cell_sd_nN = once_in(3) ? 0.0 : 50.0,
+                                                  .error_nN = once_in(3) ? 0.0 : 30.0,
+                                                  .n_adhesions = static_cast<int>(random() % 3),
+                                                  .seed = static_cast<std::uint64_t>(seed)});
+    for (StudyCell& cell : study.cells) {
+      SpaceFigures& s = *cell.space;
+      if (once_in(4)) s.total_force_sigma_nN = s.contractile_moment_sigma_nN_um = std::nullopt;
+      if (once_in(4)) s.contractile_moment_nN_um = s.contractile_moment_sigma_nN_um = std::nullopt;
+      if (once_in(4)) s.resolution_um = std::nullopt;
+      if (once_in(4)) cell.cell.outline_um.clear();
+      if (once_in(6)) {  // no bead has moved
+        s.total_force_nN = s.normal_force_nN = s.strain_energy_fJ = s.largest_traction_kPa = 0;
+        s.adhesions.clear();
+      }
     }
     if (once_in(2)) {
       study.conditions = {"a", "b"};

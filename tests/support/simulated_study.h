@@ -140,4 +140,56 @@ inline statistics::Study simulated_sheets(const SheetStudySettings& s) {
   return study;
 }
 
+struct SpaceStudySettings {
+  int n_cells = 12;
+  int n_conditions = 2;
+  double force_nN = 500;
+  double condition_effect_nN = 0;  ///< from each condition to the next
+  double cell_sd_nN = 50;
+  double error_nN = 30;  ///< standard error of a total force
+  int n_adhesions = 5;   ///< each has a share of the force; 0: no image shows them
+  std::uint64_t seed = 1;
+};
+
+/// Round cells in a row on a gel in space, whose other figures follow the force.
+inline statistics::Study simulated_cells_in_space(const SpaceStudySettings& s) {
+  std::mt19937_64 random(s.seed);
+  std::normal_distribution<double> normal;
+  statistics::Study study;
+  for (int c = 0; c < s.n_conditions; ++c)
+    study.conditions.push_back(s.n_conditions == 1 ? "" : std::string(1, static_cast<char>('a' + c)));
+  for (int i = 0; i < s.n_cells; ++i) {
+    statistics::StudyCell cell{.name = "space_" + std::to_string(i),
+                               .condition = i * s.n_conditions / s.n_cells,
+                               .cell = {},
+                               .forces = {},
+                               .tensions = {},
+                               .fit = {},
+                               .directions = {}};
+    const double x = 50.0 * i;
+    cell.cell.outline_um = {{x, 0}, {x + 40, 0}, {x + 40, 40}, {x, 40}};
+    const double force = s.force_nN + cell.condition * s.condition_effect_nN + s.cell_sd_nN * normal(random) +
+                         s.error_nN * normal(random);
+    cell.space = statistics::SpaceFigures{.method = "group-l1",
+                                          .total_force_nN = force,
+                                          .total_force_sigma_nN = s.error_nN,
+                                          .strain_energy_fJ = 1e-3 * force * force,
+                                          .contractile_moment_nN_um = 10 * force + 300 * normal(random),
+                                          .contractile_moment_sigma_nN_um = 100.0,
+                                          .normal_force_nN = 0.3 * force,
+                                          .largest_traction_kPa = 2 * std::exp(0.1 * normal(random)),
+                                          .net_force_nN = 20,
+                                          .net_moment_nN_um = 300,
+                                          .resolution_um = 9 * std::exp(0.05 * normal(random))};
+    for (int a = 0; a < s.n_adhesions; ++a)
+      cell.space->adhesions.push_back(
+          {a + 1, force / s.n_adhesions * std::exp(0.3 * normal(random)), s.error_nN / s.n_adhesions});
+    cell.fit.relative_l2 = 0.3;
+    cell.fit.noise_um = 0.02;
+    cell.fit.converged = true;
+    study.cells.push_back(std::move(cell));
+  }
+  return study;
+}
+
 }  // namespace mbtfm::test

@@ -155,4 +155,59 @@ inline void write_finished_sheet(const fs::path& folder, const statistics::Study
   files::write_figures(folder / "3_sheet/sheet.json", figures);
 }
 
+/// A cell in space of a study as the folder that it was read from.
+inline void write_finished_cell_in_space(const fs::path& folder, const statistics::StudyCell& cell) {
+  const statistics::SpaceFigures& s = *cell.space;
+  for (const char* part : {"1_segment", "2_track", "3_surface", "4_traction"}) fs::create_directories(folder / part);
+  files::write_text(folder / "cell.toml",
+                    "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\n[track]\nz_points = \"into-gel\"\n");
+  if (!cell.cell.outline_um.empty()) files::write_outline(folder / "1_segment/outline.csv", cell.cell.outline_um);
+  files::write_displacement_in_space(folder / "2_track/displacement_3d.csv",  // the cells have beads of their own
+                                     {{{s.total_force_nN, 2, 3}, {0.1, 0, 0}, 0.02, 0.06, {}}});
+  files::write_surface(folder / "3_surface/surface.vtp", {{0, 0}, {10, 10}, 4, 4, std::vector<double>(16), {}});
+  std::string tractions =
+      "x_um,y_um,z_um,tx_kPa,ty_kPa,tz_kPa,sigma_tx_kPa,sigma_ty_kPa,sigma_tz_kPa,resolution_um,normal_kPa,"
+      "tangential_kPa,area_um2\n";
+  const auto add = [&](double x, double y, double z) {
+    std::ostringstream row;
+    row.precision(17);
+    row << "1,2,0," << x << "," << y << "," << z << ",0.1,0.1,0.1,9," << -z << "," << std::hypot(x, y) << ",10\n";
+    tractions += row.str();
+  };
+  add(0.1, 0, 0), add(0, 0, -0.2), add(0.6 * s.largest_traction_kPa, 0, 0.8 * s.largest_traction_kPa), add(0, 0.3, 0);
+  files::write_text(folder / "4_traction/traction.csv", tractions);
+  Figures figures = {{"method", s.method},
+                     {"tractions_over", std::string("the cell")},
+                     {"total_force_nN", s.total_force_nN},
+                     {"normal_force_nN", s.normal_force_nN},
+                     {"net_force_x_nN", 0.6 * s.net_force_nN},
+                     {"net_force_y_nN", 0.0},
+                     {"net_force_z_nN", -0.8 * s.net_force_nN},
+                     {"moment_x_nN_um", 0.0},
+                     {"moment_y_nN_um", -0.6 * s.net_moment_nN_um},
+                     {"moment_z_nN_um", 0.8 * s.net_moment_nN_um},
+                     {"strain_energy_fJ", s.strain_energy_fJ},
+                     {"relative_l2", cell.fit.relative_l2},
+                     {"noise_um", cell.fit.noise_um}};
+  const auto add_known = [&](const char* name, const std::optional<double>& value) {
+    if (value) figures.emplace_back(name, *value);
+  };
+  add_known("total_force_sigma_nN", s.total_force_sigma_nN);
+  add_known("contractile_moment_nN_um", s.contractile_moment_nN_um);
+  add_known("contractile_moment_sigma_nN_um", s.contractile_moment_sigma_nN_um);
+  add_known("median_resolution_um", s.resolution_um);
+  files::write_figures(folder / "4_traction/traction.json", figures);
+  if (s.adhesions.empty()) return;
+  files::write_adhesions(folder / "1_segment/adhesions.csv", round_cell().adhesions);
+  std::ostringstream forces;
+  forces.precision(17);
+  forces << "adhesion_id,x_um,y_um,z_um,area_um2,fx_nN,fy_nN,fz_nN,sigma_nN\n";
+  for (const auto& a : s.adhesions) {
+    forces << a.adhesion_id << ",1,2,0,3," << 0.6 * a.force_nN << ",0," << 0.8 * a.force_nN << ",";
+    if (a.sigma_nN) forces << *a.sigma_nN;
+    forces << "\n";
+  }
+  files::write_text(folder / "4_traction/traction_adhesion_forces.csv", forces.str());
+}
+
 }  // namespace mbtfm::test

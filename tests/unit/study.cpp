@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -551,7 +552,9 @@ files::CsvTable table_of(const Study& study, const std::string& name) {
 Study read_again(const Study& study, const test::TemporaryFolder& folder, const StudyParameters& parameters = {}) {
   for (const StudyCell& cell : study.cells) {
     const Path at = folder / study.conditions[static_cast<std::size_t>(cell.condition)] / cell.name;
-    cell.sheet ? test::write_finished_sheet(at, cell) : test::write_finished_cell(at, cell);
+    if (cell.kind() == CellKind::sheet) test::write_finished_sheet(at, cell);
+    if (cell.kind() == CellKind::space) test::write_finished_cell_in_space(at, cell);
+    if (cell.kind() == CellKind::plane) test::write_finished_cell(at, cell);
   }
   StudyParameters by_folder = parameters;
   by_folder.condition_from = "folder";
@@ -569,7 +572,7 @@ TEST(SheetStudy, has_what_the_fit_found_and_compares_the_contraction_first) {
   const test::TemporaryFolder folder;
   const Study study = read_again(made, folder);
   ASSERT_EQ(study.cells.size(), 12u);
-  EXPECT_EQ(n_sheets(study), 12);
+  EXPECT_EQ(n_of_kind(study, CellKind::sheet), 12);
   const Analysis analysis = analyse(study, {});
   EXPECT_EQ(analysis.primary.measure, "contraction of sheets");
   ASSERT_EQ(analysis.primary.differences.size(), 1u) << analysis.primary.obstacle;
@@ -685,12 +688,11 @@ TEST(SheetStudy, beside_cells_with_fibres_no_figure_mixes_the_two) {
   const test::TemporaryFolder folder;
   const Study study = read_again(made, folder);
   ASSERT_EQ(study.cells.size(), 11u);
-  EXPECT_EQ(n_with_fibres(study), 5);
+  EXPECT_EQ(n_of_kind(study, CellKind::plane), 5);
   const Analysis analysis = analyse(study, {});
   for (const Measure* m : analysis.measures()) {
     for (const Observation& o : m->sample.values)
-      EXPECT_EQ(study.cells[static_cast<std::size_t>(o.cell)].sheet.has_value(), m->sample.is_of_sheets())
-          << m->sample.column;
+      EXPECT_EQ(study.cells[static_cast<std::size_t>(o.cell)].kind(), m->sample.of_cells()) << m->sample.column;
   }
   EXPECT_EQ(sample_named(analysis, "total_force_nN")->values.size(), 5u);
   EXPECT_EQ(sample_named(analysis, "sheet_force_nN")->values.size(), 6u);
@@ -783,6 +785,175 @@ TEST(SheetStudy, leaves_out_a_copy_a_sheet_without_its_fit_and_one_that_did_not_
   EXPECT_EQ(reason_of(study, "a/sheet_2"), "no fit: 3_sheet/sheet.json is not there");
   EXPECT_EQ(reason_of(study, "b/sheet_3"), "the fit did not converge");
   EXPECT_EQ(study.cells.size(), 4u);
+}
+
+TEST(SpaceStudy, has_the_figures_of_each_cell_and_compares_the_total_force_first) {
+  const Study made = test::simulated_cells_in_space({.condition_effect_nN = 200});
+  const test::TemporaryFolder folder;
+  const Study study = read_again(made, folder);
+  ASSERT_EQ(n_of_kind(study, CellKind::space), 12);
+  const Analysis analysis = analyse(study, {});
+  EXPECT_EQ(analysis.primary.measure, "total force of cells in space");
+  ASSERT_EQ(analysis.primary.differences.size(), 1u) << analysis.primary.obstacle;
+  // two conditions of six: scatter and error of 58 make 34 of the difference; four of these
+  EXPECT_NEAR(analysis.primary.differences[0].difference.estimate, 200, 136);
+  EXPECT_LT(analysis.primary.differences[0].p_holm, 0.01);
+  struct Expected {
+    const char *column, *unit;
+    std::function<double(const SpaceFigures&)> of;
+    std::function<std::optional<double>(const SpaceFigures&)> sigma = [](const SpaceFigures&) { return 0.0; };
+  };
+  const std::vector<Expected> all = {
+      {"space_force_nN", "nN", [](const SpaceFigures& s) { return s.total_force_nN; },
+       [](const SpaceFigures& s) { return s.total_force_sigma_nN; }},
+      {"space_strain_energy_fJ", "fJ", [](const SpaceFigures& s) { return s.strain_energy_fJ; }},
+      {"space_contractile_moment_nN_um", "nN µm", [](const SpaceFigures& s) { return *s.contractile_moment_nN_um; },
+       [](const SpaceFigures& s) { return s.contractile_moment_sigma_nN_um; }},
+      {"space_normal_share", "", [](const SpaceFigures& s) { return s.normal_force_nN / s.total_force_nN; }},
+      {"space_largest_traction_kPa", "kPa", [](const SpaceFigures& s) { return s.largest_traction_kPa; }},
+      {"space_resolution_um", "µm", [](const SpaceFigures& s) { return *s.resolution_um; }}};
+  const files::CsvTable cells = table_of(study, "cells.csv");
+  for (const Expected& e : all) {
+    const Sample* sample = sample_named(analysis, e.column);
+    ASSERT_NE(sample, nullptr) << e.column;
+    EXPECT_EQ(sample->unit, e.unit) << e.column;
+    ASSERT_EQ(sample->values.size(), 12u) << e.column;
+    for (const Observation& o : sample->values) {
+      const std::string name = study.cells[static_cast<std::size_t>(o.cell)].name;
+      const auto at =
+          std::ranges::find_if(made.cells, [&](const StudyCell& c) { return name.ends_with("/" + c.name); });
+      ASSERT_NE(at, made.cells.end()) << name;
+      const double value = e.of(*at->space);
+      EXPECT_NEAR(o.value, value, 1e-7 * value) << e.column << ": nine digits";
+      EXPECT_NEAR(std::sqrt(o.error_variance), *e.sigma(*at->space), 1e-6 * value) << e.column;
+      EXPECT_EQ(o.group, at->condition) << e.column;
+      EXPECT_NEAR(cells.number(row_with(cells, {{"cell", name}}), e.column), value, 1e-5 * value) << e.column;
+    }
+  }
+  const Sample* forces = sample_named(analysis, "space_adhesion_force_nN");
+  ASSERT_NE(forces, nullptr);
+  EXPECT_EQ(forces->values.size(), 60u);
+  EXPECT_NEAR(forces->values[7].value, made.cells[1].space->adhesions[2].force_nN, 1e-6);
+  EXPECT_EQ(table_of(study, "adhesions_in_space.csv").n_rows(), 60);
+  for (const char* unknown : {"net_force_nN", "space_net_force_nN", "tension_nN", "adhesion_force_nN"})
+    EXPECT_EQ(sample_named(analysis, unknown), nullptr) << unknown;
+  const int row = row_with(cells, {{"cell", "a/space_0"}});
+  EXPECT_EQ(cells.text(row, "model"), "space");
+  EXPECT_NEAR(cells.number(row, "space_net_force_nN"), 20, 1e-4);
+  EXPECT_NEAR(cells.number(row, "space_net_moment_nN_um"), 300, 1e-3);
+  EXPECT_NEAR(cells.number(row, "cell_area_um2"), 1600, 0.01);
+  for (const char* of_others : {"total_force_nN", "n_fibres", "sheet_force_nN", "strain_energy_fJ", "n_adhesions",
+                                "expected_relative_l2", "n_meshes"})
+    EXPECT_TRUE(cells.text(row, of_others).empty()) << of_others;
+  const std::string page = study_html(study, analysis, figures_of(study, analysis, {}), {}, folder.path());
+  for (const char* says : {"<h1>Forces of 12 cells in space</h1>", "Figures of the cells in space",
+                           "the mean contractile moment of cells in space is"})
+    EXPECT_NE(page.find(says), std::string::npos) << says;
+  for (const char* of_fibres : {"ibre type", "Stress-fibre", "transverse", "No tension", "Not drawn"})
+    EXPECT_EQ(page.find(of_fibres), std::string::npos) << of_fibres;
+}
+
+TEST(SpaceStudy, beside_cells_with_fibres_and_sheets_no_figure_mixes_them) {
+  Study made = test::simulated_cells_in_space({.n_cells = 6});
+  for (StudyCell& cell : test::simulated_study({.n_cells = 5, .n_conditions = 2}).cells)
+    made.cells.push_back(std::move(cell));
+  for (StudyCell& cell : test::simulated_sheets({.n_sheets = 4}).cells) made.cells.push_back(std::move(cell));
+  const test::TemporaryFolder folder;
+  const Study study = read_again(made, folder);
+  ASSERT_EQ(study.cells.size(), 15u);
+  const Analysis analysis = analyse(study, {});
+  for (const Measure* m : analysis.measures()) {
+    for (const Observation& o : m->sample.values)
+      EXPECT_EQ(study.cells[static_cast<std::size_t>(o.cell)].kind(), m->sample.of_cells()) << m->sample.column;
+  }
+  std::set<std::string> columns;
+  for (const Measure* m : analysis.measures())
+    EXPECT_TRUE(columns.insert(m->sample.column).second) << m->sample.column << " is two quantities";
+  for (const Correlation& c : analysis.correlations) {
+    for (const int cell : c.cells)
+      EXPECT_EQ(study.cells[static_cast<std::size_t>(cell)].kind(), CellKind::plane) << c.force;
+  }
+  EXPECT_EQ(analysis.primary.measure, "tension of ventral fibres");
+  EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::total_force}).primary.measure, "total force of cells");
+  EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::strain_energy}).primary.measure,
+            "strain energy of cells in space");
+  EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::contractile_moment}).primary.measure,
+            "contractile moment of cells in space");
+  const std::string page = study_html(study, analysis, figures_of(study, analysis, {}), {}, folder.path());
+  EXPECT_NE(page.find("Stress-fibre tensions of 5 cells, contraction of 4 sheets and forces of 6 cells in space"),
+            std::string::npos);
+}
+
+TEST(SpaceStudy, of_cells_without_images_that_older_versions_made_has_what_they_tell) {
+  Study made = test::simulated_cells_in_space({.n_cells = 6, .n_adhesions = 0});
+  for (StudyCell& cell : made.cells) {
+    cell.cell.outline_um.clear();
+    cell.space->contractile_moment_nN_um = cell.space->contractile_moment_sigma_nN_um = std::nullopt;
+    cell.space->total_force_sigma_nN = cell.space->resolution_um = std::nullopt;  // thesis-cg tells no errors
+  }
+  const test::TemporaryFolder folder;
+  const Study study = read_again(made, folder);
+  ASSERT_EQ(study.cells.size(), 6u);
+  const Analysis analysis = analyse(study, {});
+  EXPECT_EQ(sample_named(analysis, "space_force_nN")->values.size(), 6u);
+  EXPECT_EQ(sample_named(analysis, "space_contractile_moment_nN_um"), nullptr);
+  EXPECT_EQ(sample_named(analysis, "space_adhesion_force_nN"), nullptr);
+  EXPECT_TRUE(table_of(study, "cells.csv").text(0, "cell_area_um2").empty());
+}
+
+TEST(SpaceStudy, leaves_out_a_copy_one_without_its_tractions_and_one_that_did_not_converge) {
+  const Study made = test::simulated_cells_in_space({.n_cells = 6});
+  const test::TemporaryFolder folder;
+  read_again(made, folder);
+  const auto a = [&](const char* name) { return folder / "a" / name; };
+  std::filesystem::copy(a("space_0"), a("space_9"), std::filesystem::copy_options::recursive);
+  std::filesystem::remove(a("space_1") / "1_segment/outline.csv");  // the whole field is the cell
+  std::filesystem::copy(a("space_1"), a("space_8"), std::filesystem::copy_options::recursive);
+  std::filesystem::remove(a("space_2") / "4_traction/traction.json");
+  files::write_text(folder / "b/space_3/run.json",
+                    "{\"stages\": {\"traction\": {\"converged\": false}}, \"findings\": []}");
+  const Study study = read_study(folder.path(), {.condition_from = "folder"}, {}, 2);
+  EXPECT_EQ(reason_of(study, "a/space_9"),
+            "the same cell as a/space_0: their 2_track/displacement_3d.csv are the same bytes and their outlines "
+            "overlap");
+  EXPECT_EQ(reason_of(study, "a/space_8"),
+            "the same cell as a/space_1: their 2_track/displacement_3d.csv are the same bytes");
+  EXPECT_EQ(reason_of(study, "a/space_2"), "no fit: 4_traction/traction.json is not there");
+  EXPECT_EQ(reason_of(study, "b/space_3"), "the fit did not converge");
+  EXPECT_EQ(study.cells.size(), 4u);
+}
+
+TEST(SpaceStudy, says_where_methods_or_resolutions_make_the_difference) {
+  const auto says = [](const Study& study, const char* what) {
+    return std::ranges::any_of(analyse(study, {}).warnings,
+                               [&](const std::string& w) { return w.find(what) != w.npos; });
+  };
+  constexpr const char *kMethods = "different methods", *kCoarser = "are coarser under b than under a";
+  Study study = test::simulated_cells_in_space({.condition_effect_nN = 200});
+  EXPECT_FALSE(says(study, kMethods));
+  EXPECT_FALSE(says(study, "coarser"));
+  study.cells[3].space->method = "tikhonov";
+  EXPECT_TRUE(says(study, kMethods));
+  for (StudyCell& cell : study.cells)
+    if (cell.condition == 1) *cell.space->resolution_um *= 1.3;
+  EXPECT_TRUE(says(study, kCoarser));
+}
+
+/// As sheets do, with the scatter of cells and the known error of each.
+TEST(SpaceStudy, intervals_of_the_difference_hold_it) {
+  constexpr int kStudies = 200;
+  int n_held = 0;
+  for (int seed = 1; seed <= kStudies; ++seed) {
+    const Study study = test::simulated_cells_in_space(
+        {.condition_effect_nN = 100, .n_adhesions = 0, .seed = static_cast<std::uint64_t>(seed)});
+    const Sample sample = sample_in_space(study).front();
+    ASSERT_EQ(sample.column, "space_force_nN");
+    const Contrast c = contrast_of(model_of(sample).model->fit, Eigen::Vector2d(-1, 1));
+    n_held += c.low <= 100 && 100 <= c.high ? 1 : 0;
+  }
+  // 95 % of 200 are 190 ± 3.1: three standard deviations of the count
+  EXPECT_GE(n_held, 181);
+  EXPECT_LE(n_held, 199);
 }
 
 }  // namespace
