@@ -60,7 +60,33 @@ study() { # name, title, cells
   sed -e "s|cost.svg|../images/cost/$name.svg|" -e "s|^## .*|## $title|" "$work/study_$name/cost.md"
 }
 
+# A round cell in space on 72 um of gel, with its surface given.
+simulate_in_space() { # name, noise
+  [ -d "$work/$1" ] || {
+    "$bin/mbtfm-simulate" --scenario patches-on-ring --pixel_size_um 0.25 --image_size_px 288 --beads 500 --seed 1 \
+      --noise "$2" --quiet --out "$work/$1"
+    mkdir "$work/$1/3_surface" && mv "$work/$1/surface.vtp" "$work/$1/3_surface/"
+  }
+  [ -f "$work/$1/run.json" ] || "$bin/mbtfm" run --quiet "$work/$1"
+  [ -f "$work/study_$1/cost.csv" ] ||
+    "$bin/mbtfm" cost --repeats 1 --budget "${MINUTES:-15}" --out "$work/study_$1" "$work/$1"
+}
+
+# Error of the map, of the total force, and processor time of the presets, of both noises.
+space_rows() {
+  local preset knob
+  for preset in fast standard high; do
+    knob="preset,$preset,"
+    [ $preset = standard ] && knob="as it is,,"
+    awk -F, -v knob="$knob" -v name="$preset" 'index($0, knob) == 1 {
+      cell[++n] = sprintf(" %.0f | %.2f | %.0f %% |", $4, $13, 100 * $8) }
+      END { printf "| `%s` |%s%s\n", name, cell[1], cell[2] }' "$work"/study_space2/cost.csv "$work"/study_space10/cost.csv
+  done
+}
+
 simulate demo 1 --noise 0.07 --images
+simulate_in_space space2 0.02
+simulate_in_space space10 0.1
 for seed in 101 102 103 104; do
   simulate "imaged$seed" "$seed" --noise 0.07 --images
   simulate "clean$seed" "$seed" --noise 0

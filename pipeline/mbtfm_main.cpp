@@ -100,6 +100,8 @@ runner::RunOptions run_options(const CommandLine& line) {
           .limits = {.seconds = line.timeout_s, .memory_bytes = line.memory_bytes},
           .preset = line.preset,
           .beneath = line.preset.empty() ? std::vector<runner::Setting>() : cost::preset_named(line.preset).settings,
+          .beneath_in_space =
+              line.preset.empty() ? std::vector<runner::Setting>() : cost::preset_named(line.preset).in_space,
           .version = kVersion,
           .say = teller(line),
           .sink = line.is_json ? event_sink : std::function<runner::Sink()>(),
@@ -107,11 +109,22 @@ runner::RunOptions run_options(const CommandLine& line) {
           .finish = nullptr};
 }
 
+/// @throws UsageError where no error budget of tensions will tell what was reached
+void expect_tensions(const fs::path& cell) {
+  const runner::CellStages of = runner::stages_of(cell, runner::read_image_names(cell));
+  if (of.kind == CellKind::plane) return;
+  throw UsageError(std::string("--accuracy: is an error of fibre tensions, and this cell is ") +
+                   (of.kind == CellKind::sheet ? "a sheet (" : "in space (") + of.why +
+                   "): leave it out; its report states the errors" +
+                   (of.kind == CellKind::space ? ", and --preset sets how much is computed" : ""));
+}
+
 /// Presets are tried without a report; the last of them is then found up to date, and told of with what it reached.
 runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions options) {
   const double wanted = cost::parse_accuracy(line.accuracy);
   const std::function<void()> write_report = std::exchange(options.finish, nullptr);
   if (!line.only.empty()) throw UsageError("--accuracy: is reached by all stages together: leave out --only");
+  expect_tensions(line.folder);
   const cost::AccuracyOutcome reached = cost::reach_accuracy(wanted, [&](const std::string& preset) {
     options.preset = preset;
     options.beneath = cost::preset_named(preset).settings;

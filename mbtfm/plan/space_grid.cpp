@@ -66,7 +66,7 @@ SpacePool pool_of(const SpaceScene& scene, double beads_per_um3, const Work& wor
   if (!meshing.spacing_um) {
     const double area_um2 = (scene.high_um.x - scene.low_um.x) * (scene.high_um.y - scene.low_um.y);
     meshing.spacing_um =
-        std::max(spatial::kSpacingOfBeads / std::cbrt(beads_per_um3), std::sqrt(area_um2 / kMostVertices));
+        std::max(scene.spatial.spacing_beads / std::cbrt(beads_per_um3), std::sqrt(area_um2 / kMostVertices));
   }
   SpacePool pool{.beads = beads,
                  .problem = spatial::make_problem({beads, scene.gel, adhesions_of(scene), scene.outline_um},

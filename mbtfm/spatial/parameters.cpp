@@ -4,6 +4,9 @@ namespace mbtfm::spatial {
 
 void declare(stage::ParameterList& list, SpatialParameters& p) {
   list.table("traction");
+  list.add("spacing_beads", p.spacing_beads, Range::between(0.2, 5),
+           "beads in space: spacing of the lattice of tractions over the mean distance of the beads, if spacing_um is "
+           "unset; more: fewer tractions, in less time");
   list.add("region", p.region,
            "beads in space: where the cell pulls; auto: in the outline grown by two distances of beads, or everywhere "
            "if there is no outline");

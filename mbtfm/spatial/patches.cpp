@@ -34,12 +34,49 @@ double misfit_alone(const Problem& problem, const MatrixXd& response, const Vect
   return spectrum.misfit(least) / std::max(1.0, n_data - static_cast<double>(response.cols()));
 }
 
-/// Of a datum, where tractions may be anywhere: patches alone leave what lies outside of them as if it were noise.
-double variance_under_any_tractions(const Problem& problem, const tractions::TractionParameters& traction,
-                                    const SpatialParameters& parameters, int threads) {
-  const Basis basis = orthonormal_basis(norm_of(problem.mesh, problem.ground, [](Vec2) { return 1.0; }));
-  const MatrixXd response = basis.response(problem.response_um_per_kPa, threads);
-  return reconstruct_in(basis, response, problem, traction, parameters, threads).variance;
+/// Tractions that may be anywhere.
+struct Anywhere {
+  Basis basis;
+  MatrixXd response;
+};
+Anywhere tractions_anywhere(const Problem& problem, int threads) {
+  Basis basis = orthonormal_basis(norm_of(problem.mesh, problem.ground, [](Vec2) { return 1.0; }));
+  MatrixXd response = basis.response(problem.response_um_per_kPa, threads);
+  return {std::move(basis), std::move(response)};
+}
+
+/// How far what the patches leave looks like tractions beside them, as a standard normal deviate. With y the rows
+/// less their best forces on the patches, A the answer to tractions of variance one anywhere and M the projection off
+/// the patches' answers, y'A A'y is the score of these tractions' variance at zero. Over y'y per datum, if patches are
+/// all there is, it has the first two moments of a scaled chi-squared of h = (tr K)²/tr K² with K = A'M A, which the
+/// cube root makes normal (Wilson & Hilferty, PNAS 17 (1931) 684). Taken off before is the most that the gel's model
+/// error, which no noise is, can add.
+/// Source: Lin, Biometrika 84 (1997) 309.
+double deviate_of_tractions_beside(const Problem& problem, const MatrixXd& of_patches, const MatrixXd& anywhere,
+                                   const VectorXd& weights_by_row, double n_data, int threads) {
+  const Rows rows(problem, weights_by_row);
+  const MatrixXd P = rows.of(of_patches);
+  const Eigen::HouseholderQR<MatrixXd> factor(P);
+  const MatrixXd Q = factor.householderQ() * MatrixXd::Identity(P.rows(), P.cols());
+  const auto beside = [&](const MatrixXd& what) -> MatrixXd { return what - Q * (Q.transpose() * what); };
+  const MatrixXd u = rows.of(problem.displacement_um()), y = beside(u), MA = beside(rows.of(anywhere));
+  MatrixXd K = MatrixXd::Zero(MA.cols(), MA.cols());
+  numerics::add_upper_gram(MA, K, threads);
+  K = K.selfadjointView<Eigen::Upper>();
+  const double trace = K.trace(), trace_of_square = K.squaredNorm();
+  const double degrees = std::max(1.0, n_data - static_cast<double>(P.cols() + rows.n_common()));
+  VectorXd direction = VectorXd::Ones(K.cols());
+  double largest = 0;
+  for (int k = 0; k < 30; ++k) {  // power steps, from below: a few per cent of the largest eigenvalue suffice
+    direction = K * direction.normalized();
+    largest = direction.norm();
+  }
+  const double of_gel = problem.model_error * u.norm() * std::sqrt(largest);
+  const double score = std::max(0.0, (MA.transpose() * y).norm() - of_gel);
+  const double h = trace * trace / trace_of_square;
+  const double over_expected = score * score / (y.squaredNorm() / degrees) / trace;
+  const double spread = 2 / (9 * h);
+  return (std::cbrt(over_expected) - (1 - spread)) / std::sqrt(spread);
 }
 
 }  // namespace
@@ -95,12 +132,19 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
     r.length_um.reset();
     r.scan.reset();
   }
+  const Anywhere anywhere = tractions_anywhere(problem, threads);
   const double noise =
-      has_background ? r.variance : variance_under_any_tractions(problem, traction, parameters, threads);
+      has_background
+          ? r.variance
+          : reconstruct_in(anywhere.basis, anywhere.response, problem, traction, parameters, threads).variance;
+  const double deviate = deviate_of_tractions_beside(problem, of_patches, anywhere.response, r.weighing.by_row,
+                                                     r.weighing.n_data, threads);
   r.figures.emplace_back("misfit_of_patches_alone", alone / noise);
-  r.findings.push_back(
-      noticed(FindingKind::patches_do_not_fit, alone / noise,
-              "Forces on the patches alone leave " + brief(alone / noise) + " times the squares that the noise has."));
+  r.figures.emplace_back("tractions_beside_patches", deviate);
+  r.findings.push_back(noticed(FindingKind::patches_do_not_fit, deviate,
+                               "What forces on the patches alone leave, " + brief(alone / noise) +
+                                   " times the squares that the noise has, looks like tractions beside them: " +
+                                   brief(deviate) + " standard deviations off chance."));
   return r;
 }
 

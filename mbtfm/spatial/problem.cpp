@@ -41,10 +41,11 @@ TractionMesh graded_lattice(const Ground& ground, const Expected& expected, doub
   return mesh;
 }
 
-TractionMesh lattice_for(const Ground& ground, const Expected& expected, const Meshing& meshing, double beads_um) {
+/// @param by_beads_um  spacing where `meshing` has none
+TractionMesh lattice_for(const Ground& ground, const Expected& expected, const Meshing& meshing, double by_beads_um) {
   const Vec2 size = expected.over.high_um - expected.over.low_um;
   const bool is_graded = meshing.refine == Refine::region && expected.background > 0 && expected.background < 1;
-  double spacing = meshing.spacing_um.value_or(kSpacingOfBeads * beads_um);
+  double spacing = meshing.spacing_um.value_or(by_beads_um);
   if (starts_coarse(meshing.refine)) spacing *= 2;
   if (!meshing.spacing_um && !is_graded) spacing = std::max(spacing, std::sqrt(size.x * size.y / kMostVertices));
   if (spacing > std::max(size.x, size.y)) {
@@ -230,7 +231,9 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
   const Ground ground(inputs.gel.surface.get());
   Observed observed = observe(inputs.beads, inputs.gel, ground, parameters);
   Expected expected = expected_tractions(inputs, observed, ground, parameters, meshing.grow_um);
-  TractionMesh mesh = meshing.mesh ? *meshing.mesh : lattice_for(ground, expected, meshing, observed.distance_um);
+  TractionMesh mesh = meshing.mesh
+                          ? *meshing.mesh
+                          : lattice_for(ground, expected, meshing, parameters.spacing_beads * observed.distance_um);
   substrate::SubstrateParameters of_model = gel;
   of_model.model = substrate::ModelKind::curved;  // the one that takes quads
   const std::shared_ptr<const substrate::Substrate> model = choice::make_substrate(inputs.gel, of_model, threads);

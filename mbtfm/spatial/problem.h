@@ -16,9 +16,6 @@ namespace mbtfm::spatial {
 /// Up to so many vertices of tractions the matrix of their answers is formed: with twice as many its decomposition
 /// takes a minute and a gigabyte.
 inline constexpr int kMostVertices = 1100;
-/// Of the lattice of tractions, over the distance of the beads: beads that are closer tell no finer tractions apart; at
-/// their distance the lattice itself would be felt.
-inline constexpr double kSpacingOfBeads = 0.83;
 
 /// u = G t + u_0. Tractions are three numbers a vertex; u_0 is zero but about a strained gel.
 struct Problem {
@@ -68,7 +65,7 @@ struct Problem {
 substrate::LazyResponse response_of_vertices(const substrate::Substrate& model, const Problem& problem);
 
 struct Meshing {
-  std::optional<double> spacing_um;  ///< unset: four fifths of the distance of the beads, or what memory takes
+  std::optional<double> spacing_um;  ///< unset: by the distance of the beads, or what memory takes
   Refine refine = Refine::none;
   std::optional<TractionMesh> mesh = {};  ///< instead of these
   double grow_um = 0;                     ///< of adhesions

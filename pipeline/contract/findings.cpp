@@ -280,9 +280,11 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "with the errors right it is 1 to a few per cent; the error bars are widened by its root",
        "Check sigma_um and sigma_z_um, the surface and the region in which tractions are looked for."},
       {patches_do_not_fit, "patches-do-not-fit", "traction", caution,
-       "misfit with tractions on the patches alone over what the noise leaves, per datum", 1.1,
-       "of some thousand data chance makes less than a tenth; what lies outside of the patches then pulls at their "
-       "forces",
+       "how far what forces on the patches alone leave looks like tractions beside them, in standard deviations of "
+       "chance",
+       4,
+       "if patches are all there is, chance makes more in one cell of 30 000; what lies beside the patches then pulls "
+       "at their forces, and the standard errors without a background do not contain it",
        "Use the forces with the background (traction.background above 0), and look for adhesions that are missing in "
        "adhesions.csv."},
       {tractions_out_of_balance, "tractions-out-of-balance", "traction", caution,

@@ -83,23 +83,67 @@ std::vector<Rung> ladder(Extent extent) {
   return rungs;
 }
 
-std::string group_of(const std::string& knob) {
+std::vector<Rung> ladder_in_space(Extent extent, double spacing_um) {
+  std::vector<Rung> rungs = {{.knob = kAsItIs, .value = ""}};
+  const auto add_preset = [&](const char* name) {
+    rungs.push_back({.knob = kPreset, .value = name, .settings = preset_named(name).in_space});
+  };
+  const auto add_spacing = [&](double share) {
+    rungs.push_back({.knob = "spacing_um",
+                     .value = brief(share * spacing_um),
+                     .settings = {{"traction", "spacing_um", shortest(share * spacing_um)}}});
+  };
+  add_preset("fast");
+  for (const double share : {2.0, 1.6, 1.25}) add_spacing(share);
+  add(rungs, "substrate", "displacement_tolerance", {"0.1", "0.05"});
+  add(rungs, "traction", "method", {"tikhonov", "group-l1"});
+  add(rungs, "traction", "refine", {"resolved"});
+  add(rungs, "traction", "loss", {"mixture", "huber"});
+  add(rungs, "traction", "lambda_by", {"gcv", "evidence"});
+  for (const double share : {0.125, 0.25, 0.5})
+    rungs.push_back({.knob = "beads", .value = shortest(share), .bead_share = share});
+  add(rungs, "traction", "with_axial", {"false"});
+  add(rungs, "effects", "common_motion", {"off"});
+  add(rungs, "substrate", "margin_thicknesses", {"2", "8"});
+  rungs.push_back({.knob = "threads", .value = "1", .threads = 1});
+  add_spacing(0.8);
+  add(rungs, "substrate", "displacement_tolerance", {"0.005"});
+  add_preset("high");
+  if (extent == Extent::whole) {
+    add(rungs, "traction", "method", {"adjoint", "green", "direct"});
+    add(rungs, "substrate", "material", {"neo-hooke"});
+  }
+  return rungs;
+}
+
+std::vector<std::string> groups_of(CellKind kind) {
+  if (kind == CellKind::space) return {"tractions", "gel", "method", "data, presets, threads"};
+  return {"network and meshes", "gel", "equilibrium and fit", "data, presets, threads"};
+}
+
+std::string group_of(const std::string& knob, CellKind kind) {
   static const std::map<std::string, std::string> groups = {{"model", "gel"},
                                                             {"cells_per_thickness", "gel"},
                                                             {"elements_across_adhesion", "gel"},
                                                             {"element", "gel"},
                                                             {"margin_thicknesses", "gel"},
+                                                            {"displacement_tolerance", "gel"},
+                                                            {"material", "gel"},
                                                             {"surface_lines", "gel"},
                                                             {"n_meshes", "network and meshes"},
                                                             {"edge_length_um", "network and meshes"},
+                                                            {"spacing_um", "tractions"},
+                                                            {"refine", "tractions"},
                                                             {"beads", "data, presets, threads"},
+                                                            {"with_axial", "data, presets, threads"},
                                                             {"image_scale", "data, presets, threads"},
                                                             {"robust_loss", "data, presets, threads"},
                                                             {"preset", "data, presets, threads"},
                                                             {"threads", "data, presets, threads"},
                                                             {"bootstrap", "data, presets, threads"}};
   const auto found = groups.find(knob);
-  return found == groups.end() ? "equilibrium and fit" : found->second;
+  if (found != groups.end()) return found->second;
+  return kind == CellKind::space ? "method" : "equilibrium and fit";
 }
 
 }  // namespace mbtfm::cost

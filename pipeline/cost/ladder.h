@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/cell_kind.h"
 #include "pipeline/runner/settings.h"
 
 namespace mbtfm::cost {
@@ -27,8 +28,12 @@ inline constexpr const char* kPreset = "preset";
 
 /// The cell as it is comes first, then knob by knob, rungs from coarse to fine.
 std::vector<Rung> ladder(Extent extent);
+/// The same of a cell in space. @param spacing_um  of its lattice of tractions, which the rungs widen and narrow
+std::vector<Rung> ladder_in_space(Extent extent, double spacing_um);
 
-/// The group of knobs that are drawn together: "gel", "network and meshes", "equilibrium and fit", or the rest.
-std::string group_of(const std::string& knob);
+/// The groups of knobs that are drawn together, of one kind of cells.
+std::vector<std::string> groups_of(CellKind kind);
+/// The one of a knob.
+std::string group_of(const std::string& knob, CellKind kind);
 
 }  // namespace mbtfm::cost

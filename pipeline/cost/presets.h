@@ -11,7 +11,8 @@ namespace mbtfm::cost {
 struct Preset {
   std::string name;
   std::string purpose;
-  std::vector<runner::Setting> settings;  ///< where they differ from the defaults
+  std::vector<runner::Setting> settings;  ///< where they differ from the defaults, of cells with fibres
+  std::vector<runner::Setting> in_space;  ///< the same of cells in space
 };
 
 /// The cheapest first.

@@ -7,10 +7,13 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/cost/accuracy.h"
+#include "pipeline/cost/space_map.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/match_fibres.h"
@@ -45,9 +48,12 @@ struct Answer {
   std::vector<Fibre> fibres;
   std::map<int, double> tensions_nN;  ///< of the fibres
   double total_force_nN = 0;
+  std::optional<SpaceMap> map = {};  ///< of a cell in space, in place of the fibres
 };
 
 bool is_from_images(const runner::Stage& stage) { return !stage.images.empty(); }
+
+constexpr const char* kDisplacementInSpace = "2_track/displacement_3d.csv";
 
 /// All that segmentation and tracking read is there.
 bool has_all_images(const fs::path& cell, const runner::ImageNames& names) {
@@ -76,17 +82,21 @@ class Scratch {
         folder_(files::inside(cell, "cost/scratch", cell.string())),  // it is emptied
         images_(runner::read_image_names(cell)) {
     files::check_cell_folder(cell);
-    if (const auto of = runner::stages_of(cell, images_); of.kind != CellKind::plane) {
-      const bool is_sheet = of.kind == CellKind::sheet;
+    const runner::CellStages of = runner::stages_of(cell, images_);
+    kind_ = of.kind;
+    if (kind_ == CellKind::sheet)
       throw InputError(cell.string(),
-                       "a cell with fibres on a flat gel: the knobs that are turned are those of the tension fit",
-                       (is_sheet ? "a sheet (" : "one in space (") + of.why + ")",
-                       std::string("its report lists how long each stage took; ") +
-                           (is_sheet ? "sheet.mesh_um sets how many triangles there are"
-                                     : "traction.spacing_um sets how many tractions there are"));
+                       "a cell with fibres on a flat gel, or one in space: the knobs that are turned are theirs",
+                       "a sheet (" + of.why + ")",
+                       "its report lists how long each stage took; sheet.mesh_um sets how many triangles there are");
+    stages_ = runner::stages();
+    if (kind_ == CellKind::space) {
+      stages_ = of.stages;
+      std::erase_if(stages_, [](const runner::Stage& stage) { return stage.name != "traction"; });
+    } else {
+      has_images_ = has_all_images(cell, images_);
     }
-    has_images_ = has_all_images(cell, images_);
-    for (const char* file : {"1_segment/adhesions.csv", "2_track/displacement.csv", "cell.toml"}) {
+    for (const std::string& file : needed()) {
       if (files::is_file(cell / file)) continue;
       throw InputError((cell / file).string(), "a cell whose images were segmented and tracked", "none",
                        "run it first: mbtfm run " + cell.string());
@@ -104,6 +114,7 @@ class Scratch {
   Scratch(const Scratch&) = delete;
   Scratch& operator=(const Scratch&) = delete;
 
+  CellKind kind() const { return kind_; }
   const fs::path& folder() const { return folder_; }
   bool has_images() const { return has_images_; }
 
@@ -123,6 +134,11 @@ class Scratch {
 
   Answer answer() const {
     Answer answer;
+    if (kind_ == CellKind::space) {
+      answer.map = read_space_map(folder_);
+      answer.total_force_nN = answer.map->total_force_nN;
+      return answer;
+    }
     answer.fibres = files::read_cell(folder_ / "1_segment").fibres;
     for (const Tension& t : files::read_tensions(folder_ / "4_fit/tensions.csv")) {
       if (t.fibre_id != 0) answer.tensions_nN[t.fibre_id] = t.tension_nN;
@@ -132,31 +148,48 @@ class Scratch {
   }
 
  private:
+  /// Without which the cell was not run.
+  std::vector<std::string> needed() const {
+    if (kind_ == CellKind::space)
+      return {kDisplacementInSpace, "3_surface/surface.vtp", "4_traction/traction.json", "cell.toml"};
+    return {"1_segment/adhesions.csv", "2_track/displacement.csv", "cell.toml"};
+  }
+
   void take_from_cell() const {
-    for (const char* part : {"1_segment", "2_track"}) {
+    for (const char* part : {"1_segment", "2_track", "3_surface"}) {
+      if (std::string(part) == "3_surface" && kind_ != CellKind::space) continue;
       fs::remove_all(folder_ / part);
-      copy_files(cell_ / part, folder_ / part);
+      if (files::is_folder(cell_ / part)) copy_files(cell_ / part, folder_ / part);
     }
+    if (kind_ == CellKind::space) fs::create_directories(folder_ / "4_traction");
   }
 
   /// Every so-manieth bead, so that they stay evenly spread in whatever order they come.
   void take_share_of_beads(double share) const {
     if (share >= 1) return;
-    const fs::path file = folder_ / "2_track/displacement.csv";
-    DisplacementField some;
-    double sum = 0;
-    for (const Bead& bead : files::read_displacement(file)) {
-      sum += share;
-      if (sum < 1) continue;
-      sum -= 1;
-      some.push_back(bead);
+    const auto some_of = [share](const auto& beads) {
+      std::remove_cvref_t<decltype(beads)> some;
+      double sum = 0;
+      for (const auto& bead : beads) {
+        sum += share;
+        if (sum < 1) continue;
+        sum -= 1;
+        some.push_back(bead);
+      }
+      return some;
+    };
+    if (kind_ == CellKind::space) {
+      const fs::path file = folder_ / kDisplacementInSpace;
+      files::write_displacement_in_space(file, some_of(files::read_displacement_in_space(file)));
+    } else {
+      const fs::path file = folder_ / "2_track/displacement.csv";
+      files::write_displacement(file, some_of(files::read_displacement(file)));
     }
-    files::write_displacement(file, some);
   }
 
   Run run_stages(const Rung& rung, bool from_images) const {
     Run run;
-    for (const runner::Stage& stage : runner::stages()) {
+    for (const runner::Stage& stage : stages_) {
       if (!run.failure.empty() || is_from_images(stage) != from_images) continue;
       const runner::ProcessResult result = runner::run_process(command_of(stage, rung), {}, [](std::string_view) {});
       const bool is_answer = !result.signal && (result.exit_code == 0 || result.exit_code == exit_code::kNotSolved);
@@ -197,11 +230,19 @@ class Scratch {
   const StudyOptions& options_;
   fs::path cell_, folder_;
   runner::ImageNames images_;
+  CellKind kind_ = CellKind::plane;
+  std::vector<runner::Stage> stages_;  ///< that are run
   bool has_images_ = false;
   Run of_images_;  ///< segmentation and tracking as the cell has them
 };
 
 void compare(Measurement& m, const Answer& answer, const Answer& reference) {
+  m.force_error = std::abs(answer.total_force_nN / reference.total_force_nN - 1);
+  if (answer.map) {
+    m.error = difference(*answer.map, *reference.map);
+    m.stated_error = answer.map->stated_error.value_or(0);
+    return;
+  }
   double error = 0, size = 0;
   for (const auto& [id, tension_nN] : answer.tensions_nN) {
     const auto found = reference.tensions_nN.find(id);
@@ -210,12 +251,18 @@ void compare(Measurement& m, const Answer& answer, const Answer& reference) {
     error += std::pow(tension_nN - found->second, 2);
     size += std::pow(found->second, 2);
   }
-  m.tension_error = size > 0 ? std::sqrt(error / size) : 0;
-  m.force_error = std::abs(answer.total_force_nN / reference.total_force_nN - 1);
+  m.error = size > 0 ? std::sqrt(error / size) : 0;
 }
 
 /// The finest that the ladder's knobs allow, all at once, within reason.
-const Rung& finest() {
+Rung finest(CellKind kind, double spacing_um) {
+  if (kind == CellKind::space) {
+    constexpr double kFinest = 0.7;
+    return {.knob = "reference",
+            .value = "tractions " + brief(kFinest * spacing_um) + " um apart, gel to 0.5 %",
+            .settings = {{"traction", "spacing_um", shortest(kFinest * spacing_um)},
+                         {"substrate", "displacement_tolerance", "0.005"}}};
+  }
   static const Rung rung = {.knob = "reference",
                             .value = "32 meshes of 1 um",
                             .settings = {{"fit", "n_meshes", "32"}, {"network", "edge_length_um", "1"}}};
@@ -223,7 +270,11 @@ const Rung& finest() {
 }
 
 /// True tensions by the segmentation's fibre.
-Answer truth_of(const fs::path& cell) {
+Answer truth_of(const fs::path& cell, CellKind kind) {
+  if (kind == CellKind::space) {
+    const SpaceMap map = true_space_map(cell);
+    return {.fibres = {}, .tensions_nN = {}, .total_force_nN = map.total_force_nN, .map = map};
+  }
   const report::Comparison comparison = report::compare_with_truth(cell);
   Answer truth;
   for (const report::ComparedFibre& fibre : comparison.fibres) {
@@ -233,8 +284,9 @@ Answer truth_of(const fs::path& cell) {
   return truth;
 }
 
-/// The reference's tensions by the fibres of another segmentation.
+/// The reference's tensions by the fibres of another segmentation; a map as it is.
 Answer by_fibres_of(const Answer& answer, const Answer& reference) {
+  if (reference.map) return reference;
   Answer result{.fibres = answer.fibres, .tensions_nN = {}, .total_force_nN = reference.total_force_nN};
   for (const report::FibreMatch& match : report::match_fibres(answer.fibres, reference.fibres)) {
     const int found_id = answer.fibres[static_cast<std::size_t>(match.found_index)].fibre_id;
@@ -261,17 +313,24 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
     if (options.say) options.say(text);
   };
   Scratch scratch(cell, options);
-  Study study{.reference = "the truth", .has_images = scratch.has_images(), .measurements = {}};
-  for (Rung& rung : ladder(options.extent)) {
+  const bool is_in_space = scratch.kind() == CellKind::space;
+  Study study{.kind = scratch.kind(), .reference = "the truth", .has_images = scratch.has_images(), .measurements = {}};
+  const double spacing_um =
+      is_in_space ? files::JsonRecord(cell / "4_traction/traction.json", "a summary as mbtfm-traction writes it")
+                        .at("spacing_x_um")
+                        .number()
+                  : 0;
+  for (Rung& rung : is_in_space ? ladder_in_space(options.extent, spacing_um) : ladder(options.extent)) {
     if (scratch.has_images() || rung.knob == kPreset || !needs_images(rung))
       study.measurements.push_back({.rung = std::move(rung)});
   }
   std::vector<std::vector<Run>> runs(study.measurements.size());
   std::optional<Answer> finest_answer;
-  if (!report::has_truth(cell)) {
-    study.reference = finest().value;
+  if (!(is_in_space ? has_space_truth(cell) : report::has_truth(cell))) {
+    const Rung rung = finest(scratch.kind(), spacing_um);
+    study.reference = rung.value;
     say("reference: " + study.reference);
-    const Run run = scratch.run(finest());
+    const Run run = scratch.run(rung);
     if (!run.failure.empty()) throw NotSolved({.reason = "the reference failed: " + run.failure});
     finest_answer = scratch.answer();
   }
@@ -285,11 +344,14 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
       runs[i].push_back(run);
       if (repeat > 0 || !run.failure.empty()) continue;
       const Answer answer = scratch.answer();
-      compare(m, answer, finest_answer ? by_fibres_of(answer, *finest_answer) : truth_of(scratch.folder()));
-      const auto budget = files::read_fit_summary(scratch.folder() / "4_fit/fit.json").error_budget;
-      if (budget && m.tension_error > 0) m.stated_error = relative_error(*budget).total;
+      compare(m, answer,
+              finest_answer ? by_fibres_of(answer, *finest_answer) : truth_of(scratch.folder(), scratch.kind()));
+      if (!is_in_space) {
+        const auto budget = files::read_fit_summary(scratch.folder() / "4_fit/fit.json").error_budget;
+        if (budget && m.error > 0) m.stated_error = relative_error(*budget).total;
+      }
       say(fmt::format("{} of {}: {} {}: {:.1f} s, error {:.3f}", i + 1, runs.size(), m.rung.knob, m.rung.value,
-                      run.seconds, m.tension_error));
+                      run.seconds, m.error));
     }
   }
   for (std::size_t i = 0; i < runs.size(); ++i) {
@@ -301,6 +363,8 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
 }
 
 Study combined(const std::vector<Study>& studies) {
+  if (std::ranges::any_of(studies, [&](const Study& s) { return s.kind != studies.front().kind; }))
+    throw UsageError("cells with fibres and cells in space have different knobs: give them in two studies");
   Study all = studies.front();
   const auto n = static_cast<double>(studies.size());
   for (std::size_t i = 0; i < all.measurements.size(); ++i) {
@@ -319,11 +383,11 @@ Study combined(const std::vector<Study>& studies) {
       m.seconds += of_cell.seconds / n;
       m.cpu_seconds += of_cell.cpu_seconds / n;
       m.peak_memory_MB = std::max(m.peak_memory_MB, of_cell.peak_memory_MB);
-      tensions += std::pow(of_cell.tension_error, 2) / n;
+      tensions += std::pow(of_cell.error, 2) / n;
       forces += std::pow(of_cell.force_error, 2) / n;
       stated += std::pow(of_cell.stated_error, 2) / n;
     }
-    m.tension_error = std::sqrt(tensions);
+    m.error = std::sqrt(tensions);
     m.force_error = std::sqrt(forces);
     m.stated_error = std::sqrt(stated);
   }

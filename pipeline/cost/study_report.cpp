@@ -18,13 +18,20 @@ constexpr double kFrame_px = 340;  // the height of each: room for the names of 
 // A default is good where no other choice is better by more than this.
 constexpr double kNear = 0.2;
 
-bool is_measured(const Measurement& m) { return m.n_runs > 0 && m.failure.empty() && m.tension_error > 0; }
+bool is_measured(const Measurement& m) { return m.n_runs > 0 && m.failure.empty() && m.error > 0; }
 
 std::string name_of(const Rung& rung) { return rung.value.empty() ? rung.knob : rung.knob + " = " + rung.value; }
 
-std::string stages_of(const Study& study) { return study.has_images ? "all stages" : "network and fit"; }
+std::string stages_of(const Study& study) {
+  if (study.kind == CellKind::space) return "the stage traction";
+  return study.has_images ? "all stages" : "network and fit";
+}
+
+/// What the error is of.
+const char* what_of(const Study& study) { return study.kind == CellKind::space ? "tractions" : "tensions"; }
 
 struct CostRow {
+  CellKind kind = CellKind::plane;
   Measurement measured;
   bool is_on_front = false;
 };
@@ -38,12 +45,15 @@ const files::Table<CostRow>& cost_table() {
       return is_measured(m) ? std::optional(m.*member) : std::nullopt;
     };
   };
+  const auto of_kind = [of](auto member, CellKind kind) {
+    return [get = of(member), kind](const Row& row) { return row.kind == kind ? get(row) : std::nullopt; };
+  };
   static const files::Table<Row> table{
       .file = "cost/cost.csv",
       .row = "each value of each knob that was tried",
       .columns = {{"knob", "the parameter", [](const Row& row) { return row.measured.rung.knob; }},
                   {"value", "its value", [](const Row& row) { return row.measured.rung.value; }},
-                  {"seconds", "of all stages if the cell has its images, else of network and fit",
+                  {"seconds", "of all stages if the cell has its images, else of network and fit; in space of traction",
                    of(&Measurement::seconds), kResult},
                   {"cpu_seconds", "the same of all threads", of(&Measurement::cpu_seconds), kResult},
                   {"peak_memory_MB", "the largest of the stages", of(&Measurement::peak_memory_MB), kResult},
@@ -51,13 +61,19 @@ const files::Table<CostRow>& cost_table() {
                   {"tension_error",
                    "‖t − reference‖/‖reference‖ over the fibres; the reference is the truth if it "
                    "is known, else the finest choice",
-                   of(&Measurement::tension_error), kResult},
+                   of_kind(&Measurement::error, CellKind::plane), kResult},
                   {"force_error", "of the total force, relative", of(&Measurement::force_error), kResult},
-                  {"stated_tension_error", "what the error budget says", of(&Measurement::stated_error), kResult},
-                  {"n_fibres", "that the reference knows, too", of(&Measurement::n_fibres)},
+                  {"stated_tension_error", "what the error budget says",
+                   of_kind(&Measurement::stated_error, CellKind::plane), kResult},
+                  {"n_fibres", "that the reference knows, too", of_kind(&Measurement::n_fibres, CellKind::plane)},
                   {"is_on_front", "nothing else is both faster and more exact", &Row::is_on_front},
                   {"failure", "why there is no figure",
-                   [](const Row& row) { return row.measured.n_runs == 0 ? "no time left" : row.measured.failure; }}}};
+                   [](const Row& row) { return row.measured.n_runs == 0 ? "no time left" : row.measured.failure; }},
+                  {"traction_error",
+                   "of a cell in space: ‖t − reference‖/‖reference‖ over its surface, with the same reference",
+                   of_kind(&Measurement::error, CellKind::space), kResult},
+                  {"stated_traction_error", "what the standard errors of its tractions say; 0: there are none",
+                   of_kind(&Measurement::stated_error, CellKind::space), kResult}}};
   return table;
 }
 
@@ -66,7 +82,7 @@ void write_csv(const fs::path& file, const Study& study) {
   std::vector<CostRow> rows;
   for (const Measurement& m : study.measurements) {
     const bool is_on_front = std::find(front.begin(), front.end(), static_cast<int>(rows.size())) != front.end();
-    rows.push_back({m, is_on_front});
+    rows.push_back({study.kind, m, is_on_front});
   }
   files::write(file, cost_table(), rows);
 }
@@ -75,7 +91,7 @@ std::vector<Vec2> points_of(const std::vector<Measurement>& measurements, const 
   std::vector<Vec2> points;
   for (const int i : indices) {
     const Measurement& m = measurements[static_cast<std::size_t>(i)];
-    points.push_back({m.cpu_seconds, m.tension_error});
+    points.push_back({m.cpu_seconds, m.error});
   }
   return points;
 }
@@ -87,7 +103,7 @@ charts::Chart chart_of(const std::string& group, const Study& study, const chart
   std::map<std::string, std::vector<int>> knobs;
   for (std::size_t i = 1; i < study.measurements.size(); ++i) {
     const Measurement& m = study.measurements[i];
-    if (is_measured(m) && group_of(m.rung.knob) == group) knobs[m.rung.knob].push_back(static_cast<int>(i));
+    if (is_measured(m) && group_of(m.rung.knob, study.kind) == group) knobs[m.rung.knob].push_back(static_cast<int>(i));
   }
   chart.frame_height(kFrame_px);
   std::size_t k = 0;
@@ -97,9 +113,9 @@ charts::Chart chart_of(const std::string& group, const Study& study, const chart
     const std::string colour = charts::kColours[k++ % std::size(charts::kColours)];
     for (const int i : indices) {
       const Measurement& m = study.measurements[static_cast<std::size_t>(i)];
-      chart.dot({m.cpu_seconds, m.tension_error}, 5, "fill:" + colour + ";stroke:#fff",
-                fmt::format("{}: {:.2g} s, error {:.3g}", name_of(m.rung), m.cpu_seconds, m.tension_error));
-      dots.push_back({{m.cpu_seconds, m.tension_error}, m.rung.value});
+      chart.dot({m.cpu_seconds, m.error}, 5, "fill:" + colour + ";stroke:#fff",
+                fmt::format("{}: {:.2g} s, error {:.3g}", name_of(m.rung), m.cpu_seconds, m.error));
+      dots.push_back({{m.cpu_seconds, m.error}, m.rung.value});
     }
     chart.key(knob, colour);
     key.push_back(knob);
@@ -107,8 +123,7 @@ charts::Chart chart_of(const std::string& group, const Study& study, const chart
   add_names(chart, x, y, kFrame_px, dots, key);
   const Measurement& own = study.measurements.front();
   if (is_measured(own)) {
-    chart.dot({own.cpu_seconds, own.tension_error}, 8, "fill:none;stroke:#000;stroke-width:2.5",
-              "the cell's own settings");
+    chart.dot({own.cpu_seconds, own.error}, 8, "fill:none;stroke:#000;stroke-width:2.5", "the cell's own settings");
   }
   return chart;
 }
@@ -118,19 +133,19 @@ void draw(const fs::path& file, const Study& study, const std::string& cell_name
   for (const Measurement& m : study.measurements) {
     if (!is_measured(m)) continue;
     seconds.push_back(m.cpu_seconds);
-    errors.push_back(m.tension_error);
+    errors.push_back(m.error);
   }
   const charts::Axis x =
       charts::axis_over("processor time of " + stages_of(study) + " (s)", seconds, charts::Scale::logarithmic);
-  const charts::Axis y = charts::axis_over("error of the tensions, relative", errors, charts::Scale::logarithmic);
+  const charts::Axis y = charts::axis_over(std::string("error of the ") + what_of(study) + ", relative", errors,
+                                           charts::Scale::logarithmic);
   std::vector<charts::Chart> list;
-  for (const char* group : {"network and meshes", "gel", "equilibrium and fit", "data, presets, threads"}) {
-    list.push_back(chart_of(group, study, x, y));
-  }
+  for (const std::string& group : groups_of(study.kind)) list.push_back(chart_of(group, study, x, y));
   files::write_text(
       file, charts::svg_file(
                 list, 2,
-                {cell_name + ": |t − reference| / |reference| over the fibres; reference: " + study.reference + ".",
+                {cell_name + ": |t − reference| / |reference| over the " +
+                     (study.kind == CellKind::space ? "surface" : "fibres") + "; reference: " + study.reference + ".",
                  "Grey: the front, which no other choice beats in both. Circle: the settings of the cell."}));
 }
 
@@ -138,7 +153,7 @@ void draw(const fs::path& file, const Study& study, const std::string& cell_name
 const Measurement* quickest(const std::vector<Measurement>& measurements, const std::string& knob, double error) {
   const Measurement* best = nullptr;
   for (const Measurement& m : measurements) {
-    if (!is_measured(m) || m.rung.knob != knob || m.tension_error > error) continue;
+    if (!is_measured(m) || m.rung.knob != knob || m.error > error) continue;
     if (!best || m.cpu_seconds < best->cpu_seconds) best = &m;
   }
   return best;
@@ -160,15 +175,14 @@ std::string table_of_halving(const std::vector<Measurement>& all) {
   for (const std::string& knob : knobs_of(all)) {
     const Measurement* least = nullptr;
     for (const Measurement& m : all) {
-      if (is_measured(m) && m.rung.knob == knob && (!least || m.tension_error < least->tension_error)) least = &m;
+      if (is_measured(m) && m.rung.knob == knob && (!least || m.error < least->error)) least = &m;
     }
     if (!least) continue;
-    const Measurement* half = quickest(all, knob, 0.5 * own.tension_error);
-    text +=
-        fmt::format("| `{}` | {} | × {:.2f} | {}, time × {:.2g} |\n", knob,
-                    half ? fmt::format("time × {:.2g} ({})", half->cpu_seconds / own.cpu_seconds, half->rung.value)
-                         : std::string("not reached"),
-                    least->tension_error / own.tension_error, least->rung.value, least->cpu_seconds / own.cpu_seconds);
+    const Measurement* half = quickest(all, knob, 0.5 * own.error);
+    text += fmt::format("| `{}` | {} | × {:.2f} | {}, time × {:.2g} |\n", knob,
+                        half ? fmt::format("time × {:.2g} ({})", half->cpu_seconds / own.cpu_seconds, half->rung.value)
+                             : std::string("not reached"),
+                        least->error / own.error, least->rung.value, least->cpu_seconds / own.cpu_seconds);
   }
   return text;
 }
@@ -182,29 +196,33 @@ std::string verdict(const std::vector<Measurement>& all) {
 
 std::string page(const Study& study, const std::string& cell_name) {
   const std::vector<Measurement>& all = study.measurements;
+  const bool is_in_space = study.kind == CellKind::space;
   std::string text = fmt::format("## {}\n\n![error over time](cost.svg)\n\n", cell_name);
-  if (!is_measured(all.front())) return text + "The fit with the cell's own settings failed.\n";
+  if (!is_measured(all.front())) return text + "The run with the cell's own settings failed.\n";
   text += verdict(all) +
-          fmt::format(" They err by {:.3g} against {} over {} fibres and take {:.2g} s of processor time of {}.\n\n",
-                      all.front().tension_error, study.reference, all.front().n_fibres, all.front().cpu_seconds,
-                      stages_of(study));
+          fmt::format(" They err by {:.3g} against {} over {} and take {:.2g} s of processor time of {}.\n\n",
+                      all.front().error, study.reference,
+                      is_in_space ? std::string("the surface") : std::to_string(all.front().n_fibres) + " fibres",
+                      all.front().cpu_seconds, stages_of(study));
   text += table_of_halving(all) + "\n";
   text += "Passed: the stages one after the other, whatever else the machine had to do.\n\n";
-  text +=
-      "| choice | error of tensions | stated | error of total force | fibres | processor (s) | passed (s) | memory "
-      "(MB) |\n";
-  text += "|---|---|---|---|---|---|---|---|\n";
+  text += fmt::format(
+      "| choice | error of {} | stated | error of total force |{} processor (s) | passed (s) | memory (MB) |\n",
+      what_of(study), is_in_space ? "" : " fibres |");
+  text += is_in_space ? "|---|---|---|---|---|---|---|\n" : "|---|---|---|---|---|---|---|---|\n";
   const std::vector<int> front = front_of(all);
   for (std::size_t i = 0; i < all.size(); ++i) {
     const Measurement& m = all[i];
     if (!is_measured(m)) {
-      text += fmt::format("| {} | {} | | | | | | |\n", name_of(m.rung), m.n_runs == 0 ? "no time left" : m.failure);
+      text += fmt::format("| {} | {} | | | | |{}\n", name_of(m.rung), m.n_runs == 0 ? "no time left" : m.failure,
+                          is_in_space ? " |" : " | |");
       continue;
     }
     const bool is_on_front = std::find(front.begin(), front.end(), static_cast<int>(i)) != front.end();
-    text += fmt::format("| {}{} | {:.3g} | {:.3g} | {:.2g} % | {} | {:.2g} | {:.2g} | {:.0f} |\n", name_of(m.rung),
-                        is_on_front ? " (front)" : "", m.tension_error, m.stated_error, 100 * m.force_error, m.n_fibres,
-                        m.cpu_seconds, m.seconds, m.peak_memory_MB);
+    text += fmt::format("| {}{} | {:.3g} | {:.3g} | {:.2g} % |{} {:.2g} | {:.2g} | {:.0f} |\n", name_of(m.rung),
+                        is_on_front ? " (front)" : "", m.error, m.stated_error, 100 * m.force_error,
+                        is_in_space ? std::string() : fmt::format(" {} |", m.n_fibres), m.cpu_seconds, m.seconds,
+                        m.peak_memory_MB);
   }
   return text;
 }
@@ -220,7 +238,7 @@ std::vector<int> front_of(const std::vector<Measurement>& measurements) {
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return at(a).cpu_seconds < at(b).cpu_seconds; });
   std::vector<int> front;
   for (const int i : order) {
-    if (front.empty() || at(i).tension_error < at(front.back()).tension_error) front.push_back(i);
+    if (front.empty() || at(i).error < at(front.back()).error) front.push_back(i);
   }
   return front;
 }
@@ -230,8 +248,8 @@ double distance_to_front(const std::vector<Measurement>& measurements, int index
   double distance = 0;
   for (const Measurement& m : measurements) {
     if (!is_measured(m)) continue;
-    if (m.cpu_seconds <= own.cpu_seconds) distance = std::max(distance, 1 - m.tension_error / own.tension_error);
-    if (m.tension_error <= own.tension_error) distance = std::max(distance, 1 - m.cpu_seconds / own.cpu_seconds);
+    if (m.cpu_seconds <= own.cpu_seconds) distance = std::max(distance, 1 - m.error / own.error);
+    if (m.error <= own.error) distance = std::max(distance, 1 - m.cpu_seconds / own.cpu_seconds);
   }
   return distance;
 }

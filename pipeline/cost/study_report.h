@@ -8,7 +8,7 @@
 
 namespace mbtfm::cost {
 
-/// Indices of the measurements that no other one beats in both processor time and error of the tensions, the quickest
+/// Indices of the measurements that no other one beats in both processor time and error, the quickest
 /// first. Failed ones and ones that were not run are left out.
 std::vector<int> front_of(const std::vector<Measurement>& measurements);
 

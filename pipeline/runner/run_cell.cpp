@@ -120,14 +120,13 @@ void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
   }
 }
 
-/// @throws UsageError where the preset says nothing to this kind of cell
-void expect_fit(const RunOptions& options, const CellStages& of) {
-  if (of.kind == CellKind::plane || options.beneath.empty()) return;
-  const bool is_sheet = of.kind == CellKind::sheet;
-  throw UsageError(
-      "--preset " + options.preset + ": presets are for fibres on flat gels, and this one is " +
-      (is_sheet ? "a sheet (" : "in space (") + of.why + "): leave it out, and set " +
-      (is_sheet ? "sheet.mesh_um for finer or coarser triangles" : "traction.spacing_um for more or fewer tractions"));
+/// What the preset says to this kind of cell. @throws UsageError where it says nothing
+const std::vector<Setting>& beneath(const RunOptions& options, const CellStages& of) {
+  if (of.kind == CellKind::space) return options.beneath_in_space;
+  if (of.kind == CellKind::plane || options.beneath.empty()) return options.beneath;
+  throw UsageError("--preset " + options.preset + ": presets are for cells with fibres and cells in space, and this " +
+                   "one is a sheet (" + of.why +
+                   "): leave it out, and set sheet.mesh_um for finer or coarser triangles");
 }
 
 fs::path checked(fs::path cell) {
@@ -143,11 +142,9 @@ class CellRun {
         options_(options),
         images_(read_image_names(cell_)),
         of_(stages_of(cell_, images_)),
-        beneath_(unset_in(cell_ / "cell.toml", options.beneath)),
+        beneath_(unset_in(cell_ / "cell.toml", beneath(options, of_))),
         settings_(read_settings(cell_ / "cell.toml", of_.stages, beneath_)),
-        hashes_(cell_) {
-    expect_fit(options, of_);
-  }
+        hashes_(cell_) {}
 
   CellOutcome look();
   CellOutcome run();

@@ -17,13 +17,14 @@ struct RunOptions {
   std::filesystem::path stage_folder;  ///< where the stages' executables are
   int threads = 1;
   bool is_quiet = false;
-  bool is_checked = false;            ///< every stage is known to accept its parameters
-  std::vector<std::string> only;      ///< names of stages; empty: all
-  std::vector<std::string> redo;      ///< stages to run even if up to date or changed by hand
-  bool explain = false;               ///< let the fit estimate what the effects that are off would change
-  ProcessLimits limits;               ///< of each stage
-  std::string preset = {};            ///< name of what `beneath` comes from; empty: none
-  std::vector<Setting> beneath = {};  ///< in place of defaults, where cell.toml says nothing
+  bool is_checked = false;                     ///< every stage is known to accept its parameters
+  std::vector<std::string> only;               ///< names of stages; empty: all
+  std::vector<std::string> redo;               ///< stages to run even if up to date or changed by hand
+  bool explain = false;                        ///< let the fit estimate what the effects that are off would change
+  ProcessLimits limits;                        ///< of each stage
+  std::string preset = {};                     ///< name of what `beneath` comes from; empty: none
+  std::vector<Setting> beneath = {};           ///< in place of defaults, where cell.toml says nothing
+  std::vector<Setting> beneath_in_space = {};  ///< the same of a cell in space
   std::string version;
   std::function<void(const StageTold&)> say;          ///< what became of each stage
   std::function<Sink()> sink = {};                    ///< makes one for what a stage prints; empty: our standard error

@@ -32,17 +32,18 @@ void warn_of_few_cells(const Study& study, std::vector<std::string>& warnings) {
     std::vector<int> n_of(study.conditions.size(), 0);
     for (const StudyCell& cell : study.cells)
       n_of[static_cast<std::size_t>(cell.condition)] += cell.kind() == kind ? 1 : 0;
-    const std::string name = kind == CellKind::sheet ? "sheet" : "cell";
+    const std::string name = kind == CellKind::sheet ? "sheet" : kind == CellKind::space ? "cell in space" : "cell";
+    const std::string names = kind == CellKind::sheet ? "sheets" : kind == CellKind::space ? "cells in space" : "cells";
     for (std::size_t i = 0; i < n_of.size(); ++i) {
       const std::string where = prefix_of(study.conditions[i]);
       if (n_of[i] == 1) {
-        warnings.push_back(fmt::format(
-            "{0}a single {1}: nothing can be said of how {1}s differ, and no test counts it.", where, name));
+        warnings.push_back(fmt::format("{0}a single {1}: nothing can be said of how {2} differ, and no test counts it.",
+                                       where, name, names));
       } else if (n_of[i] > 0 && n_of[i] < kFew) {
         warnings.push_back(
-            fmt::format("{0}{1} {2}s only: intervals with the {2} as the unit are wide, and rest on the "
-                        "assumption that {2}s scatter normally.",
-                        where, n_of[i], name));
+            fmt::format("{0}{1} {2} only: intervals with the {3} as the unit are wide, and rest on the "
+                        "assumption that {2} scatter normally.",
+                        where, n_of[i], names, kind == CellKind::sheet ? "sheet" : "cell"));
       }
     }
   }
@@ -192,6 +193,16 @@ std::vector<const Measure*> Analysis::measures() const {
   return all;
 }
 
+namespace {
+/// The kind that the study has most of; of equally many cells with fibres, then sheets.
+CellKind most_of(const Study& study) {
+  CellKind most = CellKind::plane;
+  for (const CellKind kind : {CellKind::sheet, CellKind::space})
+    if (n_of_kind(study, kind) > n_of_kind(study, most)) most = kind;
+  return most;
+}
+}  // namespace
+
 PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
   const auto among = [](const std::vector<Measure>& measures, const std::string& column, const std::string& name) {
     const auto at = std::ranges::find_if(measures, [&](const Measure& m) { return m.sample.column == column; });
@@ -203,22 +214,23 @@ PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const
   const auto in_space = [&](const std::string& column, const std::string& name) {
     return among(analysis.in_space, column, name + " of cells in space");
   };
-  const bool has_space = !analysis.in_space.empty(), has_sheets = n_of_kind(study, CellKind::sheet) > 0;
+  const CellKind most = most_of(study);
   PrimaryMeasure asked = parameters.primary;
   if (asked == PrimaryMeasure::automatic)
-    asked = analysis.has_fibres ? PrimaryMeasure::tension
-            : has_sheets        ? PrimaryMeasure::contraction
-                                : PrimaryMeasure::total_force;
+    asked = most == CellKind::plane   ? PrimaryMeasure::tension
+            : most == CellKind::sheet ? PrimaryMeasure::contraction
+                                      : PrimaryMeasure::total_force;
   if (asked == PrimaryMeasure::contraction) return of_sheets(name_of(SheetQuantity::contraction), "contraction");
   if (asked == PrimaryMeasure::mean_tension) return of_sheets("mean_tension_nN_per_um", "mean tension");
   if (asked == PrimaryMeasure::contractile_moment)
     return in_space("space_contractile_moment_nN_um", "contractile moment");
   if (asked == PrimaryMeasure::strain_energy)
-    return has_space ? in_space("space_strain_energy_fJ", "strain energy")
-                     : of_sheets("strain_energy_fJ", "strain energy");
+    return most == CellKind::sheet || analysis.in_space.empty() ? of_sheets("strain_energy_fJ", "strain energy")
+                                                                : in_space("space_strain_energy_fJ", "strain energy");
   if (asked == PrimaryMeasure::total_force) {
-    if (analysis.has_fibres) return {&analysis.cells.front(), 0, "total force of cells"};
-    return has_sheets ? of_sheets("sheet_force_nN", "total force") : in_space("space_force_nN", "total force");
+    if (most == CellKind::plane) return {&analysis.cells.front(), 0, "total force of cells"};
+    return most == CellKind::sheet ? of_sheets("sheet_force_nN", "total force")
+                                   : in_space("space_force_nN", "total force");
   }
   const std::string name = "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres";
   if (!analysis.has_fibres) return {nullptr, 0, name};

@@ -78,6 +78,11 @@ charts::Chart super_plot(const Study& study, const Measure& m, int kind, const s
     if (!sample.is_never_negative) least = std::min(least, o.value - half);
     largest = std::max(largest, o.value + half);
   }
+  for (const Summary& s : m.summaries) {
+    if (s.kind != sample.kinds[static_cast<std::size_t>(kind)] || !s.model) continue;
+    least = std::min(least, s.model->low);
+    largest = std::max(largest, s.model->high);
+  }
   const std::size_t n_keys = replicates.size() > 1 ? replicates.size() : 0;
   charts::Chart chart(
       title, condition_axis(sample),
@@ -143,7 +148,9 @@ std::string dots_of(const Sample& sample) {
 std::optional<Figure> primary_figure(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
   if (study.conditions.size() < 2) return {};
   const PrimaryChoice choice = primary_choice(study, analysis, parameters);
-  if (choice.measure == nullptr || choice.measure->sample.values.empty()) return {};
+  if (choice.measure == nullptr) return {};
+  const auto is_of_kind = [&](const Observation& o) { return o.kind == choice.kind; };
+  if (std::ranges::none_of(choice.measure->sample.values, is_of_kind)) return {};
   const Measure& m = *choice.measure;
   Figure figure{.name = kPrimaryFigure,
                 .title = "Primary comparison",

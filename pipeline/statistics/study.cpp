@@ -294,8 +294,8 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
       "primary", parameters.primary,
       "what the study compares first between conditions; tension: of the fibres of primary_type; total-force: of "
       "the cells; contraction, mean-tension: of the sheets; strain-energy: of the cells in space, or of the sheets; "
-      "contractile-moment: of the cells in space; auto: tension, contraction if there are no fibres, total-force if "
-      "there are only cells in space");
+      "contractile-moment: of the cells in space; auto: tension, contraction of sheets or total-force of cells in "
+      "space, whichever the study has most cells of; total-force and strain-energy go by that, too");
   list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
   list.add("with_not_converged", parameters.with_not_converged, "include cells whose fit did not converge");
   list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),

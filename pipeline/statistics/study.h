@@ -16,12 +16,12 @@ namespace mbtfm::statistics {
 
 /// What the study was made to compare between conditions.
 enum class PrimaryMeasure {
-  automatic,      ///< tension; without fibres the contraction of the sheets; without these the force of cells in space
-  tension,        ///< of the fibres of one type
-  total_force,    ///< of the cells with fibres; without any of the sheets; without these of the cells in space
-  contraction,    ///< of the sheets
-  mean_tension,   ///< of the sheets
-  strain_energy,  ///< of the cells in space; of the sheets where there are none
+  automatic,          ///< of the kind that the study has most of: tension; contraction; total force in space
+  tension,            ///< of the fibres of one type
+  total_force,        ///< of the cells of the kind that the study has most of
+  contraction,        ///< of the sheets
+  mean_tension,       ///< of the sheets
+  strain_energy,      ///< of the cells in space, or of the sheets
   contractile_moment  ///< of the cells in space
 };
 constexpr auto words(PrimaryMeasure) {

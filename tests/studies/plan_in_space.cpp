@@ -58,7 +58,7 @@ Pool pool_of(double beads_per_um3, std::size_t n_beads) {
     bead.displacement_um = {1, 0, 0};  // known later
     bead.sigma_um = 1, bead.sigma_z_um = 3;
   }
-  const spatial::Meshing meshing{.spacing_um = spatial::kSpacingOfBeads / std::cbrt(beads_per_um3),
+  const spatial::Meshing meshing{.spacing_um = spatial::SpatialParameters{}.spacing_beads / std::cbrt(beads_per_um3),
                                  .has_patches = true};
   return {beads, spatial::make_problem({beads, kGel, pairs(), {}}, {}, meshing, {}, kThreads)};
 }
@@ -181,7 +181,8 @@ void study_lattice(const char* scenario, const std::vector<double>& factors) {
     parameters.beads_per_um3 = std::to_string(factor * scene.own_beads_per_um3);
     for (const double most : {500.0, double(spatial::kMostVertices)}) {
       const double density = factor * scene.own_beads_per_um3;
-      scene.traction.spacing_um = std::max(spatial::kSpacingOfBeads / std::cbrt(density), std::sqrt(area_um2 / most));
+      scene.traction.spacing_um =
+          std::max(spatial::SpatialParameters{}.spacing_beads / std::cbrt(density), std::sqrt(area_um2 / most));
       const Asked asked = asked_in_space(parameters, scene);
       const std::vector<SpacePool> pools = pools_of(scene, asked, kThreads);
       const SpaceGrid grid = grid_of(scene, asked, pools, foresee(scene, asked, pools, kThreads),

@@ -149,6 +149,7 @@ void patches(const TractionScene& scene) {
                   sums.mean, sums.over_stated, as_told.mean, as_told.over_stated);
       for (const auto& [name, value] : r.figures) {
         if (name == "misfit_of_patches_alone") std::printf(" patches alone leave %.2f", std::get<double>(value));
+        if (name == "tractions_beside_patches") std::printf(" deviate %.1f", std::get<double>(value));
       }
       for (const auto& f : r.findings) std::printf(f ? " [%s]" : "", f ? f->id.c_str() : "");
       std::printf("\n");
@@ -242,7 +243,7 @@ void meshes(const TractionScene& scene) {
       const double beads_um =
           observe(inputs.beads, scene.gel, spatial::Ground(scene.gel.surface.get()), parameters).distance_um;
       Known known{scene,
-                  make_problem(inputs, parameters, {.spacing_um = share * spatial::kSpacingOfBeads * beads_um}, gel, 2),
+                  make_problem(inputs, parameters, {.spacing_um = share * parameters.spacing_beads * beads_um}, gel, 2),
                   {}};
       known.areas_um2 = patch_areas_um2(scene, known.problem);
       for (const auto& [name, method] : kMethods) {

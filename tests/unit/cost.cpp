@@ -8,7 +8,11 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/cost/accuracy.h"
 #include "pipeline/cost/presets.h"
+#include "pipeline/cost/space_map.h"
 #include "pipeline/cost/study_report.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/text.h"
+#include "pipeline/runner/cell_stages.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::cost {
@@ -90,7 +94,7 @@ Measurement measured(double cpu_seconds, double error) {
           .seconds = cpu_seconds,
           .cpu_seconds = cpu_seconds,
           .n_runs = 1,
-          .tension_error = error};
+          .error = error};
 }
 
 TEST(Front, is_what_no_other_choice_beats_in_both) {
@@ -112,9 +116,109 @@ TEST(Study, of_several_cells_has_root_mean_squares_of_errors_and_means_of_times)
   other.measurements[0] = measured(4, 0.4);
   other.measurements[1].n_runs = 0;  // there was no time for it in this cell
   const Study both = combined({one, other});
-  EXPECT_NEAR(both.measurements[0].tension_error, std::sqrt((0.09 + 0.16) / 2), 1e-12);
+  EXPECT_NEAR(both.measurements[0].error, std::sqrt((0.09 + 0.16) / 2), 1e-12);
   EXPECT_DOUBLE_EQ(both.measurements[0].cpu_seconds, 3);
   EXPECT_EQ(front_of(both.measurements), (std::vector<int>{0}));
+}
+
+TEST(Study, of_cells_with_fibres_and_in_space_together_is_refused) {
+  const Study one{.reference = "the truth", .has_images = false, .measurements = {measured(2, 0.3)}};
+  Study other = one;
+  other.kind = CellKind::space;
+  EXPECT_THROW(combined({one, other}), UsageError);
+}
+
+TEST(Study, of_a_cell_in_space_tells_of_tractions_and_not_of_tensions) {
+  Study study{.kind = CellKind::space,
+              .reference = "the truth",
+              .has_images = false,
+              .measurements = {measured(4, 0.2), measured(1, 0.5)}};
+  study.measurements[0].rung = {.knob = kAsItIs, .value = ""};
+  study.measurements[1].rung = {.knob = "spacing_um", .value = "9"};
+  const test::TemporaryFolder folder;
+  write_study(folder.path(), study, "cell");
+  const files::CsvTable table(folder / "cost.csv");
+  EXPECT_EQ(table.number(1, "traction_error"), 0.5);
+  EXPECT_TRUE(table.text(1, "tension_error").empty());
+  EXPECT_TRUE(table.text(1, "n_fibres").empty());
+  study.kind = CellKind::plane;
+  write_study(folder / "flat", study, "cell");
+  const files::CsvTable flat(folder / "flat/cost.csv");
+  EXPECT_EQ(flat.number(1, "tension_error"), 0.5);
+  EXPECT_TRUE(flat.text(1, "traction_error").empty());
+  const std::string page = files::read_text(folder / "cost.md"), svg = files::read_text(folder / "cost.svg");
+  EXPECT_NE(page.find("error of tractions"), std::string::npos);
+  EXPECT_EQ(page.find("fibres"), std::string::npos);
+  EXPECT_EQ(page.find("tensions"), std::string::npos);
+  EXPECT_NE(svg.find("error of the tractions, relative"), std::string::npos);
+}
+
+/// Tractions of one kPa along x on a square lattice of `n` places a side.
+SpaceMap even_map(int n, double step_um, double traction_kPa) {
+  SpaceMap map;
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      map.at_um.push_back({i * step_um, j * step_um, 0});
+      map.traction_kPa.push_back({traction_kPa, 0, 0});
+      map.area_um2.push_back(step_um * step_um);
+    }
+  }
+  return map;
+}
+
+TEST(SpaceMaps, of_the_same_field_on_other_lattices_do_not_differ) {
+  const auto slope = [](SpaceMap map) {  // bilinear itself
+    for (std::size_t k = 0; k < map.at_um.size(); ++k) map.traction_kPa[k].z = 0.01 * map.at_um[k].x * map.at_um[k].y;
+    return map;
+  };
+  EXPECT_NEAR(difference(slope(even_map(5, 3, 1)), slope(even_map(13, 1, 1))), 0, 1e-12);
+  EXPECT_NEAR(difference(slope(even_map(13, 1, 1)), slope(even_map(5, 3, 1))), 0, 1e-12);
+}
+
+TEST(SpaceMaps, differ_by_the_share_of_the_reference) {
+  EXPECT_NEAR(difference(even_map(5, 3, 0.75), even_map(13, 1, 1)), 0.25, 1e-12);
+  EXPECT_NEAR(difference(even_map(5, 3, 2), even_map(13, 1, 1)), 1, 1e-12);
+  // beyond its last place, and where a place lacks, a map has no tractions
+  EXPECT_NEAR(difference(even_map(3, 3, 1), even_map(13, 1, 1)), std::sqrt(1 - 49. / 169), 1e-12);
+  SpaceMap holed = even_map(3, 6, 1);
+  holed.traction_kPa[4] = {};
+  SpaceMap lacks = even_map(3, 6, 1);
+  lacks.at_um.erase(lacks.at_um.begin() + 4);
+  lacks.traction_kPa.erase(lacks.traction_kPa.begin() + 4);
+  EXPECT_NEAR(difference(lacks, even_map(13, 1, 1)), difference(holed, even_map(13, 1, 1)), 1e-12);
+  EXPECT_GT(difference(lacks, even_map(13, 1, 1)), 0.1);
+}
+
+/// A truth on steps of 2 um under a slope of 60 degrees: twice the area.
+TEST(SpaceMaps, of_the_truth_have_the_area_of_the_surface) {
+  const test::TemporaryFolder folder;
+  std::string text = "x_um,y_um,z_um,nx,ny,nz,tx_kPa,ty_kPa,tz_kPa\n";
+  for (int k = 0; k < 6; ++k)
+    text += std::to_string(2 * (k % 3)) + "," + std::to_string(2 * (k / 3)) + ",0,0.8660254,0,-0.5,0,0,3\n";
+  std::filesystem::create_directories(folder / "truth");
+  EXPECT_FALSE(has_space_truth(folder.path()));
+  files::write_text(folder / "truth/surface_traction.csv", text);
+  ASSERT_TRUE(has_space_truth(folder.path()));
+  EXPECT_NEAR(true_space_map(folder.path()).total_force_nN, 6 * 8 * 3, 1e-9);
+}
+
+TEST(Ladder, in_space_turns_knobs_that_the_stage_has) {
+  std::vector<Rung> rungs = ladder_in_space(Extent::whole, 6);
+  for (const char* preset : {"fast", "high"}) EXPECT_FALSE(preset_named(preset).in_space.empty()) << preset;
+  std::set<std::string> knobs;
+  for (const Rung& rung : rungs) {
+    knobs.insert(rung.knob);
+    for (const runner::Setting& setting : rung.settings) {
+      EXPECT_FALSE(runner::flags_of(runner::stages_in_space().back(), {setting}).empty())
+          << setting.table << "." << setting.key;
+    }
+    const std::string group = group_of(rung.knob, CellKind::space);
+    EXPECT_TRUE(std::ranges::count(groups_of(CellKind::space), group) == 1) << rung.knob;
+  }
+  for (const char* knob : {"spacing_um", "displacement_tolerance", "method", "loss", "refine", "beads", "threads"})
+    EXPECT_TRUE(knobs.contains(knob)) << knob;
+  const auto coarse = std::ranges::find_if(rungs, [](const Rung& r) { return r.knob == "spacing_um"; });
+  EXPECT_EQ(coarse->settings.front().value, "12");
 }
 
 TEST(Ladder, turns_every_knob_that_trades_accuracy_for_time) {

@@ -873,8 +873,9 @@ TEST(SpaceStudy, beside_cells_with_fibres_and_sheets_no_figure_mixes_them) {
     for (const int cell : c.cells)
       EXPECT_EQ(study.cells[static_cast<std::size_t>(cell)].kind(), CellKind::plane) << c.force;
   }
-  EXPECT_EQ(analysis.primary.measure, "tension of ventral fibres");
-  EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::total_force}).primary.measure, "total force of cells");
+  EXPECT_EQ(analysis.primary.measure, "total force of cells in space") << "most cells are of them";
+  EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::tension}).primary.measure, "tension of ventral fibres");
+  EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::contraction}).primary.measure, "contraction of sheets");
   EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::strain_energy}).primary.measure,
             "strain energy of cells in space");
   EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::contractile_moment}).primary.measure,
