@@ -318,7 +318,9 @@ ordered_json axis_of(Side side, const Axis& axis) {
 
 /// Room for the numbers or names of an upright axis and its title.
 double left_room_px(const Axis& axis) {
-  return kTextWidth_px * static_cast<double>(std::max(std::size_t{5}, longest_name(axis))) +
+  const double largest = std::max(std::abs(axis.low), std::abs(axis.high));
+  const std::size_t number = fmt::format("{:.0f}", largest).size(), with_commas = number + (number - 1) / 3;
+  return kTextWidth_px * static_cast<double>(std::max({std::size_t{5}, with_commas, longest_name(axis)})) +
          (axis.label.empty() ? 12 : 28);
 }
 

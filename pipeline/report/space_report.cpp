@@ -53,10 +53,14 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   std::vector<std::string> facts;
   facts.push_back(fmt::format(
       "The cell pulls and presses with {} in total, the sum of the sizes of its tractions over {}; {} nN of it are "
-      "along the surface's normal. The largest traction is {} kPa.",
+      "along the surface’s normal. The largest traction is {} kPa.",
       with_error(total, r.find("total_force_sigma_nN"), "nN"), r.texts.at("tractions_over"),
       readable(r.number("normal_force_nN")), readable(largest_traction_kPa(r))));
   facts.push_back(fmt::format("The strain energy of the gel is {} fJ.", readable(r.number("strain_energy_fJ"))));
+  if (const auto moment_found = r.find("contractile_moment_nN_um"))
+    facts.back() += fmt::format(
+        " The contractile moment of the tractions about their centre is {}, above zero if they pull inwards.",
+        with_error(*moment_found, r.find("contractile_moment_sigma_nN_um"), "nN µm"));
   facts.push_back(
       fmt::format("Balance: the forces add up to {} ({} % of the sum of their sizes), the moments about their centre "
                   "to {}. A cell that "

@@ -178,13 +178,16 @@ Figure sheet_figure(const Study& study, const Analysis& analysis) {
 }
 
 Figure space_figure(const Study& study, const Analysis& analysis) {
-  return {.name = "cells_in_space",
-          .title = "Cells in space",
-          .caption =
-              "A dot is a cell, with the 95 % interval of its own error if that is known. Forces of adhesions: small "
-              "dots, and the large one is the mean of a cell. Black: mean of the mixed model with its 95 % interval.",
-          .charts = super_plots(study, analysis.in_space),
-          .n_columns = 3};
+  const bool has_adhesions = std::ranges::any_of(
+      analysis.in_space, [](const Measure& m) { return m.sample.each == Observed::adhesions_in_space; });
+  return {
+      .name = "cells_in_space",
+      .title = "Cells in space",
+      .caption = std::string("A dot is a cell, with the 95 % interval of its own error if that is known. ") +
+                 (has_adhesions ? "Forces of adhesions: small dots, and the large one is the mean of a cell. " : "") +
+                 "Black: mean of the mixed model with its 95 % interval.",
+      .charts = super_plots(study, analysis.in_space),
+      .n_columns = 3};
 }
 
 }  // namespace mbtfm::statistics

@@ -177,25 +177,23 @@ const Table<InCell<CellRow>>& cell_table() {
             {"space_method", "that found the tractions of a cell in space",
              of_cell([](const StudyCell& c) { return c.space ? c.space->method : std::string(); })},
             {"space_force_nN", "sum of the sizes of the tractions of a cell in space",
-             in_space(&SpaceFigures::total_force_nN), kResult},
-            {"space_force_sigma_nN", "standard error of space_force_nN", in_space(&SpaceFigures::total_force_sigma_nN),
-             kResult},
-            {"space_strain_energy_fJ", "of the gel of a cell in space", in_space(&SpaceFigures::strain_energy_fJ),
-             kResult},
+             in_space(&SpaceFigures::total_force_nN)},
+            {"space_force_sigma_nN", "standard error of space_force_nN", in_space(&SpaceFigures::total_force_sigma_nN)},
+            {"space_strain_energy_fJ", "of the gel of a cell in space", in_space(&SpaceFigures::strain_energy_fJ)},
             {"space_contractile_moment_nN_um",
              "of a cell in space: minus the integral of place times traction about the cell's centre; above 0: inward",
-             in_space(&SpaceFigures::contractile_moment_nN_um), kResult},
+             in_space(&SpaceFigures::contractile_moment_nN_um)},
             {"space_contractile_moment_sigma_nN_um", "standard error of space_contractile_moment_nN_um",
-             in_space(&SpaceFigures::contractile_moment_sigma_nN_um), kResult},
+             in_space(&SpaceFigures::contractile_moment_sigma_nN_um)},
             {"space_normal_share", "sizes of the tractions' parts along the normal over their sizes (0 to 1)",
-             in_space(&SpaceFigures::normal_share), kResult},
+             in_space(&SpaceFigures::normal_share)},
             {"space_largest_traction_kPa", "of the map of a cell in space",
-             in_space(&SpaceFigures::largest_traction_kPa), kResult},
+             in_space(&SpaceFigures::largest_traction_kPa)},
             {"space_net_force_nN", "size of the sum of the forces; of a cell that nothing else holds: errors alone",
-             in_space(&SpaceFigures::net_force_nN), kResult},
-            {"space_net_moment_nN_um", "the same of the moments", in_space(&SpaceFigures::net_moment_nN_um), kResult},
+             in_space(&SpaceFigures::net_force_nN)},
+            {"space_net_moment_nN_um", "the same of the moments", in_space(&SpaceFigures::net_moment_nN_um)},
             {"space_resolution_um", "forces closer together than this look like one; median over the surface",
-             in_space(&SpaceFigures::resolution_um), kResult}}})};
+             in_space(&SpaceFigures::resolution_um)}}})};
   return table;
 }
 
@@ -280,11 +278,10 @@ const Table<SpaceForceRow>& space_force_table() {
   static const Table<SpaceForceRow> table{
       .file = "statistics/adhesions_in_space.csv",
       .row = "each adhesion of a cell in space",
-      .columns =
-          files::joined<SpaceForceRow>({cell_columns<Of>(),
-                                        {{"adhesion_id", "label of the adhesion", of(&Of::adhesion_id)},
-                                         {"force_nN", "size of its force", of(&Of::force_nN), kResult},
-                                         {"sigma_nN", "standard error along the force", of(&Of::sigma_nN), kResult}}})};
+      .columns = files::joined<SpaceForceRow>({cell_columns<Of>(),
+                                               {{"adhesion_id", "label of the adhesion", of(&Of::adhesion_id)},
+                                                {"force_nN", "size of its force", of(&Of::force_nN)},
+                                                {"sigma_nN", "standard error along the force", of(&Of::sigma_nN)}}})};
   return table;
 }
 
