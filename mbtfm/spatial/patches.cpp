@@ -49,8 +49,8 @@ Anywhere tractions_anywhere(const Problem& problem, int threads) {
 /// less their best forces on the patches, A the answer to tractions of variance one anywhere and M the projection off
 /// the patches' answers, y'A A'y is the score of these tractions' variance at zero. Over y'y per datum, if patches are
 /// all there is, it has the first two moments of a scaled chi-squared of h = (tr K)²/tr K² with K = A'M A, which the
-/// cube root makes normal (Wilson & Hilferty, PNAS 17 (1931) 684). Taken off before is the most that the gel's model
-/// error, which no noise is, can add.
+/// cube root makes normal (Wilson & Hilferty, PNAS 17 (1931) 684). Taken off before is what a field of the size of the
+/// gel's model error adds on the average, if tractions of variance one made it: that error is no noise.
 /// Source: Lin, Biometrika 84 (1997) 309.
 double deviate_of_tractions_beside(const Problem& problem, const MatrixXd& of_patches, const MatrixXd& anywhere,
                                    const VectorXd& weights_by_row, double n_data, int threads) {
@@ -65,16 +65,10 @@ double deviate_of_tractions_beside(const Problem& problem, const MatrixXd& of_pa
   K = K.selfadjointView<Eigen::Upper>();
   const double trace = K.trace(), trace_of_square = K.squaredNorm();
   const double degrees = std::max(1.0, n_data - static_cast<double>(P.cols() + rows.n_common()));
-  VectorXd direction = VectorXd::Ones(K.cols());
-  double largest = 0;
-  for (int k = 0; k < 30; ++k) {  // power steps, from below: a few per cent of the largest eigenvalue suffice
-    direction = K * direction.normalized();
-    largest = direction.norm();
-  }
-  const double of_gel = problem.model_error * u.norm() * std::sqrt(largest);
-  const double score = std::max(0.0, (MA.transpose() * y).norm() - of_gel);
+  const double of_gel = std::pow(problem.model_error, 2) * u.squaredNorm() * trace_of_square / trace;
+  const double score = std::max(0.0, (MA.transpose() * y).squaredNorm() - of_gel);
   const double h = trace * trace / trace_of_square;
-  const double over_expected = score * score / (y.squaredNorm() / degrees) / trace;
+  const double over_expected = score / (y.squaredNorm() / degrees) / trace;
   const double spread = 2 / (9 * h);
   return (std::cbrt(over_expected) - (1 - spread)) / std::sqrt(spread);
 }

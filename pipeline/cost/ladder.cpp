@@ -95,6 +95,7 @@ std::vector<Rung> ladder_in_space(Extent extent, double spacing_um) {
   };
   add_preset("fast");
   for (const double share : {2.0, 1.6, 1.25}) add_spacing(share);
+  add(rungs, "substrate", "growth", {"16", "8"});
   add(rungs, "substrate", "displacement_tolerance", {"0.1", "0.05"});
   add(rungs, "traction", "method", {"tikhonov", "group-l1"});
   add(rungs, "traction", "refine", {"resolved"});
@@ -128,6 +129,7 @@ std::string group_of(const std::string& knob, CellKind kind) {
                                                             {"element", "gel"},
                                                             {"margin_thicknesses", "gel"},
                                                             {"displacement_tolerance", "gel"},
+                                                            {"growth", "gel"},
                                                             {"material", "gel"},
                                                             {"surface_lines", "gel"},
                                                             {"n_meshes", "network and meshes"},

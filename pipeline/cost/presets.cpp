@@ -12,7 +12,8 @@ const std::vector<Preset>& presets() {
        {{"track", "binning", "2"},              // half the time of tracking; beads that are hard to tell apart are lost
         {"network", "edge_length_um", "2.5"},   // a third of the links, and of the time of their equilibrium
         {"fit", "surface_lines", "40"}},        // drawing the gel's surface finely takes as long as fitting a mesh
-       {{"traction", "spacing_beads", "1.06"},  // a quarter of the time of the decomposition; sparse maps are coarser
+       {{"traction", "spacing_beads", "1.06"},  // with noise as near as a finer lattice, but to sparse maps
+        {"substrate", "growth", "8"},           // half the elements: they cost more than all the rest
         {"substrate", "displacement_tolerance", "0.05"}}},
       {"standard", "the defaults", {}, {}},
       {"high",

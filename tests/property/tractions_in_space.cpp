@@ -911,7 +911,7 @@ TEST_F(FindingsInSpace, tell_a_weak_patch_that_is_missing_by_what_its_beads_do_t
   traction.method = tractions::TractionMethod::patches;
   parameters.background = 0;
   constexpr int kDraws = 16;
-  constexpr double kForce_nN = 12;
+  constexpr double kForce_nN = 24;
   std::vector<double> without, with;
   for (scene.seed = 1; scene.seed <= kDraws; ++scene.seed) {
     const auto deviate_of = [&](const std::vector<BeadInSpace>& beads, bool fires_at_it) {

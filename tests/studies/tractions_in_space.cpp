@@ -3,6 +3,7 @@
 ///             independent dense inversion (docs/developers/tractions_in_space.md).
 ///   losses    the same by loss, with beads astray
 ///   patches   forces on patches that are known: with a background, without, and as sums of maps that know of none
+///   beside    the same patches alone: how far what they leave looks like tractions beside them
 ///   thesis    the minimiser of the thesis: how near to the minimum, and at what price
 ///   meshes    three meshes of the gel by three of the tractions: how far the answers differ, over what noise does
 ///   refine    faces split by each rule, beside even lattices
@@ -127,7 +128,8 @@ TractionScene with_draw(TractionScene scene, int draw) {
 }
 
 /// Of patches as wide as the bumps are, and of such whose second moment is that of the bumps.
-void patches(const TractionScene& scene) {
+enum class Ways { all, patches_alone };
+void patches_by(const TractionScene& scene, Ways ways) {
   using enum tractions::TractionMethod;
   constexpr int kDraws = 2;
   const double weak = spatial::SpatialParameters{}.background;
@@ -159,6 +161,7 @@ void patches(const TractionScene& scene) {
       for (int draw = 0; draw < kDraws; ++draw) {
         problem.observed = spatial::observe(with_draw(scene, draw).observed(noise), scene.gel, problem.ground, {});
         measure(noise, draw, "patches alone", tractions::TractionMethod::patches, 0);
+        if (ways == Ways::patches_alone) continue;
         measure(noise, draw, "patches, background", tractions::TractionMethod::patches, weak);
         if (radii < 1) continue;
         measure(noise, draw, "tikhonov", tikhonov, weak);
@@ -167,6 +170,9 @@ void patches(const TractionScene& scene) {
     }
   }
 }
+
+void patches(const TractionScene& scene) { patches_by(scene, Ways::all); }
+void beside(const TractionScene& scene) { patches_by(scene, Ways::patches_alone); }
 
 // --- the thesis' minimiser
 
@@ -429,16 +435,13 @@ void beside_fttc(const TractionScene& scene) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::map<std::string, void (*)(const TractionScene&)> studies = {{"methods", methods},
-                                                                         {"losses", losses},
-                                                                         {"patches", patches},
-                                                                         {"thesis", thesis},
-                                                                         {"meshes", meshes},
-                                                                         {"refine", refine},
-                                                                         {"surface", with_estimated_surface},
-                                                                         {"fttc", beside_fttc}};
+  const std::map<std::string, void (*)(const TractionScene&)> studies = {
+      {"methods", methods}, {"losses", losses}, {"patches", patches}, {"beside", beside},
+      {"thesis", thesis},   {"meshes", meshes}, {"refine", refine},   {"surface", with_estimated_surface},
+      {"fttc", beside_fttc}};
   if (argc < 4 || !studies.contains(argv[1])) {
-    std::cerr << "usage: tractions_in_space methods|losses|patches|thesis|meshes|refine|surface|fttc FOLDER SCENE...\n";
+    std::cerr << "usage: tractions_in_space methods|losses|patches|beside|thesis|meshes|refine|surface|fttc FOLDER "
+                 "SCENE...\n";
     return 2;
   }
   for (int k = 3; k < argc; ++k) studies.at(argv[1])(test::traction_scene(std::filesystem::path(argv[2]) / argv[k]));
