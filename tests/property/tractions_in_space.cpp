@@ -906,34 +906,39 @@ double figure_of(const SpatialReconstruction& r, const std::string& name) {
   return at == r.figures.end() ? NAN : std::get<double>(at->second);
 }
 
-/// A force that raises the squares of the misfit by no more than chance does has a direction in which it is seen.
+/// A force that raises the squares of the misfit by less than a tenth has a direction in which it is seen.
 TEST_F(FindingsInSpace, tell_a_weak_patch_that_is_missing_by_what_its_beads_do_together) {
   traction.method = tractions::TractionMethod::patches;
   parameters.background = 0;
   constexpr int kDraws = 16;
-  constexpr double kForce_nN = 24;
+  constexpr double kForce_nN = 20;
   std::vector<double> without, with;
+  int n_told = 0;
   for (scene.seed = 1; scene.seed <= kDraws; ++scene.seed) {
-    const auto deviate_of = [&](const std::vector<BeadInSpace>& beads, bool fires_at_it) {
+    const auto found_with = [&](const std::vector<BeadInSpace>& beads) {
       const auto r = reconstruct(scene.problem(beads, parameters), {{}, scene.gel, scene.adhesions(), {}}, traction,
                                  parameters, 1);
-      EXPECT_EQ(fires("patches-do-not-fit", r.findings), fires_at_it) << scene.seed;
       EXPECT_LT(figure_of(r, "misfit_of_patches_alone"), 1.1) << scene.seed;
-      return figure_of(r, "tractions_beside_patches");
+      return r;
     };
-    without.push_back(deviate_of(scene.beads(kSigma_um), false));
+    const auto whole = found_with(scene.beads(kSigma_um));
+    EXPECT_FALSE(fires("patches-do-not-fit", whole.findings)) << scene.seed;
+    without.push_back(figure_of(whole, "tractions_beside_patches"));
     scene.spots.push_back({{12, 12}, 4, {0, -kForce_nN, 0}});
     const std::vector<BeadInSpace> beads = scene.beads(kSigma_um);
     scene.spots.pop_back();
-    with.push_back(deviate_of(beads, true));
+    const auto lacks = found_with(beads);
+    n_told += fires("patches-do-not-fit", lacks.findings) ? 1 : 0;
+    with.push_back(figure_of(lacks, "tractions_beside_patches"));
   }
   double mean = 0, square = 0;
   for (const double d : without) mean += d / kDraws, square += d * d / kDraws;
-  std::printf("without: mean %.2f, rms %.2f, largest %.2f; with: least %.2f\n", mean, std::sqrt(square),
-              *std::ranges::max_element(without), *std::ranges::min_element(with));
+  std::printf("without: mean %.2f, rms %.2f, largest %.2f; with: least %.2f, told %d\n", mean, std::sqrt(square),
+              *std::ranges::max_element(without), *std::ranges::min_element(with), n_told);
   // of 16 normal numbers the mean is known to 0.25, the root mean square to 18 %: three times that
   EXPECT_NEAR(mean, 0, 0.75);
   EXPECT_NEAR(std::sqrt(square), 1, 0.53);
+  EXPECT_GE(n_told, 13);  // 15 are; the deviates scatter by more than one about their mean
 }
 
 /// A gel that is wrong by a few per cent leaves what looks like tractions; as far as it says so it is none of them.
