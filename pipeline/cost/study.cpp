@@ -91,8 +91,7 @@ class Scratch {
                        "its report lists how long each stage took; sheet.mesh_um sets how many triangles there are");
     stages_ = runner::stages();
     if (kind_ == CellKind::space) {
-      stages_ = of.stages;
-      std::erase_if(stages_, [](const runner::Stage& stage) { return stage.name != "traction"; });
+      stages_ = {of.stages.back()};  // traction
     } else {
       has_images_ = has_all_images(cell, images_);
     }
@@ -156,8 +155,9 @@ class Scratch {
   }
 
   void take_from_cell() const {
-    for (const char* part : {"1_segment", "2_track", "3_surface"}) {
-      if (std::string(part) == "3_surface" && kind_ != CellKind::space) continue;
+    std::vector<std::string> parts = {"1_segment", "2_track"};
+    if (kind_ == CellKind::space) parts.emplace_back("3_surface");
+    for (const std::string& part : parts) {
       fs::remove_all(folder_ / part);
       if (files::is_folder(cell_ / part)) copy_files(cell_ / part, folder_ / part);
     }
