@@ -255,7 +255,7 @@ Rest rest_of(const std::vector<Candidate>& fibres, const Judge& judge) {
     seen.push_back({c.trace.points, std::clamp(c.profile.width_px, kNarrowest * usual_px, kWidest * usual_px)});
   Rest rest{judge.field, {}};
   rest.field.image = without_lines(judge.field.image, seen, p.fibre_averaging_um / judge.field.pixel_um);
-  rest.ridges = find_ridges(rest.field.image, rest.field.is_inside, scales_of(p, rest.field.pixel_um));
+  rest.ridges = find_ridges(rest.field.image, scales_of(p, rest.field.pixel_um));
   cv::magnitude(judge.ridges.noise, kLeft * (judge.ridges.strongest - rest.ridges.strongest), rest.ridges.noise);
   return rest;
 }

@@ -124,8 +124,9 @@ bool Ridges::is_crest(int x, int y) const {
   return at(here - across, angle) <= height && at(here + across, angle) < height;
 }
 
-Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeScales& scales, int n_directions) {
-  const FilterBank bank = bank_of(scales, n_directions);
+namespace {
+
+Ridges filtered(const cv::Mat& image, const FilterBank& bank, int n_directions) {
   const int step = bank.side - 2 * bank.margin;
   const int columns = (image.cols + step - 1) / step, rows = (image.rows + step - 1) / step;
   cv::Mat padded;
@@ -139,6 +140,18 @@ Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeSc
     for (int i = tiles.start; i < tiles.end; ++i)
       filter_tile(padded, bank, {i % columns * step, i / columns * step}, ridges);
   });
+  return ridges;
+}
+
+}  // namespace
+
+Ridges find_ridges(const cv::Mat& image, const RidgeScales& scales, int n_directions) {
+  return filtered(image, bank_of(scales, n_directions), n_directions);
+}
+
+Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeScales& scales, int n_directions) {
+  const FilterBank bank = bank_of(scales, n_directions);
+  Ridges ridges = filtered(image, bank, n_directions);
   ridges.camera_noise = texture_of({noise_magnitude(image)}, is_inside, scales.noise_radius_px) * bank.noise_gain;
   set_noise(ridges, is_inside, scales.noise_radius_px);
   return ridges;

@@ -35,6 +35,9 @@ struct RidgeScales {
 /// @param is_inside  CV_8U, not 0 where the texture is the cell's; nothing outside of it counts as texture
 Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeScales& scales, int n_directions = 16);
 
+/// The responses alone, without noise.
+Ridges find_ridges(const cv::Mat& image, const RidgeScales& scales, int n_directions = 16);
+
 /// The noise of these responses from the places that are free of fibres: the greater of the camera's white noise
 /// through the filter and the spread of the responses in the texture around.
 /// @param is_free  CV_8U, not 0 where the cell's texture is to be seen
