@@ -20,8 +20,8 @@ double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points
 /// Texture hardly makes more significant lines.
 constexpr double kHardlyTexture = 10;
 
-/// Where a line lies: texture makes lines anywhere, fibres lie beside fibres.
-enum class LinePlace { alone, beside_a_fibre };
+/// Where a line lies: texture makes lines anywhere, fibres lie beside fibres and end on adhesions that lie along them.
+enum class LinePlace { alone, beside_a_fibre, on_adhesion_along_it };
 
 /// The lines that a cell's texture makes: how many, and how significant they are as a rule.
 struct TextureLines {
@@ -32,10 +32,15 @@ struct TextureLines {
   /// & Morel, From Gestalt Theory to Image Analysis, Springer 2008, ch. 3).
   double expected_false(double significance, LinePlace place = LinePlace::alone) const;
   /// The chance that such a line is a fibre: the density of fibres at that significance over that of all lines.
-  double chance_of_fibre(double significance, LinePlace place = LinePlace::alone) const;
+  /// @param fibres_per_unit  of significance: see fibres_per_unit()
+  double chance_of_fibre(double significance, double fibres_per_unit, LinePlace place = LinePlace::alone) const;
 };
 /// From the lines of the cell itself, most of which are its texture's.
 TextureLines texture_lines(std::vector<double> significances);
+
+/// How many fibres a cell has by unit of significance, where texture makes lines as well.
+/// @param significances  of its fibres
+double fibres_per_unit(const std::vector<double>& significances);
 
 /// Lines that others may lie beside. Bundles lie in carpets; a line of texture is beside one by chance.
 class Bundles {

@@ -78,7 +78,8 @@ struct Candidate {
   WayOn before, after;
   Profile profile;
   double significance = 0;
-  double expected_false = 0;  ///< lines as significant as this one that texture would make
+  double expected_false = 0;                             ///< lines as significant as this one that texture would make
+  double expected_beside = 0, expected_on_adhesion = 0;  ///< those of them at such places
   LinePlace place = LinePlace::alone;
 };
 
@@ -145,7 +146,9 @@ struct Judge {
     c.trace = trace.part(piece.first, piece.first + piece.n);
     c.significance = significance_of(points, c.trace.own_height(), ridges, field, p);
     c.expected_false = texture.expected_false(c.significance);
-    if (texture.expected_false(c.significance, LinePlace::beside_a_fibre) > p.fibre_false_per_cell) return std::nullopt;
+    c.expected_beside = texture.expected_false(c.significance, LinePlace::beside_a_fibre);
+    c.expected_on_adhesion = texture.expected_false(c.significance, LinePlace::on_adhesion_along_it);
+    if (std::min(c.expected_beside, c.expected_on_adhesion) > p.fibre_false_per_cell) return std::nullopt;
     c.profile = profile_across(field.image, points, 1.5 * p.fibre_width_um / field.pixel_um);
     if (!falls_on_both_sides(c.profile, p.fibre_side_ratio)) return std::nullopt;
     if (is_ruffle(c.points_um, outline_um, p.fibre_lamellipodium_um)) return std::nullopt;
@@ -162,9 +165,16 @@ struct Judge {
   }
 };
 
+struct Judged {
+  std::vector<Candidate> fibres;
+  std::vector<Candidate> doubtful;  ///< fibres if adhesions hold them
+};
+
 /// Those that are more significant than texture, and those beside them that are more significant than the texture that
-/// lies beside fibres by chance.
-std::vector<Candidate> significant(std::vector<Candidate> candidates, const FibreParameters& p) {
+/// lies beside fibres by chance. Of the others those that are more significant than the texture that ends on adhesions
+/// by chance: there may be one false one for fifty fibres, so none in a cell without fibres.
+Judged significant(std::vector<Candidate> candidates, const FibreParameters& p) {
+  constexpr double kFalseByFibre = 0.02;
   std::vector<Candidate> kept;
   Bundles bundles;
   const auto take = [&](auto is_fibre) {
@@ -177,12 +187,15 @@ std::vector<Candidate> significant(std::vector<Candidate> candidates, const Fibr
   };
   take([&](const Candidate& c) { return c.expected_false <= p.fibre_false_per_cell; });
   while (take([&](Candidate& c) {
-    if (bundles.share_beside(c.points_um) < kMostBeside) return false;
+    if (c.expected_beside > p.fibre_false_per_cell || bundles.share_beside(c.points_um) < kMostBeside) return false;
     c.place = LinePlace::beside_a_fibre;
     return true;
   })) {
   }
-  return kept;
+  const double most_false = std::min(p.fibre_false_per_cell, kFalseByFibre * static_cast<double>(kept.size()));
+  std::erase_if(candidates, [&](const Candidate& c) { return c.expected_on_adhesion > most_false; });
+  for (Candidate& c : candidates) c.place = LinePlace::on_adhesion_along_it;
+  return {std::move(kept), std::move(candidates)};
 }
 
 /// Of the ridges along the outline: the height of the cell's cortex, seen from its side. Infinite without an outline.
@@ -236,7 +249,7 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
       candidates.push_back(std::move(*inner[i]));
   }
   std::erase_if(candidates, [&](const Candidate& c) { return c.profile.height < faint; });
-  return significant(std::move(candidates), judge.p);
+  return significant(std::move(candidates), judge.p).fibres;  // what is doubtful is judged without them
 }
 
 /// What is left without the fibres found so far.
@@ -261,7 +274,7 @@ Rest rest_of(const std::vector<Candidate>& fibres, const Judge& judge) {
 }
 
 /// Also the fainter ones, which brighter ones beside or across them hide.
-std::vector<Candidate> with_hidden(std::vector<Candidate> fibres, const Rest& rest, const Judge& judge) {
+Judged with_hidden(std::vector<Candidate> fibres, const Rest& rest, const Judge& judge) {
   std::vector<Trace> known;
   std::vector<double> heights;
   for (const Candidate& c : fibres) {
@@ -285,6 +298,8 @@ std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Rest& rest
   std::vector<Candidate> result;
   const auto keep = [&](const Trace& trace) {
     auto c = judge.candidate(trace, 0);
+    if (c && c->expected_beside > judge.p.fibre_false_per_cell) c.reset();
+    if (c && c->expected_false > judge.p.fibre_false_per_cell) c->place = LinePlace::beside_a_fibre;  // as found
     if (c) result.push_back(std::move(*c));
     return c.has_value();
   };
@@ -362,19 +377,30 @@ TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, 
   const auto traces = trace_lines(ridges, field.is_inside, rule);
   const Judge judge{field, ridges, rule, outline_um, texture_lines_of(traces, ridges, field, p), p};
   std::vector<Candidate> fibres = judged(traces, judge);
+  std::vector<Candidate> doubtful;
   if (!fibres.empty()) {
     const Rest rest = rest_of(fibres, judge);
-    fibres = regrouped(with_hidden(std::move(fibres), rest, judge), rest, judge);
+    Judged all = with_hidden(std::move(fibres), rest, judge);
+    fibres = regrouped(std::move(all.fibres), rest, judge);
+    doubtful = std::move(all.doubtful);
   }
   TracedLines lines{{}, unexplained(fibres, judge)};
-  for (Candidate& c : fibres) {
-    Fibre fibre;
-    fibre.points_um = simplified(c.points_um, p.fibre_simplify_um);
-    fibre.width_um = c.profile.width_px * field.pixel_um;
-    fibre.mean_intensity = c.profile.height;
-    fibre.confidence = judge.texture.chance_of_fibre(c.significance, c.place);
-    lines.fibres.push_back({std::move(fibre), std::move(c.before), std::move(c.after)});
-  }
+  std::vector<double> significances;
+  for (const Candidate& c : fibres) significances.push_back(c.significance);
+  const double density = fibres_per_unit(significances);
+  const auto add = [&](std::vector<Candidate> candidates) {
+    for (Candidate& c : candidates) {
+      Fibre fibre;
+      fibre.points_um = simplified(c.points_um, p.fibre_simplify_um);
+      fibre.width_um = c.profile.width_px * field.pixel_um;
+      fibre.mean_intensity = c.profile.height;
+      fibre.confidence = judge.texture.chance_of_fibre(c.significance, density, c.place);
+      lines.fibres.push_back(
+          {std::move(fibre), std::move(c.before), std::move(c.after), c.place == LinePlace::on_adhesion_along_it});
+    }
+  };
+  add(std::move(fibres));
+  add(std::move(doubtful));
   return lines;
 }
 
@@ -383,7 +409,9 @@ std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhes
   std::vector<Fibre> fibres;
   for (TracedFibre& t : traced) {
     lead_on(t, adhesions, outline_um, p.fibre_reach_um);
+    const Polyline course = t.fibre.points_um;
     tie_ends(t.fibre, adhesions, outline_um, p.fibre_reach_um);
+    if (t.needs_adhesion && !is_held_along(t.fibre, course, adhesions)) continue;
     lead_to_cut(t.fibre, cuts, p.fibre_reach_um);
     fibres.push_back(std::move(t.fibre));
   }

@@ -34,7 +34,7 @@ struct FibreParameters {
 void declare(stage::ParameterList& list, FibreParameters& parameters);
 
 struct TracedLines {
-  std::vector<TracedFibre> fibres;
+  std::vector<TracedFibre> fibres;  ///< also doubtful lines, that need an adhesion
   /// By line the points, in no order, of actin as bright as the fibres that is in none of them; away from the cell's
   /// edge
   std::vector<Polyline> unexplained_um;
@@ -47,7 +47,7 @@ struct TracedLines {
 TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,
                          const FibreParameters& parameters);
 /// Tie their ends, which gives the types; label them from 1, the longest first. Those that end up too short are left
-/// out. @param cuts  of the outline: see lead_to_cut()
+/// out, and those that need an adhesion that lies along them and are not held by one. @param cuts  of the outline: see lead_to_cut()
 std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,
                         const Polygon& outline_um, const FibreParameters& parameters, const Cuts& cuts = {});
 

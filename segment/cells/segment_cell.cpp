@@ -106,7 +106,8 @@ std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const images::Ch
 void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& traced,
            const std::vector<Adhesion>& adhesions, const SegmentParameters& p) {
   std::vector<Fibre> fibres;
-  for (const TracedFibre& t : traced) fibres.push_back(t.fibre);
+  for (const TracedFibre& t : traced)
+    if (!t.needs_adhesion) fibres.push_back(t.fibre);
   s.alignment = align_channels(fibres, adhesions);
   if (!s.alignment || p.align_channels == Switch::off || !s.alignment->is_significant()) return;
   s.is_aligned = true;
@@ -360,6 +361,7 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
   else if (in.actin) {
     TracedLines traced = trace_fibres(in.actin->image, s.cell.outline_um, in.field.pixel_um, p.fibres);
     lines.traced = std::move(traced.fibres);
+    if (in.source != AdhesionSource::image) std::erase_if(lines.traced, &TracedFibre::needs_adhesion);
     s.unexplained_um = std::move(traced.unexplained_um);
   }
   CellOutline around = outline;
