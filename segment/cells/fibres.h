@@ -47,7 +47,8 @@ struct TracedLines {
 TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,
                          const FibreParameters& parameters);
 /// Tie their ends, which gives the types; label them from 1, the longest first. Those that end up too short are left
-/// out, and those that need an adhesion that lies along them and are not held by one. @param cuts  of the outline: see lead_to_cut()
+/// out, and those that need an adhesion that lies along them and are not held by one. @param cuts  of the outline: see
+/// lead_to_cut()
 std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,
                         const Polygon& outline_um, const FibreParameters& parameters, const Cuts& cuts = {});
 
