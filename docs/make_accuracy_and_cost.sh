@@ -137,7 +137,7 @@ tractions, ‖t̂ − t‖/‖t‖ over the surface, beside the truth or the fin
 |---|---|---|
 | `fast` | 1.06 | growing twice as fast away from the cell, to 5 % |
 | `standard` | 0.83 | to 2 % |
-| `high` | 0.66 | to 2 % |
+| `high` | 0.75 | to 2 % |
 
 A round cell on 72 µm of gel (`patches-on-ring`, 500 beads, method `tikhonov`), with 2 and with 10 % noise: processor time of the stage `traction`, error of the map, error of the total force.
 
