@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/half_space.h"
@@ -173,18 +172,6 @@ MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const Linear
           .chi_squared_gain = q.score.dot(covariance.ldlt().solve(q.score))};
 }
 
-/// The gain x that the greatest over this area reaches by chance in one cell of twenty. Gains are a field of
-/// chi-squared with two degrees of freedom, that forgets itself over a micrometre: its expected number of peaks above x
-/// is A (x − 1)/(2 pi) exp(−x/2). Of 200 fits to noise 4.5 % have a gain above 20, 9.5 % above 18; it says 5.5 and 13
-/// %.
-double least_gain(double area_um2) {
-  constexpr double kChance = 0.05;
-  double x = 20;
-  for (int i = 0; i < 20; ++i)  // a step leaves a tenth of the error
-    x = std::max(2.0, 2 * std::log(std::max(1.0, area_um2) * (x - 1) / (2 * std::numbers::pi * kChance)));
-  return x;
-}
-
 }  // namespace
 
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const LinearData& data, const Cell& cell,
@@ -201,7 +188,8 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
     asked[static_cast<std::size_t>(i)] = ask_at(places[static_cast<std::size_t>(i)]);
     if (asked[static_cast<std::size_t>(i)].gain < 1) asked[static_cast<std::size_t>(i)].fields = {};
   });
-  const double limit = least_gain(static_cast<double>(places.size()));
+  // chi squared of two numbers exceeds x by chance exp(-x/2)
+  const double limit = 2 * std::log(std::max<double>(1, static_cast<double>(places.size())) / 0.01);
   std::erase_if(asked, [&](const Question& q) { return q.gain < limit; });
   std::ranges::sort(asked, std::greater(), &Question::gain);
   std::vector<MissingAdhesion> found;

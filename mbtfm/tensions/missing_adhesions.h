@@ -10,7 +10,7 @@ namespace mbtfm::tensions {
 
 /// The best ones. A score test at places one micrometre apart, of a force spread over a disc of 0.5 um: with g its
 /// displacement of the beads around, less their mean, q = gᵀ W² (u − G R) is compared with its covariance. A gain is
-/// kept where chance would reach it in one cell of twenty, wherever the place (Worsley, Adv Appl Probab 26:13, 1994).
+/// kept where chance would reach it in one cell of a hundred, all places tried (Bonferroni).
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const LinearData& data, const Cell& cell,
                                                const Gel& gel, int threads);
 

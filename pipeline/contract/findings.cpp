@@ -212,7 +212,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "mbtfm-add-fibres --rois 1_segment/RoiSet.zip --missing 4_fit/missing_fibres.csv --out fibres.zip in the cell's "
        "folder, then mbtfm run."},
       {missing_adhesion, "missing-adhesion", "fit", caution, "forces that the beads call for away from all adhesions",
-       0, "a place is named if chance would name one in one cell of twenty, wherever the place",
+       0, "a place is named if chance would name one in one cell of a hundred, all places tried",
        "Look at these places in the adhesion image (4_fit/missing_adhesions.csv; dashed circles in the map). If an "
        "adhesion is there, lower segment.adhesion_seed_noise or segment.adhesion_smallest_um2, or draw it by hand."},
       {fibre_without_tension, "fibre-without-tension", "fit", caution, "segmented fibres that are not in the network",
