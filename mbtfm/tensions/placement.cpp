@@ -67,11 +67,7 @@ struct Step {
 
 Step step_of(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& derivatives,
              const Eigen::MatrixXd& placement) {
-  std::vector<Eigen::Index> free;  // not at its bound
-  for (Eigen::Index i = 0; i < derivatives.cols(); ++i) {
-    if (trial.tensions_nN[i] > 0) free.push_back(i);
-  }
-  const Eigen::MatrixXd of_free = derivatives(Eigen::all, free);
+  const Eigen::MatrixXd of_free = of_free_tensions(derivatives, trial);
   // all by way of the forces: beads × tensions are too many numbers
   Eigen::MatrixXd weighted(placement.rows(), 4);
   weighted << less_motion(data, placement), residual_um(data, trial.forces_nN);

@@ -179,12 +179,16 @@ bool stands_alone(const LinearData& data, const Eigen::VectorXd& residual, Eigen
 
 }  // namespace
 
-Studentized studentized(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& force_derivatives) {
-  std::vector<Eigen::Index> free;  // not at its bound
+Eigen::MatrixXd of_free_tensions(const Eigen::MatrixXd& force_derivatives, const Trial& trial) {
+  std::vector<Eigen::Index> free;
   for (Eigen::Index i = 0; i < force_derivatives.cols(); ++i) {
     if (trial.tensions_nN[i] > 0) free.push_back(i);
   }
-  const Eigen::MatrixXd of_free = force_derivatives(Eigen::all, free);
+  return force_derivatives(Eigen::all, free);
+}
+
+Studentized studentized(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& force_derivatives) {
+  const Eigen::MatrixXd of_free = of_free_tensions(force_derivatives, trial);
   const Eigen::VectorXd weight = squared_weights(data).cwiseSqrt();
   Eigen::Matrix3Xd hat = Eigen::Matrix3Xd::Zero(3, weight.size() / 2);  // its blocks: xx, xy, yy
   const auto add = [&](const Eigen::MatrixXd& independent) {            // columns Z of a part Z Zᵀ

@@ -10,6 +10,9 @@
 
 namespace mbtfm::tensions {
 
+/// Columns of dR/dt (2·adhesions × tensions) of the tensions that are not at their bound, zero.
+Eigen::MatrixXd of_free_tensions(const Eigen::MatrixXd& force_derivatives, const Trial& trial);
+
 /// The weighted residuals of a trial, each made as large as if the fit did not follow its bead: (1 − H)^(−1/2) r, H the
 /// bead's 2 × 2 block of the hat matrix of motions and tensions, those at zero held there (Cook & Weisberg, Residuals
 /// and Influence in Regression, 1982, 2.2). Beside an adhesion a single bead may tell half of its force.

@@ -17,6 +17,7 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/match_fibres.h"
+#include "pipeline/report/space_results.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
@@ -52,8 +53,6 @@ struct Answer {
 };
 
 bool is_from_images(const runner::Stage& stage) { return !stage.images.empty(); }
-
-constexpr const char* kDisplacementInSpace = "2_track/displacement_3d.csv";
 
 /// All that segmentation and tracking read is there.
 bool has_all_images(const fs::path& cell, const runner::ImageNames& names) {
@@ -150,7 +149,7 @@ class Scratch {
   /// Without which the cell was not run.
   std::vector<std::string> needed() const {
     if (kind_ == CellKind::space)
-      return {kDisplacementInSpace, "3_surface/surface.vtp", "4_traction/traction.json", "cell.toml"};
+      return {report::kBeadsInSpace, "3_surface/surface.vtp", "4_traction/traction.json", "cell.toml"};
     return {"1_segment/adhesions.csv", "2_track/displacement.csv", "cell.toml"};
   }
 
@@ -179,7 +178,7 @@ class Scratch {
       return some;
     };
     if (kind_ == CellKind::space) {
-      const fs::path file = folder_ / kDisplacementInSpace;
+      const fs::path file = folder_ / report::kBeadsInSpace;
       files::write_displacement_in_space(file, some_of(files::read_displacement_in_space(file)));
     } else {
       const fs::path file = folder_ / "2_track/displacement.csv";

@@ -87,7 +87,7 @@ SpaceResults read_space_results(const Path& cell) {
   declare(list, results.gel);
   stage::read_toml(list, cell / "cell.toml");
   results.surface = files::read_surface(cell / "3_surface/surface.vtp");
-  results.beads = files::read_displacement_in_space(cell / "2_track/displacement_3d.csv");
+  results.beads = files::read_displacement_in_space(cell / kBeadsInSpace);
   results.tractions = read_tractions(cell / "4_traction/traction.csv");
   results.forces = read_forces(cell / "4_traction/traction_adhesion_forces.csv");
   if (!results.forces.empty()) results.adhesions = files::read_adhesions(cell / "1_segment/adhesions.csv");

@@ -14,6 +14,9 @@
 
 namespace mbtfm::report {
 
+/// The beads of such a cell, in its folder.
+inline constexpr const char* kBeadsInSpace = "2_track/displacement_3d.csv";
+
 /// A row of 4_traction/traction.csv.
 struct SurfaceTraction {
   Vec3 at_um, traction_kPa;

@@ -33,7 +33,6 @@ std::optional<DisplacementField> field_where_there(const Path& file) {
 }
 
 constexpr const char* kDisplacement = "2_track/displacement.csv";
-constexpr const char* kDisplacementInSpace = "2_track/displacement_3d.csv";
 constexpr const char* kOutline = "1_segment/outline.csv";
 constexpr const char* kRun = "run.json";
 constexpr const char* kFitted = "4_fit/fitted_displacement.csv";
@@ -72,15 +71,7 @@ void read_end(const Path& folder, const char* stage, StudyCell& cell) {
 }
 
 StudyCell read_study_sheet(const Path& folder, const std::string& name) {
-  StudyCell c{.name = name,
-              .condition = 0,
-              .cell = {},
-              .forces = {},
-              .tensions = {},
-              .fit = {},
-              .directions = {},
-              .findings = {},
-              .sheet = files::read_sheet_summary(folder / "3_sheet")};
+  StudyCell c{.name = name, .sheet = files::read_sheet_summary(folder / "3_sheet")};
   c.cell.outline_um = outline_of_sheet(folder);
   c.fit.relative_l2 = c.sheet->relative_l2;
   c.fit.expected_relative_l2 = c.sheet->expected_relative_l2;
@@ -91,14 +82,6 @@ StudyCell read_study_sheet(const Path& folder, const std::string& name) {
 StudyCell read_study_cell_in_space(const Path& folder, const std::string& name) {
   const report::SpaceResults results = report::read_space_results(folder);
   StudyCell c{.name = name,
-              .condition = 0,
-              .cell = {},
-              .forces = {},
-              .tensions = {},
-              .fit = {},
-              .directions = {},
-              .findings = {},
-              .sheet = {},
               .space = SpaceFigures{.method = results.texts.at("method"),
                                     .total_force_nN = results.number("total_force_nN"),
                                     .total_force_sigma_nN = results.find("total_force_sigma_nN"),
@@ -122,13 +105,10 @@ StudyCell read_study_cell_in_space(const Path& folder, const std::string& name) 
 
 StudyCell read_study_cell(const Path& folder, const std::string& name, const StudyParameters& parameters) {
   StudyCell c{.name = name,
-              .condition = 0,
               .cell = files::read_cell(folder / "1_segment"),
               .forces = files::read_adhesion_forces(folder / "4_fit/adhesion_forces.csv"),
               .tensions = files::read_tensions(folder / "4_fit/tensions.csv"),
-              .fit = files::read_fit_summary(folder / "4_fit/fit.json"),
-              .directions = {},
-              .findings = {}};
+              .fit = files::read_fit_summary(folder / "4_fit/fit.json")};
   std::set<int> ids;
   for (const Adhesion& a : c.cell.adhesions) ids.insert(a.adhesion_id);
   for (const AdhesionForce& f : c.forces) {
@@ -163,7 +143,7 @@ StudyCell read_cell_of_kind(CellKind kind, const Path& folder, const std::string
 
 /// The field of beads that it was found from.
 Path field_of(const Path& folder, const StudyCell& cell) {
-  return folder / (cell.kind() == CellKind::space ? kDisplacementInSpace : kDisplacement);
+  return folder / (cell.kind() == CellKind::space ? report::kBeadsInSpace : kDisplacement);
 }
 
 /// By half of the smaller one. Two cells of one picture share the field, and lie beside each other.
@@ -326,7 +306,7 @@ const std::vector<std::string>& files_of_a_cell(CellKind kind) {
       "1_segment/adhesions.csv",   "1_segment/fibres.csv", "1_segment/fibre_points.csv", kOutline, "4_fit/tensions.csv",
       "4_fit/adhesion_forces.csv", "4_fit/fit.json"};
   static const std::vector<std::string> of_sheet = {"3_sheet/sheet_fit.csv", "3_sheet/sheet.json", "3_sheet/sheet.csv"};
-  static const std::vector<std::string> in_space = {kDisplacementInSpace, "3_surface/surface.vtp",
+  static const std::vector<std::string> in_space = {report::kBeadsInSpace, "3_surface/surface.vtp",
                                                     "4_traction/traction.csv", "4_traction/traction.json"};
   return kind == CellKind::sheet ? of_sheet : kind == CellKind::space ? in_space : with_fibres;
 }

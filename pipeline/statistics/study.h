@@ -75,11 +75,11 @@ struct StudyCell {
   std::string name;            ///< its folder, relative to the study's
   int condition = 0;           ///< index into Study::conditions
   std::string replicate = {};  ///< day, dish or animal; empty: not told
-  Cell cell;
-  std::vector<AdhesionForce> forces;
-  std::vector<Tension> tensions;
-  FitSummary fit;
-  std::vector<Direction> directions;
+  Cell cell = {};
+  std::vector<AdhesionForce> forces = {};
+  std::vector<Tension> tensions = {};
+  FitSummary fit = {};
+  std::vector<Direction> directions = {};
   std::vector<Finding> findings = {};      ///< of all its stages
   std::optional<SheetSummary> sheet = {};  ///< of a sheet, or a colony: it has no fibres, no adhesions, and of `fit` no
                                            ///< more than what the fit leaves and whether it converged

@@ -8,6 +8,7 @@
 #include "pipeline/files/base64.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -214,7 +215,9 @@ report::Table sheets_table(const Study& study) {
 }
 
 std::string with_error(double value, const std::optional<double>& sigma) {
-  return sigma && *sigma > 0 ? readable(value) + " ± " + readable(*sigma) : readable(value);
+  if (!sigma || !(*sigma > 0)) return readable(value);
+  const int decimals = report::decimals_for(*sigma);
+  return report::rounded(value, decimals) + " ± " + report::rounded(*sigma, decimals);
 }
 
 report::Table cells_in_space_table(const Study& study) {

@@ -140,6 +140,20 @@ TEST(SmallStudies, whatever_lacks_every_number_is_finite_or_its_field_empty) {
   }
 }
 
+/// Into two conditions, and with cells with fibres beside them; each in half of the cases.
+void divide_and_mix(Study& study, int seed, std::mt19937_64& random) {
+  if (random() % 2 == 0) {
+    study.conditions = {"a", "b"};
+    for (StudyCell& cell : study.cells) cell.condition = static_cast<int>(random() % 2);
+  }
+  if (random() % 2 == 0) {
+    for (StudyCell& cell : test::small_study(test::drawn_lack(static_cast<std::uint64_t>(seed)), 3).cells) {
+      cell.condition = 0;
+      study.cells.push_back(std::move(cell));
+    }
+  }
+}
+
 /// Sheets alone, and beside cells with fibres; of some the beads do not tell the contraction, of some nobody asked for
 /// it.
 TEST(SmallStudies, whatever_sheets_lack_every_number_is_finite_or_its_field_empty) {
@@ -162,16 +176,7 @@ TEST(SmallStudies, whatever_sheets_lack_every_number_is_finite_or_its_field_empt
       if (once_in(4)) cell.sheet->estimates.clear();
       if (once_in(4)) cell.sheet->strain_energy_fJ = std::nullopt;
     }
-    if (once_in(2)) {
-      study.conditions = {"a", "b"};
-      for (StudyCell& cell : study.cells) cell.condition = static_cast<int>(random() % 2);
-    }
-    if (once_in(2)) {
-      for (StudyCell& cell : test::small_study(test::drawn_lack(static_cast<std::uint64_t>(seed)), 3).cells) {
-        cell.condition = 0;
-        study.cells.push_back(std::move(cell));
-      }
-    }
+    divide_and_mix(study, seed, random);
     expect_whole(study, are_all() || seed % 10 == 1 ? Page::made : Page::left_out);
   }
 }
@@ -200,16 +205,7 @@ TEST(SmallStudies, whatever_cells_in_space_lack_every_number_is_finite_or_its_fi
         s.adhesions.clear();
       }
     }
-    if (once_in(2)) {
-      study.conditions = {"a", "b"};
-      for (StudyCell& cell : study.cells) cell.condition = static_cast<int>(random() % 2);
-    }
-    if (once_in(2)) {
-      for (StudyCell& cell : test::small_study(test::drawn_lack(static_cast<std::uint64_t>(seed)), 3).cells) {
-        cell.condition = 0;
-        study.cells.push_back(std::move(cell));
-      }
-    }
+    divide_and_mix(study, seed, random);
     expect_whole(study, are_all() || seed % 10 == 1 ? Page::made : Page::left_out);
   }
 }
