@@ -20,8 +20,8 @@ const std::vector<Preset>& presets() {
        "for the record",
        // the mean of more meshes, within 1 % of that of any number; what is left is that the cell is one network
        {{"fit", "n_meshes", "16"}, {"substrate", "cells_per_thickness", "3"}},
-       // sparse maps come nearer to the truth; a finer gel would change a tenth of what noise does. Finer still, 500 beads
-       // have more unknowns than the dense operator takes
+       // sparse maps come nearer to the truth; a finer gel would change a tenth of what noise does. Finer still, 500
+       // beads have more unknowns than the dense operator takes
        {{"traction", "spacing_beads", "0.75"}}},
   };
   return list;
