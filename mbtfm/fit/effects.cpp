@@ -37,7 +37,8 @@ Change change_with_gel(const FittedCell& c, const Effect& e, const substrate::Su
   LinearData with = c.fit.data;
   with.response = response_of({.gel = *gel, .cell = c.ready.scene.cell, .parameters = c.parameters, .threads = threads},
                               c.ready.scene.beads);
-  return change_with_data(c, e, unweighted(std::move(with)), threads);
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(with.bead_weight.size());
+  return change_with_data(c, e, reweighted(std::move(with), ones), threads);
 }
 
 std::optional<Change> with_base(const FittedCell& c, const Effect& e, int threads) {

@@ -9,6 +9,7 @@
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/neighbour_bins.h"
 #include "substrate/response.h"
 
 namespace mbtfm::fit {
@@ -43,11 +44,13 @@ struct Best {
   explicit Best(Unexplained as_is)
       : squares(as_is.squares),
         reading{.what = {}, .unexplained_share = as_is.share, .unexplained_as_is = as_is.share} {}
-  void consider(const std::string& what, Unexplained left) {
-    if (left.squares >= squares) return;
+  /// Whether it is better than all before.
+  bool consider(const std::string& what, Unexplained left) {
+    if (left.squares >= squares) return false;
     squares = left.squares;
     reading.what = what;
     reading.unexplained_share = left.share;
+    return true;
   }
 };
 
@@ -80,7 +83,7 @@ std::vector<Change> changes() {
 
 /// Each k-th, so that some hundred are left: enough to tell one reading from another.
 DisplacementField some_of(const DisplacementField& beads) {
-  constexpr std::size_t kEnough = 1000;
+  constexpr std::size_t kEnough = 400;
   const std::size_t step = 1 + beads.size() / kEnough;
   DisplacementField some;
   for (std::size_t i = 0; i < beads.size(); i += step) some.push_back(beads[i]);
@@ -140,19 +143,20 @@ Scale best_scale(double rough, const UnexplainedAt& unexplained_at) {
 /// What a program shows of these fields that smooths them with a Gaussian of this standard deviation.
 /// @param fields  2·beads × any number
 Eigen::MatrixXd smoothed(const Eigen::MatrixXd& fields, const std::vector<Vec2>& beads_um, double sigma_um) {
-  constexpr double kReach = 3;  // standard deviations
+  const double reach_um = 3 * sigma_um;
+  numerics::Grid grid(beads_um, reach_um);
+  for (std::size_t i = 0; i < beads_um.size(); ++i) grid.add(static_cast<int>(i), beads_um[i], beads_um[i]);
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(fields.rows(), fields.cols());
   for (std::size_t i = 0; i < beads_um.size(); ++i) {
     double sum = 0;
     const auto row = 2 * static_cast<Eigen::Index>(i);
-    for (std::size_t j = 0; j < beads_um.size(); ++j) {
-      const Vec2 d = beads_um[j] - beads_um[i];
-      const double square = dot(d, d) / (sigma_um * sigma_um);
-      if (square > kReach * kReach) continue;
-      const double weight = std::exp(-0.5 * square);
+    grid.for_each_near(beads_um[i], beads_um[i], reach_um, [&](int j) {
+      const Vec2 d = beads_um[static_cast<std::size_t>(j)] - beads_um[i];
+      if (dot(d, d) > reach_um * reach_um) return;
+      const double weight = std::exp(-0.5 * dot(d, d) / (sigma_um * sigma_um));
       result.middleRows<2>(row) += weight * fields.middleRows<2>(2 * static_cast<Eigen::Index>(j));
       sum += weight;
-    }
+    });
     result.middleRows<2>(row) /= sum;
   }
   return result;
@@ -185,9 +189,12 @@ Reading best_smoothing(const LinearData& data, const Eigen::MatrixXd& force_deri
                           noise_um);
   };
   Best best(left_by(fields));
+  // a field that was smoothed widely is nearer to one smoothed a little than to none
   for (const double sigma_um : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0}) {
-    best.consider("once it is smoothed, too, over " + brief(2 * sigma_um) + " um",
-                  left_by(smoothed(fields, data.position_um, sigma_um)));
+    if (!best.consider("once it is smoothed, too, over " + brief(2 * sigma_um) + " um",
+                       left_by(smoothed(fields, data.position_um, sigma_um)))) {
+      break;
+    }
   }
   return best.reading;
 }

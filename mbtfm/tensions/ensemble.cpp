@@ -487,7 +487,7 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
     work.tell(double(++n_done) / (n_meshes + 1), "fitting tensions on " + std::to_string(n_meshes) + " meshes");
   };
   // bad beads are known by a fit in which all count
-  if ((data.bead_weight.array() != 1).any()) data = unweighted(std::move(data));
+  data = unweighted(std::move(data));
   FirstFit first =
       fit_first(networks.front(), std::move(data), adhesion_ids, parameters, threads, solved_misfit, start);
   tell();

@@ -147,7 +147,7 @@ Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance) {
 
 Eigen::VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, const Eigen::MatrixXd& jacobian,
                                 const Eigen::MatrixXd& response, const Eigen::MatrixXd& covariance_nN2, int threads) {
-  constexpr double kRough = 1e-5;  // of an equilibrium: what bends is a hundredth of the forces and more
+  constexpr double kRough = 1e-4;  // of an equilibrium: what bends is a hundredth of the forces and more
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance_nN2);
   const double largest = solution.tensions_nN.maxCoeff();
   Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(jacobian.rows(), jacobian.cols());  // by direction

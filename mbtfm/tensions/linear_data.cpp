@@ -210,8 +210,9 @@ LinearData reweighted(LinearData data, const Eigen::VectorXd& bead_weight) {
 }
 
 LinearData unweighted(LinearData data) {
-  const Eigen::Index n_beads = data.bead_weight.size();
-  return reweighted(std::move(data), Eigen::VectorXd::Ones(n_beads));
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(data.bead_weight.size());
+  if (data.bead_weight == ones) return data;
+  return reweighted(std::move(data), ones);
 }
 
 LinearData about_forces(LinearData data, substrate::SharedResponse response, const Eigen::VectorXd& measured_um,
@@ -219,7 +220,8 @@ LinearData about_forces(LinearData data, substrate::SharedResponse response, con
   data.response = std::move(response);
   data.displacement_um = measured_um - offset_um;
   data.offset_um = std::move(offset_um);
-  return unweighted(std::move(data));
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(data.bead_weight.size());
+  return reweighted(std::move(data), ones);
 }
 
 Eigen::VectorXd moved_by(const LinearData& data, const Eigen::VectorXd& forces_nN) {

@@ -32,18 +32,43 @@ MatrixXd affine_motions(const std::vector<Vec2>& places_um) {
   return columns;
 }
 
-/// Tukey's, of residuals whose middle tells their scale (Maronna, Martin & Yohai, Robust Statistics, 2006, 6.4).
-VectorXd weights_of(const VectorXd& residual) {
+/// Tukey's, of residuals whose middle tells their scale (Maronna, Martin & Yohai, Robust Statistics, 2006, 6.4); beads
+/// with a flag have none.
+VectorXd weights_of(const VectorXd& residual, const DisplacementField& beads) {
   constexpr double kTukey = 5.123, kMiddle = 1.1774;  // of a vector in the plane: Rayleigh's median
+  const auto size = [&](std::size_t i) { return residual.segment<2>(2 * static_cast<Index>(i)).norm(); };
   std::vector<double> sizes;
-  for (Index row = 0; row < residual.size(); row += 2) sizes.push_back(residual.segment<2>(row).norm());
-  const double scale = std::max(numerics::median(sizes) / kMiddle, 1e-12);
-  VectorXd weights(residual.size());
-  for (Index i = 0; i < std::ssize(sizes); ++i) {
-    const double r = std::min(1.0, sizes[static_cast<std::size_t>(i)] / (kTukey * scale));
-    weights.segment<2>(2 * i).setConstant((1 - r * r) * (1 - r * r));
+  for (std::size_t i = 0; i < beads.size(); ++i) {
+    if (beads[i].flag.empty()) sizes.push_back(size(i));
+  }
+  const double scale = std::max(numerics::median(std::move(sizes)) / kMiddle, 1e-12);
+  VectorXd weights = VectorXd::Zero(residual.size());
+  for (std::size_t i = 0; i < beads.size(); ++i) {
+    if (!beads[i].flag.empty()) continue;
+    const double r = std::min(1.0, size(i) / (kTukey * scale));
+    weights.segment<2>(2 * static_cast<Index>(i)).setConstant((1 - r * r) * (1 - r * r));
   }
   return weights;
+}
+
+/// The sums of shapes that explain the displacements best with these weights; empty where they do not tell.
+/// @param n_forces  of the shapes, the first ones
+VectorXd weighted_fit(const MatrixXd& shapes, const VectorXd& displacement_um, const VectorXd& weights, Index n_forces,
+                      int threads) {
+  MatrixXd normal = MatrixXd::Zero(shapes.cols(), shapes.cols()), block;
+  constexpr Index kRows = 1024;  // at a time: no second copy of all
+  for (Index first = 0; first < shapes.rows(); first += kRows) {
+    const Index count = std::min(kRows, shapes.rows() - first);
+    block = weights.segment(first, count).cwiseSqrt().asDiagonal() * shapes.middleRows(first, count);
+    numerics::add_upper_gram(block, normal, threads);
+  }
+  constexpr double kRidge = 1e-4;  // of forces that no bead feels, or that two adhesions share
+  normal.diagonal().head(n_forces).array() += kRidge * normal.diagonal().head(n_forces).mean();
+  if (!numerics::upper_cholesky(normal, threads)) return {};
+  MatrixXd sizes = shapes.transpose() * weights.cwiseProduct(displacement_um);
+  numerics::solve_upper_transposed(normal, sizes);
+  numerics::solve_upper(normal, sizes);
+  return sizes;
 }
 
 }  // namespace
@@ -54,16 +79,15 @@ FieldOfAdhesions::FieldOfAdhesions(const std::vector<Adhesion>& adhesions, int t
 
 std::vector<Vec2> FieldOfAdhesions::um(const DisplacementField& beads) {
   std::vector<Vec2> places_um;
-  std::vector<Index> rows;  // of beads without a flag
-  VectorXd displacement_um(2 * std::ssize(beads));
+  VectorXd displacement_um(2 * std::ssize(beads)), as_flagged = VectorXd::Zero(displacement_um.size());
   for (Index i = 0; i < std::ssize(beads); ++i) {
     const Bead& bead = beads[static_cast<std::size_t>(i)];
     places_um.push_back(bead.position_um);
     displacement_um.segment<2>(2 * i) << bead.displacement_um.x, bead.displacement_um.y;
-    if (bead.flag.empty()) rows.insert(rows.end(), {2 * i, 2 * i + 1});
+    if (bead.flag.empty()) as_flagged.segment<2>(2 * i).setOnes();
   }
   const Index n_forces = 2 * std::ssize(ellipses_), n_unknowns = n_forces + 6;
-  if (ellipses_.empty() || std::ssize(rows) < 10 * n_unknowns) return {};
+  if (ellipses_.empty() || as_flagged.sum() < 10.0 * static_cast<double>(n_unknowns)) return {};
   if (places_um != places_um_) {
     const Gel gel{.youngs_modulus_kPa = 1, .poisson_ratio = 0.5};  // whatever its modulus: forces are not asked for
     shapes_.resize(displacement_um.size(), n_unknowns);
@@ -71,26 +95,22 @@ std::vector<Vec2> FieldOfAdhesions::um(const DisplacementField& beads) {
                    ->compliance_um_per_nN(places_um, ellipses_),
         affine_motions(places_um);
     places_um_ = std::move(places_um);
+    field_um_.resize(0);
   }
-  const MatrixXd used = shapes_(rows, Eigen::all);
-  const VectorXd target = displacement_um(rows);
-  VectorXd weights = VectorXd::Ones(target.size()), found;
-  constexpr int kRounds = 4;
-  for (int round = 0; round < kRounds; ++round) {
-    MatrixXd normal = MatrixXd::Zero(n_unknowns, n_unknowns);
-    numerics::add_upper_gram(weights.cwiseSqrt().asDiagonal() * used, normal, threads_);
-    constexpr double kRidge = 1e-4;  // of forces that no bead feels, or that two adhesions share
-    normal.diagonal().head(n_forces).array() += kRidge * normal.diagonal().head(n_forces).mean();
-    if (!numerics::upper_cholesky(normal, threads_)) return {};
-    MatrixXd x = used.transpose() * weights.cwiseProduct(target);
-    numerics::solve_upper_transposed(normal, x);
-    numerics::solve_upper(normal, x);
-    found = x;
-    weights = weights_of(target - used * found);
+  // of the same frame again, some beads of which were mended, the last field tells which are astray
+  const bool is_again = field_um_.size() == displacement_um.size() &&
+                        (displacement_um.array() == displacement_um_.array()).count() > displacement_um.size() / 2;
+  VectorXd weights = is_again ? weights_of(displacement_um - field_um_, beads) : as_flagged;
+  const int n_rounds = is_again ? 1 : 4;
+  for (int round = 1; round <= n_rounds; ++round) {
+    const VectorXd sizes = weighted_fit(shapes_, displacement_um, weights, n_forces, threads_);
+    if (sizes.size() == 0) return {};
+    field_um_ = shapes_ * sizes;
+    if (round < n_rounds) weights = weights_of(displacement_um - field_um_, beads);
   }
-  const VectorXd field = shapes_ * found;
+  displacement_um_ = std::move(displacement_um);
   std::vector<Vec2> all;
-  for (Index row = 0; row < field.size(); row += 2) all.push_back({field[row], field[row + 1]});
+  for (Index row = 0; row < field_um_.size(); row += 2) all.push_back({field_um_[row], field_um_[row + 1]});
   return all;
 }
 

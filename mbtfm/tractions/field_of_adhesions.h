@@ -23,8 +23,9 @@ class FieldOfAdhesions {
  private:
   std::vector<substrate::Ellipse> ellipses_;
   int threads_;
-  std::vector<Vec2> places_um_;  ///< of the last call
-  Eigen::MatrixXd shapes_;       ///< there, 2·beads × unknowns: by forces of 1 nN, and six motions
+  std::vector<Vec2> places_um_;                 ///< of the last call
+  Eigen::MatrixXd shapes_;                      ///< there, 2·beads × unknowns: by forces of 1 nN, and six motions
+  Eigen::VectorXd displacement_um_, field_um_;  ///< of the last call, as measured and as found: 2·beads
 };
 
 }  // namespace mbtfm::tractions
