@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "segment/cells/bleed_through.h"
@@ -45,17 +46,28 @@ void require_content(const images::Channel& channel) {
                      "is this the right file, channel and page? Was it overexposed?");
 }
 
+/// Bright where the image is dark.
+images::Image negative_of(images::Image image) {
+  const auto [least, most] = std::ranges::minmax(image.pixels);
+  for (float& pixel : image.pixels) pixel = least + (most - pixel);
+  return image;
+}
+
+const std::string kInvert = "the image seems inverted: fluorescence is bright on dark. In ImageJ, Edit > Invert";
+
 std::vector<Adhesion> adhesions_of(const images::Channel& channel, double pixel_um, const SegmentParameters& p) {
   require_content(channel);
   const auto found = find_adhesions(channel.image, pixel_um, p.adhesions);
-  if (found.empty())
-    throw InputError(
-        channel.name,
-        "bright spots of " + shortest(p.adhesions.adhesion_smallest_um2) + " um² or more that stand out of the noise",
-        "no adhesion: " + why_no_adhesions(channel.image, pixel_um, p.adhesions),
-        "is this the adhesion channel, in focus? Check pixel_size_um (" + images::in_um(pixel_um) +
-            "), adhesion_channel, and adhesion_seed_noise for a faint image");
-  return found;
+  if (!found.empty()) return found;
+  const std::string expected =
+      "bright spots of " + shortest(p.adhesions.adhesion_smallest_um2) + " um² or more that stand out of the noise";
+  constexpr std::size_t kSome = 5;  // fewer are gaps between bright things
+  if (const auto dark = find_adhesions(negative_of(channel.image), pixel_um, p.adhesions); dark.size() >= kSome)
+    throw InputError(channel.name, expected, counted(std::ssize(dark), "dark spots") + " on a brighter ground",
+                     kInvert);
+  throw InputError(channel.name, expected, "no adhesion: " + why_no_adhesions(channel.image, pixel_um, p.adhesions),
+                   "is this the adhesion channel, in focus? Check pixel_size_um (" + images::in_um(pixel_um) +
+                       "), adhesion_channel, and adhesion_seed_noise for a faint image");
 }
 
 /// Nothing bright, or something that is too small for a cell.
@@ -64,9 +76,12 @@ std::vector<Adhesion> adhesions_of(const images::Channel& channel, double pixel_
   const std::string expected = "a cell brighter than its surroundings",
                     size = "pixel_size_um (" + images::in_um(pixel_um) + ")";
   const double least_um2 = p.outline_smallest_um2;
+  const OutlineParameters as_given = p;
   constexpr double kSpeck = 0.02;  // 1 um² by default: less is noise
   p.outline_smallest_um2 *= kSpeck;
   const CellsInImage small = find_cells(channel.image, adhesions, pixel_um, p);
+  if (small.cells.empty() && !find_cells(negative_of(channel.image), adhesions, pixel_um, as_given).cells.empty())
+    throw InputError(channel.name, expected, "one that is darker than its surroundings", kInvert);
   if (small.cells.empty())
     throw InputError(channel.name, expected,
                      "no cell: nothing of " + shortest(least_um2) + " um² or more stands out of the noise",

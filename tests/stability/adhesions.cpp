@@ -1,6 +1,7 @@
 /// Images that show no adhesion give none, and say why.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "pipeline/contract/errors.h"
@@ -68,6 +69,21 @@ TEST(Emptiness, a_saturated_image_is_called_so) {
   EXPECT_NE(found.find("% of the pixels at 190"), std::string::npos) << found;
   EXPECT_NE(found.find("saturated"), std::string::npos) << found;
   test::came_out(found);
+}
+
+TEST(Emptiness, an_inverted_image_is_called_so) {
+  test::hard_case("dark on bright, as ImageJ inverts an image", "an error that says so");
+  const DrawnScene s = drawn_scene(10, 1);
+  const auto inverted = [](images::Image image) {
+    const float most = *std::ranges::max_element(image.pixels);
+    for (float& pixel : image.pixels) pixel = most - pixel;
+    return image;
+  };
+  const std::string spots = finding(inverted(s.adhesion_image), s.actin_image);
+  EXPECT_NE(spots.find("dark spots on a brighter ground"), std::string::npos) << spots;
+  const std::string cell = finding(s.adhesion_image, inverted(s.actin_image));
+  EXPECT_EQ(cell, "one that is darker than its surroundings");
+  test::came_out(spots + "; " + cell);
 }
 
 TEST(Emptiness, noise_alone_is_called_so_and_says_by_how_much) {
