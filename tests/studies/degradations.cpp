@@ -650,7 +650,7 @@ std::vector<std::string> names_of_cause(const std::string& degradation) {
       {"beads-mirrored", {"read-otherwise"}},
       {"beads-transposed", {"read-otherwise"}},
       {"beads-exchanged", {"exchanged"}},
-      {"beads-of-another-cell", {"explains-little"}},
+      {"beads-of-another-cell", {"explains-little", "nothing-moves"}},
       {"stressed-of-another-cell", {"one place"}},
       {"channels-exchanged", {"adhesions-long"}},
       {"bleed-through", {"bleed-through"}},
