@@ -53,7 +53,10 @@ images::Image negative_of(images::Image image) {
   return image;
 }
 
-const std::string kInvert = "the image seems inverted: fluorescence is bright on dark. In ImageJ, Edit > Invert";
+const std::string kInvert =
+    "is this the right channel and page? If it is, the image seems inverted: fluorescence is bright on dark. In "
+    "ImageJ, "
+    "Edit > Invert";
 
 std::vector<Adhesion> adhesions_of(const images::Channel& channel, double pixel_um, const SegmentParameters& p) {
   require_content(channel);
