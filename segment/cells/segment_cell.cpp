@@ -46,17 +46,7 @@ void require_content(const images::Channel& channel) {
                      "is this the right file, channel and page? Was it overexposed?");
 }
 
-/// Bright where the image is dark.
-images::Image negative_of(images::Image image) {
-  const auto [least, most] = std::ranges::minmax(image.pixels);
-  for (float& pixel : image.pixels) pixel = least + (most - pixel);
-  return image;
-}
-
-const std::string kInvert =
-    "is this the right channel and page? If it is, the image seems inverted: fluorescence is bright on dark. In "
-    "ImageJ, "
-    "Edit > Invert";
+const std::string kInvert = "the image seems inverted: in ImageJ, Edit > Invert; fluorescence is bright on dark";
 
 std::vector<Adhesion> adhesions_of(const images::Channel& channel, double pixel_um, const SegmentParameters& p) {
   require_content(channel);
@@ -64,10 +54,13 @@ std::vector<Adhesion> adhesions_of(const images::Channel& channel, double pixel_
   if (!found.empty()) return found;
   const std::string expected =
       "bright spots of " + shortest(p.adhesions.adhesion_smallest_um2) + " um² or more that stand out of the noise";
-  constexpr std::size_t kSome = 5;  // fewer are gaps between bright things
-  if (const auto dark = find_adhesions(negative_of(channel.image), pixel_um, p.adhesions); dark.size() >= kSome)
-    throw InputError(channel.name, expected, counted(std::ssize(dark), "dark spots") + " on a brighter ground",
-                     kInvert);
+  if (const auto negative = negative_of_dark_on_bright(channel.image)) {
+    const auto dark = find_adhesions(*negative, pixel_um, p.adhesions);
+    constexpr std::size_t kSome = 5;  // fewer are gaps between bright things
+    if (dark.size() >= kSome)
+      throw InputError(channel.name, expected, counted(std::ssize(dark), "dark spots") + " on a brighter ground",
+                       kInvert);
+  }
   throw InputError(channel.name, expected, "no adhesion: " + why_no_adhesions(channel.image, pixel_um, p.adhesions),
                    "is this the adhesion channel, in focus? Check pixel_size_um (" + images::in_um(pixel_um) +
                        "), adhesion_channel, and adhesion_seed_noise for a faint image");
@@ -75,20 +68,22 @@ std::vector<Adhesion> adhesions_of(const images::Channel& channel, double pixel_
 
 /// Nothing bright, or something that is too small for a cell.
 [[noreturn]] void no_cell(const images::Channel& channel, const std::vector<Adhesion>& adhesions, double pixel_um,
-                          OutlineParameters p) {
+                          const OutlineParameters& p) {
   const std::string expected = "a cell brighter than its surroundings",
                     size = "pixel_size_um (" + images::in_um(pixel_um) + ")";
   const double least_um2 = p.outline_smallest_um2;
-  const OutlineParameters as_given = p;
   constexpr double kSpeck = 0.02;  // 1 um² by default: less is noise
-  p.outline_smallest_um2 *= kSpeck;
-  const CellsInImage small = find_cells(channel.image, adhesions, pixel_um, p);
-  if (small.cells.empty() && !find_cells(negative_of(channel.image), adhesions, pixel_um, as_given).cells.empty())
-    throw InputError(channel.name, expected, "one that is darker than its surroundings", kInvert);
-  if (small.cells.empty())
+  OutlineParameters for_specks = p;
+  for_specks.outline_smallest_um2 *= kSpeck;
+  const CellsInImage small = find_cells(channel.image, adhesions, pixel_um, for_specks);
+  if (small.cells.empty()) {
+    const auto negative = negative_of_dark_on_bright(channel.image);
+    if (negative && !find_cells(*negative, adhesions, pixel_um, p).cells.empty())
+      throw InputError(channel.name, expected, "one that is darker than its surroundings", kInvert);
     throw InputError(channel.name, expected,
                      "no cell: nothing of " + shortest(least_um2) + " um² or more stands out of the noise",
                      "is this the right channel and page? Check " + size + " and outline_smallest_um2");
+  }
   throw InputError(channel.name, expected,
                    "only smaller things: the largest covers " + brief(small.cells.front().area_um2) +
                        " um², and a cell at least " + shortest(least_um2) + " um² (outline_smallest_um2)",

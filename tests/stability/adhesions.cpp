@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "pipeline/contract/errors.h"
@@ -84,6 +85,19 @@ TEST(Emptiness, an_inverted_image_is_called_so) {
   const std::string cell = finding(s.adhesion_image, inverted(s.actin_image));
   EXPECT_EQ(cell, "one that is darker than its surroundings");
   test::came_out(spots + "; " + cell);
+}
+
+TEST(Emptiness, bright_beads_are_not_called_inverted) {
+  test::hard_case("a bead image in place of the actin image", "an error that asks for the right channel");
+  images::Image beads = even_image(400, 300, 200);
+  for (int i = 0; i < 400; ++i) {
+    const Vec2 place{std::fmod(0.618034 * i, 1.0) * 40, (i + 0.5) / 400 * 30};
+    draw_ellipse(beads, ellipse(i + 1, place, 0.4, 0.4, 0), 1000, 0.15, 0.1);
+  }
+  add_noise(beads, 15, 7);
+  const std::string found = finding(std::nullopt, beads);
+  EXPECT_NE(found.find("no cell"), std::string::npos) << found;
+  test::came_out(found);
 }
 
 TEST(Emptiness, noise_alone_is_called_so_and_says_by_how_much) {

@@ -25,10 +25,9 @@ double nearest_um(const std::vector<Vec2>& points, Vec2 point) {
 
 TEST(Candidates, of_a_lattice_touch_and_do_not_overlap) {
   for (const Placement placement : {Placement::first, Placement::second}) {
-    const auto points = hexagonal_lattice({-50, -35}, {75, 100}, 2, placement);
+    const auto points = hexagonal_lattice({-100, -70}, {150, 200}, 2, placement);
     for (const Vec2 p : points) EXPECT_NEAR(nearest_um(points, p), 2, 1e-9);
-    // but for half a distance along the border
-    EXPECT_NEAR(static_cast<double>(points.size()) * std::sqrt(3.0) / 2 * 4, 125 * 135, 0.02 * 125 * 135);
+    EXPECT_NEAR(static_cast<double>(points.size()) * std::sqrt(3.0) / 2 * 4, 250 * 270, 0.01 * 250 * 270);
   }
   const Adhesion one = lattice_candidates({0, 0}, {1, 1}, 2, Placement::first, [](Vec2) { return true; }).at(0);
   EXPECT_EQ(one.major_axis_um, 2);
