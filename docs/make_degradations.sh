@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Make docs/degradations.md: three simulated cells, degraded in each way, and twenty that are sound. Run from the
-# project's folder, built; takes some forty minutes of one processor. What was made before is kept in the work folder
+# project's folder, built; takes some seventy minutes of one processor. What was made before is kept in the work folder
 # (build/degradations).
 set -euo pipefail
 cd "$(dirname "$0")/.."

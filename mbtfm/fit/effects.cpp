@@ -34,11 +34,8 @@ Change change_with_networks(const FittedCell& c, const Effect& e, const std::vec
 Change change_with_gel(const FittedCell& c, const Effect& e, const substrate::SubstrateParameters& parameters,
                        int threads) {
   const auto gel = choice::make_substrate(c.parameters.gel, parameters, threads);
-  LinearData with = c.fit.data;
-  with.response = response_of({.gel = *gel, .cell = c.ready.scene.cell, .parameters = c.parameters, .threads = threads},
-                              c.ready.scene.beads);
-  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(with.bead_weight.size());
-  return change_with_data(c, e, reweighted(std::move(with), ones), threads);
+  const GelUnderCell on{.gel = *gel, .cell = c.ready.scene.cell, .parameters = c.parameters, .threads = threads};
+  return change_with_data(c, e, with_response(c.fit.data, response_of(on, c.ready.scene.beads)), threads);
 }
 
 std::optional<Change> with_base(const FittedCell& c, const Effect& e, int threads) {

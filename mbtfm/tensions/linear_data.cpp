@@ -215,13 +215,17 @@ LinearData unweighted(LinearData data) {
   return reweighted(std::move(data), ones);
 }
 
+LinearData with_response(LinearData data, substrate::SharedResponse response) {
+  data.response = std::move(response);
+  const Eigen::Index n_beads = data.bead_weight.size();
+  return reweighted(std::move(data), Eigen::VectorXd::Ones(n_beads));
+}
+
 LinearData about_forces(LinearData data, substrate::SharedResponse response, const Eigen::VectorXd& measured_um,
                         Eigen::VectorXd offset_um) {
-  data.response = std::move(response);
   data.displacement_um = measured_um - offset_um;
   data.offset_um = std::move(offset_um);
-  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(data.bead_weight.size());
-  return reweighted(std::move(data), ones);
+  return with_response(std::move(data), std::move(response));
 }
 
 Eigen::VectorXd moved_by(const LinearData& data, const Eigen::VectorXd& forces_nN) {

@@ -73,6 +73,8 @@ LinearData reweighted(LinearData data, const Eigen::VectorXd& bead_weight);
 /// Without what a robust loss has made of the weights.
 LinearData unweighted(LinearData data);
 
+/// With another response of the same size. Without what a robust loss has made of the weights.
+LinearData with_response(LinearData data, substrate::SharedResponse response);
 /// Of a gel that is not linear: it moves the beads by response · F + offset_um near the forces that are found. Without
 /// what a robust loss has made of the weights.
 /// @param measured_um  of the beads, 2·beads

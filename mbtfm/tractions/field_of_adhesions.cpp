@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "substrate/ellipse.h"
@@ -17,11 +18,7 @@ using Eigen::VectorXd;
 
 /// Shift, and what changes linearly over the field: six columns of order 1.
 MatrixXd affine_motions(const std::vector<Vec2>& places_um) {
-  Vec2 low = places_um.front(), high = low;
-  for (const Vec2 p : places_um) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
+  const auto [low, high] = extent_of(places_um);
   const double side = std::max({high.x - low.x, high.y - low.y, 1.0});
   MatrixXd columns = MatrixXd::Zero(2 * std::ssize(places_um), 6);
   for (Index i = 0; i < std::ssize(places_um); ++i) {

@@ -17,7 +17,8 @@ class FieldOfAdhesions {
  public:
   FieldOfAdhesions(const std::vector<Adhesion>& adhesions, int threads);
   /// um, of all beads. Empty where there are not ten data for each unknown: a bead would tell much of its own guess.
-  /// Quicker for the places of the last call.
+  /// Quicker for the places of the last call; of displacements that are mostly those of the last call, what was found
+  /// then tells which beads are astray.
   std::vector<Vec2> um(const DisplacementField& beads);
 
  private:
