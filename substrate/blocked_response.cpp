@@ -1,5 +1,4 @@
 /// blocked_response(): see response.h.
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -90,14 +89,14 @@ auto axis_of(Matrix& matrix, Index first) {
 /// The fewest directions at the nodes that have all but a hundred thousandth of these fields: 2·nodes × some.
 MatrixXd common_modes(const MatrixXd& at_nodes) {
   constexpr double kLeftOut = 1e-5;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(at_nodes * at_nodes.transpose());
-  const VectorXd squares = eigen.eigenvalues().cwiseMax(0.0);
+  const auto [values, vectors] = numerics::symmetric_eigen(at_nodes * at_nodes.transpose());
+  const VectorXd squares = values.cwiseMax(0.0);
   Index n_left_out = 0;
   for (double sum = 0; n_left_out < squares.size(); ++n_left_out) {
     sum += squares[n_left_out];  // they ascend
     if (sum > kLeftOut * kLeftOut * squares.sum()) break;
   }
-  return eigen.eigenvectors().rightCols(squares.size() - n_left_out);
+  return vectors.rightCols(squares.size() - n_left_out);
 }
 
 class Blocked final : public KeptResponse {
@@ -214,8 +213,8 @@ class Blocked final : public KeptResponse {
 
   /// R with Rᵀ R = A, which may be singular: fewer points than modes.
   static MatrixXd square_root(const MatrixXd& A) {
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(A);
-    return eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.eigenvectors().transpose();
+    const auto [values, vectors] = numerics::symmetric_eigen(A);
+    return values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * vectors.transpose();
   }
 
   /// square += M Eᵀ + E Mᵀ + E O Eᵀ, E picking the near columns. Column by column, as memory lies: what belongs above

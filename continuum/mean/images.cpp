@@ -1,6 +1,5 @@
 #include "continuum/mean/images.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <algorithm>
@@ -9,6 +8,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::mean {
 namespace {
@@ -127,7 +128,7 @@ ImageWay refined(const Raster& image, const Raster& reference, Motion motion) {
   constexpr double kStill = 1e-3;  // pixels
   Step now = step_at(laid(image, reference, motion), reference, motion.to_um);
   for (int k = 0; k < kMostSteps && now.residual2 > 0; ++k) {
-    const Eigen::Matrix<double, 5, 1> change = -now.matrix.ldlt().solve(now.slope);
+    const Eigen::Matrix<double, 5, 1> change = -numerics::solve_symmetric(now.matrix, now.slope);
     double length = 1;
     bool is_better = false;
     for (; length > 0.05 && !is_better; length /= 2) {

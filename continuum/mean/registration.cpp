@@ -1,11 +1,12 @@
 #include "continuum/mean/registration.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::mean {
 namespace {
@@ -129,7 +130,7 @@ Way refined(const Polygon& outline, const Polygon& reference, Motion motion) {
   double now = mean_square(pairs);
   for (int step = 0; step < kMostSteps; ++step) {
     const Normal normal = normal_of(pairs, motion.to_um, size);
-    const Eigen::Vector3d change = -normal.matrix.ldlt().solve(normal.slope);
+    const Eigen::Vector3d change = -numerics::solve_symmetric(normal.matrix, normal.slope);
     double length = 1;
     bool is_better = false;
     for (int halving = 0; halving < kMostHalvings && !is_better; ++halving, length /= 2) {

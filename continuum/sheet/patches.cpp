@@ -1,11 +1,11 @@
 #include "continuum/sheet/patches.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/neighbour_bins.h"
 #include "pipeline/numerics/order_statistics.h"
 
@@ -18,10 +18,10 @@ substrate::Ellipse ellipse_of(Vec2 a, Vec2 b, Vec2 c) {
     const Eigen::Vector2d d(p.x - centre.x, p.y - centre.y);
     inertia += d * d.transpose() / 12;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(inertia);
-  const double ratio = std::sqrt(axes.eigenvalues()(1) / axes.eigenvalues()(0));
+  const auto [squares, axes] = numerics::symmetric_eigen(inertia);
+  const double ratio = std::sqrt(squares[1] / squares[0]);
   const double product = 0.5 * std::abs(cross(b - a, c - a)) / std::numbers::pi;
-  const Eigen::Vector2d major = axes.eigenvectors().col(1);
+  const Eigen::Vector2d major = axes.col(1);
   const double semi_major = std::sqrt(product * ratio);
   return {centre, semi_major, std::min(semi_major, product / semi_major), std::atan2(major.y(), major.x())};
 }

@@ -1,11 +1,12 @@
 #include "continuum/sheet/recovery.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 #include <tuple>
+
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::sheet {
 namespace {
@@ -77,7 +78,7 @@ class PatchFit {
     add_row(weight_um2, none, normal.y * t, normal.x * t, pull_nN_per_um.y);
   }
   Patch solved() {
-    const Eigen::Matrix<double, 3 * n, 1> found = normal_.ldlt().solve(right_);
+    const Eigen::Matrix<double, 3 * n, 1> found = numerics::solve_symmetric(normal_, right_);
     for (int c = 0; c < 3; ++c) patch_.coefficients.col(c).template head<n>() = found.template segment<n>(n * c);
     return patch_;
   }

@@ -1,7 +1,6 @@
 #include "mbtfm/plan/adhesion_pair.h"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <boost/math/distributions/normal.hpp>
@@ -206,8 +205,7 @@ std::array<Excess, D> excess_of(const Eigen::RowVectorXd& sums, const Eigen::Row
   of_two << square_at(kFirst), crossed, crossed.transpose(), square_at(kSecond);
   Eigen::Matrix<double, 2 * D, 1> noise_of_two;
   noise_of_two << of_noise.segment<D>(D * kFirst).transpose(), of_noise.segment<D>(D * kSecond).transpose();
-  const double explained_by_two =
-      noise_of_two.dot(Eigen::CompleteOrthogonalDecomposition<Square<2 * D>>(of_two).solve(noise_of_two));
+  const double explained_by_two = noise_of_two.dot(numerics::shortest_solution(of_two, noise_of_two).col(0));
   for (int k = 0; k < kPlaces; ++k) {
     const Square<D> GG = square_at(k);
     // one bead or none: no single force is found

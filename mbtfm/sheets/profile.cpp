@@ -1,12 +1,12 @@
 #include "mbtfm/sheets/profile.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "mbtfm/tensions/robust.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::sheets {
 
@@ -74,7 +74,7 @@ LinearData reweighed(LinearData data, tensions::Loss loss, const std::function<V
 }  // namespace
 
 VectorXd best_loads(const MatrixXd& H, const VectorXd& right, Eigen::Index n_bundles) {
-  VectorXd loads = H.ldlt().solve(right);
+  VectorXd loads = numerics::solve_symmetric(H, right);
   if (n_bundles == 0 || loads.tail(n_bundles).minCoeff() >= 0) return loads;
   VectorXd low = VectorXd::Constant(loads.size(), -std::numeric_limits<double>::infinity());
   low.tail(n_bundles).setZero();
@@ -83,7 +83,7 @@ VectorXd best_loads(const MatrixXd& H, const VectorXd& right, Eigen::Index n_bun
 
 tensions::Sides Profile::reach(Eigen::Index load, double room) const {
   if (n_bundles == 0) {
-    const double half = std::sqrt(room * normal.inverse()(load, load));
+    const double half = std::sqrt(room * numerics::inverse_symmetric(normal)(load, load));
     return {half, half};
   }
   // what may take both signs is given a bound that it never meets
@@ -184,9 +184,7 @@ MatrixXd padded(const MatrixXd& of_unknown, const Directions& about) {
   return whole;
 }
 
-MatrixXd inverse_of(const MatrixXd& normal) {
-  return normal.ldlt().solve(MatrixXd::Identity(normal.rows(), normal.cols()));
-}
+MatrixXd inverse_of(const MatrixXd& normal) { return numerics::inverse_symmetric(normal); }
 
 }  // namespace
 

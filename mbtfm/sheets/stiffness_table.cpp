@@ -1,10 +1,10 @@
 #include "mbtfm/sheets/stiffness_table.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::sheets {
@@ -54,9 +54,7 @@ MatrixXd loads_of(const SheetShape& shape) {
 MatrixXd basis_of(MatrixXd columns) {
   constexpr double kLeast = 1e-7;
   columns.colwise().normalize();
-  const Eigen::BDCSVD<MatrixXd> svd(columns, Eigen::ComputeThinU);
-  const VectorXd& sizes = svd.singularValues();
-  return svd.matrixU().leftCols((sizes.array() > kLeast * sizes(0)).count());
+  return numerics::principal_directions(std::move(columns), kLeast);
 }
 
 }  // namespace
@@ -100,7 +98,7 @@ StiffnessTable::StiffnessTable(const SheetShape& shape, const sheet::OnGel& grou
 MatrixXd StiffnessTable::shares(const Stiffnesses& at) const {
   MatrixXd matrix = equations_.gel + equations_.sheet / at.sheet_nN_per_um;
   if (at.adhesion_nN_per_um3) matrix += equations_.slip / *at.adhesion_nN_per_um3;
-  return matrix.ldlt().solve(equations_.pull / at.sheet_nN_per_um);
+  return numerics::solve_symmetric(matrix, equations_.pull / at.sheet_nN_per_um);
 }
 
 }  // namespace mbtfm::sheets

@@ -1,6 +1,5 @@
 #include "mbtfm/spatial/neighbours.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <variant>
 
 #include "mbtfm/spatial/loss.h"
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 
@@ -54,11 +54,11 @@ Prediction predicted(const MatrixXd& offsets, const MatrixXd& over_sigma, const 
           std::max(1e-9, loss_weight(BeadLoss::biweight, lengths[k] / std::max(made.scatter, 1e-300), n_components));
     normal = linear.transpose() * weights.asDiagonal() * linear;
     normal.diagonal().array() += 1e-9 * normal(0, 0);  // beads in a plane tell nothing across it
-    const MatrixXd field = normal.ldlt().solve(linear.transpose() * weights.asDiagonal() * over_sigma);
+    const MatrixXd field = numerics::solve_symmetric(normal, linear.transpose() * weights.asDiagonal() * over_sigma);
     lengths = (over_sigma - linear * field).rowwise().norm();
     made.distance = (own - field.row(0)).norm();
   }
-  made.leverage = normal.inverse()(0, 0);
+  made.leverage = numerics::inverse_symmetric(normal)(0, 0);
   return made;
 }
 

@@ -56,8 +56,7 @@ double deviate_of_tractions_beside(const Problem& problem, const MatrixXd& of_pa
                                    const VectorXd& weights_by_row, double n_data, int threads) {
   const Rows rows(problem, weights_by_row);
   const MatrixXd P = rows.of(of_patches);
-  const Eigen::HouseholderQR<MatrixXd> factor(P);
-  const MatrixXd Q = factor.householderQ() * MatrixXd::Identity(P.rows(), P.cols());
+  const MatrixXd Q = numerics::orthonormal_basis(P);
   const auto beside = [&](const MatrixXd& what) -> MatrixXd { return what - Q * (Q.transpose() * what); };
   const MatrixXd u = rows.of(problem.displacement_um()), y = beside(u), MA = beside(rows.of(anywhere));
   MatrixXd K = MatrixXd::Zero(MA.cols(), MA.cols());

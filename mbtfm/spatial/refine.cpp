@@ -1,9 +1,10 @@
 #include "mbtfm/spatial/refine.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::spatial {
 
@@ -35,7 +36,8 @@ std::vector<bool> is_resolved(const SpatialReconstruction& r) {
   for (Index v = 0; v < r.resolved.size(); ++v) {
     const Vector3d t = r.traction_kPa.segment<3>(3 * v);
     const Matrix3d C = r.covariance_kPa2.block<3, 3>(3 * v, 3 * v);
-    is_resolved.push_back(r.resolved[v] * kSides * kSides >= 1 && t.dot(C.ldlt().solve(t)) > kSquares);
+    is_resolved.push_back(r.resolved[v] * kSides * kSides >= 1 &&
+                          t.dot(Vector3d(numerics::solve_symmetric(C, t))) > kSquares);
   }
   return is_resolved;
 }

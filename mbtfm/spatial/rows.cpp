@@ -7,6 +7,7 @@
 
 #include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/contract/with_error.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::spatial {
 
@@ -32,8 +33,8 @@ MatrixXd common_motions(const Observed& observed) {
 Rows::Rows(const Problem& problem, const VectorXd& weights_by_row)
     : roots_(weights_by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um)) {
   if (problem.common_um.cols() == 0) return;
-  factor_.compute(roots_.asDiagonal() * problem.common_um);
-  common_ = factor_.householderQ() * MatrixXd::Identity(roots_.size(), factor_.rank());
+  weighed_common_ = roots_.asDiagonal() * problem.common_um;
+  common_ = numerics::orthonormal_basis(weighed_common_);
 }
 
 MatrixXd Rows::of(const MatrixXd& by_row) const {
@@ -47,7 +48,9 @@ MatrixXd Rows::transposed(const MatrixXd& weighed) const {
   return roots_.asDiagonal() * (weighed - common_ * (common_.transpose() * weighed));
 }
 
-MatrixXd Rows::common_in(const MatrixXd& by_row) const { return factor_.solve(roots_.asDiagonal() * by_row); }
+MatrixXd Rows::common_in(const MatrixXd& by_row) const {
+  return numerics::shortest_solution(weighed_common_, roots_.asDiagonal() * by_row);
+}
 
 std::optional<CommonMotionInSpace> common_motion_beside(const Problem& problem, const SpatialReconstruction& found) {
   if (problem.common_um.cols() == 0 || found.covariance_kPa2.size() == 0) return std::nullopt;
@@ -55,8 +58,8 @@ std::optional<CommonMotionInSpace> common_motion_beside(const Problem& problem, 
   const VectorXd roots = found.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
   const MatrixXd C = roots.asDiagonal() * problem.common_um;
   const MatrixXd by_traction = rows.common_in(problem.response_um_per_kPa);
-  const MatrixXd covariance =
-      found.variance * (C.transpose() * C).inverse() + by_traction * found.covariance_kPa2 * by_traction.transpose();
+  const MatrixXd covariance = found.variance * numerics::inverse_symmetric(C.transpose() * C) +
+                              by_traction * found.covariance_kPa2 * by_traction.transpose();
   const VectorXd left_um = problem.displacement_um() - problem.response_um_per_kPa * found.traction_kPa;
   return CommonMotionInSpace{rows.common_in(left_um), covariance.diagonal().cwiseMax(0).cwiseSqrt()};
 }

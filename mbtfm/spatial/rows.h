@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 #include <optional>
 
 #include "mbtfm/spatial/observed.h"
@@ -35,8 +34,8 @@ class Rows {
 
  private:
   Eigen::VectorXd roots_;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor_;  ///< of W S C
-  Eigen::MatrixXd common_;                              ///< Q
+  Eigen::MatrixXd weighed_common_;  ///< W S C
+  Eigen::MatrixXd common_;          ///< Q
 };
 
 /// The motion that was found beside tractions, in the order of common_motions().

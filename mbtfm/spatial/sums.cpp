@@ -165,7 +165,7 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
     balance.moment_sigma_nN_um = errors_of(of_moment);
     balance.net_force_sigma_nN = error_along(net.head<3>(), of_force);
     balance.net_moment_sigma_nN_um = error_along(net.tail<3>(), of_moment);
-    balance.imbalance = net.dot(of_net.ldlt().solve(net));
+    balance.imbalance = net.dot(VectorXd(numerics::solve_symmetric(of_net, net)));
     balance.contractile_moment_sigma_nN_um = std::sqrt(std::max(0.0, inwards.dot(covariance * inwards)));
   }
   const VectorXd u = problem.surface_displacement_um(summed);

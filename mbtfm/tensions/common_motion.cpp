@@ -1,11 +1,11 @@
 #include "mbtfm/tensions/common_motion.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "pipeline/contract/with_error.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::tensions {
 
@@ -81,13 +81,13 @@ CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementFiel
   const Eigen::VectorXd scores = weighted.transpose() * residual_um(data, fit.forces.nN);
   const Eigen::MatrixXd by_force = data.response->pull_back(weighted).transpose();
   const Eigen::MatrixXd of_noise = weighted.transpose() * motions;
-  const auto inverse = covariance_of_scores(fit, of_noise, by_force).completeOrthogonalDecomposition();
+  const Eigen::MatrixXd covariance = covariance_of_scores(fit, of_noise, by_force);
   const MeshFit& mesh = fit.meshes.front();
   const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
   const Eigen::MatrixXd information =
       of_noise - by_tension * mesh.noise_covariance_nN2 * by_tension.transpose() / fit.misfit.variance;
-  const Eigen::VectorXd moved = motions * information.completeOrthogonalDecomposition().solve(scores);
-  return {.chi_squared = scores.dot(inverse.solve(scores)),
+  const Eigen::VectorXd moved = motions * numerics::shortest_solution(information, scores);
+  return {.chi_squared = scores.dot(numerics::shortest_solution(covariance, scores).col(0)),
           .rms_um = std::sqrt(2.0) * moved.norm() / std::sqrt(std::max(1.0, static_cast<double>(moved.size())))};
 }
 

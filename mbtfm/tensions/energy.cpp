@@ -1,10 +1,10 @@
 #include "mbtfm/tensions/energy.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <numbers>
 
 #include "mbtfm/tensions/fit_results.h"
+#include "pipeline/numerics/dense.h"
 #include "substrate/greens/models.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"
@@ -76,13 +76,13 @@ Figures moments_of(const EnsembleFit& fit, const std::vector<substrate::Ellipse>
     moment -= x * forces_nN.segment<2>(2 * a).transpose();
     of_trace.segment<2>(2 * a) = -x;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(0.5 * (moment + moment.transpose()));
-  const Eigen::Vector2d major = axes.eigenvectors().col(1);
+  const auto [sizes, axes] = numerics::symmetric_eigen(0.5 * (moment + moment.transpose()));
+  const Eigen::Vector2d major = axes.col(1);
   const double angle_deg = std::atan2(major.y(), major.x()) * 180 / std::numbers::pi;
   return {{"contractile_moment_nN_um", moment.trace()},
           {"contractile_moment_sigma_nN_um", standard_error(fit, of_trace)},
-          {"contractile_moment_major_nN_um", axes.eigenvalues()[1]},
-          {"contractile_moment_minor_nN_um", axes.eigenvalues()[0]},
+          {"contractile_moment_major_nN_um", sizes[1]},
+          {"contractile_moment_minor_nN_um", sizes[0]},
           {"contractile_moment_axis_deg", angle_deg < 0 ? angle_deg + 180 : angle_deg}};
 }
 

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/layer.h"
 #include "substrate/greens/models.h"
@@ -89,7 +90,7 @@ MatrixXd covariance_by_place(const EnsembleFit& fit, const MeshFit& mesh, const 
   const MatrixXd answered = mesh.noise_covariance_nN2 * (mesh.force_derivatives.transpose() * pulled);  // Cov V
   MatrixXd middle = pulled.transpose() * mesh.force_derivatives * answered;
   middle.diagonal().array() += fit.misfit.variance;
-  return answered * middle.ldlt().solve(answered.transpose());
+  return answered * numerics::solve_symmetric(middle, answered.transpose());
 }
 
 MeanVariances mean_variances(const BudgetInputs& in) {

@@ -180,7 +180,7 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Sea
 Eigen::VectorXd solve_positive(const Eigen::MatrixXd& H, const Eigen::VectorXd& b) {
   const Eigen::LLT<Eigen::MatrixXd> quick(H);
   if (quick.info() == Eigen::Success) return quick.solve(b);
-  return H.ldlt().solve(b);
+  return numerics::solve_symmetric(H, b);
 }
 
 bool is_slack(const Eigen::VectorXd& tensions_nN, Eigen::Index i) {

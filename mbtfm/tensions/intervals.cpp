@@ -1,6 +1,5 @@
 #include "mbtfm/tensions/intervals.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -25,11 +24,10 @@ constexpr double kPressedByMoreThanChance = 3;
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& H) {
   const double least = std::max(1e-30 * H.diagonal().maxCoeff(), 1e-100);
   const Eigen::VectorXd scale = H.diagonal().cwiseMax(least).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H * scale.asDiagonal());
-  const double smallest = 1e-12 * std::max(eigen.eigenvalues().maxCoeff(), 1e-300);  // rounding of JᵀJ
-  const Eigen::VectorXd roots =
-      eigen.eigenvalues().unaryExpr([&](double v) { return 1 / std::sqrt(std::max(v, smallest)); });
-  const Eigen::MatrixXd half = scale.asDiagonal() * eigen.eigenvectors() * roots.asDiagonal();
+  const auto [values, vectors] = numerics::symmetric_eigen(scale.asDiagonal() * H * scale.asDiagonal());
+  const double smallest = 1e-12 * std::max(values.maxCoeff(), 1e-300);  // rounding of JᵀJ
+  const Eigen::VectorXd roots = values.cwiseMax(smallest).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd half = scale.asDiagonal() * vectors * roots.asDiagonal();
   return half * half.transpose();
 }
 
@@ -148,11 +146,11 @@ Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance) {
 Eigen::VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, const Eigen::MatrixXd& jacobian,
                                 const Eigen::MatrixXd& response, const Eigen::MatrixXd& covariance_nN2, int threads) {
   constexpr double kRough = 1e-4;  // of an equilibrium: what bends is a hundredth of the forces and more
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance_nN2);
+  const numerics::SymmetricEigen eigen = numerics::symmetric_eigen(covariance_nN2);
   const double largest = solution.tensions_nN.maxCoeff();
   Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(jacobian.rows(), jacobian.cols());  // by direction
   numerics::parallel_for(static_cast<int>(jacobian.cols()), threads, [&](int k) {
-    const Eigen::VectorXd deviation = std::sqrt(std::max(0.0, eigen.eigenvalues()[k])) * eigen.eigenvectors().col(k);
+    const Eigen::VectorXd deviation = std::sqrt(std::max(0.0, eigen.values[k])) * eigen.vectors.col(k);
     const double size = deviation.cwiseAbs().maxCoeff();
     if (size == 0) return;                              // held
     const double part = std::min(1.0, largest / size);  // what no bead tells of deviates without bounds

@@ -1,7 +1,5 @@
 #include "mbtfm/tensions/linear_data.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -55,11 +53,11 @@ Root root_less(const Eigen::MatrixXd& U, const Eigen::MatrixXd& F, int threads) 
 /// @param square  MᵀW²M
 Eigen::MatrixXd inverse_of_motions(Eigen::MatrixXd square, const Eigen::VectorXd& precision) {
   if (square.cols() == 0) return square;
-  if (precision.size() == 0) return square.completeOrthogonalDecomposition().pseudoInverse();
+  if (precision.size() == 0) return numerics::pseudo_inverse(square);
   square.diagonal() += precision;
   const Eigen::VectorXd size = square.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   square = size.asDiagonal() * square * size.asDiagonal();
-  return size.asDiagonal() * square.completeOrthogonalDecomposition().pseudoInverse() * size.asDiagonal();
+  return size.asDiagonal() * numerics::pseudo_inverse(square) * size.asDiagonal();
 }
 
 Eigen::MatrixXd inverse_of_motions(const LinearData& data, const Eigen::VectorXd& weight) {
@@ -72,9 +70,8 @@ Eigen::MatrixXd inverse_of_motions(const LinearData& data, const Eigen::VectorXd
 Eigen::MatrixXd explained_by(const LinearData& data, const Eigen::VectorXd& weight, const Eigen::MatrixXd& motions,
                              const Eigen::MatrixXd& inverse) {
   if (motions.cols() == 0) return Eigen::MatrixXd(data.response->cols(), 0);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse);
-  const Eigen::VectorXd root = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
-  const Eigen::MatrixXd unit = motions * (eigen.eigenvectors() * root.asDiagonal());
+  const auto [values, vectors] = numerics::symmetric_eigen(inverse);
+  const Eigen::MatrixXd unit = motions * (vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal());
   return data.response->pull_back(weight.asDiagonal() * unit);
 }
 

@@ -1,12 +1,12 @@
 #include "mbtfm/tensions/missing_adhesions.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/half_space.h"
 
@@ -108,7 +108,7 @@ Question ask(Vec2 place_um, const BeadSquares& beads, const DiscField& disc, con
     q.score += weight[row] * q.fields[k] * residual.segment<2>(row);
     q.square += weight[row] * q.fields[k] * q.fields[k];
   }
-  q.gain = q.score.dot(q.square.ldlt().solve(q.score)) / variance;
+  q.gain = q.score.dot(Eigen::Vector2d(numerics::solve_symmetric(q.square, q.score))) / variance;
   return q;
 }
 
@@ -166,10 +166,10 @@ MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const Linear
   const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
   const Eigen::MatrixXd information =
       q.square - by_tension * mesh.noise_covariance_nN2 * by_tension.transpose() / fit.misfit.variance;
-  const Eigen::Vector2d force = information.ldlt().solve(q.score);
+  const Eigen::Vector2d force = numerics::solve_symmetric(information, q.score);
   return {.position_um = q.place_um,
           .force_nN = {force[0], force[1]},
-          .chi_squared_gain = q.score.dot(covariance.ldlt().solve(q.score))};
+          .chi_squared_gain = q.score.dot(Eigen::Vector2d(numerics::solve_symmetric(covariance, q.score)))};
 }
 
 }  // namespace

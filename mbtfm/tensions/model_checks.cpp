@@ -194,7 +194,7 @@ class FibresTogether {
         chords.col(k).segment<2>(2 * static_cast<Eigen::Index>(a)) << unit.x, unit.y;
         chords.col(k).segment<2>(2 * static_cast<Eigen::Index>(b)) << -unit.x, -unit.y;
       }
-      const Eigen::MatrixXd inverse = (chords.transpose() * K_ * chords).ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+      const Eigen::MatrixXd inverse = numerics::inverse_symmetric(chords.transpose() * K_ * chords);
       const Eigen::VectorXd slopes = chords.transpose() * q_, t = inverse * slopes;
       Eigen::Index least = 0;
       if (t.minCoeff(&least) > 0)

@@ -1,7 +1,5 @@
 #include "mbtfm/tensions/model_error.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 
 #include "pipeline/contract/errors.h"
@@ -59,8 +57,7 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
 
   // E |P r|² = s² (rows − tensions) + phi tr(P C diag(L) Cᵀ P), P taking out what the tensions can follow
   const Eigen::MatrixXd& C = *data.compliance;
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(displace(data, mean.derivatives));
-  const Eigen::MatrixXd followed = qr.householderQ() * Eigen::MatrixXd::Identity(C.rows(), qr.rank());
+  const Eigen::MatrixXd followed = numerics::orthonormal_basis(displace(data, mean.derivatives));
   const auto left_of = [&](const Eigen::MatrixXd& columns) {
     return columns.squaredNorm() - numerics::transposed_product(followed, columns).squaredNorm();
   };
@@ -76,11 +73,11 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
     const Eigen::Index count = std::min(kAtOnce, C.cols() - first);
     per_phi += left_of(C.middleCols(first, count) * loads.segment(first, count).cwiseSqrt().asDiagonal());
   }
-  const double beyond_noise = left - noise_variance * static_cast<double>(data.n_felt - qr.rank());
+  const double beyond_noise = left - noise_variance * static_cast<double>(data.n_felt - followed.cols());
   const double measured = per_phi > 0 ? std::max(0.0, beyond_noise / per_phi) : 0;
   // From few adhesions the misfit tells next to nothing of single forces: of twenty numbers a third, of one nothing.
   constexpr Eigen::Index kEnough = 20;
-  const bool is_told = data.n_felt - qr.rank() >= kEnough;
+  const bool is_told = data.n_felt - followed.cols() >= kEnough;
   const double phi = std::max(least, measured);
   return {.phi_nN = phi,
           .least_phi_nN = least,

@@ -1,6 +1,5 @@
 #include "mbtfm/tensions/placement.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -82,7 +81,7 @@ Step step_of(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& 
   H.bottomRightCorner(of_free.cols(), of_free.cols()) = numerics::gram(displace(data.reduced, of_free, data.threads));
   Eigen::VectorXd g(n);
   g << placement.transpose() * weighted.col(3), pulled.col(3);
-  const Eigen::MatrixXd inverse = H.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = numerics::pseudo_inverse(H);
   return {.value = (inverse * g).head<3>(), .sigma = (noise_variance(data) * inverse.diagonal().head<3>()).cwiseSqrt()};
 }
 

@@ -1,8 +1,6 @@
 #include "mbtfm/tensions/robust.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -159,8 +157,8 @@ WeighedFit fit_with_loss(LinearData data, const network::Contractile& network, c
 
 /// R with R Rᵀ this covariance.
 Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const auto [values, vectors] = numerics::symmetric_eigen(covariance);
+  return vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
 /// Whether the nearest bead's residual does not go along with that of the bead of this row, by half of it at least.
@@ -198,9 +196,8 @@ Studentized studentized(const LinearData& data, const Trial& trial, const Eigen:
     }
   };
   if (data.motions.shapes.cols() > 0) add(weight.asDiagonal() * data.motions.shapes * root_of(data.motions.inverse));
-  const Eigen::MatrixXd unit = of_free * root_of(numerics::gram(displace(data.reduced, of_free, data.threads))
-                                                     .completeOrthogonalDecomposition()
-                                                     .pseudoInverse());
+  const Eigen::MatrixXd unit =
+      of_free * root_of(numerics::pseudo_inverse(numerics::gram(displace(data.reduced, of_free, data.threads))));
   constexpr Eigen::Index kColumns = 64;  // at a time: beads × tensions are too many numbers
   for (Eigen::Index first = 0; first < unit.cols(); first += kColumns) {
     const Eigen::Index count = std::min(kColumns, unit.cols() - first);
@@ -247,9 +244,8 @@ double harm_done_by(const std::vector<Eigen::Index>& strays, const LinearData& d
   const Eigen::MatrixXd of_strays = weight.asDiagonal() * data.response->at_points(strays)->displace(force_derivatives);
   const Eigen::MatrixXd all = numerics::gram(displace(data.reduced, force_derivatives, data.threads));
   const Eigen::MatrixXd others = all - numerics::gram(of_strays);
-  const Eigen::VectorXd moved =
-      others.completeOrthogonalDecomposition().solve(of_strays.transpose() * residual).cwiseAbs();
-  const Eigen::VectorXd variance = all.completeOrthogonalDecomposition().pseudoInverse().diagonal();
+  const Eigen::VectorXd moved = numerics::shortest_solution(others, of_strays.transpose() * residual).cwiseAbs();
+  const Eigen::VectorXd variance = numerics::pseudo_inverse(all).diagonal();
   const Eigen::VectorXd in_errors = moved.cwiseQuotient(variance.cwiseMax(1e-300).cwiseSqrt());
   const double most_moved =
       (variance.array() > 0).select(in_errors, 0).maxCoeff() / robust_scale(data, weighted_residual);

@@ -1,12 +1,11 @@
 /// The thesis' null model: each adhesion pulls with a force of its own, whatever the others do. Linear least squares.
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/ellipse.h"
 #include "substrate/greens/models.h"
@@ -50,8 +49,7 @@ Eigen::MatrixXd weighted_compliance(const substrate::Substrate& gel, const Weigh
 }
 
 void check_solvable(const Eigen::MatrixXd& normal) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal, Eigen::EigenvaluesOnly);
-  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const Eigen::VectorXd values = numerics::symmetric_eigen(normal).values;
   constexpr double kRounding = 1e-13;  // of the normal matrix
   const auto n_lost = (values.array() <= kRounding * values.maxCoeff()).count();
   if (n_lost == 0) return;
@@ -74,7 +72,7 @@ Vec2 force_with(const substrate::Substrate& gel, const WeightedBeads& beads, con
   A.block<2, 2>(2 * a, 2 * a) = columns.transpose() * columns;
   A.middleRows<2>(2 * a) = A.middleCols<2>(2 * a).transpose().eval();
   b.segment<2>(2 * a) = columns.transpose() * beads.displacement;
-  const Eigen::VectorXd forces = A.ldlt().solve(b);
+  const Eigen::VectorXd forces = numerics::solve_symmetric(A, b);
   return {forces[2 * a], forces[2 * a + 1]};
 }
 
@@ -127,16 +125,16 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
   const Eigen::MatrixXd G = weighted_compliance(*gel, beads, ellipses);
   const Eigen::MatrixXd normal_matrix = G.transpose() * G;
   check_solvable(normal_matrix);
-  const Eigen::LDLT<Eigen::MatrixXd> normal(normal_matrix);
+  const Eigen::MatrixXd inverse = numerics::inverse_symmetric(normal_matrix);
   const Eigen::VectorXd pulled = G.transpose() * beads.displacement;
-  const Eigen::VectorXd forces = normal.solve(pulled);
+  const Eigen::VectorXd forces = numerics::solve_symmetric(normal_matrix, pulled);
   const Eigen::VectorXd residual = beads.displacement - G * forces;
 
   Reconstruction r;
   const double chi_squared = residual.squaredNorm() / static_cast<double>(G.rows() - G.cols());
   // As for the tensions (7): the errors stated, or the larger ones that the misfit tells of.
   const double variance = beads.states_errors ? std::max(1.0, chi_squared) : chi_squared;
-  const Eigen::MatrixXd covariance = variance * normal.solve(Eigen::MatrixXd::Identity(G.cols(), G.cols()));
+  const Eigen::MatrixXd covariance = variance * inverse;
   std::vector<Vec2> forces_nN;
   for (std::size_t a = 0; a < ellipses.size(); ++a) {
     const auto at = 2 * static_cast<Index>(a);

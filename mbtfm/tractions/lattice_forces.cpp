@@ -1,9 +1,9 @@
 #include "mbtfm/tractions/lattice_forces.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::tractions {
@@ -41,10 +41,10 @@ struct Known {
 };
 
 Known known_from(const Normal& normal, double variance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal.matrix / variance);
-  const double floor = 1e-9 * eigen.eigenvalues().maxCoeff();  // rounding
-  const Eigen::ArrayXd d = eigen.eigenvalues().array().max(floor);
-  const Eigen::ArrayXd y = (eigen.eigenvectors().transpose() * normal.right).array() / variance;
+  const auto [values, vectors] = numerics::symmetric_eigen(normal.matrix / variance);
+  const double floor = 1e-9 * values.maxCoeff();  // rounding
+  const Eigen::ArrayXd d = values.array().max(floor);
+  const Eigen::ArrayXd y = (vectors.transpose() * normal.right).array() / variance;
   const auto log_likelihood = [&](double before) {
     return 0.5 * (y.square() * before / (1 + before * d)).sum() - 0.5 * (1 + before * d).log().sum();
   };
@@ -59,8 +59,8 @@ Known known_from(const Normal& normal, double variance) {
     best = before;
   }
   const Eigen::ArrayXd after = (d + 1 / best).inverse();
-  known.mean = eigen.eigenvectors() * (after * y).matrix();
-  known.covariance = eigen.eigenvectors() * after.matrix().asDiagonal() * eigen.eigenvectors().transpose();
+  known.mean = vectors * (after * y).matrix();
+  known.covariance = vectors * after.matrix().asDiagonal() * vectors.transpose();
   return known;
 }
 

@@ -1,5 +1,7 @@
 #include "pipeline/numerics/dense.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -19,6 +21,8 @@ void dtrmm_(const char* side, const char* triangle, const char* transpose, const
             const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
 void dsyevd_(const char* vectors, const char* triangle, const int* n, double* a, const int* lda, double* values,
              double* work, const int* n_work, int* integers, const int* n_integers, int* info);
+void dgesdd_(const char* vectors, const int* m, const int* n, double* a, const int* lda, double* values, double* u,
+             const int* ldu, double* vt, const int* ldvt, double* work, const int* lwork, int* iwork, int* info);
 void dpotrf_(const char* triangle, const int* n, double* a, const int* lda, int* info);
 }
 
@@ -168,6 +172,7 @@ void solve_upper_transposed(const MatrixXd& U, MatrixXd& B, int threads) { with_
 SymmetricEigen symmetric_eigen(MatrixXd A) {
   const int n = static_cast<int>(A.rows());
   SymmetricEigen eigen{Eigen::VectorXd(n), {}};
+  if (n == 0) return eigen;
   int info = 0, n_integers = -1, n_work = -1, integers_wanted = 0;
   double work_wanted = 0;
   dsyevd_("V", "U", &n, A.data(), &n, eigen.values.data(), &work_wanted, &n_work, &integers_wanted, &n_integers, &info);
@@ -179,6 +184,36 @@ SymmetricEigen symmetric_eigen(MatrixXd A) {
   MBTFM_ASSERT(info == 0);
   eigen.vectors = std::move(A);
   return eigen;
+}
+
+MatrixXd solve_symmetric(const MatrixXd& A, const MatrixXd& B) { return A.ldlt().solve(B); }
+MatrixXd inverse_symmetric(const MatrixXd& A) { return solve_symmetric(A, MatrixXd::Identity(A.rows(), A.cols())); }
+
+MatrixXd shortest_solution(const MatrixXd& A, const MatrixXd& B) {
+  return A.completeOrthogonalDecomposition().solve(B);
+}
+MatrixXd pseudo_inverse(const MatrixXd& A) { return A.completeOrthogonalDecomposition().pseudoInverse(); }
+
+MatrixXd orthonormal_basis(const MatrixXd& A) {
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(A);
+  return qr.householderQ() * MatrixXd::Identity(A.rows(), qr.rank());
+}
+
+MatrixXd principal_directions(MatrixXd A, double least_part) {
+  const int m = static_cast<int>(A.rows()), n = static_cast<int>(A.cols()), k = std::min(m, n);
+  MatrixXd left(m, k), right(k, n);
+  Eigen::VectorXd sizes(k);
+  std::vector<int> integers(static_cast<std::size_t>(8 * k));
+  int info = 0, n_work = -1;
+  double work_wanted = 0;
+  dgesdd_("S", &m, &n, A.data(), &m, sizes.data(), left.data(), &m, right.data(), &k, &work_wanted, &n_work,
+          integers.data(), &info);
+  n_work = static_cast<int>(work_wanted);
+  std::vector<double> work(static_cast<std::size_t>(n_work));
+  dgesdd_("S", &m, &n, A.data(), &m, sizes.data(), left.data(), &m, right.data(), &k, work.data(), &n_work,
+          integers.data(), &info);
+  MBTFM_ASSERT(info == 0);
+  return left.leftCols((sizes.array() > least_part * sizes[0]).count());
 }
 
 }  // namespace mbtfm::numerics

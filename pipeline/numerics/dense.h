@@ -49,4 +49,22 @@ struct SymmetricEigen {
 /// @param A  what is below the diagonal does not count
 SymmetricEigen symmetric_eigen(Eigen::MatrixXd A);
 
+// Eigen's own, for the small matrices of many places: compiled here once, since each place that names them costs
+// seconds.
+
+/// X of A X = B with a symmetric A, semidefinite up to rounding, by LDLᵀ with pivots.
+Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+/// A⁻¹, the same way.
+Eigen::MatrixXd inverse_symmetric(const Eigen::MatrixXd& A);
+
+/// The shortest X with the least |A X − B|, by rank.
+Eigen::MatrixXd shortest_solution(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+/// A⁺, by rank.
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& A);
+
+/// Orthonormal columns that span those of A, by rank.
+Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& A);
+/// The left singular vectors of A whose values are more than this part of the largest, in falling order (LAPACK).
+Eigen::MatrixXd principal_directions(Eigen::MatrixXd A, double least_part);
+
 }  // namespace mbtfm::numerics

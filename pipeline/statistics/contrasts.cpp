@@ -1,10 +1,11 @@
 /// What a fitted mixed model says of sums and differences of its means.
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
+#include "pipeline/numerics/dense.h"
 #include "pipeline/statistics/mixed_model.h"
 
 namespace mbtfm::statistics {
@@ -57,8 +58,8 @@ Contrast with_positive_interval(Contrast mean) {
 
 FTest test_all_zero(const MixedFit& fit, const MatrixXd& contrasts) {
   const MatrixXd spread = contrasts * fit.covariance * contrasts.transpose();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(spread);
-  const MatrixXd axes = eigen.eigenvectors().transpose() * contrasts;  // independent contrasts, one a row
+  const MatrixXd axes =
+      numerics::symmetric_eigen(spread).vectors.transpose() * contrasts;  // independent contrasts, one a row
   const double q = static_cast<double>(contrasts.rows());
   FTest test{.numerator_degrees = q};
   double expected = 0;  // of q F

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -316,7 +317,7 @@ VectorXd newton_step(const Derivatives& d, const VectorXd& v, const VectorXd& lo
   VectorXd step = VectorXd::Zero(v.size());
   while (!free.empty()) {
     const VectorXd g = (d.gradient - d.information * step)(free);
-    const VectorXd of_free = part(d.information, free).completeOrthogonalDecomposition().solve(g);
+    const VectorXd of_free = numerics::shortest_solution(part(d.information, free), g);
     std::vector<Index> left;
     VectorXd next = step;
     for (std::size_t i = 0; i < free.size(); ++i) {
@@ -363,7 +364,7 @@ std::optional<State> climb(const Design& design, const State& s, const VectorXd&
 /// Of the estimates of these variances; of none, where all are held at zero, none.
 MatrixXd covariance_of_estimates(const MatrixXd& information, const std::vector<Index>& estimated) {
   if (estimated.empty()) return {};
-  return part(information, estimated).completeOrthogonalDecomposition().pseudoInverse();
+  return numerics::pseudo_inverse(part(information, estimated));
 }
 
 /// The variances into the fit, with what the degrees of freedom need of those that are not held at zero.

@@ -1,10 +1,10 @@
 #include "segment/stacks/motion.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/stacks/mean_by_depth.h"
 
@@ -112,10 +112,9 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
     }
     normal.diagonal().array() *= 1 + 1e-9;
     normal.diagonal().array() += 1e-12;
-    const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
-    fit.solution += factor.solve(right);
+    fit.solution += numerics::solve_symmetric(normal, right);
     fit.scale = scale;
-    if (round + 1 == kRounds) fit.covariance = scale * scale * factor.solve(Eigen::MatrixXd::Identity(n, n));
+    if (round + 1 == kRounds) fit.covariance = scale * scale * numerics::inverse_symmetric(normal);
   }
   return fit;
 }

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
@@ -106,7 +107,7 @@ SpotShape SpotShape::through(const std::vector<Sample>& samples, const Volume& v
     for (int round = 0; round < kRounds; ++round) {
       Eigen::MatrixXd normal = a.transpose() * weight.asDiagonal() * a;
       normal.diagonal().array() += 1e-9 * n;
-      solution = normal.ldlt().solve(a.transpose() * (weight.array() * y.array()).matrix());
+      solution = numerics::solve_symmetric(normal, a.transpose() * (weight.array() * y.array()).matrix());
       const Eigen::VectorXd left = (y - a * solution).cwiseAbs();
       const double scale = 1.4826 * numerics::median(std::vector<double>(left.data(), left.data() + n)) + 1e-6;
       for (int k = 0; k < n; ++k) {
@@ -361,7 +362,7 @@ Widths SpotFit::fitted_widths(const Spot& spot) const {
         }
       }
     }
-    const Eigen::Matrix<double, 7, 1> change = normal.ldlt().solve(right) / now.height;
+    const Eigen::Matrix<double, 7, 1> change = numerics::solve_symmetric(normal, right) / now.height;
     if (!change.allFinite()) return {};
     const auto held = [](double by) { return std::clamp(by, -0.3, 0.3); };
     now.place += Vec3{w.xy * held(change[2]), w.xy * held(change[3]), w.z * held(change[4])};

@@ -1,5 +1,5 @@
-#include <Eigen/Cholesky>
 
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/quadrature.h"
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/material.h"
@@ -79,7 +79,7 @@ Eigen::MatrixXd box_stiffness(const substrate::Material& material, int order, co
       }
     }
   }
-  stiffness += lambda * divergence * compressibility.ldlt().solve(divergence.transpose());
+  stiffness += lambda * divergence * numerics::solve_symmetric(compressibility, divergence.transpose());
   return stiffness;
 }
 

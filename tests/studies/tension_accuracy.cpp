@@ -1,8 +1,6 @@
 /// tension_accuracy STUDY [repeats] [cells] [folder]: how well tensions are found, for docs/validation.md. Studies:
 /// descent, noise, bounds, deviations, beside-fttc, segmentation, directions, types. A table (CSV) on stdout; charts
 /// (SVG) into the folder.
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
@@ -48,7 +46,7 @@ TensionScene thesis_scene(std::uint64_t seed, int n_beads, double noise) {
 }
 
 double condition_of(const Eigen::MatrixXd& H) {
-  const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(H).eigenvalues();
+  const Eigen::VectorXd values = numerics::symmetric_eigen(H).values;
   return values.maxCoeff() / values.minCoeff();
 }
 
@@ -141,7 +139,7 @@ class Linearised {
   /// Errors of the tensions with the present noise.
   Eigen::VectorXd errors_nN() const {
     const Eigen::VectorXd residual = *problem_.data().compliance * truth_.forces_nN - problem_.data().target;
-    return -(jacobian_.transpose() * jacobian_).ldlt().solve(jacobian_.transpose() * residual);
+    return -numerics::solve_symmetric(jacobian_.transpose() * jacobian_, jacobian_.transpose() * residual);
   }
   double total_error_nN(const Eigen::VectorXd& errors_nN) const { return total_gradient_.dot(errors_nN); }
 

@@ -135,5 +135,43 @@ TEST(DenseCholesky, a_matrix_that_is_not_positive_is_told_and_its_lower_half_kep
   EXPECT_EQ(A(1, 0), 2);
 }
 
+class OfRank : public testing::TestWithParam<int> {};
+
+TEST_P(OfRank, solutions_are_the_shortest_and_bases_have_as_many_columns) {
+  const int rank = GetParam(), m = 9, n = 6;
+  const MatrixXd A = numbers(m, rank, 14) * numbers(rank, n, 15), B = numbers(m, 2, 16);
+  const MatrixXd inverse = numerics::pseudo_inverse(A);
+  // Penrose's four conditions say that it is the pseudoinverse
+  EXPECT_LE((A * inverse * A - A).norm(), kRounding * A.norm());
+  EXPECT_LE((inverse * A * inverse - inverse).norm(), kRounding * inverse.norm() * inverse.norm() * A.norm());
+  EXPECT_LE((A * inverse - (A * inverse).transpose()).norm(), kRounding * inverse.norm() * A.norm());
+  EXPECT_LE((inverse * A - (inverse * A).transpose()).norm(), kRounding * inverse.norm() * A.norm());
+  EXPECT_LE((numerics::shortest_solution(A, B) - inverse * B).norm(), kRounding * inverse.norm() * inverse.norm() * 10);
+  const MatrixXd most = numerics::principal_directions(A, 1e-9);
+  for (const MatrixXd& basis : {numerics::orthonormal_basis(A), most}) {
+    ASSERT_EQ(basis.cols(), rank);
+    EXPECT_LE((basis.transpose() * basis - MatrixXd::Identity(rank, rank)).norm(), kRounding);
+    EXPECT_LE((basis * (basis.transpose() * A) - A).norm(), kRounding * A.norm());
+  }
+  const VectorXd sizes = (most.transpose() * A).rowwise().norm();
+  for (int k = 1; k < rank; ++k) EXPECT_LE(sizes[k], sizes[k - 1]);
+}
+
+TEST_P(OfRank, symmetric_systems_are_solved_where_they_can_be) {
+  const int rank = GetParam(), n = 6;
+  const MatrixXd half = numbers(rank, n, 17), A = half.transpose() * half;
+  const MatrixXd wanted = A * numbers(n, 3, 18);  // has a solution
+  EXPECT_LE((A * numerics::solve_symmetric(A, wanted) - wanted).norm(), 1e-10 * wanted.norm());
+  const auto [values, vectors] = numerics::symmetric_eigen(A);
+  EXPECT_LE((vectors * values.asDiagonal() * vectors.transpose() - A).norm(), kRounding * A.norm());
+  EXPECT_EQ((values.array() > 1e-9 * values[n - 1]).count(), rank);
+  if (rank < n) return;
+  EXPECT_LE((A * numerics::inverse_symmetric(A) - MatrixXd::Identity(n, n)).norm(), 1e-9);
+}
+
+INSTANTIATE_TEST_SUITE_P(Ranks, OfRank, testing::Values(1, 3, 6));
+
+TEST(DenseEigen, nothing_has_no_eigenvalues) { EXPECT_EQ(numerics::symmetric_eigen(MatrixXd(0, 0)).values.size(), 0); }
+
 }  // namespace
 }  // namespace mbtfm
