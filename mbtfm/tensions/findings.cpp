@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
@@ -133,6 +134,25 @@ Noticed beads_disagree(const FitOutcome& o) {
                  "In the square of " + brief(worst.side_um) + " um about (" + brief(worst.centre_um.x) + ", " +
                      brief(worst.centre_um.y) + ") um the model leaves " + brief(worst.chi_squared) +
                      " times the squares that the noise of the beads would leave.");
+}
+
+/// The squares that the model leaves of the beads over those of their noise, each bead counted as it tells the tensions
+/// (its leverage): by as much are the tensions' variances larger than the noise of all beads says, summed over the
+/// tensions in units of what is known of each (White, Econometrica 48 (1980) 817).
+Noticed telling_beads_scatter(const FitOutcome& o) {
+  const double stated = stated_noise_um(o.data);
+  if (stated <= 0 || o.summary.noise_um <= 0) return {};
+  const MeshFit& mesh = o.fit.meshes.front();
+  const Studentized beads = studentized(o.data, mesh.fit.trial, mesh.force_derivatives);
+  const double all = beads.leverage.sum();
+  if (!(all > 0)) return {};
+  const double noise = std::pow(o.summary.noise_um / stated, 2);
+  const Eigen::Map<const Eigen::Matrix2Xd> residual(beads.residual.data(), 2, beads.leverage.size());
+  const double ratio = residual.colwise().squaredNorm().dot(beads.leverage) / (2 * noise * all);
+  constexpr double kErrors = 3;  // of the ratio by chance
+  return noticed(FindingKind::telling_beads_scatter, ratio - kErrors * beads.leverage.norm() / all,
+                 "The beads that tell the tensions, those beside adhesions, lie off the model by " + brief(ratio) +
+                     " times the squares of noise: intervals are " + brief(std::sqrt(ratio)) + " times too narrow.");
 }
 
 Noticed no_beads_at_adhesions(const FitOutcome& o) {
@@ -328,6 +348,7 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
                         unexplained(o),
                         strain_beyond_linear(o),
                         beads_disagree(o),
+                        telling_beads_scatter(o),
                         noise_unknown(o),
                         noise_disagrees(o),
                         not_identifiable(o),

@@ -62,6 +62,7 @@ enum class FindingKind {
   noise_unknown,
   noise_disagrees,
   beads_disagree_by_region,
+  telling_beads_scatter,
   adhesions_without_beads,
   // fit: the cell
   cell_cut,

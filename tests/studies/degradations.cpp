@@ -530,6 +530,18 @@ std::vector<Degradation> degradations() {
        [](Set& s, const Set&) {
          s.field = true_field(s.truth, [](Bead& b) { std::swap(b.displacement_um.x, b.displacement_um.y); });
        }},
+      {"field-astray", "a fifth of the beads within 1 um of an adhesion are off by five standard errors",
+       [](Set& s, const Set&) {
+         const std::vector<Adhesion> adhesions = files::read_adhesions(s.truth / "adhesions.csv");
+         std::mt19937_64 random(4);
+         std::uniform_real_distribution<double> chance(0, 1), turn(0, 2 * std::numbers::pi);
+         s.field = true_field(s.truth, [&](Bead& b) {
+           const auto is_beside = [&](const Adhesion& a) { return norm(a.position_um - b.position_um) < 1; };
+           if (std::ranges::none_of(adhesions, is_beside) || chance(random) > 0.2) return;
+           const double angle = turn(random);
+           b.displacement_um += 5 * b.sigma_um * Vec2{std::cos(angle), std::sin(angle)};
+         });
+       }},
       {"field-smoothed", "the displacement is of another program that smoothed it over 4 um",
        [](Set& s, const Set&) {
          const DisplacementField all = true_field(s.truth, [](Bead&) {});
@@ -697,6 +709,7 @@ std::vector<std::string> names_of_cause(const std::string& degradation) {
       {"field-uy-up", {"read-otherwise"}},
       {"field-exchanged", {"exchange"}},
       {"field-columns", {"read-otherwise"}},
+      {"field-astray", {"telling-beads-scatter"}},
       {"field-smoothed", {"field-smoothed"}}};
   const auto found = names.find(degradation);
   return found == names.end() ? std::vector<std::string>{} : found->second;
