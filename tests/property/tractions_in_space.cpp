@@ -1,7 +1,7 @@
 /// Laws of reconstructions in space: on a half-space, whose answer is a closed form.
 #include <gtest/gtest.h>
 
-#include <Eigen/Core>
+#include <Eigen/QR>
 #include <cmath>
 #include <random>
 
@@ -10,7 +10,6 @@
 #include "mbtfm/spatial/refine.h"
 #include "mbtfm/tractions/recurrences.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/numerics/dense.h"
 #include "tests/support/findings.h"
 #include "tests/support/half_space_problem.h"
 
@@ -33,8 +32,8 @@ MatrixXd smoothing_matrix(int rows, int cols) {
   const auto filled = [&](int r, int c) {
     return MatrixXd(MatrixXd::NullaryExpr(r, c, [&]() { return normal(random); }));
   };
-  const MatrixXd left = numerics::orthonormal_basis(filled(rows, cols));
-  const MatrixXd right = numerics::orthonormal_basis(filled(cols, cols));
+  const MatrixXd left = filled(rows, cols).householderQr().householderQ() * MatrixXd::Identity(rows, cols);
+  const MatrixXd right = filled(cols, cols).householderQr().householderQ();
   const VectorXd values = VectorXd::NullaryExpr(cols, [&](Eigen::Index k) { return std::pow(0.97, k); });
   return left * values.asDiagonal() * right.transpose();
 }
@@ -67,7 +66,7 @@ TEST(Recurrences, agree_with_the_dense_decomposition_at_every_lambda_and_in_thei
 
 TEST(Spectra, tell_an_error_that_can_be_followed_from_noise_that_is_everywhere) {
   const MatrixXd A = smoothing_matrix(500, 240);
-  const MatrixXd followed = numerics::orthonormal_basis(A);
+  const MatrixXd followed = A.householderQr().householderQ() * MatrixXd::Identity(500, 240);
   std::normal_distribution<double> normal;
   constexpr double kNoise = 0.02, kError = 0.05;
   int n_alarms = 0;
