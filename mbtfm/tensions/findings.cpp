@@ -151,7 +151,7 @@ Noticed telling_beads_scatter(const FitOutcome& o) {
   const double ratio = residual.colwise().squaredNorm().dot(beads.leverage) / (2 * noise * all);
   constexpr double kErrors = 3;  // of the ratio by chance
   return noticed(FindingKind::telling_beads_scatter, ratio - kErrors * beads.leverage.norm() / all,
-                 "The beads that tell the tensions, those beside adhesions, lie off the model by " + brief(ratio) +
+                 "The beads on which the tensions rest, those beside adhesions, lie off the model by " + brief(ratio) +
                      " times the squares of noise: intervals are " + brief(std::sqrt(ratio)) + " times too narrow.");
 }
 

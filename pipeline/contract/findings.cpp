@@ -197,12 +197,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Look at the region in the map of what is left: a bead picture out of focus, another cell, or a fibre or an "
        "adhesion that was not segmented."},
       {telling_beads_scatter, "telling-beads-scatter", "fit", caution,
-       "squares that the model leaves of the beads that tell the tensions, over those of noise, less three standard "
-       "errors",
+       "squares that the model leaves of the beads on which the tensions rest, over those of noise, less three "
+       "standard errors",
        1.2, "nine sound cells have 0.8 to 1.1; intervals are then a tenth too narrow",
        "Look at the beads beside adhesions in the map of what is left. If their arrows point in all directions, beads "
        "were matched wrongly: smaller pixels or fewer beads help. If they point the same way, the adhesion there is "
-       "not where the force is, or has another shape. Widen the intervals by the factor that the finding tells."},
+       "not where the force is, or has another shape. Widen the intervals by the factor in the text."},
       {adhesions_without_beads, "adhesions-without-beads", "fit", caution,
        "adhesions whose nearest bead is three distances between beads away, or further", 0,
        "of beads scattered at random, one such gap in 10^12 adhesions is chance: the beads do not show this part of "

@@ -164,26 +164,23 @@ TEST_F(FitFindings, beads_that_are_wrong_in_one_region_are_told_with_the_place) 
   EXPECT_TRUE(fires("beads-disagree", found()));
 }
 
-/// A third of those within 2 um, by five standard errors, as beads that are matched with their neighbours.
+/// Half of those within 2 um, by five standard errors, as beads that are matched with their neighbours.
 TEST_F(FitFindings, beads_that_are_wrong_beside_adhesions_are_told) {
   const Eigen::VectorXd tensions_nN = Eigen::Vector4d(0.06, 2.5, 1.7, 2);
   constexpr unsigned kSeeds = 5;
-  int n_told = 0, n_told_of_sound = 0;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     pull(tensions_nN, 8000, seed);
-    n_told_of_sound += fires("telling-beads-scatter", found());
+    EXPECT_FALSE(fires("telling-beads-scatter", found())) << seed;
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> turn(0, 2 * std::numbers::pi), chance(0, 1);
     each_bead([&](Bead& b) {
       const auto is_beside = [&](const Adhesion& a) { return norm(a.position_um - b.position_um) < 2; };
-      if (std::ranges::none_of(cell_.adhesions, is_beside) || chance(random) > 0.33) return;
+      if (std::ranges::none_of(cell_.adhesions, is_beside) || chance(random) > 0.5) return;
       const double angle = turn(random);
       b.displacement_um += 5 * b.sigma_um * Vec2{std::cos(angle), std::sin(angle)};
     });
-    n_told += fires("telling-beads-scatter", found());
+    EXPECT_TRUE(fires("telling-beads-scatter", found())) << seed;
   }
-  EXPECT_EQ(n_told_of_sound, 0);
-  EXPECT_GE(n_told, 4);
 }
 
 TEST_F(FitFindings, adhesions_beyond_the_beads_are_told) {
