@@ -184,15 +184,13 @@ MatrixXd padded(const MatrixXd& of_unknown, const Directions& about) {
   return whole;
 }
 
-MatrixXd inverse_of(const MatrixXd& normal) { return numerics::inverse_symmetric(normal); }
-
 }  // namespace
 
 Linearised linearised(const LinearData& data, const Directions& about, double variance, const MatrixXd& prior) {
   MatrixXd of_prior = MatrixXd::Zero(about.forces.cols(), about.forces.cols());
   of_prior.topLeftCorner(prior.rows(), prior.cols()) = prior;
   const auto solved = [&](const Directions& of) -> MatrixXd {
-    return padded(inverse_of(of.normal(data) + of_prior(of.unknown, of.unknown)), of);
+    return padded(numerics::inverse_symmetric(of.normal(data) + of_prior(of.unknown, of.unknown)), of);
   };
   const MatrixXd inverse = solved(about);
   // a stiffness that the beads do not tell within a factor of e follows no straight line
@@ -201,9 +199,9 @@ Linearised linearised(const LinearData& data, const Directions& about, double va
   std::erase_if(told.unknown, [&](Eigen::Index k) { return k >= n_loads && variance * inverse(k, k) > 1; });
   const MatrixXd forces = about.forces * solved(told);
   return {.covariance = variance * inverse,
-          .without_motion =
-              variance *
-              padded(inverse_of(about.normal_without_motion(data) + of_prior(about.unknown, about.unknown)), about),
+          .without_motion = variance * padded(numerics::inverse_symmetric(about.normal_without_motion(data) +
+                                                                          of_prior(about.unknown, about.unknown)),
+                                              about),
           .answers = tensions::less_motion(data, data.response->displace(forces)).transpose() *
                      tensions::squared_weights(data).asDiagonal()};
 }

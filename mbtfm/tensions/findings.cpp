@@ -151,8 +151,9 @@ Noticed telling_beads_scatter(const FitOutcome& o) {
   const double ratio = residual.colwise().squaredNorm().dot(beads.leverage) / (2 * noise * all);
   constexpr double kErrors = 3;  // of the ratio by chance
   return noticed(FindingKind::telling_beads_scatter, ratio - kErrors * beads.leverage.norm() / all,
-                 "The beads on which the tensions rest, those beside adhesions, lie off the model by " + brief(ratio) +
-                     " times the squares of noise: intervals are " + brief(std::sqrt(ratio)) + " times too narrow.");
+                 "The beads on which the tensions rest, those beside adhesions, leave " + brief(ratio) +
+                     " times the squares that their noise would leave: intervals are " + brief(std::sqrt(ratio)) +
+                     " times too narrow.");
 }
 
 Noticed no_beads_at_adhesions(const FitOutcome& o) {

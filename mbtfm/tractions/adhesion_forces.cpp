@@ -125,7 +125,6 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
   const Eigen::MatrixXd G = weighted_compliance(*gel, beads, ellipses);
   const Eigen::MatrixXd normal_matrix = G.transpose() * G;
   check_solvable(normal_matrix);
-  const Eigen::MatrixXd inverse = numerics::inverse_symmetric(normal_matrix);
   const Eigen::VectorXd pulled = G.transpose() * beads.displacement;
   const Eigen::VectorXd forces = numerics::solve_symmetric(normal_matrix, pulled);
   const Eigen::VectorXd residual = beads.displacement - G * forces;
@@ -134,7 +133,7 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
   const double chi_squared = residual.squaredNorm() / static_cast<double>(G.rows() - G.cols());
   // As for the tensions (7): the errors stated, or the larger ones that the misfit tells of.
   const double variance = beads.states_errors ? std::max(1.0, chi_squared) : chi_squared;
-  const Eigen::MatrixXd covariance = variance * inverse;
+  const Eigen::MatrixXd covariance = variance * numerics::inverse_symmetric(normal_matrix);
   std::vector<Vec2> forces_nN;
   for (std::size_t a = 0; a < ellipses.size(); ++a) {
     const auto at = 2 * static_cast<Index>(a);

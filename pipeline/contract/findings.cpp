@@ -199,7 +199,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {telling_beads_scatter, "telling-beads-scatter", "fit", caution,
        "squares that the model leaves of the beads on which the tensions rest, over those of noise, less three "
        "standard errors",
-       1.2, "nine sound cells have 0.8 to 1.1; intervals are then a tenth too narrow",
+       1.2, "nine sound cells have 0.8 to 1.1; above 1.2 intervals are a tenth too narrow, or more",
        "Look at the beads beside adhesions in the map of what is left. If their arrows point in all directions, beads "
        "were matched wrongly: smaller pixels or fewer beads help. If they point the same way, the adhesion there is "
        "not where the force is, or has another shape. Widen the intervals by the factor in the text."},

@@ -22,7 +22,7 @@ void dtrmm_(const char* side, const char* triangle, const char* transpose, const
 void dsyevd_(const char* vectors, const char* triangle, const int* n, double* a, const int* lda, double* values,
              double* work, const int* n_work, int* integers, const int* n_integers, int* info);
 void dgesdd_(const char* vectors, const int* m, const int* n, double* a, const int* lda, double* values, double* u,
-             const int* ldu, double* vt, const int* ldvt, double* work, const int* lwork, int* iwork, int* info);
+             const int* ldu, double* vt, const int* ldvt, double* work, const int* n_work, int* integers, int* info);
 void dpotrf_(const char* triangle, const int* n, double* a, const int* lda, int* info);
 }
 
