@@ -9,6 +9,13 @@ target_include_directories(mbtfm_options INTERFACE
 target_compile_options(mbtfm_options INTERFACE
   "$<BUILD_INTERFACE:-Wall;-Wextra;-Wshadow;$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>;$<$<BOOL:${MBTFM_STRICT}>:-Werror>>")
 
+# mbtfm_words(targets…): they write words, tables and pages. Most of their time is the compiler's.
+function(mbtfm_words)
+  foreach(target ${ARGN})
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  endforeach()
+endfunction()
+
 function(mbtfm_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "PUBLIC;PRIVATE")
   if(NOT arg_UNPARSED_ARGUMENTS)  # headers alone
@@ -27,6 +34,7 @@ function(mbtfm_executable name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "PRIVATE")
   add_executable(${name} ${arg_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PRIVATE mbtfm_options ${arg_PRIVATE})
+  mbtfm_words(${name})
   add_dependencies(executables ${name})
   set_property(GLOBAL APPEND PROPERTY MBTFM_PROGRAMS ${name})
   install(TARGETS ${name} RUNTIME)

@@ -3,6 +3,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/tables.h"
@@ -96,11 +97,7 @@ std::vector<std::optional<Finding>> findings_of(const PatternAtCell& pattern, co
 double unexplained_um(const Segmentation& s) {
   double sum = 0;
   for (const Polyline& crest : s.unexplained_um) {
-    Vec2 low = crest.front(), high = low;
-    for (const Vec2 p : crest) {
-      low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-    }
+    const auto [low, high] = extent_of(crest);
     sum += norm(high - low);
   }
   return sum;

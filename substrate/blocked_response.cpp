@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/response.h"
@@ -260,12 +261,8 @@ void split(const std::vector<Vec2>& points_um, std::vector<Index> points, std::s
 }
 
 Square square_around(const std::vector<Vec2>& points_um) {
-  Vec2 low = points_um.front(), high = low;
-  for (const Vec2 at : points_um) {
-    low = {std::min(low.x, at.x), std::min(low.y, at.y)};
-    high = {std::max(high.x, at.x), std::max(high.y, at.y)};
-  }
-  return {.centre_um = 0.5 * (low + high), .half_um = 0.5 * std::max(high.x - low.x, high.y - low.y)};
+  const mbtfm::Extent e = mbtfm::extent_of(points_um);
+  return {.centre_um = e.middle_um(), .half_um = 0.5 * std::max(e.high_um.x - e.low_um.x, e.high_um.y - e.low_um.y)};
 }
 
 Block block_of(const MatrixAt& matrix_at, const std::vector<Vec2>& points_um, std::vector<Index> points,

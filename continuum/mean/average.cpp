@@ -7,6 +7,7 @@
 #include <random>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 
 namespace mbtfm::mean {
 namespace {
@@ -109,11 +110,7 @@ std::vector<NodeMean> mean_of(const std::vector<Vec2>& nodes_um,
 }
 
 std::vector<Vec2> lattice_over(const Polygon& reference_um, double margin_um, double spacing_um) {
-  Vec2 low = reference_um.front(), high = low;
-  for (const Vec2 p : reference_um) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
+  const auto [low, high] = extent_of(reference_um);
   // nodes lie evenly about the middle, so that a symmetric shape has symmetric nodes
   const Vec2 middle = centroid_um(reference_um);
   const auto reach = [&](double from, double to) {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::sheet {
@@ -97,13 +98,9 @@ double Elements::area_um2() const {
 
 Locator::Locator(const Elements& elements) : elements_(elements) {
   const std::vector<Vec2>& nodes = elements.triangles().nodes_um;
-  Vec2 high = nodes.front();
-  low_um_ = high;
-  for (const Vec2 p : nodes) {
-    low_um_ = {std::min(low_um_.x, p.x), std::min(low_um_.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
-  const Vec2 size = high - low_um_;
+  const auto [low, high] = extent_of(nodes);
+  low_um_ = low;
+  const Vec2 size = high - low;
   bin_um_ = std::sqrt(size.x * size.y / std::max(1, elements.n_triangles() / 2));
   columns_ = static_cast<int>(size.x / bin_um_) + 1;
   rows_ = static_cast<int>(size.y / bin_um_) + 1;

@@ -7,6 +7,7 @@
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/files/fit_summary.h"
 
 namespace mbtfm::fit {
@@ -16,15 +17,11 @@ namespace {
 /// Those in the outline's box and a little around it: a field far larger than the cell would fill the disk.
 std::vector<tractions::Patch> near(const Polygon& outline_um, std::vector<tractions::Patch> patches) {
   constexpr double kMargin_um = 5;  // as around the report's maps
-  Vec2 low = outline_um.front(), high = low;
-  for (const Vec2 p : outline_um) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
+  const Extent box = extent_of(outline_um);
   std::erase_if(patches, [&](const tractions::Patch& patch) {
     const Vec2 p = patch.position_um;
-    return p.x < low.x - kMargin_um || p.x > high.x + kMargin_um || p.y < low.y - kMargin_um ||
-           p.y > high.y + kMargin_um;
+    return p.x < box.low_um.x - kMargin_um || p.x > box.high_um.x + kMargin_um || p.y < box.low_um.y - kMargin_um ||
+           p.y > box.high_um.y + kMargin_um;
   });
   return patches;
 }

@@ -10,6 +10,7 @@
 #include "mbtfm/tensions/intervals.h"
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 
 namespace mbtfm::sheets {
 namespace {
@@ -257,8 +258,7 @@ std::vector<FittedEstimate> estimates_of(const Posterior& p, const StiffnessTabl
 
 ContractionLattice::ContractionLattice(const sheet::Elements& elements, int n_points)
     : spacing_um_(std::sqrt(elements.area_um2() / n_points)) {
-  low_um_ = elements.triangles().nodes_um.front();
-  for (const Vec2 p : elements.triangles().nodes_um) low_um_ = {std::min(low_um_.x, p.x), std::min(low_um_.y, p.y)};
+  low_um_ = extent_of(elements.triangles().nodes_um).low_um;
   std::map<std::array<int, 2>, int> point_at;
   std::set<std::array<int, 2>> touched;
   for (int t = 0; t < elements.n_triangles(); ++t)

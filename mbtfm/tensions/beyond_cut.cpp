@@ -6,6 +6,7 @@
 
 #include "mbtfm/tensions/common_motion.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
 #include "substrate/greens/models.h"
@@ -37,11 +38,7 @@ class Tiling {
       const Vec2 along = (turn / norm(b - a)) * (b - a);
       sides_.push_back({a, {along.y, -along.x}});
     }
-    Vec2 low = cell.outline_um.front(), high = low;
-    for (const Vec2 p : cell.outline_um) {
-      low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-    }
+    const auto [low, high] = extent_of(cell.outline_um);
     constexpr double kSpreadCell_um = 60;
     reach_um_ = std::max({high.x - low.x, high.y - low.y, kSpreadCell_um});
     // a corner of the squares lies on the first side, so that none of them reaches over it

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/half_space.h"
@@ -138,12 +138,7 @@ bool is_free(const Cell& cell, Vec2 place_um) {
 }
 
 std::vector<Vec2> free_places(const Cell& cell) {
-  constexpr double kInfinite = std::numeric_limits<double>::infinity();
-  Vec2 low{kInfinite, kInfinite}, high{-kInfinite, -kInfinite};
-  for (const Vec2 p : cell.outline_um) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
+  const auto [low, high] = extent_of(cell.outline_um);
   std::vector<Vec2> places;
   for (double y = low.y; y <= high.y; y += kStep_um) {
     for (double x = low.x; x <= high.x; x += kStep_um) {

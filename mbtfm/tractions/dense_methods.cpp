@@ -5,6 +5,7 @@
 #include "mbtfm/tractions/dense_problem.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/memory.h"
 #include "substrate/ellipse.h"
 #include "substrate/greens/models.h"
@@ -92,11 +93,7 @@ void state_errors(const Loads& loads, const Eigen::MatrixXd& sums, std::vector<A
 }
 
 std::vector<Vec2> square_centres(const Polygon& outline, double side_um) {
-  Vec2 low = outline.front(), high = low;
-  for (const Vec2 p : outline) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
+  const auto [low, high] = extent_of(outline);
   const Vec2 middle = 0.5 * (low + high);
   const int n_x = static_cast<int>(std::ceil((high.x - low.x) / side_um));
   const int n_y = static_cast<int>(std::ceil((high.y - low.y) / side_um));

@@ -12,6 +12,7 @@
 #include "network/mesh/planar.h"
 #include "network/mesh/polyline.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/memory.h"
 #include "pipeline/numerics/neighbour_bins.h"
 
@@ -390,11 +391,7 @@ void expect_room_for_vertices(double count) {
 
 void expect_room_for_mesh(const SizeField& size, const Boundary& boundary) {
   const Polygon& outline = boundary.rings().front().polygon();
-  Vec2 low = outline.front(), high = low;
-  for (const Vec2 p : outline) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
+  const auto [low, high] = extent_of(outline);
   // the integral of the vertices' density, by its values at the centres of squares
   constexpr double kSquares = 1e4;
   const double step = std::sqrt((high.x - low.x) * (high.y - low.y) / kSquares);

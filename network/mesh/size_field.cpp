@@ -4,16 +4,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/contract/extent.h"
+
 namespace mbtfm::mesh {
 
 SizeField::SizeField(double edge_um, double growth, const std::vector<Vec2>& around_um)
-    : edge_um_(edge_um), growth_(growth), low_um_(around_um.front()) {
-  Vec2 high = low_um_;
-  for (const Vec2 p : around_um) {
-    low_um_ = {std::min(low_um_.x, p.x), std::min(low_um_.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
-  low_um_ += Vec2{-edge_um, -edge_um};  // adhesions may lie that far outside
+    : edge_um_(edge_um), growth_(growth) {
+  const auto [low, high] = extent_of(around_um);
+  low_um_ = low + Vec2{-edge_um, -edge_um};  // adhesions may lie that far outside
   const Vec2 size = high - low_um_ + Vec2{edge_um, edge_um};
   // half an edge: a few sources a bin; fewer bins where a field of this fineness could never be filled with vertices
   constexpr double kMostBins = 4e6;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/geometry.h"
 
 namespace mbtfm::numerics {
@@ -14,13 +15,9 @@ class Grid {
   /// Covers the box of `points`; bins of `bin_um` or larger where there would be many more bins than points.
   Grid(const std::vector<Vec2>& points, double bin_um) {
     if (points.empty()) return;
-    Vec2 high = points.front();
-    low_ = points.front();
-    for (const Vec2 p : points) {
-      low_ = {std::min(low_.x, p.x), std::min(low_.y, p.y)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-    }
-    const Vec2 size = high - low_;
+    const auto [low, high] = extent_of(points);
+    low_ = low;
+    const Vec2 size = high - low;
     const double most = 4.0 * static_cast<double>(points.size()) + 16;
     bin_ = std::max({bin_um, std::sqrt(size.x * size.y / most), (size.x + size.y) / most, 1e-300});
     columns_ = static_cast<int>(size.x / bin_) + 1;

@@ -178,6 +178,9 @@ std::optional<Doubt> doubt_about(std::string_view id, double value) {
 }
 
 std::string sentence_of(const Doubt& d) {
+  if (is_inside(quantity_of(d.id).usual, d.value))  // usual, but the image says another
+    return "the " + d.quantity + " is " + with_unit(d.id, d.value) + ", but " + with_unit(d.id, d.limit) +
+           " by the image's own calibration: both cannot be right";
   return "the " + d.quantity + " is " + with_unit(d.id, d.value) + (d.value > d.limit ? ", above " : ", below ") +
          brief(d.limit) + (d.level == DoubtLevel::refused ? ": it cannot be" : ": unusual");
 }

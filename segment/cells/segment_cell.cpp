@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 #include "segment/cells/bleed_through.h"
 #include "segment/cells/emptiness.h"
@@ -245,11 +246,7 @@ std::vector<Adhesion> candidates_in(const Inputs& in, const CellOutline& cell, c
       if (in.source == AdhesionSource::pattern) return covers(*in.drawn.adhesion_mask, point, in.field);
       return distance_to_edge_um(whole, point) <= p.candidate_band_um;
     };
-    Vec2 low = cell.outer_um.front(), high = low;
-    for (const Vec2 point : cell.outer_um) {
-      low = {std::min(low.x, point.x), std::min(low.y, point.y)};
-      high = {std::max(high.x, point.x), std::max(high.y, point.y)};
-    }
+    const auto [low, high] = extent_of(cell.outer_um);
     const auto in_cell = [&](Vec2 point) {
       const auto is_in = [&](const Polygon& ring) { return contains(ring, point); };
       return is_in(cell.outer_um) && std::ranges::none_of(cell.holes_um, is_in) && is_possible(point);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::rois {
@@ -220,11 +221,7 @@ int type_of(RoiShape shape) {
 }
 
 void write_points(Writer& out, const std::vector<Vec2>& points) {
-  Vec2 low = points.front(), high = low;
-  for (const Vec2 p : points) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
+  const auto [low, high] = extent_of(points);
   const auto whole = [](double value) { return static_cast<std::uint32_t>(static_cast<int>(std::floor(value))); };
   out.number(kTop, whole(low.y), 2);
   out.number(kLeft, whole(low.x), 2);

@@ -57,7 +57,8 @@ MatrixAt matrix_of(const Substrate& model) {
   };
 }
 
-class BlockedResponse : public testing::TestWithParam<std::pair<const char*, double>> {
+using NamedGel = std::pair<std::string, double>;
+class BlockedResponse : public testing::TestWithParam<NamedGel> {
  protected:
   const std::unique_ptr<Substrate> model = gel(GetParam().first, GetParam().second);
   const Scene scene = uneven_scene();
@@ -110,8 +111,7 @@ TEST_P(BlockedResponse, the_bits_are_the_same_for_any_number_of_threads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Gels, BlockedResponse,
-                         testing::Values(std::pair{"half-space", 60.0}, std::pair{"layer", 60.0},
-                                         std::pair{"layer", 10.0}));
+                         testing::Values(NamedGel{"half-space", 60}, NamedGel{"layer", 60}, NamedGel{"layer", 10}));
 
 TEST(Response, blocks_of_one_point_and_of_many_at_one_place_are_exact) {
   const auto model = gel("layer", 30);

@@ -1,11 +1,13 @@
-/// real_segmentation [FOLDER]: how well adhesions and outlines of real cells are found that others have marked
-/// (../shared/data), all with default parameters; into FOLDER, pictures: theirs green, found red.
+/// real_segmentation [FOLDER] [name=value …]: how well adhesions and outlines of real cells are found that others have
+/// marked (../shared/data), all with default parameters, or adhesions with these; into FOLDER, pictures of default
+/// parameters: theirs green, found red.
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
 #include "segment/cells/grid.h"
 #include "segment/images/png.h"
 #include "tests/support/real_adhesions.h"
+#include "tests/support/settings.h"
 
 namespace {
 
@@ -79,6 +81,12 @@ void draw_all(const std::filesystem::path& folder) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  const bool has_folder = !words.empty() && words.front().find('=') == std::string::npos;
+  cells::AdhesionParameters p;
+  stage::ParameterList list;
+  declare(list, p);
+  set_all(list, {words.begin() + has_folder, words.end()});
   if (!std::filesystem::exists(kHandMasks)) {
     std::printf("the shared data are absent: %s\n", kSharedData.c_str());
     return 0;
@@ -87,11 +95,11 @@ int main(int argc, char** argv) {
               "number", "", "Dice", "F1", "Dice", "F1", "theirs", "found");
   std::vector<Overlaps> all;
   for (const int i : kHandMasked) {
-    all.push_back(hand_mask_overlaps(i));
+    all.push_back(hand_mask_overlaps(i, p));
     print("hand mask " + std::to_string(i), all.back());
   }
   print("mean", mean_of(all));
-  print("fibroblast", fibroblast_overlaps());
+  print("fibroblast", fibroblast_overlaps(p));
   std::printf("outline of the doublet: intersection over union %.3f\n", doublet_overlap());
-  if (argc > 1) draw_all(argv[1]);
+  if (has_folder) draw_all(words.front());
 }

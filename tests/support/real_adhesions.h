@@ -142,20 +142,21 @@ struct Overlaps {
   Overlap pixels, ellipses;
 };
 
-inline Overlaps overlaps_of(const Labels& truth, const images::Image& image, double pixel_um) {
-  const FoundLabels found = found_labels(cells::find_adhesion_regions(image, pixel_um, {}), image, pixel_um);
+inline Overlaps overlaps_of(const Labels& truth, const images::Image& image, double pixel_um,
+                            const cells::AdhesionParameters& p) {
+  const FoundLabels found = found_labels(cells::find_adhesion_regions(image, pixel_um, p), image, pixel_um);
   return {overlap_of(truth, found.pixels), overlap_of(truth, found.ellipses)};
 }
 
-inline Overlaps hand_mask_overlaps(int image) {
+inline Overlaps hand_mask_overlaps(int image, const cells::AdhesionParameters& p = {}) {
   const std::string name = std::to_string(image) + ".tif";
   return overlaps_of(components_of(images::read_image(kHandMasks / "masks" / name)),
-                     images::read_image(kHandMasks / "images" / name), kHandMasksPixel_um);
+                     images::read_image(kHandMasks / "images" / name), kHandMasksPixel_um, p);
 }
 
-inline Overlaps fibroblast_overlaps() {
+inline Overlaps fibroblast_overlaps(const cells::AdhesionParameters& p = {}) {
   return overlaps_of(labels_of(images::read_image(kFibroblast / "adhesions.png")),
-                     images::read_image(kFibroblast / "focal_image.png"), kFibroblastPixel_um);
+                     images::read_image(kFibroblast / "focal_image.png"), kFibroblastPixel_um, p);
 }
 
 /// Intersection over union of a mask's pixels and an outline.

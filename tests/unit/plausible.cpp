@@ -103,6 +103,8 @@ TEST(Plausible, a_pixel_size_is_doubted_from_one_per_cent_off_the_images_own_and
   EXPECT_EQ(stage::doubt_about_pixel_size(0.1, 0.102)->level, stage::DoubtLevel::caution);
   EXPECT_EQ(stage::doubt_about_pixel_size(0.119, 0.1)->level, stage::DoubtLevel::caution);
   EXPECT_EQ(stage::doubt_about_pixel_size(0.121, 0.1)->level, stage::DoubtLevel::refused);
+  EXPECT_EQ(stage::sentence_of(*stage::doubt_about_pixel_size(0.1, 0.108)),
+            "the pixel size is 0.1 um, but 0.108 um by the image's own calibration: both cannot be right");
   const stage::Doubt halved = *stage::doubt_about_pixel_size(0.1, 0.2);
   EXPECT_EQ(halved.level, stage::DoubtLevel::refused);
   EXPECT_NE(halved.remedy.find("binning"), std::string::npos);
