@@ -111,7 +111,7 @@ mbtfm cost CELL                   # for this cell: what each setting gains and c
 
 ## The presets
 
-Times are from the images to the report, on two threads: seconds of the processors, and seconds that passed. The error is
+Times are from the images to the report, on two threads of a slow machine: seconds of the processors, and seconds that passed. The error is
 ‖t̂ − t‖/‖t‖: the difference of the fitted tensions from the true ones, over the true ones. It is given for the demo cell (7 % noise). The
 last two columns are root mean squares over four other simulated cells: one from images with 7 % noise, one with exact beads on
 the true segmentation. Only the last column shows what more computing can improve.

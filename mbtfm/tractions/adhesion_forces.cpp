@@ -48,8 +48,8 @@ Eigen::MatrixXd weighted_compliance(const substrate::Substrate& gel, const Weigh
   return matrix;
 }
 
-void check_solvable(const Eigen::MatrixXd& normal) {
-  const Eigen::VectorXd values = numerics::symmetric_eigen(normal).values;
+/// @param values  of the normal matrix
+void check_solvable(const Eigen::VectorXd& values) {
   constexpr double kRounding = 1e-13;  // of the normal matrix
   const auto n_lost = (values.array() <= kRounding * values.maxCoeff()).count();
   if (n_lost == 0) return;
@@ -124,16 +124,18 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
   const WeightedBeads beads = weighted(inputs.beads);
   const Eigen::MatrixXd G = weighted_compliance(*gel, beads, ellipses);
   const Eigen::MatrixXd normal_matrix = G.transpose() * G;
-  check_solvable(normal_matrix);
+  const auto [values, vectors] = numerics::symmetric_eigen(normal_matrix);
+  check_solvable(values);
+  const Eigen::MatrixXd inverse = vectors * values.cwiseInverse().asDiagonal() * vectors.transpose();
   const Eigen::VectorXd pulled = G.transpose() * beads.displacement;
-  const Eigen::VectorXd forces = numerics::solve_symmetric(normal_matrix, pulled);
+  const Eigen::VectorXd forces = inverse * pulled;
   const Eigen::VectorXd residual = beads.displacement - G * forces;
 
   Reconstruction r;
   const double chi_squared = residual.squaredNorm() / static_cast<double>(G.rows() - G.cols());
   // As for the tensions (7): the errors stated, or the larger ones that the misfit tells of.
   const double variance = beads.states_errors ? std::max(1.0, chi_squared) : chi_squared;
-  const Eigen::MatrixXd covariance = variance * numerics::inverse_symmetric(normal_matrix);
+  const Eigen::MatrixXd covariance = variance * inverse;
   std::vector<Vec2> forces_nN;
   for (std::size_t a = 0; a < ellipses.size(); ++a) {
     const auto at = 2 * static_cast<Index>(a);
