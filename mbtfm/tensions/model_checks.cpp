@@ -291,6 +291,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   std::vector<std::size_t> ends;  // adhesions, each once: two for each fibre
   const auto is_end = [&](std::size_t a) { return std::ranges::find(ends, a) != ends.end(); };
   for (const MissingFibre& f : found) {
+    if (ends.size() == 2 * kMostMissingFibres) break;
     const auto place = [&](int id) {
       return static_cast<std::size_t>(std::ranges::find(adhesions, id, &Adhesion::adhesion_id) - adhesions.begin());
     };

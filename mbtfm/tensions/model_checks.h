@@ -53,9 +53,13 @@ struct FibreLeftOut {
 };
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence);
 
-/// The best ones, no adhesion twice, found together: tensions and gains are of each beside the others. A gain is kept
-/// where chance would reach it in one cell of twenty, all pairs tried (Bonferroni), errors of the model and of the
-/// segmentation counted.
+/// Of more fibres than these none can be told from the others, and the time to find them together grows
+/// steeply: where beads call for so many, the images or the segmentation are wrong.
+constexpr std::size_t kMostMissingFibres = 24;
+
+/// The best ones, no adhesion twice, at most `kMostMissingFibres`, found together: tensions and gains are of each
+/// beside the others. A gain is kept where chance would reach it in one cell of twenty, all pairs tried (Bonferroni),
+/// errors of the model and of the segmentation counted.
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
                                          const SegmentationErrors& segmentation = {}, int threads = 1);
 
