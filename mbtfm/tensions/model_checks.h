@@ -53,8 +53,8 @@ struct FibreLeftOut {
 };
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence);
 
-/// Of more fibres than these none can be told from the others, and the time to find them together grows
-/// steeply: where beads call for so many, the images or the segmentation are wrong.
+/// Beads that call for more fibres than these show something else: wrong images, a wrong segmentation or, where they
+/// are all but exact, the errors of the model. The time to find fibres together grows steeply with their number.
 constexpr std::size_t kMostMissingFibres = 24;
 
 /// The best ones, no adhesion twice, at most `kMostMissingFibres`, found together: tensions and gains are of each

@@ -213,8 +213,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the total force is that of the adhesions in view, and what passes through the cut balances it",
        "Record the whole cell if you can. A note if forces beyond the cut are allowed for; a caution if "
        "effects.beyond_cut = off: distrust then the fibres and adhesions near the cut, and the force through it."},
-      {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for", 0,
-       "a pair of adhesions is named if chance would name one in one cell of twenty, all pairs tried",
+      {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for (24 at most)",
+       0, "a pair of adhesions is named if chance would name one in one cell of twenty, all pairs tried",
        "Look for the fibre in the actin image between these adhesions (dashed in the map). If it is there, add it: "
        "mbtfm-add-fibres --rois 1_segment/RoiSet.zip --missing 4_fit/missing_fibres.csv --out fibres.zip in the cell's "
        "folder, then mbtfm run."},

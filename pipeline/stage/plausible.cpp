@@ -177,8 +177,18 @@ std::optional<Doubt> doubt_about(std::string_view id, double value) {
                .level = is_possible ? DoubtLevel::caution : DoubtLevel::refused};
 }
 
+namespace {
+
+/// Or of an image's own calibration.
+bool is_of_table(const Doubt& d) {
+  const std::optional<Doubt> by_table = doubt_about(d.id, d.value);
+  return by_table && by_table->limit == d.limit;
+}
+
+}  // namespace
+
 std::string sentence_of(const Doubt& d) {
-  if (is_inside(quantity_of(d.id).usual, d.value))  // usual, but the image says another
+  if (!is_of_table(d))
     return "the " + d.quantity + " is " + with_unit(d.id, d.value) + ", but " + with_unit(d.id, d.limit) +
            " by the image's own calibration: both cannot be right";
   return "the " + d.quantity + " is " + with_unit(d.id, d.value) + (d.value > d.limit ? ", above " : ", below ") +
@@ -187,10 +197,8 @@ std::string sentence_of(const Doubt& d) {
 
 void require_possible(const Doubt& d, const std::vector<std::string>& allowed, const std::string& where) {
   if (d.level != DoubtLevel::refused || std::ranges::find(allowed, d.id) != allowed.end()) return;
-  const PlausibleQuantity& q = quantity_of(d.id);
-  const bool is_of_table = !is_inside(q.possible, d.value);
-  const std::string expected = is_of_table ? with_unit(d.id, describe("a number", q.possible))
-                                           : "about " + with_unit(d.id, d.limit) + ", the image's own calibration";
+  const std::string expected = is_of_table(d) ? with_unit(d.id, describe("a number", quantity_of(d.id).possible))
+                                              : "about " + with_unit(d.id, d.limit) + ", the image's own calibration";
   throw InputError(where, expected, with_unit(d.id, d.value),
                    d.remedy + ". " + d.source + ". If the value is right, set [checks] allow = [\"" + d.id + "\"]");
 }
@@ -255,7 +263,7 @@ std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um) {
                          ". Forces go with the square of the pixel size",
                .remedy = is_binning
                              ? "the two differ by a factor of " + brief(whole) +
-                                   ": was the camera's binning, or a reduced copy, left out in one of them?"
+                                   ": perhaps the camera's binning, or a reduced copy, was left out in one of them"
                              : "find out which of the two is right, and leave pixel_size_um out if it is the image's",
                .level = ratio > 1 + kRefused ? DoubtLevel::refused : DoubtLevel::caution};
 }

@@ -105,6 +105,8 @@ TEST(Plausible, a_pixel_size_is_doubted_from_one_per_cent_off_the_images_own_and
   EXPECT_EQ(stage::doubt_about_pixel_size(0.121, 0.1)->level, stage::DoubtLevel::refused);
   EXPECT_EQ(stage::sentence_of(*stage::doubt_about_pixel_size(0.1, 0.108)),
             "the pixel size is 0.1 um, but 0.108 um by the image's own calibration: both cannot be right");
+  EXPECT_EQ(stage::sentence_of(*stage::doubt_about_pixel_size(15, 14)),  // unusual, too
+            "the pixel size is 15 um, but 14 um by the image's own calibration: both cannot be right");
   const stage::Doubt halved = *stage::doubt_about_pixel_size(0.1, 0.2);
   EXPECT_EQ(halved.level, stage::DoubtLevel::refused);
   EXPECT_NE(halved.remedy.find("binning"), std::string::npos);
