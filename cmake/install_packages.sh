@@ -1,19 +1,25 @@
 #!/usr/bin/env bash
-# Install the Debian packages that mbtfm builds with, the missing ones only. As root or through sudo; says what is missing
-# if it can do neither. Arguments: further packages.
+# Install the missing Debian packages (12 or 13) that mbtfm builds with, as root or through sudo; says what is missing if it
+# can do neither. First argument: cell (what a cell needs, from images to its report), all (all programs) or tests; then
+# further packages.
 set -euo pipefail
 
+purpose=${1:-all}
+case $purpose in
+  cell | all | tests) shift || true ;;
+  *) echo "mbtfm: error: expected cell, all or tests, found '$purpose'" >&2; exit 2 ;;
+esac
 packages=(
   g++ cmake ninja-build ccache mold
-  libopencv-dev libvtk9-dev libeigen3-dev libdeal.ii-dev libboost-dev libboost-thread-dev libcgal-dev
-  libsuitesparse-dev libmetis-dev libfftw3-dev libopenblas0-pthread libopenblas-pthread-dev
-  libtiff-dev libpng-dev libjpeg62-turbo-dev libzip-dev libexpat1-dev libssl-dev zlib1g-dev
-  librsvg2-dev pkg-config fonts-dejavu-core
+  libopencv-dev libvtk9-dev libeigen3-dev libboost-dev libboost-thread-dev libcgal-dev
+  libmetis-dev libfftw3-dev libopenblas0-pthread libopenblas-pthread-dev
+  libtiff-dev libpng-dev libjpeg62-turbo-dev libzip-dev libexpat1-dev libssl-dev
   libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev
   libjs-vega
-  libgtest-dev libgmock-dev libbenchmark-dev python3-jsonschema
-  "$@"
 )
+[ "$purpose" = cell ] || packages+=(libdeal.ii-dev zlib1g-dev librsvg2-dev pkg-config fonts-dejavu-core)
+[ "$purpose" != tests ] || packages+=(libgtest-dev libgmock-dev python3-jsonschema)
+packages+=("$@")
 
 missing=()
 for package in "${packages[@]}"; do

@@ -9,6 +9,7 @@
 #include "pipeline/files/csv.h"
 #include "substrate/greens/inside.h"
 #include "substrate/greens/layer.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm::greens {
 namespace {
@@ -21,8 +22,7 @@ double largest(const Eigen::Matrix3d& matrix) { return matrix.cwiseAbs().maxCoef
 
 // tests/data/reference/substrate/layer_volume.csv: Hankel integrals by another program, to 1e-10 of the largest.
 TEST(InsideOfTheGel, all_nine_components_are_those_of_an_independent_program) {
-  const files::CsvTable table(std::filesystem::path(MBTFM_SOURCE_DIR) /
-                              "tests/data/reference/substrate/layer_volume.csv");
+  const files::CsvTable table(test::source_folder() / "tests/data/reference/substrate/layer_volume.csv");
   const std::string axes = "xyz";
   int n_half_spaces = 0;
   std::map<double, LayerInside> layers;

@@ -11,13 +11,14 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/plane.h"
 #include "segment/beads/track.h"
+#include "tests/support/folders.h"
 #include "tests/support/mat_tracks.h"
 #include "tests/support/piv.h"
 
 namespace mbtfm::beads {
 namespace {
 
-const std::filesystem::path kBeads = MBTFM_SOURCE_DIR "/../shared/data/beads";
+const std::filesystem::path kBeads = test::source_folder() / "../shared/data/beads";
 
 /// Rows of four numbers, separated by commas or blanks; a header is skipped.
 std::vector<std::array<double, 4>> rows_of_four(const std::filesystem::path& file) {

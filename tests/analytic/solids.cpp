@@ -6,11 +6,12 @@
 
 #include "continuum/solids/indent.h"
 #include "pipeline/files/csv.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm::solids {
 namespace {
 
-const std::string kReference = MBTFM_SOURCE_DIR "/tests/data/reference/chapter4/";
+const std::string kReference = test::source_folder().string() + "/tests/data/reference/chapter4/";
 
 /// A half disc or shell above z = 0, cut into patches that are not turned over.
 Patch shell(double inner_um, double outer_um, int n, int part) {

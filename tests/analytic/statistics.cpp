@@ -11,11 +11,12 @@
 #include "pipeline/statistics/descriptive.h"
 #include "pipeline/statistics/mixed_model.h"
 #include "pipeline/statistics/rank_tests.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm::statistics {
 namespace {
 
-const std::filesystem::path kData = std::filesystem::path(MBTFM_SOURCE_DIR) / "tests/data/statistics";
+const std::filesystem::path kData = test::source_folder() / "tests/data/statistics";
 
 struct Fibre {
   int cell = 0, type = 0;

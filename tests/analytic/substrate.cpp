@@ -11,6 +11,7 @@
 #include "substrate/greens/layer.h"
 #include "substrate/greens/layer_vertical.h"
 #include "substrate/material.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm::substrate {
 namespace {
@@ -19,7 +20,7 @@ using std::numbers::pi;
 
 /// Rows of numbers below a header line.
 std::vector<std::vector<double>> rows_of(const std::string& name) {
-  std::ifstream file(std::string(MBTFM_SOURCE_DIR) + "/tests/data/reference/substrate/" + name);
+  std::ifstream file(test::source_folder().string() + "/tests/data/reference/substrate/" + name);
   std::vector<std::vector<double>> rows;
   std::string line;
   std::getline(file, line);

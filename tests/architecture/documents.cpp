@@ -22,6 +22,7 @@
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/stage/plausible.h"
 #include "pipeline/statistics/study_files.h"
+#include "tests/support/folders.h"
 #include "tests/support/plain_words.h"
 #include "tests/support/program.h"
 
@@ -30,7 +31,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kDocs = fs::path(MBTFM_SOURCE_DIR) / "docs";
+const fs::path kDocs = test::source_folder() / "docs";
 
 TEST(Documents, the_examples_of_the_format_page_are_read) {
   const std::string page = files::read_text(kDocs / "formats.md");
@@ -131,7 +132,7 @@ TEST(Documents, a_parameters_meaning_stands_alone_in_plain_words) {
 TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
   const std::string page = parameter_page();
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "parameters.md", page);
-  EXPECT_EQ(files::read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+  EXPECT_EQ(files::read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_tests";
 }
 
 std::string column_page() {
@@ -148,32 +149,32 @@ std::string column_page() {
 TEST(Documents, the_page_of_columns_is_what_the_tables_declare) {
   const std::string page = column_page();
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "columns.md", page);
-  EXPECT_EQ(files::read_text(kDocs / "columns.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+  EXPECT_EQ(files::read_text(kDocs / "columns.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_tests";
 }
 
 /// The same for the page of findings.
 TEST(Documents, the_page_of_findings_is_what_the_program_declares) {
   const std::string page = findings_page();
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "findings.md", page);
-  EXPECT_EQ(files::read_text(kDocs / "findings.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+  EXPECT_EQ(files::read_text(kDocs / "findings.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_tests";
 }
 
 /// Set MBTFM_WRITE_DOCS to write the page instead.
 TEST(Documents, the_page_of_plausible_values_is_the_table_that_the_programs_ask) {
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "plausible.md", stage::plausible_page());
   EXPECT_EQ(files::read_text(kDocs / "plausible.md"), stage::plausible_page())
-      << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+      << "MBTFM_WRITE_DOCS=1 build/tests/architecture_tests";
 }
 
 /// tests/mutations.sh plants faults in the sources as they are: the text that each replaces is there, once.
 TEST(Documents, the_list_of_planted_faults_fits_the_sources) {
-  std::istringstream list(files::read_text(fs::path(MBTFM_SOURCE_DIR) / "tests/mutations.txt"));
+  std::istringstream list(files::read_text(test::source_folder() / "tests/mutations.txt"));
   std::string name, file, old;
   int n_faults = 0;
   const auto expect_once = [&] {
     if (file.empty()) return;
     ++n_faults;
-    const std::string source = files::read_text(fs::path(MBTFM_SOURCE_DIR) / file);
+    const std::string source = files::read_text(test::source_folder() / file);
     const auto at = source.find(old);
     EXPECT_NE(at, source.npos) << name << ": no longer in " << file;
     if (at == source.npos) return;
@@ -197,7 +198,7 @@ TEST(Documents, the_list_of_planted_faults_fits_the_sources) {
 TEST(Documents, the_catalogue_lists_every_hard_case) {
   const std::string page = files::read_text(kDocs / "developers/hard-cases.md");
   const std::regex any_test("\nTEST(_P)?\\("), stated("\nTEST(_P)?\\(\\w+, (\\w+)\\) \\{\\s*test::hard_case\\(");
-  for (const auto& entry : fs::directory_iterator(fs::path(MBTFM_SOURCE_DIR) / "tests/stability")) {
+  for (const auto& entry : fs::directory_iterator(test::source_folder() / "tests/stability")) {
     const std::string text = files::read_text(entry.path());
     const auto count = [&](const std::regex& what) {
       return std::distance(std::sregex_iterator(text.begin(), text.end(), what), {});

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "pipeline/contract/findings.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm {
 namespace {
@@ -40,7 +41,7 @@ Seen seen_in(const std::string& source) {
 
 Seen seen_in_all_tests() {
   Seen all;
-  const fs::path tests = fs::path(MBTFM_SOURCE_DIR) / "tests";
+  const fs::path tests = test::source_folder() / "tests";
   for (const auto& entry : fs::recursive_directory_iterator(tests)) {
     const std::string folder = entry.path().parent_path().filename(), extension = entry.path().extension();
     if (folder == "studies" || folder == "architecture" || (extension != ".h" && extension != ".cpp")) continue;

@@ -13,13 +13,14 @@
 
 #include "pipeline/files/text.h"
 #include "tests/architecture/graph.h"
+#include "tests/support/folders.h"
 
 namespace {
 
 namespace fs = std::filesystem;
 using mbtfm::test::Graph;
 
-const fs::path kRoot = MBTFM_SOURCE_DIR;
+const fs::path kRoot = mbtfm::test::source_folder();
 const std::string kPrograms = "programs";
 
 /// Every node, and which others it may include. The programs (*_main.cpp) lie above all.
@@ -297,7 +298,7 @@ TEST(Architecture, the_picture_of_the_graph_is_what_the_sources_include) {
   const fs::path file = kRoot / "docs/images/architecture.svg";
   const std::string picture = mbtfm::test::drawn(graph_of_sources(), "What includes what");
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) mbtfm::files::write_text(file, picture);
-  EXPECT_EQ(mbtfm::files::read_text(file), picture) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_includes";
+  EXPECT_EQ(mbtfm::files::read_text(file), picture) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_tests";
 }
 
 }  // namespace

@@ -9,12 +9,14 @@
 #include <map>
 #include <regex>
 
+#include "tests/support/folders.h"
+
 namespace mbtfm {
 namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kRoot = MBTFM_SOURCE_DIR;
+const fs::path kRoot = test::source_folder();
 
 /// Readers of formats whose words are not ours, or of tables that hold them.
 const std::map<std::string, std::string> kReaders = {

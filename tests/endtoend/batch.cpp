@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "pipeline/files/text.h"
+#include "tests/support/folders.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -58,7 +59,7 @@ pid_t start_batch(const fs::path& folder) {
   const pid_t pid = fork();
   if (pid == 0) {
     freopen("/dev/null", "w", stderr);
-    const std::string program = std::string(MBTFM_BINARY_DIR) + "/bin/mbtfm";
+    const std::string program = test::build_folder().string() + "/bin/mbtfm";
     execl(program.c_str(), program.c_str(), "batch", "--quiet", "--jobs", "2", folder.c_str(), nullptr);
     _exit(127);
   }

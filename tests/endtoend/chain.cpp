@@ -13,6 +13,7 @@
 #include "pipeline/report/compare.h"
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
+#include "tests/support/folders.h"
 #include "tests/support/json_schema.h"
 #include "tests/support/program.h"
 
@@ -208,7 +209,7 @@ void recompute_displacement(const fs::path& cell) {
 }
 
 TEST(Chain, tensions_of_the_oracle_cells_come_back_from_the_displacement_of_their_forces) {
-  const fs::path reference = fs::path(MBTFM_SOURCE_DIR) / "../shared/reference";
+  const fs::path reference = test::source_folder() / "../shared/reference";
   if (!fs::exists(reference)) GTEST_SKIP() << "no ../shared/reference here";
   for (const char* name : {"oracle_cell_21", "oracle_cell_22"}) {
     const TemporaryFolder folder;

@@ -10,6 +10,7 @@
 #include "pipeline/files/text.h"
 #include "segment/images/image.h"
 #include "tests/support/findings.h"
+#include "tests/support/folders.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -87,7 +88,7 @@ TEST(CutCell, cropped_images_are_fitted_and_the_force_through_the_cut_is_that_of
 }
 
 TEST(CutCell, a_real_cell_that_leaves_its_image_is_fitted) {
-  const fs::path data = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data/real/adhesions_and_beads";
+  const fs::path data = test::source_folder().parent_path() / "shared/data/real/adhesions_and_beads";
   if (!fs::exists(data)) GTEST_SKIP() << data << " is not here";
   const TemporaryFolder folder;
   const fs::path cell = folder / "cell";

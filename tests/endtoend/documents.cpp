@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "tests/support/folders.h"
 #include "tests/support/plain_words.h"
 #include "tests/support/program.h"
 
@@ -17,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kProject = MBTFM_SOURCE_DIR, kDocs = kProject / "docs";
+const fs::path kProject = test::source_folder(), kDocs = kProject / "docs";
 
 /// The blocks of a page that are marked as commands, each as it stands.
 std::vector<std::string> commands_of(const fs::path& page) {
@@ -30,7 +31,7 @@ std::vector<std::string> commands_of(const fs::path& page) {
 
 /// One after the other, as somebody would who has built the project: its programs are below the folder.
 void run_commands_of(const fs::path& page, const fs::path& folder) {
-  fs::create_directory_symlink(MBTFM_BINARY_DIR, folder / "build");
+  fs::create_directory_symlink(test::build_folder(), folder / "build");
   std::string script = "set -eu\ncd '" + folder.string() + "'\n";
   for (const std::string& block : commands_of(page)) script += block;
   files::write_text(folder / "commands.sh", script);
@@ -175,7 +176,7 @@ TEST(Pages, every_command_and_exit_code_is_on_its_page) {
   for (std::sregex_iterator at(source.begin(), source.end(), added), end; at != end; ++at, ++n_commands)
     EXPECT_NE(commands.find("| `mbtfm " + (*at)[2].str()), commands.npos) << (*at)[2];
   EXPECT_GE(n_commands, 12);
-  for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(MBTFM_BINARY_DIR) / "bin")) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(test::build_folder() / "bin")) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with("mbtfm-")) continue;
     EXPECT_NE(commands.find("`" + name + "`"), commands.npos) << name;

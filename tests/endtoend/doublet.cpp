@@ -13,6 +13,7 @@
 #include "pipeline/files/fit_summary.h"
 #include "segment/images/image.h"
 #include "segment/rois/roi.h"
+#include "tests/support/folders.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -20,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kData = fs::path(MBTFM_SOURCE_DIR) / "../shared/data/real/doublet_on_h";
+const fs::path kData = test::source_folder() / "../shared/data/real/doublet_on_h";
 constexpr double kPixel_um = 0.108;
 
 /// The bundles that the eye sees in the actin image: two along the bars of the H, two along the free edges between

@@ -13,6 +13,7 @@
 #include <set>
 
 #include "pipeline/files/text.h"
+#include "tests/support/folders.h"
 #include "tests/support/program.h"
 #include "tests/support/script_stages.h"
 
@@ -498,7 +499,7 @@ TEST_F(HostileCells, a_cell_folder_and_its_images_and_settings_may_be_links) {
 }
 
 TEST(HostileCellsPage, lists_every_way_that_is_tried) {
-  const std::string page = files::read_text(fs::path(MBTFM_SOURCE_DIR) / "docs/developers/reliability.md");
+  const std::string page = files::read_text(test::source_folder() / "docs/developers/reliability.md");
   const auto begin = page.find("## Hostile cell folders");
   const std::string section = page.substr(begin, page.find("\n## ", begin) - begin);
   std::set<std::string> listed, tried;

@@ -5,6 +5,7 @@
 
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
+#include "tests/support/folders.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -111,7 +112,7 @@ TEST(Plan, a_modulus_in_pascals_is_refused_and_no_end_of_a_search_is_an_answer) 
 /// The example of docs/planning.md, without its last density, which takes as long as all the rest.
 TEST(PlanInSpace, the_example_of_the_page_is_answered_for_each_patch_with_tables_and_a_page) {
   const test::TemporaryFolder folder;
-  const std::string page = files::read_text(fs::path(MBTFM_SOURCE_DIR) / "docs/planning.md");
+  const std::string page = files::read_text(test::source_folder() / "docs/planning.md");
   const auto begin = page.find("mbtfm plan --scenario wave"), end = page.find('\n', begin);
   ASSERT_NE(begin, page.npos);
   std::string command = page.substr(begin, end - begin);

@@ -12,13 +12,14 @@
 #include "pipeline/files/csv.h"
 #include "segment/cells/mask.h"
 #include "segment/images/image.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm::tractions {
 namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kData = fs::path(MBTFM_SOURCE_DIR) / "../shared/data";
+const fs::path kData = test::source_folder() / "../shared/data";
 
 /// Two vector fields compared: |a − b| / |b|, correlation of all components, mean magnitude of each.
 struct Comparison {

@@ -13,6 +13,7 @@
 #include "pipeline/files/vtk_files.h"
 #include "samples/drawing/scenario.h"
 #include "segment/images/image.h"
+#include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
 
 namespace {
@@ -34,7 +35,7 @@ Outcome simulate(const std::string& arguments) {
   const test::TemporaryFolder folder;
   const fs::path log = folder / "log";
   const std::string command =
-      std::string(MBTFM_BINARY_DIR) + "/bin/mbtfm-simulate " + arguments + " > '" + log.string() + "' 2>&1";
+      test::build_folder().string() + "/bin/mbtfm-simulate " + arguments + " > '" + log.string() + "' 2>&1";
   const int status = std::system(command.c_str());
   return {WEXITSTATUS(status), content_of(log)};
 }
@@ -43,7 +44,7 @@ Outcome simulate(const std::string& arguments) {
 const std::string kSmall = "--scenario two-adhesions --beads 300 ";
 
 TEST(Simulate, every_scenario_makes_a_cell_that_reads_back) {
-  for (const auto& entry : fs::directory_iterator(fs::path(MBTFM_SOURCE_DIR) / "samples" / "scenarios")) {
+  for (const auto& entry : fs::directory_iterator(test::source_folder() / "samples" / "scenarios")) {
     const std::string name = entry.path().stem().string();
     SCOPED_TRACE(name);
     const test::TemporaryFolder folder;

@@ -15,6 +15,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/text.h"
+#include "tests/support/folders.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -26,7 +27,7 @@ using test::Outcome;
 using test::run_program;
 using test::TemporaryFolder;
 
-const std::string kBin = std::string(MBTFM_BINARY_DIR) + "/bin/";
+const std::string kBin = test::build_folder().string() + "/bin/";
 
 /// The first of the command's words is a program of build/bin.
 pid_t start(std::vector<std::string> command, int output, int messages, void (*hangup)(int) = SIG_DFL) {

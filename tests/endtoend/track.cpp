@@ -12,6 +12,7 @@
 #include "segment/images/image.h"
 #include "tests/support/bead_pair.h"
 #include "tests/support/findings.h"
+#include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/weak_beads.h"
 
@@ -27,7 +28,7 @@ struct Ended {
 
 Ended run_track(const test::TemporaryFolder& folder, const std::string& arguments) {
   const std::string log = (folder / "log").string();
-  const std::string command = MBTFM_BINARY_DIR "/bin/mbtfm-track " + arguments + " >" + log + " 2>&1";
+  const std::string command = test::build_folder().string() + "/bin/mbtfm-track " + arguments + " >" + log + " 2>&1";
   const int status = std::system(command.c_str());
   std::stringstream said;
   said << std::ifstream(log).rdbuf();

@@ -12,6 +12,11 @@ namespace mbtfm::fuzz {
 
 namespace fs = std::filesystem;
 
+std::vector<Target>& targets() {
+  static std::vector<Target> all;
+  return all;
+}
+
 const fs::path& folder() {
   static const test::TemporaryFolder made = [] {
     if (fs::is_directory("/dev/shm")) setenv("TMPDIR", "/dev/shm", 1);

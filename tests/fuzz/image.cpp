@@ -11,6 +11,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "segment/images/png.h"
+#include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::images {
@@ -171,7 +172,7 @@ TEST(ImageFuzz, damaged_descriptions_of_stacks_never_crash_the_reader) {
 }
 
 TEST(ImageFuzz, the_files_of_other_programs_decode_or_are_refused) {
-  const fs::path shared = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data/tiff";
+  const fs::path shared = test::source_folder().parent_path() / "shared/data/tiff";
   if (!fs::exists(shared)) GTEST_SKIP() << "the images of other programs are not here";
   const test::TemporaryFolder folder;
   std::mt19937 random(3);

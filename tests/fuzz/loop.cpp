@@ -16,6 +16,7 @@
 
 #include "tests/fuzz/mutate.h"
 #include "tests/fuzz/target.h"
+#include "tests/support/folders.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 #define MBTFM_HAS_ASAN 1
@@ -83,14 +84,14 @@ std::uint64_t number_of(const char* variable, std::uint64_t otherwise) {
 }
 
 /// False where it broke a reader.
-bool is_answered(const std::string& input, const std::string& called) {
-  std::snprintf(current.file, sizeof current.file, "%s/tests/fuzz-%s", MBTFM_BINARY_DIR, called.c_str());
+bool is_answered(const Target& target, const std::string& input, const std::string& called) {
+  std::snprintf(current.file, sizeof current.file, "%s/tests/fuzz-%s", test::build_folder().c_str(), called.c_str());
   current.bytes = input.data();
   current.n = input.size();
   std::string thrown;
   set_clock(kHang_s);
   try {
-    LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
+    target.read(input);
   } catch (const std::exception& error) {
     thrown = error.what();
   }
@@ -101,34 +102,42 @@ bool is_answered(const std::string& input, const std::string& called) {
   return false;
 }
 
-std::vector<fs::path> kept_inputs() {
+std::vector<fs::path> kept_inputs(const Target& target) {
   std::vector<fs::path> files;
-  const fs::path kept = fs::path(MBTFM_SOURCE_DIR) / "tests/fuzz/regression" / kFamily;
+  const fs::path kept = test::source_folder() / "tests/fuzz/regression" / target.family;
   if (fs::is_directory(kept))
     for (const auto& entry : fs::directory_iterator(kept)) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   return files;
 }
 
-TEST(Fuzz, what_once_broke_a_reader_is_read_or_refused) {
+class Fuzz : public testing::TestWithParam<Target> {};
+
+TEST_P(Fuzz, what_once_broke_a_reader_is_read_or_refused) {
   watch();
-  for (const fs::path& file : kept_inputs()) is_answered(bytes_of(file), kFamily + ("-" + file.filename().string()));
+  for (const fs::path& file : kept_inputs(GetParam()))
+    is_answered(GetParam(), bytes_of(file), GetParam().family + ("-" + file.filename().string()));
 }
 
-TEST(Fuzz, changed_samples_are_read_or_refused) {
+TEST_P(Fuzz, changed_samples_are_read_or_refused) {
+  const Target& target = GetParam();
   watch();
-  std::vector<std::string> seeds = samples();
-  for (const fs::path& file : kept_inputs()) seeds.push_back(bytes_of(file));
+  std::vector<std::string> seeds = target.samples();
+  for (const fs::path& file : kept_inputs(target)) seeds.push_back(bytes_of(file));
   const std::uint64_t seed = number_of("MBTFM_FUZZ_SEED", 1);
-  const std::uint64_t n_inputs = number_of("MBTFM_FUZZ_INPUTS", kInputs);
+  const std::uint64_t n_inputs = number_of("MBTFM_FUZZ_INPUTS", target.n_inputs);
   Mutator mutator(seeds, seed);
   constexpr int kEnough = 5;  // broken inputs to look at
   int n_broken = 0;
   for (std::uint64_t i = 0; i < n_inputs && n_broken < kEnough; ++i) {
-    const std::string called = std::string(kFamily) + "-" + std::to_string(seed) + "-" + std::to_string(i);
-    n_broken += !is_answered(mutator.next(), called);
+    const std::string called = std::string(target.family) + "-" + std::to_string(seed) + "-" + std::to_string(i);
+    n_broken += !is_answered(target, mutator.next(), called);
   }
 }
+
+// in main, after each target has added itself
+INSTANTIATE_TEST_SUITE_P(Readers, Fuzz, testing::ValuesIn(targets()),
+                         [](const auto& target) { return std::string(target.param.family); });
 
 }  // namespace
 }  // namespace mbtfm::fuzz

@@ -4,14 +4,10 @@
 #include "tests/fuzz/target.h"
 #include "tests/support/fake_tables.h"
 
-namespace mbtfm::fuzz {
+namespace mbtfm::fuzz::csv {
+namespace {
 
 namespace fs = std::filesystem;
-
-const char* const kFamily = "csv";
-const int kInputs = 25000;
-
-namespace {
 
 /// A cell's tables by name, whole, in the folder `whole`; in `damaged-NAME` one of them is the input.
 const std::vector<std::string>& cell_tables() {
@@ -29,8 +25,6 @@ const std::vector<std::string>& cell_tables() {
   return names;
 }
 
-}  // namespace
-
 std::vector<std::string> samples() {
   std::vector<std::string> texts;
   for (const std::string& name : cell_tables()) texts.push_back(bytes_of(folder() / "whole" / name));
@@ -38,12 +32,9 @@ std::vector<std::string> samples() {
   return texts;
 }
 
-}  // namespace mbtfm::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
-  using namespace mbtfm;
+void read(std::string_view bytes) {
   const auto& tables = fuzz::cell_tables();
-  const auto file = fuzz::put("input.csv", fuzz::text_of(bytes, n));
+  const auto file = fuzz::put("input.csv", bytes);
   fuzz::answer([&] { files::read_displacement(file); });
   fuzz::answer([&] { files::read_displacement_in_space(file); });
   fuzz::answer([&] { files::read_points(file); });
@@ -51,5 +42,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   fuzz::answer([&] { files::read_tensions(file); });
   fuzz::answer([&] { files::read_adhesion_forces(file); });
   for (const std::string& name : tables) fuzz::answer([&] { files::read_cell(fuzz::folder() / ("damaged-" + name)); });
-  return 0;
 }
+
+const bool is_added = add({"csv", 25000, samples, read});
+
+}  // namespace
+}  // namespace mbtfm::fuzz::csv

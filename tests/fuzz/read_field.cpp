@@ -3,10 +3,8 @@
 #include "tests/fuzz/target.h"
 #include "tests/support/fake_tables.h"
 
-namespace mbtfm::fuzz {
-
-const char* const kFamily = "field";
-const int kInputs = 60000;
+namespace mbtfm::fuzz::field {
+namespace {
 
 std::vector<std::string> samples() {
   std::string spreadsheet = "i;x_um;y_um;ux_um;uy_um\n", line = "x_um\ty_um\tux_um\tuy_um\tsigma_um\n";
@@ -18,15 +16,16 @@ std::vector<std::string> samples() {
   return {bytes_of(test::write_tables(folder() / "whole").front()), spreadsheet, line};
 }
 
-}  // namespace mbtfm::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
-  using namespace mbtfm;
-  const auto file = fuzz::put("input.csv", fuzz::text_of(bytes, n));
+void read(std::string_view bytes) {
+  const auto file = fuzz::put("input.csv", bytes);
   beads::TrackParameters in_pixels;
   in_pixels.length_unit = beads::LengthUnit::px;
   in_pixels.pixel_size_um = 0.1;
   fuzz::answer([&] { beads::outwardness(beads::read_given_field(file, {})); });
   fuzz::answer([&] { beads::read_given_field(file, in_pixels); });
-  return 0;
 }
+
+const bool is_added = add({"field", 60000, samples, read});
+
+}  // namespace
+}  // namespace mbtfm::fuzz::field

@@ -5,11 +5,7 @@
 #include "segment/images/png.h"
 #include "tests/fuzz/target.h"
 
-namespace mbtfm::fuzz {
-
-const char* const kFamily = "image";
-const int kInputs = 30000;
-
+namespace mbtfm::fuzz::image {
 namespace {
 
 struct Layout {
@@ -48,8 +44,6 @@ std::string tiff(const Layout& layout) {
   return bytes_of(file);
 }
 
-}  // namespace
-
 std::vector<std::string> samples() {
   put("whole.png", "");
   images::write_png(folder() / "whole.png", {.width = 40, .height = 30, .rgb = std::vector<std::uint8_t>(3600, 17)});
@@ -79,14 +73,15 @@ std::vector<std::string> samples() {
   return files;
 }
 
-}  // namespace mbtfm::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
-  using namespace mbtfm;
-  const auto file = fuzz::put("input", fuzz::text_of(bytes, n));
+void read(std::string_view bytes) {
+  const auto file = fuzz::put("input", bytes);
   fuzz::answer([&] { images::read_image(file); });
   fuzz::answer([&] { images::read_image(file, {.channel = "2", .z = "1", .time = 1}); });
   fuzz::answer([&] { images::read_image(file, 1); });
   fuzz::answer([&] { images::read_slices(file, {.may_lack_pixels = true}); });
-  return 0;
 }
+
+const bool is_added = add({"image", 30000, samples, read});
+
+}  // namespace
+}  // namespace mbtfm::fuzz::image

@@ -4,10 +4,8 @@
 #include "segment/images/stack.h"
 #include "tests/fuzz/target.h"
 
-namespace mbtfm::fuzz {
-
-const char* const kFamily = "ome";
-const int kInputs = 100000;
+namespace mbtfm::fuzz::ome {
+namespace {
 
 std::vector<std::string> samples() {
   return {
@@ -24,11 +22,8 @@ std::vector<std::string> samples() {
       "Volocity\rXCalibrationMicrons=0.1625\rYCalibrationMicrons=0.1625\r"};
 }
 
-}  // namespace mbtfm::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
-  using namespace mbtfm;
-  const std::string description(fuzz::text_of(bytes, n));
+void read(std::string_view bytes) {
+  const std::string description(bytes);
   try {
     if (const auto stack = images::stack_of(description, "a.tif")) {
       for (const char* const channel : {"", "1"})
@@ -38,5 +33,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   }
   images::n_imagej_images(description);
   images::pixel_size_um({.description = description, .x_resolution_per_unit = 10, .y_resolution_per_unit = 1e-300});
-  return 0;
 }
+
+const bool is_added = add({"ome", 100000, samples, read});
+
+}  // namespace
+}  // namespace mbtfm::fuzz::ome

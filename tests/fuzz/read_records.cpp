@@ -9,10 +9,8 @@
 #include "pipeline/runner/verify.h"
 #include "tests/fuzz/target.h"
 
-namespace mbtfm::fuzz {
-
-const char* const kFamily = "records";
-const int kInputs = 4000;
+namespace mbtfm::fuzz::records {
+namespace {
 
 std::vector<std::string> samples() {
   const std::string hash(64, 'a');
@@ -44,8 +42,6 @@ std::vector<std::string> samples() {
       hash + " 20 1700000000000000000 1700000000000000000 65 1234 cell.toml\n" + hash + " 1 2 3 4 5 a b.csv\n"};
 }
 
-namespace {
-
 const std::string kToml = "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8\n";
 
 /// A cell in which the input is the file of this name.
@@ -63,12 +59,8 @@ runner::CellOutcome untouched() {
   return outcome;
 }
 
-}  // namespace
-}  // namespace mbtfm::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
-  using namespace mbtfm;
-  const std::string_view input = fuzz::text_of(bytes, n);
+void read(std::string_view bytes) {
+  const std::string_view input = bytes;
   runner::RunOptions options;
   options.version = "0.1.0";
 
@@ -95,5 +87,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
     runner::write_batch_table(fuzz::folder() / "batch.csv", fuzz::folder(), {cell}, {});
   });
   fuzz::answer([&] { runner::write_run_record(fitted, options, fuzz::untouched()); });
-  return 0;
 }
+
+const bool is_added = add({"records", 4000, samples, read});
+
+}  // namespace
+}  // namespace mbtfm::fuzz::records

@@ -3,10 +3,8 @@
 #include "segment/rois/roi.h"
 #include "tests/fuzz/target.h"
 
-namespace mbtfm::fuzz {
-
-const char* const kFamily = "roi";
-const int kInputs = 40000;
+namespace mbtfm::fuzz::roi {
+namespace {
 
 std::vector<std::string> samples() {
   using rois::Roi;
@@ -43,12 +41,9 @@ std::vector<std::string> samples() {
   return files;
 }
 
-}  // namespace mbtfm::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
-  using namespace mbtfm;
+void read(std::string_view bytes) {
   using namespace mbtfm::cells;
-  const auto file = fuzz::put("input", fuzz::text_of(bytes, n));
+  const auto file = fuzz::put("input", bytes);
   fuzz::answer([&] {
     const cells::RoiSet set{.name = "input", .rois = rois::read_rois(file)};
     const cells::Field field{.width_px = 512, .height_px = 400, .pixel_um = 0.1};
@@ -63,5 +58,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
       binned(roi, 2);
     }
   });
-  return 0;
 }
+
+const bool is_added = add({"roi", 40000, samples, read});
+
+}  // namespace
+}  // namespace mbtfm::fuzz::roi

@@ -9,10 +9,8 @@
 #include "pipeline/stage/parameters.h"
 #include "tests/fuzz/target.h"
 
-namespace mbtfm::fuzz {
-
-const char* const kFamily = "settings";
-const int kInputs = 30000;
+namespace mbtfm::fuzz::settings {
+namespace {
 
 std::vector<std::string> samples() {
   return {
@@ -26,8 +24,6 @@ std::vector<std::string> samples() {
 }
 
 }  // namespace mbtfm::fuzz
-
-namespace {
 
 /// One parameter of each kind.
 struct AnyParameters {
@@ -54,11 +50,8 @@ void declare(mbtfm::stage::ParameterList& list, AnyParameters& p) {
   list.add("name", p.name, "a text");
 }
 
-}  // namespace
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
-  using namespace mbtfm;
-  const auto file = fuzz::put("cell.toml", fuzz::text_of(bytes, n));
+void read(std::string_view bytes) {
+  const auto file = fuzz::put("cell.toml", bytes);
   fuzz::answer([&] {
     Gel gel;
     AnyParameters parameters;
@@ -73,5 +66,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   fuzz::answer([&] { runner::read_run_settings(fuzz::folder()); });
   fuzz::answer([&] { runner::unset_in(file, {{.table = "gel", .key = "thickness_um", .value = "50"}}); });
   fuzz::answer([&] { runner::read_image_names(fuzz::folder()); });
-  return 0;
 }
+
+const bool is_added = add({"settings", 30000, samples, read});
+
+}  // namespace
+}  // namespace mbtfm::fuzz::settings

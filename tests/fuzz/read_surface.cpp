@@ -11,11 +11,7 @@
 #include "tests/fuzz/target.h"
 #include "tests/support/mesh_files.h"
 
-namespace mbtfm::fuzz {
-
-const char* const kFamily = "surface";
-const int kInputs = 20000;
-
+namespace mbtfm::fuzz::surface {
 namespace {
 
 constexpr std::array kExtensions = {".stl", ".ply", ".obj", ".vtp"};
@@ -43,8 +39,6 @@ std::string surface_vtp() {
   return bytes_of(folder() / "whole.vtp");
 }
 
-}  // namespace
-
 std::vector<std::string> samples() {
   const TriangleMesh mesh = height_field();
   return {test::stl_text(mesh),
@@ -57,11 +51,8 @@ std::vector<std::string> samples() {
           surface_vtp()};
 }
 
-}  // namespace mbtfm::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
-  using namespace mbtfm;
-  const std::string_view input = fuzz::text_of(bytes, n);
+void read(std::string_view bytes) {
+  const std::string_view input = bytes;
   for (const char* const extension : fuzz::kExtensions) {
     const auto file = fuzz::put(std::string("input") + extension, input);
     fuzz::answer([&] {
@@ -78,5 +69,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
     const surface::Height height(map);
     height(map.origin_um);
   });
-  return 0;
 }
+
+const bool is_added = add({"surface", 20000, samples, read});
+
+}  // namespace
+}  // namespace mbtfm::fuzz::surface

@@ -4,10 +4,8 @@
 #include "tests/support/fake_tables.h"
 #include "tests/support/vtu_variants.h"
 
-namespace mbtfm::fuzz {
-
-const char* const kFamily = "vtu";
-const int kInputs = 60000;
+namespace mbtfm::fuzz::vtu {
+namespace {
 
 std::vector<std::string> samples() {
   const Network network = test::small_network();
@@ -22,12 +20,13 @@ std::vector<std::string> samples() {
   return texts;
 }
 
-}  // namespace mbtfm::fuzz
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
-  using namespace mbtfm;
-  const auto file = fuzz::put("input.vtu", fuzz::text_of(bytes, n));
+void read(std::string_view bytes) {
+  const auto file = fuzz::put("input.vtu", bytes);
   fuzz::answer([&] { files::read_network(file); });
   fuzz::answer([&] { files::read_contracted_network(file); });
-  return 0;
 }
+
+const bool is_added = add({"vtu", 60000, samples, read});
+
+}  // namespace
+}  // namespace mbtfm::fuzz::vtu

@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
+#include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::rois {
@@ -49,7 +50,7 @@ std::vector<std::string> samples(const fs::path& folder) {
   set.push_back(roi);
   write_roi_set(folder / "set.zip", set);
   result.push_back(bytes_of(folder / "set.zip"));
-  const fs::path shared = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data/roi";
+  const fs::path shared = test::source_folder().parent_path() / "shared/data/roi";
   if (!fs::exists(shared)) return result;
   for (const auto& entry : fs::recursive_directory_iterator(shared)) {
     if (entry.path().extension() == ".roi") result.push_back(bytes_of(entry.path()));

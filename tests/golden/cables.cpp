@@ -4,6 +4,7 @@
 #include "network/cables/cables.h"
 #include "pipeline/files/csv.h"
 #include "tests/support/equilibrium.h"
+#include "tests/support/folders.h"
 #include "tests/support/reference_network.h"
 
 namespace mbtfm {
@@ -12,7 +13,7 @@ namespace {
 class CablesAgainstReference : public testing::TestWithParam<const char*> {
  protected:
   files::CsvTable table(const std::string& file) const {
-    return files::CsvTable(std::filesystem::path(MBTFM_SOURCE_DIR) / "tests/data/reference/network" / GetParam() /
+    return files::CsvTable(test::source_folder() / "tests/data/reference/network" / GetParam() /
                            file);
   }
   test::ReferenceNetwork reference = test::reference_network(GetParam());

@@ -8,7 +8,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 folder=$(realpath -m "${1:-build/package}")
-./cmake/install_packages.sh debhelper dh-python pybuild-plugin-pyproject python3-all python3-setuptools python3-numpy \
+./cmake/install_packages.sh all debhelper dh-python pybuild-plugin-pyproject python3-all python3-setuptools python3-numpy \
   python3-pandas lintian mmdebstrap
 mkdir -p "$folder"
 version=$(dpkg-parsechangelog -S Version)

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "segment/cells/segment_cell.h"
+#include "tests/support/folders.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/segmentation_score.h"
 
@@ -14,7 +15,7 @@ namespace {
 
 using namespace mbtfm::test;
 
-const std::filesystem::path kActin = std::filesystem::path(MBTFM_SOURCE_DIR) / "../shared/data/actin";
+const std::filesystem::path kActin = test::source_folder() / "../shared/data/actin";
 
 #define REQUIRE_DATA()                  \
   if (!std::filesystem::exists(kActin)) \

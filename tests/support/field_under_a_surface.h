@@ -15,6 +15,7 @@
 #include "pipeline/contract/geometry.h"
 #include "pipeline/files/csv.h"
 #include "samples/gels/field.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm {
 
@@ -39,7 +40,7 @@ struct CurvedValue {
 };
 
 inline std::filesystem::path curved_folder(const std::string& name) {
-  return std::filesystem::path(MBTFM_SOURCE_DIR) / "tests/data/reference/curved" / name;
+  return test::source_folder() / "tests/data/reference/curved" / name;
 }
 
 inline CurvedCase curved_case(const std::string& name) {

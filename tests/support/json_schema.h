@@ -8,6 +8,7 @@
 #include <string>
 
 #include "pipeline/files/text.h"
+#include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::test {
@@ -16,8 +17,9 @@ namespace mbtfm::test {
 inline std::string schema_errors(const std::filesystem::path& file, const std::string& schema) {
   const TemporaryFolder folder;
   const std::filesystem::path log = folder / "log";
-  const std::string command = "python3 -W ignore -m jsonschema -i '" + file.string() + "' '" MBTFM_SOURCE_DIR "/docs/" +
-                              schema + ".schema.json' > '" + log.string() + "' 2>&1";
+  const std::string command = "python3 -W ignore -m jsonschema -i '" + file.string() + "' '" +
+                              test::source_folder().string() + "/docs/" + schema + ".schema.json' > '" + log.string() +
+                              "' 2>&1";
   const int status = std::system(command.c_str());
   const std::string said = files::read_text(log);
   return status != 0 && said.empty() ? "python3-jsonschema failed" : said;

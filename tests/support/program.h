@@ -8,6 +8,7 @@
 #include <string>
 
 #include "pipeline/files/text.h"
+#include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::test {
@@ -23,7 +24,7 @@ inline Outcome run_program(const std::string& command, const std::string& before
   const TemporaryFolder folder;
   const std::filesystem::path log = folder / "log";
   const std::string whole =
-      before + std::string(MBTFM_BINARY_DIR) + "/bin/" + command + " > '" + log.string() + "' 2>&1";
+      before + test::build_folder().string() + "/bin/" + command + " > '" + log.string() + "' 2>&1";
   const int status = std::system(whole.c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), files::read_text(log)};
 }

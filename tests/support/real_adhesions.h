@@ -11,11 +11,12 @@
 #include <vector>
 
 #include "segment/cells/segment_cell.h"
+#include "tests/support/folders.h"
 #include "tests/support/segmentation_score.h"
 
 namespace mbtfm::test {
 
-inline const std::filesystem::path kSharedData = std::filesystem::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data";
+inline const std::filesystem::path kSharedData = test::source_folder().parent_path() / "shared/data";
 
 inline const std::filesystem::path kFibroblast = kSharedData / "fa/faas_fibro100_wt02";
 /// The authors' images of this series have about 0.215 um a pixel; it makes this cell 35 x 90 um.

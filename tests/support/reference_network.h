@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/network.h"
 #include "pipeline/files/csv.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm::test {
 
@@ -18,7 +19,7 @@ struct ReferenceNetwork {
 
 /// @param name  case_21 or case_22
 inline ReferenceNetwork reference_network(const std::string& name) {
-  const std::filesystem::path folder = std::filesystem::path(MBTFM_SOURCE_DIR) / "tests/data/reference/network" / name;
+  const std::filesystem::path folder = test::source_folder() / "tests/data/reference/network" / name;
   const files::CsvTable vertices(folder / "vertices.csv"), links(folder / "links.csv"),
       tensions(folder / "tensions.csv");
   ReferenceNetwork reference;

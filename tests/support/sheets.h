@@ -11,11 +11,12 @@
 #include "continuum/sheet/on_springs.h"
 #include "continuum/sheet/recovery.h"
 #include "pipeline/files/csv.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm::test {
 
 inline files::CsvTable chapter4(const std::string& name) {
-  return files::CsvTable(std::filesystem::path(MBTFM_SOURCE_DIR "/tests/data/reference/chapter4") / (name + ".csv"));
+  return files::CsvTable(test::source_folder() / "tests/data/reference/chapter4" / (name + ".csv"));
 }
 
 /// A closed line r(t) about the origin.

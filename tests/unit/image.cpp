@@ -14,6 +14,7 @@
 #include "segment/images/image_file.h"
 #include "segment/images/png.h"
 #include "tests/support/findings.h"
+#include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::images {
@@ -184,7 +185,7 @@ TEST(Image, a_size_the_file_cannot_fill_takes_no_memory) {
 
 // ---- images of other programs
 
-const fs::path kShared = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data";
+const fs::path kShared = test::source_folder().parent_path() / "shared/data";
 
 /// What another program (tifffile, else PIL) makes of a file's first page; no extremes where it could not decode it.
 struct Decoded {

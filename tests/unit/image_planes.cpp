@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "segment/images/image.h"
+#include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::images {
@@ -245,7 +246,7 @@ TEST(ImagePlanes, more_than_4_GB_of_imagej_are_planes_after_the_only_page) {
   }
 }
 
-const fs::path kSharedImages = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data";
+const fs::path kSharedImages = test::source_folder().parent_path() / "shared/data";
 
 TEST(ImagePlanes, real_hyperstacks_are_read_as_by_another_program) {
   if (!fs::exists(kSharedImages / "tiff")) GTEST_SKIP() << "the images of other programs are not here";

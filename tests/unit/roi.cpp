@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/text.h"
+#include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::rois {
@@ -167,7 +168,7 @@ TEST(Roi, what_is_no_roi_is_named_for_what_it_is) {
 
 // ---- files that ImageJ wrote, and what other readers make of them
 
-const fs::path kShared = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data/roi";
+const fs::path kShared = test::source_folder().parent_path() / "shared/data/roi";
 
 void expect_coordinates(const Roi& roi, const json& answer) {
   const auto number = [&](const char* key) { return answer.at(key).get<double>(); };
