@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Make docs/resolution.md and docs/images/resolution.svg: plans and one drawn experiment for each density and noise, on
-# simulated U2OS cells.
+# Make docs/resolution.md: plans and one drawn experiment for each density and noise, on simulated U2OS cells.
 # Run from the project's folder, built; takes some five minutes of one processor. docs/make_resolution.sh [WORK_FOLDER]
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -42,7 +41,6 @@ law() { # column of the error: exponents of noise and density, least squares of 
     printf "noise^%.2f · density^%.2f", (e * b - f * d) / (a * b - d * d), (f * a - e * d) / (a * b - d * d)}' "$work/rows"
 }
 rows >"$work/rows"
-build/tests/resolution_curves "$work/rows" docs/images/resolution.svg
 {
   sed -n '/^<<TOP$/,/^TOP$/p' "$0" | sed '1d;$d'
   cat "$work/rows"
@@ -80,6 +78,8 @@ On another gel the same numbers hold at the same product of noise and modulus: 3
 
 ![Three charts, one for each noise: error of an adhesion's force over the density of beads. With the network it stays below 0.1 nN.
 Alone it falls from far above that to the network's error as beads get dense and exact. FTTC stays between 0.15 and 0.3 nN.](images/resolution.svg)
+
+The charts were drawn with version 0.2.
 
 | beads per µm² | noise (nm) | network | alone | FTTC | planned: network | planned: alone | alone / network | FTTC / network | apart (µm) |
 |---|---|---|---|---|---|---|---|---|---|

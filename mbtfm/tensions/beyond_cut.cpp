@@ -238,7 +238,7 @@ DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::
 
 /// Standard deviation that a component of an adhesion's own force is expected to have at this distance from the cut, in
 /// that of the cell's adhesion forces. By unseen fibres as much as any adhesion has. By the network, whose own gave way
-/// at the cut: measured as forces of the cells 1 to 8 less those of their networks held at cuts (`cut_cells profile`).
+/// at the cut: measured as forces of the cells 1 to 8 less those of their networks held at cuts.
 double expected_own(double distance_um) {
   constexpr double kUnseen_um = 3, kOfNetwork = 0.23, kFade_um = 10;
   return distance_um < kUnseen_um ? 1 : kOfNetwork * std::exp(-distance_um / kFade_um);

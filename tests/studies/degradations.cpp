@@ -5,8 +5,8 @@
 ///
 /// A degraded cell's error bars hold if at least 90 % of the tensions' 95 % intervals hold the truth, and the total
 /// force lies within three of its standard errors. The truth is that of the adhesions in view. Where they do not, the
-/// program must name the cause: by one of the findings of names_of_cause(), or where it refuses the cell, by one of its
-/// words.
+/// program must name the cause: by one of the findings of Degradation::named_by, or where it refuses the cell, by one
+/// of its words.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -40,32 +40,37 @@ constexpr double kTruePixel_um = 0.1;  // whatever cell.toml says
 
 /// A cell's images and settings; what a degradation changes.
 struct Set {
-  images::Image adhesion, actin, relaxed, stressed;
-  fs::path truth;              ///< folder
-  std::string settings;        ///< further tables of cell.toml
-  std::string image_settings;  ///< further lines of [images]
+  Image adhesion, actin, relaxed, stressed;
+  fs::path truth;             ///< folder
+  std::string settings = {};  ///< further tables of cell.toml
   std::string pixel_size_um = "0.1", youngs_modulus_kPa = "8.4", thickness_um = "60";
   bool as_jpeg = false;
-  bool is_calibrated = true;                       ///< the files state their pixel size
-  std::map<std::string, images::Image> more = {};  ///< further images, by name
-  std::optional<DisplacementField> field = {};     ///< of another program, in the place of the bead images
-  std::vector<Fibre> fibres = {};                  ///< drawn by hand
-  std::vector<images::Image*> all() { return {&adhesion, &actin, &relaxed, &stressed}; }
+  bool is_calibrated = true;                    ///< the files state their pixel size
+  std::map<std::string, Image> more = {};       ///< further images, by name
+  std::optional<DisplacementField> field = {};  ///< of another program, in the place of the bead images
+  std::vector<Fibre> fibres = {};               ///< drawn by hand
+  std::vector<Image*> all() { return {&adhesion, &actin, &relaxed, &stressed}; }
 };
 
-cv::Mat mat(const images::Image& image) {
+cv::Mat mat(const Image& image) {
   return cv::Mat(image.height, image.width, CV_32F, const_cast<float*>(image.pixels.data())).clone();
 }
 
-void put(images::Image& image, const cv::Mat& pixels) {
+void put(Image& image, const cv::Mat& pixels) {
   image.width = pixels.cols;
   image.height = pixels.rows;
   image.pixels.assign(reinterpret_cast<const float*>(pixels.data),
                       reinterpret_cast<const float*>(pixels.data) + pixels.total());
 }
 
+Image image_of(const cv::Mat& pixels) {
+  Image image{.width = 0, .height = 0, .pixels = {}, .pixel_size_um = {}};
+  put(image, pixels);
+  return image;
+}
+
 /// image(x) becomes image(from(x)); px, 0 at the centre of the first one.
-void warp(images::Image& image, const std::function<Vec2(Vec2)>& from) {
+void warp(Image& image, const std::function<Vec2(Vec2)>& from) {
   cv::Mat x(image.height, image.width, CV_32F), y = x.clone(), warped;
   for (int j = 0; j < image.height; ++j) {
     for (int i = 0; i < image.width; ++i) {
@@ -78,10 +83,10 @@ void warp(images::Image& image, const std::function<Vec2(Vec2)>& from) {
   put(image, cv::max(warped, 0));
 }
 
-Vec2 middle(const images::Image& image) { return {0.5 * (image.width - 1), 0.5 * (image.height - 1)}; }
+Vec2 middle(const Image& image) { return {0.5 * (image.width - 1), 0.5 * (image.height - 1)}; }
 
 /// What the image shows moves by this linear map about its middle, and a shift (px).
-void move(images::Image& image, Vec2 shift, double growth = 0, double turn_deg = 0, double shear = 0) {
+void move(Image& image, Vec2 shift, double growth = 0, double turn_deg = 0, double shear = 0) {
   const Vec2 c = middle(image);
   const double t = turn_deg * std::numbers::pi / 180;
   warp(image, [=](Vec2 p) {
@@ -90,14 +95,14 @@ void move(images::Image& image, Vec2 shift, double growth = 0, double turn_deg =
   });
 }
 
-void blur(images::Image& image, double sigma_px) {
+void blur(Image& image, double sigma_px) {
   cv::Mat blurred;
   cv::GaussianBlur(mat(image), blurred, {}, sigma_px);
   put(image, blurred);
 }
 
 /// Sharp in the middle, at the left and the right border blurred by this: a tilt against the focal plane.
-void blur_to_borders(images::Image& image, double sigma_px) {
+void blur_to_borders(Image& image, double sigma_px) {
   constexpr int kSteps = 8;
   const cv::Mat sharp = mat(image);
   cv::Mat result = sharp.clone();
@@ -112,21 +117,27 @@ void blur_to_borders(images::Image& image, double sigma_px) {
   put(image, result);
 }
 
-void add_noise(images::Image& image, double times, unsigned seed) {
+/// What this share of the values is below.
+float quantile(std::vector<float> values, double share) {
+  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size()));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+void add_noise(Image& image, double times, unsigned seed) {
   cv::Mat pixels = mat(image), high;
   cv::Laplacian(pixels, high, CV_32F);  // of noise of sd s: s sqrt(20)
   std::vector<float> sizes;
   for (int j = 0; j < high.rows; ++j) {
     for (int i = 0; i < high.cols; ++i) sizes.push_back(std::abs(high.at<float>(j, i)));
   }
-  std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
-  const double sigma = 1.4826 * sizes[sizes.size() / 2] / std::sqrt(20.0);
+  const double sigma = 1.4826 * quantile(sizes, 0.5) / std::sqrt(20.0);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal(0, times * sigma);
   for (float& p : image.pixels) p = float(std::max(0.0, p + normal(random)));
 }
 
-void blur_left_half(images::Image& image, double sigma_px) {
+void blur_left_half(Image& image, double sigma_px) {
   cv::Mat blurred, result = mat(image);
   cv::GaussianBlur(result, blurred, {}, sigma_px);
   blurred.colRange(0, image.width / 2).copyTo(result.colRange(0, image.width / 2));
@@ -134,15 +145,13 @@ void blur_left_half(images::Image& image, double sigma_px) {
   add_noise(image, 1, 11);  // as the camera does, which blur takes off
 }
 
-void saturate(images::Image& image, double share) {
-  std::vector<float> values = image.pixels;
-  const auto at = values.begin() + std::ptrdiff_t((1 - share) * double(values.size()));
-  std::nth_element(values.begin(), at, values.end());
-  for (float& p : image.pixels) p = std::min(p, *at) / *at * 65535;
+void saturate(Image& image, double share) {
+  const float most = quantile(image.pixels, 1 - share);
+  for (float& p : image.pixels) p = std::min(p, most) / most * 65535;
 }
 
 void crop(Set& set, double left, double right, double top, double bottom) {
-  for (images::Image* image : set.all()) {
+  for (Image* image : set.all()) {
     const cv::Rect box(int(left * image->width), int(top * image->height), int((right - left) * image->width),
                        int((bottom - top) * image->height));
     put(*image, mat(*image)(box).clone());
@@ -150,49 +159,52 @@ void crop(Set& set, double left, double right, double top, double bottom) {
 }
 
 /// What the cameras of one set do to all of its images.
-void to_all(Set& set, const std::function<void(images::Image&)>& change) {
-  for (images::Image* image : set.all()) change(*image);
+void to_all(Set& set, const std::function<void(Image&)>& change) {
+  for (Image* image : set.all()) change(*image);
 }
-void to_beads(Set& set, const std::function<void(images::Image&)>& change) {
+void to_beads(Set& set, const std::function<void(Image&)>& change) {
   change(set.relaxed);
   change(set.stressed);
 }
 
-void flip_rows(images::Image& image) {
+void flip(Image& image, int axis) {
   cv::Mat flipped;
-  cv::flip(mat(image), flipped, 0);
+  cv::flip(mat(image), flipped, axis);
   put(image, flipped);
 }
+void flip_rows(Image& image) { flip(image, 0); }
+void mirror(Image& image) { flip(image, 1); }
+void transpose(Image& image) { put(image, mat(image).t()); }
 
 /// Of the camera, or of a copy: nobody corrects the pixel size.
-void bin(images::Image& image, int binning) { image = images::binned(image, binning); }
+void bin(Image& image, int binning) { image = images::binned(image, binning); }
 
-void resize(images::Image& image, double across, double down) {
+void resize(Image& image, double across, double down) {
   cv::Mat resized;
   cv::resize(mat(image), resized, {}, across, down, cv::INTER_CUBIC);
   put(image, cv::max(resized, 0));
 }
 
-void invert(images::Image& image) {
+void invert(Image& image) {
   const float most = *std::ranges::max_element(image.pixels);
   for (float& p : image.pixels) p = most - p;
 }
 
 /// As a copy of 8 bits has it, from the darkest to the brightest pixel.
-void to_8_bits(images::Image& image) {
+void to_8_bits(Image& image) {
   const auto [least, most] = std::ranges::minmax(image.pixels);
   for (float& p : image.pixels) p = std::round(255 * (p - least) / (most - least));
 }
 
 /// Pixels that shine by themselves, the same in each image of a camera.
-void add_hot_pixels(images::Image& image, int n) {
+void add_hot_pixels(Image& image, int n) {
   std::mt19937_64 random(7);
   const float bright = *std::ranges::max_element(image.pixels);
   std::uniform_int_distribution<std::size_t> any(0, image.pixels.size() - 1);
   for (int k = 0; k < n; ++k) image.pixels[any(random)] = bright;
 }
 
-void sharpen(images::Image& image) {
+void sharpen(Image& image) {
   cv::Mat blurred;
   cv::GaussianBlur(mat(image), blurred, {}, 1.5);
   const cv::Mat sharp = 2.5 * mat(image) - 1.5 * blurred;
@@ -200,14 +212,12 @@ void sharpen(images::Image& image) {
 }
 
 /// The background taken off, and what is below zero then cut off.
-void take_ground_off(images::Image& image) {
-  std::vector<float> values = image.pixels;
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  for (float& p : image.pixels) p = std::max(0.f, p - *middle);
+void take_ground_off(Image& image) {
+  const float ground = quantile(image.pixels, 0.5);
+  for (float& p : image.pixels) p = std::max(0.f, p - ground);
 }
 
-images::Image mask_of_outline(const fs::path& truth, int width, int height) {
+Image mask_of_outline(const fs::path& truth, int width, int height) {
   const files::CsvTable table(truth / "outline.csv");
   std::vector<cv::Point> corners;
   for (int row = 0; row < table.n_rows(); ++row) {
@@ -216,12 +226,10 @@ images::Image mask_of_outline(const fs::path& truth, int width, int height) {
   }
   cv::Mat mask = cv::Mat::zeros(height, width, CV_32F);
   cv::fillPoly(mask, std::vector<std::vector<cv::Point>>{corners}, 255);
-  images::Image image{.width = 0, .height = 0, .pixels = {}, .pixel_size_um = {}};
-  put(image, mask);
-  return image;
+  return image_of(mask);
 }
 
-images::Image mask_of_adhesions(const fs::path& truth, int width, int height) {
+Image mask_of_adhesions(const fs::path& truth, int width, int height) {
   cv::Mat mask = cv::Mat::zeros(height, width, CV_32F);
   for (const Adhesion& a : files::read_adhesions(truth / "adhesions.csv")) {
     cv::ellipse(mask,
@@ -230,9 +238,7 @@ images::Image mask_of_adhesions(const fs::path& truth, int width, int height) {
                                 float(a.angle_rad * 180 / std::numbers::pi)),
                 255, cv::FILLED);
   }
-  images::Image image{.width = 0, .height = 0, .pixels = {}, .pixel_size_um = {}};
-  put(image, mask);
-  return image;
+  return image_of(mask);
 }
 
 /// As another program would have found it, with 20 nm of noise.
@@ -254,46 +260,47 @@ void scale(Bead& bead, double factor) {
   bead.sigma_um *= factor;
 }
 
-void transpose(images::Image& image) { put(image, mat(image).t()); }
-
-void mirror(images::Image& image) {
-  cv::Mat flipped;
-  cv::flip(mat(image), flipped, 1);
-  put(image, flipped);
+/// The displacement as another program has it.
+auto as_field(const std::function<void(Bead&)>& change) {
+  return [=](Set& s, const auto&) { s.field = true_field(s.truth, change); };
 }
 
 struct Degradation {
   std::string name, what;
+  std::string named_by;  ///< findings, or words of a refusal: whoever reads them knows what to mend; with semicolons
   std::function<void(Set&, const Set& other)> apply;
 };
 
 std::vector<Degradation> degradations() {
-  const auto stressed = [](auto... motion) { return [=](Set& s, const Set&) { move(s.stressed, motion...); }; };
+  const auto moved = [](Image Set::*which, auto... motion) {
+    return [=](Set& s, const Set&) { move(s.*which, motion...); };
+  };
+  const auto stressed = [=](auto... motion) { return moved(&Set::stressed, motion...); };
   return {
-      {"sound", "nothing", [](Set&, const Set&) {}},
-      {"growth-0.05", "the stressed bead image is 0.05 % larger", stressed(Vec2{}, .0005)},
-      {"growth-0.1", "the stressed bead image is 0.1 % larger", stressed(Vec2{}, .001)},
-      {"growth-0.3", "the stressed bead image is 0.3 % larger", stressed(Vec2{}, .003)},
-      {"growth-minus-0.05", "the stressed bead image is 0.05 % smaller", stressed(Vec2{}, -.0005)},
-      {"growth-minus-0.1", "the stressed bead image is 0.1 % smaller", stressed(Vec2{}, -.001)},
-      {"growth-minus-0.3", "the stressed bead image is 0.3 % smaller", stressed(Vec2{}, -.003)},
-      {"growth-2", "the stressed bead image is 2 % larger: another objective", stressed(Vec2{}, .02)},
-      {"shear-0.1", "the stressed bead image is sheared by 0.1 %", stressed(Vec2{}, 0., 0., .001)},
-      {"turn-0.3", "the stressed bead image is turned by 0.3 degrees", stressed(Vec2{}, 0., .3)},
-      {"turn-5", "the stressed bead image is turned by 5 degrees", stressed(Vec2{}, 0., 5.)},
-      {"drift", "the stage drifted by (3.4, -1.7) px between the bead images", stressed(Vec2{3.4, -1.7})},
-      {"all-motions", "growth, shear, turn and drift together", stressed(Vec2{3.4, -1.7}, .001, .3, .001)},
-      {"tiles", "the right half of the stressed bead image was stitched 1 px off",
+      {"sound", "nothing", "", [](Set&, const Set&) {}},
+      {"growth-0.05", "the stressed bead image is 0.05 % larger", "", stressed(Vec2{}, .0005)},
+      {"growth-0.1", "the stressed bead image is 0.1 % larger", "", stressed(Vec2{}, .001)},
+      {"growth-0.3", "the stressed bead image is 0.3 % larger", "", stressed(Vec2{}, .003)},
+      {"growth-minus-0.05", "the stressed bead image is 0.05 % smaller", "", stressed(Vec2{}, -.0005)},
+      {"growth-minus-0.1", "the stressed bead image is 0.1 % smaller", "", stressed(Vec2{}, -.001)},
+      {"growth-minus-0.3", "the stressed bead image is 0.3 % smaller", "", stressed(Vec2{}, -.003)},
+      {"growth-2", "the stressed bead image is 2 % larger: another objective", "", stressed(Vec2{}, .02)},
+      {"shear-0.1", "the stressed bead image is sheared by 0.1 %", "", stressed(Vec2{}, 0., 0., .001)},
+      {"turn-0.3", "the stressed bead image is turned by 0.3 degrees", "", stressed(Vec2{}, 0., .3)},
+      {"turn-5", "the stressed bead image is turned by 5 degrees", "", stressed(Vec2{}, 0., 5.)},
+      {"drift", "the stage drifted by (3.4, -1.7) px between the bead images", "", stressed(Vec2{3.4, -1.7})},
+      {"all-motions", "growth, shear, turn and drift together", "", stressed(Vec2{3.4, -1.7}, .001, .3, .001)},
+      {"tiles", "the right half of the stressed bead image was stitched 1 px off", "curved-motion",
        [](Set& s, const Set&) {
          const double half = 0.55 * s.stressed.width;
          warp(s.stressed, [=](Vec2 p) { return p.x > half ? p - Vec2{1, 0} : p; });
        }},
-      {"rolling-drift", "the stage swung by 0.5 px while the stressed bead image was scanned",
+      {"rolling-drift", "the stage swung by 0.5 px while the stressed bead image was scanned", "curved-motion",
        [](Set& s, const Set&) {
          const double period = s.stressed.height;
          warp(s.stressed, [=](Vec2 p) { return p - Vec2{0.5 * std::sin(2 * std::numbers::pi * p.y / period), 0}; });
        }},
-      {"lens", "the stressed bead image was taken through a lens that distorts by 0.1 % at the border",
+      {"lens", "the stressed bead image was taken through a lens that distorts by 0.1 % at the border", "curved-motion",
        [](Set& s, const Set&) {
          const Vec2 c = middle(s.stressed);
          warp(s.stressed, [=](Vec2 p) {
@@ -302,80 +309,65 @@ std::vector<Degradation> degradations() {
          });
        }},
       {"tilted-stage", "the stage was tilted by 3 degrees: one direction is shorter, the borders are out of focus",
+       "defocused; beads-disagree",
        [](Set& s, const Set&) {
          const Vec2 c = middle(s.stressed);
          warp(s.stressed, [=](Vec2 p) { return Vec2{c.x + (p.x - c.x) / std::cos(3 * std::numbers::pi / 180), p.y}; });
          blur_to_borders(s.stressed, 2);
        }},
       {"half-defocused", "the left half of both bead images is far out of focus (blurred by 4 px)",
-       [](Set& s, const Set&) {
-         for (images::Image* i : {&s.relaxed, &s.stressed}) blur_left_half(*i, 4);
-       }},
-      {"adhesions-3px", "the adhesion channel is shifted by 3 px against the others",
-       [](Set& s, const Set&) {
-         move(s.adhesion, {2.5, -1.7});
-       }},
-      {"adhesions-5px", "the adhesion channel is shifted by 5 px against the others",
-       [](Set& s, const Set&) {
-         move(s.adhesion, {-4, 3});
-       }},
-      {"actin-4px", "the actin channel is shifted by 4 px against the others",
-       [](Set& s, const Set&) {
-         move(s.actin, {3, 2.6});
-       }},
-      {"beads-5px", "both bead images are shifted by 5 px against the cell",
-       [](Set& s, const Set&) {
-         for (images::Image* i : {&s.relaxed, &s.stressed}) move(*i, {4, 3});
-       }},
-      {"beads-turned", "both bead images are turned by 0.5 degrees against the cell",
-       [](Set& s, const Set&) {
-         for (images::Image* i : {&s.relaxed, &s.stressed}) move(*i, {}, 0, .5);
-       }},
-      {"beads-mirrored", "both bead images are mirrored",
-       [](Set& s, const Set&) {
-         for (images::Image* i : {&s.relaxed, &s.stressed}) mirror(*i);
-       }},
-      {"beads-transposed", "rows and columns of both bead images are exchanged",
-       [](Set& s, const Set&) {
-         for (images::Image* i : {&s.relaxed, &s.stressed}) transpose(*i);
-       }},
-      {"beads-exchanged", "the stressed and the relaxed bead image are exchanged",
+       "tracked-by-correlation; defocused",
+       [](Set& s, const Set&) { to_beads(s, [](Image& i) { blur_left_half(i, 4); }); }},
+      {"adhesions-3px", "the adhesion channel is shifted by 3 px against the others", "",
+       moved(&Set::adhesion, Vec2{2.5, -1.7})},
+      {"adhesions-5px", "the adhesion channel is shifted by 5 px against the others", "",
+       moved(&Set::adhesion, Vec2{-4, 3})},
+      {"actin-4px", "the actin channel is shifted by 4 px against the others", "", moved(&Set::actin, Vec2{3, 2.6})},
+      {"beads-5px", "both bead images are shifted by 5 px against the cell", "",
+       [](Set& s, const Set&) { to_beads(s, [](Image& i) {
+                                  move(i, Vec2{4, 3});
+                                }); }},
+      {"beads-turned", "both bead images are turned by 0.5 degrees against the cell", "",
+       [](Set& s, const Set&) { to_beads(s, [](Image& i) { move(i, {}, 0, .5); }); }},
+      {"beads-mirrored", "both bead images are mirrored", "read-otherwise",
+       [](Set& s, const Set&) { to_beads(s, mirror); }},
+      {"beads-transposed", "rows and columns of both bead images are exchanged", "read-otherwise",
+       [](Set& s, const Set&) { to_beads(s, transpose); }},
+      {"beads-exchanged", "the stressed and the relaxed bead image are exchanged", "exchanged",
        [](Set& s, const Set&) { std::swap(s.relaxed, s.stressed); }},
-      {"beads-of-another-cell", "both bead images are those of another cell",
+      {"beads-of-another-cell", "both bead images are those of another cell", "explains-little; nothing-moves",
        [](Set& s, const Set& o) { s.relaxed = o.relaxed, s.stressed = o.stressed; }},
-      {"stressed-of-another-cell", "the stressed bead image is that of another cell",
+      {"stressed-of-another-cell", "the stressed bead image is that of another cell", "one place",
        [](Set& s, const Set& o) { s.stressed = o.stressed; }},
-      {"channels-exchanged", "the adhesion and the actin image are exchanged",
+      {"channels-exchanged", "the adhesion and the actin image are exchanged", "adhesions-long",
        [](Set& s, const Set&) { std::swap(s.adhesion, s.actin); }},
-      {"bleed-through", "a third of the actin signal is seen in the adhesion channel",
+      {"bleed-through", "a third of the actin signal is seen in the adhesion channel", "bleed-through",
        [](Set& s, const Set&) {
          for (std::size_t k = 0; k < s.adhesion.pixels.size(); ++k) s.adhesion.pixels[k] += .33f * s.actin.pixels[k];
        }},
-      {"defocus", "the stressed bead image is out of focus (blurred by 1.5 px)",
+      {"defocus", "the stressed bead image is out of focus (blurred by 1.5 px)", "defocused",
        [](Set& s, const Set&) { blur(s.stressed, 1.5); }},
-      {"both-defocused", "both bead images are out of focus (blurred by 2 px)",
-       [](Set& s, const Set&) {
-         for (images::Image* i : {&s.relaxed, &s.stressed}) blur(*i, 2);
-       }},
-      {"noisy-beads", "three times more noise in both bead images",
+      {"both-defocused", "both bead images are out of focus (blurred by 2 px)", "",
+       [](Set& s, const Set&) { to_beads(s, [](Image& i) { blur(i, 2); }); }},
+      {"noisy-beads", "three times more noise in both bead images", "",
        [](Set& s, const Set&) {
          add_noise(s.relaxed, 3, 1);
          add_noise(s.stressed, 3, 2);
        }},
-      {"adhesions-saturated", "the brightest 1 % of the adhesion image are saturated",
+      {"adhesions-saturated", "the brightest 1 % of the adhesion image are saturated", "saturated",
        [](Set& s, const Set&) { saturate(s.adhesion, .01); }},
-      {"actin-saturated", "the brightest 2 % of the actin image are saturated",
+      {"actin-saturated", "the brightest 2 % of the actin image are saturated", "saturated",
        [](Set& s, const Set&) { saturate(s.actin, .02); }},
-      {"beads-saturated", "the brightest 2 % of both bead images are saturated",
+      {"beads-saturated", "the brightest 2 % of both bead images are saturated", "saturated",
+       [](Set& s, const Set&) { to_beads(s, [](Image& i) { saturate(i, .02); }); }},
+      {"jpeg", "all images are JPEG files", "lossy-image", [](Set& s, const Set&) { s.as_jpeg = true; }},
+      {"cut-one-side", "the border cuts a third of the cell off", "cell-cut",
+       [](Set& s, const Set&) { crop(s, 0, .6, 0, 1); }},
+      {"cut-two-sides", "the border cuts the cell on two sides", "cell-cut",
+       [](Set& s, const Set&) { crop(s, 0, .62, 0, .62); }},
+      {"uneven-light", "the light of adhesion and actin image falls to a third at the border", "",
        [](Set& s, const Set&) {
-         for (images::Image* i : {&s.relaxed, &s.stressed}) saturate(*i, .02);
-       }},
-      {"jpeg", "all images are JPEG files", [](Set& s, const Set&) { s.as_jpeg = true; }},
-      {"cut-one-side", "the border cuts a third of the cell off", [](Set& s, const Set&) { crop(s, 0, .6, 0, 1); }},
-      {"cut-two-sides", "the border cuts the cell on two sides", [](Set& s, const Set&) { crop(s, 0, .62, 0, .62); }},
-      {"uneven-light", "the light of adhesion and actin image falls to a third at the border",
-       [](Set& s, const Set&) {
-         for (images::Image* image : {&s.adhesion, &s.actin}) {
+         for (Image* image : {&s.adhesion, &s.actin}) {
            const Vec2 c = middle(*image);
            for (int j = 0; j < image->height; ++j) {
              for (int i = 0; i < image->width; ++i) {
@@ -385,15 +377,15 @@ std::vector<Degradation> degradations() {
            }
          }
        }},
-      {"blurred-cell", "adhesion and actin image are out of focus (blurred by 3 px)",
+      {"blurred-cell", "adhesion and actin image are out of focus (blurred by 3 px)", "",
        [](Set& s, const Set&) {
-         for (images::Image* i : {&s.adhesion, &s.actin}) blur(*i, 3);
+         for (Image* i : {&s.adhesion, &s.actin}) blur(*i, 3);
        }},
-      {"fibres-missed", "weak fibres are not found (fibre_start_noise = 60)",
+      {"fibres-missed", "weak fibres are not found (fibre_start_noise = 60)", "missing-fibre",
        [](Set& s, const Set&) { s.settings += "[segment]\nfibre_start_noise = 60\n"; }},
-      {"adhesions-missed", "small and dim adhesions are not found (adhesion_smallest_um2 = 0.8)",
+      {"adhesions-missed", "small and dim adhesions are not found (adhesion_smallest_um2 = 0.8)", "missing-adhesion",
        [](Set& s, const Set&) { s.settings += "[segment]\nadhesion_smallest_um2 = 0.8\n"; }},
-      {"second-cell", "another cell pulls at the beads in the corner, unseen in the other channels",
+      {"second-cell", "another cell pulls at the beads in the corner, unseen in the other channels", "beads-disagree",
        [](Set& s, const Set&) {
          const Vec2 c{.12 * s.stressed.width, .12 * s.stressed.height};
          warp(s.stressed, [=](Vec2 p) {
@@ -401,89 +393,93 @@ std::vector<Degradation> degradations() {
            return p - Vec2{5 * std::exp(-dot(d, d) / (2 * 30 * 30)), 0};
          });
        }},
-      {"pixel-size", "the pixel size of cell.toml is 30 % too large",
+      {"pixel-size", "the pixel size of cell.toml is 30 % too large", "pixel",
        [](Set& s, const Set&) { s.pixel_size_um = "0.13"; }},
-      {"modulus-in-pascal", "the modulus is given in Pa", [](Set& s, const Set&) { s.youngs_modulus_kPa = "8400"; }},
+      {"modulus-in-pascal", "the modulus is given in Pa", "kPa",
+       [](Set& s, const Set&) { s.youngs_modulus_kPa = "8400"; }},
       {"binned", "all images were binned 2 x 2, the pixel size is that of before; the files do not state it",
+       "pixel-size-unchecked",
        [](Set& s, const Set&) {
          to_all(s, [](Image& i) { bin(i, 2); });
          s.is_calibrated = false;
        }},
-      {"pixel-size-double", "the pixel size is twice too large; the files do not state it",
+      {"pixel-size-double", "the pixel size is twice too large; the files do not state it", "pixel-size-unchecked",
        [](Set& s, const Set&) {
          s.pixel_size_um = "0.2";
          s.is_calibrated = false;
        }},
       {"beads-binned", "the bead images were binned 2 x 2, the others were not; the files do not state it",
+       "track.beads_pixel_size_um",
        [](Set& s, const Set&) {
          to_beads(s, [](Image& i) { bin(i, 2); });
          s.is_calibrated = false;
        }},
-      {"resized", "all images were enlarged to twice as many pixels a side, with the right pixel size",
+      {"resized", "all images were enlarged to twice as many pixels a side, with the right pixel size", "",
        [](Set& s, const Set&) {
          to_all(s, [](Image& i) { resize(i, 2, 2); });
          s.pixel_size_um = "0.05";
          s.is_calibrated = false;
        }},
-      {"stretched", "all images are 10 % less high than they should be: pixels that are not square",
+      {"stretched", "all images are 10 % less high than they should be: pixels that are not square", "beads-not-round",
        [](Set& s, const Set&) { to_all(s, [](Image& i) { resize(i, 1, 0.9); }); }},
-      {"8-bit", "each image was scaled to 8 bits by itself", [](Set& s, const Set&) { to_all(s, to_8_bits); }},
-      {"square-root", "of each image the square root was taken (gamma 0.5)",
+      {"8-bit", "each image was scaled to 8 bits by itself", "", [](Set& s, const Set&) { to_all(s, to_8_bits); }},
+      {"square-root", "of each image the square root was taken (gamma 0.5)", "",
        [](Set& s, const Set&) {
          to_all(s, [](Image& i) {
            for (float& p : i.pixels) p = 100 * std::sqrt(p);
          });
        }},
-      {"beads-inverted", "both bead images are dark on bright", [](Set& s, const Set&) { to_beads(s, invert); }},
-      {"actin-inverted", "the actin image is dark on bright", [](Set& s, const Set&) { invert(s.actin); }},
-      {"adhesions-inverted", "the adhesion image is dark on bright", [](Set& s, const Set&) { invert(s.adhesion); }},
-      {"hot-pixels", "300 pixels of the camera shine in both bead images",
+      {"beads-inverted", "both bead images are dark on bright", "dark",
+       [](Set& s, const Set&) { to_beads(s, invert); }},
+      {"actin-inverted", "the actin image is dark on bright", "dark", [](Set& s, const Set&) { invert(s.actin); }},
+      {"adhesions-inverted", "the adhesion image is dark on bright", "dark",
+       [](Set& s, const Set&) { invert(s.adhesion); }},
+      {"hot-pixels", "300 pixels of the camera shine in both bead images", "",
        [](Set& s, const Set&) { to_beads(s, [](Image& i) { add_hot_pixels(i, 300); }); }},
-      {"beads-sharpened", "both bead images were sharpened (unsharp mask)",
+      {"beads-sharpened", "both bead images were sharpened (unsharp mask)", "",
        [](Set& s, const Set&) { to_beads(s, sharpen); }},
-      {"beads-cut-off", "of both bead images the background was taken off, and what is negative",
+      {"beads-cut-off", "of both bead images the background was taken off, and what is negative", "",
        [](Set& s, const Set&) { to_beads(s, take_ground_off); }},
-      {"beads-20px", "the stressed bead image shows the place 20 px beside",
-       [](Set& s, const Set&) {
-         move(s.stressed, {16, -12});
-       }},
-      {"relaxed-twice", "the stressed bead image shows the relaxed gel",
+      {"beads-20px", "the stressed bead image shows the place 20 px beside", "", stressed(Vec2{16, -12})},
+      {"relaxed-twice", "the stressed bead image shows the relaxed gel", "nothing-moves",
        [](Set& s, const Set&) {
          s.stressed = s.relaxed;
          add_noise(s.stressed, 1, 5);
        }},
-      {"actin-flipped", "the rows of the actin image run upwards", [](Set& s, const Set&) { flip_rows(s.actin); }},
-      {"adhesions-flipped", "the rows of the adhesion image run upwards",
+      {"actin-flipped", "the rows of the actin image run upwards", "adhesions-off-actin",
+       [](Set& s, const Set&) { flip_rows(s.actin); }},
+      {"adhesions-flipped", "the rows of the adhesion image run upwards", "adhesions-off-actin",
        [](Set& s, const Set&) { flip_rows(s.adhesion); }},
-      {"cell-flipped", "the rows of adhesion and actin image run upwards",
+      {"cell-flipped", "the rows of adhesion and actin image run upwards", "read-otherwise",
        [](Set& s, const Set&) {
          flip_rows(s.adhesion);
          flip_rows(s.actin);
        }},
-      {"actin-of-another-cell", "the actin image is that of another cell",
+      {"actin-of-another-cell", "the actin image is that of another cell", "adhesions-off-actin",
        [](Set& s, const Set& o) { s.actin = o.actin; }},
-      {"adhesions-of-another-cell", "the adhesion image is that of another cell",
+      {"adhesions-of-another-cell", "the adhesion image is that of another cell", "adhesions-off-actin",
        [](Set& s, const Set& o) { s.adhesion = o.adhesion; }},
-      {"outline-of-another-cell", "the outline is a mask of another cell",
+      {"outline-of-another-cell", "the outline is a mask of another cell", "outline-off-actin",
        [](Set& s, const Set& o) { s.more["outline_mask"] = mask_of_outline(o.truth, s.actin.width, s.actin.height); }},
-      {"beads-as-actin", "the relaxed bead image is given as actin", [](Set& s, const Set&) { s.actin = s.relaxed; }},
-      {"beads-as-adhesions", "the relaxed bead image is given as adhesions",
+      {"beads-as-actin", "the relaxed bead image is given as actin", "right channel; right file",
+       [](Set& s, const Set&) { s.actin = s.relaxed; }},
+      {"beads-as-adhesions", "the relaxed bead image is given as adhesions", "adhesions-off-actin",
        [](Set& s, const Set&) { s.adhesion = s.relaxed; }},
-      {"adhesions-as-actin", "the adhesion image is given as actin, too",
+      {"adhesions-as-actin", "the adhesion image is given as actin, too", "same pixels",
        [](Set& s, const Set&) { s.actin = s.adhesion; }},
-      {"actin-as-adhesions", "the actin image is given as adhesions, too",
+      {"actin-as-adhesions", "the actin image is given as adhesions, too", "same pixels",
        [](Set& s, const Set&) { s.adhesion = s.actin; }},
-      {"adhesions-as-pattern", "a mask of the adhesions is given as the adhesive pattern",
+      {"adhesions-as-pattern", "a mask of the adhesions is given as the adhesive pattern", "pattern-too-fine",
        [](Set& s, const Set&) {
          s.more["adhesion_mask"] = mask_of_adhesions(s.truth, s.actin.width, s.actin.height);
          s.settings += "[segment]\nadhesions = \"pattern\"\n";
        }},
-      {"cell-as-pattern", "a mask of the cell is given as the adhesive pattern",
+      {"cell-as-pattern", "a mask of the cell is given as the adhesive pattern", "pattern-as-cell",
        [](Set& s, const Set&) {
          s.more["adhesion_mask"] = mask_of_outline(s.truth, s.actin.width, s.actin.height);
          s.settings += "[segment]\nadhesions = \"pattern\"\n";
        }},
-      {"fibres-twice", "each fibre was drawn twice",
+      {"fibres-twice", "each fibre was drawn twice", "not-identifiable",
        [](Set& s, const Set&) {
          s.fibres = files::read_fibres(s.truth / "fibres.csv", s.truth / "fibre_points.csv");
          const std::vector<Fibre> once = s.fibres;
@@ -492,25 +488,23 @@ std::vector<Degradation> degradations() {
            s.fibres.push_back(f);
          }
        }},
-      {"thickness-6", "the thickness is given as 6 um; it is 60", [](Set& s, const Set&) { s.thickness_um = "6"; }},
-      {"thickness-600", "the thickness is given as 600 um; it is 60",
+      {"thickness-6", "the thickness is given as 6 um; it is 60", "unusual-value",
+       [](Set& s, const Set&) { s.thickness_um = "6"; }},
+      {"thickness-600", "the thickness is given as 600 um; it is 60", "unusual-value",
        [](Set& s, const Set&) { s.thickness_um = "600"; }},
-      {"field", "the displacement is of another program",
-       [](Set& s, const Set&) { s.field = true_field(s.truth, [](Bead&) {}); }},
-      {"field-in-pixels", "the displacement is of another program, in px",
-       [](Set& s, const Set&) { s.field = true_field(s.truth, [](Bead& b) { scale(b, 10); }); }},
-      {"field-half-in-pixels", "the displacement is of another program, in px, its places in um",
-       [](Set& s, const Set&) {
-         s.field = true_field(s.truth, [](Bead& b) {
-           b.displacement_um = 10 * b.displacement_um;
-           b.sigma_um *= 10;
-         });
-       }},
-      {"field-places-in-pixels", "the displacement is of another program, in um, its places in px",
-       [](Set& s, const Set&) { s.field = true_field(s.truth, [](Bead& b) { b.position_um = 10 * b.position_um; }); }},
-      {"field-in-metres", "the displacement is of another program, in m",
-       [](Set& s, const Set&) { s.field = true_field(s.truth, [](Bead& b) { scale(b, 1e-6); }); }},
-      {"field-y-up", "the displacement is of another program, with y upwards",
+      {"field", "the displacement is of another program", "", as_field([](Bead&) {})},
+      {"field-in-pixels", "the displacement is of another program, in px", "read-otherwise",
+       as_field([](Bead& b) { scale(b, 10); })},
+      {"field-half-in-pixels", "the displacement is of another program, in px, its places in um", "unusual-value",
+       as_field([](Bead& b) {
+         b.displacement_um = 10 * b.displacement_um;
+         b.sigma_um *= 10;
+       })},
+      {"field-places-in-pixels", "the displacement is of another program, in um, its places in px", "read-otherwise",
+       as_field([](Bead& b) { b.position_um = 10 * b.position_um; })},
+      {"field-in-metres", "the displacement is of another program, in m", "um",
+       as_field([](Bead& b) { scale(b, 1e-6); })},
+      {"field-y-up", "the displacement is of another program, with y upwards", "read-otherwise",
        [](Set& s, const Set&) {
          const double height_um = 0.1 * s.actin.height;
          s.field = true_field(s.truth, [=](Bead& b) {
@@ -518,19 +512,14 @@ std::vector<Degradation> degradations() {
            b.displacement_um.y = -b.displacement_um.y;
          });
        }},
-      {"field-uy-up", "the displacement is of another program, uy upwards and y downwards",
-       [](Set& s, const Set&) {
-         s.field = true_field(s.truth, [](Bead& b) { b.displacement_um.y = -b.displacement_um.y; });
-       }},
-      {"field-exchanged", "the displacement is of another program, from the stressed to the relaxed state",
-       [](Set& s, const Set&) {
-         s.field = true_field(s.truth, [](Bead& b) { b.displacement_um = -1 * b.displacement_um; });
-       }},
-      {"field-columns", "the displacement is of another program, ux and uy exchanged",
-       [](Set& s, const Set&) {
-         s.field = true_field(s.truth, [](Bead& b) { std::swap(b.displacement_um.x, b.displacement_um.y); });
-       }},
+      {"field-uy-up", "the displacement is of another program, uy upwards and y downwards", "read-otherwise",
+       as_field([](Bead& b) { b.displacement_um.y = -b.displacement_um.y; })},
+      {"field-exchanged", "the displacement is of another program, from the stressed to the relaxed state", "exchange",
+       as_field([](Bead& b) { b.displacement_um = -1 * b.displacement_um; })},
+      {"field-columns", "the displacement is of another program, ux and uy exchanged", "read-otherwise",
+       as_field([](Bead& b) { std::swap(b.displacement_um.x, b.displacement_um.y); })},
       {"field-astray", "a fifth of the beads within 1 um of an adhesion are off by five standard errors",
+       "telling-beads-scatter",
        [](Set& s, const Set&) {
          const std::vector<Adhesion> adhesions = files::read_adhesions(s.truth / "adhesions.csv");
          std::mt19937_64 random(4);
@@ -542,7 +531,7 @@ std::vector<Degradation> degradations() {
            b.displacement_um += 5 * b.sigma_um * Vec2{std::cos(angle), std::sin(angle)};
          });
        }},
-      {"field-smoothed", "the displacement is of another program that smoothed it over 4 um",
+      {"field-smoothed", "the displacement is of another program that smoothed it over 4 um", "field-smoothed",
        [](Set& s, const Set&) {
          const DisplacementField all = true_field(s.truth, [](Bead&) {});
          s.field = true_field(s.truth, [&](Bead& b) {
@@ -565,13 +554,11 @@ Set read(const fs::path& folder) {
           .actin = images::read_image(folder / "actin.tif"),
           .relaxed = images::read_image(folder / "beads_relaxed.tif"),
           .stressed = images::read_image(folder / "beads_stressed.tif"),
-          .truth = folder / "truth",
-          .settings = {},
-          .image_settings = {}};
+          .truth = folder / "truth"};
 }
 
 void write(const fs::path& folder, const Set& set) {
-  const auto image = [&](const std::string& name, images::Image i) {
+  const auto image = [&](const std::string& name, Image i) {
     if (!set.is_calibrated) i.pixel_size_um.reset();
     if (!set.as_jpeg) return images::write_tiff(folder / (name + ".tif"), i);
     const float most = *std::ranges::max_element(i.pixels);
@@ -583,7 +570,7 @@ void write(const fs::path& folder, const Set& set) {
   };
   image("paxillin", set.adhesion);
   image("actin", set.actin);
-  std::string images = set.image_settings;
+  std::string images;  // lines of [images]
   if (set.field) {
     files::write_displacement(folder / "field.csv", *set.field);
     images += "displacement = \"field.csv\"\n";
@@ -616,9 +603,8 @@ struct Score {
   double error = 0, total_z = 0;
 };
 
-/// @param view_um  size of the image, whose corner stays where it was: of a cell that it cuts the force found is that
-/// of
-///                 the adhesions in view
+/// @param view_um  size of the image, whose corner stays where it was: of a cell that it cuts, the force found is that
+///                 of the adhesions in view
 Score score_of(const fs::path& cell, const fs::path& truth, Vec2 view_um) {
   const auto fibres = [](const fs::path& f) { return files::read_fibres(f / "fibres.csv", f / "fibre_points.csv"); };
   const std::vector<Fibre> found = fibres(cell / "1_segment"), wanted = fibres(truth);
@@ -651,73 +637,11 @@ Score score_of(const fs::path& cell, const fs::path& truth, Vec2 view_um) {
   return score;
 }
 
-/// Findings, or words of a refusal, that name what was done: whoever reads them knows what to mend.
-std::vector<std::string> names_of_cause(const std::string& degradation) {
-  static const std::map<std::string, std::vector<std::string>> names = {
-      {"tiles", {"curved-motion"}},
-      {"rolling-drift", {"curved-motion"}},
-      {"lens", {"curved-motion"}},
-      {"tilted-stage", {"defocused", "beads-disagree"}},
-      {"half-defocused", {"tracked-by-correlation", "defocused"}},
-      {"beads-mirrored", {"read-otherwise"}},
-      {"beads-transposed", {"read-otherwise"}},
-      {"beads-exchanged", {"exchanged"}},
-      {"beads-of-another-cell", {"explains-little", "nothing-moves"}},
-      {"stressed-of-another-cell", {"one place"}},
-      {"channels-exchanged", {"adhesions-long"}},
-      {"bleed-through", {"bleed-through"}},
-      {"defocus", {"defocused"}},
-      {"adhesions-saturated", {"saturated"}},
-      {"actin-saturated", {"saturated"}},
-      {"beads-saturated", {"saturated"}},
-      {"jpeg", {"lossy-image"}},
-      {"cut-one-side", {"cell-cut"}},
-      {"cut-two-sides", {"cell-cut"}},
-      {"fibres-missed", {"missing-fibre"}},
-      {"adhesions-missed", {"missing-adhesion"}},
-      {"second-cell", {"beads-disagree"}},
-      {"pixel-size", {"pixel"}},
-      {"modulus-in-pascal", {"kPa"}},
-      {"binned", {"pixel-size-unchecked"}},
-      {"pixel-size-double", {"pixel-size-unchecked"}},
-      {"beads-binned", {"track.beads_pixel_size_um"}},
-      {"stretched", {"beads-not-round"}},
-      {"beads-inverted", {"dark"}},
-      {"actin-inverted", {"dark"}},
-      {"adhesions-inverted", {"dark"}},
-      {"relaxed-twice", {"nothing-moves"}},
-      {"actin-flipped", {"adhesions-off-actin"}},
-      {"adhesions-flipped", {"adhesions-off-actin"}},
-      {"cell-flipped", {"read-otherwise"}},
-      {"actin-of-another-cell", {"adhesions-off-actin"}},
-      {"adhesions-of-another-cell", {"adhesions-off-actin"}},
-      {"outline-of-another-cell", {"outline-off-actin"}},
-      {"beads-as-actin", {"right channel", "right file"}},
-      {"beads-as-adhesions", {"adhesions-off-actin"}},
-      {"adhesions-as-actin", {"same pixels"}},
-      {"actin-as-adhesions", {"same pixels"}},
-      {"adhesions-as-pattern", {"pattern-too-fine"}},
-      {"cell-as-pattern", {"pattern-as-cell"}},
-      {"fibres-twice", {"not-identifiable"}},
-      {"thickness-6", {"unusual-value"}},
-      {"thickness-600", {"unusual-value"}},
-      {"field-in-pixels", {"read-otherwise"}},
-      {"field-half-in-pixels", {"unusual-value"}},
-      {"field-places-in-pixels", {"read-otherwise"}},
-      {"field-in-metres", {"um"}},
-      {"field-y-up", {"read-otherwise"}},
-      {"field-uy-up", {"read-otherwise"}},
-      {"field-exchanged", {"exchange"}},
-      {"field-columns", {"read-otherwise"}},
-      {"field-astray", {"telling-beads-scatter"}},
-      {"field-smoothed", {"field-smoothed"}}};
-  const auto found = names.find(degradation);
-  return found == names.end() ? std::vector<std::string>{} : found->second;
-}
-
-bool names_cause(const std::string& degradation, const std::string& said) {
-  return std::ranges::any_of(names_of_cause(degradation),
-                             [&](const std::string& name) { return said.find(name) != said.npos; });
+bool names_cause(const Degradation& d, const std::string& said) {
+  std::istringstream names(d.named_by);
+  for (std::string name; std::getline(names >> std::ws, name, ';');)
+    if (said.find(name) != said.npos) return true;
+  return false;
 }
 
 struct Noticed {
@@ -773,17 +697,13 @@ void study(const Degradation& d, int seed, const fs::path& folder) {
         s.n_fibres > 0 && s.n_held >= 0.9 * s.n_fibres - 1 && std::abs(s.total_z) < 3;  // of 20 fibres one by chance
     std::printf("%d,%d,%.3f,%.2f,%s,%s,%s,\"%s\",\"%s\",\n", s.n_fibres, s.n_held, s.error, s.total_z,
                 holds ? "true" : "false", holds || !ids.empty() ? "true" : "false",
-                names_cause(d.name, all_ids) ? "true" : "false", ids.c_str(), all_ids.c_str());
+                names_cause(d, all_ids) ? "true" : "false", ids.c_str(), all_ids.c_str());
   } else {
-    std::printf(",,,,,true,%s,,,\"%s\"\n", names_cause(d.name, run.output) ? "true" : "false",
+    std::printf(",,,,,true,%s,,,\"%s\"\n", names_cause(d, run.output) ? "true" : "false",
                 error_line(run.output).c_str());
   }
   std::fflush(stdout);
 }
-
-}  // namespace
-
-namespace {
 
 /// docs/degradations.md, of a table that this program wrote.
 void print_page(const fs::path& file) {

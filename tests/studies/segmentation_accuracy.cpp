@@ -1,14 +1,20 @@
 /// segmentation_accuracy [scenario] [first seed] [last seed] [true-adhesions] [name=value …]: how well simulated cells
 /// are segmented, at three image qualities; mean over the seeds. `true-adhesions` judges the fibres apart from the
 /// adhesions. What is lost of the fibres, and where, is of the ordinary images.
+/// segmentation_accuracy real [name=value …]: adhesions and outlines of real cells that others have marked
+/// (../shared/data), with default parameters, or adhesions with these.
 #include <cstdio>
 #include <cstdlib>
 
 #include "pipeline/contract/errors.h"
 #include "tests/support/fibre_losses.h"
+#include "tests/support/real_adhesions.h"
 #include "tests/support/settings.h"
 
 namespace {
+
+using namespace mbtfm;
+using namespace mbtfm::test;
 
 /// How many of the fibres said to be one with some confidence are one.
 struct Calibration {
@@ -30,11 +36,41 @@ struct Calibration {
   }
 };
 
+void real(const std::vector<std::string>& settings) {
+  cells::AdhesionParameters p;
+  stage::ParameterList list;
+  declare(list, p);
+  set_all(list, settings);
+  if (!std::filesystem::exists(kHandMasks)) {
+    std::printf("the shared data are absent: %s\n", kSharedData.c_str());
+    return;
+  }
+  const auto print = [](const std::string& name, const Overlaps& o) {
+    std::printf("%-12s %9.3f %6.3f %9.3f %6.3f %8d %6d\n", name.c_str(), o.pixels.dice, o.pixels.f1, o.ellipses.dice,
+                o.ellipses.f1, o.pixels.n_true, o.pixels.n_found);
+  };
+  std::printf("%-12s %16s %16s %15s\n%-12s %9s %6s %9s %6s %8s %6s\n", "adhesions", "by pixels", "by ellipses",
+              "number", "", "Dice", "F1", "Dice", "F1", "theirs", "found");
+  Overlaps mean;
+  for (const int i : kHandMasked) {
+    const Overlaps o = hand_mask_overlaps(i, p);
+    print("hand mask " + std::to_string(i), o);
+    for (const auto& [to, from] : {std::pair(&mean.pixels, &o.pixels), {&mean.ellipses, &o.ellipses}}) {
+      to->dice += from->dice / std::size(kHandMasked);
+      to->f1 += from->f1 / std::size(kHandMasked);
+      to->n_true += from->n_true;
+      to->n_found += from->n_found;
+    }
+  }
+  print("mean", mean);
+  print("fibroblast", fibroblast_overlaps(p));
+  std::printf("outline of the doublet: intersection over union %.3f\n", doublet_overlap());
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  using namespace mbtfm;
-  using namespace mbtfm::test;
+  if (argc > 1 && std::string(argv[1]) == "real") return real({argv + 2, argv + argc}), 0;
   const std::string scenario = argc > 1 ? argv[1] : "u2os";
   const int first = argc > 2 ? std::atoi(argv[2]) : 1, last = argc > 3 ? std::atoi(argv[3]) : 4;
   const bool has_true_adhesions = argc > 4 && std::string(argv[4]) == "true-adhesions";

@@ -1,4 +1,4 @@
-/// The hard cases of the cable network, as scenes: the stability tests solve them, the study `hard_cables` draws them.
+/// The hard cases of the cable network, as scenes, which the stability tests solve.
 #pragma once
 
 #include <numbers>

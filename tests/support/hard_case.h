@@ -1,5 +1,4 @@
-/// Lines of the catalogue of hard cases (docs/developers/hard-cases.md), recorded with a test's result; `hard_cases`
-/// makes the page.
+/// Lines of the catalogue of hard cases (docs/developers/hard-cases.md), recorded with a test's result.
 #pragma once
 
 #include <gtest/gtest.h>
