@@ -12,6 +12,7 @@
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"

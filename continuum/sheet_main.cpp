@@ -21,6 +21,8 @@
 #include "pipeline/charts/chart.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"
 #include "pipeline/files/csv.h"

@@ -5,6 +5,7 @@
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"

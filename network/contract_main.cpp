@@ -3,6 +3,7 @@
 #include <string>
 
 #include "network/cables/cables.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/vtk_files.h"

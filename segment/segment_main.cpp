@@ -4,6 +4,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/tables.h"

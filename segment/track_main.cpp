@@ -7,6 +7,7 @@
 
 #include "mbtfm/tractions/field_of_adhesions.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"
 #include "pipeline/files/csv_files.h"

@@ -3,6 +3,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
+#include "pipeline/stage/parameters.h"
 #include "substrate/effects.h"
 #include "substrate/loads.h"
 #include "substrate/models.h"

@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "pipeline/contract/cell.h"
+#include "pipeline/contract/figures.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/geometry.h"
-#include "pipeline/contract/report.h"
 #include "pipeline/numerics/cholesky.h"
 #include "pipeline/stage/effects.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::substrate {
 

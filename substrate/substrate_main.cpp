@@ -8,7 +8,8 @@
 #include <optional>
 #include <string>
 
-#include "pipeline/contract/findings.h"
+#include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv.h"

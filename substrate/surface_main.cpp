@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/axes.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/place.h"
 #include "pipeline/files/base64.h"

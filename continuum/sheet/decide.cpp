@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/stage/effects.h"
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "continuum/sheet/mesh_size.h"
 #include "continuum/sheet/moved_rims.h"

@@ -1,6 +1,7 @@
 #include "continuum/sheet/parameters.h"
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::sheet {
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "continuum/sheet/forward.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::sheet {
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::solids {
@@ -202,7 +203,7 @@ Indentation tried_case(const Setting& setting, const Case& of, const Resolutions
     return {.of = of,
             .contact_radius_um = section.contact_radius_um(),
             .contact_area_um2 = section.contact_area_um2(),
-            .failure = error.report.reason};
+            .failure = error.report->reason};
   }
 }
 

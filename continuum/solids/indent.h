@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "continuum/solids/revolved.h"
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/progress.h"
 
 namespace mbtfm::solids {
 

@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/numerics/memory.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/numerics/quadrature.h"

@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/report.h"
 
 namespace mbtfm::solids {
 namespace {

@@ -7,6 +7,7 @@
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/placement.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "substrate/response.h"
 
 namespace mbtfm::fit {

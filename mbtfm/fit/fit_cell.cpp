@@ -8,6 +8,7 @@
 #include "mbtfm/tensions/second_placement.h"
 #include "mbtfm/tensions/solved_misfit.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/stage/stopwatch.h"
 #include "substrate/choice/large_strain.h"
 
 namespace mbtfm::fit {
@@ -52,7 +53,7 @@ EnsembleFit on_strained_gel(ReadyCell& ready, EnsembleFit fit, const Inputs& inp
   } catch (const NotSolved& none) {
     if (effect.setting == Switch::on) throw;
     effect.is_on = false;
-    effect.why += "; but " + none.report.reason;
+    effect.why += "; but " + none.report->reason;
   }
   effect.seconds = watch.seconds();
   return fit;

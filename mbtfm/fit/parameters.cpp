@@ -2,6 +2,7 @@
 
 #include "mbtfm/fit/effects.h"
 #include "mbtfm/tensions/effects.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::fit {
 

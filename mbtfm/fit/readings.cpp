@@ -8,6 +8,7 @@
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/extent.h"
+#include "pipeline/contract/findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/neighbour_bins.h"
 #include "substrate/response.h"

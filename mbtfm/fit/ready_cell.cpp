@@ -6,6 +6,7 @@
 #include "mbtfm/tensions/second_placement.h"
 #include "network/cables/effects.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "substrate/choice/factory.h"
 
 namespace mbtfm::fit {

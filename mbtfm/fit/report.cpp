@@ -4,6 +4,7 @@
 
 #include "mbtfm/tensions/findings.h"
 #include "mbtfm/tensions/noise.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 

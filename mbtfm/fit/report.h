@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mbtfm/fit/fit_cell.h"
+#include "pipeline/contract/stage_report.h"
 
 namespace mbtfm::fit {
 

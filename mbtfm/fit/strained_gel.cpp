@@ -5,6 +5,7 @@
 
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "substrate/choice/large_strain.h"
 
 namespace mbtfm::fit {

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::plan {
 

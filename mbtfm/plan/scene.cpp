@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv_files.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::plan {
 

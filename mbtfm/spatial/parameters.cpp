@@ -1,5 +1,7 @@
 #include "mbtfm/spatial/parameters.h"
 
+#include "pipeline/stage/parameters.h"
+
 namespace mbtfm::spatial {
 
 void declare(stage::ParameterList& list, SpatialParameters& p) {

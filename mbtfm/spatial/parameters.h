@@ -5,7 +5,7 @@
 
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/words.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::spatial {
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "mbtfm/spatial/reconstruction.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/dense.h"
 

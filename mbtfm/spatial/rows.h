@@ -6,7 +6,6 @@
 
 #include "mbtfm/spatial/observed.h"
 #include "pipeline/contract/effects.h"
-#include "pipeline/contract/report.h"
 #include "pipeline/stage/effects.h"
 
 namespace mbtfm::spatial {

@@ -6,6 +6,7 @@
 #include "mbtfm/spatial/refine.h"
 #include "mbtfm/spatial/strained.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"

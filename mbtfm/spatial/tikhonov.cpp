@@ -4,6 +4,7 @@
 #include "mbtfm/spatial/neighbours.h"
 #include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
 

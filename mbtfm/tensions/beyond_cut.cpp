@@ -7,6 +7,7 @@
 #include "mbtfm/tensions/common_motion.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
 #include "substrate/greens/models.h"

@@ -11,6 +11,7 @@
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/linear_data.h"
 #include "pipeline/contract/affine_motion.h"
+#include "pipeline/contract/figures.h"
 #include "pipeline/stage/effects.h"
 
 namespace mbtfm::tensions {

@@ -1,5 +1,7 @@
 #include "mbtfm/tensions/effects.h"
 
+#include "pipeline/contract/kinds_of_effects.h"
+
 namespace mbtfm::tensions {
 
 std::optional<Loss> loss_of_switch(Switch setting, Loss robust_kind) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mbtfm/tensions/ensemble.h"
+#include "pipeline/contract/figures.h"
 #include "pipeline/contract/gel.h"
 
 namespace mbtfm::tensions {

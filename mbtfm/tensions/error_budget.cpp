@@ -9,6 +9,7 @@
 
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/parameters.h"
 #include "substrate/greens/layer.h"
 #include "substrate/greens/models.h"
 #include "substrate/response.h"

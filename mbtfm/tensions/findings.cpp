@@ -7,6 +7,7 @@
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/extent.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"
 

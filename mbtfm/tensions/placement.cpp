@@ -7,11 +7,13 @@
 
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/robust.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/stopwatch.h"
 #include "substrate/greens/half_space.h"
 
 namespace mbtfm::tensions {

@@ -19,7 +19,6 @@
 #include "mbtfm/tensions/linear_data.h"
 #include "mbtfm/tensions/tension_fit.h"
 #include "network/contractile.h"
-#include "pipeline/contract/report.h"
 #include "substrate/compliance.h"
 
 namespace mbtfm::tensions {

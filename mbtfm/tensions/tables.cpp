@@ -1,5 +1,7 @@
 #include "mbtfm/tensions/tables.h"
 
+#include "pipeline/contract/kinds_of_effects.h"
+
 namespace mbtfm::tensions {
 
 using files::Table;

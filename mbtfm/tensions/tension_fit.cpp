@@ -2,6 +2,8 @@
 
 #include <numeric>
 
+#include "pipeline/stage/parameters.h"
+
 namespace mbtfm::tensions {
 
 void declare(stage::ParameterList& list, FitParameters& p) {

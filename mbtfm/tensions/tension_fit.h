@@ -7,7 +7,7 @@
 
 #include "mbtfm/tensions/tension_problem.h"
 #include "pipeline/contract/report.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::tensions {
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/stopwatch.h"
 
 namespace mbtfm::tensions {
 

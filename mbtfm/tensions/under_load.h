@@ -12,7 +12,6 @@
 #include <string>
 
 #include "mbtfm/tensions/linear_data.h"
-#include "pipeline/contract/report.h"
 
 namespace mbtfm::tensions {
 

@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/numerics/memory.h"
 
 namespace mbtfm::tractions {

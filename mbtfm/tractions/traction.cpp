@@ -7,6 +7,7 @@
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/magnitude_interval.h"
 #include "pipeline/numerics/memory.h"
+#include "pipeline/stage/parameters.h"
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
 

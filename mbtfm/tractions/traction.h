@@ -12,7 +12,7 @@
 #include "pipeline/contract/report.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/files/named_array.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::tractions {
 

@@ -10,6 +10,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense_panel.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::cables {
 namespace {

@@ -18,7 +18,7 @@
 #include "pipeline/contract/network.h"
 #include "pipeline/contract/polyline.h"
 #include "pipeline/contract/report.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::cables {
 

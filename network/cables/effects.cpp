@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/stage/stopwatch.h"
 
 namespace mbtfm::cables {
 

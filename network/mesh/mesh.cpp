@@ -16,6 +16,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/memory.h"
 #include "pipeline/numerics/neighbour_bins.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::mesh {
 namespace {

@@ -8,7 +8,7 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/network.h"
 #include "pipeline/contract/report.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::mesh {
 

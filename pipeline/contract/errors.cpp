@@ -6,6 +6,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "pipeline/contract/report.h"
+
 namespace mbtfm {
 
 namespace {
@@ -33,6 +35,11 @@ bool is_want_of_memory(const std::exception& error) {
 
 }  // namespace
 
+NotSolved::NotSolved(Report what)
+    : std::runtime_error(what.reason), report(std::make_shared<Report>(std::move(what))) {}
+
+OutOfMemory::OutOfMemory(std::string reason) : NotSolved(Report{.reason = std::move(reason)}) {}
+
 int report_current_exception(const std::string& program) {
   using namespace exit_code;
   try {
@@ -44,9 +51,9 @@ int report_current_exception(const std::string& program) {
   } catch (const InvalidData& error) {
     return tell(program, kInput, error.what());
   } catch (const OutOfMemory& error) {
-    return tell(program, kResources, error.report.reason);
+    return tell(program, kResources, error.report->reason);
   } catch (const NotSolved& error) {
-    return tell(program, kNoAnswer, "not solved: " + error.report.reason);
+    return tell(program, kNoAnswer, "not solved: " + error.report->reason);
   } catch (const OutputError& error) {
     return tell(program, kOutput, error.what());
   } catch (const std::filesystem::filesystem_error& error) {

@@ -1,12 +1,14 @@
 /// What can go wrong, one type for each kind, and how a program ends with it.
 #pragma once
 
+#include <memory>
 #include <stdexcept>
 #include <string>
-
-#include "pipeline/contract/report.h"
+#include <utility>
 
 namespace mbtfm {
+
+struct Report;
 
 /// How a program ends (docs/formats.md, "Exit codes").
 namespace exit_code {
@@ -52,13 +54,13 @@ struct InvalidData : std::invalid_argument {
 /// Not converged or ill-posed. Whoever catches it and still writes outputs marks them and ends with exit code 4; where
 /// nothing catches it, nothing is written: exit code 7.
 struct NotSolved : std::runtime_error {
-  Report report;
-  explicit NotSolved(Report what) : std::runtime_error(what.reason), report(std::move(what)) {}
+  std::shared_ptr<Report> report;  ///< not null; copies share it
+  explicit NotSolved(Report what);
 };
 
 /// What is asked for takes more memory than there is, which is known before it is taken. Exit code 6.
 struct OutOfMemory : NotSolved {
-  explicit OutOfMemory(std::string reason) : NotSolved(Report{.reason = std::move(reason)}) {}
+  explicit OutOfMemory(std::string reason);
 };
 
 /// Cannot write. Exit code 5.
@@ -76,10 +78,12 @@ struct InternalError : std::logic_error {
   using std::logic_error::logic_error;
 };
 
-/// @throws InternalError with file and line where `holds` is false.
-#define MBTFM_ASSERT(holds)                                                                                           \
-  do {                                                                                                                \
-    if (!(holds)) throw ::mbtfm::InternalError(std::string(__FILE__) + ":" + std::to_string(__LINE__) + ": " #holds); \
+/// @throws InternalError with file and line where `holds` is false. The file without its folder: objects are the same
+/// in every clone.
+#define MBTFM_ASSERT(holds)                                                                                    \
+  do {                                                                                                         \
+    if (!(holds))                                                                                              \
+      throw ::mbtfm::InternalError(std::string(__FILE_NAME__) + ":" + std::to_string(__LINE__) + ": " #holds); \
   } while (false)
 
 /// In a catch block: tell what was thrown, with its hint, as an error of `program` on stderr.

@@ -1,4 +1,4 @@
-#include "pipeline/contract/findings.h"
+#include "pipeline/contract/kinds_of_findings.h"
 
 #include <algorithm>
 #include <cmath>

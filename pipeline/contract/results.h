@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
+#include "pipeline/contract/figures.h"
 #include "pipeline/contract/geometry.h"
-#include "pipeline/contract/report.h"
 
 namespace mbtfm {
 

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <utility>
 
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/progress.h"
 
 namespace mbtfm {
 

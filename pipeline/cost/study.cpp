@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/cost/accuracy.h"
 #include "pipeline/cost/space_map.h"

@@ -1,5 +1,6 @@
 #include "pipeline/files/json.h"
 
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/files/names.h"
 

@@ -4,7 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/effects.h"
+#include "pipeline/contract/figures.h"
+#include "pipeline/contract/findings.h"
 #include "pipeline/files/json_record.h"
 
 namespace mbtfm::files {

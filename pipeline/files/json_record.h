@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/figures.h"
 
 namespace mbtfm::files {
 

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/numerics/dense_panel.h"
 #include "pipeline/numerics/factor_file.h"
 #include "pipeline/numerics/parallel.h"

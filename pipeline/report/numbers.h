@@ -5,7 +5,7 @@
 #include <string>
 
 #include "pipeline/charts/chart.h"
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/figures.h"
 
 namespace mbtfm::report {
 

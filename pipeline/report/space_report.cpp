@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/contract/findings.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/json.h"

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/figures.h"
 #include "pipeline/contract/findings.h"
-#include "pipeline/contract/report.h"
 
 namespace mbtfm::report {
 

@@ -5,6 +5,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/toml.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;

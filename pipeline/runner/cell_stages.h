@@ -10,7 +10,7 @@
 #include "pipeline/contract/words.h"
 #include "pipeline/runner/images.h"
 #include "pipeline/runner/stages.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::runner {
 

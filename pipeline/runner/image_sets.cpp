@@ -9,6 +9,7 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/images.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;

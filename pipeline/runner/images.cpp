@@ -8,6 +8,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pipeline/runner/stages.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::runner {
 

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/files/json.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/effects.h"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/stage_report.h"
 #include "pipeline/runner/record.h"
 
 namespace mbtfm::runner {

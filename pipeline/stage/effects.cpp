@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::stage {
 namespace {

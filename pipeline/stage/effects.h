@@ -5,12 +5,11 @@
 /// number exceeds its threshold. docs/effects.md has the numbers.
 #pragma once
 
-#include <chrono>
 #include <string>
 #include <vector>
 
 #include "pipeline/contract/effects.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::stage {
 
@@ -46,14 +45,5 @@ Effect decided(EffectKind kind, Switch setting, bool is_called_for, const std::s
 
 /// "finite sides: off (auto): sides at 2.5 thicknesses change the field by 0.025, ...; 0.2 s"
 std::string line_of(const Effect& effect);
-
-/// Seconds since it was made.
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 }  // namespace mbtfm::stage

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/stage_report.h"
 
 namespace mbtfm::stage {
 

@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::stage {
 

@@ -10,7 +10,7 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/range.h"
 #include "pipeline/contract/results.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::stage {
 

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/hash.h"
@@ -21,6 +22,7 @@
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/events.h"
 #include "pipeline/stage/manual.h"
+#include "pipeline/stage/stopwatch.h"
 #include "pipeline/stage/suggest.h"
 
 namespace mbtfm::stage {

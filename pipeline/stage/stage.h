@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/progress.h"
+#include "pipeline/contract/stage_report.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/plausible.h"
 

@@ -20,6 +20,7 @@
 #include "pipeline/report/space_results.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/statistics/conditions.h"
 #include "pipeline/statistics/descriptive.h"
 

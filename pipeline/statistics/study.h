@@ -6,10 +6,11 @@
 #include <vector>
 
 #include "pipeline/contract/cell_kind.h"
+#include "pipeline/contract/findings.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/contract/sheet_results.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 #include "pipeline/statistics/directions.h"
 
 namespace mbtfm::statistics {

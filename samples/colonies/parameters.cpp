@@ -1,5 +1,7 @@
 #include "samples/colonies/parameters.h"
 
+#include "pipeline/stage/parameters.h"
+
 namespace mbtfm::colonies {
 
 void declare(stage::ParameterList& list, ColonyParameters& p) {

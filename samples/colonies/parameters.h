@@ -2,7 +2,7 @@
 #pragma once
 
 #include "continuum/sheet/parameters.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::colonies {
 

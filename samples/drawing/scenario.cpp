@@ -4,6 +4,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::drawing {
 

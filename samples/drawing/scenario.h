@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pipeline/contract/gel.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::drawing {
 

@@ -6,6 +6,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
+#include "pipeline/stage/parameters.h"
 #include "samples/drawing/render.h"
 
 namespace mbtfm::experiment {

@@ -8,6 +8,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
+#include "pipeline/stage/parameters.h"
 #include "samples/drawing/random.h"
 
 namespace mbtfm::gels {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "pipeline/contract/progress.h"
 #include "samples/drawing/scenario.h"
 #include "samples/drawing/stack.h"
 #include "samples/gels/scene.h"

@@ -9,6 +9,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/parameters.h"
 #include "samples/drawing/random.h"
 
 namespace mbtfm::gels {

@@ -1,15 +1,16 @@
 /// Cells on gels that are not flat, with exact fields: the scenes of chapter 2 of Soiné's thesis (2014).
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "pipeline/contract/beads_in_space.h"
 #include "pipeline/contract/gel.h"
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/progress.h"
 #include "pipeline/contract/surface.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 #include "samples/gels/field.h"
 
 namespace mbtfm::gels {

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/stopwatch.h"
 #include "segment/beads/plane.h"
 
 namespace mbtfm::beads {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/effects.h"
 #include "segment/beads/far_field.h"
 #include "segment/beads/track.h"
 

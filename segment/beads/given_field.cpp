@@ -5,6 +5,7 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/place.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"

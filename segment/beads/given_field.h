@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "pipeline/contract/effects.h"
 #include "segment/beads/track.h"
 
 namespace mbtfm::beads {

@@ -5,9 +5,12 @@
 #include <exception>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/stopwatch.h"
 #include "segment/beads/alignment.h"
 #include "segment/beads/beads.h"
 #include "segment/beads/coarse_field.h"

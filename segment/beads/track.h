@@ -8,10 +8,11 @@
 
 #include "pipeline/contract/affine_motion.h"
 #include "pipeline/contract/beads.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/work.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 #include "segment/images/image.h"
 
 namespace mbtfm::beads {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pipeline/contract/numbers.h"
+#include "pipeline/stage/parameters.h"
 #include "segment/cells/adhesion_fit.h"
 #include "segment/cells/adhesion_parts.h"
 #include "segment/cells/emptiness.h"

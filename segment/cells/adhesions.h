@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "pipeline/contract/cell.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 #include "segment/cells/ellipse.h"
 #include "segment/images/image.h"
 

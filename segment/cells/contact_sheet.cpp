@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/stage/parameters.h"
 #include "segment/cells/overlay.h"
 
 namespace mbtfm::cells {

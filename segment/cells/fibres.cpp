@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/stage/parameters.h"
 #include "segment/cells/bright_actin.h"
 #include "segment/cells/fibre_line.h"
 #include "segment/cells/fibre_profile.h"

@@ -5,7 +5,7 @@
 
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 #include "segment/cells/fibre_ends.h"
 #include "segment/images/image.h"
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "pipeline/stage/parameters.h"
 #include "segment/cells/edge_profile.h"
 #include "segment/cells/ellipse.h"
 #include "segment/cells/grid.h"

@@ -6,7 +6,7 @@
 
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 #include "segment/images/image.h"
 
 namespace mbtfm::cells {

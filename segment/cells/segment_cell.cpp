@@ -8,6 +8,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/stage/parameters.h"
 #include "segment/cells/bleed_through.h"
 #include "segment/cells/emptiness.h"
 #include "segment/cells/fibre_ends.h"

@@ -5,6 +5,7 @@
 #include <functional>
 #include <numbers>
 #include <numeric>
+#include <type_traits>
 #include <utility>
 
 #include "pipeline/numerics/order_statistics.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::images {

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/stage/parameters.h"
 #include "segment/images/image_file.h"
 #include "segment/images/stack.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::images {
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/order_statistics.h"
 

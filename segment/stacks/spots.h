@@ -1,6 +1,7 @@
 /// Inside of the tracker of beads in stacks: the picture of a bead, and its place by a fit.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <vector>

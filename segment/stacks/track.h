@@ -8,8 +8,7 @@
 
 #include "pipeline/contract/axes.h"
 #include "pipeline/contract/beads_in_space.h"
-#include "pipeline/contract/findings.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/parameters_fwd.h"
 #include "segment/stacks/detect.h"
 #include "segment/stacks/match.h"
 #include "segment/stacks/motion.h"

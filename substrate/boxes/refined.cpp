@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/report.h"
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/boxes/load_cases.h"
 #include "substrate/boxes/models.h"
@@ -209,9 +210,9 @@ class Refined final : public substrate::Substrate {
       return solve_on(fineness, request);
     } catch (NotSolved& error) {
       if (std::isfinite(mean(errors))) {
-        error.report.reason += "; the mesh before it has an estimated error of " + brief(mean(errors)) +
-                               " (substrate.displacement_tolerance is " + brief(parameters_.displacement_tolerance) +
-                               ")";
+        error.report->reason += "; the mesh before it has an estimated error of " + brief(mean(errors)) +
+                                " (substrate.displacement_tolerance is " + brief(parameters_.displacement_tolerance) +
+                                ")";
       }
       throw;
     }

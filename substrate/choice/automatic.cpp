@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/stopwatch.h"
 #include "substrate/choice/decide.h"
 #include "substrate/choice/factory.h"
 #include "substrate/effects.h"

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
 #include "substrate/choice/factory.h"
 #include "substrate/greens/layer.h"

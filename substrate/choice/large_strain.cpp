@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "substrate/choice/factory.h"
 #include "substrate/effects.h"
 #include "substrate/material.h"

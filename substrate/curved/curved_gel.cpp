@@ -1,5 +1,6 @@
 /// A gel under a surface that is not flat: finite elements bent onto it.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -7,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/curved/linear.h"

@@ -1,5 +1,6 @@
 #include "substrate/surface/formula.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <map>

@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::surface {

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "continuum/solids/indent.h"
+#include "pipeline/contract/words.h"
 #include "pipeline/files/csv.h"
 #include "tests/support/folders.h"
 

@@ -1,6 +1,7 @@
 /// The statistics beside R's own functions on the same tables: tests/data/statistics/expected.R makes both.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <random>

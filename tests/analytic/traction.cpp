@@ -221,7 +221,7 @@ TEST(Criteria, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_
         chosen_lambda(scan, LambdaCriterion::l_curve);
         FAIL() << "a corner was found";
       } catch (const NotSolved& error) {
-        EXPECT_NE(error.report.reason.find("set lambda_by = risk"), std::string::npos) << error.report.reason;
+        EXPECT_NE(error.report->reason.find("set lambda_by = risk"), std::string::npos) << error.report->reason;
       }
     }
   }

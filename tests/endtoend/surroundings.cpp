@@ -11,6 +11,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
+#include <vector>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"

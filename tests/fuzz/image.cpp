@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <tiffio.h>
 
+#include <algorithm>
 #include <cstdio>  // jpeglib.h needs it before
 #include <fstream>
 #include <random>

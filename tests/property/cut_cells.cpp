@@ -7,6 +7,7 @@
 
 #include "mbtfm/tensions/findings.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "tests/support/cut_cell.h"
 
 namespace mbtfm {

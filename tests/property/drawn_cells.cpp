@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/polyline.h"
+#include "pipeline/stage/parameters.h"
 #include "samples/drawing/draw.h"
 #include "samples/drawing/geometry.h"
 #include "samples/drawing/random.h"

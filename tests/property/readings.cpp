@@ -6,6 +6,7 @@
 #include <functional>
 #include <random>
 
+#include "pipeline/contract/kinds_of_findings.h"
 #include "substrate/choice/factory.h"
 #include "tests/support/findings.h"
 #include "tests/support/tension_scene.h"

@@ -49,7 +49,7 @@ TEST(HardMesh, one_that_memory_cannot_hold_is_refused_with_its_count_before_it_i
     FAIL() << "made";
   } catch (const OutOfMemory& error) {
     // 400 um2 over the (sqrt 3 / 2) edge^2 that a vertex of an even mesh has to itself: 4.6e10
-    EXPECT_NE(error.report.reason.find("4.62e+10 vertices"), std::string::npos) << error.report.reason;
+    EXPECT_NE(error.report->reason.find("4.62e+10 vertices"), std::string::npos) << error.report->reason;
   }
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/findings.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/hard_case.h"

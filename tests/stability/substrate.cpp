@@ -6,7 +6,10 @@
 #include <fstream>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/parameters.h"
 #include "substrate/choice/decide.h"
 #include "substrate/choice/factory.h"
 #include "substrate/effects.h"
@@ -158,8 +161,8 @@ TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
       model->compliance_um_per_nN(test::scattered_points(10, 40), test::scattered_ellipses(5, 30));
       FAIL() << name;
     } catch (const NotSolved& error) {
-      EXPECT_NE(error.report.reason.find("memory"), std::string::npos) << error.report.reason;
-      test::came_out(error.report.reason);
+      EXPECT_NE(error.report->reason.find("memory"), std::string::npos) << error.report->reason;
+      test::came_out(error.report->reason);
     }
   }
   // a scene of 1 mm on a gel of 1 um: no grid of it fits
@@ -184,8 +187,8 @@ TEST(Substrate, says_which_mesh_would_fit_the_memory) {
           ->compliance_um_per_nN(test::scattered_points(10, 45), test::scattered_ellipses(40, 35));
       FAIL();
     } catch (const NotSolved& error) {
-      EXPECT_NE(error.report.reason.find(fitting), std::string::npos) << error.report.reason;
-      test::came_out(error.report.reason);
+      EXPECT_NE(error.report->reason.find(fitting), std::string::npos) << error.report->reason;
+      test::came_out(error.report->reason);
     }
   }
 }
@@ -214,7 +217,7 @@ TEST(Substrate, refuses_a_thousand_adhesions_that_refined_has_no_memory_for) {
       choice::make_substrate(kGel, parameters, 2)->compliance_um_per_nN(points, ellipses);
       FAIL();
     } catch (const NotSolved& error) {
-      const std::string& reason = error.report.reason;
+      const std::string& reason = error.report->reason;
       EXPECT_NE(reason.find("would fit the memory"), std::string::npos) << reason;
       EXPECT_NE(reason.find("elements_across_adhesion"), std::string::npos) << reason;
     }

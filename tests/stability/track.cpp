@@ -8,6 +8,7 @@
 
 #include "mbtfm/tractions/field_of_adhesions.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/stage/parameters.h"
 #include "segment/beads/given_field.h"
 #include "segment/beads/plane.h"
 #include "segment/beads/track.h"

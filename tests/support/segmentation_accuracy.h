@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 
+#include "pipeline/stage/parameters.h"
 #include "samples/drawing/draw.h"
 #include "samples/drawing/render.h"
 #include "samples/drawing/scenario.h"

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/record.h"
+#include "pipeline/stage/parameters.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm {

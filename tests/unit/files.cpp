@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"

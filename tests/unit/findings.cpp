@@ -1,4 +1,3 @@
-#include "pipeline/contract/findings.h"
 
 #include <gtest/gtest.h>
 
@@ -6,6 +5,7 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/with_error.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/text.h"

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/text.h"
@@ -81,9 +82,9 @@ TEST(Memory, what_does_not_fit_is_refused_with_its_count_and_memory_before_it_is
     numerics::expect_room_for(large);
     FAIL() << "no error";
   } catch (const OutOfMemory& error) {
-    EXPECT_EQ(error.report.reason.find("the mesh would have 1e+15 vertices, which take 1e+08 GB of memory"), 0u)
-        << error.report.reason;
-    EXPECT_TRUE(error.report.reason.ends_with(": choose a larger edge")) << error.report.reason;
+    EXPECT_EQ(error.report->reason.find("the mesh would have 1e+15 vertices, which take 1e+08 GB of memory"), 0u)
+        << error.report->reason;
+    EXPECT_TRUE(error.report->reason.ends_with(": choose a larger edge")) << error.report->reason;
   }
 }
 

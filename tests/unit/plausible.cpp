@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm {
 namespace {

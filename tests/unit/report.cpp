@@ -5,6 +5,7 @@
 #include <regex>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/text.h"

@@ -8,6 +8,8 @@
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/cell_stages.h"

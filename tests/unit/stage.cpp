@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "pipeline/contract/report.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/manual.h"
