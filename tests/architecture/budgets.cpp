@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/findings.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/files/text.h"
 #include "tests/support/folders.h"
 
@@ -106,7 +106,7 @@ TEST(Budgets, of_headers_that_a_source_gets) {
     if (!name.ends_with(".cpp")) continue;
     std::set<std::string> headers;
     add_headers(includes, name, headers);
-    n_see_findings += headers.contains("pipeline/contract/finding_kinds.h");
+    n_see_findings += headers.contains("pipeline/contract/kinds_of_findings.h");
     if (product().contains(name)) n_headers.push_back(static_cast<int>(headers.size()));
   }
   std::sort(n_headers.begin(), n_headers.end());
