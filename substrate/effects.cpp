@@ -1,6 +1,7 @@
 #include "substrate/effects.h"
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "substrate/models.h"
 
 namespace mbtfm::substrate {

@@ -14,6 +14,7 @@
 #include "pipeline/report/colours.h"
 #include "pipeline/report/hover.h"
 #include "pipeline/report/numbers.h"
+#include "pipeline/report/page.h"
 #include "pipeline/report/tension_plot.h"
 
 namespace mbtfm::report {
@@ -243,6 +244,8 @@ std::string adhesion_keys(const Cell& cell) {
 }
 
 }  // namespace
+
+std::string html_of(const Figure& map) { return figure(map.chart, map.caption, map.legend); }
 
 Figure segmentation_map(const CellResults& results) {
   const bool is_dark = results.images.has_value();

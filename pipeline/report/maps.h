@@ -15,6 +15,7 @@ struct Figure {
   std::string caption;
   std::string legend;  ///< HTML
 };
+std::string html_of(const Figure& map);
 
 /// Outline, adhesions and fibres over the images that they were found in, where there are any.
 Figure segmentation_map(const CellResults& results);

@@ -29,8 +29,6 @@ extern const std::string_view kParaviewScript, kParaviewScriptInSpace;
 
 namespace {
 
-std::string html_of(const Figure& map) { return figure(map.chart, map.caption, map.legend); }
-
 /// A file of the cell as it lies in its folder.
 Download file_of(const CellResults& results, const std::string& file) {
   const std::filesystem::path path = results.folder / file;

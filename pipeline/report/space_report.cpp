@@ -117,8 +117,6 @@ std::string svg_of(const Path& file, const std::string& title, const std::string
       html_escaped(title), files::base64(files::read_text(file)), html_escaped(caption));
 }
 
-std::string html_of(const Figure& map) { return figure(map.chart, map.caption, map.legend); }
-
 std::string space_section(const SpaceResults& r) {
   const ColourScale colours = traction_colours(r);
   return section("In space",
