@@ -12,18 +12,16 @@ target_compile_options(mbtfm_options INTERFACE
 
 # What most sources include is read once for each level of optimisation.
 option(MBTFM_PRECOMPILED "sources share precompiled headers" ON)
-foreach(level 1 2)
-  set(nothing ${CMAKE_BINARY_DIR}/generated/headers_O${level}.cpp)
-  if(MBTFM_PRECOMPILED AND NOT EXISTS ${nothing})
-    file(TOUCH ${nothing})
-  endif()
-endforeach()
 function(mbtfm_share_headers target level)
   if(NOT MBTFM_PRECOMPILED)
     return()
   endif()
   if(NOT TARGET mbtfm_headers_O${level})
-    add_library(mbtfm_headers_O${level} OBJECT ${CMAKE_BINARY_DIR}/generated/headers_O${level}.cpp)
+    set(nothing ${CMAKE_BINARY_DIR}/generated/headers_O${level}.cpp)
+    if(NOT EXISTS ${nothing})
+      file(WRITE ${nothing} "")
+    endif()
+    add_library(mbtfm_headers_O${level} OBJECT ${nothing})
     target_link_libraries(mbtfm_headers_O${level} PRIVATE mbtfm_options Eigen3::Eigen)
     target_compile_options(mbtfm_headers_O${level} PRIVATE $<$<CONFIG:Release>:-O${level}>)
     target_precompile_headers(mbtfm_headers_O${level} PRIVATE
