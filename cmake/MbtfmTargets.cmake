@@ -1,5 +1,6 @@
-# mbtfm_library(NAME sources… [PUBLIC libs…] [PRIVATE libs…]) and mbtfm_executable(NAME sources… [PRIVATE libs…]):
-# a target with the project's include root and warnings.
+# mbtfm_library(NAME [HOT|WORDS] sources… [PUBLIC libs…] [PRIVATE libs…]) and mbtfm_executable(NAME sources… [PRIVATE libs…]):
+# a target with the project's include root and warnings. Sources are compiled with -O2; with -O3 those where a profile shows the
+# programs' time (HOT); with -O1 those that write words, tables and pages (WORDS), most of whose time is the compiler's.
 
 add_library(mbtfm_options INTERFACE)
 target_compile_features(mbtfm_options INTERFACE cxx_std_20)
@@ -10,11 +11,16 @@ target_include_directories(mbtfm_options INTERFACE
 target_compile_options(mbtfm_options INTERFACE
   "$<BUILD_INTERFACE:-Wall;-Wextra;-Wshadow;$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;--param=ggc-min-heapsize=500000>;$<$<BOOL:${MBTFM_STRICT}>:-Werror>>")
 
-# What most sources include is read once for each level of optimisation.
+# Optimise a target at this level, and share what most sources include, which is read once for each level.
 option(MBTFM_PRECOMPILED "sources share precompiled headers" ON)
-function(mbtfm_share_headers target level)
+function(mbtfm_optimise target level)
+  if(NOT level EQUAL 2)
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O${level}>)
+  endif()
   if(NOT MBTFM_PRECOMPILED)
     return()
+  elseif(level EQUAL 3)
+    set(level 2)
   endif()
   if(NOT TARGET mbtfm_headers_O${level})
     set(nothing ${CMAKE_BINARY_DIR}/generated/headers_O${level}.cpp)
@@ -32,7 +38,7 @@ function(mbtfm_share_headers target level)
 endfunction()
 
 function(mbtfm_library name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "WORDS" "" "PUBLIC;PRIVATE")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "HOT;WORDS" "" "PUBLIC;PRIVATE")
   if(NOT arg_UNPARSED_ARGUMENTS)  # headers alone
     add_library(${name} INTERFACE)
     target_link_libraries(${name} INTERFACE mbtfm_options ${arg_PUBLIC})
@@ -40,16 +46,12 @@ function(mbtfm_library name)
   endif()
   add_library(${name} STATIC ${arg_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PUBLIC mbtfm_options ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
-  mbtfm_optimise(${name} "${arg_WORDS}")
-endfunction()
-
-# WORDS: it writes words, tables and pages. Most of their time is the compiler's.
-function(mbtfm_optimise target writes_words)
-  if(writes_words)
-    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
-    mbtfm_share_headers(${target} 1)
+  if(arg_HOT)
+    mbtfm_optimise(${name} 3)
+  elseif(arg_WORDS)
+    mbtfm_optimise(${name} 1)
   else()
-    mbtfm_share_headers(${target} 2)
+    mbtfm_optimise(${name} 2)
   endif()
 endfunction()
 
@@ -60,7 +62,7 @@ function(mbtfm_executable name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "PRIVATE")
   add_executable(${name} ${arg_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PRIVATE mbtfm_options ${arg_PRIVATE})
-  mbtfm_optimise(${name} WORDS)
+  mbtfm_optimise(${name} 1)
   add_dependencies(executables ${name})
   set_property(GLOBAL APPEND PROPERTY MBTFM_PROGRAMS ${name})
   install(TARGETS ${name} RUNTIME)

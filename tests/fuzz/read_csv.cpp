@@ -4,7 +4,7 @@
 #include "tests/fuzz/target.h"
 #include "tests/support/fake_tables.h"
 
-namespace mbtfm::fuzz::csv {
+namespace mbtfm::fuzz::csv_readers {
 namespace {
 
 namespace fs = std::filesystem;
@@ -33,7 +33,7 @@ std::vector<std::string> samples() {
 }
 
 void read(std::string_view bytes) {
-  const auto& tables = fuzz::cell_tables();
+  const auto& tables = cell_tables();
   const auto file = fuzz::put("input.csv", bytes);
   fuzz::answer([&] { files::read_displacement(file); });
   fuzz::answer([&] { files::read_displacement_in_space(file); });
@@ -47,4 +47,4 @@ void read(std::string_view bytes) {
 const bool is_added = add({"csv", 25000, samples, read});
 
 }  // namespace
-}  // namespace mbtfm::fuzz::csv
+}  // namespace mbtfm::fuzz::csv_readers

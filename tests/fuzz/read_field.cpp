@@ -3,7 +3,7 @@
 #include "tests/fuzz/target.h"
 #include "tests/support/fake_tables.h"
 
-namespace mbtfm::fuzz::field {
+namespace mbtfm::fuzz::field_readers {
 namespace {
 
 std::vector<std::string> samples() {
@@ -28,4 +28,4 @@ void read(std::string_view bytes) {
 const bool is_added = add({"field", 60000, samples, read});
 
 }  // namespace
-}  // namespace mbtfm::fuzz::field
+}  // namespace mbtfm::fuzz::field_readers

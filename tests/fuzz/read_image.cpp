@@ -5,7 +5,7 @@
 #include "segment/images/png.h"
 #include "tests/fuzz/target.h"
 
-namespace mbtfm::fuzz::image {
+namespace mbtfm::fuzz::image_readers {
 namespace {
 
 struct Layout {
@@ -84,4 +84,4 @@ void read(std::string_view bytes) {
 const bool is_added = add({"image", 30000, samples, read});
 
 }  // namespace
-}  // namespace mbtfm::fuzz::image
+}  // namespace mbtfm::fuzz::image_readers

@@ -4,7 +4,7 @@
 #include "segment/images/stack.h"
 #include "tests/fuzz/target.h"
 
-namespace mbtfm::fuzz::ome {
+namespace mbtfm::fuzz::ome_readers {
 namespace {
 
 std::vector<std::string> samples() {
@@ -38,4 +38,4 @@ void read(std::string_view bytes) {
 const bool is_added = add({"ome", 100000, samples, read});
 
 }  // namespace
-}  // namespace mbtfm::fuzz::ome
+}  // namespace mbtfm::fuzz::ome_readers

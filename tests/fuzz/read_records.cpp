@@ -9,7 +9,7 @@
 #include "pipeline/runner/verify.h"
 #include "tests/fuzz/target.h"
 
-namespace mbtfm::fuzz::records {
+namespace mbtfm::fuzz::records_readers {
 namespace {
 
 std::vector<std::string> samples() {
@@ -64,8 +64,8 @@ void read(std::string_view bytes) {
   runner::RunOptions options;
   options.version = "0.1.0";
 
-  const auto run = fuzz::cell_with("run.json", input), recorded = fuzz::cell_with("4_fit/record.json", input),
-             fitted = fuzz::cell_with("4_fit/fit.json", input), hashed = fuzz::cell_with(".mbtfm.hashes", input);
+  const auto run = cell_with("run.json", input), recorded = cell_with("4_fit/record.json", input),
+             fitted = cell_with("4_fit/fit.json", input), hashed = cell_with(".mbtfm.hashes", input);
   fuzz::answer([&] { runner::HashCache(hashed).hash({"cell.toml"}); });
   fuzz::answer([&] { runner::recorded_failure(run); });
   fuzz::answer([&] { runner::last_summary(recorded, {}); });
@@ -77,7 +77,7 @@ void read(std::string_view bytes) {
     files::JsonRecord(run / "run.json", "JSON");
     is_json = true;
   });
-  if (!is_json) return 0;
+  if (!is_json) return;
   fuzz::answer([&] { runner::run_record_tells_of(run, options); });
   fuzz::answer([&] { runner::verify_cell(run); });
   fuzz::answer([&] { runner::write_run_record(recorded, options, runner::look_at_cell(recorded, options)); });
@@ -86,10 +86,10 @@ void read(std::string_view bytes) {
     cell.cell = recorded;
     runner::write_batch_table(fuzz::folder() / "batch.csv", fuzz::folder(), {cell}, {});
   });
-  fuzz::answer([&] { runner::write_run_record(fitted, options, fuzz::untouched()); });
+  fuzz::answer([&] { runner::write_run_record(fitted, options, untouched()); });
 }
 
 const bool is_added = add({"records", 4000, samples, read});
 
 }  // namespace
-}  // namespace mbtfm::fuzz::records
+}  // namespace mbtfm::fuzz::records_readers

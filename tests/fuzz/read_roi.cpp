@@ -3,7 +3,7 @@
 #include "segment/rois/roi.h"
 #include "tests/fuzz/target.h"
 
-namespace mbtfm::fuzz::roi {
+namespace mbtfm::fuzz::roi_readers {
 namespace {
 
 std::vector<std::string> samples() {
@@ -63,4 +63,4 @@ void read(std::string_view bytes) {
 const bool is_added = add({"roi", 40000, samples, read});
 
 }  // namespace
-}  // namespace mbtfm::fuzz::roi
+}  // namespace mbtfm::fuzz::roi_readers

@@ -9,7 +9,7 @@
 #include "pipeline/stage/parameters.h"
 #include "tests/fuzz/target.h"
 
-namespace mbtfm::fuzz::settings {
+namespace mbtfm::fuzz::settings_readers {
 namespace {
 
 std::vector<std::string> samples() {
@@ -22,8 +22,6 @@ std::vector<std::string> samples() {
       "[effects]\nmodel_error = \"on\"\n[fit]\nlist = [1, [2.5, \"x\"], {a = 1, b.c = 2}]\nday = 1979-05-27T07:32:00Z\n"
       "[[stats.many]]\na = 1\n[[stats.many]]\n"};
 }
-
-}  // namespace mbtfm::fuzz
 
 /// One parameter of each kind.
 struct AnyParameters {
@@ -71,4 +69,4 @@ void read(std::string_view bytes) {
 const bool is_added = add({"settings", 30000, samples, read});
 
 }  // namespace
-}  // namespace mbtfm::fuzz::settings
+}  // namespace mbtfm::fuzz::settings_readers

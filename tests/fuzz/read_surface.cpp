@@ -11,7 +11,7 @@
 #include "tests/fuzz/target.h"
 #include "tests/support/mesh_files.h"
 
-namespace mbtfm::fuzz::surface {
+namespace mbtfm::fuzz::surface_readers {
 namespace {
 
 constexpr std::array kExtensions = {".stl", ".ply", ".obj", ".vtp"};
@@ -53,7 +53,7 @@ std::vector<std::string> samples() {
 
 void read(std::string_view bytes) {
   const std::string_view input = bytes;
-  for (const char* const extension : fuzz::kExtensions) {
+  for (const char* const extension : kExtensions) {
     const auto file = fuzz::put(std::string("input") + extension, input);
     fuzz::answer([&] {
       const TriangleMesh mesh = files::read_triangle_mesh(file, 1);
@@ -74,4 +74,4 @@ void read(std::string_view bytes) {
 const bool is_added = add({"surface", 20000, samples, read});
 
 }  // namespace
-}  // namespace mbtfm::fuzz::surface
+}  // namespace mbtfm::fuzz::surface_readers

@@ -4,7 +4,7 @@
 #include "tests/support/fake_tables.h"
 #include "tests/support/vtu_variants.h"
 
-namespace mbtfm::fuzz::vtu {
+namespace mbtfm::fuzz::vtu_readers {
 namespace {
 
 std::vector<std::string> samples() {
@@ -29,4 +29,4 @@ void read(std::string_view bytes) {
 const bool is_added = add({"vtu", 60000, samples, read});
 
 }  // namespace
-}  // namespace mbtfm::fuzz::vtu
+}  // namespace mbtfm::fuzz::vtu_readers
