@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "pipeline/contract/beads.h"
+#include "pipeline/contract/network.h"
 #include "pipeline/contract/polyline.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/text.h"
@@ -14,6 +16,7 @@
 #include "pipeline/report/colours.h"
 #include "pipeline/report/hover.h"
 #include "pipeline/report/numbers.h"
+#include "pipeline/report/results.h"
 #include "pipeline/report/tension_plot.h"
 
 namespace mbtfm::report {

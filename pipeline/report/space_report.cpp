@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pipeline/contract/kinds_of_findings.h"
+#include "pipeline/contract/results.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/json.h"

@@ -10,8 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "segment/cells/segment_cell.h"
-#include "tests/support/segmentation_score.h"
+#include "pipeline/contract/cell.h"
+#include "segment/cells/adhesions.h"
+#include "segment/cells/outline.h"
 
 namespace mbtfm::test {
 
