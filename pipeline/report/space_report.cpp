@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/results.h"
