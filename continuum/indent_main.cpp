@@ -15,6 +15,7 @@
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm::solids {

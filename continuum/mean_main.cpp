@@ -8,7 +8,9 @@
 #include <set>
 
 #include "continuum/mean/align.h"
+#include "continuum/mean/symmetry.h"
 #include "continuum/outlines/rings.h"
+#include "mbtfm/tractions/fttc.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
@@ -24,6 +26,7 @@
 #include "pipeline/report/page.h"
 #include "pipeline/report/stage_page.h"
 #include "pipeline/runner/images.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "segment/images/image.h"
 

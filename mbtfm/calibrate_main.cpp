@@ -12,6 +12,7 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm::tractions {

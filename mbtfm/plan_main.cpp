@@ -1,6 +1,7 @@
 /// mbtfm-plan: how many beads, which gel, how little noise and how many cells a question takes.
 #include "mbtfm/plan/answer.h"
 #include "mbtfm/plan/page.h"
+#include "mbtfm/plan/space_answer.h"
 #include "mbtfm/plan/space_page.h"
 #include "mbtfm/plan/tables.h"
 #include "pipeline/contract/counted.h"

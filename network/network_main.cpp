@@ -6,6 +6,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm {

@@ -3,6 +3,7 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/stage.h"
+#include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/picture.h"
 #include "pipeline/statistics/study_files.h"
 

@@ -2,7 +2,9 @@
 #include <string_view>
 
 #include "pipeline/contract/numbers.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
+#include "samples/colonies/colony.h"
 #include "samples/colonies/folder.h"
 #include "samples/experiment/cell_folder.h"
 #include "samples/gels/folder.h"

@@ -4,6 +4,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/tables.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "segment/rois/roi.h"
 

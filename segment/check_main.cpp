@@ -9,6 +9,7 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/stage/console.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "segment/beads/track.h"
 #include "segment/cells/segment_cell.h"

@@ -12,6 +12,7 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "segment/images/image.h"
 #include "segment/survey/roles.h"

@@ -5,6 +5,7 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "segment/beads/unloaded.h"
 #include "segment/images/channels.h"

@@ -16,6 +16,7 @@
 #include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "segment/beads/given_field.h"
 #include "segment/beads/picture.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <type_traits>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"

@@ -1,3 +1,5 @@
+#include "substrate/compliance.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +12,13 @@
 #include "substrate/response.h"
 
 namespace mbtfm::substrate {
+
+Ellipse ellipse_of(const Adhesion& adhesion) {
+  return {.centre_um = adhesion.position_um,
+          .semi_major_um = 0.5 * adhesion.major_axis_um,
+          .semi_minor_um = 0.5 * adhesion.minor_axis_um,
+          .angle_rad = adhesion.angle_rad};
+}
 
 void declare(stage::ParameterList& list, SubstrateParameters& p) {
   list.table("substrate");

@@ -12,19 +12,13 @@
 #include "pipeline/contract/figures.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/geometry.h"
-#include "pipeline/numerics/cholesky.h"
+#include "pipeline/numerics/precision.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/parameters_fwd.h"
+#include "substrate/ellipse.h"
 
 namespace mbtfm::substrate {
 
-/// The patch over which a force is spread evenly.
-struct Ellipse {
-  Vec2 centre_um;
-  double semi_major_um = 0;
-  double semi_minor_um = 0;
-  double angle_rad = 0;  ///< of the major axis, from +x towards +y
-};
 Ellipse ellipse_of(const Adhesion& adhesion);
 
 enum class ModelKind {

@@ -11,13 +11,6 @@ namespace mbtfm::substrate {
 
 using std::numbers::pi;
 
-Ellipse ellipse_of(const Adhesion& adhesion) {
-  return {.centre_um = adhesion.position_um,
-          .semi_major_um = 0.5 * adhesion.major_axis_um,
-          .semi_minor_um = 0.5 * adhesion.minor_axis_um,
-          .angle_rad = adhesion.angle_rad};
-}
-
 void check(const std::vector<Ellipse>& ellipses) {
   for (std::size_t j = 0; j < ellipses.size(); ++j) {
     const Ellipse& e = ellipses[j];

@@ -3,9 +3,17 @@
 
 #include <vector>
 
-#include "substrate/compliance.h"
+#include "pipeline/contract/geometry.h"
 
 namespace mbtfm::substrate {
+
+/// The patch over which a force is spread evenly.
+struct Ellipse {
+  Vec2 centre_um;
+  double semi_major_um = 0;
+  double semi_minor_um = 0;
+  double angle_rad = 0;  ///< of the major axis, from +x towards +y
+};
 
 /// @throws InvalidData where an axis is not positive, the axes are swapped or a number is not finite
 void check(const std::vector<Ellipse>& ellipses);

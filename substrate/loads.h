@@ -1,11 +1,13 @@
 /// What loads a gel, and where it is asked.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <variant>
 #include <vector>
 
-#include "substrate/compliance.h"
+#include "pipeline/contract/geometry.h"
+#include "substrate/ellipse.h"
 
 namespace mbtfm::substrate {
 

@@ -7,7 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "substrate/loads.h"
+#include "pipeline/contract/geometry.h"
+#include "substrate/ellipse.h"
 
 namespace mbtfm::substrate {
 

@@ -16,6 +16,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "substrate/choice/decide.h"
 #include "substrate/choice/factory.h"

@@ -19,6 +19,7 @@
 #include "pipeline/files/triangle_mesh.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "segment/images/image.h"
 #include "segment/images/png.h"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "continuum/mean/symmetry.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/parallel.h"

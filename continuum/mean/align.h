@@ -6,7 +6,8 @@
 
 #include "continuum/mean/images.h"
 #include "continuum/mean/outputs.h"
-#include "continuum/mean/symmetry.h"
+#include "pipeline/contract/beads.h"
+#include "pipeline/contract/gel.h"
 #include "pipeline/contract/words.h"
 
 namespace mbtfm::mean {

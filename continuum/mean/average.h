@@ -7,7 +7,6 @@
 
 #include "continuum/mean/registration.h"
 #include "mbtfm/tractions/traction.h"
-#include "pipeline/contract/beads.h"
 
 namespace mbtfm::mean {
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mbtfm/tractions/fttc.h"
 #include "substrate/greens/wave.h"
 
 namespace mbtfm::mean {

@@ -5,7 +5,8 @@
 #include <memory>
 
 #include "continuum/mean/average.h"
-#include "mbtfm/tractions/fttc.h"
+#include "pipeline/contract/beads.h"
+#include "pipeline/contract/gel.h"
 
 namespace mbtfm::mean {
 

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <map>
 
+#include "continuum/sheet/elements.h"
+#include "continuum/sheet/forward.h"
+#include "continuum/sheet/recovery.h"
 #include "pipeline/files/columns.h"
 #include "pipeline/numerics/neighbour_bins.h"
 

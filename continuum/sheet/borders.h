@@ -4,10 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "continuum/sheet/forward.h"
 #include "pipeline/contract/path.h"
 
 namespace mbtfm::sheet {
+
+struct Solution;
 
 /// Which cell each pixel belongs to; 0: none. Row by row from the top.
 struct CellLabels {

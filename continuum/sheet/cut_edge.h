@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "continuum/sheet/elements.h"
-#include "pipeline/contract/words.h"
 
 namespace mbtfm::sheet {
 

@@ -6,7 +6,9 @@
 
 #include "continuum/sheet/mesh_size.h"
 #include "continuum/sheet/moved_rims.h"
+#include "continuum/sheet/on_springs.h"
 #include "continuum/sheet/patches.h"
+#include "continuum/sheet/recovery.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::sheet {

@@ -8,9 +8,8 @@
 
 #include "continuum/sheet/bundles.h"
 #include "continuum/sheet/on_gel.h"
-#include "continuum/sheet/on_springs.h"
-#include "continuum/sheet/recovery.h"
 #include "pipeline/contract/words.h"
+#include "substrate/compliance.h"
 
 namespace mbtfm::sheet {
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 
+#include "continuum/sheet/recovery.h"
 #include "continuum/sheet/stiffness.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"

@@ -6,6 +6,7 @@
 
 #include "continuum/sheet/patch_compliance.h"
 #include "pipeline/numerics/waves.h"
+#include "substrate/compliance.h"
 
 namespace mbtfm::sheet {
 

@@ -8,6 +8,7 @@
 
 #include "continuum/sheet/large_strain.h"
 #include "continuum/sheet/patch_compliance.h"
+#include "substrate/compliance.h"
 
 namespace mbtfm::sheet {
 

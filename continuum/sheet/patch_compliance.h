@@ -6,6 +6,7 @@
 
 #include "continuum/sheet/patches.h"
 #include "pipeline/contract/words.h"
+#include "substrate/compliance.h"
 
 namespace mbtfm::sheet {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "continuum/sheet/elements.h"
-#include "substrate/compliance.h"
+#include "substrate/ellipse.h"
 
 namespace mbtfm::sheet {
 

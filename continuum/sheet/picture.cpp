@@ -6,6 +6,9 @@
 #include <limits>
 #include <map>
 
+#include "continuum/sheet/elements.h"
+#include "continuum/sheet/forward.h"
+#include "continuum/sheet/recovery.h"
 #include "pipeline/charts/chart.h"
 #include "pipeline/charts/colour_map.h"
 

@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "continuum/sheet/forward.h"
-
 namespace mbtfm::sheet {
+
+struct Solution;
 
 /// An SVG file: two or three maps, x to the right and y down. @param caption  a line of text below
 std::string picture_of(const Solution& solution, const std::string& caption);

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "continuum/sheet/elements.h"
+#include "continuum/sheet/forward.h"
+#include "continuum/sheet/recovery.h"
 #include "pipeline/files/columns.h"
 #include "pipeline/files/vtk_files.h"
 

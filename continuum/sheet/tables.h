@@ -5,10 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "continuum/sheet/forward.h"
+#include "pipeline/contract/geometry.h"
 #include "pipeline/contract/path.h"
 
 namespace mbtfm::sheet {
+
+struct Solution;
 
 /// A place of the sheet; empty values where the sheet is not.
 struct SheetPoint {

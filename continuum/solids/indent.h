@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "continuum/solids/revolved.h"
-#include "pipeline/contract/progress.h"
+#include "pipeline/contract/work.h"
 
 namespace mbtfm::solids {
 

@@ -8,6 +8,7 @@
 #include "mbtfm/tensions/placement.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
+#include "substrate/loads.h"
 #include "substrate/response.h"
 
 namespace mbtfm::fit {

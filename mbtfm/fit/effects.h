@@ -7,9 +7,11 @@
 #include <string_view>
 #include <vector>
 
-#include "mbtfm/fit/fit_cell.h"
+#include "mbtfm/tensions/explain.h"
 
 namespace mbtfm::fit {
+
+struct FittedCell;
 
 struct EffectRow {
   EffectKind kind;

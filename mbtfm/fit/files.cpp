@@ -1,5 +1,7 @@
 #include "mbtfm/fit/files.h"
 
+#include "mbtfm/fit/checks.h"
+#include "mbtfm/fit/fit_cell.h"
 #include "mbtfm/tensions/second_placement.h"
 #include "mbtfm/tensions/tables.h"
 #include "pipeline/files/csv_files.h"

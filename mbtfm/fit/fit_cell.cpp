@@ -1,6 +1,8 @@
 #include "mbtfm/fit/fit_cell.h"
 
+#include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/fit/effects.h"
+#include "mbtfm/fit/networks.h"
 #include "mbtfm/fit/strained_gel.h"
 #include "mbtfm/tensions/energy.h"
 #include "mbtfm/tensions/error_budget.h"

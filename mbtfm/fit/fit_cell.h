@@ -7,6 +7,7 @@
 #include "mbtfm/fit/checks.h"
 #include "mbtfm/fit/readings.h"
 #include "mbtfm/tensions/explain.h"
+#include "pipeline/contract/fit_summary.h"
 
 namespace mbtfm::fit {
 

@@ -5,7 +5,9 @@
 #include <limits>
 #include <vector>
 
+#include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/findings.h"

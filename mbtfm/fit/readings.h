@@ -6,10 +6,12 @@
 #include <optional>
 #include <string>
 
-#include "mbtfm/fit/data_of_beads.h"
+#include "mbtfm/tensions/linear_data.h"
 #include "pipeline/contract/findings.h"
 
 namespace mbtfm::fit {
+
+struct GelUnderCell;
 
 struct Reading {
   std::string what;              ///< what mends it: "once the bead images are mirrored from left to right"

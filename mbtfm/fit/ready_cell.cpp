@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "mbtfm/fit/data_of_beads.h"
+#include "mbtfm/fit/networks.h"
 #include "mbtfm/tensions/effects.h"
 #include "mbtfm/tensions/second_placement.h"
 #include "network/cables/effects.h"

@@ -4,12 +4,12 @@
 #include <memory>
 #include <vector>
 
-#include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/fit/inputs.h"
-#include "mbtfm/fit/networks.h"
 #include "mbtfm/fit/parameters.h"
+#include "mbtfm/tensions/beyond_cut.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/placement.h"
+#include "mbtfm/tensions/under_load.h"
 #include "pipeline/contract/work.h"
 
 namespace mbtfm::fit {

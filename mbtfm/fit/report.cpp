@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "mbtfm/fit/checks.h"
+#include "mbtfm/fit/fit_cell.h"
 #include "mbtfm/tensions/findings.h"
 #include "mbtfm/tensions/noise.h"
 #include "pipeline/contract/kinds_of_findings.h"

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "substrate/choice/large_strain.h"
+#include "substrate/loads.h"
 
 namespace mbtfm::fit {
 

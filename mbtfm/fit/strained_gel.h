@@ -4,11 +4,14 @@
 
 #include <functional>
 
-#include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/tension_problem.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/work.h"
 
 namespace mbtfm::fit {
+
+struct GelUnderCell;
 
 /// Whether the forces found call for it.
 /// @throws UsageError where it is switched on, and the scene has what keeps it off

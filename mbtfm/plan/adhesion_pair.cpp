@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <type_traits>
+#include <utility>
 
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"

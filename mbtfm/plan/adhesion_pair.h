@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "pipeline/contract/gel.h"
-#include "pipeline/contract/geometry.h"
 
 namespace mbtfm::plan {
 

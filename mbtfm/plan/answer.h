@@ -9,6 +9,7 @@
 
 #include "mbtfm/plan/cell_numbers.h"
 #include "mbtfm/plan/drawn.h"
+#include "mbtfm/plan/parameters.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::plan {

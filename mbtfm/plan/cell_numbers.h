@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mbtfm/plan/grid.h"
+#include "mbtfm/plan/scene.h"
 
 namespace mbtfm::plan {
 

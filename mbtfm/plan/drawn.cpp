@@ -4,10 +4,12 @@
 
 #include "mbtfm/fit/networks.h"
 #include "mbtfm/plan/experiment.h"
+#include "mbtfm/plan/grid.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "substrate/choice/factory.h"
+#include "substrate/loads.h"
 
 namespace mbtfm::plan {
 

@@ -4,9 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/plan/grid.h"
+#include "mbtfm/plan/experiment.h"
+#include "mbtfm/plan/scene.h"
+#include "pipeline/contract/work.h"
 
 namespace mbtfm::plan {
+
+struct Computed;
 
 /// One fibre in one experiment.
 struct DrawnTension {

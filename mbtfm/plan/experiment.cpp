@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "mbtfm/plan/precision.h"
+#include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/numerics/order_statistics.h"

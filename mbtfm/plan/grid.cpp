@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "mbtfm/plan/adhesion_pair.h"
 #include "mbtfm/tensions/linear_data.h"
 #include "mbtfm/tractions/fttc_mixtures.h"
 #include "pipeline/contract/errors.h"

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/plan/adhesion_pair.h"
 #include "mbtfm/plan/experiment.h"
+#include "mbtfm/plan/precision.h"
 
 namespace mbtfm::plan {
 

@@ -4,10 +4,13 @@
 #include <cmath>
 
 #include "mbtfm/fit/networks.h"
+#include "mbtfm/plan/scene.h"
 #include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/parallel.h"
+#include "samples/experiment/experiment.h"
 
 namespace mbtfm::plan {
 

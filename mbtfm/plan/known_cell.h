@@ -5,12 +5,15 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "mbtfm/plan/scene.h"
-#include "mbtfm/tensions/error_budget.h"
 #include "network/cables/cables.h"
+#include "pipeline/contract/beads.h"
 #include "pipeline/contract/work.h"
+#include "substrate/ellipse.h"
+#include "substrate/response.h"
 
 namespace mbtfm::plan {
+
+struct Scene;
 
 /// By label: the network, then the fibres.
 struct KnownCell {

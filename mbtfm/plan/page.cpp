@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "mbtfm/plan/answer.h"
 #include "mbtfm/plan/page_parts.h"
 #include "mbtfm/plan/tables.h"
 #include "pipeline/contract/numbers.h"

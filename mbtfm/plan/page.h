@@ -4,10 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/plan/answer.h"
 #include "pipeline/charts/chart.h"
 
 namespace mbtfm::plan {
+
+struct Plan;
 
 /// A chart for each noise: standard error of the middle fibre over density, a curve for each gel, the target as a line.
 std::vector<charts::Chart> charts_of(const Plan& plan);

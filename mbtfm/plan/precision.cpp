@@ -6,11 +6,14 @@
 #include <numeric>
 
 #include "mbtfm/fit/data_of_beads.h"
+#include "mbtfm/plan/known_cell.h"
 #include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/intervals.h"
 #include "pipeline/numerics/dense.h"
 #include "samples/drawing/random.h"
 #include "substrate/choice/factory.h"
+#include "substrate/loads.h"
 
 namespace mbtfm::plan {
 

@@ -4,10 +4,13 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "mbtfm/plan/known_cell.h"
+#include "mbtfm/plan/scene.h"
+#include "pipeline/contract/work.h"
 #include "samples/drawing/random.h"
 
 namespace mbtfm::plan {
+
+struct KnownCell;
 
 /// Standard errors by the beads' noise alone, for a noise of 1 um on a gel of 1 kPa:
 ///

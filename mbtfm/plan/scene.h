@@ -8,7 +8,7 @@
 
 #include "mbtfm/fit/parameters.h"
 #include "mbtfm/plan/parameters.h"
-#include "samples/experiment/experiment.h"
+#include "samples/drawing/draw.h"
 
 namespace mbtfm::plan {
 

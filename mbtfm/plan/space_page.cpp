@@ -2,6 +2,7 @@
 
 #include "mbtfm/plan/answer.h"
 #include "mbtfm/plan/page_parts.h"
+#include "mbtfm/plan/space_answer.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::plan {

@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "mbtfm/plan/space_answer.h"
-
 namespace mbtfm::plan {
+
+struct SpacePlan;
 
 std::string svg_of(const SpacePlan& plan);
 std::string html_of(const SpacePlan& plan);

@@ -12,6 +12,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/stage/parameters.h"
 #include "samples/colonies/parameters.h"
 #include "samples/gels/folder.h"
 #include "samples/gels/scene.h"

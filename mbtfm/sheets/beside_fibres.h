@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "mbtfm/tensions/model_checks.h"
+#include "pipeline/contract/gel.h"
+#include "substrate/compliance.h"
 
 namespace mbtfm::sheets {
 

@@ -1,5 +1,6 @@
 #include "mbtfm/sheets/tables.h"
 
+#include "mbtfm/sheets/field_fit.h"
 #include "pipeline/files/sheet_files.h"
 
 namespace mbtfm::sheets {

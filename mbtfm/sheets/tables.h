@@ -3,10 +3,12 @@
 
 #include <string>
 
-#include "mbtfm/sheets/field_fit.h"
+#include "mbtfm/sheets/sheet_fit.h"
 #include "pipeline/contract/path.h"
 
 namespace mbtfm::sheets {
+
+struct ContractionAt;
 
 void write_estimates(const Path& file, const SheetFit& fit);
 void write_contractions(const Path& file, const std::vector<ContractionAt>& rows);

@@ -1,6 +1,8 @@
 /// Tractions as sums of shapes.
 #pragma once
 
+#include <utility>
+
 #include <Eigen/Core>
 
 #include "mbtfm/spatial/traction_mesh.h"

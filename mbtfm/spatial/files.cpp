@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"

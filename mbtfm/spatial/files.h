@@ -3,10 +3,14 @@
 
 #include <string>
 
-#include "mbtfm/spatial/reconstruction.h"
+#include "mbtfm/spatial/problem.h"
 #include "pipeline/contract/path.h"
 
 namespace mbtfm::spatial {
+
+struct Balance;
+struct PartForce;
+struct SpatialReconstruction;
 
 /// A table with a row for each vertex, and the surface with the same.
 void write_tractions(const Path& csv, const Path& vtp, const Problem& problem,

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/spatial/basis.h"
+#include "mbtfm/spatial/rows.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
 

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/reconstruction.h"
+#include "mbtfm/spatial/rows.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"

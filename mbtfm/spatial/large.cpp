@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/neighbours.h"
 #include "mbtfm/spatial/reconstruction.h"
+#include "mbtfm/spatial/rows.h"
 #include "mbtfm/tractions/recurrences.h"
 #include "pipeline/contract/errors.h"
 #include "substrate/response.h"

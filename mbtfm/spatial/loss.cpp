@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "mbtfm/spatial/observed.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/order_statistics.h"
 

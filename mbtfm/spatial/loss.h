@@ -6,9 +6,11 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "mbtfm/spatial/observed.h"
+#include "mbtfm/spatial/parameters.h"
 
 namespace mbtfm::spatial {
+
+struct Observed;
 
 /// Weight psi(r)/r of a bead whose residual has this length, in standard deviations of a component:
 /// l2 1 | l1 1/r | huber min(1, k/r) | biweight (1 − (r/c)²)². k and c keep 95 % efficiency where the noise is Gaussian

@@ -4,8 +4,11 @@
 #include <chrono>
 #include <cmath>
 
+#include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/reconstruction.h"
+#include "mbtfm/spatial/rows.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/numerics/dense.h"
 
 namespace mbtfm::spatial {

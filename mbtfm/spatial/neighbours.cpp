@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "mbtfm/spatial/loss.h"
+#include "mbtfm/spatial/observed.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"

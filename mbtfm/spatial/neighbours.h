@@ -3,9 +3,11 @@
 
 #include <vector>
 
-#include "mbtfm/spatial/observed.h"
+#include "mbtfm/spatial/parameters.h"
 
 namespace mbtfm::spatial {
+
+struct Observed;
 
 /// u − u_n by bead. u_n is the displacement at the bead's place of the linear field that the 16 nearest beads follow
 /// (biweight, Maronna, Martin & Yohai, Robust Statistics, 2006, 5.4; as the normalised median test of Westerweel &

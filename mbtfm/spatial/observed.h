@@ -7,6 +7,7 @@
 #include "mbtfm/spatial/parameters.h"
 #include "mbtfm/spatial/traction_mesh.h"
 #include "pipeline/contract/beads_in_space.h"
+#include "pipeline/contract/gel.h"
 #include "substrate/loads.h"
 
 namespace mbtfm::spatial {

@@ -3,7 +3,6 @@
 
 #include <optional>
 
-#include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/words.h"
 #include "pipeline/stage/parameters_fwd.h"
 

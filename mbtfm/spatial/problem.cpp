@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/spatial/rows.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"

@@ -4,9 +4,8 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "mbtfm/spatial/basis.h"
+#include "mbtfm/spatial/observed.h"
 #include "mbtfm/spatial/region.h"
-#include "mbtfm/spatial/rows.h"
 #include "mbtfm/tractions/spectrum.h"
 #include "substrate/compliance.h"
 #include "substrate/response.h"

@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/loss.h"
 #include "mbtfm/spatial/problem.h"
-#include "mbtfm/tractions/traction.h"
+#include "mbtfm/tractions/parameters.h"
 #include "pipeline/contract/findings.h"
 
 namespace mbtfm::spatial {

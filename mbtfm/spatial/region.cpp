@@ -2,8 +2,11 @@
 
 #include <algorithm>
 
+#include "mbtfm/spatial/observed.h"
+#include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "substrate/compliance.h"
 #include "substrate/ellipse.h"
 
 namespace mbtfm::spatial {

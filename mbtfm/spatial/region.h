@@ -5,10 +5,15 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/spatial/observed.h"
+#include "mbtfm/spatial/parameters.h"
+#include "mbtfm/spatial/traction_mesh.h"
+#include "pipeline/contract/beads_in_space.h"
 #include "pipeline/contract/cell.h"
+#include "pipeline/contract/gel.h"
 
 namespace mbtfm::spatial {
+
+struct Observed;
 
 struct SpatialInputs {
   std::vector<BeadInSpace> beads;

@@ -4,12 +4,12 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "mbtfm/spatial/observed.h"
 #include "pipeline/contract/effects.h"
-#include "pipeline/stage/effects.h"
+#include "pipeline/contract/figures.h"
 
 namespace mbtfm::spatial {
 
+struct Observed;
 struct Problem;
 struct SpatialReconstruction;
 

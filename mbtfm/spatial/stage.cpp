@@ -4,6 +4,7 @@
 
 #include "mbtfm/spatial/files.h"
 #include "mbtfm/spatial/refine.h"
+#include "mbtfm/spatial/rows.h"
 #include "mbtfm/spatial/strained.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
@@ -11,6 +12,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/vtk_files.h"
+#include "pipeline/stage/parameters.h"
 #include "substrate/choice/large_strain.h"
 
 namespace mbtfm::spatial {

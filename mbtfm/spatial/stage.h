@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mbtfm/spatial/parameters.h"
+#include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/stage_report.h"
 #include "pipeline/stage/stage.h"
 #include "substrate/compliance.h"

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/report.h"
 #include "substrate/choice/factory.h"
 #include "substrate/choice/large_strain.h"
 

@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "mbtfm/spatial/reconstruction.h"
-#include "substrate/response.h"
 
 namespace mbtfm::spatial {
 

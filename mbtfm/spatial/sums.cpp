@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "mbtfm/spatial/reconstruction.h"
+#include "mbtfm/spatial/rows.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/neighbours.h"
 #include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/contract/errors.h"

@@ -9,8 +9,9 @@
 #include <vector>
 
 #include "mbtfm/tensions/linear_data.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/gel.h"
 #include "pipeline/stage/effects.h"
-#include "substrate/compliance.h"
 
 namespace mbtfm::tensions {
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/dense.h"

@@ -8,13 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/linear_data.h"
 #include "pipeline/contract/affine_motion.h"
 #include "pipeline/contract/figures.h"
 #include "pipeline/stage/effects.h"
 
 namespace mbtfm::tensions {
+
+struct EnsembleFit;
 
 /// The six motions of unit size as displacements of the beads, 2·beads × 6: shift (um), then turn, growth and shears
 /// (relative).

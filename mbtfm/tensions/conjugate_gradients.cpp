@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "mbtfm/tensions/tension_fit.h"
 #include "pipeline/contract/numbers.h"

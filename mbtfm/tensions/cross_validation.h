@@ -8,7 +8,7 @@
 
 #include "mbtfm/tensions/linear_data.h"
 #include "mbtfm/tensions/tension_problem.h"
-#include "pipeline/files/csv_files.h"
+#include "pipeline/contract/cell.h"
 
 namespace mbtfm::tensions {
 

@@ -1,6 +1,7 @@
 #include "mbtfm/tensions/effects.h"
 
 #include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/stage/effects.h"
 
 namespace mbtfm::tensions {
 

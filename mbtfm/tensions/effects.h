@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "mbtfm/tensions/tension_fit.h"
-#include "pipeline/stage/effects.h"
+#include "pipeline/contract/effects.h"
 
 namespace mbtfm::tensions {
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/numerics/dense.h"
 #include "substrate/greens/models.h"

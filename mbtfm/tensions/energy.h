@@ -1,11 +1,13 @@
 /// What the forces of a cell have done to its gel, and how they are laid out.
 #pragma once
 
-#include "mbtfm/tensions/ensemble.h"
+#include "pipeline/contract/cell.h"
 #include "pipeline/contract/figures.h"
 #include "pipeline/contract/gel.h"
 
 namespace mbtfm::tensions {
+
+struct EnsembleFit;
 
 /// Figures of fit.json, each with its standard error:
 ///

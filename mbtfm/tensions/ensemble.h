@@ -12,6 +12,7 @@
 
 #include "mbtfm/tensions/intervals.h"
 #include "mbtfm/tensions/model_error.h"
+#include "mbtfm/tensions/tension_fit.h"
 #include "pipeline/contract/work.h"
 
 namespace mbtfm::tensions {

@@ -7,11 +7,13 @@
 #include <numbers>
 #include <optional>
 
+#include "mbtfm/tensions/ensemble.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/parameters.h"
 #include "substrate/greens/layer.h"
 #include "substrate/greens/models.h"
+#include "substrate/loads.h"
 #include "substrate/response.h"
 
 namespace mbtfm::tensions {

@@ -3,11 +3,16 @@
 
 #include <vector>
 
-#include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/linear_data.h"
+#include "network/contractile.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/gel.h"
 #include "pipeline/contract/results.h"
-#include "substrate/compliance.h"
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::tensions {
+
+struct EnsembleFit;
 
 /// Standard errors of what the segmentation measures. Found on simulated cells of ordinary image quality, outliers
 /// included (docs/developers/cost-tables.md). For a segmentation that is known to be exact: zero.

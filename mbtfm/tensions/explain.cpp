@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::tensions {

@@ -6,9 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/tensions/ensemble.h"
+#include "pipeline/contract/effects.h"
 
 namespace mbtfm::tensions {
+
+struct EnsembleFit;
 
 struct Change {
   EffectKind effect;

@@ -6,11 +6,12 @@
 
 #include "mbtfm/tensions/beyond_cut.h"
 #include "mbtfm/tensions/common_motion.h"
-#include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/missing_adhesions.h"
-#include "mbtfm/tensions/model_checks.h"
 #include "mbtfm/tensions/placement.h"
+#include "pipeline/contract/cell.h"
 #include "pipeline/contract/findings.h"
+#include "pipeline/contract/fit_summary.h"
 
 namespace mbtfm::tensions {
 

@@ -3,13 +3,17 @@
 
 #include <vector>
 
-#include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/linear_data.h"
+#include "mbtfm/tensions/tension_fit.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/fit_summary.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/files/named_array.h"
-#include "substrate/compliance.h"
 
 namespace mbtfm::tensions {
+
+struct EnsembleFit;
 
 struct CellOnBeads {
   Cell cell;

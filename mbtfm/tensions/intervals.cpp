@@ -6,6 +6,7 @@
 #include <numeric>
 #include <random>
 
+#include "mbtfm/tensions/tension_fit.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 

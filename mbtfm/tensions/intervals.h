@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "mbtfm/tensions/tension_fit.h"
+#include "mbtfm/tensions/tension_problem.h"
 
 namespace mbtfm::tensions {
+
+struct FitParameters;
 
 inline constexpr double kNormal95 = 1.959963984540054;  ///< two-sided 95 % of a normal variable
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 
+#include "mbtfm/tensions/ensemble.h"
+#include "pipeline/contract/cell.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"

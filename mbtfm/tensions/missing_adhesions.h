@@ -3,10 +3,14 @@
 
 #include <vector>
 
-#include "mbtfm/tensions/ensemble.h"
-#include "pipeline/files/csv_files.h"
+#include "mbtfm/tensions/linear_data.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/gel.h"
+#include "pipeline/contract/results.h"
 
 namespace mbtfm::tensions {
+
+struct EnsembleFit;
 
 /// The best ones. A score test at places one micrometre apart, of a force spread over a disc of 0.5 um: with g its
 /// displacement of the beads around, less their mean, q = gᵀ W² (u − G R) is compared with its covariance. A gain is

@@ -10,6 +10,7 @@
 
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/triangle.h"
+#include "substrate/compliance.h"
 
 namespace mbtfm::tensions {
 

@@ -7,7 +7,7 @@
 
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/error_budget.h"
-#include "pipeline/files/csv_files.h"
+#include "pipeline/contract/cell.h"
 
 namespace mbtfm::tensions {
 

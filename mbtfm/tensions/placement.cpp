@@ -7,6 +7,7 @@
 
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/robust.h"
+#include "pipeline/contract/cell.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"
@@ -14,6 +15,7 @@
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/stopwatch.h"
+#include "substrate/compliance.h"
 #include "substrate/greens/half_space.h"
 
 namespace mbtfm::tensions {

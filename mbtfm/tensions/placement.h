@@ -19,7 +19,8 @@
 #include "mbtfm/tensions/linear_data.h"
 #include "mbtfm/tensions/tension_fit.h"
 #include "network/contractile.h"
-#include "substrate/compliance.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/gel.h"
 
 namespace mbtfm::tensions {
 

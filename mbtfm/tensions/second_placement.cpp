@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/own_files.h"

@@ -5,11 +5,13 @@
 #include <map>
 #include <optional>
 
-#include "mbtfm/tensions/ensemble.h"
+#include "pipeline/contract/cell.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/contract/results.h"
 
 namespace mbtfm::tensions {
+
+struct EnsembleFit;
 
 /// Standard errors by the choice of a placement: two answers a and b have the variance (a − b)²/2 about all answers.
 /// What two ensembles of meshes differ by is in it, too.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mbtfm/tensions/ensemble.h"
+#include "pipeline/contract/cell.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/contract/results.h"
 

@@ -1,6 +1,7 @@
 /// Tensions from bead displacements (thesis 3.2.5): minimise Phi(t) over t >= 0, by several methods.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/files/csv.h"

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "mbtfm/tensions/linear_data.h"
+#include "pipeline/contract/effects.h"
 
 namespace mbtfm::tensions {
 

@@ -9,6 +9,7 @@
 #include "pipeline/numerics/memory.h"
 #include "substrate/ellipse.h"
 #include "substrate/greens/models.h"
+#include "substrate/loads.h"
 #include "substrate/response.h"
 
 namespace mbtfm::tractions {

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/beads.h"
+#include "pipeline/contract/gel.h"
 
 namespace mbtfm::tractions {
 

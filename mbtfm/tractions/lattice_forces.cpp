@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "mbtfm/tractions/traction.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 

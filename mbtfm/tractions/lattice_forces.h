@@ -5,7 +5,7 @@
 
 #include "mbtfm/tractions/lattice_problem.h"
 #include "mbtfm/tractions/regularisation.h"
-#include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/results.h"
 
 namespace mbtfm::tractions {
 

@@ -10,6 +10,7 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/numerics/memory.h"
+#include "substrate/greens/wave.h"
 
 namespace mbtfm::tractions {
 

@@ -8,7 +8,6 @@
 
 #include "mbtfm/tractions/surface_spectrum.h"
 #include "pipeline/contract/beads.h"
-#include "substrate/greens/wave.h"
 
 namespace mbtfm::tractions {
 

@@ -3,7 +3,6 @@
 
 #include "pipeline/contract/gel.h"
 #include "pipeline/numerics/waves.h"
-#include "substrate/greens/wave.h"
 
 namespace mbtfm::tractions {
 

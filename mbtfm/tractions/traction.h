@@ -5,63 +5,18 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/tractions/lattice_problem.h"
+#include "mbtfm/tractions/parameters.h"
 #include "mbtfm/tractions/regularisation.h"
+#include "pipeline/contract/beads.h"
 #include "pipeline/contract/cell.h"
+#include "pipeline/contract/figures.h"
+#include "pipeline/contract/gel.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/files/named_array.h"
-#include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::tractions {
-
-enum class TractionMethod {
-  // beads of a flat surface, displaced along it
-  fttc,
-  sparse,
-  trpf,
-  bem,
-  adhesion_forces,
-  // beads in space: mbtfm/spatial
-  tikhonov,   ///< one lambda for all
-  group_l1,   ///< zero in most places
-  patches,    ///< a force on each adhesion, and a weak background
-  adjoint,    ///< the equations of tikhonov, by its adjoint
-  direct,     ///< the displacement measured is imposed on the surface
-  green,      ///< even tractions on facets
-  thesis_cg,  ///< the minimum of tikhonov, by the thesis' minimiser
-};
-constexpr auto words(TractionMethod) {
-  return std::array{"fttc",     "sparse",  "trpf",    "bem",    "adhesion-forces", "tikhonov",
-                    "group-l1", "patches", "adjoint", "direct", "green",           "thesis-cg"};
-}
-
-/// How the tractions of a lattice are read out.
-enum class ReadOut {
-  cells,  ///< their mean over the cell around each node: sums of traction times area are forces
-  points  ///< at the nodes, as Butler et al. 2002
-};
-constexpr auto words(ReadOut) { return std::array{"cells", "points"}; }
-
-struct TractionParameters {
-  /// Unset: fttc; of beads in space group-l1 where there are adhesions, else tikhonov.
-  std::optional<TractionMethod> method;
-  GelModel gel_model = GelModel::layer;               ///< gels are some tens of um thick: a cell feels the base
-  LambdaCriterion lambda_by = LambdaCriterion::risk;  ///< aims at the tractions; the others at the displacements
-  std::optional<double> lambda_um_per_kPa;            ///< fixed instead
-  std::optional<double> spacing_um;                   ///< of the lattice
-  double padding = 1.5;  ///< neighbours' images half a field away: their dipole fields are small
-  ReadOut read_out = ReadOut::cells;
-  double gaussian_um = 0;  ///< regularisation smooths already
-  double element_um = 2;   ///< bem: the finest that some 10 000 beads of 20 nm noise tell apart
-  double grow_um = 1.5;    ///< smoothed tractions spill over an adhesion's rim by about that
-  // adhesion-forces: errors of an ellipse whose effect on its force is reported, as segmentations have them
-  double shift_error_um = 0.3;
-  double size_error = 0.2;
-  double angle_error_deg = 10;
-};
-void declare(stage::ParameterList& list, TractionParameters& parameters);
 
 struct TractionInputs {
   DisplacementField beads;  ///< without the flagged ones

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,7 +17,6 @@
 #include "network/contractile.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/network.h"
-#include "pipeline/contract/polyline.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/stage/parameters_fwd.h"
 

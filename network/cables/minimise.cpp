@@ -3,6 +3,7 @@
 #include <limits>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 namespace mbtfm::cables {
 namespace {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "network/mesh/polyline.h"
+#include "pipeline/contract/polyline.h"
 #include "pipeline/numerics/neighbour_bins.h"
 
 namespace mbtfm::mesh {

@@ -13,6 +13,7 @@
 #include "network/mesh/polyline.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
+#include "pipeline/contract/polyline.h"
 #include "pipeline/numerics/memory.h"
 #include "pipeline/numerics/neighbour_bins.h"
 

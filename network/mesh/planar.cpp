@@ -7,6 +7,7 @@
 #include <numeric>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "network/mesh/polyline.h"
 #include "pipeline/numerics/neighbour_bins.h"

@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/contract/polyline.h"
+
 namespace mbtfm::mesh {
 
 Polyline simplified(const Polyline& points_um, double tolerance_um) {

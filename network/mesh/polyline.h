@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "network/mesh/size_field.h"
-#include "pipeline/contract/polyline.h"
 
 namespace mbtfm::mesh {
 

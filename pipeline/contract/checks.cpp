@@ -8,6 +8,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/network.h"
+#include "pipeline/contract/surface.h"
 
 namespace mbtfm {
 

@@ -4,10 +4,11 @@
 #include <memory>
 #include <optional>
 
-#include "pipeline/contract/surface.h"
 #include "pipeline/contract/words.h"
 
 namespace mbtfm {
+
+struct HeightMap;  // surface.h
 
 struct Gel {
   double youngs_modulus_kPa = 0;

@@ -1,12 +1,14 @@
 /// What a long computation may take, and whom it tells how far it has come.
 #pragma once
 
+#include <functional>
 #include <string_view>
 #include <utility>
 
-#include "pipeline/contract/progress.h"
-
 namespace mbtfm {
+
+/// Told how far a long work has come (0 to 1) and with what; may throw to cancel. May be empty.
+using Progress = std::function<void(double fraction, std::string_view what)>;
 
 struct Work {
   /// Threads alone are work, too.

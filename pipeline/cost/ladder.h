@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "pipeline/contract/cell_kind.h"
-#include "pipeline/runner/settings.h"
+#include "pipeline/runner/stages.h"
 
 namespace mbtfm::cost {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/runner/settings.h"
+#include "pipeline/runner/stages.h"
 
 namespace mbtfm::cost {
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "pipeline/contract/cell.h"
+#include "pipeline/contract/fit_summary.h"
 #include "pipeline/contract/path.h"
-#include "pipeline/contract/results.h"
 
 namespace mbtfm::files {
 

@@ -1,5 +1,7 @@
 #include "pipeline/files/json.h"
 
+#include <nlohmann/json.hpp>
+
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/files/names.h"

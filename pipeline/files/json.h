@@ -1,7 +1,7 @@
 /// Figures, effects and findings as JSON. Inside pipeline/ only.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "pipeline/contract/effects.h"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/own_files.h"
@@ -40,6 +41,11 @@ std::string kind_of(const Json& value) {
 }
 
 }  // namespace
+
+struct JsonRecord::File {
+  std::string name, kind, hint;
+  Json json;
+};
 
 JsonRecord::JsonRecord(const std::filesystem::path& file, std::string kind, std::string hint) {
   File whole{.name = file.string(), .kind = std::move(kind), .hint = std::move(hint), .json = {}};

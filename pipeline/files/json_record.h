@@ -3,7 +3,7 @@
 
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -51,10 +51,7 @@ class JsonRecord {
   [[noreturn]] void fail(const std::string& expected) const;
 
  private:
-  struct File {
-    std::string name, kind, hint;
-    Json json;
-  };
+  struct File;
   JsonRecord(std::shared_ptr<const File> file, const Json& value, std::string place)
       : file_(std::move(file)), value_(&value), place_(std::move(place)) {}
   JsonRecord child(const std::string& key, const Json& value) const;

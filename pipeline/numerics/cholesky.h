@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pipeline/numerics/block_cholesky.h"
+#include "pipeline/numerics/precision.h"
 
 namespace mbtfm::numerics {
 
@@ -26,11 +27,6 @@ class NodalColumn {
   std::size_t stride_;
   const std::vector<int>* place_;
 };
-
-/// How the numbers of the factor are kept. `single_`: 7 digits, of which the condition of the matrix takes its share;
-/// half the memory, nearly twice the speed.
-enum class Precision { single_, double_ };
-constexpr auto words(Precision) { return std::array{"single", "double"}; }
 
 struct FactorOptions {
   int threads = 1;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/json_record.h"

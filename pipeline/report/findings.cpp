@@ -11,8 +11,10 @@
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/stage_state.h"
+#include "pipeline/report/compare.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
+#include "pipeline/report/results.h"
 #include "pipeline/report/tension_plot.h"
 #include "pipeline/report/tension_table.h"
 

@@ -5,9 +5,10 @@
 #include <vector>
 
 #include "pipeline/report/provenance.h"
-#include "pipeline/report/results.h"
 
 namespace mbtfm::report {
+
+struct CellResults;
 
 /// The section of a cell's report: sentences on what was found, the open findings with their remedies, a tick where
 /// none is open, and the notes.

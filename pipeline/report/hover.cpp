@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/report/numbers.h"
+#include "pipeline/report/results.h"
 #include "pipeline/report/tension_plot.h"
 
 namespace mbtfm::report {

@@ -3,9 +3,11 @@
 
 #include <string>
 
-#include "pipeline/report/results.h"
+#include "pipeline/contract/cell.h"
 
 namespace mbtfm::report {
+
+struct CellResults;
 
 /// Id, type, tension with its 95 % interval, length, adhesions.
 std::string hover_of(const Fibre& fibre, const CellResults& results);

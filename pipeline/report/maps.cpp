@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "pipeline/contract/beads.h"
+#include "pipeline/contract/network.h"
 #include "pipeline/contract/polyline.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/text.h"
@@ -15,6 +17,7 @@
 #include "pipeline/report/hover.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
+#include "pipeline/report/results.h"
 #include "pipeline/report/tension_plot.h"
 
 namespace mbtfm::report {

@@ -5,9 +5,10 @@
 #include <vector>
 
 #include "pipeline/charts/chart.h"
-#include "pipeline/report/results.h"
 
 namespace mbtfm::report {
+
+struct CellResults;
 
 /// A map and what must be known to read it.
 struct Figure {

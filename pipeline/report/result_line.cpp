@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"

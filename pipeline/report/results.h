@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/contract/beads.h"
+#include "pipeline/contract/fit_summary.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/network.h"
 #include "pipeline/contract/path.h"

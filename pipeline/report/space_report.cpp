@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/contract/kinds_of_findings.h"
+#include "pipeline/contract/results.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/json.h"

@@ -1,5 +1,7 @@
 #include "pipeline/report/space_results.h"
 
+#include <nlohmann/json.hpp>
+
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 
+#include "pipeline/report/compare.h"
 #include "pipeline/report/hover.h"
 #include "pipeline/report/numbers.h"
+#include "pipeline/report/results.h"
 
 namespace mbtfm::report {
 namespace {

@@ -5,9 +5,12 @@
 #include <string>
 
 #include "pipeline/charts/chart.h"
-#include "pipeline/report/results.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/results.h"
 
 namespace mbtfm::report {
+
+struct CellResults;
 
 /// One row a fibre, by type, the strongest first.
 charts::Chart tension_plot(const CellResults& results);

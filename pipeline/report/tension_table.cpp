@@ -6,7 +6,9 @@
 #include <cmath>
 
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/report/compare.h"
 #include "pipeline/report/numbers.h"
+#include "pipeline/report/results.h"
 #include "pipeline/report/tension_plot.h"
 
 namespace mbtfm::report {

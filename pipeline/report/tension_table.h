@@ -4,9 +4,10 @@
 #include <string>
 
 #include "pipeline/report/page.h"
-#include "pipeline/report/results.h"
 
 namespace mbtfm::report {
+
+struct CellResults;
 
 /// A row for the actin network, then one a fibre in the order of the plot.
 Table tension_table(const CellResults& results);

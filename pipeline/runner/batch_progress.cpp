@@ -1,6 +1,7 @@
 #include "pipeline/runner/batch_progress.h"
 
 #include <iomanip>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "pipeline/files/json.h"

@@ -10,7 +10,6 @@
 #include "pipeline/contract/stage_state.h"
 #include "pipeline/runner/hash_cache.h"
 #include "pipeline/runner/images.h"
-#include "pipeline/runner/settings.h"
 #include "pipeline/runner/stages.h"
 
 namespace mbtfm::runner {

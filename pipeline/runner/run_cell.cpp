@@ -15,6 +15,8 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
+#include "pipeline/runner/settings.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm::runner {

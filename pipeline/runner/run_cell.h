@@ -8,7 +8,6 @@
 
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/record.h"
-#include "pipeline/runner/settings.h"
 #include "pipeline/runner/told.h"
 
 namespace mbtfm::runner {

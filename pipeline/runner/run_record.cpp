@@ -13,6 +13,7 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/record.h"
+#include "pipeline/runner/run_cell.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;

@@ -1,11 +1,15 @@
 /// run.json: how all that is in a cell folder came about.
 #pragma once
 
+#include <array>
 #include <filesystem>
-
-#include "pipeline/runner/run_cell.h"
+#include <optional>
+#include <string>
 
 namespace mbtfm::runner {
+
+struct CellOutcome;
+struct RunOptions;
 
 /// How a run ended.
 enum class RunOutcome { done, failed, unfinished };

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/stage_state.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/json_record.h"
@@ -12,6 +13,8 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/runner/record.h"
+#include "pipeline/runner/run_cell.h"
 #include "pipeline/runner/run_record.h"
 
 namespace mbtfm::runner {

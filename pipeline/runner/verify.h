@@ -2,12 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
-#include "pipeline/runner/run_cell.h"
-
 namespace mbtfm::runner {
+
+struct RunOptions;
 
 struct Verification {
   int n_files = 0;

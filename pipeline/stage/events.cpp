@@ -1,5 +1,7 @@
 #include "pipeline/stage/events.h"
 
+#include <nlohmann/json.hpp>
+
 #include "pipeline/files/json.h"
 
 namespace mbtfm::stage {

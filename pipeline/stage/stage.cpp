@@ -22,6 +22,7 @@
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/events.h"
 #include "pipeline/stage/manual.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stopwatch.h"
 #include "pipeline/stage/suggest.h"
 

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/progress.h"
 #include "pipeline/contract/stage_report.h"
-#include "pipeline/stage/parameters.h"
+#include "pipeline/contract/work.h"
+#include "pipeline/stage/parameters_fwd.h"
 #include "pipeline/stage/plausible.h"
 
 namespace mbtfm::stage {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/files/csv_files.h"
+#include "pipeline/contract/path.h"
 
 namespace mbtfm::statistics {
 

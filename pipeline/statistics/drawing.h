@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {

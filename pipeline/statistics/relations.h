@@ -6,9 +6,11 @@
 #include <vector>
 
 #include "pipeline/statistics/bootstrap.h"
-#include "pipeline/statistics/study.h"
+#include "pipeline/statistics/directions.h"
 
 namespace mbtfm::statistics {
+
+struct Study;
 
 /// A force of the cells against a measure of their size, with a line through the origin (thesis figs. 3.11, 3.12, A.1,
 /// A.2).

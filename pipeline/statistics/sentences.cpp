@@ -5,6 +5,7 @@
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/report/page.h"
+#include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {

@@ -10,6 +10,7 @@
 #include "pipeline/contract/findings.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/json.h"

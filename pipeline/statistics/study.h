@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/cell_kind.h"
 #include "pipeline/contract/findings.h"
+#include "pipeline/contract/fit_summary.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/contract/sheet_results.h"

@@ -5,9 +5,12 @@
 #include <utility>
 
 #include "pipeline/charts/chart.h"
-#include "pipeline/statistics/analysis.h"
+#include "pipeline/contract/path.h"
+#include "pipeline/statistics/study.h"
 
 namespace mbtfm::statistics {
+
+struct Analysis;
 
 /// Every table with the name of its file.
 std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, const Analysis& analysis);

@@ -10,6 +10,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
+#include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {

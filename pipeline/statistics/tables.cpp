@@ -7,6 +7,7 @@
 #include "pipeline/files/sheet_files.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {

@@ -6,6 +6,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/parameters.h"
+#include "samples/colonies/colony.h"
 #include "samples/drawing/raster.h"
 #include "samples/drawing/render.h"
 

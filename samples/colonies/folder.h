@@ -1,10 +1,14 @@
 /// Writes a colony as a cell folder.
 #pragma once
 
-#include "samples/colonies/colony.h"
+#include "continuum/sheet/forward.h"
+#include "continuum/sheet/parameters.h"
+#include "samples/colonies/parameters.h"
 #include "samples/experiment/cell_folder.h"
 
 namespace mbtfm::colonies {
+
+struct Colony;
 
 /// Everything that a scenario with a colony says.
 struct Whole {

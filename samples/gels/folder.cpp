@@ -9,7 +9,9 @@
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/stage/parameters.h"
+#include "samples/drawing/psf.h"
 #include "samples/drawing/random.h"
+#include "samples/drawing/stack.h"
 
 namespace mbtfm::gels {
 namespace {

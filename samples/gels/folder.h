@@ -4,9 +4,8 @@
 #include <filesystem>
 #include <functional>
 
-#include "pipeline/contract/progress.h"
+#include "pipeline/contract/work.h"
 #include "samples/drawing/scenario.h"
-#include "samples/drawing/stack.h"
 #include "samples/gels/scene.h"
 
 namespace mbtfm::gels {

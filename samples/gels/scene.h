@@ -8,8 +8,8 @@
 
 #include "pipeline/contract/beads_in_space.h"
 #include "pipeline/contract/gel.h"
-#include "pipeline/contract/progress.h"
 #include "pipeline/contract/surface.h"
+#include "pipeline/contract/work.h"
 #include "pipeline/stage/parameters_fwd.h"
 #include "samples/gels/field.h"
 

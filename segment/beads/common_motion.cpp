@@ -9,6 +9,8 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/stopwatch.h"
+#include "segment/beads/at_rest.h"
+#include "segment/beads/far_field.h"
 #include "segment/beads/plane.h"
 
 namespace mbtfm::beads {

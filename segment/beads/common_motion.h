@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "pipeline/contract/effects.h"
-#include "segment/beads/far_field.h"
 #include "segment/beads/track.h"
 
 namespace mbtfm::beads {

@@ -3,7 +3,6 @@
 
 #include <optional>
 
-#include "segment/beads/plane.h"
 #include "segment/beads/registration.h"
 
 namespace mbtfm::beads {

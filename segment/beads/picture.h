@@ -1,6 +1,7 @@
 /// The two bead images on each other, for the eye.
 #pragma once
 
+#include "pipeline/contract/geometry.h"
 #include "segment/images/image.h"
 #include "segment/images/png.h"
 

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
-#include "segment/cells/trace.h"
 
 namespace mbtfm::cells {
 

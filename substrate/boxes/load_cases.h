@@ -4,7 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include "substrate/boxes/elastic_system.h"
+#include "pipeline/numerics/cholesky.h"
+#include "substrate/boxes/block_mesh.h"
 
 namespace mbtfm::boxes {
 

@@ -6,6 +6,7 @@
 
 #include "substrate/boxes/ellipse_load.h"
 #include "substrate/ellipse.h"
+#include "substrate/scene.h"
 
 namespace mbtfm::boxes {
 namespace {

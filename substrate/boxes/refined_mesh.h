@@ -2,6 +2,7 @@
 #pragma once
 
 #include "substrate/boxes/block_mesh.h"
+#include "substrate/ellipse.h"
 #include "substrate/material.h"
 #include "substrate/scene.h"
 

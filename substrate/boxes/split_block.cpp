@@ -4,6 +4,7 @@
 
 #include "pipeline/numerics/quadrature.h"
 #include "substrate/models.h"
+#include "substrate/scene.h"
 
 namespace mbtfm::boxes {
 namespace {

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "substrate/boxes/elastic_system.h"
+#include "substrate/compliance.h"
 #include "substrate/scene.h"
 
 namespace mbtfm::boxes {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "substrate/boxes/elastic_system.h"
+#include "substrate/compliance.h"
 
 namespace mbtfm::boxes {
 

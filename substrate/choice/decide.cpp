@@ -7,6 +7,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/surface.h"
 #include "substrate/choice/factory.h"
 #include "substrate/greens/layer.h"
 #include "substrate/material.h"

@@ -10,6 +10,7 @@
 #include "pipeline/contract/kinds_of_effects.h"
 #include "substrate/choice/factory.h"
 #include "substrate/effects.h"
+#include "substrate/loads.h"
 #include "substrate/material.h"
 
 namespace mbtfm::choice {

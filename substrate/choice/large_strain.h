@@ -7,7 +7,6 @@
 #include <memory>
 
 #include "substrate/compliance.h"
-#include "substrate/loads.h"
 #include "substrate/response.h"
 
 namespace mbtfm::choice {

@@ -11,7 +11,6 @@
 #include <optional>
 
 #include "pipeline/contract/gel.h"
-#include "substrate/curved/linear.h"
 #include "substrate/curved/models.h"
 
 namespace mbtfm::curved {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "pipeline/numerics/parallel.h"
+#include "substrate/compliance.h"
 #include "substrate/greens/half_space.h"
 #include "substrate/greens/inside.h"
 #include "substrate/greens/wave.h"

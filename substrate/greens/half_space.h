@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "pipeline/contract/gel.h"
 #include "substrate/ellipse.h"
 
 namespace mbtfm::greens {

@@ -22,6 +22,7 @@
 #include <array>
 #include <vector>
 
+#include "pipeline/contract/gel.h"
 #include "substrate/ellipse.h"
 
 namespace mbtfm::greens {

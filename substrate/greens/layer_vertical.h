@@ -12,7 +12,8 @@
 
 #include <vector>
 
-#include "substrate/greens/half_space.h"
+#include "pipeline/contract/gel.h"
+#include "substrate/ellipse.h"
 
 namespace mbtfm::greens {
 

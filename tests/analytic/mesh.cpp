@@ -9,6 +9,7 @@
 #include "network/mesh/mesh.h"
 #include "network/mesh/polyline.h"
 #include "network/mesh/triangulation.h"
+#include "pipeline/contract/polyline.h"
 #include "tests/support/valid_network.h"
 
 namespace mbtfm::mesh {

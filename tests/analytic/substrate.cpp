@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <sstream>
+#include <utility>
 
 #include "pipeline/numerics/quadrature.h"
 #include "substrate/greens/layer.h"

@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/numbers.h"
 #include "substrate/choice/factory.h"
+#include "substrate/loads.h"
 #include "substrate/material.h"
 
 namespace mbtfm::choice {

@@ -12,6 +12,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "substrate/choice/large_strain.h"
+#include "substrate/curved/linear.h"
 #include "substrate/curved/surface_loads.h"
 #include "tests/support/cubed_sphere.h"
 #include "tests/support/field_under_a_surface.h"

@@ -5,6 +5,7 @@
 
 #include "pipeline/files/base64.h"
 #include "pipeline/report/report.h"
+#include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
 #include "tests/support/browser.h"
 #include "tests/support/fake_cell.h"

@@ -1,6 +1,7 @@
 /// The executables that reconstruct tractions and compare them with the fit.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <random>
 
 #include "mbtfm/tractions/traction.h"

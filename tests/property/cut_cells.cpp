@@ -6,8 +6,11 @@
 #include <sstream>
 
 #include "mbtfm/tensions/findings.h"
+#include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
+#include "samples/drawing/scenario.h"
+#include "samples/experiment/experiment.h"
 #include "tests/support/cut_cell.h"
 
 namespace mbtfm {

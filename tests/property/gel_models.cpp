@@ -3,6 +3,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "substrate/choice/factory.h"
+#include "substrate/loads.h"
 #include "substrate/response.h"
 #include "tests/support/substrate_scene.h"
 

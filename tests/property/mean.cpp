@@ -7,6 +7,7 @@
 
 #include "continuum/mean/align.h"
 #include "continuum/mean/images.h"
+#include "continuum/mean/symmetry.h"
 #include "pipeline/contract/errors.h"
 #include "substrate/greens/half_space.h"
 

@@ -10,6 +10,7 @@
 #include "mbtfm/plan/drawn.h"
 #include "mbtfm/plan/space_drawn.h"
 #include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"

@@ -6,6 +6,7 @@
 #include <functional>
 #include <random>
 
+#include "mbtfm/fit/data_of_beads.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "substrate/choice/factory.h"
 #include "tests/support/findings.h"

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "substrate/greens/models.h"
+#include "substrate/loads.h"
 #include "tests/support/substrate_scene.h"
 
 namespace mbtfm::substrate {

@@ -10,6 +10,7 @@
 
 #include "mbtfm/plan/cell_numbers.h"
 #include "pipeline/files/csv.h"
+#include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
 #include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"

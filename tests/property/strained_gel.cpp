@@ -8,9 +8,11 @@
 #include <random>
 #include <utility>
 
+#include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "substrate/choice/factory.h"
 #include "substrate/choice/large_strain.h"
+#include "substrate/loads.h"
 #include "substrate/material.h"
 
 namespace mbtfm::fit {

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <random>
 
+#include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/foresight.h"
 #include "mbtfm/spatial/neighbours.h"
 #include "mbtfm/spatial/refine.h"
+#include "mbtfm/spatial/rows.h"
 #include "mbtfm/tractions/recurrences.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/findings.h"

@@ -9,6 +9,7 @@
 #include "pipeline/contract/errors.h"
 #include "substrate/choice/factory.h"
 #include "substrate/choice/large_strain.h"
+#include "substrate/loads.h"
 #include "substrate/response.h"
 #include "substrate/surface/beads.h"
 #include "substrate/surface/formula.h"

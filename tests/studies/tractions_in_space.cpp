@@ -17,8 +17,10 @@
 #include <numbers>
 #include <string>
 
+#include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/spatial/refine.h"
+#include "mbtfm/tractions/traction.h"
 #include "substrate/choice/factory.h"
 #include "substrate/surface/beads.h"
 #include "tests/support/traction_scene.h"

@@ -9,13 +9,12 @@
 
 #include "mbtfm/tensions/beyond_cut.h"
 #include "mbtfm/tensions/common_motion.h"
-#include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/ensemble.h"
 #include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
-#include "samples/experiment/experiment.h"
 #include "segment/cells/hand_drawn.h"
 #include "substrate/greens/models.h"
-#include "substrate/response.h"
+#include "substrate/loads.h"
 
 namespace mbtfm::test {
 

@@ -6,7 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "mbtfm/spatial/reconstruction.h"
+#include "mbtfm/spatial/observed.h"
+#include "mbtfm/spatial/problem.h"
 #include "substrate/greens/inside.h"
 
 namespace mbtfm::test {

@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "pipeline/numerics/quadrature.h"
 #include "substrate/greens/half_space.h"

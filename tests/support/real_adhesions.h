@@ -10,6 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/cell.h"
+#include "segment/cells/adhesions.h"
+#include "segment/cells/outline.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/folders.h"
 #include "tests/support/segmentation_score.h"

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/files/hash.h"
-#include "pipeline/runner/record.h"
+#include "pipeline/runner/stages.h"
 #include "tests/support/fake_cell.h"
 
 namespace mbtfm::test {

@@ -13,6 +13,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/runner/settings.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::cost {

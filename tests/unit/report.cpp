@@ -15,6 +15,7 @@
 #include "pipeline/report/findings.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/result_line.h"
+#include "pipeline/report/results.h"
 #include "pipeline/report/stage_page.h"
 #include "pipeline/report/tension_table.h"
 #include "tests/support/fake_cell.h"

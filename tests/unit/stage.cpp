@@ -15,6 +15,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/manual.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/stage/suggest.h"
 #include "tests/support/findings.h"
 #include "tests/support/temporary_folder.h"
