@@ -283,7 +283,6 @@ class Builder {
     }
     std::sort(knots.begin(), knots.end());
     const int fewest = knots.size() == 1 ? 6 : knots.size() == 2 ? 2 : 1;  // a closed line needs three vertices
-    const double jitter = parameters_.seeds == Seeds::regular ? 0 : kBoundaryJitter;
     Chain chain{.is_closed = true};
     for (std::size_t i = 0; i < knots.size(); ++i) {
       const Knot& knot = knots[i];
@@ -292,7 +291,7 @@ class Builder {
       const double arc = next.s_um - knot.s_um + (i + 1 == knots.size() ? curve.length_um() : 0);
       const auto size_at = [&](double along) { return frame_.size.at(curve.at(knot.s_um + along)); };
       for (double along : even_division_um(arc, size_at, fewest)) {
-        along += random_.uniform(-jitter, jitter) * std::min(size_at(along), arc / fewest);
+        along += random_.uniform(-kBoundaryJitter, kBoundaryJitter) * std::min(size_at(along), arc / fewest);
         const Vec2 drawn = drawn_along(knot, along) + drawn_along(next, arc - along);
         const double s = knot.s_um + along;
         chain.vertices.push_back(drawn == Vec2{} ? sliding_vertex(ring, s)

@@ -130,9 +130,6 @@ void declare(stage::ParameterList& list, NetworkParameters& parameters) {
   list.add("edge_growth", parameters.edge_growth, Range{.low = 0.05, .high = 1},
            "growth of the cables' length with the distance from what is resolved finer (um per um)");
   list.add("seed", parameters.seed, "random seed of the vertices' first positions");
-  list.add("seeds", parameters.seeds,
-           "first positions of the vertices: on a lattice (regular), moved off it at random (jittered), or at random "
-           "(poisson)");
   list.add(
       "link_weights", parameters.link_weights,
       "tension and stiffness of the actin network's links: the same for all, or by the width of material that each "
@@ -155,7 +152,7 @@ GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& par
   Random random(parameters.seed);
   const Boundary boundary(cell, parameters.edge_length_um);
   const Frame frame = build_frame(cell, boundary, parameters, random);
-  const RelaxedMesh mesh = fill_and_relax(frame, boundary, parameters.seeds, random);
+  const RelaxedMesh mesh = fill_and_relax(frame, boundary, random);
 
   GeneratedNetwork result;
   result.report = mesh.report;

@@ -28,6 +28,9 @@ const std::vector<std::string> kMoreOfGel = {"radius_um"};
 /// The keys above the first table.
 constexpr std::array kRootKeys = {"pixel_size_um"};
 
+/// Keys up to version 0.2 that are constants now: nobody set them.
+constexpr std::array kDeletedKeys = {"seeds"};
+
 template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
@@ -138,6 +141,8 @@ std::string spelled(const toml::node& node, const std::string& where) {
 
 /// @param list  of the stage, whose keys of other tables may be meant
 std::string unknown_key_hint(const ParameterList& list, const std::vector<std::string>& known, std::string_view key) {
+  if (std::ranges::find(kDeletedKeys, key) != kDeletedKeys.end())
+    return "this version computes as its default did and has no such key: take the line out (CHANGELOG.md)";
   const std::string closest = nearest(known, key);
   if (!closest.empty() && is_alike(closest, key)) return did_you_mean(closest);
   if (std::ranges::find(kMoreOfGel, key) != kMoreOfGel.end()) return "it belongs under [gel]";
