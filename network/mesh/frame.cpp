@@ -56,7 +56,7 @@ class Builder {
         frame_{.size = SizeField(edge_, parameters.edge_growth, cell.outline_um)} {}
 
   Frame build() {
-    refine_where_wanted();
+    if (has_rims()) refine_at_rims();
     expect_room_for_mesh(frame_.size, boundary_);
     add_adhesions();
     for (const Fibre& fibre : cell_.fibres) add_fibre(fibre);
@@ -78,16 +78,10 @@ class Builder {
     return std::min(edge_, perimeter_um(adhesion) / parameters_.rim_points);
   }
 
-  void refine_where_wanted() {
+  void refine_at_rims() {
     for (const Adhesion& a : cell_.adhesions) {
-      if (!has_rims()) break;
       const Polygon rim = rim_um(a, rim_edge_um(a));
       for (std::size_t i = 0; i < rim.size(); i += 2) frame_.size.refine(rim[i], rim_edge_um(a));
-    }
-    for (const Fibre& f : cell_.fibres) {
-      if (parameters_.free_fibre_ends != FreeFibreEnds::width) break;
-      if (!f.start_adhesion_id) frame_.size.refine(f.points_um.front(), f.width_um);
-      if (!f.end_adhesion_id) frame_.size.refine(f.points_um.back(), f.width_um);
     }
   }
 

@@ -142,8 +142,6 @@ void declare(stage::ParameterList& list, NetworkParameters& parameters) {
            "or the one at its centre");
   list.add("rim_points", parameters.rim_points, Range::between(3, 1000),
            "least number of vertices around an adhesion's rim");
-  list.add("free_fibre_ends", parameters.free_fibre_ends,
-           "length of the cables at the free end of a fibre: as elsewhere (point), or the fibre's width (width)");
 }
 
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters) {

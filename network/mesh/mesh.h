@@ -27,9 +27,6 @@ constexpr auto words(LinkReach) { return std::array{"neighbours", "second-neighb
 enum class AdhesionAnchor { rim, ellipse, centre };
 constexpr auto words(AdhesionAnchor) { return std::array{"rim", "ellipse", "centre"}; }
 
-enum class FreeFibreEnds { point, width };
-constexpr auto words(FreeFibreEnds) { return std::array{"point", "width"}; }
-
 struct NetworkParameters {
   double edge_length_um = 1.5;  ///< mean cable length: about the spacing of the bundles one can resolve
   double edge_growth = 0.3;     ///< of the edge length with distance from what is resolved finer
@@ -38,7 +35,6 @@ struct NetworkParameters {
   LinkReach link_reach = LinkReach::second_neighbours;
   AdhesionAnchor adhesion_anchor = AdhesionAnchor::ellipse;
   int rim_points = 8;  ///< round an adhesion, at least: an octagon shows which way it is long
-  FreeFibreEnds free_fibre_ends = FreeFibreEnds::point;
 };
 void declare(stage::ParameterList& list, NetworkParameters& parameters);
 
