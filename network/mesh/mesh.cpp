@@ -127,8 +127,6 @@ void expect_room_for_even_mesh(const Cell& cell, const NetworkParameters& parame
 void declare(stage::ParameterList& list, NetworkParameters& parameters) {
   list.table("network");
   list.add("edge_length_um", parameters.edge_length_um, Range::mesh_um(), "mean length of the network's cables (um)");
-  list.add("edge_growth", parameters.edge_growth, Range{.low = 0.05, .high = 1},
-           "growth of the cables' length with the distance from what is resolved finer (um per um)");
   list.add("seed", parameters.seed, "random seed of the vertices' first positions");
   list.add(
       "link_weights", parameters.link_weights,

@@ -29,7 +29,6 @@ constexpr auto words(AdhesionAnchor) { return std::array{"rim", "ellipse", "cent
 
 struct NetworkParameters {
   double edge_length_um = 1.5;  ///< mean cable length: about the spacing of the bundles one can resolve
-  double edge_growth = 0.3;     ///< of the edge length with distance from what is resolved finer
   std::uint64_t seed = 1;       ///< of the first placement of the vertices
   LinkWeights link_weights = LinkWeights::width;
   LinkReach link_reach = LinkReach::second_neighbours;

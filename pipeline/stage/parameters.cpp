@@ -29,7 +29,7 @@ const std::vector<std::string> kMoreOfGel = {"radius_um"};
 constexpr std::array kRootKeys = {"pixel_size_um"};
 
 /// Keys up to version 0.2 that are constants now: nobody set them.
-constexpr std::array kDeletedKeys = {"seeds", "free_fibre_ends"};
+constexpr std::array kDeletedKeys = {"seeds", "free_fibre_ends", "edge_growth"};
 
 template <class... F>
 struct Overloaded : F... {
