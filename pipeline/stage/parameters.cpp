@@ -29,7 +29,17 @@ const std::vector<std::string> kMoreOfGel = {"radius_um"};
 constexpr std::array kRootKeys = {"pixel_size_um"};
 
 /// Keys up to version 0.2 that are constants now: nobody set them.
-constexpr std::array kDeletedKeys = {"seeds", "free_fibre_ends", "edge_growth"};
+constexpr std::array kDeletedKeys = {"seeds",
+                                     "free_fibre_ends",
+                                     "edge_growth",
+                                     "adhesion_level_radius_um",
+                                     "adhesion_blur_um",
+                                     "fibre_edge_height",
+                                     "fibre_side_ratio",
+                                     "fibre_simplify_um",
+                                     "outline_smoothing_um",
+                                     "outline_band_um",
+                                     "outline_spacing_um"};
 
 template <class... F>
 struct Overloaded : F... {

@@ -36,6 +36,8 @@ std::vector<Patch> patches_of(const cv::Mat& labels, int margin) {
 /// The greatest of the noisy heights near a place lies above the adhesion's own: by 1.3 standard deviations for five
 /// independent ones, and by half more as bright pixels have more shot noise than the ground.
 constexpr double kLift = 2;
+/// Of the reference height of a rim: three deviations of the blur, so that a bright neighbour further off is none.
+constexpr double kLevelRadius_um = 0.4;
 
 /// Height above the rim's level, positive inside: the level is a share of the greatest height near, within the region.
 cv::Mat excess_over_rim(const Contrast& c, const cv::Mat& labels, const Patch& patch, double radius_px,
@@ -108,7 +110,7 @@ bool reaches_seed(const std::vector<CoveredPixel>& pixels, const cv::Mat& seeds)
 std::vector<std::vector<CoveredPixel>> adhesion_parts(const Contrast& c, double pixel_size_um,
                                                       const AdhesionParameters& p) {
   const cv::Mat seeds = above(c, p.adhesion_seed_noise) & (c.height > c.least_seed);
-  const double pixel_um2 = pixel_size_um * pixel_size_um, radius_px = p.adhesion_level_radius_um / pixel_size_um;
+  const double pixel_um2 = pixel_size_um * pixel_size_um, radius_px = kLevelRadius_um / pixel_size_um;
   const SplitRule rule{.depth = p.adhesion_split_depth, .smallest_px = p.adhesion_smallest_um2 / pixel_um2 / 2};
   const cv::Mat labels = split_regions(c.height, c.noise, above(c, p.adhesion_rim_noise), rule);
   std::vector<std::vector<CoveredPixel>> result;

@@ -116,7 +116,7 @@ CellOutline outline_of(const LabelMask& mask, int label, const Field& field, con
   rings.erase(largest);
   CellOutline cell;
   cell.area_um2 = (signed_area_um2(outer) + 0.5) * pixel_um * pixel_um;
-  const int every = every_nth(outer.size(), pixel_um, p.outline_spacing_um);
+  const int every = every_nth(outer.size(), pixel_um, kOutlineSpacing_um);
   CutRing ring = thinned(cut_by_border(in_um(outer, pixel_um), field_um, pixel_um), every, field_um);
   cell.outer_um = std::move(ring.points_um);
   cell.is_cut = std::move(ring.is_cut);
@@ -126,7 +126,7 @@ CellOutline outline_of(const LabelMask& mask, int label, const Field& field, con
     if (!contains(outer, hole_px.front())) continue;
     cell.area_um2 -= area_um2;
     cell.holes_um.push_back(
-        thinned({in_um(hole_px, pixel_um), {}}, every_nth(hole_px.size(), pixel_um, p.outline_spacing_um), field_um)
+        thinned({in_um(hole_px, pixel_um), {}}, every_nth(hole_px.size(), pixel_um, kOutlineSpacing_um), field_um)
             .points_um);
   }
   return cell;

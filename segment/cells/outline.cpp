@@ -13,8 +13,10 @@ namespace mbtfm::cells {
 
 namespace {
 
-constexpr double kSigma_px = 1.5;  // of the smoothing of masks
-constexpr double kGrid_um = 0.4;   // pitch of the masks: a little more than the smoothing
+constexpr double kSigma_px = 1.5;      // of the smoothing of masks
+constexpr double kSmoothing_um = 0.3;  // just above the resolution of light: more would round the cell's corners
+constexpr double kBand_um = 3;         // brightness inside and outside is compared within this distance
+constexpr double kGrid_um = 0.4;       // pitch of the masks: a little more than the smoothing
 
 cv::Mat filled(const cv::Mat& mask) {
   // what cannot be reached from a frame around the image is a cell or a hole in one
@@ -226,21 +228,21 @@ struct Scene {
   double border_um() const { return 1.5 * pixel_um; }
 };
 
-Scene scene_of(const cv::Mat& full, double pixel_size_um, const OutlineParameters& p) {
+Scene scene_of(const cv::Mat& full, double pixel_size_um) {
   Scene s{full, {}, pixel_size_um, pixel_size_um, 0, 0};
   // the rings' last move is made in the full image, so that three pixels a micrometre do here
   const int factor = std::max(1, static_cast<int>(kGrid_um / pixel_size_um));
   s.pixel_um = pixel_size_um * factor;
-  s.band_px = std::max(2.0, p.outline_band_um / s.pixel_um);
+  s.band_px = std::max(2.0, kBand_um / s.pixel_um);
   const cv::Mat small = shrink(full, factor);
-  const double sigma_px = std::max(0.5, p.outline_smoothing_um / s.pixel_um);
+  const double sigma_px = std::max(0.5, kSmoothing_um / s.pixel_um);
   s.smooth = gaussian(small, sigma_px);
   s.noise = overall_noise(small) * noise_gain(sigma_px);
   return s;
 }
 
 /// All cells; holes filled.
-Body cells_in(const Scene& s, double smallest, const OutlineParameters& p) {
+Body cells_in(const Scene& s, double smallest) {
   cv::Mat mask = first_mask(s.smooth, s.noise, smallest);
   if (cv::countNonZero(mask) == 0 || cv::countNonZero(~mask) == 0) return {};
   // two halves of pure noise differ by 1.6 standard deviations
@@ -252,7 +254,7 @@ Body cells_in(const Scene& s, double smallest, const OutlineParameters& p) {
     // less than a pixel in a thousand of the cell: what still changes is noise
     if (cv::countNonZero(before ^ mask) * 1000 < cv::countNonZero(mask)) break;
   }
-  Body body = without_haze(s.smooth, mask, s.pixel_um, p.outline_band_um);
+  Body body = without_haze(s.smooth, mask, s.pixel_um, kBand_um);
   if (cv::countNonZero(body.mask ^ mask) > 0) mask = without_debris(smoothed(body.mask), smallest);
   return {mask, body.soft};
 }
@@ -276,8 +278,8 @@ std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Ad
 
 /// A ring of the mask's grid as the polygon on the image's edge.
 Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const std::vector<Adhesion>& adhesions,
-                   const cv::Mat& soft, const OutlineParameters& p) {
-  const auto points = resampled(ring, p.outline_spacing_um / s.pixel_um);
+                   const cv::Mat& soft) {
+  const auto points = resampled(ring, kOutlineSpacing_um / s.pixel_um);
   Polygon coarse, polygon;
   std::vector<cv::Point2d> full_ring;
   for (const cv::Point2d& point : points) {
@@ -286,7 +288,7 @@ Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const s
   }
   const Vec2 field_um = s.field_um();
   const auto moved = on_edge(s.full, full_ring, movable(coarse, adhesions, s, soft), s.full_pixel_um);
-  for (const cv::Point2d& point : resampled(smoothed_ring(moved, 1), p.outline_spacing_um / s.full_pixel_um)) {
+  for (const cv::Point2d& point : resampled(smoothed_ring(moved, 1), kOutlineSpacing_um / s.full_pixel_um)) {
     const Vec2 at = to_um(point, s.full_pixel_um);
     polygon.push_back({std::clamp(at.x, 0.0, field_um.x), std::clamp(at.y, 0.0, field_um.y)});
   }
@@ -302,13 +304,8 @@ bool is_inside(const Polygon& hole, const Polygon& outer) {
 
 void declare(stage::ParameterList& list, OutlineParameters& p) {
   list.table("segment");
-  list.add("outline_smoothing_um", p.outline_smoothing_um, Range::between(1e-3, 100),
-           "smoothing before the outline is looked for (standard deviation, um)");
-  list.add("outline_band_um", p.outline_band_um, Range::between(1e-3, 100),
-           "distance over which the brightness inside and outside is compared (um)");
   list.add("outline_reach_um", p.outline_reach_um, Range::zero_or_size_um(),
            "an adhesion this far outside still belongs to the cell (um)");
-  list.add("outline_spacing_um", p.outline_spacing_um, Range::mesh_um(), "distance of the outline's points (um)");
   list.add("outline_smallest_um2", p.outline_smallest_um2, Range::area_um2(), "least area of a cell (um²)");
   list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2(), "greatest area of a cell (um²)");
   list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2(),
@@ -317,9 +314,9 @@ void declare(stage::ParameterList& list, OutlineParameters& p) {
 
 CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
                         const OutlineParameters& p) {
-  const Scene s = scene_of(matrix_of(image), pixel_size_um, p);
+  const Scene s = scene_of(matrix_of(image), pixel_size_um);
   const double smallest = s.px_of(p.outline_smallest_um2);
-  auto [mask, soft] = cells_in(s, smallest, p);
+  auto [mask, soft] = cells_in(s, smallest);
   if (mask.empty() || cv::countNonZero(mask) == 0) return {};
   const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
   CellsInImage found;
@@ -331,7 +328,7 @@ CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>&
     cell.is_sheet = each.n_pixels > s.px_of(p.outline_largest_um2);
     const auto rings = rings_of(cell.is_sheet ? part : part & ~holes);
     for (const auto& ring : rings) {
-      const Polygon polygon = polygon_of(s, ring, adhesions, soft, p);
+      const Polygon polygon = polygon_of(s, ring, adhesions, soft);
       if (cell.outer_um.empty()) {
         CutRing cut = cut_by_border(polygon, s.field_um(), s.border_um());
         cell.outer_um = std::move(cut.points_um);
