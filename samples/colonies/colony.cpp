@@ -115,7 +115,7 @@ Contracting::Contracting(const ColonyParameters& colony, const sheet::SheetParam
     return;
   }
   substrate::SubstrateParameters model;
-  model.model = substrate::kind_of(scenario.mechanics.simulation_substrate);
+  model.model = substrate::ModelKind::layer;
   gel_ = greens::make_greens(scenario.gel, model, work.threads);
   scene.size = sheet::size_on_gel(scene.region, scene.material, scenario.gel, scene.adhesion_nN_per_um3);
   if (p.mesh_um) scene.size = sheet::with_edge(scene.size, *p.mesh_um);
