@@ -57,7 +57,7 @@ Polygon follow(std::map<Corner, unsigned>& sides) {
     const auto here = sides.find(at);
     here->second &= ~(1u << direction);
     if (here->second == 0) sides.erase(here);
-    const Corner step = kSteps[static_cast<std::size_t>(direction)];
+    const Corner step = kSteps[direction];
     ring.push_back({at.x + 0.5 * step.x, at.y + 0.5 * step.y});
     at = {at.x + step.x, at.y + step.y};
     const auto next = sides.find(at);
@@ -352,7 +352,7 @@ std::vector<CellOutline> mask_outlines(const LabelMask& mask, int cell, const Fi
   if (mask.is_binary && cell > static_cast<int>(labels.size()))
     throw InputError(mask.name, "cell " + std::to_string(cell), std::to_string(labels.size()) + " in all",
                      "cells that touch count as one: a label image separates them");
-  const int label = mask.is_binary ? labels[static_cast<std::size_t>(cell - 1)] : cell;
+  const int label = mask.is_binary ? labels[cell - 1] : cell;
   if (std::ranges::find(labels, label) == labels.end())
     throw InputError(mask.name, "a cell with label " + std::to_string(label), "labels " + listed(labels),
                      "choose the cell by its label: segment.cell = " + std::to_string(labels.front()));

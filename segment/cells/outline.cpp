@@ -107,7 +107,7 @@ std::vector<double> add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& ad
   std::vector<cv::Point> cell_pixel(mask.total() + 1);  // the mask's pixel nearest to each point, by label
   for (int y = 0; y < mask.rows; ++y)
     for (int x = 0; x < mask.cols; ++x)
-      if (mask.at<uchar>(y, x)) cell_pixel[static_cast<std::size_t>(labels.at<int>(y, x))] = {x, y};
+      if (mask.at<uchar>(y, x)) cell_pixel[labels.at<int>(y, x)] = {x, y};
   std::vector<double> beyond_um;
   for (const Adhesion& adhesion : adhesions) {
     const cv::Point2d centre = to_pixels(adhesion.position_um, pixel_um);
@@ -117,8 +117,7 @@ std::vector<double> add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& ad
     const cv::Size axes(cvRound(adhesion.major_axis_um / 2 / pixel_um), cvRound(adhesion.minor_axis_um / 2 / pixel_um));
     cv::ellipse(mask, c, axes, adhesion.angle_rad * 180 / CV_PI, 0, 360, cv::Scalar(255), cv::FILLED);
     // a bridge of five pixels outlives the smoothing of the polygon
-    if (distance.at<float>(c) > 0)
-      cv::line(mask, c, cell_pixel[static_cast<std::size_t>(labels.at<int>(c))], cv::Scalar(255), 5);
+    if (distance.at<float>(c) > 0) cv::line(mask, c, cell_pixel[labels.at<int>(c)], cv::Scalar(255), 5);
   }
   return beyond_um;
 }
@@ -147,8 +146,8 @@ std::vector<cv::Point2d> smoothed_ring(const std::vector<cv::Point2d>& ring, int
   std::vector<cv::Point2d> result(ring.size());
   for (int i = 0; i < n; ++i) {
     cv::Point2d sum(0, 0);
-    for (int k = -half_window; k <= half_window; ++k) sum += ring[static_cast<std::size_t>(((i + k) % n + n) % n)];
-    result[static_cast<std::size_t>(i)] = sum / (2 * half_window + 1);
+    for (int k = -half_window; k <= half_window; ++k) sum += ring[((i + k) % n + n) % n];
+    result[i] = sum / (2 * half_window + 1);
   }
   return result;
 }
