@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "segment/cells/adhesion_regions.h"
+#include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
 
@@ -44,9 +45,7 @@ cv::Mat excess_over_rim(const Contrast& c, const cv::Mat& labels, const Patch& p
                         const AdhesionParameters& p) {
   cv::Mat inside = labels(patch.box) == patch.label, own, greatest;
   c.height(patch.box).copyTo(own, inside);
-  const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
-  const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * r + 1, 2 * r + 1));
-  cv::dilate(own, greatest, disc);
+  cv::dilate(own, greatest, disc_of(radius_px));
   if (c.coarseness > 1) greatest -= c.noise(patch.box) * kLift;  // else noise is no tenth of the height
   const cv::Mat faintest = cv::max(c.noise(patch.box) * p.adhesion_rim_noise, c.floor);
   return c.height(patch.box) - cv::max(greatest * p.adhesion_rim_level, faintest);
@@ -61,13 +60,6 @@ double share_of(const cv::Mat& excess, int x, int y) {
   const double value = at(x, y);
   if (slope <= 1e-12 * std::abs(value)) return value > 0 ? 1 : 0;
   return std::clamp(0.5 + value / slope, 0.0, 1.0);
-}
-
-cv::Mat filled(const cv::Mat& mask) {
-  cv::Mat padded, outside;
-  cv::copyMakeBorder(mask, padded, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
-  cv::floodFill(padded, cv::Point(0, 0), 128);
-  return padded(cv::Rect(1, 1, mask.cols, mask.rows)) != 128;
 }
 
 /// The region's parts above their rim, each as covered pixels.

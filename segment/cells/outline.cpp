@@ -18,14 +18,6 @@ constexpr double kSmoothing_um = 0.3;  // just above the resolution of light: mo
 constexpr double kBand_um = 3;         // brightness inside and outside is compared within this distance
 constexpr double kGrid_um = 0.4;       // pitch of the masks: a little more than the smoothing
 
-cv::Mat filled(const cv::Mat& mask) {
-  // what cannot be reached from a frame around the image is a cell or a hole in one
-  cv::Mat framed;
-  cv::copyMakeBorder(mask, framed, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
-  cv::floodFill(framed, cv::Point(0, 0), 128);
-  return framed(cv::Rect(1, 1, mask.cols, mask.rows)) != 128;
-}
-
 /// Parts of a mask by label, from 1, of at least `smallest` pixels each, the largest first.
 struct Parts {
   struct Part {
