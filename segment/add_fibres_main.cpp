@@ -11,12 +11,6 @@
 namespace mbtfm::rois {
 namespace {
 
-struct AddFibresParameters {};
-void declare(stage::ParameterList& list, AddFibresParameters& parameters) {
-  (void)list;
-  (void)parameters;
-}
-
 /// Of the ellipse `adhesion 12`, `anchor 12` or `candidate 12`, as lines count: from the centre of the first pixel.
 Vec2 centre_of_adhesion(const std::vector<Roi>& rois, int adhesion_id, const std::string& file) {
   constexpr double kCentre_px = 0.5;
@@ -30,7 +24,7 @@ Vec2 centre_of_adhesion(const std::vector<Roi>& rois, int adhesion_id, const std
                    "RoiSet.zip and missing_fibres.csv must be of the same run: mbtfm run CELL");
 }
 
-StageReport add_fibres(const AddFibresParameters&, stage::StageContext& context) {
+StageReport add_fibres(stage::StageContext& context) {
   const auto rois_file = context.input("rois"), missing_file = context.input("missing");
   const std::vector<Roi> rois = read_rois(rois_file);
   std::vector<Roi> fibres;
@@ -61,11 +55,11 @@ StageReport add_fibres(const AddFibresParameters&, stage::StageContext& context)
 int main(int argc, char** argv) {
   using mbtfm::stage::FileArgument;
   using namespace mbtfm::rois;
-  return mbtfm::stage::run_stage<AddFibresParameters>(
+  return mbtfm::stage::run_stage(
       {.name = "add-fibres",
        .purpose = "put the fibres that the beads call for beside the segmented ones, as fibres.zip for mbtfm run",
        .files = {{"rois", FileArgument::Kind::input, "1_segment/RoiSet.zip of the cell"},
                  {"missing", FileArgument::Kind::input, "4_fit/missing_fibres.csv of the same run"},
                  {"out", FileArgument::Kind::output, "fibres.zip beside cell.toml"}}},
-      argc, argv, add_fibres);
+      argc, argv, [](auto&) {}, add_fibres);
 }

@@ -21,9 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 using namespace mbtfm;
 
-struct CheckParameters {};
-void declare(stage::ParameterList&, CheckParameters&) {}
-
 /// Which planes cell.toml chooses, as the stages will read them. @throws InputError where a key or value is wrong
 struct Chosen {
   cells::SegmentParameters segment;
@@ -148,14 +145,13 @@ StageReport check(const fs::path& folder, int threads, bool& is_fine) {
 
 int main(int argc, char** argv) {
   bool is_fine = true;
-  const int code = stage::run_stage<CheckParameters>(
+  const int code = stage::run_stage(
       {.name = "check",
        .purpose =
            "what the images below a folder are good for, before a batch is run: calibration, sizes, saturation, focus, "
            "beads, margin, pictures that are the same, disk",
        .files = {{"cells", stage::FileArgument::Kind::input, "a cell folder, or a folder of cell folders"}}},
-      argc, argv, [&](const CheckParameters&, stage::StageContext& context) {
-        return check(context.input("cells", {}), context.threads, is_fine);
-      });
+      argc, argv, [](auto&) {},
+      [&](stage::StageContext& context) { return check(context.input("cells", {}), context.threads, is_fine); });
   return code == exit_code::kDone && !is_fine ? exit_code::kFailed : code;
 }

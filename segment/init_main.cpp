@@ -22,9 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 using namespace mbtfm;
 
-struct InitParameters {};
-void declare(stage::ParameterList&, InitParameters&) {}
-
 constexpr std::string_view kImages[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
 
 bool is_image(const fs::path& file) {
@@ -169,10 +166,10 @@ StageReport init(stage::StageContext& context) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return mbtfm::stage::run_stage<InitParameters>(
+  return mbtfm::stage::run_stage(
       {.name = "init",
        .purpose = "write a cell.toml from what the images of a folder say",
        .files = {{"cell", stage::FileArgument::Kind::input, "folder with the images of a cell"},
                  {"out", stage::FileArgument::Kind::output, "the cell.toml"}}},
-      argc, argv, [](const InitParameters&, stage::StageContext& context) { return init(context); });
+      argc, argv, [](auto&) {}, init);
 }

@@ -32,8 +32,8 @@ class CableAnswer final : public network::GeometryAnswer {
     std::vector<std::vector<std::size_t>> links_of(network.vertices_um.size());
     for (std::size_t k = 0; k < network.links.size(); ++k) {
       if (network.links[k].fibre_id == 0) continue;
-      links_of[static_cast<std::size_t>(network.links[k].vertex_a)].push_back(k);
-      links_of[static_cast<std::size_t>(network.links[k].vertex_b)].push_back(k);
+      links_of[network.links[k].vertex_a].push_back(k);
+      links_of[network.links[k].vertex_b].push_back(k);
     }
     Eigen::VectorXd variance = Eigen::VectorXd::Zero(gradient_.by_link.cols());
     for (std::size_t v = 0; v < links_of.size(); ++v) {

@@ -28,6 +28,7 @@ constexpr double kFlat = 0.05;          // a fibre's points are left out where t
 constexpr double kShortestPiece = 0.4;  // of a fibre, between its own points
 constexpr double kSnapReach = 1.0;      // an adhesion this far outside still belongs to the cell
 constexpr double kBoundaryJitter = 0.15;
+constexpr double kEdgeGrowth = 0.3;  // per length: triangles keep a quality of 0.95
 
 std::string shown(double value_um) { return std::to_string(value_um) + " um"; }
 
@@ -54,10 +55,10 @@ class Builder {
         parameters_(parameters),
         edge_(parameters.edge_length_um),
         random_(random),
-        frame_{.size = SizeField(edge_, parameters.edge_growth, cell.outline_um)} {}
+        frame_{.size = SizeField(edge_, kEdgeGrowth, cell.outline_um)} {}
 
   Frame build() {
-    refine_where_wanted();
+    if (has_rims()) refine_at_rims();
     expect_room_for_mesh(frame_.size, boundary_);
     add_adhesions();
     for (const Fibre& fibre : cell_.fibres) add_fibre(fibre);
@@ -79,16 +80,10 @@ class Builder {
     return std::min(edge_, perimeter_um(adhesion) / parameters_.rim_points);
   }
 
-  void refine_where_wanted() {
+  void refine_at_rims() {
     for (const Adhesion& a : cell_.adhesions) {
-      if (!has_rims()) break;
       const Polygon rim = rim_um(a, rim_edge_um(a));
       for (std::size_t i = 0; i < rim.size(); i += 2) frame_.size.refine(rim[i], rim_edge_um(a));
-    }
-    for (const Fibre& f : cell_.fibres) {
-      if (parameters_.free_fibre_ends != FreeFibreEnds::width) break;
-      if (!f.start_adhesion_id) frame_.size.refine(f.points_um.front(), f.width_um);
-      if (!f.end_adhesion_id) frame_.size.refine(f.points_um.back(), f.width_um);
     }
   }
 
@@ -284,7 +279,6 @@ class Builder {
     }
     std::sort(knots.begin(), knots.end());
     const int fewest = knots.size() == 1 ? 6 : knots.size() == 2 ? 2 : 1;  // a closed line needs three vertices
-    const double jitter = parameters_.seeds == Seeds::regular ? 0 : kBoundaryJitter;
     Chain chain{.is_closed = true};
     for (std::size_t i = 0; i < knots.size(); ++i) {
       const Knot& knot = knots[i];
@@ -293,7 +287,7 @@ class Builder {
       const double arc = next.s_um - knot.s_um + (i + 1 == knots.size() ? curve.length_um() : 0);
       const auto size_at = [&](double along) { return frame_.size.at(curve.at(knot.s_um + along)); };
       for (double along : even_division_um(arc, size_at, fewest)) {
-        along += random_.uniform(-jitter, jitter) * std::min(size_at(along), arc / fewest);
+        along += random_.uniform(-kBoundaryJitter, kBoundaryJitter) * std::min(size_at(along), arc / fewest);
         const Vec2 drawn = drawn_along(knot, along) + drawn_along(next, arc - along);
         const double s = knot.s_um + along;
         chain.vertices.push_back(drawn == Vec2{} ? sliding_vertex(ring, s)

@@ -128,12 +128,7 @@ void expect_room_for_even_mesh(const Cell& cell, const NetworkParameters& parame
 void declare(stage::ParameterList& list, NetworkParameters& parameters) {
   list.table("network");
   list.add("edge_length_um", parameters.edge_length_um, Range::mesh_um(), "mean length of the network's cables (um)");
-  list.add("edge_growth", parameters.edge_growth, Range{.low = 0.05, .high = 1},
-           "growth of the cables' length with the distance from what is resolved finer (um per um)");
   list.add("seed", parameters.seed, "random seed of the vertices' first positions");
-  list.add("seeds", parameters.seeds,
-           "first positions of the vertices: on a lattice (regular), moved off it at random (jittered), or at random "
-           "(poisson)");
   list.add(
       "link_weights", parameters.link_weights,
       "tension and stiffness of the actin network's links: the same for all, or by the width of material that each "
@@ -146,8 +141,6 @@ void declare(stage::ParameterList& list, NetworkParameters& parameters) {
            "or the one at its centre");
   list.add("rim_points", parameters.rim_points, Range::between(3, 1000),
            "least number of vertices around an adhesion's rim");
-  list.add("free_fibre_ends", parameters.free_fibre_ends,
-           "length of the cables at the free end of a fibre: as elsewhere (point), or the fibre's width (width)");
 }
 
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters) {
@@ -156,7 +149,7 @@ GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& par
   Random random(parameters.seed);
   const Boundary boundary(cell, parameters.edge_length_um);
   const Frame frame = build_frame(cell, boundary, parameters, random);
-  const RelaxedMesh mesh = fill_and_relax(frame, boundary, parameters.seeds, random);
+  const RelaxedMesh mesh = fill_and_relax(frame, boundary, random);
 
   GeneratedNetwork result;
   result.report = mesh.report;

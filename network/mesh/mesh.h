@@ -12,11 +12,6 @@
 
 namespace mbtfm::mesh {
 
-/// First places of the vertices: a triangular lattice, turned and shifted at random; the same with each vertex moved at
-/// random; at random, none nearer to another than 0.76 of the wanted distance (Poisson discs).
-enum class Seeds { regular, jittered, poisson };
-constexpr auto words(Seeds) { return std::array{"regular", "jittered", "poisson"}; }
-
 enum class LinkWeights {
   equal,  ///< as in the thesis
   width   ///< of the material that a link stands for
@@ -32,19 +27,13 @@ constexpr auto words(LinkReach) { return std::array{"neighbours", "second-neighb
 enum class AdhesionAnchor { rim, ellipse, centre };
 constexpr auto words(AdhesionAnchor) { return std::array{"rim", "ellipse", "centre"}; }
 
-enum class FreeFibreEnds { point, width };
-constexpr auto words(FreeFibreEnds) { return std::array{"point", "width"}; }
-
 struct NetworkParameters {
   double edge_length_um = 1.5;  ///< mean cable length: about the spacing of the bundles one can resolve
-  double edge_growth = 0.3;     ///< of the edge length with distance from what is resolved finer
   std::uint64_t seed = 1;       ///< of the first placement of the vertices
-  Seeds seeds = Seeds::jittered;
   LinkWeights link_weights = LinkWeights::width;
   LinkReach link_reach = LinkReach::second_neighbours;
   AdhesionAnchor adhesion_anchor = AdhesionAnchor::ellipse;
   int rim_points = 8;  ///< round an adhesion, at least: an octagon shows which way it is long
-  FreeFibreEnds free_fibre_ends = FreeFibreEnds::point;
 };
 void declare(stage::ParameterList& list, NetworkParameters& parameters);
 

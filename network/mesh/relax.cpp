@@ -317,11 +317,11 @@ class Relaxation {
 
 }  // namespace
 
-RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, Seeds seeds, Random& random) {
+RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, Random& random) {
   refine_where_lines_are_close(frame);
   expect_room_for_mesh(frame.size, boundary);
   std::vector<Vec2> points = frame.points_um;
-  const std::vector<Vec2> inner = places_of_seeds(frame, seeds, random);
+  const std::vector<Vec2> inner = places_of_seeds(frame, random);
   points.insert(points.end(), inner.begin(), inner.end());
   return Relaxation(frame, boundary, std::move(points)).run();
 }

@@ -21,10 +21,9 @@ struct RelaxedMesh {
 /// by area over h², and edges flip to a constrained Delaunay triangulation. This lowers an energy in each half step and
 /// comes to rest within tens of sweeps, where distmesh's springs wander on. The frame's vertices stay, but those that
 /// slide on the boundary. Where the wanted length h asks for more or fewer vertices, they are put in or taken out.
-/// @param seeds  as NetworkParameters::seeds
 /// Sources: Chen & Holst, Comput. Methods Appl. Mech. Eng. 200:967 (2011), centroidal patch triangulation; Persson &
 /// Strang, SIAM Review 46:329 (2004), for h and the sliding. Constrained edges and walls are ours.
 /// @throws InvalidData where lines of the frame cross, OutOfMemory
-RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, Seeds seeds, Random& random);
+RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, Random& random);
 
 }  // namespace mbtfm::mesh

@@ -22,10 +22,12 @@ class Near {
       low_ = {std::min(low_.x, p.x), std::min(low_.y, p.y), std::min(low_.z, p.z)};
       high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
     }
-    // no more cells than some for each point, however far apart the points are
-    const double most = 4.0 * static_cast<double>(points_.size()) + 64, side = std::cbrt(most);
+    // no more cells than some for each point, however far apart the points are: in space, in a plane, on a line
+    const double most = 4.0 * static_cast<double>(points_.size()) + 64;
     const Vec3 size = high - low_;
-    cell_ = std::max({cell, size.x / side, size.y / side, size.z / side, 1e-300});
+    const auto plane = [&](double a, double b) { return std::sqrt(a / most) * std::sqrt(b); };
+    cell_ = std::max({cell, std::cbrt(size.x / most) * std::cbrt(size.y) * std::cbrt(size.z), plane(size.x, size.y),
+                      plane(size.y, size.z), plane(size.z, size.x), std::max({size.x, size.y, size.z}) / most, 1e-300});
     nx_ = 1 + static_cast<int>(size.x / cell_), ny_ = 1 + static_cast<int>(size.y / cell_);
     nz_ = 1 + static_cast<int>(size.z / cell_);
     first_.assign(static_cast<std::size_t>(nx_) * ny_ * nz_ + 1, 0);

@@ -28,6 +28,13 @@ const std::vector<std::string> kMoreOfGel = {"radius_um"};
 /// The keys above the first table.
 constexpr std::array kRootKeys = {"pixel_size_um"};
 
+/// Keys up to version 0.2 that are constants now, as nobody set them; a space before and after each.
+constexpr std::string_view kDeletedKeys =
+    " seeds free_fibre_ends edge_growth adhesion_level_radius_um adhesion_blur_um fibre_edge_height fibre_side_ratio "
+    "fibre_simplify_um outline_smoothing_um outline_band_um outline_spacing_um corner_jitter edge_concavity "
+    "free_edge_concavity adhesion_area_log_sd peripheral_fraction peripheral_band_um n_carpets merging_fraction "
+    "nucleus_radius_um simulation_substrate ";
+
 template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
@@ -138,6 +145,8 @@ std::string spelled(const toml::node& node, const std::string& where) {
 
 /// @param list  of the stage, whose keys of other tables may be meant
 std::string unknown_key_hint(const ParameterList& list, const std::vector<std::string>& known, std::string_view key) {
+  if (kDeletedKeys.find(" " + std::string(key) + " ") != kDeletedKeys.npos)
+    return "this version computes as its default did and has no such key: take the line out (CHANGELOG.md)";
   const std::string closest = nearest(known, key);
   if (!closest.empty() && is_alike(closest, key)) return did_you_mean(closest);
   if (std::ranges::find(kMoreOfGel, key) != kMoreOfGel.end()) return "it belongs under [gel]";

@@ -115,7 +115,7 @@ Contracting::Contracting(const ColonyParameters& colony, const sheet::SheetParam
     return;
   }
   substrate::SubstrateParameters model;
-  model.model = substrate::kind_of(scenario.mechanics.simulation_substrate);
+  model.model = substrate::ModelKind::layer;
   gel_ = greens::make_greens(scenario.gel, model, work.threads);
   scene.size = sheet::size_on_gel(scene.region, scene.material, scenario.gel, scene.adhesion_nN_per_um3);
   if (p.mesh_um) scene.size = sheet::with_edge(scene.size, *p.mesh_um);
@@ -140,7 +140,7 @@ std::vector<Vec2> Contracting::displaced_um(const std::vector<Vec2>& points_um,
   std::vector<substrate::Ellipse> patches;
   std::vector<Vec2> forces;
   for (int t = 0; t < elements.n_triangles(); ++t) {
-    const sheet::GroundPatch& patch = solution_.patches[static_cast<std::size_t>(t)];
+    const sheet::GroundPatch& patch = solution_.patches[t];
     if (norm(patch.traction_kPa) == 0) continue;  // where it does not adhere
     patches.push_back(sheet::patch_of(elements, t));
     forces.push_back(patch.area_um2 * patch.traction_kPa);

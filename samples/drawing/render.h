@@ -28,7 +28,7 @@ struct Nucleus {
   /// From the centre, 1 on its rim.
   double distance(Vec2 point) const;
 };
-Nucleus nucleus_of(const Cell& cell, const ActinParameters& actin, std::uint64_t seed);
+Nucleus nucleus_of(const Cell& cell, std::uint64_t seed);
 
 /// Photons by pixel of a specimen: PSF, haze, uneven illumination.
 images::Image photons_of(const images::Image& specimen, const MicroscopeParameters& microscope, int threads);

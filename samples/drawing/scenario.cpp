@@ -19,26 +19,15 @@ void declare_cell(stage::ParameterList& list, CellParameters& p) {
   list.add("diameter_um", p.diameter_um, Range::size_um(), "diameter of the cell (um)");
   list.add("n_corners", p.n_corners, Range::between(3, 50),
            "number of the outline's corners, which are rich in adhesions");
-  list.add("corner_jitter", p.corner_jitter, Range::between(0, 0.4), "scatter of the corners' radii, relative");
-  list.add("edge_concavity", p.edge_concavity, Range::between(0, 0.3),
-           "depth of the arc between two corners over their distance");
   list.add("elongation", p.elongation, Range::between(1, 20), "long over short diameter of the cell");
   list.add("edge_roughness_um", p.edge_roughness_um, Range::zero_or_size_um(),
            "raggedness of the outline (standard deviation, um)");
-  list.add("free_edge_concavity", p.free_edge_concavity, Range::between(0, 0.3),
-           "depth over length of the arcs that an edge bundle draws in");
   list.add("n_adhesions", p.n_adhesions, Range::between(2, 5000), "number of all adhesions");
   list.add("adhesion_area_um2", p.adhesion_area_um2, Range::area_um2(), "mean area of an adhesion (um²)");
-  list.add("adhesion_area_log_sd", p.adhesion_area_log_sd, Range::between(0, 5),
-           "standard deviation of the logarithm of the adhesions' areas");
   list.add("smallest_area_um2", p.smallest_area_um2, Range::area_um2(), "smallest area of an adhesion (um²)");
   list.add("largest_area_um2", p.largest_area_um2, Range::area_um2(), "largest area of an adhesion (um²)");
   list.add("smallest_aspect", p.smallest_aspect, Range::between(1, 1000), "least length over width of an adhesion");
   list.add("largest_aspect", p.largest_aspect, Range::between(1, 1000), "largest length over width of an adhesion");
-  list.add("peripheral_fraction", p.peripheral_fraction, Range::between(0, 1),
-           "share of the adhesions without a fibre that lie along the outline");
-  list.add("peripheral_band_um", p.peripheral_band_um, Range::size_um(),
-           "width of the band along the outline in which the adhesions of peripheral_fraction lie (um)");
   list.add("adhesion_clearance_um", p.adhesion_clearance_um, Range::zero_or_size_um(),
            "least gap between adhesions, and between an adhesion and a fibre it does not hold (um)");
   list.add("adhesion_stress_kPa", p.adhesion_stress_kPa, Range::modulus_kPa(),
@@ -48,14 +37,10 @@ void declare_cell(stage::ParameterList& list, CellParameters& p) {
   list.add("n_arc", p.n_arc, Range::between(0, 1000), "number of transverse arcs");
   list.add("n_edge", p.n_edge, Range::between(0, 20),
            "number of bundles along concave arcs of the outline (layout dense)");
-  list.add("n_carpets", p.n_carpets, Range::between(1, 20),
-           "number of groups of ventral fibres side by side (layout dense)");
   list.add("carpet_smallest_um", p.carpet_smallest_um, Range::size_um(),
            "least distance of neighbours in a group of ventral fibres side by side, at its narrow end (um)");
   list.add("carpet_largest_um", p.carpet_largest_um, Range::size_um(),
            "largest distance of neighbours in a group of ventral fibres side by side, at its narrow end (um)");
-  list.add("merging_fraction", p.merging_fraction, Range::between(0, 1),
-           "share of the ventral fibres in groups that end on their neighbour's adhesion");
   list.add("fibre_width_um", p.fibre_width_um, Range::size_um(), "median width of a fibre (um)");
   list.add("fibre_width_log_sd", p.fibre_width_log_sd, Range::between(0, 0.5),
            "standard deviation of the logarithm of the fibres' widths");
@@ -94,7 +79,6 @@ void declare_actin(stage::ParameterList& list, ActinParameters& p) {
            "share of the brightness that actin in no fibre loses over the nucleus");
   list.add("nuclear_dimming", p.nuclear_dimming, Range::between(0, 1),
            "share of the brightness that fibres lose over the nucleus");
-  list.add("nucleus_radius_um", p.nucleus_radius_um, Range::size_um(), "mean radius of the nucleus (um)");
   list.add("filaments_per_um2", p.filaments_per_um2, Range::between(0, 10),
            "number of thin filaments of the actin meshwork, by area (1/um²)");
   list.add("shortest_filament_um", p.shortest_filament_um, Range::size_um(),
@@ -188,7 +172,6 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   declare_tension(list, p.tension);
   list.add("simulation_edge_length_um", p.mechanics.simulation_edge_length_um, Range::mesh_um(),
            "mean cable length of the simulation's network (um)");
-  list.add("simulation_substrate", p.mechanics.simulation_substrate, "model of the gel in the simulation");
   list.add("simulation_material", p.mechanics.simulation_material,
            "law of the gel in the simulation: linear, or neo-hooke, whatever the strains are");
   declare_microscope(list, p.microscope);

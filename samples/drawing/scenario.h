@@ -26,30 +26,22 @@ struct CellParameters {
   Layout layout = Layout::spread;
   double diameter_um = 66;             ///< mean, over the corners
   int n_corners = 9;                   ///< adhesion-rich corners with concave arcs between them
-  double corner_jitter = 0.1;          ///< of a corner's radius, relative (standard deviation)
-  double edge_concavity = 0.08;        ///< depth of the arc between two corners over their distance
   double elongation = 1.15;            ///< long over short diameter
   double edge_roughness_um = 0;        ///< standard deviation: smooth; real edges are ragged by their filopodia
-  double free_edge_concavity = 0.13;   ///< as edge_concavity, of the arcs with an edge bundle: it draws them in
   int n_adhesions = 170;               ///< thesis 3.4: 3 612 adhesions in 21 cells
   double adhesion_area_um2 = 0.46;     ///< mean (thesis 3.4)
-  double adhesion_area_log_sd = 0.6;   ///< of the logarithm: areas spread over a decade
   double smallest_area_um2 = 0.1;      ///< about the resolution of the microscope
   double largest_area_um2 = 3.0;       ///< super-mature adhesions at strong fibres
   double smallest_aspect = 1.5;        ///< length over width
   double largest_aspect = 4;           ///< length over width
-  double peripheral_fraction = 0.75;   ///< of the adhesions without a fibre
-  double peripheral_band_um = 3.5;     ///< width of the band inside the outline that they lie in
   double adhesion_clearance_um = 0.3;  ///< free rim around each adhesion: two PSF widths keep them apart
   double adhesion_stress_kPa = 5.5;    ///< an adhesion grows to carry its fibre (Balaban 2001: 5.5 nN/um²)
   int n_ventral = 7;                   ///< 369 fibres in 21 cells: 18 a cell
   int n_dorsal = 7;
   int n_arc = 6;
   int n_edge = 0;                   ///< bundles along concave arcs of the outline, between adhesions (dense only)
-  int n_carpets = 3;                ///< groups of ventral fibres side by side (dense only)
   double carpet_smallest_um = 0.6;  ///< distance of neighbours at a carpet's narrow end: as near as light resolves …
   double carpet_largest_um = 2;     ///< … and as far as the next peak lies beside most fibres of real cells
-  double merging_fraction = 0.2;    ///< of a carpet's fibres that end on the same adhesion as their neighbour
   double fibre_width_um = 0.6;      ///< median
   double fibre_width_log_sd = 0;    ///< all alike
   double fibre_spacing_um = 2.0;    ///< least distance of fibres that run alongside; crossing is free
@@ -74,7 +66,6 @@ struct ActinParameters {
   double grain = 0;                   ///< the same over the resolution of light: dots and pits
   double nuclear_shadow = 0;          ///< loss of cytosol over the nucleus, which lifts the cell out of focus
   double nuclear_dimming = 0;         ///< loss of the fibres' brightness there
-  double nucleus_radius_um = 8;       ///< of its shadow, mean
   double filaments_per_um2 = 0.8;     ///< thin ones, of the cortical mesh
   double shortest_filament_um = 2;    ///< shorter ones make grains
   double longest_filament_um = 6;     ///< of thin filaments
@@ -99,8 +90,7 @@ struct TensionParameters {
 
 /// The simulation's own mechanics, finer than what a reconstruction uses.
 struct MechanicsParameters {
-  double simulation_edge_length_um = 0.9;           ///< of its network: well below the 1.5 um of a reconstruction
-  GelModel simulation_substrate = GelModel::layer;  ///< the Green's function of the finite layer: exact
+  double simulation_edge_length_um = 0.9;  ///< of its network: well below the 1.5 um of a reconstruction
   MaterialLaw simulation_material = MaterialLaw::linear;
 };
 

@@ -16,10 +16,13 @@ namespace {
 constexpr double kRim_um = 0.2;
 /// Adhesions nearer to a fibre than this align with it.
 constexpr double kAlignedDistance_um = 5;
+constexpr double kAreaLogSd = 0.6;          // areas spread over a decade
+constexpr double kPeripheral = 0.75;        // share of the adhesions without a fibre that lie along the outline …
+constexpr double kPeripheralBand_um = 3.5;  // … within this band
 
 LogNormal area_distribution(const Sketch& sketch) {
   const CellParameters& p = sketch.parameters;
-  return {p.adhesion_area_um2, p.adhesion_area_log_sd, p.smallest_area_um2, p.largest_area_um2};
+  return {p.adhesion_area_um2, kAreaLogSd, p.smallest_area_um2, p.largest_area_um2};
 }
 
 /// Areas of the adhesions without a fibre: what is left of the mean after those with one.
@@ -57,8 +60,7 @@ Adhesion propose_peripheral(const Sketch& sketch, double area, double aspect, Ra
     boundary = ((corner + static_cast<int>(std::lround(5 / kOutlineSpacing_um * random.normal()))) % n + n) % n;
   }
   const Vec2 inward = inward_normal(sketch, boundary);
-  const Vec2 position =
-      sketch.outline_um[boundary] + random.uniform(0.5, sketch.parameters.peripheral_band_um) * inward;
+  const Vec2 position = sketch.outline_um[boundary] + random.uniform(0.5, kPeripheralBand_um) * inward;
   const Vec2 to_centre = unit(sketch.centre_um - position);
   const Vec2 pointing = unit(inward + to_centre);
   return make_adhesion(position, area, aspect, std::atan2(pointing.y, pointing.x) + 0.25 * random.normal());
@@ -98,7 +100,7 @@ void draw_free_adhesions(Sketch& sketch, Random& random) {
   if (n_held >= p.n_adhesions) return;
   const LogNormal areas = free_area_distribution(sketch);
   for (int i = n_held; i < p.n_adhesions; ++i) {
-    const bool is_peripheral = random.uniform() < p.peripheral_fraction;
+    const bool is_peripheral = random.uniform() < kPeripheral;
     const double area = draw(random, areas);
     const double aspect = random.uniform(p.smallest_aspect, p.largest_aspect);
     Adhesion adhesion;

@@ -15,6 +15,8 @@ namespace {
 constexpr double kAlongside_rad = 12 * std::numbers::pi / 180;
 constexpr double kShortestDenseVentral_um = 10;  ///< ventral fibres span a good part of the cell
 constexpr double kMerge_um = 6;                  ///< the last part of a fibre that bends to its neighbour's adhesion
+constexpr int kCarpets = 3;                      ///< groups of ventral fibres side by side
+constexpr double kMerging = 0.2;                 ///< of their fibres that end on their neighbour's adhesion
 constexpr int kTries = 60;                       ///< for one fibre of a group, before the next place is tried
 
 /// One end of a fibre: free, on an adhesion of its own, or on one that is there already.
@@ -174,7 +176,6 @@ double reach_um(const Sketch& sketch, const Carpet& carpet, double offset, int w
 
 std::optional<Plan> plan_ventral(const Sketch& sketch, const Carpet& carpet, double offset, double tension_nN,
                                  Random& random) {
-  const CellParameters& p = sketch.parameters;
   if (depth_um(sketch, carpet.at(0, offset)) < 2) return std::nullopt;
   Carpet own = carpet;  // each goes its own way a little
   own.fan_per_um += 0.002 * random.normal();
@@ -189,7 +190,7 @@ std::optional<Plan> plan_ventral(const Sketch& sketch, const Carpet& carpet, dou
   const double swing_um = 0.1 * random.normal(), wave_per_um = 2 * std::numbers::pi / random.uniform(6, 15);
   for (double s = -reach[0]; s <= reach[1]; s += kFibreSpacing_um)
     plan.points_um.push_back(own.at(s, offset + swing_um * std::sin(wave_per_um * s)));
-  const int merging = random.uniform() < p.merging_fraction ? random.below(2) : -1;
+  const int merging = random.uniform() < kMerging ? random.below(2) : -1;
   if (merging >= 0 && !sketch.fibres.empty() && sketch.fibres.back().type == FibreType::ventral) {
     const Fibre& neighbour = sketch.fibres.back();
     const Vec2 target = merging == 0 ? neighbour.points_um.front() : neighbour.points_um.back();
@@ -306,9 +307,9 @@ struct Builder {
   void add_carpets() {
     const CellParameters& p = sketch.parameters;
     for (int i = 0; n_of(FibreType::ventral) < p.n_ventral; ++i) {
-      if (i >= 20 * p.n_carpets) no_room(sketch, FibreType::ventral);
+      if (i >= 20 * kCarpets) no_room(sketch, FibreType::ventral);
       const int left = p.n_ventral - n_of(FibreType::ventral);
-      const int share = (p.n_ventral + p.n_carpets - 1) / p.n_carpets;
+      const int share = (p.n_ventral + kCarpets - 1) / kCarpets;
       add_carpet(draw_carpet(sketch, i, random), std::min(left, i % 4 < 2 ? share + 2 : std::max(2, share / 2)));
     }
   }

@@ -213,14 +213,15 @@ double Nucleus::distance(Vec2 point) const {
   return std::hypot(dot(offset, long_axis) / half_length_um, cross(long_axis, offset) / half_width_um);
 }
 
-Nucleus nucleus_of(const Cell& cell, const ActinParameters& p, std::uint64_t seed) {
+Nucleus nucleus_of(const Cell& cell, std::uint64_t seed) {
+  constexpr double kNucleusRadius_um = 8;  // mean
   Random random(seed, Stream::optics, 3);
   Nucleus nucleus;
   nucleus.centre_um = centroid_of(cell.outline_um) + Vec2{2 * random.normal(), 2 * random.normal()};
   nucleus.long_axis = direction(random.uniform(0, std::numbers::pi));
   const double stretch = std::sqrt(random.uniform(1, 1.6));
-  nucleus.half_length_um = p.nucleus_radius_um * stretch;
-  nucleus.half_width_um = p.nucleus_radius_um / stretch;
+  nucleus.half_length_um = kNucleusRadius_um * stretch;
+  nucleus.half_width_um = kNucleusRadius_um / stretch;
   return nucleus;
 }
 
@@ -228,7 +229,7 @@ images::Image actin_specimen(const Cell& cell, const ActinParameters& p, const M
                              std::uint64_t seed, int threads) {
   // what scenarios came to have later has streams of its own, so that earlier images stay as they are
   Random random(seed, Stream::optics, 1), added(seed, Stream::optics, 4);
-  const Nucleus nucleus = nucleus_of(cell, p, seed);
+  const Nucleus nucleus = nucleus_of(cell, seed);
   images::Image image = thickness_of(cell, p.bulge, p.lamella, m, random, threads);
   for (float& value : image.pixels) value *= static_cast<float>(p.cytosol);
   shade_cytosol(image, p, nucleus, m, added, threads);

@@ -32,7 +32,7 @@ std::vector<images::Image> recorded_stack(const std::vector<GlowingBead>& beads,
   std::vector<images::Image> slices(static_cast<std::size_t>(m.n_slices));
   const double step_um = m.focus_step_um();
   numerics::parallel_for(m.n_slices, threads, [&](int k) {
-    images::Image& slice = slices[static_cast<std::size_t>(k)];
+    images::Image& slice = slices[k];
     slice.width = slice.height = m.image_size_px;
     slice.full_scale = 65535;
     slice.pixel_size_um = m.pixel_size_um;
@@ -41,7 +41,7 @@ std::vector<images::Image> recorded_stack(const std::vector<GlowingBead>& beads,
                         static_cast<float>(m.background_photons));
     const double z_um = m.first_um + (k + 0.5) * step_um;
     const double left = std::pow(1 - m.bleached, exposure + static_cast<double>(k) / m.n_slices);
-    const Vec2 shift = stage.shift_um.empty() ? Vec2{} : stage.shift_um[static_cast<std::size_t>(k)];
+    const Vec2 shift = stage.shift_um.empty() ? Vec2{} : stage.shift_um[k];
     for (const GlowingBead& bead : beads) {
       const double above = z_um - bead.position_um.z;
       if (std::abs(above) >= PointSpread::kReachAlongZ_um) continue;

@@ -84,7 +84,7 @@ std::vector<AdhesionForce> force_list(const Cell& cell, const std::map<int, Vec2
 
 DisplacementField displacement_of(const Experiment& e, const drawing::ScenarioParameters& p, int threads) {
   substrate::SubstrateParameters substrate_parameters;
-  substrate_parameters.model = substrate::kind_of(p.mechanics.simulation_substrate);
+  substrate_parameters.model = substrate::ModelKind::layer;
   const auto gel = greens::make_greens(p.gel, substrate_parameters, threads);
   std::vector<substrate::Ellipse> ellipses;
   std::vector<Vec2> forces;

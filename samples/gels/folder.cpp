@@ -100,7 +100,7 @@ void write_slices(const std::filesystem::path& file, const drawing::StackMicrosc
   for (int k = 0; k < m.n_slices; ++k) {
     csv.add(std::to_string(k + 1)).add(m.first_um + (k + 0.5) * m.focus_step_um());
     for (const drawing::StageMotion* s : {&relaxed, &stressed}) {
-      const Vec2 shift = s->shift_um.empty() ? Vec2{} : s->shift_um[static_cast<std::size_t>(k)];
+      const Vec2 shift = s->shift_um.empty() ? Vec2{} : s->shift_um[k];
       csv.add(shift.x).add(shift.y);
     }
     csv.end_row();

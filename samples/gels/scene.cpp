@@ -271,18 +271,18 @@ std::vector<FieldUnderASurface::Source> fitted_sources(const Surface& surface, c
   Eigen::VectorXd b(3 * n_rows);
   numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int s) {
     for (int c = 0; c < 3; ++c) {
-      const FieldUnderASurface unit({{places[static_cast<std::size_t>(s)], Eigen::Vector3d::Unit(c)}},
-                                    size.gel.youngs_modulus_kPa, size.gel.poisson_ratio, size.gel.thickness_um);
+      const FieldUnderASurface unit({{places[s], Eigen::Vector3d::Unit(c)}}, size.gel.youngs_modulus_kPa,
+                                    size.gel.poisson_ratio, size.gel.thickness_um);
       for (Eigen::Index r = 0; r < n_rows; ++r) {
-        const Row& row = rows[static_cast<std::size_t>(r)];
+        const Row& row = rows[r];
         a.col(3 * s + c).segment<3>(3 * r) = std::sqrt(row.area) * traction(unit, surface, row.at);
       }
       for (Eigen::Index p = 0; p < n_patches; ++p)
-        through.col(3 * s + c).segment<3>(3 * p) = force_through(unit, surface, within[static_cast<std::size_t>(p)]);
+        through.col(3 * s + c).segment<3>(3 * p) = force_through(unit, surface, within[p]);
     }
   });
   for (Eigen::Index r = 0; r < n_rows; ++r) {
-    const Row& row = rows[static_cast<std::size_t>(r)];
+    const Row& row = rows[r];
     b.segment<3>(3 * r) = std::sqrt(row.area) * as_eigen(aimed_traction(bumps, surface.at(row.at)));
   }
   const Eigen::Index n_all = n + 6 + 3 * n_patches;
@@ -306,7 +306,7 @@ std::vector<FieldUnderASurface::Source> fitted_sources(const Surface& surface, c
   Eigen::VectorXd right = Eigen::VectorXd::Zero(n_all);
   right.head(n) = a.transpose() * b;
   for (Eigen::Index p = 0; p < n_patches; ++p)
-    right.segment<3>(n + 6 + 3 * p) = scale * as_eigen(bumps[static_cast<std::size_t>(p)].patch.aimed_nN);
+    right.segment<3>(n + 6 + 3 * p) = scale * as_eigen(bumps[p].patch.aimed_nN);
   const Eigen::VectorXd f = system.partialPivLu().solve(right).head(n);
   std::vector<FieldUnderASurface::Source> sources;
   for (std::size_t s = 0; s < places.size(); ++s)
@@ -341,9 +341,9 @@ void measure_patches(GelScene& scene, const Surface& surface, const std::vector<
   scene.patches.resize(bumps.size());
   numerics::parallel_for(static_cast<int>(bumps.size()), threads, [&](int p) {
     constexpr double kStep = 0.5;  // um
-    Patch patch = bumps[static_cast<std::size_t>(p)].patch;
+    Patch patch = bumps[p].patch;
     patch.force_nN = as_vec(force_through(field, surface, rows_within(surface, patch, kStep)));
-    scene.patches[static_cast<std::size_t>(p)] = patch;
+    scene.patches[p] = patch;
   });
 }
 
@@ -359,8 +359,8 @@ void place_beads(GelScene& scene, const Surface& surface, const SpaceParameters&
   }
   scene.truth.resize(places.size());
   numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int k) {
-    const Vec3 place = places[static_cast<std::size_t>(k)];
-    scene.truth[static_cast<std::size_t>(k)] = {
+    const Vec3 place = places[k];
+    scene.truth[k] = {
         .position_um = place, .displacement_um = as_vec(field.displacement_um(as_eigen(place))), .flag = {}};
   });
   for (const BeadInSpace& bead : scene.truth)

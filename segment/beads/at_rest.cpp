@@ -67,6 +67,27 @@ RestingField in_squares(const std::vector<Vec2>& positions, const std::vector<Ve
   return field;
 }
 
+/// Call use(i, j, k) for each square, k its index.
+template <class Use>
+void for_each_square(const RestingField& field, const Use& use) {
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) use(i, j, static_cast<std::size_t>(j) * field.nx + i);
+  }
+}
+
+/// The same of the squares within `reach` of one, itself among them, inside of the picture.
+template <class Use>
+void for_each_within(const RestingField& field, int i, int j, int reach, const Use& use) {
+  for (int b = std::max(0, j - reach); b <= std::min(field.ny - 1, j + reach); ++b) {
+    for (int a = std::max(0, i - reach); a <= std::min(field.nx - 1, i + reach); ++a)
+      use(a, b, static_cast<std::size_t>(b) * field.nx + a);
+  }
+}
+
+bool is_border(const RestingField& field, int i, int j) {
+  return i == 0 || j == 0 || i == field.nx - 1 || j == field.ny - 1;
+}
+
 /// Weighted least squares over the squares; the linear part is held to what pictures do.
 AffineMotion fitted(const RestingField& field, const std::vector<double>& weights, Vec2 centre, double scale,
                     double width) {
@@ -110,12 +131,8 @@ struct Search {
   Standing from(const std::function<bool(int, int)>& is_in) const {
     std::vector<double> weights(field.cells.size(), 0), misfits;
     const double typical = numerics::quantile(width_of, 0.5);
-    for (int j = 0; j < field.ny; ++j) {
-      for (int i = 0; i < field.nx; ++i) {
-        const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
-        weights[k] = field.cells[k].n_beads > 0 && is_in(i, j);
-      }
-    }
+    for_each_square(field,
+                    [&](int i, int j, std::size_t k) { weights[k] = field.cells[k].n_beads > 0 && is_in(i, j); });
     Standing result{fitted(field, weights, centre, scale, typical)};
     for (std::size_t k = 0; k < weights.size(); ++k) {
       if (weights[k] > 0) misfits.push_back(misfit(field.cells[k], result.motion));
@@ -167,27 +184,22 @@ AffineMotion mode_of(const Search& search) {
 /// Of the eight around a square (inside of the picture) the share for which `is` holds.
 double share_around(const RestingField& field, const std::vector<char>& is, int i, int j) {
   int n = 0, n_is = 0;
-  for (int b = std::max(0, j - 1); b <= std::min(field.ny - 1, j + 1); ++b) {
-    for (int a = std::max(0, i - 1); a <= std::min(field.nx - 1, i + 1); ++a) {
-      if (a == i && b == j) continue;
-      ++n;
-      n_is += is[static_cast<std::size_t>(b) * field.nx + a];
-    }
-  }
+  for_each_within(field, i, j, 1, [&](int a, int b, std::size_t k) {
+    if (a == i && b == j) return;
+    ++n;
+    n_is += is[k];
+  });
   return n == 0 ? 1 : 1.0 * n_is / n;
 }
 
 /// A square goes with most of those around it: noise makes single ones of either kind.
 std::vector<char> smoothed(const RestingField& field, const std::vector<char>& is) {
   std::vector<char> result = is;
-  for (int j = 0; j < field.ny; ++j) {
-    for (int i = 0; i < field.nx; ++i) {
-      const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
-      const double share = share_around(field, is, i, j);
-      if (share < 0.3) result[k] = 0;
-      if (share > 0.7 || (field.cells[k].n_beads == 0 && share > 0.5)) result[k] = 1;
-    }
-  }
+  for_each_square(field, [&](int i, int j, std::size_t k) {
+    const double share = share_around(field, is, i, j);
+    if (share < 0.3) result[k] = 0;
+    if (share > 0.7 || (field.cells[k].n_beads == 0 && share > 0.5)) result[k] = 1;
+  });
   return result;
 }
 
@@ -215,16 +227,9 @@ std::vector<char> from_border(const RestingField& field, const std::vector<char>
 /// All squares within `reach` of one for which `is` holds.
 std::vector<char> grown(const RestingField& field, const std::vector<char>& is, int reach) {
   std::vector<char> result = is;
-  for (int j = 0; j < field.ny; ++j) {
-    for (int i = 0; i < field.nx; ++i) {
-      if (!is[static_cast<std::size_t>(j) * field.nx + i]) continue;
-      for (int b = std::max(0, j - reach); b <= std::min(field.ny - 1, j + reach); ++b) {
-        for (int a = std::max(0, i - reach); a <= std::min(field.nx - 1, i + reach); ++a) {
-          result[static_cast<std::size_t>(b) * field.nx + a] = 1;
-        }
-      }
-    }
-  }
+  for_each_square(field, [&](int i, int j, std::size_t k) {
+    if (is[k]) for_each_within(field, i, j, reach, [&](int, int, std::size_t near) { result[near] = 1; });
+  });
   return result;
 }
 
@@ -240,14 +245,12 @@ struct Around {
 };
 Around around(const RestingField& field, const AffineMotion& motion, int i, int j) {
   Around result;
-  for (int b = std::max(0, j - 1); b <= std::min(field.ny - 1, j + 1); ++b) {
-    for (int a = std::max(0, i - 1); a <= std::min(field.nx - 1, i + 1); ++a) {
-      const FieldCell& cell = field.at(a, b);
-      if (cell.n_beads == 0) continue;
-      result.u += cell.n_beads * (cell.u - motion.at(cell.place));
-      result.n_beads += cell.n_beads;
-    }
-  }
+  for_each_within(field, i, j, 1, [&](int, int, std::size_t k) {
+    const FieldCell& cell = field.cells[k];
+    if (cell.n_beads == 0) return;
+    result.u += cell.n_beads * (cell.u - motion.at(cell.place));
+    result.n_beads += cell.n_beads;
+  });
   if (result.n_beads > 0) result.u = (1.0 / result.n_beads) * result.u;
   return result;
 }
@@ -255,37 +258,30 @@ Around around(const RestingField& field, const AffineMotion& motion, int i, int 
 /// Squares that move by more than a share of the largest displacement.
 std::vector<char> pulled(const RestingField& field, double share) {
   std::vector<char> result;
-  for (int j = 0; j < field.ny; ++j) {
-    for (int i = 0; i < field.nx; ++i) {
-      const Around here = around(field, field.motion, i, j);
-      const double error = field.bead_noise / std::sqrt(std::max(1, here.n_beads));
-      result.push_back(here.n_beads == 0 || norm(here.u) > std::max(3 * error, share * field.largest));
-    }
-  }
+  for_each_square(field, [&](int i, int j, std::size_t) {
+    const Around here = around(field, field.motion, i, j);
+    const double error = field.bead_noise / std::sqrt(std::max(1, here.n_beads));
+    result.push_back(here.n_beads == 0 || norm(here.u) > std::max(3 * error, share * field.largest));
+  });
   return smoothed(field, result);
 }
 
 double share_of_border(const RestingField& field, const std::vector<char>& is) {
   int n = 0, n_is = 0;
-  for (int j = 0; j < field.ny; ++j) {
-    for (int i = 0; i < field.nx; ++i) {
-      if (i > 0 && j > 0 && i < field.nx - 1 && j < field.ny - 1) continue;
-      ++n;
-      n_is += is[static_cast<std::size_t>(j) * field.nx + i];
-    }
-  }
+  for_each_square(field, [&](int i, int j, std::size_t k) {
+    if (!is_border(field, i, j)) return;
+    ++n;
+    n_is += is[k];
+  });
   return 1.0 * n_is / std::max(1, n);
 }
 
 /// Largest motion along the border, as a mean of nine squares, over the largest displacement.
 double pull_of_border(const RestingField& field) {
   double border = 0;
-  for (int j = 0; j < field.ny; ++j) {
-    for (int i = 0; i < field.nx; ++i) {
-      const bool is_border = i == 0 || j == 0 || i == field.nx - 1 || j == field.ny - 1;
-      if (is_border) border = std::max(border, norm(around(field, field.motion, i, j).u));
-    }
-  }
+  for_each_square(field, [&](int i, int j, std::size_t) {
+    if (is_border(field, i, j)) border = std::max(border, norm(around(field, field.motion, i, j).u));
+  });
   return field.largest > 0 ? border / field.largest : 0;
 }
 

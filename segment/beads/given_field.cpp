@@ -5,6 +5,7 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/place.h"
 #include "pipeline/files/csv.h"
@@ -91,11 +92,7 @@ std::vector<Misfit> misfits_of(const DisplacementField& field) {
   }
   std::vector<Misfit> result(field.size());
   if (positions.size() < kNeighbours) return result;
-  const auto [left, right] =
-      std::minmax_element(positions.begin(), positions.end(), [](Vec2 a, Vec2 b) { return a.x < b.x; });
-  const auto [top, bottom] =
-      std::minmax_element(positions.begin(), positions.end(), [](Vec2 a, Vec2 b) { return a.y < b.y; });
-  const double area = std::max(1e-12, (right->x - left->x) * (bottom->y - top->y));
+  const double area = std::max(1e-12, extent_of(positions).area_um2());
   const double spacing = std::sqrt(area / static_cast<double>(positions.size()));
   const Neighbours neighbours(positions, 2 * spacing);
   for (std::size_t k = 0; k < positions.size(); ++k) {
@@ -177,11 +174,7 @@ GivenMotion take_affine_off(DisplacementField& field, const TrackParameters& par
     positions.push_back(bead.position_um);
     displacements.push_back(bead.displacement_um);
   }
-  Vec2 first{1e300, 1e300}, last{-1e300, -1e300};
-  for (const Vec2 p : positions) {
-    first = {std::min(first.x, p.x), std::min(first.y, p.y)};
-    last = {std::max(last.x, p.x), std::max(last.y, p.y)};
-  }
+  const auto [first, last] = extent_of(positions);
   constexpr std::size_t kFewest = 100;  // squares enough that a motion of six numbers is no chance
   if (positions.size() < kFewest || !(last.x > first.x) || !(last.y > first.y)) {
     return {

@@ -86,7 +86,7 @@ struct Matching {
   double free_in_reach = 1;        ///< spots to be expected by chance
   std::vector<int> leftover_of{};  ///< by bead; -1: it has a good track, or has left the picture
   std::vector<Leftover> leftovers{};
-  Vec2 expected_of(int bead) const { return expected.empty() ? Vec2{} : expected[static_cast<std::size_t>(bead)]; }
+  Vec2 expected_of(int bead) const { return expected.empty() ? Vec2{} : expected[bead]; }
   /// Of a good track, beside what is expected.
   Vec2 step_of(int bead) const { return tracks[bead].found.motion.u - expected_of(bead); }
   double area_px2() const { return std::numbers::pi * reach_px * reach_px; }

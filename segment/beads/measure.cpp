@@ -30,7 +30,7 @@ struct Spots {
 Neighbours sorted_places(const Scene& scene, const std::vector<DetectedBead>& beads) {
   std::vector<Vec2> places;
   for (const DetectedBead& bead : beads) places.push_back(bead.position_px);
-  return {std::move(places), std::max(4.0, scene.spacing())};
+  return {places, std::max(4.0, scene.spacing())};
 }
 
 /// How far off a bead's picture reaches into the narrow window: a spot ends at three sigmas.
@@ -63,7 +63,7 @@ Spots expected_spots(const Scene& scene, const std::vector<Track>& tracks, const
     ends.push_back(scene.position(k) + (is_good ? motions[k].u : Vec2{}));
     spots.push_back({ends.back(), is_good ? scene.relaxed->beads[k].brightness : 0});
   }
-  const Neighbours near(std::move(ends), std::max(4.0, scene.spacing()));
+  const Neighbours near(ends, std::max(4.0, scene.spacing()));
   for (const DetectedBead& bead : scene.stressed.beads) {
     const auto expected = near.within(bead.position_px, 2 * scene.bead_sigma(), 4);
     if (std::none_of(expected.begin(), expected.end(), [&](int k) { return tracks[k].is_good(); }))

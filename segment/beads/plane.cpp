@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -120,49 +119,11 @@ double parabola_vertex(double before, double here, double after) {
   return curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
 }
 
-Neighbours::Neighbours(std::vector<Vec2> points, double cell) : points_(std::move(points)), cell_(cell) {
-  if (points_.empty()) return;
-  Vec2 last = points_[0];
-  left_ = last.x, top_ = last.y;
-  for (const Vec2 p : points_) {
-    left_ = std::min(left_, p.x), top_ = std::min(top_, p.y);
-    last = {std::max(last.x, p.x), std::max(last.y, p.y)};
-  }
-  // no more cells than some for each point, however far apart the points are: of a line, or with one astray
-  const double width = last.x - left_, height = last.y - top_, most = 16.0 * static_cast<double>(points_.size());
-  cell_ = std::max({cell_, std::sqrt(width / most) * std::sqrt(height), width / most, height / most});
-  nx_ = 1 + static_cast<int>((last.x - left_) / cell_);
-  ny_ = 1 + static_cast<int>((last.y - top_) / cell_);
-  const auto cell_of = [&](Vec2 p) {
-    return static_cast<std::size_t>((p.y - top_) / cell_) * nx_ + static_cast<std::size_t>((p.x - left_) / cell_);
-  };
-  first_.assign(static_cast<std::size_t>(nx_) * ny_ + 1, 0);
-  for (const Vec2 p : points_) ++first_[cell_of(p) + 1];
-  std::partial_sum(first_.begin(), first_.end(), first_.begin());
-  std::vector<int> next(first_.begin(), first_.end() - 1);
-  order_.resize(points_.size());
-  for (std::size_t k = 0; k < points_.size(); ++k) order_[next[cell_of(points_[k])]++] = static_cast<int>(k);
-}
-
-std::vector<int> Neighbours::within(Vec2 place, double radius, int n) const {
-  const auto cell_of = [&](double offset, int last) {
-    return static_cast<int>(std::clamp(std::floor(offset / cell_), 0.0, static_cast<double>(last)));
-  };
-  std::vector<std::pair<double, int>> found;
-  for (int j = cell_of(place.y - radius - top_, ny_ - 1); j <= cell_of(place.y + radius - top_, ny_ - 1); ++j) {
-    const std::size_t row = static_cast<std::size_t>(j) * nx_;
-    const int from = first_[row + cell_of(place.x - radius - left_, nx_ - 1)];
-    const int to = first_[row + cell_of(place.x + radius - left_, nx_ - 1) + 1];
-    for (int at = from; at < to; ++at) {
-      const Vec2 d = points_[order_[at]] - place;
-      if (dot(d, d) <= radius * radius) found.emplace_back(dot(d, d), order_[at]);
-    }
-  }
-  const std::size_t kept = std::min(found.size(), static_cast<std::size_t>(n));
-  std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end());
-  std::vector<int> result;
-  for (std::size_t k = 0; k < kept; ++k) result.push_back(found[k].second);
-  return result;
+Neighbours::Neighbours(const std::vector<Vec2>& points, double cell) {
+  std::vector<Vec3> in_space;
+  in_space.reserve(points.size());
+  for (const Vec2 p : points) in_space.push_back({p.x, p.y, 0});
+  near_ = numerics::Near(std::move(in_space), cell);
 }
 
 }  // namespace mbtfm::beads

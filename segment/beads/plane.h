@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
+#include "pipeline/numerics/near.h"
 #include "segment/images/image.h"
 
 namespace mbtfm::beads {
@@ -34,20 +35,18 @@ double bead_sigma_of(const Plane& plane);
 /// Vertex of the parabola through three values of which the middle one is highest, within half a pixel of it.
 double parabola_vertex(double before, double here, double after);
 
-/// Points sorted into square cells.
+/// Points of the plane sorted into square cells.
 class Neighbours {
  public:
   Neighbours() = default;
-  Neighbours(std::vector<Vec2> points, double cell);
+  Neighbours(const std::vector<Vec2>& points, double cell);
   /// Indices of the points within `radius` of a place, nearest first, at most `n`.
-  std::vector<int> within(Vec2 place, double radius, int n) const;
+  std::vector<int> within(Vec2 place, double radius, int n) const {
+    return near_.within({place.x, place.y, 0}, radius, n);
+  }
 
  private:
-  std::vector<Vec2> points_;
-  double cell_ = 1, left_ = 0, top_ = 0;
-  int nx_ = 1, ny_ = 1;
-  std::vector<int> first_ = {0, 0};  ///< of each cell in order_
-  std::vector<int> order_;
+  numerics::Near near_;
 };
 
 /// Call body(from, to) for strips of 0 … n; the strips do not depend on the threads.

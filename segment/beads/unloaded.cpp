@@ -35,8 +35,7 @@ double shared_um(const DisplacementField& good, Vec2 drift_um, double noise_um, 
     return std::clamp(static_cast<int>(kRegions * at / size), 0, kRegions - 1);
   };
   for (const Bead& b : good) {
-    Region& r = regions[static_cast<std::size_t>(kRegions * index(b.position_um.y, height_um) +
-                                                 index(b.position_um.x, width_um))];
+    Region& r = regions[kRegions * index(b.position_um.y, height_um) + index(b.position_um.x, width_um)];
     r.sum += b.displacement_um - drift_um;
     ++r.n;
   }

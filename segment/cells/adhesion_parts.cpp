@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "segment/cells/adhesion_regions.h"
+#include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
 
@@ -36,15 +37,15 @@ std::vector<Patch> patches_of(const cv::Mat& labels, int margin) {
 /// The greatest of the noisy heights near a place lies above the adhesion's own: by 1.3 standard deviations for five
 /// independent ones, and by half more as bright pixels have more shot noise than the ground.
 constexpr double kLift = 2;
+/// Of the reference height of a rim: three deviations of the blur, so that a bright neighbour further off is none.
+constexpr double kLevelRadius_um = 0.4;
 
 /// Height above the rim's level, positive inside: the level is a share of the greatest height near, within the region.
 cv::Mat excess_over_rim(const Contrast& c, const cv::Mat& labels, const Patch& patch, double radius_px,
                         const AdhesionParameters& p) {
   cv::Mat inside = labels(patch.box) == patch.label, own, greatest;
   c.height(patch.box).copyTo(own, inside);
-  const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
-  const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * r + 1, 2 * r + 1));
-  cv::dilate(own, greatest, disc);
+  cv::dilate(own, greatest, disc_of(radius_px));
   if (c.coarseness > 1) greatest -= c.noise(patch.box) * kLift;  // else noise is no tenth of the height
   const cv::Mat faintest = cv::max(c.noise(patch.box) * p.adhesion_rim_noise, c.floor);
   return c.height(patch.box) - cv::max(greatest * p.adhesion_rim_level, faintest);
@@ -59,13 +60,6 @@ double share_of(const cv::Mat& excess, int x, int y) {
   const double value = at(x, y);
   if (slope <= 1e-12 * std::abs(value)) return value > 0 ? 1 : 0;
   return std::clamp(0.5 + value / slope, 0.0, 1.0);
-}
-
-cv::Mat filled(const cv::Mat& mask) {
-  cv::Mat padded, outside;
-  cv::copyMakeBorder(mask, padded, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
-  cv::floodFill(padded, cv::Point(0, 0), 128);
-  return padded(cv::Rect(1, 1, mask.cols, mask.rows)) != 128;
 }
 
 /// The region's parts above their rim, each as covered pixels.
@@ -108,7 +102,7 @@ bool reaches_seed(const std::vector<CoveredPixel>& pixels, const cv::Mat& seeds)
 std::vector<std::vector<CoveredPixel>> adhesion_parts(const Contrast& c, double pixel_size_um,
                                                       const AdhesionParameters& p) {
   const cv::Mat seeds = above(c, p.adhesion_seed_noise) & (c.height > c.least_seed);
-  const double pixel_um2 = pixel_size_um * pixel_size_um, radius_px = p.adhesion_level_radius_um / pixel_size_um;
+  const double pixel_um2 = pixel_size_um * pixel_size_um, radius_px = kLevelRadius_um / pixel_size_um;
   const SplitRule rule{.depth = p.adhesion_split_depth, .smallest_px = p.adhesion_smallest_um2 / pixel_um2 / 2};
   const cv::Mat labels = split_regions(c.height, c.noise, above(c, p.adhesion_rim_noise), rule);
   std::vector<std::vector<CoveredPixel>> result;

@@ -53,19 +53,15 @@ bool agrees(const BlurredEllipse& fit, const BlurredEllipse& region) {
 /// The model explains nine tenths of the variance in the window.
 bool is_elliptical(const FittedEllipse& fit) { return fit.is_settled && fit.unexplained < 0.1; }
 
-std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<AdhesionRegion>& regions, double pixel_um,
-                                     const AdhesionParameters& p) {
+std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<AdhesionRegion>& regions, double pixel_um) {
   const auto start = [&](CommonShape shape) {
     std::vector<BlurredEllipse> ellipses;
     for (const AdhesionRegion& r : regions) ellipses.push_back(in_pixels(r.adhesion, pixel_um, shape));
     return ellipses;
   };
   if (regions.empty()) return {};
-  CommonShape shape{p.adhesion_blur_um.value_or(kUsualBlur_um) / pixel_um, kUsualDome};
-  if (!p.adhesion_blur_um) {
-    shape = common_shape(c.sharp, start(shape));
-    shape.blur = std::min(shape.blur, kWidestBlur_um / pixel_um);
-  }
+  CommonShape shape = common_shape(c.sharp, start({kUsualBlur_um / pixel_um, kUsualDome}));
+  shape.blur = std::min(shape.blur, kWidestBlur_um / pixel_um);
   shape.blur = std::max(shape.blur, 0.5);  // px: what sampling alone does
   return fit_ellipses(c.sharp, c.sharp_noise, start(shape));
 }
@@ -86,13 +82,7 @@ void declare(stage::ParameterList& list, AdhesionParameters& p) {
            "least height of an adhesion's other pixels over its background (standard deviations of the noise)");
   list.add("adhesion_rim_level", p.adhesion_rim_level,
            {.low = 0, .high = 1, .excludes_low = true, .excludes_high = true},
-           "height of an adhesion's rim over the background, as a share of the height within adhesion_level_radius_um "
-           "of it");
-  list.add("adhesion_level_radius_um", p.adhesion_level_radius_um, Range::size_um(),
-           "radius within which the rim's reference height is taken (um)");
-  list.add("adhesion_blur_um", p.adhesion_blur_um, {.low = 0, .high = 1, .excludes_low = true},
-           "standard deviation of the blur at an adhesion's rim (um); unset: measured on the widest adhesions, between "
-           "half a pixel and 0.2 um");
+           "height of an adhesion's rim over the background, as a share of the height within 0.4 um of it");
   list.add("adhesion_split_depth", p.adhesion_split_depth, Range::between(0, 1),
            "least dip of the brightness between two adhesions that touch, as a share of the fainter one's height");
   list.add("adhesion_smallest_um2", p.adhesion_smallest_um2, Range::area_um2(), "smallest area of an adhesion (um²)");
@@ -110,7 +100,7 @@ std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, do
     // with the blur on it an adhesion is larger, never smaller
     if (adhesion.area_um2 <= p.adhesion_largest_um2) regions.push_back({adhesion, std::move(pixels)});
   }
-  const std::vector<FittedEllipse> fitted = fitted_to(c, regions, pixel_size_um, p);
+  const std::vector<FittedEllipse> fitted = fitted_to(c, regions, pixel_size_um);
   for (std::size_t i = 0; i < regions.size(); ++i) {
     Adhesion& adhesion = regions[i].adhesion;
     if (is_elliptical(fitted[i]) && agrees(fitted[i].ellipse, in_pixels(adhesion, pixel_size_um, {})))

@@ -19,12 +19,10 @@ struct AdhesionParameters {
   double adhesion_rim_noise = 2.5;              ///< the rim may be fainter than the seed, but still out of the noise
   double adhesion_rim_level =
       0.45;  ///< a blurred edge passes half of the height at the true edge; less, as adhesions fade to their rim
-  double adhesion_level_radius_um = 0.4;   ///< three deviations of the blur: a bright neighbour further off is none
-  std::optional<double> adhesion_blur_um;  ///< unset: as the image shows it
-  double adhesion_split_depth = 0.25;      ///< the dip between two points that the optics just resolve (Rayleigh: 26 %)
-  double adhesion_smallest_um2 = 0.08;     ///< about one resolution element
-  double adhesion_largest_um2 = 25;        ///< beyond any focal adhesion; larger is a bright cell body
-  double adhesion_faintest = 0.25;         ///< relative to the bright ones: what is fainter is texture of the cytosol
+  double adhesion_split_depth = 0.25;   ///< the dip between two points that the optics just resolve (Rayleigh: 26 %)
+  double adhesion_smallest_um2 = 0.08;  ///< about one resolution element
+  double adhesion_largest_um2 = 25;     ///< beyond any focal adhesion; larger is a bright cell body
+  double adhesion_faintest = 0.25;      ///< relative to the bright ones: what is fainter is texture of the cytosol
 };
 
 void declare(stage::ParameterList& list, AdhesionParameters& parameters);

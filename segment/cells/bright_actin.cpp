@@ -44,7 +44,7 @@ std::vector<std::vector<cv::Point2d>> bright_crests_beside(const Ridges& ridges,
   std::vector<std::vector<cv::Point2d>> lines(static_cast<std::size_t>(n));
   for (int y = 0; y < crests.rows; ++y)
     for (int x = 0; x < crests.cols; ++x)
-      if (crests.at<std::uint8_t>(y, x) != 0) lines[static_cast<std::size_t>(labels.at<int>(y, x))].emplace_back(x, y);
+      if (crests.at<std::uint8_t>(y, x) != 0) lines[labels.at<int>(y, x)].emplace_back(x, y);
   std::erase_if(lines, [&](const auto& line) { return static_cast<double>(line.size()) < shortest_px; });
   return lines;
 }

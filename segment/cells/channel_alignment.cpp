@@ -33,8 +33,8 @@ End end_of(Polyline line, bool at_front) {
   std::array<Vec2, kPoints> points;
   Vec2 mean;
   for (int i = 0; i < kPoints; ++i) {
-    points[static_cast<std::size_t>(i)] = point_along_um(line, 1 - part / length * i / (kPoints - 1));
-    mean += 1.0 / kPoints * points[static_cast<std::size_t>(i)];
+    points[i] = point_along_um(line, 1 - part / length * i / (kPoints - 1));
+    mean += 1.0 / kPoints * points[i];
   }
   double xx = 0, xy = 0, yy = 0;
   for (const Vec2 p : points) {

@@ -66,16 +66,15 @@ Trial trial_of(const std::optional<images::Channel>& adhesion, const std::option
 }
 
 /// What all the pictures show: every cell found, or the whole image.
-View common_view(const std::vector<Trial>& trials, const images::Image& image, double pixel_um) {
-  std::optional<View> common;
+Extent common_view(const std::vector<Trial>& trials, const images::Image& image, double pixel_um) {
+  std::vector<Vec2> corners;
   for (const Trial& trial : trials) {
     if (!trial.segmentation) continue;
-    const View view = view_of(*trial.segmentation);
-    if (!common) common = view;
-    common->low_um = {std::min(common->low_um.x, view.low_um.x), std::min(common->low_um.y, view.low_um.y)};
-    common->high_um = {std::max(common->high_um.x, view.high_um.x), std::max(common->high_um.y, view.high_um.y)};
+    const Extent view = view_of(*trial.segmentation);
+    corners.insert(corners.end(), {view.low_um, view.high_um});
   }
-  return common.value_or(View{{0, 0}, {image.width * pixel_um, image.height * pixel_um}});
+  if (corners.empty()) return {{0, 0}, {image.width * pixel_um, image.height * pixel_um}};
+  return extent_of(corners);
 }
 
 void write_line(cv::Mat& picture, const std::string& text, cv::Point at, double size, const cv::Scalar& colour) {
@@ -117,7 +116,7 @@ images::Picture draw_contact_sheet(const std::optional<images::Channel>& adhesio
   const images::Channel &first = adhesion ? *adhesion : *actin, &second = actin ? *actin : *adhesion;
   Segmentation nothing;
   nothing.pixel_size_um = images::common_pixel_size_um(first, second, parameters.pixel_size_um);
-  const View view = common_view(trials, first.image, nothing.pixel_size_um);
+  const Extent view = common_view(trials, first.image, nothing.pixel_size_um);
   std::vector<cv::Mat> tiles;
   for (const Trial& trial : trials)
     tiles.push_back(draw_thumbnail(adhesion, actin, trial.segmentation.value_or(nothing), view, kTile_px));
@@ -131,7 +130,7 @@ images::Picture draw_contact_sheet(const std::optional<images::Channel>& adhesio
     write_line(sheet, trials[i].outcome, corner + cv::Point(0, 66), 0.65, kGrey);
     tiles[i].copyTo(sheet(cv::Rect(corner + cv::Point(0, kCaption_px), tiles[i].size())));
   }
-  return {sheet.cols, sheet.rows, std::vector<std::uint8_t>(sheet.data, sheet.data + sheet.total() * 3)};
+  return picture_of(sheet);
 }
 
 }  // namespace mbtfm::cells

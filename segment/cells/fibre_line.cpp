@@ -42,8 +42,8 @@ std::vector<cv::Point2d> smoothed(const std::vector<cv::Point2d>& points, int ha
   for (int i = 0; i < n; ++i) {
     const int h = std::min({half_window, i, n - 1 - i});
     cv::Point2d sum(0, 0);
-    for (int k = i - h; k <= i + h; ++k) sum += points[static_cast<std::size_t>(k)];
-    result[static_cast<std::size_t>(i)] = sum / (2 * h + 1);
+    for (int k = i - h; k <= i + h; ++k) sum += points[k];
+    result[i] = sum / (2 * h + 1);
   }
   return result;
 }

@@ -37,10 +37,9 @@ Column column_at(const cv::Mat& image, const std::vector<cv::Point2d>& points, d
 double half_width(const std::vector<Column>& profile, int middle, int direction, double level) {
   const int n = static_cast<int>(profile.size());
   int i = middle;
-  while (i + direction >= 0 && i + direction < n && profile[static_cast<std::size_t>(i)].level > level) i += direction;
+  while (i + direction >= 0 && i + direction < n && profile[i].level > level) i += direction;
   if (i == middle) return 0;
-  const double inner = profile[static_cast<std::size_t>(i - direction)].level,
-               outer = profile[static_cast<std::size_t>(i)].level;
+  const double inner = profile[i - direction].level, outer = profile[i].level;
   const double part = inner > outer ? std::clamp((inner - level) / (inner - outer), 0.0, 1.0) : 1;
   return std::abs(i - middle) - 1 + part;
 }
@@ -60,13 +59,13 @@ Profile profile_across(const cv::Mat& image, const std::vector<cv::Point2d>& poi
       static_cast<int>(std::max_element(columns.begin() + half / 2, columns.begin() + half + half / 2 + 1,
                                         [](const Column& a, const Column& b) { return a.level < b.level; }) -
                        columns.begin());
-  const double top = columns[static_cast<std::size_t>(peak)].level;
+  const double top = columns[peak].level;
   Profile p;
   p.lower_drop = std::max(0.0, top - std::max(left.level, right.level));
   p.upper_drop = std::max(0.0, top - std::min(left.level, right.level));
   p.height = (p.lower_drop + p.upper_drop) / 2;
   p.side = top - p.height;
-  p.noise = std::hypot(columns[static_cast<std::size_t>(peak)].error, std::max(left.error, right.error));
+  p.noise = std::hypot(columns[peak].error, std::max(left.error, right.error));
   p.width_px = kColumnStep * (half_width(columns, peak, -1, top - (top - right.level) / 2) +
                               half_width(columns, peak, +1, top - (top - left.level) / 2));
   return p;

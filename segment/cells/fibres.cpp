@@ -26,6 +26,11 @@ namespace mbtfm::cells {
 
 namespace {
 
+constexpr double kSideRatio = 0.1;  // a step (the cell's edge) falls on one side only, a fibre on both
+constexpr double kAboveCortex =
+    1.5;  // a line along the outline is a fibre if it is as many times as high as the cortex
+constexpr double kSimplify_um = 0.05;  // points are left out if the line moves less: half a pixel
+
 /// The part of the image that holds the cell, shrunk until the narrowest filter spans no more pixels than it needs.
 struct Crop {
   cv::Mat image;
@@ -151,7 +156,7 @@ struct Judge {
     c.expected_on_adhesion = texture.expected_false(c.significance, LinePlace::on_adhesion_along_it);
     if (std::min(c.expected_beside, c.expected_on_adhesion) > p.fibre_false_per_cell) return std::nullopt;
     c.profile = profile_across(field.image, points, 1.5 * p.fibre_width_um / field.pixel_um);
-    if (!falls_on_both_sides(c.profile, p.fibre_side_ratio)) return std::nullopt;
+    if (!falls_on_both_sides(c.profile, kSideRatio)) return std::nullopt;
     if (is_ruffle(c.points_um, outline_um, p.fibre_lamellipodium_um)) return std::nullopt;
     if (piece.first == 0) c.before = way_on(trace, LineEnd::first);
     if (piece.first + piece.n == trace.points.size()) c.after = way_on(trace, LineEnd::last);
@@ -235,7 +240,7 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
   }
   constexpr std::size_t kEnough = 5;  // fewer do not tell what bright and faint are
   constexpr double kHigh = 0.8;       // of the second highest of ten
-  double faint = 0, bright = judge.p.fibre_edge_height * height_of_cortex(judge);
+  double faint = 0, bright = kAboveCortex * height_of_cortex(judge);
   if (heights.size() >= kEnough) {
     faint = judge.p.fibre_faintest * numerics::quantile(heights, 0.5);
     bright = std::min(bright, kHigh * numerics::quantile(ridge_heights, 0.9));
@@ -350,20 +355,14 @@ void declare(stage::ParameterList& list, FibreParameters& p) {
            "least height of a fibre, as a share of the median height of the cell's fibres");
   list.add("fibre_edge_um", p.fibre_edge_um, Range::zero_or_size_um(),
            "a line along the outline this near to it is the cell's edge, not a fibre (um)");
-  list.add("fibre_edge_height", p.fibre_edge_height, Range::zero_or_factor(),
-           "a line near the edge counts as a fibre if it is this many times as high as the edge usually is");
   list.add("fibre_lamellipodium_um", p.fibre_lamellipodium_um, Range::zero_or_size_um(),
            "a line that winds this near to the outline is a ruffle, not a fibre (um)");
   list.add("fibre_gap_um", p.fibre_gap_um, Range::zero_or_size_um(), "length over which a fibre may be invisible (um)");
   list.add("fibre_shortest_um", p.fibre_shortest_um, Range::size_um(), "shortest fibre (um)");
-  list.add("fibre_side_ratio", p.fibre_side_ratio, Range::between(0, 1),
-           "least drop of the brightness to one side of a fibre, as a share of the drop to the other side");
   list.add("fibre_reach_um", p.fibre_reach_um, Range::size_um(),
            "a fibre's end this near to an adhesion is held by it (um)");
   list.add("fibre_faint_um", p.fibre_faint_um, Range::zero_or_size_um(),
            "distance over which a fibre's end is followed to an adhesion, while it is brighter than the texture (um)");
-  list.add("fibre_simplify_um", p.fibre_simplify_um, Range::size_um(),
-           "points of a fibre are left out if its line then moves less than this (um)");
 }
 
 TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,
@@ -392,7 +391,7 @@ TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, 
   const auto add = [&](std::vector<Candidate> candidates) {
     for (Candidate& c : candidates) {
       Fibre fibre;
-      fibre.points_um = simplified(c.points_um, p.fibre_simplify_um);
+      fibre.points_um = simplified(c.points_um, kSimplify_um);
       fibre.width_um = c.profile.width_px * field.pixel_um;
       fibre.mean_intensity = c.profile.height;
       fibre.confidence = judge.texture.chance_of_fibre(c.significance, density, c.place);

@@ -22,13 +22,10 @@ struct FibreParameters {
   double fibre_smallest_radius_um = 6;  ///< of curvature: bundles under tension are straight or gently curved
   double fibre_gap_um = 1.5;            ///< a bundle may be hidden by a crossing one for this long
   double fibre_shortest_um = 3;         ///< shorter lines cannot be told from texture
-  double fibre_side_ratio = 0.1;        ///< a step (the cell's edge) falls on one side only, a fibre on both
-  double fibre_edge_um = 1.0;           ///< a line along the outline this near to it is the cortex of the edge …
-  double fibre_edge_height = 1.5;       ///< … unless it stands out of that by this factor
+  double fibre_edge_um = 1.0;           ///< a line along the outline this near to it is the cortex of the edge
   double fibre_lamellipodium_um = 3;    ///< its width: this near to the edge a line that winds is a ruffle
   double fibre_reach_um = 1.0;          ///< an end this near to an adhesion's rim is held by it
   double fibre_faint_um = 4;            ///< longest faint end of the fibres that experts drew on a real cell
-  double fibre_simplify_um = 0.05;      ///< points are left out where the line moves less: half a pixel
 };
 
 void declare(stage::ParameterList& list, FibreParameters& parameters);

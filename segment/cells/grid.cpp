@@ -150,6 +150,14 @@ double median_within(const cv::Mat& values, const cv::Mat& mask) {
   return within.empty() ? 0 : quantile(cv::Mat(within), 0.5);
 }
 
+cv::Mat filled(const cv::Mat& mask) {
+  // what cannot be reached from a frame around the image is in the mask or in a hole of it
+  cv::Mat framed;
+  cv::copyMakeBorder(mask, framed, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
+  cv::floodFill(framed, cv::Point(0, 0), 128);
+  return framed(cv::Rect(1, 1, mask.cols, mask.rows)) != 128;
+}
+
 cv::Mat disc_of(double radius_px) {
   const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
   return cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * r + 1, 2 * r + 1));

@@ -58,6 +58,9 @@ float quantile(const cv::Mat& values, double q);
 /// Median of the values where the mask is not 0; 0 where it is nowhere.
 double median_within(const cv::Mat& values, const cv::Mat& mask);
 
+/// A mask with its holes filled.
+cv::Mat filled(const cv::Mat& mask);
+
 /// A disc for dilation and erosion, of a pixel at least.
 cv::Mat disc_of(double radius_px);
 

@@ -57,7 +57,7 @@ Polygon follow(std::map<Corner, unsigned>& sides) {
     const auto here = sides.find(at);
     here->second &= ~(1u << direction);
     if (here->second == 0) sides.erase(here);
-    const Corner step = kSteps[static_cast<std::size_t>(direction)];
+    const Corner step = kSteps[direction];
     ring.push_back({at.x + 0.5 * step.x, at.y + 0.5 * step.y});
     at = {at.x + step.x, at.y + step.y};
     const auto next = sides.find(at);
@@ -116,7 +116,7 @@ CellOutline outline_of(const LabelMask& mask, int label, const Field& field, con
   rings.erase(largest);
   CellOutline cell;
   cell.area_um2 = (signed_area_um2(outer) + 0.5) * pixel_um * pixel_um;
-  const int every = every_nth(outer.size(), pixel_um, p.outline_spacing_um);
+  const int every = every_nth(outer.size(), pixel_um, kOutlineSpacing_um);
   CutRing ring = thinned(cut_by_border(in_um(outer, pixel_um), field_um, pixel_um), every, field_um);
   cell.outer_um = std::move(ring.points_um);
   cell.is_cut = std::move(ring.is_cut);
@@ -126,7 +126,7 @@ CellOutline outline_of(const LabelMask& mask, int label, const Field& field, con
     if (!contains(outer, hole_px.front())) continue;
     cell.area_um2 -= area_um2;
     cell.holes_um.push_back(
-        thinned({in_um(hole_px, pixel_um), {}}, every_nth(hole_px.size(), pixel_um, p.outline_spacing_um), field_um)
+        thinned({in_um(hole_px, pixel_um), {}}, every_nth(hole_px.size(), pixel_um, kOutlineSpacing_um), field_um)
             .points_um);
   }
   return cell;
@@ -352,7 +352,7 @@ std::vector<CellOutline> mask_outlines(const LabelMask& mask, int cell, const Fi
   if (mask.is_binary && cell > static_cast<int>(labels.size()))
     throw InputError(mask.name, "cell " + std::to_string(cell), std::to_string(labels.size()) + " in all",
                      "cells that touch count as one: a label image separates them");
-  const int label = mask.is_binary ? labels[static_cast<std::size_t>(cell - 1)] : cell;
+  const int label = mask.is_binary ? labels[cell - 1] : cell;
   if (std::ranges::find(labels, label) == labels.end())
     throw InputError(mask.name, "a cell with label " + std::to_string(label), "labels " + listed(labels),
                      "choose the cell by its label: segment.cell = " + std::to_string(labels.front()));

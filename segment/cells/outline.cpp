@@ -14,16 +14,10 @@ namespace mbtfm::cells {
 
 namespace {
 
-constexpr double kSigma_px = 1.5;  // of the smoothing of masks
-constexpr double kGrid_um = 0.4;   // pitch of the masks: a little more than the smoothing
-
-cv::Mat filled(const cv::Mat& mask) {
-  // what cannot be reached from a frame around the image is a cell or a hole in one
-  cv::Mat framed;
-  cv::copyMakeBorder(mask, framed, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
-  cv::floodFill(framed, cv::Point(0, 0), 128);
-  return framed(cv::Rect(1, 1, mask.cols, mask.rows)) != 128;
-}
+constexpr double kSigma_px = 1.5;      // of the smoothing of masks
+constexpr double kSmoothing_um = 0.3;  // just above the resolution of light: more would round the cell's corners
+constexpr double kBand_um = 3;         // brightness inside and outside is compared within this distance
+constexpr double kGrid_um = 0.4;       // pitch of the masks: a little more than the smoothing
 
 /// Parts of a mask by label, from 1, of at least `smallest` pixels each, the largest first.
 struct Parts {
@@ -106,7 +100,7 @@ std::vector<double> add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& ad
   std::vector<cv::Point> cell_pixel(mask.total() + 1);  // the mask's pixel nearest to each point, by label
   for (int y = 0; y < mask.rows; ++y)
     for (int x = 0; x < mask.cols; ++x)
-      if (mask.at<uchar>(y, x)) cell_pixel[static_cast<std::size_t>(labels.at<int>(y, x))] = {x, y};
+      if (mask.at<uchar>(y, x)) cell_pixel[labels.at<int>(y, x)] = {x, y};
   std::vector<double> beyond_um;
   for (const Adhesion& adhesion : adhesions) {
     const cv::Point2d centre = to_pixels(adhesion.position_um, pixel_um);
@@ -116,8 +110,7 @@ std::vector<double> add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& ad
     const cv::Size axes(cvRound(adhesion.major_axis_um / 2 / pixel_um), cvRound(adhesion.minor_axis_um / 2 / pixel_um));
     cv::ellipse(mask, c, axes, adhesion.angle_rad * 180 / CV_PI, 0, 360, cv::Scalar(255), cv::FILLED);
     // a bridge of five pixels outlives the smoothing of the polygon
-    if (distance.at<float>(c) > 0)
-      cv::line(mask, c, cell_pixel[static_cast<std::size_t>(labels.at<int>(c))], cv::Scalar(255), 5);
+    if (distance.at<float>(c) > 0) cv::line(mask, c, cell_pixel[labels.at<int>(c)], cv::Scalar(255), 5);
   }
   return beyond_um;
 }
@@ -146,8 +139,8 @@ std::vector<cv::Point2d> smoothed_ring(const std::vector<cv::Point2d>& ring, int
   std::vector<cv::Point2d> result(ring.size());
   for (int i = 0; i < n; ++i) {
     cv::Point2d sum(0, 0);
-    for (int k = -half_window; k <= half_window; ++k) sum += ring[static_cast<std::size_t>(((i + k) % n + n) % n)];
-    result[static_cast<std::size_t>(i)] = sum / (2 * half_window + 1);
+    for (int k = -half_window; k <= half_window; ++k) sum += ring[((i + k) % n + n) % n];
+    result[i] = sum / (2 * half_window + 1);
   }
   return result;
 }
@@ -227,21 +220,21 @@ struct Scene {
   double border_um() const { return 1.5 * pixel_um; }
 };
 
-Scene scene_of(const cv::Mat& full, double pixel_size_um, const OutlineParameters& p) {
+Scene scene_of(const cv::Mat& full, double pixel_size_um) {
   Scene s{full, {}, pixel_size_um, pixel_size_um, 0, 0};
   // the rings' last move is made in the full image, so that three pixels a micrometre do here
   const int factor = std::max(1, static_cast<int>(kGrid_um / pixel_size_um));
   s.pixel_um = pixel_size_um * factor;
-  s.band_px = std::max(2.0, p.outline_band_um / s.pixel_um);
+  s.band_px = std::max(2.0, kBand_um / s.pixel_um);
   const cv::Mat small = shrink(full, factor);
-  const double sigma_px = std::max(0.5, p.outline_smoothing_um / s.pixel_um);
+  const double sigma_px = std::max(0.5, kSmoothing_um / s.pixel_um);
   s.smooth = gaussian(small, sigma_px);
   s.noise = overall_noise(small) * noise_gain(sigma_px);
   return s;
 }
 
 /// All cells; holes filled.
-Body cells_in(const Scene& s, double smallest, const OutlineParameters& p) {
+Body cells_in(const Scene& s, double smallest) {
   cv::Mat mask = first_mask(s.smooth, s.noise, smallest);
   if (cv::countNonZero(mask) == 0 || cv::countNonZero(~mask) == 0) return {};
   // two halves of pure noise differ by 1.6 standard deviations
@@ -253,7 +246,7 @@ Body cells_in(const Scene& s, double smallest, const OutlineParameters& p) {
     // less than a pixel in a thousand of the cell: what still changes is noise
     if (cv::countNonZero(before ^ mask) * 1000 < cv::countNonZero(mask)) break;
   }
-  Body body = without_haze(s.smooth, mask, s.pixel_um, p.outline_band_um);
+  Body body = without_haze(s.smooth, mask, s.pixel_um, kBand_um);
   if (cv::countNonZero(body.mask ^ mask) > 0) mask = without_debris(smoothed(body.mask), smallest);
   return {mask, body.soft};
 }
@@ -277,8 +270,8 @@ std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Ad
 
 /// A ring of the mask's grid as the polygon on the image's edge.
 Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const std::vector<Adhesion>& adhesions,
-                   const cv::Mat& soft, const OutlineParameters& p) {
-  const auto points = resampled(ring, p.outline_spacing_um / s.pixel_um);
+                   const cv::Mat& soft) {
+  const auto points = resampled(ring, kOutlineSpacing_um / s.pixel_um);
   Polygon coarse, polygon;
   std::vector<cv::Point2d> full_ring;
   for (const cv::Point2d& point : points) {
@@ -287,7 +280,7 @@ Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const s
   }
   const Vec2 field_um = s.field_um();
   const auto moved = on_edge(s.full, full_ring, movable(coarse, adhesions, s, soft), s.full_pixel_um);
-  for (const cv::Point2d& point : resampled(smoothed_ring(moved, 1), p.outline_spacing_um / s.full_pixel_um)) {
+  for (const cv::Point2d& point : resampled(smoothed_ring(moved, 1), kOutlineSpacing_um / s.full_pixel_um)) {
     const Vec2 at = to_um(point, s.full_pixel_um);
     polygon.push_back({std::clamp(at.x, 0.0, field_um.x), std::clamp(at.y, 0.0, field_um.y)});
   }
@@ -303,13 +296,8 @@ bool is_inside(const Polygon& hole, const Polygon& outer) {
 
 void declare(stage::ParameterList& list, OutlineParameters& p) {
   list.table("segment");
-  list.add("outline_smoothing_um", p.outline_smoothing_um, Range::between(1e-3, 100),
-           "smoothing before the outline is looked for (standard deviation, um)");
-  list.add("outline_band_um", p.outline_band_um, Range::between(1e-3, 100),
-           "distance over which the brightness inside and outside is compared (um)");
   list.add("outline_reach_um", p.outline_reach_um, Range::zero_or_size_um(),
            "an adhesion this far outside still belongs to the cell (um)");
-  list.add("outline_spacing_um", p.outline_spacing_um, Range::mesh_um(), "distance of the outline's points (um)");
   list.add("outline_smallest_um2", p.outline_smallest_um2, Range::area_um2(), "least area of a cell (um²)");
   list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2(), "greatest area of a cell (um²)");
   list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2(),
@@ -318,9 +306,9 @@ void declare(stage::ParameterList& list, OutlineParameters& p) {
 
 CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
                         const OutlineParameters& p) {
-  const Scene s = scene_of(matrix_of(image), pixel_size_um, p);
+  const Scene s = scene_of(matrix_of(image), pixel_size_um);
   const double smallest = s.px_of(p.outline_smallest_um2);
-  auto [mask, soft] = cells_in(s, smallest, p);
+  auto [mask, soft] = cells_in(s, smallest);
   if (mask.empty() || cv::countNonZero(mask) == 0) return {};
   const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
   CellsInImage found;
@@ -332,7 +320,7 @@ CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>&
     cell.is_sheet = each.n_pixels > s.px_of(p.outline_largest_um2);
     const auto rings = rings_of(cell.is_sheet ? part : part & ~holes);
     for (const auto& ring : rings) {
-      const Polygon polygon = polygon_of(s, ring, adhesions, soft, p);
+      const Polygon polygon = polygon_of(s, ring, adhesions, soft);
       if (cell.outer_um.empty()) {
         CutRing cut = cut_by_border(polygon, s.field_um(), s.border_um());
         cell.outer_um = std::move(cut.points_um);

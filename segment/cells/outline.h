@@ -11,11 +11,10 @@
 
 namespace mbtfm::cells {
 
+constexpr double kOutlineSpacing_um = 0.5;  ///< of the polygon's points
+
 struct OutlineParameters {
-  double outline_smoothing_um = 0.3;      ///< just above the resolution of light: more would round the cell's corners
-  double outline_band_um = 3;             ///< brightness inside and outside is compared within this distance
   double outline_reach_um = 3;            ///< an adhesion up to this far outside is still this cell's
-  double outline_spacing_um = 0.5;        ///< of the polygon's points
   double outline_smallest_um2 = 50;       ///< less is debris, not a spread cell
   double outline_largest_um2 = 30000;     ///< ten spread cells: more is a sheet of cells that touch
   double outline_smallest_hole_um2 = 10;  ///< less is a gap in the actin mesh, over which the membrane spans

@@ -72,8 +72,8 @@ Place centred_text(cv::Point2d centre, const std::string& text, double size) {
 /// The part of the images around the cell, enlarged or reduced to a size that suits a screen.
 class Canvas {
  public:
-  Canvas(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin, const View& view,
-         double pixel_size_um, double long_side) {
+  Canvas(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
+         const Extent& view, double pixel_size_um, double long_side) {
     const images::Image& any = actin ? actin->image : adhesion->image;
     const Vec2 low = (1 / pixel_size_um) * view.low_um, high = (1 / pixel_size_um) * view.high_um;
     const cv::Rect wanted(cv::Point(cvFloor(low.x), cvFloor(low.y)), cv::Point(cvCeil(high.x), cvCeil(high.y)));
@@ -280,17 +280,13 @@ images::Picture picture_of(const cv::Mat& rgb) {
   return {rgb.cols, rgb.rows, std::vector<std::uint8_t>(rgb.data, rgb.data + rgb.total() * 3)};
 }
 
-View view_of(const Segmentation& s) {
+Extent view_of(const Segmentation& s) {
   Polyline points = s.cell.outline_um;
   for (const Adhesion& a : s.cell.adhesions) points.push_back(a.position_um);
   for (const Fibre& f : s.cell.fibres) points.insert(points.end(), f.points_um.begin(), f.points_um.end());
-  View view{points.front(), points.front()};
-  for (const Vec2 p : points) {
-    view.low_um = {std::min(view.low_um.x, p.x), std::min(view.low_um.y, p.y)};
-    view.high_um = {std::max(view.high_um.x, p.x), std::max(view.high_um.y, p.y)};
-  }
+  const auto [low, high] = extent_of(points);
   const Vec2 margin{kMargin_um, kMargin_um};
-  return {view.low_um - margin, view.high_um + margin};
+  return {low - margin, high + margin};
 }
 
 images::Picture draw_overlay(const std::optional<images::Channel>& adhesion,
@@ -315,7 +311,7 @@ Ground draw_ground(const std::optional<images::Channel>& adhesion, const std::op
 }
 
 cv::Mat draw_thumbnail(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
-                       const Segmentation& s, const View& view, int long_side_px) {
+                       const Segmentation& s, const Extent& view, int long_side_px) {
   Canvas canvas(adhesion, actin, view, s.pixel_size_um, long_side_px);
   draw_marks(canvas, s.cell, 1);
   return canvas.picture();

@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "pipeline/contract/extent.h"
 #include "segment/cells/segment_cell.h"
 #include "segment/images/png.h"
 
@@ -24,18 +25,13 @@ struct Ground {
 Ground draw_ground(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
                    const Segmentation& segmentation);
 
-/// The part of the specimen that a picture shows.
-struct View {
-  Vec2 low_um, high_um;
-};
-
-/// The cell and a margin around it.
-View view_of(const Segmentation& segmentation);
+/// The part of the specimen that a picture shows: the cell and a margin around it.
+Extent view_of(const Segmentation& segmentation);
 
 /// @param rgb  8-bit red, green, blue
 images::Picture picture_of(const cv::Mat& rgb);
 /// The same in small, without text: outline, ellipses and fibres (8-bit red, green, blue).
 cv::Mat draw_thumbnail(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
-                       const Segmentation& segmentation, const View& view, int long_side_px);
+                       const Segmentation& segmentation, const Extent& view, int long_side_px);
 
 }  // namespace mbtfm::cells

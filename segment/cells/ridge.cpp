@@ -71,8 +71,8 @@ FilterBank bank_of(const RidgeScales& scales, int n_directions) {
   bank.filters.resize(static_cast<std::size_t>(n_directions / 2));
   cv::parallel_for_(cv::Range(0, n_directions / 2), [&](const cv::Range& pairs) {
     for (int i = pairs.start; i < pairs.end; ++i)
-      bank.filters[static_cast<std::size_t>(i)] = pair_of_filters(
-          bank.side, along(2 * i, n_directions), along(2 * i + 1, n_directions), scales.width_sigma_px, l);
+      bank.filters[i] = pair_of_filters(bank.side, along(2 * i, n_directions), along(2 * i + 1, n_directions),
+                                        scales.width_sigma_px, l);
   });
   // along the pixels and across their diagonal: the grid cuts the narrow filter's spectrum differently
   for (const std::size_t pair : {std::size_t{0}, bank.filters.size() / 2})
@@ -112,8 +112,7 @@ double Ridges::at(cv::Point2d point, double angle_rad) const {
   place -= n * std::floor(place / n);
   const int k = static_cast<int>(place) % n;
   const double u = place - std::floor(place);
-  return (1 - u) * sample(response[static_cast<std::size_t>(k)], point) +
-         u * sample(response[static_cast<std::size_t>((k + 1) % n)], point);
+  return (1 - u) * sample(response[k], point) + u * sample(response[(k + 1) % n], point);
 }
 
 double Ridges::angle_rad(int x, int y) const { return pi * direction.at<std::uint8_t>(y, x) / n_directions(); }

@@ -114,7 +114,7 @@ std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const images::Ch
   if (p.cell > static_cast<int>(cells.size()))
     throw InputError(channel.name, "cell " + std::to_string(p.cell), std::to_string(cells.size()) + " in all",
                      "cells that touch count as one");
-  return {std::move(cells[static_cast<std::size_t>(p.cell - 1)])};
+  return {std::move(cells[p.cell - 1])};
 }
 
 /// Move what the actin image shows to where the adhesion image has it.

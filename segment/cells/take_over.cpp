@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "segment/cells/parabola.h"
+#include "segment/cells/squares.h"
 
 namespace mbtfm::cells {
 
@@ -19,30 +20,6 @@ using Points = std::vector<cv::Point2d>;
 /// A point of a line.
 struct PointOf {
   std::size_t line, point;
-};
-
-/// Points of lines by squares of the image.
-class PointGrid {
- public:
-  PointGrid(const std::vector<Trace>& lines, double side) : side_(side) {
-    for (std::size_t i = 0; i < lines.size(); ++i)
-      for (std::size_t k = 0; k < lines[i].size(); ++k) squares_[square(lines[i].points[k], 0, 0)].push_back({i, k});
-  }
-  /// In the square of a point and in its neighbours.
-  template <class Use>
-  void each_near(cv::Point2d point, Use use) const {
-    for (int dy = -1; dy <= 1; ++dy)
-      for (int dx = -1; dx <= 1; ++dx)
-        if (const auto found = squares_.find(square(point, dx, dy)); found != squares_.end())
-          for (const PointOf& place : found->second) use(place);
-  }
-
- private:
-  std::pair<int, int> square(cv::Point2d p, int dx, int dy) const {
-    return {static_cast<int>(std::floor(p.x / side_)) + dx, static_cast<int>(std::floor(p.y / side_)) + dy};
-  }
-  double side_;
-  std::map<std::pair<int, int>, std::vector<PointOf>> squares_;
 };
 
 /// Where the course of a line's end meets another line: points of that one, and steps of the course.
@@ -78,7 +55,10 @@ double unlikeness(const Parabola& way, const TraceRule& rule) {
 class Search {
  public:
   Search(const std::vector<Trace>& lines, const TraceRule& rule)
-      : lines_(lines), rule_(rule), near_px_(1.33 * rule.line_radius_px), grid_(lines, near_px_) {}
+      : lines_(lines), rule_(rule), near_px_(1.33 * rule.line_radius_px), squares_(near_px_) {
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      for (std::size_t k = 0; k < lines[i].size(); ++k) squares_.add(lines[i].points[k], {i, k});
+  }
 
   /// All of them, the greatest gain first.
   std::vector<TakeOver> all() const {
@@ -106,7 +86,7 @@ class Search {
     const Points course = course_of(lines_[line], end);
     std::map<std::size_t, Meeting> meetings;
     for (std::size_t i = 0; i < course.size(); ++i)
-      grid_.each_near(course[i], [&](const PointOf& place) {
+      squares_.each_near(course[i], [&](const PointOf& place) {
         const Points& other = lines_[place.line].points;
         const cv::Point2d d = other[place.point] - course[i];
         if (place.line == line || std::hypot(d.x, d.y) > near_px_) return;
@@ -144,7 +124,7 @@ class Search {
   const std::vector<Trace>& lines_;
   const TraceRule& rule_;
   double near_px_;
-  PointGrid grid_;
+  Squares<PointOf> squares_;
 };
 
 /// The owner with the part that it gets back, and what is left of the other line.

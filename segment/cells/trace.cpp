@@ -177,7 +177,7 @@ std::vector<Trace> without_doubles(std::vector<Trace> traces, const Ridges& ridg
 /// Is a response greatest across its direction, and over the directions?
 bool is_crest(const Ridges& ridges, int k, cv::Point at) {
   const int n = ridges.n_directions();
-  const auto of = [&](int i) -> const cv::Mat& { return ridges.response[static_cast<std::size_t>((i + n) % n)]; };
+  const auto of = [&](int i) -> const cv::Mat& { return ridges.response[(i + n) % n]; };
   const float height = of(k).at<float>(at);
   if (of(k - 1).at<float>(at) > height || of(k + 1).at<float>(at) >= height) return false;
   const cv::Point2d across = left_of(unit(pi * k / n)), here(at);
@@ -186,7 +186,7 @@ bool is_crest(const Ridges& ridges, int k, cv::Point at) {
 
 std::vector<Seed> seeds_along(int k, const Ridges& ridges, const Ways& ways, const cv::Mat& is_inside,
                               const TraceRule& rule) {
-  const cv::Mat& response = ridges.response[static_cast<std::size_t>(k)];
+  const cv::Mat& response = ridges.response[k];
   const double angle = pi * k / ridges.n_directions();
   std::vector<Seed> seeds;
   for (int y = 1; y + 1 < response.rows; ++y)
@@ -205,8 +205,7 @@ std::vector<Seed> seeds_along(int k, const Ridges& ridges, const Ways& ways, con
 std::vector<Seed> seeds_of(const Ridges& ridges, const Ways& ways, const cv::Mat& is_inside, const TraceRule& rule) {
   std::vector<std::vector<Seed>> by_direction(ridges.response.size());
   cv::parallel_for_(cv::Range(0, ridges.n_directions()), [&](const cv::Range& range) {
-    for (int k = range.start; k < range.end; ++k)
-      by_direction[static_cast<std::size_t>(k)] = seeds_along(k, ridges, ways, is_inside, rule);
+    for (int k = range.start; k < range.end; ++k) by_direction[k] = seeds_along(k, ridges, ways, is_inside, rule);
   });
   std::vector<Seed> seeds;
   for (const auto& some : by_direction) seeds.insert(seeds.end(), some.begin(), some.end());

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <optional>
 #include <tuple>
 
 #include "segment/cells/grid.h"
 #include "segment/cells/parabola.h"
+#include "segment/cells/squares.h"
 
 namespace mbtfm::cells {
 
@@ -112,41 +112,17 @@ struct Fit {
   }
 };
 
-/// The ends by squares of the image.
-class EndGrid {
- public:
-  EndGrid(const std::vector<EndPoint>& ends, double side) : side_(side) {
-    for (End e = 0; e < ends.size(); ++e) grid_[square(ends[e].point, 0, 0)].push_back(e);
-  }
-  /// Those in the square of a point and in its neighbours.
-  void add_near(cv::Point2d point, std::vector<End>& near) const {
-    for (int dy = -1; dy <= 1; ++dy)
-      for (int dx = -1; dx <= 1; ++dx) {
-        const auto found = grid_.find(square(point, dx, dy));
-        if (found != grid_.end()) near.insert(near.end(), found->second.begin(), found->second.end());
-      }
-  }
-
- private:
-  std::pair<int, int> square(cv::Point2d p, int dx, int dy) const {
-    return {static_cast<int>(std::floor(p.x / side_)) + dx, static_cast<int>(std::floor(p.y / side_)) + dy};
-  }
-  double side_;
-  std::map<std::pair<int, int>, std::vector<End>> grid_;
-};
-
 /// All pairs of ends nearer than `within_px` that fit, the best first.
 template <class Mismatch>
 std::vector<Fit> fits_of(const std::vector<EndPoint>& ends, double within_px, Mismatch mismatch_of) {
-  const EndGrid grid(ends, std::max(1.0, within_px));
+  Squares<End> squares(std::max(1.0, within_px));
+  for (End e = 0; e < ends.size(); ++e) squares.add(ends[e].point, e);
   std::vector<Fit> fits;
-  for (End a = 0; a < ends.size(); ++a) {
-    std::vector<End> near;
-    grid.add_near(ends[a].point, near);
-    for (const End b : near)
-      if (a < b && b != opposite(a))
-        if (const auto m = mismatch_of(a, b)) fits.push_back({*m, a, b});
-  }
+  for (End a = 0; a < ends.size(); ++a)
+    squares.each_near(ends[a].point, [&](End b) {
+      if (a >= b || b == opposite(a)) return;
+      if (const auto m = mismatch_of(a, b)) fits.push_back({*m, a, b});
+    });
   std::sort(fits.begin(), fits.end());
   return fits;
 }

@@ -80,9 +80,9 @@ class Ridge {
       double sum = 0, weights = 0;
       for (int k = std::max(0, i - reach); k <= std::min(n - 1, i + reach); ++k) {
         const double w = std::exp(-(k - i) * (k - i) / (2 * sigma * sigma));
-        sum += w * values[static_cast<std::size_t>(k)], weights += w;
+        sum += w * values[k], weights += w;
       }
-      result[static_cast<std::size_t>(i)] = sum / weights;
+      result[i] = sum / weights;
     }
     return result;
   }

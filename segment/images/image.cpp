@@ -95,6 +95,27 @@ void require_packed_bytes(const std::filesystem::path& file, std::uint64_t n_byt
   throw InputError(file.string(), kTooLarge, std::to_string(n_bytes) + " of them" + in_bytes_of(file), kDamaged);
 }
 
+Samples chosen_samples(bool is_rgb, const PlaneChoice& choice, const std::filesystem::path& file) {
+  if (is_rgb && choice.channel.empty()) return {.first = 0, .n = 3};
+  return {.first = chosen_channel(is_rgb ? kRgbNames : std::vector<std::string>{""}, choice, file.string())};
+}
+
+Image image_of(const std::vector<unsigned char>& bytes, std::uint32_t width, std::uint32_t height,
+               const SampleLayout& layout, const Samples& samples) {
+  Image image{.width = static_cast<int>(width), .height = static_cast<int>(height), .pixels = {}, .pixel_size_um = {}};
+  image.full_scale = static_cast<double>((1u << layout.bits) - 1);
+  image.pixels.resize(static_cast<std::size_t>(width) * height);
+  const int sample_bytes = layout.bits == 16 ? 2 : 1;
+  for (std::size_t k = 0; k < image.pixels.size(); ++k) {
+    const unsigned char* sample = bytes.data() + (k * layout.n_channels + samples.first) * sample_bytes;
+    float sum = 0;
+    for (int c = 0; c < samples.n; ++c, sample += sample_bytes)
+      sum += static_cast<float>(sample_bytes == 2 ? sample[0] << 8 | sample[1] : sample[0]);
+    image.pixels[k] = sum / static_cast<float>(samples.n);
+  }
+  return image;
+}
+
 void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image) {
   choice.prefix = prefix;
   list.add(prefix + "_channel", choice.channel,

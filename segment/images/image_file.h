@@ -26,6 +26,20 @@ Image read_png(const std::filesystem::path& file, const PlaneChoice& choice);
 /// Read a file that begins as a JPEG, grey or RGB, of which the mean where no channel is chosen. @throws InputError
 Image read_jpeg(const std::filesystem::path& file, const PlaneChoice& choice);
 
+/// The samples of a pixel whose mean is its grey value: one channel, or red, green and blue where none is chosen.
+struct Samples {
+  int first = 0, n = 1;
+};
+/// @throws InputError
+Samples chosen_samples(bool is_rgb, const PlaneChoice& choice, const std::filesystem::path& file);
+
+/// How the samples of a pixel lie in bytes; those of 16 bits big-endian.
+struct SampleLayout {
+  int n_channels = 1, bits = 8;
+};
+Image image_of(const std::vector<unsigned char>& bytes, std::uint32_t width, std::uint32_t height,
+               const SampleLayout& layout, const Samples& samples);
+
 /// Refuse a size that a damaged header makes up, before memory is taken for it.
 ///
 /// Up to 2^26 pixels (256 MiB as float) any file may claim, since an even image packs almost without limit. More than

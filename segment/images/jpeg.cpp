@@ -12,7 +12,6 @@
 #include "segment/images/file_handle.h"
 #include "segment/images/image_file.h"
 #include "segment/images/png.h"
-#include "segment/images/stack.h"
 
 namespace mbtfm::images {
 namespace {
@@ -102,22 +101,6 @@ bool read_jpeg_rows(JpegReading& r) {
   return true;
 }
 
-/// The mean of `n_colours` samples of each pixel from `first` on.
-Image to_image(const JpegReading& r, int n_channels, int first, int n_colours) {
-  Image image;
-  image.width = static_cast<int>(r.jpeg.image_width);
-  image.height = static_cast<int>(r.jpeg.image_height);
-  image.full_scale = 255;
-  image.is_lossy = true;
-  image.pixels.resize(static_cast<std::size_t>(image.width) * image.height);
-  for (std::size_t k = 0; k < image.pixels.size(); ++k) {
-    float sum = 0;
-    for (int c = first; c < first + n_colours; ++c) sum += r.bytes[k * n_channels + c];
-    image.pixels[k] = sum / static_cast<float>(n_colours);
-  }
-  return image;
-}
-
 }  // namespace
 
 Image read_jpeg(const std::filesystem::path& file, const PlaneChoice& choice) {
@@ -144,11 +127,11 @@ Image read_jpeg(const std::filesystem::path& file, const PlaneChoice& choice) {
   constexpr std::uint64_t kMostByJpeg = 3 * 64 * 8;  // a bit at least for 8 x 8 pixels of three colours
   require_packed_bytes(file, n_bytes, kMostByJpeg);
   r.bytes.resize(n_bytes);
-  const bool is_mean = is_rgb && choice.channel.empty();
-  const std::vector<std::string> names = is_rgb ? kRgbNames : std::vector<std::string>{""};
-  const int first = is_mean ? 0 : chosen_channel(names, choice, file.string());
+  const Samples samples = chosen_samples(is_rgb, choice, file);
   expect(read_jpeg_rows(r));
-  return to_image(r, n_channels, first, is_mean ? 3 : 1);
+  Image image = image_of(r.bytes, r.jpeg.image_width, r.jpeg.image_height, {.n_channels = n_channels}, samples);
+  image.is_lossy = true;
+  return image;
 }
 
 void write_jpeg(const std::filesystem::path& file, const Picture& picture) {

@@ -10,7 +10,6 @@
 #include "pipeline/contract/errors.h"
 #include "segment/images/file_handle.h"
 #include "segment/images/image_file.h"
-#include "segment/images/stack.h"
 
 namespace mbtfm::images {
 namespace {
@@ -68,26 +67,6 @@ bool read_png_rows(PngReading& r) {
   return true;
 }
 
-/// The mean of `n_colours` samples of each pixel from `first` on.
-Image to_image(const PngReading& r, int first, int n_colours) {
-  Image image;
-  image.width = static_cast<int>(r.width);
-  image.height = static_cast<int>(r.height);
-  image.full_scale = static_cast<double>((1u << r.bits) - 1);
-  image.pixels.resize(static_cast<std::size_t>(r.width) * r.height);
-  const int sample_bytes = r.bits == 16 ? 2 : 1;
-  for (std::size_t k = 0; k < image.pixels.size(); ++k) {
-    const unsigned char* pixel = r.bytes.data() + k * r.channels * sample_bytes;
-    float sum = 0;
-    for (int c = first; c < first + n_colours; ++c) {
-      const unsigned char* sample = pixel + c * sample_bytes;
-      sum += static_cast<float>(sample_bytes == 2 ? sample[0] << 8 | sample[1] : sample[0]);  // PNG is big-endian
-    }
-    image.pixels[k] = sum / static_cast<float>(n_colours);
-  }
-  return image;
-}
-
 void append(png_structp png, png_bytep data, png_size_t size) {
   static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(data), size);
 }
@@ -125,12 +104,9 @@ Image read_png(const std::filesystem::path& file, const PlaneChoice& choice) {
   require_packed_bytes(file, row_bytes * r.height, kMostByDeflate);
   r.bytes.resize(row_bytes * r.height);
   for (std::size_t j = 0; j < r.height; ++j) r.rows.push_back(r.bytes.data() + j * row_bytes);
-  const bool is_rgb = r.channels >= 3;
-  const bool is_mean = is_rgb && choice.channel.empty();
-  const std::vector<std::string> names = is_rgb ? kRgbNames : std::vector<std::string>{""};
-  const int first = is_mean ? 0 : chosen_channel(names, choice, file.string());
+  const Samples samples = chosen_samples(r.channels >= 3, choice, file);
   if (!read_png_rows(r)) fail();
-  return to_image(r, first, is_mean ? 3 : 1);
+  return image_of(r.bytes, r.width, r.height, {r.channels, r.bits}, samples);
 }
 
 std::string png_of(const Picture& picture) {

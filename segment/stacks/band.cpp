@@ -67,18 +67,18 @@ Block averaged(const Block& block, const Average& by) {
     std::ranges::fill(slice.values, 0.0f);
     for (int l = -reach_z; l <= reach_z; ++l) {
       const float* from = block.row(0, mirrored(k + l, nz));
-      add_row(slice.row(0, 0), from, by.z[static_cast<std::size_t>(std::abs(l))], nx * ny);
+      add_row(slice.row(0, 0), from, by.z[std::abs(l)], nx * ny);
     }
     std::vector<float> along_x(static_cast<std::size_t>(nx) * ny);
     for (int j = 0; j < ny; ++j) {
       float* to = along_x.data() + static_cast<std::size_t>(j) * nx + reach;
       for (int l = -reach; l <= reach; ++l)
-        add_row(to, slice.row(j, 0) + reach + l, by.xy[static_cast<std::size_t>(std::abs(l))], nx - 2 * reach);
+        add_row(to, slice.row(j, 0) + reach + l, by.xy[std::abs(l)], nx - 2 * reach);
     }
     for (int j = reach; j < ny - reach; ++j) {
       for (int l = -reach; l <= reach; ++l) {
         const float* from = along_x.data() + static_cast<std::size_t>(j + l) * nx;
-        add_row(result.row(j, k), from, by.xy[static_cast<std::size_t>(std::abs(l))], nx);
+        add_row(result.row(j, k), from, by.xy[std::abs(l)], nx);
       }
     }
   }
@@ -138,7 +138,7 @@ std::vector<Peak> peaks_of(const Volume& volume, Widths w, const Noise& noise, d
           if (!(row[i] > least) || !is_peak(answers, i, j, k)) continue;
           const float here = row[i];
           if (here < detection_snr * gain * std::sqrt(noise.variance(k, light.row(j, k)[i]))) continue;
-          found[static_cast<std::size_t>(number)].push_back(
+          found[number].push_back(
               {{x + beads::parabola_vertex(row[i - 1], here, row[i + 1]),
                 y + beads::parabola_vertex(answers.row(j - 1, k)[i], here, answers.row(j + 1, k)[i]),
                 k + beads::parabola_vertex(answers.row(j, k - 1)[i], here, answers.row(j, k + 1)[i])},

@@ -49,7 +49,7 @@ Noise flatten(Volume& volume, double width, int threads) {
   noise.dark.resize(static_cast<std::size_t>(volume.depth));
   numerics::parallel_for(volume.depth, threads, [&](int k) {
     const beads::Plane plane = beads::without_background(slice_of(volume, k), beads::background_sigma(width));
-    noise.dark[static_cast<std::size_t>(k)] = beads::noise_of(plane);
+    noise.dark[k] = beads::noise_of(plane);
     std::copy(plane.values.begin(), plane.values.end(), volume.row(0, k));
   });
   // whole numbers are at least rounded
@@ -57,8 +57,7 @@ Noise flatten(Volume& volume, double width, int threads) {
   const std::vector<double> raw = noise.dark;
   for (int k = 0; k < volume.depth; ++k) {
     const int from = std::max(0, k - 2), to = std::min(volume.depth, k + 3);
-    noise.dark[static_cast<std::size_t>(k)] =
-        std::max(least, numerics::median(std::vector<double>(raw.begin() + from, raw.begin() + to)));
+    noise.dark[k] = std::max(least, numerics::median(std::vector<double>(raw.begin() + from, raw.begin() + to)));
   }
   return noise;
 }
@@ -69,7 +68,7 @@ double light_variance_of(const Volume& volume, const Noise& noise) {
   constexpr int kBins = 12;
   std::vector<std::vector<float>> answers(kBins), lights(kBins);
   for (const int k : some_slices(volume.depth)) {
-    const double dark = noise.dark[static_cast<std::size_t>(k)];
+    const double dark = noise.dark[k];
     for (int j = 1; j + 1 < volume.height; ++j) {
       const float *above = volume.row(j - 1, k), *here = volume.row(j, k), *below = volume.row(j + 1, k);
       for (int i = 1; i + 1 < volume.width; ++i) {
@@ -87,10 +86,10 @@ double light_variance_of(const Volume& volume, const Noise& noise) {
   const double dark = numerics::median(noise.dark);
   constexpr std::size_t kFewest = 300, kDimmest = 3;  // of a bin; bins
   for (int bin = 0; bin < kBins && variances.size() < kDimmest; ++bin) {
-    auto& of_bin = answers[static_cast<std::size_t>(bin)];
+    auto& of_bin = answers[bin];
     if (of_bin.size() < kFewest) continue;
     const double sd = numerics::median_in(of_bin) / 0.6745;
-    variances.push_back((sd * sd - dark * dark) / numerics::median_in(lights[static_cast<std::size_t>(bin)]));
+    variances.push_back((sd * sd - dark * dark) / numerics::median_in(lights[bin]));
   }
   return variances.empty() ? 0 : std::max(0.0, numerics::median(variances));
 }
@@ -175,9 +174,8 @@ std::vector<Spot> hidden(const SpotFit& fit, double detection_snr, int threads) 
   const numerics::Near near(places, kNear * w.xy);
   std::erase_if(found, [&](const Spot& spot) {
     const Vec3 at{spot.place.x, spot.place.y, stretch * spot.place.z};
-    return std::ranges::any_of(near.within(at, kNear * w.xy, 100), [&](int s) {
-      return spot.height < kOwnLight * fit.spots()[static_cast<std::size_t>(s)].height;
-    });
+    return std::ranges::any_of(near.within(at, kNear * w.xy, 100),
+                               [&](int s) { return spot.height < kOwnLight * fit.spots()[s].height; });
   });
   return found;
 }

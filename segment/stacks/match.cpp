@@ -62,7 +62,7 @@ Constellations constellations_of(const Cloud& cloud, int n, int threads) {
     const std::size_t end = at + static_cast<std::size_t>(most);
     for (const int other : cloud.near.nearest(here, most + 1)) {
       if (static_cast<std::size_t>(other) != bead && at < end)
-        result.vectors[at++] = as_eigen(cloud.beads[static_cast<std::size_t>(other)].position_um - here).cast<float>();
+        result.vectors[at++] = as_eigen(cloud.beads[other].position_um - here).cast<float>();
     }
   });
   return result;
@@ -242,9 +242,9 @@ class Matcher {
     for (std::size_t k = step / 2; k < n; k += step) asked.push_back(k);
     std::vector<Found> found(asked.size());
     numerics::parallel_for(static_cast<int>(asked.size()), threads_, [&](int k) {
-      Found& best = found[static_cast<std::size_t>(k)];
+      Found& best = found[k];
       for (std::size_t other = 0; other < stressed_.beads.size(); ++other) {
-        const double s = similarity(asked[static_cast<std::size_t>(k)], other, turn, kSlack);
+        const double s = similarity(asked[k], other, turn, kSlack);
         if (s > best.score) {
           best.margin = s - best.score;
           best.score = s, best.partner = static_cast<int>(other);
@@ -256,8 +256,7 @@ class Matcher {
     std::vector<Vote> votes;
     for (std::size_t k = 0; k < asked.size(); ++k) {
       if (found[k].score > kLeast && found[k].margin > kClear)
-        votes.push_back({relaxed_.beads[asked[k]].position_um,
-                         stressed_.beads[static_cast<std::size_t>(found[k].partner)].position_um});
+        votes.push_back({relaxed_.beads[asked[k]].position_um, stressed_.beads[found[k].partner].position_um});
     }
     return votes;
   }
@@ -345,7 +344,7 @@ class Matcher {
     double next = 0;
     const double light = relaxed_.beads[bead].brightness;
     for (const int other : stressed_.near.within(expected.place, reach_um, kMost)) {
-      const PlacedBead& o = stressed_.beads[static_cast<std::size_t>(other)];
+      const PlacedBead& o = stressed_.beads[other];
       const double s = similarity(bead, static_cast<std::size_t>(other), expected.strain, slack);
       double score = s;
       if (is_nearby_) {
@@ -378,15 +377,15 @@ class Matcher {
     std::vector<int> owner(stressed_.beads.size(), -1);
     for (std::size_t bead = 0; bead < n; ++bead) {
       if (found[bead].partner < 0) continue;
-      int& o = owner[static_cast<std::size_t>(found[bead].partner)];
-      if (o < 0 || found[bead].score > found[static_cast<std::size_t>(o)].score) o = static_cast<int>(bead);
+      int& o = owner[found[bead].partner];
+      if (o < 0 || found[bead].score > found[o].score) o = static_cast<int>(bead);
     }
     for (std::size_t bead = 0; bead < n; ++bead) {
       Match& m = result_.matches[bead];
       m = {};
       if (found[bead].partner < 0) continue;
       m.similarity = found[bead].similarity;
-      const bool is_owner = owner[static_cast<std::size_t>(found[bead].partner)] == static_cast<int>(bead);
+      const bool is_owner = owner[found[bead].partner] == static_cast<int>(bead);
       if (!is_owner || found[bead].margin < kMargin) {
         m.flag = TrackFlag::ambiguous;
         continue;
@@ -411,12 +410,11 @@ class Matcher {
 
   Vec3 displacement(std::size_t bead) const {
     const Match& m = result_.matches[bead];
-    return stressed_.beads[static_cast<std::size_t>(m.partner)].position_um - relaxed_.beads[bead].position_um;
+    return stressed_.beads[m.partner].position_um - relaxed_.beads[bead].position_um;
   }
 
   Sample sample_of(std::size_t bead) const {
-    const PlacedBead &a = relaxed_.beads[bead],
-                     &b = stressed_.beads[static_cast<std::size_t>(result_.matches[bead].partner)];
+    const PlacedBead &a = relaxed_.beads[bead], &b = stressed_.beads[result_.matches[bead].partner];
     return {a.position_um, displacement(bead), std::hypot(a.sigma_um, b.sigma_um),
             std::hypot(a.sigma_z_um, b.sigma_z_um)};
   }
@@ -425,7 +423,7 @@ class Matcher {
   LocalMotion motion_around(std::size_t bead, int n) const {
     std::vector<Sample> samples;
     for (const int k : near_good_.nearest(relaxed_.beads[bead].position_um, n + 1)) {
-      const auto other = static_cast<std::size_t>(good_[static_cast<std::size_t>(k)]);
+      const auto other = static_cast<std::size_t>(good_[k]);
       if (other != bead) samples.push_back(sample_of(other));
     }
     return local_motion(relaxed_.beads[bead].position_um, samples, spacing_um_);
@@ -469,9 +467,9 @@ class Matcher {
   void measure_light() {
     std::vector<double> ratios;
     for (const int k : good_) {
-      const double a = relaxed_.beads[static_cast<std::size_t>(k)].brightness;
-      const int partner = result_.matches[static_cast<std::size_t>(k)].partner;
-      const double b = stressed_.beads[static_cast<std::size_t>(partner)].brightness;
+      const double a = relaxed_.beads[k].brightness;
+      const int partner = result_.matches[k].partner;
+      const double b = stressed_.beads[partner].brightness;
       if (a > 0 && b > 0) ratios.push_back(std::log(b / a));
     }
     if (ratios.size() < 20) return;

@@ -212,7 +212,7 @@ Vec3 CommonMotion::drift_um_at(double at_um) const {
   const Between b = between(z_um, at_um);
   Vec3 u;
   for (int p = 0; p < 2; ++p) {
-    const Vec2 drift = slices_um[static_cast<std::size_t>(b.place[p])];
+    const Vec2 drift = slices_um[b.place[p]];
     u += b.share[p] * Vec3{drift.x, drift.y, 0};
   }
   return u;
@@ -222,7 +222,7 @@ double CommonMotion::drift_sigma_um_at(double at_um) const {
   if (!has_slice_drift || z_um.empty()) return 0;
   const Between b = between(z_um, at_um);
   double sigma_um = 0;  // as if both places were off alike
-  for (int p = 0; p < 2; ++p) sigma_um += b.share[p] * drift_sigma_um[static_cast<std::size_t>(b.place[p])];
+  for (int p = 0; p < 2; ++p) sigma_um += b.share[p] * drift_sigma_um[b.place[p]];
   return sigma_um;
 }
 

@@ -183,15 +183,15 @@ struct SpotFit::Step {
 SpotFit::Step SpotFit::step_of(int number, bool with_errors) const {
   constexpr int kOwn = 5;  // height, three of the place, level; four more for each neighbour
   constexpr int kMost = kOwn + 4 * kMostNeighbours;
-  const Spot& spot = spots_[static_cast<std::size_t>(number)];
+  const Spot& spot = spots_[number];
   Step result{.spot = spot};
   const Widths w = shape_.at(spot.place);
   const Box box = box_around(volume_, spot.place, w, kReach);
   if (box.is_empty() || !(spot.height > 0)) return result;
   std::vector<Profiles> profiles{{spot.place, box, w}};
   std::vector<double> heights{spot.height};
-  for (const int other : touching_[static_cast<std::size_t>(number)]) {
-    const Spot& o = spots_[static_cast<std::size_t>(other)];
+  for (const int other : touching_[number]) {
+    const Spot& o = spots_[other];
     profiles.emplace_back(o.place, box, shape_.at(o.place));
     heights.push_back(o.height);
   }
@@ -281,12 +281,12 @@ void SpotFit::improve(int rounds) {
     numerics::parallel_for_each(wanted.size(), threads_, [&](std::size_t k) { steps[k] = step_of(wanted[k], false); });
     std::vector<int> unsettled;
     for (std::size_t k = 0; k < wanted.size(); ++k) {
-      Spot& spot = spots_[static_cast<std::size_t>(wanted[k])];
+      Spot& spot = spots_[wanted[k]];
       if (!steps[k].is_sound) continue;
       if (!steps[k].is_settled) unsettled.push_back(wanted[k]);
       // a fit that runs away from its maximum is not believed
       constexpr double kFarthest = 1.5;
-      const Vec3 begin = first[static_cast<std::size_t>(wanted[k])].place;
+      const Vec3 begin = first[wanted[k]].place;
       if (distance_in_widths(steps[k].spot.place, begin, shape_.at(begin)) > kFarthest) continue;
       paint(spot, 1);
       spot = steps[k].spot;
@@ -320,7 +320,7 @@ void SpotFit::drop_doubles(double share) {
   std::vector<bool> is_double(spots_.size());
   for (std::size_t s = 0; s < spots_.size(); ++s) {
     for (const int other : touching_[s]) {
-      const Spot& o = spots_[static_cast<std::size_t>(other)];
+      const Spot& o = spots_[other];
       const bool is_dimmer =
           o.height > spots_[s].height || (o.height == spots_[s].height && static_cast<std::size_t>(other) < s);
       const double apart = distance_in_widths(o.place, spots_[s].place, shape_.at(spots_[s].place));
@@ -388,27 +388,25 @@ void SpotFit::measure_shape() {
   constexpr int kLayers = 8;
   std::vector<std::vector<int>> layers(kLayers);
   for (const int s : lonely) {
-    const double z = spots_[static_cast<std::size_t>(s)].place.z;
-    layers[static_cast<std::size_t>(std::clamp(static_cast<int>(kLayers * z / volume_.depth), 0, kLayers - 1))]
-        .push_back(s);
+    const double z = spots_[s].place.z;
+    layers[std::clamp(static_cast<int>(kLayers * z / volume_.depth), 0, kLayers - 1)].push_back(s);
   }
   std::vector<int> chosen;
   constexpr std::size_t kMostOfLayer = 200;
   for (std::vector<int>& layer : layers) {
     std::ranges::sort(layer, [&](int a, int b) {
-      const double ha = spots_[static_cast<std::size_t>(a)].height, hb = spots_[static_cast<std::size_t>(b)].height;
+      const double ha = spots_[a].height, hb = spots_[b].height;
       return ha != hb ? ha > hb : a < b;
     });
     layer.resize(std::min((layer.size() + 1) / 2, kMostOfLayer));
     chosen.insert(chosen.end(), layer.begin(), layer.end());
   }
   std::vector<Widths> widths(chosen.size());
-  numerics::parallel_for_each(chosen.size(), threads_, [&](std::size_t k) {
-    widths[k] = fitted_widths(spots_[static_cast<std::size_t>(chosen[k])]);
-  });
+  numerics::parallel_for_each(chosen.size(), threads_,
+                              [&](std::size_t k) { widths[k] = fitted_widths(spots_[chosen[k]]); });
   std::vector<SpotShape::Sample> samples;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
-    const Vec3 place = spots_[static_cast<std::size_t>(chosen[k])].place;
+    const Vec3 place = spots_[chosen[k]].place;
     const Widths was = shape_.at(place), is = widths[k];
     constexpr double kLikely = 3;  // a factor beyond which it is no bead, or two
     const bool is_likely =
@@ -451,8 +449,8 @@ void SpotFit::measure_noise() {
           const int bin = bin_of(light);
           if (bin < 0 || bin >= kBins) continue;
           const double left = volume_.at(i, j, k), dark = noise_.variance(k, 0);
-          bins[static_cast<std::size_t>(bin)].squares.push_back(static_cast<float>(left * left - dark));
-          bins[static_cast<std::size_t>(bin)].light += light;
+          bins[bin].squares.push_back(static_cast<float>(left * left - dark));
+          bins[bin].light += light;
         }
       }
     }

@@ -48,7 +48,7 @@ struct Noise {
   std::vector<double> dark;   ///< standard deviation by slice
   double light_variance = 0;  ///< by grey value above the surroundings
   double variance(int slice, double light) const {
-    const double d = dark[static_cast<std::size_t>(slice)];
+    const double d = dark[slice];
     return d * d + light_variance * std::max(0.0, light);
   }
 };

@@ -76,13 +76,13 @@ Agreement agreement_of(const std::vector<PlacedBead>& relaxed, const std::vector
   }
   if (across.empty()) return {};
   const auto own = [&](std::size_t k, double PlacedBead::*sigma) {
-    return std::hypot(relaxed[k].*sigma, stressed[static_cast<std::size_t>(matches[k].partner)].*sigma);
+    return std::hypot(relaxed[k].*sigma, stressed[matches[k].partner].*sigma);
   };
   const numerics::Near near(places, spacing_um);
   for (std::size_t g = 0; g < good.size(); ++g) {
     for (const int other : near.within(places[g], spacing_um, 2)) {
       if (static_cast<std::size_t>(other) == g) continue;
-      const std::size_t k = good[g], l = good[static_cast<std::size_t>(other)];
+      const std::size_t k = good[g], l = good[other];
       const Vec3 off = matches[k].from_neighbours_um - matches[l].from_neighbours_um;
       // each is among the other's neighbours, with the share by which these raise its error
       const double s = own(k, &PlacedBead::sigma_um), s_z = own(k, &PlacedBead::sigma_z_um);
@@ -113,7 +113,7 @@ TrackFlag flag_of(const std::vector<PlacedBead>& relaxed, const std::vector<Plac
   const TrackFlag own = relaxed[k].flag;
   if (m.partner < 0) return own != TrackFlag::none ? own : m.flag;
   if (m.flag != TrackFlag::none) return m.flag;
-  return own != TrackFlag::none ? own : stressed[static_cast<std::size_t>(m.partner)].flag;
+  return own != TrackFlag::none ? own : stressed[m.partner].flag;
 }
 
 /// In the frame of the relaxed stack: the turn and shift that begin the match are taken back.
@@ -123,7 +123,7 @@ Moved moved_bead(const std::vector<PlacedBead>& relaxed, const std::vector<Place
   const PlacedBead& a = relaxed[k];
   const int partner = matching.matches[k].partner;
   if (partner < 0) return {a.position_um, {}, scale * a.sigma_um, scale_z * a.sigma_z_um};
-  const PlacedBead& b = stressed[static_cast<std::size_t>(partner)];
+  const PlacedBead& b = stressed[partner];
   return {a.position_um, back(matching.first).at(b.position_um) - a.position_um,
           scale * std::hypot(a.sigma_um, b.sigma_um), scale_z * std::hypot(a.sigma_z_um, b.sigma_z_um)};
 }
@@ -224,7 +224,7 @@ Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<Placed
     entry.sigma_z_um = bead.sigma_z_um;
     if (partner < 0) continue;
     entry.displacement_um = bead.displacement_um - result.common.at(bead.place_um);
-    const double before = relaxed[k].brightness, after = stressed[static_cast<std::size_t>(partner)].brightness;
+    const double before = relaxed[k].brightness, after = stressed[partner].brightness;
     if (flag == TrackFlag::none && before > 0 && after > 0) light.push_back(after / before);
   }
   if (!light.empty()) result.light_ratio = numerics::median(light);

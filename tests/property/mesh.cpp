@@ -85,8 +85,6 @@ TEST(Mesh, two_hundred_random_cells_give_valid_networks) {
     GeneratedNetwork generated;
     NetworkParameters parameters{.seed = seed};
     parameters.adhesion_anchor = values_of<AdhesionAnchor>()[seed % 3];
-    parameters.free_fibre_ends = std::array{FreeFibreEnds::width, FreeFibreEnds::point}[seed % 2];
-    parameters.seeds = values_of<Seeds>()[seed / 2 % 3];
     ASSERT_NO_THROW(generated = generate_network(cell, parameters));
     expect_valid(generated, cell, test::finest_edge_um(cell, parameters));
     EXPECT_GE(generated.worst_free_quality, 0.3);

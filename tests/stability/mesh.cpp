@@ -316,7 +316,6 @@ TEST_P(HardCell, gives_a_valid_network_with_good_triangles_away_from_its_lines) 
       SCOPED_TRACE(std::string(name_of(anchor)) + ", seed " + std::to_string(seed));
       NetworkParameters parameters{.seed = seed};
       parameters.adhesion_anchor = anchor;
-      parameters.free_fibre_ends = anchor == AdhesionAnchor::rim ? FreeFibreEnds::width : FreeFibreEnds::point;
       const GeneratedNetwork generated = generate_network(cell, parameters);
       expect_valid(generated, cell, test::finest_edge_um(cell, parameters));
       EXPECT_GE(generated.worst_free_quality, 0.3);

@@ -36,7 +36,7 @@ inline SimulatedCell simulated_cell(const std::string& scenario, const std::stri
   };
   cell.adhesion = {"paxillin.tif", image(drawing::paxillin_specimen(cell.truth, m, seed, kThreads), 0)};
   cell.actin = {"actin.tif", image(drawing::actin_specimen(cell.truth, p.actin, m, seed, kThreads), 1)};
-  cell.nucleus = drawing::nucleus_of(cell.truth, p.actin, seed);
+  cell.nucleus = drawing::nucleus_of(cell.truth, seed);
   for (images::Channel* channel : {&cell.adhesion, &cell.actin}) channel->image.pixel_size_um = m.pixel_size_um;
   return cell;
 }

@@ -40,10 +40,6 @@ inline double finest_edge_um(const Cell& cell, const mesh::NetworkParameters& pa
     if (parameters.adhesion_anchor == mesh::AdhesionAnchor::rim)
       finest = std::min(finest, length_um(rim) / parameters.rim_points);
   }
-  for (const Fibre& f : cell.fibres) {
-    const bool is_free = !f.start_adhesion_id || !f.end_adhesion_id;
-    if (parameters.free_fibre_ends == mesh::FreeFibreEnds::width && is_free) finest = std::min(finest, f.width_um);
-  }
   return finest;
 }
 

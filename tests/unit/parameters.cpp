@@ -125,6 +125,13 @@ TEST(Parameters, a_key_in_the_wrong_table_is_told_where_it_belongs_and_one_that_
             "cell.toml:2: expected a known key of [network], found 'whatever' | docs/parameters.md has all keys");
 }
 
+TEST(Parameters, a_deleted_key_is_told_from_a_misspelt_one) {
+  EXPECT_EQ(
+      message_of("[network]\nseeds = 'jittered'\n"),
+      "cell.toml:2: expected a known key of [network], found 'seeds' | this version computes as its default did and "
+      "has no such key: take the line out (CHANGELOG.md)");
+}
+
 TEST(Parameters, keys_of_other_stages_are_left_to_them) { EXPECT_EQ(message_of("[fit]\nwhatever = 2\n"), "read"); }
 
 TEST(Parameters, a_repeated_key_a_wrong_type_and_a_value_out_of_range_are_refused) {
