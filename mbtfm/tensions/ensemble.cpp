@@ -1,7 +1,6 @@
 #include "mbtfm/tensions/ensemble.h"
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <functional>
 #include <mutex>
@@ -9,6 +8,7 @@
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/distributions.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::tensions {
@@ -506,9 +506,7 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   return all;
 }
 
-double quantile_975(const Estimate& estimate) {
-  return boost::math::quantile(boost::math::students_t(estimate.degrees), 0.975);
-}
+double quantile_975(const Estimate& estimate) { return numerics::student_quantile(estimate.degrees, 0.975); }
 
 Interval interval_95(const Estimate& estimate) {
   const double student = quantile_975(estimate);

@@ -3,12 +3,12 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/distributions.h"
 #include "pipeline/numerics/triangle.h"
 
 namespace mbtfm::tensions {
@@ -238,7 +238,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
                                          const SegmentationErrors& segmentation, int threads) {
   const double n_pairs = 0.5 * static_cast<double>(adhesions.size()) * (static_cast<double>(adhesions.size()) - 1);
   if (n_pairs < 1) return {};
-  const double limit = boost::math::quantile(boost::math::normal(), 1 - 0.05 / n_pairs);
+  const double limit = numerics::normal_quantile(1 - 0.05 / n_pairs);
   const MeshFit& mesh = fit.meshes.front();
   ReducedData data = fit.data.reduced;
   if (fit.model_error) {
