@@ -68,10 +68,10 @@ Vec2 force_with(const substrate::Substrate& gel, const WeightedBeads& beads, con
   const Eigen::MatrixXd columns = weighted_compliance(gel, beads, {other});
   Eigen::MatrixXd A = normal;
   Eigen::VectorXd b = pulled;
-  A.middleCols<2>(2 * a) = G.transpose() * columns;
-  A.block<2, 2>(2 * a, 2 * a) = columns.transpose() * columns;
+  A.middleCols<2>(2 * a) = numerics::small_transposed_product(G, columns);
+  A.block<2, 2>(2 * a, 2 * a) = numerics::small_transposed_product(columns, columns);
   A.middleRows<2>(2 * a) = A.middleCols<2>(2 * a).transpose().eval();
-  b.segment<2>(2 * a) = columns.transpose() * beads.displacement;
+  b.segment<2>(2 * a) = numerics::transposed_matvec(columns, beads.displacement);
   const Eigen::VectorXd forces = numerics::solve_symmetric(A, b);
   return {forces[2 * a], forces[2 * a + 1]};
 }
@@ -123,13 +123,13 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
   for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
   const WeightedBeads beads = weighted(inputs.beads);
   const Eigen::MatrixXd G = weighted_compliance(*gel, beads, ellipses);
-  const Eigen::MatrixXd normal_matrix = G.transpose() * G;
+  const Eigen::MatrixXd normal_matrix = numerics::small_transposed_product(G, G);
   const auto [values, vectors] = numerics::symmetric_eigen(normal_matrix);
   check_solvable(values);
-  const Eigen::MatrixXd inverse = vectors * values.cwiseInverse().asDiagonal() * vectors.transpose();
-  const Eigen::VectorXd pulled = G.transpose() * beads.displacement;
-  const Eigen::VectorXd forces = inverse * pulled;
-  const Eigen::VectorXd residual = beads.displacement - G * forces;
+  const Eigen::MatrixXd inverse = numerics::weighted_outer(vectors, values.cwiseInverse());
+  const Eigen::VectorXd pulled = numerics::transposed_matvec(G, beads.displacement);
+  const Eigen::VectorXd forces = numerics::matvec(inverse, pulled);
+  const Eigen::VectorXd residual = numerics::minus_matvec(beads.displacement, G, forces);
 
   Reconstruction r;
   const double chi_squared = residual.squaredNorm() / static_cast<double>(G.rows() - G.cols());
