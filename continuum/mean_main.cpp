@@ -42,9 +42,6 @@ constexpr auto words(Others) { return std::array{"refused", "left-out"}; }
 enum class By { outlines, images };
 constexpr auto words(By) { return std::array{"outlines", "images"}; }
 
-enum class LambdaFor { all, each };
-constexpr auto words(LambdaFor) { return std::array{"all", "each"}; }
-
 struct Parameters {
   std::optional<double> pixel_size_um;
   Gel gel;
@@ -57,10 +54,7 @@ struct Parameters {
   Others others = Others::refused;
   GelModel gel_model = GelModel::layer;
   std::optional<double> lambda_um_per_kPa;
-  LambdaFor lambda_for = LambdaFor::all;
   std::optional<double> spacing_um;
-  std::optional<double> margin_um;
-  std::optional<double> band_um;
   std::uint64_t seed = 1;
 };
 
@@ -86,15 +80,9 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.add("gel_model", p.gel_model, "layer on a rigid base, or half-space");
   list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::positive(),
            "regularisation of the tractions (um/kPa); unset: that of the least expected error");
-  list.add("lambda_for", p.lambda_for,
-           "whether all cells have one regularisation, the median of theirs, or each its own");
   list.add(
       "spacing_um", p.spacing_um, Range::mesh_um(),
       "distance of the nodes at which the mean is given (um); unset: half the mean distance of the first cell's beads");
-  list.add("margin_um", p.margin_um, Range::zero_or_size_um(),
-           "margin of the mean around the reference (um); unset: a fifth of its radius");
-  list.add("band_um", p.band_um, Range::size_um(),
-           "width of the edge within the outline (um); unset: a tenth of the reference's radius");
   list.add("seed", p.seed, "random seed of the resampling of cells and of the model's errors of registration");
 }
 
@@ -287,7 +275,6 @@ std::vector<double> lambdas_of(const std::vector<Registered>& cells, const Param
   std::vector<double> lambdas(cells.size());
   numerics::parallel_for(static_cast<int>(cells.size()), threads,
                          [&](int k) { lambdas[k] = lambda_by_risk_um_per_kPa(cells[k], fttc); });
-  if (p.lambda_for == LambdaFor::each) return lambdas;
   // gels differ: a length, lambda E, is the same for all
   std::vector<double> lengths;
   for (std::size_t k = 0; k < cells.size(); ++k) lengths.push_back(lambdas[k] * cells[k].gel.youngs_modulus_kPa);
@@ -445,12 +432,12 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   for (std::size_t k = 0, of_kept = 0; k < rows.size(); ++k) {
     if (rows[k].is_kept) rows[k].lambda_um_per_kPa = lambdas[of_kept++];
   }
-  const std::vector<Vec2> nodes = lattice_over(alignment.reference_um, p.margin_um.value_or(size / 5), spacing);
+  const std::vector<Vec2> nodes = lattice_over(alignment.reference_um, size / 5, spacing);
   const Samples samples = samples_of(kept.size(), nodes, alignment.motions, context.threads,
                                      [&](int k) { return field_of(kept[k], fttc, lambdas[k]); });
   const std::vector<NodeMean> means = mean_of(nodes, samples, alignment.reference_um);
   context.progress(0.8, "means");
-  const double band = p.band_um.value_or(size / 10);
+  const double band = size / 10;
   const std::optional<Ratio> ratio =
       tip_over_edge(nodes, samples, edge_parts(nodes, alignment.reference_um, band, 2 * band),
                     centroid_um(alignment.reference_um), p.seed);

@@ -36,15 +36,12 @@ void declare(stage::ParameterList& list, SubstrateParameters& p) {
            "gel's own sides are far away (gel thicknesses)");
   list.add("cells_per_thickness", p.cells_per_thickness, Range::between(1, 20),
            "split: cells of the correction's grid over the gel's thickness");
-  list.add("element", p.element, "refined: kind of the finite elements");
   list.add("elements_across_adhesion", p.elements_across_adhesion, Range::between(0.25, 100),
            "refined, curved: number of elements across an adhesion in the first mesh (square root of its area over an "
            "element's side)");
   list.add("precision", p.precision,
            "refined: precision of the factorised matrix: single or double; auto: single up to a Poisson ratio of "
            "0.495, above it double");
-  list.add("elements_per_adhesion", p.elements_per_adhesion, Range::between(1, 10000),
-           "refined: least number of elements that touch each adhesion");
   list.add("growth", p.growth, Range::between(0.1, 10),
            "refined, curved: largest side of an element over its distance to the nearest adhesion; curved takes a "
            "quarter of this value");

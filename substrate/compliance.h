@@ -34,13 +34,6 @@ constexpr ModelKind kind_of(GelModel model) {
   return model == GelModel::layer ? ModelKind::layer : ModelKind::half_space;
 }
 
-/// Of the model refined.
-enum class FiniteElement {
-  q2_p1disc,  ///< stable as nu -> 1/2
-  q1_p0       ///< cheaper, and several times less accurate
-};
-constexpr auto words(FiniteElement) { return std::array{"q2-p1disc", "q1-p0"}; }
-
 struct SubstrateParameters {
   ModelKind model = ModelKind::automatic;  ///< how, not what
   double displacement_tolerance = 0.02;    ///< a third of the beads' noise in good experiments
@@ -53,12 +46,10 @@ struct SubstrateParameters {
   int cells_per_thickness = 2;  ///< 0.1 % of a column at 2, 0.03 % at 3 (it is smooth over h)
 
   // refined
-  FiniteElement element = FiniteElement::q2_p1disc;
   double elements_across_adhesion = 1.4;  ///< square root of its area over their side: 2 % of a column; 1 % at 2
   /// Single: half the memory and time where the last digits do not matter. Unset: by Poisson's ratio.
   std::optional<numerics::Precision> precision = {};
-  int elements_per_adhesion = 4;  ///< that touch each adhesion at least: the thesis' rule
-  double growth = 4;              ///< their side over the distance to the adhesion: 2 costs twice and gains 5 %
+  double growth = 4;  ///< their side over the distance to the adhesion: 2 costs twice and gains 5 %
 
   std::optional<double> side_distance_um = {};  ///< a gel is centimetres wide: its sides are far away
   double surface_tilt_deg = 0;                  ///< gels are cast level to a fraction of a degree

@@ -97,9 +97,7 @@ Reading read_planes(const Rays& rays, const std::vector<double>& depths_um, cons
     return of_all;
   };
   for (const double depth : depths_um) {
-    const Largest deepest = largest(depth, 1);
-    reading.depth_um.push_back(deepest.value);
-    reading.deepest_at_um.push_back(deepest.at);
+    reading.depth_um.push_back(largest(depth, 1).value);
   }
   reading.lift_um = std::max(0.0, largest(0, -1).value);
   return reading;

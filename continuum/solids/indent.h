@@ -27,7 +27,6 @@ struct Case {
 
 struct Reading {
   std::vector<double> depth_um;       ///< by depth of reading: the largest displacement into the gel there
-  std::vector<double> deepest_at_um;  ///< and how far from the axis it is
   double lift_um = 0;                 ///< largest displacement of the gel's surface out of it: near the contact's rim
   double largest_u_um = 0;            ///< anywhere
   double largest_u_gel_um = 0;

@@ -3,13 +3,13 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <numbers>
 #include <type_traits>
 #include <utility>
 
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/distributions.h"
 #include "pipeline/numerics/parallel.h"
 #include "samples/drawing/random.h"
 #include "substrate/greens/half_space.h"
@@ -276,8 +276,6 @@ std::vector<Excess> drawn_excess(const PairFields& f, double density, const Eige
   return all;
 }
 
-double normal_quantile(double chance) { return boost::math::quantile(boost::math::normal(), chance); }
-
 /// Each noise and its opposite are as likely. Neither 0 nor 1, which no number of experiments tells.
 double chance_to_tell(const std::vector<Excess>& experiments, double force) {
   double n_told = 0.5;
@@ -346,8 +344,8 @@ std::optional<double> PairResolution::least_distance_um(double force_nN, double 
       if (i == 0) return touching_um();
       // the square root of the excess is nearly linear in the distance's logarithm, and so is the chance's normal
       // variable
-      const double low = normal_quantile(before), high = normal_quantile(chance);
-      const double share = (normal_quantile(kChance) - low) / (high - low);
+      const double low = numerics::normal_quantile(before), high = numerics::normal_quantile(chance);
+      const double share = (numerics::normal_quantile(kChance) - low) / (high - low);
       return distance_um_[i - 1] * std::pow(distance_um_[i] / distance_um_[i - 1], share);
     }
     before = chance;

@@ -1,10 +1,10 @@
 #include "mbtfm/plan/cell_numbers.h"
 
 #include <algorithm>
-#include <boost/math/distributions/non_central_t.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <set>
+
+#include "pipeline/numerics/distributions.h"
 
 namespace mbtfm::plan {
 
@@ -61,9 +61,8 @@ double power_of(const Scatter& s, double difference_nN, double fibres_per_cell, 
   const double shift = difference_nN / std::sqrt(2 * of_cell / cells);
   constexpr double kSure = 30;  // beyond, the distribution is one to all digits
   if (shift > kSure) return 1;
-  const double limit = boost::math::quantile(boost::math::students_t(degrees), 0.975);
-  const boost::math::non_central_t t(degrees, shift);
-  return boost::math::cdf(boost::math::complement(t, limit)) + boost::math::cdf(t, -limit);
+  const double limit = numerics::student_quantile(degrees, 0.975);
+  return numerics::student_power(degrees, shift, limit);
 }
 
 std::optional<int> cells_for(const Scatter& s, double difference_nN, double fibres_per_cell, double power) {

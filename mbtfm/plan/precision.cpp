@@ -1,6 +1,5 @@
 #include "mbtfm/plan/precision.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -107,10 +106,10 @@ Precision precision_of(const Scene& scene, const KnownCell& cell, const BeadsOnG
     const LocalMisfit local{.tensions_nN = cell.tensions_nN,
                             .H = numerics::gram(displace(data.reduced, D)),
                             .g = Eigen::VectorXd::Zero(D.cols())};
-    const Eigen::MatrixXd U = Eigen::LLT<Eigen::MatrixXd>(response_of(local, 1)).matrixL();
-    const Eigen::MatrixXd of_forces = D * U;
+    const Eigen::MatrixXd U = numerics::SmallCholesky(response_of(local, 1)).upper().transpose();
+    const Eigen::MatrixXd of_forces = numerics::small_product(D, U);
     const Precision of_mesh{.tensions = U.rowwise().norm(),
-                            .total_force = (directions_of(cell.forces_nN).transpose() * of_forces).norm(),
+                            .total_force = numerics::transposed_matvec(of_forces, directions_of(cell.forces_nN)).norm(),
                             .adhesion_forces = errors_along(of_forces, along),
                             .free_forces = Eigen::VectorXd::Zero(along.size() / 2)};
     mean = sum(std::move(mean), powers(of_mesh, 2), 1.0 / static_cast<double>(cell.derivatives.size()));

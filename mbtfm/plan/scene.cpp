@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/stage/parameters.h"
@@ -16,17 +17,8 @@ namespace {
 /// No fibre of a cell pulls less in the simulator; and one that hangs loose tells nothing of what a taut one shows.
 constexpr double kLeastTension_nN = 0.05;
 
-Field whole_field(const drawing::MicroscopeParameters& m) {
+Extent whole_field(const drawing::MicroscopeParameters& m) {
   return {{0, 0}, {drawing::field_um(m), drawing::field_um(m)}};
-}
-
-Field rectangle_of(const DisplacementField& beads) {
-  Field field{beads.front().position_um, beads.front().position_um};
-  for (const Bead& b : beads) {
-    field.low_um = {std::min(field.low_um.x, b.position_um.x), std::min(field.low_um.y, b.position_um.y)};
-    field.high_um = {std::max(field.high_um.x, b.position_um.x), std::max(field.high_um.y, b.position_um.y)};
-  }
-  return field;
 }
 
 }  // namespace
@@ -66,7 +58,7 @@ Scene measured_scene(const std::filesystem::path& folder, const Parameters& para
   }
   const DisplacementField beads = files::read_displacement(folder / "2_track/displacement.csv");
   if (beads.empty()) throw InputError((folder / "2_track/displacement.csv").string(), "beads", "none");
-  scene.field = rectangle_of(beads);
+  scene.field = extent_of(tensions::points_of(beads));
   drawing::ScenarioParameters& p = scene.experiment;
   p.seed = parameters.seed;
   p.gel = scene.fit.gel;

@@ -8,22 +8,18 @@
 
 #include "mbtfm/fit/parameters.h"
 #include "mbtfm/plan/parameters.h"
+#include "pipeline/contract/extent.h"
 #include "samples/drawing/draw.h"
+#include "samples/experiment/experiment.h"
 
 namespace mbtfm::plan {
-
-/// Where beads may lie.
-struct Field {
-  Vec2 low_um, high_um;
-  double area_um2() const { return (high_um.x - low_um.x) * (high_um.y - low_um.y); }
-};
 
 struct Scene {
   std::string name;                        ///< for people
   drawing::DrawnCell cell;                 ///< with the tensions of its fibres
   drawing::ScenarioParameters experiment;  ///< how experiments with it are simulated; its gel is the cell's own
   fit::Parameters fit;                     ///< how they are evaluated
-  Field field;
+  Extent field;                            ///< where beads may lie
 };
 
 /// @throws UsageError where there is no such scenario

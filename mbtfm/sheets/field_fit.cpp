@@ -1,6 +1,5 @@
 #include "mbtfm/sheets/field_fit.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -11,6 +10,7 @@
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::sheets {
 namespace {
@@ -96,7 +96,8 @@ class FieldSearch {
     for (const double M : stiffnesses_nN_per_um) {
       const MatrixXd columns =
           tensions::displace(data_.reduced, table_.shares({M, table_.known_adhesion_nN_per_um3()}));
-      normals_.push_back({M, columns.transpose() * columns, columns.transpose() * data_.reduced.target});
+      normals_.push_back({M, numerics::small_transposed_product(columns, columns),
+                          numerics::transposed_matvec(columns, data_.reduced.target)});
     }
   }
 
@@ -111,26 +112,24 @@ class FieldSearch {
     return mean_of(pairs);
   }
 
-  Eigen::LLT<MatrixXd> precision(const Normal& normal, double smoothing) const {
-    Eigen::LLT<MatrixXd> factor(normal.matrix / variance_ + smoothing * roughness_);
-    MBTFM_ASSERT(factor.info() == Eigen::Success);
+  numerics::SmallCholesky precision(const Normal& normal, double smoothing) const {
+    const numerics::SmallCholesky factor(normal.matrix / variance_ + smoothing * roughness_);
+    MBTFM_ASSERT(factor.is_definite());
     return factor;
   }
 
   Pair pair(std::size_t m, std::size_t l) const {
     const Normal& normal = normals_[m];
-    const Eigen::LLT<MatrixXd> factor = precision(normal, smoothings_[l]);
+    const numerics::SmallCholesky factor = precision(normal, smoothings_[l]);
     Pair p{.stiffness = m, .smoothing = l, .loads = factor.solve(normal.right / variance_)};
     const Index n_bundles = std::ssize(table_.bundles());
     if (n_bundles > 0 && p.loads.tail(n_bundles).minCoeff() < 0)
       p.loads =
           best_loads(normal.matrix / variance_ + smoothings_[l] * roughness_, normal.right / variance_, n_bundles);
-    const double log_determinant = 2 * factor.matrixLLT().diagonal().array().log().sum();
     // Q/v but for |y|²/v, the same for all
-    const double misfit =
-        p.loads.dot(factor.matrixL() * (factor.matrixU() * p.loads)) - 2 * normal.right.dot(p.loads) / variance_;
-    p.log_evidence = 0.5 * rank_ * std::log(smoothings_[l]) - 0.5 * log_determinant - 0.5 * misfit;
-    p.degrees = factor.solve(normal.matrix / variance_).trace();
+    const double misfit = p.loads.dot(factor.multiply(p.loads)) - 2 * normal.right.dot(p.loads) / variance_;
+    p.log_evidence = 0.5 * rank_ * std::log(smoothings_[l]) - 0.5 * factor.log_determinant() - 0.5 * misfit;
+    p.degrees = factor.solve_matrix(normal.matrix / variance_).trace();
     return p;
   }
 
@@ -159,8 +158,7 @@ class FieldSearch {
       constexpr double kNone = 1e-9;
       if (p.share < kNone) continue;
       const MatrixXd second =
-          precision(normals_[p.stiffness], smoothings_[p.smoothing]).solve(MatrixXd::Identity(n, n)) +
-          p.loads * p.loads.transpose();
+          precision(normals_[p.stiffness], smoothings_[p.smoothing]).inverse() + p.loads * p.loads.transpose();
       all.covariance += p.share * second;
       all.covariance_over_stiffness += p.share / (M * M) * second;
     }
@@ -322,15 +320,16 @@ std::vector<ContractionAt> contractions_at(const sheet::Elements& elements, cons
   for (const Vec2 p : elements.triangles().nodes_um) {
     const VectorXd shares = lattice.shares_at(p);
     const double s = shares.dot(fit.contractions);
-    const double sigma = std::sqrt(std::max(0.0, shares.dot(fit.covariance * shares)));
+    const double sigma = std::sqrt(std::max(0.0, numerics::quadratic_form(fit.covariance, shares)));
     rows.push_back({p, s, sigma, s - tensions::kNormal95 * sigma, s + tensions::kNormal95 * sigma});
   }
   return rows;
 }
 
 void add_error(FieldFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um) {
-  const MatrixXd of_contractions = fit.sheet.answers.topRows(fit.contractions.size()) * changes_um;
-  fit.covariance += of_contractions * of_contractions.transpose();
+  const MatrixXd of_contractions =
+      numerics::small_product(fit.sheet.answers.topRows(fit.contractions.size()), changes_um);
+  fit.covariance += numerics::small_product(of_contractions, of_contractions.transpose());
   add_error(fit.sheet, part, changes_um);
 }
 
@@ -338,7 +337,9 @@ FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss 
                    const ContractionLattice& lattice, const VectorXd& mean) {
   MBTFM_ASSERT(table.n_contractions() == lattice.n_points() && !table.adhesion_nN_per_um3());
   const MatrixXd roughness = lattice.roughness();
-  const auto amplitudes = [&](const Posterior& p) -> VectorXd { return table.shares(at_mean(p, table)) * p.loads; };
+  const auto amplitudes = [&](const Posterior& p) -> VectorXd {
+    return numerics::matvec(table.shares(at_mean(p, table)), p.loads);
+  };
   const auto found = [&](const LinearData& of, double variance) {
     return FieldSearch(of, table, known, roughness, variance).posterior();
   };

@@ -95,17 +95,18 @@ tensions::Sides Profile::reach(Eigen::Index load, double room) const {
 }
 
 Profile Search::at(const Stiffnesses& stiffnesses) const {
-  const MatrixXd columns = tensions::displace(data_.reduced, table_.shares(stiffnesses) * joined_);
+  const MatrixXd columns =
+      tensions::displace(data_.reduced, numerics::small_product(table_.shares(stiffnesses), joined_));
   Profile profile{.at = stiffnesses,
                   .loads = {},
                   .misfit = 0,
-                  .normal = columns.transpose() * columns,
+                  .normal = numerics::small_transposed_product(columns, columns),
                   .gradient = {},
                   .n_bundles = n_bundles_};
-  profile.loads = best_loads(profile.normal, columns.transpose() * data_.reduced.target, n_bundles_);
-  const VectorXd left = columns * profile.loads - data_.reduced.target;
+  profile.loads = best_loads(profile.normal, numerics::transposed_matvec(columns, data_.reduced.target), n_bundles_);
+  const VectorXd left = numerics::matvec(columns, profile.loads) - data_.reduced.target;
   profile.misfit = left.squaredNorm();
-  profile.gradient = columns.transpose() * left;
+  profile.gradient = numerics::transposed_matvec(columns, left);
   return profile;
 }
 
@@ -147,12 +148,12 @@ MatrixXd without_bundles(const StiffnessTable& table) {
 
 MatrixXd Directions::normal(const LinearData& data) const {
   const MatrixXd J = tensions::displace(data.reduced, forces(Eigen::all, unknown));
-  return J.transpose() * J;
+  return numerics::small_transposed_product(J, J);
 }
 
 MatrixXd Directions::normal_without_motion(const LinearData& data) const {
   const MatrixXd J = data.response->displace(forces(Eigen::all, unknown));
-  return J.transpose() * (tensions::squared_weights(data).asDiagonal() * J);
+  return numerics::small_transposed_product(J, tensions::squared_weights(data).asDiagonal() * J);
 }
 
 Directions directions_about(const StiffnessTable& table, const Stiffnesses& at, const VectorXd& loads,
@@ -162,7 +163,7 @@ Directions directions_about(const StiffnessTable& table, const Stiffnesses& at, 
     Stiffnesses moved = at;
     moved.sheet_nN_per_um *= std::exp(log_sheet);
     if (moved.adhesion_nN_per_um3) *moved.adhesion_nN_per_um3 *= std::exp(log_adhesion);
-    return table.shares(moved) * loads;
+    return numerics::matvec(table.shares(moved), loads);
   };
   const Eigen::Index n = table.n_loads(), first_bundle = n - std::ssize(table.bundles());
   Directions all{.forces = MatrixXd(table.shares(at).rows(), n + 2), .unknown = {}};
@@ -197,7 +198,7 @@ Linearised linearised(const LinearData& data, const Directions& about, double va
   Directions told = about;
   const Eigen::Index n_loads = about.forces.cols() - 2;
   std::erase_if(told.unknown, [&](Eigen::Index k) { return k >= n_loads && variance * inverse(k, k) > 1; });
-  const MatrixXd forces = about.forces * solved(told);
+  const MatrixXd forces = numerics::small_product(about.forces, solved(told));
   return {.covariance = variance * inverse,
           .without_motion = variance * padded(numerics::inverse_symmetric(about.normal_without_motion(data) +
                                                                           of_prior(about.unknown, about.unknown)),
@@ -211,8 +212,8 @@ void split_by_noise(std::vector<FittedEstimate>& estimates, const Linearised& ab
   const double by_beads = data.has_errors ? std::min(1.0, tensions::noise_variance(data) / variance) : 1;
   for (FittedEstimate& e : estimates) {
     if (!e.sigma) continue;
-    const double whole = e.by_unknown.dot(about.covariance * e.by_unknown),
-                 without = e.by_unknown.dot(about.without_motion * e.by_unknown);
+    const double whole = numerics::quadratic_form(about.covariance, e.by_unknown),
+                 without = numerics::quadratic_form(about.without_motion, e.by_unknown);
     const double by_motion = whole > 0 ? std::clamp(1 - without / whole, 0.0, 1.0) : 0;
     e.parts.beads = *e.sigma * std::sqrt(by_beads * (1 - by_motion));
     if (data.motions.shapes.cols() > 0) e.parts.motion = *e.sigma * std::sqrt(by_beads * by_motion);

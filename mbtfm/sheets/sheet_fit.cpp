@@ -9,6 +9,7 @@
 #include "mbtfm/sheets/profile.h"
 #include "mbtfm/tensions/intervals.h"
 #include "mbtfm/tensions/robust.h"
+#include "pipeline/numerics/dense.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"
 
@@ -193,7 +194,7 @@ class Estimates {
     FittedEstimate e{{.quantity = quantity,
                       .part = part,
                       .value = value,
-                      .sigma = std::sqrt(std::max(0.0, by_unknown.dot(covariance_ * by_unknown))),
+                      .sigma = std::sqrt(std::max(0.0, numerics::quadratic_form(covariance_, by_unknown))),
                       .low = limits.low,
                       .high = limits.high},
                      by_unknown};
@@ -238,7 +239,7 @@ void add_error(std::vector<FittedEstimate>& estimates, std::optional<double> She
 }
 
 void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um) {
-  const MatrixXd moved = fit.answers * changes_um;
+  const MatrixXd moved = numerics::small_product(fit.answers, changes_um);
   VectorXd sizes(std::ssize(fit.estimates));
   for (Eigen::Index k = 0; k < sizes.size(); ++k)
     sizes(k) = (fit.estimates[static_cast<std::size_t>(k)].by_unknown.transpose() * moved).norm();
@@ -270,7 +271,7 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   fit.is_at_bound = !known && std::min(std::log(sheet_of(best) / table.sheet_nN_per_um().low),
                                        std::log(table.sheet_nN_per_um().high / sheet_of(best))) < kAtBound;
   fit.loads = best.loads;
-  add_misfit(fit, data, table.shares(best.at) * best.loads, static_cast<double>(n_unknowns));
+  add_misfit(fit, data, numerics::matvec(table.shares(best.at), best.loads), static_cast<double>(n_unknowns));
   fit.variance = tensions::misfit_variance(data, fit.node_amplitudes, n_unknowns, loss);
   Linearised about = linearised(data, directions_about(table, best.at, best.loads, known.has_value()), fit.variance);
   const MatrixXd& covariance = about.covariance;

@@ -25,7 +25,7 @@ VectorXd Basis::tractions(const VectorXd& x) const {
   const Index n = shapes_.rows();
   VectorXd t(3 * n);
   for (Index c = 0; c < 3; ++c) {
-    const VectorXd of_component = shapes_ * x.segment(c * size(), size());
+    const VectorXd of_component = numerics::matvec(shapes_, x.segment(c * size(), size()));
     for (Index v = 0; v < n; ++v) t[3 * v + c] = of_component[v];
   }
   return t;
@@ -36,7 +36,7 @@ VectorXd Basis::transposed(const VectorXd& by_vertex) const {
   VectorXd x(3 * size()), of_component(n);
   for (Index c = 0; c < 3; ++c) {
     for (Index v = 0; v < n; ++v) of_component[v] = by_vertex[3 * v + c];
-    x.segment(c * size(), size()) = shapes_.transpose() * of_component;
+    x.segment(c * size(), size()) = numerics::transposed_matvec(shapes_, of_component);
   }
   return x;
 }

@@ -1,6 +1,5 @@
 #include "mbtfm/spatial/foresight.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -60,17 +59,17 @@ Foresight::Foresight(const Problem& problem, const tractions::TractionParameters
   const Rows rows(problem, VectorXd::Ones(displacement_um.size()));
   const MatrixXd A = rows.of(basis.response(problem.response_um_per_kPa, threads)),
                  P = rows.of(problem.patch_response_um_per_nN);
-  const VectorXd u = rows.of(displacement_um), pulled = A.transpose() * u;
+  const VectorXd u = rows.of(displacement_um), pulled = numerics::transposed_matvec(A, u);
   MatrixXd normal = MatrixXd::Zero(A.cols(), A.cols());
   numerics::add_upper_gram(A, normal, threads);
   spectrum_.emplace(std::move(normal), pulled, u.squaredNorm(),
                     static_cast<double>(u.size()) - static_cast<double>(rows.n_common()));
   const MatrixXd& V = spectrum_->vectors();
   patches_ = numerics::gram(P, threads);
-  hidden_ = V.transpose() * (A.transpose() * P);
-  pulled_by_patches_ = P.transpose() * u;
-  pulled_ = V.transpose() * pulled;
-  sums_ = V.transpose() * sums_of(problem, basis);
+  hidden_ = numerics::small_transposed_product(V, numerics::small_transposed_product(A, P));
+  pulled_by_patches_ = numerics::transposed_matvec(P, u);
+  pulled_ = numerics::transposed_matvec(V, pulled);
+  sums_ = numerics::small_transposed_product(V, sums_of(problem, basis));
   shown_ = shown_by(basis, norm, V);
 }
 
@@ -84,26 +83,28 @@ Foreseen Foresight::at(double noise) const {
   const double variance = std::max(scan.variance, least), lambda2 = chosen.lambda * chosen.lambda;
   const ArrayXd& values = spectrum_->values();
   const ArrayXd of_background = 1 / (values + lambda2);
-  const Eigen::LLT<MatrixXd> told(patches_ - hidden_.transpose() * of_background.matrix().asDiagonal() * hidden_);
-  const MatrixXd heard = patches_ - hidden_.transpose() *
-                                        (2 * of_background - values * of_background.square()).matrix().asDiagonal() *
-                                        hidden_;
-  const MatrixXd inverse = told.solve(MatrixXd::Identity(patches_.rows(), patches_.cols()));
-  Foreseen f{
-      .lambda = chosen.lambda / noise,
-      .degrees = noisy.degrees(chosen.lambda),
-      .covariance_nN2 = variance * inverse,
-      .by_noise_nN2 = stated * inverse * heard * inverse,
-      .mean_nN = told.solve(pulled_by_patches_ - hidden_.transpose() * (of_background * pulled_.array()).matrix()),
-      .net_force_nN2 = {},
-      .net_by_noise_nN2 = {},
-      .resolution_um = {}};
+  const numerics::SmallCholesky told(
+      numerics::minus_product(patches_, hidden_.transpose() * of_background.matrix().asDiagonal(), hidden_));
+  const MatrixXd heard = numerics::minus_product(
+      patches_, hidden_.transpose() * (2 * of_background - values * of_background.square()).matrix().asDiagonal(),
+      hidden_);
+  const MatrixXd inverse = told.inverse();
+  Foreseen f{.lambda = chosen.lambda / noise,
+             .degrees = noisy.degrees(chosen.lambda),
+             .covariance_nN2 = variance * inverse,
+             .by_noise_nN2 = numerics::small_product(numerics::small_product(stated, inverse, heard), inverse),
+             .mean_nN = told.solve(pulled_by_patches_ -
+                                   numerics::transposed_matvec(hidden_, (of_background * pulled_.array()).matrix())),
+             .net_force_nN2 = {},
+             .net_by_noise_nN2 = {},
+             .resolution_um = {}};
   const double of_sums = chosen.by == tractions::LambdaCriterion::risk ? scan.by_prediction : chosen.lambda;
   const ArrayXd of_sum = 1 / (values + of_sums * of_sums);
-  f.net_force_nN2 = variance * sums_.transpose() * of_sum.matrix().asDiagonal() * sums_;
-  f.net_by_noise_nN2 = stated * sums_.transpose() * (values * of_sum.square()).matrix().asDiagonal() * sums_;
+  f.net_force_nN2 = numerics::small_product(variance * sums_.transpose() * of_sum.matrix().asDiagonal(), sums_);
+  f.net_by_noise_nN2 =
+      numerics::small_product(stated * sums_.transpose() * (values * of_sum.square()).matrix().asDiagonal(), sums_);
   SpatialReconstruction as_resolved;
-  as_resolved.resolved = (shown_ * (values * of_background).matrix()).cwiseMax(0).cwiseMin(1);
+  as_resolved.resolved = numerics::matvec(shown_, (values * of_background).matrix()).cwiseMax(0).cwiseMin(1);
   f.resolution_um = resolution_um(problem_, as_resolved);
   return f;
 }

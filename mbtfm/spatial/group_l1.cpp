@@ -41,7 +41,7 @@ class GroupLasso {
     auto [values, vectors] = numerics::symmetric_eigen(normal);
     values_ = values.array().max(0);
     vectors_ = std::move(vectors);
-    projected_ = vectors_.transpose() * pulled_;
+    projected_ = numerics::transposed_matvec(vectors_, pulled_);
     z_ = VectorXd::Zero(pulled_.size());
     dual_ = z_;
   }
@@ -57,8 +57,8 @@ class GroupLasso {
     const double rho = mu * weights_.mean() / (kShortening * largest_);
     VectorXd x;
     for (int k = 0; k < kMost; ++k) {
-      const VectorXd right = projected_ + vectors_.transpose() * (rho * z_ - dual_);
-      x = vectors_ * (right.array() / (values_ + rho)).matrix();
+      const VectorXd right = projected_ + numerics::transposed_matvec(vectors_, rho * z_ - dual_);
+      x = numerics::matvec(vectors_, (right.array() / (values_ + rho)).matrix());
       const VectorXd v = x + dual_ / rho;
       const ArrayXd shares = (1 - mu / rho * weights_ / lengths_of(v).max(1e-300)).max(0);
       const VectorXd next = v.cwiseProduct(for_each_component(shares.matrix()));
@@ -72,7 +72,7 @@ class GroupLasso {
   }
 
   const VectorXd& x() const { return z_; }
-  double misfit() const { return data_squared_ - 2 * z_.dot(pulled_) + z_.dot(normal_ * z_); }
+  double misfit() const { return data_squared_ - 2 * z_.dot(pulled_) + numerics::quadratic_form(normal_, z_); }
   int steps() const { return steps_; }
   const VectorXd& pulled() const { return pulled_; }
   const ArrayXd& weights() const { return weights_; }
@@ -135,7 +135,7 @@ Posterior posterior_of(const GroupLasso& lasso, const MatrixXd& normal, double m
     const ArrayXd size = (lengths_of(posterior.mean).square() + spread).sqrt();
     posterior.precision_before = for_each_component((mu * lasso.weights() / size).matrix());
     posterior.covariance = inverse_of(normal, posterior.precision_before, threads);
-    posterior.mean = posterior.covariance * lasso.pulled();
+    posterior.mean = numerics::matvec(posterior.covariance, lasso.pulled());
     const VectorXd diagonal = variance * posterior.covariance.diagonal();
     spread = diagonal.head(n) + diagonal.segment(n, n) + diagonal.tail(n);
   }
@@ -167,7 +167,7 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   const MatrixXd weighed = rows.of(response);
   const VectorXd data = rows.of(problem.displacement_um());
   const MatrixXd normal = numerics::gram(weighed, threads);
-  GroupLasso lasso(normal, weighed.transpose() * data, data.squaredNorm(), weights, largest);
+  GroupLasso lasso(normal, numerics::transposed_matvec(weighed, data), data.squaredNorm(), weights, largest);
   // The sum of n squares of the noise varies by sqrt(2/n), 2 % for 1 500 beads, and that is half of what the penalty
   // moves: the misfit aimed at is the one of the noise that these beads have, not of the one they state, and of what
   // their weights leave of it.

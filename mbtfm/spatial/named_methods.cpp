@@ -25,8 +25,12 @@ struct Functional {
   VectorXd data;      ///< W u
   double lambda2 = 0;
 
-  double value(const VectorXd& x) const { return (data - response * x).squaredNorm() + lambda2 * x.squaredNorm(); }
-  VectorXd half_slope(const VectorXd& x) const { return lambda2 * x - response.transpose() * (data - response * x); }
+  double value(const VectorXd& x) const {
+    return (data - numerics::matvec(response, x)).squaredNorm() + lambda2 * x.squaredNorm();
+  }
+  VectorXd half_slope(const VectorXd& x) const {
+    return lambda2 * x - numerics::transposed_matvec(response, numerics::minus_matvec(data, response, x));
+  }
 };
 
 Functional functional_of(const Problem& problem, const Basis& basis, const SpatialReconstruction& r, int threads) {
@@ -73,7 +77,8 @@ SpatialReconstruction reconstruct_adjoint(const Problem& problem, const traction
   double square = first;
   int iterations = 0;
   for (; iterations < kMost && square > kSettled * kSettled * first; ++iterations) {
-    const VectorXd moved = f.response.transpose() * (f.response * step) + f.lambda2 * step;
+    const VectorXd moved =
+        numerics::transposed_matvec(f.response, numerics::matvec(f.response, step)) + f.lambda2 * step;
     const double length = square / step.dot(moved);
     x += length * step;
     downhill -= length * moved;
@@ -102,7 +107,7 @@ SpatialReconstruction reconstruct_thesis_cg(const Problem& problem, const tracti
   const double first = downhill.norm();
   int steps = 0;
   for (; steps < kMost && downhill.norm() > kSettled * first; ++steps) {
-    const VectorXd moved = f.response * step;
+    const VectorXd moved = numerics::matvec(f.response, step);
     const double length = 0.5 * downhill.dot(step) / (moved.squaredNorm() + f.lambda2 * step.squaredNorm());
     x += length * step;
     const VectorXd next = -2 * f.half_slope(x);
@@ -126,7 +131,7 @@ SpatialReconstruction reconstruct_direct(const Problem& problem, int threads) {
     imposed.segment<3>(3 * static_cast<Index>(v)) = interpolated_um(problem, vertices[v]);
   // by normal equations: the compliance of the surface is symmetric but for the lattice
   MatrixXd normal = numerics::gram(problem.surface_um_per_kPa, threads);
-  MatrixXd right = problem.surface_um_per_kPa.transpose() * imposed;
+  MatrixXd right = numerics::transposed_matvec(problem.surface_um_per_kPa, imposed);
   normal.diagonal().array() += 1e-12 * normal.diagonal().maxCoeff();  // rounding
   if (!numerics::upper_cholesky(normal, threads))
     throw NotSolved({.reason = "direct: tractions do not follow from the displacement of the surface"});

@@ -60,7 +60,9 @@ double deviate_of_tractions_beside(const Problem& problem, const MatrixXd& of_pa
   const Rows rows(problem, weights_by_row);
   const MatrixXd P = rows.of(of_patches);
   const MatrixXd Q = numerics::orthonormal_basis(P);
-  const auto beside = [&](const MatrixXd& what) -> MatrixXd { return what - Q * (Q.transpose() * what); };
+  const auto beside = [&](const MatrixXd& what) -> MatrixXd {
+    return numerics::minus_product(what, Q, numerics::small_transposed_product(Q, what));
+  };
   const MatrixXd u = rows.of(problem.displacement_um()), y = beside(u), MA = beside(rows.of(anywhere));
   MatrixXd K = MatrixXd::Zero(MA.cols(), MA.cols());
   numerics::add_upper_gram(MA, K, threads);
@@ -68,7 +70,7 @@ double deviate_of_tractions_beside(const Problem& problem, const MatrixXd& of_pa
   const double trace = K.trace(), trace_of_square = K.squaredNorm();
   const double degrees = std::max(1.0, n_data - static_cast<double>(P.cols() + rows.n_common()));
   const double of_gel = std::pow(problem.model_error, 2) * u.squaredNorm() * trace_of_square / trace;
-  const double score = std::max(0.0, (MA.transpose() * y).squaredNorm() - of_gel);
+  const double score = std::max(0.0, numerics::small_transposed_product(MA, y).squaredNorm() - of_gel);
   const double h = trace * trace / trace_of_square;
   const double over_expected = score / (y.squaredNorm() / degrees) / trace;
   const double spread = 2 / (9 * h);

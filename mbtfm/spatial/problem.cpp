@@ -272,7 +272,7 @@ tractions::Spectrum spectrum_of(const Problem& problem, const MatrixXd& response
   const VectorXd data = rows.of(problem.displacement_um());
   MatrixXd normal = MatrixXd::Zero(weighed.cols(), weighed.cols());
   numerics::add_upper_gram(weighed, normal, threads);
-  return {std::move(normal), weighed.transpose() * data, data.squaredNorm(),
+  return {std::move(normal), numerics::transposed_matvec(weighed, data), data.squaredNorm(),
           n_data - static_cast<double>(rows.n_common())};
 }
 

@@ -17,15 +17,6 @@ std::string text_of(const Rectangle& r) {
          brief(r.high_um.y) + " um";
 }
 
-Rectangle around(const std::vector<Vec2>& points) {
-  Rectangle r{points.front(), points.front()};
-  for (const Vec2 p : points) {
-    r.low_um = {std::min(r.low_um.x, p.x), std::min(r.low_um.y, p.y)};
-    r.high_um = {std::max(r.high_um.x, p.x), std::max(r.high_um.y, p.y)};
-  }
-  return r;
-}
-
 Rectangle grown(Rectangle r, double by) {
   r.low_um += Vec2{-by, -by};
   r.high_um += Vec2{by, by};
@@ -42,7 +33,7 @@ bool is_empty(const Rectangle& r) { return r.low_um.x >= r.high_um.x || r.low_um
 Rectangle of_beads(const Observed& observed) {
   std::vector<Vec2> places;
   for (const Vec3& p : std::get<std::vector<Vec3>>(observed.at.points_um)) places.push_back({p.x, p.y});
-  return around(places);
+  return extent_of(places);
 }
 
 struct Shape {
@@ -52,7 +43,7 @@ struct Shape {
 };
 
 Shape outline_shape(const Polygon& outline, double grow_um) {
-  return {grown(around(outline), grow_um),
+  return {grown(extent_of(outline), grow_um),
           [outline, grow_um](Vec2 p) { return contains(outline, p) || distance_to_boundary_um(outline, p) <= grow_um; },
           "the outline"};
 }
@@ -63,7 +54,7 @@ Shape adhesion_shape(const std::vector<Adhesion>& adhesions, double grow_um) {
     const Vec2 half = substrate::half_extent_um(substrate::ellipse_of(a)) + Vec2{grow_um, grow_um};
     corners.insert(corners.end(), {a.position_um - half, a.position_um + half});
   }
-  return {around(corners),
+  return {extent_of(corners),
           [adhesions, grow_um](Vec2 p) { return tractions::adhesion_of_patches({p}, adhesions, grow_um).front() >= 0; },
           "the adhesions"};
 }

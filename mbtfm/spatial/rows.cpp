@@ -40,13 +40,15 @@ Rows::Rows(const Problem& problem, const VectorXd& weights_by_row)
 
 MatrixXd Rows::of(const MatrixXd& by_row) const {
   MatrixXd weighed = roots_.asDiagonal() * by_row;
-  if (common_.cols() > 0) weighed -= common_ * (common_.transpose() * weighed);
+  if (common_.cols() > 0)
+    weighed -= numerics::small_product(common_, numerics::small_transposed_product(common_, weighed));
   return weighed;
 }
 
 MatrixXd Rows::transposed(const MatrixXd& weighed) const {
   if (common_.cols() == 0) return roots_.asDiagonal() * weighed;
-  return roots_.asDiagonal() * (weighed - common_ * (common_.transpose() * weighed));
+  return roots_.asDiagonal() *
+         (weighed - numerics::small_product(common_, numerics::small_transposed_product(common_, weighed)));
 }
 
 MatrixXd Rows::common_in(const MatrixXd& by_row) const {
@@ -59,9 +61,11 @@ std::optional<CommonMotionInSpace> common_motion_beside(const Problem& problem, 
   const VectorXd roots = found.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
   const MatrixXd C = roots.asDiagonal() * problem.common_um;
   const MatrixXd by_traction = rows.common_in(problem.response_um_per_kPa);
-  const MatrixXd covariance = found.variance * numerics::inverse_symmetric(C.transpose() * C) +
-                              by_traction * found.covariance_kPa2 * by_traction.transpose();
-  const VectorXd left_um = problem.displacement_um() - problem.response_um_per_kPa * found.traction_kPa;
+  const MatrixXd covariance =
+      numerics::plus_product(found.variance * numerics::inverse_symmetric(numerics::small_transposed_product(C, C)),
+                             numerics::small_product(by_traction, found.covariance_kPa2), by_traction.transpose());
+  const VectorXd left_um =
+      numerics::minus_matvec(problem.displacement_um(), problem.response_um_per_kPa, found.traction_kPa);
   return CommonMotionInSpace{rows.common_in(left_um), covariance.diagonal().cwiseMax(0).cwiseSqrt()};
 }
 

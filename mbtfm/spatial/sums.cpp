@@ -88,11 +88,13 @@ std::vector<PartForce> forces_beside_background(const Problem& problem, const Ma
   numerics::add_upper_gram(A, inner, threads);
   inner.diagonal().array() += *r.lambda * *r.lambda;
   const Eigen::LLT<MatrixXd, Eigen::Upper> factor(inner);
-  const MatrixXd AP = A.transpose() * P;
+  const MatrixXd AP = numerics::small_transposed_product(A, P);
   const MatrixXd hidden = factor.solve(AP);
-  const Eigen::LLT<MatrixXd> told(P.transpose() * P - AP.transpose() * hidden);
-  const VectorXd forces_nN = told.solve(P.transpose() * u - hidden.transpose() * (A.transpose() * u));
-  const MatrixXd covariance_nN2 = r.variance * told.solve(MatrixXd::Identity(P.cols(), P.cols()));
+  const numerics::SmallCholesky told(
+      numerics::minus_product(numerics::small_transposed_product(P, P), AP.transpose(), hidden));
+  const VectorXd forces_nN = told.solve(numerics::transposed_matvec(P, u) -
+                                        numerics::transposed_matvec(hidden, numerics::transposed_matvec(A, u)));
+  const MatrixXd covariance_nN2 = r.variance * told.inverse();
   std::vector<PartForce> parts = parts_of(problem, problem.adhesion_areas_um2);
   for (std::size_t a = 0; a < parts.size(); ++a) {
     const auto at = 3 * static_cast<Index>(a);
@@ -108,10 +110,10 @@ std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruc
     for (Index v = 0; v < areas_um2.cols(); ++v) {
       for (Index c = 0; c < 3; ++c) sums(c, 3 * v + c) = areas_um2(static_cast<Index>(a), v);
     }
-    const Vector3d f = sums * summed_tractions_kPa(r);
+    const Vector3d f = numerics::matvec(sums, summed_tractions_kPa(r));
     const MatrixXd& covariance = covariance_of_summed_kPa2(r);
     forces[a].force_nN = vec(f);
-    if (covariance.size() > 0) set_force(forces[a], f, sums * covariance * sums.transpose());
+    if (covariance.size() > 0) set_force(forces[a], f, numerics::congruence(sums, covariance));
   }
   return forces;
 }
@@ -147,15 +149,15 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
     VectorXd along(3 * n);
     for (Index v = 0; v < n; ++v)
       along.segment<3>(3 * v) = mesh.areas_um2[static_cast<std::size_t>(v)] * traction(v).stableNormalized();
-    balance.total_force_sigma_nN = std::sqrt(std::max(0.0, along.dot(r.covariance_kPa2 * along)));
+    balance.total_force_sigma_nN = std::sqrt(std::max(0.0, numerics::quadratic_form(r.covariance_kPa2, along)));
   }
   const VectorXd& summed = summed_tractions_kPa(r);
-  const VectorXd net = sums * summed;
+  const VectorXd net = numerics::matvec(sums, summed);
   balance.force_nN = vec(net.head<3>());
   balance.moment_nN_um = vec(net.tail<3>());
   balance.contractile_moment_nN_um = inwards.dot(summed);
   if (const MatrixXd& covariance = covariance_of_summed_kPa2(r); covariance.size() > 0) {
-    MatrixXd of_net = sums * covariance * sums.transpose();
+    MatrixXd of_net = numerics::congruence(sums, covariance);
     const double of_gel = problem.model_error * problem.model_error * balance.total_force_nN;
     for (Index v = 0; v < n; ++v) {
       const auto of_vertex = sums.middleCols<3>(3 * v);  // of a traction there

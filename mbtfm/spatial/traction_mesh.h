@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "pipeline/contract/extent.h"
 #include "substrate/loads.h"
 #include "substrate/surface/height.h"
 
@@ -33,9 +34,7 @@ class Ground {
 };
 
 /// Seen from above.
-struct Rectangle {
-  Vec2 low_um, high_um;
-};
+using Rectangle = Extent;
 
 /// A face of the quadtree: of level n its sides are those of the coarsest lattice, halved n times.
 struct Leaf {

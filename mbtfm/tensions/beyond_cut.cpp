@@ -119,10 +119,10 @@ Spectrum spectrum_of(const LinearData& data, const Eigen::MatrixXd& Z) {
   const Eigen::MatrixXd left = numerics::transposed_product(Z, weighted) -
                                numerics::transposed_product(pulled, solve_normal(data.reduced, pulled));
   const Eigen::VectorXd residual = residual_um(data, free_forces_nN(data.reduced));
-  const Eigen::VectorXd b = Z.transpose() * weight.cwiseProduct(residual);
+  const Eigen::VectorXd b = numerics::transposed_matvec(Z, weight.cwiseProduct(residual));
   const auto [values, vectors] = numerics::symmetric_eigen(0.5 * (left + left.transpose()));
   const double rounding = 1e-10 * std::max(values.maxCoeff(), 1e-300);
-  Spectrum s{values, (vectors.transpose() * b).cwiseAbs2(), 0};
+  Spectrum s{values, numerics::transposed_matvec(vectors, b).cwiseAbs2(), 0};
   double explained = 0;
   auto n_left = static_cast<double>(data.n_used - data.reduced.n_felt);
   for (Eigen::Index i = 0; i < s.information.size(); ++i) {
@@ -199,7 +199,7 @@ Eigen::MatrixXd motions_that_stand_out(const LinearData& data, const Eigen::Matr
   const Eigen::MatrixXd square = kappa * numerics::transposed_product(Z, squared_weights(data).asDiagonal() * Z);
   const auto [values, vectors] = numerics::symmetric_eigen(square);
   const Eigen::Index n_motions = (values.array() > kUnseen).count();
-  return std::sqrt(kappa) * Z * vectors.rightCols(n_motions);
+  return numerics::small_product(std::sqrt(kappa), Z, vectors.rightCols(n_motions));
 }
 
 }  // namespace
@@ -225,9 +225,10 @@ DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::
   // motion twice, whose square no rounding leaves definite.
   const Eigen::MatrixXd even = motions.middleCols(n_affine, n_free - n_affine);
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * even;
-  motions.rightCols(random.cols()) -=
-      even *
-      numerics::shortest_solution(even.transpose() * weighted, weighted.transpose() * motions.rightCols(random.cols()));
+  motions.rightCols(random.cols()) -= numerics::small_product(
+      even,
+      numerics::shortest_solution(numerics::small_transposed_product(even, weighted),
+                                  numerics::small_transposed_product(weighted, motions.rightCols(random.cols()))));
   Eigen::VectorXd precision = Eigen::VectorXd::Ones(motions.cols());
   precision.head(n_free).setZero();
   if (n_affine > 0) precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));

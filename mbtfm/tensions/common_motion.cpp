@@ -61,7 +61,8 @@ Eigen::MatrixXd curved_motions(const DisplacementField& beads) {
 
 MotionsBeside motions_beside(const LinearData& data, const EnsembleFit& fit) {
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
-  const Eigen::MatrixXd by_force = data.motions.inverse * data.response->pull_back(weighted).transpose();
+  const Eigen::MatrixXd by_force =
+      numerics::small_product(data.motions.inverse, data.response->pull_back(weighted).transpose());
   return {.values = motion_in(data, data.displacement_um - data.response->displace(fit.forces.nN)),
           .sigma = covariance_of_estimates(fit, data.motions.inverse, by_force).diagonal().cwiseMax(0).cwiseSqrt()};
 }
@@ -80,15 +81,15 @@ FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<
 CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementField& beads, const EnsembleFit& fit) {
   const Eigen::MatrixXd motions = less_motion(data, curved_motions(beads));
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * motions;
-  const Eigen::VectorXd scores = weighted.transpose() * residual_um(data, fit.forces.nN);
+  const Eigen::VectorXd scores = numerics::transposed_matvec(weighted, residual_um(data, fit.forces.nN));
   const Eigen::MatrixXd by_force = data.response->pull_back(weighted).transpose();
-  const Eigen::MatrixXd of_noise = weighted.transpose() * motions;
+  const Eigen::MatrixXd of_noise = numerics::small_transposed_product(weighted, motions);
   const Eigen::MatrixXd covariance = covariance_of_scores(fit, of_noise, by_force);
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
+  const Eigen::MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
   const Eigen::MatrixXd information =
-      of_noise - by_tension * mesh.noise_covariance_nN2 * by_tension.transpose() / fit.misfit.variance;
-  const Eigen::VectorXd moved = motions * numerics::shortest_solution(information, scores);
+      of_noise - numerics::congruence(by_tension, mesh.noise_covariance_nN2) / fit.misfit.variance;
+  const Eigen::VectorXd moved = numerics::small_product(motions, numerics::shortest_solution(information, scores));
   return {.chi_squared = scores.dot(numerics::shortest_solution(covariance, scores).col(0)),
           .rms_um = std::sqrt(2.0) * moved.norm() / std::sqrt(std::max(1.0, static_cast<double>(moved.size())))};
 }

@@ -1,7 +1,6 @@
 #include "mbtfm/tensions/ensemble.h"
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <functional>
 #include <mutex>
@@ -9,6 +8,7 @@
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/distributions.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::tensions {
@@ -47,9 +47,9 @@ void add_errors(MeshFit& mesh, const EnsembleFit& all) {
   const Eigen::MatrixXd J = displace(all.data.reduced, mesh.force_derivatives);
   const Eigen::MatrixXd by_slope = numerics::transposed_product(J, *all.data.reduced.compliance);
   if (all.model_error)
-    mesh.local.model_variance = by_slope * all.model_error->force_variance_nN2.asDiagonal() * by_slope.transpose();
+    mesh.local.model_variance = numerics::weighted_outer(by_slope, all.model_error->force_variance_nN2);
   mesh.response = response_of(mesh.local, all.misfit.variance);
-  mesh.by_force = mesh.response * by_slope;
+  mesh.by_force = numerics::small_product(mesh.response, by_slope);
   mesh.noise_covariance_nN2 = all.misfit.variance * mesh.response;
   mesh.covariance_nN2 = covariance_nN2(mesh.local, all.misfit.variance);
   mesh.past_bounds_nN = past_bounds_nN(mesh.local, all.misfit.variance);
@@ -157,14 +157,15 @@ std::vector<Estimate> with_own_forces(const EnsembleFit& all, const Eigen::Matri
                                       bool is_single = false) {
   const Eigen::MatrixXd along = by_network_force(all, sums);
   const auto of_mesh = [&](const MeshFit& mesh) {
-    return Quantities{value_of(mesh), mesh.force_derivatives.transpose() * along};
+    return Quantities{value_of(mesh), numerics::small_transposed_product(mesh.force_derivatives, along)};
   };
   return estimates_of(all, of_mesh, along, is_single, own_variances(all, sums));
 }
 
 /// R + E a, of one mesh.
 Eigen::VectorXd exerted_nN(const EnsembleFit& all, const Eigen::VectorXd& network_nN) {
-  return all.forces.own ? Eigen::VectorXd(all.forces.own->left * network_nN + all.forces.own->found_nN) : network_nN;
+  return all.forces.own ? Eigen::VectorXd(numerics::matvec(all.forces.own->left, network_nN) + all.forces.own->found_nN)
+                        : network_nN;
 }
 
 /// Of the adhesions' forces, along the mean over meshes.
@@ -183,14 +184,14 @@ std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
     }
     if (all.forces.own) {
       const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
-        return along.transpose() * exerted_nN(all, mesh.fit.trial.forces_nN);
+        return numerics::transposed_matvec(along, exerted_nN(all, mesh.fit.trial.forces_nN));
       };
       for (const Estimate& magnitude : with_own_forces(all, along, value_of, true)) magnitudes.push_back(magnitude);
       continue;
     }
     const Eigen::MatrixXd own = along.middleRows(2 * first, 2 * count);  // the others are zero
     const auto of_mesh = [&](const MeshFit& mesh) {
-      return Quantities{own.transpose() * mesh.fit.trial.forces_nN.segment(2 * first, 2 * count),
+      return Quantities{numerics::transposed_matvec(own, mesh.fit.trial.forces_nN.segment(2 * first, 2 * count)),
                         numerics::transposed_product(mesh.force_derivatives.middleRows(2 * first, 2 * count), own)};
     };
     for (const Estimate& magnitude : estimates_of(all, of_mesh, along, true)) magnitudes.push_back(magnitude);
@@ -235,9 +236,9 @@ Estimate total_force_of(const EnsembleFit& all) {
   const Eigen::VectorXd forces_nN = adhesion_forces_nN(all), along = directions_of(forces_nN);
   const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
     const Eigen::MatrixXd derivatives =
-        all.forces.own ? Eigen::MatrixXd(all.forces.own->left * mesh.force_derivatives) : mesh.force_derivatives;
+        all.forces.own ? numerics::small_product(all.forces.own->left, mesh.force_derivatives) : mesh.force_derivatives;
     return Eigen::VectorXd::Constant(
-        1, along.dot(exerted_nN(all, mesh.fit.trial.forces_nN) + derivatives * mesh.past_bounds_nN) -
+        1, along.dot(exerted_nN(all, mesh.fit.trial.forces_nN) + numerics::matvec(derivatives, mesh.past_bounds_nN)) -
                magnitude_bias_nN(forces_nN, derivatives, mesh.covariance_nN2));
   };
   Estimate total = with_own_forces(all, along, value_of).front();
@@ -339,8 +340,8 @@ std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
   std::vector<MeshForces> forces;
   for (const MeshFit& mesh : all.meshes) {
     const Trial& trial = mesh.fit.trial;
-    forces.push_back({trial.forces_nN + mesh.force_derivatives * (mean_nN - trial.tensions_nN), mesh.network_part_nN,
-                      mesh.force_derivatives});
+    forces.push_back({numerics::plus_matvec(trial.forces_nN, mesh.force_derivatives, mean_nN - trial.tensions_nN),
+                      mesh.network_part_nN, mesh.force_derivatives});
   }
   return forces;
 }
@@ -381,12 +382,13 @@ namespace {
 Eigen::MatrixXd covariance_beside(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
                                   const Eigen::MatrixXd& by_force, int sign) {
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
+  const Eigen::MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
   Eigen::MatrixXd covariance =
-      fit.misfit.variance * of_noise + sign * (by_tension * mesh.noise_covariance_nN2 * by_tension.transpose());
+      fit.misfit.variance * of_noise + sign * numerics::congruence(by_tension, mesh.noise_covariance_nN2);
   if (fit.model_error) {
-    const Eigen::MatrixXd left = by_force - by_tension * mesh.by_force;  // of errors of the forces, tensions following
-    covariance += left * fit.model_error->force_variance_nN2.asDiagonal() * left.transpose();
+    const Eigen::MatrixXd left =
+        numerics::minus_product(by_force, by_tension, mesh.by_force);  // of errors of the forces, tensions following
+    covariance += numerics::weighted_outer(left, fit.model_error->force_variance_nN2);
   }
   return covariance;
 }
@@ -405,12 +407,13 @@ Eigen::MatrixXd covariance_of_scores(const EnsembleFit& fit, const Eigen::Matrix
 Eigen::VectorXd adhesion_forces_nN(const EnsembleFit& fit) { return exerted_nN(fit, fit.forces.nN); }
 
 Eigen::MatrixXd by_network_force(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
-  return fit.forces.own ? Eigen::MatrixXd(fit.forces.own->left.transpose() * sums) : sums;
+  return fit.forces.own ? numerics::small_transposed_product(fit.forces.own->left, sums) : sums;
 }
 
 Eigen::VectorXd own_variances(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
   if (!fit.forces.own) return Eigen::VectorXd::Zero(sums.cols());
-  return fit.misfit.variance * sums.cwiseProduct(fit.forces.own->covariance * sums).colwise().sum().transpose();
+  return fit.misfit.variance *
+         sums.cwiseProduct(numerics::small_product(fit.forces.own->covariance, sums)).colwise().sum().transpose();
 }
 
 Eigen::Vector2d CutForce::direction() const {
@@ -506,9 +509,7 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   return all;
 }
 
-double quantile_975(const Estimate& estimate) {
-  return boost::math::quantile(boost::math::students_t(estimate.degrees), 0.975);
-}
+double quantile_975(const Estimate& estimate) { return numerics::student_quantile(estimate.degrees, 0.975); }
 
 Interval interval_95(const Estimate& estimate) {
   const double student = quantile_975(estimate);

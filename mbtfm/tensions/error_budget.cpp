@@ -1,7 +1,5 @@
 #include "mbtfm/tensions/error_budget.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -46,15 +44,18 @@ Gain gain_of(const EnsembleFit& fit, const MeshFit& mesh) {
   const Index n = mesh.covariance_nN2.rows();
   const MatrixXd sums = sums_of(fit);
   Gain gain{MatrixXd::Identity(n + sums.cols(), n), {}, {}};
-  gain.of_tensions.bottomRows(sums.cols()) = by_network_force(fit, sums).transpose() * mesh.force_derivatives;
-  gain.of_forces = gain.of_tensions * mesh.by_force;
+  gain.of_tensions.bottomRows(sums.cols()) =
+      numerics::small_transposed_product(by_network_force(fit, sums), mesh.force_derivatives);
+  gain.of_forces = numerics::small_product(gain.of_tensions, mesh.by_force);
   gain.of_forces.bottomRows(sums.cols()) += (sums - by_network_force(fit, sums)).transpose();  // as forces of their own
   gain.of_model = gain.of_forces;
   gain.of_model.bottomRows(sums.cols()) -= sums.transpose();
   return gain;
 }
 
-VectorXd variances(const MatrixXd& gain, const VectorXd& variance) { return gain.cwiseAbs2() * variance; }
+VectorXd variances(const MatrixXd& gain, const VectorXd& variance) {
+  return numerics::matvec(gain.cwiseAbs2(), variance);
+}
 
 /// The parts that each mesh tells, in squares, mean over the meshes.
 struct MeanVariances {
@@ -74,8 +75,9 @@ VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& g
   for (Index i = 0; i < slope.size(); ++i) {
     if (mesh.local.tensions_nN[i] <= 0) slope[i] = std::min(slope[i], 0.0);  // at its bound, where the minimum is
   }
-  const VectorXd step = mesh.response * slope;
-  return (gain.of_tensions * step).cwiseAbs() + imbalance * (gain.of_tensions * mesh.local.tensions_nN).cwiseAbs();
+  const VectorXd step = numerics::matvec(mesh.response, slope);
+  return numerics::matvec(gain.of_tensions, step).cwiseAbs() +
+         imbalance * numerics::matvec(gain.of_tensions, mesh.local.tensions_nN).cwiseAbs();
 }
 
 /// Motions of the cell's place, pulled back to the forces: Gᵀ W² U with Uᵀ W² U = 1, the other motions taken off. With
@@ -83,17 +85,20 @@ VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& g
 MatrixXd pulled_place(const BudgetInputs& in) {
   const Index n = in.n_of_place;
   const MatrixXd columns = in.data.motions.inverse.rightCols(n);
-  const MatrixXd upper = columns.bottomRows(n).llt().matrixU();
-  return in.data.response->pull_back(squared_weights(in.data).asDiagonal() *
-                                     (in.data.motions.shapes * columns * upper.inverse()));
+  const MatrixXd upper = numerics::SmallCholesky(columns.bottomRows(n)).upper();
+  return in.data.response->pull_back(
+      squared_weights(in.data).asDiagonal() *
+      numerics::small_product(numerics::small_product(in.data.motions.shapes, columns), numerics::inverse(upper)));
 }
 
 /// What the beads would tell more of the tensions if the place were known: Cov − (Cov⁻¹ + V Vᵀ/s²)⁻¹ with V = Jᵀ U.
 MatrixXd covariance_by_place(const EnsembleFit& fit, const MeshFit& mesh, const MatrixXd& pulled) {
-  const MatrixXd answered = mesh.noise_covariance_nN2 * (mesh.force_derivatives.transpose() * pulled);  // Cov V
-  MatrixXd middle = pulled.transpose() * mesh.force_derivatives * answered;
+  const MatrixXd answered = numerics::small_product(
+      mesh.noise_covariance_nN2, numerics::small_transposed_product(mesh.force_derivatives, pulled));  // Cov V
+  MatrixXd middle =
+      numerics::small_product(numerics::small_transposed_product(pulled, mesh.force_derivatives), answered);
   middle.diagonal().array() += fit.misfit.variance;
-  return answered * numerics::solve_symmetric(middle, answered.transpose());
+  return numerics::small_product(answered, numerics::solve_symmetric(middle, answered.transpose()));
 }
 
 MeanVariances mean_variances(const BudgetInputs& in) {
@@ -104,12 +109,15 @@ MeanVariances mean_variances(const BudgetInputs& in) {
   const MatrixXd pulled = in.n_of_place > 0 ? pulled_place(in) : MatrixXd();
   for (const MeshFit& mesh : in.fit.meshes) {
     const Gain gain = gain_of(in.fit, mesh);
-    const VectorXd noise =
-        (gain.of_tensions * mesh.noise_covariance_nN2).cwiseProduct(gain.of_tensions).rowwise().sum();
+    const VectorXd noise = numerics::small_product(gain.of_tensions, mesh.noise_covariance_nN2)
+                               .cwiseProduct(gain.of_tensions)
+                               .rowwise()
+                               .sum();
     mean.beads += bead_share(in) / n * noise;
     if (in.n_of_place > 0) {
       const MatrixXd by_place = covariance_by_place(in.fit, mesh, pulled);
-      mean.place += bead_share(in) / n * (gain.of_tensions * by_place).cwiseProduct(gain.of_tensions).rowwise().sum();
+      mean.place += bead_share(in) / n *
+                    numerics::small_product(gain.of_tensions, by_place).cwiseProduct(gain.of_tensions).rowwise().sum();
     }
     mean.solver += solver_error(in.fit, mesh, gain).cwiseAbs2() / n;
     mean.model += (1 - bead_share(in)) / n * noise;
@@ -235,7 +243,8 @@ VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const 
       const AdhesionChanges& c = changes[static_cast<std::size_t>(i)];
       MatrixXd answer = c.by_vertices.middleRows(first, of_beads.rows());
       for (std::size_t b = 0; b < c.near.size(); ++b) {
-        answer += of_beads.middleCols<2>(2 * c.near[b]) * c.displacement.middleRows<2>(2 * static_cast<Index>(b));
+        answer += numerics::small_product(of_beads.middleCols<2>(2 * c.near[b]),
+                                          c.displacement.middleRows<2>(2 * static_cast<Index>(b)));
       }
       by_adhesion[static_cast<std::size_t>(i)] = answer.cwiseAbs2().rowwise().sum();
     });
@@ -263,7 +272,7 @@ VectorXd field_of_base_um(const BudgetInputs& in) {
 /// An error of all adhesions' fields alike changes the tensions in proportion; errors by adhesion add up in squares.
 /// Which of the two it is no model tells: both are counted.
 VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers) {
-  const VectorXd values = gain.of_tensions * in.fit.meshes.front().fit.trial.tensions_nN;
+  const VectorXd values = numerics::matvec(gain.of_tensions, in.fit.meshes.front().fit.trial.tensions_nN);
   VectorXd variance = (in.substrate_error * values).cwiseAbs2();
   for (Index a = 0; a < in.fit.forces.nN.size(); a += 2) {
     variance += (in.substrate_error * gain.of_forces.middleCols<2>(a) * in.fit.forces.nN.segment<2>(a)).cwiseAbs2();
@@ -271,7 +280,7 @@ VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const Bea
   if (!in.lacks_base) return variance;
   const VectorXd field = field_of_base_um(in);
   answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
-    variance.segment(first, of_beads.rows()) += (of_beads * field).cwiseAbs2();
+    variance.segment(first, of_beads.rows()) += numerics::matvec(of_beads, field).cwiseAbs2();
   });
   return variance;
 }
@@ -298,12 +307,12 @@ std::optional<VectorXd> gel_variances(const BudgetInputs& in, const Gain& gain, 
                                       int threads) {
   const Gel& gel = in.gel;
   if (!gel.youngs_modulus_sigma_kPa && !gel.thickness_sigma_um && !gel.poisson_ratio_sigma) return std::nullopt;
-  const VectorXd values = gain.of_tensions * in.fit.meshes.front().fit.trial.tensions_nN;
+  const VectorXd values = numerics::matvec(gain.of_tensions, in.fit.meshes.front().fit.trial.tensions_nN);
   VectorXd variance = (gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa * values).cwiseAbs2();
   for (const Gel& other : gels_an_error_away(gel)) {
     const VectorXd change = change_by_other_gel_um(in, other, threads);
     answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
-      variance.segment(first, of_beads.rows()) += (of_beads * change).cwiseAbs2();
+      variance.segment(first, of_beads.rows()) += numerics::matvec(of_beads, change).cwiseAbs2();
     });
   }
   return variance;

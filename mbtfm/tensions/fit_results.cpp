@@ -11,6 +11,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/vtk_files.h"
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/magnitude_interval.h"
 #include "substrate/compliance.h"
 
@@ -186,7 +187,9 @@ FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double s
 DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementField& beads, const LinearData& data) {
   Eigen::VectorXd model = moved_by(data, forces_nN);
   if (data.motions.shapes.cols() > 0) {
-    model += data.motions.shapes * motion_in(data, data.displacement_um - data.response->displace(forces_nN));
+    model += numerics::small_product(data.motions.shapes,
+                                     motion_in(data, data.displacement_um - data.response->displace(forces_nN)))
+                 .col(0);
   }
   DisplacementField field = beads;
   for (std::size_t i = 0; i < field.size(); ++i) {

@@ -1,4 +1,3 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -92,33 +91,34 @@ struct Step {
 void learn_bend(Eigen::MatrixXd& bend, const Trial& before, const Eigen::MatrixXd& jacobian_before, const Trial& after,
                 const Eigen::MatrixXd& jacobian_after) {
   const Eigen::VectorXd s = after.tensions_nN - before.tensions_nN;
-  const Eigen::VectorXd gradient = jacobian_after.transpose() * after.residual;
-  const Eigen::VectorXd y = gradient - jacobian_before.transpose() * before.residual;
-  const Eigen::VectorXd wanted = gradient - jacobian_before.transpose() * after.residual;  // of bend · s
+  const Eigen::VectorXd gradient = numerics::transposed_matvec(jacobian_after, after.residual);
+  const Eigen::VectorXd y = gradient - numerics::transposed_matvec(jacobian_before, before.residual);
+  const Eigen::VectorXd wanted =
+      gradient - numerics::transposed_matvec(jacobian_before, after.residual);  // of bend · s
   const double y_s = y.dot(s);
   constexpr double kLeast = 1e-3;  // less curvature than that part of JᵀJ's is no minimum's
-  if (y_s <= kLeast * (jacobian_after * s).squaredNorm()) return;
-  const double size = s.dot(bend * s);
+  if (y_s <= kLeast * numerics::matvec(jacobian_after, s).squaredNorm()) return;
+  const double size = numerics::quadratic_form(bend, s);
   if (size != 0) bend *= std::min(1.0, std::abs(s.dot(wanted) / size));
-  const Eigen::VectorXd rest = wanted - bend * s;
+  const Eigen::VectorXd rest = numerics::minus_matvec(wanted, bend, s);
   bend += (rest * y.transpose() + y * rest.transpose()) / y_s - rest.dot(s) / (y_s * y_s) * y * y.transpose();
 }
 
 /// @param bend  see learn_bend(); left out where it takes more than half of the curvature away
 Step damped_step(const Trial& trial, const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& bend, double damping) {
   const Eigen::MatrixXd straight = numerics::gram(jacobian);
-  const Eigen::VectorXd gradient = jacobian.transpose() * trial.residual;
+  const Eigen::VectorXd gradient = numerics::transposed_matvec(jacobian, trial.residual);
   // A tension that hardly any bead feels would run away: a thousandth of the middle one's weight
   // damps its steps, but moves no minimum.
   const Eigen::VectorXd scale = straight.diagonal();
   const Eigen::VectorXd weak = Eigen::VectorXd::Constant(
       scale.size(), 1e-6 * numerics::median(std::vector(scale.begin(), scale.end())) + 1e-300);
   const Eigen::MatrixXd least = 0.5 * straight + bend + Eigen::MatrixXd(weak.asDiagonal());
-  const bool is_convex = least.llt().info() == Eigen::Success;
+  const bool is_convex = numerics::SmallCholesky(least).is_definite();
   const Eigen::MatrixXd H = is_convex ? straight + bend : straight;
   const Eigen::MatrixXd damped = H + Eigen::MatrixXd((damping * scale + weak).asDiagonal());
   const Eigen::VectorXd step = bounded_quadratic_minimum(damped, gradient, lowest_step(trial.tensions_nN));
-  return {.change_nN = step, .predicted = -(gradient.dot(step) + 0.5 * step.dot(H * step))};
+  return {.change_nN = step, .predicted = -(gradient.dot(step) + 0.5 * numerics::quadratic_form(H, step))};
 }
 
 /// By how much the last steps lowered Phi.
@@ -178,9 +178,8 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Sea
 
 /// H⁻¹ b, in blocks where rounding leaves H positive definite.
 Eigen::VectorXd solve_positive(const Eigen::MatrixXd& H, const Eigen::VectorXd& b) {
-  const Eigen::LLT<Eigen::MatrixXd> quick(H);
-  if (quick.info() == Eigen::Success) return quick.solve(b);
-  return numerics::solve_symmetric(H, b);
+  const numerics::SmallCholesky quick(H);
+  return quick.is_definite() ? quick.solve(b) : Eigen::VectorXd(numerics::solve_symmetric(H, b));
 }
 
 bool is_slack(const Eigen::VectorXd& tensions_nN, Eigen::Index i) {
@@ -195,7 +194,7 @@ Enough is_back_at(const TensionProblem& problem, const Trial& minimum) {
     for (Eigen::Index i = 1; i < at.size(); ++i) {
       if (is_slack(trial.tensions_nN, i) != is_slack(at, i)) return false;
     }
-    return (jacobian * (trial.tensions_nN - at)).squaredNorm() < variance;
+    return numerics::matvec(jacobian, trial.tensions_nN - at).squaredNorm() < variance;
   };
 }
 
@@ -243,13 +242,13 @@ Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen:
   Eigen::VectorXd x = low.cwiseMax(0.0);
   // What is pressed against its bound from the start is held from the start: found one by one, each costs a step.
   std::vector<bool> is_held(n, false);
-  const Eigen::VectorXd slope = H * x + g;
+  const Eigen::VectorXd slope = numerics::matvec(H, x) + g;
   for (int i = 0; i < n; ++i) is_held[i] = x[i] <= low[i] && slope[i] > 0;
   for (int step = 0; step < 20 * n + 20; ++step) {
     const std::vector<int> free = indices_where(is_held, false);
     Eigen::VectorXd wanted = x;
     if (!free.empty()) {
-      const Eigen::VectorXd gradient = H * x + g;
+      const Eigen::VectorXd gradient = numerics::matvec(H, x) + g;
       wanted(free) -= solve_positive(H(free, free), gradient(free));
     }
     double fraction = 1;
@@ -268,7 +267,7 @@ Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen:
       is_held[blocking] = true;
       continue;
     }
-    const Eigen::VectorXd gradient = H * x + g;
+    const Eigen::VectorXd gradient = numerics::matvec(H, x) + g;
     int leaving = -1;
     double steepest = -1e-14 * (g.cwiseAbs().maxCoeff() + std::numeric_limits<double>::min());
     for (const int i : indices_where(is_held, true)) {

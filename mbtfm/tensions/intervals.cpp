@@ -25,16 +25,16 @@ constexpr double kPressedByMoreThanChance = 3;
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& H) {
   const double least = std::max(1e-30 * H.diagonal().maxCoeff(), 1e-100);
   const Eigen::VectorXd scale = H.diagonal().cwiseMax(least).cwiseSqrt().cwiseInverse();
-  const auto [values, vectors] = numerics::symmetric_eigen(scale.asDiagonal() * H * scale.asDiagonal());
+  const auto [values, vectors] = numerics::symmetric_eigen(numerics::scaled_on_both_sides(H, scale));
   const double smallest = 1e-12 * std::max(values.maxCoeff(), 1e-300);  // rounding of JᵀJ
   const Eigen::VectorXd roots = values.cwiseMax(smallest).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd half = scale.asDiagonal() * vectors * roots.asDiagonal();
-  return half * half.transpose();
+  return numerics::small_product(half, half.transpose());
 }
 
 Eigen::MatrixXd sandwich(const LocalMisfit& local, double variance, const Eigen::MatrixXd& K) {
   if (local.model_variance.size() == 0) return variance * K;
-  return variance * K + K * local.model_variance * K;
+  return numerics::plus_product(variance * K, numerics::small_product(K, local.model_variance), K);
 }
 
 /// By tension: 1 where it is free, 0 where the data press it against zero by a standard error more than `half_held`,
@@ -56,9 +56,9 @@ Eigen::VectorXd freedom_of(const LocalMisfit& local, double variance, double hal
 /// H⁻¹ with tensions held as much as they lack freedom: f (f H f + (1 − f²) diag H)⁻¹ f. Without the held ones where
 /// all are 0 or 1.
 Eigen::MatrixXd held_inverse(const Eigen::MatrixXd& H, const Eigen::VectorXd& freedom) {
-  Eigen::MatrixXd held = freedom.asDiagonal() * H * freedom.asDiagonal();
+  Eigen::MatrixXd held = numerics::scaled_on_both_sides(H, freedom);
   held.diagonal() = H.diagonal();
-  return freedom.asDiagonal() * inverse_of(held) * freedom.asDiagonal();
+  return numerics::scaled_on_both_sides(inverse_of(held), freedom);
 }
 
 /// Of 2 Phi where a tension changes and the others follow as they may.
@@ -79,7 +79,7 @@ Rise rise(const LocalMisfit& local, int i, double shift) {
   const Eigen::VectorXd g = local.g(others) + shift * column(others);
   const Eigen::VectorXd low = -local.tensions_nN(others);
   const Eigen::VectorXd s = bounded_quadratic_minimum(H, g, low);
-  rise.value += 2 * g.dot(s) + s.dot(H * s);
+  rise.value += 2 * g.dot(s) + numerics::quadratic_form(H, s);
   rise.slope += 2 * column(others).dot(s);
   return rise;
 }
@@ -126,7 +126,9 @@ bool is_unbounded(const LocalMisfit& local, const Eigen::MatrixXd& K, int i, dou
 }  // namespace
 
 LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian) {
-  return {.tensions_nN = trial.tensions_nN, .H = numerics::gram(jacobian), .g = jacobian.transpose() * trial.residual};
+  return {.tensions_nN = trial.tensions_nN,
+          .H = numerics::gram(jacobian),
+          .g = numerics::transposed_matvec(jacobian, trial.residual)};
 }
 
 Eigen::MatrixXd response_of(const LocalMisfit& local, double variance) {
@@ -141,7 +143,7 @@ Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance) {
   Eigen::VectorXd pressed = Eigen::VectorXd::Zero(local.g.size());  // a free tension's gradient is a last step's rest
   for (Eigen::Index i = 0; i < pressed.size(); ++i)
     if (local.tensions_nN[i] <= 0) pressed[i] = std::max(0.0, local.g[i]);
-  return -held_inverse(local.H, freedom_of(local, variance, kPressedByMoreThanChance)) * pressed;
+  return numerics::matvec(-held_inverse(local.H, freedom_of(local, variance, kPressedByMoreThanChance)), pressed);
 }
 
 Eigen::VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, const Eigen::MatrixXd& jacobian,
@@ -157,11 +159,11 @@ Eigen::VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solu
     const double part = std::min(1.0, largest / size);  // what no bead tells of deviates without bounds
     for (const double step : {part, -part}) {
       const Eigen::VectorXd there = (solution.tensions_nN + step * deviation).cwiseMax(0.0);
-      const Eigen::VectorXd straight = solution.residual + jacobian * (there - solution.tensions_nN);
+      const Eigen::VectorXd straight = numerics::plus_matvec(solution.residual, jacobian, there - solution.tensions_nN);
       bend.col(k) += (problem.evaluate(there, &solution, kRough).residual - straight) / (part * part);
     }
   });
-  return -0.5 * response * (jacobian.transpose() * bend.rowwise().sum());
+  return numerics::matvec(-0.5 * response, numerics::transposed_matvec(jacobian, bend.rowwise().sum()));
 }
 
 double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd& derivatives,
@@ -174,7 +176,7 @@ double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd
     const Eigen::Vector2d across(-force.y() / size, force.x() / size);
     const Eigen::VectorXd gradient = derivatives.middleRows<2>(row).transpose() * across;
     // No more than the force itself: where the error is as large as the force the second order says nothing.
-    bias += std::min(size, gradient.dot(covariance_nN2 * gradient) / (2 * size));
+    bias += std::min(size, numerics::quadratic_form(covariance_nN2, gradient) / (2 * size));
   }
   return bias;
 }
@@ -218,7 +220,7 @@ Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const Fit
       drawn.target[k] += solution.residual[k] + std::sqrt(variance) * normal();
     Eigen::VectorXd of_model = force_variance_nN2.cwiseSqrt();
     for (double& e : of_model) e *= normal();
-    if (of_model.size() > 0) drawn.target += *drawn.compliance * of_model;
+    if (of_model.size() > 0) drawn.target += numerics::matvec(*drawn.compliance, of_model);
     const TensionProblem again(problem.cell(), drawn, problem.adhesion_ids());
     const Trial start = again.evaluate(solution.tensions_nN, &solution);
     deviations.col(d) = fit_gauss_newton(again, parameters, start).trial.tensions_nN - solution.tensions_nN;

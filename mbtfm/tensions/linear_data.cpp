@@ -56,13 +56,14 @@ Eigen::MatrixXd inverse_of_motions(Eigen::MatrixXd square, const Eigen::VectorXd
   if (precision.size() == 0) return numerics::pseudo_inverse(square);
   square.diagonal() += precision;
   const Eigen::VectorXd size = square.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  square = size.asDiagonal() * square * size.asDiagonal();
-  return size.asDiagonal() * numerics::pseudo_inverse(square) * size.asDiagonal();
+  square = numerics::scaled_on_both_sides(square, size);
+  return numerics::scaled_on_both_sides(numerics::pseudo_inverse(square), size);
 }
 
 Eigen::MatrixXd inverse_of_motions(const LinearData& data, const Eigen::VectorXd& weight) {
-  return inverse_of_motions(data.motions.shapes.transpose() * (weight.asDiagonal() * data.motions.shapes),
-                            data.motions.precision);
+  return inverse_of_motions(
+      numerics::small_transposed_product(data.motions.shapes, weight.asDiagonal() * data.motions.shapes),
+      data.motions.precision);
 }
 
 /// F with FFᵀ what these motions explain of a Gram matrix Gᵀ W² P G.
@@ -71,7 +72,7 @@ Eigen::MatrixXd explained_by(const LinearData& data, const Eigen::VectorXd& weig
                              const Eigen::MatrixXd& inverse) {
   if (motions.cols() == 0) return Eigen::MatrixXd(data.response->cols(), 0);
   const auto [values, vectors] = numerics::symmetric_eigen(inverse);
-  const Eigen::MatrixXd unit = motions * (vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal());
+  const Eigen::MatrixXd unit = numerics::small_product(motions, vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal());
   return data.response->pull_back(weight.asDiagonal() * unit);
 }
 
@@ -149,7 +150,8 @@ LinearData with_more_motions(LinearData data, const Eigen::MatrixXd& motions) {
   const Eigen::MatrixXd beside = less_motion(data, motions);
   Root root = root_less(
       *data.reduced.compliance,
-      explained_by(data, weight, beside, inverse_of_motions(motions.transpose() * (weight.asDiagonal() * beside), {})),
+      explained_by(data, weight, beside,
+                   inverse_of_motions(numerics::small_transposed_product(motions, weight.asDiagonal() * beside), {})),
       data.threads);
   const Eigen::Index before = data.motions.shapes.cols(), n = motions.cols();
   data.n_used -= n;
@@ -170,22 +172,23 @@ LinearData with_more_motions(LinearData data, const Eigen::MatrixXd& motions) {
 
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
-  return data.motions.inverse * (weighted.transpose() * displacements);
+  return numerics::small_product(data.motions.inverse, numerics::small_transposed_product(weighted, displacements));
 }
 
 std::optional<OwnForces> own_forces_in(const LinearData& data) {
   const Eigen::MatrixXd& E = data.motions.forces;
   if (E.size() == 0) return std::nullopt;
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
-  const Eigen::MatrixXd gain = E * data.motions.inverse;
-  return OwnForces{
-      .left = Eigen::MatrixXd::Identity(E.rows(), E.rows()) - gain * data.response->pull_back(weighted).transpose(),
-      .found_nN = gain * (weighted.transpose() * data.displacement_um),
-      .covariance = gain * E.transpose()};
+  const Eigen::MatrixXd gain = numerics::small_product(E, data.motions.inverse);
+  return OwnForces{.left = numerics::minus_product(Eigen::MatrixXd::Identity(E.rows(), E.rows()), gain,
+                                                   data.response->pull_back(weighted).transpose()),
+                   .found_nN = numerics::matvec(gain, numerics::transposed_matvec(weighted, data.displacement_um)),
+                   .covariance = numerics::small_product(gain, E.transpose())};
 }
 
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements) {
-  if (data.motions.shapes.cols() > 0) displacements -= data.motions.shapes * motion_in(data, displacements);
+  if (data.motions.shapes.cols() > 0)
+    displacements -= numerics::small_product(data.motions.shapes, motion_in(data, displacements));
   return displacements;
 }
 

@@ -160,9 +160,9 @@ MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const Linear
   const Eigen::MatrixXd by_force = data.response->pull_back(weighted).transpose();
   const Eigen::MatrixXd covariance = covariance_of_scores(fit, q.square, by_force);
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
+  const Eigen::MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
   const Eigen::MatrixXd information =
-      q.square - by_tension * mesh.noise_covariance_nN2 * by_tension.transpose() / fit.misfit.variance;
+      q.square - numerics::congruence(by_tension, mesh.noise_covariance_nN2) / fit.misfit.variance;
   const Eigen::Vector2d force = numerics::solve_symmetric(information, q.score);
   return {.position_um = q.place_um,
           .force_nN = {force[0], force[1]},

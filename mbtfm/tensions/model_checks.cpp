@@ -1,14 +1,13 @@
 #include "mbtfm/tensions/model_checks.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/distributions.h"
 #include "pipeline/numerics/triangle.h"
 #include "substrate/compliance.h"
 
@@ -37,7 +36,7 @@ Eigen::VectorXd best_uniform_nN(const TensionProblem& problem) {
   constexpr int kMaxSteps = 20;  // forces are all but proportional to the tension: three do
   for (int i = 0; i < kMaxSteps; ++i) {
     const double tension = trial.tensions_nN[0];
-    const Eigen::VectorXd slope = problem.jacobian(trial) * ones;
+    const Eigen::VectorXd slope = numerics::matvec(problem.jacobian(trial), ones);
     const double step = -slope.dot(trial.residual) / std::max(slope.squaredNorm(), 1e-300);
     const bool is_pushed = tension + step <= 0 && 0.5 * problem.data().target.squaredNorm() <= trial.objective;
     if (is_pushed) return Eigen::VectorXd::Zero(trial.forces_nN.size());
@@ -55,7 +54,7 @@ Eigen::VectorXd best_uniform_nN(const TensionProblem& problem) {
 Eigen::MatrixXd correlation_of(const EnsembleFit& fit) {
   Eigen::VectorXd scale = fit.tensions.covariance_nN2.diagonal().cwiseSqrt();
   for (double& s : scale) s = s > 0 ? 1 / s : 0;
-  return scale.asDiagonal() * fit.tensions.covariance_nN2 * scale.asDiagonal();
+  return numerics::scaled_on_both_sides(fit.tensions.covariance_nN2, scale);
 }
 
 std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
@@ -119,7 +118,7 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
   const ReducedData& reduced = data.reduced;
   const double variance = noise_variance(data);
   const auto misfit = [&](const Eigen::VectorXd& forces) {
-    return (*reduced.compliance * forces - reduced.target).squaredNorm() + reduced.floor_squared;
+    return (numerics::matvec(*reduced.compliance, forces) - reduced.target).squaredNorm() + reduced.floor_squared;
   };
   const Eigen::VectorXd uniform = best_uniform_nN(TensionProblem(first_network, reduced, adhesion_ids));
   std::vector<ModelScore> models = {
@@ -195,8 +194,9 @@ class FibresTogether {
         chords.col(k).segment<2>(2 * static_cast<Eigen::Index>(a)) << unit.x, unit.y;
         chords.col(k).segment<2>(2 * static_cast<Eigen::Index>(b)) << -unit.x, -unit.y;
       }
-      const Eigen::MatrixXd inverse = numerics::inverse_symmetric(chords.transpose() * K_ * chords);
-      const Eigen::VectorXd slopes = chords.transpose() * q_, t = inverse * slopes;
+      const Eigen::MatrixXd inverse =
+          numerics::inverse_symmetric(numerics::small_product(numerics::small_transposed_product(chords, K_), chords));
+      const Eigen::VectorXd slopes = numerics::transposed_matvec(chords, q_), t = numerics::matvec(inverse, slopes);
       Eigen::Index least = 0;
       if (t.minCoeff(&least) > 0)
         return {std::move(pairs), t, inverse.diagonal().cwiseMax(0).cwiseSqrt(), slopes.dot(t)};
@@ -239,7 +239,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
                                          const SegmentationErrors& segmentation, int threads) {
   const double n_pairs = 0.5 * static_cast<double>(adhesions.size()) * (static_cast<double>(adhesions.size()) - 1);
   if (n_pairs < 1) return {};
-  const double limit = boost::math::quantile(boost::math::normal(), 1 - 0.05 / n_pairs);
+  const double limit = numerics::normal_quantile(1 - 0.05 / n_pairs);
   const MeshFit& mesh = fit.meshes.front();
   ReducedData data = fit.data.reduced;
   if (fit.model_error) {
@@ -252,12 +252,13 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.
   const Eigen::MatrixXd CJ = displace(data, mesh.force_derivatives, threads);
   const Eigen::MatrixXd cross_terms = numerics::transposed_product(CJ, C, threads);
-  Eigen::MatrixXd H = CJ.transpose() * CJ;
+  Eigen::MatrixXd H = numerics::small_transposed_product(CJ, CJ);
   H.diagonal() += 1e-9 * H.diagonal() + Eigen::VectorXd::Constant(H.rows(), 1e-300);
-  const Eigen::LLT<Eigen::MatrixXd> solver(H);
-  const Eigen::MatrixXd explained = solver.matrixL().solve(cross_terms);
+  const numerics::SmallCholesky solver(H);
+  const Eigen::MatrixXd explained = solver.solve_lower(cross_terms);
   const Eigen::VectorXd q =
-      C.transpose() * residual - cross_terms.transpose() * solver.solve(CJ.transpose() * residual);
+      numerics::transposed_matvec(C, residual) -
+      numerics::transposed_matvec(cross_terms, solver.solve(numerics::transposed_matvec(CJ, residual)));
 
   std::vector<MissingFibre> found;
   std::vector<Eigen::Matrix2d> own(adhesions.size());  // blocks of K = Cᵀ P C on its diagonal
@@ -308,10 +309,11 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
     if (k % 2 == 1) pairs.push_back({k - 1, k});
   }
   const Eigen::MatrixXd C_there = C(Eigen::all, components), explained_there = explained(Eigen::all, components);
-  const FibresTogether together(
-      std::move(places_um),
-      (C_there.transpose() * C_there - explained_there.transpose() * explained_there) / fit.misfit.variance,
-      q(components) / fit.misfit.variance);
+  const FibresTogether together(std::move(places_um),
+                                (numerics::small_transposed_product(C_there, C_there) -
+                                 numerics::small_transposed_product(explained_there, explained_there)) /
+                                    fit.misfit.variance,
+                                q(components) / fit.misfit.variance);
   FibresTogether::Told told = together.with_best_partners(std::move(pairs));
   const auto gains = [&] { return Eigen::VectorXd(told.tension_nN.cwiseQuotient(told.sigma_nN).cwiseAbs2()); };
   for (Eigen::Index least = 0; !told.pairs.empty() && gains().minCoeff(&least) < limit * limit;) {

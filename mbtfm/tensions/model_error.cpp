@@ -66,7 +66,7 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
     squares += (mesh.forces_nN - mean.forces_nN).squaredNorm();
     left_of_squares += left_of(displace(data, mesh.forces_nN - mean.forces_nN));
   }
-  const double left = left_of(data.target - C * mean.forces_nN);
+  const double left = left_of(numerics::minus_matvec(data.target, C, mean.forces_nN));
   double per_phi = 0;
   constexpr Eigen::Index kAtOnce = 512;  // columns: a whole is as large as C
   for (Eigen::Index first = 0; first < C.cols(); first += kAtOnce) {

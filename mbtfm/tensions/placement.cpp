@@ -76,17 +76,18 @@ Step step_of(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& 
   Eigen::MatrixXd weighted(placement.rows(), 4);
   weighted << less_motion(data, placement), residual_um(data, trial.forces_nN);
   weighted = squared_weights(data).asDiagonal() * weighted;
-  const Eigen::MatrixXd pulled = of_free.transpose() * data.response->pull_back(weighted);
+  const Eigen::MatrixXd pulled = numerics::small_transposed_product(of_free, data.response->pull_back(weighted));
   const Eigen::Index n = 3 + of_free.cols();
   Eigen::MatrixXd H(n, n);
-  H.topLeftCorner<3, 3>() = placement.transpose() * weighted.leftCols<3>();
+  H.topLeftCorner<3, 3>() = numerics::small_transposed_product(placement, weighted.leftCols<3>());
   H.bottomLeftCorner(of_free.cols(), 3) = pulled.leftCols<3>();
   H.topRightCorner(3, of_free.cols()) = pulled.leftCols<3>().transpose();
   H.bottomRightCorner(of_free.cols(), of_free.cols()) = numerics::gram(displace(data.reduced, of_free, data.threads));
   Eigen::VectorXd g(n);
-  g << placement.transpose() * weighted.col(3), pulled.col(3);
+  g << numerics::transposed_matvec(placement, weighted.col(3)), pulled.col(3);
   const Eigen::MatrixXd inverse = numerics::pseudo_inverse(H);
-  return {.value = (inverse * g).head<3>(), .sigma = (noise_variance(data) * inverse.diagonal().head<3>()).cwiseSqrt()};
+  return {.value = numerics::matvec(inverse, g).head<3>(),
+          .sigma = (noise_variance(data) * inverse.diagonal().head<3>()).cwiseSqrt()};
 }
 
 double mean_semi_minor_um(const Cell& cell) {

@@ -1,6 +1,5 @@
 #include "mbtfm/tensions/robust.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -76,7 +75,7 @@ NormalEquations normal_equations(const BeadJacobian& J, const Eigen::VectorXd& b
       for (Eigen::Index b = 0; b < count; ++b) root.segment<2>(2 * b).setConstant(std::sqrt(bead_weights[first + b]));
       const Eigen::MatrixXd weighted = root.asDiagonal() * J.middleRows(2 * first, 2 * count).cast<double>();
       numerics::add_upper_gram(weighted, sum.H, 1);
-      sum.b += weighted.transpose() * root.cwiseProduct(residual.segment(2 * first, 2 * count));
+      sum.b += numerics::transposed_matvec(weighted, root.cwiseProduct(residual.segment(2 * first, 2 * count)));
     }
   });
   for (int piece = 1; piece < kPieces; ++piece) {
@@ -143,7 +142,7 @@ WeighedFit fit_with_loss(LinearData data, const network::Contractile& network, c
       // or a thousandth of the largest tension: at a kink of the forces fits may end on either side in turn
       const Eigen::VectorXd change = fit.trial.tensions_nN - before;
       const double settled = kSettled * scale * std::sqrt(static_cast<double>(change.size()));
-      const Eigen::VectorXd changed = less_motion(data, data.response->displace(derivatives * change));
+      const Eigen::VectorXd changed = less_motion(data, data.response->displace(numerics::matvec(derivatives, change)));
       const double moved = data.weight_per_um.cwiseProduct(changed).norm();
       return moved <= settled || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff();
     };
@@ -195,9 +194,10 @@ Studentized studentized(const LinearData& data, const Trial& trial, const Eigen:
       hat.col(b) += Eigen::Vector3d(x.squaredNorm(), x.dot(y), y.squaredNorm());
     }
   };
-  if (data.motions.shapes.cols() > 0) add(weight.asDiagonal() * data.motions.shapes * root_of(data.motions.inverse));
-  const Eigen::MatrixXd unit =
-      of_free * root_of(numerics::pseudo_inverse(numerics::gram(displace(data.reduced, of_free, data.threads))));
+  if (data.motions.shapes.cols() > 0)
+    add(numerics::small_product(weight.asDiagonal() * data.motions.shapes, root_of(data.motions.inverse)));
+  const Eigen::MatrixXd unit = numerics::small_product(
+      of_free, root_of(numerics::pseudo_inverse(numerics::gram(displace(data.reduced, of_free, data.threads)))));
   constexpr Eigen::Index kColumns = 64;  // at a time: beads × tensions are too many numbers
   for (Eigen::Index first = 0; first < unit.cols(); first += kColumns) {
     const Eigen::Index count = std::min(kColumns, unit.cols() - first);
@@ -207,11 +207,8 @@ Studentized studentized(const LinearData& data, const Trial& trial, const Eigen:
   for (Eigen::Index b = 0; b < hat.cols(); ++b) {
     Eigen::Matrix2d left;
     left << 1 - hat(0, b), -hat(1, b), -hat(1, b), 1 - hat(2, b);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(left);
     constexpr double kLeast = 0.01;  // a bead that tells all by itself leaves rounding, not a residual
-    residual.segment<2>(2 * b) = eigen.eigenvectors() *
-                                 eigen.eigenvalues().cwiseMax(kLeast).cwiseSqrt().cwiseInverse().asDiagonal() *
-                                 eigen.eigenvectors().transpose() * residual.segment<2>(2 * b);
+    residual.segment<2>(2 * b) = numerics::inverse_root(left, kLeast) * residual.segment<2>(2 * b);
   }
   return {.residual = std::move(residual), .leverage = (hat.row(0) + hat.row(2)).transpose()};
 }
@@ -244,7 +241,8 @@ double harm_done_by(const std::vector<Eigen::Index>& strays, const LinearData& d
   const Eigen::MatrixXd of_strays = weight.asDiagonal() * data.response->at_points(strays)->displace(force_derivatives);
   const Eigen::MatrixXd all = numerics::gram(displace(data.reduced, force_derivatives, data.threads));
   const Eigen::MatrixXd others = all - numerics::gram(of_strays);
-  const Eigen::VectorXd moved = numerics::shortest_solution(others, of_strays.transpose() * residual).cwiseAbs();
+  const Eigen::VectorXd moved =
+      numerics::shortest_solution(others, numerics::transposed_matvec(of_strays, residual)).cwiseAbs();
   const Eigen::VectorXd variance = numerics::pseudo_inverse(all).diagonal();
   const Eigen::VectorXd in_errors = moved.cwiseQuotient(variance.cwiseMax(1e-300).cwiseSqrt());
   const double most_moved =

@@ -5,6 +5,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::tensions {
@@ -41,7 +42,7 @@ Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* 
   trial.rest = cell_.at_rest(tensions_nN, nearby ? nearby->rest.get() : nullptr, force_tolerance);
   if (!trial.rest->report().converged) throw NotSolved(trial.rest->report());
   trial.forces_nN = to_data_rows(trial.rest->forces_nN());
-  trial.residual = *data_.compliance * trial.forces_nN - data_.target;
+  trial.residual = numerics::matvec(*data_.compliance, trial.forces_nN) - data_.target;
   trial.objective =
       0.5 * (solved_misfit_ ? solved_misfit_(trial.forces_nN) - data_.floor_squared : trial.residual.squaredNorm());
   return trial;
@@ -60,6 +61,10 @@ Eigen::VectorXd TensionProblem::torques_nN_um(const Trial& trial) const {
 
 Eigen::MatrixXd TensionProblem::force_derivatives(const Trial& trial) const {
   return to_data_rows(trial.rest->force_derivatives(threads_));
+}
+
+Eigen::VectorXd TensionProblem::gradient(const Trial& trial) const {
+  return numerics::transposed_matvec(jacobian(trial), trial.residual);
 }
 
 Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, int threads) const {
@@ -82,7 +87,7 @@ Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, i
 Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby) {
   constexpr double kRough = 1e-3;  // its size is all that is asked for
   const Trial trial = problem.evaluate(tensions_nN, nearby, kRough);
-  const Eigen::VectorXd response = *problem.data().compliance * trial.forces_nN;
+  const Eigen::VectorXd response = numerics::matvec(*problem.data().compliance, trial.forces_nN);
   double factor = response.dot(problem.data().target) / std::max(response.squaredNorm(), 1e-300);
   // Where the cell seems to push, as noise alone may look, any small positive size serves.
   if (factor <= 0) factor = 1e-3 / std::max(tensions_nN.maxCoeff(), 1e-300);
@@ -92,7 +97,7 @@ Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensi
 Trial uniform_start(const TensionProblem& problem) {
   Trial start = scaled_to_data(problem, Eigen::VectorXd::Ones(problem.n_tensions()));
   const ReducedData& data = problem.data();
-  const Eigen::VectorXd pull = (*data.compliance * start.forces_nN).normalized();
+  const Eigen::VectorXd pull = numerics::matvec(*data.compliance, start.forces_nN).normalized();
   const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_components - data.n_felt));
   const double sigma = std::sqrt(std::max(data.floor_squared, 1e-300) / n_free);  // of a component of the data
   constexpr double kCertain = 6;  // standard errors: noise alone pushes by two or three, once in 1e9 by six

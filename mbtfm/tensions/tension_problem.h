@@ -54,7 +54,7 @@ class TensionProblem {
   /// d(C R)/dt: 2·adhesions × tensions
   Eigen::MatrixXd jacobian(const Trial& trial) const { return displace(data_, force_derivatives(trial), threads_); }
   /// dPhi/dt by tension, exact.
-  Eigen::VectorXd gradient(const Trial& trial) const { return jacobian(trial).transpose() * trial.residual; }
+  Eigen::VectorXd gradient(const Trial& trial) const;
   /// dPhi/dt by central differences over threads, as the thesis does (3.2.5); for comparison.
   Eigen::VectorXd finite_difference_gradient(const Trial& trial, int threads) const;
 

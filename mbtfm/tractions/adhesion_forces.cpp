@@ -68,10 +68,10 @@ Vec2 force_with(const substrate::Substrate& gel, const WeightedBeads& beads, con
   const Eigen::MatrixXd columns = weighted_compliance(gel, beads, {other});
   Eigen::MatrixXd A = normal;
   Eigen::VectorXd b = pulled;
-  A.middleCols<2>(2 * a) = G.transpose() * columns;
-  A.block<2, 2>(2 * a, 2 * a) = columns.transpose() * columns;
+  A.middleCols<2>(2 * a) = numerics::small_transposed_product(G, columns);
+  A.block<2, 2>(2 * a, 2 * a) = numerics::small_transposed_product(columns, columns);
   A.middleRows<2>(2 * a) = A.middleCols<2>(2 * a).transpose().eval();
-  b.segment<2>(2 * a) = columns.transpose() * beads.displacement;
+  b.segment<2>(2 * a) = numerics::transposed_matvec(columns, beads.displacement);
   const Eigen::VectorXd forces = numerics::solve_symmetric(A, b);
   return {forces[2 * a], forces[2 * a + 1]};
 }
@@ -79,17 +79,19 @@ Vec2 force_with(const substrate::Substrate& gel, const WeightedBeads& beads, con
 /// A force is stationary where its ellipse fits best, so derivatives would say little: finite errors do.
 Sensitivity sensitivity(const substrate::Substrate& gel, const WeightedBeads& beads, const Eigen::MatrixXd& G,
                         const Eigen::MatrixXd& normal, const Eigen::VectorXd& pulled, Vec2 force_nN,
-                        const substrate::Ellipse& ellipse, Index a, const TractionParameters& p) {
+                        const substrate::Ellipse& ellipse, Index a) {
+  // errors of an ellipse as segmentations have them
+  constexpr double kShift_um = 0.3, kSize = 0.2, kTurn_deg = 10;
   const Vec2 along{std::cos(ellipse.angle_rad), std::sin(ellipse.angle_rad)};
   const auto change_nN = [&](const substrate::Ellipse& other) {
     return norm(force_with(gel, beads, G, normal, pulled, a, other) - force_nN);
   };
   substrate::Ellipse shifted_along = ellipse, shifted_across = ellipse, grown = ellipse, turned = ellipse;
-  shifted_along.centre_um += p.shift_error_um * along;
-  shifted_across.centre_um += p.shift_error_um * Vec2{-along.y, along.x};
-  grown.semi_major_um *= 1 + p.size_error;
-  grown.semi_minor_um *= 1 + p.size_error;
-  turned.angle_rad += p.angle_error_deg * std::numbers::pi / 180;
+  shifted_along.centre_um += kShift_um * along;
+  shifted_across.centre_um += kShift_um * Vec2{-along.y, along.x};
+  grown.semi_major_um *= 1 + kSize;
+  grown.semi_minor_um *= 1 + kSize;
+  turned.angle_rad += kTurn_deg * std::numbers::pi / 180;
   return {.shift_along_nN = change_nN(shifted_along),
           .shift_across_nN = change_nN(shifted_across),
           .size_nN = change_nN(grown),
@@ -123,13 +125,13 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
   for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
   const WeightedBeads beads = weighted(inputs.beads);
   const Eigen::MatrixXd G = weighted_compliance(*gel, beads, ellipses);
-  const Eigen::MatrixXd normal_matrix = G.transpose() * G;
+  const Eigen::MatrixXd normal_matrix = numerics::small_transposed_product(G, G);
   const auto [values, vectors] = numerics::symmetric_eigen(normal_matrix);
   check_solvable(values);
-  const Eigen::MatrixXd inverse = vectors * values.cwiseInverse().asDiagonal() * vectors.transpose();
-  const Eigen::VectorXd pulled = G.transpose() * beads.displacement;
-  const Eigen::VectorXd forces = inverse * pulled;
-  const Eigen::VectorXd residual = beads.displacement - G * forces;
+  const Eigen::MatrixXd inverse = numerics::weighted_outer(vectors, values.cwiseInverse());
+  const Eigen::VectorXd pulled = numerics::transposed_matvec(G, beads.displacement);
+  const Eigen::VectorXd forces = numerics::matvec(inverse, pulled);
+  const Eigen::VectorXd residual = numerics::minus_matvec(beads.displacement, G, forces);
 
   Reconstruction r;
   const double chi_squared = residual.squaredNorm() / static_cast<double>(G.rows() - G.cols());
@@ -153,7 +155,7 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
       greens::make_greens(inputs.gel, {.model = substrate::kind_of(parameters.gel_model)}, 1);  // one column a thread
   numerics::parallel_for(static_cast<int>(ellipses.size()), threads, [&](int a) {
     const auto i = static_cast<std::size_t>(a);
-    r.sensitivities[i] = sensitivity(*alone, beads, G, normal_matrix, pulled, forces_nN[i], ellipses[i], a, parameters);
+    r.sensitivities[i] = sensitivity(*alone, beads, G, normal_matrix, pulled, forces_nN[i], ellipses[i], a);
   });
   for (std::size_t a = 0; a < ellipses.size(); ++a) {
     const Adhesion& adhesion = inputs.adhesions[a];

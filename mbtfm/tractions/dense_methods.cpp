@@ -6,6 +6,7 @@
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/memory.h"
 #include "substrate/ellipse.h"
 #include "substrate/greens/models.h"
@@ -77,8 +78,9 @@ Loads regularised(const TractionInputs& inputs, const TractionParameters& parame
 /// noise, and by what penalty and model make of forces spread over their adhesions.
 /// docs/theory/reconstructions.md (17).
 void state_errors(const Loads& loads, const Eigen::MatrixXd& sums, std::vector<AdhesionForce>& forces) {
-  const Eigen::MatrixXd covariance = sums * loads.covariance * sums.transpose();
-  const Eigen::MatrixXd missed = sums * loads.response - Eigen::MatrixXd::Identity(sums.rows(), loads.response.cols());
+  const Eigen::MatrixXd covariance = numerics::congruence(sums, loads.covariance);
+  const Eigen::MatrixXd missed =
+      numerics::small_product(sums, loads.response) - Eigen::MatrixXd::Identity(sums.rows(), loads.response.cols());
   for (std::size_t a = 0; a < forces.size(); ++a) {
     const Vec2 along = direction_of(forces[a].force_nN);
     const Eigen::RowVector2d e(along.x, along.y);

@@ -66,17 +66,17 @@ DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance
   Eigen::MatrixXd pulled_by_truth = Eigen::MatrixXd::Zero(n_loads, n_true);
   for_blocks([&](const Range& range, const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
     numerics::add_upper_gram(G, normal);
-    pulled += G.transpose() * u;
-    if (n_true > 0) pulled_by_truth += G.transpose() * weighted(truth, range);
+    pulled += numerics::transposed_matvec(G, u);
+    if (n_true > 0) pulled_by_truth += numerics::small_transposed_product(G, weighted(truth, range));
     data_squared += u.squaredNorm();
   });
   spectrum_.emplace(std::move(normal), std::move(pulled), data_squared, static_cast<double>(2 * beads.size()));
-  projected_truth_ = spectrum_->vectors().transpose() * pulled_by_truth;
+  projected_truth_ = numerics::small_transposed_product(spectrum_->vectors(), pulled_by_truth);
 }
 
 Eigen::MatrixXd DenseProblem::response_to_truth(double lambda) const {
   const Eigen::VectorXd shares = (spectrum_->values() + lambda * lambda).inverse().matrix();
-  return spectrum_->vectors() * (shares.asDiagonal() * projected_truth_);
+  return numerics::small_product(spectrum_->vectors(), shares.asDiagonal() * projected_truth_);
 }
 
 }  // namespace mbtfm::tractions

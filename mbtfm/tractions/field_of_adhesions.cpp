@@ -62,7 +62,7 @@ VectorXd weighted_fit(const MatrixXd& shapes, const VectorXd& displacement_um, c
   constexpr double kRidge = 1e-4;  // of forces that no bead feels, or that two adhesions share
   normal.diagonal().head(n_forces).array() += kRidge * normal.diagonal().head(n_forces).mean();
   if (!numerics::upper_cholesky(normal, threads)) return {};
-  MatrixXd sizes = shapes.transpose() * weights.cwiseProduct(displacement_um);
+  MatrixXd sizes = numerics::transposed_matvec(shapes, weights.cwiseProduct(displacement_um));
   numerics::solve_upper_transposed(normal, sizes);
   numerics::solve_upper(normal, sizes);
   return sizes;

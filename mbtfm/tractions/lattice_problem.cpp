@@ -7,6 +7,7 @@
 #include <random>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/numerics/memory.h"
@@ -17,19 +18,6 @@ namespace mbtfm::tractions {
 namespace {
 
 constexpr double kOnNode = 1e-6;  // of a spacing: files hold six digits at least
-
-struct Extent {
-  Vec2 low, high;
-};
-
-Extent extent_of(const DisplacementField& beads) {
-  Extent e{beads.front().position_um, beads.front().position_um};
-  for (const Bead& b : beads) {
-    e.low = {std::min(e.low.x, b.position_um.x), std::min(e.low.y, b.position_um.y)};
-    e.high = {std::max(e.high.x, b.position_um.x), std::max(e.high.y, b.position_um.y)};
-  }
-  return e;
-}
 
 void check_beads(const DisplacementField& beads) {
   check(beads);
@@ -79,14 +67,16 @@ std::optional<double> lattice_spacing_um(const DisplacementField& beads, const E
   const auto step_x = common_step(std::move(x)), step_y = common_step(std::move(y));
   if (!step_x || !step_y || std::abs(*step_x - *step_y) > 1e-3 * *step_x) return std::nullopt;
   const double step = 0.5 * (*step_x + *step_y);
-  const double n_nodes = (1 + (e.high.x - e.low.x) / step) * (1 + (e.high.y - e.low.y) / step);
+  const double n_nodes = (1 + (e.high_um.x - e.low_um.x) / step) * (1 + (e.high_um.y - e.low_um.y) / step);
   // coordinates rounded to some digits have a common step too, but then hardly a node has a bead
   return static_cast<double>(beads.size()) > 0.5 * n_nodes ? std::optional(step) : std::nullopt;
 }
 
 Lattice field_of(const DisplacementField& beads, const LatticeOptions& options) {
-  const Extent e = extent_of(beads);
-  const Vec2 size = e.high - e.low;
+  std::vector<Vec2> places_um;
+  for (const Bead& b : beads) places_um.push_back(b.position_um);
+  const Extent e = extent_of(places_um);
+  const Vec2 size = e.high_um - e.low_um;
   if (!(size.x > 0 && size.y > 0)) {
     throw InvalidData("displacement", "beads spread over an area", "all on one line");
   }
@@ -107,7 +97,7 @@ Lattice field_of(const DisplacementField& beads, const LatticeOptions& options) 
                 .n_columns = static_cast<int>(n_along(size.x)),
                 .n_rows = static_cast<int>(n_along(size.y))};
   // centred on the beads, so that a mirrored or turned scene has a mirrored or turned lattice
-  const Vec2 middle = 0.5 * (e.low + e.high);
+  const Vec2 middle = e.middle_um();
   field.origin_um = middle - 0.5 * spacing * Vec2{field.n_columns - 1.0, field.n_rows - 1.0};
   return field;
 }

@@ -50,10 +50,6 @@ struct TractionParameters {
   double gaussian_um = 0;  ///< regularisation smooths already
   double element_um = 2;   ///< bem: the finest that some 10 000 beads of 20 nm noise tell apart
   double grow_um = 1.5;    ///< smoothed tractions spill over an adhesion's rim by about that
-  // adhesion-forces: errors of an ellipse whose effect on its force is reported, as segmentations have them
-  double shift_error_um = 0.3;
-  double size_error = 0.2;
-  double angle_error_deg = 10;
 };
 void declare(stage::ParameterList& list, TractionParameters& parameters);
 

@@ -26,7 +26,7 @@ Spectrum::Spectrum(MatrixXd normal, VectorXd pulled, double data_squared, double
     : data_squared_(data_squared), n_data_(n_data) {
   auto [values, vectors] = numerics::symmetric_eigen(std::move(normal));
   vectors_ = std::make_shared<const MatrixXd>(std::move(vectors));
-  projected_ = vectors_->transpose() * pulled;
+  projected_ = numerics::transposed_matvec(*vectors_, pulled);
   // Of fewer data than unknowns the other directions have values of rounding. The risk has them over lambda².
   const Eigen::Array<bool, Eigen::Dynamic, 1> felt = values.array() > kRounding * values.maxCoeff();
   values_ = felt.select(values.array(), 0);
@@ -132,7 +132,7 @@ double Spectrum::removable_misfit(double lambda) const {
 double Spectrum::explained(double lambda) const { return (projected_.square() / (values_ + lambda * lambda)).sum(); }
 
 VectorXd Spectrum::solve(double lambda) const {
-  return *vectors_ * (projected_ / (values_ + lambda * lambda)).matrix();
+  return numerics::matvec(*vectors_, (projected_ / (values_ + lambda * lambda)).matrix());
 }
 
 MatrixXd Spectrum::outer(const ArrayXd& shares) const {
@@ -151,7 +151,7 @@ MatrixXd Spectrum::posterior(double lambda, double variance) const {
 }
 
 VectorXd Spectrum::resolved(double lambda) const {
-  return vectors_->array().square().matrix() * (values_ / (values_ + lambda * lambda)).matrix();
+  return numerics::matvec(vectors_->array().square().matrix(), (values_ / (values_ + lambda * lambda)).matrix());
 }
 
 double Spectrum::misfit(double lambda) const {

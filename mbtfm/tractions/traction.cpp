@@ -35,14 +35,6 @@ void declare(stage::ParameterList& list, TractionParameters& p) {
   list.add("grow_um", p.grow_um, Range::zero_or_size_um(),
            "tractions are summed up to this distance from the outline or from the adhesions (um); bem: an adhesion's "
            "force is that of the tractions on its ellipse grown by this");
-  list.add("shift_error_um", p.shift_error_um, Range::size_um(),
-           "adhesion-forces: shift of an adhesion's ellipse; what it changes of the adhesion's force is reported (um)");
-  list.add("size_error", p.size_error, Range::between(0.001, 10),
-           "adhesion-forces: error of both axes of an adhesion's ellipse, as a share; what it changes of the "
-           "adhesion's force is reported");
-  list.add(
-      "angle_error_deg", p.angle_error_deg, Range::between(0.001, 90),
-      "adhesion-forces: turn of an adhesion's ellipse; what it changes of the adhesion's force is reported (degrees)");
 }
 
 namespace {

@@ -26,7 +26,6 @@ void add_slow(std::vector<Rung>& rungs) {
   const std::vector<runner::Setting> refined = {{"substrate", "model", "refined"},
                                                 {"substrate", "displacement_tolerance", "0"}};
   add(rungs, "substrate", "elements_across_adhesion", {"1", "1.4", "2"}, refined);
-  add(rungs, "substrate", "element", {"q1-p0"}, refined);
   rungs.push_back({.knob = "model", .value = "refined", .settings = {{"substrate", "model", "refined"}}});
   for (const char* evaluations : {"100", "1000"}) {
     add(rungs, "fit", "method", {"plain-cg", "blockwise-cg"}, {{"fit", "max_evaluations", evaluations}});
@@ -126,7 +125,6 @@ std::string group_of(const std::string& knob, CellKind kind) {
   static const std::map<std::string, std::string> groups = {{"model", "gel"},
                                                             {"cells_per_thickness", "gel"},
                                                             {"elements_across_adhesion", "gel"},
-                                                            {"element", "gel"},
                                                             {"margin_thicknesses", "gel"},
                                                             {"displacement_tolerance", "gel"},
                                                             {"growth", "gel"},

@@ -1,6 +1,8 @@
 #include "pipeline/numerics/dense.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -184,6 +186,45 @@ SymmetricEigen symmetric_eigen(MatrixXd A) {
   MBTFM_ASSERT(info == 0);
   eigen.vectors = std::move(A);
   return eigen;
+}
+
+using Eigen::VectorXd;
+
+VectorXd matvec(const MatrixView& A, const VectorView& x) { return A * x; }
+VectorXd transposed_matvec(const MatrixView& A, const VectorView& x) { return A.transpose() * x; }
+VectorXd plus_matvec(const VectorView& c, const MatrixView& A, const VectorView& x) { return c + A * x; }
+VectorXd minus_matvec(const VectorView& c, const MatrixView& A, const VectorView& x) { return c - A * x; }
+double quadratic_form(const MatrixView& S, const VectorView& x) { return x.dot(S * x); }
+
+MatrixXd small_product(const MatrixView& A, const MatrixView& B) { return A * B; }
+MatrixXd small_transposed_product(const MatrixView& A, const MatrixView& B) { return A.transpose() * B; }
+MatrixXd small_product(double factor, const MatrixView& A, const MatrixView& B) { return factor * A * B; }
+MatrixXd plus_product(const MatrixView& C, const MatrixView& A, const MatrixView& B) { return C + A * B; }
+MatrixXd minus_product(const MatrixView& C, const MatrixView& A, const MatrixView& B) { return C - A * B; }
+MatrixXd congruence(const MatrixView& A, const MatrixView& S) {
+  return small_product(small_product(A, S), A.transpose());
+}
+MatrixXd weighted_outer(const MatrixView& A, const VectorView& w) {
+  return small_product(A * w.asDiagonal(), A.transpose());
+}
+MatrixXd scaled_on_both_sides(const MatrixView& S, const VectorView& d) { return d.asDiagonal() * S * d.asDiagonal(); }
+
+SmallCholesky::SmallCholesky(const MatrixView& A) : llt_(std::make_shared<const Eigen::LLT<MatrixXd>>(A)) {}
+bool SmallCholesky::is_definite() const { return llt_->info() == Eigen::Success; }
+VectorXd SmallCholesky::solve(const VectorView& b) const { return llt_->solve(b); }
+MatrixXd SmallCholesky::solve_matrix(const MatrixView& B) const { return llt_->solve(B); }
+MatrixXd SmallCholesky::inverse() const { return llt_->solve(MatrixXd::Identity(llt_->rows(), llt_->cols())); }
+VectorXd SmallCholesky::multiply(const VectorView& x) const { return llt_->matrixL() * (llt_->matrixU() * x); }
+double SmallCholesky::log_determinant() const { return 2 * llt_->matrixLLT().diagonal().array().log().sum(); }
+MatrixXd SmallCholesky::solve_lower(const MatrixView& B) const { return llt_->matrixL().solve(B); }
+MatrixXd SmallCholesky::upper() const { return llt_->matrixU(); }
+
+MatrixXd inverse(const MatrixView& A) { return A.inverse(); }
+
+Eigen::Matrix2d inverse_root(const Eigen::Matrix2d& A, double least) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(A);
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(least).cwiseSqrt().cwiseInverse().asDiagonal() *
+         eigen.eigenvectors().transpose();
 }
 
 MatrixXd solve_symmetric(const MatrixXd& A, const MatrixXd& B) { return A.ldlt().solve(B); }

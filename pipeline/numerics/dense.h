@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 
 namespace mbtfm::numerics {
 
@@ -50,7 +51,55 @@ struct SymmetricEigen {
 SymmetricEigen symmetric_eigen(Eigen::MatrixXd A);
 
 // Eigen's own, for the small matrices of many places: compiled here once, since each place that names them costs
-// seconds.
+// seconds. small_product() and the like sum in Eigen's order, product() and the like in BLAS'.
+
+using MatrixView = Eigen::Ref<const Eigen::MatrixXd>;  ///< a matrix, or a block of one
+using VectorView = Eigen::Ref<const Eigen::VectorXd>;
+
+/// A x and Aᵀ x.
+Eigen::VectorXd matvec(const MatrixView& A, const VectorView& x);
+Eigen::VectorXd transposed_matvec(const MatrixView& A, const VectorView& x);
+/// c + A x and c − A x.
+Eigen::VectorXd plus_matvec(const VectorView& c, const MatrixView& A, const VectorView& x);
+Eigen::VectorXd minus_matvec(const VectorView& c, const MatrixView& A, const VectorView& x);
+/// xᵀ S x with a square S.
+double quadratic_form(const MatrixView& S, const VectorView& x);
+
+/// A B, Aᵀ B and factor A B.
+Eigen::MatrixXd small_product(const MatrixView& A, const MatrixView& B);
+Eigen::MatrixXd small_transposed_product(const MatrixView& A, const MatrixView& B);
+Eigen::MatrixXd small_product(double factor, const MatrixView& A, const MatrixView& B);
+/// C + A B and C − A B.
+Eigen::MatrixXd plus_product(const MatrixView& C, const MatrixView& A, const MatrixView& B);
+Eigen::MatrixXd minus_product(const MatrixView& C, const MatrixView& A, const MatrixView& B);
+/// A S Aᵀ with a square S.
+Eigen::MatrixXd congruence(const MatrixView& A, const MatrixView& S);
+/// A diag(w) Aᵀ.
+Eigen::MatrixXd weighted_outer(const MatrixView& A, const VectorView& w);
+/// diag(d) S diag(d).
+Eigen::MatrixXd scaled_on_both_sides(const MatrixView& S, const VectorView& d);
+
+/// A = L Lᵀ, where rounding leaves A positive definite.
+class SmallCholesky {
+ public:
+  explicit SmallCholesky(const MatrixView& A);
+  bool is_definite() const;
+  Eigen::VectorXd solve(const VectorView& b) const;         ///< A⁻¹ b
+  Eigen::MatrixXd solve_matrix(const MatrixView& B) const;  ///< A⁻¹ B
+  Eigen::MatrixXd inverse() const;
+  Eigen::MatrixXd solve_lower(const MatrixView& B) const;  ///< L⁻¹ B
+  Eigen::VectorXd multiply(const VectorView& x) const;     ///< L (Lᵀ x)
+  double log_determinant() const;
+  Eigen::MatrixXd upper() const;  ///< Lᵀ
+
+ private:
+  std::shared_ptr<const Eigen::LLT<Eigen::MatrixXd>> llt_;
+};
+
+/// A⁻¹ of any regular A.
+Eigen::MatrixXd inverse(const MatrixView& A);
+/// A^(−1/2) of a symmetric A, no eigenvalue counting as less than this one.
+Eigen::Matrix2d inverse_root(const Eigen::Matrix2d& A, double least);
 
 /// X of A X = B with a symmetric A, semidefinite up to rounding, by LDLᵀ with pivots.
 Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);

@@ -1,8 +1,9 @@
 #include "pipeline/numerics/magnitude_interval.h"
 
-#include <boost/math/distributions/non_central_chi_squared.hpp>
 #include <cmath>
 #include <limits>
+
+#include "pipeline/numerics/distributions.h"
 
 namespace mbtfm::numerics {
 
@@ -11,10 +12,7 @@ namespace {
 constexpr double kTail = 0.025, kQuantile = 1.959963984540054;
 
 /// That so short a length or a shorter one is found. Lengths are in units of the error.
-double probability_below(double found, double truth) {
-  const boost::math::non_central_chi_squared square(2, truth * truth);
-  return boost::math::cdf(square, found * found);
-}
+double probability_below(double found, double truth) { return chi_squared_below(2, truth * truth, found * found); }
 
 /// The true length at which that is `probability`, which falls with it.
 double truth_at(double found, double probability, double low, double high) {

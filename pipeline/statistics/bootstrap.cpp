@@ -1,13 +1,12 @@
 #include "pipeline/statistics/bootstrap.h"
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <map>
 #include <random>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/distributions.h"
 
 namespace mbtfm::statistics {
 
@@ -33,8 +32,8 @@ std::optional<Interval> bootstrap_interval(std::vector<std::optional<double>> va
   }
   if (static_cast<double>(defined.size()) < 0.95 * static_cast<double>(values.size())) return std::nullopt;
   std::sort(defined.begin(), defined.end());
-  const double t = quantile(boost::math::students_t(n_cells - 1), 0.025);
-  const double share = cdf(boost::math::normal(), t * std::sqrt(n_cells / (n_cells - 1.0)));
+  const double t = numerics::student_quantile(n_cells - 1, 0.025);
+  const double share = numerics::normal_below(t * std::sqrt(n_cells / (n_cells - 1.0)));
   const double last = static_cast<double>(defined.size()) - 1;
   const auto at = [&](double p) {
     const double place = std::clamp(p, 0.0, 1.0) * last;

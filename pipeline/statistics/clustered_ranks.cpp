@@ -1,9 +1,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <map>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/distributions.h"
 #include "pipeline/statistics/rank_tests.h"
 
 namespace mbtfm::statistics {
@@ -116,7 +116,7 @@ TestResult clustered_rank_test(const std::vector<ClusteredValue>& values) {
   if (!(ldlt.vectorD().minCoeff() > 1e-12)) throw InvalidData("the groups", "values that scatter", "none that do");
   const double chi_squared = distance.dot(ldlt.solve(distance));
   const double f = chi_squared * degrees / (static_cast<double>(q) * (n_cells - 1));
-  return {.statistic = f, .p_value = cdf(complement(boost::math::fisher_f(static_cast<double>(q), degrees), f))};
+  return {.statistic = f, .p_value = numerics::fisher_above(static_cast<double>(q), degrees, f)};
 }
 
 }  // namespace mbtfm::statistics

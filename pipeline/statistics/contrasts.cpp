@@ -1,11 +1,10 @@
 /// What a fitted mixed model says of sums and differences of its means.
 #include <Eigen/Core>
 #include <algorithm>
-#include <boost/math/distributions/fisher_f.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/distributions.h"
 #include "pipeline/statistics/mixed_model.h"
 
 namespace mbtfm::statistics {
@@ -31,9 +30,8 @@ double satterthwaite_degrees(const MixedFit& fit, const VectorXd& weights) {
 Contrast by_students_t(double estimate, double standard_error, double degrees) {
   Contrast c{.estimate = estimate, .standard_error = standard_error, .degrees = degrees};
   c.t = c.estimate / c.standard_error;
-  const boost::math::students_t t(c.degrees);
-  c.p_value = std::min(1.0, 2 * cdf(complement(t, std::abs(c.t))));
-  const double half = quantile(t, 0.975) * c.standard_error;
+  c.p_value = std::min(1.0, 2 * numerics::student_above(c.degrees, std::abs(c.t)));
+  const double half = numerics::student_quantile(c.degrees, 0.975) * c.standard_error;
   c.low = c.estimate - half;
   c.high = c.estimate + half;
   return c;
@@ -71,7 +69,7 @@ FTest test_all_zero(const MixedFit& fit, const MatrixXd& contrasts) {
   test.denominator_degrees = contrasts.rows() == 1 ? contrast_of(fit, axes.row(0).transpose()).degrees
                              : expected > q        ? 2 * expected / (expected - q)
                                                    : 2;
-  test.p_value = cdf(complement(boost::math::fisher_f(q, test.denominator_degrees), test.f));
+  test.p_value = numerics::fisher_above(q, test.denominator_degrees, test.f);
   return test;
 }
 

@@ -1,12 +1,11 @@
 #include "pipeline/statistics/descriptive.h"
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/distributions.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -58,7 +57,7 @@ Share share_over_cells(const std::vector<CellCount>& cells) {
     double squares = 0;  // of the residuals of the ratio, by cell
     for (const CellCount& c : cells) squares += std::pow(c.n_with - share.value * c.n, 2);
     const double variance = n_cells / (n_cells - 1) * squares / (n * n);
-    const double t = quantile(boost::math::students_t(n_cells - 1), 0.975);
+    const double t = numerics::student_quantile(n_cells - 1, 0.975);
     const double as_many = share.value * (1 - share.value) / std::max(variance, 1e-300);
     share.n_effective = std::min(n, as_many * std::pow(kNormal95 / t, 2));
   }
@@ -109,7 +108,6 @@ double deconvolved_fraction_above(const std::vector<double>& values, const std::
   const int n_above = static_cast<int>(std::ceil((widest - threshold) / step_above + 0.5));
   const int n_points = n_below + n_above;
   const auto point = [&](int k) { return k < n_below ? k * step : threshold + (k - n_below + 0.5) * step_above; };
-  const boost::math::normal normal;
   std::vector<std::vector<double>> kernel;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double grid = values[i] > threshold ? step_above : step;
@@ -117,7 +115,7 @@ double deconvolved_fraction_above(const std::vector<double>& values, const std::
     std::vector<double> row;
     for (int k = 0; k < n_points; ++k) {
       const double z = (values[i] - point(k)) / sigma;
-      row.push_back((values[i] > 0 ? std::exp(-z * z / 2) / sigma : cdf(normal, z) + 1e-300) + 1e-300);
+      row.push_back((values[i] > 0 ? std::exp(-z * z / 2) / sigma : numerics::normal_below(z) + 1e-300) + 1e-300);
     }
     kernel.push_back(std::move(row));
   }

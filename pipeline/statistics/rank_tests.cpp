@@ -1,12 +1,11 @@
 #include "pipeline/statistics/rank_tests.h"
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/distributions.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -61,9 +60,9 @@ TestResult kruskal_wallis(const std::vector<std::vector<double>>& groups) {
   }
   const double tie_correction = 1 - ranks.ties / (n * n * n - n);
   const double h = (12 / (n * (n + 1)) * sum - 3 * (n + 1)) / tie_correction;
-  const boost::math::chi_squared distribution(static_cast<double>(groups.size() - 1));
   // h is not negative but for rounding
-  return {.statistic = h, .p_value = cdf(complement(distribution, std::max(h, 0.0)))};
+  return {.statistic = h,
+          .p_value = numerics::chi_squared_above(static_cast<double>(groups.size() - 1), std::max(h, 0.0))};
 }
 
 TestResult mann_whitney(const std::vector<double>& a, const std::vector<double>& b) {
@@ -74,7 +73,7 @@ TestResult mann_whitney(const std::vector<double>& a, const std::vector<double>&
   const double u = rank_sum - n_a * (n_a + 1) / 2;
   const double variance = n_a * n_b / 12 * ((n + 1) - ranks.ties / (n * (n - 1)));
   const double distance = std::max(0.0, std::abs(u - n_a * n_b / 2) - 0.5);  // U is a whole number: continuity
-  const double p = 2 * cdf(complement(boost::math::normal(), distance / std::sqrt(variance)));
+  const double p = 2 * numerics::normal_above(distance / std::sqrt(variance));
   return {.statistic = u, .p_value = std::min(1.0, p)};
 }
 

@@ -49,7 +49,7 @@ constexpr int kInner = 3;
 
 }  // namespace
 
-std::vector<substrate::DiscPoint> clipped_ellipse_rule(const substrate::Ellipse& ellipse, const Rectangle& rectangle) {
+std::vector<substrate::DiscPoint> clipped_ellipse_rule(const substrate::Ellipse& ellipse, const Extent& rectangle) {
   static const numerics::GaussRule outer = numerics::gauss_legendre(kOuter);
   static const numerics::GaussRule inner = numerics::gauss_legendre(kInner);
   const Span span = span_of(ellipse);

@@ -3,16 +3,13 @@
 
 #include <vector>
 
+#include "pipeline/contract/extent.h"
 #include "substrate/ellipse.h"
 
 namespace mbtfm::boxes {
 
-struct Rectangle {
-  Vec2 low_um, high_um;
-};
-
 /// Quadrature points of an ellipse cut by a rectangle, with weights as shares of the ellipse's area: integrate
 /// polynomials of degree 4 to rounding (1e-13). Empty where they do not overlap.
-std::vector<substrate::DiscPoint> clipped_ellipse_rule(const substrate::Ellipse& ellipse, const Rectangle& rectangle);
+std::vector<substrate::DiscPoint> clipped_ellipse_rule(const substrate::Ellipse& ellipse, const Extent& rectangle);
 
 }  // namespace mbtfm::boxes

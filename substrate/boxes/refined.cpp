@@ -51,6 +51,7 @@ std::vector<int> columns_by_place(const std::vector<substrate::Ellipse>& ellipse
   return columns;
 }
 
+constexpr int kOrder = 2;  // with discontinuous linear pressures: stable as nu -> 1/2
 constexpr substrate::Capabilities kRefinedCan{
     .base = true, .sides = true, .grading = true, .inside = true, .normal_displacement = true};
 
@@ -59,8 +60,7 @@ class Refined final : public substrate::Substrate {
   Refined(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
       : Substrate(parameters, kRefinedCan),
         material_{gel, substrate::profile_of(parameters.modulus_profile)},
-        threads_(threads),
-        order_(parameters.element == substrate::FiniteElement::q1_p0 ? 1 : 2) {}
+        threads_(threads) {}
 
   substrate::LazyResponse response(const substrate::Loads& loads,
                                    const substrate::Observations& observations) const override {
@@ -158,15 +158,13 @@ class Refined final : public substrate::Substrate {
 
   Fineness first_fineness(std::size_t n_ellipses) const {
     return {.across = parameters_.elements_across_adhesion,
-            .fewest_elements = parameters_.elements_per_adhesion,
-            .growth = growth(),
+            .fewest_elements = 4,  // that touch each adhesion: the thesis' rule
+            .growth = parameters_.growth,
             .halvings = std::vector<int>(n_ellipses, 0)};
   }
 
-  /// Trilinear elements follow the far field as well as quadratic ones of eight times their side (measured).
-  double growth() const { return order_ == 1 ? parameters_.growth / 8 : parameters_.growth; }
   /// Far away the error falls as the side to order + 1, near the rims as its power 3/2: there the side may shrink less.
-  double far_step() const { return std::pow(2, 1.5 / (order_ + 1)); }
+  double far_step() const { return std::pow(2, 1.5 / (kOrder + 1)); }
 
   /// Halve the elements on the adhesions whose columns are worst, those far away by as much as they matter.
   /// @return the estimated error of each adhesion's columns
@@ -256,11 +254,11 @@ class Refined final : public substrate::Substrate {
 
   ElasticSystem system_for(const Fineness& fineness, const std::vector<Vec2>& points_um,
                            const std::vector<substrate::Ellipse>& ellipses) const {
-    // too few for any mesh of the kind (measured: 250 kB an element of Q2, 25 of Q1); the factor is weighed exactly
-    const double bytes = order_ == 2 ? 1e5 : 1e4;
-    const auto most = static_cast<std::int64_t>(1e9 * allowed_GB(parameters_.memory_limit_GB) / bytes);
+    // of an element: too few for any mesh (measured: 250 kB); the factor is weighed exactly
+    constexpr double kBytes = 1e5;
+    const auto most = static_cast<std::int64_t>(1e9 * allowed_GB(parameters_.memory_limit_GB) / kBytes);
     BlockMesh mesh = refined_mesh(material_, substrate::extent_of(points_um, ellipses), ellipses, fineness,
-                                  substrate::margin_um(material_.gel, parameters_), order_, most, threads_);
+                                  substrate::margin_um(material_.gel, parameters_), kOrder, most, threads_);
     return {material_,
             std::move(mesh),
             {.threads = threads_,
@@ -282,7 +280,7 @@ class Refined final : public substrate::Substrate {
     const GridLines& lines = system.mesh().lines;
     const std::lock_guard lock(mutex_);
     figures_ = {{"substrate_model", "refined"},
-                {"substrate_element", name_of(parameters_.element)},
+                {"substrate_element", "q2-p1disc"},
                 {"substrate_precision", std::string(is_single() ? "single" : "double")},
                 {"substrate_thickness_um", material_.gel.thickness_um},
                 {"substrate_unknowns", std::int64_t{system.n_unknowns()}},
@@ -302,7 +300,6 @@ class Refined final : public substrate::Substrate {
 
   substrate::Material material_;
   int threads_;
-  int order_;
   mutable std::mutex mutex_;
   mutable Figures figures_ = {{"substrate_model", "refined"}};  // of the last call
 };

@@ -34,13 +34,6 @@ std::array<double, 3> middle_of(const boxes::Box& box) {
   return middle;
 }
 
-/// How often an interval of the lines was halved to have the box's side.
-int level_of(const boxes::GridLines& lines, const boxes::Box& box) {
-  const double x = box.low_um[0] + 0.5 * box.size_um[0];
-  const auto above = std::upper_bound(lines.x_um.begin() + 1, lines.x_um.end() - 1, x);
-  return static_cast<int>(std::lround(std::log2((*above - *(above - 1)) / box.size_um[0])));
-}
-
 }  // namespace
 
 void check_inside(const Shape& shape, const Vec3& point_um) {
@@ -141,26 +134,6 @@ Location Block::locate(const Vec3& point_um) const {
     z = box.low_um[2] + (unit.z() < 0 ? -1e-6 : 1 + 1e-6) * box.size_um[2];
   }
   throw InternalError("no cell of the gel's block holds a point of it");
-}
-
-void Marked::add(const boxes::Box& box, int level) {
-  for (; level >= 0; --level) keys_.insert(key_of(lines_, level, middle_of(box)));
-}
-
-bool Marked::contains(const boxes::Box& box) const {
-  const int level = level_of(lines_, box);
-  return level >= 0 && keys_.contains(key_of(lines_, level, middle_of(box)));
-}
-
-boxes::GridLines every_second(const boxes::GridLines& lines) {
-  const auto thinned = [](const std::vector<double>& line) {
-    std::vector<double> kept;
-    for (std::size_t k = 0; k < line.size(); ++k) {
-      if (line.size() % 2 == 0 || k % 2 == 0) kept.push_back(line[k]);
-    }
-    return kept;
-  };
-  return {thinned(lines.x_um), thinned(lines.y_um), thinned(lines.z_um)};
 }
 
 }  // namespace mbtfm::curved

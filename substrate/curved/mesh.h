@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <set>
 #include <vector>
 
 #include "substrate/boxes/block_mesh.h"
@@ -75,22 +74,5 @@ class Block {
   Mesh mesh_;
   std::map<BoxKey, int> cell_at_;
 };
-
-/// Boxes of a block that are to be halved, and with them all that they are parts of.
-class Marked {
- public:
-  explicit Marked(boxes::GridLines lines) : lines_(std::move(lines)) {}
-  /// So that it is halved.
-  void add(const boxes::Box& box, int level);
-  /// As make_block_mesh asks.
-  bool contains(const boxes::Box& box) const;
-
- private:
-  boxes::GridLines lines_;
-  std::set<BoxKey> keys_;
-};
-
-/// Every second line, so that cells are twice as large; the others stay where their number is odd.
-boxes::GridLines every_second(const boxes::GridLines& lines);
 
 }  // namespace mbtfm::curved

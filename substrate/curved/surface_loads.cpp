@@ -14,16 +14,15 @@ namespace mbtfm::curved {
 namespace {
 
 using boxes::NodeWeight;
-using boxes::Rectangle;
 
-Rectangle rectangle_of(const substrate::Square& square) {
+Extent rectangle_of(const substrate::Square& square) {
   const Vec2 half = {0.5 * square.side_um, 0.5 * square.side_um};
   return {square.centre_um - half, square.centre_um + half};
 }
 
 /// @throws InvalidData where it is no rectangle along the axes
-Rectangle rectangle_of(const substrate::SurfaceMesh& mesh, const std::array<int, 4>& face) {
-  Rectangle r{mesh.points_um.at(face[0]), mesh.points_um.at(face[0])};
+Extent rectangle_of(const substrate::SurfaceMesh& mesh, const std::array<int, 4>& face) {
+  Extent r{mesh.points_um.at(face[0]), mesh.points_um.at(face[0])};
   for (const int corner : face) {
     const Vec2 p = mesh.points_um.at(corner);
     r = {{std::min(r.low_um.x, p.x), std::min(r.low_um.y, p.y)},
@@ -61,7 +60,7 @@ class Sum {
 
   /// The integral of a function over a rectangle of the surface. @return its area, seen from above
   template <class Function>
-  double integrate(const Rectangle& over, const Function& function) {
+  double integrate(const Extent& over, const Function& function) {
     constexpr int kPoints = 4;
     const numerics::GaussRule gauss = numerics::gauss_legendre(kPoints);
     double covered = 0;
@@ -141,7 +140,7 @@ std::vector<std::vector<NodeWeight>> vertex_weights(const Block& block, const Sp
                                                     const substrate::SurfaceMesh& mesh) {
   std::vector<Sum> sums(mesh.points_um.size(), Sum(block, space));
   for (const std::array<int, 4>& face : mesh.faces) {
-    const Rectangle r = rectangle_of(mesh, face);
+    const Extent r = rectangle_of(mesh, face);
     const Vec2 size = r.high_um - r.low_um;
     for (const int corner : face) {
       const Vec2 at = mesh.points_um[corner];
@@ -168,12 +167,12 @@ std::vector<Target> targets_of(const substrate::Loads& loads, double across) {
     }
   } else if (const auto* squares = std::get_if<std::vector<substrate::Square>>(&loads.shapes)) {
     for (const substrate::Square& s : *squares) {
-      const Rectangle r = rectangle_of(s);
+      const Extent r = rectangle_of(s);
       targets.push_back({r.low_um, r.high_um, s.side_um / across});
     }
   } else if (const auto* mesh = std::get_if<substrate::SurfaceMesh>(&loads.shapes)) {
     for (const auto& face : mesh->faces) {
-      const Rectangle r = rectangle_of(*mesh, face);
+      const Extent r = rectangle_of(*mesh, face);
       const Vec2 size = r.high_um - r.low_um;
       constexpr double kFaces = 2;  // bilinear over each and without a rim, tractions are smooth over two
       targets.push_back({r.low_um, r.high_um, kFaces * std::min(size.x, size.y) / across});

@@ -226,7 +226,7 @@ TEST(Ladder, turns_every_knob_that_trades_accuracy_for_time) {
   std::set<std::string> knobs;
   for (const Rung& rung : ladder(Extent::whole)) knobs.insert(rung.knob);
   for (const char* knob :
-       {"model", "elements_across_adhesion", "element", "margin_thicknesses", "edge_length_um", "n_meshes", "smoothing",
+       {"model", "elements_across_adhesion", "margin_thicknesses", "edge_length_um", "n_meshes", "smoothing",
         "force_tolerance", "method", "gradients", "tolerance", "beads", "image_scale", "bootstrap", "threads"})
     EXPECT_TRUE(knobs.contains(knob)) << knob;
 }
