@@ -8,49 +8,39 @@
 namespace mbtfm::mean {
 namespace {
 
-using files::kForPeople;
+using files::kResult;
+using files::member;
 
 double degrees(double rad) { return rad * 180 / std::numbers::pi; }
 
-const files::Table<CellRow>& table_of_cells() {
-  static const files::Table<CellRow> table{
+files::Table<CellRow> table_of_cells() {
+  return {
       .file = "registration.csv",
       .row = "each cell",
       .columns = {
           {"cell", "folder of the cell", &CellRow::cell},
           {"kept", "whether it is in the mean", &CellRow::is_kept},
           {"reason", "why it is not", &CellRow::reason},
-          {"x_um", "place of its centroid, in its own images", [](const CellRow& c) { return c.way.motion.from_um.x; }},
-          {"y_um", "the same along y", [](const CellRow& c) { return c.way.motion.from_um.y; }},
+          {"x_um", "place of its centroid, in its own images",
+           files::x_of(&CellRow::way, &Way::motion, &Motion::from_um)},
+          {"y_um", "the same along y", files::y_of(&CellRow::way, &Way::motion, &Motion::from_um)},
           {"reference_x_um", "where the centroid comes to lie in the frame of the reference",
-           [](const CellRow& c) { return c.way.motion.to_um.x; }},
-          {"reference_y_um", "the same along y", [](const CellRow& c) { return c.way.motion.to_um.y; }},
+           files::x_of(&CellRow::way, &Way::motion, &Motion::to_um)},
+          {"reference_y_um", "the same along y", files::y_of(&CellRow::way, &Way::motion, &Motion::to_um)},
           {"angle_deg", "by which it is turned about its centroid, from +x towards +y, after it was mirrored",
            [](const CellRow& c) { return degrees(c.way.motion.angle_rad); }},
-          {"mirrored", "whether y was turned into -y first", [](const CellRow& c) { return c.way.motion.is_mirrored; }},
-          {"misfit_um",
-           "root mean square distance of its outline and the reference, both ways",
-           [](const CellRow& c) { return c.way.misfit_um; },
-           {.digits = kForPeople}},
-          {"second_misfit_um",
-           "the same of the best way that is no symmetry of this one",
-           &CellRow::second_misfit_um,
-           {.digits = kForPeople}},
+          {"mirrored", "whether y was turned into -y first", member(&CellRow::way, &Way::motion, &Motion::is_mirrored)},
+          {"misfit_um", "root mean square distance of its outline and the reference, both ways",
+           member(&CellRow::way, &Way::misfit_um), kResult},
+          {"second_misfit_um", "the same of the best way that is no symmetry of this one", &CellRow::second_misfit_um,
+           kResult},
           {"ambiguous", "whether that fits as well", &CellRow::is_ambiguous},
-          {"shift_error_um",
-           "standard error of each component of the shift",
-           [](const CellRow& c) { return c.way.shift_error_um; },
-           {.digits = kForPeople}},
-          {"angle_error_deg",
-           "standard error of the angle",
-           [](const CellRow& c) { return degrees(c.way.angle_error_rad); },
-           {.digits = kForPeople}},
+          {"shift_error_um", "standard error of each component of the shift",
+           member(&CellRow::way, &Way::shift_error_um), kResult},
+          {"angle_error_deg", "standard error of the angle",
+           [](const CellRow& c) { return degrees(c.way.angle_error_rad); }, kResult},
           {"n_beads", "beads that were used", &CellRow::n_beads},
-          {"lambda_um_per_kPa",
-           "regularisation of its tractions",
-           &CellRow::lambda_um_per_kPa,
-           {.digits = kForPeople}}}};
-  return table;
+          {"lambda_um_per_kPa", "regularisation of its tractions", &CellRow::lambda_um_per_kPa, kResult}}};
 }
 
 struct MeanRow {
@@ -58,56 +48,39 @@ struct MeanRow {
   std::optional<Vec2> model_kPa;
 };
 
-const files::Table<MeanRow>& table_of_mean() {
-  const auto sigma = [](auto component) {
-    return [=](const MeanRow& row) -> std::optional<double> {
-      if (!row.node.sigma) return std::nullopt;
-      return component(*row.node.sigma);
-    };
-  };
-  const auto mean = [](auto component) { return [=](const MeanRow& row) { return component(row.node.mean); }; };
-  const auto ux = [](const Sample& s) { return s.displacement_um.x; };
-  const auto uy = [](const Sample& s) { return s.displacement_um.y; };
-  const auto tx = [](const Sample& s) { return s.traction_kPa.x; };
-  const auto ty = [](const Sample& s) { return s.traction_kPa.y; };
-  static const files::Table<MeanRow> table{
-      .file = "mean.csv",
-      .row = "each node of the lattice over the reference that beads of some cell reach",
-      .columns = {
-          {"x_um", "place in the frame of the reference", [](const MeanRow& r) { return r.node.position_um.x; }},
-          {"y_um", "the same along y", [](const MeanRow& r) { return r.node.position_um.y; }},
-          {"ux_um", "mean displacement", mean(ux)},
-          {"uy_um", "the same along y", mean(uy)},
-          {"ux_sigma_um", "its standard error, from the scatter of the cells", sigma(ux)},
-          {"uy_sigma_um", "the same along y", sigma(uy)},
-          {"tx_kPa", "mean traction", mean(tx)},
-          {"ty_kPa", "the same along y", mean(ty)},
-          {"tx_sigma_kPa", "its standard error, from the scatter of the cells", sigma(tx)},
-          {"ty_sigma_kPa", "the same along y", sigma(ty)},
-          {"n_cells", "cells whose beads reach it", [](const MeanRow& r) { return r.node.n_cells; }},
-          {"inside", "whether the reference holds it", [](const MeanRow& r) { return r.node.is_inside; }},
-          {"model_tx_kPa", "traction of the model, blurred as the cells are; empty if none was given",
-           [](const MeanRow& r) { return r.model_kPa ? std::optional(r.model_kPa->x) : std::nullopt; }},
-          {"model_ty_kPa", "the same along y",
-           [](const MeanRow& r) { return r.model_kPa ? std::optional(r.model_kPa->y) : std::nullopt; }}}};
-  return table;
+files::Table<MeanRow> table_of_mean() {
+  using Row = MeanRow;
+  const auto mean = [](auto vector, auto part) { return member(&Row::node, &NodeMean::mean, vector, part); };
+  const auto sigma = [](auto vector, auto part) { return member(&Row::node, &NodeMean::sigma, vector, part); };
+  const auto u = &Sample::displacement_um, t = &Sample::traction_kPa;
+  return {.file = "mean.csv",
+          .row = "each node of the lattice over the reference that beads of some cell reach",
+          .columns = {{"x_um", "place in the frame of the reference", files::x_of(&Row::node, &NodeMean::position_um)},
+                      {"y_um", "the same along y", files::y_of(&Row::node, &NodeMean::position_um)},
+                      {"ux_um", "mean displacement", mean(u, &Vec2::x)},
+                      {"uy_um", "the same along y", mean(u, &Vec2::y)},
+                      {"ux_sigma_um", "its standard error, from the scatter of the cells", sigma(u, &Vec2::x)},
+                      {"uy_sigma_um", "the same along y", sigma(u, &Vec2::y)},
+                      {"tx_kPa", "mean traction", mean(t, &Vec2::x)},
+                      {"ty_kPa", "the same along y", mean(t, &Vec2::y)},
+                      {"tx_sigma_kPa", "its standard error, from the scatter of the cells", sigma(t, &Vec2::x)},
+                      {"ty_sigma_kPa", "the same along y", sigma(t, &Vec2::y)},
+                      {"n_cells", "cells whose beads reach it", member(&Row::node, &NodeMean::n_cells)},
+                      {"inside", "whether the reference holds it", member(&Row::node, &NodeMean::is_inside)},
+                      {"model_tx_kPa", "traction of the model, blurred as the cells are; empty if none was given",
+                       member(&Row::model_kPa, &Vec2::x)},
+                      {"model_ty_kPa", "the same along y", member(&Row::model_kPa, &Vec2::y)}}};
 }
 
-const files::Table<WaveShare>& table_of_waves() {
-  static const files::Table<WaveShare> table{
-      .file = "blur.csv",
-      .row = "waves of traction of each length",
-      .columns = {{"wavelength_um", "length of the wave", &WaveShare::wavelength_um, {.digits = kForPeople}},
-                  {"fttc_along",
-                   "share that the regularisation leaves if the traction points along the wave",
-                   &WaveShare::along,
-                   {.digits = kForPeople}},
-                  {"fttc_across", "the same if it points across", &WaveShare::across, {.digits = kForPeople}},
-                  {"registration",
-                   "share that the errors of registration leave in the mean",
-                   &WaveShare::registration,
-                   {.digits = kForPeople}}}};
-  return table;
+files::Table<WaveShare> table_of_waves() {
+  return {.file = "blur.csv",
+          .row = "waves of traction of each length",
+          .columns = {{"wavelength_um", "length of the wave", &WaveShare::wavelength_um, kResult},
+                      {"fttc_along", "share that the regularisation leaves if the traction points along the wave",
+                       &WaveShare::along, kResult},
+                      {"fttc_across", "the same if it points across", &WaveShare::across, kResult},
+                      {"registration", "share that the errors of registration leave in the mean",
+                       &WaveShare::registration, kResult}}};
 }
 
 }  // namespace

@@ -12,27 +12,23 @@
 namespace mbtfm::sheet {
 namespace {
 
-const files::Table<SheetPoint>& sheet_table() {
+files::Table<SheetPoint> sheet_table() {
   using Row = SheetPoint;
-  static const files::Table<Row> table{
+  return {
       .file = "sheet.csv",
       .row = "each point given to `mbtfm-sheet`, or each node of its mesh; empty fields if a point is outside",
-      .columns = {
-          {"x_um", "the point", [](const Row& row) { return row.position_um.x; }},
-          {"y_um", "the point", [](const Row& row) { return row.position_um.y; }},
-          {"ux_um", "displacement of the sheet", [](const Row& row) { return row.ux_um; }},
-          {"uy_um", "displacement of the sheet", [](const Row& row) { return row.uy_um; }},
-          {"sxx_nN_per_um", "tension along x, contraction included (the same as mN/m)",
-           [](const Row& row) { return row.sxx_nN_per_um; }},
-          {"syy_nN_per_um", "tension along y", [](const Row& row) { return row.syy_nN_per_um; }},
-          {"sxy_nN_per_um", "shear", [](const Row& row) { return row.sxy_nN_per_um; }},
-          {"mean_tension_nN_per_um", "half of sxx + syy", [](const Row& row) { return row.mean_tension_nN_per_um; }},
-          {"max_shear_nN_per_um", "half the difference of the principal tensions",
-           [](const Row& row) { return row.max_shear_nN_per_um; }},
-          {"mean_tension_sigma_nN_per_um",
-           "its standard error by the tractions' (`traction_sigma_kPa`); empty: not known",
-           [](const Row& row) { return row.mean_tension_sigma_nN_per_um; }}}};
-  return table;
+      .columns = {{"x_um", "the point", files::x_of(&Row::position_um)},
+                  {"y_um", "the point", files::y_of(&Row::position_um)},
+                  {"ux_um", "displacement of the sheet", &Row::ux_um},
+                  {"uy_um", "displacement of the sheet", &Row::uy_um},
+                  {"sxx_nN_per_um", "tension along x, contraction included (the same as mN/m)", &Row::sxx_nN_per_um},
+                  {"syy_nN_per_um", "tension along y", &Row::syy_nN_per_um},
+                  {"sxy_nN_per_um", "shear", &Row::sxy_nN_per_um},
+                  {"mean_tension_nN_per_um", "half of sxx + syy", &Row::mean_tension_nN_per_um},
+                  {"max_shear_nN_per_um", "half the difference of the principal tensions", &Row::max_shear_nN_per_um},
+                  {"mean_tension_sigma_nN_per_um",
+                   "its standard error by the tractions' (`traction_sigma_kPa`); empty: not known",
+                   &Row::mean_tension_sigma_nN_per_um}}};
 }
 
 SheetPoint row_of(Vec2 place, Vec2 u, const Tensor& S) {

@@ -7,65 +7,51 @@
 namespace mbtfm::solids {
 namespace {
 
-using files::kForPeople;
+using files::kResult;
+using files::member;
+
+/// None of a case without an equilibrium.
+const Indentation* solved(const Indentation& i) { return i.failure ? nullptr : &i; }
 
 files::Table<Indentation> table_of_cases(const std::vector<double>& depths_um) {
-  files::Table<Indentation> table{
-      .file = "indent.csv",
-      .row = "each cell on each gel",
-      .columns = {{"height_um", "height of the cell", [](const Indentation& i) { return i.of.height_um; }},
-                  {"modulus_ratio", "Young's modulus of the gel over the cell's",
-                   [](const Indentation& i) { return i.of.modulus_ratio; }}}};
-  // of a case without an equilibrium the fields are empty
-  const auto add = [&](const std::string& name, const std::string& meaning, auto get) {
-    table.columns.push_back({name,
-                             meaning,
-                             [get](const Indentation& i) -> std::optional<double> {
-                               if (i.failure) return std::nullopt;
-                               return get(i);
-                             },
-                             {.digits = kForPeople}});
-  };
+  using Row = Indentation;
+  files::Table<Row> table{.file = "indent.csv",
+                          .row = "each cell on each gel",
+                          .columns = {{"height_um", "height of the cell", member(&Row::of, &Case::height_um)},
+                                      {"modulus_ratio", "Young's modulus of the gel over the cell's",
+                                       member(&Row::of, &Case::modulus_ratio)}}};
+  const auto reading = [](auto number) { return member(solved, &Row::reading, number); };
   for (std::size_t k = 0; k < depths_um.size(); ++k) {
-    add("depth_" + shortest(depths_um[k]) + "_um",
-        "largest displacement into the gel, " + shortest(depths_um[k]) + " um below its surface",
-        [k](const Indentation& i) { return i.reading.depth_um[k]; });
+    const std::string depth = shortest(depths_um[k]);
+    table.columns.push_back(
+        {"depth_" + depth + "_um", "largest displacement into the gel, " + depth + " um below its surface",
+         [k](const Row& row) { return solved(row) ? std::optional(row.reading.depth_um[k]) : std::nullopt; }, kResult});
   }
-  add("largest_u_um", "largest displacement anywhere", [](const Indentation& i) { return i.reading.largest_u_um; });
-  add("error_um", "largest change of the depths and displacements of the row on a coarser mesh",
-      [](const Indentation& i) { return i.error_um; });
-  table.columns.push_back({"contact_radius_um",
-                           "radius of the contact, or of the circle of its area",
-                           &Indentation::contact_radius_um,
-                           {.digits = kForPeople}});
   table.columns.push_back(
-      {"contact_area_um2", "area of the contact", &Indentation::contact_area_um2, {.digits = kForPeople}});
-  add("lift_um", "largest displacement of the gel's surface out of it, near the rim of the contact",
-      [](const Indentation& i) { return i.reading.lift_um; });
-  add("largest_u_gel_um", "largest displacement in the gel",
-      [](const Indentation& i) { return i.reading.largest_u_gel_um; });
-  add("top_down_um", "displacement of the cell's top towards the gel",
-      [](const Indentation& i) { return i.reading.top_down_um; });
-  table.columns.push_back({"not_solved", "why the case has no equilibrium; empty: it has one",
-                           [](const Indentation& i) { return i.failure.value_or(""); }});
+      {{"largest_u_um", "largest displacement anywhere", reading(&Reading::largest_u_um), kResult},
+       {"error_um", "largest change of the depths and displacements of the row on a coarser mesh",
+        member(solved, &Row::error_um), kResult},
+       {"contact_radius_um", "radius of the contact, or of the circle of its area", &Row::contact_radius_um, kResult},
+       {"contact_area_um2", "area of the contact", &Row::contact_area_um2, kResult},
+       {"lift_um", "largest displacement of the gel's surface out of it, near the rim of the contact",
+        reading(&Reading::lift_um), kResult},
+       {"largest_u_gel_um", "largest displacement in the gel", reading(&Reading::largest_u_gel_um), kResult},
+       {"top_down_um", "displacement of the cell's top towards the gel", reading(&Reading::top_down_um), kResult},
+       {"not_solved", "why the case has no equilibrium; empty: it has one",
+        [](const Row& row) { return row.failure.value_or(""); }}});
   return table;
 }
 
-const files::Table<Optimum>& table_of_optima() {
-  static const files::Table<Optimum> table{
-      .file = "optima.csv",
-      .row = "the best height on each gel, for each depth of reading",
-      .columns = {
-          {"modulus_ratio", "Young's modulus of the gel over the cell's", &Optimum::modulus_ratio},
-          {"read_at_um", "depth of reading below the surface", &Optimum::read_at_um},
-          {"height_um", "height of the cell that presses deepest", &Optimum::height_um, {.digits = kForPeople}},
-          {"height_error_um",
-           "by which the meshes and the search may be off",
-           &Optimum::height_error_um,
-           {.digits = kForPeople}},
-          {"depth_um", "displacement into the gel there", &Optimum::depth_um, {.digits = kForPeople}},
-          {"contact_area_um2", "area of the contact there", &Optimum::contact_area_um2, {.digits = kForPeople}}}};
-  return table;
+files::Table<Optimum> table_of_optima() {
+  return {.file = "optima.csv",
+          .row = "the best height on each gel, for each depth of reading",
+          .columns = {
+              {"modulus_ratio", "Young's modulus of the gel over the cell's", &Optimum::modulus_ratio},
+              {"read_at_um", "depth of reading below the surface", &Optimum::read_at_um},
+              {"height_um", "height of the cell that presses deepest", &Optimum::height_um, kResult},
+              {"height_error_um", "by which the meshes and the search may be off", &Optimum::height_error_um, kResult},
+              {"depth_um", "displacement into the gel there", &Optimum::depth_um, kResult},
+              {"contact_area_um2", "area of the contact there", &Optimum::contact_area_um2, kResult}}};
 }
 
 }  // namespace

@@ -8,11 +8,11 @@
 
 namespace mbtfm::plan {
 
+using files::kResult;
+using files::member;
 using files::Table;
 
 namespace {
-
-constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
 
 const SpaceExpected& expected_of(const SpaceGrid& grid, const SpacePoint& p, SpaceQuantity quantity) {
   return *std::ranges::find_if(grid.expected, [&](const SpaceExpected& e) {
@@ -105,17 +105,16 @@ std::vector<std::string> further_sentences(const SpacePlan& plan) {
   return sentences;
 }
 
-const Table<SpaceExpected>& space_expected_table() {
+Table<SpaceExpected> space_expected_table() {
   using Row = SpaceExpected;
-  const auto point = [](auto member) { return [member](const Row& row) { return row.point.*member; }; };
-  static const Table<Row> table{
+  return {
       .file = "plan/plan.csv of a cell in space",
       .row = "each gel, density, noise and quantity",
       .columns = {
-          {"youngs_modulus_kPa", "of the gel", point(&SpacePoint::youngs_modulus_kPa), kResult},
-          {"beads_per_um3", "beads by volume", point(&SpacePoint::beads_per_um3), kResult},
-          {"noise_um", "standard deviation of a displacement component along x or y", point(&SpacePoint::noise_um),
-           kResult},
+          {"youngs_modulus_kPa", "of the gel", member(&Row::point, &SpacePoint::youngs_modulus_kPa), kResult},
+          {"beads_per_um3", "beads by volume", member(&Row::point, &SpacePoint::beads_per_um3), kResult},
+          {"noise_um", "standard deviation of a displacement component along x or y",
+           member(&Row::point, &SpacePoint::noise_um), kResult},
           {"quantity", "what is estimated; total force: the sum of the magnitudes of the patches' forces",
            &Row::quantity},
           {"n", "how many of them the cell has; of several, the numbers are medians", &Row::n},
@@ -137,12 +136,11 @@ const Table<SpaceExpected>& space_expected_table() {
           {"numbers_told", "how many numbers of the tractions the beads tell", &Row::degrees, kResult},
           {"largest_displacement_um", "of all beads", &Row::largest_displacement_um, kResult},
           {"beyond_linear", "share of the displacement that linear elasticity leaves out", &Row::left_out, kResult}}};
-  return table;
 }
 
-const Table<SpaceNeeded>& space_needed_table() {
+Table<SpaceNeeded> space_needed_table() {
   using Row = SpaceNeeded;
-  static const Table<Row> table{
+  return {
       .file = "plan/plan_needed.csv of a cell in space",
       .row = "each gel and noise",
       .columns = {
@@ -153,24 +151,21 @@ const Table<SpaceNeeded>& space_needed_table() {
            "four times the densest asked for",
            &Row::beads_per_um3, kResult},
           {"beads_per_um3_for_nine_in_ten", "the same for nine patches in ten", &Row::of_most, kResult}}};
-  return table;
 }
 
-const Table<SpaceDrawnForce>& space_drawn_table() {
+Table<SpaceDrawnForce> space_drawn_table() {
   using Row = SpaceDrawnForce;
-  static const Table<Row> table{
-      .file = "plan/plan_drawn.csv of a cell in space",
-      .row = "each component of each patch's force in each drawn experiment",
-      .columns = {
-          {"experiment", "counts from 1", &Row::experiment},
-          {"adhesion_id", "label of the patch", &Row::adhesion_id},
-          {"component",
-           "`along the surface`: as the true force goes there; `normal`: out of the gel; `across`: square to both",
-           &Row::component},
-          {"true_nN", "its true value", &Row::true_nN, kResult},
-          {"found_nN", "as reconstructed", &Row::found_nN, kResult},
-          {"predicted_error_nN", "standard error by the plan", &Row::predicted_error_nN, kResult}}};
-  return table;
+  return {.file = "plan/plan_drawn.csv of a cell in space",
+          .row = "each component of each patch's force in each drawn experiment",
+          .columns = {
+              {"experiment", "counts from 1", &Row::experiment},
+              {"adhesion_id", "label of the patch", &Row::adhesion_id},
+              {"component",
+               "`along the surface`: as the true force goes there; `normal`: out of the gel; `across`: square to both",
+               &Row::component},
+              {"true_nN", "its true value", &Row::true_nN, kResult},
+              {"found_nN", "as reconstructed", &Row::found_nN, kResult},
+              {"predicted_error_nN", "standard error by the plan", &Row::predicted_error_nN, kResult}}};
 }
 
 }  // namespace mbtfm::plan

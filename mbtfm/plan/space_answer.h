@@ -25,8 +25,8 @@ SpacePoint answered_point(const Asked& asked, const SpaceGrid& grid, double own_
 std::string answer_sentence(const SpacePlan& plan);
 std::vector<std::string> further_sentences(const SpacePlan& plan);
 
-const files::Table<SpaceExpected>& space_expected_table();
-const files::Table<SpaceNeeded>& space_needed_table();
-const files::Table<SpaceDrawnForce>& space_drawn_table();
+files::Table<SpaceExpected> space_expected_table();
+files::Table<SpaceNeeded> space_needed_table();
+files::Table<SpaceDrawnForce> space_drawn_table();
 
 }  // namespace mbtfm::plan

@@ -6,24 +6,20 @@
 
 namespace mbtfm::plan {
 
+using files::kResult;
+using files::member;
 using files::Table;
 
-namespace {
-
-constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
-
-}  // namespace
-
-const Table<Expected>& expected_table() {
+Table<Expected> expected_table() {
   using Row = Expected;
-  const auto point = [](auto member) { return [member](const Row& row) { return row.point.*member; }; };
-  static const Table<Row> table{
+  return {
       .file = "plan/plan.csv",
       .row = "each gel, density, noise and quantity",
       .columns = {
-          {"youngs_modulus_kPa", "of the gel", point(&Point::youngs_modulus_kPa), kResult},
-          {"beads_per_um2", "beads by area", point(&Point::beads_per_um2), kResult},
-          {"noise_um", "standard deviation of a displacement component", point(&Point::noise_um), kResult},
+          {"youngs_modulus_kPa", "of the gel", member(&Row::point, &Point::youngs_modulus_kPa), kResult},
+          {"beads_per_um2", "beads by area", member(&Row::point, &Point::beads_per_um2), kResult},
+          {"noise_um", "standard deviation of a displacement component", member(&Row::point, &Point::noise_um),
+           kResult},
           {"quantity", "what is estimated; `adhesion force alone`: by the method adhesion-forces, without a network",
            &Row::quantity},
           {"n", "how many of them the cell has; of several, the numbers are medians", &Row::n},
@@ -41,12 +37,11 @@ const Table<Expected>& expected_table() {
            &Row::least_distance_um, kResult},
           {"largest_displacement_um", "of all beads", &Row::largest_displacement_um, kResult},
           {"beyond_linear", "share of the displacement that linear elasticity leaves out", &Row::left_out, kResult}}};
-  return table;
 }
 
-const Table<Needed>& needed_table() {
+Table<Needed> needed_table() {
   using Row = Needed;
-  static const Table<Row> table{
+  return {
       .file = "plan/plan_needed.csv",
       .row = "each gel and noise",
       .columns = {
@@ -61,49 +56,44 @@ const Table<Needed>& needed_table() {
              return std::isfinite(row.of_most) ? std::optional(row.of_most) : std::nullopt;
            },
            kResult}}};
-  return table;
 }
 
-const Table<DrawnTension>& drawn_table() {
+Table<DrawnTension> drawn_table() {
   using Row = DrawnTension;
-  static const Table<Row> table{
-      .file = "plan/plan_drawn.csv",
-      .row = "each fibre in each drawn experiment",
-      .columns = {{"experiment", "counts from 1", &Row::experiment},
-                  {"fibre_id", "label of the fibre", &Row::fibre_id},
-                  {"true_nN", "its tension", &Row::true_nN, kResult},
-                  {"found_nN", "as fitted", &Row::found_nN, kResult},
-                  {"predicted_error_nN", "standard error by the plan", &Row::predicted_error_nN, kResult},
-                  {"stated_error_nN", "standard error by the fit itself", &Row::stated_error_nN, kResult}}};
-  return table;
+  return {.file = "plan/plan_drawn.csv",
+          .row = "each fibre in each drawn experiment",
+          .columns = {{"experiment", "counts from 1", &Row::experiment},
+                      {"fibre_id", "label of the fibre", &Row::fibre_id},
+                      {"true_nN", "its tension", &Row::true_nN, kResult},
+                      {"found_nN", "as fitted", &Row::found_nN, kResult},
+                      {"predicted_error_nN", "standard error by the plan", &Row::predicted_error_nN, kResult},
+                      {"stated_error_nN", "standard error by the fit itself", &Row::stated_error_nN, kResult}}};
 }
 
-const Table<CellNumbers>& cell_table() {
+Table<CellNumbers> cell_table() {
   using Row = CellNumbers;
-  const auto scatter = [](auto member) { return [member](const Row& row) { return row.scatter.*member; }; };
-  std::vector<files::Column<Row>> powers;
+  files::Columns<Row> powers;
   for (std::size_t k = 0; k < std::size(kCells); ++k)
-    powers.emplace_back(
-        "power_of_" + std::to_string(kCells[k]) + "_cells",
-        "chance to see the difference with so many cells of each condition",
-        [k](const Row& row) { return row.power.at(k); }, kResult);
-  static const Table<Row> table{
+    powers.push_back({"power_of_" + std::to_string(kCells[k]) + "_cells",
+                      "chance to see the difference with so many cells of each condition",
+                      [k](const Row& row) { return row.power.at(k); }, kResult});
+  return {
       .file = "plan/plan_cells.csv",
       .row = "each type, difference and number of fibres",
-      .columns = files::joined<Row>(
-          {{{"type", "of the fibres", scatter(&Scatter::type)},
-            {"mean_nN", "tension", scatter(&Scatter::mean_nN), kResult},
-            {"between_cells_nN", "standard deviation of a cell's own mean", scatter(&Scatter::between_cells_nN),
-             kResult},
-            {"within_nN", "standard deviation of a cell's fibres about it", scatter(&Scatter::within_nN), kResult},
-            {"error_nN", "standard error of a fibre's tension, root mean square", scatter(&Scatter::error_nN), kResult},
-            {"source", "of the scatter", scatter(&Scatter::source)},
-            {"difference", "between two conditions, over the mean", &Row::difference, kResult},
-            {"fibres_per_cell", "of this type", &Row::fibres_per_cell, kResult},
-            {"cells", "of each condition that see it with the chance asked for; empty: more than ten thousand",
-             &Row::cells}},
-           powers})};
-  return table;
+      .columns = {{"type", "of the fibres", member(&Row::scatter, &Scatter::type)},
+                  {"mean_nN", "tension", member(&Row::scatter, &Scatter::mean_nN), kResult},
+                  {"between_cells_nN", "standard deviation of a cell's own mean",
+                   member(&Row::scatter, &Scatter::between_cells_nN), kResult},
+                  {"within_nN", "standard deviation of a cell's fibres about it",
+                   member(&Row::scatter, &Scatter::within_nN), kResult},
+                  {"error_nN", "standard error of a fibre's tension, root mean square",
+                   member(&Row::scatter, &Scatter::error_nN), kResult},
+                  {"source", "of the scatter", member(&Row::scatter, &Scatter::source)},
+                  {"difference", "between two conditions, over the mean", &Row::difference, kResult},
+                  {"fibres_per_cell", "of this type", &Row::fibres_per_cell, kResult},
+                  {"cells", "of each condition that see it with the chance asked for; empty: more than ten thousand",
+                   &Row::cells},
+                  powers}};
 }
 
 std::string pages_of_tables() {

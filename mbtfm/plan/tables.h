@@ -9,10 +9,10 @@
 
 namespace mbtfm::plan {
 
-const files::Table<Expected>& expected_table();
-const files::Table<Needed>& needed_table();
-const files::Table<DrawnTension>& drawn_table();
-const files::Table<CellNumbers>& cell_table();
+files::Table<Expected> expected_table();
+files::Table<Needed> needed_table();
+files::Table<DrawnTension> drawn_table();
+files::Table<CellNumbers> cell_table();
 
 /// Their part of docs/columns.md.
 std::string pages_of_tables();

@@ -6,35 +6,32 @@
 namespace mbtfm::sheets {
 namespace {
 
-using files::kForPeople;
+using files::kResult;
 
-const files::Table<SheetModel>& model_table() {
+files::Table<SheetModel> model_table() {
   using Row = SheetModel;
-  static const files::Table<Row> table{
-      .file = "sheet_models.csv",
-      .row = "each model of what moves the beads under a sheet",
-      .columns = {
-          {"model", "nothing, the sheet, the sheet with more or in parts, or each adhesion for itself", &Row::name},
-          {"n_parameters", "that were fitted", &Row::n_parameters},
-          {"chi_squared", "of the misfit, in units of the noise", &Row::chi_squared, {.digits = kForPeople}},
-          {"relative_l2", "of the misfit", &Row::relative_l2, {.digits = kForPeople}},
-          {"aic", "Akaike's criterion", &Row::aic, {.digits = kForPeople}},
-          {"bic", "the Bayesian criterion", &Row::bic, {.digits = kForPeople}}}};
-  return table;
+  return {.file = "sheet_models.csv",
+          .row = "each model of what moves the beads under a sheet",
+          .columns = {
+              {"model", "nothing, the sheet, the sheet with more or in parts, or each adhesion for itself", &Row::name},
+              {"n_parameters", "that were fitted", &Row::n_parameters},
+              {"chi_squared", "of the misfit, in units of the noise", &Row::chi_squared, kResult},
+              {"relative_l2", "of the misfit", &Row::relative_l2, kResult},
+              {"aic", "Akaike's criterion", &Row::aic, kResult},
+              {"bic", "the Bayesian criterion", &Row::bic, kResult}}};
 }
 
-const files::Table<ContractionAt>& contraction_table() {
+files::Table<ContractionAt> contraction_table() {
   using Row = ContractionAt;
-  static const files::Table<Row> table{
+  return {
       .file = "contraction.csv",
       .row = "each node of a sheet whose contraction varies (`mbtfm-sheet --displacement` with `fit_parts = field`)",
-      .columns = {{"x_um", "place of the node", [](const Row& row) { return row.position_um.x; }},
-                  {"y_um", "place of the node", [](const Row& row) { return row.position_um.y; }},
-                  {"contraction_nN_per_um", "contraction there", &Row::nN_per_um, {.digits = kForPeople}},
-                  {"sigma_nN_per_um", "its standard error", &Row::sigma_nN_per_um, {.digits = kForPeople}},
-                  {"low_nN_per_um", "lower end of its 95 % interval", &Row::low_nN_per_um, {.digits = kForPeople}},
-                  {"high_nN_per_um", "upper end of its 95 % interval", &Row::high_nN_per_um, {.digits = kForPeople}}}};
-  return table;
+      .columns = {{"x_um", "place of the node", files::x_of(&Row::position_um)},
+                  {"y_um", "place of the node", files::y_of(&Row::position_um)},
+                  {"contraction_nN_per_um", "contraction there", &Row::nN_per_um, kResult},
+                  {"sigma_nN_per_um", "its standard error", &Row::sigma_nN_per_um, kResult},
+                  {"low_nN_per_um", "lower end of its 95 % interval", &Row::low_nN_per_um, kResult},
+                  {"high_nN_per_um", "upper end of its 95 % interval", &Row::high_nN_per_um, kResult}}};
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 namespace mbtfm::spatial {
 namespace {
 
-constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
+using files::kResult;
 
 struct Row {
   Vec3 position_um, traction_kPa;
@@ -22,8 +22,8 @@ struct Row {
   Vec3 displacement_um;
 };
 
-const files::Table<Row>& traction_table() {
-  static const files::Table<Row> table{
+files::Table<Row> traction_table() {
+  return {
       .file = "traction_3d.csv",
       .row =
           "each vertex of the smallest faces of the tractions of `mbtfm-traction` in space, which are bilinear between "
@@ -49,7 +49,6 @@ const files::Table<Row>& traction_table() {
           {"ux_um", "the model's displacement there", files::x_of(&Row::displacement_um), kResult},
           {"uy_um", "the model's displacement there", files::y_of(&Row::displacement_um), kResult},
           {"uz_um", "the model's displacement there, into the gel", files::z_of(&Row::displacement_um), kResult}}};
-  return table;
 }
 
 /// As an even lattice of the smallest faces, which every reader understands.
@@ -102,25 +101,23 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
   return all;
 }
 
-const files::Table<PartForce>& force_table() {
-  static const files::Table<PartForce> table{
-      .file = "traction_3d_adhesion_forces.csv",
-      .row = "each adhesion of `mbtfm-traction` in space",
-      .columns = {{"adhesion_id", "label of the adhesion", &PartForce::adhesion_id},
-                  {"x_um", "middle of its part of the surface", files::x_of(&PartForce::position_um)},
-                  {"y_um", "middle of its part of the surface", files::y_of(&PartForce::position_um)},
-                  {"z_um", "middle of its part of the surface", files::z_of(&PartForce::position_um)},
-                  {"area_um2", "of the curved surface", &PartForce::area_um2, kResult},
-                  {"fx_nN", "force of the cell on the gel", files::x_of(&PartForce::force_nN)},
-                  {"fy_nN", "the same along y", files::y_of(&PartForce::force_nN)},
-                  {"fz_nN", "the same into the gel", files::z_of(&PartForce::force_nN)},
-                  {"sigma_fx_nN", "standard error: the beads' noise, and what they do not resolve",
-                   files::x_of(&PartForce::sigma_nN), kResult},
-                  {"sigma_fy_nN", "the same along y", files::y_of(&PartForce::sigma_nN), kResult},
-                  {"sigma_fz_nN", "the same into the gel", files::z_of(&PartForce::sigma_nN), kResult},
-                  {"force_nN", "its size", [](const PartForce& f) { return norm(f.force_nN); }, kResult},
-                  {"sigma_nN", "standard error along the force", &PartForce::magnitude_sigma_nN, kResult}}};
-  return table;
+files::Table<PartForce> force_table() {
+  return {.file = "traction_3d_adhesion_forces.csv",
+          .row = "each adhesion of `mbtfm-traction` in space",
+          .columns = {{"adhesion_id", "label of the adhesion", &PartForce::adhesion_id},
+                      {"x_um", "middle of its part of the surface", files::x_of(&PartForce::position_um)},
+                      {"y_um", "middle of its part of the surface", files::y_of(&PartForce::position_um)},
+                      {"z_um", "middle of its part of the surface", files::z_of(&PartForce::position_um)},
+                      {"area_um2", "of the curved surface", &PartForce::area_um2, kResult},
+                      {"fx_nN", "force of the cell on the gel", files::x_of(&PartForce::force_nN)},
+                      {"fy_nN", "the same along y", files::y_of(&PartForce::force_nN)},
+                      {"fz_nN", "the same into the gel", files::z_of(&PartForce::force_nN)},
+                      {"sigma_fx_nN", "standard error: the beads' noise, and what they do not resolve",
+                       files::x_of(&PartForce::sigma_nN), kResult},
+                      {"sigma_fy_nN", "the same along y", files::y_of(&PartForce::sigma_nN), kResult},
+                      {"sigma_fz_nN", "the same into the gel", files::z_of(&PartForce::sigma_nN), kResult},
+                      {"force_nN", "its size", [](const PartForce& f) { return norm(f.force_nN); }, kResult},
+                      {"sigma_nN", "standard error along the force", &PartForce::magnitude_sigma_nN, kResult}}};
 }
 
 }  // namespace

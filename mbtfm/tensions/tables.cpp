@@ -4,81 +4,68 @@
 
 namespace mbtfm::tensions {
 
+using files::kId;
+using files::kResult;
+using files::member;
 using files::Table;
 
 namespace {
 
-constexpr files::ColumnOptions kId = {.range = {.low = 1}};
-constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
-
 /// A number of a frame that has a fit; the field is empty where it has none.
-template <class Access>
-files::Column<FitOfFrame> of_fit(const std::string& name, const std::string& meaning, Access access,
-                                 files::ColumnOptions options = kResult) {
-  using T = std::remove_cvref_t<std::invoke_result_t<Access, FrameFit&>>;
-  const auto get = [access](const FitOfFrame& row) -> std::optional<T> {
-    return row.fit.refused.empty() ? std::optional<T>(std::invoke(access, row.fit)) : std::nullopt;
+template <class... Of>
+files::Columns<FitOfFrame> of_fit(const char* name, const char* meaning, const files::ColumnOptions& options,
+                                  Of... of) {
+  const auto number = member(&FitOfFrame::fit, of...);
+  using T = typename decltype(member(&FitOfFrame::fit, of...))::Type;
+  const auto get = [number](const FitOfFrame& row) {
+    return row.fit.refused.empty() ? std::optional(*static_cast<const T*>(number.way.from(&row))) : std::nullopt;
   };
-  const auto put = [access](FitOfFrame& row, const std::optional<T>& value) {
-    if constexpr (std::is_lvalue_reference_v<std::invoke_result_t<Access, FrameFit&>>)
-      if (value) std::invoke(access, row.fit) = *value;
+  const auto put = [number](FitOfFrame& row, const std::optional<T>& value) {
+    if (value) *static_cast<T*>(number.way.from(&row)) = *value;
   };
   return {name, meaning, get, put, options};
 }
 
 }  // namespace
 
-const Table<TrackRow>& track_table() {
-  static const Table<TrackRow> table{
-      .file = "4_fit/tracks.csv",
-      .row = "the actin network and each fibre in each frame of a time series",
-      .columns = files::joined<TrackRow>({{{"frame", "counts from 1", &TrackRow::frame, kId},
-                                           {"time_s",
-                                            "since the first frame; empty: `frame_interval_s` is not set",
-                                            &TrackRow::time_s,
-                                            {.digits = files::kForPeople, .may_lack = true}}},
-                                          files::columns_of<TrackRow>(files::tension_table(), &TrackRow::fibre)})};
-  return table;
+Table<TrackRow> track_table() {
+  return {.file = "4_fit/tracks.csv",
+          .row = "the actin network and each fibre in each frame of a time series",
+          .columns = {{"frame", "counts from 1", &TrackRow::frame, kId},
+                      {"time_s", "since the first frame; empty: `frame_interval_s` is not set", &TrackRow::time_s,
+                       files::kResultMayLack},
+                      files::columns_of(&TrackRow::fibre, files::tension_table().columns)}};
 }
 
-const Table<FitOfFrame>& frame_fit_table() {
+Table<FitOfFrame> frame_fit_table() {
   using Row = FitOfFrame;
-  const auto fit = [](auto member) {
-    return [member](auto& row) -> auto& { return row.fit.*member; };
-  };
-  const auto value = [](auto member) {
-    return [member](auto& f) -> auto& { return (f.*member).value; };
-  };
-  const auto sigma = [](auto member) {
-    return [member](auto& f) -> auto& { return (f.*member).standard_error; };
-  };
   constexpr files::ColumnOptions kWhole = {};  // their difference is what the next run writes again
-  static const Table<Row> table{
+  return {
       .file = "4_fit/frames.csv",
       .row = "each frame of a time series",
-      .columns = {
-          {"frame", "counts from 1", fit(&FrameFit::frame), kId},
-          {"time_s",
-           "since the first frame; empty: `frame_interval_s` is not set",
-           &Row::time_s,
-           {.digits = files::kForPeople, .may_lack = true}},
-          of_fit("total_force_nN", "sum of the adhesions' force magnitudes", value(&FrameFit::total_force_nN), kWhole),
-          of_fit("total_force_sigma_nN", "its standard error", sigma(&FrameFit::total_force_nN)),
-          of_fit("network_force_nN", "the same of the network alone", value(&FrameFit::network_force_nN), kWhole),
-          of_fit("network_force_sigma_nN", "its standard error", sigma(&FrameFit::network_force_nN)),
-          {"fibre_force_nN", "what the fibres add",
-           [](const Row& row) -> std::optional<double> {
-             if (!row.fit.refused.empty()) return std::nullopt;
-             return row.fit.total_force_nN.value - row.fit.network_force_nN.value;
-           },
-           kResult},
-          of_fit("relative_l2", "‖measured − model‖ / ‖measured‖", &FrameFit::relative_l2),
-          of_fit("chi_squared_per_degree", "1 if the model explains all but the noise",
-                 &FrameFit::chi_squared_per_degree),
-          of_fit("converged", "the fit came to its end", &FrameFit::converged),
-          {"refused", "why the frame has no fit; empty: it has", fit(&FrameFit::refused)},
-          {"displacement_sha256", "of the frame's file", fit(&FrameFit::displacement_sha256)}}};
-  return table;
+      .columns = {{"frame", "counts from 1", member(&Row::fit, &FrameFit::frame), kId},
+                  {"time_s", "since the first frame; empty: `frame_interval_s` is not set", &Row::time_s,
+                   files::kResultMayLack},
+                  of_fit("total_force_nN", "sum of the adhesions' force magnitudes", kWhole, &FrameFit::total_force_nN,
+                         &Estimate::value),
+                  of_fit("total_force_sigma_nN", "its standard error", kResult, &FrameFit::total_force_nN,
+                         &Estimate::standard_error),
+                  of_fit("network_force_nN", "the same of the network alone", kWhole, &FrameFit::network_force_nN,
+                         &Estimate::value),
+                  of_fit("network_force_sigma_nN", "its standard error", kResult, &FrameFit::network_force_nN,
+                         &Estimate::standard_error),
+                  {"fibre_force_nN", "what the fibres add",
+                   [](const Row& row) -> std::optional<double> {
+                     if (!row.fit.refused.empty()) return std::nullopt;
+                     return row.fit.total_force_nN.value - row.fit.network_force_nN.value;
+                   },
+                   kResult},
+                  of_fit("relative_l2", "‖measured − model‖ / ‖measured‖", kResult, &FrameFit::relative_l2),
+                  of_fit("chi_squared_per_degree", "1 if the model explains all but the noise", kResult,
+                         &FrameFit::chi_squared_per_degree),
+                  of_fit("converged", "the fit came to its end", kResult, &FrameFit::converged),
+                  {"refused", "why the frame has no fit; empty: it has", member(&Row::fit, &FrameFit::refused)},
+                  {"displacement_sha256", "of the frame's file", member(&Row::fit, &FrameFit::displacement_sha256)}}};
 }
 
 std::vector<CorrelationRow> correlation_rows(const EnsembleFit& fit) {
@@ -93,42 +80,37 @@ std::vector<CorrelationRow> correlation_rows(const EnsembleFit& fit) {
   return rows;
 }
 
-const Table<CorrelationRow>& correlation_table() {
+Table<CorrelationRow> correlation_table() {
   using Row = CorrelationRow;
-  static const Table<Row> table{.file = "4_fit/correlations.csv",
-                                .row = "each pair of tensions",
-                                .columns = {{"fibre_id", "one of them; 0: the actin network", &Row::fibre_id},
-                                            {"other_fibre_id", "the other", &Row::other_fibre_id},
-                                            {"correlation", "of their errors from noise", &Row::correlation, kResult}}};
-  return table;
+  return {.file = "4_fit/correlations.csv",
+          .row = "each pair of tensions",
+          .columns = {{"fibre_id", "one of them; 0: the actin network", &Row::fibre_id},
+                      {"other_fibre_id", "the other", &Row::other_fibre_id},
+                      {"correlation", "of their errors from noise", &Row::correlation, kResult}}};
 }
 
-const Table<ModelScore>& model_table() {
+Table<ModelScore> model_table() {
   using Row = ModelScore;
-  static const Table<Row> table{
-      .file = "4_fit/models.csv",
-      .row = "each model that is compared",
-      .columns = {{"model", "its name: no-fibres, full, adhesion-forces, sheet", &Row::name},
-                  {"n_parameters", "numbers that are fitted", &Row::n_parameters},
-                  {"chi_squared", "misfit in units of the noise", &Row::chi_squared, kResult},
-                  {"relative_l2", "‖measured − model‖ / ‖measured‖", &Row::relative_l2, kResult},
-                  {"aic", "Akaike's criterion", &Row::aic, kResult},
-                  {"bic", "the Bayesian criterion", &Row::bic, kResult}}};
-  return table;
+  return {.file = "4_fit/models.csv",
+          .row = "each model that is compared",
+          .columns = {{"model", "its name: no-fibres, full, adhesion-forces, sheet", &Row::name},
+                      {"n_parameters", "numbers that are fitted", &Row::n_parameters},
+                      {"chi_squared", "misfit in units of the noise", &Row::chi_squared, kResult},
+                      {"relative_l2", "‖measured − model‖ / ‖measured‖", &Row::relative_l2, kResult},
+                      {"aic", "Akaike's criterion", &Row::aic, kResult},
+                      {"bic", "the Bayesian criterion", &Row::bic, kResult}}};
 }
 
-const Table<FibreLeftOut>& fibre_left_out_table() {
+Table<FibreLeftOut> fibre_left_out_table() {
   using Row = FibreLeftOut;
-  static const Table<Row> table{
-      .file = "4_fit/fibres_left_out.csv",
-      .row = "each fibre",
-      .columns = {{"fibre_id", "the fibre that is left out", &Row::fibre_id},
-                  {"chi_squared_rise", "by how much the misfit rises without it", &Row::chi_squared_rise, kResult},
-                  {"aic_rise", "the same of Akaike's criterion", &Row::aic_rise, kResult},
-                  {"supported", "the beads call for the fibre", [](const Row& f) { return f.aic_rise > 0; }},
-                  {"n_informing_beads", "number of beads, effectively, that determine this tension",
-                   &Row::n_informing_beads, kResult}}};
-  return table;
+  return {.file = "4_fit/fibres_left_out.csv",
+          .row = "each fibre",
+          .columns = {{"fibre_id", "the fibre that is left out", &Row::fibre_id},
+                      {"chi_squared_rise", "by how much the misfit rises without it", &Row::chi_squared_rise, kResult},
+                      {"aic_rise", "the same of Akaike's criterion", &Row::aic_rise, kResult},
+                      {"supported", "the beads call for the fibre", [](const Row& f) { return f.aic_rise > 0; }},
+                      {"n_informing_beads", "number of beads, effectively, that determine this tension",
+                       &Row::n_informing_beads, kResult}}};
 }
 
 std::vector<DrawRow> draw_rows(const CrossValidation& result) {
@@ -138,14 +120,12 @@ std::vector<DrawRow> draw_rows(const CrossValidation& result) {
   return rows;
 }
 
-const Table<DrawRow>& draw_table() {
-  static const Table<DrawRow> table{
-      .file = "4_fit/cross_validation.csv",
-      .row = "each draw of tensions (if draws are asked for)",
-      .columns = {{"draw", "counts from 1", &DrawRow::draw},
-                  {"own", "relative L2 of tensions drawn by fibre type", &DrawRow::own, kResult},
-                  {"exchanged", "the same with dorsal and ventral exchanged", &DrawRow::exchanged, kResult}}};
-  return table;
+Table<DrawRow> draw_table() {
+  return {.file = "4_fit/cross_validation.csv",
+          .row = "each draw of tensions (if draws are asked for)",
+          .columns = {{"draw", "counts from 1", &DrawRow::draw},
+                      {"own", "relative L2 of tensions drawn by fibre type", &DrawRow::own, kResult},
+                      {"exchanged", "the same with dorsal and ventral exchanged", &DrawRow::exchanged, kResult}}};
 }
 
 std::vector<ChangeRow> change_rows(const std::vector<Change>& changes, const EnsembleFit& fit) {
@@ -157,15 +137,13 @@ std::vector<ChangeRow> change_rows(const std::vector<Change>& changes, const Ens
   return rows;
 }
 
-const Table<ChangeRow>& change_table() {
+Table<ChangeRow> change_table() {
   using Row = ChangeRow;
-  static const Table<Row> table{
-      .file = "4_fit/effects_left_out.csv",
-      .row = "each tension and each effect that is off (`--explain`)",
-      .columns = {{"effect", "its name", [](const Row& row) { return std::string(name_of(row.effect)); }},
-                  {"fibre_id", "label of the fibre; 0: the actin network", &Row::fibre_id},
-                  {"change_nN", "with the effect, less without", &Row::change_nN, kResult}}};
-  return table;
+  return {.file = "4_fit/effects_left_out.csv",
+          .row = "each tension and each effect that is off (`--explain`)",
+          .columns = {{"effect", "its name", [](const Row& row) { return std::string(name_of(row.effect)); }},
+                      {"fibre_id", "label of the fibre; 0: the actin network", &Row::fibre_id},
+                      {"change_nN", "with the effect, less without", &Row::change_nN, kResult}}};
 }
 
 std::string pages_of_tables() {

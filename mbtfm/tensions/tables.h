@@ -19,30 +19,30 @@ struct TrackRow {
   std::optional<double> time_s = {};
   files::FibreTension fibre = {};
 };
-const files::Table<TrackRow>& track_table();
+files::Table<TrackRow> track_table();
 
 struct FitOfFrame {
   FrameFit fit;
   std::optional<double> time_s = {};
 };
-const files::Table<FitOfFrame>& frame_fit_table();
+files::Table<FitOfFrame> frame_fit_table();
 
 struct CorrelationRow {
   int fibre_id = 0, other_fibre_id = 0;
   double correlation = 0;
 };
 std::vector<CorrelationRow> correlation_rows(const EnsembleFit& fit);
-const files::Table<CorrelationRow>& correlation_table();
+files::Table<CorrelationRow> correlation_table();
 
-const files::Table<ModelScore>& model_table();
-const files::Table<FibreLeftOut>& fibre_left_out_table();
+files::Table<ModelScore> model_table();
+files::Table<FibreLeftOut> fibre_left_out_table();
 
 struct DrawRow {
   int draw = 0;
   double own = 0, exchanged = 0;
 };
 std::vector<DrawRow> draw_rows(const CrossValidation& result);
-const files::Table<DrawRow>& draw_table();
+files::Table<DrawRow> draw_table();
 
 struct ChangeRow {
   EffectKind effect;
@@ -50,7 +50,7 @@ struct ChangeRow {
   double change_nN = 0;
 };
 std::vector<ChangeRow> change_rows(const std::vector<Change>& changes, const EnsembleFit& fit);
-const files::Table<ChangeRow>& change_table();
+files::Table<ChangeRow> change_table();
 
 /// Their part of docs/columns.md.
 std::string pages_of_tables();

@@ -207,42 +207,40 @@ TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs&
 
 namespace {
 
-constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
+using files::kResult;
 
-const files::Table<Patch>& patch_table() {
-  static const files::Table<Patch> table{
-      .file = "traction.csv",
-      .row = "each point or patch of `mbtfm-traction`",
-      .columns = {{"x_um", "the point", files::x_of(&Patch::position_um)},
-                  {"y_um", "the point", files::y_of(&Patch::position_um)},
-                  {"tx_kPa", "traction of the cell on the gel", files::x_of(&Patch::traction_kPa)},
-                  {"ty_kPa", "traction of the cell on the gel", files::y_of(&Patch::traction_kPa)},
-                  {"area_um2", "of the patch around the point", &Patch::area_um2},
-                  {"ux_um", "the model's displacement there", files::x_of(&Patch::displacement_um), kResult},
-                  {"uy_um", "the model's displacement there", files::y_of(&Patch::displacement_um), kResult}}};
-  return table;
+files::Table<Patch> patch_table() {
+  return {.file = "traction.csv",
+          .row = "each point or patch of `mbtfm-traction`",
+          .columns = {{"x_um", "the point", files::x_of(&Patch::position_um)},
+                      {"y_um", "the point", files::y_of(&Patch::position_um)},
+                      {"tx_kPa", "traction of the cell on the gel", files::x_of(&Patch::traction_kPa)},
+                      {"ty_kPa", "traction of the cell on the gel", files::y_of(&Patch::traction_kPa)},
+                      {"area_um2", "of the patch around the point", &Patch::area_um2},
+                      {"ux_um", "the model's displacement there", files::x_of(&Patch::displacement_um), kResult},
+                      {"uy_um", "the model's displacement there", files::y_of(&Patch::displacement_um), kResult}}};
 }
 
 struct LambdaRow {
   ScanPoint point;
   double length_um = 0, gcv = 0, curvature = 0, evidence = 0, risk = 0;
 };
-const files::Table<LambdaRow>& lambda_table() {
+files::Table<LambdaRow> lambda_table() {
   using Row = LambdaRow;
-  const auto of = [](auto member) { return [member](const Row& row) { return row.point.*member; }; };
-  static const files::Table<Row> table{
+  return {
       .file = "traction_lambda.csv",
       .row = "each penalty λ that was tried (fttc, trpf, bem)",
-      .columns = {{"lambda", "the penalty, in the method's own unit", of(&ScanPoint::lambda), kResult},
-                  {"length_um", "λE, the same for every method", &Row::length_um, kResult},
-                  {"misfit", "what the model leaves of the displacement", of(&ScanPoint::misfit), kResult},
-                  {"norm", "of the tractions", of(&ScanPoint::norm), kResult},
-                  {"degrees", "of freedom that the tractions use", of(&ScanPoint::degrees), kResult},
-                  {"gcv", "generalised cross-validation; small is good", &Row::gcv, kResult},
-                  {"l_curve_curvature", "of the L-curve; large is good", &Row::curvature, kResult},
-                  {"log_evidence", "Bayesian evidence; large is good", &Row::evidence, kResult},
-                  {"risk", "expected error of the tractions; small is good", &Row::risk, kResult}}};
-  return table;
+      .columns = {
+          {"lambda", "the penalty, in the method's own unit", files::member(&Row::point, &ScanPoint::lambda), kResult},
+          {"length_um", "λE, the same for every method", &Row::length_um, kResult},
+          {"misfit", "what the model leaves of the displacement", files::member(&Row::point, &ScanPoint::misfit),
+           kResult},
+          {"norm", "of the tractions", files::member(&Row::point, &ScanPoint::norm), kResult},
+          {"degrees", "of freedom that the tractions use", files::member(&Row::point, &ScanPoint::degrees), kResult},
+          {"gcv", "generalised cross-validation; small is good", &Row::gcv, kResult},
+          {"l_curve_curvature", "of the L-curve; large is good", &Row::curvature, kResult},
+          {"log_evidence", "Bayesian evidence; large is good", &Row::evidence, kResult},
+          {"risk", "expected error of the tractions; small is good", &Row::risk, kResult}}};
 }
 
 }  // namespace

@@ -36,45 +36,45 @@ struct CostRow {
   bool is_on_front = false;
 };
 
-const files::Table<CostRow>& cost_table() {
+/// None where it was not measured.
+const Measurement* measured(const CostRow& row) { return is_measured(row.measured) ? &row.measured : nullptr; }
+const Measurement* measured_in_plane(const CostRow& row) {
+  return row.kind == CellKind::plane ? measured(row) : nullptr;
+}
+const Measurement* measured_in_space(const CostRow& row) {
+  return row.kind == CellKind::space ? measured(row) : nullptr;
+}
+
+files::Table<CostRow> cost_table() {
   using Row = CostRow;
-  constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
-  const auto of = [](auto member) {  // empty where it was not measured
-    return [member](const Row& row) {
-      const Measurement& m = row.measured;
-      return is_measured(m) ? std::optional(m.*member) : std::nullopt;
-    };
-  };
-  const auto of_kind = [of](auto member, CellKind kind) {
-    return [get = of(member), kind](const Row& row) { return row.kind == kind ? get(row) : std::nullopt; };
-  };
-  static const files::Table<Row> table{
-      .file = "cost/cost.csv",
-      .row = "each value of each knob that was tried",
-      .columns = {{"knob", "the parameter", [](const Row& row) { return row.measured.rung.knob; }},
-                  {"value", "its value", [](const Row& row) { return row.measured.rung.value; }},
-                  {"seconds", "of all stages if the cell has its images, else of network and fit; in space of traction",
-                   of(&Measurement::seconds), kResult},
-                  {"cpu_seconds", "the same of all threads", of(&Measurement::cpu_seconds), kResult},
-                  {"peak_memory_MB", "the largest of the stages", of(&Measurement::peak_memory_MB), kResult},
-                  {"n_runs", "of which the times are the median", of(&Measurement::n_runs)},
-                  {"tension_error",
-                   "‖t − reference‖/‖reference‖ over the fibres; the reference is the truth if it "
-                   "is known, else the finest choice",
-                   of_kind(&Measurement::error, CellKind::plane), kResult},
-                  {"force_error", "of the total force, relative", of(&Measurement::force_error), kResult},
-                  {"stated_tension_error", "what the error budget says",
-                   of_kind(&Measurement::stated_error, CellKind::plane), kResult},
-                  {"n_fibres", "that the reference knows, too", of_kind(&Measurement::n_fibres, CellKind::plane)},
-                  {"is_on_front", "nothing else is both faster and more exact", &Row::is_on_front},
-                  {"failure", "why there is no figure",
-                   [](const Row& row) { return row.measured.n_runs == 0 ? "no time left" : row.measured.failure; }},
-                  {"traction_error",
-                   "of a cell in space: ‖t − reference‖/‖reference‖ over its surface, with the same reference",
-                   of_kind(&Measurement::error, CellKind::space), kResult},
-                  {"stated_traction_error", "what the standard errors of its tractions say; 0: there are none",
-                   of_kind(&Measurement::stated_error, CellKind::space), kResult}}};
-  return table;
+  using files::kResult;
+  using files::member;
+  return {.file = "cost/cost.csv",
+          .row = "each value of each knob that was tried",
+          .columns = {
+              {"knob", "the parameter", member(&Row::measured, &Measurement::rung, &Rung::knob)},
+              {"value", "its value", member(&Row::measured, &Measurement::rung, &Rung::value)},
+              {"seconds", "of all stages if the cell has its images, else of network and fit; in space of traction",
+               member(measured, &Measurement::seconds), kResult},
+              {"cpu_seconds", "the same of all threads", member(measured, &Measurement::cpu_seconds), kResult},
+              {"peak_memory_MB", "the largest of the stages", member(measured, &Measurement::peak_memory_MB), kResult},
+              {"n_runs", "of which the times are the median", member(measured, &Measurement::n_runs)},
+              {"tension_error",
+               "‖t − reference‖/‖reference‖ over the fibres; the reference is the truth if it "
+               "is known, else the finest choice",
+               member(measured_in_plane, &Measurement::error), kResult},
+              {"force_error", "of the total force, relative", member(measured, &Measurement::force_error), kResult},
+              {"stated_tension_error", "what the error budget says",
+               member(measured_in_plane, &Measurement::stated_error), kResult},
+              {"n_fibres", "that the reference knows, too", member(measured_in_plane, &Measurement::n_fibres)},
+              {"is_on_front", "nothing else is both faster and more exact", &Row::is_on_front},
+              {"failure", "why there is no figure",
+               [](const Row& row) { return row.measured.n_runs == 0 ? "no time left" : row.measured.failure; }},
+              {"traction_error",
+               "of a cell in space: ‖t − reference‖/‖reference‖ over its surface, with the same reference",
+               member(measured_in_space, &Measurement::error), kResult},
+              {"stated_traction_error", "what the standard errors of its tractions say; 0: there are none",
+               member(measured_in_space, &Measurement::stated_error), kResult}}};
 }
 
 void write_csv(const fs::path& file, const Study& study) {

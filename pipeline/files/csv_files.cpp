@@ -180,8 +180,9 @@ void write_outline(const Path& file, const Polygon& outer_um, const std::vector<
     ++ring;
     for (const Vec2 p : hole) points.push_back({.position_um = p, .ring = ring});
   }
-  const bool tells_cuts = std::ranges::find(is_cut, true) != is_cut.end();
-  write(file, tells_cuts ? outline_table() : outline_table().without({"is_cut"}), points);
+  Table<OutlinePoint> table = outline_table();
+  if (std::ranges::find(is_cut, true) == is_cut.end()) table.columns = table.columns.without({"is_cut"});
+  write(file, table, points);
 }
 
 Cell read_cell(const Path& folder) {
@@ -256,18 +257,12 @@ std::vector<AdhesionForce> read_adhesion_forces(const Path& file) {
 
 void write_adhesion_forces(const Path& file, const std::vector<AdhesionForce>& forces,
                            const std::vector<Adhesion>& adhesions, const std::vector<PointArray>& more) {
-  std::map<int, const Adhesion*> adhesion_of;
-  for (const Adhesion& a : adhesions) adhesion_of[a.adhesion_id] = &a;
   Table<ForceOnAdhesion> table = adhesion_force_table();
+  std::vector<ForceOnAdhesion> rows = forces_on(adhesions, forces);
   for (std::size_t k = 0; k < more.size(); ++k) {
     MBTFM_ASSERT(more[k].scalars.size() == forces.size());
-    table.columns.emplace_back(more[k].name, "", [k](const ForceOnAdhesion& row) { return row.more[k]; });
-  }
-  std::vector<ForceOnAdhesion> rows;
-  for (const AdhesionForce& force : forces) {
-    MBTFM_ASSERT(adhesion_of.contains(force.adhesion_id));
-    ForceOnAdhesion& row = rows.emplace_back(ForceOnAdhesion{force, adhesion_of[force.adhesion_id]});
-    for (const PointArray& column : more) row.more.push_back(column.scalars[rows.size() - 1]);
+    table.columns.push_back({more[k].name, "", [k](const ForceOnAdhesion& row) { return row.more[k]; }});
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i].more.push_back(more[k].scalars[i]);
   }
   write(file, table, rows);
 }

@@ -5,16 +5,15 @@
 namespace mbtfm::files {
 namespace {
 
-Column<SheetEstimate> part(const char* name, const char* meaning, std::optional<double> SheetErrorParts::*of) {
-  const auto member = [of](auto& row) -> decltype(auto) { return (row.parts.*of); };
-  return {name, meaning, member, {.digits = kForPeople, .may_lack = true}};
+Columns<SheetEstimate> part(const char* name, const char* meaning, std::optional<double> SheetErrorParts::*of) {
+  return {name, meaning, member(&SheetEstimate::parts, of), kResultMayLack};
 }
 
 }  // namespace
 
-const Table<SheetEstimate>& sheet_estimate_table() {
+Table<SheetEstimate> sheet_estimate_table() {
   using Row = SheetEstimate;
-  static const Table<Row> table{
+  return {
       .file = "sheet_fit.csv",
       .row = "each number of a sheet that the beads were asked for (`mbtfm-sheet --displacement`)",
       .columns = {
@@ -23,13 +22,10 @@ const Table<SheetEstimate>& sheet_estimate_table() {
            "of the sheet, where parts contract each by its own: inside, edge, or a cell of the label image; mean, "
            "of a contraction that varies; or the bundle; else empty",
            &Row::part},
-          {"value", "where the misfit is least", &Row::value, {.digits = kForPeople}},
-          {"sigma",
-           "standard error; empty if the beads do not determine the quantity",
-           &Row::sigma,
-           {.digits = kForPeople}},
-          {"low", "lower end of the 95 % interval; empty: none", &Row::low, {.digits = kForPeople}},
-          {"high", "upper end of the 95 % interval; empty: none", &Row::high, {.digits = kForPeople}},
+          {"value", "where the misfit is least", &Row::value, kResult},
+          {"sigma", "standard error; empty if the beads do not determine the quantity", &Row::sigma, kResult},
+          {"low", "lower end of the 95 % interval; empty: none", &Row::low, kResult},
+          {"high", "upper end of the 95 % interval; empty: none", &Row::high, kResult},
           {"identifiable", "the beads limit it to both sides", &Row::identifiable},
           part("by_beads",
                "part of sigma by noise of the beads' displacements; the squares of all parts add up to that "
@@ -44,7 +40,6 @@ const Table<SheetEstimate>& sheet_estimate_table() {
                "part by the gel's modulus, thickness and Poisson's ratio; empty: no errors of these were given",
                &SheetErrorParts::gel),
           part("by_substrate", "part by what the model leaves out of the gel", &SheetErrorParts::substrate)}};
-  return table;
 }
 
 SheetSummary read_sheet_summary(const Path& folder) {

@@ -7,7 +7,7 @@
 
 namespace mbtfm::files {
 
-const Table<SheetEstimate>& sheet_estimate_table();
+Table<SheetEstimate> sheet_estimate_table();
 
 /// sheet_fit.csv and sheet.json of a fit. @throws InputError where one of them lacks or is malformed
 SheetSummary read_sheet_summary(const Path& folder);

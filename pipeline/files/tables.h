@@ -13,39 +13,25 @@
 
 namespace mbtfm::files {
 
-/// For columns: the components of a member of the row that is a Vec2 or a Vec3.
-template <class Access>
-auto x_of(Access access) {
-  return [access](auto& row) -> auto& { return std::invoke(access, row).x; };
-}
-template <class Access>
-auto y_of(Access access) {
-  return [access](auto& row) -> auto& { return std::invoke(access, row).y; };
-}
-template <class Access>
-auto z_of(Access access) {
-  return [access](auto& row) -> auto& { return std::invoke(access, row).z; };
-}
-
-const Table<Adhesion>& adhesion_table();
-const Table<Fibre>& fibre_table();
+Table<Adhesion> adhesion_table();
+Table<Fibre> fibre_table();
 
 struct FibrePoint {
   int fibre_id = 0, point = 0;
   Vec2 position_um;
 };
-const Table<FibrePoint>& fibre_point_table();
+Table<FibrePoint> fibre_point_table();
 
 struct OutlinePoint {
   Vec2 position_um;
   int ring = 0;
   bool is_cut = false;
 };
-const Table<OutlinePoint>& outline_table();
+Table<OutlinePoint> outline_table();
 
-const Table<Vec2>& point_table();
-const Table<Bead>& displacement_table();
-const Table<BeadInSpace>& displacement_in_space_table();
+Table<Vec2> point_table();
+Table<Bead> displacement_table();
+Table<BeadInSpace> displacement_in_space_table();
 
 struct FibreTension {
   Tension tension;
@@ -53,29 +39,32 @@ struct FibreTension {
 };
 /// With none where `fibres` lacks the fibre.
 std::vector<FibreTension> with_types(const std::vector<Tension>& tensions, const std::vector<Fibre>& fibres);
-const Table<FibreTension>& tension_table();
+Table<FibreTension> tension_table();
 
 struct ForceOnAdhesion {
   AdhesionForce force;
   const Adhesion* adhesion = nullptr;
   std::vector<double> more = {};  ///< of further columns
 };
-const Table<ForceOnAdhesion>& adhesion_force_table();
+inline const Adhesion& adhesion_of(const ForceOnAdhesion& force) { return *force.adhesion; }
+std::vector<ForceOnAdhesion> forces_on(const std::vector<Adhesion>& adhesions,
+                                       const std::vector<AdhesionForce>& forces);
+Table<ForceOnAdhesion> adhesion_force_table();
 
 struct Reaction {
   int vertex = 0;
   Vec2 force_nN;
 };
-const Table<Reaction>& reaction_table();
+Table<Reaction> reaction_table();
 
-const Table<MissingFibre>& missing_fibre_table();
-const Table<MissingAdhesion>& missing_adhesion_table();
+Table<MissingFibre> missing_fibre_table();
+Table<MissingAdhesion> missing_adhesion_table();
 
 /// Where images.jpg lies.
 struct ImagePlace {
   Vec2 low_um, size_um;
 };
-const Table<ImagePlace>& image_place_table();
+Table<ImagePlace> image_place_table();
 
 /// What the tracker says of a frame of a time series.
 struct FrameRow {
@@ -85,7 +74,7 @@ struct FrameRow {
   std::optional<double> drift_x_um = {}, drift_y_um = {}, turn_deg = {}, noise_um = {}, largest_displacement_um = {};
   std::string refused = {};  ///< why it has no displacements
 };
-const Table<FrameRow>& frame_table();
+Table<FrameRow> frame_table();
 
 /// Their part of docs/columns.md.
 std::string pages_of_cell_tables();

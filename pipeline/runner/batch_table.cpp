@@ -76,20 +76,19 @@ struct BatchRow {
 };
 
 files::Table<BatchRow> batch_table(const fs::path& folder) {
-  const auto of = [](auto member) { return [member](const BatchRow& row) { return row.cell.*member; }; };
   return {
       .file = "batch.csv",
       .row = "each cell of a batch",
       .columns = {{"cell", "its folder, below the batch's",
                    [folder](const BatchRow& row) { return row.cell.cell.lexically_relative(folder).generic_string(); }},
-                  {"exit_code", "of `mbtfm run`", of(&BatchCell::exit_code)},
-                  {"seconds", "it took", of(&BatchCell::seconds), {.digits = files::kForPeople}},
-                  {"message", "why it failed", of(&BatchCell::message)},
-                  {"failed_stage", "where it failed", of(&BatchCell::failed_stage)},
+                  {"exit_code", "of `mbtfm run`", files::member(&BatchRow::cell, &BatchCell::exit_code)},
+                  {"seconds", "it took", files::member(&BatchRow::cell, &BatchCell::seconds), files::kResult},
+                  {"message", "why it failed", files::member(&BatchRow::cell, &BatchCell::message)},
+                  {"failed_stage", "where it failed", files::member(&BatchRow::cell, &BatchCell::failed_stage)},
                   {"findings", "that are open", [](const BatchRow& row) { return open_ids(row.findings); }}}};
 }
 
-files::Column<BatchRow> figure_column(const std::string& name) {
+files::Columns<BatchRow> figure_column(const std::string& name) {
   return {name, "a figure that a stage reported", [name](const BatchRow& row) {
             const auto figure = row.figures.find(name);
             return figure == row.figures.end() ? std::string() : figure->second;
