@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <mutex>
+#include <stdexcept>
 
 #include "pipeline/contract/errors.h"
 #include "substrate/boxes/mesh_maker.h"
@@ -74,7 +75,14 @@ BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function
     // one at a time: deal.II has one limit of threads for all, and no lock on it
     static std::mutex in_use;
     const std::lock_guard lock(in_use);
-    make(mesh, is_too_large, most_cells, threads);
+    try {
+      make(mesh, is_too_large, most_cells, threads);
+    } catch (const std::length_error&) {
+      throw OutOfMemory("the substrate's mesh has more than " + std::to_string(most_cells) +
+                        " elements; one of at most half as many would fit the memory allowed: "
+                        "ask for a coarser one (displacement_tolerance, elements_across_adhesion), allow more "
+                        "(memory_limit_GB), or take the model 'layer'");
+    }
   }
   for (std::size_t cell = 0; cell < mesh.cells.size(); ++cell) {
     const Box& box = mesh.cells[cell];
