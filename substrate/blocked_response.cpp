@@ -24,14 +24,14 @@ constexpr int kNodes = 6;         // along each axis of a square
 constexpr double kFarFrom = 3.0;  // half sides from its centre
 
 /// A square of the plane.
-struct Square {
+struct Tile {
   Vec2 centre_um;
   double half_um = 0;
 };
 
 double chebyshev_node(int k) { return std::cos(std::numbers::pi * (k + 0.5) / kNodes); }
 
-std::vector<Vec2> nodes_um(const Square& square) {
+std::vector<Vec2> nodes_um(const Tile& square) {
   std::vector<Vec2> nodes;
   for (int j = 0; j < kNodes; ++j)
     for (int i = 0; i < kNodes; ++i)
@@ -52,7 +52,7 @@ std::array<double, kNodes> polynomials(double t) {
 }
 
 /// Points × nodes: what the value at each node counts at a point.
-MatrixXd interpolation(const Square& square, const std::vector<Vec2>& points_um) {
+MatrixXd interpolation(const Tile& square, const std::vector<Vec2>& points_um) {
   MatrixXd weights(points_um.size(), kNodes * kNodes);
   for (std::size_t p = 0; p < points_um.size(); ++p) {
     const Vec2 at = points_um[p] - square.centre_um;
@@ -65,7 +65,7 @@ MatrixXd interpolation(const Square& square, const std::vector<Vec2>& points_um)
   return weights;
 }
 
-bool is_far(const Square& square, const Ellipse& ellipse) {
+bool is_far(const Tile& square, const Ellipse& ellipse) {
   const Vec2 d = ellipse.centre_um - square.centre_um;
   return std::max(std::abs(d.x), std::abs(d.y)) - ellipse.semi_major_um >= kFarFrom * square.half_um;
 }
@@ -261,7 +261,7 @@ void split(const std::vector<Vec2>& points_um, std::vector<Index> points, std::s
   split(points_um, {cut, points.end()}, most, parts);
 }
 
-Square square_around(const std::vector<Vec2>& points_um) {
+Tile tile_around(const std::vector<Vec2>& points_um) {
   const mbtfm::Extent e = mbtfm::extent_of(points_um);
   return {.centre_um = e.middle_um(), .half_um = 0.5 * std::max(e.high_um.x - e.low_um.x, e.high_um.y - e.low_um.y)};
 }
@@ -270,7 +270,7 @@ Block block_of(const MatrixAt& matrix_at, const std::vector<Vec2>& points_um, st
                const std::vector<Ellipse>& ellipses) {
   std::vector<Vec2> own_um;
   for (const Index p : points) own_um.push_back(points_um[static_cast<std::size_t>(p)]);
-  const Square square = square_around(own_um);
+  const Tile square = tile_around(own_um);
   std::vector<Ellipse> far, near;
   std::vector<Index> far_columns, near_columns;
   for (std::size_t e = 0; e < ellipses.size(); ++e) {

@@ -172,18 +172,18 @@ std::vector<Sample> sample_cells(const Study& study) {
 }
 
 std::vector<Sample> sample_sheets(const Study& study) {
-  struct Figure {
+  struct Measured {
     const char *column, *name, *unit;
     std::function<std::optional<double>(const SheetSummary&)> of;
     bool is_never_negative = true;
   };
-  const Figure figures[] = {
+  const Measured figures[] = {
       {"mean_tension_nN_per_um", "mean tension", "nN/µm", &SheetSummary::mean_tension_nN_per_um, false},
       {"sheet_force_nN", "total force", "nN", &SheetSummary::total_force_nN},
       {"strain_energy_fJ", "strain energy", "fJ", &SheetSummary::strain_energy_fJ},
       {"sheet_area_um2", "area", "µm²", &SheetSummary::area_um2}};
   std::vector<Sample> samples = {sample_estimates(study, SheetQuantity::contraction)};
-  for (const Figure& figure : figures) {
+  for (const Measured& figure : figures) {
     Sample sample = empty_sample(study, figure.column, figure.name, figure.unit, Observed::sheets, {kWholeSheet});
     sample.is_never_negative = figure.is_never_negative;
     for (const int i : cells_of(study, CellKind::sheet)) {
@@ -200,13 +200,13 @@ std::vector<Sample> sample_sheets(const Study& study) {
 
 std::vector<Sample> sample_in_space(const Study& study) {
   using Number = std::optional<double>;
-  struct Figure {
+  struct Measured {
     const char *column, *name, *unit;
     std::function<Number(const SpaceFigures&)> of;
     Number SpaceFigures::*sigma = nullptr;
     bool is_never_negative = true;
   };
-  const Figure figures[] = {
+  const Measured figures[] = {
       {"space_force_nN", "total force", "nN", &SpaceFigures::total_force_nN, &SpaceFigures::total_force_sigma_nN},
       {"space_strain_energy_fJ", "strain energy", "fJ", &SpaceFigures::strain_energy_fJ},
       {"space_contractile_moment_nN_um", "contractile moment", "nN µm", &SpaceFigures::contractile_moment_nN_um,
@@ -217,7 +217,7 @@ std::vector<Sample> sample_in_space(const Study& study) {
   std::vector<Sample> samples;
   const std::vector<int> cells = cells_of(study, CellKind::space);
   const auto figures_in = [&](int i) -> const SpaceFigures& { return *study.cells[static_cast<std::size_t>(i)].space; };
-  for (const Figure& figure : figures) {
+  for (const Measured& figure : figures) {
     Sample sample = empty_sample(study, figure.column, figure.name, figure.unit, Observed::cells_in_space, {"cell"});
     sample.is_never_negative = figure.is_never_negative;
     for (const int i : cells) {
