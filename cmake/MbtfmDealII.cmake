@@ -1,13 +1,25 @@
-# Debian's deal.II as one thin target. deal_ii_setup_target would leak its flags into every consumer and list 170
-# libraries on each link line.
+# Debian's deal.II (9.4 in Debian 12, 9.6 in Debian 13) as one thin target. Its own would leak its flags into every consumer and
+# list 170 libraries on each link line.
 find_package(deal.II 9.4 REQUIRED QUIET HINTS $ENV{DEAL_II_DIR} /usr)
-include(${DEAL_II_TARGET_CONFIG})
+if(NOT TARGET ${DEAL_II_TARGET_RELEASE})
+  include(${DEAL_II_TARGET_CONFIG})
+endif()
+set(folders ${DEAL_II_INCLUDE_DIRS})
+get_target_property(parts ${DEAL_II_TARGET_RELEASE} INTERFACE_LINK_LIBRARIES)
+foreach(part ${parts})  # since 9.5 each library that its headers include is a target
+  if(part MATCHES "^dealii::interface_")
+    get_target_property(more ${part} INTERFACE_INCLUDE_DIRECTORIES)
+    if(more)
+      list(APPEND folders ${more})
+    endif()
+  endif()
+endforeach()
 find_library(TEUCHOS_CORE trilinos_teuchoscore REQUIRED)
 find_library(TEUCHOS_COMM trilinos_teuchoscomm REQUIRED)
 find_library(DEALII_MPI mpi PATHS /usr/lib/x86_64-linux-gnu/openmpi/lib /usr/lib/aarch64-linux-gnu/openmpi/lib REQUIRED)
 find_package(TBB REQUIRED)
-get_target_property(dealii_library deal.ii IMPORTED_LOCATION_DEBUGRELEASE)
+get_target_property(dealii_library ${DEAL_II_TARGET_RELEASE} IMPORTED_LOCATION_DEBUGRELEASE)
 add_library(mbtfm_dealii INTERFACE)
-target_include_directories(mbtfm_dealii SYSTEM INTERFACE ${DEAL_II_INCLUDE_DIRS})
+target_include_directories(mbtfm_dealii SYSTEM INTERFACE ${folders})
 target_compile_definitions(mbtfm_dealii INTERFACE ${DEAL_II_USER_DEFINITIONS} OMPI_SKIP_MPICXX)
 target_link_libraries(mbtfm_dealii INTERFACE ${dealii_library} TBB::tbb ${TEUCHOS_CORE} ${TEUCHOS_COMM} ${DEALII_MPI})
