@@ -92,7 +92,7 @@ void take(T& value, const CsvTable& table, int row, const std::string& column, c
 template <class T>
 std::string kind_of(const Range& range) {
   if constexpr (kIsOptional<T>) {
-    return kind_of<typename T::value_type>(range) + ", or empty";
+    return kind_of<typename T::value_type>(range).append(", or empty");
   } else if constexpr (std::is_same_v<T, bool>) {
     return "`TRUE` or `FALSE`";
   } else if constexpr (std::is_floating_point_v<T>) {
