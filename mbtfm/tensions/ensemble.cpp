@@ -412,8 +412,7 @@ Eigen::MatrixXd by_network_force(const EnsembleFit& fit, const Eigen::MatrixXd& 
 
 Eigen::VectorXd own_variances(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
   if (!fit.forces.own) return Eigen::VectorXd::Zero(sums.cols());
-  return fit.misfit.variance *
-         sums.cwiseProduct(numerics::small_product(fit.forces.own->covariance, sums)).colwise().sum().transpose();
+  return fit.misfit.variance * numerics::quadratic_forms(fit.forces.own->covariance, sums);
 }
 
 Eigen::Vector2d CutForce::direction() const {

@@ -151,7 +151,7 @@ MatrixXd Spectrum::posterior(double lambda, double variance) const {
 }
 
 VectorXd Spectrum::resolved(double lambda) const {
-  return numerics::matvec(vectors_->array().square().matrix(), (values_ / (values_ + lambda * lambda)).matrix());
+  return vectors_->array().square().matrix() * (values_ / (values_ + lambda * lambda)).matrix();
 }
 
 double Spectrum::misfit(double lambda) const {

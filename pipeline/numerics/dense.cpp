@@ -195,6 +195,9 @@ VectorXd transposed_matvec(const MatrixView& A, const VectorView& x) { return A.
 VectorXd plus_matvec(const VectorView& c, const MatrixView& A, const VectorView& x) { return c + A * x; }
 VectorXd minus_matvec(const VectorView& c, const MatrixView& A, const VectorView& x) { return c - A * x; }
 double quadratic_form(const MatrixView& S, const VectorView& x) { return x.dot(S * x); }
+VectorXd quadratic_forms(const MatrixXd& S, const MatrixXd& X) {
+  return X.cwiseProduct(S * X).colwise().sum().transpose();
+}
 
 MatrixXd small_product(const MatrixView& A, const MatrixView& B) { return A * B; }
 MatrixXd small_transposed_product(const MatrixView& A, const MatrixView& B) { return A.transpose() * B; }

@@ -64,6 +64,8 @@ Eigen::VectorXd plus_matvec(const VectorView& c, const MatrixView& A, const Vect
 Eigen::VectorXd minus_matvec(const VectorView& c, const MatrixView& A, const VectorView& x);
 /// xᵀ S x with a square S.
 double quadratic_form(const MatrixView& S, const VectorView& x);
+/// The same of each column of X.
+Eigen::VectorXd quadratic_forms(const Eigen::MatrixXd& S, const Eigen::MatrixXd& X);
 
 /// A B, Aᵀ B and factor A B.
 Eigen::MatrixXd small_product(const MatrixView& A, const MatrixView& B);
