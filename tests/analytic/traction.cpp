@@ -199,7 +199,7 @@ TEST(Tractions, that_swirl_around_an_adhesions_centre_have_a_moment_of_their_sen
   EXPECT_NEAR(*forces.front().moment_nN_um, 2, 1e-12);
 }
 
-TEST(Criteria, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_the_other_way) {
+TEST(LCurve, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_the_other_way) {
   // An L: above the corner the misfit grows with lambda², below it the tractions do with 1/lambda². The other way round
   // there is no such place.
   constexpr double kCorner = 0.02;

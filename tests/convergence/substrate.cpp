@@ -120,7 +120,7 @@ TEST(ElasticSystem, the_base_bears_the_whole_load) {
   }
 }
 
-TEST(Refined, converges_to_the_layer_as_its_elements_halve) {
+TEST(RefinedLayer, converges_to_the_layer_as_its_elements_halve) {
   const Gel gel = gel_of(0.49, 10);
   // an area of 1 um² on elements of 10/2^k um: halving the side is one level
   const std::vector<Ellipse> ellipse = {{{0.3, 0.2}, 0.8, 1 / (0.8 * pi), 0.5}};
@@ -141,7 +141,7 @@ TEST(Refined, converges_to_the_layer_as_its_elements_halve) {
   EXPECT_LT(errors[2], 0.01);
 }
 
-TEST(Refined, error_does_not_grow_as_the_gel_becomes_incompressible) {
+TEST(RefinedLayer, error_does_not_grow_as_the_gel_becomes_incompressible) {
   const std::vector<Ellipse> ellipse = {{{0.3, 0.2}, 0.8, 0.4, 0.5}};
   const auto points = test::scattered_points(1000, 6);
   SubstrateParameters parameters = test::model_named("refined");

@@ -143,7 +143,7 @@ std::set<std::string> anchors_of(const fs::path& page) {
   return anchors;
 }
 
-TEST(Pages, every_link_between_them_leads_to_a_file_and_a_title_in_it) {
+TEST(DocumentPages, every_link_between_them_leads_to_a_file_and_a_title_in_it) {
   const std::regex link(R"(\]\(([^)#:]*)(#[^)]*)?\))");
   for (const fs::path& page : pages()) {
     const std::string text = files::read_text(page);
@@ -158,7 +158,7 @@ TEST(Pages, every_link_between_them_leads_to_a_file_and_a_title_in_it) {
   }
 }
 
-TEST(Pages, the_index_names_every_page) {
+TEST(DocumentPages, the_index_names_every_page) {
   const std::string index = files::read_text(kDocs / "README.md");
   for (const fs::path& page : pages()) {
     const std::string name = page.lexically_relative(kDocs).generic_string();
@@ -168,7 +168,7 @@ TEST(Pages, the_index_names_every_page) {
 }
 
 /// Commands as pipeline/mbtfm_main.cpp adds them, programs as they were built, codes as the sources name them.
-TEST(Pages, every_command_and_exit_code_is_on_its_page) {
+TEST(DocumentPages, every_command_and_exit_code_is_on_its_page) {
   const std::string commands = files::read_text(kDocs / "commands.md");
   const std::string source = files::read_text(kProject / "pipeline/mbtfm_main.cpp");
   const std::regex added(R"re(add_(command\(\s*app,\s*line,|subcommand\()\s*"([a-z]+)")re");
@@ -191,7 +191,7 @@ TEST(Pages, every_command_and_exit_code_is_on_its_page) {
 }
 
 /// Those of theory are for readers of equations.
-TEST(Pages, for_users_have_plain_words) {
+TEST(DocumentPages, for_users_have_plain_words) {
   for (const fs::path& page : pages()) {
     const std::string name = page.lexically_relative(kProject).generic_string();
     if (name.starts_with("docs/developers/") || name.starts_with("docs/theory") || name == "CONTRIBUTING.md") continue;
@@ -239,7 +239,7 @@ void expect_short_sentences(const std::string& page, int median, int p90) {
 
 /// For readers whose language is another one. The bars are those of guides for plain English: some 15 words a sentence,
 /// none that one must read twice. What one reads from begin to end has the lower bars, what one looks up the others.
-TEST(Pages, have_short_sentences) {
+TEST(DocumentPages, have_short_sentences) {
   struct Bar {
     int median, p90;
     std::vector<const char*> pages;
@@ -259,7 +259,7 @@ TEST(Pages, have_short_sentences) {
     for (const char* page : bar.pages) expect_short_sentences(page, bar.median, bar.p90);
 }
 
-TEST(Pages, of_theory_have_short_sentences) {
+TEST(DocumentPages, of_theory_have_short_sentences) {
   for (const fs::directory_entry& entry : fs::directory_iterator(kDocs / "theory"))
     expect_short_sentences("theory/" + entry.path().filename().string(), 22, 40);
 }

@@ -199,7 +199,7 @@ TEST_F(Unloaded, one_picture_twice_or_one_alone_is_refused) {
 }
 
 /// The noise that a simulation is asked for is the noise it has, whatever the gel.
-TEST(Simulate, noise_in_um_and_beads_by_area_hold_on_every_gel) {
+TEST(SimulatedNoise, noise_in_um_and_beads_by_area_hold_on_every_gel) {
   const test::TemporaryFolder folder;
   for (const char* gel : {"1", "16"}) {
     const fs::path cell = folder / gel;

@@ -165,7 +165,7 @@ Network regular_sheet(int side, double edge_um, Polygon& outline_um) {
   return network;
 }
 
-TEST(Cables, surface_tension_of_a_regular_network_is_root_three_times_tension_over_edge) {
+TEST(SurfaceTension, surface_tension_of_a_regular_network_is_root_three_times_tension_over_edge) {
   constexpr int kSide = 40;
   constexpr double kEdge_um = 0.7, kTension_nN = 0.06;
   Cell cell;

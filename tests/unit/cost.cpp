@@ -110,7 +110,7 @@ TEST(Front, is_what_no_other_choice_beats_in_both) {
   EXPECT_DOUBLE_EQ(distance_to_front(all, 2), 0.5);
 }
 
-TEST(Study, of_several_cells_has_root_mean_squares_of_errors_and_means_of_times) {
+TEST(CostStudy, of_several_cells_has_root_mean_squares_of_errors_and_means_of_times) {
   Study one{.reference = "the truth", .has_images = false, .measurements = {measured(2, 0.3), measured(1, 0.1)}};
   one.measurements[1].rung.value = "2";
   Study other = one;
@@ -122,14 +122,14 @@ TEST(Study, of_several_cells_has_root_mean_squares_of_errors_and_means_of_times)
   EXPECT_EQ(front_of(both.measurements), (std::vector<int>{0}));
 }
 
-TEST(Study, of_cells_with_fibres_and_in_space_together_is_refused) {
+TEST(CostStudy, of_cells_with_fibres_and_in_space_together_is_refused) {
   const Study one{.reference = "the truth", .has_images = false, .measurements = {measured(2, 0.3)}};
   Study other = one;
   other.kind = CellKind::space;
   EXPECT_THROW(combined({one, other}), UsageError);
 }
 
-TEST(Study, of_a_cell_in_space_tells_of_tractions_and_not_of_tensions) {
+TEST(CostStudy, of_a_cell_in_space_tells_of_tractions_and_not_of_tensions) {
   Study study{.kind = CellKind::space,
               .reference = "the truth",
               .has_images = false,
