@@ -19,6 +19,9 @@ void declare_cell(stage::ParameterList& list, CellParameters& p) {
   list.add("diameter_um", p.diameter_um, Range::size_um(), "diameter of the cell (um)");
   list.add("n_corners", p.n_corners, Range::between(3, 50),
            "number of the outline's corners, which are rich in adhesions");
+  list.add("corner_jitter", p.corner_jitter, Range::between(0, 0.4), "scatter of the corners' radii, relative");
+  list.add("edge_concavity", p.edge_concavity, Range::between(0, 0.3),
+           "depth of the arc between two corners over their distance");
   list.add("elongation", p.elongation, Range::between(1, 20), "long over short diameter of the cell");
   list.add("edge_roughness_um", p.edge_roughness_um, Range::zero_or_size_um(),
            "raggedness of the outline (standard deviation, um)");

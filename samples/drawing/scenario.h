@@ -26,6 +26,8 @@ struct CellParameters {
   Layout layout = Layout::spread;
   double diameter_um = 66;             ///< mean, over the corners
   int n_corners = 9;                   ///< adhesion-rich corners with concave arcs between them
+  double corner_jitter = 0.1;          ///< of a corner's radius, relative (standard deviation)
+  double edge_concavity = 0.08;        ///< depth of the arc between two corners over their distance
   double elongation = 1.15;            ///< long over short diameter
   double edge_roughness_um = 0;        ///< standard deviation: smooth; real edges are ragged by their filopodia
   int n_adhesions = 170;               ///< thesis 3.4: 3 612 adhesions in 21 cells

@@ -13,9 +13,8 @@ namespace {
 
 /// Width over which a cell's corner is rounded: about a focal adhesion's length.
 constexpr double kCornerRadius_um = 1.2;
-constexpr double kCornerJitter = 0.1;        // standard deviation of a corner's radius, relative
-constexpr double kEdgeConcavity = 0.08;      // depth of the arc between two corners over their distance
-constexpr double kFreeEdgeConcavity = 0.13;  // the same of arcs with an edge bundle, which draws them in
+// depth of the arc between two corners over their distance, where an edge bundle draws it in
+constexpr double kFreeEdgeConcavity = 0.13;
 
 /// Corners around the centre, on an ellipse, with jitter in radius and angle.
 std::vector<Vec2> corners_of(const Sketch& sketch, Random& random) {
@@ -25,7 +24,7 @@ std::vector<Vec2> corners_of(const Sketch& sketch, Random& random) {
   std::vector<Vec2> corners;
   for (int i = 0; i < p.n_corners; ++i) {
     const double angle = first + 2 * std::numbers::pi * (i + 0.25 * random.uniform(-1, 1)) / p.n_corners;
-    const double jitter = std::clamp(random.normal(), -2.0, 2.0) * kCornerJitter;
+    const double jitter = std::clamp(random.normal(), -2.0, 2.0) * p.corner_jitter;
     const Vec2 on_circle = (0.5 * p.diameter_um * (1 + jitter)) * direction(angle);
     const double along = dot(on_circle, long_axis);
     const double stretch = std::sqrt(p.elongation);
@@ -111,7 +110,7 @@ void draw_outline(Sketch& sketch, Random& random) {
     const Vec2 a = corners[i];
     const Vec2 b = corners[(i + 1) % corners.size()];
     const double deviate = random.uniform(0.3, 1.7);
-    const double concavity = is_free[i] ? kFreeEdgeConcavity * (0.7 + 0.3 * deviate) : kEdgeConcavity * deviate;
+    const double concavity = is_free[i] ? kFreeEdgeConcavity * (0.7 + 0.3 * deviate) : p.edge_concavity * deviate;
     Polyline edge = parabola(a, b, concavity * norm(b - a), kOutlineSpacing_um);
     outline.insert(outline.end(), edge.begin(), edge.end() - 1);
   }

@@ -28,7 +28,7 @@ constexpr int kLongestSource = 890;                                             
 constexpr int kOwnHeadersMedian = 13, kOwnHeadersP90 = 39, kOwnHeadersMost = 93;  // that a source of the product gets
 constexpr int kSeeFindings = 30;  // sources of product and tests that a new kind of finding compiles again
 constexpr int kKindsOfFindings = 80;
-constexpr int kParameterRows = 457;  // of docs/parameters.md
+constexpr int kParameterRows = 459;  // of docs/parameters.md
 constexpr int kWordsOfDocs = 144500;
 
 const std::vector<std::string> kProduct = {"pipeline", "segment",   "network", "substrate",

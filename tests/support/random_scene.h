@@ -59,8 +59,8 @@ inline RandomScene random_scene(std::uint64_t seed) {
        << "\npoisson_ratio = " << dice.one_of<double>({0.3, 0.45, 0.48, 0.495, 0.4999})
        << "\nthickness_um = " << dice.decades(5, 300) << "\n[scenario]\ndiameter_um = " << diameter_um
        << "\nimage_size_px = " << std::lround(field_um / pixel_um) << "\nelongation = " << dice.uniform(1, 2.2)
-       << "\nn_corners = " << dice.whole(4, 12) << "\n";
-  for (int former = 0; former < 2; ++former) dice.uniform(0, 1);  // settings of version 0.2: a seed keeps its scene
+       << "\nn_corners = " << dice.whole(4, 12) << "\ncorner_jitter = " << dice.uniform(0, 0.25)
+       << "\nedge_concavity = " << dice.uniform(0, 0.15) << "\n";
   const double room = std::pow(diameter_um / 66, 2);
   const int n_ventral = dice.whole(0, std::max(1, static_cast<int>(10 * room)));
   const int n_dorsal = dice.whole(0, std::max(1, static_cast<int>(10 * room)));
