@@ -26,9 +26,9 @@ struct Case {
 };
 
 struct Reading {
-  std::vector<double> depth_um;       ///< by depth of reading: the largest displacement into the gel there
-  double lift_um = 0;                 ///< largest displacement of the gel's surface out of it: near the contact's rim
-  double largest_u_um = 0;            ///< anywhere
+  std::vector<double> depth_um;  ///< by depth of reading: the largest displacement into the gel there
+  double lift_um = 0;            ///< largest displacement of the gel's surface out of it: near the contact's rim
+  double largest_u_um = 0;       ///< anywhere
   double largest_u_gel_um = 0;
   double top_down_um = 0;  ///< of the cell's top, towards the gel
 };

@@ -13,8 +13,7 @@ namespace {
 class CablesAgainstReference : public testing::TestWithParam<const char*> {
  protected:
   files::CsvTable table(const std::string& file) const {
-    return files::CsvTable(test::source_folder() / "tests/data/reference/network" / GetParam() /
-                           file);
+    return files::CsvTable(test::source_folder() / "tests/data/reference/network" / GetParam() / file);
   }
   test::ReferenceNetwork reference = test::reference_network(GetParam());
   cables::CableNetwork cables{reference.network};
