@@ -4,8 +4,9 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 purpose=cell all=OFF target="what a cell needs"
-if [ "${1:-}" = --all ]; then purpose=all all=ON target="all programs"; fi
-if grep -qs '^MBTFM_ALL:BOOL=ON' build/CMakeCache.txt; then all=ON purpose=all; fi  # nothing is unbuilt
+if [ "${1:-}" = --all ] || grep -qs '^MBTFM_ALL:BOOL=ON' build/CMakeCache.txt; then  # once all, always all
+  purpose=all all=ON target="all programs"
+fi
 ./cmake/install_packages.sh $purpose
 cmake --preset release -DMBTFM_ALL=$all >build-configure.log 2>&1 || { cat build-configure.log >&2; exit 1; }
 mv build-configure.log build/configure.log
