@@ -1,14 +1,9 @@
 /// One factorisation, over the sizes of blocks and scalars that the stages use.
-#include "pipeline/numerics/block_cholesky.h"
-
-#include <gtest/gtest.h>
-
 #include <Eigen/Cholesky>
-#include <algorithm>
-#include <cmath>
-#include <limits>
 
+#include "pipeline/numerics/block_cholesky.h"
 #include "pipeline/numerics/dense_panel.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::numerics {
 namespace {

@@ -1,11 +1,9 @@
-#include <gtest/gtest.h>
-
 #include <Eigen/Dense>
-#include <numbers>
 
 #include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
 #include "tests/support/equilibrium.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

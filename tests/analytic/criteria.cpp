@@ -1,15 +1,11 @@
 /// What the criteria for lambda are defined to be, against the definitions themselves: leaving data out, a Gaussian's
 /// density, the error of the tractions. Each on linear problems small enough to be solved outright.
-#include <gtest/gtest.h>
-
 #include <Eigen/Dense>
-#include <cmath>
-#include <numbers>
-#include <random>
 
 #include "mbtfm/tractions/dense_problem.h"
 #include "mbtfm/tractions/regularisation.h"
 #include "mbtfm/tractions/spectrum.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::tractions {
 namespace {

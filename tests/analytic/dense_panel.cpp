@@ -1,10 +1,7 @@
-#include "pipeline/numerics/dense_panel.h"
-
-#include <gtest/gtest.h>
-
 #include <Eigen/Cholesky>
-#include <limits>
-#include <vector>
+
+#include "pipeline/numerics/dense_panel.h"
+#include "tests/support/test.h"
 
 namespace {
 

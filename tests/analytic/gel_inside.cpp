@@ -1,15 +1,9 @@
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <map>
-#include <numbers>
-#include <string>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "substrate/greens/inside.h"
 #include "substrate/greens/layer.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::greens {
 namespace {

@@ -1,15 +1,6 @@
 /// The interval of a force's magnitude holds the true one as often as it says.
 #include "pipeline/numerics/magnitude_interval.h"
-
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <cstdio>
-#include <limits>
-#include <random>
-#include <string>
-#include <vector>
+#include "tests/support/test.h"
 
 namespace mbtfm::numerics {
 namespace {

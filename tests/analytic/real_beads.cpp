@@ -1,11 +1,4 @@
 /// Images that others took or made, where ../shared is at hand.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <fstream>
-#include <numbers>
-#include <sstream>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/order_statistics.h"
@@ -14,6 +7,7 @@
 #include "tests/support/folders.h"
 #include "tests/support/mat_tracks.h"
 #include "tests/support/piv.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::beads {
 namespace {

@@ -1,12 +1,7 @@
 /// Images whose sums and centroids are known.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
 #include "samples/drawing/geometry.h"
 #include "samples/drawing/render.h"
+#include "tests/support/test.h"
 
 namespace {
 

@@ -1,13 +1,7 @@
 /// Cells whose contact is no circle: the full solution in space against the round cell's, symmetries and balances.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <numbers>
-#include <string>
-
 #include "continuum/solids/indent.h"
 #include "pipeline/contract/errors.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::solids {
 namespace {

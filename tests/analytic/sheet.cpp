@@ -1,15 +1,10 @@
 /// Sheets on springs against closed forms and an independent spectral program (tests/data/reference/chapter4).
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <random>
-#include <sstream>
-
 #include "continuum/sheet/from_traction.h"
 #include "continuum/sheet/mesh_size.h"
 #include "continuum/sheet/tables.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/sheets.h"
+#include "tests/support/test.h"
 
 namespace {
 

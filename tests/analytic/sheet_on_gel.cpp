@@ -1,9 +1,5 @@
 /// Sheets bonded to gels against an exact spectral solution (tests/data/reference/chapter4).
-#include <gtest/gtest.h>
-
 #include <Eigen/LU>
-#include <chrono>
-#include <numbers>
 
 #include "continuum/sheet/decide.h"
 #include "continuum/sheet/forward.h"
@@ -11,6 +7,7 @@
 #include "pipeline/contract/errors.h"
 #include "substrate/greens/models.h"
 #include "tests/support/sheets.h"
+#include "tests/support/test.h"
 
 namespace {
 

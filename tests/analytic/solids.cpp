@@ -1,14 +1,9 @@
 /// Contracting solids against closed forms and independent programs (tests/data/reference/chapter4).
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-#include <utility>
-
 #include "continuum/solids/indent.h"
 #include "pipeline/contract/words.h"
 #include "pipeline/files/csv.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::solids {
 namespace {

@@ -1,11 +1,4 @@
 /// The statistics beside R's own functions on the same tables: tests/data/statistics/expected.R makes both.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <map>
-#include <random>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/statistics/bootstrap.h"
@@ -13,6 +6,7 @@
 #include "pipeline/statistics/mixed_model.h"
 #include "pipeline/statistics/rank_tests.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::statistics {
 namespace {

@@ -1,18 +1,10 @@
 /// The half-space and the layer against closed forms, brute-force quadrature and independently computed values.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <fstream>
-#include <map>
-#include <numbers>
-#include <sstream>
-#include <utility>
-
 #include "pipeline/numerics/quadrature.h"
 #include "substrate/greens/layer.h"
 #include "substrate/greens/layer_vertical.h"
 #include "substrate/material.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::substrate {
 namespace {

@@ -1,10 +1,4 @@
 /// Traction reconstructions against closed forms and known scenes.
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <functional>
-#include <random>
-
 #include "mbtfm/tractions/field_of_adhesions.h"
 #include "mbtfm/tractions/fttc.h"
 #include "mbtfm/tractions/fttc_mixtures.h"
@@ -15,6 +9,7 @@
 #include "substrate/greens/wave.h"
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/substrate_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::tractions {
 namespace {

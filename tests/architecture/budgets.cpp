@@ -1,20 +1,12 @@
 /// Budgets that only fall: what a newcomer has to read, and what a compiler has to. A budget is raised only by a commit
 /// of its own that says by how much and why. A new capability is a reason, a second implementation is none. When a
 /// figure has fallen by more than a fiftieth, lower its budget.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <fstream>
-#include <map>
 #include <regex>
-#include <set>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include "pipeline/contract/findings.h"
 #include "pipeline/files/text.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

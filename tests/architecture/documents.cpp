@@ -1,10 +1,5 @@
 /// The pages of docs/ are in step with the program.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <map>
 #include <regex>
-#include <sstream>
 
 #include "continuum/mean/outputs.h"
 #include "continuum/sheet/borders.h"
@@ -25,6 +20,7 @@
 #include "tests/support/folders.h"
 #include "tests/support/plain_words.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

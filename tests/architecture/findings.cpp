@@ -1,15 +1,10 @@
 /// Of each kind of finding a test makes the cause and sees it fire, and a test sees it silent where all is sound.
 /// Studies do not count: nobody runs them with each change.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <regex>
-#include <set>
 
 #include "pipeline/contract/findings.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

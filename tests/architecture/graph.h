@@ -1,12 +1,7 @@
 /// A graph of nodes that include each other: its levels, and its picture.
 #pragma once
 
-#include <algorithm>
-#include <map>
-#include <set>
-#include <sstream>
-#include <string>
-#include <vector>
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

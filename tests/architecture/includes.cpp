@@ -1,19 +1,11 @@
 /// The layers of the project, read from its #include lines. A folder is a library, a namespace and a node of their
 /// graph.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <map>
 #include <regex>
-#include <set>
-#include <string>
-#include <vector>
 
 #include "pipeline/files/text.h"
 #include "tests/architecture/graph.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace {
 

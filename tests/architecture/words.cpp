@@ -1,15 +1,9 @@
 /// Words that stand for a choice are read once, where a file, an argument or a flag is: from there on it is a value of
 /// an enumeration (pipeline/contract/words.h), which the compiler knows.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <map>
 #include <regex>
 
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

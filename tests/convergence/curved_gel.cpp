@@ -1,9 +1,4 @@
 /// Finite elements bent onto a surface, against exact fields (tests/data/reference/curved, by another program).
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-
 #include "pipeline/contract/errors.h"
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/choice/factory.h"
@@ -13,6 +8,7 @@
 #include "substrate/response.h"
 #include "tests/support/cubed_sphere.h"
 #include "tests/support/field_under_a_surface.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::curved {
 namespace {

@@ -1,15 +1,12 @@
 /// What large strains change of a gel's displacement, for fits that go on from a linear model.
-#include "substrate/choice/large_strain.h"
-
-#include <gtest/gtest.h>
-
 #include <Eigen/Cholesky>
-#include <random>
 
 #include "pipeline/contract/numbers.h"
 #include "substrate/choice/factory.h"
+#include "substrate/choice/large_strain.h"
 #include "substrate/loads.h"
 #include "substrate/material.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::choice {
 namespace {

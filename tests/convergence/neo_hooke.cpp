@@ -1,21 +1,15 @@
 /// Large strains, against closed forms and manufactured fields (tests/data/reference/curved, by another program).
-#include "substrate/curved/neo_hooke.h"
-
-#include <gtest/gtest.h>
-
 #include <Eigen/LU>
-#include <array>
-#include <cmath>
-#include <map>
-#include <numbers>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "substrate/choice/large_strain.h"
 #include "substrate/curved/linear.h"
+#include "substrate/curved/neo_hooke.h"
 #include "substrate/curved/surface_loads.h"
 #include "tests/support/cubed_sphere.h"
 #include "tests/support/field_under_a_surface.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::curved {
 namespace {

@@ -1,8 +1,4 @@
 /// Finite elements against the layer, which shares nothing with them, and their building stones.
-#include <gtest/gtest.h>
-
-#include <numeric>
-
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/boxes/ellipse_load.h"
 #include "substrate/choice/factory.h"
@@ -10,6 +6,7 @@
 #include "substrate/greens/half_space.h"
 #include "substrate/material.h"
 #include "tests/support/substrate_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::substrate {
 namespace {

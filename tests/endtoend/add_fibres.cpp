@@ -1,12 +1,9 @@
 /// "Add it and run again": fibres that the beads call for, put beside the segmented ones.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

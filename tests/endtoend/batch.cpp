@@ -1,20 +1,14 @@
 /// Batches that survive: kills at any time, a full disk, another batch in the same folder. However a batch comes to its
 /// end, its results are byte for byte those of an undisturbed one.
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include <chrono>
-#include <fstream>
-#include <map>
-#include <random>
-#include <sstream>
 #include <thread>
 
 #include "pipeline/files/text.h"
 #include "tests/support/folders.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,15 +1,11 @@
 /// Cells without an adhesion image, and with masks of other programs, from the images to the report.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "segment/images/image.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

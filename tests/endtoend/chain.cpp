@@ -1,11 +1,4 @@
 /// The whole chain on simulated cells, against the truth.
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <fstream>
-#include <sstream>
-
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -16,6 +9,7 @@
 #include "tests/support/folders.h"
 #include "tests/support/json_schema.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,10 +1,4 @@
 /// mbtfm-indent and mbtfm-mean as a person runs them.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-#include <random>
-
 #include "pipeline/contract/beads.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -12,6 +6,7 @@
 #include "segment/images/image.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

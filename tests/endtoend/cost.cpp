@@ -1,9 +1,6 @@
 /// Presets, wanted accuracy and the cost study, as a person runs them on a small cell.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

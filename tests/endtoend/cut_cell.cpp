@@ -1,9 +1,4 @@
 /// Images that end before the cell does, through the whole chain.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
@@ -12,6 +7,7 @@
 #include "tests/support/findings.h"
 #include "tests/support/folders.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,17 +1,11 @@
 /// The pages for users do what they say: their commands run, their links lead somewhere, their sentences are short.
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <cctype>
-#include <cstdlib>
-#include <map>
 #include <regex>
-#include <set>
-#include <sstream>
 
 #include "tests/support/folders.h"
 #include "tests/support/plain_words.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

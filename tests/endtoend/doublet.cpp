@@ -1,11 +1,6 @@
 /// Real beads and actin of two cells on an H-shaped adhesive pattern, without an adhesion image: forces on candidates
 /// all over the pattern, beside what optical flow and Fourier tractions give of the same images.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <fstream>
 #include <iostream>
-#include <map>
 
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/results.h"
@@ -15,6 +10,7 @@
 #include "segment/rois/roi.h"
 #include "tests/support/folders.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

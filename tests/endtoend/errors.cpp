@@ -1,15 +1,10 @@
 /// Bad input: an error that names file, place, expectation and finding; a non-zero exit code; nothing half-written.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <fstream>
-#include <random>
-
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "segment/images/image.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

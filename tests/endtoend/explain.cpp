@@ -1,14 +1,10 @@
 /// What `--explain` says that an effect would change, against a run that has it.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <map>
-
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

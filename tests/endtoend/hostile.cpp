@@ -1,21 +1,16 @@
 /// Cell folders from elsewhere, made to lead the programs astray: nothing outside of them is read beyond what their
 /// settings name, nor written, emptied or deleted; damage is told as an error of that cell, and the others go on.
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include <functional>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <regex>
-#include <set>
 
 #include "pipeline/files/text.h"
 #include "tests/support/folders.h"
 #include "tests/support/program.h"
 #include "tests/support/script_stages.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

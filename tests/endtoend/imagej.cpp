@@ -1,16 +1,11 @@
 // A real ImageJ (Debian's `imagej`, under `xvfb-run`) reads what mbtfm writes, and mbtfm reads what it writes.
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <fstream>
-#include <sstream>
-
 #include "pipeline/files/csv_files.h"
 #include "segment/cells/ellipse.h"
 #include "segment/rois/roi.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

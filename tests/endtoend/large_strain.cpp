@@ -1,13 +1,10 @@
 /// A cell that strains its gel beyond linear elasticity, simulated and fitted.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

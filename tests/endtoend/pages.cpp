@@ -1,14 +1,11 @@
 /// The reports as a person sees them, in a browser.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include "pipeline/files/base64.h"
 #include "pipeline/report/report.h"
 #include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
 #include "tests/support/browser.h"
 #include "tests/support/fake_cell.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

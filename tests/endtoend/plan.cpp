@@ -1,12 +1,9 @@
 /// mbtfm plan and mbtfm noise as a person runs them.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "tests/support/folders.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,10 +1,4 @@
 /// Tractions from displacements that other programs wrote, beside what those programs made of them.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <fstream>
-#include <numbers>
-
 #include "continuum/sheet/borders.h"
 #include "continuum/sheet/from_traction.h"
 #include "continuum/sheet/mesh_size.h"
@@ -13,6 +7,7 @@
 #include "segment/cells/mask.h"
 #include "segment/images/image.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::tractions {
 namespace {

@@ -1,13 +1,4 @@
 /// mbtfm-sheet as a person runs it.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <fstream>
-#include <functional>
-#include <map>
-#include <numbers>
-#include <random>
-
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json_record.h"
@@ -16,6 +7,7 @@
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
 #include "tests/support/sheets.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,14 +1,11 @@
 /// Image content that moves right and down ends as a force to the right and down in the report.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <random>
 #include <regex>
 
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "segment/images/image.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

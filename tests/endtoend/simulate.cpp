@@ -1,12 +1,5 @@
 /// mbtfm-simulate as a person runs it.
-#include <gtest/gtest.h>
 #include <sys/wait.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <fstream>
-#include <iterator>
 
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -15,6 +8,7 @@
 #include "segment/images/image.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace {
 

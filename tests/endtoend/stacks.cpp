@@ -1,11 +1,5 @@
 /// From two stacks of beads to displacements in space, as a person runs it.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "mbtfm/plan/space_scene.h"
 #include "pipeline/files/csv.h"
@@ -17,6 +11,7 @@
 #include "pipeline/report/space_report.h"
 #include "segment/images/image.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

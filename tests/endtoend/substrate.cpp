@@ -1,5 +1,4 @@
 /// mbtfm-substrate on files: forces or tractions in; points, the surface or the gel's inside out.
-#include <gtest/gtest.h>
 #include <vtkCellData.h>
 #include <vtkCellType.h>
 #include <vtkDataArray.h>
@@ -9,13 +8,11 @@
 #include <vtkUnstructuredGrid.h>
 #include <vtkXMLUnstructuredGridReader.h>
 
-#include <cmath>
-#include <numbers>
-
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,11 +1,5 @@
 /// mbtfm-surface on files, and mbtfm-substrate on a gel with such a surface.
-#include <gtest/gtest.h>
 #include <tiffio.h>
-
-#include <cmath>
-#include <fstream>
-#include <numbers>
-#include <random>
 
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
@@ -15,6 +9,7 @@
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,23 +1,18 @@
 /// What a program meets outside of its own: a reader that goes away, a terminal that closes, no memory, a full device,
 /// names that are no text. Every time: an answer, or an error with its code, and nothing half written.
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include <array>
-#include <chrono>
 #include <csignal>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
-#include <vector>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/text.h"
 #include "tests/support/folders.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,10 +1,5 @@
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <tiffio.h>
-
-#include <fstream>
-#include <limits>
-#include <sstream>
 
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -14,6 +9,7 @@
 #include "tests/support/findings.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 #include "tests/support/weak_beads.h"
 
 namespace mbtfm {

@@ -1,8 +1,5 @@
 /// The executables that reconstruct tractions and compare them with the fit.
-#include <gtest/gtest.h>
-
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
@@ -15,6 +12,7 @@
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::tractions {
 namespace {

@@ -1,18 +1,14 @@
 /// The files for ParaView, read by VTK's own readers: what is in them, in which unit, how large.
-#include <gtest/gtest.h>
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
 #include <vtkDataSet.h>
 #include <vtkPointData.h>
 #include <vtkXMLGenericDataObjectReader.h>
 
-#include <cmath>
-#include <map>
-#include <set>
-
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,11 +1,8 @@
 /// Under libFuzzer one target, MBTFM_FUZZ_FAMILY, reads. It begins with the samples and the inputs that once broke it:
 /// it puts them into MBTFM_FUZZ_CORPUS, a folder that libFuzzer is then given as its corpus, too.
-#include <algorithm>
-#include <cstdlib>
-#include <fstream>
-
 #include "tests/fuzz/target.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace {
 

@@ -1,19 +1,15 @@
-#include "segment/images/image.h"
-
-#include <gtest/gtest.h>
 #include <tiffio.h>
 
-#include <algorithm>
 #include <cstdio>  // jpeglib.h needs it before
-#include <fstream>
-#include <random>
 
 #include <jpeglib.h>
 
 #include "pipeline/contract/errors.h"
+#include "segment/images/image.h"
 #include "segment/images/png.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::images {
 namespace {

@@ -3,20 +3,15 @@
 /// MBTFM_FUZZ_INPUTS sets the number of changed samples (for an hour or a night), MBTFM_FUZZ_SEED the seed. An input
 /// that breaks a reader is kept as fuzz-FAMILY-SEED-NUMBER in the build folder's tests/.
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/time.h>
 #include <unistd.h>
-
-#include <algorithm>
 #include <csignal>
-#include <cstdio>
-#include <cstdlib>
-#include <fstream>
 
 #include "tests/fuzz/mutate.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 #define MBTFM_HAS_ASAN 1

@@ -1,12 +1,7 @@
 /// Samples, changed as damage and malice change files. The same seed gives the same inputs.
 #pragma once
 
-#include <algorithm>
-#include <array>
-#include <cstdint>
-#include <random>
-#include <string>
-#include <vector>
+#include "tests/support/test.h"
 
 namespace mbtfm::fuzz {
 

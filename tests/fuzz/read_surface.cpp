@@ -1,8 +1,4 @@
 /// The gel's surface: triangle meshes of other programs until they are heights, and surface.vtp.
-#include <algorithm>
-#include <array>
-#include <cmath>
-
 #include "pipeline/files/triangle_mesh.h"
 #include "pipeline/files/vtk_files.h"
 #include "substrate/surface/height.h"
@@ -10,6 +6,7 @@
 #include "substrate/surface/missing.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/mesh_files.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::fuzz::surface_readers {
 namespace {

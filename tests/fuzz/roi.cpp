@@ -1,14 +1,9 @@
 #include "segment/rois/roi.h"
-
-#include <gtest/gtest.h>
-
-#include <fstream>
-#include <random>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::rois {
 namespace {

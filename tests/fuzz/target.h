@@ -4,13 +4,9 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "pipeline/contract/errors.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::fuzz {
 

@@ -1,14 +1,8 @@
-#include <gtest/gtest.h>
-
-#include <limits>
-#include <map>
-#include <numbers>
-#include <numeric>
-
 #include "network/cables/cables.h"
 #include "pipeline/numerics/parallel.h"
 #include "tests/support/equilibrium.h"
 #include "tests/support/lattice.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

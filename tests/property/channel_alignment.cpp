@@ -1,13 +1,7 @@
 #include "segment/cells/channel_alignment.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-#include <random>
-
 #include "segment/cells/segment_cell.h"
 #include "tests/support/segmentation_accuracy.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

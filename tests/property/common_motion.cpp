@@ -1,12 +1,8 @@
 #include "mbtfm/tensions/common_motion.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/tension_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {

@@ -1,9 +1,5 @@
 /// Simulated cells that the image cuts, against the truth of the whole cell.
-#include <gtest/gtest.h>
-
 #include <Eigen/LU>
-#include <cmath>
-#include <sstream>
 
 #include "mbtfm/tensions/findings.h"
 #include "mbtfm/tensions/fit_results.h"
@@ -12,6 +8,7 @@
 #include "samples/drawing/scenario.h"
 #include "samples/experiment/experiment.h"
 #include "tests/support/cut_cell.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

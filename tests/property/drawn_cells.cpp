@@ -1,15 +1,11 @@
 /// What must hold of every cell that is drawn.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/polyline.h"
 #include "pipeline/stage/parameters.h"
 #include "samples/drawing/draw.h"
 #include "samples/drawing/geometry.h"
 #include "samples/drawing/random.h"
+#include "tests/support/test.h"
 
 namespace {
 

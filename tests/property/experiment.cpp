@@ -1,11 +1,8 @@
 /// What must hold of a simulated experiment.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
+#include "samples/experiment/experiment.h"
 #include "network/cables/cables.h"
 #include "pipeline/contract/errors.h"
-#include "samples/experiment/experiment.h"
+#include "tests/support/test.h"
 
 namespace {
 

@@ -1,15 +1,11 @@
 /// What the fit of a cell notices: nothing on a sound one, and each fault of its inputs by its own finding.
-#include <gtest/gtest.h>
-
-#include <numbers>
-#include <random>
-
 #include "mbtfm/fit/fit_cell.h"
 #include "mbtfm/fit/report.h"
 #include "mbtfm/tensions/findings.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/findings.h"
 #include "tests/support/tension_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::fit {
 namespace {

@@ -1,16 +1,12 @@
 /// What the fit tells its user of a cell as a whole.
-#include "mbtfm/tensions/fit_results.h"
-
-#include <gtest/gtest.h>
-
 #include <Eigen/Geometry>
-
-#include <numbers>
 
 #include "mbtfm/tensions/energy.h"
 #include "mbtfm/tensions/findings.h"
+#include "mbtfm/tensions/fit_results.h"
 #include "tests/support/substrate_scene.h"
 #include "tests/support/tension_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {

@@ -1,15 +1,10 @@
 /// Registered cells and their mean.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-#include <random>
-
 #include "continuum/mean/align.h"
 #include "continuum/mean/images.h"
 #include "continuum/mean/symmetry.h"
 #include "pipeline/contract/errors.h"
 #include "substrate/greens/half_space.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::mean {
 namespace {

@@ -1,11 +1,6 @@
-#include <algorithm>
-#include <array>
-#include <cmath>
-
-#include <gtest/gtest.h>
-
 #include "tests/support/hard_cells.h"
 #include "tests/support/random_cell.h"
+#include "tests/support/test.h"
 #include "tests/support/valid_network.h"
 
 namespace mbtfm::mesh {

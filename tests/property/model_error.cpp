@@ -1,17 +1,10 @@
-#include "mbtfm/tensions/model_error.h"
-
-#include <gtest/gtest.h>
-
 #include <Eigen/LU>
 #include <Eigen/QR>
 
-#include <cmath>
-#include <map>
-#include <numbers>
-#include <random>
-
 #include "mbtfm/tensions/model_checks.h"
+#include "mbtfm/tensions/model_error.h"
 #include "tests/support/tension_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {

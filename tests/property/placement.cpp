@@ -1,15 +1,12 @@
-#include "mbtfm/tensions/placement.h"
-
-#include <gtest/gtest.h>
-
 #include <Eigen/Geometry>
-#include <cmath>
 
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/placement.h"
 #include "mbtfm/tensions/series.h"
 #include "tests/support/layer_data.h"
 #include "tests/support/tension_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {

@@ -1,11 +1,4 @@
 /// Laws of a plan: how its errors scale, and that they are those of the fit.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <random>
-
 #include "mbtfm/plan/cell_numbers.h"
 #include "mbtfm/plan/drawn.h"
 #include "mbtfm/plan/space_drawn.h"
@@ -15,6 +8,7 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 #include "tests/support/drawn_pair.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::plan {
 namespace {

@@ -1,16 +1,10 @@
 #include "mbtfm/fit/readings.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <random>
-
 #include "mbtfm/fit/data_of_beads.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "substrate/choice/factory.h"
 #include "tests/support/findings.h"
 #include "tests/support/tension_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::fit {
 namespace {

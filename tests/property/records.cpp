@@ -1,9 +1,5 @@
 /// Records of a finished cell, each of their values in turn replaced by something else: whoever reads them throws an
 /// InputError or nothing.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/cost/accuracy.h"
 #include "pipeline/report/error_budget.h"
@@ -16,6 +12,7 @@
 #include "pipeline/stage/stage.h"
 #include "tests/support/script_stages.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

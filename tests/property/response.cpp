@@ -1,13 +1,9 @@
 /// The gel's response as an operator: the blocked one is the dense one but for what far fields lose by interpolation.
 #include "substrate/response.h"
-
-#include <gtest/gtest.h>
-
-#include <random>
-
 #include "substrate/greens/models.h"
 #include "substrate/loads.h"
 #include "tests/support/substrate_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::substrate {
 namespace {

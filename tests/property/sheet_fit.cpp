@@ -1,10 +1,4 @@
 /// The fit of a sheet to the beads under it: what it finds, and whether its error bars hold.
-#include <gtest/gtest.h>
-
-#include <map>
-#include <numbers>
-#include <random>
-
 #include "continuum/sheet/forward.h"
 #include "continuum/sheet/mesh_size.h"
 #include "continuum/sheet/moved_rims.h"
@@ -13,6 +7,7 @@
 #include "mbtfm/tensions/common_motion.h"
 #include "substrate/greens/models.h"
 #include "tests/support/sheets.h"
+#include "tests/support/test.h"
 
 namespace {
 

@@ -1,12 +1,6 @@
 /// Studies of two to six cells in which next to nothing can be known: every table, figure and sentence says so.
 /// MBTFM_ALL_STUDIES=1 reads all of them from folders and makes all pages, too, instead of one in ten.
-#include <gtest/gtest.h>
-
 #include <cctype>
-#include <cmath>
-#include <cstdlib>
-#include <set>
-#include <sstream>
 
 #include "mbtfm/plan/cell_numbers.h"
 #include "pipeline/files/csv.h"
@@ -14,6 +8,7 @@
 #include "pipeline/statistics/study_files.h"
 #include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::statistics {
 namespace {

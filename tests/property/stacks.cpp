@@ -1,11 +1,4 @@
 /// Laws of following beads in space.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <random>
-
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/track.h"
@@ -15,6 +8,7 @@
 #include "segment/stacks/track.h"
 #include "tests/support/findings.h"
 #include "tests/support/stack_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::stacks {
 namespace {

@@ -1,19 +1,12 @@
 /// The fit on a gel that is strained beyond linear elasticity, with forces free of any network.
 #include "mbtfm/fit/strained_gel.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-#include <random>
-#include <utility>
-
 #include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "substrate/choice/factory.h"
 #include "substrate/choice/large_strain.h"
 #include "substrate/loads.h"
 #include "substrate/material.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::fit {
 namespace {

@@ -1,14 +1,9 @@
 /// Tractions that strain the gel beyond linear elasticity.
 #include "mbtfm/spatial/strained.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <random>
-
 #include "pipeline/contract/numbers.h"
 #include "substrate/choice/factory.h"
 #include "substrate/material.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::spatial {
 namespace {

@@ -4,20 +4,14 @@
 #include <CGAL/Alpha_shape_vertex_base_2.h>
 #include <CGAL/Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <functional>
 #include <iostream>
-#include <numbers>
-#include <random>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "substrate/surface/alpha_slices.h"
 #include "substrate/surface/beads.h"
 #include "tests/support/beads_below.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {

@@ -1,15 +1,9 @@
 /// A gel's surface from the beads below it, against surfaces that are known.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <numbers>
-#include <random>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "substrate/surface/beads.h"
 #include "tests/support/beads_below.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {

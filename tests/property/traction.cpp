@@ -1,12 +1,8 @@
 /// Symmetries of traction reconstructions, and what they do at borders, with nothing and with bad input.
-#include <gtest/gtest.h>
-
-#include <numbers>
-#include <random>
-
 #include "mbtfm/tractions/fttc.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/ellipse_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::tractions {
 namespace {

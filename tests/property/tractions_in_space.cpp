@@ -1,9 +1,5 @@
 /// Laws of reconstructions in space: on a half-space, whose answer is a closed form.
-#include <gtest/gtest.h>
-
 #include <Eigen/QR>
-#include <cmath>
-#include <random>
 
 #include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/foresight.h"
@@ -14,6 +10,7 @@
 #include "pipeline/contract/errors.h"
 #include "tests/support/findings.h"
 #include "tests/support/half_space_problem.h"
+#include "tests/support/test.h"
 
 namespace {
 

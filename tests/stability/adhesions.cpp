@@ -1,15 +1,10 @@
 /// Images that show no adhesion give none, and say why.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include "pipeline/contract/errors.h"
 #include "segment/cells/emptiness.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/hard_case.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -1,11 +1,4 @@
 /// Hard cases of gels that are not flat and not linear: their surfaces, as users have them, and their mechanics.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <random>
-
 #include "pipeline/contract/errors.h"
 #include "substrate/choice/factory.h"
 #include "substrate/choice/large_strain.h"
@@ -17,6 +10,7 @@
 #include "substrate/surface/missing.h"
 #include "tests/support/beads_below.h"
 #include "tests/support/hard_case.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

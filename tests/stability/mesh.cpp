@@ -1,15 +1,10 @@
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
-#include <gtest/gtest.h>
-
 #include "network/mesh/adhesions.h"
 #include "network/mesh/frame.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/hard_cells.h"
 #include "tests/support/random_cell.h"
+#include "tests/support/test.h"
 #include "tests/support/valid_network.h"
 
 namespace mbtfm::mesh {

@@ -1,14 +1,9 @@
 /// Fibres in images that no one here made, where they are at hand (../shared/data); skipped elsewhere.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <map>
-#include <string>
-
 #include "segment/cells/segment_cell.h"
 #include "tests/support/folders.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/segmentation_score.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::images {
 namespace {

@@ -1,14 +1,11 @@
 /// The whole chain on scenes at random: ten in the suite, as many as MBTFM_SCENES says at night
 /// (MBTFM_SCENES=500 MBTFM_FIRST_SCENE=1000 build/tests/stability_scenes). Scenes that failed once are kept below.
-#include <gtest/gtest.h>
-
-#include <cstdio>
-#include <cstdlib>
 #include <ostream>
 
 #include "pipeline/contract/errors.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/random_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

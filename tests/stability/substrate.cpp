@@ -1,9 +1,5 @@
 /// Hard cases of every model, and what none of them takes.
-#include <gtest/gtest.h>
 #include <sys/resource.h>
-
-#include <algorithm>
-#include <fstream>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
@@ -19,6 +15,7 @@
 #include "tests/support/hard_case.h"
 #include "tests/support/substrate_scene.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::substrate {
 namespace {

@@ -1,19 +1,12 @@
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <memory>
-#include <numbers>
-
+#include "segment/beads/track.h"
 #include "mbtfm/tractions/field_of_adhesions.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/stage/parameters.h"
 #include "segment/beads/given_field.h"
 #include "segment/beads/plane.h"
-#include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 #include "tests/support/hard_case.h"
+#include "tests/support/test.h"
 #include "tests/support/tracked_cell.h"
 
 namespace mbtfm::beads {

@@ -1,14 +1,9 @@
 /// A pair of bead images whose displacement is known exactly.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <random>
-#include <vector>
-
 #include "pipeline/contract/geometry.h"
 #include "segment/images/image.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,11 +1,8 @@
 /// Beads in a gel's volume, below a surface that is known.
 #pragma once
 
-#include <functional>
-#include <random>
-#include <vector>
-
 #include "pipeline/contract/geometry.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,13 +1,8 @@
 /// Small charts of a study as stand-alone SVG: panels side by side, lines with points.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <string>
-#include <vector>
-
 #include "pipeline/charts/chart.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -4,12 +4,9 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <array>
-#include <cmath>
-#include <map>
-#include <numbers>
 
 #include "substrate/curved/mesh.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

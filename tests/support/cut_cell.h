@@ -1,12 +1,6 @@
 /// A simulated cell seen through a smaller image than it: what is left of the segmentation, and what is not seen.
 #pragma once
 
-#include <algorithm>
-#include <array>
-#include <map>
-#include <optional>
-#include <utility>
-
 #include "mbtfm/tensions/beyond_cut.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
@@ -15,6 +9,7 @@
 #include "segment/cells/hand_drawn.h"
 #include "substrate/greens/models.h"
 #include "substrate/loads.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,16 +1,10 @@
 /// Fibres that experts drew on a real cell, and how well a segmentation agrees with them.
 #pragma once
 
-#include <cmath>
-#include <filesystem>
-#include <map>
-#include <numbers>
-#include <string>
-#include <vector>
-
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/files/csv.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,16 +1,12 @@
 /// Images with known content: ellipses and lines with blurred rims on an even ground, camera noise.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <random>
-
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/polyline.h"
 #include "segment/images/image.h"
 #include "tests/support/segmentation_score.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -2,15 +2,11 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <algorithm>
-#include <cstdint>
-#include <functional>
-#include <random>
-#include <vector>
 
 #include "mbtfm/plan/adhesion_pair.h"
 #include "substrate/greens/half_space.h"
 #include "substrate/greens/inside.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -3,14 +3,11 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <cmath>
-#include <numbers>
-#include <random>
-#include <vector>
 
 #include "pipeline/contract/beads.h"
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

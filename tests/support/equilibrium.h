@@ -1,11 +1,8 @@
 /// What holds of every equilibrium of cables.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include "network/cables/cables.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

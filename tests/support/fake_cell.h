@@ -1,17 +1,12 @@
 /// Cell folders with files of the right form and invented values, to test what reads them without running the stages.
 #pragma once
 
-#include <algorithm>
-#include <filesystem>
-#include <map>
-#include <numbers>
-#include <random>
-
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

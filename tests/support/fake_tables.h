@@ -1,13 +1,11 @@
 /// The files of a small made-up cell, for tests of their readers.
 #pragma once
 
-#include <filesystem>
-#include <vector>
-
 #include "pipeline/contract/network.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

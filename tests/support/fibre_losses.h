@@ -1,12 +1,9 @@
 /// Which true fibres a segmentation misses, breaks or takes for another type, and what is special where it does.
 #pragma once
 
-#include <cstdio>
-#include <map>
-#include <string>
-
 #include "pipeline/contract/polyline.h"
 #include "tests/support/segmentation_accuracy.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -2,20 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <functional>
 #include <nlohmann/json.hpp>
-#include <numbers>
-#include <string>
-#include <vector>
 
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/files/csv.h"
 #include "samples/gels/field.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 

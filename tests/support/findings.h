@@ -2,15 +2,8 @@
 /// of each kind that a test sees it fire, and sees it silent.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <optional>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include "pipeline/contract/findings.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,14 +1,10 @@
 /// Tractions on a flat half-space, whose answer is a closed form: reconstructions in space without finite elements.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <random>
-#include <vector>
-
 #include "mbtfm/spatial/observed.h"
 #include "mbtfm/spatial/problem.h"
 #include "substrate/greens/inside.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

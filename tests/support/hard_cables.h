@@ -1,12 +1,9 @@
 /// The hard cases of the cable network, as scenes, which the stability tests solve.
 #pragma once
 
-#include <numbers>
-#include <string>
-#include <vector>
-
 #include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,10 +1,7 @@
 /// Lines of the catalogue of hard cases (docs/developers/hard-cases.md), recorded with a test's result.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <cstdio>
-#include <string>
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,14 +1,9 @@
 /// Cells that are hard to mesh, by name. Squares of 12 um or what is drawn in them.
 #pragma once
 
-#include <cmath>
-#include <numbers>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

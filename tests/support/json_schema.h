@@ -1,15 +1,10 @@
 /// The JSON files of a cell against the schemas of docs/ (python3-jsonschema).
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <cstdlib>
-#include <filesystem>
-#include <string>
-
 #include "pipeline/files/text.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

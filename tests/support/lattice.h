@@ -1,13 +1,9 @@
 /// Regular triangular cable lattices with straight fibres and random adhesions: networks of any size from a seed.
 #pragma once
 
-#include <cmath>
-#include <random>
-#include <utility>
-#include <vector>
-
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/network.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

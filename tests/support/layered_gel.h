@@ -6,12 +6,10 @@
 #pragma once
 
 #include <Eigen/LU>
-#include <cmath>
-#include <numbers>
-#include <utility>
 
 #include "pipeline/numerics/quadrature.h"
 #include "substrate/greens/half_space.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

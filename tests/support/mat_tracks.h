@@ -4,12 +4,8 @@
 
 #include <zlib.h>
 
-#include <cstdint>
-#include <cstring>
-#include <string>
-#include <vector>
-
 #include "pipeline/contract/geometry.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,12 +1,9 @@
 /// Triangle meshes as other programs write them.
 #pragma once
 
-#include <cstdint>
-#include <cstring>
-#include <string>
-
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/surface.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,14 +1,10 @@
 /// Image correlation in windows, for comparison: what it does itself, and what it would make of tracked beads.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <random>
-#include <vector>
-
 #include "segment/beads/coarse_field.h"
 #include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

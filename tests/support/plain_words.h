@@ -1,11 +1,9 @@
 /// Words that people whose language is another one trip over, and that no page needs (CONTRIBUTING.md, "Plain words").
 #pragma once
 
-#include <array>
 #include <regex>
-#include <sstream>
-#include <string>
-#include <vector>
+
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

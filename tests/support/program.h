@@ -3,13 +3,10 @@
 
 #include <sys/wait.h>
 
-#include <cstdlib>
-#include <filesystem>
-#include <string>
-
 #include "pipeline/files/text.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,15 +1,9 @@
 /// Segmented cells at random: any outline, adhesions and fibres a segmentation may give, valid by `check`.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <numbers>
-#include <random>
-#include <vector>
-
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -2,21 +2,13 @@
 /// laboratories have; and what must hold of the chain's answer whatever the scene.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <filesystem>
-#include <random>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/report/compare.h"
 #include "tests/support/program.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

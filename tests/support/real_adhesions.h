@@ -2,20 +2,13 @@
 /// with its labels (Berginski et al. 2011), noisy live cells with masks drawn by hand, a doublet with its outline.
 #pragma once
 
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <map>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "pipeline/contract/cell.h"
 #include "segment/cells/adhesions.h"
 #include "segment/cells/outline.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/folders.h"
 #include "tests/support/segmentation_score.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,14 +1,10 @@
 /// The independent reference networks of tests/data/reference/network: each held vertex is an adhesion of its own.
 #pragma once
 
-#include <filesystem>
-#include <set>
-#include <string>
-#include <vector>
-
 #include "pipeline/contract/network.h"
 #include "pipeline/files/csv.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,15 +1,13 @@
 /// Simulated cells seen through a microscope of a given quality, and how well a segmentation finds what is in them.
 #pragma once
 
-#include <map>
-#include <string>
-
 #include "pipeline/stage/parameters.h"
 #include "samples/drawing/draw.h"
 #include "samples/drawing/render.h"
 #include "samples/drawing/scenario.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/segmentation_score.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

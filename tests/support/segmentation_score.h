@@ -1,13 +1,9 @@
 /// How well a segmentation finds what is known to be there.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <vector>
-
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,10 +1,8 @@
 /// Settings of studies from their command lines.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "pipeline/stage/parameters.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,17 +1,11 @@
 /// Sheets of the reference values, and how far a solution is from them.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <numbers>
-#include <string>
-#include <vector>
-
 #include "continuum/sheet/on_springs.h"
 #include "continuum/sheet/recovery.h"
 #include "pipeline/files/csv.h"
 #include "tests/support/folders.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -2,12 +2,9 @@
 /// damage and chance make of it. In memory, and as folders.
 #pragma once
 
-#include <algorithm>
-#include <sstream>
-#include <string>
-
 #include "pipeline/files/sheet_files.h"
 #include "tests/support/simulated_study.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

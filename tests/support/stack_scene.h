@@ -1,13 +1,9 @@
 /// Small stacks of beads with known places, and beads without pictures.
 #pragma once
 
-#include <cmath>
-#include <functional>
-#include <random>
-#include <vector>
-
 #include "samples/drawing/stack.h"
 #include "segment/stacks/match.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,13 +1,8 @@
 /// Scenes and measures for tests of the substrate.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <random>
-#include <vector>
-
 #include "substrate/compliance.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

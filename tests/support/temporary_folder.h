@@ -2,10 +2,9 @@
 #pragma once
 
 #include <unistd.h>
-
-#include <filesystem>
-#include <string>
 #include <system_error>
+
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -2,11 +2,6 @@
 #pragma once
 
 #include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
-#include <map>
-#include <numbers>
-#include <random>
 
 #include "mbtfm/tensions/ensemble.h"
 #include "network/cables/cables.h"
@@ -14,6 +9,7 @@
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
 #include "tests/support/reference_network.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

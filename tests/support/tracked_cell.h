@@ -1,14 +1,10 @@
 /// Bead images of simulated cells, and what became of the beads in them.
 #pragma once
 
-#include <algorithm>
-#include <map>
-#include <string>
-#include <vector>
-
 #include "samples/drawing/render.h"
 #include "samples/experiment/experiment.h"
 #include "segment/beads/plane.h"
+#include "tests/support/test.h"
 #include "tests/support/tracking_accuracy.h"
 
 namespace mbtfm::test {

@@ -1,11 +1,9 @@
 /// How far tracked beads are from the truth.
 #pragma once
 
-#include <cstdio>
-#include <string>
-
 #include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -2,18 +2,12 @@
 /// (tests/data/reference/tractions, made by an independent program).
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <numeric>
-#include <string>
-#include <vector>
 
 #include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/files/csv.h"
 #include "substrate/surface/formula.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -1,15 +1,8 @@
 /// What must hold of every generated network.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <map>
-#include <set>
-#include <tuple>
-#include <vector>
-
 #include "network/mesh/mesh.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

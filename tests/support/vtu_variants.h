@@ -7,8 +7,7 @@
 #include <vtkXMLUnstructuredGridReader.h>
 #include <vtkXMLUnstructuredGridWriter.h>
 
-#include <string>
-#include <vector>
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

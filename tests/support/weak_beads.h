@@ -1,13 +1,9 @@
 /// Bead images as no bead tracker likes them: weak, dense, blurred, on a mottled ground, in eight bits.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <random>
-#include <vector>
-
 #include "segment/beads/plane.h"
 #include "tests/support/bead_pair.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

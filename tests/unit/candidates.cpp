@@ -1,17 +1,10 @@
 #include "segment/cells/candidates.h"
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-
 #include "pipeline/contract/errors.h"
 #include "segment/cells/fibre_ends.h"
 #include "segment/cells/mask.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

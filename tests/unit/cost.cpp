@@ -1,10 +1,3 @@
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <set>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/cost/accuracy.h"
 #include "pipeline/cost/presets.h"
@@ -15,6 +8,7 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/settings.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::cost {
 namespace {

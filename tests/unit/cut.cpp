@@ -1,8 +1,4 @@
 /// Where the image's border cuts a cell: outline, fibres, files, the network's held vertices.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "network/mesh/mesh.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv_files.h"
@@ -11,6 +7,7 @@
 #include "segment/cells/fibre_ends.h"
 #include "segment/cells/outline.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

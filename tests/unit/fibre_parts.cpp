@@ -1,16 +1,10 @@
 /// The parts of the fibre finder: what lies beside fibres, what a faint end leads to, what counts as texture.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <random>
-
 #include "segment/cells/bright_actin.h"
 #include "segment/cells/fibre_ends.h"
 #include "segment/cells/fibre_significance.h"
 #include "segment/cells/fibres.h"
 #include "segment/cells/ridge.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -1,13 +1,8 @@
 /// Fibres in pieces, and parts of them that another line took over. On responses that are made by hand: a pixel is a
 /// unit of length, and the texture has a deviation of 1.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <functional>
-
 #include "segment/cells/take_over.h"
 #include "segment/cells/trace_join.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -1,14 +1,10 @@
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,9 +1,5 @@
 
-#include <gtest/gtest.h>
-
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
@@ -11,6 +7,7 @@
 #include "pipeline/files/json.h"
 #include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

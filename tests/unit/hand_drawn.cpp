@@ -1,14 +1,10 @@
 #include "segment/cells/hand_drawn.h"
-
-#include <gtest/gtest.h>
-
-#include <numbers>
-
 #include "pipeline/contract/errors.h"
 #include "segment/cells/cell_rois.h"
 #include "segment/cells/ellipse.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -1,21 +1,15 @@
-#include "segment/images/image.h"
-
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <tiffio.h>
 
-#include <algorithm>
-#include <cstring>
-#include <fstream>
-#include <sstream>
-
 #include "pipeline/contract/errors.h"
 #include "segment/images/channels.h"
+#include "segment/images/image.h"
 #include "segment/images/image_file.h"
 #include "segment/images/png.h"
 #include "tests/support/findings.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::images {
 namespace {

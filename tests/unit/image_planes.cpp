@@ -1,13 +1,11 @@
 /// Which plane of a file is read. Each page of the files made here is filled with its own number.
-#include <gtest/gtest.h>
 #include <tiffio.h>
-
-#include <fstream>
 
 #include "pipeline/contract/errors.h"
 #include "segment/images/image.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::images {
 namespace {

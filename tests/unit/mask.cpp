@@ -1,14 +1,9 @@
 #include "segment/cells/mask.h"
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <numbers>
-
 #include "pipeline/contract/errors.h"
 #include "segment/cells/ellipse.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -1,17 +1,14 @@
-#include "pipeline/files/names.h"
-
-#include <gtest/gtest.h>
-
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/json.h"
+#include "pipeline/files/names.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/memory.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

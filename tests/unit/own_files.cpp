@@ -1,15 +1,12 @@
-#include "pipeline/files/own_files.h"
-
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 
-#include <functional>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/json_record.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,16 +1,9 @@
-#include "pipeline/numerics/parallel.h"
-
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
-
-#include <algorithm>
-#include <chrono>
-#include <numeric>
-#include <stdexcept>
-#include <string>
 #include <thread>
-#include <vector>
+
+#include "pipeline/numerics/parallel.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

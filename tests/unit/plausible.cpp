@@ -1,11 +1,7 @@
 #include "pipeline/stage/plausible.h"
-
-#include <gtest/gtest.h>
-
-#include <functional>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/stage/parameters.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,8 +1,5 @@
 #include "pipeline/contract/polyline.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

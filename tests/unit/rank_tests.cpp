@@ -1,12 +1,8 @@
 /// Expected values: the examples in SciPy's documentation of scipy.stats.kruskal and mannwhitneyu, and by hand.
 #include "pipeline/statistics/rank_tests.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/statistics/descriptive.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::statistics {
 namespace {

@@ -1,15 +1,11 @@
-#include "segment/rois/roi.h"
-
-#include <gtest/gtest.h>
-
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/text.h"
+#include "segment/rois/roi.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::rois {
 namespace {

@@ -1,11 +1,5 @@
 /// The runner on stages that are shell scripts: which it runs, which it leaves, what it says.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <chrono>
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
@@ -21,6 +15,7 @@
 #include "pipeline/runner/verify.h"
 #include "pipeline/stage/effects.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::runner {
 namespace {

@@ -1,14 +1,6 @@
-#include "pipeline/stage/stage.h"
-
-#include <gtest/gtest.h>
-
 #include <unistd.h>
-
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cstdlib>
 #include <new>
-#include <stdexcept>
 #include <system_error>
 
 #include "pipeline/contract/report.h"
@@ -16,9 +8,11 @@
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/manual.h"
 #include "pipeline/stage/parameters.h"
+#include "pipeline/stage/stage.h"
 #include "pipeline/stage/suggest.h"
 #include "tests/support/findings.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

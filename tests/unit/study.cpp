@@ -1,12 +1,4 @@
 #include "pipeline/statistics/study.h"
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <functional>
-#include <map>
-#include <set>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
@@ -20,6 +12,7 @@
 #include "tests/support/fake_cell.h"
 #include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::statistics {
 namespace {

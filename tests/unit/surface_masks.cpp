@@ -1,14 +1,9 @@
 /// The surface of a gel from masks.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <numbers>
-
 #include "pipeline/contract/errors.h"
 #include "substrate/surface/points.h"
 #include "substrate/surface/voxels.h"
 #include "tests/support/hard_case.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {

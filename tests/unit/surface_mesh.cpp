@@ -1,17 +1,11 @@
 /// The gel's surface from meshes of triangles in the files of other programs.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <numbers>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/triangle_mesh.h"
 #include "substrate/surface/mesh.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {

@@ -1,18 +1,11 @@
 /// Surfaces of a gel from formulas, height maps and points.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <numbers>
-#include <random>
-
 #include "pipeline/contract/errors.h"
 #include "substrate/surface/formula.h"
 #include "substrate/surface/height.h"
 #include "substrate/surface/missing.h"
 #include "substrate/surface/points.h"
 #include "tests/support/hard_case.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {

@@ -1,10 +1,6 @@
 /// The best way on of a line, on responses that are made by hand: a pixel is a unit of length.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-
 #include "segment/cells/ways.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

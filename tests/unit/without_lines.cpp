@@ -1,9 +1,6 @@
 /// Images without their lines: what is left shows the lines that were hidden.
 #include "segment/cells/without_lines.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
+#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {
