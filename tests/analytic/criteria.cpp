@@ -277,8 +277,7 @@ Loaded loaded(int n_beads, int n_loads) {
   for (double& g : scene.G.reshaped()) g = normal(random);
   for (int i = 0; i < n_beads; ++i) {
     const double x = normal(random), y = normal(random);
-    scene.beads.push_back(
-        {.position_um = {1.0 * i, 0}, .displacement_um = {x, y}, .sigma_um = 1 + 0.1 * i, .flag = {}});
+    scene.beads.push_back({.position_um = {1.0 * i, 0}, .displacement_um = {x, y}, .sigma_um = 1 + 0.1 * i});
   }
   return scene;
 }

@@ -162,7 +162,7 @@ TEST(InsideOfTheGel, an_ellipse_is_the_mean_of_its_point_forces) {
 
 TEST(InsideOfTheGel, below_an_ellipse_the_field_tends_to_that_of_its_surface) {
   const Gel gel = gel_of(10, 0.45, 20);
-  const substrate::Ellipse ellipse{.centre_um = {}, .semi_major_um = 1.5, .semi_minor_um = 0.5, .angle_rad = 0.7};
+  const substrate::Ellipse ellipse{.semi_major_um = 1.5, .semi_minor_um = 0.5, .angle_rad = 0.7};
   const EllipseInside field(gel, nullptr, ellipse);
   for (const Vec2 point : {Vec2{0, 0}, Vec2{0.9, 0.8}, Vec2{2, -3}}) {
     const Eigen::Matrix3d surface = field.compliance_um_per_nN(point, 0);

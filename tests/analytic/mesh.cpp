@@ -166,8 +166,7 @@ TEST(Mesh, second_neighbours_of_a_regular_triangulation_pull_evenly_in_twelve_di
   for (int j = -3; j <= 3; ++j) {
     for (int i = std::max(-3, -3 - j); i <= std::min(3, 3 - j); ++i) points.push_back(i * along + j * up);
   }
-  RelaxedMesh mesh{
-      .points_um = points, .triangulation = {}, .size_um = std::vector<double>(points.size(), 1), .report = {}};
+  RelaxedMesh mesh{.points_um = points, .size_um = std::vector<double>(points.size(), 1)};
   std::vector<Vec2> hull = {{3, 0}, 3 * up, 3 * (up - along), {-3, 0}, -3 * up, -3 * (up - along)};
   Frame frame{.size = SizeField(1, 0.3, hull)};
   const auto at = [&](Vec2 p) {
@@ -178,7 +177,7 @@ TEST(Mesh, second_neighbours_of_a_regular_triangulation_pull_evenly_in_twelve_di
     for (int k = 0; k < 3; ++k) {
       const Vec2 step = (1.0 / 3) * (hull[(side + 1) % 6] - hull[side]);
       const auto [a, b] = std::minmax({at(hull[side] + k * step), at(hull[side] + (k + 1) * step)});
-      frame.segments.push_back({.vertex_a = a, .vertex_b = b, .fibre_ids = {}, .outline_count = 1});
+      frame.segments.push_back({.vertex_a = a, .vertex_b = b, .outline_count = 1});
     }
   }
   mesh.triangulation = *triangulate(points, frame.segments);

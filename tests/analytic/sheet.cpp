@@ -50,7 +50,7 @@ TEST(Curve, a_loop_is_found_and_a_neighbour_is_none) {
 }
 
 TEST(Sheet, triangles_beyond_all_memory_are_counted_and_refused_before_any_is_made) {
-  const sheet::Region disc{.rims = {sheet::Curve(test::circle(25))}, .lines = {}};
+  const sheet::Region disc{.rims = {sheet::Curve(test::circle(25))}};
   const sheet::TriangleSize size{.at_curves_um = 1e-9, .largest_um = 5, .growth = 0.13};
   // a side of 1e-9 um: 1.6e11 of them around the rim
   EXPECT_GT(sheet::expected_triangles(disc, size), 1e11);

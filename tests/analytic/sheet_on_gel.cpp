@@ -27,7 +27,7 @@ DiscOnGel disc_of(const files::CsvTable& csv, int row, double finer = 1) {
   const auto value = [&](const char* column) {
     return csv.text(row, column) == "inf" ? std::numeric_limits<double>::infinity() : csv.number(row, column);
   };
-  DiscOnGel disc{.radius_um = value("radius_um"), .scene = {}, .gel = {}};
+  DiscOnGel disc{.radius_um = value("radius_um")};
   disc.gel = {value("gel_E_kPa"), value("gel_nu"), std::min(kThick_um, value("gel_thickness_um"))};
   disc.scene.region.rims.emplace_back(test::circle(disc.radius_um));
   disc.scene.material = {value("E_kPa"), value("nu"), value("h_um")};
@@ -140,7 +140,7 @@ TEST(SheetOnGel, halved_triangles_err_by_two_thirds_or_less) {
 
 /// Patches of very different sizes, on a layer; each held as all pairs and by the lattice.
 TEST(SheetOnGel, the_lattice_answers_as_all_pairs_of_patches_do) {
-  DiscOnGel disc{.radius_um = 25, .scene = {}, .gel = {8.4, 0.49, 30}};
+  DiscOnGel disc{.radius_um = 25, .gel = {8.4, 0.49, 30}};
   disc.scene.region.rims.emplace_back(test::ring([](double t) { return 25 * (1 + 0.3 * std::cos(3 * t)); }, 360));
   disc.scene.material = {1, 0.5, 4};
   disc.scene.size = {.at_curves_um = 1.2, .largest_um = 6, .growth = 0.9};
@@ -218,7 +218,7 @@ TEST(SheetOnGel, on_a_rigid_gel_large_strains_are_those_on_springs) {
 
 /// Of a sheet without symmetry, bonded to a soft gel.
 TEST(SheetOnGel, large_strains_are_small_ones_in_the_limit_and_in_balance_where_the_sheet_has_moved_to) {
-  DiscOnGel made{.radius_um = 25, .scene = {}, .gel = {1, 0.45, 60}};
+  DiscOnGel made{.radius_um = 25, .gel = {1, 0.45, 60}};
   made.scene.region.rims.emplace_back(
       test::ring([](double t) { return 25 * (1 + 0.25 * std::cos(3 * t) + 0.1 * std::sin(t)); }, 360));
   made.scene.material = {2, 0.4, 4};
@@ -255,8 +255,7 @@ TEST(SheetOnGel, other_outlines_are_within_the_error_of_the_independent_solution
     const auto radius = [=](double t) {
       return is_ellipse ? 30 * 18 / std::hypot(18 * std::cos(t), 30 * std::sin(t)) : 26 * (1 + 0.3 * std::cos(2 * t));
     };
-    DiscOnGel made{
-        .radius_um = 26, .scene = {}, .gel = {value("gel_E_kPa"), value("gel_nu"), value("gel_thickness_um")}};
+    DiscOnGel made{.radius_um = 26, .gel = {value("gel_E_kPa"), value("gel_nu"), value("gel_thickness_um")}};
     made.scene.region.rims.emplace_back(test::ring(radius, 360));
     made.scene.material = {value("E_kPa"), value("nu"), value("h_um")};
     made.scene.contraction.nN_per_um = value("s_nN_per_um");
@@ -290,7 +289,7 @@ TEST(SheetOnGel, springs_stand_for_a_gel_where_beta_says_so_and_only_there) {
     const GroundChoice choice = decide_ground(std::nullopt, material, kappa, gel);
     EXPECT_EQ(choice.ground, beta > kLargestBeta ? Ground::gel : Ground::springs) << beta;
     EXPECT_EQ(choice.effect.is_on, beta > kLargestBeta);
-    DiscOnGel disc{.radius_um = 25, .scene = {}, .gel = gel};
+    DiscOnGel disc{.radius_um = 25, .gel = gel};
     disc.scene.region.rims.emplace_back(test::circle(25));
     disc.scene.material = material;
     disc.scene.contraction.nN_per_um = 1;

@@ -106,8 +106,7 @@ Setting setting_of(const files::CsvTable& table, int row) {
           .slab = {number("gel_thickness_um"), number("gel_radius_um")},
           .gel_poisson_ratio = number("gel_nu"),
           .depths_um = {0, 2, 5, 15},
-          .strain = Strain::small,
-          .fineness = {}};
+          .strain = Strain::small};
 }
 
 TEST(Solids, a_section_of_a_sphere_presses_into_its_gel_as_an_independent_program_has_it) {

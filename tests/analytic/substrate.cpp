@@ -90,7 +90,7 @@ TEST(Layer, beyond_its_reach_nothing_is_left_of_the_half_spaces_field) {
   const Gel gel{.youngs_modulus_kPa = 5, .poisson_ratio = 0.3, .thickness_um = 2};
   const greens::Layer layer(gel);
   const greens::LayerVertical vertical(gel);
-  const Ellipse disc{.centre_um = {}, .semi_major_um = 0.5, .semi_minor_um = 0.5, .angle_rad = 0};
+  const Ellipse disc{.semi_major_um = 0.5, .semi_minor_um = 0.5, .angle_rad = 0};
   for (const double thicknesses : {39.0, 41.0, 200.0}) {
     const double r = thicknesses * gel.thickness_um;
     const Vec2 offset = r * Vec2{std::cos(0.7), std::sin(0.7)};
@@ -214,7 +214,7 @@ TEST(HalfSpace, a_hertz_like_patch_moves_the_surface_by_the_known_values) {
       const double s = 0.5 * (1 + gauss.nodes[k]);
       const double radius = a * std::sqrt(1 - s * s);
       const double share = 0.5 * gauss.weights[k] * 1.5 * (1 - s * s);
-      const Ellipse disc = {.centre_um = {}, .semi_major_um = radius, .semi_minor_um = radius, .angle_rad = 0};
+      const Ellipse disc = {.semi_major_um = radius, .semi_minor_um = radius, .angle_rad = 0};
       sum += share * force * greens::HalfSpaceEllipse(gel, disc).compliance_um_per_nN({x, y});
     }
     // the values have six decimals; the stack's kink where a disc's rim passes the point errs by about 1/200² of 0.4
@@ -240,7 +240,7 @@ TEST(HalfSpace, series_of_an_ellipse_errs_as_the_sixth_power_of_its_size_over_th
 }
 
 TEST(HalfSpace, far_from_an_ellipse_its_field_is_a_point_force) {
-  const Ellipse ellipse = {.centre_um = {}, .semi_major_um = 1, .semi_minor_um = 0.4, .angle_rad = 1};
+  const Ellipse ellipse = {.semi_major_um = 1, .semi_minor_um = 0.4, .angle_rad = 1};
   // the next term is the second moment, (a/r)²/4 times a second derivative's factor of at most 2
   for (const double r : {10.0, 100.0, 1000.0}) {
     const Vec2 point = {0.6 * r, -0.8 * r};

@@ -199,8 +199,7 @@ TEST(NoiseLevel, is_the_standard_deviation_of_a_component_far_from_the_cell_what
       const double angle = 0.01 * i, radius = i < n_far ? 40 : 5;
       const double x = noise(random), y = noise(random);
       beads.push_back({.position_um = radius * Vec2{std::cos(angle), std::sin(angle)},
-                       .displacement_um = {x + (i < n_far && i % 10 == 0 ? astray : 0), y + (i < n_far ? 0 : 1)},
-                       .flag = {}});
+                       .displacement_um = {x + (i < n_far && i % 10 == 0 ? astray : 0), y + (i < n_far ? 0 : 1)}});
     }
     const LinearData data = reduce(beads, Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(beads.size()), 2));
     return noise_level(beads, data, Eigen::VectorXd::Zero(2), outline, 10).sigma_um;

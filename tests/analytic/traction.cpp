@@ -25,7 +25,7 @@ TractionParameters half_space(TractionMethod method = TractionMethod::fttc) {
 }
 
 TractionInputs inputs_of(const EllipseScene& scene) {
-  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions, .outline_um = {}};
+  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions};
 }
 
 std::vector<Vec2> forces_of(const Reconstruction& r) {
@@ -74,7 +74,7 @@ TEST(SurfaceSpectrum, its_waves_add_up_to_the_field_of_a_loaded_disc) {
   // envelope); the images are 30 thicknesses away.
   for (const double nu : {0.0, 0.3, 0.4999}) {
     const Gel gel{.youngs_modulus_kPa = 5, .poisson_ratio = nu, .thickness_um = 4};
-    const Lattice lattice{.origin_um = {}, .spacing_um = 0.25, .n_columns = 480, .n_rows = 450};
+    const Lattice lattice{.spacing_um = 0.25, .n_columns = 480, .n_rows = 450};
     const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic);
     const WaveTransform transform(lattice.n_columns, lattice.n_rows);
     const double radius = 3;
@@ -127,7 +127,7 @@ TEST(SurfaceSpectrum, a_thick_layer_is_finite_and_tends_to_the_half_space) {
 
 TEST(SurfaceSpectrum, an_even_traction_shears_a_layer_as_a_very_long_wave_does) {
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 30};
-  const Lattice lattice{.origin_um = {}, .spacing_um = 1, .n_columns = 32, .n_rows = 32};
+  const Lattice lattice{.spacing_um = 1, .n_columns = 32, .n_rows = 32};
   const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic);
   const greens::WaveCompliance longest = greens::wave_compliance(gel, GelModel::layer, 1e-6);  // of 2e5 thicknesses
   EXPECT_NEAR(spectrum.across_um_per_kPa()[0] / longest.across_um_per_kPa, 1, 1e-6);
@@ -136,7 +136,7 @@ TEST(SurfaceSpectrum, an_even_traction_shears_a_layer_as_a_very_long_wave_does) 
 
 TEST(SurfaceSpectrum, a_loaded_cell_turned_by_a_quarter_displaces_the_same_turned) {
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.45, .thickness_um = 30};
-  const Lattice lattice{.origin_um = {}, .spacing_um = 1, .n_columns = 32, .n_rows = 32};
+  const Lattice lattice{.spacing_um = 1, .n_columns = 32, .n_rows = 32};
   for (const Basis basis : {Basis::waves, Basis::cells}) {
     const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic, basis);
     const WaveTransform transform(32, 32);
@@ -168,11 +168,10 @@ TEST(LatticeProblem, states_the_variance_of_weighted_data_that_show_nothing_but_
   DisplacementField beads;
   for (int i = 0; i < kBeads; ++i) {
     const double x = place(random), y = place(random), sigma = error(random), u = normal(random), v = normal(random);
-    beads.push_back({.position_um = {x, y}, .displacement_um = {sigma * u, sigma * v}, .sigma_um = sigma, .flag = {}});
+    beads.push_back({.position_um = {x, y}, .displacement_um = {sigma * u, sigma * v}, .sigma_um = sigma});
   }
-  const LatticeProblem problem(
-      beads, {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
-      {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+  const LatticeProblem problem(beads, {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
+                               {.model = GelModel::half_space, .padding = 1.5, .basis = Basis::waves, .threads = 1});
   EXPECT_GT(static_cast<double>(problem.field().n_nodes()), 2.0 * kBeads);
   EXPECT_NEAR(problem.data_squared() / problem.n_data() / *problem.stated_variance(), 1, 4 / std::sqrt(1.0 * kBeads));
 }
@@ -232,7 +231,7 @@ TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
         const EllipseScene scene = ellipse_scene(n_side, noise, 7, 0, 64, states_errors);
         const LatticeProblem problem(
             scene.field, scene.gel,
-            {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+            {.model = GelModel::half_space, .padding = 1.5, .basis = Basis::waves, .threads = 1});
         TikhonovSolver solver(problem);
         const double chosen = chosen_lambda(scan_lambda(problem, solver), LambdaCriterion::risk);
         const auto error_at = [&](double lambda) {
@@ -424,7 +423,7 @@ TEST(AdhesionForces, of_few_beads_tell_the_noise_by_what_forces_leave_of_it) {
     inputs.beads.clear();
     for (int i = 0; i < 10; ++i) {
       const double x = place(random), y = place(random), u = noise(random), v = noise(random);
-      inputs.beads.push_back({.position_um = {x, y}, .displacement_um = {u, v}, .sigma_um = 0, .flag = {}});
+      inputs.beads.push_back({.position_um = {x, y}, .displacement_um = {u, v}, .sigma_um = 0});
     }
     const Reconstruction r = reconstruct(inputs, half_space(TractionMethod::adhesion_forces), 1);
     ASSERT_EQ(r.figures.front().first, "residual_variance_um2");
@@ -470,8 +469,7 @@ TEST(Panel, squares_that_fill_a_disc_add_up_to_it_and_far_away_to_a_point) {
   }
   const double area = kSide * kSide * static_cast<double>(squares.size());
   const double radius = std::sqrt(area / std::numbers::pi);
-  const greens::LayerEllipse disc(layer,
-                                  {.centre_um = {}, .semi_major_um = radius, .semi_minor_um = radius, .angle_rad = 0});
+  const greens::LayerEllipse disc(layer, {.semi_major_um = radius, .semi_minor_um = radius, .angle_rad = 0});
   for (const Vec2 at : {Vec2{0, 0}, {0.5, 1.1}, {5, 1}, {-9, 14}}) {
     greens::Sym2 sum;
     for (const Vec2 s : squares) sum += greens::square_compliance_um_per_kPa(layer, kSide, at - s);
@@ -521,9 +519,9 @@ TEST(DenseMethods, state_errors_that_hold_noise_penalty_and_model) {
 TEST(DenseMethods, elements_find_tractions_that_are_even_on_elements) {
   const Gel gel{.youngs_modulus_kPa = 8, .poisson_ratio = 0.45, .thickness_um = 20};
   const greens::Layer layer(gel);
-  TractionInputs inputs{.beads = {}, .gel = gel, .adhesions = {}, .outline_um = {{0, 0}, {12, 0}, {12, 9}, {0, 9}}};
+  TractionInputs inputs{.gel = gel, .outline_um = {{0, 0}, {12, 0}, {12, 9}, {0, 9}}};
   for (const Vec2 p : test::scattered_points(600, 14, {6, 4.5}, 3)) {
-    inputs.beads.push_back({.position_um = p, .displacement_um = {}, .sigma_um = 0, .flag = {}});
+    inputs.beads.push_back({.position_um = p, .sigma_um = 0});
   }
   std::vector<Vec2> truth;
   for (int j = 0; j < 3; ++j) {

@@ -166,8 +166,7 @@ void write_cell(const Path& folder, double angle, std::uint64_t seed, double spi
     const double pull = 0.4 * std::exp(-std::pow((norm(arm) - 25) / 8, 2));
     beads.push_back({.position_um = at,
                      .displacement_um = Vec2{noise(random), noise(random)} - (pull / norm(arm)) * arm,
-                     .sigma_um = 0.01,
-                     .flag = {}});
+                     .sigma_um = 0.01});
   }
   files::write_displacement(folder / "displacement.csv", beads);
 }
@@ -198,8 +197,7 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
   for (const int k : {1, 3}) {
     const Path cell = folder_ / ("cells/cell_" + std::to_string(k));
     const Polygon outline = files::read_outline(cell / "outline.csv").front();
-    images::Image mask{
-        .width = kSide, .height = kSide, .pixels = std::vector<float>(kSide * kSide, 0), .pixel_size_um = {}};
+    images::Image mask{.width = kSide, .height = kSide, .pixels = std::vector<float>(kSide * kSide, 0)};
     for (int j = 0; j < kSide; ++j)
       for (int i = 0; i < kSide; ++i)
         if (contains(outline, 0.25 * Vec2{i + 0.5, j + 0.5})) mask.at(i, j) = 255;
@@ -274,7 +272,7 @@ TEST_F(Continuum, cells_are_laid_onto_each_other_by_images_that_their_settings_n
   // the outline of one is a mask with a name of its own
   const Path last = folder_ / "cells/cell_3";
   const Polygon outline = files::read_outline(last / "outline.csv").front();
-  images::Image mask{.width = 480, .height = 480, .pixels = std::vector<float>(480 * 480, 0), .pixel_size_um = {}};
+  images::Image mask{.width = 480, .height = 480, .pixels = std::vector<float>(480 * 480, 0)};
   for (int j = 0; j < 480; ++j)
     for (int i = 0; i < 480; ++i)
       if (contains(outline, 0.25 * Vec2{i + 0.5, j + 0.5})) mask.at(i, j) = 255;

@@ -58,15 +58,11 @@ TEST(OthersData, tractions_of_a_monolayer_are_those_of_the_program_that_publishe
   const fs::path folder = kData / "beads/mdck_pdms_bism/reference";
   if (!fs::exists(folder)) GTEST_SKIP() << "no ../shared/data here";
   for (const char* frame : {"1", "2"}) {
-    TractionInputs inputs{.beads = {},
-                          .gel = {.youngs_modulus_kPa = 15, .poisson_ratio = 0.499999, .thickness_um = 1e6},
-                          .adhesions = {},
-                          .outline_um = {}};
+    TractionInputs inputs{.gel = {.youngs_modulus_kPa = 15, .poisson_ratio = 0.499999, .thickness_um = 1e6}};
     for (const auto& row : read_rows(folder / ("PIV" + std::string(frame) + ".txt"), 4)) {
       inputs.beads.push_back({.position_um = {0.64 * row[0], 0.64 * row[1]},
                               .displacement_um = {0.64 * row[2], 0.64 * row[3]},
-                              .sigma_um = 0,
-                              .flag = {}});
+                              .sigma_um = 0});
     }
     std::vector<Vec2> published;
     for (const auto& row : read_rows(folder / ("Traction_PIV" + std::string(frame) + ".txt"), 5)) {
@@ -99,16 +95,12 @@ TEST(OthersData, discs_of_a_synthetic_cell_carry_their_tractions) {
   const fs::path folder = kData / "displacement/easytfm_synthetic";
   if (!fs::exists(folder)) GTEST_SKIP() << "no ../shared/data here";
   constexpr double kPixel_um = 0.1;
-  TractionInputs inputs{.beads = {},
-                        .gel = {.youngs_modulus_kPa = 10, .poisson_ratio = 0.3, .thickness_um = 1e6},
-                        .adhesions = {},
-                        .outline_um = {}};
+  TractionInputs inputs{.gel = {.youngs_modulus_kPa = 10, .poisson_ratio = 0.3, .thickness_um = 1e6}};
   const files::CsvTable field(folder / "converted_frame1.csv");
   for (int row = 0; row < field.n_rows(); ++row) {
     inputs.beads.push_back({.position_um = kPixel_um * Vec2{field.number(row, "x_px"), field.number(row, "y_px")},
                             .displacement_um = kPixel_um * Vec2{field.number(row, "u_px"), field.number(row, "v_px")},
-                            .sigma_um = 0,
-                            .flag = {}});
+                            .sigma_um = 0});
   }
   const files::CsvTable discs(folder / "derived_discs_frame1.csv");
   for (int row = 0; row < discs.n_rows(); ++row) {
@@ -202,15 +194,10 @@ Colony read_colony(const fs::path& folder, const std::string& name) {
   const auto read = [&](const char* what) { return read_npy(folder / (name + what)); };
   const Grid u = read("_u.npy"), v = read("_v.npy"), tx = read("_tx.npy"), ty = read("_ty.npy");
   const images::Image mask = images::read_image(folder / (name + "_mask.png"));
-  Colony colony{.inputs = {.beads = {},
-                           .gel = {.youngs_modulus_kPa = 49, .poisson_ratio = 0.49, .thickness_um = 300},
-                           .adhesions = {},
-                           .outline_um = {}},
+  Colony colony{.inputs = {.gel = {.youngs_modulus_kPa = 49, .poisson_ratio = 0.49, .thickness_um = 300}},
                 .n_rows = u.n_rows,
                 .n_columns = u.n_columns,
                 .step_um = kCameraPixel_um * mask.width / u.n_columns,
-                .published_kPa = {},
-                .is_on_colony = {},
                 .area_um2 = 0};
   const std::vector<bool> force_area = enclosed(mask, 1), cells = enclosed(mask, 3);
   colony.area_um2 =
@@ -220,8 +207,7 @@ Colony read_colony(const fs::path& folder, const std::string& name) {
       const auto at = static_cast<std::size_t>(j * u.n_columns + i);
       colony.inputs.beads.push_back({.position_um = colony.step_um * Vec2{i + 0.5, j + 0.5},
                                      .displacement_um = kCameraPixel_um * Vec2{u.values[at], v.values[at]},
-                                     .sigma_um = 0,
-                                     .flag = {}});
+                                     .sigma_um = 0});
       colony.published_kPa.push_back(0.001 * Vec2{tx.values[at], ty.values[at]});
       const int x = static_cast<int>((i + 0.5) * mask.width / u.n_columns);
       const int y = static_cast<int>((j + 0.5) * mask.height / u.n_rows);
@@ -312,7 +298,7 @@ TEST(OthersData, tractions_of_colonies_are_those_of_the_program_that_published_t
 /// The closed line of a label as an outline.
 sheet::Region region_enclosed(const images::Image& mask, float label) {
   const std::vector<bool> is_inside = enclosed(mask, label);
-  cells::LabelMask filled{.name = "mask", .width = mask.width, .height = mask.height, .labels = {}};
+  cells::LabelMask filled{.name = "mask", .width = mask.width, .height = mask.height};
   for (const bool inside : is_inside) filled.labels.push_back(inside ? 1 : 0);
   Polygon ring;
   double largest = 0;
@@ -328,7 +314,7 @@ sheet::Region region_enclosed(const images::Image& mask, float label) {
 /// Size of the force per length across the borders between cells, which the mask's label 3 draws.
 double mean_across_borders(const images::Image& mask, const sheet::Solution& solution) {
   const std::vector<bool> is_inside = enclosed(mask, 3);
-  cells::LabelMask parts{.name = "cells", .width = mask.width, .height = mask.height, .labels = {}, .is_binary = true};
+  cells::LabelMask parts{.name = "cells", .width = mask.width, .height = mask.height, .is_binary = true};
   for (std::size_t k = 0; k < is_inside.size(); ++k)
     parts.labels.push_back(is_inside[k] && mask.pixels[k] != 3 ? 1 : 0);
   parts = cells::with_parts_labelled(parts);

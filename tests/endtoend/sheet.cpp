@@ -125,7 +125,7 @@ TEST_F(Sheet, a_mask_is_an_outline_and_a_band_contracts_alone) {
   ASSERT_EQ(run(springs).code, 0);
   const double mean = figure("mean_tension_nN_per_um"), whole_nN = figure("total_force_nN");
   constexpr double kPixel_um = 0.25;
-  images::Image mask{.width = 240, .height = 240, .pixels = std::vector<float>(240 * 240), .pixel_size_um = {}};
+  images::Image mask{.width = 240, .height = 240, .pixels = std::vector<float>(240 * 240)};
   for (int j = 0; j < mask.height; ++j)
     for (int i = 0; i < mask.width; ++i)
       mask.at(i, j) = std::hypot(i + 0.5 - 120, j + 0.5 - 120) * kPixel_um < 25 ? 1.0F : 0.0F;
@@ -279,8 +279,7 @@ TEST_F(Sheet, one_that_expands_or_has_the_stiffness_of_a_bound_is_doubted) {
         const double r = norm(at), x = noise(random), y = noise(random);
         beads.push_back({.position_um = at,
                          .displacement_um = (r > 0 ? outward_um(r) / r : 0) * at + Vec2{x, y},
-                         .sigma_um = 0.01,
-                         .flag = {}});
+                         .sigma_um = 0.01});
       }
     }
     files::write_displacement(folder_ / "displacement.csv", beads);
@@ -576,7 +575,7 @@ TEST_F(SheetsOfImages, take_a_mask_for_the_outline_and_say_what_lacks) {
   const auto nothing = test::run_program("mbtfm run " + cell_.string());
   EXPECT_EQ(nothing.code, 3);
   EXPECT_NE(nothing.output.find("actin.tif"), std::string::npos) << nothing.output;
-  images::Image mask{.width = 480, .height = 480, .pixels = std::vector<float>(480 * 480, 0), .pixel_size_um = {}};
+  images::Image mask{.width = 480, .height = 480, .pixels = std::vector<float>(480 * 480, 0)};
   for (int j = 0; j < 480; ++j)
     for (int i = 0; i < 480; ++i)
       if (std::hypot(i + 0.5 - 240, j + 0.5 - 240) < 140) mask.at(i, j) = 255;

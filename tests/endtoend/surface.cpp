@@ -68,7 +68,7 @@ TEST_F(Surface, of_a_formula_a_table_and_its_points_is_the_same) {
 }
 
 TEST_F(Surface, of_an_image_of_heights_has_its_holes_filled_or_refused_by_place) {
-  images::Image image{.width = 80, .height = 80, .pixels = {}, .pixel_size_um = 0.5};
+  images::Image image{.width = 80, .height = 80, .pixel_size_um = 0.5};
   for (int k = 0; k < 6400; ++k)
     image.pixels.push_back(static_cast<float>(std::lround(1000 + 100 * wave({(k % 80 + 0.5) / 2 - 20, 0}))));
   images::write_tiff(file("map.tif"), image);

@@ -39,14 +39,14 @@ bool is_read(const fs::path& file, const PlaneChoice& choice = {}) {
 
 Image sample() {
   std::mt19937 random(7);
-  Image image{.width = 61, .height = 150, .pixels = {}, .pixel_size_um = 0.1, .full_scale = 0};
+  Image image{.width = 61, .height = 150, .pixel_size_um = 0.1, .full_scale = 0};
   for (int k = 0; k < image.width * image.height; ++k) image.pixels.push_back(static_cast<float>(random() % 4096));
   return image;
 }
 
 Picture speckled() {
   std::mt19937 random(3);
-  Picture picture{.width = 40, .height = 30, .rgb = {}};
+  Picture picture{.width = 40, .height = 30};
   for (int k = 0; k < 3600; ++k) picture.rgb.push_back(static_cast<std::uint8_t>(random() % 256));
   return picture;
 }

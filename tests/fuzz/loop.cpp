@@ -55,7 +55,7 @@ void on_signal(int signal) {
 }
 
 void set_clock(time_t seconds) {
-  const itimerval clock{.it_interval = {}, .it_value = {.tv_sec = seconds, .tv_usec = 0}};
+  const itimerval clock{.it_value = {.tv_sec = seconds, .tv_usec = 0}};
   setitimer(ITIMER_PROF, &clock, nullptr);
 }
 

@@ -21,10 +21,8 @@ std::vector<std::string> samples() {
        .noise_um = 0.02,
        .total_force_nN = 80,
        .converged = true,
-       .error_budget = ErrorBudget{.tensions = {{.fibre_id = 1, .tension_nN = 3, .parts_nN = {.mesh = 0.1}}},
-                                   .total_force_nN = 80,
-                                   .total_force_parts_nN = {},
-                                   .cut_force = {}},
+       .error_budget =
+           ErrorBudget{.tensions = {{.fibre_id = 1, .tension_nN = 3, .parts_nN = {.mesh = 0.1}}}, .total_force_nN = 80},
        .more = {{"loss", std::string("huber")}, {"n_beads", std::int64_t{200}}, {"is_lost", false}}});
   return {
       bytes_of(folder() / "whole.json"),

@@ -50,7 +50,7 @@ void read(std::string_view bytes) {
     fuzz::answer([&] { cells::hand_drawn_outline(set, field); });
     std::vector<Adhesion> adhesions;
     fuzz::answer([&] { adhesions = cells::hand_drawn_adhesions(set, {}, field); });
-    const cells::CellOutline cell{.outer_um = {{0, 0}, {50, 0}, {50, 40}}, .holes_um = {}};
+    const cells::CellOutline cell{.outer_um = {{0, 0}, {50, 0}, {50, 40}}};
     fuzz::answer([&] { cells::hold_fibres(cells::drawn_lines(set, {}, field, {}), adhesions, cell, {}, 1); });
     for (const rois::Roi& roi : set.rois) {
       if (rois::is_area(roi.shape)) rois::area_px(roi);

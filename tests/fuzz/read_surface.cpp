@@ -28,7 +28,7 @@ TriangleMesh height_field() {
 }
 
 std::string surface_vtp() {
-  HeightMap map{.origin_um = {-3, 4}, .spacing_um = {1.5, 2}, .n_x = kSide, .n_y = kSide, .z_um = {}, .sigma_um = {}};
+  HeightMap map{.origin_um = {-3, 4}, .spacing_um = {1.5, 2}, .n_x = kSide, .n_y = kSide};
   for (int k = 0; k < kSide * kSide; ++k) map.z_um.push_back(at(k % kSide, k / kSide).z);
   map.sigma_um.assign(map.z_um.size(), 0.25);
   put("whole.vtp", "");

@@ -47,7 +47,7 @@ TEST(CommonMotion, whatever_it_is_the_tensions_and_their_errors_stay) {
 
 TEST(CommonMotion, without_allowing_for_it_growth_is_taken_for_force) {
   TensionScene scene = test::tension_scene("case_21", 600, 0.05, 3);
-  move(scene.beads, {.shift = {}, .growth = 0.003, .centre = {}});
+  move(scene.beads, {.growth = 0.003});
   const LinearData blind = reduce(scene.beads, scene.compliance_um_per_nN), seeing = with_motions(scene, scene.beads);
   const double truth = total_nN(scene.forces_nN);
   const EnsembleFit a = fit_of(scene, blind), b = fit_of(scene, seeing);
@@ -149,7 +149,7 @@ TEST(CommonMotion, of_beads_in_one_place_or_none_is_no_obstacle) {
 
 TEST(CommonMotion, its_largest_displacement_is_reached_and_never_passed) {
   constexpr AffineMotion kStill{
-      .shift = {}, .turn_rad = 0.005, .growth = -0.003, .stretch = 0.001, .skew = 0.002, .centre = {20, 30}};
+      .turn_rad = 0.005, .growth = -0.003, .stretch = 0.001, .skew = 0.002, .centre = {20, 30}};
   double largest = 0;
   for (int i = 0; i < 3600; ++i) {
     const double angle = i * 1.7453292519943296e-3;

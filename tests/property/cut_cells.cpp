@@ -31,11 +31,7 @@ Scene scene(std::uint64_t seed, double part = 0.35) {
   drawing::ScenarioParameters p;
   p.seed = seed;
   p.beads = 4000;
-  Scene s{.experiment = experiment::simulate(p, 2),
-          .gel = p.gel,
-          .window = {{-1e4, -1e4}, {1e4, 1e4}},
-          .cut = {},
-          .beads = {}};
+  Scene s{.experiment = experiment::simulate(p, 2), .gel = p.gel, .window = {{-1e4, -1e4}, {1e4, 1e4}}};
   double low = 1e9, high = -1e9;
   for (const Vec2 q : s.experiment.cell.outline_um) {
     low = std::min(low, q.x);

@@ -67,7 +67,7 @@ TEST(Mean, a_shape_that_is_its_own_mirror_image_is_not_mirrored) {
 
 /// Smooth blobs of light in places of their own, seen in the frame of a motion's cell.
 Brightness blobs(const Motion& motion, double noise, std::uint64_t seed) {
-  Brightness image{.width = 260, .height = 240, .pixel_size_um = 0.5, .values = {}};
+  Brightness image{.width = 260, .height = 240, .pixel_size_um = 0.5};
   std::mt19937_64 places(4), random(seed);
   std::uniform_real_distribution<double> across(25, 95), height(0.4, 1);
   std::normal_distribution<double> normal(0, noise);
@@ -105,9 +105,7 @@ TEST(Mean, images_tell_a_known_shift_and_turn) {
   }
 }
 
-Cell cell_of(const Polygon& outline) {
-  return {.name = "cell", .outline_file = {}, .outline_um = outline, .beads = {}, .gel = {}};
-}
+Cell cell_of(const Polygon& outline) { return {.name = "cell", .outline_um = outline}; }
 
 TEST(Mean, a_symmetric_shape_is_ambiguous_unless_its_symmetry_is_said) {
   const Polygon reference = spiked(40, 15, 0, 360);
@@ -161,7 +159,7 @@ Pulling pulling(int n_beads, double sigma_um, std::uint64_t seed, const Motion& 
   std::uniform_real_distribution<double> across(-50, 50);
   std::normal_distribution<double> noise(0, sigma_um);
   for (int k = 0; k < n_beads; ++k) {
-    Bead bead{.position_um = {across(random), across(random)}, .displacement_um = {}, .sigma_um = 0.01, .flag = {}};
+    Bead bead{.position_um = {across(random), across(random)}, .sigma_um = 0.01};
     for (std::size_t j = 0; j < 4; ++j) {
       const Vec2 force = p.forces_nN[j];
       const Vec2 there = camera.back_um(bead.position_um);
@@ -284,8 +282,7 @@ Samples noise_fields(int n_cells, const std::vector<Vec2>& nodes) {
     for (int i = 0; i < 500; ++i)
       beads.push_back({.position_um = {across(random), across(random)},
                        .displacement_um = {noise(random), noise(random)},
-                       .sigma_um = 0.02,
-                       .flag = {}});
+                       .sigma_um = 0.02});
     const CellField field = field_of(registered(beads, {{0, 0}, {0, 0}, angle(random), false}), parameters, 0.3);
     auto& of_cell = samples.emplace_back();
     for (const Vec2 node : nodes) of_cell.push_back(field.at(node));

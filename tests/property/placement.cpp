@@ -68,7 +68,7 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
   for (int i = 0; i < 14; ++i) forces[i] = std::sin(1 + i);
   const auto model = [&](const Placement& at) -> Eigen::VectorXd {
     DisplacementField places;
-    for (const Vec2 p : beads) places.push_back({.position_um = p, .displacement_um = {}, .flag = {}});
+    for (const Vec2 p : beads) places.push_back({.position_um = p});
     const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::half_space}, 1);
     const Eigen::VectorXd seen =
         gel->compliance_um_per_nN(points_of(in_cell_frame(places, at)), ellipses_of(cell)) * forces;
@@ -79,8 +79,8 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
     return u;
   };
   const Vec2 centre{30, 30};
-  const Eigen::MatrixXd motions = placement_motions(test::kGel, ellipses_of(cell), forces, beads,
-                                                    model({.centre_um = centre, .shift_um = {}}), centre, 2);
+  const Eigen::MatrixXd motions =
+      placement_motions(test::kGel, ellipses_of(cell), forces, beads, model({.centre_um = centre}), centre, 2);
   constexpr double kStep = 1e-3;
   const Placement steps[] = {{centre, {kStep, 0}, 0}, {centre, {0, kStep}, 0}, {centre, {}, kStep}};
   for (int k = 0; k < 3; ++k) {
@@ -113,7 +113,7 @@ TEST(Placement, what_carries_a_bead_changes_its_displacement_by_as_much_as_the_f
 
 TEST(Placement, frames_are_each_others_inverse) {
   const Placement placement{.centre_um = {30, 20}, .shift_um = {0.4, -0.7}, .turn_rad = 0.3};
-  const DisplacementField beads = {{.position_um = {3, 4}, .displacement_um = {0.1, -0.2}, .flag = {}}};
+  const DisplacementField beads = {{.position_um = {3, 4}, .displacement_um = {0.1, -0.2}}};
   const DisplacementField seen = in_cell_frame(beads, placement);
   EXPECT_LE(norm(placement.of(seen[0].position_um) - beads[0].position_um), 1e-13);
   const DisplacementField back = in_bead_frame(seen, beads, placement);
@@ -229,7 +229,6 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
                                            .cell = still.cell,
                                            .beads = still.scene.beads,
                                            .gel = test::kGel,
-                                           .segmentation = {},
                                            .n_of_place = 3},
                                           1);
   const auto noise = [](const EnsembleFit& of) -> Eigen::VectorXd {
@@ -253,7 +252,7 @@ TEST(Placement, frames_of_a_series_hold_the_error_of_the_place) {
   const EnsembleFit& single = known.first;
   const Trial start = next_start(single);
   const auto frame_fit = [&](const AllowMore& allow) {
-    return fit_series({{.frame = 1, .refused = {}, .beads = shifted.scene.beads}}, networks, data.response, {},
+    return fit_series({{.frame = 1, .beads = shifted.scene.beads}}, networks, data.response, {},
                       shifted.scene.adhesion_ids, {}, true, false, 1, start, {}, allow)
         .front();
   };

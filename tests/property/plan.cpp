@@ -268,12 +268,11 @@ TEST(AdhesionPair, by_beads_in_a_volume_the_least_distance_asks_for_force_over_n
 SpaceScene two_patches_in_space() {
   SpaceScene scene{.name = "two patches",
                    .gel = {.youngs_modulus_kPa = 10, .poisson_ratio = 0.45, .thickness_um = 20},
-                   .patches = {},
                    .low_um = {0, 0},
                    .high_um = {36, 36},
                    .bead_depth_um = 12,
                    .own_beads_per_um3 = 0.02};
-  HeightMap flat{.origin_um = {-2, -2}, .spacing_um = {4, 4}, .n_x = 11, .n_y = 11, .z_um = {}, .sigma_um = {}};
+  HeightMap flat{.origin_um = {-2, -2}, .spacing_um = {4, 4}, .n_x = 11, .n_y = 11};
   flat.z_um.assign(121, 0.0);
   scene.gel.surface = std::make_shared<const HeightMap>(flat);
   scene.traction.spacing_um = 2.43;  // of all densities, so that the beads alone change the errors

@@ -42,7 +42,7 @@ Scene scene_with_noise() {
   }
   for (int i = 0; i < 2000; ++i) {
     const double x = std::generate_canonical<double, 53>(random), y = std::generate_canonical<double, 53>(random);
-    scene.beads.push_back({.position_um = {kSide_um * x, kSide_um * y}, .displacement_um = {}, .flag = {}});
+    scene.beads.push_back({.position_um = {kSide_um * x, kSide_um * y}});
   }
   const Eigen::VectorXd u = response_of(scene.on(), scene.beads)->displace(scene.forces_nN);
   const double sigma_um = scene.noise_um = 0.02 * u.cwiseAbs().maxCoeff();

@@ -45,14 +45,7 @@ const std::vector<std::string>& replacements() {
 class RecordsOfCells : public testing::Test {
  protected:
   void SetUp() override {
-    options_ = {.stage_folder = test::make_script_stages(folder_.path()),
-                .is_checked = true,
-                .only = {},
-                .redo = {},
-                .limits = {},
-                .version = "1",
-                .say = nullptr,
-                .finish = nullptr};
+    options_ = {.stage_folder = test::make_script_stages(folder_.path()), .is_checked = true, .version = "1"};
     test::make_unfinished_cell(cell_);
     runner::run_cell(cell_, options_);
     report::update_report(cell_);
@@ -72,7 +65,7 @@ class RecordsOfCells : public testing::Test {
   void read_all(const std::string& what) {
     const auto expect = [&](const std::function<void()>& read) { expect_input_errors_only(what, read); };
     const fs::path run_json = cell_ / "run.json";
-    const runner::BatchCell cell{.cell = cell_, .message = {}, .failed_stage = {}, .how = {}};
+    const runner::BatchCell cell{.cell = cell_};
     expect([&] { runner::is_done(cell_, options_, runner::look_at_cell(cell_, options_)); });
     expect([&] { runner::verify_cell(cell_); });
     expect([&] { runner::recorded_failure(cell_); });
@@ -96,12 +89,11 @@ class RecordsOfCells : public testing::Test {
     for (const StageState state : {StageState::up_to_date, StageState::not_asked}) {
       runner::CellOutcome outcome;
       for (const runner::Stage& stage : runner::stages())
-        outcome.stages.push_back({.stage = stage.name, .status = {state, ""}, .failure = {}});
+        outcome.stages.push_back({.stage = stage.name, .status = {state, ""}});
       expect_input_errors_only(what, [&] { runner::write_run_record(cell_, options_, outcome); });
       files::write_text(run_json, before);
     }
-    expect_input_errors_only(
-        what, [&] { cost::record_accuracy(cell_, 0.1, {.preset = "fast", .reached = {}, .verdict = "met"}); });
+    expect_input_errors_only(what, [&] { cost::record_accuracy(cell_, 0.1, {.preset = "fast", .verdict = "met"}); });
     files::write_text(run_json, before);
   }
 

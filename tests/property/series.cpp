@@ -31,17 +31,14 @@ struct Series {
 };
 
 Series make_series(int n_frames) {
-  Series series{.scene = test::tension_scene("case_21", 1500, kNoiseOfFrames, 1),
-                .true_nN = {},
-                .true_total_nN = {},
-                .frames = {}};
+  Series series{.scene = test::tension_scene("case_21", 1500, kNoiseOfFrames, 1)};
   const Eigen::VectorXd base_nN = series.scene.tensions_nN;
   for (int f = 1; f <= n_frames; ++f) {
     series.true_nN.push_back(tensions_at(base_nN, f));
     contract(series.scene, series.true_nN.back());
     measure(series.scene, kNoiseOfFrames, static_cast<unsigned>(f));
     series.true_total_nN.push_back(total_nN(series.scene.forces_nN));
-    series.frames.push_back({.frame = f, .refused = {}, .beads = series.scene.beads});
+    series.frames.push_back({.frame = f, .beads = series.scene.beads});
   }
   return series;
 }
@@ -82,7 +79,7 @@ TEST(Series, tensions_and_total_force_that_change_are_followed_within_their_stan
 
 TEST(Series, a_frame_without_displacements_or_with_too_few_beads_does_not_stop_the_others) {
   Series series = make_series(4);
-  series.frames[1] = {.frame = 2, .refused = "out of focus", .beads = {}};
+  series.frames[1] = {.frame = 2, .refused = "out of focus"};
   for (std::size_t i = 2; i < series.frames[2].beads.size(); ++i) series.frames[2].beads[i].flag = "lost";
   const std::vector<FrameFit> fits = fit(series);
   EXPECT_EQ(fits[1].refused, "out of focus");
@@ -144,7 +141,7 @@ TEST(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
   const std::vector<FrameFit> known = read_fits(folder / "");
   contract(series.scene, series.true_nN[0]);
   measure(series.scene, kNoiseOfFrames, 99);
-  series.frames[1] = {.frame = 2, .refused = {}, .sha256 = "another file", .beads = series.scene.beads};
+  series.frames[1] = {.frame = 2, .sha256 = "another file", .beads = series.scene.beads};
   const std::vector<FrameFit> again = fit(series, known);
   EXPECT_EQ(again[0].tensions[0].tension_nN, 42);
   EXPECT_NE(again[1].total_force_nN.value, whole[1].total_force_nN.value);

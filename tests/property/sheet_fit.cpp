@@ -52,10 +52,7 @@ struct FittedDisc {
     const int n = 28;
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j)
-        beads.push_back({.position_um = side * Vec2{(i + 0.5) / n - 0.5, (j + 0.5) / n - 0.5},
-                         .displacement_um = {},
-                         .sigma_um = kNoise_um,
-                         .flag = {}});
+        beads.push_back({.position_um = side * Vec2{(i + 0.5) / n - 0.5, (j + 0.5) / n - 0.5}, .sigma_um = kNoise_um});
   }
 
   /// Of its own triangles.

@@ -18,7 +18,7 @@ TractionParameters half_space(TractionMethod method) {
 }
 
 TractionInputs inputs_of(const EllipseScene& scene) {
-  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions, .outline_um = {}};
+  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions};
 }
 
 /// Those of flat surfaces.
@@ -188,9 +188,8 @@ TEST(Fttc, cross_validation_smooths_more_where_there_is_more_noise) {
   double before = 0;
   for (const double noise : {0.01, 0.03, 0.1, 0.2}) {
     const EllipseScene scene = ellipse_scene(96, noise, 2, 0, 64, false);
-    const LatticeProblem problem(
-        scene.field, scene.gel,
-        {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+    const LatticeProblem problem(scene.field, scene.gel,
+                                 {.model = GelModel::half_space, .padding = 1.5, .basis = Basis::waves, .threads = 1});
     TikhonovSolver solver(problem);
     const LambdaScan scan = scan_lambda(problem, solver);
     EXPECT_GT(scan.by_gcv, before);
@@ -235,7 +234,7 @@ TEST(Fttc, scattered_beads_and_a_lattice_tell_the_same) {
   std::normal_distribution<double> noise(0, 0.02);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vec2 error{noise(random), noise(random)};
-    inputs.beads.push_back({.position_um = points[i], .displacement_um = u[i] + error, .sigma_um = 0.02, .flag = {}});
+    inputs.beads.push_back({.position_um = points[i], .displacement_um = u[i] + error, .sigma_um = 0.02});
   }
   const Reconstruction r = reconstruct(inputs, half_space(TractionMethod::fttc), 1);
   std::vector<Vec2> forces;

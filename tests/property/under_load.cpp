@@ -49,8 +49,7 @@ PullingCell pulling_cell(double share, double noise, unsigned seed) {
   test::add_ventral(cell, 1, 5);
   test::add_ventral(cell, 2, 7);
   PullingCell result{.cell = cell,
-                     .scene = test::scene_of(cell, share * Eigen::Vector3d(0.2, 16, 8), 900, noise, seed),
-                     .at_rest = {}};
+                     .scene = test::scene_of(cell, share * Eigen::Vector3d(0.2, 16, 8), 900, noise, seed)};
   result.at_rest = result.scene.beads;
   for (std::size_t i = 0; i < result.at_rest.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);
@@ -65,7 +64,7 @@ double error_of(const PullingCell& cell, const EnsembleFit& fit) {
 }
 
 TEST(UnderLoad, beads_go_to_where_the_cell_pulls_them) {
-  const DisplacementField beads = {{.position_um = {3, 4}, .displacement_um = {0.1, -0.2}, .flag = {}}};
+  const DisplacementField beads = {{.position_um = {3, 4}, .displacement_um = {0.1, -0.2}}};
   EXPECT_EQ(under_load(beads)[0].position_um.x, 3 + 0.1);
   EXPECT_EQ(under_load(beads)[0].position_um.y, 4 - 0.2);
   EXPECT_EQ(under_load(beads)[0].displacement_um.y, -0.2);

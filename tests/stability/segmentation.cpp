@@ -88,7 +88,7 @@ TEST(Segmentation, says_what_is_missing) {
 class ImagesOfTwoCells : public testing::Test {
  protected:
   static std::shared_ptr<const LabelMask> mask_of(const Polygon& outline_um, const images::Image& like) {
-    LabelMask mask{.name = "mask.png", .width = like.width, .height = like.height, .labels = {}, .is_binary = true};
+    LabelMask mask{.name = "mask.png", .width = like.width, .height = like.height, .is_binary = true};
     for (int j = 0; j < like.height; ++j)
       for (int i = 0; i < like.width; ++i)
         mask.labels.push_back(contains(outline_um, centre_of_pixel_um(i, j, kPixel_um)) ? 1 : 0);

@@ -53,8 +53,7 @@ TEST(TensionFitHard, beads_all_beside_the_cell_are_refused_with_their_place) {
   test::hard_case("positions with the wrong sign: no bead is near the cell", "refused, with the places of both");
   const Cell cell = test::round_cell(8, 6);
   DisplacementField beads;
-  for (const Adhesion& a : cell.adhesions)
-    beads.push_back({.position_um = a.position_um, .displacement_um = {}, .sigma_um = 0.02, .flag = {}});
+  for (const Adhesion& a : cell.adhesions) beads.push_back({.position_um = a.position_um, .sigma_um = 0.02});
   EXPECT_NO_THROW(check_place(beads, cell));
   EXPECT_NO_THROW(check_place({beads.front()}, cell));  // a field may show a part of the cell
   const auto with_sign = [&](double x, double y) {
@@ -106,7 +105,6 @@ TEST(TensionFitHard, a_hundred_fibres) {
                            .type = FibreType::dorsal,
                            .width_um = 0.6,
                            .start_adhesion_id = i + 1,
-                           .end_adhesion_id = {},
                            .mean_intensity = 1,
                            .points_um = {start, Vec2{30, 30} + 0.75 * (start - Vec2{30, 30})}});
     tensions[i + 1] = 0.1 * i;

@@ -86,7 +86,7 @@ inline std::string chart(const std::vector<Panel>& panels) {
 /// A histogram as a line of bins.
 inline Series histogram(const std::string& name, const std::vector<double>& values, double low, double high,
                         int n_bins) {
-  Series s{.name = name, .x = {}, .y = {}};
+  Series s{.name = name};
   std::vector<double> counts(static_cast<std::size_t>(n_bins), 0);
   for (const double v : values) {
     const int bin = std::clamp(static_cast<int>((v - low) / (high - low) * n_bins), 0, n_bins - 1);

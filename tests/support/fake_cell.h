@@ -115,8 +115,7 @@ inline void write_given_stages(const fs::path& folder, const Cell& cell) {
     const double size = 0.3 * std::exp(-std::pow(norm(inwards) / 15 - 1, 2));
     field.push_back({.position_um = p,
                      .displacement_um = (size / (norm(inwards) + 1)) * inwards + Vec2{noise(random), noise(random)},
-                     .sigma_um = 0.01,
-                     .flag = {}});
+                     .sigma_um = 0.01});
   }
   files::write_displacement(folder / "2_track/displacement.csv", field);
 }
@@ -151,8 +150,7 @@ inline void write_invented_fit(const fs::path& folder, unsigned seed = 1) {
     forces.push_back({.adhesion_id = a.adhesion_id,
                       .force_nN = (0.5 * strength(random) / (norm(arm) + 1)) * arm,
                       .sigma_nN = 0.1,
-                      .connected = a.adhesion_id % 2 == 1,
-                      .moment_nN_um = {}});
+                      .connected = a.adhesion_id % 2 == 1});
     net += forces.back().force_nN;
   }
   FitSummary summary{.relative_l2 = 0.16,
@@ -162,9 +160,7 @@ inline void write_invented_fit(const fs::path& folder, unsigned seed = 1) {
                      .network_surface_tension_nN_per_um = 0.07,
                      .n_meshes = 4,
                      .iterations = 9,
-                     .converged = true,
-                     .error_budget = {},
-                     .more = {}};
+                     .converged = true};
   for (AdhesionForce& force : forces) {
     force.force_nN = force.force_nN - (1.0 / static_cast<double>(forces.size())) * net;
     summary.total_force_nN += norm(force.force_nN);

@@ -35,8 +35,6 @@ inline Cell small_cell() {
                  {.fibre_id = 4,
                   .type = FibreType::arc,
                   .width_um = 0.8,
-                  .start_adhesion_id = {},
-                  .end_adhesion_id = {},
                   .mean_intensity = 40,
                   .confidence = 0.5,
                   .points_um = {{12, 14}, {14, 16}},
@@ -82,12 +80,12 @@ inline std::vector<std::filesystem::path> write_tables(const std::filesystem::pa
   files::write_displacement(folder / "displacement.csv", field);
   files::write_tensions(folder / "tensions.csv",
                         {{.fibre_id = 0, .tension_nN = 0.06, .low_nN = 0.03, .high_nN = 0.09},
-                         {.fibre_id = 1, .tension_nN = 4.2, .low_nN = {}, .high_nN = {}, .identifiable = false}},
+                         {.fibre_id = 1, .tension_nN = 4.2, .identifiable = false}},
                         small_cell().fibres);
   files::write_adhesion_forces(
       folder / "adhesion_forces.csv",
       {{.adhesion_id = 1, .force_nN = {-2.9, 0.1}, .sigma_nN = 0.3, .connected = true, .moment_nN_um = 0.02},
-       {.adhesion_id = 7, .force_nN = {2.9, -0.1}, .sigma_nN = {}, .connected = false, .moment_nN_um = {}}},
+       {.adhesion_id = 7, .force_nN = {2.9, -0.1}, .connected = false}},
       small_cell().adhesions);
   files::write_displacement_in_space(
       folder / "displacement_3d.csv",

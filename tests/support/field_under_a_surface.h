@@ -42,11 +42,7 @@ inline CurvedCase curved_case(const std::string& name) {
   const nlohmann::json json = nlohmann::json::parse(file);
   const auto number = [&](const char* key) { return json.at(key).get<double>(); };
   const std::string kind = json.at("surface").get<std::string>();
-  CurvedCase made{.name = name,
-                  .height_um = {},
-                  .base_um = number("base_z_um"),
-                  .sources = {},
-                  .youngs_modulus_kPa = number("youngs_modulus_kPa")};
+  CurvedCase made{.name = name, .base_um = number("base_z_um"), .youngs_modulus_kPa = number("youngs_modulus_kPa")};
   if (kind == "wave") {
     made.height_um = [a = number("amplitude_um"), period = number("period_um"), phase = number("phase_um")](Vec2 p) {
       return -a * std::cos(2 * std::numbers::pi * (p.x - phase) / period);

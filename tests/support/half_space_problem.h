@@ -55,10 +55,8 @@ struct HalfSpaceScene {
     std::vector<BeadInSpace> made;
     for (int b = 0; b < n_beads; ++b) {
       BeadInSpace bead{.position_um = {across(random), across(random), down(random)},
-                       .displacement_um = {},
                        .sigma_um = sigma_um,
-                       .sigma_z_um = 3 * sigma_um,
-                       .flag = {}};
+                       .sigma_z_um = 3 * sigma_um};
       for (const Spot& spot : spots) bead.displacement_um += displaced_um(bead.position_um, spot);
       const double x = noise(random), y = noise(random), z = noise(random);
       bead.displacement_um += sigma_um * Vec3{x, y, 3 * z};

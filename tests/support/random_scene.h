@@ -42,7 +42,7 @@ struct RandomScene {
 /// The cell's size sets the field, the number of adhesions and the fibres' spacing, so that most scenes can be drawn.
 inline RandomScene random_scene(std::uint64_t seed) {
   Dice dice(seed);
-  RandomScene scene{.seed = seed, .has_images = dice.happens(0.25), .scenario = {}, .settings = {}};
+  RandomScene scene{.seed = seed, .has_images = dice.happens(0.25)};
   std::ostringstream text;
   const double diameter_um = dice.decades(18, 90);
   const double pixel_um = dice.uniform(0.08, 0.16);
@@ -142,8 +142,7 @@ inline SceneOutcome run_scene(const RandomScene& scene, const std::filesystem::p
       run_program("mbtfm-simulate --quiet --scenario " + file.string() + " --seed " + std::to_string(scene.seed) +
                       (scene.has_images ? " --images" : "") + " --out " + cell.string(),
                   before);
-  if (made.code == exit_code::kUsage)
-    return {.kind = SceneOutcome::Kind::cannot_be_drawn, .faults = {}, .message = made.output};
+  if (made.code == exit_code::kUsage) return {.kind = SceneOutcome::Kind::cannot_be_drawn, .message = made.output};
   if (made.code != 0) return {.faults = {"a simulation"}, .message = made.output};
   files::write_text(cell / "cell.toml", files::read_text(cell / "cell.toml") + scene.settings);
   const Outcome run = run_program("mbtfm run " + cell.string(), before);

@@ -65,8 +65,7 @@ inline fs::path make_script_stages(const fs::path& folder, unsigned seed = 1) {
   const ErrorParts parts{.beads = 0.1, .segmentation = 0.2, .mesh = 0.1, .substrate = 0.01, .solver = 0, .model = 0.1};
   fit.error_budget = ErrorBudget{.tensions = {{0, 0.06, parts}, {1, 2, parts}, {2, 3, parts}},
                                  .total_force_nN = fit.total_force_nN,
-                                 .total_force_parts_nN = parts,
-                                 .cut_force = {}};
+                                 .total_force_parts_nN = parts};
   files::write_fit_summary(made / "4_fit/fit.json", fit, round_cell().fibres);
   fs::create_directories(bin);
   for (const runner::Stage& stage : runner::stages()) {

@@ -29,15 +29,10 @@ inline statistics::Study simulated_study(const StudySettings& s) {
   for (int c = 0; c < s.n_conditions; ++c)
     study.conditions.push_back(s.n_conditions == 1 ? "" : std::string(1, static_cast<char>('a' + c)));
   for (int i = 0; i < s.n_cells; ++i) {
-    statistics::StudyCell cell{.name = "cell_" + std::to_string(i),
-                               .condition = i * s.n_conditions / s.n_cells,
-                               .cell = round_cell(),
-                               .forces = {},
-                               .tensions = {},
-                               .fit = {},
-                               .directions = {}};
+    statistics::StudyCell cell{
+        .name = "cell_" + std::to_string(i), .condition = i * s.n_conditions / s.n_cells, .cell = round_cell()};
     cell.cell.fibres.clear();
-    cell.tensions.push_back({.fibre_id = 0, .tension_nN = 0.06, .low_nN = {}, .high_nN = {}});
+    cell.tensions.push_back({.fibre_id = 0, .tension_nN = 0.06});
     const double of_cell = s.cell_sd_nN * normal(random);
     for (const FibreType type : kFibreTypes) {
       const double of_type = s.type_in_cell_sd_nN * normal(random);
@@ -45,12 +40,8 @@ inline statistics::Study simulated_study(const StudySettings& s) {
       const int n = std::poisson_distribution<int>(s.mean_fibres_by_type)(random);
       for (int k = 0; k < n; ++k) {
         const int id = static_cast<int>(cell.cell.fibres.size()) + 1;
-        cell.cell.fibres.push_back({.fibre_id = id,
-                                    .type = type,
-                                    .width_um = 0.6,
-                                    .start_adhesion_id = {},
-                                    .end_adhesion_id = {},
-                                    .points_um = {{20, 20}, {30, 30.0 + id}}});
+        cell.cell.fibres.push_back(
+            {.fibre_id = id, .type = type, .width_um = 0.6, .points_um = {{20, 20}, {30, 30.0 + id}}});
         const double error = s.error_nN * std::uniform_real_distribution<double>(0.5, 1.5)(random);
         const double t = s.offset_nN + mean + cell.condition * s.condition_effect_nN + of_cell + of_type +
                          s.fibre_sd_nN * normal(random) + error * normal(random);
@@ -63,8 +54,7 @@ inline statistics::Study simulated_study(const StudySettings& s) {
       cell.forces.push_back({.adhesion_id = a.adhesion_id,
                              .force_nN = {f, 0.5 * f},
                              .sigma_nN = 0.1,
-                             .connected = a.adhesion_id % 3 == 0,
-                             .moment_nN_um = {}});
+                             .connected = a.adhesion_id % 3 == 0});
       cell.fit.total_force_nN += norm(cell.forces.back().force_nN);
     }
     cell.fit.network_force_nN = 0.2 * cell.fit.total_force_nN;
@@ -95,13 +85,7 @@ inline statistics::Study simulated_sheets(const SheetStudySettings& s) {
   for (int c = 0; c < s.n_conditions; ++c)
     study.conditions.push_back(s.n_conditions == 1 ? "" : std::string(1, static_cast<char>('a' + c)));
   for (int i = 0; i < s.n_sheets; ++i) {
-    statistics::StudyCell cell{.name = "sheet_" + std::to_string(i),
-                               .condition = i * s.n_conditions / s.n_sheets,
-                               .cell = {},
-                               .forces = {},
-                               .tensions = {},
-                               .fit = {},
-                               .directions = {}};
+    statistics::StudyCell cell{.name = "sheet_" + std::to_string(i), .condition = i * s.n_conditions / s.n_sheets};
     const double x = 50.0 * i;
     cell.cell.outline_um = {{x, 0}, {x + 40, 0}, {x + 40, 40}, {x, 40}};
     const double value = s.contraction_nN_per_um + cell.condition * s.condition_effect_nN_per_um +
@@ -159,13 +143,7 @@ inline statistics::Study simulated_cells_in_space(const SpaceStudySettings& s) {
   for (int c = 0; c < s.n_conditions; ++c)
     study.conditions.push_back(s.n_conditions == 1 ? "" : std::string(1, static_cast<char>('a' + c)));
   for (int i = 0; i < s.n_cells; ++i) {
-    statistics::StudyCell cell{.name = "space_" + std::to_string(i),
-                               .condition = i * s.n_conditions / s.n_cells,
-                               .cell = {},
-                               .forces = {},
-                               .tensions = {},
-                               .fit = {},
-                               .directions = {}};
+    statistics::StudyCell cell{.name = "space_" + std::to_string(i), .condition = i * s.n_conditions / s.n_cells};
     const double x = 50.0 * i;
     cell.cell.outline_um = {{x, 0}, {x + 40, 0}, {x + 40, 40}, {x, 40}};
     const double force = s.force_nN + cell.condition * s.condition_effect_nN + s.cell_sd_nN * normal(random) +

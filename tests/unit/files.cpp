@@ -27,7 +27,6 @@ Fibre fibre(int id) {
           .type = FibreType::dorsal,
           .width_um = 0.6,
           .start_adhesion_id = 7,
-          .end_adhesion_id = {},
           .mean_intensity = 3,
           .confidence = 0.5,
           .points_um = {{0, 0}, {1, 0.5}, {2, 0.7}},
@@ -238,15 +237,14 @@ TEST(Files, adhesions_of_an_older_version_are_read_as_seen_in_the_image) {
 }
 
 TEST(Files, a_candidate_stands_for_the_cell_of_its_lattice) {
-  const Adhesion disc{
-      .position_um = {}, .area_um2 = 3.14159265, .origin = AdhesionOrigin::candidate};  // of 2 um, on a lattice of 2 um
+  const Adhesion disc{.area_um2 = 3.14159265, .origin = AdhesionOrigin::candidate};  // of 2 um, on a lattice of 2 um
   EXPECT_NEAR(area_stood_for_um2(disc), std::sqrt(3.0) / 2 * 4, 1e-6);
-  EXPECT_EQ(area_stood_for_um2({.position_um = {}, .area_um2 = 1.5}), 1.5);
+  EXPECT_EQ(area_stood_for_um2({.area_um2 = 1.5}), 1.5);
 }
 
 TEST(Columns, a_truth_value_is_written_for_r_and_pandas_and_read_as_any_program_writes_it) {
   const TemporaryFolder folder;
-  files::write_tensions(folder / "tensions.csv", {{.fibre_id = 0, .tension_nN = 1, .low_nN = {}, .high_nN = {}}}, {});
+  files::write_tensions(folder / "tensions.csv", {{.fibre_id = 0, .tension_nN = 1}}, {});
   EXPECT_NE(files::read_text(folder / "tensions.csv").find(",TRUE\n"), std::string::npos);
   const auto is_identifiable = [&](const std::string& word) {
     files::write_text(folder / "tensions.csv", "fibre_id,tension_nN,identifiable\n0,1," + word + "\n");
@@ -342,12 +340,12 @@ TEST(Columns, results_have_six_digits_and_what_is_computed_with_has_all) {
   const TemporaryFolder folder;
   const double third = 1.0 / 3;
   files::write_tensions(folder / "tensions.csv",
-                        {{.fibre_id = 0, .tension_nN = third, .low_nN = third, .high_nN = {}, .sigma_nN = third}}, {});
+                        {{.fibre_id = 0, .tension_nN = third, .low_nN = third, .sigma_nN = third}}, {});
   EXPECT_EQ(files::read_text(folder / "tensions.csv"),
             "fibre_id,type,tension_nN,low_nN,high_nN,sigma_nN,identifiable\n"
             "0,network,0.333333,0.333333,,0.333333,TRUE\n");
   const DisplacementField field = {
-      {.position_um = {third, third}, .displacement_um = {third, third}, .sigma_um = third, .flag = {}}};
+      {.position_um = {third, third}, .displacement_um = {third, third}, .sigma_um = third}};
   files::write_displacement(folder / "displacement.csv", field);
   EXPECT_EQ(files::read_displacement(folder / "displacement.csv").at(0).sigma_um, third);
 }
@@ -377,7 +375,7 @@ TEST(Files, what_has_no_end_is_refused_and_what_is_empty_is_empty) {
 }
 
 TEST(Files, a_surface_beyond_a_metre_is_none) {
-  HeightMap map{.origin_um = {0, 0}, .spacing_um = {1, 1}, .n_x = 4, .n_y = 4, .z_um = {}, .sigma_um = {}};
+  HeightMap map{.origin_um = {0, 0}, .spacing_um = {1, 1}, .n_x = 4, .n_y = 4};
   map.z_um.assign(16, -2);
   EXPECT_NO_THROW(check(map));
   for (const double far : {1e300, -2e6, std::nan("")}) {

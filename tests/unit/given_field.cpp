@@ -65,7 +65,7 @@ TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
     for (int j = 0; j < 64; ++j) {
       for (int i = 0; i < 64; ++i) {
         const Vec2 place{8 * i + 4.0, 8 * j + 4.0}, u = test::displacement(peaks, place);
-        truth.push_back({.position_um = place, .displacement_um = u, .sigma_um = 0.05, .flag = {}});
+        truth.push_back({.position_um = place, .displacement_um = u, .sigma_um = 0.05});
         field.push_back(truth.back());
         const double x = normal(random);
         field.back().displacement_um = u + growth * (place - Vec2{256, 256}) + Vec2{x, normal(random)};

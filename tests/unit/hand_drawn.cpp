@@ -173,7 +173,7 @@ TEST(HandDrawn, fibres_that_meet_share_an_anchor) {
 }
 
 TEST(HandDrawn, an_end_a_little_outside_the_cell_is_held_on_its_edge_and_one_far_outside_is_refused) {
-  const CellOutline cell{.outer_um = {{4, 4}, {20, 4}, {20, 20}, {4, 20}}, .holes_um = {}};
+  const CellOutline cell{.outer_um = {{4, 4}, {20, 4}, {20, 20}, {4, 20}}};
   const auto near = held(set_of({line({{100, 100}, {209.5, 99.5}}, "ventral 1")}), {}, cell);
   EXPECT_NEAR(norm(near.anchors[0].position_um - Vec2{20, 10}), 0, 1e-9);
   EXPECT_EQ(near.fibres[0].points_um.back(), near.anchors[0].position_um);
@@ -189,7 +189,7 @@ TEST(HandDrawn, a_line_that_passes_an_adhesion_between_two_points_does_not_turn_
 }
 
 TEST(HandDrawn, no_anchor_is_made_where_a_fibre_leaves_the_image) {
-  const CellOutline cell{.outer_um = {{0, 4}, {20, 4}, {20, 20}, {0, 20}}, .holes_um = {}};
+  const CellOutline cell{.outer_um = {{0, 4}, {20, 4}, {20, 20}, {0, 20}}};
   const Cuts cuts = {{{0, 20}, {0, 4}}};
   const RoiSet set = set_of({line({{100, 100}, {2, 100}}, "ventral 1")});
   const HeldFibres result = hold_fibres(drawn_lines(set, std::nullopt, kField, {}), {}, cell, {}, kAnchor_um2, cuts);

@@ -66,7 +66,7 @@ TEST(Image, binned_ones_hold_the_means_of_whole_blocks_and_keep_their_scale) {
 
 TEST(Image, values_outside_16_bits_are_clamped_and_fractions_rounded) {
   const TemporaryFolder folder;
-  Image image{.width = 4, .height = 1, .pixels = {-3.0f, 1.5f, 70000.0f, 2.4f}, .pixel_size_um = {}, .full_scale = 0};
+  Image image{.width = 4, .height = 1, .pixels = {-3.0f, 1.5f, 70000.0f, 2.4f}, .full_scale = 0};
   write_tiff(folder / "a.tif", image);
   EXPECT_EQ(read_image(folder / "a.tif").pixels, (std::vector<float>{0, 2, 65535, 2}));
 }
@@ -198,7 +198,7 @@ std::vector<Decoded> decoded_by_others(const fs::path& table) {
     std::stringstream cells(line);
     for (std::string cell; std::getline(cells, cell, ',');) fields.push_back(cell);
     fields.resize(19);
-    Decoded d{.file = fields[0], .photometric = fields[8], .low = {}, .high = {}, .sum = {}};
+    Decoded d{.file = fields[0], .photometric = fields[8]};
     const auto whole = [&](int i) { return fields[i].empty() ? 0 : std::stoi(fields[i]); };
     d.width = whole(2);
     d.height = whole(3);
@@ -308,7 +308,7 @@ TEST(Image, real_calibrations_are_found) {
 
 TEST(Jpeg, is_read_as_what_it_shows_and_marked_as_lossy) {
   const test::TemporaryFolder folder;
-  Picture picture{.width = 64, .height = 48, .rgb = {}};
+  Picture picture{.width = 64, .height = 48};
   for (int j = 0; j < 48; ++j) {
     for (int i = 0; i < 64; ++i) {
       for (const int value : {2 * i + 40, 2 * i + 40, 2 * i + 40})
@@ -337,7 +337,7 @@ TEST(Jpeg, is_read_as_what_it_shows_and_marked_as_lossy) {
 
 TEST(Channels, a_pixel_size_that_no_image_states_is_told) {
   const Channel with{"a.tif", {.width = 1, .height = 1, .pixels = {0}, .pixel_size_um = 0.1}},
-      without{"b.tif", {.width = 1, .height = 1, .pixels = {0}, .pixel_size_um = {}}};
+      without{"b.tif", {.width = 1, .height = 1, .pixels = {0}}};
   EXPECT_TRUE(fires("pixel-size-unchecked", noticed_unchecked({&without}, 0.2)));
   EXPECT_FALSE(fires("pixel-size-unchecked", noticed_unchecked({&without, &with}, 0.2)));
   EXPECT_FALSE(fires("pixel-size-unchecked", noticed_unchecked({}, 0.2)));

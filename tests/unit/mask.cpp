@@ -221,8 +221,7 @@ TEST(Mask, of_a_pattern_lies_beneath_the_cell_by_the_share_of_the_parts_that_it_
   paint_disc(image, 255, {210, 210}, 20);                                                        // another cell's
   const LabelMask pattern = mask(image);
   const auto share = [&](double x_um) {
-    const CellOutline cell{
-        .outer_um = {{x_um, 5}, {x_um + 12, 5}, {x_um + 12, 17}, {x_um, 17}}, .holes_um = {}, .area_um2 = 144};
+    const CellOutline cell{.outer_um = {{x_um, 5}, {x_um + 12, 5}, {x_um + 12, 17}, {x_um, 17}}, .area_um2 = 144};
     return pattern_at(pattern, cell, kMaskField).beneath;
   };
   // by columns of points 0.2 um apart, over 10 um
@@ -230,7 +229,7 @@ TEST(Mask, of_a_pattern_lies_beneath_the_cell_by_the_share_of_the_parts_that_it_
   EXPECT_NEAR(share(13).value(), 0.3, 0.02);
   EXPECT_FALSE(share(-20));
   images::Image whole = test::even_image(kSide, kSide, 255);  // cut by the image
-  const CellOutline cell{.outer_um = {{5, 5}, {17, 5}, {17, 17}, {5, 17}}, .holes_um = {}, .area_um2 = 144};
+  const CellOutline cell{.outer_um = {{5, 5}, {17, 5}, {17, 17}, {5, 17}}, .area_um2 = 144};
   EXPECT_FALSE(pattern_at(mask(whole), cell, kMaskField).beneath);
 }
 

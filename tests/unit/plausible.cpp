@@ -127,31 +127,25 @@ TEST(Plausible, inputs_that_nobody_gave_are_listed_as_assumed) {
 }
 
 TEST(Plausible, one_adhesion_that_was_drawn_too_small_makes_no_traction_unusual) {
-  std::vector<Adhesion> adhesions(4, {.adhesion_id = 1, .position_um = {}, .area_um2 = 1});
+  std::vector<Adhesion> adhesions(4, {.adhesion_id = 1, .area_um2 = 1});
   adhesions[2].area_um2 = 0.01;
   std::vector<AdhesionForce> forces;
   for (const double force_nN : {3., 4., 2., 5.}) {
-    forces.push_back(
-        {.adhesion_id = 1, .force_nN = {force_nN, 0}, .sigma_nN = {}, .connected = false, .moment_nN_um = {}});
+    forces.push_back({.adhesion_id = 1, .force_nN = {force_nN, 0}, .connected = false});
   }
   EXPECT_DOUBLE_EQ(stage::traction_of_half_the_force_kPa(forces, adhesions), 5) << "200 kPa on a seventh of the force";
   EXPECT_DOUBLE_EQ(stage::traction_of_half_the_force_kPa({}, {}), 0);
 }
 
 TEST(Plausible, a_traction_or_a_tension_counts_as_far_as_its_error_leaves_it_sure) {
-  const std::vector<Adhesion> adhesions(2, {.adhesion_id = 1, .position_um = {}, .area_um2 = 0.1});
+  const std::vector<Adhesion> adhesions(2, {.adhesion_id = 1, .area_um2 = 0.1});
   std::vector<AdhesionForce> forces(2);
-  forces[0] = {.adhesion_id = 1,
-               .force_nN = {3, 4},
-               .sigma_nN = 2.5,
-               .connected = false,
-               .moment_nN_um = {}};  // 50 kPa, all of it noise
-  forces[1] = {.adhesion_id = 2, .force_nN = {0, 1}, .sigma_nN = 0.25, .connected = false, .moment_nN_um = {}};
+  forces[0] = {.adhesion_id = 1, .force_nN = {3, 4}, .sigma_nN = 2.5, .connected = false};  // 50 kPa, all of it noise
+  forces[1] = {.adhesion_id = 2, .force_nN = {0, 1}, .sigma_nN = 0.25, .connected = false};
   EXPECT_DOUBLE_EQ(stage::traction_of_half_the_force_kPa(forces, adhesions), 5);
-  const std::vector<Tension> tensions = {
-      {.fibre_id = 0, .tension_nN = 99, .low_nN = {}, .high_nN = {}},  // the network's is no fibre's
-      {.fibre_id = 1, .tension_nN = 50, .low_nN = 2, .high_nN = 98},
-      {.fibre_id = 2, .tension_nN = 7, .low_nN = {}, .high_nN = {}}};
+  const std::vector<Tension> tensions = {{.fibre_id = 0, .tension_nN = 99},  // the network's is no fibre's
+                                         {.fibre_id = 1, .tension_nN = 50, .low_nN = 2, .high_nN = 98},
+                                         {.fibre_id = 2, .tension_nN = 7}};
   EXPECT_EQ(stage::surest_fibre_tension_nN(tensions), 7);
 }
 

@@ -73,15 +73,7 @@ class Runner : public testing::Test {
   TemporaryFolder folder_;
   const fs::path cell_ = folder_ / "cell";
   const fs::path bin_ = folder_ / "bin";
-  RunOptions options_{.stage_folder = bin_,
-                      .threads = 2,
-                      .is_quiet = true,
-                      .only = {},
-                      .redo = {},
-                      .limits = {},
-                      .version = "1",
-                      .say = nullptr,
-                      .finish = nullptr};
+  RunOptions options_{.stage_folder = bin_, .threads = 2, .is_quiet = true, .version = "1"};
 
   void SetUp() override {
     fs::create_directories(cell_);
@@ -659,19 +651,9 @@ TEST(Batch, a_failed_cell_does_not_stop_the_others) {
                   "#!/bin/sh\ncase $2 in */b) echo 'mbtfm: error: broken' >&2; exit 3;; */c) kill -9 $$;; esac\n");
   const auto cells = find_cells(folder.path()).cells;
   ASSERT_EQ(cells.size(), 3u);
-  const auto outcomes = run_batch(cells, {.program = folder / "mbtfm",
-                                          .arguments = {},
-                                          .jobs = 2,
-                                          .threads = 2,
-                                          .run = {.stage_folder = folder / "bin",
-                                                  .only = {},
-                                                  .redo = {},
-                                                  .limits = {},
-                                                  .version = "1",
-                                                  .say = nullptr,
-                                                  .finish = nullptr},
-                                          .say = nullptr,
-                                          .show = nullptr});
+  const auto outcomes = run_batch(
+      cells,
+      {.program = folder / "mbtfm", .jobs = 2, .threads = 2, .run = {.stage_folder = folder / "bin", .version = "1"}});
   EXPECT_EQ(outcomes[0].exit_code, 0);
   EXPECT_EQ(outcomes[1].exit_code, 3);
   EXPECT_EQ(outcomes[1].message, "mbtfm: error: broken");

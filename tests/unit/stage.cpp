@@ -61,7 +61,7 @@ StageReport write_two(const Lengths&, stage::StageContext& context) {
   context.input("in");
   files::write_text(context.output("out", "a.csv"), "a");
   files::write_text(context.output("out", "deep/b.csv"), "b");
-  return {.summary = "two files", .figures = {{"n", std::int64_t{2}}}, .effects = {}, .findings = {}};
+  return {.summary = "two files", .figures = {{"n", std::int64_t{2}}}};
 }
 
 TEST_F(Stage, outputs_and_the_record_are_in_place_when_it_is_done) {

@@ -49,7 +49,7 @@ TEST(Study, leaves_out_cells_with_a_reason_that_the_table_keeps) {
   EXPECT_EQ(study.cells.size(), 4u);
   EXPECT_EQ(reason_of(study, "treated/cell_6").substr(0, 6), "no fit");
   EXPECT_EQ(reason_of(study, "control/cell_5"), "the fit did not converge");
-  EXPECT_EQ(fake.read({.condition_from = {}, .with_not_converged = true}).cells.size(), 5u);
+  EXPECT_EQ(fake.read({.with_not_converged = true}).cells.size(), 5u);
   const files::CsvTable cells(tables_of(study, analyse(study, {}))[0].second, "cells.csv");
   ASSERT_EQ(cells.n_rows(), 6);
   EXPECT_EQ(cells.text(4, "cell"), "control/cell_5");
@@ -247,17 +247,11 @@ TEST(Study, four_cells_have_no_line_and_five_have_one) {
 TEST(Study, the_error_of_a_tension_is_that_of_the_side_zero_does_not_cut) {
   EXPECT_NEAR(*standard_error_nN({.tension_nN = 4, .low_nN = 2, .high_nN = 6}), 4 / (2 * 1.96), 1e-4);
   EXPECT_NEAR(*standard_error_nN({.tension_nN = 1, .low_nN = 0, .high_nN = 5}), 4 / 1.96, 1e-3);
-  EXPECT_FALSE(standard_error_nN({.tension_nN = 1, .low_nN = {}, .high_nN = {}}));
+  EXPECT_FALSE(standard_error_nN({.tension_nN = 1}));
 }
 
 TEST(Study, holes_are_not_of_a_cells_area) {
-  StudyCell cell{.name = "a",
-                 .condition = 0,
-                 .cell = test::round_cell(),
-                 .forces = {},
-                 .tensions = {},
-                 .fit = {},
-                 .directions = {}};
+  StudyCell cell{.name = "a", .condition = 0, .cell = test::round_cell()};
   const double whole = figures_of(cell).cell_area_um2;
   cell.cell.holes_um = {{{30, 30}, {32, 30}, {32, 33}, {30, 33}}};
   EXPECT_NEAR(figures_of(cell).cell_area_um2, whole - 6, 1e-9);
@@ -282,20 +276,13 @@ TEST(Study, every_adhesion_is_in_one_bin_of_its_area) {
   Study study;
   study.conditions = {""};
   for (int c = 0; c < 2; ++c) {
-    StudyCell cell{.name = std::to_string(c),
-                   .condition = 0,
-                   .cell = test::round_cell(),
-                   .forces = {},
-                   .tensions = {},
-                   .fit = {},
-                   .directions = {}};
+    StudyCell cell{.name = std::to_string(c), .condition = 0, .cell = test::round_cell()};
     cell.cell.adhesions.clear();
     for (int i = 1; i <= 100; ++i) {
       cell.cell.adhesions.emplace_back();
       cell.cell.adhesions.back().adhesion_id = i;
       cell.cell.adhesions.back().area_um2 = 0.1 * (1 + i % 37);
-      cell.forces.push_back(
-          {.adhesion_id = i, .force_nN = {1, 0}, .sigma_nN = {}, .connected = i % 2 == 0, .moment_nN_um = {}});
+      cell.forces.push_back({.adhesion_id = i, .force_nN = {1, 0}, .connected = i % 2 == 0});
     }
     study.cells.push_back(std::move(cell));
   }
@@ -325,8 +312,8 @@ TEST(Directions, of_a_fibre_that_pulls_its_adhesions_are_zero) {
                     .points_um = {{10, 30}, {30, 30}}};
   DisplacementField measured, across;
   for (const double x : {10.0, 10.5, 30.0, 29.5}) {
-    measured.push_back({.position_um = {x, 30.1}, .displacement_um = {x < 20 ? 0.5 : -0.5, 0}, .flag = {}});
-    across.push_back({.position_um = {x, 30.1}, .displacement_um = {0, 0.1}, .flag = {}});
+    measured.push_back({.position_um = {x, 30.1}, .displacement_um = {x < 20 ? 0.5 : -0.5, 0}});
+    across.push_back({.position_um = {x, 30.1}, .displacement_um = {0, 0.1}});
   }
   const Displacements fields{measured, measured, across, 0.01, 1.5};
   const auto list = directions_of(cell, fields);
@@ -762,7 +749,7 @@ TEST(SheetStudy, leaves_out_a_copy_a_sheet_without_its_fit_and_one_that_did_not_
   const Study made = test::simulated_sheets({.n_sheets = 6});
   const test::TemporaryFolder folder;
   read_again(made, folder);
-  const DisplacementField field = {{.position_um = {1, 2}, .displacement_um = {}, .sigma_um = 1, .flag = {}}};
+  const DisplacementField field = {{.position_um = {1, 2}, .sigma_um = 1}};
   const auto a = [&](const char* name) { return folder / "a" / name; };
   for (const char* name : {"sheet_0", "sheet_1"}) {
     std::filesystem::create_directories(a(name) / "2_track");

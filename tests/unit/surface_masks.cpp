@@ -11,7 +11,7 @@ namespace {
 using HeightOf = std::function<double(Vec2)>;
 
 VoxelStack masks_of(const HeightOf& height) {
-  VoxelStack s{.n_x = 60, .n_y = 50, .n_z = 40, .pixel_um = 0.5, .step_um = 1, .share = {}};
+  VoxelStack s{.n_x = 60, .n_y = 50, .n_z = 40, .pixel_um = 0.5, .step_um = 1};
   for (int k = 0; k < s.n_z; ++k) {
     for (int j = 0; j < s.n_y; ++j) {
       for (int i = 0; i < s.n_x; ++i)
