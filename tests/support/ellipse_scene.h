@@ -95,7 +95,8 @@ inline EllipseScene ellipse_scene(int n_side, double noise, unsigned seed = 1, d
     const double noise_x = normal(random), noise_y = normal(random);
     scene.field.push_back({.position_um = points[p],
                            .displacement_um = u[p] + Vec2{sigma * noise_x, sigma * noise_y},
-                           .sigma_um = states_errors ? sigma : 0});
+                           .sigma_um = states_errors ? sigma : 0,
+                           .flag = {}});
     Vec2 traction;
     for (std::size_t a = 0; a < scene.adhesions.size(); ++a) {
       if (norm(points[p] - scene.adhesions[a].position_um) > scene.adhesions[a].major_axis_um) continue;

@@ -40,7 +40,8 @@ inline void measure(TensionScene& scene, double noise, unsigned seed) {
     scene.beads.push_back(
         {.position_um = scene.points_um[i],
          .displacement_um = {scene.displacement_um[row] + sigma_um * x, scene.displacement_um[row + 1] + sigma_um * y},
-         .sigma_um = sigma_um});
+         .sigma_um = sigma_um,
+         .flag = {}});
   }
   scene.data = tensions::reduce(scene.beads, scene.compliance_um_per_nN);
 }
@@ -67,7 +68,16 @@ inline void contract(TensionScene& scene, const Eigen::VectorXd& tensions_nN) {
 /// On an 8.4 kPa layer; beads evenly at random up to 15 um beyond the adhesions.
 inline TensionScene scene_of(const Network& network, const Eigen::VectorXd& tensions_nN,
                              const std::map<int, substrate::Ellipse>& ellipses, int n_beads, unsigned seed) {
-  TensionScene scene{.cables = cables::CableNetwork(network)};
+  TensionScene scene{.cables = cables::CableNetwork(network),
+                     .tensions_nN = {},
+                     .adhesion_ids = {},
+                     .ellipses = {},
+                     .points_um = {},
+                     .compliance_um_per_nN = {},
+                     .forces_nN = {},
+                     .displacement_um = {},
+                     .beads = {},
+                     .data = {}};
   Vec2 low{1e9, 1e9}, high{-1e9, -1e9};
   for (const auto& [id, ellipse] : ellipses) {
     scene.adhesion_ids.push_back(id);
