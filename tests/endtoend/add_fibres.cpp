@@ -9,6 +9,7 @@ namespace mbtfm {
 namespace {
 
 using test::Outcome;
+using test::output_of;
 using test::run_program;
 
 TEST(AddFibres, fibres_that_the_beads_call_for_are_in_the_next_run) {
@@ -31,8 +32,7 @@ TEST(AddFibres, fibres_that_the_beads_call_for_are_in_the_next_run) {
       run_program("mbtfm-add-fibres --rois " + (cell / "1_segment/RoiSet.zip").string() + " --missing " +
                   (cell / "4_fit/missing_fibres.csv").string() + " --out " + (cell / "fibres.zip").string());
   ASSERT_EQ(added.code, 0) << added.output;
-  const Outcome second = run_program("mbtfm run --quiet " + cell.string());
-  ASSERT_EQ(second.code, 0) << second.output;
+  output_of("mbtfm run --quiet " + cell.string());
   const std::vector<Fibre> now = fibres();
   EXPECT_EQ(now.size(), n_segmented + static_cast<std::size_t>(named.n_rows()));
   for (int row = 0; row < named.n_rows(); ++row) {
@@ -49,9 +49,9 @@ TEST(AddFibres, fibres_that_the_beads_call_for_are_in_the_next_run) {
 TEST(AddFibres, a_table_of_another_run_is_refused_by_name) {
   const test::TemporaryFolder folder;
   files::write_text(folder / "missing.csv", "start_adhesion_id,end_adhesion_id,tension_nN\n1,2,3\n");
-  const Outcome outcome = run_program("mbtfm-add-fibres --rois " + (folder / "none.zip").string() + " --missing " +
-                                      (folder / "missing.csv").string() + " --out " + (folder / "out.zip").string());
-  EXPECT_EQ(outcome.code, 3) << outcome.output;
+  output_of("mbtfm-add-fibres --rois " + (folder / "none.zip").string() + " --missing " +
+                (folder / "missing.csv").string() + " --out " + (folder / "out.zip").string(),
+            3);
   EXPECT_FALSE(std::filesystem::exists(folder / "out.zip"));
 }
 

@@ -15,6 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::Outcome;
+using test::output_of;
 using test::run_program;
 using test::TemporaryFolder;
 
@@ -86,10 +87,8 @@ class Batches : public testing::Test {
   static void SetUpTestSuite() {
     scene_ = new TemporaryFolder;
     const fs::path first = *scene_ / "study/cell1";
-    const Outcome made = run_program(
-        "mbtfm-simulate --scenario two-adhesions --seed 103 --noise 0.05 --beads 300 --images --quiet --out " +
-        first.string());
-    ASSERT_EQ(made.code, 0) << made.output;
+    output_of("mbtfm-simulate --scenario two-adhesions --seed 103 --noise 0.05 --beads 300 --images --quiet --out " +
+              first.string());
     fs::remove_all(first / "truth");
     const std::string settings = files::read_text(first / "cell.toml") +
                                  "[fit]\nn_meshes = 1\n[substrate]\nmodel = \"layer\"\n[network]\nseed = ";
@@ -99,8 +98,7 @@ class Batches : public testing::Test {
       files::write_text(cell / "cell.toml", settings + number + "\n");
     }
     fs::copy(*scene_ / "study", *scene_ / "whole", fs::copy_options::recursive);
-    const Outcome batch = run_program(batch_command(*scene_ / "whole"));
-    ASSERT_EQ(batch.code, 0) << batch.output;
+    output_of(batch_command(*scene_ / "whole"));
     whole_ = results_in(*scene_ / "whole");
     ASSERT_GT(whole_.size(), 3u * 15u);
   }
@@ -128,8 +126,7 @@ TEST_F(Batches, killed_at_random_moments_resume_to_the_same_bytes) {
     expect_nothing_half_written(study_, whole_, "round " + std::to_string(round));
   }
   EXPECT_GT(n_killed, 0);
-  const Outcome last = run_program(batch_command(study_));
-  EXPECT_EQ(last.code, 0) << last.output;
+  output_of(batch_command(study_));
   expect_the_same(study_, whole_);
   for (const auto& entry : fs::recursive_directory_iterator(study_))
     EXPECT_FALSE(entry.path().filename().string().starts_with(".partial-")) << entry.path();
@@ -137,9 +134,7 @@ TEST_F(Batches, killed_at_random_moments_resume_to_the_same_bytes) {
 
 TEST_F(Batches, do_not_depend_on_the_libraries_own_threads) {
   // As on a machine of other processors: Snakemake and many clusters set these.
-  const Outcome run = run_program("mbtfm run --quiet " + (study_ / "cell1").string(),
-                                  "export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1; ");
-  ASSERT_EQ(run.code, 0) << run.output;
+  output_of("mbtfm run --quiet " + (study_ / "cell1").string(), 0, "export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1; ");
   expect_nothing_half_written(study_, whole_, "with one thread of the BLAS");
 }
 
@@ -155,8 +150,7 @@ TEST_F(Batches, a_full_disk_leaves_nothing_half_written) {
   const Outcome full = run_program(batch_command(study_), "trap '' XFSZ; ulimit -f 4; ");
   EXPECT_NE(full.code, 0);
   expect_nothing_half_written(study_, whole_, "on a full disk");
-  const Outcome again = run_program(batch_command(study_));
-  EXPECT_EQ(again.code, 0) << again.output;
+  output_of(batch_command(study_));
   expect_the_same(study_, whole_);
 }
 
@@ -175,9 +169,8 @@ TEST_F(Batches, a_run_is_repeated_from_its_record_alone) {
   const std::string cell = (*scene_ / "whole/cell1").string(), out = (folder_ / "again").string();
   // run.json, away from the cell; of the folder it tells of, the images alone are read
   fs::copy(cell + "/run.json", folder_ / "run.json");
-  const Outcome repeated = run_program("mbtfm repeat " + (folder_ / "run.json").string() + " --inputs " +
-                                       (study_ / "cell1").string() + " --quiet --out " + out);
-  EXPECT_EQ(repeated.code, 0) << repeated.output;
+  output_of("mbtfm repeat " + (folder_ / "run.json").string() + " --inputs " + (study_ / "cell1").string() +
+            " --quiet --out " + out);
   for (const auto& [path, bytes] : results_in(folder_ / "again")) EXPECT_EQ(bytes, whole_.at("cell1/" + path)) << path;
 }
 

@@ -12,6 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::Outcome;
+using test::output_of;
 using test::run_program;
 
 constexpr const char* kScenario =
@@ -23,9 +24,8 @@ class WithoutAdhesions : public ::testing::Test {
  protected:
   void SetUp() override {
     files::write_text(folder_ / "scenario.toml", kScenario);
-    const Outcome made = run_program("mbtfm-simulate --quiet --images --scenario " +
-                                     (folder_ / "scenario.toml").string() + " --seed 3 --out " + cell().string());
-    ASSERT_EQ(made.code, 0) << made.output;
+    output_of("mbtfm-simulate --quiet --images --scenario " + (folder_ / "scenario.toml").string() +
+              " --seed 3 --out " + cell().string());
     true_total_nN_ = total_nN(cell() / "truth/adhesion_forces.csv");
   }
   fs::path cell() const { return folder_ / "cell"; }
@@ -64,8 +64,7 @@ TEST_F(WithoutAdhesions, a_cell_is_fitted_on_candidates_and_says_so) {
   EXPECT_NE(report.find("No adhesion was seen: forces are placed where adhesions may be"), std::string::npos);
   EXPECT_NE(report.find("candidate, not seen"), std::string::npos);
   EXPECT_NE(report.find("traction density"), std::string::npos);
-  const Outcome stats = run_program("mbtfm stats " + folder_.path().string());
-  EXPECT_EQ(stats.code, 0) << stats.output;
+  output_of("mbtfm stats " + folder_.path().string());
 
   // an adhesion image that comes later takes the candidates' place
   fs::copy(cell() / "actin.tif", cell() / "adhesion_mask.tif");

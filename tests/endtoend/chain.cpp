@@ -17,15 +17,13 @@ namespace {
 namespace fs = std::filesystem;
 using report::compare_with_truth;
 using report::Comparison;
-using test::Outcome;
+using test::output_of;
 using test::run_program;
 using test::TemporaryFolder;
 
 report::Comparison simulate_and_run(const fs::path& cell, const std::string& arguments) {
-  const Outcome made = run_program("mbtfm-simulate " + arguments + " --quiet --out " + cell.string());
-  EXPECT_EQ(made.code, 0) << made.output;
-  const Outcome run = run_program("mbtfm run " + cell.string());
-  EXPECT_EQ(run.code, 0) << run.output;
+  output_of("mbtfm-simulate " + arguments + " --quiet --out " + cell.string());
+  output_of("mbtfm run " + cell.string());
   test::expect_schemas_hold(cell);
   return report::compare_with_truth(cell);
 }
@@ -101,15 +99,11 @@ TEST(Chain, beads_without_any_noise_are_fitted_no_worse_than_noisy_ones) {
 TEST(Chain, noise_free_tensions_on_the_simulations_own_network_come_back) {
   const TemporaryFolder folder;
   const fs::path cell = folder / "cell";
-  const Outcome made =
-      run_program("mbtfm-simulate --scenario u2os --seed 2 --noise 0 --beads 3000 --quiet --out " + cell.string());
-  ASSERT_EQ(made.code, 0) << made.output;
-  const Outcome fit =
-      run_program("mbtfm-fit --model layer --n_meshes 1 --tolerance 1e-9 --compare_sheet on --cell " +
-                  (cell / "1_segment").string() + " --network " + (cell / "truth/network.vtu").string() +
-                  " --displacement " + (cell / "2_track/displacement.csv").string() + " --config " +
-                  (cell / "cell.toml").string() + " --out " + (cell / "4_fit").string());
-  ASSERT_EQ(fit.code, 0) << fit.output;
+  output_of("mbtfm-simulate --scenario u2os --seed 2 --noise 0 --beads 3000 --quiet --out " + cell.string());
+  output_of("mbtfm-fit --model layer --n_meshes 1 --tolerance 1e-9 --compare_sheet on --cell " +
+            (cell / "1_segment").string() + " --network " + (cell / "truth/network.vtu").string() + " --displacement " +
+            (cell / "2_track/displacement.csv").string() + " --config " + (cell / "cell.toml").string() + " --out " +
+            (cell / "4_fit").string());
   const auto found = files::read_tensions(cell / "4_fit/tensions.csv");
   const auto truth = files::read_tensions(cell / "truth/tensions.csv");
   ASSERT_EQ(found.size(), truth.size());
@@ -155,8 +149,7 @@ TEST(Chain, one_two_and_four_threads_give_the_same_bytes) {
   std::string first, first_of_usual_method;
   for (const char* threads : {"1", "2", "4"}) {
     fs::remove_all(cell / "4_fit");
-    const Outcome run = run_program("mbtfm run --threads " + std::string(threads) + " " + cell.string());
-    ASSERT_EQ(run.code, 0) << run.output;
+    output_of("mbtfm run --threads " + std::string(threads) + " " + cell.string());
     const std::string tensions = files::read_text(cell / "4_fit/tensions.csv");
     if (first.empty()) first = tensions;
     EXPECT_EQ(tensions, first) << threads << " threads";
@@ -164,10 +157,9 @@ TEST(Chain, one_two_and_four_threads_give_the_same_bytes) {
     if (first_of_usual_method.empty()) first_of_usual_method = usual_method;
     EXPECT_EQ(usual_method, first_of_usual_method) << threads << " threads";
   }
-  const Outcome alone = run_program("mbtfm-traction --displacement " + (cell / "2_track/displacement.csv").string() +
-                                    " --outline " + (cell / "1_segment/outline.csv").string() + " --config " +
-                                    (cell / "cell.toml").string() + " --out " + (folder / "traction.csv").string());
-  ASSERT_EQ(alone.code, 0) << alone.output;
+  output_of("mbtfm-traction --displacement " + (cell / "2_track/displacement.csv").string() + " --outline " +
+            (cell / "1_segment/outline.csv").string() + " --config " + (cell / "cell.toml").string() + " --out " +
+            (folder / "traction.csv").string());
   // fttc.csv ends a little around the cell
   const std::string whole = files::read_text(folder / "traction.csv");
   std::istringstream lines(first_of_usual_method);
@@ -214,9 +206,8 @@ TEST(Chain, tensions_of_the_oracle_cells_come_back_from_the_displacement_of_thei
       fs::permissions(entry, fs::perms::owner_write, fs::perm_options::add);
     }
     recompute_displacement(cell);
-    const Outcome run = run_program("mbtfm run " + cell.string());
-    EXPECT_EQ(run.code, 0) << run.output;
-    EXPECT_NE(run.output.find("given"), std::string::npos) << "segmentation and tracking are skipped: " << run.output;
+    const std::string run = output_of("mbtfm run " + cell.string());
+    EXPECT_NE(run.find("given"), std::string::npos) << "segmentation and tracking are skipped: " << run;
     EXPECT_LE(report::compare_with_truth(cell).relative_error, 0.30) << name;
   }
 }

@@ -29,10 +29,9 @@ constexpr const char* kCell =
     "volume_um3 = 5000\nheight_um = 7.5\nyoungs_modulus_kPa = 10\npoisson_ratio = 0.49\ncontraction_kPa = 30\n";
 
 TEST_F(Continuum, a_cell_on_a_gel_gives_the_table_that_the_formats_promise) {
-  const auto outcome = test::run_program("mbtfm-indent --config " + settings(kCell) + " --out " + file("out"));
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_TRUE(fires("contraction-beyond-linear", outcome.output)) << outcome.output;
-  EXPECT_FALSE(fires("cases-not-solved", outcome.output)) << outcome.output;
+  const std::string outcome = test::output_of("mbtfm-indent --config " + settings(kCell) + " --out " + file("out"));
+  EXPECT_TRUE(fires("contraction-beyond-linear", outcome)) << outcome;
+  EXPECT_FALSE(fires("cases-not-solved", outcome)) << outcome;
   const files::CsvTable table(file("out/indent.csv"));
   ASSERT_EQ(table.n_rows(), 1);
   // notes of an independent program: half a percent
@@ -46,10 +45,8 @@ TEST_F(Continuum, a_cell_on_a_gel_gives_the_table_that_the_formats_promise) {
 }
 
 TEST_F(Continuum, a_sweep_finds_the_height_that_presses_deepest) {
-  const auto outcome =
-      test::run_program("mbtfm-indent --config " + settings(kCell) + " --order 4 --towards_rim 4 --out " + file("out") +
-                        " --sweep 'height_um=5.3..11.3:4 modulus_ratio=0.5,1'");
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  test::output_of("mbtfm-indent --config " + settings(kCell) + " --order 4 --towards_rim 4 --out " + file("out") +
+                  " --sweep 'height_um=5.3..11.3:4 modulus_ratio=0.5,1'");
   EXPECT_EQ(files::CsvTable(file("out/indent.csv")).n_rows(), 8);
   const files::CsvTable optima(file("out/optima.csv"));
   ASSERT_EQ(optima.n_rows(), 4);
@@ -65,10 +62,9 @@ TEST_F(Continuum, a_sweep_finds_the_height_that_presses_deepest) {
 TEST_F(Continuum, cases_of_a_sweep_that_are_not_solved_say_so_in_their_row) {
   const std::string large =
       "mbtfm-indent --config " + settings(kCell) + " --strain large --order 4 --towards_rim 4 --out " + file("out");
-  const auto outcome = test::run_program(large + " --sweep 'height_um=5.3,7.4,9.5 modulus_ratio=0.1'");
-  ASSERT_EQ(outcome.code, 4) << outcome.output;
-  EXPECT_TRUE(fires("cases-not-solved", outcome.output)) << outcome.output;
-  EXPECT_FALSE(fires("contraction-beyond-linear", outcome.output)) << "they are computed: " << outcome.output;
+  const std::string outcome = test::output_of(large + " --sweep 'height_um=5.3,7.4,9.5 modulus_ratio=0.1'", 4);
+  EXPECT_TRUE(fires("cases-not-solved", outcome)) << outcome;
+  EXPECT_FALSE(fires("contraction-beyond-linear", outcome)) << "they are computed: " << outcome;
   const files::CsvTable table(file("out/indent.csv"));
   ASSERT_EQ(table.n_rows(), 3);
   for (int row = 0; row < 3; ++row) {
@@ -88,9 +84,8 @@ TEST_F(Continuum, cases_of_a_sweep_that_are_not_solved_say_so_in_their_row) {
 
 TEST_F(Continuum, what_is_no_cell_or_no_gel_for_it_is_refused) {
   const auto refused = [&](const std::string& cell, const std::string& words) {
-    const auto outcome = test::run_program("mbtfm-indent --config " + settings(cell) + " --out " + file("out"));
-    EXPECT_EQ(outcome.code, 2) << outcome.output;
-    EXPECT_NE(outcome.output.find(words), std::string::npos) << outcome.output;
+    const std::string outcome = test::output_of("mbtfm-indent --config " + settings(cell) + " --out " + file("out"), 2);
+    EXPECT_NE(outcome.find(words), std::string::npos) << outcome;
     EXPECT_FALSE(std::filesystem::exists(file("out/indent.csv")));
   };
   refused("height_um = 22\n", "whole sphere");
@@ -106,10 +101,9 @@ constexpr const char* kOnOutline =
 TEST_F(Continuum, a_contact_that_is_an_outline_is_solved_in_space) {
   Polygon square = {{10, 20}, {46, 20}, {46, 56}, {10, 56}};
   files::write_outline(file("outline.csv"), square);
-  const auto outcome = test::run_program("mbtfm-indent --config " + settings(kOnOutline) + " --outline " +
-                                         file("outline.csv") + " --towards_rim 2 --out " + file("out"));
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_TRUE(fires("contraction-beyond-linear", outcome.output)) << outcome.output;
+  const std::string outcome = test::output_of("mbtfm-indent --config " + settings(kOnOutline) + " --outline " +
+                                              file("outline.csv") + " --towards_rim 2 --out " + file("out"));
+  EXPECT_TRUE(fires("contraction-beyond-linear", outcome)) << outcome;
   const files::CsvTable table(file("out/indent.csv"));
   ASSERT_EQ(table.n_rows(), 1);
   EXPECT_NEAR(table.number(0, "contact_area_um2"), 36 * 36, 0.01);
@@ -125,11 +119,11 @@ TEST_F(Continuum, outlines_that_are_no_contact_are_refused_with_the_file_and_the
   const auto refused = [&](const std::vector<Polygon>& rings, const std::string& flags, int code,
                            const std::string& words) {
     files::write_outline(file("outline.csv"), rings.front(), {rings.begin() + 1, rings.end()});
-    const auto outcome = test::run_program("mbtfm-indent --config " + settings(kOnOutline) + " --outline " +
-                                           file("outline.csv") + " --out " + file("out") + flags);
-    EXPECT_EQ(outcome.code, code) << outcome.output;
-    EXPECT_NE(outcome.output.find(words), std::string::npos) << outcome.output;
-    EXPECT_EQ(outcome.output.find("outline.csv") != std::string::npos, code == 3) << outcome.output;
+    const std::string outcome = test::output_of("mbtfm-indent --config " + settings(kOnOutline) + " --outline " +
+                                                    file("outline.csv") + " --out " + file("out") + flags,
+                                                code);
+    EXPECT_NE(outcome.find(words), std::string::npos) << outcome;
+    EXPECT_EQ(outcome.find("outline.csv") != std::string::npos, code == 3) << outcome;
     EXPECT_FALSE(std::filesystem::exists(file("out/indent.csv")));
   };
   const Polygon square = {{0, 0}, {36, 0}, {36, 36}, {0, 36}};
@@ -177,9 +171,8 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
   const std::string settings_file = settings("");
   const std::string mean =
       "mbtfm-mean " + file("cells") + " --config " + settings_file + " --symmetry C4v --spacing_um 3";
-  const auto outcome = test::run_program(mean + " --out " + file("mean"));
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  test::expect_silent({"cells-left-out", "few-cells", "registration-ambiguous"}, outcome.output);
+  const std::string outcome = test::output_of(mean + " --out " + file("mean"));
+  test::expect_silent({"cells-left-out", "few-cells", "registration-ambiguous"}, outcome);
   const files::CsvTable registration(file("mean/registration.csv"));
   ASSERT_EQ(registration.n_rows(), 5);
   for (int row = 0; row < 5; ++row) {
@@ -204,9 +197,8 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
     images::write_tiff(cell / "outline_mask.tif", mask);
     std::filesystem::rename(cell / "outline.csv", cell / "was_outline.csv");
   }
-  const auto unknown = test::run_program(mean + " --out " + file("unknown"));
-  EXPECT_EQ(unknown.code, 2) << unknown.output;
-  EXPECT_NE(unknown.output.find("pixel_size_um is missing"), std::string::npos) << unknown.output;
+  const std::string unknown = test::output_of(mean + " --out " + file("unknown"), 2);
+  EXPECT_NE(unknown.find("pixel_size_um is missing"), std::string::npos) << unknown;
   const auto by_mask = test::run_program(mean + " --pixel_size_um 0.25 --out " + file("by_mask"));
   ASSERT_EQ(by_mask.code, 0) << by_mask.output;
   const files::CsvTable of_masks(file("by_mask/registration.csv"));
@@ -218,14 +210,12 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
   }
   // its own mean as a model is blurred once more
   const std::string pattern = mean + " --pattern " + file("mean/reference.csv") + " --lambda_um_per_kPa 0.1";
-  const auto again = test::run_program(pattern + " --model " + file("mean/mean.csv") + " --out " + file("again"));
-  EXPECT_EQ(again.code, 0) << again.output;
+  test::output_of(pattern + " --model " + file("mean/mean.csv") + " --out " + file("again"));
 
   std::filesystem::remove(folder_ / "cells/round");
   write_cell(folder_ / "cells/round", 0, 9, 0);
-  const auto refused = test::run_program(pattern + " --out " + file("no"));
-  EXPECT_EQ(refused.code, 3) << refused.output;
-  EXPECT_NE(refused.output.find("cell 'round'"), std::string::npos) << refused.output;
+  const std::string refused = test::output_of(pattern + " --out " + file("no"), 3);
+  EXPECT_NE(refused.find("cell 'round'"), std::string::npos) << refused;
   EXPECT_FALSE(std::filesystem::exists(file("no/mean.csv")));
   const auto left = test::run_program(pattern + " --others left-out --out " + file("left"));
   EXPECT_EQ(left.code, 0) << left.output;
@@ -235,11 +225,10 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
 /// A square lies on itself in four ways; nobody has said that it is one.
 TEST_F(Continuum, a_mean_of_few_cells_that_lie_on_each_other_in_several_ways_says_both) {
   for (int k = 0; k < 3; ++k) write_cell(folder_ / ("cells/cell_" + std::to_string(k)), 0.4 * k, k, 12);
-  const auto outcome = test::run_program("mbtfm-mean " + file("cells") + " --config " + settings("") +
-                                         " --spacing_um 6 --lambda_um_per_kPa 0.1 --out " + file("mean"));
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_TRUE(fires("few-cells", outcome.output)) << outcome.output;
-  EXPECT_TRUE(fires("registration-ambiguous", outcome.output)) << outcome.output;
+  const std::string outcome = test::output_of("mbtfm-mean " + file("cells") + " --config " + settings("") +
+                                              " --spacing_um 6 --lambda_um_per_kPa 0.1 --out " + file("mean"));
+  EXPECT_TRUE(fires("few-cells", outcome)) << outcome;
+  EXPECT_TRUE(fires("registration-ambiguous", outcome)) << outcome;
 }
 
 /// Spots that turn with the cell, of 0.5 um a pixel.
@@ -280,11 +269,10 @@ TEST_F(Continuum, cells_are_laid_onto_each_other_by_images_that_their_settings_n
   std::filesystem::remove(last / "outline.csv");
   for (int k = 0; k + 1 < kCells; ++k)  // a name that is given must be there
     std::filesystem::copy(last / "cell_shape.tif", folder_ / ("cells/cell_" + std::to_string(k)) / "cell_shape.tif");
-  const auto outcome = test::run_program("mbtfm-mean " + file("cells") + " --config " + settings("") +
-                                         " --register_by images --image actin --reference cell_0 --pixel_size_um 0.25 "
-                                         "--spacing_um 3 --out " +
-                                         file("mean"));
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  test::output_of("mbtfm-mean " + file("cells") + " --config " + settings("") +
+                  " --register_by images --image actin --reference cell_0 --pixel_size_um 0.25 "
+                  "--spacing_um 3 --out " +
+                  file("mean"));
   const files::CsvTable registration(file("mean/registration.csv"));
   ASSERT_EQ(registration.n_rows(), kCells);
   for (int row = 0; row < kCells; ++row) {

@@ -7,14 +7,13 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::Outcome;
+using test::output_of;
 using test::run_program;
 
 class SmallCell : public testing::Test {
  protected:
   void SetUp() override {
-    const Outcome made =
-        run_program("mbtfm-simulate --scenario ring --seed 3 --noise 0.02 --beads 800 --quiet --out " + cell.string());
-    ASSERT_EQ(made.code, 0) << made.output;
+    output_of("mbtfm-simulate --scenario ring --seed 3 --noise 0.02 --beads 800 --quiet --out " + cell.string());
   }
   Outcome run(const std::string& arguments) const { return run_program("mbtfm " + arguments + " " + cell.string()); }
   test::TemporaryFolder folder;

@@ -13,8 +13,7 @@ namespace mbtfm {
 namespace {
 
 namespace fs = std::filesystem;
-using test::Outcome;
-using test::run_program;
+using test::output_of;
 using test::TemporaryFolder;
 
 /// The right part of the picture.
@@ -39,9 +38,7 @@ double figure(const FitSummary& fit, const std::string& name) {
 TEST(CutCell, cropped_images_are_fitted_and_the_force_through_the_cut_is_that_of_the_adhesions_outside) {
   const TemporaryFolder folder;
   const fs::path cell = folder / "cell";
-  const Outcome made =
-      run_program("mbtfm-simulate --scenario u2os --seed 41 --noise 0.07 --images --quiet --out " + cell.string());
-  ASSERT_EQ(made.code, 0) << made.output;
+  output_of("mbtfm-simulate --scenario u2os --seed 41 --noise 0.07 --images --quiet --out " + cell.string());
   double low = 1e9, high = -1e9;
   const std::vector<Polygon> rings = files::read_outline(cell / "truth/outline.csv");
   for (const Vec2 p : rings.front()) {
@@ -57,9 +54,8 @@ TEST(CutCell, cropped_images_are_fitted_and_the_force_through_the_cut_is_that_of
     images::write_tiff(cell / name, without_left(image, n_columns));
   }
   const double border_um = n_columns * pixel_um;
-  const Outcome run = run_program("mbtfm run " + cell.string());
-  ASSERT_EQ(run.code, 0) << run.output;
-  EXPECT_TRUE(test::fires("cell-cut", run.output)) << run.output;
+  const std::string run = output_of("mbtfm run " + cell.string());
+  EXPECT_TRUE(test::fires("cell-cut", run)) << run;
 
   Vec2 outside_nN;
   const auto truth = files::read_adhesion_forces(cell / "truth/adhesion_forces.csv");
@@ -95,8 +91,7 @@ TEST(CutCell, a_real_cell_that_leaves_its_image_is_fitted) {
           (data / "ph_a.tif").string() + "\"\nactin = \"" + (data / "ph_a.tif").string() + "\"\nbeads_stressed = \"" +
           (data / "bead_a.tif").string() + "\"\nbeads_relaxed = \"" + (data / "bead_a.tif").string() +
           "\"\n[track]\nstressed_page = 1\nrelaxed_page = 2\n");
-  const Outcome run = run_program("mbtfm run " + cell.string());
-  ASSERT_EQ(run.code, 0) << run.output;
+  output_of("mbtfm run " + cell.string());
   const FitSummary fit = files::read_fit_summary(cell / "4_fit/fit.json");
   EXPECT_TRUE(fit.converged);
   // the adhesions move into the cell, which lies below: the cut's force balances them upwards, and is known

@@ -11,6 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::Outcome;
+using test::output_of;
 using test::run_program;
 using test::TemporaryFolder;
 
@@ -21,9 +22,8 @@ class Errors : public ::testing::Test {
   /// A small cell: two adhesions and a fibre, with images.
   static void SetUpTestSuite() {
     scene_ = new TemporaryFolder;
-    const Outcome made = run_program("mbtfm-simulate --scenario two-adhesions --seed 3 --images --quiet --out " +
-                                     (scene_->path() / "cell").string());
-    ASSERT_EQ(made.code, 0) << made.output;
+    output_of("mbtfm-simulate --scenario two-adhesions --seed 3 --images --quiet --out " +
+              (scene_->path() / "cell").string());
   }
   static void TearDownTestSuite() { delete scene_; }
 
@@ -39,10 +39,9 @@ class Errors : public ::testing::Test {
 
   /// Run the cell, expect this code and these words, and that no output was left in `folder`.
   void expect_error(int code, const std::vector<std::string>& words, const std::string& folder) const {
-    const Outcome outcome = run_program("mbtfm run " + cell_.string());
-    EXPECT_EQ(outcome.code, code) << outcome.output;
+    const std::string outcome = output_of("mbtfm run " + cell_.string(), code);
     for (const std::string& word : words) {
-      EXPECT_NE(outcome.output.find(word), std::string::npos) << "'" << word << "' is not in: " << outcome.output;
+      EXPECT_NE(outcome.find(word), std::string::npos) << "'" << word << "' is not in: " << outcome;
     }
     if (!fs::exists(cell_ / folder)) return;
     for (const auto& entry : fs::directory_iterator(cell_ / folder)) {
@@ -115,8 +114,7 @@ TEST_F(Errors, bead_images_of_another_field_are_refused_before_anything_runs_and
 
   files::write_text(cell_ / "cell.toml",
                     files::read_text(cell_ / "cell.toml") + "\n[track]\nbeads_pixel_size_um = " + pixel + "\n");
-  const Outcome run = run_program("mbtfm run " + cell_.string());
-  ASSERT_EQ(run.code, 0) << run.output;
+  output_of("mbtfm run " + cell_.string());
   double farthest_um = 0;
   for (const Bead& bead : files::read_displacement(cell_ / "2_track/displacement.csv"))
     farthest_um = std::max(farthest_um, bead.position_um.x);
@@ -185,11 +183,10 @@ TEST_F(Errors, an_adhesion_outside_the_outline_is_named) {
 
 TEST_F(Errors, a_full_disk_leaves_nothing_and_says_so) {
   // A limit on the size of files, its signal ignored, fails a write half-way as a full disk does.
-  const Outcome outcome = run_program("mbtfm-network --edge_length_um 0.5 --cell " + (cell_ / "truth").string() +
-                                          " --out " + (folder_ / "new/network.vtu").string(),
-                                      "trap '' XFSZ; ulimit -f 8; ");
-  EXPECT_EQ(outcome.code, kOutput) << outcome.output;
-  EXPECT_NE(outcome.output.find("network.vtu"), std::string::npos) << outcome.output;
+  const std::string outcome = output_of("mbtfm-network --edge_length_um 0.5 --cell " + (cell_ / "truth").string() +
+                                            " --out " + (folder_ / "new/network.vtu").string(),
+                                        kOutput, "trap '' XFSZ; ulimit -f 8; ");
+  EXPECT_NE(outcome.find("network.vtu"), std::string::npos) << outcome;
   EXPECT_FALSE(fs::exists(folder_ / "new")) << "neither the file nor the folder made for it";
 }
 
@@ -201,9 +198,8 @@ TEST_F(Errors, a_wrong_flag_names_it) {
 
 TEST_F(Errors, what_was_probably_meant_is_named) {
   const auto said = [](const std::string& command, int code) {
-    const Outcome outcome = run_program(command);
-    EXPECT_EQ(outcome.code, code) << outcome.output;
-    return outcome.output;
+    const std::string outcome = output_of(command, code);
+    return outcome;
   };
   EXPECT_NE(said("mbtfm run --thread 2 " + cell_.string(), kUsage).find("did you mean '--threads'?"),
             std::string::npos);
@@ -286,15 +282,13 @@ TEST_F(Errors, a_cell_toml_that_init_wrote_runs_once_the_modulus_is_in_it) {
   fs::rename(cell_ / "beads_relaxed.tif", cell_ / "beads_after_trypsin.tif");
   fs::rename(cell_ / "beads_stressed.tif", cell_ / "beads_with_cell.tif");
   fs::create_symlink("round.tif", cell_ / "round.tif");  // a link that leads round in a circle is no image
-  const Outcome made = run_program("mbtfm init " + cell_.string());
-  EXPECT_EQ(made.code, 0) << made.output;
-  EXPECT_NE(made.output.find("complete in it: youngs_modulus_kPa in [gel]"), std::string::npos) << made.output;
+  const std::string made = output_of("mbtfm init " + cell_.string());
+  EXPECT_NE(made.find("complete in it: youngs_modulus_kPa in [gel]"), std::string::npos) << made;
   EXPECT_EQ(run_program("mbtfm init " + cell_.string()).code, kInput) << "a cell.toml that is there stays";
   expect_error(kUsage, {"youngs_modulus_kPa"}, "4_fit");
   replace_in_toml("# youngs_modulus_kPa", "youngs_modulus_kPa = 8.4");
-  const Outcome run = run_program("mbtfm run --preset fast " + cell_.string());
-  EXPECT_EQ(run.code, 0) << run.output;
-  EXPECT_NE(run.output.find("total force "), std::string::npos) << run.output;
+  const std::string run = output_of("mbtfm run --preset fast " + cell_.string());
+  EXPECT_NE(run.find("total force "), std::string::npos) << run;
 }
 
 }  // namespace

@@ -10,8 +10,7 @@ namespace mbtfm {
 namespace {
 
 namespace fs = std::filesystem;
-using test::Outcome;
-using test::run_program;
+using test::output_of;
 
 /// On a gel whose base, sides and grading all matter.
 constexpr const char* kScenario =
@@ -36,9 +35,8 @@ class Explained : public ::testing::TestWithParam<int> {
  protected:
   void SetUp() override {
     files::write_text(folder_ / "scenario.toml", kScenario);
-    const Outcome made = run_program("mbtfm-simulate --quiet --scenario " + (folder_ / "scenario.toml").string() +
-                                     " --seed " + std::to_string(GetParam()) + " --out " + cell().string());
-    ASSERT_EQ(made.code, 0) << made.output;
+    output_of("mbtfm-simulate --quiet --scenario " + (folder_ / "scenario.toml").string() + " --seed " +
+              std::to_string(GetParam()) + " --out " + cell().string());
     toml_ = files::read_text(cell() / "cell.toml") + kSettings;
   }
   fs::path cell() const { return folder_ / "cell"; }
@@ -47,8 +45,7 @@ class Explained : public ::testing::TestWithParam<int> {
     std::string toml = toml_;
     for (const auto& [name, setting] : switches) toml += name + " = '" + setting + "'\n";
     files::write_text(cell() / "cell.toml", toml);
-    const Outcome outcome = run_program("mbtfm run " + cell().string() + flags);
-    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    output_of("mbtfm run " + cell().string() + flags);
     return files::read_tensions(cell() / "4_fit/tensions.csv");
   }
 

@@ -330,8 +330,7 @@ class HostileCells : public testing::Test {
 
   static void make_finished(const fs::path& cell, const fs::path& stages) {
     test::make_unfinished_cell(cell);
-    const Outcome run = test::run_program("mbtfm run --stages-dir " + stages.string() + " " + cell.string());
-    ASSERT_EQ(run.code, 0) << run.output;
+    test::output_of("mbtfm run --stages-dir " + stages.string() + " " + cell.string());
   }
   static void copy_cell(const std::string& name, const fs::path& to) {
     fs::create_directories(to.parent_path());
@@ -488,8 +487,7 @@ TEST_F(HostileCells, a_cell_folder_and_its_images_and_settings_may_be_links) {
   fs::create_symlink("../disk/cell", scene.cell());
   const Outcome run = mbtfm("run " + scene.cell().string());
   EXPECT_EQ(run.code, 0) << run.output;
-  const Outcome verify = test::run_program("mbtfm verify " + scene.cell().string());
-  EXPECT_EQ(verify.code, 0) << verify.output;
+  test::output_of("mbtfm verify " + scene.cell().string());
   EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(scene.root / "disk/cell/report.html")));
 }
 

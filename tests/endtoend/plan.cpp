@@ -10,6 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::Outcome;
+using test::output_of;
 using test::run_program;
 
 const std::string kSmall =
@@ -18,10 +19,9 @@ const std::string kSmall =
 TEST(Plan, a_question_is_answered_with_a_sentence_tables_a_picture_and_a_page) {
   const test::TemporaryFolder folder;
   const fs::path out = folder / "plan";
-  const Outcome outcome = run_program(kSmall + "--drawn 1 --out " + out.string());
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find(" to see 1 nN per fibre to 20 %"), std::string::npos) << outcome.output;
-  EXPECT_NE(outcome.output.find("Checked with 1 simulated experiment"), std::string::npos) << outcome.output;
+  const std::string outcome = output_of(kSmall + "--drawn 1 --out " + out.string());
+  EXPECT_NE(outcome.find(" to see 1 nN per fibre to 20 %"), std::string::npos) << outcome;
+  EXPECT_NE(outcome.find("Checked with 1 simulated experiment"), std::string::npos) << outcome;
   for (const char* file :
        {"plan.html", "plan.csv", "plan_needed.csv", "plan_cells.csv", "plan_drawn.csv", "plan.svg", "plan.png"}) {
     EXPECT_GT(fs::file_size(out / file), 100u) << file;
@@ -37,9 +37,7 @@ TEST(Plan, a_question_is_answered_with_a_sentence_tables_a_picture_and_a_page) {
 TEST(Plan, the_same_question_has_the_same_answer_for_any_number_of_threads) {
   const test::TemporaryFolder folder;
   for (const char* threads : {"1", "2"}) {
-    const Outcome outcome =
-        run_program(kSmall + "--drawn 1 --threads " + threads + " --out " + (folder / threads).string());
-    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    output_of(kSmall + "--drawn 1 --threads " + threads + " --out " + (folder / threads).string());
   }
   for (const char* file : {"plan.csv", "plan_drawn.csv", "plan.html"})
     EXPECT_EQ(files::read_text(folder / "1" / file), files::read_text(folder / "2" / file)) << file;
@@ -56,9 +54,8 @@ TEST(Plan, a_finished_cell_is_planned_with_by_its_own_tensions_beads_and_gel) {
   EXPECT_EQ(run_program(ask).code, 3) << "its fit is missing";
   EXPECT_FALSE(fs::exists(out));
   ASSERT_EQ(run_program("mbtfm run --quiet " + cell.string()).code, 0);
-  const Outcome outcome = run_program(ask);
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find("your gel of 8.4 kPa"), std::string::npos) << outcome.output;
+  const std::string outcome = output_of(ask);
+  EXPECT_NE(outcome.find("your gel of 8.4 kPa"), std::string::npos) << outcome;
 }
 
 TEST(Plan, a_gel_that_hardly_moves_or_moves_too_far_is_warned_of) {
@@ -83,9 +80,8 @@ TEST(Plan, what_is_no_plan_is_refused_and_leaves_nothing_behind) {
     const Outcome outcome = run_program("mbtfm plan --scenario two-adhesions " + std::string(bad) + out);
     EXPECT_EQ(outcome.code, 2) << bad << ": " << outcome.output;
   }
-  const Outcome colony = run_program("mbtfm plan --scenario colony-disc" + out);
-  EXPECT_EQ(colony.code, 2) << colony.output;
-  EXPECT_NE(colony.output.find("is a sheet without fibres"), std::string::npos) << colony.output;
+  const std::string colony = output_of("mbtfm plan --scenario colony-disc" + out, 2);
+  EXPECT_NE(colony.find("is a sheet without fibres"), std::string::npos) << colony;
   EXPECT_EQ(run_program("mbtfm plan --cell " + (folder / "nowhere").string() + out).code, 3);
   EXPECT_FALSE(fs::exists(folder / "plan"));
 }
@@ -94,15 +90,13 @@ TEST(Plan, a_modulus_in_pascals_is_refused_and_no_end_of_a_search_is_an_answer) 
   const test::TemporaryFolder folder;
   const std::string ask = "mbtfm plan --scenario two-adhesions --drawn 0 --beads_per_um2 0.5 --noise_um 0.05 --out " +
                           (folder / "plan").string() + " --youngs_modulus_kPa ";
-  const Outcome pascals = run_program(ask + "8400");
-  EXPECT_EQ(pascals.code, 3) << pascals.output;
-  EXPECT_NE(pascals.output.find("8400 Pa is 8.4 kPa"), std::string::npos) << pascals.output;
+  const std::string pascals = output_of(ask + "8400", 3);
+  EXPECT_NE(pascals.find("8400 Pa is 8.4 kPa"), std::string::npos) << pascals;
   EXPECT_FALSE(fs::exists(folder / "plan"));
-  const Outcome stiff = run_program(ask + "900");
-  ASSERT_EQ(stiff.code, 0) << stiff.output;
-  EXPECT_NE(stiff.output.find("no number of beads suffices to see 1 nN per fibre to 20 %: with 0.5 per µm² the noise"),
+  const std::string stiff = output_of(ask + "900");
+  EXPECT_NE(stiff.find("no number of beads suffices to see 1 nN per fibre to 20 %: with 0.5 per µm² the noise"),
             std::string::npos)
-      << stiff.output;
+      << stiff;
   EXPECT_TRUE(files::CsvTable(folder / "plan/plan_needed.csv").text(0, "beads_per_um2").empty());
 }
 
@@ -116,10 +110,9 @@ TEST(PlanInSpace, the_example_of_the_page_is_answered_for_each_patch_with_tables
   const std::string last = ",0.004 ";
   ASSERT_NE(command.find(last), command.npos);
   command.replace(command.find(last), last.size(), " ");
-  const Outcome outcome = run_program(command + " --drawn 1 --out " + (folder / "plan").string());
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find(" beads per µm³ ("), std::string::npos) << outcome.output;
-  EXPECT_NE(outcome.output.find("Checked with 1 simulated experiment"), std::string::npos) << outcome.output;
+  const std::string outcome = output_of(command + " --drawn 1 --out " + (folder / "plan").string());
+  EXPECT_NE(outcome.find(" beads per µm³ ("), std::string::npos) << outcome;
+  EXPECT_NE(outcome.find("Checked with 1 simulated experiment"), std::string::npos) << outcome;
   for (const char* file : {"plan.html", "plan.csv", "plan_needed.csv", "plan_drawn.csv", "plan.svg", "plan.png"})
     EXPECT_GT(fs::file_size(folder / "plan" / file), 100u) << file;
   EXPECT_FALSE(fs::exists(folder / "plan/plan_cells.csv")) << "there are no tensions to compare";
@@ -143,9 +136,8 @@ TEST(PlanInSpace, what_is_no_plan_in_space_is_refused_with_the_remedy) {
   files::write_text(folder / "cell/cell.toml",
                     "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8\nthickness_um = 60\n");
   files::write_text(folder / "cell/2_track/displacement_3d.csv", "");
-  const Outcome outcome = run_program("mbtfm plan --cell " + (folder / "cell").string() + out);
-  EXPECT_EQ(outcome.code, 3) << outcome.output;
-  EXPECT_NE(outcome.output.find("give their image, and run the cell again"), std::string::npos) << outcome.output;
+  const std::string outcome = output_of("mbtfm plan --cell " + (folder / "cell").string() + out, 3);
+  EXPECT_NE(outcome.find("give their image, and run the cell again"), std::string::npos) << outcome;
   EXPECT_FALSE(fs::exists(folder / "plan"));
 }
 
@@ -155,11 +147,10 @@ class Unloaded : public ::testing::Test {
   static constexpr double kNoise_um = 0.05;
   static constexpr double kDensity = 0.3;
   void SetUp() override {
-    const Outcome made = run_program(
+    output_of(
         "mbtfm-simulate --quiet --scenario two-adhesions --images --ventral_median_nN 1e-5 --smallest_tension_nN 1e-6 "
         "--surface_tension_nN_per_um 0 --drift_x_um 0.31 --lost_bead_fraction 0.05 --noise_um " +
         std::to_string(kNoise_um) + " --beads_per_um2 " + std::to_string(kDensity) + " --out " + cell().string());
-    ASSERT_EQ(made.code, 0) << made.output;
   }
   fs::path cell() const { return folder_ / "cell"; }
   std::string picture(const char* name) const { return (cell() / name).string(); }
@@ -174,19 +165,17 @@ double number_after(const std::string& text, const std::string& words) {
 }
 
 TEST_F(Unloaded, noise_density_drift_and_share_lost_are_found) {
-  const Outcome found =
-      run_program("mbtfm noise " + picture("beads_relaxed.tif") + " " + picture("beads_stressed.tif"));
-  ASSERT_EQ(found.code, 0) << found.output;
+  const std::string found =
+      output_of("mbtfm noise " + picture("beads_relaxed.tif") + " " + picture("beads_stressed.tif"));
   // the camera adds some nm to the beads' own; what neighbours tell takes some away; 800 beads tell it to 3 %
-  EXPECT_NEAR(number_after(found.output, "noise of a displacement component"), kNoise_um, 0.15 * kNoise_um)
-      << found.output;
-  EXPECT_NEAR(number_after(found.output, "drift "), 0.31, 4 * kNoise_um / std::sqrt(kDensity * 51.2 * 51.2));
+  EXPECT_NEAR(number_after(found, "noise of a displacement component"), kNoise_um, 0.15 * kNoise_um) << found;
+  EXPECT_NEAR(number_after(found, "drift "), 0.31, 4 * kNoise_um / std::sqrt(kDensity * 51.2 * 51.2));
   // beads that melt together or lie on the rim are not followed
-  EXPECT_NEAR(number_after(found.output, "beads followed"), kDensity, 0.2 * kDensity) << found.output;
-  const double lost = number_after(found.output, "share lost");
-  EXPECT_GT(lost, 1) << found.output;
-  EXPECT_LT(lost, 15) << found.output;
-  EXPECT_EQ(found.output.find("WARNING"), std::string::npos) << found.output;
+  EXPECT_NEAR(number_after(found, "beads followed"), kDensity, 0.2 * kDensity) << found;
+  const double lost = number_after(found, "share lost");
+  EXPECT_GT(lost, 1) << found;
+  EXPECT_LT(lost, 15) << found;
+  EXPECT_EQ(found.find("WARNING"), std::string::npos) << found;
 }
 
 TEST_F(Unloaded, one_picture_twice_or_one_alone_is_refused) {
@@ -200,10 +189,9 @@ TEST(SimulatedNoise, noise_in_um_and_beads_by_area_hold_on_every_gel) {
   const test::TemporaryFolder folder;
   for (const char* gel : {"1", "16"}) {
     const fs::path cell = folder / gel;
-    const Outcome made = run_program(
+    output_of(
         "mbtfm-simulate --quiet --scenario two-adhesions --noise_um 0.03 --beads_per_um2 0.5 --youngs_modulus_kPa " +
         std::string(gel) + " --out " + cell.string());
-    ASSERT_EQ(made.code, 0) << made.output;
     const auto truth = files::read_displacement(cell / "truth/displacement.csv"),
                measured = files::read_displacement(cell / "2_track/displacement.csv");
     ASSERT_EQ(measured.size(), static_cast<std::size_t>(std::lround(0.5 * 51.2 * 51.2)));

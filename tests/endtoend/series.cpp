@@ -11,6 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::Outcome;
+using test::output_of;
 using test::run_program;
 
 /// The cell pulls twice as hard in the second frame; the third could not be tracked.
@@ -25,9 +26,7 @@ void write_frames(const fs::path& track) {
 TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
   const test::TemporaryFolder folder;
   const fs::path cell = folder / "cell";
-  const Outcome made = run_program(
-      "mbtfm-simulate --scenario two-adhesions --seed 1 --noise 0.05 --beads 800 --quiet --out " + cell.string());
-  ASSERT_EQ(made.code, 0) << made.output;
+  output_of("mbtfm-simulate --scenario two-adhesions --seed 1 --noise 0.05 --beads 800 --quiet --out " + cell.string());
   write_frames(cell / "2_track");
   std::string toml = files::read_text(cell / "cell.toml");
   files::write_text(cell / "cell.toml", toml + "\n[fit]\nframe_interval_s = 30\n");
@@ -61,8 +60,7 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
   DisplacementField field = files::read_displacement(cell / "2_track/displacement_0002.csv");
   for (Bead& bead : field) bead.displacement_um = 1.5 * bead.displacement_um;
   files::write_displacement(cell / "2_track/displacement_0002.csv", field);
-  const Outcome changed = run_program("mbtfm run " + cell.string());
-  ASSERT_EQ(changed.code, 0) << changed.output;
+  output_of("mbtfm run " + cell.string());
   EXPECT_NE(files::read_text(cell / "4_fit/record.json").find("--kept"), std::string::npos);
   const std::string after = files::read_text(cell / "4_fit/tracks.csv");
   EXPECT_EQ(after.substr(0, after.find("\n2,")), before.substr(0, before.find("\n2,")));  // the first frame's rows
@@ -74,8 +72,7 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
   files::write_displacement(cell / "2_track/displacement_0002.csv", field);
 
   files::write_text(cell / "2_track/frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
-  const Outcome again = run_program("mbtfm run " + cell.string());
-  EXPECT_EQ(again.code, 0) << again.output;
+  output_of("mbtfm run " + cell.string());
   EXPECT_EQ(files::CsvTable(cell / "4_fit/frames.csv").n_rows(), 2);
 }
 

@@ -526,9 +526,8 @@ class SheetsOfImages : public Sheet {
     files::write_text(cell_ / "cell.toml", toml);
   }
   static std::string done(const std::string& command) {
-    const auto outcome = test::run_program(command);
-    EXPECT_EQ(outcome.code, 0) << outcome.output;
-    return outcome.output;
+    const std::string outcome = test::output_of(command);
+    return outcome;
   }
   void add(const std::string& text) {
     files::write_text(cell_ / "cell.toml", files::read_text(cell_ / "cell.toml") + "\n" + text);
@@ -593,9 +592,8 @@ TEST(SheetStudies, a_known_difference_of_contraction_is_found_and_the_tables_agr
                                                                    {"drug", {0.9, 1.1, 1.2, 1.4}}};
   std::map<std::string, double> truth_of, mean_of;
   const auto done = [](const std::string& command) {
-    const auto outcome = test::run_program(command);
-    EXPECT_EQ(outcome.code, 0) << outcome.output;
-    return outcome.output;
+    const std::string outcome = test::output_of(command);
+    return outcome;
   };
   int seed = 0;
   for (const auto& [condition, list] : contractions) {

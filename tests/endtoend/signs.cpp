@@ -11,8 +11,7 @@ namespace mbtfm {
 namespace {
 
 namespace fs = std::filesystem;
-using test::Outcome;
-using test::run_program;
+using test::output_of;
 using test::TemporaryFolder;
 
 constexpr double kPixel_um = 0.1;
@@ -94,8 +93,7 @@ TEST(Signs, image_content_moved_right_and_down_is_a_force_right_and_down_up_to_t
   files::write_text(cell / "cell.toml", "[gel]\nyoungs_modulus_kPa = 8.4\n[fit]\nn_meshes = 1\n");
   write_bead_images(cell);
   write_segmentation(cell / "1_segment");
-  const Outcome run = run_program("mbtfm run " + cell.string());
-  ASSERT_EQ(run.code, 0) << run.output;
+  output_of("mbtfm run " + cell.string());
 
   int n_near = 0;
   for (const Bead& bead : files::read_displacement(cell / "2_track/displacement.csv")) {

@@ -17,6 +17,7 @@ namespace mbtfm {
 namespace {
 
 namespace fs = std::filesystem;
+using test::output_of;
 using test::run_program;
 
 /// A round cell of patches in a field of 72 um: small stacks, 2.7 million voxels each.
@@ -28,9 +29,7 @@ class Stacks : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new test::TemporaryFolder;
-    const auto made =
-        run_program(kScene + "--images --slice_drift_um 0.02 --surface_beads 150 --out " + cell().string());
-    ASSERT_EQ(made.code, 0) << made.output;
+    output_of(kScene + "--images --slice_drift_um 0.02 --surface_beads 150 --out " + cell().string());
   }
   static void TearDownTestSuite() {
     delete folder_;
@@ -56,10 +55,9 @@ class Stacks : public testing::Test {
 };
 
 TEST_F(Stacks, beads_are_followed_to_the_truth_within_their_errors) {
-  const auto outcome = run_program(track(relaxed(), stressed(),
-                                         "--surface_beads " + (cell() / "surface_beads.tif").string() + " --record " +
-                                             (*folder_ / "out/record.json").string()));
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  output_of(track(relaxed(), stressed(),
+                  "--surface_beads " + (cell() / "surface_beads.tif").string() + " --record " +
+                      (*folder_ / "out/record.json").string()));
   const fs::path out = *folder_ / "out";
   const auto found = files::read_displacement_in_space(out / "displacement_3d.csv");
   const auto truth = files::read_displacement_in_space(cell() / "truth/displacement_3d.csv");
@@ -197,9 +195,8 @@ void expect_a_plan_says_that_it_has_no_robust_loss(const fs::path& folder) {
 
 /// What batch.csv says of a cell is what the statistics take.
 void expect_statistics_of(const fs::path& study) {
-  const auto outcome = run_program("mbtfm stats " + study.string());
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find("1 cell in space"), std::string::npos) << outcome.output;
+  const std::string outcome = output_of("mbtfm stats " + study.string());
+  EXPECT_NE(outcome.find("1 cell in space"), std::string::npos) << outcome;
   const files::CsvTable batch(study / "batch.csv"), cells(study / "statistics/cells.csv");
   EXPECT_EQ(cells.text(0, "included"), "TRUE") << cells.text(0, "reason");
   for (const auto& [ours, stage] : {std::pair{"space_force_nN", "traction.total_force_nN"},
@@ -214,8 +211,7 @@ void expect_statistics_of(const fs::path& study) {
 /// Beside the truth, in a little time: the cell as it is, and what else there is time for.
 void expect_a_cost_study_of(const fs::path& folder) {
   const std::string before = files::read_text(folder / "4_traction/traction.csv");
-  const auto outcome = run_program("mbtfm cost --repeats 1 --budget 0.05 " + folder.string());
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  output_of("mbtfm cost --repeats 1 --budget 0.05 " + folder.string());
   const files::CsvTable table(folder / "cost/cost.csv");
   EXPECT_EQ(table.text(0, "knob"), "as it is");
   EXPECT_GT(table.number(0, "traction_error"), 0.2);  // 9 um between tractions do not show patches of 6 um
@@ -238,8 +234,7 @@ void expect_that_a_preset_is_taken(const fs::path& folder) {
   EXPECT_EQ(parameters().at("traction").at("spacing_beads"), 1.06);
   EXPECT_EQ(parameters().at("traction").at("spacing_um"), 9);
   EXPECT_NE(files::read_text(folder / "run.json").find("\"preset\": \"fast\""), std::string::npos);
-  const auto as_before = run_program("mbtfm run " + folder.string());
-  ASSERT_EQ(as_before.code, 0) << as_before.output;
+  output_of("mbtfm run " + folder.string());
   EXPECT_EQ(parameters().at("substrate").at("displacement_tolerance"), 0.02);
 }
 
@@ -252,12 +247,10 @@ TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
   files::write_text(folder / "cell.toml",
                     files::read_text(folder / "cell.toml") + "\n[traction]\nspacing_um = 9\nmethod = \"tikhonov\"\n");
   const std::string run = "mbtfm run " + folder.string();
-  const auto refused = run_program(run + " --accuracy 5%");
-  EXPECT_EQ(refused.code, 2) << refused.output;
-  EXPECT_NE(refused.output.find("--accuracy: is an error of fibre tensions"), std::string::npos) << refused.output;
+  const std::string refused = output_of(run + " --accuracy 5%", 2);
+  EXPECT_NE(refused.find("--accuracy: is an error of fibre tensions"), std::string::npos) << refused;
   EXPECT_FALSE(fs::exists(folder / "run.json"));
-  const auto first = run_program(run);
-  ASSERT_EQ(first.code, 0) << first.output;
+  output_of(run);
   for (const char* file :
        {"2_track/displacement_3d.csv", "3_surface/surface.vtp", "4_traction/traction.csv", "4_traction/traction.vtp",
         "4_traction/traction_adhesion_forces.csv", "report.html", "view_in_paraview.py"})
@@ -287,20 +280,18 @@ TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
   EXPECT_EQ(by_evidence.find("(criterion: risk)"), std::string::npos);
   EXPECT_NE(told("\"given\"").find("The regularisation was given"), std::string::npos);
   files::write_text(folder / "4_traction/traction.json", figures);
-  const auto again = run_program(run);
-  EXPECT_EQ(again.code, 0) << again.output;
-  EXPECT_NE(again.output.find("traction up to date"), std::string::npos) << again.output;
-  EXPECT_NE(again.output.find("beads in space, as track.z_points is set"), std::string::npos) << again.output;
+  const std::string again = output_of(run);
+  EXPECT_NE(again.find("traction up to date"), std::string::npos) << again;
+  EXPECT_NE(again.find("beads in space, as track.z_points is set"), std::string::npos) << again;
   EXPECT_EQ(run_program("mbtfm verify " + folder.string()).code, 0);
   expect_a_plan_of(folder);
   // beads corrected by hand are the user's, and the tractions follow them
   auto beads = files::read_displacement_in_space(folder / "2_track/displacement_3d.csv");
   beads.pop_back();
   files::write_displacement_in_space(folder / "2_track/displacement_3d.csv", beads);
-  const auto by_hand = run_program(run);
-  EXPECT_EQ(by_hand.code, 0) << by_hand.output;
-  EXPECT_NE(by_hand.output.find("displacement_3d.csv was changed by hand: kept"), std::string::npos) << by_hand.output;
-  EXPECT_NE(by_hand.output.find("2_track/displacement_3d.csv"), std::string::npos) << by_hand.output;
+  const std::string by_hand = output_of(run);
+  EXPECT_NE(by_hand.find("displacement_3d.csv was changed by hand: kept"), std::string::npos) << by_hand;
+  EXPECT_NE(by_hand.find("2_track/displacement_3d.csv"), std::string::npos) << by_hand;
   const auto batch = run_program("mbtfm batch " + folder.parent_path().string());
   EXPECT_EQ(batch.code, 0) << batch.output;
   const files::CsvTable table(folder.parent_path() / "batch.csv");
@@ -326,19 +317,16 @@ TEST_F(Stacks, init_and_check_know_them) {
   const fs::path folder = *folder_ / "new";
   fs::create_directories(folder);
   for (const char* file : {"beads_relaxed.tif", "beads_stressed.tif"}) fs::copy(cell() / file, folder / file);
-  const auto made = run_program("mbtfm init " + folder.string());
-  ASSERT_EQ(made.code, 0) << made.output;
-  EXPECT_NE(made.output.find("z_points in [track]"), std::string::npos) << made.output;
-  EXPECT_EQ(made.output.find("actin"), std::string::npos) << made.output;
+  const std::string made = output_of("mbtfm init " + folder.string());
+  EXPECT_NE(made.find("z_points in [track]"), std::string::npos) << made;
+  EXPECT_EQ(made.find("actin"), std::string::npos) << made;
   fs::remove(folder / "cell.toml");
   fs::copy(cell() / "cell.toml", folder / "cell.toml");
-  const auto looked = run_program("mbtfm check " + folder.string());
-  EXPECT_EQ(looked.code, 0) << looked.output;
-  EXPECT_NE(looked.output.find("beads in space"), std::string::npos) << looked.output;
+  const std::string looked = output_of("mbtfm check " + folder.string());
+  EXPECT_NE(looked.find("beads in space"), std::string::npos) << looked;
   fs::remove(folder / "beads_stressed.tif");
   EXPECT_NE(run_program("mbtfm check " + folder.string()).code, 0);
-  const auto lacks = run_program("mbtfm run " + folder.string());
-  EXPECT_EQ(lacks.code, 3) << lacks.output;
+  output_of("mbtfm run " + folder.string(), 3);
   EXPECT_FALSE(fs::exists(folder / "2_track"));
 }
 
@@ -346,9 +334,7 @@ TEST_F(Stacks, scenes_are_in_balance_and_at_rest_at_the_base) {
   for (const char* scene : {"wave", "groove-edge", "between-grooves", "between-waves"}) {
     SCOPED_TRACE(scene);
     const fs::path made = *folder_ / scene;
-    const auto outcome =
-        run_program("mbtfm-simulate --scenario " + std::string(scene) + " --beads 200 --out " + made.string());
-    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    output_of("mbtfm-simulate --scenario " + std::string(scene) + " --beads 200 --out " + made.string());
     const files::CsvTable sources(made / "truth/sources.csv");
     Vec3 sum, moment;
     double size = 0;

@@ -253,14 +253,11 @@ TEST_F(Gel, carries_a_lattice_of_tractions_on_its_surface) {
   write("tractions.csv", tractions);
   const std::string gel = "mbtfm-substrate --quiet --displacement_tolerance 0.1 --gel " + file("gel.toml") +
                           " --surface " + file("surface.vtp") + " --traction " + file("tractions.csv");
-  const auto at_points = test::run_program(gel + " --points " + file("points.csv") + " --out " + file("u.csv"));
-  ASSERT_EQ(at_points.code, 0) << at_points.output;
+  test::output_of(gel + " --points " + file("points.csv") + " --out " + file("u.csv"));
   for (const Vec3& u : displaced("u.csv")) EXPECT_GT(u.z, 0);  // pressed into the gel
-  const auto on_surface = test::run_program(gel + " --out " + file("u.vtu"));
-  ASSERT_EQ(on_surface.code, 0) << on_surface.output;
+  test::output_of(gel + " --out " + file("u.vtu"));
   EXPECT_NE(files::read_text(file("u.vtu")).find("traction_kPa"), std::string::npos);
-  const auto volume = test::run_program(gel + " --out " + file("volume.vtu"));
-  EXPECT_EQ(volume.code, 2) << volume.output;
+  test::output_of(gel + " --out " + file("volume.vtu"), 2);
 }
 
 TEST_F(Gel, whose_surface_does_not_hold_the_level_from_which_its_thickness_counts_is_told) {
@@ -268,10 +265,9 @@ TEST_F(Gel, whose_surface_does_not_hold_the_level_from_which_its_thickness_count
                                 " --forces " + file("forces.csv") + " --surface " + file("surface.vtp") + " --points " +
                                 file("points.csv") + " --displacement_tolerance 0.1 --out " + file("u.csv");
   ASSERT_EQ(run("--formula 'flat z_um=4' --spacing_um 4" + kSquare).code, 0);
-  const auto told = test::run_program(substrate);
-  ASSERT_EQ(told.code, 0) << told.output;
-  EXPECT_TRUE(fires("surface-off-zero", told.output)) << told.output;
-  EXPECT_NE(told.output.find("26 um thick"), std::string::npos) << told.output;
+  const std::string told = test::output_of(substrate);
+  EXPECT_TRUE(fires("surface-off-zero", told)) << told;
+  EXPECT_NE(told.find("26 um thick"), std::string::npos) << told;
   ASSERT_EQ(run("--formula 'flat z_um=4' --zero_at mean --spacing_um 4" + kSquare).code, 0);
   EXPECT_FALSE(fires("surface-off-zero", test::run_program(substrate).output));
 }

@@ -20,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace exit_code;
 using test::Outcome;
+using test::output_of;
 using test::run_program;
 using test::TemporaryFolder;
 
@@ -84,9 +85,7 @@ class Surroundings : public ::testing::Test {
   static void SetUpTestSuite() {
     scene_ = new TemporaryFolder;
     const fs::path cell = *scene_ / "cell";
-    const Outcome made = run_program(
-        "mbtfm-simulate --scenario two-adhesions --seed 3 --beads 300 --images --quiet --out " + cell.string());
-    ASSERT_EQ(made.code, 0) << made.output;
+    output_of("mbtfm-simulate --scenario two-adhesions --seed 3 --beads 300 --images --quiet --out " + cell.string());
     files::write_text(cell / "cell.toml", files::read_text(cell / "cell.toml") +
                                               "[fit]\nn_meshes = 1\n[substrate]\nmodel = \"layer\"\n[network]\n");
   }
@@ -210,29 +209,24 @@ TEST_F(Surroundings, a_name_that_is_not_utf8_is_a_name) {
     EXPECT_TRUE(files::is_utf8(files::read_text(file))) << file;
   EXPECT_NE(files::read_text(odd / "report.html").find("caf\\xE9"), std::string::npos);
   EXPECT_NE(files::read_text(study_ / "batch.csv").find("caf\\xE9,0"), std::string::npos);
-  const Outcome verified = run_program("mbtfm verify '" + odd.string() + "'");
-  EXPECT_EQ(verified.code, kDone) << verified.output;
-  const Outcome repeated =
-      run_program("mbtfm repeat --quiet --out " + (folder_ / "again").string() + " '" + odd.string() + "'");
-  EXPECT_EQ(repeated.code, kDone) << repeated.output;
+  output_of("mbtfm verify '" + odd.string() + "'", kDone);
+  output_of("mbtfm repeat --quiet --out " + (folder_ / "again").string() + " '" + odd.string() + "'", kDone);
   const Outcome list = run_program("mbtfm batch --list " + study_.string());
   EXPECT_EQ(list.output.find("run,"), std::string::npos) << "all is up to date: " << list.output;
 }
 
 TEST_F(Surroundings, a_mesh_that_memory_cannot_hold_is_refused_with_its_count) {
   set("edge_length_um = 0.01");  // 1.3 million vertices, of a kilobyte each at the least
-  const Outcome run = run_program("mbtfm run " + cell_.string(), "ulimit -v 1000000; ");
-  EXPECT_EQ(run.code, kResources) << run.output;
-  EXPECT_NE(run.output.find(" vertices, which take "), std::string::npos) << run.output;
-  EXPECT_NE(run.output.find("edge_length_um"), std::string::npos) << run.output;
+  const std::string run = output_of("mbtfm run " + cell_.string(), kResources, "ulimit -v 1000000; ");
+  EXPECT_NE(run.find(" vertices, which take "), std::string::npos) << run;
+  EXPECT_NE(run.find("edge_length_um"), std::string::npos) << run;
   EXPECT_FALSE(fs::exists(cell_ / "3_network"));
 }
 
 TEST_F(Surroundings, an_edge_length_that_is_no_length_is_refused_before_anything_runs) {
   set("edge_length_um = 1e-300");
-  const Outcome run = run_program("mbtfm run " + cell_.string());
-  EXPECT_EQ(run.code, kInput) << run.output;
-  EXPECT_NE(run.output.find("expected a number >= 0.01 and <= 100, found '1e-300'"), std::string::npos) << run.output;
+  const std::string run = output_of("mbtfm run " + cell_.string(), kInput);
+  EXPECT_NE(run.find("expected a number >= 0.01 and <= 100, found '1e-300'"), std::string::npos) << run;
   EXPECT_FALSE(fs::exists(cell_ / "1_segment"));
   const Outcome flag = run_program("mbtfm-network --edge_length_um 1500 --check");
   EXPECT_EQ(flag.code, kUsage);

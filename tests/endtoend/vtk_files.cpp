@@ -14,7 +14,7 @@ namespace mbtfm {
 namespace {
 
 namespace fs = std::filesystem;
-using test::run_program;
+using test::output_of;
 using test::TemporaryFolder;
 
 /// A small cell that went through every stage, from images.
@@ -22,11 +22,8 @@ const fs::path& cell() {
   static const TemporaryFolder folder;
   static const fs::path made = [] {
     const fs::path path = folder / "cell";
-    const auto simulated =
-        run_program("mbtfm-simulate --scenario ring --seed 101 --beads 800 --images --quiet --out " + path.string());
-    EXPECT_EQ(simulated.code, 0) << simulated.output;
-    const auto run = run_program("mbtfm run " + path.string());
-    EXPECT_EQ(run.code, 0) << run.output;
+    output_of("mbtfm-simulate --scenario ring --seed 101 --beads 800 --images --quiet --out " + path.string());
+    output_of("mbtfm run " + path.string());
     return path;
   }();
   return made;

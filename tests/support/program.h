@@ -26,4 +26,11 @@ inline Outcome run_program(const std::string& command, const std::string& before
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), files::read_text(log)};
 }
 
+/// What a program says that ends with this exit code; with another one, the test ends.
+inline std::string output_of(const std::string& command, int code = 0, const std::string& before = {}) {
+  const Outcome outcome = run_program(command, before);
+  if (outcome.code == code) return outcome.output;
+  throw std::runtime_error(command + "\nended with " + std::to_string(outcome.code) + ": " + outcome.output);
+}
+
 }  // namespace mbtfm::test
