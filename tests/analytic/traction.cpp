@@ -212,12 +212,8 @@ TEST(LCurve, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_th
     if (is_l) {
       EXPECT_NEAR(std::log(*scan.by_l_curve / kCorner), 0, std::log(1.2));  // a tenth of the scan's step
     } else {
-      try {
-        chosen_lambda(scan, LambdaCriterion::l_curve);
-        FAIL() << "a corner was found";
-      } catch (const NotSolved& error) {
-        EXPECT_NE(error.report->reason.find("set lambda_by = risk"), std::string::npos) << error.report->reason;
-      }
+      const NotSolved error = test::thrown<NotSolved>([&] { chosen_lambda(scan, LambdaCriterion::l_curve); });
+      EXPECT_NE(error.report->reason.find("set lambda_by = risk"), std::string::npos) << error.report->reason;
     }
   }
 }

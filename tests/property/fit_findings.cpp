@@ -193,13 +193,9 @@ TEST_F(FitFindings, a_fibre_that_came_after_the_network_is_told) {
 TEST_F(FitFindings, a_network_with_a_fibre_that_is_none_of_the_cells_is_refused) {
   inputs_.network_file = "network.vtu";
   inputs_.cell.fibres.pop_back();
-  try {
-    found();
-    FAIL() << "not refused";
-  } catch (const InputError& error) {
-    EXPECT_EQ(error.where, "network.vtu");
-    EXPECT_NE(error.found.find("fibre 3"), std::string::npos) << error.found;
-  }
+  const InputError error = test::thrown<InputError>([&] { found(); });
+  EXPECT_EQ(error.where, "network.vtu");
+  EXPECT_NE(error.found.find("fibre 3"), std::string::npos) << error.found;
 }
 
 TEST_F(FitFindings, a_fibre_that_was_drawn_twice_is_told_apart_from_itself_by_no_beads) {

@@ -150,12 +150,8 @@ TEST(Plan, a_list_that_is_none_is_refused) {
 TEST(Plan, a_percentage_without_its_sign_is_refused_and_named) {
   Parameters p;
   p.within = "20";
-  try {
-    asked_by(p, 8);
-    FAIL();
-  } catch (const UsageError& e) {
-    EXPECT_NE(std::string(e.what()).find("Did you mean 20%?"), std::string::npos) << e.what();
-  }
+  const UsageError e = test::thrown<UsageError>([&] { asked_by(p, 8); });
+  EXPECT_NE(std::string(e.what()).find("Did you mean 20%?"), std::string::npos) << e.what();
 }
 
 // --- pairs

@@ -105,13 +105,10 @@ TEST(Stacks, beads_of_another_place_are_refused) {
 
 TEST(Stacks, too_few_beads_are_refused_with_the_number_that_would_do) {
   const BeadClouds clouds = bead_clouds(25, 0.03, 0, 5, pull);
-  try {
-    follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 1);
-    FAIL() << "not refused";
-  } catch (const beads::NotFollowed& error) {
-    EXPECT_NE(error.expected.find("40"), std::string::npos) << error.expected;
-    EXPECT_EQ(error.found, "25");
-  }
+  const beads::NotFollowed error =
+      test::thrown<beads::NotFollowed>([&] { follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 1); });
+  EXPECT_NE(error.expected.find("40"), std::string::npos) << error.expected;
+  EXPECT_EQ(error.found, "25");
 }
 
 /// Beads at rest are at rest again whatever the slices did; the cell's pull stays.

@@ -51,12 +51,8 @@ Height nearest_in(const HeightMap& map) {
 }
 
 std::string refusal(const std::vector<Vec3>& beads, const AlphaParameters& parameters = {}) {
-  try {
-    alpha_shape_surface(beads, parameters, 2);
-  } catch (const InvalidData& e) {
-    return e.what();
-  }
-  return {};
+  const auto e = test::caught<InvalidData>([&] { alpha_shape_surface(beads, parameters, 2); });
+  return e ? e->what() : "";
 }
 
 TEST(SurfaceFromAlphaSlices, errs_as_much_as_in_the_thesis_into_the_gel_and_more_than_the_likelihood) {

@@ -89,12 +89,8 @@ TEST(SurfaceFromBeads, is_not_lifted_by_stray_beads_and_names_them) {
 
 TEST(SurfaceFromBeads, refuses_by_place_what_no_bead_holds_and_sheets_of_beads) {
   const auto reason = [](const std::vector<Vec3>& beads) -> std::string {
-    try {
-      fitted(beads);
-    } catch (const InvalidData& e) {
-      return e.what();
-    }
-    return {};
+    const auto e = test::caught<InvalidData>([&] { fitted(beads); });
+    return e ? e->what() : "";
   };
   std::vector<Vec3> beads = beads_below(wave, 0.0062, 1);
   std::vector<Vec3> with_hole = beads;

@@ -48,15 +48,11 @@ TEST(Segmentation, says_how_small_a_thing_is_that_is_too_small_for_a_cell) {
   SegmentParameters p;
   p.pixel_size_um = 0.1;
   p.candidates.adhesions = AdhesionSource::none;
-  try {
-    segment_cell({}, images::Channel{"small.tif", image}, p);
-    FAIL() << "a cell of 28 um2";
-  } catch (const InputError& error) {
-    EXPECT_NE(error.found.find("the largest covers 2"), std::string::npos) << error.found;
-    EXPECT_NE(error.found.find("at least 50 um²"), std::string::npos) << error.found;
-    EXPECT_NE(error.hint.find("outline_smallest_um2"), std::string::npos);
-    EXPECT_NE(error.hint.find("pixel_size_um"), std::string::npos);
-  }
+  const InputError error = test::thrown<InputError>([&] { segment_cell({}, images::Channel{"small.tif", image}, p); });
+  EXPECT_NE(error.found.find("the largest covers 2"), std::string::npos) << error.found;
+  EXPECT_NE(error.found.find("at least 50 um²"), std::string::npos) << error.found;
+  EXPECT_NE(error.hint.find("outline_smallest_um2"), std::string::npos);
+  EXPECT_NE(error.hint.find("pixel_size_um"), std::string::npos);
 }
 
 TEST(Segmentation, says_what_is_missing) {
@@ -64,20 +60,11 @@ TEST(Segmentation, says_what_is_missing) {
   SegmentParameters p;
   const images::Channel flat{"flat.tif", even_image(64, 64, 5)}, wide{"wide.tif", even_image(80, 64, 5)};
   EXPECT_THROW(segment_cell({}, {}, p), UsageError);
-  try {
-    segment_cell(flat, {}, p);
-    FAIL() << "no pixel size, and no error";
-  } catch (const InputError& error) {
-    EXPECT_EQ(error.where, "flat.tif");
-    EXPECT_NE(error.hint.find("pixel_size_um"), std::string::npos);
-  }
+  const InputError error = test::thrown<InputError>([&] { segment_cell(flat, {}, p); });
+  EXPECT_EQ(error.where, "flat.tif");
+  EXPECT_NE(error.hint.find("pixel_size_um"), std::string::npos);
   p.pixel_size_um = 0.1;
-  try {
-    segment_cell(flat, {}, p);
-    FAIL() << "no adhesion, and no error";
-  } catch (const InputError& error) {
-    EXPECT_EQ(error.found, "every pixel is 5");
-  }
+  EXPECT_EQ(test::thrown<InputError>([&] { segment_cell(flat, {}, p); }).found, "every pixel is 5");
   EXPECT_THROW(segment_cell(flat, wide, p), InputError);
   images::Channel one = flat, two = flat;
   one.image.pixel_size_um = 0.1;

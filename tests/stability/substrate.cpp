@@ -135,16 +135,14 @@ TEST_P(Model, takes_empty_scenes) {
 
 TEST(Substrate, names_the_models_it_knows) {
   test::hard_case("a misspelt model", "an error that lists the models");
-  try {
+  const UsageError error = test::thrown<UsageError>([&] {
     SubstrateParameters parameters;
     stage::ParameterList list;
     declare(list, parameters);
     stage::set_from_text(stage::parameter_named(list, "model"), "layr");
-    FAIL();
-  } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("half-space, layer, split, refined, curved, auto"), std::string::npos)
-        << error.what();
-  }
+  });
+  EXPECT_NE(std::string(error.what()).find("half-space, layer, split, refined, curved, auto"), std::string::npos)
+      << error.what();
   EXPECT_THROW(greens::make_greens(kGel, test::model_named("split"), 1), UsageError);
 }
 
@@ -154,13 +152,10 @@ TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
     SubstrateParameters parameters = test::model_named(name);
     parameters.memory_limit_GB = 0.005;
     const auto model = choice::make_substrate(kGel, parameters, 1);
-    try {
-      model->compliance_um_per_nN(test::scattered_points(10, 40), test::scattered_ellipses(5, 30));
-      FAIL() << name;
-    } catch (const NotSolved& error) {
-      EXPECT_NE(error.report->reason.find("memory"), std::string::npos) << error.report->reason;
-      test::came_out(error.report->reason);
-    }
+    const NotSolved error = test::thrown<NotSolved>(
+        [&] { model->compliance_um_per_nN(test::scattered_points(10, 40), test::scattered_ellipses(5, 30)); });
+    EXPECT_NE(error.report->reason.find("memory"), std::string::npos) << error.report->reason;
+    test::came_out(error.report->reason);
   }
   // a scene of 1 mm on a gel of 1 um: no grid of it fits
   Gel thin = kGel;
@@ -179,14 +174,12 @@ TEST(Substrate, says_which_mesh_would_fit_the_memory) {
   parameters.precision = numerics::Precision::double_;
   for (const auto& [limit_GB, fitting] : {std::pair{0.2, "elements; one of"}, std::pair{0.5, "unknowns would fit"}}) {
     parameters.memory_limit_GB = limit_GB;
-    try {
+    const NotSolved error = test::thrown<NotSolved>([&] {
       choice::make_substrate(kGel, parameters, 1)
           ->compliance_um_per_nN(test::scattered_points(10, 45), test::scattered_ellipses(40, 35));
-      FAIL();
-    } catch (const NotSolved& error) {
-      EXPECT_NE(error.report->reason.find(fitting), std::string::npos) << error.report->reason;
-      test::came_out(error.report->reason);
-    }
+    });
+    EXPECT_NE(error.report->reason.find(fitting), std::string::npos) << error.report->reason;
+    test::came_out(error.report->reason);
   }
 }
 
@@ -210,14 +203,11 @@ TEST(Substrate, refuses_a_thousand_adhesions_that_refined_has_no_memory_for) {
   getrusage(RUSAGE_SELF, &before);
   for (const double limit_GB : {0.5, 1.0}) {
     parameters.memory_limit_GB = limit_GB;
-    try {
-      choice::make_substrate(kGel, parameters, 2)->compliance_um_per_nN(points, ellipses);
-      FAIL();
-    } catch (const NotSolved& error) {
-      const std::string& reason = error.report->reason;
-      EXPECT_NE(reason.find("would fit the memory"), std::string::npos) << reason;
-      EXPECT_NE(reason.find("elements_across_adhesion"), std::string::npos) << reason;
-    }
+    const NotSolved error = test::thrown<NotSolved>(
+        [&] { choice::make_substrate(kGel, parameters, 2)->compliance_um_per_nN(points, ellipses); });
+    const std::string& reason = error.report->reason;
+    EXPECT_NE(reason.find("would fit the memory"), std::string::npos) << reason;
+    EXPECT_NE(reason.find("elements_across_adhesion"), std::string::npos) << reason;
   }
   getrusage(RUSAGE_SELF, &after);
   const double taken_GB = 1e-6 * static_cast<double>(after.ru_maxrss - before.ru_maxrss);
@@ -391,12 +381,8 @@ TEST(Automatic, refuses_switches_without_a_datum_and_models_that_cannot_follow) 
     SubstrateParameters p = test::model_named(model);
     p.effects.*member = setting;
     p.side_distance_um = side_distance_um;
-    try {
-      choice::make_substrate(kGel, p, 1);
-    } catch (const UsageError& error) {
-      return std::string(error.what()).find("effects.") != std::string::npos;
-    }
-    return false;
+    const auto error = test::caught<UsageError>([&] { choice::make_substrate(kGel, p, 1); });
+    return error ? std::string(error->what()).find("effects.") != std::string::npos : false;
   };
   using S = stage::EffectSwitches;
   EXPECT_TRUE(refused("auto", &S::finite_sides, Switch::on));

@@ -1,13 +1,12 @@
 /// Cells and data that make the tension fit hard: the right answer, a wide interval or a clear refusal.
 #include "mbtfm/tensions/tension_fit.h"
 
-#include <gtest/gtest.h>
-
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/model_checks.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/tension_scene.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {
@@ -129,14 +128,10 @@ TEST(TensionFitHard, a_hundred_fibres) {
 TEST(TensionFitHard, fewer_beads_than_unknowns_are_refused_with_the_count_that_would_do) {
   test::hard_case("four beads for a dozen tensions", "an error with the number that would do");
   TensionScene scene = tension_scene("case_21", 4, 0.05, 3);
-  try {
-    fit_own_network(scene);
-    FAIL() << "four beads told " << scene.tensions_nN.size() << " tensions";
-  } catch (const InvalidData& error) {
-    const std::string enough = "at least " + std::to_string((scene.tensions_nN.size() + 1) / 2) + " good beads";
-    EXPECT_NE(std::string(error.what()).find(enough), std::string::npos) << error.what();
-    test::came_out(error.what());
-  }
+  const InvalidData error = test::thrown<InvalidData>([&] { fit_own_network(scene); });
+  const std::string enough = "at least " + std::to_string((scene.tensions_nN.size() + 1) / 2) + " good beads";
+  EXPECT_NE(std::string(error.what()).find(enough), std::string::npos) << error.what();
+  test::came_out(error.what());
 }
 
 TEST(TensionFitHard, a_fibre_without_beads_near_it_gets_a_wide_interval_that_covers) {

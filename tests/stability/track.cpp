@@ -273,12 +273,8 @@ TEST(TrackStability, faint_beads_are_tracked_with_larger_errors) {
 
 std::string what_is_wrong(const images::Image& relaxed, const images::Image& stressed,
                           const TrackParameters& parameters = {}) {
-  try {
-    track_beads(relaxed, stressed, 1.0, parameters);
-  } catch (const InvalidData& error) {
-    return error.what();
-  }
-  return "nothing";
+  const auto error = test::caught<InvalidData>([&] { track_beads(relaxed, stressed, 1.0, parameters); });
+  return error ? error->what() : "nothing";
 }
 
 TEST(TrackStability, images_without_beads_are_refused) {

@@ -126,12 +126,9 @@ TEST(WeakBeads, the_hint_of_what_cannot_be_followed_names_what_helps) {
   const auto weak =
       test::weakened(test::draw_bead_pair(wide_adhesions(), {.brightness = 25, .seed = 1}), {.levels = 40}, 1);
   const auto hint = [&](const images::Image& relaxed, const images::Image& stressed) -> std::string {
-    try {
-      track_beads(relaxed, stressed, 1.0, by(TrackMethod::beads), 2);
-    } catch (const NotFollowed& error) {
-      return error.hint;
-    }
-    return "found";
+    const auto error =
+        test::caught<NotFollowed>([&] { track_beads(relaxed, stressed, 1.0, by(TrackMethod::beads), 2); });
+    return error ? error->hint : "found";
   };
   EXPECT_EQ(hint(weak.relaxed, weak.stressed).substr(0, 19), "track.method = auto");
   EXPECT_EQ(hint(one.relaxed, other.stressed), "");

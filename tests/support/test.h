@@ -1,5 +1,6 @@
 #pragma once
-/// What nearly every test needs: GoogleTest and the standard library. The build reads them once (tests/CMakeLists.txt).
+/// What nearly every test needs: GoogleTest, the standard library, which the build reads once (tests/CMakeLists.txt),
+/// and what ends with an exception.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,3 +30,25 @@
 #include <tuple>
 #include <utility>
 #include <vector>
+
+namespace mbtfm::test {
+
+/// The exception of this type that the call ends with.
+template <class Error>
+std::optional<Error> caught(const auto& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error;
+  }
+  return std::nullopt;
+}
+
+/// The same of a call that must end with one.
+template <class Error>
+Error thrown(const auto& call) {
+  if (const std::optional<Error> error = caught<Error>(call)) return *error;
+  throw std::runtime_error("nothing was thrown");
+}
+
+}  // namespace mbtfm::test

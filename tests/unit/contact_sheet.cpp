@@ -1,9 +1,8 @@
 #include "segment/cells/contact_sheet.h"
 
-#include <gtest/gtest.h>
-
 #include "pipeline/contract/errors.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::images {
 namespace {
@@ -50,12 +49,8 @@ TEST(ContactSheet, shows_values_with_which_nothing_is_found) {
 
 TEST(ContactSheet, names_the_parameter_that_was_meant) {
   const Sheet sheet;
-  try {
-    sheet.draw("adhesion_smalest_um2=3");
-    FAIL() << "no such parameter, and no error";
-  } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("adhesion_smallest_um2"), std::string::npos);
-  }
+  const UsageError error = test::thrown<UsageError>([&] { sheet.draw("adhesion_smalest_um2=3"); });
+  EXPECT_NE(std::string(error.what()).find("adhesion_smallest_um2"), std::string::npos);
   EXPECT_THROW(sheet.draw("adhesion_smallest_um2=-1"), UsageError);
 }
 

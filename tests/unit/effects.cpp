@@ -1,14 +1,13 @@
 /// The switches of the effects: how they are read, decided, recorded, and whose result depends on which.
 #include "pipeline/stage/effects.h"
 
-#include <gtest/gtest.h>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/record.h"
 #include "pipeline/stage/parameters.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {
@@ -31,12 +30,8 @@ TEST(Effects, a_stage_reads_its_own_switches_and_leaves_the_others_to_their_stag
 }
 
 TEST(Effects, a_misspelt_switch_is_refused_by_every_stage) {
-  try {
-    read("[effects]\nfinite_side = 'on'\n", {"drift_affine"});
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_NE(error.hint.find("'finite_sides'"), std::string::npos) << error.hint;
-  }
+  const InputError error = test::thrown<InputError>([&] { read("[effects]\nfinite_side = 'on'\n", {"drift_affine"}); });
+  EXPECT_NE(error.hint.find("'finite_sides'"), std::string::npos) << error.hint;
   EXPECT_THROW(read("[effects]\nfinite_sides = 'yes'\n", {"finite_sides"}), InputError);
 }
 

@@ -42,12 +42,8 @@ Network network() {
 }
 
 std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no InputError";
+  const auto error = test::caught<InputError>([&] { action(); });
+  return error ? error->what() : "no InputError";
 }
 
 TEST(Files, adhesions_and_fibres_come_back_as_they_were_written) {
@@ -164,12 +160,8 @@ TEST(Files, missing_columns_extra_fields_open_quotes_and_early_ends_are_refused)
 
 TEST(Files, semicolons_and_capitals_in_a_table_are_answered_with_how_to_write_it) {
   const auto error_of = [](const std::string& text) {
-    try {
-      files::CsvTable(text, "points.csv").require({"x_um"});
-    } catch (const InputError& error) {
-      return error.found + " | " + error.hint;
-    }
-    return std::string("read");
+    const auto error = test::caught<InputError>([&] { files::CsvTable(text, "points.csv").require({"x_um"}); });
+    return error ? error->found + " | " + error->hint : std::string("read");
   };
   EXPECT_NE(error_of("x_um;y_um\n1,5;2,5\n").find("semicolons | save it as CSV with commas"), std::string::npos);
   EXPECT_NE(error_of("x_um\ty_um\n1\t2\n").find("tabs | "), std::string::npos);
@@ -314,12 +306,8 @@ TEST(Files, heights_along_a_diagonal_are_refused_before_memory_is_taken) {
   std::string text = "x_um,y_um,z_um\n";
   for (int k = 0; k < 100'000; ++k) text += std::to_string(k) + "," + std::to_string(k) + ",1\n";
   files::write_text(folder / "diagonal.csv", text);
-  try {
-    files::read_heights(folder / "diagonal.csv");
-    FAIL() << "80 GB of heights";
-  } catch (const InputError& error) {
-    EXPECT_NE(error.expected.find("100000 x 100000 vertices"), std::string::npos) << error.what();
-  }
+  const InputError error = test::thrown<InputError>([&] { files::read_heights(folder / "diagonal.csv"); });
+  EXPECT_NE(error.expected.find("100000 x 100000 vertices"), std::string::npos) << error.what();
 }
 
 TEST(Files, two_heights_for_one_place_are_refused_by_line) {
@@ -327,12 +315,8 @@ TEST(Files, two_heights_for_one_place_are_refused_by_line) {
   std::string text = "x_um,y_um,z_um\n";
   for (int k = 0; k < 16; ++k) text += std::to_string(k % 4) + "," + std::to_string(k / 4) + ",1\n";
   files::write_text(folder / "twice.csv", text + "2,1,5\n");
-  try {
-    files::read_heights(folder / "twice.csv");
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_NE(error.where.find(":18"), std::string::npos) << error.what();
-  }
+  const InputError error = test::thrown<InputError>([&] { files::read_heights(folder / "twice.csv"); });
+  EXPECT_NE(error.where.find(":18"), std::string::npos) << error.what();
 }
 
 /// What a later stage computes with comes back as it was; a result has the digits that mean something.
@@ -355,12 +339,10 @@ TEST(Files, numbers_that_no_cell_can_have_are_refused_by_row_and_column) {
   const auto refusal = [&](const std::string& row) {
     files::write_text(folder / "a.csv", "x_um,y_um,ux_um,uy_um,traction_kPa\n1,2,0,0,3\n" + row + "\n");
     const files::CsvTable table(folder / "a.csv");
-    try {
+    const auto error = test::caught<InputError>([&] {
       for (const char* column : {"x_um", "y_um", "ux_um", "uy_um", "traction_kPa"}) table.number(1, column);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    });
+    return error ? std::string(error->what()) : std::string();
   };
   EXPECT_EQ(refusal("-1e6,1e6,0,0,-1e30"), "");
   for (const char* row : {"1e7,0,0,0,0", "0,-1e300,0,0,0", "0,0,1e40,0,0"})

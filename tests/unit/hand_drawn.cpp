@@ -224,12 +224,8 @@ TEST(HandDrawn, areas_within_the_outline_are_its_holes) {
 }
 
 std::string error_of(const auto& body) {
-  try {
-    body();
-  } catch (const InputError& error) {
-    return error.where + ": " + error.found;
-  }
-  return "no error";
+  const auto error = test::caught<InputError>([&] { body(); });
+  return error ? error->where + ": " + error->found : "no error";
 }
 
 TEST(HandDrawn, what_cannot_be_used_is_named) {

@@ -41,12 +41,8 @@ std::string refusal_of(const auto& body) {
 }
 
 std::string hint_of(const auto& body) {
-  try {
-    body();
-  } catch (const InputError& error) {
-    return error.hint;
-  }
-  return "no error";
+  const auto error = test::caught<InputError>([&] { body(); });
+  return error ? error->hint : "no error";
 }
 
 TEST(Mask, an_outline_goes_round_its_pixels_without_bias) {

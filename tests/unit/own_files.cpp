@@ -137,13 +137,9 @@ TEST_F(Records, answer_what_they_hold) {
 
 TEST_F(Records, tell_place_and_finding_of_what_is_otherwise) {
   const files::JsonRecord r = record(R"({"a": {"b": [1, "x"]}})");
-  try {
-    r.at("a").at("b").list()[1].number();
-    FAIL() << "no error";
-  } catch (const InputError& error) {
-    EXPECT_EQ(error.expected, "'a.b.1' of a record to be a number");
-    EXPECT_EQ(error.found, "\"x\"");
-  }
+  const InputError error = test::thrown<InputError>([&] { r.at("a").at("b").list()[1].number(); });
+  EXPECT_EQ(error.expected, "'a.b.1' of a record to be a number");
+  EXPECT_EQ(error.found, "\"x\"");
   EXPECT_THROW(r.at("b"), InputError);
   EXPECT_THROW(r.at("a").list(), InputError);
   EXPECT_THROW(r.at("a").at("b").members(), InputError);

@@ -20,14 +20,12 @@ TEST(ParallelFor, every_index_is_visited_once_for_any_number_of_threads) {
 
 TEST(ParallelFor, the_exception_of_the_lowest_index_is_rethrown) {
   for (const int threads : {1, 2, 4}) {
-    try {
+    const std::runtime_error error = test::thrown<std::runtime_error>([&] {
       numerics::parallel_for(20, threads, [](int i) {
         if (i == 3 || i == 17) throw std::runtime_error(std::to_string(i));
       });
-      FAIL() << "nothing was thrown";
-    } catch (const std::runtime_error& error) {
-      EXPECT_STREQ(error.what(), "3");
-    }
+    });
+    EXPECT_STREQ(error.what(), "3");
   }
 }
 

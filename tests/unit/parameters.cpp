@@ -1,8 +1,7 @@
-#include <gtest/gtest.h>
-
+#include "pipeline/stage/parameters.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/range.h"
-#include "pipeline/stage/parameters.h"
+#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {
@@ -38,12 +37,8 @@ std::string message_of(std::string_view toml) {
   Example e;
   stage::ParameterList list;
   declare(list, e);
-  try {
-    stage::read_toml(list, toml, "cell.toml");
-  } catch (const InputError& error) {
-    return std::string(error.what()) + " | " + error.hint;
-  }
-  return "read";
+  const auto error = test::caught<InputError>([&] { stage::read_toml(list, toml, "cell.toml"); });
+  return error ? std::string(error->what()) + " | " + error->hint : "read";
 }
 
 TEST(Parameters, values_are_read_from_their_table) {
@@ -73,12 +68,8 @@ TEST(Parameters, a_length_in_nanometres_is_recognised) {
   list.add("stiffness_nN", e.stiffness_nN, Range::force_nN(), "stiffness (nN)");
   list.add("ratio", e.ratio, Range::between(0, 1), "a ratio");
   const auto hint_on = [&](const std::string& line) {
-    try {
-      stage::read_toml(list, "[network]\n" + line, "cell.toml");
-    } catch (const InputError& error) {
-      return error.hint;
-    }
-    return std::string("read");
+    const auto error = test::caught<InputError>([&] { stage::read_toml(list, "[network]\n" + line, "cell.toml"); });
+    return error ? error->hint : std::string("read");
   };
   EXPECT_EQ(hint_on("edge_length_um = 1500\n"), "the unit is um: 1500 nm is 1.5 um (mean cable length (um))");
   EXPECT_EQ(hint_on("stiffness_nN = 5e7\n"), "the unit is nN: 5e+07 pN is 50000 nN (stiffness (nN))");
@@ -86,12 +77,9 @@ TEST(Parameters, a_length_in_nanometres_is_recognised) {
   EXPECT_EQ(hint_on("edge_length_um = 1e9\n"), "mean cable length (um)");
   EXPECT_EQ(hint_on("ratio = 500\n"), "a ratio") << "has no unit";
   EXPECT_EQ(hint_on("edge_length_um = 1.5\n"), "read");
-  try {
-    stage::set_from_text(stage::parameter_named(list, "edge_length_um"), "1500");
-    FAIL() << "no error";
-  } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("1500 nm is 1.5 um"), std::string::npos) << error.what();
-  }
+  const UsageError error =
+      test::thrown<UsageError>([&] { stage::set_from_text(stage::parameter_named(list, "edge_length_um"), "1500"); });
+  EXPECT_NE(std::string(error.what()).find("1500 nm is 1.5 um"), std::string::npos) << error.what();
 }
 
 TEST(Parameters, text_that_is_no_toml_is_an_input_error_with_its_line_whatever_it_is) {
@@ -201,12 +189,8 @@ TEST(Parameters, a_gel_needs_its_modulus_and_a_poisson_ratio_below_one_half) {
 TEST(Parameters, what_other_programs_and_countries_write_is_answered_with_how_to_write_it) {
   const auto hint = [](const std::string& text) {
     stage::ParameterList list;
-    try {
-      stage::read_toml(list, text, "cell.toml");
-    } catch (const InputError& error) {
-      return error.hint;
-    }
-    return std::string("read");
+    const auto error = test::caught<InputError>([&] { stage::read_toml(list, text, "cell.toml"); });
+    return error ? error->hint : std::string("read");
   };
   EXPECT_EQ(hint("[gel]\nthickness_um = 8,4\n"), "decimals follow a point: 8.4");
   EXPECT_NE(hint("[images]\nactin = \"D:\\images\\cell 1\\actin.tif\"\n").find("write folders with /"),

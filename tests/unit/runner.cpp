@@ -327,12 +327,8 @@ TEST_F(Runner, rejects_a_half_given_stage) {
 
 TEST_F(Runner, starts_nothing_where_an_image_lacks) {
   fs::remove(cell_ / "beads_relaxed.tif");
-  try {
-    started();
-    FAIL() << "no error";
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("beads_relaxed.tif"), std::string::npos);
-  }
+  const InputError error = test::thrown<InputError>([&] { started(); });
+  EXPECT_NE(std::string(error.what()).find("beads_relaxed.tif"), std::string::npos);
   EXPECT_EQ(calls(), "");
 }
 
@@ -350,12 +346,7 @@ TEST_F(Runner, runs_a_stage_again_that_was_interrupted) {
 
 TEST_F(Runner, passes_on_the_exit_code_and_resumes) {
   files::write_text(bin_ / "exit-network", "3");
-  try {
-    started();
-    FAIL() << "no error";
-  } catch (const StageFailed& error) {
-    EXPECT_EQ(error.failure.exit_code, 3);
-  }
+  EXPECT_EQ(test::thrown<StageFailed>([&] { started(); }).failure.exit_code, 3);
   EXPECT_EQ(calls(), "network segment track");
   fs::remove(bin_ / "exit-network");
   EXPECT_EQ(started(), "fit network");
@@ -461,13 +452,8 @@ TEST_F(Runner, kills_a_stage_and_what_it_started_when_its_time_is_over) {
   files::write_text(bin_ / "shell-segment",
                     "(trap '' TERM; sleep 3; touch " + (folder_ / "survived").string() + ") & wait");
   options_.limits.seconds = 0.2;
-  try {
-    started();
-    FAIL() << "no error";
-  } catch (const StageFailed& error) {
-    EXPECT_EQ(error.failure.exit_code, 6);
-    EXPECT_NE(error.failure.how.find("timed out"), std::string::npos);
-  }
+  EXPECT_EQ(test::thrown<StageFailed>([&] { started(); }).failure.exit_code, 6);
+  EXPECT_NE(error.failure.how.find("timed out"), std::string::npos);
   EXPECT_EQ(run_process({"/bin/sh", "-c", "sleep 4"}).exit_code, 0);
   EXPECT_FALSE(fs::exists(folder_ / "survived"));
 }
@@ -477,48 +463,29 @@ TEST_F(Runner, kills_a_stage_that_takes_too_much_memory) {
       bin_ / "shell-segment",
       "head -c 200000000 /dev/zero | tail -c 1 > /dev/null; x=$(head -c 200000000 /dev/zero | tr '\\0' x); sleep 60");
   options_.limits.memory_bytes = 100'000'000;
-  try {
-    started();
-    FAIL() << "no error";
-  } catch (const StageFailed& error) {
-    EXPECT_EQ(error.failure.exit_code, 6);
-    EXPECT_NE(error.failure.how.find("took too much memory"), std::string::npos) << error.failure.how;
-  }
+  EXPECT_EQ(test::thrown<StageFailed>([&] { started(); }).failure.exit_code, 6);
+  EXPECT_NE(error.failure.how.find("took too much memory"), std::string::npos) << error.failure.how;
 }
 
 TEST_F(Runner, limits_hold_while_a_stage_reads_its_parameters) {
   files::write_text(bin_ / "check-network", "sleep 60");
   options_.limits.seconds = 0.5;
-  try {
-    started();
-    FAIL() << "no error";
-  } catch (const StageFailed& error) {
-    EXPECT_EQ(error.failure.exit_code, 6);
-    EXPECT_TRUE(error.failure.how.starts_with("timed out after ")) << error.failure.how;
-    EXPECT_TRUE(error.failure.how.ends_with(" s while it read cell.toml")) << error.failure.how;
-  }
+  EXPECT_EQ(test::thrown<StageFailed>([&] { started(); }).failure.exit_code, 6);
+  EXPECT_TRUE(error.failure.how.starts_with("timed out after ")) << error.failure.how;
+  EXPECT_TRUE(error.failure.how.ends_with(" s while it read cell.toml")) << error.failure.how;
   EXPECT_EQ(calls(), "") << "nothing runs before every stage has read its parameters";
 }
 
 TEST_F(Runner, a_stage_that_crashes_while_it_reads_its_parameters_is_told_as_that) {
   files::write_text(bin_ / "check-fit", "kill -SEGV $$");
-  try {
-    started();
-    FAIL() << "no error";
-  } catch (const StageFailed& error) {
-    EXPECT_EQ(error.failure.exit_code, 128 + 11);
-    EXPECT_EQ(error.failure.how, "killed by signal 11 (Segmentation fault) while it read cell.toml");
-  }
+  const StageFailed error = test::thrown<StageFailed>([&] { started(); });
+  EXPECT_EQ(error.failure.exit_code, 128 + 11);
+  EXPECT_EQ(error.failure.how, "killed by signal 11 (Segmentation fault) while it read cell.toml");
 }
 
 TEST_F(Runner, a_stage_that_found_no_answer_and_wrote_nothing_did_not_merely_fail_to_converge) {
   files::write_text(bin_ / "shell-network", "exit 4");
-  try {
-    started();
-    FAIL() << "no error";
-  } catch (const StageFailed& error) {
-    EXPECT_EQ(error.failure.exit_code, 7);
-  }
+  EXPECT_EQ(test::thrown<StageFailed>([&] { started(); }).failure.exit_code, 7);
   EXPECT_EQ(run_record(cell_)["outcome"], "failed");
 }
 
@@ -568,12 +535,8 @@ TEST_F(Runner, names_of_images_are_globs_that_fit_one_file) {
   names.adhesion = "c1_*.tif";
   EXPECT_EQ(resolve_image(cell_, names, "adhesion"), cell_ / "c1_pax.tif");
   names.adhesion = "*_pax.tif";
-  try {
-    resolve_image(cell_, names, "adhesion");
-    FAIL() << "no error";
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("c1_pax.tif, c2_pax.tif"), std::string::npos);
-  }
+  const InputError error = test::thrown<InputError>([&] { resolve_image(cell_, names, "adhesion"); });
+  EXPECT_NE(std::string(error.what()).find("c1_pax.tif, c2_pax.tif"), std::string::npos);
 }
 
 TEST_F(Runner, a_file_whose_name_looks_like_a_glob_is_found) {
@@ -710,12 +673,8 @@ TEST_F(Runner, an_image_that_is_missing_is_answered_with_the_one_that_was_probab
     fs::create_directory(folder);
     files::write_text(folder / there, "x");
     ImageNames names;
-    try {
-      resolve_image(folder, names, "actin");
-    } catch (const InputError& error) {
-      return error.hint;
-    }
-    return std::string("found");
+    const auto error = test::caught<InputError>([&] { resolve_image(folder, names, "actin"); });
+    return error ? error->hint : std::string("found");
   };
   EXPECT_EQ(hint("actin.tif"), "found");
   EXPECT_NE(hint("Actin.TIF").find("there is 'Actin.TIF': capitals count"), std::string::npos);

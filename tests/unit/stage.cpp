@@ -202,12 +202,8 @@ TEST(Suggestion, names_the_flag_or_command_that_was_meant_and_nothing_where_none
   app.add_subcommand("verify", "");
   const auto after = [&](std::vector<std::string> arguments) {
     std::ranges::reverse(arguments);
-    try {
-      app.parse(arguments);
-    } catch (const CLI::ParseError& error) {
-      return stage::suggestion(app, error.what());
-    }
-    return std::string("parsed");
+    const auto error = test::caught<CLI::ParseError>([&] { app.parse(arguments); });
+    return error ? stage::suggestion(app, error->what()) : std::string("parsed");
   };
   EXPECT_EQ(after({"batch", "--thread=2"}), "; did you mean '--threads'?");
   EXPECT_EQ(after({"bacth"}), "; did you mean 'batch'?");

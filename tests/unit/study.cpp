@@ -150,12 +150,8 @@ TEST(Study, a_folder_without_a_finished_cell_is_an_error) {
 TEST(Study, where_no_cell_enters_each_reason_is_told) {
   const FakeStudy fake;
   files::write_text(fake.folder / "study.csv", "cell,exclude\ncell_1,blurred\ncell_2,blurred\ncell_3,dividing\n");
-  try {
-    fake.read({}, fake.folder / "study.csv");
-    FAIL() << "nothing was thrown";
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("2: blurred, 1: dividing"), std::string::npos) << error.what();
-  }
+  const InputError error = test::thrown<InputError>([&] { fake.read({}, fake.folder / "study.csv"); });
+  EXPECT_NE(std::string(error.what()).find("2: blurred, 1: dividing"), std::string::npos) << error.what();
 }
 
 TEST(Study, tensions_that_cannot_be_identified_do_not_enter) {

@@ -71,12 +71,8 @@ TEST(Masks, an_overhang_is_refused_by_place) {
     for (int i = 10; i < 20; ++i) voxel(s, i, 7, k) = 1;  // a roof
   }
   for (int k = 8; k < 21; ++k) voxel(s, 10, 7, k) = 1;  // on a wall
-  try {
-    points_of_masks(s);
-    FAIL();
-  } catch (const InvalidData& error) {
-    EXPECT_NE(error.element.find("x, y = 5.75, 3.75"), std::string::npos) << error.what();
-  }
+  const InvalidData error = test::thrown<InvalidData>([&] { points_of_masks(s); });
+  EXPECT_NE(error.element.find("x, y = 5.75, 3.75"), std::string::npos) << error.what();
 }
 
 TEST(Masks, with_the_gel_black_or_without_a_surface_are_refused) {

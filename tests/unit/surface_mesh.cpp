@@ -68,12 +68,8 @@ std::string refusal(const TemporaryFolder& folder, const std::string& name, cons
 }
 
 std::string refusal(const TriangleMesh& mesh) {
-  try {
-    sample_mesh(mesh, 1);
-  } catch (const InvalidData& error) {
-    return error.what();
-  }
-  return "sampled";
+  const auto error = test::caught<InvalidData>([&] { sample_mesh(mesh, 1); });
+  return error ? error->what() : "sampled";
 }
 
 std::string with(std::string text, const std::string& old, const std::string& now) {

@@ -43,12 +43,8 @@ TEST(Formula, is_what_it_says) {
 
 TEST(Formula, that_is_none_is_refused_by_name) {
   const auto message_of = [](const std::string& text) -> std::string {
-    try {
-      formula_of(text);
-    } catch (const UsageError& error) {
-      return error.what();
-    }
-    return "";
+    const auto error = test::caught<UsageError>([&] { formula_of(text); });
+    return error ? error->what() : "";
   };
   EXPECT_NE(message_of("wawe").find("wave"), std::string::npos);
   EXPECT_NE(message_of("wave amplitude_um=3").find("period_um"), std::string::npos);
@@ -127,12 +123,8 @@ TEST(HeightMap, a_wide_hole_is_refused_by_place) {
   const HeightMap map = with_holes(sampled(bumpy, {-20, -20}, {20, 20}, 0.5), [](Vec2 p) {
     return norm(p - Vec2{5, 3}) < 3;
   });
-  try {
-    filled(map, 5);
-    FAIL();
-  } catch (const InvalidData& error) {
-    EXPECT_NE(error.element.find("x, y = 5, 3"), std::string::npos) << error.what();
-  }
+  const InvalidData error = test::thrown<InvalidData>([&] { filled(map, 5); });
+  EXPECT_NE(error.element.find("x, y = 5, 3"), std::string::npos) << error.what();
 }
 
 TEST(HeightMap, coarser_ones_are_means_and_keep_their_place) {

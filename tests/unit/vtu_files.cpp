@@ -1,12 +1,11 @@
 /// network.vtu as others write it, and damaged.
-#include <gtest/gtest.h>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/files/vtu_file.h"
 #include "tests/support/fake_tables.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 #include "tests/support/vtu_variants.h"
 
 namespace mbtfm {
@@ -198,12 +197,9 @@ TEST(VtuFiles, damaged_polygons_are_refused) {
            {with(whole, "0 2 3<", "0 2 -1<"), "a point below 4"},
            {with(whole, "type=\"PolyData\"", "type=\"UnstructuredGrid\""), "polygons (.vtp"}}) {
     const auto refusal_of = [](const std::string& text) -> std::string {
-      try {
-        files::VtuFile(text, "surface.vtp", files::VtuKind::poly_data).polygons();
-      } catch (const InputError& error) {
-        return error.what();
-      }
-      return "read";
+      const auto error =
+          test::caught<InputError>([&] { files::VtuFile(text, "surface.vtp", files::VtuKind::poly_data).polygons(); });
+      return error ? error->what() : "read";
     };
     EXPECT_NE(refusal_of(changed).find(expected), std::string::npos) << expected << ": " << refusal_of(changed);
   }
