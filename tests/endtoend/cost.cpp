@@ -32,14 +32,12 @@ TEST_F(SmallCell, is_fitted_anew_where_the_preset_changes_and_only_then) {
 }
 
 TEST_F(SmallCell, is_fitted_as_accurately_as_asked_for_or_says_why_not) {
-  const Outcome easy = run("run --accuracy 90%");
-  EXPECT_EQ(easy.code, 0) << easy.output;
-  EXPECT_NE(files::read_text(cell / "run.json").find("\"met\": true"), std::string::npos) << easy.output;
+  const std::string easy = output_of(run("run --accuracy 90%"));
+  EXPECT_NE(files::read_text(cell / "run.json").find("\"met\": true"), std::string::npos) << easy;
   EXPECT_NE(files::read_text(cell / "report.html").find("Verified by the error budget: tensions to"),
             std::string::npos);
-  const Outcome hopeless = run("run --accuracy 0.0001%");
-  EXPECT_EQ(hopeless.code, 0) << hopeless.output;
-  EXPECT_NE(hopeless.output.find("no computing reaches that"), std::string::npos) << hopeless.output;
+  const std::string hopeless = output_of(run("run --accuracy 0.0001%"));
+  EXPECT_NE(hopeless.find("no computing reaches that"), std::string::npos) << hopeless;
   EXPECT_NE(files::read_text(cell / "report.html").find("no computing reaches that"), std::string::npos);
   ASSERT_EQ(run("run").code, 0);
   EXPECT_EQ(files::read_text(cell / "report.html").find("Verified by"), std::string::npos);
@@ -48,8 +46,7 @@ TEST_F(SmallCell, is_fitted_as_accurately_as_asked_for_or_says_why_not) {
 
 TEST_F(SmallCell, has_a_cost_study_within_its_budget) {
   ASSERT_EQ(run("run").code, 0);
-  const Outcome study = run("cost --repeats 1 --budget 0.05");
-  ASSERT_EQ(study.code, 0) << study.output;
+  output_of(run("cost --repeats 1 --budget 0.05"));
   const std::string csv = files::read_text(cell / "cost/cost.csv");
   EXPECT_NE(csv.find("as it is,,"), std::string::npos) << csv;
   EXPECT_TRUE(fs::is_regular_file(cell / "cost/cost.svg"));

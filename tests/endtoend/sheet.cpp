@@ -36,9 +36,8 @@ class Sheet : public testing::Test {
 };
 
 TEST_F(Sheet, springs_alone_need_no_gel_and_carry_the_tension_that_balance_asks_for) {
-  const auto outcome = run(std::string(kSheet) + "adhesion_stiffness_nN_per_um3 = 0.03\n",
-                           "--points " + (folder_ / "points.csv").string());
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  test::output_of(run(std::string(kSheet) + "adhesion_stiffness_nN_per_um3 = 0.03\n",
+                      "--points " + (folder_ / "points.csv").string()));
   // each patch's force acts at its centre, where a traction that grows across the patch has it a little further out
   EXPECT_NEAR(figure("mean_tension_nN_per_um"), figure("virial_tension_nN_per_um"), 1e-3 * 0.02);
   EXPECT_LE(figure("net_force_nN"), 1e-9 * figure("total_force_nN"));
@@ -54,8 +53,7 @@ TEST_F(Sheet, its_tractions_give_its_tensions_back) {
   const double mean = figure("mean_tension_nN_per_um");
   std::filesystem::rename(folder_ / "out" / "traction.csv", folder_ / "traction.csv");
   const std::string traction = record() + "--traction " + (folder_ / "traction.csv").string();
-  const auto outcome = run("[sheet]\npoisson_ratio = 0.3\n", traction);
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  test::output_of(run("[sheet]\npoisson_ratio = 0.3\n", traction));
   test::expect_silent({"sheet-cut", "sheet-coarse", "tractions-outside", "tractions-off-balance"},
                       files::read_text(folder_ / "record.json"));
   EXPECT_NEAR(figure("inside_mean_tension_nN_per_um"), mean, 0.01 * 0.02);
@@ -68,10 +66,9 @@ TEST_F(Sheet, its_tractions_give_its_tensions_back) {
 /// On stiff springs the tension rises within a few micrometres of the edge.
 TEST_F(Sheet, one_of_triangles_too_large_for_its_tensions_is_doubted) {
   for (const double mesh_um : {1.5, 12.0}) {
-    const auto outcome =
+    test::output_of(
         run(std::string(kSheet) + "adhesion_stiffness_nN_per_um3 = 0.03\nmesh_um = " + std::to_string(mesh_um) + "\n",
-            record());
-    ASSERT_EQ(outcome.code, 0) << outcome.output;
+            record()));
     EXPECT_EQ(fires("sheet-coarse"), mesh_um > 10) << figure("mesh_relative_error");
   }
 }
@@ -96,9 +93,8 @@ TEST_F(Sheet, one_that_the_image_cuts_is_held_at_the_cut_and_said_to_be) {
   std::vector<bool> is_cut(half.size());
   is_cut.back() = true;
   files::write_outline(folder_ / "half.csv", half, {}, is_cut);
-  const auto outcome =
-      run("[sheet]\npoisson_ratio = 0.3\n", record() + "--traction " + (folder_ / "traction.csv").string(), "half.csv");
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  test::output_of(run("[sheet]\npoisson_ratio = 0.3\n", record() + "--traction " + (folder_ / "traction.csv").string(),
+                      "half.csv"));
   EXPECT_TRUE(fires("sheet-cut"));
   EXPECT_NE(files::read_text(folder_ / "out" / "sheet.html").find("The image cuts the sheet"), std::string::npos);
   // triangles of the whole lie across the cut: some of the forces are on the other side of it
@@ -112,10 +108,9 @@ TEST_F(Sheet, one_that_the_image_cuts_is_held_at_the_cut_and_said_to_be) {
 /// The limit is 0.02 of the half width, here 25 um: 0.5 um.
 TEST_F(Sheet, one_that_is_too_thick_for_a_sheet_is_doubted_and_a_thin_one_is_not) {
   for (const double thickness_um : {0.45, 0.55}) {
-    const auto outcome = run("[sheet]\nyoungs_modulus_kPa = 1\nthickness_um = " + std::to_string(thickness_um) +
-                                 "\ncontraction_nN_per_um = 0.02\nadhesion_stiffness_nN_per_um3 = 0.003\n",
-                             record());
-    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    test::output_of(run("[sheet]\nyoungs_modulus_kPa = 1\nthickness_um = " + std::to_string(thickness_um) +
+                            "\ncontraction_nN_per_um = 0.02\nadhesion_stiffness_nN_per_um3 = 0.003\n",
+                        record()));
     EXPECT_EQ(fires("sheet-thick"), thickness_um > 0.5);
   }
 }
@@ -130,8 +125,7 @@ TEST_F(Sheet, a_mask_is_an_outline_and_a_band_contracts_alone) {
     for (int i = 0; i < mask.width; ++i)
       mask.at(i, j) = std::hypot(i + 0.5 - 120, j + 0.5 - 120) * kPixel_um < 25 ? 1.0F : 0.0F;
   images::write_tiff(folder_ / "mask.tif", mask);
-  const auto by_mask = run("pixel_size_um = 0.25\n" + springs, {}, "mask.tif");
-  ASSERT_EQ(by_mask.code, 0) << by_mask.output;
+  test::output_of(run("pixel_size_um = 0.25\n" + springs, {}, "mask.tif"));
   EXPECT_NEAR(figure("mean_tension_nN_per_um"), mean, 0.02 * mean);  // steps of a pixel in 100 of the radius
   // a band of the whole width is the even sheet; of a fifth of it, what is inside is drawn outwards and pulls less
   ASSERT_EQ(run(springs + "edge_band_um = 25.1\n").code, 0);
@@ -149,16 +143,15 @@ TEST_F(Sheet, tractions_in_pascals_are_refused) {
   for (int y = -30; y <= 30; y += 3)
     for (int x = -30; x <= 30; x += 3) file << x << ',' << y << ',' << -10 * x << ',' << -10 * y << '\n';
   file.close();
-  const auto outcome = run("[sheet]\npoisson_ratio = 0.3\n", "--traction " + (folder_ / "traction.csv").string());
-  EXPECT_EQ(outcome.code, 3) << outcome.output;
-  EXPECT_NE(outcome.output.find("200 Pa are 0.2 kPa"), std::string::npos) << outcome.output;
+  const std::string outcome =
+      test::output_of(run("[sheet]\npoisson_ratio = 0.3\n", "--traction " + (folder_ / "traction.csv").string()), 3);
+  EXPECT_NE(outcome.find("200 Pa are 0.2 kPa"), std::string::npos) << outcome;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
 TEST_F(Sheet, a_bonded_sheet_pulls_on_its_gel_without_net_force) {
-  const auto outcome = run(
-      "[gel]\nyoungs_modulus_kPa = 5\npoisson_ratio = 0.45\nthickness_um = 60\n" + std::string(kSheet), "--mesh_um 2");
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  test::output_of(run("[gel]\nyoungs_modulus_kPa = 5\npoisson_ratio = 0.45\nthickness_um = 60\n" + std::string(kSheet),
+                      "--mesh_um 2"));
   EXPECT_LE(figure("net_force_nN"), 1e-9 * figure("total_force_nN"));
   EXPECT_GT(figure("total_force_nN"), 0);
 }
@@ -172,10 +165,9 @@ class FittedSheet : public Sheet {
     for (int i = -20; i <= 20; ++i)
       for (int j = -20; j <= 20; ++j) points += std::to_string(2 * i) + "," + std::to_string(2 * j) + "\n";
     files::write_text(folder_ / "beads.csv", points);
-    const auto made =
+    test::output_of(
         run(gel_ + sheet_ + "mesh_um = 0.8\nyoungs_modulus_kPa = " + std::to_string(modulus_kPa_) + "\n" + more,
-            "--beads " + (folder_ / "beads.csv").string() + " " + arguments, outline_);
-    ASSERT_EQ(made.code, 0) << made.output;
+            "--beads " + (folder_ / "beads.csv").string() + " " + arguments, outline_));
     DisplacementField beads = files::read_displacement(folder_ / "out" / "displacement.csv");
     std::mt19937_64 random(3);
     std::normal_distribution<double> noise(0, 0.01);
@@ -236,9 +228,8 @@ TEST_F(FittedSheet, contraction_and_stiffness_come_back_from_beads) {
   EXPECT_EQ(outcome.output.find("explains"), std::string::npos) << "the sheet explains the beads: " << outcome.output;
   // a gel whose modulus is known to 10 %, and whose thickness to a third
   const double sigma = found.number(0, "sigma");
-  const auto on_doubtful = run(gel_ + "youngs_modulus_sigma_kPa = 0.1\nthickness_sigma_um = 20\n" + sheet_ + mesh_,
-                               "--displacement " + (folder_ / "displacement.csv").string());
-  ASSERT_EQ(on_doubtful.code, 0) << on_doubtful.output;
+  test::output_of(run(gel_ + "youngs_modulus_sigma_kPa = 0.1\nthickness_sigma_um = 20\n" + sheet_ + mesh_,
+                      "--displacement " + (folder_ / "displacement.csv").string()));
   const files::CsvTable doubtful(folder_ / "out" / "sheet_fit.csv");
   EXPECT_GT(doubtful.number(0, "sigma"), std::hypot(sigma, 0.1 * 0.99 * found.number(0, "value")));
   EXPECT_LT(doubtful.number(0, "sigma"), std::hypot(sigma, 0.2 * found.number(0, "value")));
@@ -246,17 +237,16 @@ TEST_F(FittedSheet, contraction_and_stiffness_come_back_from_beads) {
   EXPECT_EQ(
       run(gel_ + sheet_ + "strain = \"large\"\n", "--displacement " + (folder_ / "displacement.csv").string()).code, 2);
   // a contraction that may vary, and does not
-  const auto varying = run(gel_ + sheet_ + mesh_ + "fit_parts = \"field\"\nfield_points = 6\n",
-                           "--displacement " + (folder_ / "displacement.csv").string());
-  ASSERT_EQ(varying.code, 0) << varying.output;
+  test::output_of(run(gel_ + sheet_ + mesh_ + "fit_parts = \"field\"\nfield_points = 6\n",
+                      "--displacement " + (folder_ / "displacement.csv").string()));
   const files::CsvTable places(folder_ / "out" / "contraction.csv");
   for (int row = 0; row < places.n_rows(); ++row)
     EXPECT_NEAR(places.number(row, "contraction_nN_per_um"), 0.5, 4 * places.number(row, "sigma_nN_per_um"));
   EXPECT_EQ(files::CsvTable(folder_ / "out" / "sheet_fit.csv").text(0, "part"), "mean");
   EXPECT_NE(files::read_text(folder_ / "out" / "sheet.svg").find(">Contraction<"), std::string::npos);
-  const auto unknown_bond = run(gel_ + sheet_ + mesh_ + "fit_parts = \"field\"\nfit_adhesion_stiffness = true\n",
-                                "--displacement " + (folder_ / "displacement.csv").string());
-  EXPECT_EQ(unknown_bond.code, 2) << unknown_bond.output;
+  test::output_of(run(gel_ + sheet_ + mesh_ + "fit_parts = \"field\"\nfit_adhesion_stiffness = true\n",
+                      "--displacement " + (folder_ / "displacement.csv").string()),
+                  2);
 }
 
 /// Of a sheet a hundred times stiffer than its gel the beads tell by how much it shrinks, and no more.
@@ -283,11 +273,10 @@ TEST_F(Sheet, one_that_expands_or_has_the_stiffness_of_a_bound_is_doubted) {
       }
     }
     files::write_displacement(folder_ / "displacement.csv", beads);
-    const auto outcome =
+    test::output_of(
         run("[gel]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.49\nthickness_um = 60\n[sheet]\npoisson_ratio = 0.3\n"
             "thickness_um = 0.4\nmesh_um = 2\n",
-            record() + "--displacement " + (folder_ / "displacement.csv").string());
-    EXPECT_EQ(outcome.code, 0) << outcome.output;
+            record() + "--displacement " + (folder_ / "displacement.csv").string()));
     return files::read_text(folder_ / "record.json");
   };
   const auto radial = [](double r) { return 0.8 * r / 25 * std::exp(-std::pow(r / 25, 4)); };
@@ -416,9 +405,8 @@ TEST_F(Sheet, tractions_of_a_larger_area_tell_both_means_their_errors_and_what_i
   std::filesystem::rename(folder_ / "out" / "traction.csv", folder_ / "traction.csv");
   files::write_outline(folder_ / "area.csv", test::circle(32, 180));
   const std::string traction = "--traction " + (folder_ / "traction.csv").string();
-  const auto wider = run("[sheet]\npoisson_ratio = 0.3\ntraction_sigma_kPa = 0.0005\n",
-                         traction + " --area " + (folder_ / "area.csv").string());
-  ASSERT_EQ(wider.code, 0) << wider.output;
+  test::output_of(run("[sheet]\npoisson_ratio = 0.3\ntraction_sigma_kPa = 0.0005\n",
+                      traction + " --area " + (folder_ / "area.csv").string()));
   // beyond what pulls a sheet of no traction bears what its inner edge has: the mean inside is higher
   EXPECT_GT(figure("inside_mean_tension_nN_per_um"), figure("mean_tension_nN_per_um"));
   EXPECT_NEAR(figure("virial_tension_nN_per_um"), figure("mean_tension_nN_per_um"), 1e-9 * mean);
@@ -435,12 +423,10 @@ TEST_F(Sheet, tractions_of_a_larger_area_tell_both_means_their_errors_and_what_i
   }
   files::write_text(folder_ / "traction.csv", one_side);
   std::filesystem::remove_all(folder_ / "out");
-  const auto refused = run("[sheet]\npoisson_ratio = 0.3\n", traction);
-  EXPECT_EQ(refused.code, 3) << refused.output;
-  EXPECT_NE(refused.output.find("most_unbalanced"), std::string::npos) << refused.output;
+  const std::string refused = test::output_of(run("[sheet]\npoisson_ratio = 0.3\n", traction), 3);
+  EXPECT_NE(refused.find("most_unbalanced"), std::string::npos) << refused;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
-  const auto allowed = run("[sheet]\npoisson_ratio = 0.3\nmost_unbalanced = 1\n", record() + traction);
-  EXPECT_EQ(allowed.code, 0) << allowed.output;
+  test::output_of(run("[sheet]\npoisson_ratio = 0.3\nmost_unbalanced = 1\n", record() + traction));
   EXPECT_TRUE(fires("tractions-off-balance"));
 }
 
@@ -451,8 +437,7 @@ TEST_F(Sheet, large_strains_are_computed_on_a_gel_if_they_are_asked_for) {
                         "contraction_nN_per_um = 2\n";  // a free sheet would contract by 0.17
   std::map<std::string, double> largest_um;
   for (const std::string strain : {"auto", "small", "large"}) {
-    const auto outcome = run(gel + soft + "strain = \"" + strain + "\"\n");
-    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    test::output_of(run(gel + soft + "strain = \"" + strain + "\"\n"));
     largest_um[strain] = figure("largest_displacement_um");
     EXPECT_LE(figure("net_force_nN"), 1e-7 * figure("total_force_nN"));
   }
@@ -466,8 +451,7 @@ TEST_F(Sheet, a_line_tension_keeps_strains_small_and_the_finding_says_what_that_
       "[sheet]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.3\nthickness_um = 0.4\ncontraction_nN_per_um = 0.04\n"
       "adhesion_stiffness_nN_per_um3 = 0.003\n";
   for (const bool has_line : {false, true}) {
-    const auto outcome = run(strong + (has_line ? "line_tension_nN = 0.1\n" : ""), record());
-    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    test::output_of(run(strong + (has_line ? "line_tension_nN = 0.1\n" : ""), record()));
     EXPECT_EQ(fires("sheet-strain"), has_line);
   }
 }
@@ -507,9 +491,8 @@ TEST_F(Sheet, what_cannot_be_is_refused_by_name) {
   const auto line = run(std::string(kSheet) + springs, "", "line.csv");
   EXPECT_EQ(line.code, 3) << line.output;
   EXPECT_NE(line.output.find("line.csv: expected an outline"), std::string::npos) << line.output;
-  const auto outcome = run(std::string(kSheet) + springs, "", "eight.csv");
-  EXPECT_EQ(outcome.code, 3) << outcome.output;
-  EXPECT_NE(outcome.output.find("piece 1 of ring 0 and piece 3 of ring 0 cross"), std::string::npos) << outcome.output;
+  const std::string outcome = test::output_of(run(std::string(kSheet) + springs, "", "eight.csv"), 3);
+  EXPECT_NE(outcome.find("piece 1 of ring 0 and piece 3 of ring 0 cross"), std::string::npos) << outcome;
 }
 
 /// The folder of a cell whose images were simulated, to be run as a sheet.

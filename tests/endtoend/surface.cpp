@@ -100,10 +100,9 @@ TEST_F(Surface, from_beads_knows_its_error_and_tells_beads_above_it) {
   write("beads.csv", text);
   const std::string beads = "--z_points into-gel --beads " + file("beads.csv");
   EXPECT_EQ(run(beads).code, 2);  // no error of z
-  const auto outcome = run(beads + " --sigma_z_um 0.3");
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_TRUE(fires("off-the-surface", outcome.output)) << outcome.output;
-  EXPECT_FALSE(fires("surface-level", outcome.output)) << outcome.output;
+  const std::string outcome = test::output_of(run(beads + " --sigma_z_um 0.3"));
+  EXPECT_TRUE(fires("off-the-surface", outcome)) << outcome;
+  EXPECT_FALSE(fires("surface-level", outcome)) << outcome;
   const HeightMap map = surface();
   ASSERT_EQ(map.sigma_um.size(), map.z_um.size());
   EXPECT_LT(largest_error(map, 5), 1.9);  // half of the beads' distance, three standard errors
@@ -118,10 +117,9 @@ TEST_F(Surface, that_beads_find_level_may_be_the_end_of_the_images) {
   for (int k = 0; k < 2000; ++k)
     text += brief(across(random)) + "," + brief(across(random)) + "," + brief(down(random)) + "\n";
   write("beads.csv", text);
-  const auto outcome = run("--z_points into-gel --sigma_z_um 0.1 --beads " + file("beads.csv"));
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_TRUE(fires("surface-level", outcome.output)) << outcome.output;
-  EXPECT_FALSE(fires("off-the-surface", outcome.output)) << outcome.output;
+  const std::string outcome = test::output_of(run("--z_points into-gel --sigma_z_um 0.1 --beads " + file("beads.csv")));
+  EXPECT_TRUE(fires("surface-level", outcome)) << outcome;
+  EXPECT_FALSE(fires("off-the-surface", outcome)) << outcome;
 }
 
 /// A TIFF of masks of the gel below the wave, 40 pixels of a micrometre to each side, slices of half a micrometre.
@@ -220,8 +218,7 @@ class Gel : public Surface {
 TEST_F(Gel, under_a_level_surface_anywhere_is_a_flat_one) {
   ASSERT_EQ(run("--formula 'flat z_um=4' --spacing_um 4" + kSquare).code, 0);
   const std::string points = " --points " + file("points.csv") + " --out ";
-  const auto outcome = substrate("--model curved --surface " + file("surface.vtp") + points + file("raised.csv"));
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  test::output_of(substrate("--model curved --surface " + file("surface.vtp") + points + file("raised.csv")));
   write("gel.toml", "[gel]\nyoungs_modulus_kPa = 10\npoisson_ratio = 0.45\nthickness_um = 26\n");
   std::string below = "x_um,y_um,z_um\n";
   for (const Vec2 p : {Vec2{-9, 2}, Vec2{0, 0}, Vec2{3, 5}, Vec2{12, -3}})
@@ -234,8 +231,7 @@ TEST_F(Gel, under_a_level_surface_anywhere_is_a_flat_one) {
 TEST_F(Gel, whose_surface_is_not_flat_is_computed_by_the_model_that_has_it) {
   ASSERT_EQ(run("--formula 'wave amplitude_um=4 period_um=40' --spacing_um 1" + kSquare).code, 0);
   const std::string given = " --surface " + file("surface.vtp") + " --points " + file("points.csv") + " --out ";
-  const auto outcome = substrate("--displacement_tolerance 0.1" + given + file("wavy.csv"));
-  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  test::output_of(substrate("--displacement_tolerance 0.1" + given + file("wavy.csv")));
   ASSERT_EQ(substrate("--points " + file("points.csv") + " --out " + file("flat.csv")).code, 0);
   EXPECT_GT(difference(displaced("wavy.csv"), displaced("flat.csv")), 0.1);
   const auto refused = substrate("--model layer" + given + file("layer.csv"));
@@ -277,10 +273,9 @@ TEST_F(Gel, is_known_no_further_than_its_surface) {
       run("--formula 'wave amplitude_um=4 period_um=40' --low_x_um -10 --low_y_um -20 --high_x_um 5 --high_y_um 20")
           .code,
       0);
-  const auto refused =
-      substrate("--surface " + file("surface.vtp") + " --points " + file("points.csv") + " --out " + file("u.csv"));
-  EXPECT_EQ(refused.code, 3) << refused.output;
-  EXPECT_NE(refused.output.find("surface is known"), std::string::npos) << refused.output;
+  const std::string refused = test::output_of(
+      substrate("--surface " + file("surface.vtp") + " --points " + file("points.csv") + " --out " + file("u.csv")), 3);
+  EXPECT_NE(refused.find("surface is known"), std::string::npos) << refused;
 }
 
 }  // namespace

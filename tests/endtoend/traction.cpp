@@ -99,9 +99,8 @@ TEST(TractionProgram, takes_a_field_without_errors_and_says_which_it_assumed) {
                              (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string() +
                              more);
   };
-  const auto told = run("");
-  ASSERT_EQ(told.code, 0) << told.output;
-  EXPECT_NE(told.output.find("the field states no errors"), std::string::npos) << told.output;
+  const std::string told = test::output_of(run(""));
+  EXPECT_NE(told.find("the field states no errors"), std::string::npos) << told;
   // 2304 beads: half of them tell the noise to 2.5 %
   const double assumed_um = files::JsonRecord(folder / "traction.json", "figures").at("assumed_sigma_um").number();
   EXPECT_NEAR(assumed_um / (kNoise * scene.largest_um), 1, 0.075);
@@ -116,9 +115,8 @@ TEST(TractionProgram, refuses_a_modulus_in_pascal_unless_told_to_and_takes_an_in
     return test::run_program("mbtfm-traction --gel " + (folder / "cell.toml").string() + " --displacement " +
                              (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
   };
-  const auto refused = run("[gel]\nyoungs_modulus_kPa = 8400\n");
-  EXPECT_EQ(refused.code, 3) << refused.output;
-  EXPECT_NE(refused.output.find("8400 Pa is 8.4 kPa"), std::string::npos) << refused.output;
+  const std::string refused = test::output_of(run("[gel]\nyoungs_modulus_kPa = 8400\n"), 3);
+  EXPECT_NE(refused.find("8400 Pa is 8.4 kPa"), std::string::npos) << refused;
   EXPECT_FALSE(fs::exists(folder / "traction.csv"));
   EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8400\n[checks]\nallow = [\"youngs_modulus_kPa\"]\n").code, 0);
   EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.5\n").code, 0);
@@ -173,8 +171,7 @@ class TractionInSpace : public testing::Test {
 
 TEST_F(TractionInSpace, finds_forces_of_adhesions_on_a_wave_with_their_errors) {
   for (const std::string method : {"auto", "patches"}) {
-    const auto outcome = run("--spacing_um 4 --grow_um 3 --adhesions " + at("adhesions.csv") + " --method " + method);
-    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    test::output_of(run("--spacing_um 4 --grow_um 3 --adhesions " + at("adhesions.csv") + " --method " + method));
     const files::CsvTable forces(folder_ / "traction_3d_adhesion_forces.csv");
     ASSERT_EQ(forces.n_rows(), 2);
     for (int row = 0; row < 2; ++row) {
@@ -202,8 +199,7 @@ TEST_F(TractionInSpace, splits_faces_by_each_rule_and_writes_an_even_lattice) {
     return nlohmann::json::parse(files::read_text(folder_ / "traction_3d.json")).at(name).get<double>();
   };
   for (const std::string rule : {"none", "region", "resolved", "threshold"}) {
-    const auto outcome = run("--spacing_um 3 --method tikhonov --outline " + at("outline.csv") + " --refine " + rule);
-    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    test::output_of(run("--spacing_um 3 --method tikhonov --outline " + at("outline.csv") + " --refine " + rule));
     const files::CsvTable map(folder_ / "traction_3d.csv");
     Vec3 sum;
     for (int row = 0; row < map.n_rows(); ++row)
@@ -296,9 +292,8 @@ TEST_F(TractionInSpace, says_whether_a_common_motion_was_looked_for) {
             std::string::npos);
   EXPECT_NE(run(dense + "direct").output.find("common motion: off (auto): the displacement is imposed"),
             std::string::npos);
-  const auto refused = run(dense + "direct --common_motion on");
-  EXPECT_EQ(refused.code, 2) << refused.output;
-  EXPECT_NE(refused.output.find("direct imposes the displacement as it was measured"), std::string::npos);
+  const std::string refused = test::output_of(run(dense + "direct --common_motion on"), 2);
+  EXPECT_NE(refused.find("direct imposes the displacement as it was measured"), std::string::npos);
 }
 
 TEST_F(TractionInSpace, doubts_a_total_force_that_no_cell_has) {

@@ -26,11 +26,14 @@ inline Outcome run_program(const std::string& command, const std::string& before
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), files::read_text(log)};
 }
 
-/// What a program says that ends with this exit code; with another one, the test ends.
-inline std::string output_of(const std::string& command, int code = 0, const std::string& before = {}) {
-  const Outcome outcome = run_program(command, before);
+/// What a program said that ended with this exit code; with another one, the test ends.
+inline std::string output_of(const Outcome& outcome, int code = 0) {
   if (outcome.code == code) return outcome.output;
-  throw std::runtime_error(command + "\nended with " + std::to_string(outcome.code) + ": " + outcome.output);
+  throw std::runtime_error("exit code " + std::to_string(outcome.code) + ": " + outcome.output);
+}
+
+inline std::string output_of(const std::string& command, int code = 0, const std::string& before = {}) {
+  return output_of(run_program(command, before), code);
 }
 
 }  // namespace mbtfm::test
