@@ -194,7 +194,6 @@ TEST(Adhesions, a_published_cell_has_the_adhesions_that_its_authors_found) {
     EXPECT_GE(o.f1, 0.9);
     EXPECT_NEAR(o.n_found, o.n_true, 0.2 * o.n_true);
     RecordProperty("dice of " + name, std::to_string(o.dice));
-    std::printf("%s: Dice %.3f, F1 %.3f, %d found, %d theirs\n", name.c_str(), o.dice, o.f1, o.n_found, o.n_true);
   }
 }
 

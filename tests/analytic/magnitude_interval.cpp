@@ -28,7 +28,6 @@ TEST(MagnitudeInterval, holds_the_truth_in_nineteen_cases_of_twenty_and_near_zer
   constexpr double kChance = 4 * 0.0044;  // four standard errors of a share of 0.95 in 2 500 draws
   for (const auto& [truth, least, most] : expected) {
     const double coverage = coverage_of(truth, 7);
-    std::printf("true force %g sigma: held in %.2f %%\n", truth, 100 * coverage);
     EXPECT_GT(coverage, least - kChance) << truth;
     EXPECT_LT(coverage, most + kChance) << truth;
   }

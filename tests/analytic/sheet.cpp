@@ -60,6 +60,20 @@ TEST(Sheet, triangles_beyond_all_memory_are_counted_and_refused_before_any_is_ma
   EXPECT_LE(sheet::expected_triangles(disc, coarser), 1e5);
 }
 
+/// The rows of one case, from `row` on, along a line off the axes, where the mesh has no symmetry.
+void expect_radial(const SolvedSheet& solved, const files::CsvTable& csv, int& row) {
+  const int of_case = csv.integer(row, "case", 0);
+  const double c = std::cos(0.7), s = std::sin(0.7);
+  Deviation u, rr, tt;
+  for (; row < csv.n_rows() && csv.integer(row, "case", 0) == of_case; ++row) {
+    const auto [at, S] = solved.at(csv.number(row, "r_um") * Vec2{c, s}).value();
+    u.add(at.x * c + at.y * s, csv.number(row, "ur_um"));
+    rr.add(c * c * S.xx + s * s * S.yy + 2 * c * s * S.xy, csv.number(row, "Srr_nN_per_um"));
+    tt.add(s * s * S.xx + c * c * S.yy - 2 * c * s * S.xy, csv.number(row, "Stt_nN_per_um"));
+  }
+  for (const Deviation& deviation : {u, rr, tt}) EXPECT_LE(deviation.relative(), 1e-4) << "case " << of_case;
+}
+
 TEST(Sheet, discs_on_springs_are_the_closed_form) {
   const auto csv = test::chapter4("sheet_disc");
   int row = 0;
@@ -77,26 +91,8 @@ TEST(Sheet, discs_on_springs_are_the_closed_form) {
     disc.sheet.contraction_nN_per_um = even(disc.elements, value("s_nN_per_um"));
     disc.sheet.spring_nN_per_um3 = even(disc.elements, value("kappa_nN_per_um3"));
     disc.sheet.line_tension_nN = value("line_nN");
-    const double kappa = value("kappa_nN_per_um3");
-    const auto start = std::chrono::steady_clock::now();
     disc.solve();
-    std::printf("%.2f s ", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-    Deviation u, rr, tt;
-    for (; row < csv.n_rows() && csv.integer(row, "case", 0) == of_case; ++row) {
-      // off the axes, where the mesh has no symmetry
-      const double r = value("r_um"), c = std::cos(0.7), s = std::sin(0.7);
-      const auto at = disc.at(r * Vec2{c, s});
-      ASSERT_TRUE(at);
-      u.add(at->u.x * c + at->u.y * s, value("ur_um"));
-      const Tensor& S = at->S;
-      rr.add(c * c * S.xx + s * s * S.yy + 2 * c * s * S.xy, value("Srr_nN_per_um"));
-      tt.add(s * s * S.xx + c * c * S.yy - 2 * c * s * S.xy, value("Stt_nN_per_um"));
-    }
-    std::printf("case %d: %d nodes, u %.1e rr %.1e tt %.1e (kappa %g)\n", of_case, disc.elements.n_nodes(),
-                u.relative(), rr.relative(), tt.relative(), kappa);
-    EXPECT_LE(u.relative(), 1e-4) << "case " << of_case;
-    EXPECT_LE(rr.relative(), 1e-4) << "case " << of_case;
-    EXPECT_LE(tt.relative(), 1e-4) << "case " << of_case;
+    expect_radial(disc, csv, row);
   }
 }
 
@@ -111,7 +107,6 @@ TEST(Sheet, rings_of_adhesion_and_annuli_are_the_closed_form) {
   const auto csv = test::chapter4("sheet_rings");
   int row = 0;
   while (row < csv.n_rows()) {
-    const int of_case = csv.integer(row, "case", 0);
     const auto value = [&](const char* column) { return csv.number(row, column); };
     const std::vector<double> radii = numbers_in(csv.text(row, "radii_um")),
                               kappas = numbers_in(csv.text(row, "kappas_nN_per_um3"));
@@ -136,21 +131,7 @@ TEST(Sheet, rings_of_adhesion_and_annuli_are_the_closed_form) {
           for (const int node : side.nodes) rings.sheet.held[static_cast<std::size_t>(node)] = {true, true};
     }
     rings.solve();
-    Deviation u, rr, tt;
-    for (; row < csv.n_rows() && csv.integer(row, "case", 0) == of_case; ++row) {
-      const double r = value("r_um"), c = std::cos(0.7), s = std::sin(0.7);
-      const auto at = rings.at(r * Vec2{c, s});
-      ASSERT_TRUE(at);
-      u.add(at->u.x * c + at->u.y * s, value("ur_um"));
-      const Tensor& S = at->S;
-      rr.add(c * c * S.xx + s * s * S.yy + 2 * c * s * S.xy, value("Srr_nN_per_um"));
-      tt.add(s * s * S.xx + c * c * S.yy - 2 * c * s * S.xy, value("Stt_nN_per_um"));
-    }
-    std::printf("rings %d: %d nodes, u %.1e rr %.1e tt %.1e\n", of_case, rings.elements.n_nodes(), u.relative(),
-                rr.relative(), tt.relative());
-    EXPECT_LE(u.relative(), 1e-4) << "case " << of_case;
-    EXPECT_LE(rr.relative(), 1e-4) << "case " << of_case;
-    EXPECT_LE(tt.relative(), 1e-4) << "case " << of_case;
+    expect_radial(rings, csv, row);
   }
 }
 
@@ -182,7 +163,6 @@ TEST(Sheet, strips_are_the_closed_form) {
       u.add(at->u.x, value("ux_um"));
       xx.add(at->S.xx, value("Sxx_nN_per_um"));
     }
-    std::printf("strip %d: %d nodes, u %.1e xx %.1e\n", first, strip.elements.n_nodes(), u.relative(), xx.relative());
     EXPECT_LE(u.relative(), 1e-4) << "row " << first;
     EXPECT_LE(xx.relative(), 1e-4) << "row " << first;
   }
@@ -244,8 +224,6 @@ TEST(Sheet, any_outline_is_the_spectral_solution) {
       // the polygon of the file is smaller than the curve that it stands for
       EXPECT_NEAR(made.elements.area_um2(), energies.number(k, "area_um2"), 1e-4 * made.elements.area_um2()) << shape;
     }
-    std::printf("%s: %d nodes, u %.1e (stated %.1e), S %.1e\n", shape.c_str(), made.elements.n_nodes(), u.relative(),
-                stated / u.largest, S.relative());
     EXPECT_LE(u.difference, std::max(1e-4 * u.largest, stated)) << shape;
   }
 }
@@ -270,7 +248,6 @@ TEST(Sheet, tips_of_spikes_pull_more_than_a_disc_where_the_penetration_length_is
       return *scene.adhesion_nN_per_um3 * std::hypot(rows.front().ux_um.value(), rows.front().uy_um.value());
     };
     const double ratio = pull_at_tip(a) / pull_at_tip(0), exact = value("tip_over_disc_edge");
-    std::printf("spikes of %g um, l %g um: %.3f (%.3f)\n", a, l, ratio, exact);
     EXPECT_NEAR(ratio, exact, std::max(0.01, value("relative_error")) * exact) << a << " " << l;
   }
 }
@@ -308,8 +285,6 @@ TEST(Sheet, tensions_follow_from_tractions) {
              {std::pair{at.xx, "Sxx_nN_per_um"}, {at.yy, "Syy_nN_per_um"}, {at.xy, "Sxy_nN_per_um"}})
           S.difference = std::max(S.difference, std::abs(ours - value(column)));
       }
-      std::printf("%s nu %.2f: S %.1e of s, mean %.5f (%.5f)\n", shape.c_str(), nu, S.difference / s,
-                  found.balance.mean_tension_nN_per_um, mean);
       EXPECT_LE(S.difference, 0.01 * s) << shape << " " << nu;
     }
   }
@@ -393,7 +368,6 @@ TEST(Sheet, at_a_cut_anywhere_the_edge_that_is_held_errs_less_than_a_free_one_an
     const double truth = ellipse.mean_nN_per_um();
     const auto mean = [&](CutEdge edge) { return ellipse.of_part(edge).balance.mean_tension_nN_per_um; };
     const double held = mean(CutEdge::held), clamped = mean(CutEdge::clamped), free = mean(CutEdge::free);
-    std::printf("cut at %g: truth %.4f, held %.4f, clamped %.4f, free %.4f\n", cut, truth, held, clamped, free);
     EXPECT_LT(std::abs(held - truth), 0.3 * std::abs(free - truth)) << cut;
     EXPECT_LE(std::abs(held - truth), std::max(std::abs(clamped - held), std::abs(free - held))) << cut;
   }
@@ -458,7 +432,6 @@ TEST(Sheet, quadratic_elements_are_of_third_order_on_the_ellipse) {
     }
     errors.push_back(std::sqrt(sum));
     sizes.push_back(1 / std::sqrt(made.elements.n_nodes()));  // growth and bends keep the meshes from being alike
-    std::printf("finer %g: %d nodes, %.2e\n", finer, made.elements.n_nodes(), errors.back());
   }
   EXPECT_GE(std::log(errors.front() / errors.back()) / std::log(sizes.front() / sizes.back()), 2.7);
 }
@@ -483,7 +456,6 @@ TEST(Sheet, large_strains_are_the_independent_solution) {
       u.add(at->u.x, csv.number(row, "ux_um"));
       u.add(at->u.y, csv.number(row, "uy_um"));
     }
-    std::printf("%s %s: u %.1e\n", shape.c_str(), measure.c_str(), u.relative());
     EXPECT_LE(u.relative(), 1e-3) << shape << " " << measure;
   }
 }

@@ -106,19 +106,10 @@ TEST(SheetOnGel, bonded_discs_are_the_spectral_solution) {
     const int of_case = csv.integer(row, "case", 0);
     if (of_case == 1 || of_case == 3 || of_case == 6) continue;  // as 2 and 5, on a thicker and a thinner gel
     const DiscOnGel disc = disc_of(csv, row);
-    const auto start = std::chrono::steady_clock::now();
     const Solution solution = solved(disc);
     const Errors errors = errors_of(csv, row, solution);
     const Balance balance = balance_of(solution);
-    std::printf("%.2f s case %d: %d triangles, %d steps, u %.2e mean tension %.2e; net %.1e torque %.1e virial %.1e\n",
-                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), of_case,
-                solution.elements->n_triangles(), solution.report.iterations, errors.u, errors.mean_tension,
-                norm(balance.net_force_nN) / balance.total_force_nN,
-                std::abs(balance.net_torque_nN_um) / balance.largest_torque_nN_um,
-                std::abs(balance.virial_tension_nN_per_um / balance.mean_tension_nN_per_um - 1));
     const double force = rim_force_error(csv, row, 0.85, disc, solution);
-    std::printf("    force within 0.15 R of the rim %.2e, 0.05 R %.2e\n", force,
-                rim_force_error(csv, row, 0.95, disc, solution));
     EXPECT_LE(force, 0.02);
     EXPECT_LE(errors.u, 0.01);
     EXPECT_LE(errors.mean_tension, 0.005);
@@ -160,7 +151,6 @@ TEST(SheetOnGel, the_lattice_answers_as_all_pairs_of_patches_do) {
   const Eigen::VectorXd other = Eigen::VectorXd::Random(2 * patches.n());
   for (const Eigen::VectorXd& forces : {inward, other}) {
     const Eigen::VectorXd exact = dense->displace(forces), ours = lattice->displace(forces);
-    std::printf("%d patches: %.1e\n", patches.n(), (ours - exact).norm() / exact.norm());
     // All pairs take a patch's centre for its mean beyond 2.5 sizes of both. 1/r is then off by size² / 24 r²: 1.7e-3
     // of equal patches, less of those further away.
     EXPECT_LE((ours - exact).norm(), 1.7e-3 * exact.norm());
@@ -211,7 +201,6 @@ TEST(SheetOnGel, on_a_rigid_gel_large_strains_are_those_on_springs) {
     EXPECT_LE((on_gel.u - on_springs.u).norm(), 1e-3 * on_springs.u.norm()) << name_of(measure);
     EXPECT_LE(on_gel.report.last_change, 1e-9);
     const double more = (on_springs.u - linear.u).norm() / linear.u.norm();
-    std::printf("%s: large strains change u by %.4f\n", name_of(measure), more);
     EXPECT_GT(more, 2e-3) << "then this asks nothing";
   }
 }
@@ -233,7 +222,6 @@ TEST(SheetOnGel, large_strains_are_small_ones_in_the_limit_and_in_balance_where_
   for (const double x : {0.005, 0.01, 0.1}) {
     const Solution large = by(Strain::large, x);
     const double off = (large.u - x / 0.01 * linear.u).norm() / (x / 0.01 * linear.u.norm());
-    std::printf("x %.3f: off the linear one by %.4f, %s\n", x, off, large.report.reason.c_str());
     if (x == 0.01) {
       EXPECT_NEAR(off / before, 2, 0.1) << "what linear theory leaves out is of second order";
     }

@@ -237,8 +237,6 @@ TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
         double best = 1;
         for (double lambda = 1; lambda > 0.008; lambda /= 1.4) best = std::min(best, error_at(lambda));
         const double reached = error_at(chosen);
-        std::printf("fttc %d, noise %g, errors %s: L2 %.3f, best %.3f\n", n_side, noise,
-                    states_errors ? "stated" : "not stated", reached, best);
         EXPECT_LE(reached, 1.15 * best) << n_side << ", noise " << noise;
       }
     }
@@ -294,8 +292,6 @@ TEST(FttcMixtures, forces_are_those_of_a_reconstruction_with_as_much_noise) {
         error2 += dot(f.force_nN - scene.forces_nN[a], f.force_nN - scene.forces_nN[a]);
         all2 += dot(f.force_nN, f.force_nN);
       }
-      std::printf("fttc mixture, noise %g: forces %.4f off, errors %.3f\n", share, std::sqrt(difference2 / all2),
-                  std::sqrt(error2 / all2));
       // Of one wave a cubic through points a third of a decade apart errs by 1.6 % at most: the fourth derivative of
       // 1 / (1 + lambda² / c²) by log lambda is 2, its factor (ln 10 / 3)⁴ 9/16 / 24.
       if (parameters.lambda_um_per_kPa) {
@@ -319,12 +315,8 @@ TEST(Sparse, tractions_are_sharper_than_any_smooth_ones) {
   int row = 0;
   for (const double noise : {0.0, 0.05, 0.1}) {
     const EllipseScene scene = ellipse_scene(128, noise, 5);
-    const auto start = std::chrono::steady_clock::now();
     const Reconstruction r = reconstruct(inputs_of(scene), half_space(TractionMethod::sparse), 1);
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     const double error = test::traction_error(scene, map_of(r));
-    std::printf("sparse, noise %g: L2 %.3f, F %.3f, %.1f s\n", noise, error, test::force_error(scene, forces_of(r)),
-                seconds.count());
     EXPECT_TRUE(r.report.converged);
     EXPECT_LE(error, most[row++]);
   }
@@ -343,7 +335,6 @@ TEST(Tractions, forces_by_adhesion_are_nearer_the_truth_than_any_sum_of_the_map_
         best = std::min(best, test::force_error(scene, sums));
       }
       const double reached = test::force_error(scene, forces_of(r));
-      std::printf("%s, noise %g: error of forces %.3f, of the best sums %.3f\n", name_of(method), noise, reached, best);
       EXPECT_LE(reached, best) << name_of(method) << ", noise " << noise;
     }
   }
@@ -362,8 +353,6 @@ void expect_forces_err_as_stated(const TractionParameters& parameters, double no
       sum += z * z / 40;
     }
   }
-  std::printf("%s, noise %g, lambda %g: mean error/sigma %.2f, mean (error/sigma)^2 %.2f\n",
-              name_of(*parameters.method), noise, parameters.lambda_um_per_kPa.value_or(0), offset, sum);
   EXPECT_LE(std::abs(offset), 3 * std::sqrt(1 / 40.0)) << name_of(*parameters.method) << ", noise " << noise;
   EXPECT_NEAR(sum, 1, 3 * std::sqrt(2 / 40.0)) << name_of(*parameters.method) << ", noise " << noise;
 }
@@ -397,7 +386,6 @@ TEST(AdhesionForces, are_as_good_as_the_noise_allows_and_err_as_much_as_stated) 
         sum += std::pow(off / std::max(*r.forces[a].sigma_nN, 1e-9), 2) / (8 * n_seeds);
       }
     }
-    std::printf("adhesion-forces, noise %g: F %.4f, mean (error/sigma)^2 %.2f\n", noise, error, sum);
     EXPECT_LE(error, most[row++]);
     if (noise == 0) continue;
     EXPECT_GT(sum, 0.52);
@@ -504,7 +492,6 @@ TEST(DenseMethods, state_errors_that_hold_noise_penalty_and_model) {
       for (std::size_t a = 0; a < r.forces.size(); ++a) {
         squares += std::pow((norm(r.forces[a].force_nN) - norm(scene.forces_nN[a])) / *r.forces[a].sigma_nN, 2) / 8;
       }
-      std::printf("%s, noise %g: rms of error/sigma %.2f\n", name_of(method), noise, std::sqrt(squares));
       // the noise alone would give 1.6 to 10; the root of a mean of eight squares is itself known to a quarter
       EXPECT_GT(std::sqrt(squares), 0.7) << name_of(method) << noise;
       EXPECT_LT(std::sqrt(squares), 1.4) << name_of(method) << noise;

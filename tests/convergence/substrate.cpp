@@ -189,7 +189,6 @@ TEST(Split, states_an_error_that_falls_as_its_own_does) {
     const auto split = choice::make_substrate(gel, parameters, 2);
     const double error = test::mean_column_difference(split->compliance_um_per_nN(points, ellipses), layer);
     const double stated = split->stated_error();
-    std::printf("split with %d cells: error %.2g, stated %.2g\n", cells, error, stated);
     EXPECT_LE(error, 1.2 * stated) << cells << " cells";
     EXPECT_GE(error, 0.5 * stated) << cells << " cells";
   }

@@ -207,8 +207,6 @@ TEST(Mean, a_cell_that_lies_turned_in_its_image_has_the_same_tractions) {
     const CellField turned = field_of(registered(turned_beads, back(camera)), fttc(), kLambda_um_per_kPa);
     // other beads on another lattice, and a square field that ends elsewhere: as two images of one cell differ
     const CellField again = field_of(registered(pulling(4000, 0, 9).beads, {}), fttc(), kLambda_um_per_kPa);
-    std::printf("turned %.4f, other beads %.4f\n", relative_difference(still, turned),
-                relative_difference(still, again));
     EXPECT_LT(relative_difference(still, turned), 1.5 * relative_difference(still, again));
   }
 }

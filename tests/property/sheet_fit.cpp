@@ -180,10 +180,6 @@ TEST(SheetFit, exact_displacements_give_the_stiffness_of_the_adhesions_back) {
   for (const double kappa : {0.05, 0.5}) {
     const DisplacementField field = disc.exact(3, sheet::even(*disc.elements, 1), 0, kappa);
     const SheetFit fit = fit_sheet(data_of(field, table, *disc.ground, *disc.model, 1), table, tensions::Loss::squares);
-    std::printf("kappa %g: s %.5f M %.5f kappa %.5f l2 %.1e, %d columns\n", kappa, of(fit, Quantity::contraction).value,
-                of(fit, Quantity::stiffness).value / disc.stiffness(3),
-                of(fit, Quantity::adhesion_stiffness).value / kappa, fit.relative_l2,
-                static_cast<int>(table.forces_nN().cols()));
     // The solutions between the table's own lack 1e-4 of the displacement; s, M and kappa are correlated by up to
     // 0.999.
     EXPECT_LE(fit.relative_l2, 1e-3) << kappa;
@@ -574,7 +570,6 @@ TEST(SheetField, intervals_hold_what_the_mesh_makes_of_the_contraction) {
       }
     }
   }
-  std::printf("held of %d: %d, without the mesh's part %d\n", kRuns * kPlaces, n_held, n_held_without);
   EXPECT_GE(n_held, (0.95 - 3 * 0.03) * kRuns * kPlaces);
   EXPECT_LT(n_held_without, 0.9 * kRuns * kPlaces) << "then this asks nothing";
 
@@ -593,9 +588,7 @@ TEST(SheetField, intervals_hold_what_the_mesh_makes_of_the_contraction) {
   const MeshChange change = change_for(disc.stiffness(3), [&](Vec2) { return without.loads(0); });
   SheetFit with = fitted(corrected(disc.data(beads), change));
   add_error(with, &SheetErrorParts::mesh, change.left_um);
-  const SheetEstimate &e = of(with, Quantity::contraction), &uncorrected = of(without, Quantity::contraction);
-  std::printf("even: %.4f, sigma %.4f; without the finer meshes %.4f, %.5f\n", e.value, *e.sigma, uncorrected.value,
-              *uncorrected.sigma);
+  const SheetEstimate& e = of(with, Quantity::contraction);
   EXPECT_LE(*e.low, 2);
   EXPECT_GE(*e.high, 2);
   EXPECT_LT(*e.sigma, 0.05 * 2) << "meshes differ by 1 to 3 % of the displacement";
@@ -701,10 +694,6 @@ TEST(SheetFit, intervals_hold_the_truth_and_standard_errors_are_the_scatter) {
     const double r_scatter = std::sqrt((r_squares - r_sum * r_sum / kRuns) / (kRuns - 1));
     const double s_scatter = std::sqrt((s_squares - s_sum * s_sum / kRuns) / (kRuns - 1));
     const double m_scatter = std::sqrt((m_squares - m_sum * m_sum / kRuns) / (kRuns - 1));
-    std::printf(
-        "E %g: held %d, %d of %d; s %.4f, error %.4f, scatter %.4f; log M error %.3f, scatter %.3f; "
-        "s / M error %.4f, scatter %.4f\n",
-        E, s_held, M_held, kRuns, s_sum / kRuns, s_sigma, s_scatter, m_sigma, m_scatter, r_sigma, r_scatter);
     // 95 % of 200 are 190 ± 3.1: three standard deviations of the count
     EXPECT_GE(s_held, 181) << E;
     EXPECT_GE(M_held, 181) << E;
@@ -723,7 +712,6 @@ TEST(SheetFit, intervals_hold_a_truth_on_another_mesh) {
   constexpr double kContraction = 1;
   struct Count {
     int s_held = 0, M_held = 0;
-    double s_squares = 0, s_sigma = 0;
   };
   std::map<double, Count> by_modulus;
   std::mt19937_64 random(12);
@@ -753,15 +741,11 @@ TEST(SheetFit, intervals_hold_a_truth_on_another_mesh) {
         const SheetEstimate &s = of(fit, Quantity::contraction), &M = of(fit, Quantity::stiffness);
         count.s_held += s.low.value_or(0) <= kContraction && kContraction <= s.high.value_or(1e300);
         count.M_held += M.low.value_or(0) <= disc.stiffness(E) && disc.stiffness(E) <= M.high.value_or(1e300);
-        count.s_squares += std::pow(s.value - kContraction, 2);
-        count.s_sigma += s.sigma.value_or(0);
       }
     }
   }
   constexpr int kAll = kOutlines * kRuns;
   for (const auto& [E, count] : by_modulus) {
-    std::printf("E %g, truth on a finer mesh: held %d, %d of %d; s off by %.4f (rms), standard error %.4f\n", E,
-                count.s_held, count.M_held, kAll, std::sqrt(count.s_squares / kAll), count.s_sigma / kAll);
     for (const int held : {count.s_held, count.M_held}) {  // as above
       EXPECT_GE(held, 181) << E;
       EXPECT_LE(held, 199) << E;

@@ -68,8 +68,6 @@ TEST(SurfaceFromAlphaSlices, errs_as_much_as_in_the_thesis_into_the_gel_and_more
       alpha.mean_um += a.mean_um / kSeeds, alpha.rms_um += a.rms_um / kSeeds;
       likely.mean_um += l.mean_um / kSeeds, likely.rms_um += l.rms_um / kSeeds;
     }
-    std::cout << name << ": alpha " << brief(alpha.mean_um) << " " << brief(alpha.rms_um) << ", likelihood "
-              << brief(likely.mean_um) << " " << brief(likely.rms_um) << " um (mean, rms)\n";
     // the thesis' way at this and half the density: 1.2 to 4.8 um, too deep by up to the beads' distance; a method that
     // errs less is welcome
     EXPECT_LE(alpha.rms_um, 4.8) << name;

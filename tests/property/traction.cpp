@@ -210,8 +210,6 @@ TEST(Fttc, a_field_cut_at_the_border_does_not_inflate_the_contractile_moment) {
   }
   // cut 1.5 um from the outermost adhesion's rim: 48 of 64 um
   const EllipseScene cut = ellipse_scene(96, 0.02, 6, 0, 48);
-  std::printf("contractile moment: true %.0f, whole %.0f, cut %.0f near the adhesions, %.0f over all nN um\n", truth,
-              moment(whole, true), moment(cut, true), moment(cut, false));
   EXPECT_NEAR(moment(cut, true), moment(whole, true), 0.05 * truth);
   EXPECT_LE(moment(cut, false), 1.1 * truth);
 }
@@ -246,7 +244,6 @@ TEST(Fttc, scattered_beads_and_a_lattice_tell_the_same) {
     even_forces.push_back(f.force_nN);
   }
   const double on_lattice = test::force_error(even, even_forces), scattered = test::force_error(scene, forces);
-  std::printf("10000 beads, noise 0.02 um: F %.3f scattered, %.3f on a lattice\n", scattered, on_lattice);
   EXPECT_LE(scattered, 2 * on_lattice);
 }
 

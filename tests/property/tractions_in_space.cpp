@@ -911,7 +911,7 @@ TEST_F(FindingsInSpace, tell_a_weak_patch_that_is_missing_by_what_its_beads_do_t
   parameters.background = 0;
   constexpr int kDraws = 16;
   constexpr double kForce_nN = 20;
-  std::vector<double> without, with;
+  std::vector<double> without;
   int n_told = 0, n_by_squares = 0;
   for (scene.seed = 1; scene.seed <= kDraws; ++scene.seed) {
     const auto found_with = [&](const std::vector<BeadInSpace>& beads) {
@@ -927,12 +927,9 @@ TEST_F(FindingsInSpace, tell_a_weak_patch_that_is_missing_by_what_its_beads_do_t
     const auto lacks = found_with(beads);
     n_told += fires("patches-do-not-fit", lacks.findings) ? 1 : 0;
     n_by_squares += figure_of(lacks, "misfit_of_patches_alone") > 1.1 ? 1 : 0;
-    with.push_back(figure_of(lacks, "tractions_beside_patches"));
   }
   double mean = 0, square = 0;
   for (const double d : without) mean += d / kDraws, square += d * d / kDraws;
-  std::printf("without: mean %.2f, rms %.2f, largest %.2f; with: least %.2f, told %d\n", mean, std::sqrt(square),
-              *std::ranges::max_element(without), *std::ranges::min_element(with), n_told);
   // of 16 normal numbers the mean is known to 0.25, the root mean square to 18 %: three times that
   EXPECT_NEAR(mean, 0, 0.75);
   EXPECT_NEAR(std::sqrt(square), 1, 0.53);
@@ -958,7 +955,6 @@ TEST_F(FindingsInSpace, are_no_tractions_beside_patches_where_the_gel_says_that_
   for (const bool is_said : {false, true}) {
     problem.model_error = is_said ? std::sqrt(off / size) : 0;
     const auto r = reconstruct(problem, {{}, scene.gel, scene.adhesions(), {}}, traction, parameters, 1);
-    std::printf("model error %.4f: deviate %.1f\n", problem.model_error, figure_of(r, "tractions_beside_patches"));
     EXPECT_EQ(fires("patches-do-not-fit", r.findings), !is_said);
   }
 }
@@ -979,8 +975,6 @@ TEST_F(FindingsInSpace, the_contractile_moment_is_that_of_the_forces_within_its_
     EXPECT_GT(balance.contractile_moment_nN_um, 0);
     squares +=
         std::pow((balance.contractile_moment_nN_um - exact) / balance.contractile_moment_sigma_nN_um, 2) / kDraws;
-    std::printf("contractile moment %.0f +- %.0f, exact %.0f\n", balance.contractile_moment_nN_um,
-                balance.contractile_moment_sigma_nN_um, exact);
     SpatialReconstruction outward = r;
     outward.traction_kPa *= -1;
     outward.summands->traction_kPa *= -1;

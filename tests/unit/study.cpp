@@ -637,7 +637,6 @@ TEST(SheetStudy, intervals_of_the_difference_hold_it_and_leave_out_what_sheets_s
     n_held += c.low <= -0.6 && -0.6 <= c.high ? 1 : 0;
     n_found += c.high < 0 ? 1 : 0;
   }
-  std::printf("held %d, found %d of %d\n", n_held, n_found, kStudies);
   // 95 % of 200 are 190 ± 3.1: three standard deviations of the count
   EXPECT_GE(n_held, 181);
   EXPECT_LE(n_held, 199);
