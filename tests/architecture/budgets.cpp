@@ -11,8 +11,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr int kLinesOfProduct = 101800;
 constexpr int kLinesOfTests = 46200;
 constexpr int kLongSources = 29;                                                  // .cpp of the product above 400 lines

@@ -25,8 +25,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-
 const fs::path kDocs = test::source_folder() / "docs";
 
 TEST(Documents, the_examples_of_the_format_page_are_read) {

@@ -9,8 +9,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-
 /// Identities.
 struct Seen {
   std::set<std::string> to_fire, to_be_silent;

@@ -10,6 +10,7 @@
 namespace {
 
 namespace fs = std::filesystem;
+
 using mbtfm::test::Graph;
 
 const fs::path kRoot = mbtfm::test::source_folder();

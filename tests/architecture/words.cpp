@@ -8,8 +8,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-
 const fs::path kRoot = test::source_folder();
 
 /// Readers of formats whose words are not ours, or of tables that hold them.

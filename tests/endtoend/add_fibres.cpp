@@ -8,10 +8,6 @@
 namespace mbtfm {
 namespace {
 
-using test::Outcome;
-using test::output_of;
-using test::run_program;
-
 TEST(AddFibres, fibres_that_the_beads_call_for_are_in_the_next_run) {
   const test::TemporaryFolder folder;
   const std::filesystem::path cell = folder / "cell";

@@ -13,12 +13,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::Outcome;
-using test::output_of;
-using test::run_program;
-using test::TemporaryFolder;
-
 using Files = std::map<std::string, std::string>;
 
 /// Bytes by path of what the stages of all cells below a folder wrote. Records and reports tell times, and differ.

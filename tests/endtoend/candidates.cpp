@@ -10,11 +10,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::Outcome;
-using test::output_of;
-using test::run_program;
-
 constexpr const char* kScenario =
     "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 60\n"
     "[scenario]\ndiameter_um = 24\nimage_size_px = 400\nn_adhesions = 24\nn_ventral = 3\nn_dorsal = 2\nn_arc = 0\n"

@@ -14,12 +14,8 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
 using report::compare_with_truth;
 using report::Comparison;
-using test::output_of;
-using test::run_program;
-using test::TemporaryFolder;
 
 report::Comparison simulate_and_run(const fs::path& cell, const std::string& arguments) {
   output_of("mbtfm-simulate " + arguments + " --quiet --out " + cell.string());

@@ -5,11 +5,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::Outcome;
-using test::output_of;
-using test::run_program;
-
 class SmallCell : public testing::Test {
  protected:
   void SetUp() override {

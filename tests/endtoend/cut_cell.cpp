@@ -12,10 +12,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::output_of;
-using test::TemporaryFolder;
-
 /// The right part of the picture.
 images::Image without_left(const images::Image& image, int n_columns) {
   images::Image part = image;

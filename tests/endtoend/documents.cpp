@@ -10,8 +10,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-
 const fs::path kProject = test::source_folder(), kDocs = kProject / "docs";
 
 /// The blocks of a page that are marked as commands, each as it stands.

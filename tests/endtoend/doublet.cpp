@@ -15,8 +15,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-
 const fs::path kData = test::source_folder() / "../shared/data/real/doublet_on_h";
 constexpr double kPixel_um = 0.108;
 

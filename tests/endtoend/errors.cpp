@@ -9,12 +9,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::Outcome;
-using test::output_of;
-using test::run_program;
-using test::TemporaryFolder;
-
 constexpr int kFailed = 1, kUsage = 2, kInput = 3, kOutput = 5;
 
 class Errors : public ::testing::Test {

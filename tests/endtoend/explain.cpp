@@ -9,9 +9,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::output_of;
-
 /// On a gel whose base, sides and grading all matter.
 constexpr const char* kScenario =
     "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 25\n"

@@ -15,10 +15,7 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
 using nlohmann::ordered_json;
-using test::Outcome;
-using test::TemporaryFolder;
 
 constexpr const char* kSecret = "WITNESS-7f3a";
 

@@ -10,9 +10,7 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
 using rois::Roi;
-using test::TemporaryFolder;
 
 bool has_imagej() { return std::system("command -v imagej xvfb-run > /dev/null") == 0; }
 

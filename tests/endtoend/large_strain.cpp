@@ -9,11 +9,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::Outcome;
-using test::output_of;
-using test::run_program;
-
 class LargeStrains : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {

@@ -8,11 +8,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::Outcome;
-using test::output_of;
-using test::run_program;
-
 const std::string kSmall =
     "mbtfm plan --scenario two-adhesions --noise_um 0.02,0.05 --beads_per_um2 0.5,1 --youngs_modulus_kPa 4,8 ";
 

@@ -12,8 +12,6 @@
 namespace mbtfm::tractions {
 namespace {
 
-namespace fs = std::filesystem;
-
 const fs::path kData = test::source_folder() / "../shared/data";
 
 /// Two vector fields compared: |a − b| / |b|, correlation of all components, mean magnitude of each.

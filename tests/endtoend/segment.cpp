@@ -15,7 +15,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
 using rois::Roi;
 using rois::RoiShape;
 using test::fires;

@@ -9,11 +9,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::Outcome;
-using test::output_of;
-using test::run_program;
-
 /// The cell pulls twice as hard in the second frame; the third could not be tracked.
 void write_frames(const fs::path& track) {
   DisplacementField field = files::read_displacement(track / "displacement.csv");

@@ -10,10 +10,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::output_of;
-using test::TemporaryFolder;
-
 constexpr double kPixel_um = 0.1;
 constexpr int kSize_px = 512;
 constexpr Vec2 kUpperLeft_um{18, 20};

@@ -12,7 +12,6 @@
 
 namespace {
 
-namespace fs = std::filesystem;
 using namespace mbtfm;
 
 struct Outcome {

@@ -16,10 +16,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::output_of;
-using test::run_program;
-
 /// A round cell of patches in a field of 72 um: small stacks, 2.7 million voxels each.
 const std::string kScene =
     "mbtfm-simulate --scenario patches-on-ring --pixel_size_um 0.25 --image_size_px 288 --beads 1200 ";

@@ -17,8 +17,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-
 class SubstrateProgram : public testing::Test {
  protected:
   SubstrateProgram() {

@@ -17,12 +17,7 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
 using namespace exit_code;
-using test::Outcome;
-using test::output_of;
-using test::run_program;
-using test::TemporaryFolder;
 
 const std::string kBin = test::build_folder().string() + "/bin/";
 

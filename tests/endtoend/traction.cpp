@@ -17,8 +17,6 @@
 namespace mbtfm::tractions {
 namespace {
 
-namespace fs = std::filesystem;
-
 TEST(TractionProgram, writes_what_it_says_for_every_method) {
   const test::TemporaryFolder folder;
   const test::EllipseScene scene = test::ellipse_scene(48, 0.03);

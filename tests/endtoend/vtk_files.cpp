@@ -13,10 +13,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::output_of;
-using test::TemporaryFolder;
-
 /// A small cell that went through every stage, from images.
 const fs::path& cell() {
   static const TemporaryFolder folder;

@@ -7,8 +7,6 @@
 
 namespace mbtfm::fuzz {
 
-namespace fs = std::filesystem;
-
 std::vector<Target>& targets() {
   static std::vector<Target> all;
   return all;

@@ -27,8 +27,6 @@ extern "C" void __sanitizer_set_death_callback(void (*)(void));
 namespace mbtfm::fuzz {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr time_t kHang_s = 5;  // of the processor: a busy machine may let any input wait
 constexpr rlim_t kMemory_bytes = rlim_t{1} << 30;
 

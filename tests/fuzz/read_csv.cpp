@@ -7,8 +7,6 @@
 namespace mbtfm::fuzz::csv_readers {
 namespace {
 
-namespace fs = std::filesystem;
-
 /// A cell's tables by name, whole, in the folder `whole`; in `damaged-NAME` one of them is the input.
 const std::vector<std::string>& cell_tables() {
   static const std::vector<std::string> names = [] {

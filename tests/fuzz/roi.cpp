@@ -8,8 +8,6 @@
 namespace mbtfm::rois {
 namespace {
 
-namespace fs = std::filesystem;
-
 std::string bytes_of(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {(std::istreambuf_iterator<char>(in)), {}};

@@ -17,7 +17,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 /// Pointers to the value and to all values in it. What the other stages tell is of the same form as the fit's.

@@ -10,8 +10,6 @@
 
 namespace mbtfm::test {
 
-namespace fs = std::filesystem;
-
 /// A round cell of radius 20 um with 12 adhesions, two ventral fibres, a dorsal one and an arc.
 inline Cell round_cell() {
   Cell cell;

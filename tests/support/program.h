@@ -37,3 +37,11 @@ inline std::string output_of(const std::string& command, int code = 0, const std
 }
 
 }  // namespace mbtfm::test
+
+namespace mbtfm {
+
+using test::Outcome;
+using test::output_of;
+using test::run_program;
+
+}  // namespace mbtfm

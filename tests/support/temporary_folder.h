@@ -34,3 +34,9 @@ class TemporaryFolder {
 };
 
 }  // namespace mbtfm::test
+
+namespace mbtfm {
+
+using test::TemporaryFolder;
+
+}  // namespace mbtfm

@@ -31,6 +31,12 @@
 #include <utility>
 #include <vector>
 
+namespace mbtfm {
+
+namespace fs = std::filesystem;
+
+}  // namespace mbtfm
+
 namespace mbtfm::test {
 
 /// The exception of this type that the call ends with.

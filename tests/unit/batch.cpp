@@ -12,9 +12,6 @@
 namespace mbtfm::runner {
 namespace {
 
-namespace fs = std::filesystem;
-using test::TemporaryFolder;
-
 struct ImageFolder {
   TemporaryFolder folder;
   explicit ImageFolder(const std::vector<std::string>& files) {

@@ -14,7 +14,6 @@ namespace {
 
 using cells::cut_by_border;
 using cells::CutRing;
-using test::TemporaryFolder;
 
 constexpr Vec2 kField_um{50, 40};
 

@@ -9,8 +9,6 @@
 namespace mbtfm {
 namespace {
 
-using test::TemporaryFolder;
-
 Adhesion adhesion(int id) {
   return {.adhesion_id = id,
           .position_um = {1.0 / 3, 2},

@@ -14,9 +14,7 @@
 namespace mbtfm::images {
 namespace {
 
-namespace fs = std::filesystem;
 using test::fires;
-using test::TemporaryFolder;
 
 Image ramp(int width, int height) {
   Image image;

@@ -10,9 +10,6 @@
 namespace mbtfm::images {
 namespace {
 
-namespace fs = std::filesystem;
-using test::TemporaryFolder;
-
 /// A TIFF of 8-bit pages of 4 x 3 pixels, page k filled with k; the first has the description.
 void write_pages(const fs::path& file, int n_pages, const std::string& description, int n_samples = 1) {
   TIFF* tiff = TIFFOpen(file.c_str(), "w");

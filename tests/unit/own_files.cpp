@@ -11,9 +11,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::TemporaryFolder;
-
 class OwnFiles : public testing::Test {
  protected:
   void SetUp() override {

@@ -24,8 +24,6 @@
 namespace mbtfm::report {
 namespace {
 
-using test::TemporaryFolder;
-
 struct FakeCell {
   TemporaryFolder folder;
   FakeCell() {

@@ -10,7 +10,6 @@
 namespace mbtfm::rois {
 namespace {
 
-namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr double kFloat = 1e-4;  // px: half of a float's spacing below 2048 px

@@ -20,9 +20,6 @@
 namespace mbtfm::runner {
 namespace {
 
-namespace fs = std::filesystem;
-using test::TemporaryFolder;
-
 void make_executable(const fs::path& file, const std::string& text) {
   files::write_text(file, text);
   fs::permissions(file, fs::perms::owner_all);

@@ -17,9 +17,6 @@
 namespace mbtfm {
 namespace {
 
-namespace fs = std::filesystem;
-using test::TemporaryFolder;
-
 struct Lengths {
   double length_um = 1.5;
   bool is_fast = false;

@@ -11,8 +11,6 @@
 namespace mbtfm {
 namespace {
 
-using test::TemporaryFolder;
-
 std::string written(const TemporaryFolder& folder) {
   files::write_network(folder / "written.vtu", test::small_network());
   return files::read_text(folder / "written.vtu");
