@@ -60,7 +60,7 @@ class Segment : public testing::Test {
 /// 0.2 um pixels still show what is 0.5 um wide; where it lies does not depend on the pixels.
 TEST_F(Segment, binned_images_show_the_same_cell_at_the_same_place) {
   ASSERT_EQ(segment("whole", both()).code, 0);
-  const test::Outcome binned = segment("binned", both() + " --binning 2 --outline-roi " + path("outline.roi"));
+  const Outcome binned = segment("binned", both() + " --binning 2 --outline-roi " + path("outline.roi"));
   EXPECT_EQ(binned.code, 3) << binned.output;  // there is none yet
   const std::vector<rois::Roi> rois = rois::read_rois(folder_ / "whole/RoiSet.zip");
   files::write_text(folder_ / "outline.roi", rois::encode_roi(rois.front()));
@@ -86,14 +86,14 @@ TEST_F(Segment, one_file_of_two_channels_is_segmented_as_two_files_of_one) {
   const images::Image dark = test::even_image(256, 256, 0);  // a slice that adds nothing to the projection
   write_pages(folder_ / "both.ome.tif", {dark, scene_.adhesion_image, dark, scene_.actin_image}, ome);
   const std::string file = path("both.ome.tif");
-  const test::Outcome one = segment(
+  const Outcome one = segment(
       "one", "--adhesion-image " + file + " --actin-image " + file + " --adhesion_channel paxillin --actin_channel 2");
   ASSERT_EQ(one.code, 0) << one.output;
   ASSERT_EQ(segment("two", both()).code, 0);
   for (const char* name : {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv", "RoiSet.zip"})
     EXPECT_EQ(files::read_text(folder_ / "one" / name), files::read_text(folder_ / "two" / name)) << name;
 
-  const test::Outcome unnamed = segment("none", "--actin-image " + file);
+  const Outcome unnamed = segment("none", "--actin-image " + file);
   EXPECT_EQ(unnamed.code, 3);
   EXPECT_NE(unnamed.output.find("2 channels: 1 'paxillin', 2 'actin'"), std::string::npos) << unnamed.output;
   EXPECT_NE(unnamed.output.find("actin_channel"), std::string::npos) << unnamed.output;
@@ -103,7 +103,7 @@ TEST_F(Segment, one_file_of_two_channels_is_segmented_as_two_files_of_one) {
 TEST_F(Segment, channels_of_different_pixel_sizes_are_an_error) {
   scene_.actin_image.pixel_size_um = 0.11;
   images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
-  const test::Outcome outcome = segment("out", both());
+  const Outcome outcome = segment("out", both());
   EXPECT_EQ(outcome.code, 3);
   EXPECT_NE(outcome.output.find("0.11 um"), std::string::npos) << outcome.output;
   EXPECT_EQ(segment("out", both() + " --pixel_size_um 0.1").code, 0);
@@ -135,7 +135,7 @@ TEST_F(Segment, what_is_drawn_by_hand_takes_the_place_of_what_would_be_found) {
   EXPECT_NEAR(signed_area_um2(cell.outline_um), 21.6 * 21.6, 1e-9);
   EXPECT_TRUE(fires("outline-off-actin", outcome)) << "a square about a disc: " << outcome;
 
-  const test::Outcome swapped = segment("swapped", both() + " --fibre-rois " + path("adhesions.zip"));
+  const Outcome swapped = segment("swapped", both() + " --fibre-rois " + path("adhesions.zip"));
   EXPECT_EQ(swapped.code, 3);
   EXPECT_NE(swapped.output.find("'mine': expected a line"), std::string::npos) << swapped.output;
 }

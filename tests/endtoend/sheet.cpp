@@ -207,7 +207,7 @@ class FittedSheet : public Sheet {
 /// Beads of a computed gel, with noise, are fitted: the sheet that moved them comes back within its errors.
 TEST_F(FittedSheet, contraction_and_stiffness_come_back_from_beads) {
   move_beads("contraction_nN_per_um = 0.5\n");
-  const test::Outcome outcome = fit("", record());
+  const Outcome outcome = fit("", record());
   test::expect_silent(
       {"sheet-not-identifiable", "sheet-unexplained", "sheet-at-bound", "sheet-expands", "sheet-thick", "sheet-coarse"},
       files::read_text(folder_ / "record.json"));

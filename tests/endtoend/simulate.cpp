@@ -1,12 +1,12 @@
 /// mbtfm-simulate as a person runs it.
-#include <sys/wait.h>
-
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "samples/drawing/scenario.h"
 #include "segment/images/image.h"
 #include "tests/support/folders.h"
+#include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 
@@ -14,24 +14,7 @@ namespace {
 
 using namespace mbtfm;
 
-struct Outcome {
-  int code = 0;
-  std::string message;
-};
-
-std::string content_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-Outcome simulate(const std::string& arguments) {
-  const test::TemporaryFolder folder;
-  const fs::path log = folder / "log";
-  const std::string command =
-      test::build_folder().string() + "/bin/mbtfm-simulate " + arguments + " > '" + log.string() + "' 2>&1";
-  const int status = std::system(command.c_str());
-  return {WEXITSTATUS(status), content_of(log)};
-}
+Outcome simulate(const std::string& arguments) { return run_program("mbtfm-simulate " + arguments); }
 
 /// A small experiment: what does not need a whole cell is tested on this.
 const std::string kSmall = "--scenario two-adhesions --beads 300 ";
@@ -42,8 +25,7 @@ TEST(Simulate, every_scenario_makes_a_cell_that_reads_back) {
     SCOPED_TRACE(name);
     const test::TemporaryFolder folder;
     const fs::path cell = folder / "cell";
-    const Outcome outcome = simulate("--beads 500 --mesh_um 6 --scenario " + name + " --out " + cell.string());
-    ASSERT_EQ(outcome.code, 0) << outcome.message;
+    output_of(simulate("--beads 500 --mesh_um 6 --scenario " + name + " --out " + cell.string()));
     if (fs::exists(cell / "truth" / "sheet.csv")) {  // a contracting sheet
       EXPECT_FALSE(files::read_outline(cell / "1_segment" / "outline.csv").empty());
       EXPECT_EQ(files::read_displacement(cell / "truth" / "displacement.csv").size(), 500u);
@@ -70,8 +52,7 @@ TEST(Simulate, every_scenario_makes_a_cell_that_reads_back) {
 TEST(Simulate, images_stand_in_for_segmentation_and_displacement) {
   const test::TemporaryFolder folder;
   const fs::path cell = folder / "cell";
-  const Outcome outcome = simulate(kSmall + "--images --out " + cell.string());
-  ASSERT_EQ(outcome.code, 0) << outcome.message;
+  output_of(simulate(kSmall + "--images --out " + cell.string()));
   for (const char* name : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"}) {
     SCOPED_TRACE(name);
     const images::Image image = images::read_image(cell / name);
@@ -91,11 +72,10 @@ TEST(Simulate, images_stand_in_for_segmentation_and_displacement) {
 
 TEST(Simulate, colonies_have_images_of_their_beads_and_of_themselves) {
   const test::TemporaryFolder folder;
-  const Outcome outcome = simulate(
+  output_of(simulate(
       "--scenario colony-disc --images --radius_um 12 --image_size_px 400 --beads 800 --n_colonies 2 --n_dipoles 0 "
       "--mesh_um 3 --out " +
-      (folder / "all").string());
-  ASSERT_EQ(outcome.code, 0) << outcome.message;
+      (folder / "all").string()));
   for (const char* name : {"colony_001", "colony_002"}) {
     const fs::path colony = folder / "all" / name;
     const Polygon rim = files::read_outline(colony / "1_segment" / "outline.csv").front();
@@ -118,8 +98,8 @@ TEST(Simulate, colonies_have_images_of_their_beads_and_of_themselves) {
     }
     EXPECT_FALSE(fs::exists(colony / "2_track"));
   }
-  EXPECT_FALSE(content_of(folder / "all/colony_001/beads_stressed.tif") ==
-               content_of(folder / "all/colony_002/beads_stressed.tif"));
+  EXPECT_FALSE(files::read_text(folder / "all/colony_001/beads_stressed.tif") ==
+               files::read_text(folder / "all/colony_002/beads_stressed.tif"));
 }
 
 TEST(Simulate, images_do_not_join_the_segmentation_of_another_experiment) {
@@ -139,7 +119,7 @@ TEST(Simulate, same_seed_same_bytes_for_any_number_of_threads) {
   for (const auto& entry : fs::recursive_directory_iterator(folder / "a")) {
     if (!entry.is_regular_file()) continue;
     const fs::path relative = fs::relative(entry.path(), folder / "a");
-    EXPECT_TRUE(content_of(entry.path()) == content_of(folder / "b" / relative)) << relative;
+    EXPECT_TRUE(files::read_text(entry.path()) == files::read_text(folder / "b" / relative)) << relative;
     ++n_files;
   }
   EXPECT_GE(n_files, 12);
@@ -149,22 +129,20 @@ TEST(Simulate, flags_override_the_scenario_and_its_record_repeats_it) {
   const test::TemporaryFolder folder;
   const fs::path first = folder / "first", again = folder / "again";
   ASSERT_EQ(simulate(kSmall + "--youngs_modulus_kPa 3 --noise 0.1 --out " + first.string()).code, 0);
-  EXPECT_NE(content_of(first / "cell.toml").find("youngs_modulus_kPa = 3"), std::string::npos);
-  const Outcome outcome =
-      simulate("--scenario " + (first / "truth" / "scenario.toml").string() + " --out " + again.string());
-  ASSERT_EQ(outcome.code, 0) << outcome.message;
-  EXPECT_EQ(content_of(first / "2_track" / "displacement.csv"), content_of(again / "2_track" / "displacement.csv"));
+  EXPECT_NE(files::read_text(first / "cell.toml").find("youngs_modulus_kPa = 3"), std::string::npos);
+  output_of(simulate("--scenario " + (first / "truth" / "scenario.toml").string() + " --out " + again.string()));
+  EXPECT_EQ(files::read_text(first / "2_track" / "displacement.csv"),
+            files::read_text(again / "2_track" / "displacement.csv"));
 }
 
 TEST(Simulate, colonies_differ_by_place_beads_and_dipoles_alone) {
   const test::TemporaryFolder folder;
-  const Outcome outcome = simulate(
+  output_of(simulate(
       "--scenario colony-spikes --beads 2000 --noise_um 0 --n_colonies 2 --scatter_um 8 --n_dipoles 0 --mesh_um 8 "
       "--out " +
-      (folder / "all").string());
-  ASSERT_EQ(outcome.code, 0) << outcome.message;
+      (folder / "all").string()));
   const fs::path a = folder / "all" / "colony_001", b = folder / "all" / "colony_002";
-  EXPECT_EQ(content_of(a / "truth" / "sheet.csv"), content_of(b / "truth" / "sheet.csv"));
+  EXPECT_EQ(files::read_text(a / "truth" / "sheet.csv"), files::read_text(b / "truth" / "sheet.csv"));
   const Polygon one = files::read_outline(a / "1_segment" / "outline.csv").front(),
                 other = files::read_outline(b / "1_segment" / "outline.csv").front();
   ASSERT_EQ(one.size(), other.size());
@@ -189,9 +167,8 @@ TEST(Simulate, dipoles_pull_inside_of_a_colony_and_add_to_its_sheet) {
   const test::TemporaryFolder folder;
   const auto field = [&](int n_dipoles) {
     const fs::path out = folder / std::to_string(n_dipoles);
-    const Outcome outcome = simulate("--scenario colony-disc --beads 2000 --noise_um 0 --n_dipoles " +
-                                     std::to_string(n_dipoles) + " --mesh_um 8 --out " + out.string());
-    EXPECT_EQ(outcome.code, 0) << outcome.message;
+    output_of(simulate("--scenario colony-disc --beads 2000 --noise_um 0 --n_dipoles " + std::to_string(n_dipoles) +
+                       " --mesh_um 8 --out " + out.string()));
     return files::read_displacement(out / "truth" / "displacement.csv");
   };
   const DisplacementField without = field(0), with = field(6);
@@ -232,7 +209,7 @@ TEST(Simulate, on_springs_what_lies_under_the_sheet_moves_and_nothing_else) {
   }
   const Outcome pulled = simulate(disc + "--adhesion_stiffness_nN_per_um3 0.1 --n_dipoles 3 --out " + cell.string());
   EXPECT_EQ(pulled.code, 2);
-  EXPECT_NE(pulled.message.find("n_dipoles"), std::string::npos) << pulled.message;
+  EXPECT_NE(pulled.output.find("n_dipoles"), std::string::npos) << pulled.output;
 }
 
 TEST(Simulate, wrong_arguments_are_explained_and_leave_nothing_behind) {
@@ -240,7 +217,7 @@ TEST(Simulate, wrong_arguments_are_explained_and_leave_nothing_behind) {
   const std::string out = " --out " + (folder / "cell").string();
   const Outcome unknown = simulate("--scenario no-such" + out);
   EXPECT_EQ(unknown.code, 2);
-  EXPECT_NE(unknown.message.find("two-adhesions"), std::string::npos) << unknown.message;
+  EXPECT_NE(unknown.output.find("two-adhesions"), std::string::npos) << unknown.output;
   EXPECT_EQ(simulate("--scenario ./nowhere.toml" + out).code, 2);
   EXPECT_EQ(simulate("--noise -1" + out).code, 2);
   EXPECT_EQ(simulate("--youngs_modulus_kPa 0" + out).code, 2);
@@ -249,7 +226,7 @@ TEST(Simulate, wrong_arguments_are_explained_and_leave_nothing_behind) {
   for (const char* scenario : {"wave", "contracting-disc"}) {
     const Outcome strained = simulate("--simulation_material neo-hooke --scenario " + std::string(scenario) + out);
     EXPECT_EQ(strained.code, 2) << scenario;
-    EXPECT_NE(strained.message.find("simulation_material"), std::string::npos) << strained.message;
+    EXPECT_NE(strained.output.find("simulation_material"), std::string::npos) << strained.output;
   }
   EXPECT_FALSE(fs::exists(folder / "cell"));
 
@@ -257,7 +234,7 @@ TEST(Simulate, wrong_arguments_are_explained_and_leave_nothing_behind) {
   std::ofstream(file) << "[scenario]\nn_adhesion = 5\n";
   const Outcome typo = simulate("--scenario " + file.string() + out);
   EXPECT_EQ(typo.code, 3);
-  EXPECT_NE(typo.message.find("n_adhesions"), std::string::npos) << typo.message;
+  EXPECT_NE(typo.output.find("n_adhesions"), std::string::npos) << typo.output;
 }
 
 }  // namespace

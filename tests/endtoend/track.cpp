@@ -1,4 +1,3 @@
-#include <sys/wait.h>
 #include <tiffio.h>
 
 #include "pipeline/files/csv.h"
@@ -8,6 +7,7 @@
 #include "tests/support/bead_pair.h"
 #include "tests/support/findings.h"
 #include "tests/support/folders.h"
+#include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 #include "tests/support/weak_beads.h"
@@ -17,19 +17,7 @@ namespace {
 
 using test::fires;
 
-struct Ended {
-  int code = 0;
-  std::string said;
-};
-
-Ended run_track(const test::TemporaryFolder& folder, const std::string& arguments) {
-  const std::string log = (folder / "log").string();
-  const std::string command = test::build_folder().string() + "/bin/mbtfm-track " + arguments + " >" + log + " 2>&1";
-  const int status = std::system(command.c_str());
-  std::stringstream said;
-  said << std::ifstream(log).rdbuf();
-  return {WEXITSTATUS(status), said.str()};
-}
+Outcome run_track(const std::string& arguments) { return run_program("mbtfm-track " + arguments); }
 
 std::string files(const test::TemporaryFolder& folder, const std::string& relaxed, const std::string& stressed) {
   return "--relaxed " + (folder / relaxed).string() + " --stressed " + (folder / stressed).string() + " --out " +
@@ -56,8 +44,7 @@ TEST(TrackEndToEnd, images_become_a_displacement_file_in_um) {
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
   write(folder / "r.tif", pair.relaxed, 0.2);
   write(folder / "s.tif", pair.stressed, 0.2);
-  const Ended ended = run_track(folder, files(folder, "r.tif", "s.tif"));
-  ASSERT_EQ(ended.code, 0) << ended.said;
+  output_of(run_track(files(folder, "r.tif", "s.tif")));
   const DisplacementField field = files::read_displacement(folder / "out/displacement.csv");
   EXPECT_GT(field.size(), 150u);
   for (const Bead& bead : field) EXPECT_LE(std::max(bead.position_um.x, bead.position_um.y), 128 * 0.2);
@@ -67,8 +54,7 @@ TEST(TrackEndToEnd, images_become_a_displacement_file_in_um) {
 TEST(TrackEndToEnd, a_folder_of_frames_is_tracked_against_one_relaxed_image) {
   const test::TemporaryFolder folder;
   write_series(folder);
-  const Ended ended = run_track(folder, files(folder, "r.tif", "frames"));
-  ASSERT_EQ(ended.code, 0) << ended.said;
+  output_of(run_track(files(folder, "r.tif", "frames")));
   const files::CsvTable frames(folder / "out/frames.csv");
   ASSERT_EQ(frames.n_rows(), 2);
   EXPECT_NEAR(frames.number(0, "drift_x_um"), 0.4, 0.005);
@@ -82,14 +68,13 @@ TEST(TrackEndToEnd, a_frame_that_is_lost_is_tracked_again_and_the_others_are_not
   const test::TemporaryFolder folder;
   write_series(folder);
   const std::string arguments = files(folder, "r.tif", "frames") + " --record " + (folder / "out/record.json").string();
-  ASSERT_EQ(run_track(folder, arguments).code, 0);
+  ASSERT_EQ(run_track(arguments).code, 0);
   const std::string list = files::read_text(folder / "out/frames.csv"),
                     lost = files::read_text(folder / "out/displacement_0002.csv");
   const std::string other = files::read_text(folder / "out/displacement.csv") + "1,1,0,0,0.1,by hand\n";
   files::write_text(folder / "out/displacement_0001.csv", other);  // no tracking would give it
   std::filesystem::remove(folder / "out/displacement_0002.csv");
-  const Ended ended = run_track(folder, arguments + " --kept " + (folder / "out").string());
-  ASSERT_EQ(ended.code, 0) << ended.said;
+  output_of(run_track(arguments + " --kept " + (folder / "out").string()));
   EXPECT_EQ(files::read_text(folder / "out/displacement_0002.csv"), lost);
   EXPECT_EQ(files::read_text(folder / "out/displacement_0001.csv"), other);
   EXPECT_EQ(files::read_text(folder / "out/frames.csv"), list);
@@ -102,18 +87,17 @@ TEST(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
   const std::string out = " --out " + (folder / "out").string();
   const std::string given = "--displacement " + (folder / "piv.csv").string() + out;
   const std::string columns = " --x_column x --y_column y --ux_column u --uy_column v";
-  const Ended ended = run_track(folder, given + columns + " --length_unit px --pixel_size_um 0.5");
-  ASSERT_EQ(ended.code, 0) << ended.said;
-  EXPECT_NE(ended.said.find("1 flagged"), std::string::npos) << ended.said;
+  const std::string ended = output_of(run_track(given + columns + " --length_unit px --pixel_size_um 0.5"));
+  EXPECT_NE(ended.find("1 flagged"), std::string::npos) << ended;
   const DisplacementField field = files::read_displacement(folder / "out/displacement.csv");
   ASSERT_EQ(field.size(), 4u);
   EXPECT_EQ(field[1].position_um, (Vec2{5.25, 0.25}));
   EXPECT_EQ(field[1].displacement_um, (Vec2{0.5, 0}));
   EXPECT_EQ(field[3].flag, "not a number");
-  EXPECT_EQ(run_track(folder, given).code, 3);                                                  // other columns
-  EXPECT_EQ(run_track(folder, given + columns + " --length_unit px").code, 2);                  // of which size?
-  EXPECT_EQ(run_track(folder, given + " --relaxed " + (folder / "piv.csv").string()).code, 2);  // which of them?
-  EXPECT_EQ(run_track(folder, out).code, 2);
+  EXPECT_EQ(run_track(given).code, 3);                                                  // other columns
+  EXPECT_EQ(run_track(given + columns + " --length_unit px").code, 2);                  // of which size?
+  EXPECT_EQ(run_track(given + " --relaxed " + (folder / "piv.csv").string()).code, 2);  // which of them?
+  EXPECT_EQ(run_track(out).code, 2);
 }
 
 TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
@@ -138,10 +122,8 @@ TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
                {"r.tif", "other_scale.tif", {"other_scale.tif", "r.tif", "0.25"}},
                {"no_scale.tif", "no_scale.tif", {"no_scale.tif", "calibration", "pixel_size_um"}}};
   for (const auto& c : cases) {
-    const Ended ended = run_track(folder, files(folder, c.relaxed, c.stressed));
-    EXPECT_EQ(ended.code, 3) << ended.said;
-    for (const std::string& word : c.said)
-      EXPECT_NE(ended.said.find(word), std::string::npos) << word << ": " << ended.said;
+    const std::string ended = output_of(run_track(files(folder, c.relaxed, c.stressed)), 3);
+    for (const std::string& word : c.said) EXPECT_NE(ended.find(word), std::string::npos) << word << ": " << ended;
     EXPECT_FALSE(std::filesystem::exists(folder / "out/displacement.csv")) << c.stressed;
   }
 }
@@ -157,9 +139,8 @@ TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
   write(folder / "frames/b.tif", one.stressed, 0.2);
   files::write_text(folder / "frames/c.tif", "no image");
   write(folder / "frames/d.tif", two.stressed, 0.2);
-  const Ended ended = run_track(folder, files(folder, "r.tif", "frames"));
-  EXPECT_EQ(ended.code, 4) << ended.said;
-  EXPECT_NE(ended.said.find("2 of 4 frames"), std::string::npos) << ended.said;
+  const std::string ended = output_of(run_track(files(folder, "r.tif", "frames")), 4);
+  EXPECT_NE(ended.find("2 of 4 frames"), std::string::npos) << ended;
   const files::CsvTable frames(folder / "out/frames.csv");
   ASSERT_EQ(frames.n_rows(), 4);
   EXPECT_NE(frames.text(0, "refused").find("bright beads"), std::string::npos);
@@ -175,7 +156,7 @@ TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
   std::filesystem::remove(folder / "frames/b.tif");
   std::filesystem::remove(folder / "frames/d.tif");
   std::filesystem::remove_all(folder / "out");
-  EXPECT_EQ(run_track(folder, files(folder, "r.tif", "frames")).code, 3);  // of no frame is there a field
+  EXPECT_EQ(run_track(files(folder, "r.tif", "frames")).code, 3);  // of no frame is there a field
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
@@ -212,20 +193,20 @@ TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
               "channels=2\nslices=1\nframes=3\nhyperstack=true\n");
   const std::string both = files(folder, "s.tif", "s.tif") + " --pixel_size_um 0.2";
   const std::string relaxed = " --relaxed_channel 2 --relaxed_time 3", beads = " --stressed_channel 2";
-  Ended ended = run_track(folder, both + relaxed + beads + " --stressed_time 1 --stressed_last 2");
-  ASSERT_EQ(ended.code, 0) << ended.said;
+  Outcome ended = run_track(both + relaxed + beads + " --stressed_time 1 --stressed_last 2");
+  ASSERT_EQ(ended.code, 0) << ended.output;
   const files::CsvTable frames(folder / "out/frames.csv");
   ASSERT_EQ(frames.n_rows(), 2);
   EXPECT_NEAR(frames.number(0, "drift_x_um"), 0.4, 0.005);
   EXPECT_NEAR(frames.number(1, "drift_x_um"), -0.6, 0.005);
   const std::string of_time = files::read_text(folder / "out/displacement_0002.csv");
-  ended = run_track(folder, both + " --relaxed_page 6 --stressed_page 4");
-  ASSERT_EQ(ended.code, 0) << ended.said;
+  ended = run_track(both + " --relaxed_page 6 --stressed_page 4");
+  ASSERT_EQ(ended.code, 0) << ended.output;
   EXPECT_EQ(files::read_text(folder / "out/displacement.csv"), of_time);
-  EXPECT_EQ(run_track(folder, both).code, 3);                                           // which of them?
-  EXPECT_EQ(run_track(folder, both + relaxed + beads).code, 3);                         // of which time?
-  EXPECT_EQ(run_track(folder, both + relaxed + beads + " --stressed_last 2").code, 2);  // from where?
-  EXPECT_EQ(run_track(folder, both + relaxed + beads + " --stressed_time 3 --stressed_last 2").code, 2);
+  EXPECT_EQ(run_track(both).code, 3);                                           // which of them?
+  EXPECT_EQ(run_track(both + relaxed + beads).code, 3);                         // of which time?
+  EXPECT_EQ(run_track(both + relaxed + beads + " --stressed_last 2").code, 2);  // from where?
+  EXPECT_EQ(run_track(both + relaxed + beads + " --stressed_time 3 --stressed_last 2").code, 2);
 }
 
 TEST(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
@@ -233,17 +214,17 @@ TEST(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
   const auto pair = test::draw_bead_pair(test::ring_of_adhesions(384, 6), {.width = 384, .n_beads = 2950});
   write(folder / "r.tif", pair.relaxed, 0.2);
   write(folder / "s.tif", pair.stressed, 0.2);
-  const Ended sound = run_track(folder, files(folder, "r.tif", "s.tif"));
+  const Outcome sound = run_track(files(folder, "r.tif", "s.tif"));
   EXPECT_EQ(sound.code, 0);
   test::expect_silent({"nothing-moves", "moves-outward", "tracked-by-correlation", "defocused", "beads-not-round",
                        "saturated", "lossy-image", "unusual-value"},
-                      sound.said);
-  const Ended swapped = run_track(folder, files(folder, "s.tif", "r.tif"));
+                      sound.output);
+  const Outcome swapped = run_track(files(folder, "s.tif", "r.tif"));
   EXPECT_EQ(swapped.code, 3);
-  EXPECT_NE(swapped.said.find("exchange the files of --stressed and --relaxed"), std::string::npos) << swapped.said;
-  const Ended pushed = run_track(folder, files(folder, "s.tif", "r.tif") + " --may_push");
+  EXPECT_NE(swapped.output.find("exchange the files of --stressed and --relaxed"), std::string::npos) << swapped.output;
+  const Outcome pushed = run_track(files(folder, "s.tif", "r.tif") + " --may_push");
   EXPECT_EQ(pushed.code, 0);
-  EXPECT_TRUE(fires("moves-outward", pushed.said)) << pushed.said;
+  EXPECT_TRUE(fires("moves-outward", pushed.output)) << pushed.output;
 }
 
 TEST(TrackEndToEnd, images_that_cannot_be_a_pair_are_refused_with_the_reason) {
@@ -271,9 +252,10 @@ TEST(TrackEndToEnd, images_that_cannot_be_a_pair_are_refused_with_the_reason) {
                {"nan.tif", "s.tif", {"nan.tif", "finite pixel values", "NaN"}},
                {"r.tif", "r.tif", {"two images", "the same pixels in both"}}};
   for (const auto& c : cases) {
-    const Ended ended = run_track(folder, files(folder, c.relaxed, c.stressed));
-    EXPECT_EQ(ended.code, 3) << c.relaxed << ' ' << c.stressed << ended.said;
-    for (const std::string& word : c.said) EXPECT_NE(ended.said.find(word), std::string::npos) << word << ended.said;
+    const Outcome ended = run_track(files(folder, c.relaxed, c.stressed));
+    EXPECT_EQ(ended.code, 3) << c.relaxed << ' ' << c.stressed << ended.output;
+    for (const std::string& word : c.said)
+      EXPECT_NE(ended.output.find(word), std::string::npos) << word << ended.output;
     EXPECT_FALSE(std::filesystem::exists(folder / "out"));
   }
 }
@@ -284,10 +266,9 @@ TEST(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_told_of) {
   for (const double pixel_um : {0.2, 0.05}) {
     write(folder / "r.tif", pair.relaxed, pixel_um);
     write(folder / "s.tif", pair.stressed, pixel_um);
-    const Ended ended = run_track(folder, files(folder, "r.tif", "s.tif"));
-    EXPECT_EQ(ended.code, 0) << ended.said;
-    EXPECT_EQ(ended.said.find("of the beads in the images is 0.0") != std::string::npos, pixel_um < 0.1) << ended.said;
-    EXPECT_EQ(fires("unusual-value", ended.said), pixel_um < 0.1) << ended.said;
+    const std::string ended = output_of(run_track(files(folder, "r.tif", "s.tif")));
+    EXPECT_EQ(ended.find("of the beads in the images is 0.0") != std::string::npos, pixel_um < 0.1) << ended;
+    EXPECT_EQ(fires("unusual-value", ended), pixel_um < 0.1) << ended;
   }
 }
 
@@ -296,9 +277,8 @@ TEST(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_to
   const auto told = [&](const test::BeadPair& pair) {
     write(folder / "r.tif", pair.relaxed, 0.2);
     write(folder / "s.tif", pair.stressed, 0.2);
-    const Ended ended = run_track(folder, files(folder, "r.tif", "s.tif"));
-    EXPECT_EQ(ended.code, 0) << ended.said;
-    return ended.said;
+    const std::string ended = output_of(run_track(files(folder, "r.tif", "s.tif")));
+    return ended;
   };
   test::BeadScene scene{.width = 256, .n_beads = 1300, .drift = {2, 1}};
   std::vector<test::Peak> peaks = test::ring_of_adhesions(scene.width, 3);
@@ -326,15 +306,15 @@ TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_
   files::write_text(folder / "still.csv", still);
   files::write_text(folder / "twice.csv", twice + "3,3,0.03,0\n");
   const auto given = [&](const char* file) {
-    return run_track(folder, "--displacement " + (folder / file).string() + " --out " + (folder / "out").string());
+    return run_track("--displacement " + (folder / file).string() + " --out " + (folder / "out").string());
   };
-  const Ended of_still = given("still.csv");
+  const Outcome of_still = given("still.csv");
   EXPECT_EQ(of_still.code, 0);
-  EXPECT_TRUE(fires("nothing-moves", of_still.said)) << of_still.said;
-  EXPECT_NE(of_still.said.find("Nothing moves: 0 of 64 beads"), std::string::npos) << of_still.said;
-  const Ended of_twice = given("twice.csv");
+  EXPECT_TRUE(fires("nothing-moves", of_still.output)) << of_still.output;
+  EXPECT_NE(of_still.output.find("Nothing moves: 0 of 64 beads"), std::string::npos) << of_still.output;
+  const Outcome of_twice = given("twice.csv");
   EXPECT_EQ(of_twice.code, 0);
-  EXPECT_NE(of_twice.said.find("1 flagged"), std::string::npos) << of_twice.said;
+  EXPECT_NE(of_twice.output.find("1 flagged"), std::string::npos) << of_twice.output;
   EXPECT_EQ(files::read_displacement(folder / "out/displacement.csv").back().flag, "duplicate");
 }
 

@@ -263,7 +263,7 @@ TEST_F(TractionInSpace, says_which_criterion_chose_lambda_in_the_end) {
   files::write_displacement_in_space(folder_ / "astray.csv", beads);
   const std::string dense = "--spacing_um 4 --method tikhonov ";
   const auto text = [&](const char* name) { return files::read_text(folder_ / name); };
-  const auto expect_chosen = [&](const test::Outcome& outcome, const std::string& by, const char* file_says) {
+  const auto expect_chosen = [&](const Outcome& outcome, const std::string& by, const char* file_says) {
     ASSERT_EQ(outcome.code, 0) << outcome.output;
     EXPECT_NE(outcome.output.find("um (" + by + ")"), std::string::npos) << outcome.output;
     EXPECT_FALSE(test::fires("lambda-runs-away", outcome.output)) << outcome.output;
@@ -306,7 +306,7 @@ TEST_F(TractionInSpace, refuses_what_tells_nothing_and_leaves_no_file) {
   files::write_text(folder_ / "flat.csv", "x_um,y_um,ux_um,uy_um,sigma_um\n1,2,0.1,0.2,0.01\n");
   files::write_text(folder_ / "few.csv", "x_um,y_um,z_um,ux_um,uy_um,uz_um\n1,2,5,0.1,0.2,0.01\n3,2,5,0.1,0.2,0.01\n");
   files::write_text(folder_ / "outline.csv", "x_um,y_um\n100,100\n120,100\n120,120\n");
-  const auto refused = [&](const test::Outcome& outcome, int code, const char* says) {
+  const auto refused = [&](const Outcome& outcome, int code, const char* says) {
     EXPECT_EQ(outcome.code, code) << outcome.output;
     EXPECT_NE(outcome.output.find(says), std::string::npos) << outcome.output;
     EXPECT_FALSE(fs::exists(folder_ / "traction_3d.csv"));

@@ -449,7 +449,8 @@ TEST_F(Runner, kills_a_stage_and_what_it_started_when_its_time_is_over) {
   files::write_text(bin_ / "shell-segment",
                     "(trap '' TERM; sleep 3; touch " + (folder_ / "survived").string() + ") & wait");
   options_.limits.seconds = 0.2;
-  EXPECT_EQ(test::thrown<StageFailed>([&] { started(); }).failure.exit_code, 6);
+  const StageFailed error = test::thrown<StageFailed>([&] { started(); });
+  EXPECT_EQ(error.failure.exit_code, 6);
   EXPECT_NE(error.failure.how.find("timed out"), std::string::npos);
   EXPECT_EQ(run_process({"/bin/sh", "-c", "sleep 4"}).exit_code, 0);
   EXPECT_FALSE(fs::exists(folder_ / "survived"));
@@ -460,14 +461,16 @@ TEST_F(Runner, kills_a_stage_that_takes_too_much_memory) {
       bin_ / "shell-segment",
       "head -c 200000000 /dev/zero | tail -c 1 > /dev/null; x=$(head -c 200000000 /dev/zero | tr '\\0' x); sleep 60");
   options_.limits.memory_bytes = 100'000'000;
-  EXPECT_EQ(test::thrown<StageFailed>([&] { started(); }).failure.exit_code, 6);
+  const StageFailed error = test::thrown<StageFailed>([&] { started(); });
+  EXPECT_EQ(error.failure.exit_code, 6);
   EXPECT_NE(error.failure.how.find("took too much memory"), std::string::npos) << error.failure.how;
 }
 
 TEST_F(Runner, limits_hold_while_a_stage_reads_its_parameters) {
   files::write_text(bin_ / "check-network", "sleep 60");
   options_.limits.seconds = 0.5;
-  EXPECT_EQ(test::thrown<StageFailed>([&] { started(); }).failure.exit_code, 6);
+  const StageFailed error = test::thrown<StageFailed>([&] { started(); });
+  EXPECT_EQ(error.failure.exit_code, 6);
   EXPECT_TRUE(error.failure.how.starts_with("timed out after ")) << error.failure.how;
   EXPECT_TRUE(error.failure.how.ends_with(" s while it read cell.toml")) << error.failure.how;
   EXPECT_EQ(calls(), "") << "nothing runs before every stage has read its parameters";
