@@ -18,12 +18,11 @@ constexpr int kN = 40;
 /// A bell of this width around each datum, on a ring: every datum has the same surroundings.
 MatrixXd ring_of_bells(double width) {
   MatrixXd G(kN, kN);
-  for (int i = 0; i < kN; ++i) {
+  for (int i = 0; i < kN; ++i)
     for (int j = 0; j < kN; ++j) {
       const int apart = std::min((i - j + kN) % kN, (j - i + kN) % kN);
       G(i, j) = std::exp(-0.5 * std::pow(apart / width, 2));
     }
-  }
   return G;
 }
 
@@ -130,9 +129,8 @@ TEST(Criteria, evidence_is_the_density_of_the_data_where_tractions_are_Gaussian)
   // the determinant is summed by trapezia: off by h²/6 times the change of the slope of `degrees` in log lambda
   const double h = std::log(scan.points[0].lambda / scan.points[1].lambda);
   double steepest = 0;
-  for (std::size_t i = 1; i < scan.points.size(); ++i) {
+  for (std::size_t i = 1; i < scan.points.size(); ++i)
     steepest = std::max(steepest, (scan.points[i].degrees - scan.points[i - 1].degrees) / h);
-  }
   for (std::size_t i = 1; i < scan.points.size(); ++i) {
     const double rise = log_density(scan.points[i].lambda) - log_density(scan.points[0].lambda);
     EXPECT_NEAR(scan.evidence[i] - scan.evidence[0], rise, h * h / 6 * steepest) << "lambda " << scan.points[i].lambda;
@@ -239,9 +237,8 @@ TEST(Criteria, do_not_depend_on_the_unit_of_the_displacements) {
   const MatrixXd G = ring_of_bells(2);
   const VectorXd u = G * some_tractions() + noise_of(0.5, kN, 3);
   const LambdaScan one = judged(G, u, 0.25), other = judged(G, 1000 * u, 1e6 * 0.25);
-  for (const LambdaCriterion criterion : {LambdaCriterion::risk, LambdaCriterion::gcv, LambdaCriterion::evidence}) {
+  for (const LambdaCriterion criterion : {LambdaCriterion::risk, LambdaCriterion::gcv, LambdaCriterion::evidence})
     EXPECT_NEAR(chosen_lambda(other, criterion) / chosen_lambda(one, criterion), 1, 1e-9) << name_of(criterion);
-  }
   EXPECT_EQ(one.by_l_curve.has_value(), other.by_l_curve.has_value());
 }
 
@@ -285,10 +282,9 @@ Loaded loaded(int n_beads, int n_loads) {
 DenseProblem problem_of(const Loaded& scene, const DisplacementField& beads) {
   const Compliance answers = [&scene](const std::vector<Vec2>& at) {
     MatrixXd rows(2 * static_cast<Eigen::Index>(at.size()), scene.G.cols());
-    for (std::size_t i = 0; i < at.size(); ++i) {
+    for (std::size_t i = 0; i < at.size(); ++i)
       rows.middleRows(2 * static_cast<Eigen::Index>(i), 2) =
           scene.G.middleRows(2 * static_cast<Eigen::Index>(std::lround(at[i].x)), 2);
-    }
     return rows;
   };
   return DenseProblem(beads, answers, scene.G.cols(), {}, 0);

@@ -23,9 +23,8 @@ TEST(InsideOfTheGel, all_nine_components_are_those_of_an_independent_program) {
   for (int row = 0; row < table.n_rows(); ++row) {
     const auto value = [&](const std::string& column) { return std::stod(table.text(row, column)); };
     Eigen::Matrix3d reference;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) reference(i, j) = value(std::string("g_") + axes[i] + axes[j] + "_um_per_nN");
-    }
     const Vec2 offset{value("dx_um"), value("dy_um")};
     const bool is_half_space = table.text(row, "thickness_um") == "inf";
     const Gel gel =
@@ -73,13 +72,12 @@ TEST(InsideOfTheGel, is_in_balance_without_forces_inside) {
     };
     // second derivatives of all nine components, by pair of directions
     std::array<std::array<Eigen::Matrix3d, 3>, 3> second;
-    for (int a = 0; a < 3; ++a) {
+    for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) {
         const Eigen::Vector3d i = Eigen::Vector3d::Unit(a), j = Eigen::Vector3d::Unit(b);
         second[a][b] = (u(i + j) - u(i - j) - u(j - i) + u(-i - j)) / (4 * step * step);
       }
-    }
-    for (int force = 0; force < 3; ++force) {
+    for (int force = 0; force < 3; ++force)
       for (int i = 0; i < 3; ++i) {
         double laplacian = 0, of_divergence = 0, size = 0;
         for (int j = 0; j < 3; ++j) {
@@ -90,7 +88,6 @@ TEST(InsideOfTheGel, is_in_balance_without_forces_inside) {
         EXPECT_LT(std::abs(laplacian + of_divergence / (1 - 2 * nu)), 2e-3 * size)
             << at.transpose() << ", " << force << i;
       }
-    }
   }
 }
 
@@ -129,14 +126,13 @@ Eigen::Matrix3d mean_by_rings(const LayerInside* layer, const Gel& gel, const su
                               double z_um, int n) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   const double c = std::cos(ellipse.angle_rad), s = std::sin(ellipse.angle_rad);
-  for (int i = 0; i < n; ++i) {
+  for (int i = 0; i < n; ++i)
     for (int k = 0; k < n; ++k) {
       const double r = std::sqrt((i + 0.5) / n), angle = 2 * std::numbers::pi * (k + 0.5) / n;
       const double x = ellipse.semi_major_um * r * std::cos(angle), y = ellipse.semi_minor_um * r * std::sin(angle);
       const Vec2 offset = point - ellipse.centre_um - Vec2{c * x - s * y, s * x + c * y};
       sum += layer ? layer->compliance_um_per_nN(offset, z_um) : half_space_inside_um_per_nN(gel, offset, z_um);
     }
-  }
   return 1.0 / (n * n) * sum;
 }
 
@@ -148,16 +144,14 @@ TEST(InsideOfTheGel, an_ellipse_is_the_mean_of_its_point_forces) {
     const Eigen::Matrix3d exact = EllipseInside(gel, base, ellipse).compliance_um_per_nN(point, z_um);
     return largest(mean_by_rings(base, gel, ellipse, point, z_um, n) - exact) / largest(exact);
   };
-  for (const LayerInside* base : {static_cast<const LayerInside*>(nullptr), &layer}) {
-    for (const double z : {0.4, 2.0, 5.0}) {
+  for (const LayerInside* base : {static_cast<const LayerInside*>(nullptr), &layer})
+    for (const double z : {0.4, 2.0, 5.0})
       for (const Vec2 point : {Vec2{1, -2}, Vec2{1.8, -1.2}, Vec2{5, 3}, Vec2{1, -2.6}}) {
         // midpoints err by the square of their distance
         const double coarse = difference(base, point, z, 24), fine = difference(base, point, z, 96);
         EXPECT_LT(fine, 3e-4) << z << " at " << point.x << ", " << point.y;
         EXPECT_LT(fine, coarse / 8 + 1e-8) << z << " at " << point.x << ", " << point.y;
       }
-    }
-  }
 }
 
 TEST(InsideOfTheGel, below_an_ellipse_the_field_tends_to_that_of_its_surface) {

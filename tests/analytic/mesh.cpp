@@ -33,13 +33,12 @@ TEST(Mesh, quality_is_one_for_an_equilateral_and_zero_for_a_flat_triangle) {
 }
 
 TEST(Mesh, unit_circle_is_as_good_as_distmesh_makes_it) {
-  for (const double edge : {0.1, 0.05}) {
+  for (const double edge : {0.1, 0.05})
     for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
       const GeneratedNetwork generated = generate_network(disc(400), {.edge_length_um = edge, .seed = seed});
       EXPECT_GE(generated.mean_quality, 0.985) << "edge " << edge << " seed " << seed;
       EXPECT_GE(generated.worst_quality, 0.5) << "edge " << edge << " seed " << seed;
     }
-  }
 }
 
 TEST(Mesh, disc_and_square_obey_eulers_formula) {
@@ -109,10 +108,9 @@ TEST(Mesh, an_adhesion_covers_what_lies_in_its_ellipse) {
                           .eccentricity = 0,
                           .mean_intensity = 1};
   const Polygon corners = ellipse_corners(adhesion, 10000);  // within 1e-7 of the ellipse
-  for (double y = 2; y < 6; y += 0.0371) {
+  for (double y = 2; y < 6; y += 0.0371)
     for (double x = 1; x < 5; x += 0.0371)
       EXPECT_EQ(covers(adhesion, {x, y}), contains(corners, {x, y})) << x << " " << y;
-  }
 }
 
 TEST(Mesh, edges_along_an_adhesions_rim_enclose_its_area) {
@@ -163,9 +161,8 @@ TEST(Mesh, second_neighbours_of_a_regular_triangulation_pull_evenly_in_twelve_di
   // near links have t l = 1, twice: once in the six near ones, once in the six far ones, so that each has t l = 1/2.
   std::vector<Vec2> points;
   const Vec2 along = {1, 0}, up = {0.5, std::sqrt(3.0) / 2};
-  for (int j = -3; j <= 3; ++j) {
+  for (int j = -3; j <= 3; ++j)
     for (int i = std::max(-3, -3 - j); i <= std::min(3, 3 - j); ++i) points.push_back(i * along + j * up);
-  }
   RelaxedMesh mesh{.points_um = points, .size_um = std::vector<double>(points.size(), 1)};
   std::vector<Vec2> hull = {{3, 0}, 3 * up, 3 * (up - along), {-3, 0}, -3 * up, -3 * (up - along)};
   Frame frame{.size = SizeField(1, 0.3, hull)};
@@ -173,13 +170,12 @@ TEST(Mesh, second_neighbours_of_a_regular_triangulation_pull_evenly_in_twelve_di
     return static_cast<int>(std::find_if(points.begin(), points.end(), [&](Vec2 q) { return norm(p - q) < 1e-9; }) -
                             points.begin());
   };
-  for (int side = 0; side < 6; ++side) {
+  for (int side = 0; side < 6; ++side)
     for (int k = 0; k < 3; ++k) {
       const Vec2 step = (1.0 / 3) * (hull[(side + 1) % 6] - hull[side]);
       const auto [a, b] = std::minmax({at(hull[side] + k * step), at(hull[side] + (k + 1) * step)});
       frame.segments.push_back({.vertex_a = a, .vertex_b = b, .outline_count = 1});
     }
-  }
   mesh.triangulation = *triangulate(points, frame.segments);
   Vec2 force;
   double xx = 0, xy = 0, yy = 0;  // of the stress: isotropic with twelve times t l / 2 in its diagonal
@@ -202,7 +198,7 @@ TEST(Mesh, second_neighbours_of_a_regular_triangulation_pull_evenly_in_twelve_di
 
 TEST(Mesh, mean_width_is_that_of_a_regular_triangulation) {
   // Widths times lengths of all links fill twice the area: the sheet's tension does not depend on the edge length.
-  for (const LinkReach reach : values_of<LinkReach>()) {
+  for (const LinkReach reach : values_of<LinkReach>())
     for (const double edge : {0.05, 0.1, 0.2}) {
       const GeneratedNetwork generated = generate_network(
           disc(400), {.edge_length_um = edge, .link_weights = LinkWeights::width, .link_reach = reach});
@@ -210,7 +206,6 @@ TEST(Mesh, mean_width_is_that_of_a_regular_triangulation) {
       for (const Link& link : generated.network.links) sum += link.share * link.rest_length_um * edge / std::sqrt(3.0);
       EXPECT_NEAR(sum, 2 * generated.area_um2, 1e-3 * generated.area_um2) << name_of(reach) << ", edge " << edge;
     }
-  }
 }
 
 TEST(Mesh, straight_fibre_between_two_adhesions_keeps_its_length) {

@@ -17,11 +17,9 @@ double sum_of(const images::Image& image) {
 /// Centroid with pixel centres at (i+½, j+½) pixel sizes.
 Vec2 centroid_um(const images::Image& image) {
   Vec2 sum;
-  for (int row = 0; row < image.height; ++row) {
-    for (int column = 0; column < image.width; ++column) {
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column)
       sum += image.at(column, row) * *image.pixel_size_um * Vec2{column + 0.5, row + 0.5};
-    }
-  }
   return (1 / sum_of(image)) * sum;
 }
 

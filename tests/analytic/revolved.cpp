@@ -94,16 +94,14 @@ TEST(Revolved, a_turned_outline_turns_the_answer_and_forces_and_moments_cancel) 
   // both outlines are followed up to off_um
   const double within = (straight.mesh.sectors.off_um + turned.mesh.sectors.off_um) / kRadius_um * largest;
   EXPECT_LT(within, 2e-3 * largest);
-  for (const double depth : {0.0, 5.0}) {
-    for (const double angle : {0.1, 1.2, 2.8, 4.4}) {
+  for (const double depth : {0.0, 5.0})
+    for (const double angle : {0.1, 1.2, 2.8, 4.4})
       for (const double r : {0.0, 12.0, 30.0}) {
         const Vec3 a = displacement_um(straight, r, angle, depth), b = displacement_um(turned, r, angle + turn, depth);
         const Vec3 back = {b.x * std::cos(turn) + b.y * std::sin(turn), b.y * std::cos(turn) - b.x * std::sin(turn),
                            b.z};
         EXPECT_LT(norm(back + -1 * a), within) << r << " " << angle << " " << depth;
       }
-    }
-  }
   Vec3 force, moment;
   double sum = 0;
   const std::vector<Vec3> forces = turned.forces_nN(kCell);

@@ -382,7 +382,7 @@ TEST(Sheet, errors_of_tensions_are_the_scatter_under_drawn_errors_of_tractions) 
   const auto tractions = [&](double even_kPa, std::mt19937_64* random) {
     std::normal_distribution<double> normal(0, noise.sigma_kPa);
     std::vector<GroundPatch> patches;
-    for (int j = -5; j <= 5; ++j) {
+    for (int j = -5; j <= 5; ++j)
       for (int i = -5; i <= 5; ++i) {
         const Vec2 at = noise.correlation_um * Vec2{static_cast<double>(i), static_cast<double>(j)};
         if (norm(at) > 19) continue;
@@ -390,7 +390,6 @@ TEST(Sheet, errors_of_tensions_are_the_scatter_under_drawn_errors_of_tractions) 
         if (random) traction += {normal(*random), normal(*random)};
         patches.push_back({at, noise.correlation_um * noise.correlation_um, traction, {}});
       }
-    }
     return patches;
   };
   const auto solved = [&](std::mt19937_64* random) {

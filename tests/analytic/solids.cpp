@@ -131,10 +131,9 @@ TEST(Solids, a_section_of_a_sphere_presses_into_its_gel_as_an_independent_progra
         {"down_top_of_cell_um", deformed.displacement_um_at(mesh.top_of_cell()).y},
         {"largest_u_cell_um", indentation(setting, of).reading.largest_u_um}};
     // both are finite elements with errors of their own
-    for (const auto& [column, value] : found) {
+    for (const auto& [column, value] : found)
       EXPECT_NEAR(value, table.number(row, column), 5e-4 * table.number(row, "largest_u_cell_um"))
           << "row " << row << " " << column;
-    }
   }
 }
 
@@ -207,11 +206,10 @@ TEST(Solids, the_map_has_its_optima_where_an_independent_program_has_them) {
   Setting setting = thesis_setting(0.49);
   setting.fineness = {4, 4};
   std::vector<Case> cases;
-  for (const double ratio : {0.1, 0.2, 0.5, 1.0, 1.5, 2.0}) {
+  for (const double ratio : {0.1, 0.2, 0.5, 1.0, 1.5, 2.0})
     for (const double height : {5.3, 6.5, 8.0, 9.5, 13.36}) cases.push_back({height, ratio});
-  }
   const std::vector<Indentation> solved = indentations(setting, cases, 2, {});
-  for (const Indentation& one : solved) {
+  for (const Indentation& one : solved)
     for (int row = 0; row < map.n_rows(); ++row) {
       if (map.number(row, "nu") != 0.49 || map.number(row, "E_ratio") != one.of.modulus_ratio ||
           map.number(row, "h_um") != one.of.height_um)
@@ -225,7 +223,6 @@ TEST(Solids, the_map_has_its_optima_where_an_independent_program_has_them) {
       expect(one.reading.lift_um, "lift_um");
       expect(one.reading.largest_u_um, "umax_cell_um");
     }
-  }
   const std::vector<Optimum> best = optima(setting, solved, 2);
   ASSERT_EQ(best.size(), 12u);
   const std::vector<double> at_surface = {6.48, 7.18, 8.11, 8.71, 8.99, 9.15},

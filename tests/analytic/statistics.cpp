@@ -143,9 +143,8 @@ TEST(StatisticsBesideR, mixed_model_of_metafor_with_known_errors) { expect_neste
 TEST(StatisticsBesideR, clustered_rank_sum_by_its_definition) {
   const FromR r;
   std::vector<ClusteredValue> values;
-  for (const Fibre& f : r.fibres) {
+  for (const Fibre& f : r.fibres)
     if (f.type != 1) values.push_back({.value = f.tension_nN, .group = f.type / 2, .cell = f.cell});
-  }
   const ClusteredRanks ranks = clustered_ranks(values);
   r.expect("clustered.s", ranks.sum[1], kExact);
   r.expect("clustered.expected", ranks.expected[1], kExact);
@@ -154,10 +153,9 @@ TEST(StatisticsBesideR, clustered_rank_sum_by_its_definition) {
 TEST(MixedModel, balanced_cells_give_the_classical_degrees_of_freedom) {
   // one group, the same number in each cell: the mean's variance is that between cells over their number
   std::vector<Observation> data;
-  for (int cell = 0; cell < 7; ++cell) {
+  for (int cell = 0; cell < 7; ++cell)
     for (int i = 0; i < 4; ++i)
       data.push_back({.value = std::sin(2.0 * cell) + 0.3 * std::cos(11.0 * (4 * cell + i)), .cell = cell});
-  }
   const MixedFit fit = fit_mixed_model(data);
   const Contrast mean = contrast_of(fit, Eigen::VectorXd::Ones(1));
   std::vector<double> cell_means(7, 0);

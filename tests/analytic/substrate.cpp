@@ -71,19 +71,16 @@ TEST(DiscRule, averages_powers_up_to_its_degree) {
   const auto odd_factorial = [](int n) {
     return n == 0 ? 1.0 : std::tgamma(2 * n) / std::tgamma(n) / std::pow(2, n - 1);
   };
-  for (const int degree : {3, 5, 7, 11}) {
-    for (int i = 0; 2 * i <= degree; ++i) {
+  for (const int degree : {3, 5, 7, 11})
+    for (int i = 0; 2 * i <= degree; ++i)
       for (int k = 0; 2 * (i + k) <= degree; ++k) {
         double sum = 0;
-        for (const DiscPoint& p : disc_rule(degree)) {
+        for (const DiscPoint& p : disc_rule(degree))
           sum += p.weight * std::pow(p.position.x, 2 * i) * std::pow(p.position.y, 2 * k);
-        }
         const int n = i + k;
         const double exact = odd_factorial(i) * odd_factorial(k) / (std::pow(2, n) * std::tgamma(n + 2));
         EXPECT_NEAR(sum, exact, 1e-13) << "degree " << degree << ", x^" << 2 * i << " y^" << 2 * k;
       }
-    }
-  }
 }
 
 TEST(Layer, beyond_its_reach_nothing_is_left_of_the_half_spaces_field) {
@@ -128,9 +125,8 @@ TEST(Layer, equals_independent_values_of_an_ellipse_in_every_row) {
 /// The kernel averaged over the ellipse by a fine rule: right outside it.
 greens::Sym2 averaged_cerruti(const Gel& gel, const Ellipse& ellipse, Vec2 point) {
   greens::Sym2 sum;
-  for (const DiscPoint& p : ellipse_rule(ellipse, 159)) {
+  for (const DiscPoint& p : ellipse_rule(ellipse, 159))
     sum += p.weight * cerruti_surface(gel, point - ellipse.centre_um - p.position);
-  }
   return sum;
 }
 
@@ -172,8 +168,8 @@ greens::Sym2 brute_chord_moments(Vec2 p, double a, double b, int n) {
 
 TEST(HalfSpace, chord_moments_equal_brute_force_inside_outside_and_on_the_rim) {
   constexpr int kDirections = 2000000;
-  for (const double aspect : {1.0, 3.0, 10.0}) {
-    for (const double r : {0.0, 0.5, 0.99, 1.0, 1.01, 1.5}) {
+  for (const double aspect : {1.0, 3.0, 10.0})
+    for (const double r : {0.0, 0.5, 0.99, 1.0, 1.01, 1.5})
       for (const double angle : {0.0, 0.4, 0.5 * pi, 2.2}) {
         const Vec2 point = {aspect * r * std::cos(angle), r * std::sin(angle)};
         // outside, brute force errs where a chord begins, as a square root: step^(3/2) of the ellipse's own angle;
@@ -183,8 +179,6 @@ TEST(HalfSpace, chord_moments_equal_brute_force_inside_outside_and_on_the_rim) {
                   1e-8)
             << "aspect " << aspect << ", r " << r << ", angle " << angle;
       }
-    }
-  }
 }
 
 TEST(HalfSpace, centre_of_a_uniform_disc_moves_by_the_textbook_value) {
@@ -227,7 +221,7 @@ TEST(HalfSpace, series_of_an_ellipse_errs_as_the_sixth_power_of_its_size_over_th
   for (const double aspect : {1.0, 1.5, 10.0}) {
     const Ellipse ellipse = {.centre_um = {1, 2}, .semi_major_um = aspect, .semi_minor_um = 1, .angle_rad = 0.7};
     const greens::HalfSpaceEllipse field(kGel, ellipse);
-    for (const double r : {5.0, 10.0, 20.0}) {
+    for (const double r : {5.0, 10.0, 20.0})
       for (int k = 0; k < 12; ++k) {
         const double direction = 2 * pi * k / 12;
         const Vec2 point = ellipse.centre_um + r * aspect * Vec2{std::cos(direction), std::sin(direction)};
@@ -235,7 +229,6 @@ TEST(HalfSpace, series_of_an_ellipse_errs_as_the_sixth_power_of_its_size_over_th
                   0.2 * std::pow(r, -6))
             << "aspect " << aspect << ", r " << r << ", direction " << direction;
       }
-    }
   }
 }
 

@@ -151,9 +151,8 @@ TEST(Track, swapped_images_have_the_inverse_turn_and_growth_and_mirrored_ones_th
   std::swap(pair.relaxed, pair.stressed);
   expect_recovered(tracked_similarity(pair), {-truth.turn_rad, 1 / (1 + truth.growth) - 1, {0, 0}});
   std::swap(pair.relaxed, pair.stressed);
-  for (images::Image* image : {&pair.relaxed, &pair.stressed}) {
+  for (images::Image* image : {&pair.relaxed, &pair.stressed})
     for (int j = 0; j < 384; ++j) std::reverse(&image->at(0, j), &image->at(0, j) + 384);
-  }
   expect_recovered(tracked_similarity(pair), {-truth.turn_rad, truth.growth, {0, 0}});
 }
 
@@ -286,9 +285,8 @@ TEST(Track, beads_are_found_to_a_tenth_of_a_pixel) {
   int n_found = 0, n_alone = 0;
   for (const Vec2 truth : pair.positions) {
     double next = 1e9, nearest = 1e9;
-    for (const Vec2 other : pair.positions) {
+    for (const Vec2 other : pair.positions)
       if (!(other == truth)) next = std::min(next, norm(other - truth));
-    }
     if (next < 5) continue;  // four sigmas apart: two spots, not one
     ++n_alone;
     for (const DetectedBead& bead : beads) nearest = std::min(nearest, norm(bead.position_px - truth));

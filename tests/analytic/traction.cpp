@@ -80,7 +80,7 @@ TEST(SurfaceSpectrum, its_waves_add_up_to_the_field_of_a_loaded_disc) {
     const double radius = 3;
     const Vec2 centre = lattice.position_um(240, 220);
     WaveField waves = transform.no_waves();
-    for (int j = 0; j < lattice.n_rows; ++j) {
+    for (int j = 0; j < lattice.n_rows; ++j)
       for (int i = 0; i < transform.n_half(); ++i) {
         const double k_x = 2 * std::numbers::pi / (480 * 0.25) * i;
         const double k_y = 2 * std::numbers::pi / (450 * 0.25) * (2 * j <= 450 ? j : j - 450);
@@ -89,7 +89,6 @@ TEST(SurfaceSpectrum, its_waves_add_up_to_the_field_of_a_loaded_disc) {
         waves.x[i + transform.n_half() * j] =
             disc / (0.25 * 0.25) * std::polar(1.0, -(k_x * centre.x + k_y * centre.y));
       }
-    }
     spectrum.displace(waves);
     const NodeField u = transform.backward(waves);
     const greens::Layer layer(gel);
@@ -149,13 +148,12 @@ TEST(SurfaceSpectrum, a_loaded_cell_turned_by_a_quarter_displaces_the_same_turne
     };
     const NodeField by_x = displaced(&NodeField::x), by_y = displaced(&NodeField::y);
     const double peak = by_x.x.maxCoeff();
-    for (int q = -8; q <= 8; ++q) {
+    for (int q = -8; q <= 8; ++q)
       for (int p = -8; p <= 8; ++p) {  // (p, q) turns to (−q, p), x to y and y to −x
         const Eigen::Index here = 16 + p + 32 * (16 + q), there = 16 - q + 32 * (16 + p);
         EXPECT_NEAR(by_x.x[here], by_y.y[there], 1e-12 * peak) << p << ", " << q;
         EXPECT_NEAR(by_x.y[here], -by_y.x[there], 1e-12 * peak) << p << ", " << q;
       }
-    }
   }
 }
 
@@ -219,8 +217,8 @@ TEST(LCurve, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_th
 }
 
 TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
-  for (const int n_side : {128, 256}) {
-    for (const double noise : {0.0, 0.05, 0.1}) {
+  for (const int n_side : {128, 256})
+    for (const double noise : {0.0, 0.05, 0.1})
       for (const bool states_errors : {true, false}) {
         if (noise == 0 && states_errors) continue;
         if (n_side == 256 && states_errors) continue;
@@ -239,8 +237,6 @@ TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
         const double reached = error_at(chosen);
         EXPECT_LE(reached, 1.15 * best) << n_side << ", noise " << noise;
       }
-    }
-  }
 }
 
 TEST(Fttc, sums_are_those_of_the_scene) {
@@ -323,7 +319,7 @@ TEST(Sparse, tractions_are_sharper_than_any_smooth_ones) {
 }
 
 TEST(Tractions, forces_by_adhesion_are_nearer_the_truth_than_any_sum_of_the_map_over_grown_ellipses) {
-  for (const TractionMethod method : {TractionMethod::fttc, TractionMethod::sparse}) {
+  for (const TractionMethod method : {TractionMethod::fttc, TractionMethod::sparse})
     for (const double noise : {0.02, 0.08}) {
       const EllipseScene scene = ellipse_scene(64, noise, 31);
       const Reconstruction r = reconstruct(inputs_of(scene), half_space(method), 2);
@@ -337,7 +333,6 @@ TEST(Tractions, forces_by_adhesion_are_nearer_the_truth_than_any_sum_of_the_map_
       const double reached = test::force_error(scene, forces_of(r));
       EXPECT_LE(reached, best) << name_of(method) << ", noise " << noise;
     }
-  }
 }
 
 void expect_forces_err_as_stated(const TractionParameters& parameters, double noise) {
@@ -358,10 +353,9 @@ void expect_forces_err_as_stated(const TractionParameters& parameters, double no
 }
 
 TEST(Tractions, forces_by_adhesion_err_as_much_as_stated_whatever_the_penalty_takes) {
-  for (const double noise : {0.03, 0.08}) {
+  for (const double noise : {0.03, 0.08})
     for (const TractionMethod method : {TractionMethod::fttc, TractionMethod::sparse})
       expect_forces_err_as_stated(half_space(method), noise);
-  }
   // with lambdas that others chose: far less smoothing than the default, and the default's at the larger noise
   TractionParameters parameters = half_space();
   for (const double lambda : {0.05, 0.4}) {
@@ -446,11 +440,9 @@ TEST(Panel, squares_that_fill_a_disc_add_up_to_it_and_far_away_to_a_point) {
   const greens::Layer layer(gel);
   constexpr double kSide = 0.05, kRadius = 2;
   std::vector<Vec2> squares;
-  for (double y = -kRadius + kSide / 2; y < kRadius; y += kSide) {
-    for (double x = -kRadius + kSide / 2; x < kRadius; x += kSide) {
+  for (double y = -kRadius + kSide / 2; y < kRadius; y += kSide)
+    for (double x = -kRadius + kSide / 2; x < kRadius; x += kSide)
       if (norm(Vec2{x, y}) <= kRadius) squares.push_back({x, y});
-    }
-  }
   const double area = kSide * kSide * static_cast<double>(squares.size());
   const double radius = std::sqrt(area / std::numbers::pi);
   const greens::LayerEllipse disc(layer, {.semi_major_um = radius, .semi_minor_um = radius, .angle_rad = 0});
@@ -482,32 +474,29 @@ TEST(DenseMethods, state_errors_that_hold_noise_penalty_and_model) {
     const double angle = k * std::numbers::pi / 12;
     outline.push_back(Vec2{32, 32} + 26 * Vec2{std::cos(angle), std::sin(angle)});
   }
-  for (const TractionMethod method : {TractionMethod::trpf, TractionMethod::bem}) {
+  for (const TractionMethod method : {TractionMethod::trpf, TractionMethod::bem})
     for (const double noise : {0.01, 0.05, 0.1}) {
       const EllipseScene scene = ellipse_scene(64, noise, 401);
       TractionInputs inputs = inputs_of(scene);
       inputs.outline_um = outline;
       const Reconstruction r = reconstruct(inputs, half_space(method), 2);
       double squares = 0;
-      for (std::size_t a = 0; a < r.forces.size(); ++a) {
+      for (std::size_t a = 0; a < r.forces.size(); ++a)
         squares += std::pow((norm(r.forces[a].force_nN) - norm(scene.forces_nN[a])) / *r.forces[a].sigma_nN, 2) / 8;
-      }
       // the noise alone would give 1.6 to 10; the root of a mean of eight squares is itself known to a quarter
       EXPECT_GT(std::sqrt(squares), 0.7) << name_of(method) << noise;
       EXPECT_LT(std::sqrt(squares), 1.4) << name_of(method) << noise;
     }
-  }
 }
 
 TEST(DenseMethods, elements_find_tractions_that_are_even_on_elements) {
   const Gel gel{.youngs_modulus_kPa = 8, .poisson_ratio = 0.45, .thickness_um = 20};
   const greens::Layer layer(gel);
   TractionInputs inputs{.gel = gel, .outline_um = {{0, 0}, {12, 0}, {12, 9}, {0, 9}}};
-  for (const Vec2 p : test::scattered_points(600, 14, {6, 4.5}, 3)) {
+  for (const Vec2 p : test::scattered_points(600, 14, {6, 4.5}, 3))
     inputs.beads.push_back({.position_um = p, .sigma_um = 0});
-  }
   std::vector<Vec2> truth;
-  for (int j = 0; j < 3; ++j) {
+  for (int j = 0; j < 3; ++j)
     for (int i = 0; i < 4; ++i) {
       truth.push_back({std::sin(i + 2.0 * j), std::cos(3.0 * i - j)});
       for (Bead& b : inputs.beads) {
@@ -517,7 +506,6 @@ TEST(DenseMethods, elements_find_tractions_that_are_even_on_elements) {
         b.displacement_um += Vec2{g.xx * t.x + g.xy * t.y, g.xy * t.x + g.yy * t.y};
       }
     }
-  }
   TractionParameters parameters;
   parameters.method = TractionMethod::bem;
   parameters.element_um = 3;
@@ -550,7 +538,7 @@ TEST(NeighbourNoise, is_not_told_by_few_beads_or_beads_on_a_line) {
 }
 
 TEST(Fttc, a_gel_of_poissons_ratio_one_half_is_the_limit_of_nearly_incompressible_ones) {
-  for (const GelModel model : {GelModel::layer, GelModel::half_space}) {
+  for (const GelModel model : {GelModel::layer, GelModel::half_space})
     for (const double k : {0.01, 0.1, 1.0}) {
       const auto at = [&](double nu) {
         return greens::wave_compliance({.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = 60}, model, k);
@@ -558,7 +546,6 @@ TEST(Fttc, a_gel_of_poissons_ratio_one_half_is_the_limit_of_nearly_incompressibl
       EXPECT_NEAR(at(0.5).along_um_per_kPa / at(0.499999).along_um_per_kPa, 1, 1e-5) << k;
       EXPECT_NEAR(at(0.5).across_um_per_kPa / at(0.499999).across_um_per_kPa, 1, 1e-5) << k;
     }
-  }
   const std::vector<substrate::Ellipse> ellipses = {{{0, 0}, 1, 0.5, 0.3}};
   for (const GelModel model : values_of<GelModel>()) {
     const auto at = [&](double nu) {

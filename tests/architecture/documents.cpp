@@ -32,9 +32,8 @@ TEST(Documents, the_examples_of_the_format_page_are_read) {
   const std::regex example("```csv ([a-z_0-9]+\\.csv)\n([^`]*)```");
   const test::TemporaryFolder folder;
   int n_examples = 0;
-  for (std::sregex_iterator at(page.begin(), page.end(), example), end; at != end; ++at, ++n_examples) {
+  for (std::sregex_iterator at(page.begin(), page.end(), example), end; at != end; ++at, ++n_examples)
     files::write_text(folder / (*at)[1], (*at)[2].str());
-  }
   EXPECT_EQ(n_examples, 8);
   EXPECT_EQ(files::read_cell(folder.path()).fibres.size(), 2u);
   EXPECT_EQ(files::read_displacement(folder / "displacement.csv").size(), 2u);

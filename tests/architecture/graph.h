@@ -84,7 +84,7 @@ inline Layout layout_of(const Graph& graph) {
     return rows[row].back();
   };
   for (const auto& [node, height] : level) layout.node[node] = add(layout.n_rows - 1 - height, true);
-  for (const auto& [from, to] : without_short_cuts(graph)) {
+  for (const auto& [from, to] : without_short_cuts(graph))
     for (const std::string& t : to) {
       std::vector<int> line = {layout.node.at(from)};
       const int last = layout.places[layout.node.at(t)].row;
@@ -92,15 +92,13 @@ inline Layout layout_of(const Graph& graph) {
       line.push_back(layout.node.at(t));
       layout.lines.push_back(line);
     }
-  }
   for (auto& row : rows) spread(layout, row);
   std::map<int, std::vector<int>> beside;
-  for (const auto& line : layout.lines) {
+  for (const auto& line : layout.lines)
     for (std::size_t i = 1; i < line.size(); ++i) {
       beside[line[i]].push_back(line[i - 1]);
       beside[line[i - 1]].push_back(line[i]);
     }
-  }
   for (int sweep = 0; sweep < 24; ++sweep) {  // each row in the order of the middle of its neighbours
     for (auto& row : rows) {
       std::map<int, double> middle;

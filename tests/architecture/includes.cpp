@@ -132,13 +132,12 @@ std::string node_of(const std::string& file) {
 
 std::vector<std::string> sources() {
   std::vector<std::string> found;
-  for (const char* top : {"pipeline", "segment", "network", "substrate", "mbtfm", "continuum", "samples"}) {
+  for (const char* top : {"pipeline", "segment", "network", "substrate", "mbtfm", "continuum", "samples"})
     for (const auto& entry : fs::recursive_directory_iterator(kRoot / top)) {
       const std::string extension = entry.path().extension();
       if (extension != ".h" && extension != ".cpp" && extension != ".inc") continue;
       found.push_back(fs::relative(entry.path(), kRoot).generic_string());
     }
-  }
   std::sort(found.begin(), found.end());
   return found;
 }
@@ -167,9 +166,8 @@ bool is_ours(const std::string& header) {
 }
 
 const std::set<std::string>* third_party_nodes(const std::string& header) {
-  for (const auto& [prefix, nodes] : kThirdParty) {
+  for (const auto& [prefix, nodes] : kThirdParty)
     if (header.starts_with(prefix)) return &nodes;
-  }
   return nullptr;
 }
 
@@ -193,30 +191,27 @@ TEST(Architecture, nodes_include_what_the_table_lets_them_and_no_more) {
   const Graph graph = graph_of_sources();
   for (const auto& [node, allowed] : kMayInclude) {
     ASSERT_TRUE(graph.contains(node)) << node << " has no source";
-    for (const std::string& to : allowed) {
+    for (const std::string& to : allowed)
       EXPECT_TRUE(graph.at(node).contains(to))
           << node << " does not include " << to << " any more: take it off the table";
-    }
   }
 }
 
 TEST(Architecture, the_table_has_no_cycle_and_no_stage_knows_another) {
   EXPECT_EQ(mbtfm::test::levels_of(kMayInclude).size(), kMayInclude.size()) << "a cycle";
   const std::set<std::string> stages = {"segment", "network", "substrate", "mbtfm", "samples"};
-  for (const auto& [node, allowed] : kMayInclude) {
+  for (const auto& [node, allowed] : kMayInclude)
     for (const std::string& to : allowed) {
       const bool is_above = top_of(node) == "mbtfm" || top_of(node) == "continuum" || top_of(node) == "samples";
       if (is_above || top_of(to) == top_of(node)) continue;
       EXPECT_EQ(top_of(to), "pipeline") << node << " knows " << to;
     }
-  }
 }
 
 TEST(Architecture, every_source_lies_in_a_node_or_belongs_to_a_program) {
-  for (const std::string& file : sources()) {
+  for (const std::string& file : sources())
     EXPECT_TRUE(node_of(file) != kPrograms || file.ends_with("_main.cpp"))
         << file << ": its folder is not in the table";
-  }
 }
 
 /// substrate/greens is the library substrate_greens.

@@ -54,7 +54,7 @@ std::vector<std::string> comparisons_in(const std::string& name, const std::stri
 
 std::map<std::string, std::vector<std::string>> comparisons() {
   std::map<std::string, std::vector<std::string>> found;
-  for (const char* top : {"pipeline", "segment", "network", "substrate", "continuum", "mbtfm", "samples"}) {
+  for (const char* top : {"pipeline", "segment", "network", "substrate", "continuum", "mbtfm", "samples"})
     for (const auto& entry : fs::recursive_directory_iterator(kRoot / top)) {
       const std::string extension = entry.path().extension();
       if (extension != ".h" && extension != ".cpp") continue;
@@ -62,7 +62,6 @@ std::map<std::string, std::vector<std::string>> comparisons() {
       const auto in_file = comparisons_in(name, text_of(entry.path()));
       if (!in_file.empty()) found[name] = in_file;
     }
-  }
   return found;
 }
 

@@ -71,9 +71,8 @@ double error_in_volume(const Field& field, const FieldUnderASurface& exact) {
 TEST(CurvedElement, has_the_stiffness_of_a_box_where_it_is_one) {
   const boxes::Box box{{1, -2, 3}, {4, 5, 2.5}};
   NodePositions nodes;
-  for (int k = 0; k < kNodes; ++k) {
+  for (int k = 0; k < kNodes; ++k)
     for (int i = 0; i < 3; ++i) nodes(i, k) = box.low_um[i] + unit_of_node(k)[i] * box.size_um[i];
-  }
   for (const double nu : {0.3, 0.4999}) {
     const Gel gel{10, nu, 50};
     const double mu = substrate::shear_modulus_kPa(gel), lambda = 2 * mu * nu / (1 - 2 * nu);
@@ -99,9 +98,8 @@ TEST(CurvedElement, holds_a_linear_field_without_force_on_its_inner_node) {
     const Eigen::VectorXd force =
         linear_stiffness(Element(nodes), 3, 100) * Eigen::Map<const Eigen::VectorXd>(u.data(), kUnknowns);
     EXPECT_LE(force.segment<3>(3 * 13).norm(), 1e-10 * force.norm());
-    for (int axis = 0; axis < 3; ++axis) {
+    for (int axis = 0; axis < 3; ++axis)
       EXPECT_NEAR(Eigen::Map<const NodeValues>(force.data()).row(axis).sum(), 0, 1e-11 * force.norm());
-    }
   }
 }
 
@@ -188,9 +186,8 @@ TEST(Shell, vector_harmonics_displace_it_as_they_must) {
       }
       return sum;
     };
-    for (int row = 0; row < modes.n_rows(); ++row) {
+    for (int row = 0; row < modes.n_rows(); ++row)
       if (modes.text(row, "case") == name) radii << modes.number(row, "inner_um"), modes.number(row, "outer_um");
-    }
     const test::CubedSphere sphere(radii[0], radii[1], 8, name == "3" ? 3 : 6);
     const Space space(sphere.mesh, 2);
     EXPECT_LE(space.n_unknowns(), 100000);
@@ -265,9 +262,8 @@ TEST(FlatSurface, is_displaced_as_a_layer) {
     return of.response({ellipses, 3}, {points, substrate::Components::all})->matrix();
   };
   const Eigen::MatrixXd exact = matrix(*gel_of(gel, "layer")), found = matrix(*model);
-  for (Eigen::Index column = 0; column < exact.cols(); ++column) {
+  for (Eigen::Index column = 0; column < exact.cols(); ++column)
     EXPECT_LE((found.col(column) - exact.col(column)).norm(), 0.015 * exact.col(column).norm()) << column;
-  }
   EXPECT_GT(model->stated_error(), 0);
   EXPECT_GE(model->stated_error(), 0.5 * (found - exact).norm() / exact.norm());
   EXPECT_LE(model->stated_error(), 2 * (found - exact).norm() / exact.norm());
@@ -330,12 +326,10 @@ TEST(AnEllipse, pulls_at_the_centre_of_the_area_that_it_covers_of_the_slope) {
 
 TEST(TractionsOfASurfaceMesh, pull_back_exactly_as_they_displace_and_add_up_to_the_force_of_an_even_one) {
   substrate::SurfaceMesh mesh;
-  for (int j = 0; j < 4; ++j) {
+  for (int j = 0; j < 4; ++j)
     for (int i = 0; i < 4; ++i) mesh.points_um.push_back({4.0 * i - 6, 3.0 * j - 4.5});
-  }
-  for (int j = 0; j < 3; ++j) {
+  for (int j = 0; j < 3; ++j)
     for (int i = 0; i < 3; ++i) mesh.faces.push_back({4 * j + i, 4 * j + i + 1, 4 * j + i + 5, 4 * j + i + 4});
-  }
   const std::vector<Vec3> points = {{1, 2, 3}, {-8, 4, 19}, {0, 0, 0.2}, {5, -5, 8}};
   const Gel gel{10, 0.49, 25};
   const auto model = gel_of(gel, "curved");

@@ -112,11 +112,9 @@ TEST(LargeStrain, coarse_elements_give_the_change_within_what_is_stated) {
   const VectorXd coarse = LargeStrain(kGel, s.ellipses, s.beads, forces, 2).about(forces).displacement_um,
                  fine = LargeStrain(kGel, s.ellipses, s.beads, forces, 2, 4).about(forces).displacement_um;
   VectorXd away = VectorXd::Ones(fine.size());
-  for (std::size_t b = 0; b < s.beads.size(); ++b) {
-    for (const Ellipse& e : s.ellipses) {
+  for (std::size_t b = 0; b < s.beads.size(); ++b)
+    for (const Ellipse& e : s.ellipses)
       if (norm(s.beads[b] - e.centre_um) < 2 * e.semi_major_um) away.segment<2>(2 * static_cast<Index>(b)).setZero();
-    }
-  }
   const double off = (coarse - fine).norm() / fine.norm(),
                off_there = away.cwiseProduct(coarse - fine).norm() / away.cwiseProduct(fine).norm();
   RecordProperty("elements", brief(off) + " " + brief(off_there));

@@ -48,9 +48,8 @@ TEST(NeoHooke, has_the_stresses_of_the_closed_forms_in_even_states) {
     // that of the file has 12 digits, too few where kappa is large: the same one, with all digits
     double lateral = at("lateral_stretch");
     if (name == "uniaxial" || name == "equibiaxial") {
-      for (int step = 0; step < 3; ++step) {
+      for (int step = 0; step < 3; ++step)
         lateral -= free_kPa(lateral) * 2e-7 / (free_kPa(lateral + 1e-7) - free_kPa(lateral - 1e-7));
-      }
       EXPECT_NEAR(lateral, at("lateral_stretch"), 1e-11);
     }
     const Matrix3d F = state(lateral);
@@ -104,9 +103,8 @@ TEST(NeoHooke, an_even_state_is_exact_in_bent_cells) {
   const LargeSolution solution = solve_neo_hooke(
       gel, space, {.traction_kPa = [&](const Vector3d&, const Vector3d& n) -> Vector3d { return P * n; }, .held_um = u},
       1, kTwoThreads);
-  for (std::size_t k = 0; k < block.mesh().position_um.size(); ++k) {
+  for (std::size_t k = 0; k < block.mesh().position_um.size(); ++k)
     EXPECT_LE((solution.state.at_nodes_um[k] - u(block.mesh().position_um[k])).norm(), 1e-8);
-  }
   const Matrix3d cauchy = P * F.transpose() / F.determinant();
   const auto field = volume_field(space, solution.state.at_nodes_um, large_stress(gel, solution.state));
   EXPECT_EQ(field.stress_kPa.size(), 8u * block.mesh().n_cells());

@@ -22,9 +22,8 @@ SubstrateParameters refined_to(double tolerance) {
 }
 
 double reported_error(const Substrate& model) {
-  for (const auto& [name, value] : model.figures()) {
+  for (const auto& [name, value] : model.figures())
     if (name == "substrate_estimated_error") return std::get<double>(value);
-  }
   ADD_FAILURE() << "no error reported";
   return 0;
 }
@@ -70,12 +69,11 @@ TEST(LayeredGel, of_one_modulus_is_the_layer) {
 Eigen::MatrixXd compliance(const test::LayeredGel& gel, const std::vector<Vec2>& points,
                            const std::vector<Ellipse>& ellipses) {
   Eigen::MatrixXd matrix(2 * points.size(), 2 * ellipses.size());
-  for (std::size_t j = 0; j < ellipses.size(); ++j) {
+  for (std::size_t j = 0; j < ellipses.size(); ++j)
     for (std::size_t i = 0; i < points.size(); ++i) {
       const greens::Sym2 g = gel.compliance_um_per_nN(ellipses[j], points[i]);
       matrix.block<2, 2>(2 * i, 2 * j) << g.xx, g.xy, g.xy, g.yy;
     }
-  }
   return matrix;
 }
 
@@ -153,14 +151,13 @@ TEST(Refined, turns_mirrors_scales_and_superposes_with_the_scene) {
   // solved to rounding times the condition: 1e4 nodes and lambda / mu = 50
   const double tiny = 1e-9 * before.cwiseAbs().maxCoeff();
   EXPECT_LT((3 * scaled - before).cwiseAbs().maxCoeff(), tiny);
-  for (Eigen::Index i = 0; i < before.rows(); i += 2) {
+  for (Eigen::Index i = 0; i < before.rows(); i += 2)
     for (Eigen::Index j = 0; j < before.cols(); j += 2) {
       EXPECT_NEAR(after(i, j), before(i + 1, j + 1), tiny);
       EXPECT_NEAR(after(i + 1, j), -before(i, j + 1), tiny);
       EXPECT_NEAR(across(i, j), before(i, j), tiny);
       EXPECT_NEAR(across(i + 1, j), -before(i + 1, j), tiny);
     }
-  }
   const auto sum = model->displacements_um(scene.points, scene.ellipses, {{1, 2}, {-3, 0.5}});
   const Eigen::VectorXd expected = before * Eigen::Vector4d(1, 2, -3, 0.5);
   for (std::size_t i = 0; i < sum.size(); ++i) {
@@ -175,11 +172,10 @@ TEST(Refined, is_the_same_for_any_number_of_threads) {
     const Gel gel = gel_of(nu, 15);
     const Eigen::MatrixXd one =
         choice::make_substrate(gel, refined_to(0.03), 1)->compliance_um_per_nN(scene.points, scene.ellipses);
-    for (const int threads : {2, 4}) {
+    for (const int threads : {2, 4})
       EXPECT_TRUE(
           one ==
           choice::make_substrate(gel, refined_to(0.03), threads)->compliance_um_per_nN(scene.points, scene.ellipses));
-    }
   }
 }
 
@@ -189,9 +185,8 @@ TEST(Refined, is_reciprocal_between_two_loaded_ellipses) {
   const std::vector<Ellipse> pair = {{{0, 0}, 1.5, 0.6, 0.3}, {{4, 1.5}, 1.2, 0.8, 2}};
   std::vector<Vec2> points;
   const std::size_t n = ellipse_rule(pair[0], 39).size();
-  for (const Ellipse& ellipse : pair) {
+  for (const Ellipse& ellipse : pair)
     for (const DiscPoint& p : ellipse_rule(ellipse, 39)) points.push_back(ellipse.centre_um + p.position);
-  }
   const Eigen::MatrixXd g =
       choice::make_substrate(gel_of(0.49, 10), refined_to(0), 2)->compliance_um_per_nN(points, pair);
   Eigen::Matrix2d mean[2] = {Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Zero()};

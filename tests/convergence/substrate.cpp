@@ -57,8 +57,8 @@ TEST(EllipseLoad, pieces_cut_by_a_grid_add_up_to_the_ellipse) {
     double sum = 0;
     Vec2 first;
     greens::Sym2 second;
-    for (double y = -4; y < 4; y += 0.25) {
-      for (double x = -4; x < 4; x += 0.25) {
+    for (double y = -4; y < 4; y += 0.25)
+      for (double x = -4; x < 4; x += 0.25)
         for (const DiscPoint& p : boxes::clipped_ellipse_rule(ellipse, {{x, y}, {x + 0.25, y + 0.25}})) {
           EXPECT_GE(p.weight, 0);
           const Vec2 offset = p.position - ellipse.centre_um;
@@ -66,8 +66,6 @@ TEST(EllipseLoad, pieces_cut_by_a_grid_add_up_to_the_ellipse) {
           first += p.weight * offset;
           second += p.weight * greens::Sym2{offset.x * offset.x, offset.x * offset.y, offset.y * offset.y};
         }
-      }
-    }
     // of an even ellipse: 1, 0 and a²/4 along, b²/4 across
     const double c = std::cos(ellipse.angle_rad), s = std::sin(ellipse.angle_rad);
     const double a2 = ellipse.semi_major_um * ellipse.semi_major_um / 4;
@@ -104,9 +102,8 @@ TEST(ElasticSystem, the_base_bears_the_whole_load) {
         },
         [&](int, const numerics::NodalColumn& u) {
           Eigen::VectorXd values(system.n_unknowns());
-          for (Eigen::Index k = 0; k < values.size(); ++k) {
+          for (Eigen::Index k = 0; k < values.size(); ++k)
             values[k] = u(static_cast<int>(k / 3), static_cast<int>(k % 3));
-          }
           const Eigen::VectorXd on_base = system.bottom_stiffness().transpose() * values;
           for (Eigen::Index k = 0; k < on_base.size(); ++k) reaction[k % 3] += on_base[k];
         });

@@ -198,9 +198,8 @@ TEST(Chain, tensions_of_the_oracle_cells_come_back_from_the_displacement_of_thei
     const fs::path cell = folder / "cell";
     fs::copy(reference / name, cell, fs::copy_options::recursive);
     fs::permissions(cell, fs::perms::owner_write, fs::perm_options::add);
-    for (const auto& entry : fs::recursive_directory_iterator(cell)) {
+    for (const auto& entry : fs::recursive_directory_iterator(cell))
       fs::permissions(entry, fs::perms::owner_write, fs::perm_options::add);
-    }
     recompute_displacement(cell);
     const std::string run = output_of("mbtfm run " + cell.string());
     EXPECT_NE(run.find("given"), std::string::npos) << "segmentation and tracking are skipped: " << run;

@@ -90,9 +90,8 @@ TEST(CurvedGels, every_command_runs) {
 std::vector<fs::path> pages() {
   std::vector<fs::path> list = {kProject / "README.md", kProject / "CONTRIBUTING.md", kProject / "python/README.md",
                                 kProject / "samples/README.md"};
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kDocs)) {
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kDocs))
     if (entry.path().extension() == ".md") list.push_back(entry.path());
-  }
   std::sort(list.begin(), list.end());
   return list;
 }

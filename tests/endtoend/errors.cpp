@@ -34,13 +34,10 @@ class Errors : public ::testing::Test {
   /// Run the cell, expect this code and these words, and that no output was left in `folder`.
   void expect_error(int code, const std::vector<std::string>& words, const std::string& folder) const {
     const std::string outcome = output_of("mbtfm run " + cell_.string(), code);
-    for (const std::string& word : words) {
+    for (const std::string& word : words)
       EXPECT_NE(outcome.find(word), std::string::npos) << "'" << word << "' is not in: " << outcome;
-    }
     if (!fs::exists(cell_ / folder)) return;
-    for (const auto& entry : fs::directory_iterator(cell_ / folder)) {
-      ADD_FAILURE() << "left behind: " << entry.path();
-    }
+    for (const auto& entry : fs::directory_iterator(cell_ / folder)) ADD_FAILURE() << "left behind: " << entry.path();
   }
 
   TemporaryFolder folder_;
@@ -164,9 +161,8 @@ TEST_F(Errors, not_a_number_in_a_table_names_file_line_and_column) {
 
 TEST_F(Errors, an_adhesion_outside_the_outline_is_named) {
   fs::create_directory(cell_ / "1_segment");
-  for (const char* file : {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv"}) {
+  for (const char* file : {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv"})
     fs::copy(cell_ / "truth" / file, cell_ / "1_segment" / file);
-  }
   auto adhesions = files::read_adhesions(cell_ / "1_segment/adhesions.csv");
   adhesions.push_back(adhesions.front());
   adhesions.back().adhesion_id = 77;
@@ -250,23 +246,21 @@ TEST_F(Errors, check_knows_channels_that_are_exchanged_blur_few_beads_and_a_cell
     images::write_tiff(cell_ / name, image);
   };
   // only patches keep their beads
-  for (const char* name : {"beads_relaxed.tif", "beads_stressed.tif"}) {
+  for (const char* name : {"beads_relaxed.tif", "beads_stressed.tif"})
     changed(name, [](images::Image& image) {
       const float dark = *std::ranges::min_element(image.pixels);
       for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x)
           if (x % 256 > 40 || y % 256 > 40) image.pixels[static_cast<std::size_t>(y * image.width + x)] = dark;
     });
-  }
   EXPECT_NE(said().find("um apart (limit 3 um)"), std::string::npos) << said();
-  for (const char* name : {"paxillin.tif", "actin.tif"}) {
+  for (const char* name : {"paxillin.tif", "actin.tif"})
     changed(name, [](images::Image& image) {  // moved to the left border
       for (int y = 0; y < image.height; ++y) {
         const auto row = image.pixels.begin() + static_cast<std::ptrdiff_t>(y) * image.width;
         std::rotate(row, row + image.width / 5, row + image.width);
       }
     });
-  }
   EXPECT_NE(said().find("of the image's border (limit 5 um)"), std::string::npos) << said();
 }
 

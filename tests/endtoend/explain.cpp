@@ -50,9 +50,8 @@ class Explained : public ::testing::TestWithParam<int> {
   std::map<std::string, std::map<int, double>> stated() const {
     const files::CsvTable table(cell() / "4_fit/effects_left_out.csv");
     std::map<std::string, std::map<int, double>> result;
-    for (int row = 0; row < table.n_rows(); ++row) {
+    for (int row = 0; row < table.n_rows(); ++row)
       result[table.text(row, "effect")][table.integer(row, "fibre_id", 0)] = table.number(row, "change_nN");
-    }
     return result;
   }
 
@@ -114,9 +113,7 @@ TEST_P(Explained, a_graded_gel_changes_the_tensions_by_no_more_than_stated) {
   switches["depth_graded_gel"] = "on";
   const std::vector<Tension> with = run(switches);
   double squares = 0;
-  for (std::size_t i = 1; i < with.size(); ++i) {
-    squares += std::pow(with[i].tension_nN - without[i].tension_nN, 2);
-  }
+  for (std::size_t i = 1; i < with.size(); ++i) squares += std::pow(with[i].tension_nN - without[i].tension_nN, 2);
   EXPECT_GT(squares, 0);
   EXPECT_LE(std::sqrt(squares), bound * size_of(without));
 }

@@ -48,9 +48,8 @@ std::map<std::string, Measured> measured_in(const fs::path& table) {
     std::getline(fields, field, '|');
     m.length = std::stod(field);
     fields >> m.corner_px.x >> m.corner_px.y >> m.size_px.x >> m.size_px.y;
-    for (std::string point; fields >> point;) {
+    for (std::string point; fields >> point;)
       m.points_px.push_back({std::stod(point), std::stod(point.substr(point.find(',') + 1))});
-    }
     m.shoelace = std::abs(signed_area_um2(m.points_px));
   }
   return result;
@@ -123,9 +122,8 @@ TEST(ImageJ, it_measures_the_areas_and_lengths_of_the_set_that_the_segmentation_
     EXPECT_NEAR(m.length, length_px, 1e-4 * length_px);
     EXPECT_EQ(m.type, "polyline");
     ASSERT_EQ(m.points_px.size(), f.points_um.size());
-    for (std::size_t i = 0; i < f.points_um.size(); ++i) {
+    for (std::size_t i = 0; i < f.points_um.size(); ++i)
       EXPECT_NEAR(norm(pixel_um * (m.points_px[i] + Vec2{0.5, 0.5}) - f.points_um[i]), 0, 1e-4);
-    }
   }
 }
 
@@ -217,9 +215,8 @@ TEST(ImageJ, a_hyperstack_it_saves_is_read_by_channel_slice_and_frame) {
     const fs::path file = folder / (std::string(bits) + ".tif");
     run_macro(folder.path(), "newImage('h', '" + std::string(bits) + R"(-bit grayscale-mode', 20, 10, 2, 3, 4);
 run("Properties...", "channels=2 slices=3 frames=4 unit=micron pixel_width=0.125 pixel_height=0.125 voxel_depth=1");
-for (c = 1; c <= 2; c++) for (z = 1; z <= 3; z++) for (t = 1; t <= 4; t++) {
+for (c = 1; c <= 2; c++) for (z = 1; z <= 3; z++) for (t = 1; t <= 4; t++)
   Stack.setPosition(c, z, t); run("Set...", "value=" + (100 * (c - 1) + 10 * z + t) + " slice");
-}
 saveAs("Tiff", ")" + file.string() +
                                  R"(");)");
     for (int c = 1; c <= 2; ++c)

@@ -76,9 +76,8 @@ TEST_F(Pages, open_without_network_and_without_a_word_in_the_console) {
   for (const auto& page : {cell_page(), study_page()}) {
     Browser& browser = opened(page);
     EXPECT_EQ(browser.console(), std::vector<std::string>{}) << page;
-    for (const std::string& address : browser.requests()) {
+    for (const std::string& address : browser.requests())
       EXPECT_TRUE(address.starts_with("file://") || address.starts_with("data:")) << address.substr(0, 100);
-    }
   }
 }
 

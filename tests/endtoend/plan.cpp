@@ -31,9 +31,8 @@ TEST(Plan, a_question_is_answered_with_a_sentence_tables_a_picture_and_a_page) {
 
 TEST(Plan, the_same_question_has_the_same_answer_for_any_number_of_threads) {
   const test::TemporaryFolder folder;
-  for (const char* threads : {"1", "2"}) {
+  for (const char* threads : {"1", "2"})
     output_of(kSmall + "--drawn 1 --threads " + threads + " --out " + (folder / threads).string());
-  }
   for (const char* file : {"plan.csv", "plan_drawn.csv", "plan.html"})
     EXPECT_EQ(files::read_text(folder / "1" / file), files::read_text(folder / "2" / file)) << file;
 }

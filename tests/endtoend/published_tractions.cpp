@@ -57,15 +57,13 @@ TEST(OthersData, tractions_of_a_monolayer_are_those_of_the_program_that_publishe
   if (!fs::exists(folder)) GTEST_SKIP() << "no ../shared/data here";
   for (const char* frame : {"1", "2"}) {
     TractionInputs inputs{.gel = {.youngs_modulus_kPa = 15, .poisson_ratio = 0.499999, .thickness_um = 1e6}};
-    for (const auto& row : read_rows(folder / ("PIV" + std::string(frame) + ".txt"), 4)) {
+    for (const auto& row : read_rows(folder / ("PIV" + std::string(frame) + ".txt"), 4))
       inputs.beads.push_back({.position_um = {0.64 * row[0], 0.64 * row[1]},
                               .displacement_um = {0.64 * row[2], 0.64 * row[3]},
                               .sigma_um = 0});
-    }
     std::vector<Vec2> published;
-    for (const auto& row : read_rows(folder / ("Traction_PIV" + std::string(frame) + ".txt"), 5)) {
+    for (const auto& row : read_rows(folder / ("Traction_PIV" + std::string(frame) + ".txt"), 5))
       published.push_back({row[2] / 1000, row[3] / 1000});
-    }
     TractionParameters parameters;
     parameters.gel_model = GelModel::half_space;
     parameters.padding = 1;
@@ -95,11 +93,10 @@ TEST(OthersData, discs_of_a_synthetic_cell_carry_their_tractions) {
   constexpr double kPixel_um = 0.1;
   TractionInputs inputs{.gel = {.youngs_modulus_kPa = 10, .poisson_ratio = 0.3, .thickness_um = 1e6}};
   const files::CsvTable field(folder / "converted_frame1.csv");
-  for (int row = 0; row < field.n_rows(); ++row) {
+  for (int row = 0; row < field.n_rows(); ++row)
     inputs.beads.push_back({.position_um = kPixel_um * Vec2{field.number(row, "x_px"), field.number(row, "y_px")},
                             .displacement_um = kPixel_um * Vec2{field.number(row, "u_px"), field.number(row, "v_px")},
                             .sigma_um = 0});
-  }
   const files::CsvTable discs(folder / "derived_discs_frame1.csv");
   for (int row = 0; row < discs.n_rows(); ++row) {
     const double radius = kPixel_um * discs.number(row, "radius_px");
@@ -200,7 +197,7 @@ Colony read_colony(const fs::path& folder, const std::string& name) {
   const std::vector<bool> force_area = enclosed(mask, 1), cells = enclosed(mask, 3);
   colony.area_um2 =
       kCameraPixel_um * kCameraPixel_um * static_cast<double>(std::count(cells.begin(), cells.end(), true));
-  for (int j = 0; j < u.n_rows; ++j) {
+  for (int j = 0; j < u.n_rows; ++j)
     for (int i = 0; i < u.n_columns; ++i) {
       const auto at = static_cast<std::size_t>(j * u.n_columns + i);
       colony.inputs.beads.push_back({.position_um = colony.step_um * Vec2{i + 0.5, j + 0.5},
@@ -211,7 +208,6 @@ Colony read_colony(const fs::path& folder, const std::string& name) {
       const int y = static_cast<int>((j + 0.5) * mask.height / u.n_rows);
       colony.is_on_colony.push_back(force_area[static_cast<std::size_t>(y) * mask.width + x]);
     }
-  }
   return colony;
 }
 
@@ -268,12 +264,11 @@ TEST(OthersData, tractions_of_colonies_are_those_of_the_program_that_published_t
     // forgotten.
     std::vector<Vec2> inside, inside_published;
     constexpr int kRim = 20;
-    for (int j = kRim; j < colony.n_rows - kRim; ++j) {
+    for (int j = kRim; j < colony.n_rows - kRim; ++j)
       for (int i = kRim; i < colony.n_columns - kRim; ++i) {
         inside.push_back(same[static_cast<std::size_t>(j * colony.n_columns + i)]);
         inside_published.push_back(colony.published_kPa[static_cast<std::size_t>(j * colony.n_columns + i)]);
       }
-    }
     const Comparison whole = compare(same, colony.published_kPa), inner = compare(inside, inside_published);
     const ColonySums sums = sums_over(colony, same), theirs = sums_over(colony, colony.published_kPa);
     const Reconstruction own = reconstruct(colony.inputs, {}, 2);

@@ -71,9 +71,8 @@ TEST_F(Segment, binned_images_show_the_same_cell_at_the_same_place) {
   for (std::size_t i = 0; i < fine.outline_um.size(); ++i)
     EXPECT_LT(norm(coarse.outline_um[i] - fine.outline_um[i]), 0.01 * step_um);
   int n_there = 0;
-  for (const Adhesion& a : fine.adhesions) {
+  for (const Adhesion& a : fine.adhesions)
     for (const Adhesion& b : coarse.adhesions) n_there += norm(a.position_um - b.position_um) < step_um;
-  }
   EXPECT_GE(n_there, 0.9 * static_cast<double>(fine.adhesions.size()));
   const std::vector<rois::Roi> again = rois::read_rois(folder_ / "binned/RoiSet.zip");
   EXPECT_LT(norm(again.front().points_px[0] - rois.front().points_px[0]), 0.01);

@@ -263,7 +263,7 @@ TEST_F(Sheet, one_that_expands_or_has_the_stiffness_of_a_bound_is_doubted) {
   std::normal_distribution<double> noise(0, 0.01);
   const auto fitted = [&](const std::function<double(double)>& outward_um) {
     DisplacementField beads;
-    for (int i = -20; i <= 20; ++i) {
+    for (int i = -20; i <= 20; ++i)
       for (int j = -20; j <= 20; ++j) {
         const Vec2 at{2.0 * i, 2.0 * j};
         const double r = norm(at), x = noise(random), y = noise(random);
@@ -271,7 +271,6 @@ TEST_F(Sheet, one_that_expands_or_has_the_stiffness_of_a_bound_is_doubted) {
                          .displacement_um = (r > 0 ? outward_um(r) / r : 0) * at + Vec2{x, y},
                          .sigma_um = 0.01});
       }
-    }
     files::write_displacement(folder_ / "displacement.csv", beads);
     test::output_of(
         run("[gel]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.49\nthickness_um = 60\n[sheet]\npoisson_ratio = 0.3\n"
@@ -573,7 +572,7 @@ TEST(SheetStudies, a_known_difference_of_contraction_is_found_and_the_tables_agr
     return outcome;
   };
   int seed = 0;
-  for (const auto& [condition, list] : contractions) {
+  for (const auto& [condition, list] : contractions)
     for (const double contraction : list) {
       const std::string name = condition + "/" + std::to_string(++seed);
       const auto cell = folder / name;
@@ -586,7 +585,6 @@ TEST(SheetStudies, a_known_difference_of_contraction_is_found_and_the_tables_agr
       truth_of[name] = files::CsvTable(cell / "truth/sheet.csv").number(0, "value");
       mean_of[condition] += truth_of[name] / static_cast<double>(list.size());
     }
-  }
   const std::string study = folder.path().string();
   done("mbtfm batch " + study + " --quiet --jobs 2 --threads 2");
   EXPECT_NE(done("mbtfm stats " + study + " --condition-from folder").find("8 sheets; 0 cells left out"),

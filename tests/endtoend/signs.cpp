@@ -23,12 +23,11 @@ Vec2 displacement_um(Vec2 p) {
 
 void add_spot(images::Image& image, Vec2 p_um) {
   const double x = p_um.x / kPixel_um - 0.5, y = p_um.y / kPixel_um - 0.5, sigma = 1.4;
-  for (int row = std::max(0, int(y) - 6); row < std::min(kSize_px, int(y) + 8); ++row) {
+  for (int row = std::max(0, int(y) - 6); row < std::min(kSize_px, int(y) + 8); ++row)
     for (int column = std::max(0, int(x) - 6); column < std::min(kSize_px, int(x) + 8); ++column) {
       const double squared = (column - x) * (column - x) + (row - y) * (row - y);
       image.at(column, row) += static_cast<float>(3000 * std::exp(-squared / (2 * sigma * sigma)));
     }
-  }
 }
 
 void write_bead_images(const fs::path& cell) {
@@ -47,9 +46,8 @@ void write_bead_images(const fs::path& cell) {
     add_spot(relaxed, p);
     add_spot(stressed, p + displacement_um(p));
   }
-  for (images::Image* image : {&relaxed, &stressed}) {
+  for (images::Image* image : {&relaxed, &stressed})
     for (float& value : image->pixels) value += noise(random);
-  }
   images::write_tiff(cell / "beads_relaxed.tif", relaxed);
   images::write_tiff(cell / "beads_stressed.tif", stressed);
 }

@@ -46,7 +46,7 @@ TEST_F(SubstrateProgram, displaces_points_by_forces_and_by_the_same_force_as_tra
   // the disc as squares of 0.1 um: those whose centres it holds
   std::string rows = "x_um,y_um,tx_kPa,ty_kPa\n";
   int n = 0;
-  for (int j = -12; j < 12; ++j) {
+  for (int j = -12; j < 12; ++j)
     for (int i = -12; i < 12; ++i) {
       const double x = 0.1 * (i + 0.5), y = 0.1 * (j + 0.5);
       const bool is_inside = std::hypot(x, y) < 1;
@@ -54,7 +54,6 @@ TEST_F(SubstrateProgram, displaces_points_by_forces_and_by_the_same_force_as_tra
       rows +=
           shortest(20 + x) + "," + shortest(20 + y) + (is_inside ? ",0.954929658551372,0.318309886183791\n" : ",0,0\n");
     }
-  }
   write("traction.csv", rows);
   ASSERT_EQ(run("--traction " + file("traction.csv") + " " + at_points + file("b.csv")).code, 0);
   const DisplacementField a = files::read_displacement(file("a.csv")), b = files::read_displacement(file("b.csv"));
@@ -202,9 +201,8 @@ TEST_F(SubstrateProgram, takes_large_strains_where_the_material_and_the_traction
   const auto displaced = [&](const std::string& name) {
     std::vector<double> numbers;
     const files::CsvTable table(file(name));
-    for (int row = 0; row < table.n_rows(); ++row) {
+    for (int row = 0; row < table.n_rows(); ++row)
       for (const char* column : {"ux_um", "uy_um", "uz_um"}) numbers.push_back(table.number(row, column));
-    }
     return numbers;
   };
   const auto apart = [&](const std::string& a, double times, const std::string& b) {

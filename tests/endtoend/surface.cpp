@@ -29,9 +29,8 @@ class Surface : public testing::Test {
   template <class Z>
   std::string table(double half_um, const Z& z) const {
     std::string text = "x_um,y_um,z_um\n";
-    for (double y = -half_um; y <= half_um; ++y) {
+    for (double y = -half_um; y <= half_um; ++y)
       for (double x = -half_um; x <= half_um; ++x) text += brief(x) + "," + brief(y) + "," + z(Vec2{x, y}) + "\n";
-    }
     return text;
   }
   double largest_error(const HeightMap& map, double rim_um = 0) const {
@@ -242,10 +241,9 @@ TEST_F(Gel, whose_surface_is_not_flat_is_computed_by_the_model_that_has_it) {
 TEST_F(Gel, carries_a_lattice_of_tractions_on_its_surface) {
   ASSERT_EQ(run("--formula 'wave amplitude_um=4 period_um=40' --spacing_um 1" + kSquare).code, 0);
   std::string tractions = "x_um,y_um,tx_kPa,ty_kPa,tz_kPa\n";
-  for (double y = -16; y <= 16; y += 4) {
+  for (double y = -16; y <= 16; y += 4)
     for (double x = -16; x <= 16; x += 4)
       tractions += brief(x) + "," + brief(y) + "," + brief(std::exp(-(x * x + y * y) / 50)) + ",0,0.2\n";
-  }
   write("tractions.csv", tractions);
   const std::string gel = "mbtfm-substrate --quiet --displacement_tolerance 0.1 --gel " + file("gel.toml") +
                           " --surface " + file("surface.vtp") + " --traction " + file("tractions.csv");

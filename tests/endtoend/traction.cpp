@@ -38,9 +38,8 @@ TEST(TractionProgram, writes_what_it_says_for_every_method) {
     for (const char* ending : {".vtp", ".json"})
       EXPECT_TRUE(fs::exists(folder / (method + ending))) << method << ending;
     const bool has_scan = method != "sparse" && method != "adhesion-forces";
-    for (const char* ending : {"_lambda.csv", "_lambda.svg"}) {
+    for (const char* ending : {"_lambda.csv", "_lambda.svg"})
       EXPECT_EQ(fs::exists(folder / (method + ending)), has_scan) << method << ending;
-    }
   }
 }
 
@@ -88,9 +87,8 @@ TEST(TractionProgram, takes_a_field_without_errors_and_says_which_it_assumed) {
   constexpr double kNoise = 0.05;
   const test::EllipseScene scene = test::ellipse_scene(48, kNoise);
   files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
-  for (const Bead& b : scene.field) {
+  for (const Bead& b : scene.field)
     csv.add(b.position_um.x).add(b.position_um.y).add(b.displacement_um.x).add(b.displacement_um.y).end_row();
-  }
   files::write_text(folder / "displacement.csv", csv.str());
   const auto run = [&](const std::string& more) {
     return test::run_program("mbtfm-traction --youngs_modulus_kPa 8.4 --displacement " +

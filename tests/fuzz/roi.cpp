@@ -45,9 +45,8 @@ std::vector<std::string> samples(const fs::path& folder) {
   result.push_back(bytes_of(folder / "set.zip"));
   const fs::path shared = test::source_folder().parent_path() / "shared/data/roi";
   if (!fs::exists(shared)) return result;
-  for (const auto& entry : fs::recursive_directory_iterator(shared)) {
+  for (const auto& entry : fs::recursive_directory_iterator(shared))
     if (entry.path().extension() == ".roi") result.push_back(bytes_of(entry.path()));
-  }
   return result;
 }
 
@@ -75,7 +74,7 @@ TEST(RoiFuzz, a_truncated_set_or_geometry_is_an_input_error_at_every_length) {
 TEST(RoiFuzz, changed_bytes_never_crash_the_reader) {
   const test::TemporaryFolder folder;
   std::mt19937 random(5);
-  for (const std::string& whole : samples(folder.path())) {
+  for (const std::string& whole : samples(folder.path()))
     for (int round = 0; round < 150; ++round) {
       std::string changed = whole;
       const std::size_t n_changes = 1 + random() % 4;
@@ -85,7 +84,6 @@ TEST(RoiFuzz, changed_bytes_never_crash_the_reader) {
       write(folder / "changed", changed);
       is_read(folder / "changed");
     }
-  }
 }
 
 TEST(RoiFuzz, counts_beyond_the_bytes_take_no_memory) {

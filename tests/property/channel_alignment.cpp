@@ -96,12 +96,10 @@ TEST(ChannelAlignment, fibres_of_a_shifted_channel_are_tied_as_if_it_were_not) {
   };
   images::Channel shifted = cell.adhesion;
   constexpr int kRight = 4, kDown = -3;
-  for (int j = 0; j < shifted.image.height; ++j) {
-    for (int i = 0; i < shifted.image.width; ++i) {
+  for (int j = 0; j < shifted.image.height; ++j)
+    for (int i = 0; i < shifted.image.width; ++i)
       shifted.image.at(i, j) = cell.adhesion.image.at(std::clamp(i - kRight, 0, shifted.image.width - 1),
                                                       std::clamp(j - kDown, 0, shifted.image.height - 1));
-    }
-  }
   SegmentParameters parameters;
   parameters.pixel_size_um = 0.1;
   const Segmentation still = segment_cell(cell.adhesion, cell.actin, parameters);

@@ -80,10 +80,9 @@ TEST(CutCells, tensions_forces_and_the_force_through_the_cut_are_found_within_th
                           tensions::interval_95(e).high - e.value;
     }
     double total_nN = 0;
-    for (const Adhesion& a : s.cut.cell.adhesions) {
+    for (const Adhesion& a : s.cut.cell.adhesions)
       total_nN += s.cut.share_inside.at(a.adhesion_id) *
                   norm(std::ranges::find(s.experiment.forces, a.adhesion_id, &AdhesionForce::adhesion_id)->force_nN);
-    }
     of_totals += (found.fit.total_force_nN.value - total_nN) / found.fit.total_force_nN.standard_error;
     const tensions::CutForce& c = *found.fit.cut;
     squares += std::pow((c.x_nN.value - s.cut.outside_nN.x) / c.x_nN.standard_error, 2) +

@@ -18,9 +18,8 @@ constexpr int kSeeds = 8;
 /// Cells of seeds 1 … kSeeds, drawn once for all tests.
 const drawing::DrawnCell& cell_of_seed(int seed) {
   static std::vector<drawing::DrawnCell> cells;
-  for (int next = static_cast<int>(cells.size()) + 1; next <= seed; ++next) {
+  for (int next = static_cast<int>(cells.size()) + 1; next <= seed; ++next)
     cells.push_back(drawing::draw_cell({}, {}, kField_um, next));
-  }
   return cells[seed - 1];
 }
 
@@ -58,17 +57,14 @@ TEST(DrawnCell, keeps_adhesions_inside_the_outline_and_apart) {
     const Cell& cell = cell_of_seed(seed).cell;
     EXPECT_GT(signed_area_um2(cell.outline_um), 0) << "the outline turns the wrong way";
     for (std::size_t i = 0; i < cell.adhesions.size(); ++i) {
-      for (const Vec2 point : drawing::ellipse_points(cell.adhesions[i], 0)) {
+      for (const Vec2 point : drawing::ellipse_points(cell.adhesions[i], 0))
         EXPECT_TRUE(contains(cell.outline_um, point)) << "adhesion " << cell.adhesions[i].adhesion_id;
-      }
-      for (std::size_t j = 0; j < i; ++j) {
+      for (std::size_t j = 0; j < i; ++j)
         EXPECT_FALSE(drawing::too_near(cell.adhesions[i], cell.adhesions[j], p.adhesion_clearance_um))
             << "adhesions " << i + 1 << " and " << j + 1;
-      }
     }
-    for (const Fibre& f : cell.fibres) {
+    for (const Fibre& f : cell.fibres)
       for (const Vec2 point : f.points_um) EXPECT_TRUE(contains(cell.outline_um, point)) << "fibre " << f.fibre_id;
-    }
   }
 }
 
@@ -85,13 +81,12 @@ TEST(DrawnCell, types_fibres_by_the_adhesions_at_their_ends) {
       for (const bool is_start : {true, false}) {
         const auto id = is_start ? f.start_adhesion_id : f.end_adhesion_id;
         const Vec2 end = is_start ? f.points_um.front() : f.points_um.back();
-        for (const Adhesion& a : cell.adhesions) {
+        for (const Adhesion& a : cell.adhesions)
           if (id == a.adhesion_id) {
             EXPECT_LT(norm(a.position_um - end), 1e-9) << "fibre " << f.fibre_id;
           } else if (!id) {
             EXPECT_FALSE(drawing::covers(a, p.free_end_clearance_um - 1e-9, end)) << "fibre " << f.fibre_id;
           }
-        }
       }
     }
     EXPECT_EQ(n_of_type[static_cast<int>(FibreType::ventral)], p.n_ventral);
@@ -104,13 +99,12 @@ TEST(DrawnCell, adhesions_carry_their_fibres_with_at_most_the_stress_asked_for) 
   const drawing::CellParameters p;
   for (int seed = 1; seed <= kSeeds; ++seed) {
     const drawing::DrawnCell& drawn = cell_of_seed(seed);
-    for (std::size_t i = 0; i < drawn.cell.fibres.size(); ++i) {
+    for (std::size_t i = 0; i < drawn.cell.fibres.size(); ++i)
       for (const auto& id : {drawn.cell.fibres[i].start_adhesion_id, drawn.cell.fibres[i].end_adhesion_id}) {
         if (!id) continue;
         const double area = drawn.cell.adhesions[*id - 1].area_um2;
         EXPECT_GE(area * (1 + 1e-12), std::min(drawn.tensions_nN[i] / p.adhesion_stress_kPa, p.largest_area_um2));
       }
-    }
   }
 }
 
@@ -120,9 +114,8 @@ TEST(DrawnCell, is_the_same_for_the_same_seed_and_another_for_another) {
   ASSERT_EQ(a.cell.outline_um.size(), b.cell.outline_um.size());
   EXPECT_TRUE(std::ranges::equal(a.cell.outline_um, b.cell.outline_um));
   EXPECT_EQ(a.tensions_nN, b.tensions_nN);
-  for (std::size_t i = 0; i < a.cell.adhesions.size(); ++i) {
+  for (std::size_t i = 0; i < a.cell.adhesions.size(); ++i)
     EXPECT_TRUE(a.cell.adhesions[i].position_um == b.cell.adhesions[i].position_um);
-  }
   EXPECT_NE(a.tensions_nN, c.tensions_nN);
 }
 
@@ -229,9 +222,8 @@ TEST(DrawnTensions, follow_the_histograms_of_their_types) {
   const auto fraction_above = [&](double median, double log_sd, double level) {
     drawing::Random random(1, drawing::Stream::tensions);
     int n = 0;
-    for (int i = 0; i < 2000; ++i) {
+    for (int i = 0; i < 2000; ++i)
       n += drawing::draw(random, {median, log_sd, p.smallest_tension_nN, p.largest_tension_nN}) > level;
-    }
     return n / 2000.0;
   };
   EXPECT_GT(fraction_above(p.ventral_median_nN, p.ventral_log_sd, 5), 0.30);

@@ -60,7 +60,7 @@ Network held_lattice(int side) {
   Network network;
   const auto index = [&](int i, int j) { return j * side + i; };
   int adhesion_id = 0;
-  for (int j = 0; j < side; ++j) {
+  for (int j = 0; j < side; ++j)
     for (int i = 0; i < side; ++i) {
       network.vertices_um.push_back({1.5 * (i + 0.5 * j), 1.5 * std::sqrt(0.75) * j});
       const bool is_border = i == 0 || j == 0 || i == side - 1 || j == side - 1;
@@ -70,7 +70,6 @@ Network held_lattice(int side) {
         network.links.push_back({.vertex_a = index(i + di, j + dj), .vertex_b = index(i, j), .rest_length_um = 1.5});
       }
     }
-  }
   return network;
 }
 

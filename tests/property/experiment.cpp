@@ -53,17 +53,15 @@ TEST(Experiment, noise_and_beads_leave_the_cell_as_it_is) {
   const experiment::Experiment a = experiment::simulate(p, 1), b = experiment::simulate(noisy, 1);
   ASSERT_EQ(a.forces.size(), b.forces.size());
   for (std::size_t i = 0; i < a.forces.size(); ++i) EXPECT_TRUE(a.forces[i].force_nN == b.forces[i].force_nN);
-  for (std::size_t i = 0; i < a.displacement.size(); ++i) {
+  for (std::size_t i = 0; i < a.displacement.size(); ++i)
     EXPECT_TRUE(a.displacement[i].position_um == b.displacement[i].position_um) << "bead " << i;
-  }
 }
 
 TEST(Experiment, does_not_depend_on_the_number_of_threads) {
   const experiment::Experiment a = experiment::simulate(small_scenario(), 1),
                                b = experiment::simulate(small_scenario(), 3);
-  for (std::size_t i = 0; i < a.measured.size(); ++i) {
+  for (std::size_t i = 0; i < a.measured.size(); ++i)
     EXPECT_TRUE(a.measured[i].displacement_um == b.measured[i].displacement_um) << "bead " << i;
-  }
 }
 
 TEST(Experiment, noise_has_the_standard_deviation_asked_for) {
@@ -92,9 +90,8 @@ TEST(Experiment, the_gel_moves_towards_the_middle_of_a_cell_that_contracts) {
   for (const Bead& bead : e.measured) inward += dot(bead.displacement_um, centre - bead.position_um);
   EXPECT_GT(inward, 0) << "displacement is stressed minus relaxed position";
   double pinch = 0;
-  for (std::size_t i = 0; i < e.forces.size(); ++i) {
+  for (std::size_t i = 0; i < e.forces.size(); ++i)
     pinch += dot(e.forces[i].force_nN, centre - e.cell.adhesions[i].position_um);
-  }
   EXPECT_GT(pinch, 0) << "forces are those of the cell on the gel";
 }
 
@@ -104,9 +101,8 @@ TEST(Experiment, its_network_has_the_surface_tension_asked_for_on_any_mesh) {
     p.mechanics.simulation_edge_length_um = edge_um;
     const experiment::Experiment e = experiment::simulate(p, 2);
     double sum = 0;  // half the trace of the network's stress times its area
-    for (const Link& link : e.network.links) {
+    for (const Link& link : e.network.links)
       if (link.fibre_id == 0) sum += 0.5 * link.share * e.tensions.front().tension_nN * link.rest_length_um;
-    }
     const double tension = sum / std::abs(signed_area_um2(e.cell.outline_um));
     // fibres take the place of some per cent of the network's links, and so do links at the border
     EXPECT_NEAR(tension / p.tension.surface_tension_nN_per_um, 1, 0.15) << "edge " << edge_um;
@@ -118,9 +114,8 @@ TEST(Beads, keep_their_distance_or_say_that_they_cannot) {
   p.bead_distance_um = 0.8;
   const std::vector<Vec2> beads = experiment::place_beads(p);
   ASSERT_EQ(static_cast<int>(beads.size()), p.beads);
-  for (std::size_t i = 0; i < beads.size(); ++i) {
+  for (std::size_t i = 0; i < beads.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) ASSERT_GE(norm(beads[i] - beads[j]), 0.8);
-  }
   p.bead_distance_um = 5;
   EXPECT_THROW(experiment::place_beads(p), UsageError);
 }

@@ -31,9 +31,7 @@ TEST(AdhesionForces, are_off_by_no_more_than_stated_where_the_cells_network_is_a
   for (std::uint64_t seed = 5; seed < 8; ++seed) {
     test::TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 2000, 0.01, 7, {.seed = 100 + seed});
     std::vector<cables::CableNetwork> networks;
-    for (int m = 0; m < 2; ++m) {
-      networks.emplace_back(mesh::generate_network(cell, {.seed = 10 * seed + m}).network);
-    }
+    for (int m = 0; m < 2; ++m) networks.emplace_back(mesh::generate_network(cell, {.seed = 10 * seed + m}).network);
     const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {.loss = Loss::squares}, 2);
     const std::vector<AdhesionForce> forces = forces_of(fit, cell);
     for (std::size_t a = 0; a < forces.size(); ++a, ++n) {
@@ -67,9 +65,8 @@ TEST(AdhesionsWithoutBeads, are_those_that_the_bead_images_do_not_show) {
 }
 
 double figure(const Figures& figures, const std::string& name) {
-  for (const auto& [known, value] : figures) {
+  for (const auto& [known, value] : figures)
     if (known == name) return std::get<double>(value);
-  }
   return std::numeric_limits<double>::quiet_NaN();
 }
 
@@ -80,13 +77,12 @@ TEST(StrainEnergy, of_discs_far_apart_is_that_of_each_by_itself) {
   constexpr double kRadius_um = 0.5, kDistance_um = 400, kForce_nN = 3;
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.4, .thickness_um = 2000};
   Cell cell;
-  for (const double x : {-0.5 * kDistance_um, 0.5 * kDistance_um}) {
+  for (const double x : {-0.5 * kDistance_um, 0.5 * kDistance_um})
     cell.adhesions.push_back({.adhesion_id = static_cast<int>(cell.adhesions.size()) + 1,
                               .position_um = {x, 0},
                               .area_um2 = std::numbers::pi * kRadius_um * kRadius_um,
                               .major_axis_um = 2 * kRadius_um,
                               .minor_axis_um = 2 * kRadius_um});
-  }
   EnsembleFit fit;
   fit.forces.nN = Eigen::Vector4d(kForce_nN, 0, -kForce_nN, 0);
   fit.meshes.emplace_back();
@@ -139,25 +135,22 @@ Network regular_sheet(int side, double edge_um, Polygon& outline_um) {
   Network network;
   std::map<std::pair<int, int>, int> vertex_at;
   const auto place = [&](int i, int j) { return edge_um * Vec2{i + 0.5 * j, 0.5 * std::sqrt(3.0) * j}; };
-  for (int j = -side; j <= side; ++j) {
+  for (int j = -side; j <= side; ++j)
     for (int i = std::max(-side, -side - j); i <= std::min(side, side - j); ++i) {
       vertex_at[{i, j}] = static_cast<int>(network.vertices_um.size());
       network.vertices_um.push_back(place(i, j));
       network.adhesion_id.push_back(0);
     }
-  }
-  for (const auto& [at, a] : vertex_at) {
+  for (const auto& [at, a] : vertex_at)
     for (const auto& [di, dj] : {std::pair{1, 0}, {0, 1}, {-1, 1}}) {
       const auto b = vertex_at.find({at.first + di, at.second + dj});
       if (b == vertex_at.end()) continue;
       network.links.push_back({std::min(a, b->second), std::max(a, b->second), 0, edge_um, 1});
     }
-  }
   network.adhesion_id[0] = 1;
   network.adhesion_id.back() = 2;
-  for (const auto& [i, j] : {std::pair{side, 0}, {0, side}, {-side, side}, {-side, 0}, {0, -side}, {side, -side}}) {
+  for (const auto& [i, j] : {std::pair{side, 0}, {0, side}, {-side, side}, {-side, 0}, {0, -side}, {side, -side}})
     outline_um.push_back(place(i, j));
-  }
   return network;
 }
 

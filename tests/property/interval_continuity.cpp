@@ -116,12 +116,11 @@ void expect_continuous(const Case& c) {
 TEST(Continuity, tensions_and_interval_ends_follow_the_data) {
   const char* more = std::getenv("MBTFM_CASES");
   const unsigned n = more ? static_cast<unsigned>(std::atoi(more)) : 1;
-  for (const double noise : {0.05, 0.15, 0.3}) {
+  for (const double noise : {0.05, 0.15, 0.3})
     for (unsigned seed = 1; seed <= n; ++seed) {
       for (const std::string name : {"case_21", "case_22"}) expect_continuous(of_reference(name, noise, seed));
       for (const int n_meshes : {1, 2}) expect_continuous(of_round_cell(n_meshes, noise, seed));
     }
-  }
 }
 
 }  // namespace

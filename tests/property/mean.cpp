@@ -44,7 +44,7 @@ Polygon leaning(Polygon outline) {
 
 TEST(Mean, registration_finds_a_known_shift_turn_and_mirror) {
   const Polygon reference = leaning(spiked(40, 15, 6, 360));
-  for (const bool is_mirrored : {false, true}) {
+  for (const bool is_mirrored : {false, true})
     for (const double angle : {0.3, 100.0, -170.0}) {
       const Motion truth{{80, 70}, centroid_um(reference), angle * kDegree, is_mirrored};
       // another sampling, and outlines of pixels of 0.2 um
@@ -57,7 +57,6 @@ TEST(Mean, registration_finds_a_known_shift_turn_and_mirror) {
         EXPECT_LT(norm(way.motion.place_um(at) - truth.place_um(at)), 0.02 + 0.1 * kDegree * arm) << angle;
       }
     }
-  }
 }
 
 TEST(Mean, a_shape_that_is_its_own_mirror_image_is_not_mirrored) {
@@ -80,14 +79,13 @@ Brightness blobs(const Motion& motion, double noise, std::uint64_t seed) {
     const double x = across(places), y = across(places);
     all.push_back({{x, y}, height(places)});
   }
-  for (int j = 0; j < image.height; ++j) {
+  for (int j = 0; j < image.height; ++j)
     for (int i = 0; i < image.width; ++i) {
       const Vec2 at = motion.place_um({0.5 * (i + 0.5), 0.5 * (j + 0.5)});
       double value = 5 + normal(random);
       for (const Blob& blob : all) value += blob.height * std::exp(-dot(at - blob.at, at - blob.at) / 18);
       image.values.push_back(static_cast<float>(value));
     }
-  }
   return image;
 }
 
@@ -189,13 +187,12 @@ constexpr double kLambda_um_per_kPa = 0.3;
 
 double relative_difference(const CellField& a, const CellField& b) {
   double difference = 0, size = 0;
-  for (double y = -30; y <= 30; y += 2) {
+  for (double y = -30; y <= 30; y += 2)
     for (double x = -30; x <= 30; x += 2) {
       const Vec2 of_a = a.at({x, y})->traction_kPa, of_b = b.at({x, y})->traction_kPa;
       difference += dot(of_a - of_b, of_a - of_b);
       size += dot(of_a, of_a);
     }
-  }
   return std::sqrt(difference / size);
 }
 
@@ -254,13 +251,12 @@ TEST(Mean, a_model_is_blurred_as_beads_blur_the_truth) {
   const CellField found = field_of(cell, fttc(), kLambda_um_per_kPa),
                   model = blurred(truth, cell, fttc(), kLambda_um_per_kPa);
   double difference = 0, size = 0;
-  for (double y = -30; y <= 30; y += 2) {
+  for (double y = -30; y <= 30; y += 2)
     for (double x = -30; x <= 30; x += 2) {
       const Vec2 a = found.at({x, y})->traction_kPa, b = model.at({x, y})->traction_kPa;
       difference += dot(a - b, a - b);
       size += dot(a, a);
     }
-  }
   // the truth's sharp rims lie between nodes of 0.7 um: a twentieth of a patch of 8 to 12 um
   EXPECT_LT(std::sqrt(difference / size), 0.05);
 }
@@ -308,13 +304,12 @@ TEST(Mean, noise_falls_with_the_root_of_the_number_and_error_bars_cover_the_trut
   constexpr int kCells = 8;
   constexpr double kStudent = 2.3646;  // 97.5 % of seven degrees of freedom
   int n = 0, n_covered = 0;
-  for (int from = 0; from < 192; from += kCells) {
+  for (int from = 0; from < 192; from += kCells)
     for (const NodeMean& node : mean_of(nodes, {all.begin() + from, all.begin() + from + kCells}, disc)) {
       n += 2;
       n_covered += std::abs(node.mean.traction_kPa.x) < kStudent * node.sigma->traction_kPa.x ? 1 : 0;
       n_covered += std::abs(node.mean.traction_kPa.y) < kStudent * node.sigma->traction_kPa.y ? 1 : 0;
     }
-  }
   EXPECT_NEAR(static_cast<double>(n_covered) / n, 0.95, 0.02) << n;
 }
 

@@ -34,9 +34,8 @@ Cell moved(Cell cell, double angle, Vec2 shift) {
     move(a.position_um);
     a.angle_rad += angle;
   }
-  for (Fibre& f : cell.fibres) {
+  for (Fibre& f : cell.fibres)
     for (Vec2& p : f.points_um) move(p);
-  }
   return cell;
 }
 

@@ -31,9 +31,8 @@ struct Hidden {
   }
   void hide_forces() {
     std::vector<substrate::Ellipse> discs;
-    for (const Vec2 place : kPlaces) {
+    for (const Vec2 place : kPlaces)
       discs.push_back({.centre_um = place, .semi_major_um = 0.6, .semi_minor_um = 0.4, .angle_rad = 1});
-    }
     const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::layer}, 1);
     const Eigen::Vector4d forces(kMissing_nN.x, kMissing_nN.y, -kMissing_nN.x, -kMissing_nN.y);
     scene.displacement_um += gel->compliance_um_per_nN(scene.points_um, discs) * forces;

@@ -263,7 +263,7 @@ OverStated errors_over_stated(mesh::LinkReach reach_of_truth, int n_meshes) {
 }
 
 TEST(ModelError, is_what_the_tensions_of_a_cell_with_another_network_are_off_by) {
-  for (const mesh::LinkReach reach : {mesh::LinkReach::second_neighbours, mesh::LinkReach::neighbours}) {
+  for (const mesh::LinkReach reach : {mesh::LinkReach::second_neighbours, mesh::LinkReach::neighbours})
     for (const int n_meshes : {2, 6}) {
       const OverStated squares = errors_over_stated(reach, n_meshes);
       // twenty fibres: chi² / 20 is within 0.37 … 2.0 in 99.5 % (chi² with 20 degrees), if all tell of themselves
@@ -271,7 +271,6 @@ TEST(ModelError, is_what_the_tensions_of_a_cell_with_another_network_are_off_by)
       EXPECT_GT(squares.all, 0.2) << name_of(reach) << ", " << n_meshes << " meshes";
       EXPECT_GT(squares.noise_alone, 4) << "the noise alone must not explain it for this to tell anything";
     }
-  }
 }
 
 TEST(ModelError, what_the_beads_tell_of_a_tension_adds_up_to_their_part_of_its_error) {

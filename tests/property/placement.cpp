@@ -73,9 +73,8 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
     const Eigen::VectorXd seen =
         gel->compliance_um_per_nN(points_of(in_cell_frame(places, at)), ellipses_of(cell)) * forces;
     Eigen::VectorXd u(seen.size());
-    for (Eigen::Index row = 0; row < seen.size(); row += 2) {
+    for (Eigen::Index row = 0; row < seen.size(); row += 2)
       u.segment<2>(row) = Eigen::Rotation2Dd(at.turn_rad) * seen.segment<2>(row);
-    }
     return u;
   };
   const Vec2 centre{30, 30};

@@ -157,7 +157,7 @@ TEST_F(RecordsOfCells, the_whole_report_and_run_stand_damage_of_each_part_of_the
   for (const char* file : {"run.json", "4_fit/record.json", "4_fit/fit.json"}) {
     const std::string whole = files::read_text(cell_ / file);
     const auto json = ordered_json::parse(whole);
-    for (const auto& [key, value] : json.items()) {
+    for (const auto& [key, value] : json.items())
       for (const ordered_json& other : {ordered_json(), ordered_json(1), ordered_json("x"), ordered_json{1, 2}}) {
         ordered_json changed = json;
         changed[key] = other;
@@ -168,7 +168,6 @@ TEST_F(RecordsOfCells, the_whole_report_and_run_stand_damage_of_each_part_of_the
         });
         files::write_text(cell_ / file, whole);
       }
-    }
   }
 }
 

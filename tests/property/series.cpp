@@ -156,9 +156,7 @@ TEST(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
 
 TEST(Series, time_begins_with_the_first_frame) {
   std::vector<FrameFit> fits(2);
-  for (FrameFit& fit : fits) {
-    fit.tensions.resize(1);
-  }
+  for (FrameFit& fit : fits) fit.tensions.resize(1);
   fits[0].frame = 1;
   fits[1].frame = 4;
   const test::TemporaryFolder folder;

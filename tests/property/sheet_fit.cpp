@@ -745,12 +745,11 @@ TEST(SheetFit, intervals_hold_a_truth_on_another_mesh) {
     }
   }
   constexpr int kAll = kOutlines * kRuns;
-  for (const auto& [E, count] : by_modulus) {
+  for (const auto& [E, count] : by_modulus)
     for (const int held : {count.s_held, count.M_held}) {  // as above
       EXPECT_GE(held, 181) << E;
       EXPECT_LE(held, 199) << E;
     }
-  }
 }
 
 }  // namespace

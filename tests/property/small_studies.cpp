@@ -55,9 +55,8 @@ std::vector<std::string> header_of(const std::string& text) {
 bool may_be_negative(const files::CsvTable& table, int row) {
   const std::set<std::string> signed_ones = {"fibre_force_nN", "contraction_nN_per_um", "mean_tension_nN_per_um",
                                              "contraction_over_stiffness", "space_contractile_moment_nN_um"};
-  for (const char* column : {"quantity", "force"}) {
+  for (const char* column : {"quantity", "force"})
     if (table.has(column) && signed_ones.contains(table.text(row, column))) return true;
-  }
   return false;
 }
 
@@ -96,13 +95,12 @@ void expect_table(const std::string& text, const std::string& name) {
 }
 
 bool says_nan(const std::string& text) {
-  for (const std::string word : {"nan", "inf"}) {
+  for (const std::string word : {"nan", "inf"})
     for (std::size_t at = text.find(word); at != text.npos; at = text.find(word, at + 1)) {
       const bool is_begun = at > 0 && std::isalpha(static_cast<unsigned char>(text[at - 1]));
       const std::size_t end = at + word.size();
       if (!is_begun && (end == text.size() || !std::isalpha(static_cast<unsigned char>(text[end])))) return true;
     }
-  }
   return false;
 }
 

@@ -141,9 +141,8 @@ TEST(Stacks, errors_are_raised_where_beads_state_too_little_and_not_where_the_ge
   for (const double stated : {1.0, 0.4}) {
     SCOPED_TRACE(stated);
     BeadClouds clouds = bead_clouds(5000, 0.02, 0.03, 8, bent);
-    for (auto* cloud : {&clouds.relaxed, &clouds.stressed}) {
+    for (auto* cloud : {&clouds.relaxed, &clouds.stressed})
       for (PlacedBead& bead : *cloud) bead.sigma_um *= stated, bead.sigma_z_um *= stated;
-    }
     const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::off, {}, 2);
     EXPECT_GT(followed.n_good, 4500);
     EXPECT_GT(followed.neighbours_um, 2 * std::numbers::sqrt2 * 0.02) << "then this asks nothing";
@@ -304,9 +303,8 @@ TEST(StackFindings, a_sound_pair_has_none_and_each_fault_its_own) {
   EXPECT_TRUE(fires("slices-moved", found_of(bead_clouds(1200, kError_um, 0.03, 5, drift))));
 
   BeadClouds too_sure = sound;
-  for (auto* cloud : {&too_sure.relaxed, &too_sure.stressed}) {
+  for (auto* cloud : {&too_sure.relaxed, &too_sure.stressed})
     for (PlacedBead& bead : *cloud) bead.sigma_um /= 2, bead.sigma_z_um /= 2;
-  }
   EXPECT_TRUE(fires("beads-scatter", found_of(too_sure)));
   for (const double left : {0.8, 0.3}) {
     BeadClouds bleached = sound;

@@ -40,14 +40,13 @@ TEST_P(ClosedForm, turns_with_the_scene) {
       e.angle_rad += 0.5 * pi;
     }
     const Eigen::MatrixXd after = compliance(kGel, points, ellipses);
-    for (Eigen::Index i = 0; i < before.rows(); i += 2) {
+    for (Eigen::Index i = 0; i < before.rows(); i += 2)
       for (Eigen::Index j = 0; j < before.cols(); j += 2) {
         const double size = before.block<2, 2>(i, j).norm();
         EXPECT_NEAR(after(i, j), before(i + 1, j + 1), kLeftOut * size);
         EXPECT_NEAR(after(i + 1, j + 1), before(i, j), kLeftOut * size);
         EXPECT_NEAR(after(i + 1, j), -before(i, j + 1), kLeftOut * size);
       }
-    }
   }
 }
 
@@ -61,13 +60,12 @@ TEST_P(ClosedForm, mirrors_with_the_scene) {
     e.angle_rad = pi - e.angle_rad;
   }
   const Eigen::MatrixXd after = compliance(kGel, points, ellipses);
-  for (Eigen::Index i = 0; i < before.rows(); ++i) {
+  for (Eigen::Index i = 0; i < before.rows(); ++i)
     for (Eigen::Index j = 0; j < before.cols(); ++j) {
       const double sign = (i + j) % 2 == 0 ? 1 : -1;
       const double size = before.block<2, 2>(i / 2 * 2, j / 2 * 2).norm();
       EXPECT_NEAR(after(i, j), sign * before(i, j), kLeftOut * size);
     }
-  }
 }
 
 TEST_P(ClosedForm, scales_with_one_over_the_modulus) {
@@ -113,9 +111,8 @@ TEST_P(ClosedForm, forces_superpose) {
   const auto sum = model->displacements_um(points, ellipses, forces);
   for (std::size_t i = 0; i < points.size(); ++i) {
     Eigen::Vector2d expected = Eigen::Vector2d::Zero();
-    for (std::size_t j = 0; j < forces.size(); ++j) {
+    for (std::size_t j = 0; j < forces.size(); ++j)
       expected += g.block<2, 2>(2 * i, 2 * j) * Eigen::Vector2d(forces[j].x, forces[j].y);
-    }
     EXPECT_NEAR(sum[i].x, expected[0], 1e-14);
     EXPECT_NEAR(sum[i].y, expected[1], 1e-14);
   }

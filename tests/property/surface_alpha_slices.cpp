@@ -31,14 +31,13 @@ struct Misfit {
 Misfit misfit_of(const Height& surface, const Height& height) {
   Misfit sum;
   int n = 0;
-  for (double y = -45; y <= 45; y += 1.5) {
+  for (double y = -45; y <= 45; y += 1.5)
     for (double x = -45; x <= 45; x += 1.5) {
       const double error = surface({x, y}) - height({x, y});
       sum.mean_um += error;
       sum.rms_um += error * error;
       ++n;
     }
-  }
   return {sum.mean_um / n, std::sqrt(sum.rms_um / n)};
 }
 
@@ -81,12 +80,11 @@ TEST(SurfaceFromAlphaSlices, lies_nowhere_above_the_highest_bead_nor_below_the_l
   for (unsigned seed = 1; seed <= 3; ++seed) {
     const std::vector<Vec3> beads = beads_below(wave, kDensity, seed);
     const auto [high, low] = std::ranges::minmax_element(beads, {}, &Vec3::z);
-    for (const double radius : {0.0, 7.0, 12.0, 1000.0}) {
+    for (const double radius : {0.0, 7.0, 12.0, 1000.0})
       for (const double z : alpha_shape_surface(beads, {.radius_um = radius}, 2).z_um) {
         EXPECT_GE(z, high->z - 1e-9);  // rounding
         EXPECT_LE(z, low->z + 1e-9);
       }
-    }
   }
 }
 
@@ -109,9 +107,8 @@ TEST(SurfaceFromAlphaSlices, is_the_upper_boundary_of_the_alpha_shape_of_cgal) {
   for (const Vec3& bead : beads) low = std::min(low, bead.x), high = std::max(high, bead.x);
   const double width = (high - low) / 12, radius = 12;
   std::vector<Kernel::Point_2> first;
-  for (const Vec3& bead : beads) {
+  for (const Vec3& bead : beads)
     if (bead.x < low + width) first.emplace_back(bead.y, bead.z);
-  }
   Alpha shape(first.begin(), first.end(), radius * radius, Alpha::REGULARIZED);
   ASSERT_EQ(shape.number_of_solid_components(), 1u);
   const HeightMap map = alpha_shape_surface(beads, {.slice_um = 0.999 * width, .radius_um = radius}, 1);
@@ -137,21 +134,17 @@ TEST(SurfaceFromAlphaSlices, turns_with_the_beads_and_their_slices) {
   ASSERT_EQ(turned.n_y, map.n_x);
   EXPECT_DOUBLE_EQ(turned.origin_um.x, map.origin_um.y);
   EXPECT_DOUBLE_EQ(turned.spacing_um.y, map.spacing_um.x);
-  for (int j = 0; j < map.n_y; ++j) {
-    for (int i = 0; i < map.n_x; ++i) {
+  for (int j = 0; j < map.n_y; ++j)
+    for (int i = 0; i < map.n_x; ++i)
       EXPECT_DOUBLE_EQ(turned.z_um[static_cast<std::size_t>(i * turned.n_x + j)],
                        map.z_um[static_cast<std::size_t>(j * map.n_x + i)]);
-    }
-  }
 }
 
 TEST(SurfaceFromAlphaSlices, beads_on_a_grid_are_borne) {
   std::vector<Vec3> beads;  // four on each circle, rows on one line, those behind each other at one place
-  for (int k = 0; k < 8; ++k) {
-    for (int j = 0; j < 8; ++j) {
+  for (int k = 0; k < 8; ++k)
+    for (int j = 0; j < 8; ++j)
       for (int i = 0; i < 8; ++i) beads.push_back({0.1 * i, 0.1 * j, 0.3 + 0.1 * k});
-    }
-  }
   for (const double z : alpha_shape_surface(beads, {.slice_um = 0.2}, 0.1).z_um) EXPECT_NEAR(z, 0.3, 1e-12);
   for (Vec3& bead : beads) bead.z += 0.7 * bead.y;  // rounding leaves slivers along the slope
   const HeightMap slope = alpha_shape_surface(beads, {.slice_um = 0.2, .radius_um = 0.12}, 0.1);

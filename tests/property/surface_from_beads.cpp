@@ -27,7 +27,7 @@ struct Misfit {
 Misfit misfit_of(const SurfaceFit& fit, const Height& height) {
   Misfit sum;
   int n = 0;
-  for (double y = -45; y <= 45; y += 1.5) {
+  for (double y = -45; y <= 45; y += 1.5)
     for (double x = -45; x <= 45; x += 1.5) {
       const double error = fit.height_um({x, y}) - height({x, y});
       sum.mean_um += error;
@@ -35,7 +35,6 @@ Misfit misfit_of(const SurfaceFit& fit, const Height& height) {
       sum.rms_over_sigma += std::pow(error / fit.sigma_um({x, y}), 2);
       ++n;
     }
-  }
   return {sum.mean_um / n, std::sqrt(sum.rms_um / n), std::sqrt(sum.rms_over_sigma / n)};
 }
 
@@ -80,9 +79,8 @@ TEST(SurfaceFromBeads, is_not_lifted_by_stray_beads_and_names_them) {
     beads.push_back({at.x, at.y, wave(at) - 8 - k});
   }
   const SurfaceFit fit = fitted(beads);
-  for (int k = n; k < n + 8; ++k) {
+  for (int k = n; k < n + 8; ++k)
     EXPECT_TRUE(std::find(fit.above_surface.begin(), fit.above_surface.end(), k) != fit.above_surface.end()) << k - n;
-  }
   EXPECT_LE(fit.above_surface.size(), 10u);
   EXPECT_LE(misfit_of(fit, wave).rms_um, 1.3 * without.rms_um);
 }
@@ -112,9 +110,8 @@ TEST(SurfaceFromBeads, knows_no_unit_and_bears_a_bead_far_above) {
   for (Vec3& p : in_nm) p = {1000 * p.x, 1000 * p.y, 1000 * p.z};
   const SurfaceFit nm = fit_beads(in_nm, std::vector<double>(in_nm.size(), 1000 * kSigma));
   const SurfaceFit um = fitted(beads);
-  for (const Vec2 at : {Vec2{0, 0}, {20, -30}, {-41, 7}}) {
+  for (const Vec2 at : {Vec2{0, 0}, {20, -30}, {-41, 7}})
     EXPECT_NEAR(nm.height_um(1000 * at) / 1000, um.height_um(at), 0.1);
-  }
   beads.push_back({0, 0, -900});
   const SurfaceFit with = fitted(beads);
   EXPECT_EQ(with.above_surface, (std::vector<int>{static_cast<int>(beads.size()) - 1}));

@@ -440,9 +440,8 @@ TEST(ModelChecks, a_fibre_left_out_costs_what_a_fit_without_it_says) {
   // without the fibre its links are plain network
   const int removed = 3;
   Network network = scene.cables.network();
-  for (Link& link : network.links) {
+  for (Link& link : network.links)
     if (link.fibre_id == removed) link.fibre_id = 0;
-  }
   TensionScene without = tension_scene("case_21", 2000, 0.05, 9);
   without.cables = cables::CableNetwork(network);
   const double rise =
@@ -500,9 +499,8 @@ TEST(ModelChecks, missing_fibres_that_cross_have_their_own_ends) {
     test::add_ventral(cell, second_start, second_end);
     TensionScene lacking = test::scene_of(cell, Eigen::Vector4d(0.06, 4, 6, 6), 3000, 0.05, 10);
     Network network = lacking.cables.network();
-    for (Link& link : network.links) {
+    for (Link& link : network.links)
       if (link.fibre_id > 1) link.fibre_id = 0;
-    }
     lacking.cables = cables::CableNetwork(network);
     const std::vector<MissingFibre> missing = missing_fibres(fit_own_network(lacking), cell.adhesions);
     ASSERT_EQ(missing.size(), 2u);

@@ -17,12 +17,11 @@ test::BeadPair small_pair() {
 template <class Place>
 images::Image rearranged(const images::Image& image, const Place& place) {
   images::Image result = image;
-  for (int j = 0; j < image.height; ++j) {
+  for (int j = 0; j < image.height; ++j)
     for (int i = 0; i < image.width; ++i) {
       const auto [a, b] = place(i, j);
       result.at(i, j) = image.at(a, b);
     }
-  }
   return result;
 }
 

@@ -111,7 +111,7 @@ TEST(Tractions, forces_are_found_on_gels_of_any_compressibility) {
   std::vector<Vec2> points;
   for (const Adhesion& a : scene.adhesions) ellipses.push_back(substrate::ellipse_of(a));
   for (const Bead& b : scene.field) points.push_back(b.position_um);
-  for (const GelModel model : values_of<GelModel>()) {
+  for (const GelModel model : values_of<GelModel>())
     for (const double nu : {0.0, 0.25, 0.49, 0.4999, 0.4999999}) {
       TractionInputs inputs = inputs_of(scene);
       inputs.gel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = 20};
@@ -127,7 +127,6 @@ TEST(Tractions, forces_are_found_on_gels_of_any_compressibility) {
         EXPECT_LE(test::force_error(scene, forces), most) << name_of(method) << ", " << name_of(model) << ", nu " << nu;
       }
     }
-  }
 }
 
 TEST(Tractions, are_the_same_bits_for_any_number_of_threads) {
@@ -140,9 +139,8 @@ TEST(Tractions, are_the_same_bits_for_any_number_of_threads) {
     const Reconstruction one = reconstruct(inputs, parameters, 1);
     for (const int threads : {2, 4}) {
       const Reconstruction many = reconstruct(inputs, parameters, threads);
-      for (std::size_t p = 0; p < one.patches.size(); ++p) {
+      for (std::size_t p = 0; p < one.patches.size(); ++p)
         ASSERT_EQ(many.patches[p].traction_kPa, one.patches[p].traction_kPa) << name_of(method) << ", " << threads;
-      }
       for (std::size_t a = 0; a < one.forces.size(); ++a) {
         ASSERT_EQ(many.forces[a].force_nN, one.forces[a].force_nN) << name_of(method) << ", " << threads;
         ASSERT_EQ(many.forces[a].sigma_nN, one.forces[a].sigma_nN) << name_of(method) << ", " << threads;
@@ -177,10 +175,9 @@ TEST(Fttc, odd_and_even_lattices_agree) {
     const EllipseScene even = ellipse_scene(128, 0), odd = ellipse_scene(127, 0);
     const Reconstruction one = reconstruct(inputs_of(even), parameters, 1);
     const Reconstruction other = reconstruct(inputs_of(odd), parameters, 1);
-    for (std::size_t a = 0; a < one.forces.size(); ++a) {
+    for (std::size_t a = 0; a < one.forces.size(); ++a)
       EXPECT_LE(norm(one.forces[a].force_nN - other.forces[a].force_nN), 0.03 * norm(one.forces[a].force_nN))
           << "padding " << padding;
-    }
   }
 }
 
@@ -205,9 +202,8 @@ TEST(Fttc, a_field_cut_at_the_border_does_not_inflate_the_contractile_moment) {
     return sums_of(reconstruct(inputs, half_space(TractionMethod::fttc), 1), inputs, 1.5).contractile_moment_nN_um();
   };
   double truth = 0;
-  for (std::size_t a = 0; a < whole.forces_nN.size(); ++a) {
+  for (std::size_t a = 0; a < whole.forces_nN.size(); ++a)
     truth -= dot(whole.adhesions[a].position_um - Vec2{32, 32}, whole.forces_nN[a]);
-  }
   // cut 1.5 um from the outermost adhesion's rim: 48 of 64 um
   const EllipseScene cut = ellipse_scene(96, 0.02, 6, 0, 48);
   EXPECT_NEAR(moment(cut, true), moment(whole, true), 0.05 * truth);
@@ -240,9 +236,8 @@ TEST(Fttc, scattered_beads_and_a_lattice_tell_the_same) {
   // As many beads on a lattice are the best spread they can have; chance leaves holes between scattered ones.
   const EllipseScene even = ellipse_scene(100, 0.02 / scene.largest_um, 3);
   std::vector<Vec2> even_forces;
-  for (const AdhesionForce& f : reconstruct(inputs_of(even), half_space(TractionMethod::fttc), 1).forces) {
+  for (const AdhesionForce& f : reconstruct(inputs_of(even), half_space(TractionMethod::fttc), 1).forces)
     even_forces.push_back(f.force_nN);
-  }
   const double on_lattice = test::force_error(even, even_forces), scattered = test::force_error(scene, forces);
   EXPECT_LE(scattered, 2 * on_lattice);
 }

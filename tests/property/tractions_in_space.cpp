@@ -163,10 +163,9 @@ TractionMesh split_at_random(const Ground& ground, std::uint64_t seed) {
 /// Of one lattice, the vertices of a finer one: rows of shares.
 MatrixXd prolongation(const TractionMesh& mesh, const TractionMesh& finer) {
   MatrixXd P = MatrixXd::Zero(finer.n_vertices(), mesh.n_vertices());
-  for (int v = 0; v < finer.n_vertices(); ++v) {
+  for (int v = 0; v < finer.n_vertices(); ++v)
     for (const auto& [vertex, share] : shares_at(mesh, finer.quads.points_um[static_cast<std::size_t>(v)]))
       P(v, vertex) += share;
-  }
   return P;
 }
 
@@ -247,9 +246,8 @@ TEST(Bases, an_orthonormal_one_has_the_integral_of_squares_for_its_norm) {
   const Basis basis = orthonormal_basis(norm);
   const VectorXd x = VectorXd::LinSpaced(3 * basis.size(), -1, 2), t = basis.tractions(x);
   double square = 0;
-  for (Eigen::Index v = 0; v < norm.rows(); ++v) {
+  for (Eigen::Index v = 0; v < norm.rows(); ++v)
     for (Eigen::Index w = 0; w < norm.rows(); ++w) square += norm(v, w) * t.segment<3>(3 * v).dot(t.segment<3>(3 * w));
-  }
   EXPECT_NEAR(square, x.squaredNorm(), 1e-9 * square);
   const MatrixXd covariance = basis.covariance(MatrixXd(x * x.transpose()), 1);
   EXPECT_LE((covariance - t * t.transpose()).norm(), 1e-12 * covariance.norm());
@@ -264,14 +262,13 @@ class InSpace : public testing::Test {
   VectorXd truth_at(const Problem& problem) const {
     const std::vector<Vec3> vertices = problem.vertices_um();
     VectorXd truth_kPa = VectorXd::Zero(problem.n_unknowns());
-    for (std::size_t v = 0; v < vertices.size(); ++v) {
+    for (std::size_t v = 0; v < vertices.size(); ++v)
       for (const auto& spot : scene.spots) {
         if (norm(Vec2{vertices[v].x, vertices[v].y} - spot.centre_um) > spot.radius_um) continue;
         const double area_um2 = M_PI * spot.radius_um * spot.radius_um;
         truth_kPa.segment<3>(3 * static_cast<Eigen::Index>(v)) +=
             Eigen::Vector3d(spot.force_nN.x, spot.force_nN.y, spot.force_nN.z) / area_um2;
       }
-    }
     return truth_kPa;
   }
 };
@@ -873,9 +870,8 @@ TEST_F(FindingsInSpace, are_none_of_a_balance_that_the_error_of_the_gel_disturbs
     if (!is_balanced) scene.spots[1].force_nN.x *= 0.8;
     Problem problem = scene.problem(scene.beads(kSmall_um), parameters);
     const std::vector<Vec3> vertices = problem.vertices_um();
-    for (std::size_t v = 0; v < vertices.size(); ++v) {
+    for (std::size_t v = 0; v < vertices.size(); ++v)
       if (vertices[v].x < 0) problem.response_um_per_kPa.middleCols<3>(3 * static_cast<Eigen::Index>(v)) *= 1 + kError;
-    }
     problem.model_error = kError;
     EXPECT_EQ(fires("tractions-out-of-balance", noticed_imbalance(balance_of(problem, found(problem)))), !is_balanced);
     if (!is_balanced) continue;
@@ -999,10 +995,9 @@ TEST_F(FindingsInSpace, patches_that_are_all_there_is_have_the_errors_of_least_s
     EXPECT_FALSE(fires("misfit-in-space", r.findings));
     EXPECT_FALSE(r.lambda);
     double left_nN = 0;  // of the map
-    for (int v = 0; v < problem.mesh.n_vertices(); ++v) {
+    for (int v = 0; v < problem.mesh.n_vertices(); ++v)
       if (problem.mesh.quads.points_um[static_cast<std::size_t>(v)].x < 0)
         left_nN += problem.mesh.areas_um2[static_cast<std::size_t>(v)] * r.traction_kPa[3 * v];
-    }
     EXPECT_NEAR(left_nN, r.forces[0].force_nN.x, 1e-3 * left_nN);
     for (std::size_t s = 0; s < scene.spots.size(); ++s) {
       const Vec3 off = r.forces[s].force_nN - scene.spots[s].force_nN, sigma = r.forces[s].sigma_nN;

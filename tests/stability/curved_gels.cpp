@@ -46,9 +46,8 @@ struct Pair {
   explicit Pair(const std::string& formula) {
     gel.surface =
         std::make_shared<const HeightMap>(surface::sampled(surface::formula_of(formula), {-40, -40}, {40, 40}, 0.2));
-    for (double y = -12; y <= 12; y += 4) {
+    for (double y = -12; y <= 12; y += 4)
       for (double x = -14; x <= 14; x += 3.5) points.push_back({x, y});
-    }
   }
   VectorXd displaced(double elements_across) const {
     substrate::SubstrateParameters p;
@@ -172,9 +171,8 @@ TEST(SurfaceOfAMap, has_small_holes_filled_and_wide_ones_refused) {
                   "the small one filled within 0.1 um, the wide one refused by place");
   const auto holed = [](double radius_um) {
     HeightMap map = surface::sampled(wave, {-30, -30}, {30, 30}, 0.5);
-    for (std::size_t k = 0; k < map.z_um.size(); ++k) {
+    for (std::size_t k = 0; k < map.z_um.size(); ++k)
       if (norm(map.vertex_um(k)) < radius_um) map.z_um[k] = std::numeric_limits<double>::quiet_NaN();
-    }
     return map;
   };
   const HeightMap filled = surface::filled(holed(2), 5).map;
@@ -191,13 +189,12 @@ TEST(SurfaceOfAMap, has_small_holes_filled_and_wide_ones_refused) {
 TriangleMesh mesh_of(bool has_flipped, double hole_um) {
   constexpr int kSide = 21;
   TriangleMesh mesh;
-  for (int j = 0; j < kSide; ++j) {
+  for (int j = 0; j < kSide; ++j)
     for (int i = 0; i < kSide; ++i) {
       const Vec2 p = {2.0 * i - 20, 2.0 * j - 20};
       mesh.points_um.push_back({p.x, p.y, wave(p)});
     }
-  }
-  for (int j = 0; j + 1 < kSide; ++j) {
+  for (int j = 0; j + 1 < kSide; ++j)
     for (int i = 0; i + 1 < kSide; ++i) {
       if (std::hypot(2.0 * i - 19, 2.0 * j - 19) < hole_um) continue;
       const int a = kSide * j + i, b = a + 1, c = a + kSide, d = c + 1;
@@ -205,7 +202,6 @@ TriangleMesh mesh_of(bool has_flipped, double hole_um) {
       mesh.triangles.push_back(flips ? std::array{a, c, b} : std::array{a, b, c});
       mesh.triangles.push_back(flips ? std::array{b, c, d} : std::array{b, d, c});
     }
-  }
   return mesh;
 }
 

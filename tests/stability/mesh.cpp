@@ -60,9 +60,8 @@ TEST(HardMesh, crossing_fibres_share_a_vertex) {
   cell.fibres = {fibre_along(1, {{3, 10}, {17, 10}}), fibre_along(2, {{10, 3}, {10, 17}})};
   const Network net = generate_network(cell, {}).network;
   std::vector<int> seen(net.vertices_um.size(), 0);
-  for (const Link& link : net.links) {
+  for (const Link& link : net.links)
     if (link.fibre_id > 0) seen[link.vertex_a] |= link.fibre_id, seen[link.vertex_b] |= link.fibre_id;
-  }
   int n_crossings = 0;
   for (std::size_t v = 0; v < seen.size(); ++v) {
     if (seen[v] != 3) continue;
@@ -249,9 +248,8 @@ TEST(HardMesh, outline_of_thousands_of_pixel_steps) {
     expect_valid(generated, stepped, 1.5);
     // averaging half an edge leaves steps of a fraction of a pixel: area within perimeter · pixel / 2
     double perimeter = 0;
-    for (std::size_t i = 1; i < smooth.outline_um.size(); ++i) {
+    for (std::size_t i = 1; i < smooth.outline_um.size(); ++i)
       perimeter += norm(smooth.outline_um[i] - smooth.outline_um[i - 1]);
-    }
     EXPECT_NEAR(generated.area_um2, std::abs(signed_area_um2(smooth.outline_um)), 0.5 * perimeter * (pixel + 0.1));
     EXPECT_GE(generated.mean_quality, 0.9);
     test::came_out("mean quality " + test::two_digits(generated.mean_quality));
@@ -261,12 +259,11 @@ TEST(HardMesh, outline_of_thousands_of_pixel_steps) {
 TEST(HardMesh, cell_smaller_than_an_edge) {
   test::hard_case("edges of 10 to 100 um in a cell of 20 um", "a valid mesh, each adhesion held");
   const Cell cell = square_cell();
-  for (const AdhesionAnchor anchor : {AdhesionAnchor::rim, AdhesionAnchor::ellipse}) {
+  for (const AdhesionAnchor anchor : {AdhesionAnchor::rim, AdhesionAnchor::ellipse})
     for (const double edge : {10.0, 20.0, 100.0}) {
       SCOPED_TRACE(std::string(name_of(anchor)) + ", edge " + std::to_string(edge));
       expect_valid(generate_network(cell, {.edge_length_um = edge, .adhesion_anchor = anchor}), cell, 0.0);
     }
-  }
 }
 
 TEST(HardMesh, adhesions_of_any_size) {
@@ -303,7 +300,7 @@ TEST_P(HardCell, gives_a_valid_network_with_good_triangles_away_from_its_lines) 
                   "a valid mesh, worst free triangle >= 0.3");
   const Cell& cell = GetParam().cell;
   double worst = 1;
-  for (const AdhesionAnchor anchor : values_of<AdhesionAnchor>()) {
+  for (const AdhesionAnchor anchor : values_of<AdhesionAnchor>())
     for (const std::uint64_t seed : {1, 2, 3}) {
       SCOPED_TRACE(std::string(name_of(anchor)) + ", seed " + std::to_string(seed));
       NetworkParameters parameters{.seed = seed};
@@ -313,7 +310,6 @@ TEST_P(HardCell, gives_a_valid_network_with_good_triangles_away_from_its_lines) 
       EXPECT_GE(generated.worst_free_quality, 0.3);
       worst = std::min(worst, generated.worst_free_quality);
     }
-  }
   test::came_out("worst triangle away from lines " + test::two_digits(worst));
 }
 

@@ -32,11 +32,10 @@ void tell(std::uint64_t seed, const SceneOutcome& outcome) {
 }
 
 void expect_no_faults(std::uint64_t seed, const SceneOutcome& outcome) {
-  for (const std::string& fault : outcome.faults) {
+  for (const std::string& fault : outcome.faults)
     ADD_FAILURE() << "scene " << seed << ": expected " << fault << "\n"
                   << outcome.message << "scenario:\n"
                   << test::random_scene(seed).scenario;
-  }
 }
 
 TEST(RandomScenes, are_answered_in_balance_with_intervals_that_hold_or_refused_with_a_reason) {

@@ -47,7 +47,7 @@ TEST_P(Model, copes_with_thin_and_thick_gels_near_incompressibility) {
   test::hard_case("h = 2 and 1 000 um, nu = 0 and 0.4999", "the layer's exact field within the model's tolerance");
   if (std::string(GetParam()) == "half-space") GTEST_SKIP() << "has no thickness";
   double worst = 0;
-  for (const auto& [thickness, half_side] : {std::pair{2.0, 4.0}, std::pair{1000.0, 40.0}}) {
+  for (const auto& [thickness, half_side] : {std::pair{2.0, 4.0}, std::pair{1000.0, 40.0}})
     for (const double nu : {0.0, 0.4999}) {
       const Gel gel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = thickness};
       const auto points = test::scattered_points(200, half_side);
@@ -57,7 +57,6 @@ TEST_P(Model, copes_with_thin_and_thick_gels_near_incompressibility) {
       EXPECT_LT(difference, tolerance_of(GetParam())) << "nu " << nu << ", thickness " << thickness;
       worst = std::max(worst, difference);
     }
-  }
   test::came_out("differs by " + test::two_digits(worst) + ", allowed " + test::two_digits(tolerance_of(GetParam())));
 }
 
@@ -87,11 +86,9 @@ TEST_P(Model, is_continuous_through_the_centre_and_the_rim) {
   for (const double b : {0.1, 0.5, 1.0}) {
     const Ellipse ellipse = {{0, 0}, 1, b, 0};
     std::vector<Vec2> points;
-    for (const double angle : {0.0, 0.3, 0.5 * pi, 3.0}) {
-      for (const double r : {0.0, 1e-9, 1 - 1e-9, 1.0, 1 + 1e-9}) {
+    for (const double angle : {0.0, 0.3, 0.5 * pi, 3.0})
+      for (const double r : {0.0, 1e-9, 1 - 1e-9, 1.0, 1 + 1e-9})
         points.push_back({r * std::cos(angle), r * b * std::sin(angle)});
-      }
-    }
     const Eigen::MatrixXd g = compliance(GetParam(), kGel, points, {ellipse});
     ASSERT_TRUE(g.allFinite());
     // slopes at the rim grow as log(1 / distance): 1e-9 away no more than 1e-7 of the field
@@ -429,9 +426,8 @@ TEST(Cache, gives_the_same_bits_survives_damage_and_many_writers) {
   const auto note = [&] {
     const auto model = choice::make_substrate(kGel, parameters, 1);
     EXPECT_TRUE(without == model->compliance_um_per_nN(points, ellipses));
-    for (const auto& [name, value] : model->figures()) {
+    for (const auto& [name, value] : model->figures())
       if (name == "substrate_cache") return std::get<std::string>(value);
-    }
     return std::string("none");
   };
   numerics::parallel_for(4, 4, [&](int) { note(); });  // at once: none sees half a file, and no temporary one is left

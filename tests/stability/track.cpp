@@ -352,9 +352,8 @@ images::Image cropped(const images::Image& image, int left, int top, int width, 
   images::Image result = image;
   result.width = width, result.height = height;
   result.pixels.clear();
-  for (int j = top; j < top + height; ++j) {
+  for (int j = top; j < top + height; ++j)
     for (int i = left; i < left + width; ++i) result.pixels.push_back(image.at(i, j));
-  }
   return result;
 }
 

@@ -149,7 +149,7 @@ TEST(Focus, of_equal_images_is_equal_and_a_blurred_one_is_found) {
   test::hard_case("the stressed image blurred: beads 1.5 times as wide",
                   "the ratio of sizes, within a quarter of the difference");
   const auto peaks = test::ring_of_adhesions(384, 6);
-  for (const double blur : {1.0, 1.5}) {
+  for (const double blur : {1.0, 1.5})
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
       SCOPED_TRACE(seed);
       const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 1500, .defocus = blur, .seed = seed});
@@ -158,7 +158,6 @@ TEST(Focus, of_equal_images_is_equal_and_a_blurred_one_is_found) {
       EXPECT_NEAR(tracking.sizes.ratio, blur, 0.25 * (blur - 1) + 5 * tracking.sizes.sigma);
       EXPECT_LT(tracking.sizes.sigma, 0.02);
     }
-  }
 }
 
 TEST(Focus, beads_that_are_not_round_are_measured) {

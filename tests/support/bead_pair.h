@@ -80,12 +80,11 @@ inline void add_bead(images::Image& image, Vec2 at, double peak, double sigma, d
   const double wide = sigma / std::sqrt(aspect), high = sigma * std::sqrt(aspect);
   const int reach = static_cast<int>(std::ceil(5 * std::max(wide, high)));
   const int i0 = static_cast<int>(std::lround(at.x)), j0 = static_cast<int>(std::lround(at.y));
-  for (int j = std::max(0, j0 - reach); j <= std::min(image.height - 1, j0 + reach); ++j) {
+  for (int j = std::max(0, j0 - reach); j <= std::min(image.height - 1, j0 + reach); ++j)
     for (int i = std::max(0, i0 - reach); i <= std::min(image.width - 1, i0 + reach); ++i) {
       const double squared = std::pow((i - at.x) / wide, 2) + std::pow((j - at.y) / high, 2);
       image.at(i, j) += static_cast<float>(peak * std::exp(-0.5 * squared));
     }
-  }
 }
 
 /// Draw the pair. Beads fill a margin around the picture too, so that some come in and some leave.
@@ -125,7 +124,7 @@ inline BeadPair draw_bead_pair(const std::vector<Peak>& peaks, const BeadScene& 
   }
   for (images::Image* image : {&pair.relaxed, &pair.stressed}) {
     const bool is_stressed = image == &pair.stressed;
-    for (int j = 0; j < scene.width; ++j) {
+    for (int j = 0; j < scene.width; ++j)
       for (int i = 0; i < scene.width; ++i) {
         const double along = (is_stressed ? i : scene.width - i) / (1.0 * scene.width);
         const double light = (is_stressed ? scene.gain : 1) * (1 - scene.uneven_light * along);
@@ -134,7 +133,6 @@ inline BeadPair draw_bead_pair(const std::vector<Peak>& peaks, const BeadScene& 
         image->at(i, j) = static_cast<float>(std::max(
             0.0, std::round(counted + scene.read_noise * normal(random) + 100 + (is_stressed ? scene.offset : 0))));
       }
-    }
   }
   return pair;
 }

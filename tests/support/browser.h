@@ -106,9 +106,8 @@ class Browser {
   /// Addresses that the page asked for.
   std::vector<std::string> requests() const {
     std::vector<std::string> addresses;
-    for (const json& e : events_) {
+    for (const json& e : events_)
       if (e["method"] == "Network.requestWillBeSent") addresses.push_back(e["params"]["request"]["url"]);
-    }
     return addresses;
   }
 

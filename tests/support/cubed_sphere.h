@@ -16,7 +16,7 @@ class CubedSphere {
   CubedSphere(double inner_um, double outer_um, int n, int layers)
       : inner_(inner_um), outer_(outer_um), n_(n), layers_(layers) {
     std::map<std::array<long, 3>, int> node_at;
-    for (int patch = 0; patch < 6; ++patch) {
+    for (int patch = 0; patch < 6; ++patch)
       for (int cell = 0; cell < n * n * layers; ++cell) {
         const Eigen::Vector3d low(cell % n, cell / n % n, static_cast<double>(cell / (n * n)));
         if (low.z() == 0) mesh.surface_cells.push_back(mesh.n_cells());
@@ -33,7 +33,6 @@ class CubedSphere {
           mesh.cell_nodes.push_back(found->second);
         }
       }
-    }
     mesh.hanging.resize(mesh.position_um.size());
   }
 

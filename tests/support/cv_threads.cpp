@@ -18,12 +18,11 @@ class FollowedThreads : public cv::parallel::ParallelForAPI {
         thread_number > 0 ? 1 : std::clamp(tasks, 1, n_threads_);  // a loop inside of a loop stays in its thread
     const auto first_of = [&](int k) { return static_cast<int>(static_cast<long>(tasks) * k / n); };
     std::vector<std::thread> threads;
-    for (int k = 1; k < n; ++k) {
+    for (int k = 1; k < n; ++k)
       threads.emplace_back([&, k] {
         thread_number = k;
         body(first_of(k), first_of(k + 1), data);
       });
-    }
     body(0, first_of(1), data);
     for (std::thread& thread : threads) thread.join();
   }

@@ -80,11 +80,9 @@ inline EllipseScene ellipse_scene(int n_side, double noise, unsigned seed = 1, d
   const auto greens = greens::make_greens(scene.gel, {.model = substrate::ModelKind::half_space}, 2);
   std::vector<Vec2> points;
   const double start = 32 - side_um / 2;
-  for (int j = 0; j < n_side; ++j) {
-    for (int i = 0; i < n_side; ++i) {
+  for (int j = 0; j < n_side; ++j)
+    for (int i = 0; i < n_side; ++i)
       points.push_back({start + (i + 0.5) * scene.spacing_um, start + (j + 0.5) * scene.spacing_um});
-    }
-  }
   const std::vector<Vec2> u = greens->displacements_um(points, ellipses, scene.forces_nN);
   for (const Vec2 v : u) scene.largest_um = std::max(scene.largest_um, norm(v));
   const double sigma = noise * scene.largest_um;
@@ -126,9 +124,8 @@ inline double traction_error(const EllipseScene& scene, const std::vector<Vec2>&
 /// Mean |F − true| / |true| of forces by adhesion.
 inline double force_error(const EllipseScene& scene, const std::vector<Vec2>& forces_nN) {
   double sum = 0;
-  for (std::size_t a = 0; a < forces_nN.size(); ++a) {
+  for (std::size_t a = 0; a < forces_nN.size(); ++a)
     sum += norm(forces_nN[a] - scene.forces_nN[a]) / norm(scene.forces_nN[a]);
-  }
   return sum / static_cast<double>(forces_nN.size());
 }
 

@@ -52,9 +52,8 @@ inline Network web_over(const Cell& cell) {
   Network network;
   const auto add_vertex = [&](Vec2 p) {
     int held_by = 0;
-    for (const Adhesion& a : cell.adhesions) {
+    for (const Adhesion& a : cell.adhesions)
       if (norm(a.position_um - p) < 0.5 * a.minor_axis_um) held_by = a.adhesion_id;
-    }
     network.vertices_um.push_back(p);
     network.adhesion_id.push_back(held_by);
     return static_cast<int>(network.vertices_um.size()) - 1;
@@ -78,18 +77,16 @@ inline Network web_over(const Cell& cell) {
     }
   }
   std::map<std::pair<int, int>, int> grid;
-  for (int row = 0; row < 80; ++row) {
+  for (int row = 0; row < 80; ++row)
     for (int column = 0; column < 80; ++column) {
       const Vec2 p{1.4 * column + 0.1, 1.4 * row + 0.1};
       if (contains(cell.outline_um, p)) grid[{row, column}] = add_vertex(p);
     }
-  }
-  for (const auto& [place, vertex] : grid) {
+  for (const auto& [place, vertex] : grid)
     for (const auto& step : {std::pair{0, 1}, {1, 0}, {1, 1}}) {
       const auto next = grid.find({place.first + step.first, place.second + step.second});
       if (next != grid.end()) add_link(vertex, next->second, 0);
     }
-  }
   return network;
 }
 
@@ -168,9 +165,8 @@ inline void write_invented_fit(const fs::path& folder, unsigned seed = 1) {
   files::write_fit_summary(folder / "4_fit/fit.json", summary);
 
   std::vector<Vec2> drawn = network.vertices_um;
-  for (std::size_t v = 0; v < drawn.size(); ++v) {
+  for (std::size_t v = 0; v < drawn.size(); ++v)
     if (network.adhesion_id[v] == 0) drawn[v] += 0.05 * (centre - drawn[v]);
-  }
   std::vector<double> carried;
   for (const Link& link : network.links)
     carried.push_back(link.fibre_id == 0 ? 0.06 : tensions[link.fibre_id].tension_nN);

@@ -71,12 +71,11 @@ inline void write_cell(const std::filesystem::path& folder) {
 inline std::vector<std::filesystem::path> write_tables(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   DisplacementField field;
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 20; ++i)
     field.push_back({.position_um = {1.5 * i, 30.0 - i * i / 13.0},
                      .displacement_um = {0.1 * i, -1e-7 * i},
                      .sigma_um = 0.02,
                      .flag = i == 3 ? "neighbours disagree" : ""});
-  }
   files::write_displacement(folder / "displacement.csv", field);
   files::write_tensions(folder / "tensions.csv",
                         {{.fibre_id = 0, .tension_nN = 0.06, .low_nN = 0.03, .high_nN = 0.09},

@@ -26,13 +26,12 @@ struct HalfSpaceScene {
 
   std::vector<Adhesion> adhesions() const {
     std::vector<Adhesion> made;
-    for (const Spot& s : spots) {
+    for (const Spot& s : spots)
       made.push_back({.adhesion_id = static_cast<int>(made.size()) + 1,
                       .position_um = s.centre_um,
                       .area_um2 = M_PI * s.radius_um * s.radius_um,
                       .major_axis_um = 2 * s.radius_um,
                       .minor_axis_um = 2 * s.radius_um});
-    }
     return made;
   }
 
@@ -102,7 +101,7 @@ struct HalfSpaceScene {
     made.surface_um_per_kPa = response(made.mesh, below);
     made.adhesion_areas_um2 = adhesion_areas_um2(made.mesh, ground, adhesions(), 0);
     made.patch_response_um_per_nN.resize(3 * std::ssize(points), 3 * std::ssize(spots));
-    for (std::size_t s = 0; s < spots.size(); ++s) {
+    for (std::size_t s = 0; s < spots.size(); ++s)
       for (int c = 0; c < 3; ++c) {
         Spot unit = spots[s];
         unit.force_nN = {c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0};
@@ -114,7 +113,6 @@ struct HalfSpaceScene {
               u.y, u.z;
         }
       }
-    }
     return made;
   }
 };

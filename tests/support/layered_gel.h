@@ -24,7 +24,7 @@ class LayeredGel {
     const double most = 14 / layers_[0].thickness_um;
     const numerics::GaussRule gauss = numerics::gauss_legendre(12);
     constexpr int kPanels = 40;
-    for (int panel = 0; panel < kPanels; ++panel) {
+    for (int panel = 0; panel < kPanels; ++panel)
       for (std::size_t g = 0; g < gauss.nodes.size(); ++g) {
         const double k = most / kPanels * (panel + 0.5 * (1 + gauss.nodes[g]));
         const double weight = 0.5 * most / kPanels * gauss.weights[g] * k / (2 * std::numbers::pi);
@@ -34,16 +34,14 @@ class LayeredGel {
         s_.push_back(0.5 * weight * (along + across));
         d_.push_back(-0.5 * weight * (along - across));
       }
-    }
   }
 
   /// Displacement by a unit force on an ellipse: the half-space of the first layer, plus the rest averaged.
   greens::Sym2 compliance_um_per_nN(const substrate::Ellipse& ellipse, Vec2 point) const {
     const Gel top = {.youngs_modulus_kPa = layers_[0].youngs_modulus_kPa, .poisson_ratio = nu_, .thickness_um = 1};
     greens::Sym2 sum = greens::HalfSpaceEllipse(top, ellipse).compliance_um_per_nN(point);
-    for (const substrate::DiscPoint& p : substrate::ellipse_rule(ellipse, 5)) {
+    for (const substrate::DiscPoint& p : substrate::ellipse_rule(ellipse, 5))
       sum += p.weight * rest(point - ellipse.centre_um - p.position);
-    }
     return sum;
   }
 

@@ -48,7 +48,7 @@ inline std::vector<MatElement> elements_of(const std::string& text, std::size_t 
 /// The columns x, y of every matrix of doubles in the file, in its order.
 inline std::vector<std::vector<Vec2>> matrices_of(const std::string& text, std::size_t at = 128) {
   std::vector<std::vector<Vec2>> result;
-  for (const MatElement& element : elements_of(text, at)) {
+  for (const MatElement& element : elements_of(text, at))
     if (element.type == 9) {
       std::vector<double> values(element.bytes.size() / sizeof(double));
       std::memcpy(values.data(), element.bytes.data(), element.bytes.size());
@@ -56,11 +56,9 @@ inline std::vector<std::vector<Vec2>> matrices_of(const std::string& text, std::
       for (std::size_t k = 0; k < values.size() / 2; ++k) rows.push_back({values[k], values[values.size() / 2 + k]});
       result.push_back(std::move(rows));
     } else if (element.type == 14 || element.type == 15) {
-      for (auto& rows : matrices_of(element.type == 15 ? inflated(element.bytes) : element.bytes, 0)) {
+      for (auto& rows : matrices_of(element.type == 15 ? inflated(element.bytes) : element.bytes, 0))
         result.push_back(std::move(rows));
-      }
     }
-  }
   return result;
 }
 

@@ -68,18 +68,16 @@ struct PivGrid {
 /// Weighed 1 : 2 : 1 with the neighbours along both axes.
 inline beads::GridField smoothed(const beads::GridField& field) {
   beads::GridField result = field;
-  for (int j = 0; j < field.ny; ++j) {
+  for (int j = 0; j < field.ny; ++j)
     for (int i = 0; i < field.nx; ++i) {
       Vec2 sum;
-      for (int b = -1; b <= 1; ++b) {
+      for (int b = -1; b <= 1; ++b)
         for (int a = -1; a <= 1; ++a) {
           const int x = std::clamp(i + a, 0, field.nx - 1), y = std::clamp(j + b, 0, field.ny - 1);
           sum += (2.0 - std::abs(a)) * (2.0 - std::abs(b)) / 16 * field.u[static_cast<std::size_t>(y) * field.nx + x];
         }
-      }
       result.u[static_cast<std::size_t>(j) * field.nx + i] = sum;
     }
-  }
   return result;
 }
 
@@ -117,9 +115,8 @@ inline BeadPair redrawn(const images::Image& relaxed, const beads::Tracking& tra
   }
   std::mt19937_64 random(101);
   std::normal_distribution<float> noise(0, 0.02f * background);
-  for (images::Image* image : {&pair.relaxed, &pair.stressed}) {
+  for (images::Image* image : {&pair.relaxed, &pair.stressed})
     for (float& value : image->pixels) value += noise(random);
-  }
   return pair;
 }
 
@@ -129,11 +126,9 @@ inline std::vector<double> window_of(const images::Image& image, int left, int t
   double sum = 0;
   int n = 0;
   const auto for_each = [&](const auto& body) {
-    for (int j = std::max(0, -top); j < std::min(side, image.height - top); ++j) {
-      for (int i = std::max(0, -left); i < std::min(side, image.width - left); ++i) {
+    for (int j = std::max(0, -top); j < std::min(side, image.height - top); ++j)
+      for (int i = std::max(0, -left); i < std::min(side, image.width - left); ++i)
         body(values[static_cast<std::size_t>(j) * side + i], image.at(left + i, top + j));
-      }
-    }
   };
   for_each([&](double&, double pixel) { sum += pixel, ++n; });
   for_each([&](double& value, double pixel) { value = pixel - sum / n; });
@@ -160,20 +155,17 @@ inline Vec2 piv_displacement(const images::Image& relaxed, const images::Image& 
   };
   constexpr int kSide = 2 * kReach + 3;
   std::vector<double> map;
-  for (int b = -kReach - 1; b <= kReach + 1; ++b) {
+  for (int b = -kReach - 1; b <= kReach + 1; ++b)
     for (int a = -kReach - 1; a <= kReach + 1; ++a) map.push_back(correlation(a, b));
-  }
   const double lowest = *std::min_element(map.begin(), map.end());
   const auto at = [&](int a, int b) {
     return map[static_cast<std::size_t>((b + kReach + 1) * kSide + a + kReach + 1)];
   };
   double best = -1e300;
   int a = 0, b = 0;
-  for (int j = -kReach; j <= kReach; ++j) {
-    for (int i = -kReach; i <= kReach; ++i) {
+  for (int j = -kReach; j <= kReach; ++j)
+    for (int i = -kReach; i <= kReach; ++i)
       if (at(i, j) > best) best = at(i, j), a = i, b = j;
-    }
-  }
   const auto vertex = [&](double before, double here, double after) {
     const auto log_of = [&](double value) { return std::log(std::max(value - lowest, 1e-9)); };
     const double curvature = log_of(before) - 2 * log_of(here) + log_of(after);
@@ -186,12 +178,11 @@ inline Vec2 piv_displacement(const images::Image& relaxed, const images::Image& 
 inline images::Image deformed_back(const images::Image& image, const beads::GridField& u) {
   const beads::Spline spline = beads::spline_through({image.width, image.height, image.pixels}, 1);
   images::Image result = image;
-  for (int j = 0; j < image.height; ++j) {
+  for (int j = 0; j < image.height; ++j)
     for (int i = 0; i < image.width; ++i) {
       const Vec2 place{1.0 * i, 1.0 * j};
       result.pixels[static_cast<std::size_t>(j) * image.width + i] = beads::value_at(spline, place + u.at(place).u);
     }
-  }
   return result;
 }
 

@@ -25,16 +25,14 @@ inline double uniform(std::mt19937_64& engine, double low, double high) {
 /// A star-shaped outline: a circle with waves of two to six periods.
 inline Polygon random_outline(std::mt19937_64& engine, const RandomCellOptions& options) {
   std::vector<std::pair<double, double>> waves;  // amplitude, phase
-  for (int k = 2; k <= 6; ++k) {
+  for (int k = 2; k <= 6; ++k)
     waves.push_back({options.roughness * uniform(engine, 0, 1.5) / k, uniform(engine, 0, 2 * std::numbers::pi)});
-  }
   Polygon outline;
   for (int i = 0; i < options.n_outline_points; ++i) {
     const double angle = 2 * std::numbers::pi * i / options.n_outline_points;
     double radius = options.radius_um;
-    for (std::size_t k = 0; k < waves.size(); ++k) {
+    for (std::size_t k = 0; k < waves.size(); ++k)
       radius += options.radius_um * waves[k].first * std::cos(static_cast<double>(k + 2) * angle + waves[k].second);
-    }
     radius = std::max(radius, 0.15 * options.radius_um);
     outline.push_back({30 + radius * std::cos(angle), 30 + radius * std::sin(angle)});
   }

@@ -23,12 +23,11 @@ inline ReferenceNetwork reference_network(const std::string& name) {
     reference.network.vertices_um.push_back({vertices.number(v, "x_um"), vertices.number(v, "y_um")});
     reference.network.adhesion_id.push_back(vertices.integer(v, "fixed", 0) == 1 ? v + 1 : 0);
   }
-  for (int k = 0; k < links.n_rows(); ++k) {
+  for (int k = 0; k < links.n_rows(); ++k)
     reference.network.links.push_back({.vertex_a = links.integer(k, "vertex_a", 0),
                                        .vertex_b = links.integer(k, "vertex_b", 0),
                                        .fibre_id = links.integer(k, "group", 0),
                                        .rest_length_um = links.number(k, "rest_length_um")});
-  }
   for (int g = 0; g < tensions.n_rows(); ++g) reference.tensions_nN.push_back(tensions.number(g, "tension_nN"));
   return reference;
 }

@@ -95,9 +95,8 @@ inline statistics::Study small_study(const Lack& lack, std::uint64_t seed) {
       if (lack.are_adhesion_forces_zero) f.force_nN = {0, 0};
       if (lack.are_adhesions_equal || lack.are_adhesion_forces_zero) f.sigma_nN = 0;
     }
-    for (Adhesion& a : cell.cell.adhesions) {
+    for (Adhesion& a : cell.cell.adhesions)
       if (!lack.are_adhesions_equal) a.area_um2 *= 0.5 + uniform(random);
-    }
     if (lack.are_adhesions_missing) {
       cell.forces.clear();
       cell.cell.adhesions.clear();

@@ -46,9 +46,8 @@ inline std::vector<substrate::Ellipse> scattered_ellipses(int n, double radius_u
 /// Relative L2 difference of each ellipse's pair of columns, averaged over the ellipses.
 inline double mean_column_difference(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& reference) {
   double sum = 0;
-  for (Eigen::Index j = 0; j + 1 < matrix.cols(); j += 2) {
+  for (Eigen::Index j = 0; j + 1 < matrix.cols(); j += 2)
     sum += (matrix - reference).middleCols(j, 2).norm() / reference.middleCols(j, 2).norm();
-  }
   return 2 * sum / static_cast<double>(matrix.cols());
 }
 

@@ -60,9 +60,8 @@ inline void contract(TensionScene& scene, const Eigen::VectorXd& tensions_nN) {
   }
   scene.displacement_um = scene.compliance_um_per_nN * scene.forces_nN;
   scene.largest_um = 0;
-  for (Eigen::Index i = 0; i < scene.displacement_um.size(); i += 2) {
+  for (Eigen::Index i = 0; i < scene.displacement_um.size(); i += 2)
     scene.largest_um = std::max(scene.largest_um, scene.displacement_um.segment<2>(i).norm());
-  }
 }
 
 /// On an 8.4 kPa layer; beads evenly at random up to 15 um beyond the adhesions.

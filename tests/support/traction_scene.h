@@ -42,9 +42,8 @@ struct TractionScene {
       const Vec3 e = noise[b];
       seen.push_back({beads_um[b], exact_um[b] + s * Vec3{e.x, e.y, 3 * e.z}, std::abs(s), 3 * std::abs(s), {}});
     }
-    for (const Outlier& o : outliers) {
+    for (const Outlier& o : outliers)
       if (o.rank < astray) seen[o.bead].displacement_um = exact_um[o.bead] + 10 * o.box;
-    }
     return seen;
   }
   /// The patches as a segmentation would have them.
@@ -69,9 +68,8 @@ inline TractionScene traction_scene(const std::filesystem::path& folder) {
   const nlohmann::json json = nlohmann::json::parse(file);
   const std::string kind = json.at("surface").get<std::string>();
   std::string formula = kind + (kind == "flat" ? " z_um=0" : "");
-  for (const char* key : {"amplitude_um", "period_um", "phase_um", "depth_um", "width_um", "wall_um"}) {
+  for (const char* key : {"amplitude_um", "period_um", "phase_um", "depth_um", "width_um", "wall_um"})
     if (json.contains(key)) formula += std::string(" ") + key + "=" + std::to_string(json.at(key).get<double>());
-  }
   scene.gel = {json.at("youngs_modulus_kPa").get<double>(), json.at("poisson_ratio").get<double>(),
                json.at("base_z_um").get<double>()};
   if (kind != "flat") {
@@ -89,16 +87,14 @@ inline TractionScene traction_scene(const std::filesystem::path& folder) {
     scene.noise.push_back(vector(beads, row, "ex", "ey", "ez"));
   }
   const files::CsvTable outliers(folder / "outliers.csv");
-  for (int row = 0; row < outliers.n_rows(); ++row) {
+  for (int row = 0; row < outliers.n_rows(); ++row)
     scene.outliers.push_back({static_cast<std::size_t>(outliers.integer(row, "bead", 0)), outliers.number(row, "rank"),
                               vector(outliers, row, "bx", "by", "bz")});
-  }
   const files::CsvTable patches(folder / "patches.csv");
-  for (int row = 0; row < patches.n_rows(); ++row) {
+  for (int row = 0; row < patches.n_rows(); ++row)
     scene.patches.push_back({{patches.number(row, "x_um"), patches.number(row, "y_um")},
                              patches.number(row, "radius_um"),
                              vector(patches, row, "fx_nN", "fy_nN", "fz_nN")});
-  }
   const files::CsvTable truth(folder / "surface.csv");
   const spatial::Ground ground(scene.gel.surface.get());
   constexpr double kHalf = 45, kStep = 2.5;

@@ -30,16 +30,12 @@ struct VtuVariant {
 
 inline std::vector<VtuVariant> vtu_variants() {
   std::vector<VtuVariant> variants;
-  for (const VtuMode mode : {VtuMode::ascii, VtuMode::binary, VtuMode::appended_base64, VtuMode::appended_raw}) {
-    for (const auto compressor : {vtkXMLWriterBase::NONE, vtkXMLWriterBase::ZLIB, vtkXMLWriterBase::LZ4}) {
-      for (const bool is_big_endian : {false, true}) {
-        for (const bool has_long_sizes : {false, true}) {
+  for (const VtuMode mode : {VtuMode::ascii, VtuMode::binary, VtuMode::appended_base64, VtuMode::appended_raw})
+    for (const auto compressor : {vtkXMLWriterBase::NONE, vtkXMLWriterBase::ZLIB, vtkXMLWriterBase::LZ4})
+      for (const bool is_big_endian : {false, true})
+        for (const bool has_long_sizes : {false, true})
           for (const int block_bytes : {0, 64})
             variants.push_back({mode, compressor, is_big_endian, has_long_sizes, block_bytes});
-        }
-      }
-    }
-  }
   return variants;
 }
 

@@ -16,9 +16,8 @@ namespace {
 /// Two fibres of 3 and 4 nN; parts of each tension's error in nN.
 ErrorBudget budget(double beads, std::optional<double> mesh) {
   ErrorBudget b;
-  for (const auto& [id, tension_nN] : {std::pair{0, 0.06}, {1, 3.0}, {2, 4.0}}) {
+  for (const auto& [id, tension_nN] : {std::pair{0, 0.06}, {1, 3.0}, {2, 4.0}})
     b.tensions.push_back({.fibre_id = id, .tension_nN = tension_nN, .parts_nN = {.beads = beads, .mesh = mesh}});
-  }
   return b;
 }
 
@@ -151,13 +150,12 @@ TEST(CostStudy, of_a_cell_in_space_tells_of_tractions_and_not_of_tensions) {
 /// Tractions of one kPa along x on a square lattice of `n` places a side.
 SpaceMap even_map(int n, double step_um, double traction_kPa) {
   SpaceMap map;
-  for (int j = 0; j < n; ++j) {
+  for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       map.at_um.push_back({i * step_um, j * step_um, 0});
       map.traction_kPa.push_back({traction_kPa, 0, 0});
       map.area_um2.push_back(step_um * step_um);
     }
-  }
   return map;
 }
 
@@ -203,10 +201,9 @@ TEST(Ladder, in_space_turns_knobs_that_the_stage_has) {
   std::set<std::string> knobs;
   for (const Rung& rung : rungs) {
     knobs.insert(rung.knob);
-    for (const runner::Setting& setting : rung.settings) {
+    for (const runner::Setting& setting : rung.settings)
       EXPECT_FALSE(runner::flags_of(runner::stages_in_space().back(), {setting}).empty())
           << setting.table << "." << setting.key;
-    }
     const std::string group = group_of(rung.knob, CellKind::space);
     EXPECT_TRUE(std::ranges::count(groups_of(CellKind::space), group) == 1) << rung.knob;
   }
@@ -227,13 +224,12 @@ TEST(Ladder, turns_every_knob_that_trades_accuracy_for_time) {
 
 /// A rung whose settings no stage has would measure the default once more.
 TEST(Ladder, turns_knobs_that_a_stage_has) {
-  for (const Rung& rung : ladder(Extent::whole)) {
+  for (const Rung& rung : ladder(Extent::whole))
     for (const runner::Setting& setting : rung.settings) {
       const bool is_known = std::any_of(runner::stages().begin(), runner::stages().end(),
                                         [&](const auto& stage) { return !runner::flags_of(stage, {setting}).empty(); });
       EXPECT_TRUE(is_known) << setting.table << "." << setting.key;
     }
-  }
 }
 
 TEST(Settings, of_the_cell_win) {

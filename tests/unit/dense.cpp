@@ -41,11 +41,8 @@ TEST_P(Dense, gram_adds_to_the_upper_half_alone_and_may_take_away) {
   MatrixXd square = before;
   numerics::add_upper_gram(A, square, 2, -2.0);
   const MatrixXd wanted = before - 2 * A.transpose().lazyProduct(A);
-  for (int j = 0; j < n; ++j) {
-    for (int i = 0; i < n; ++i) {
-      EXPECT_NEAR(square(i, j), i > j ? before(i, j) : wanted(i, j), i > j ? 0 : kRounding);
-    }
-  }
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) EXPECT_NEAR(square(i, j), i > j ? before(i, j) : wanted(i, j), i > j ? 0 : kRounding);
 }
 
 TEST_P(Dense, cholesky_s_factor_squares_to_the_matrix_and_solves_with_it) {

@@ -62,9 +62,8 @@ TEST(Effects, a_switch_makes_anew_the_stages_that_have_it_and_no_other) {
     const auto before = settings("[gel]\nyoungs_modulus_kPa = 8\n");
     const auto after = settings("[gel]\nyoungs_modulus_kPa = 8\n" + toml);
     std::string names;
-    for (const runner::Stage& stage : runner::stages()) {
+    for (const runner::Stage& stage : runner::stages())
       if (before.at(stage.name) != after.at(stage.name)) names += stage.name + " ";
-    }
     return names;
   };
   EXPECT_EQ(changed("[effects]\ndrift_affine = 'off'\n"), "track ");

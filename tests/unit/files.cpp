@@ -197,14 +197,13 @@ TEST(Files, writers_check_what_they_write) {
 TEST(Files, an_adhesions_origin_and_its_distance_from_the_edge_are_kept) {
   const test::TemporaryFolder folder;
   std::vector<Adhesion> adhesions;
-  for (const AdhesionOrigin origin : values_of<AdhesionOrigin>()) {
+  for (const AdhesionOrigin origin : values_of<AdhesionOrigin>())
     adhesions.push_back({.adhesion_id = static_cast<int>(adhesions.size()) + 1,
                          .position_um = {1, 2},
                          .area_um2 = 1,
                          .major_axis_um = 1.2,
                          .minor_axis_um = 1.1,
                          .origin = origin});
-  }
   adhesions[1].edge_distance_um = 0.25;
   files::write_adhesions(folder / "adhesions.csv", adhesions);
   const auto read = files::read_adhesions(folder / "adhesions.csv");

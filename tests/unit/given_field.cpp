@@ -40,18 +40,16 @@ TEST(GivenField, a_grid_of_a_known_field_keeps_its_peaks_and_tells_its_noise) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal(0, 0.05);
   files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
-  for (int j = 0; j < 64; ++j) {
+  for (int j = 0; j < 64; ++j)
     for (int i = 0; i < 64; ++i) {
       const Vec2 place{8 * i + 4.0, 8 * j + 4.0}, u = test::displacement(peaks, place);
       csv.add(place.x).add(place.y).add(u.x + normal(random)).add(u.y + normal(random)).end_row();
     }
-  }
   const DisplacementField field = read_given_field(write(folder, csv.str()), {});
   EXPECT_NEAR(field[0].sigma_um, 0.05, 0.01);
   int n_flagged = 0;
-  for (const Bead& bead : field) {
+  for (const Bead& bead : field)
     if (!bead.flag.empty()) ++n_flagged;
-  }
   EXPECT_LE(n_flagged, 0.01 * static_cast<double>(field.size()));
   EXPECT_LT(outwardness(field), -0.5);
 }
@@ -62,7 +60,7 @@ TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
   std::normal_distribution<double> normal(0, 0.05);
   for (const double growth : {0.0, 0.003}) {
     DisplacementField field, truth;
-    for (int j = 0; j < 64; ++j) {
+    for (int j = 0; j < 64; ++j)
       for (int i = 0; i < 64; ++i) {
         const Vec2 place{8 * i + 4.0, 8 * j + 4.0}, u = test::displacement(peaks, place);
         truth.push_back({.position_um = place, .displacement_um = u, .sigma_um = 0.05});
@@ -70,7 +68,6 @@ TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
         const double x = normal(random);
         field.back().displacement_um = u + growth * (place - Vec2{256, 256}) + Vec2{x, normal(random)};
       }
-    }
     TrackParameters parameters;
     parameters.drift_affine = Switch::automatic;
     const DisplacementField before = field;
@@ -90,12 +87,11 @@ TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
 TEST(GivenField, what_cannot_be_used_is_flagged_and_kept) {
   const test::TemporaryFolder folder;
   files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um", "sigma_um"});
-  for (int j = 0; j < 8; ++j) {
+  for (int j = 0; j < 8; ++j)
     for (int i = 0; i < 8; ++i) {
       const bool is_outlier = i == 4 && j == 4;
       csv.add(1.0 * i).add(1.0 * j).add(is_outlier ? 3.0 : 0.1 * i).add(0.05 * j).add(0.01).end_row();
     }
-  }
   csv.add(3.0).add(3.0).add(0.3).add(0.15).add(0.01).end_row();
   csv.add(3.5).add(3.5).add("NaN").add(0.15).add(0.01).end_row();
   csv.add(2.5).add(3.5).add("").add(0.15).add(0.01).end_row();

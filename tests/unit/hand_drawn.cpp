@@ -139,7 +139,7 @@ TEST(HandDrawn, a_named_fibre_is_held_by_what_it_reaches_and_by_anchors_where_it
 
 TEST(HandDrawn, a_fibre_is_held_at_as_many_ends_as_its_type_says_with_or_without_adhesions) {
   const std::vector<Adhesion> at_both = {test::ellipse(1, {5, 5}, 1, 0.5, 0), test::ellipse(2, {15, 5}, 1, 0.5, 0)};
-  for (const FibreType type : kFibreTypes) {
+  for (const FibreType type : kFibreTypes)
     for (const auto& adhesions : {std::vector<Adhesion>{}, at_both}) {
       const HeldFibres result =
           held(set_of({line({{50, 50}, {150, 50}}, std::string(name_of(type)) + " 1")}), adhesions);
@@ -150,7 +150,6 @@ TEST(HandDrawn, a_fibre_is_held_at_as_many_ends_as_its_type_says_with_or_without
       EXPECT_EQ(static_cast<int>(result.anchors.size()), adhesions.empty() ? n_held_ends(type) : 0);
       EXPECT_NEAR(length_um(f.points_um), 10, 0.2) << name_of(type);  // free ends stay where they are drawn
     }
-  }
 }
 
 TEST(HandDrawn, a_dorsal_fibre_is_held_at_its_last_point_where_that_alone_reaches_an_adhesion) {

@@ -113,9 +113,8 @@ TEST(Image, calibration_is_understood_in_each_dialect) {
        {},
        0.16},
   };
-  for (const CalibrationCase& c : cases) {
+  for (const CalibrationCase& c : cases)
     EXPECT_EQ(pixel_size_um({c.description, c.x_resolution, c.y_resolution}), c.expected_um) << c.description;
-  }
 }
 
 std::string error_of(const fs::path& file, int page = 0) {
@@ -307,12 +306,10 @@ TEST(Image, real_calibrations_are_found) {
 TEST(Jpeg, is_read_as_what_it_shows_and_marked_as_lossy) {
   const test::TemporaryFolder folder;
   Picture picture{.width = 64, .height = 48};
-  for (int j = 0; j < 48; ++j) {
-    for (int i = 0; i < 64; ++i) {
+  for (int j = 0; j < 48; ++j)
+    for (int i = 0; i < 64; ++i)
       for (const int value : {2 * i + 40, 2 * i + 40, 2 * i + 40})
         picture.rgb.push_back(static_cast<std::uint8_t>(value));
-    }
-  }
   write_jpeg(folder / "a.jpg", picture);
   const Image image = read_image(folder / "a.jpg");
   ASSERT_EQ(image.width, 64);
@@ -321,9 +318,8 @@ TEST(Jpeg, is_read_as_what_it_shows_and_marked_as_lossy) {
   EXPECT_TRUE(image.is_lossy);
   EXPECT_FALSE(image.pixel_size_um) << "its resolution is a printer's";
   // an even slope has few waves: at quality 80 these are rounded to steps of some counts
-  for (int j = 0; j < 48; ++j) {
+  for (int j = 0; j < 48; ++j)
     for (int i = 0; i < 64; ++i) EXPECT_NEAR(image.at(i, j), 2 * i + 40, 6) << i << ", " << j;
-  }
   EXPECT_TRUE(binned(image, 2).is_lossy);
   EXPECT_TRUE(fires("lossy-image", noticed_loss({"a.jpg", image})));
   write_tiff(folder / "a.tif", image);

@@ -63,7 +63,7 @@ TEST_F(OwnFiles, writing_replaces_a_link_and_a_second_name_and_a_pipe) {
   const std::vector<std::function<void()>> others = {
       [&] { fs::create_symlink("../outside", file); }, [&] { fs::create_hard_link(folder_ / "outside", file); },
       [&] { fs::create_symlink("../new", file); }, [&] { ASSERT_EQ(mkfifo(file.c_str(), 0600), 0); }};
-  for (const auto& put : others) {
+  for (const auto& put : others)
     for (const auto& write : {files::write_text, files::write_whole}) {
       fs::remove(file);
       put();
@@ -73,7 +73,6 @@ TEST_F(OwnFiles, writing_replaces_a_link_and_a_second_name_and_a_pipe) {
       EXPECT_EQ(files::read_text(folder_ / "outside"), "precious");
       EXPECT_FALSE(fs::exists(folder_ / "new"));
     }
-  }
   EXPECT_THROW(files::write_text(cell_ / "4_fit", ""), OutputError);
 }
 

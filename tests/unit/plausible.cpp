@@ -130,9 +130,8 @@ TEST(Plausible, one_adhesion_that_was_drawn_too_small_makes_no_traction_unusual)
   std::vector<Adhesion> adhesions(4, {.adhesion_id = 1, .area_um2 = 1});
   adhesions[2].area_um2 = 0.01;
   std::vector<AdhesionForce> forces;
-  for (const double force_nN : {3., 4., 2., 5.}) {
+  for (const double force_nN : {3., 4., 2., 5.})
     forces.push_back({.adhesion_id = 1, .force_nN = {force_nN, 0}, .connected = false});
-  }
   EXPECT_DOUBLE_EQ(stage::traction_of_half_the_force_kPa(forces, adhesions), 5) << "200 kPa on a seventh of the force";
   EXPECT_DOUBLE_EQ(stage::traction_of_half_the_force_kPa({}, {}), 0);
 }

@@ -35,12 +35,10 @@ struct FakeCell {
 TEST(Report, names_every_fibre_and_adhesion) {
   const FakeCell cell;
   const std::string html = report_html(cell.folder.path());
-  for (int fibre = 1; fibre <= 4; ++fibre) {
+  for (int fibre = 1; fibre <= 4; ++fibre)
     EXPECT_NE(html.find("fibre " + std::to_string(fibre) + " ("), std::string::npos) << fibre;
-  }
-  for (int adhesion = 1; adhesion <= 12; ++adhesion) {
+  for (int adhesion = 1; adhesion <= 12; ++adhesion)
     EXPECT_NE(html.find("adhesion " + std::to_string(adhesion) + "\\n"), std::string::npos) << adhesion;
-  }
 }
 
 TEST(Charts, keys_are_dark_enough_to_read_on_white) {
@@ -149,9 +147,8 @@ TEST(Report, the_methods_paragraph_has_the_numbers_of_this_cell) {
   const std::size_t at = html.find("For-your-methods-section");
   ASSERT_NE(at, html.npos);
   const std::string paragraph = html.substr(html.find("<p class=\"cite\">", at));
-  for (const char* part : {"8.4 kPa", "12 adhesions", "4 stress fibres"}) {
+  for (const char* part : {"8.4 kPa", "12 adhesions", "4 stress fibres"})
     EXPECT_LT(paragraph.find(part), paragraph.find("</p>")) << part;
-  }
 }
 
 TEST(Report, shows_the_bead_images_where_tracking_has_left_them) {
@@ -308,9 +305,8 @@ TEST(Report, names_no_part_of_the_network_that_beads_do_not_tell) {
 TEST(Report, shows_no_more_digits_of_a_tension_than_its_interval_warrants) {
   const FakeCell cell;
   CellResults results = read_results(cell.folder.path());
-  for (auto& [id, tension] : results.tensions) {
+  for (auto& [id, tension] : results.tensions)
     tension = {.fibre_id = id, .tension_nN = 0.0251, .low_nN = 0, .high_nN = 4.29, .identifiable = true};
-  }
   results.tensions.at(0) = {.tension_nN = 0.04312, .low_nN = 0.016188, .high_nN = 0.07003, .identifiable = true};
   const Table table = tension_table(results);
   EXPECT_EQ(table.rows[0][2], "0.043");

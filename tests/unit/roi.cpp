@@ -225,9 +225,8 @@ TEST(Roi, files_of_a_third_program_are_read_as_imagej_does) {
   expect_equal(area_px(read("unit_rectangle.roi")), {{0, 0}, {1, 0}, {1, 1}, {0, 1}}, 0);
   expect_equal(read("float_point.roi").points_px, {{123.4, 567.8}}, kFloat);
   expect_equal(read("int_point.roi").points_px, {{128, 256}}, 0);
-  for (const char* name : {"polygon_circle.roi", "freehand_circle.roi"}) {
+  for (const char* name : {"polygon_circle.roi", "freehand_circle.roi"})
     for (const Vec2 p : read(name).points_px) EXPECT_NEAR(norm(p - Vec2{10, 15}), 1, kFloat) << name;
-  }
 }
 
 }  // namespace

@@ -77,9 +77,8 @@ class Runner : public testing::Test {
     fs::create_directories(bin_);
     for (const Stage& stage : stages()) make_executable(bin_ / ("mbtfm-" + stage.name), kStageScript);
     write_parameters("");
-    for (const char* image : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"}) {
+    for (const char* image : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"})
       files::write_text(cell_ / image, image);
-    }
   }
 
   void write_parameters(const std::string& further) {
@@ -103,9 +102,8 @@ class Runner : public testing::Test {
     return list;
   }
   StageState state_of(const std::string& stage) const {
-    for (const StageOutcome& outcome : last_.stages) {
+    for (const StageOutcome& outcome : last_.stages)
       if (outcome.stage == stage) return outcome.status.state;
-    }
     throw InternalError("no stage " + stage);
   }
   CellOutcome last_;

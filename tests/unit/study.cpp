@@ -37,9 +37,8 @@ struct FakeStudy {
 };
 
 std::string reason_of(const Study& study, const std::string& cell) {
-  for (const LeftOutCell& c : study.left_out) {
+  for (const LeftOutCell& c : study.left_out)
     if (c.name == cell) return c.reason;
-  }
   return {};
 }
 
@@ -158,9 +157,8 @@ TEST(Study, tensions_that_cannot_be_identified_do_not_enter) {
   const FakeStudy fake;
   Study study = fake.read();
   const auto all = measured_fibres(study).size();
-  for (Tension& t : study.cells[0].tensions) {
+  for (Tension& t : study.cells[0].tensions)
     if (t.fibre_id == 2) t.identifiable = false;
-  }
   EXPECT_EQ(measured_fibres(study).size(), all - 1);
   const auto warnings = analyse(study, {}).warnings;
   EXPECT_TRUE(std::any_of(warnings.begin(), warnings.end(),
@@ -366,10 +364,9 @@ TEST(Analysis, tests_by_cell_hold_their_level_where_those_by_fibre_do_not) {
                                                                  .types_differ = false,
                                                                  .type_in_cell_sd_nN = 0.7,
                                                                  .seed = 100 + static_cast<std::uint64_t>(i)}));
-    for (const Comparison& c : compare(sample, model_of(sample).model)) {
+    for (const Comparison& c : compare(sample, model_of(sample).model))
       if (c.question == Question::between_conditions && c.within == "ventral" && c.p_value < 0.05)
         ++n_rejected[name_of(c.test) + std::string(", ") + name_of(c.unit)];
-    }
   }
   // 5 % of 200 are 10, with a standard deviation of 3.1; four of it
   EXPECT_LE(n_rejected["mixed model, cell"], 22);
@@ -424,9 +421,8 @@ TEST(Analysis, works_on_what_lacks_most) {
   lacking.cells[2].cell.fibres.clear();
   expect_whole(lacking);
   // equal values everywhere
-  for (StudyCell& c : lacking.cells) {
+  for (StudyCell& c : lacking.cells)
     for (Tension& t : c.tensions) t.tension_nN = 1;
-  }
   expect_whole(lacking);
 }
 
@@ -472,9 +468,8 @@ TEST(Primary, with_replicates_compares_their_means_in_pairs) {
   std::map<std::pair<int, std::string>, std::vector<double>> cells_of;
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
     std::vector<double> own;
-    for (const Observation& o : sample.values) {
+    for (const Observation& o : sample.values)
       if (o.cell == static_cast<int>(i) && o.kind == 2) own.push_back(o.value);
-    }
     if (!own.empty()) cells_of[{study.cells[i].condition, study.cells[i].replicate}].push_back(describe(own).mean);
   }
   double sum = 0;
@@ -511,9 +506,8 @@ TEST(Figures, are_drawn_into_pixels) {
 
 /// Row of a table where these columns have these texts.
 int row_with(const files::CsvTable& table, const std::map<std::string, std::string>& texts) {
-  for (int row = 0; row < table.n_rows(); ++row) {
+  for (int row = 0; row < table.n_rows(); ++row)
     if (std::ranges::all_of(texts, [&](const auto& t) { return table.text(row, t.first) == t.second; })) return row;
-  }
   ADD_FAILURE() << "no row " << texts.begin()->second;
   return 0;
 }
@@ -665,10 +659,9 @@ TEST(SheetStudy, beside_cells_with_fibres_no_figure_mixes_the_two) {
   ASSERT_EQ(study.cells.size(), 11u);
   EXPECT_EQ(n_of_kind(study, CellKind::plane), 5);
   const Analysis analysis = analyse(study, {});
-  for (const Measure* m : analysis.measures()) {
+  for (const Measure* m : analysis.measures())
     for (const Observation& o : m->sample.values)
       EXPECT_EQ(study.cells[static_cast<std::size_t>(o.cell)].kind(), m->sample.of_cells()) << m->sample.column;
-  }
   EXPECT_EQ(sample_named(analysis, "total_force_nN")->values.size(), 5u);
   EXPECT_EQ(sample_named(analysis, "sheet_force_nN")->values.size(), 6u);
   for (const Correlation& c : analysis.correlations)
@@ -837,17 +830,15 @@ TEST(SpaceStudy, beside_cells_with_fibres_and_sheets_no_figure_mixes_them) {
   const Study study = read_again(made, folder);
   ASSERT_EQ(study.cells.size(), 15u);
   const Analysis analysis = analyse(study, {});
-  for (const Measure* m : analysis.measures()) {
+  for (const Measure* m : analysis.measures())
     for (const Observation& o : m->sample.values)
       EXPECT_EQ(study.cells[static_cast<std::size_t>(o.cell)].kind(), m->sample.of_cells()) << m->sample.column;
-  }
   std::set<std::string> columns;
   for (const Measure* m : analysis.measures())
     EXPECT_TRUE(columns.insert(m->sample.column).second) << m->sample.column << " is two quantities";
-  for (const Correlation& c : analysis.correlations) {
+  for (const Correlation& c : analysis.correlations)
     for (const int cell : c.cells)
       EXPECT_EQ(study.cells[static_cast<std::size_t>(cell)].kind(), CellKind::plane) << c.force;
-  }
   EXPECT_EQ(analysis.primary.measure, "total force of cells in space") << "most cells are of them";
   EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::tension}).primary.measure, "tension of ventral fibres");
   EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::contraction}).primary.measure, "contraction of sheets");

@@ -12,12 +12,10 @@ using HeightOf = std::function<double(Vec2)>;
 
 VoxelStack masks_of(const HeightOf& height) {
   VoxelStack s{.n_x = 60, .n_y = 50, .n_z = 40, .pixel_um = 0.5, .step_um = 1};
-  for (int k = 0; k < s.n_z; ++k) {
-    for (int j = 0; j < s.n_y; ++j) {
+  for (int k = 0; k < s.n_z; ++k)
+    for (int j = 0; j < s.n_y; ++j)
       for (int i = 0; i < s.n_x; ++i)
         s.share.push_back(k * s.step_um > height({(i + 0.5) * s.pixel_um, (j + 0.5) * s.pixel_um}) ? 1 : 0);
-    }
-  }
   return s;
 }
 float& voxel(VoxelStack& s, int i, int j, int k) {
@@ -35,9 +33,8 @@ TEST(Masks, tell_the_surface_far_finer_than_their_slices) {
     const PointFit fit = fit_points(found.points_um, std::vector(found.points_um.size(), found.sigma_um));
     double square = 0;
     int n = 0;
-    for (double y = 2; y < 23; y += 0.9) {
+    for (double y = 2; y < 23; y += 0.9)
       for (double x = 2; x < 28; x += 0.9, ++n) square += std::pow(fit.height_um({x, y}) - height({x, y}), 2);
-    }
     EXPECT_LT(std::sqrt(square / n), 1 / std::sqrt(12.0));  // the error of one column
   }
 }

@@ -20,19 +20,17 @@ double wavy(Vec2 p) { return 3 * std::sin(0.4 * p.x) + std::cos(0.7 * p.y) - 5; 
 /// Squares from (-8, 4) um on, each two triangles along the diagonal from its first corner.
 TriangleMesh height_field(const std::function<double(Vec2)>& height, int n_squares = kSquares, double side_um = kSide) {
   TriangleMesh mesh;
-  for (int j = 0; j <= n_squares; ++j) {
+  for (int j = 0; j <= n_squares; ++j)
     for (int i = 0; i <= n_squares; ++i) {
       const Vec2 at = {-8 + side_um * i, 4 + side_um * j};
       mesh.points_um.push_back({at.x, at.y, height(at)});
     }
-  }
-  for (int j = 0; j < n_squares; ++j) {
+  for (int j = 0; j < n_squares; ++j)
     for (int i = 0; i < n_squares; ++i) {
       const int a = i + (n_squares + 1) * j, b = a + n_squares + 1;
       mesh.triangles.push_back({a, a + 1, b + 1});
       mesh.triangles.push_back({a, b + 1, b});
     }
-  }
   return mesh;
 }
 
@@ -185,20 +183,18 @@ TEST(SurfaceMesh, a_wall_is_a_jump_where_it_has_a_height) {
 TEST(SurfaceMesh, a_closed_mesh_is_refused_with_the_remedy) {
   TriangleMesh ball;
   constexpr int kRound = 16, kDown = 8;
-  for (int j = 0; j <= kDown; ++j) {
+  for (int j = 0; j <= kDown; ++j)
     for (int i = 0; i < kRound; ++i) {
       const double polar = std::numbers::pi * j / kDown, turn = 2 * std::numbers::pi * i / kRound;
       const double radius = j == 0 || j == kDown ? 0 : 10 * std::sin(polar);
       ball.points_um.push_back({radius * std::cos(turn), radius * std::sin(turn), 10 * std::cos(polar)});
     }
-  }
-  for (int j = 0; j < kDown; ++j) {
+  for (int j = 0; j < kDown; ++j)
     for (int i = 0; i < kRound; ++i) {
       const int a = kRound * j + i, b = kRound * j + (i + 1) % kRound;
       if (j > 0) ball.triangles.push_back({a, b, b + kRound});
       if (j < kDown - 1) ball.triangles.push_back({a, b + kRound, a + kRound});
     }
-  }
   EXPECT_NE(refusal(ball).find("a closed mesh"), std::string::npos) << refusal(ball);
   EXPECT_NE(refusal(ball).find("cut the mesh"), std::string::npos) << refusal(ball);
   ball.triangles.pop_back();

@@ -18,9 +18,8 @@ double bumpy(Vec2 p) { return 3 * std::sin(p.x / 7) * std::cos(p.y / 9) + 0.1 * 
 double largest_error(const std::function<double(Vec2)>& truth, double spacing_um) {
   const Height height(sampled(truth, {-20, -15}, {20, 25}, spacing_um));
   double largest = 0;
-  for (double y = -15; y <= 25; y += 0.37) {
+  for (double y = -15; y <= 25; y += 0.37)
     for (double x = -20; x <= 20; x += 0.37) largest = std::max(largest, std::abs(height({x, y}) - truth({x, y})));
-  }
   return largest;
 }
 
@@ -72,13 +71,12 @@ TEST(Height, of_a_cubic_is_exact_and_so_are_its_slopes) {
 TEST(Height, goes_on_beyond_its_rim_without_a_kink_and_ends_level_at_its_mean) {
   const Height height(sampled(bumpy, {-20, -15}, {20, 25}, 1));
   constexpr double kStep = 1e-4;
-  for (const Vec2 rim : {Vec2{20, 3}, Vec2{-20, 3}, Vec2{3, 25}, Vec2{20, 25}}) {
+  for (const Vec2 rim : {Vec2{20, 3}, Vec2{-20, 3}, Vec2{3, 25}, Vec2{20, 25}})
     for (const Vec2 along : {Vec2{1, 0}, Vec2{0, 1}}) {
       const double before = (height(rim) - height(rim - kStep * along)) / kStep;
       const double behind = (height(rim + kStep * along) - height(rim)) / kStep;
       EXPECT_NEAR(before, behind, 1e-3);  // a step of 1e-4 um on curvatures up to 1 / um
     }
-  }
   EXPECT_EQ(height({1000, 0}), height.mean_um());
   EXPECT_TRUE(height.contains({20, 25}));
   EXPECT_FALSE(height.contains({20.1, 25}));
@@ -161,14 +159,13 @@ struct Misfit {
 Misfit misfit_of(const PointFit& fit) {
   Misfit sum;
   int n = 0;
-  for (double y = -18; y <= 18; y += 0.7) {
+  for (double y = -18; y <= 18; y += 0.7)
     for (double x = -18; x <= 18; x += 0.7) {
       const double error = fit.height_um({x, y}) - bumpy({x, y});
       sum.rms_um += error * error;
       sum.rms_over_sigma += std::pow(error / fit.sigma_um({x, y}), 2);
       ++n;
     }
-  }
   return {std::sqrt(sum.rms_um / n), std::sqrt(sum.rms_over_sigma / n)};
 }
 
