@@ -5,6 +5,7 @@
 #include "pipeline/statistics/study_files.h"
 #include "tests/support/browser.h"
 #include "tests/support/fake_cell.h"
+#include "tests/support/folders.h"
 #include "tests/support/test.h"
 
 namespace mbtfm {
@@ -35,6 +36,7 @@ class Pages : public testing::Test {
   static Browser& opened(const std::filesystem::path& page) {
     static Browser browser;
     browser.open(page);
+    browser.evaluate(files::read_text(test::source_folder() / "tests/data/look.js"));
     return browser;
   }
   std::filesystem::path cell_page() const { return folder_ / "cell.html"; }
@@ -158,19 +160,10 @@ TEST_F(Pages, nothing_reaches_beyond_the_window_and_no_text_is_small) {
       browser.resize(width_px, 900);
       EXPECT_LE(browser.evaluate("document.documentElement.scrollWidth"), width_px) << page;
       // in px of the screen: of drawings that the page scales, too
-      const test::json small = browser.evaluate(
-          "[...document.querySelectorAll('main *')].filter(e => [...e.childNodes].some(n => n.nodeType === 3 && "
-          "n.data.trim()) && !['SCRIPT', 'STYLE', 'NOSCRIPT'].includes(e.tagName) && parseFloat(getComputedStyle(e)"
-          ".fontSize) * (e.getScreenCTM ? Math.hypot(e.getScreenCTM().c, e.getScreenCTM().d) : 1) < 11.99).map(e => "
-          "e.outerHTML.slice(0, 200))");
+      const test::json small = browser.evaluate("look.small()");
       EXPECT_EQ(small, test::json::array()) << page << " at " << width_px;
       // names and numbers along an axis
-      const test::json overlapping = browser.evaluate(
-          "[...document.querySelectorAll('.chart svg .role-axis-label')].flatMap(axis => {"
-          "const texts = [...axis.querySelectorAll('text')].filter(e => e.getAttribute('opacity') !== '0');"
-          "const boxes = texts.map(e => e.getBoundingClientRect());"
-          "const meet = (r, q) => r.left < q.right && q.left < r.right && r.top < q.bottom - 2 && q.top < r.bottom - 2;"
-          "return texts.filter((e, i) => boxes.some((q, j) => j > i && meet(boxes[i], q))).map(e => e.textContent)})");
+      const test::json overlapping = browser.evaluate("look.overlapping()");
       EXPECT_EQ(overlapping, test::json::array()) << page << " at " << width_px;
     }
   }
@@ -178,27 +171,10 @@ TEST_F(Pages, nothing_reaches_beyond_the_window_and_no_text_is_small) {
 
 /// What a screen reader is given (WCAG 2.1: 1.1.1, 1.3.1, 2.5.3, 4.1.2), of what axe-core asks.
 TEST_F(Pages, all_that_can_be_used_or_looked_at_has_a_name) {
-  const std::string lists =
-      "(() => { const all = s => [...document.querySelectorAll(s)], shown = e => e.outerHTML.slice(0, 200);"
-      "const name = e => (e.getAttribute('aria-label') || e.textContent || e.title || '').trim();"
-      "const hidden = e => e.closest('[aria-hidden=true]');"
-      "return {"
-      "nameless: all('button, a, summary, [role=button], input, select').filter(e => !name(e)).map(shown),"
-      "spoken_otherwise: all(':is(button, a)[aria-label]').filter(e => e.textContent.trim() &&"
-      "  !e.getAttribute('aria-label').startsWith(e.textContent.trim())).map(shown),"
-      "images: all('img').filter(e => !e.hasAttribute('alt')).map(shown),"
-      "charts: all('.chart').filter(e => e.getAttribute('role') !== 'graphics-document' ||"
-      "  !e.getAttribute('aria-label')).map(shown),"
-      "marks: all('svg [role=graphics-symbol]').filter(e => !hidden(e) && !e.getAttribute('aria-label')).map(shown),"
-      "tables: all('table').filter(e => !e.caption || !e.caption.textContent.trim()).map(shown),"
-      "figures: all('figure').filter(e => !e.querySelector('h3')).map(shown),"
-      "twice: all('[id]').map(e => e.id).filter((id, i, ids) => ids.indexOf(id) !== i),"
-      "headings: all('h1, h2, h3, h4').filter((e, i, list) => i && +e.tagName[1] > +list[i - 1].tagName[1] + 1)"
-      "  .map(shown)}; })()";
   for (const auto& page : {cell_page(), study_page()}) {
     Browser& browser = opened(page);
     browser.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)");
-    const test::json found_lists = browser.evaluate(lists);
+    const test::json found_lists = browser.evaluate("look.lists()");
     for (const auto& [what, found] : found_lists.items()) EXPECT_EQ(found, test::json::array()) << page << ": " << what;
     EXPECT_EQ(browser.evaluate("[document.querySelectorAll('main').length, document.querySelectorAll('h1').length,"
                                "document.documentElement.lang, document.title !== '']"),
@@ -209,32 +185,13 @@ TEST_F(Pages, all_that_can_be_used_or_looked_at_has_a_name) {
 
 /// WCAG 2.1, 1.4.3: 4.5 of text to what is behind it; 3 of large text. Text on pictures has a white rim instead.
 TEST_F(Pages, all_text_stands_out_from_what_is_behind_it) {
-  const std::string faint =
-      "(() => { const rgba = c => { const n = (c.match(/[\\d.]+/g) || [0, 0, 0, 0]).map(Number);"
-      "  return n.length < 4 ? [...n, 1] : n; };"
-      "const light = c => c.slice(0, 3).map(v => { v /= 255; return v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** "
-      "2.4;})"
-      "  .reduce((sum, v, i) => sum + v * [.2126, .7152, .0722][i], 0);"
-      "const behind = e => { for (; e; e = e.parentElement) { const c = rgba(getComputedStyle(e).backgroundColor);"
-      "  if (c[3] > .99) return c; } return [255, 255, 255, 1]; };"
-      "const list = [];"
-      "for (const e of document.querySelectorAll('main *')) {"
-      "  if (['SCRIPT', 'STYLE', 'NOSCRIPT'].includes(e.tagName) || !e.getClientRects().length) continue;"
-      "  if (![...e.childNodes].some(n => n.nodeType === 3 && n.data.trim())) continue;"
-      "  const style = getComputedStyle(e), isDrawn = Boolean(e.ownerSVGElement);"
-      "  if (isDrawn && style.stroke !== 'none') continue;"  // the rim itself
-      "  const ink = rgba(isDrawn ? style.fill : style.color), ground = behind(e.ownerSVGElement || e);"
-      "  const [a, b] = [light(ink), light(ground)].sort((p, q) => q - p), ratio = (a + .05) / (b + .05);"
-      "  const size = parseFloat(style.fontSize), isLarge = size >= 24 || (size >= 18.66 && style.fontWeight >= 700);"
-      "  if (ratio < (isLarge ? 3 : 4.5)) list.push(ratio.toFixed(2) + ' ' + e.outerHTML.slice(0, 200));"
-      "} return list; })()";
   for (const auto& page : {cell_page(), study_page()}) {
     Browser& browser = opened(page);
     browser.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)");
-    EXPECT_EQ(browser.evaluate(faint), test::json::array()) << page;
+    EXPECT_EQ(browser.evaluate("look.faint()"), test::json::array()) << page;
     // the law itself: grey that is too light is found
     browser.evaluate("document.querySelector('main p').style.color = '#999'");
-    EXPECT_NE(browser.evaluate(faint), test::json::array()) << page;
+    EXPECT_NE(browser.evaluate("look.faint()"), test::json::array()) << page;
   }
 }
 

@@ -6,26 +6,9 @@
 #include "pipeline/files/hash.h"
 #include "pipeline/runner/stages.h"
 #include "tests/support/fake_cell.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm::test {
-
-inline constexpr const char* kCopyingStage = R"sh(#!/bin/sh
-made=${0%/*}/../made; name=${0##*/mbtfm-}
-while [ $# -gt 0 ]; do
-  case "$1" in
-    --check) exit 0;;
-    --out) out=$2; shift 2;;
-    --record) record=$2; shift 2;;
-    *) shift;;
-  esac
-done
-case $name in
-  segment) cp "$made"/1_segment/*.csv "$out"; cp "$made/1_segment/record.json" "$record";;
-  track) cp "$made"/2_track/*.csv "$out"; cp "$made/2_track/record.json" "$record";;
-  network) cp "$made/3_network/network.vtu" "$out"; cp "$made/3_network/record.json" "$record";;
-  fit) cp "$made"/4_fit/*.csv "$made/4_fit/fit.json" "$made/4_fit/contracted.vtu" "$out"; cp "$made/4_fit/record.json" "$record";;
-esac
-)sh";
 
 /// The record that a stage writes of the files in its folder, with one value of each kind that records have.
 inline nlohmann::ordered_json record_of_folder(const fs::path& folder, const std::string& stage) {
@@ -70,7 +53,8 @@ inline fs::path make_script_stages(const fs::path& folder, unsigned seed = 1) {
   fs::create_directories(bin);
   for (const runner::Stage& stage : runner::stages()) {
     files::write_text(made / stage.folder / "record.json", record_of_folder(made / stage.folder, stage.name).dump());
-    files::write_text(bin / ("mbtfm-" + stage.name), kCopyingStage);
+    files::write_text(bin / ("mbtfm-" + stage.name),
+                      files::read_text(test::source_folder() / "tests/data/copying_stage.sh"));
     fs::permissions(bin / ("mbtfm-" + stage.name), fs::perms::owner_all);
   }
   return bin;

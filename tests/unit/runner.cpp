@@ -14,6 +14,7 @@
 #include "pipeline/runner/told.h"
 #include "pipeline/runner/verify.h"
 #include "pipeline/stage/effects.h"
+#include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 
@@ -25,45 +26,7 @@ void make_executable(const fs::path& file, const std::string& text) {
   fs::permissions(file, fs::perms::owner_all);
 }
 
-// Each output is a line that the stage's inputs decide, but for the segmentation: it is the same for all images, as for
-// two images that differ outside the cell only. With exit-<name> beside it, a stage ends with the code in that file;
-// shell-<name> is run first, check-<name> where it only reads its parameters.
-constexpr const char* kStageScript = R"sh(#!/bin/sh
-here=$(dirname "$0"); name=$(basename "$0"); name=${name#mbtfm-}; all=""
-while [ $# -gt 0 ]; do
-  case "$1" in
-    --check) check=1; shift;;
-    --quiet) shift;;
-    --out) out=$2; shift 2;;
-    --record) record=$2; shift 2;;
-    --config) config=$2; shift 2;;
-    --threads) shift 2;;
-    --kept) kept=$2; shift 2;;
-    *) [ -f "$2" ] && all="$all $2"; shift 2;;
-  esac
-done
-if [ -n "$check" ]; then [ -f "$here/check-$name" ] && . "$here/check-$name"; grep -q refuse_$name "$config" && { echo "mbtfm-$name: error: refused" >&2; exit 2; }; exit 0; fi
-echo $name${kept:+-keeping} >> "$here/calls"
-[ -f "$here/shell-$name" ] && . "$here/shell-$name"
-code=0; [ -f "$here/exit-$name" ] && code=$(cat "$here/exit-$name")
-[ $code -ne 0 ] && [ $code -ne 4 ] && { echo "mbtfm-$name: error: made to fail" >&2; exit $code; }
-sum=$(cat $all "$config" | cksum)
-case $name in
-  segment) for f in adhesions fibres fibre_points outline; do echo same > "$out/$f.csv"; done;;
-  track) echo "$sum" > "$out/displacement.csv"
-    if [ -f "$here/series" ]; then
-      printf 'frame,refused\n1,\n2,blurred\n3,\n' > "$out/frames.csv"
-      for k in 1 3; do [ -n "$kept" -a -f "$out/displacement_000$k.csv" ] || echo "$k" > "$out/displacement_000$k.csv"; done
-      outputs='{"file": "frames.csv"}, {"file": "displacement_0001.csv"}, {"file": "displacement_0003.csv"}'
-    fi;;
-  network) echo "$sum" > "$out";;
-  fit) for f in tensions.csv adhesion_forces.csv fit.json contracted.vtu; do echo "{}" > "$out/$f"; done;;
-  sheet) for f in sheet_fit sheet_models sheet traction displacement; do echo "{}" > "$out/$f.csv"; done
-    for f in sheet.json sheet.svg sheet.html sheet.vtu; do echo "{}" > "$out/$f"; done;;
-esac
-echo "{\"stage\": \"$name\", \"version\": \"1\", \"summary\": \"made by a script\", \"outputs\": [$outputs]}" > "$record"
-exit $code
-)sh";
+std::string stage_script() { return files::read_text(test::source_folder() / "tests/data/stage.sh"); }
 
 class Runner : public testing::Test {
  protected:
@@ -75,7 +38,7 @@ class Runner : public testing::Test {
   void SetUp() override {
     fs::create_directories(cell_);
     fs::create_directories(bin_);
-    for (const Stage& stage : stages()) make_executable(bin_ / ("mbtfm-" + stage.name), kStageScript);
+    for (const Stage& stage : stages()) make_executable(bin_ / ("mbtfm-" + stage.name), stage_script());
     write_parameters("");
     for (const char* image : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"})
       files::write_text(cell_ / image, image);
@@ -238,7 +201,7 @@ TEST_F(Kinds, what_the_table_run_cannot_mean_is_refused) {
 }
 
 TEST_F(Runner, a_cell_that_becomes_a_sheet_is_segmented_again_only_where_that_differs) {
-  make_executable(bin_ / "mbtfm-sheet", kStageScript);
+  make_executable(bin_ / "mbtfm-sheet", stage_script());
   started();
   write_parameters("[run]\nmodel = 'sheet'\n");
   EXPECT_EQ(started(), "sheet");  // outline, adhesions and displacement are as they were
@@ -416,7 +379,7 @@ TEST_F(Runner, stages_that_are_run_one_by_one_leave_the_same_record) {
 
 /// As the workflow runs a sheet of given beads: it has no job for the stage `track`.
 TEST_F(Runner, what_was_given_is_told_though_no_run_asked_for_its_stage) {
-  make_executable(bin_ / "mbtfm-sheet", kStageScript);
+  make_executable(bin_ / "mbtfm-sheet", stage_script());
   for (const char* image : {"beads_stressed.tif", "beads_relaxed.tif"}) fs::remove(cell_ / image);
   fs::create_directories(cell_ / "2_track");
   files::write_text(cell_ / "2_track/displacement.csv", "given");
