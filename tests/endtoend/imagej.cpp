@@ -4,6 +4,7 @@
 #include "segment/cells/ellipse.h"
 #include "segment/rois/roi.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/folders.h"
 #include "tests/support/program.h"
 #include "tests/support/test.h"
 
@@ -57,31 +58,7 @@ std::map<std::string, Measured> measured_in(const fs::path& table) {
 
 /// ImageJ measures areas by counting pixels: it is asked on a canvas on which the selection is some hundreds of pixels
 /// wide.
-constexpr const char* kReportFunction = R"(
-function report(table) {
-  name = Roi.getName; type = Roi.getType; colour = Roi.getStrokeColor; area = 0; length = 0;
-  getSelectionCoordinates(x, y);
-  Roi.getFloatBounds(left, top, width, height);
-  points = " " + left + " " + top + " " + width + " " + height;
-  for (i = 0; i < x.length; i++) points = points + " " + d2s(x[i], 6) + "," + d2s(y[i], 6);
-  if (type == "composite") {
-    List.setMeasurements; area = List.getValue("Area");
-  } else if (indexOf(type, "line") >= 0) {
-    List.setMeasurements; length = List.getValue("Length");
-  } else {
-    Array.getStatistics(x, x0, x1, mean, sd); Array.getStatistics(y, y0, y1, mean, sd);
-    k = 2000 / maxOf(x1 - x0, y1 - y0);
-    xs = newArray(x.length); ys = newArray(x.length);
-    for (i = 0; i < x.length; i++) { xs[i] = 20 + k * (x[i] - x0); ys[i] = 20 + k * (y[i] - y0); }
-    source = getImageID(); selectImage("canvas");
-    makeSelection("polygon", xs, ys); List.setMeasurements; area = List.getValue("Area") / (k * k);
-    selectImage(source);
-  }
-  File.append(name + "|" + type + "|" + colour + "|" + d2s(area, 9) + "|" + d2s(length, 9) + "|" + points, table);
-}
-newImage("canvas", "8-bit", 2040, 2040, 1);
-newImage("image", "8-bit", 256, 256, 1);
-)";
+std::string report_function() { return files::read_text(test::source_folder() / "tests/data/report.ijm"); }
 
 TEST(ImageJ, it_measures_the_areas_and_lengths_of_the_set_that_the_segmentation_writes) {
   if (!has_imagej()) GTEST_SKIP() << "imagej and xvfb-run are not installed";
@@ -93,7 +70,7 @@ TEST(ImageJ, it_measures_the_areas_and_lengths_of_the_set_that_the_segmentation_
   test::output_of("mbtfm-segment --pixel_size_um 0.1 --adhesion-image '" + (folder / "paxillin.tif").string() +
                   "' --actin-image '" + (folder / "actin.tif").string() + "' --out '" + folder.path().string() + "'");
   const fs::path table = folder / "measured";
-  run_macro(folder.path(), std::string(kReportFunction) + "roiManager('Open', '" + (folder / "RoiSet.zip").string() +
+  run_macro(folder.path(), report_function() + "roiManager('Open', '" + (folder / "RoiSet.zip").string() +
                                "');\nn = roiManager('count');\nfor (r = 0; r < n; r++) {\n" +
                                "  selectImage('image'); roiManager('select', r); report('" + table.string() + "');\n}");
   const Cell cell = files::read_cell(folder.path());
@@ -148,31 +125,11 @@ TEST(ImageJ, selections_it_saves_are_read_as_it_draws_them) {
   const fs::path table = folder / "drawn";
   const std::string save = "save('";
   std::ostringstream macro;
-  macro << kReportFunction << R"(
+  macro << report_function() << R"(
 function save(name) { Roi.setName(name); saveAs("Selection", ")"
         << folder.path().string() << R"(/" + name + ".roi"); report(")" << table.string() << R"("); }
-x = newArray(10.25, 30.5, 50.75, 70.125); y = newArray(20.5, 40.125, 20.25, 90);
-makeLine(10.25, 20.5, 50.75, 40.125); save("line");
-makeLine(10, 20, 30, 40, 50, 20); save("whole polyline");
-makeSelection("polyline", x, y); save("polyline");
-makeSelection("freeline", x, y); save("freehand line");
-makeLine(10, 20, 30, 40, 50, 20, 60, 70, 120, 30); run("Fit Spline"); save("spline");
-makePolygon(10, 20, 30, 40, 50, 20); save("whole polygon");
-makeSelection("polygon", x, y); save("polygon");
-makeSelection("freehand", x, y); save("freehand");
-makeSelection("traced", newArray(10, 30, 30, 10), newArray(20, 20, 40, 40)); save("traced");
-makePolygon(10, 20, 30, 40, 50, 20); run("Fit Spline"); save("closed spline of 3");
-makePolygon(10,20,30,10,50,20,60,70,20,90,15,80,5,60,3,50,2,40,4,30); run("Fit Spline"); save("closed spline of 10");
-makeOval(10, 20, 30, 17); save("oval");
-makeOval(10.25, 20.5, 30.5, 17.75); save("shifted oval");
-makeEllipse(20, 30, 70, 60, 0.4); save("ellipse");
-makeRectangle(10, 20, 30, 17); save("rectangle");
-makeRectangle(10.25, 20.5, 30.5, 17.75); save("shifted rectangle");
-makeRectangle(10, 20, 40, 30, 12); save("rounded rectangle");
-makeRotatedRectangle(20, 30, 70, 60, 12); save("rotated rectangle");
-makeRectangle(10, 20, 60, 50); setKeyDown("alt"); makeRectangle(20, 30, 15, 10); save("composite with a hole");
-makeRectangle(10, 20, 30, 17); setKeyDown("shift"); makeRectangle(60, 25, 20, 40); save("composite of two");
 )";
+  macro << files::read_text(test::source_folder() / "tests/data/selections.ijm");
   run_macro(folder.path(), macro.str());
   const auto drawn = measured_in(table);
   EXPECT_EQ(drawn.size(), 20u);
