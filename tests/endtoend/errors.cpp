@@ -187,10 +187,7 @@ TEST_F(Errors, a_wrong_flag_names_it) {
 }
 
 TEST_F(Errors, what_was_probably_meant_is_named) {
-  const auto said = [](const std::string& command, int code) {
-    const std::string outcome = output_of(command, code);
-    return outcome;
-  };
+  const auto said = [](const std::string& command, int code) { return output_of(command, code); };
   EXPECT_NE(said("mbtfm run --thread 2 " + cell_.string(), kUsage).find("did you mean '--threads'?"),
             std::string::npos);
   EXPECT_NE(said("mbtfm bacth " + cell_.string(), kUsage).find("did you mean 'batch'?"), std::string::npos);
