@@ -187,7 +187,7 @@ std::vector<GroundPatch> read_tractions(const Path& file) {
   const Vec2 spacing = has_areas ? Vec2{} : files::lattice_spacing_um(points, file);
   std::vector<GroundPatch> patches;
   for (int row = 0; row < table.n_rows(); ++row)
-    patches.push_back({points[static_cast<std::size_t>(row)],
+    patches.push_back({points[row],
                        has_areas ? table.number(row, "area_um2", Range::positive()) : spacing.x * spacing.y,
                        {table.number(row, "tx_kPa"), table.number(row, "ty_kPa")},
                        {}});

@@ -46,7 +46,7 @@ std::array<double, kNodes> polynomials(double t) {
   for (int k = 0; k < kNodes; ++k) {
     double sum = 0.5;
     for (int m = 1; m < kNodes; ++m) sum += std::cos(m * angle) * std::cos(m * std::numbers::pi * (k + 0.5) / kNodes);
-    values[static_cast<std::size_t>(k)] = 2 * sum / kNodes;
+    values[k] = 2 * sum / kNodes;
   }
   return values;
 }
@@ -113,7 +113,7 @@ class Blocked final : public KeptResponse {
     MBTFM_ASSERT(forces_nN.rows() == n_columns_);
     MatrixXd u = MatrixXd::Zero(rows(), forces_nN.cols());
     numerics::parallel_for(static_cast<int>(blocks_.size()), threads_, [&](int b) {
-      const Block& block = blocks_[static_cast<std::size_t>(b)];
+      const Block& block = blocks_[b];
       const MatrixXd own =
           numerics::product(block.modes.cast<double>(), numerics::product(block.far->cast<double>(), forces_nN)) +
           numerics::product(block.near.cast<double>(), forces_nN(*block.near_columns, Eigen::all));
@@ -127,7 +127,7 @@ class Blocked final : public KeptResponse {
     constexpr std::size_t kPieces = 8;  // that sums are made of, whatever the threads
     std::vector<MatrixXd> parts(kPieces, MatrixXd::Zero(n_columns_, displacements.cols()));
     numerics::parallel_for(kPieces, threads_, [&](int piece) {
-      MatrixXd& sum = parts[static_cast<std::size_t>(piece)];
+      MatrixXd& sum = parts[piece];
       for (std::size_t b = static_cast<std::size_t>(piece); b < blocks_.size(); b += kPieces) {
         const Block& block = blocks_[b];
         const MatrixXd own = displacements(rows_of(block), Eigen::all);
@@ -158,9 +158,8 @@ class Blocked final : public KeptResponse {
         const MatrixXd modes = root.asDiagonal() * block.modes.cast<double>();
         const MatrixXd near = root.asDiagonal() * block.near.cast<double>();
         const MatrixXd far = block.far->cast<double>();
-        parts[static_cast<std::size_t>(i)] = {
-            numerics::product(square_root(numerics::gram(modes)), far),
-            numerics::transposed_product(far, numerics::transposed_product(modes, near)), numerics::gram(near)};
+        parts[i] = {numerics::product(square_root(numerics::gram(modes)), far),
+                    numerics::transposed_product(far, numerics::transposed_product(modes, near)), numerics::gram(near)};
       });
       Index n_rows = 0;
       for (const Part& part : parts) n_rows += part.root_far.rows();
@@ -183,14 +182,14 @@ class Blocked final : public KeptResponse {
     std::vector<Index> block_of(static_cast<std::size_t>(n_points_)), place_of(block_of.size());
     for (std::size_t b = 0; b < blocks_.size(); ++b)
       for (std::size_t p = 0; p < blocks_[b].points.size(); ++p) {
-        block_of[static_cast<std::size_t>(blocks_[b].points[p])] = static_cast<Index>(b);
-        place_of[static_cast<std::size_t>(blocks_[b].points[p])] = static_cast<Index>(p);
+        block_of[blocks_[b].points[p]] = static_cast<Index>(b);
+        place_of[blocks_[b].points[p]] = static_cast<Index>(p);
       }
     std::vector<std::vector<Index>> kept(blocks_.size()), named(blocks_.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
       const auto p = static_cast<std::size_t>(points[i]);
-      kept[static_cast<std::size_t>(block_of[p])].push_back(place_of[p]);
-      named[static_cast<std::size_t>(block_of[p])].push_back(static_cast<Index>(i));
+      kept[block_of[p]].push_back(place_of[p]);
+      named[block_of[p]].push_back(static_cast<Index>(i));
     }
     std::vector<Block> some;
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
@@ -243,9 +242,9 @@ class Blocked final : public KeptResponse {
 /// Points in a part of the plane, halved across its longer side until they are few.
 void split(const std::vector<Vec2>& points_um, std::vector<Index> points, std::size_t most,
            std::vector<std::vector<Index>>& parts) {
-  Vec2 low = points_um[static_cast<std::size_t>(points.front())], high = low;
+  Vec2 low = points_um[points.front()], high = low;
   for (const Index p : points) {
-    const Vec2 at = points_um[static_cast<std::size_t>(p)];
+    const Vec2 at = points_um[p];
     low = {std::min(low.x, at.x), std::min(low.y, at.y)};
     high = {std::max(high.x, at.x), std::max(high.y, at.y)};
   }
@@ -253,7 +252,7 @@ void split(const std::vector<Vec2>& points_um, std::vector<Index> points, std::s
   const bool is_wide = high.x - low.x >= high.y - low.y;
   const double middle = is_wide ? 0.5 * (low.x + high.x) : 0.5 * (low.y + high.y);
   const auto is_below = [&](Index p) {
-    const Vec2 at = points_um[static_cast<std::size_t>(p)];
+    const Vec2 at = points_um[p];
     return (is_wide ? at.x : at.y) < middle;
   };
   const auto cut = std::stable_partition(points.begin(), points.end(), is_below);

@@ -100,7 +100,7 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
     const int i = cell % columns, j = cell / columns;
     const int first = j * (columns + 1) + i, next = first + columns + 1;
     for (const int corner : {first, first + 1, next + 1, next}) grid.cells.push_back(corner);
-    const Vec2 t = tractions[static_cast<std::size_t>(cell)];
+    const Vec2 t = tractions[cell];
     for (const double value : {t.x, t.y, 0.0}) grid.cell_arrays[0].values.push_back(value);
   }
   files::write_grid_vtu(file, grid);

@@ -248,7 +248,7 @@ HeightMap heights_of(const Fit& fit, const Parameters& p) {
 
 void note_off(Made& made, const Places& places, const std::vector<int>& off) {
   for (const int k : off) {
-    const Vec3& p = places.at_um[static_cast<std::size_t>(k)];
+    const Vec3& p = places.at_um[k];
     made.off_um.push_back({p.x, p.y});
   }
   made.share_off = static_cast<double>(off.size()) / static_cast<double>(places.at_um.size());

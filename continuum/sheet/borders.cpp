@@ -46,7 +46,7 @@ std::vector<Vec2> directions(const std::vector<PixelSide>& sides, double reach_u
     Vec2 mean;
     double n = 0, xx = 0, yy = 0, xy = 0;
     grid.for_each_near(at, at, reach_um, [&](int k) {
-      const Vec2 d = places[static_cast<std::size_t>(k)] - at;
+      const Vec2 d = places[k] - at;
       if (dot(d, d) > reach_um * reach_um) return;
       mean += d;
       xx += d.x * d.x;
@@ -144,7 +144,7 @@ std::vector<CellTension> cell_tensions(const CellLabels& cells, const Solution& 
       if (!(at.x >= 0 && at.y >= 0 && at.x < cells.width && at.y < cells.height)) continue;
       const int label = cells.at(static_cast<int>(at.x), static_cast<int>(at.y));
       if (label == 0) continue;
-      const Tensor& S = solution.at_points[static_cast<std::size_t>(Elements::kPoints * t + p)];
+      const Tensor& S = solution.at_points[Elements::kPoints * t + p];
       CellTension& cell = by_label[label];
       cell.cell = label;
       cell.area_um2 += shape.weight_um2;

@@ -146,7 +146,7 @@ std::string crossing_of(const std::vector<Polygon>& rings_um) {
   for (std::size_t k = 0; k < pieces.size() && found.empty(); ++k) {
     const Piece& p = pieces[k];
     grid.for_each_near(p.a, p.b, 0, [&](int other) {
-      const Piece& q = pieces[static_cast<std::size_t>(other)];
+      const Piece& q = pieces[other];
       if (static_cast<std::size_t>(other) <= k || are_neighbours(p, q) || !found.empty()) return;
       const double c1 = cross(p.b - p.a, q.a - p.a), c2 = cross(p.b - p.a, q.b - p.a);
       const double c3 = cross(q.b - q.a, p.a - q.a), c4 = cross(q.b - q.a, p.b - q.a);

@@ -31,15 +31,14 @@ CutHold hold_at_cuts(const Elements& elements, const Region& region, CutEdge edg
   hold.held.assign(x.size(), {false, false});
   for (const Triangles::Side& side : elements.triangles().sides) {
     if (side.curve >= std::ssize(region.rims)) continue;
-    const double length = norm(x[static_cast<std::size_t>(side.nodes[1])] - x[static_cast<std::size_t>(side.nodes[0])]);
+    const double length = norm(x[side.nodes[1]] - x[side.nodes[0]]);
     const auto nearest = [&](int node) {
-      return std::ranges::min_element(region.cuts, {}, [&](const auto& cut) {
-        return distance_to_segment_um(x[static_cast<std::size_t>(node)], cut.first, cut.second);
-      });
+      return std::ranges::min_element(
+          region.cuts, {}, [&](const auto& cut) { return distance_to_segment_um(x[node], cut.first, cut.second); });
     };
     const bool is_cut = std::ranges::all_of(side.nodes, [&](int node) {
       const auto cut = nearest(node);
-      return distance_to_segment_um(x[static_cast<std::size_t>(node)], cut->first, cut->second) < kBeside * length;
+      return distance_to_segment_um(x[node], cut->first, cut->second) < kBeside * length;
     });
     if (!is_cut) continue;
     hold.length_um += length;
@@ -47,7 +46,7 @@ CutHold hold_at_cuts(const Elements& elements, const Region& region, CutEdge edg
     for (std::size_t axis = 0; axis < 2; ++axis) {
       if (axis != across && edge == CutEdge::held) continue;
       hold.holds[axis] = true;
-      for (const int node : side.nodes) hold.held[static_cast<std::size_t>(node)][axis] = true;
+      for (const int node : side.nodes) hold.held[node][axis] = true;
     }
   }
   return hold;

@@ -53,7 +53,7 @@ Shape Elements::shape(int triangle, double r, double s) const {
   Shape shape;
   shape.value = local.value;
   for (int i = 0; i < 6; ++i) {
-    const Vec2 x = triangles_.nodes_um[static_cast<std::size_t>(nodes(triangle)[i])];
+    const Vec2 x = triangles_.nodes_um[nodes(triangle)[i]];
     shape.place_um += local.value[i] * x;
     by_r += local.slope[i].x * x;
     by_s += local.slope[i].y * x;
@@ -73,7 +73,7 @@ Elements::Elements(Triangles triangles) : triangles_(std::move(triangles)) {
   shapes_.resize(static_cast<std::size_t>(kPoints) * triangles_.nodes.size());
   for (int t = 0; t < n_triangles(); ++t) {
     for (int p = 0; p < kPoints; ++p) {
-      Shape& at_point = shapes_[static_cast<std::size_t>(kPoints * t + p)];
+      Shape& at_point = shapes_[kPoints * t + p];
       at_point = shape(t, rule[p].r, rule[p].s);
       if (!(at_point.weight_um2 > 0))
         throw InvalidData(
@@ -106,9 +106,9 @@ Locator::Locator(const Elements& elements) : elements_(elements) {
   rows_ = static_cast<int>(size.y / bin_um_) + 1;
   bins_.resize(static_cast<std::size_t>(columns_) * rows_);
   for (int t = 0; t < elements.n_triangles(); ++t) {
-    Vec2 a = nodes[static_cast<std::size_t>(elements.nodes(t)[0])], b = a;
+    Vec2 a = nodes[elements.nodes(t)[0]], b = a;
     for (const int node : elements.nodes(t)) {
-      const Vec2 p = nodes[static_cast<std::size_t>(node)];
+      const Vec2 p = nodes[node];
       a = {std::min(a.x, p.x), std::min(a.y, p.y)};
       b = {std::max(b.x, p.x), std::max(b.y, p.y)};
     }
@@ -138,7 +138,7 @@ std::optional<Locator::Place> Locator::find(Vec2 point_um, double outside) const
       const Local local = local_at(r, s);
       Vec2 by_r, by_s;
       for (int i = 0; i < 6; ++i) {
-        const Vec2 x = elements_.triangles().nodes_um[static_cast<std::size_t>(elements_.nodes(t)[i])];
+        const Vec2 x = elements_.triangles().nodes_um[elements_.nodes(t)[i]];
         by_r += local.slope[i].x * x;
         by_s += local.slope[i].y * x;
       }

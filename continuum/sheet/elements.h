@@ -27,11 +27,9 @@ class Elements {
   const Triangles& triangles() const { return triangles_; }
   int n_nodes() const { return static_cast<int>(triangles_.nodes_um.size()); }
   int n_triangles() const { return static_cast<int>(triangles_.nodes.size()); }
-  const std::array<int, 6>& nodes(int triangle) const { return triangles_.nodes[static_cast<std::size_t>(triangle)]; }
+  const std::array<int, 6>& nodes(int triangle) const { return triangles_.nodes[triangle]; }
   /// At point 0 … kPoints − 1 of the triangle.
-  const Shape& at(int triangle, int point) const {
-    return shapes_[static_cast<std::size_t>(kPoints * triangle + point)];
-  }
+  const Shape& at(int triangle, int point) const { return shapes_[kPoints * triangle + point]; }
   double area_um2(int triangle) const;
   double area_um2() const;
   /// At barycentric coordinates (1 − r − s, r, s) of a triangle; weight_um2 is the Jacobian's.

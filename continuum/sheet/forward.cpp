@@ -32,9 +32,7 @@ double rim_length_um(const Elements& elements, int n_rims) {
   for (const Triangles::Side& side : elements.triangles().sides) {
     if (side.curve >= n_rims) continue;
     for (const double q : {-0.7745966692414834, 0.0, 0.7745966692414834}) {
-      const Vec2 along = (q - 0.5) * x[static_cast<std::size_t>(side.nodes[0])] +
-                         (q + 0.5) * x[static_cast<std::size_t>(side.nodes[1])] +
-                         (-2 * q) * x[static_cast<std::size_t>(side.nodes[2])];
+      const Vec2 along = (q - 0.5) * x[side.nodes[0]] + (q + 0.5) * x[side.nodes[1]] + (-2 * q) * x[side.nodes[2]];
       length += (q == 0 ? 8.0 : 5.0) / 9 * norm(along);
     }
   }
@@ -68,7 +66,7 @@ Solution solved_on(const OnGel& ground, Solution solution, const Scene& scene) {
     solution.patches.push_back({patch_of(elements, t).centre_um, elements.area_um2(t), {}, {}});
   const Eigen::VectorXd gel_um = ground.gel_um(found.forces_nN);
   for (std::size_t k = 0; k < ground.triangles().size(); ++k) {
-    GroundPatch& patch = solution.patches[static_cast<std::size_t>(ground.triangles()[k])];
+    GroundPatch& patch = solution.patches[ground.triangles()[k]];
     patch.traction_kPa = 1 / patch.area_um2 * at_node(found.forces_nN, static_cast<int>(k));
     patch.displacement_um = at_node(gel_um, static_cast<int>(k));
   }
@@ -88,14 +86,14 @@ std::vector<double> contraction_at_points(const Elements& elements, const Region
   if (contraction.at)
     for (int t = 0; t < elements.n_triangles(); ++t)
       for (int p = 0; p < Elements::kPoints; ++p)
-        s[static_cast<std::size_t>(Elements::kPoints * t + p)] = contraction.at(elements.at(t, p).place_um);
+        s[Elements::kPoints * t + p] = contraction.at(elements.at(t, p).place_um);
   if (!contraction.edge_band_um) return s;
   for (int t = 0; t < elements.n_triangles(); ++t)
     for (int p = 0; p < Elements::kPoints; ++p) {
       double nearest = std::numeric_limits<double>::infinity();
       for (const Curve& rim : region.rims)
         nearest = std::min(nearest, distance_to_boundary_um(rim.points_um(), elements.at(t, p).place_um));
-      if (nearest > *contraction.edge_band_um) s[static_cast<std::size_t>(Elements::kPoints * t + p)] = 0;
+      if (nearest > *contraction.edge_band_um) s[Elements::kPoints * t + p] = 0;
     }
   return s;
 }
@@ -141,8 +139,7 @@ Solution solve_on_springs(const Scene& scene, int threads) {
     }
     patch.position_um = 1 / patch.area_um2 * patch.position_um;
     patch.displacement_um = 1 / patch.area_um2 * patch.displacement_um;
-    patch.traction_kPa =
-        solution.sheet.spring_nN_per_um3[static_cast<std::size_t>(Elements::kPoints * t)] * patch.displacement_um;
+    patch.traction_kPa = solution.sheet.spring_nN_per_um3[Elements::kPoints * t] * patch.displacement_um;
     solution.patches.push_back(patch);
   }
   return solution;
@@ -165,7 +162,7 @@ std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Soluti
   std::vector<Vec2> forces;
   for (int t = 0; t < solution.elements->n_triangles(); ++t) {
     patches.push_back(patch_of(*solution.elements, t));
-    const GroundPatch& patch = solution.patches[static_cast<std::size_t>(t)];
+    const GroundPatch& patch = solution.patches[t];
     forces.push_back(patch.area_um2 * patch.traction_kPa);
   }
   return gel.displacements_um(points_um, patches, forces);

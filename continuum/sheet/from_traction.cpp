@@ -140,7 +140,7 @@ Balance balance_of_parts(const Parts& parts, const Solution& solution, const Nod
     virial += dot(part.shape.place_um, part.force_nN);
   }
   for (int i = 0; i < solution.elements->n_nodes(); ++i)
-    virial -= dot(solution.elements->triangles().nodes_um[static_cast<std::size_t>(i)], at_node(reactions, i));
+    virial -= dot(solution.elements->triangles().nodes_um[i], at_node(reactions, i));
   result.virial_tension_nN_per_um = -virial / (2 * result.area_um2);
   return result;
 }
@@ -185,9 +185,8 @@ TensionErrors errors_by(const TractionNoise& noise, Parts parts, const Solution&
     errors.mean_nN_per_um += std::pow(mean_of(mean_over(elements, S)), 2) / TensionErrors::kDraws;
     for (int t = 0; t < elements.n_triangles(); ++t) {
       double mean = 0;
-      for (int p = 0; p < Elements::kPoints; ++p)
-        mean += mean_of(S[static_cast<std::size_t>(Elements::kPoints * t + p)]) / Elements::kPoints;
-      squares[static_cast<std::size_t>(t)] += mean * mean / TensionErrors::kDraws;
+      for (int p = 0; p < Elements::kPoints; ++p) mean += mean_of(S[Elements::kPoints * t + p]) / Elements::kPoints;
+      squares[t] += mean * mean / TensionErrors::kDraws;
     }
   }
   errors.mean_nN_per_um = std::sqrt(errors.mean_nN_per_um);
@@ -250,7 +249,7 @@ TensionFigures figures_inside(const Solution& solution, const Polygon& outline_u
     for (int p = 0; p < Elements::kPoints; ++p) {
       const Shape& shape = solution.elements->at(t, p);
       if (!contains(outline_um, shape.place_um)) continue;
-      const Tensor& S = solution.at_points[static_cast<std::size_t>(Elements::kPoints * t + p)];
+      const Tensor& S = solution.at_points[Elements::kPoints * t + p];
       figures.area_um2 += shape.weight_um2;
       sum += shape.weight_um2 * mean_of(S);
       squares += shape.weight_um2 * mean_of(S) * mean_of(S);

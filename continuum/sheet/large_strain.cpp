@@ -58,7 +58,7 @@ struct PointLaw {
 
 PointLaw law_at(const Sheet& sheet, ContractionMeasure measure, int triangle, int point, double share,
                 const Matrix2d& gradient) {
-  const double s = sheet.contraction_nN_per_um[static_cast<std::size_t>(Elements::kPoints * triangle + point)];
+  const double s = sheet.contraction_nN_per_um[Elements::kPoints * triangle + point];
   return {sheet.material, share * s, measure, gradient};
 }
 
@@ -204,7 +204,7 @@ std::vector<Tensor> large_tension_at_points(const Elements& elements, const Shee
   std::vector<Tensor> tension;
   for (int t = 0; t < elements.n_triangles(); ++t)
     for (int p = 0; p < Elements::kPoints; ++p) {
-      const double s = sheet.contraction_nN_per_um[static_cast<std::size_t>(Elements::kPoints * t + p)];
+      const double s = sheet.contraction_nN_per_um[Elements::kPoints * t + p];
       const PointLaw law(sheet.material, s, measure, gradient_of(u, elements.nodes(t), elements.at(t, p)));
       const Matrix2d cauchy = law.stress() * law.F.transpose() / law.F.determinant();
       tension.push_back({cauchy(0, 0), cauchy(1, 1), 0.5 * (cauchy(0, 1) + cauchy(1, 0))});

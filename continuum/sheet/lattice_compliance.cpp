@@ -23,9 +23,9 @@ constexpr double kMostNodes = 250000;  // 1 000 × 1 000 with the padding: 30 ms
 std::array<double, kOrder> weights_at(double x) {
   std::array<double, kOrder> weights;
   for (int i = 0; i < kOrder; ++i) {
-    weights[static_cast<std::size_t>(i)] = 1;
+    weights[i] = 1;
     for (int k = 0; k < kOrder; ++k)
-      if (k != i) weights[static_cast<std::size_t>(i)] *= (x - k) / (i - k);
+      if (k != i) weights[i] *= (x - k) / (i - k);
   }
   return weights;
 }
@@ -96,8 +96,7 @@ LatticeCompliance::Stencil LatticeCompliance::stencil_of(const Patches& patches,
     const auto along_x = weights_at(at.x - column), along_y = weights_at(at.y - row);
     for (int i = 0; i < kOrder; ++i)
       for (int j = 0; j < kOrder; ++j)
-        weights[{column + i, row + j}] +=
-            patches.share(patch, p) * along_x[static_cast<std::size_t>(i)] * along_y[static_cast<std::size_t>(j)];
+        weights[{column + i, row + j}] += patches.share(patch, p) * along_x[i] * along_y[j];
   }
   Stencil stencil;
   for (const auto& [node, weight] : weights) {
@@ -109,10 +108,10 @@ LatticeCompliance::Stencil LatticeCompliance::stencil_of(const Patches& patches,
 
 MatrixXd LatticeCompliance::by_lattice(const std::vector<Stencil>& stencils, const std::vector<int>& of, int j,
                                        const Kernel& kernel) {
-  const Stencil& source = stencils[static_cast<std::size_t>(j)];
+  const Stencil& source = stencils[j];
   std::array<int, 2> low = source.node.front(), high = low;  // of a box around all of them
   for (const int i : of)
-    for (const std::array<int, 2>& node : stencils[static_cast<std::size_t>(i)].node)
+    for (const std::array<int, 2>& node : stencils[i].node)
       for (std::size_t axis = 0; axis < 2; ++axis) {
         low[axis] = std::min(low[axis], node[axis]);
         high[axis] = std::max(high[axis], node[axis]);
@@ -121,8 +120,7 @@ MatrixXd LatticeCompliance::by_lattice(const std::vector<Stencil>& stencils, con
   const auto at = [&](const std::array<int, 2>& node) { return (node[1] - low[1]) * n_columns + node[0] - low[0]; };
   std::vector<char> is_asked(static_cast<std::size_t>(n_columns * n_rows));
   for (const int i : of)
-    for (const std::array<int, 2>& node : stencils[static_cast<std::size_t>(i)].node)
-      is_asked[static_cast<std::size_t>(at(node))] = 1;
+    for (const std::array<int, 2>& node : stencils[i].node) is_asked[at(node)] = 1;
   Eigen::ArrayXXd field = Eigen::ArrayXXd::Zero(n_columns * n_rows, 3);
   for (int row = 0; row < n_rows; ++row) {
     const auto first = is_asked.begin() + row * n_columns, end = first + n_columns;
@@ -141,7 +139,7 @@ MatrixXd LatticeCompliance::by_lattice(const std::vector<Stencil>& stencils, con
   MatrixXd blocks(2 * std::ssize(of), 2);
   Index to = 0;
   for (const int i : of) {
-    const Stencil& stencil = stencils[static_cast<std::size_t>(i)];
+    const Stencil& stencil = stencils[i];
     std::array<double, 3> sum{};
     for (std::size_t k = 0; k < stencil.node.size(); ++k)
       for (std::size_t c = 0; c < 3; ++c)
@@ -184,15 +182,15 @@ void LatticeCompliance::set_near(const Patches& patches, const substrate::Substr
       neighbours_of(patches, [&](double sizes) { return std::max(kMeanReach * sizes, kHalfWidth * sizes + apart_um); });
   const std::vector<MatrixXd> columns = near_columns(patches, gel, near, threads);
   const auto exact = [&](int i, int j) -> Eigen::Matrix2d {  // of i by j
-    const std::vector<int>& of = near[static_cast<std::size_t>(j)];
-    return columns[static_cast<std::size_t>(j)].middleRows<2>(2 * (std::ranges::lower_bound(of, i) - of.begin()));
+    const std::vector<int>& of = near[j];
+    return columns[j].middleRows<2>(2 * (std::ranges::lower_bound(of, i) - of.begin()));
   };
   using Entries = std::vector<Eigen::Triplet<double>>;
   std::vector<Entries> by_patch(near.size());
   diagonal_.resize(2 * patches.n());
   numerics::parallel_for(patches.n(), threads, [&](int j) {
-    Entries& entries = by_patch[static_cast<std::size_t>(j)];
-    std::vector<int> of = near[static_cast<std::size_t>(j)];
+    Entries& entries = by_patch[j];
+    std::vector<int> of = near[j];
     of.erase(of.begin(), std::ranges::lower_bound(of, j));
     const MatrixXd on_lattice = by_lattice(stencils, of, j, kernel);
     Index at = 0;

@@ -11,9 +11,7 @@ namespace {
 
 /// Away from the sheet, of unit length, at the begin, the end and the middle of a side.
 std::array<Vec2, 3> normals_of(const Elements& elements, const Triangles::Side& side) {
-  const auto node = [&](int k) {
-    return elements.triangles().nodes_um[static_cast<std::size_t>(side.nodes[static_cast<std::size_t>(k)])];
-  };
+  const auto node = [&](int k) { return elements.triangles().nodes_um[side.nodes[k]]; };
   const Vec2 begin = node(0), end = node(1), between = node(2);
   // derivatives of the parabola through the three
   const std::array<Vec2, 3> along = {-1.5 * begin - 0.5 * end + 2 * between, 0.5 * begin + 1.5 * end - 2 * between,
@@ -51,7 +49,7 @@ Elements with_rims_further_out(const Elements& elements, int n_rims, double outw
   std::vector<std::array<bool, 2>> held(static_cast<std::size_t>(elements.n_nodes()), {false, false});
   NodeVectors move = NodeVectors::Zero(2 * elements.n_nodes());
   for (const auto& [node, by_um] : moves) {
-    held[static_cast<std::size_t>(node)] = {true, true};
+    held[node] = {true, true};
     move.segment<2>(2 * node) << by_um.x, by_um.y;
   }
   Stiffness stiffness(elements, std::move(held));
@@ -61,17 +59,15 @@ Elements with_rims_further_out(const Elements& elements, int n_rims, double outw
         elastic_stiffness(elements, t, {.youngs_modulus_kPa = 1, .poisson_ratio = 0, .thickness_um = 1});
     stiffness.add(t, K);
     Eigen::Matrix<double, 12, 1> of_nodes;
-    for (int i = 0; i < 6; ++i)
-      of_nodes.segment<2>(2 * i) = move.segment<2>(2 * elements.nodes(t)[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < 6; ++i) of_nodes.segment<2>(2 * i) = move.segment<2>(2 * elements.nodes(t)[i]);
     const Eigen::Matrix<double, 12, 1> forces = K * of_nodes;
-    for (int i = 0; i < 6; ++i)
-      pulled.segment<2>(2 * elements.nodes(t)[static_cast<std::size_t>(i)]) -= forces.segment<2>(2 * i);
+    for (int i = 0; i < 6; ++i) pulled.segment<2>(2 * elements.nodes(t)[i]) -= forces.segment<2>(2 * i);
   }
   const bool is_definite = stiffness.factorise();
   MBTFM_ASSERT(is_definite);
   move += stiffness.solve(pulled);
   Triangles moved = elements.triangles();
-  for (int i = 0; i < elements.n_nodes(); ++i) moved.nodes_um[static_cast<std::size_t>(i)] += at_node(move, i);
+  for (int i = 0; i < elements.n_nodes(); ++i) moved.nodes_um[i] += at_node(move, i);
   return Elements(std::move(moved));
 }
 

@@ -48,7 +48,7 @@ struct Means {
 MatrixXd rigid_motions(const Elements& elements) {
   MatrixXd rigid = MatrixXd::Zero(2 * elements.n_nodes(), 3);
   for (int i = 0; i < elements.n_nodes(); ++i) {
-    const Vec2 x = elements.triangles().nodes_um[static_cast<std::size_t>(i)];
+    const Vec2 x = elements.triangles().nodes_um[i];
     rigid.block<2, 3>(2 * i, 0) << 1, 0, -x.y, 0, 1, x.x;
   }
   return rigid;
@@ -121,8 +121,7 @@ OnGel::OnGel(const Elements& elements, const substrate::Substrate& gel, std::vec
 VectorXd OnGel::slip_um_per_nN(std::optional<double> adhesion_nN_per_um3) const {
   VectorXd slip = VectorXd::Zero(2 * patches_.n());
   if (!adhesion_nN_per_um3) return slip;
-  for (Index i = 0; i < slip.size(); ++i)
-    slip(i) = 1 / (*adhesion_nN_per_um3 * patches_.areas_um2[static_cast<std::size_t>(i / 2)]);
+  for (Index i = 0; i < slip.size(); ++i) slip(i) = 1 / (*adhesion_nN_per_um3 * patches_.areas_um2[i / 2]);
   return slip;
 }
 

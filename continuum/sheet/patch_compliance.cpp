@@ -61,7 +61,7 @@ std::vector<MatrixXd> near_columns(const Patches& patches, const substrate::Subs
                                    const std::vector<std::vector<int>>& near, int threads) {
   std::vector<MatrixXd> columns(near.size());
   numerics::parallel_for(patches.n(), threads, [&](int j) {
-    const std::vector<int>& of = near[static_cast<std::size_t>(j)];
+    const std::vector<int>& of = near[j];
     const auto n_points = [&](int i) {
       const double sizes = patches.size_um(i) + patches.size_um(j);
       return norm(patches.centre_um(i) - patches.centre_um(j)) < kMeanReach * sizes ? Elements::kPoints : 1;
@@ -71,8 +71,8 @@ std::vector<MatrixXd> near_columns(const Patches& patches, const substrate::Subs
       if (n_points(i) == 1) points.push_back(patches.centre_um(i));
       for (int p = 0; p < n_points(i) && n_points(i) > 1; ++p) points.push_back(patches.at(i, p).place_um);
     }
-    const MatrixXd field = gel.compliance_um_per_nN(points, {patches.ellipses[static_cast<std::size_t>(j)]});
-    MatrixXd& column = columns[static_cast<std::size_t>(j)];
+    const MatrixXd field = gel.compliance_um_per_nN(points, {patches.ellipses[j]});
+    MatrixXd& column = columns[j];
     column.resize(2 * std::ssize(of), 2);
     Index row = 0, to = 0;
     for (const int i : of) {

@@ -27,9 +27,7 @@ substrate::Ellipse ellipse_of(Vec2 a, Vec2 b, Vec2 c) {
 }
 
 substrate::Ellipse patch_of(const Elements& elements, int triangle) {
-  const auto corner = [&](std::size_t i) {
-    return elements.triangles().nodes_um[static_cast<std::size_t>(elements.nodes(triangle)[i])];
-  };
+  const auto corner = [&](std::size_t i) { return elements.triangles().nodes_um[elements.nodes(triangle)[i]]; };
   substrate::Ellipse ellipse = ellipse_of(corner(0), corner(1), corner(2));
   const double area = elements.area_um2(triangle);  // of the curved triangle
   const double scale = std::sqrt(area / (std::numbers::pi * ellipse.semi_major_um * ellipse.semi_minor_um));
@@ -47,7 +45,7 @@ std::vector<Vec2> Patches::centres_um() const {
   return centres;
 }
 
-double Patches::size_um(int patch) const { return std::sqrt(areas_um2[static_cast<std::size_t>(patch)]); }
+double Patches::size_um(int patch) const { return std::sqrt(areas_um2[patch]); }
 
 Patches patches_of(const Elements& elements, std::vector<int> triangles) {
   if (triangles.size() < 2)
@@ -73,8 +71,8 @@ std::vector<std::vector<int>> neighbours_of(const Patches& patches, const std::f
       const double other = patches.size_um(i);
       if (other > size || (other == size && i > j)) return;
       if (norm(patches.centre_um(i) - at) >= reach_um(size + other)) return;
-      near[static_cast<std::size_t>(j)].push_back(i);
-      if (i != j) near[static_cast<std::size_t>(i)].push_back(j);
+      near[j].push_back(i);
+      if (i != j) near[i].push_back(j);
     });
   }
   for (std::vector<int>& list : near) std::ranges::sort(list);

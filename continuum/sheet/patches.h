@@ -22,18 +22,14 @@ struct Patches {
   std::vector<double> areas_um2;
 
   int n() const { return static_cast<int>(triangles.size()); }
-  Vec2 centre_um(int patch) const { return ellipses[static_cast<std::size_t>(patch)].centre_um; }
+  Vec2 centre_um(int patch) const { return ellipses[patch].centre_um; }
   std::vector<Vec2> centres_um() const;
   /// The root of its area.
   double size_um(int patch) const;
   /// At point 0 … Elements::kPoints − 1 of a patch.
-  const Shape& at(int patch, int point) const {
-    return elements->at(triangles[static_cast<std::size_t>(patch)], point);
-  }
+  const Shape& at(int patch, int point) const { return elements->at(triangles[patch], point); }
   /// Of a point in the mean over the patch.
-  double share(int patch, int point) const {
-    return at(patch, point).weight_um2 / areas_um2[static_cast<std::size_t>(patch)];
-  }
+  double share(int patch, int point) const { return at(patch, point).weight_um2 / areas_um2[patch]; }
 };
 /// @throws InvalidData where there are fewer than two
 Patches patches_of(const Elements& elements, std::vector<int> triangles);

@@ -87,9 +87,7 @@ void draw_rims(Chart& map, const Solution& solution) {
   const Triangles& triangles = solution.elements->triangles();
   for (const Triangles::Side& side : triangles.sides) {
     if (side.curve >= solution.sheet.n_rims) continue;
-    const auto at = [&](int i) {
-      return triangles.nodes_um[static_cast<std::size_t>(side.nodes[static_cast<std::size_t>(i)])];
-    };
+    const auto at = [&](int i) { return triangles.nodes_um[side.nodes[i]]; };
     pieces.emplace_back(at(0), at(2));
     pieces.emplace_back(at(2), at(1));
   }
@@ -124,7 +122,7 @@ void draw_tractions(Chart& map, const Solution& solution, const Frame& frame) {
 double mean_contraction_of(const Solution& solution, int triangle) {
   double sum = 0;
   for (int p = 0; p < Elements::kPoints; ++p)
-    sum += solution.sheet.contraction_nN_per_um[static_cast<std::size_t>(Elements::kPoints * triangle + p)];
+    sum += solution.sheet.contraction_nN_per_um[Elements::kPoints * triangle + p];
   return sum / Elements::kPoints;
 }
 
@@ -141,7 +139,7 @@ std::string picture_of(const Solution& solution, const std::string& caption) {
     return mean_of(value_of(solution.at_nodes, solution.elements->nodes(place.triangle), shape));
   });
   draw_values(traction, solution, frame, "kPa", [&](const Locator::Place& place, const Shape&) {
-    return norm(solution.patches[static_cast<std::size_t>(place.triangle)].traction_kPa);
+    return norm(solution.patches[place.triangle].traction_kPa);
   });
   draw_rims(tension, solution);
   draw_rims(traction, solution);

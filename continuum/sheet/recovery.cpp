@@ -100,14 +100,14 @@ std::vector<std::vector<int>> triangles_around(const Elements& elements) {
   constexpr std::size_t kFewest = 4;
   std::vector<std::vector<int>> around(static_cast<std::size_t>(elements.triangles().n_corners));
   for (int t = 0; t < elements.n_triangles(); ++t)
-    for (int i = 0; i < 3; ++i) around[static_cast<std::size_t>(elements.nodes(t)[i])].push_back(t);
+    for (int i = 0; i < 3; ++i) around[elements.nodes(t)[i]].push_back(t);
   std::vector<std::vector<int>> patches = around;
   for (std::vector<int>& triangles : patches) {
     if (triangles.size() >= kFewest) continue;
     std::vector<int> more = triangles;
     for (const int t : triangles)
       for (int i = 0; i < 3; ++i) {
-        const auto& next = around[static_cast<std::size_t>(elements.nodes(t)[i])];
+        const auto& next = around[elements.nodes(t)[i]];
         more.insert(more.end(), next.begin(), next.end());
       }
     std::sort(more.begin(), more.end());
@@ -127,7 +127,7 @@ struct EdgePlace {
 /// By the circle through the three nodes: on it normals and curvature are exact.
 std::vector<EdgePlace> places_of(const Triangles& triangles, const Triangles::Side& side, double line_tension_nN) {
   std::array<Vec2, 3> x;
-  for (std::size_t i = 0; i < 3; ++i) x[i] = triangles.nodes_um[static_cast<std::size_t>(side.nodes[i])];
+  for (std::size_t i = 0; i < 3; ++i) x[i] = triangles.nodes_um[side.nodes[i]];
   const Vec2 chord = x[1] - x[0];
   const double length = norm(chord);
   // positive where the curve turns from +x towards +y, as the outer rim does, and rims of holes do, too
@@ -174,10 +174,10 @@ Patch fitted(const Around& around, std::size_t corner) {
       if (has_balance) fit.add_divergence(elements.at(t, p), around.known->divergence_kPa[k]);
     }
     for (std::size_t i = 3; i < 6; ++i)
-      for (const std::size_t side : around.free_sides[static_cast<std::size_t>(elements.nodes(t)[i])])
+      for (const std::size_t side : around.free_sides[elements.nodes(t)[i]])
         for (const EdgePlace& place :
              places_of(elements.triangles(), elements.triangles().sides[side], around.known->line_tension_nN)) {
-          const std::optional<Tensor>& value = around.known->at_nodes[static_cast<std::size_t>(place.node)];
+          const std::optional<Tensor>& value = around.known->at_nodes[place.node];
           if (value) {
             fit.add_value(place.place_um, place.weight_um2, *value);
           } else {
@@ -201,16 +201,16 @@ std::vector<Tensor> recovered(const Elements& elements, const std::vector<Tensor
                 std::vector<char>(n_nodes)};
   if (known != nullptr)
     for (std::size_t k = 0; k < triangles.sides.size(); ++k) {
-      if (known->is_free[k]) around.free_sides[static_cast<std::size_t>(triangles.sides[k].nodes[2])].push_back(k);
+      if (known->is_free[k]) around.free_sides[triangles.sides[k].nodes[2]].push_back(k);
       if (triangles.sides[k].curve >= known->n_rims)
-        for (const int node : triangles.sides[k].nodes) around.is_on_line[static_cast<std::size_t>(node)] = 1;
+        for (const int node : triangles.sides[k].nodes) around.is_on_line[node] = 1;
     }
   std::vector<Patch> patches;
   for (std::size_t corner = 0; corner < n_corners; ++corner) {
     // at the edge, where patches are one-sided, balance lets them be cubic
     const bool is_at_edge = std::ranges::any_of(around.triangles[corner], [&](int t) {
       for (std::size_t i = 3; i < 6; ++i)
-        if (!around.free_sides[static_cast<std::size_t>(elements.nodes(t)[i])].empty()) return true;
+        if (!around.free_sides[elements.nodes(t)[i]].empty()) return true;
       return false;
     });
     patches.push_back(is_at_edge ? fitted<kCubic>(around, corner) : fitted<kQuadratic>(around, corner));
@@ -296,21 +296,20 @@ std::vector<std::optional<double>> strain_along_rims(const Elements& elements, i
       bool is_smooth = true;
       for (std::size_t k = 0; k < 5; ++k) {
         nodes[k] = ring[(i + n + k - 2) % n];
-        if (k > 0)
-          p[k] = p[k - 1] + norm(x[static_cast<std::size_t>(nodes[k])] - x[static_cast<std::size_t>(nodes[k - 1])]);
+        if (k > 0) p[k] = p[k - 1] + norm(x[nodes[k]] - x[nodes[k - 1]]);
         if (k < 2) continue;
-        const Vec2 a = x[static_cast<std::size_t>(nodes[k - 1])] - x[static_cast<std::size_t>(nodes[k - 2])];
-        const Vec2 b = x[static_cast<std::size_t>(nodes[k])] - x[static_cast<std::size_t>(nodes[k - 1])];
+        const Vec2 a = x[nodes[k - 1]] - x[nodes[k - 2]];
+        const Vec2 b = x[nodes[k]] - x[nodes[k - 1]];
         is_smooth = is_smooth && std::abs(std::atan2(cross(a, b), dot(a, b))) < kCorner;
       }
       if (!is_smooth) continue;
       const std::array<double, 5> weights = slope_weights(p);
       Vec2 along, change;
       for (std::size_t k = 0; k < 5; ++k) {
-        along += weights[k] * x[static_cast<std::size_t>(nodes[k])];
+        along += weights[k] * x[nodes[k]];
         change += weights[k] * at_node(u, nodes[k]);
       }
-      strain[static_cast<std::size_t>(nodes[2])] = dot(along, change) / dot(along, along);
+      strain[nodes[2]] = dot(along, change) / dot(along, along);
     }
   }
   return strain;
@@ -322,9 +321,7 @@ std::vector<std::optional<Tensor>> tension_at_rims(const Elements& elements, con
   const std::vector<std::optional<double>> strain = strain_along_rims(elements, sheet.n_rims, u);
   std::vector<double> contraction(strain.size());
   for (int t = 0; t < elements.n_triangles(); ++t)
-    for (const int node : elements.nodes(t))
-      contraction[static_cast<std::size_t>(node)] =
-          sheet.contraction_nN_per_um[static_cast<std::size_t>(Elements::kPoints * t)];
+    for (const int node : elements.nodes(t)) contraction[node] = sheet.contraction_nN_per_um[Elements::kPoints * t];
   std::vector<std::optional<Tensor>> tension(strain.size());
   const double nu = sheet.material.poisson_ratio, youngs = sheet.material.youngs_tension_nN_per_um();
   const Triangles& triangles = elements.triangles();
@@ -353,7 +350,7 @@ KnownOfTension known_on_springs(const Elements& elements, const Sheet& sheet, co
                        .at_nodes = {}};
   for (int t = 0; t < elements.n_triangles(); ++t)
     for (int p = 0; p < Elements::kPoints; ++p)
-      known.divergence_kPa.push_back(sheet.spring_nN_per_um3[static_cast<std::size_t>(Elements::kPoints * t + p)] *
+      known.divergence_kPa.push_back(sheet.spring_nN_per_um3[Elements::kPoints * t + p] *
                                      value_of(u, elements.nodes(t), elements.at(t, p)));
   for (const Triangles::Side& side : elements.triangles().sides) {
     const auto middle = static_cast<std::size_t>(side.nodes[2]);
@@ -366,7 +363,7 @@ KnownOfTension known_on_springs(const Elements& elements, const Sheet& sheet, co
 
 Tensor value_of(const std::vector<Tensor>& at_nodes, const std::array<int, 6>& nodes, const Shape& shape) {
   Tensor value;
-  for (int i = 0; i < 6; ++i) value = value + shape.value[i] * at_nodes[static_cast<std::size_t>(nodes[i])];
+  for (int i = 0; i < 6; ++i) value = value + shape.value[i] * at_nodes[nodes[i]];
   return value;
 }
 
@@ -378,7 +375,7 @@ double relative_error(const Elements& elements, const std::vector<Tensor>& at_po
     for (int p = 0; p < Elements::kPoints; ++p) {
       const Shape& shape = elements.at(t, p);
       const Tensor smooth = value_of(at_nodes, elements.nodes(t), shape);
-      const Tensor& own = at_points[static_cast<std::size_t>(Elements::kPoints * t + p)];
+      const Tensor& own = at_points[Elements::kPoints * t + p];
       error += shape.weight_um2 * squared(smooth + (-1.0) * own);
       whole += shape.weight_um2 * squared(smooth);
     }
@@ -391,7 +388,7 @@ Tensor mean_over(const Elements& elements, const std::vector<Tensor>& at_points)
   for (int t = 0; t < elements.n_triangles(); ++t)
     for (int p = 0; p < Elements::kPoints; ++p) {
       const double weight = elements.at(t, p).weight_um2;
-      sum = sum + weight * at_points[static_cast<std::size_t>(Elements::kPoints * t + p)];
+      sum = sum + weight * at_points[Elements::kPoints * t + p];
       area += weight;
     }
   return 1 / area * sum;

@@ -39,8 +39,7 @@ NodeVectors forces_of_contraction_nN(const Elements& elements, const Sheet& shee
   for (int t = 0; t < elements.n_triangles(); ++t) {
     for (int p = 0; p < Elements::kPoints; ++p) {
       const Shape& shape = elements.at(t, p);
-      const double pull =
-          shape.weight_um2 * sheet.contraction_nN_per_um[static_cast<std::size_t>(Elements::kPoints * t + p)];
+      const double pull = shape.weight_um2 * sheet.contraction_nN_per_um[Elements::kPoints * t + p];
       for (int i = 0; i < 6; ++i) {
         f(2 * elements.nodes(t)[i]) -= pull * shape.gradient_per_um[i].x;
         f(2 * elements.nodes(t)[i] + 1) -= pull * shape.gradient_per_um[i].y;
@@ -57,8 +56,7 @@ NodeVectors forces_of_contraction_nN(const Elements& elements, const Sheet& shee
       const double x = kAt[q];
       const std::array<double, 3> slope = {x - 0.5, x + 0.5, -2 * x};  // of begin, end, between
       Vec2 along;
-      for (int i = 0; i < 3; ++i)
-        along += slope[i] * elements.triangles().nodes_um[static_cast<std::size_t>(side.nodes[i])];
+      for (int i = 0; i < 3; ++i) along += slope[i] * elements.triangles().nodes_um[side.nodes[i]];
       const Vec2 pull = sheet.line_tension_nN * kWeight[q] / norm(along) * along;
       for (int i = 0; i < 3; ++i) {
         f(2 * side.nodes[i]) -= slope[i] * pull.x;

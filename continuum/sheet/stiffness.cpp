@@ -46,12 +46,11 @@ void Stiffness::add(int triangle, const OfElement& stiffness) {
   int k = 0;
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j <= i; ++j) {
-      double* block = matrix_.value.data() + 4 * slots_[static_cast<std::size_t>(triangle)][k++];
+      double* block = matrix_.value.data() + 4 * slots_[triangle][k++];
       const int high = nodes[i] >= nodes[j] ? i : j, low = nodes[i] >= nodes[j] ? j : i;
       for (int a = 0; a < 2; ++a)
         for (int b = 0; b < 2; ++b) {
-          if (held_[static_cast<std::size_t>(nodes[high])][a] || held_[static_cast<std::size_t>(nodes[low])][b])
-            continue;
+          if (held_[nodes[high]][a] || held_[nodes[low]][b]) continue;
           block[2 * a + b] += stiffness(2 * high + a, 2 * low + b);
         }
     }
@@ -71,7 +70,7 @@ bool Stiffness::factorise(double shift, int threads) {
   for (int i = 0; i < matrix_.n; ++i) {
     double* block = matrix_.value.data() + 4 * matrix_.start[i];
     for (int a = 0; a < 2; ++a)
-      if (held_[static_cast<std::size_t>(i)][a]) block[3 * a] = diagonal;
+      if (held_[i][a]) block[3 * a] = diagonal;
   }
   return factor_.factorise(matrix_, {.shift = shift * diagonal, .threads = threads});
 }
@@ -83,11 +82,10 @@ Eigen::MatrixXd Stiffness::solve(const Eigen::MatrixXd& forces_nN) const {
   const Eigen::Index n = n_given == 1 ? 1 : (n_given + kAtATime - 1) / kAtATime * kAtATime;
   Columns in_order = Columns::Zero(forces_nN.rows(), n);
   const std::vector<int>& place = factor_.elimination().place;
-  const auto row_of = [&](int node, int axis) { return 2 * place[static_cast<std::size_t>(node)] + axis; };
+  const auto row_of = [&](int node, int axis) { return 2 * place[node] + axis; };
   for (int i = 0; i < matrix_.n; ++i)
     for (int a = 0; a < 2; ++a)
-      if (!held_[static_cast<std::size_t>(i)][a])
-        in_order.row(row_of(i, a)).leftCols(n_given) = forces_nN.row(2 * i + a);
+      if (!held_[i][a]) in_order.row(row_of(i, a)).leftCols(n_given) = forces_nN.row(2 * i + a);
   factor_.solve(in_order.data(), static_cast<std::size_t>(n));
   Eigen::MatrixXd u(forces_nN.rows(), n_given);
   for (int i = 0; i < matrix_.n; ++i)

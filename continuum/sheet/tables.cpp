@@ -41,13 +41,12 @@ std::vector<SheetPoint> at_nodes_of(const Solution& solution) {
   const Elements& elements = *solution.elements;
   std::vector<SheetPoint> rows;
   for (int i = 0; i < elements.n_nodes(); ++i)
-    rows.push_back(row_of(elements.triangles().nodes_um[static_cast<std::size_t>(i)], at_node(solution.u, i),
-                          solution.at_nodes[static_cast<std::size_t>(i)]));
+    rows.push_back(row_of(elements.triangles().nodes_um[i], at_node(solution.u, i), solution.at_nodes[i]));
   if (solution.sigma_by_triangle.empty()) return rows;
   for (int t = 0; t < elements.n_triangles(); ++t)
     for (const int node : elements.nodes(t)) {
-      std::optional<double>& sigma = rows[static_cast<std::size_t>(node)].mean_tension_sigma_nN_per_um;
-      sigma = std::max(sigma.value_or(0), solution.sigma_by_triangle[static_cast<std::size_t>(t)]);
+      std::optional<double>& sigma = rows[node].mean_tension_sigma_nN_per_um;
+      sigma = std::max(sigma.value_or(0), solution.sigma_by_triangle[t]);
     }
   return rows;
 }
@@ -65,7 +64,7 @@ std::vector<SheetPoint> at_points_of(const Solution& solution, const std::vector
     const auto& nodes = solution.elements->nodes(place->triangle);
     rows.push_back(row_of(p, value_of(solution.u, nodes, shape), value_of(solution.at_nodes, nodes, shape)));
     if (!solution.sigma_by_triangle.empty())
-      rows.back().mean_tension_sigma_nN_per_um = solution.sigma_by_triangle[static_cast<std::size_t>(place->triangle)];
+      rows.back().mean_tension_sigma_nN_per_um = solution.sigma_by_triangle[place->triangle];
   }
   return rows;
 }
@@ -79,8 +78,8 @@ void write_sheet_vtu(const Path& file, const Solution& solution) {
       shear{"max_shear_nN_per_um", 1, {}}, axis{"largest_tension_axis", 3, {}}, traction{"traction_kPa", 3, {}},
       gel{"ground_displacement_um", 3, {}};
   for (int i = 0; i < elements.n_nodes(); ++i) {
-    const Vec2 x = elements.triangles().nodes_um[static_cast<std::size_t>(i)], at = at_node(solution.u, i);
-    const Tensor& s = solution.at_nodes[static_cast<std::size_t>(i)];
+    const Vec2 x = elements.triangles().nodes_um[i], at = at_node(solution.u, i);
+    const Tensor& s = solution.at_nodes[i];
     grid.points_um.push_back({x.x, x.y, 0});
     u.values.insert(u.values.end(), {at.x, at.y, 0});
     S.values.insert(S.values.end(), {s.xx, s.yy, s.xy});
@@ -91,7 +90,7 @@ void write_sheet_vtu(const Path& file, const Solution& solution) {
   }
   for (int t = 0; t < elements.n_triangles(); ++t) {
     grid.cells.insert(grid.cells.end(), elements.nodes(t).begin(), elements.nodes(t).end());
-    const GroundPatch& patch = solution.patches[static_cast<std::size_t>(t)];
+    const GroundPatch& patch = solution.patches[t];
     traction.values.insert(traction.values.end(), {patch.traction_kPa.x, patch.traction_kPa.y, 0});
     gel.values.insert(gel.values.end(), {patch.displacement_um.x, patch.displacement_um.y, 0});
   }

@@ -94,7 +94,7 @@ std::vector<std::string> names_of_groups(const EnsembleFit& fit) {
   for (const FibreGroup& group : fibres_not_told_apart(fit)) {
     std::string& text = names.emplace_back();
     for (std::size_t k = 0; k < group.indices.size(); ++k) {
-      text += (k > 0 ? " + " : "") + std::to_string(fit.tensions.fibre_ids[static_cast<std::size_t>(group.indices[k])]);
+      text += (k > 0 ? " + " : "") + std::to_string(fit.tensions.fibre_ids[group.indices[k]]);
     }
     text += ": " + brief(group.sum_nN.value) + " ± " + brief(group.sum_nN.standard_error) + " nN";
   }

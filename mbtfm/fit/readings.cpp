@@ -154,7 +154,7 @@ Eigen::MatrixXd smoothed(const Eigen::MatrixXd& fields, const std::vector<Vec2>&
     double sum = 0;
     const auto row = 2 * static_cast<Eigen::Index>(i);
     grid.for_each_near(beads_um[i], beads_um[i], reach_um, [&](int j) {
-      const Vec2 d = beads_um[static_cast<std::size_t>(j)] - beads_um[i];
+      const Vec2 d = beads_um[j] - beads_um[i];
       if (dot(d, d) > reach_um * reach_um) return;
       const double weight = std::exp(-0.5 * dot(d, d) / (sigma_um * sigma_um));
       result.middleRows<2>(row) += weight * fields.middleRows<2>(2 * static_cast<Eigen::Index>(j));

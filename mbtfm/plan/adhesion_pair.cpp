@@ -159,8 +159,7 @@ PairFields fields_of(const Gel& given, double area_um2, double distance_um, cons
   f.fields.resize(D * n, D * kPlaces);
   for (int k = 0; k < kPlaces; ++k) {
     const FieldOf<D> field(gel, disc(distance_um * place_of_one(k), radius_um), volume);
-    for (Eigen::Index i = 0; i < n; ++i)
-      f.fields.block<D, D>(D * i, D * k) = field(f.patches[static_cast<std::size_t>(i)].at_um);
+    for (Eigen::Index i = 0; i < n; ++i) f.fields.block<D, D>(D * i, D * k) = field(f.patches[i].at_um);
   }
   f.products.resize(n, kOfPair<D> + kPlaces * kOfPlace<D>);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -217,8 +216,8 @@ std::array<Excess, D> excess_of(const Eigen::RowVectorXd& sums, const Eigen::Row
       const Eigen::Matrix<double, D, 1> Gu =
           sums.segment<D>(kOfPair<D> + k * kOfPlace<D> + kOfSquare<D> + D * c).transpose();
       const Eigen::Matrix<double, D, 1> found = inverse * Gu;
-      all[static_cast<std::size_t>(c)].row(k) << sums[c] - Gu.dot(found),
-          noise_of_two[c] + noise_of_two[D + c] - found.dot(noise), explained_by_two - noise.dot(inverse * noise);
+      all[c].row(k) << sums[c] - Gu.dot(found), noise_of_two[c] + noise_of_two[D + c] - found.dot(noise),
+          explained_by_two - noise.dot(inverse * noise);
     }
   }
   return all;
@@ -264,7 +263,7 @@ std::vector<Excess> drawn_excess(const PairFields& f, double density, const Eige
   for (Eigen::Index k = 0; k < counts.rows(); ++k) {
     drawing::Random random(1, drawing::Stream::beads, static_cast<std::uint64_t>(k));
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double mean = density * f.patches[static_cast<std::size_t>(i)].measure;
+      const double mean = density * f.patches[i].measure;
       counts(k, i) = mean < kMany ? random.poisson(mean) : mean;
       noise.block<1, D>(k, D * i) = std::sqrt(counts(k, i)) * normal.block<1, D>(k, D * i);
     }

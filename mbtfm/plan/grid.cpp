@@ -299,7 +299,7 @@ Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c, int thre
   const auto n_densities = static_cast<int>(asked.beads_per_um2.size());
   numerics::parallel_for(n_densities, threads, [&](int i) {
     // the densest, which takes longest, first
-    const double density = asked.beads_per_um2[static_cast<std::size_t>(n_densities - 1 - i)];
+    const double density = asked.beads_per_um2[n_densities - 1 - i];
     const FttcExperiment experiment = fttc_experiment(scene, c, density / asked.beads_per_um2.back());
     for (std::size_t k = 0; k < points.size(); ++k)
       if (points[k].beads_per_um2 == density) of_fttc[k] = errors_of_fttc(experiment, c, points[k]);

@@ -42,8 +42,7 @@ Eigen::VectorXd tensions_by_label(const Scene& scene, const std::vector<int>& fi
   for (std::size_t i = 1; i < fibre_ids.size(); ++i) {
     const auto fibre = std::ranges::find(fibres, fibre_ids[i], &Fibre::fibre_id);
     MBTFM_ASSERT(fibre != fibres.end());
-    tensions_nN[static_cast<Eigen::Index>(i)] =
-        scene.cell.tensions_nN[static_cast<std::size_t>(fibre - fibres.begin())];
+    tensions_nN[static_cast<Eigen::Index>(i)] = scene.cell.tensions_nN[fibre - fibres.begin()];
   }
   return tensions_nN;
 }

@@ -87,12 +87,11 @@ BeadsOnGel beads_on_gel(const Scene& scene, const KnownCell& cell, double beads_
 BeadsOnGel some_of(const BeadsOnGel& beads, double share, drawing::Random& random) {
   std::vector<Eigen::Index> order(beads.places_um.size());
   std::iota(order.begin(), order.end(), 0);
-  for (std::size_t i = order.size(); i > 1; --i)
-    std::swap(order[i - 1], order[static_cast<std::size_t>(random.below(static_cast<int>(i)))]);
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(static_cast<int>(i))]);
   order.resize(static_cast<std::size_t>(std::round(share * static_cast<double>(order.size()))));
   std::ranges::sort(order);
   BeadsOnGel some{.places_um = {}, .response = beads.response->at_points(order), .modulus_kPa = beads.modulus_kPa};
-  for (const Eigen::Index i : order) some.places_um.push_back(beads.places_um[static_cast<std::size_t>(i)]);
+  for (const Eigen::Index i : order) some.places_um.push_back(beads.places_um[i]);
   return some;
 }
 

@@ -70,7 +70,7 @@ SpaceDrawn draw_experiments(const SpaceScene& scene, const SpacePool& pool, cons
     const std::vector<Index> chosen = random_part(pool.beads.size(), n_beads_of(scene, point.beads_per_um3), places);
     // a stiffer gel is more noise
     const double over_stated = point.noise_um * point.youngs_modulus_kPa / scene.gel.youngs_modulus_kPa;
-    found[static_cast<std::size_t>(k)] = found_in(scene, part_of(scene, pool, chosen, over_stated, &noise));
+    found[k] = found_in(scene, part_of(scene, pool, chosen, over_stated, &noise));
   });
   for (std::size_t k = 0; k < found.size(); ++k) {
     for (std::size_t a = 0; a < scene.patches.size(); ++a) {

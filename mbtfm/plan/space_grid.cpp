@@ -158,7 +158,7 @@ double resolution_at_patches(const SpaceScene& scene, const spatial::Problem& pr
   for (const SpacePatch& patch : scene.patches) {
     const auto away = [&](Vec2 at) { return norm(at - patch.adhesion.position_um); };
     const auto nearest = std::ranges::min_element(problem.mesh.quads.points_um, {}, away);
-    of_patches.push_back(f.resolution_um[static_cast<std::size_t>(nearest - problem.mesh.quads.points_um.begin())]);
+    of_patches.push_back(f.resolution_um[nearest - problem.mesh.quads.points_um.begin()]);
   }
   return numerics::median_in(of_patches);
 }
@@ -277,7 +277,7 @@ spatial::Problem part_of(const SpaceScene& scene, const SpacePool& pool, const s
                          drawing::Random* random) {
   std::vector<BeadInSpace> beads;
   for (const Index b : chosen) {
-    BeadInSpace bead = pool.beads[static_cast<std::size_t>(b)];
+    BeadInSpace bead = pool.beads[b];
     bead.sigma_um *= noise;
     bead.sigma_z_um *= noise;
     if (random) {

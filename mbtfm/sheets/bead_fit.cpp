@@ -81,7 +81,7 @@ sheet::Scene scene_of(const Question& q, const Unknowns& u, const SheetFit& fit)
     };
   made.line_tension_nN = q.has_line ? fit.loads(n_parts) : 0;
   for (Index k = 0; k < n_bundles; ++k)
-    made.bundles.push_back({u.shape.bundles[static_cast<std::size_t>(k)], fit.loads(fit.loads.size() - n_bundles + k)});
+    made.bundles.push_back({u.shape.bundles[k], fit.loads(fit.loads.size() - n_bundles + k)});
   return made;
 }
 

@@ -276,7 +276,7 @@ ContractionLattice::ContractionLattice(const sheet::Elements& elements, int n_po
 
 double ContractionLattice::share(int point, Vec2 place_um) const {
   const Vec2 at = 1 / spacing_um_ * (place_um - low_um_);
-  const auto [column, row] = points_[static_cast<std::size_t>(point)];
+  const auto [column, row] = points_[point];
   return std::max(0.0, 1 - std::abs(at.x - column)) * std::max(0.0, 1 - std::abs(at.y - row));
 }
 

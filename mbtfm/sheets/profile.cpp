@@ -49,8 +49,7 @@ Line searched(const StiffnessRange& range, int n_steps, const ProfileAt& profile
     }
   }
   line.best = profile_at(std::exp(0.5 * (a + b)));
-  if (line.scan[static_cast<std::size_t>(least)].misfit < line.best.misfit)
-    line.best = line.scan[static_cast<std::size_t>(least)];
+  if (line.scan[least].misfit < line.best.misfit) line.best = line.scan[least];
   return line;
 }
 
@@ -91,7 +90,7 @@ tensions::Sides Profile::reach(Eigen::Index load, double room) const {
   for (Eigen::Index k = 0; k < loads.size() - n_bundles; ++k)
     local.tensions_nN[k] = 1e3 * (std::abs(loads[k]) + std::sqrt(room / normal(k, k)));
   constexpr double kNormal95 = tensions::kNormal95;
-  return tensions::profiles_95(local, room / (kNormal95 * kNormal95))[static_cast<std::size_t>(load)];
+  return tensions::profiles_95(local, room / (kNormal95 * kNormal95))[load];
 }
 
 Profile Search::at(const Stiffnesses& stiffnesses) const {

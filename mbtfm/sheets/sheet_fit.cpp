@@ -160,7 +160,7 @@ class Estimates {
     std::vector<FittedEstimate> all;
     const auto add = [&](Quantity quantity, const std::string& part, double value, const VectorXd& by_unknown,
                          const Limits& limits) { all.push_back(one(quantity, part, value, by_unknown, limits)); };
-    const auto part_of = [&](Eigen::Index k) { return parts.empty() ? "" : parts[static_cast<std::size_t>(k)]; };
+    const auto part_of = [&](Eigen::Index k) { return parts.empty() ? "" : parts[k]; };
     for (Eigen::Index k = 0; k < table_.n_contractions(); ++k)
       add(Quantity::contraction, part_of(k), best_.loads(k), by(k, 1), allowed_.of_load(k, Quantity::contraction));
     add(Quantity::stiffness, {}, M, by(at_M, M), allowed_.of_sheet());
@@ -241,15 +241,14 @@ void add_error(std::vector<FittedEstimate>& estimates, std::optional<double> She
 void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um) {
   const MatrixXd moved = numerics::small_product(fit.answers, changes_um);
   VectorXd sizes(std::ssize(fit.estimates));
-  for (Eigen::Index k = 0; k < sizes.size(); ++k)
-    sizes(k) = (fit.estimates[static_cast<std::size_t>(k)].by_unknown.transpose() * moved).norm();
+  for (Eigen::Index k = 0; k < sizes.size(); ++k) sizes(k) = (fit.estimates[k].by_unknown.transpose() * moved).norm();
   add_error(fit.estimates, part, sizes);
 }
 
 VectorXd changes_by_modulus(const std::vector<FittedEstimate>& estimates, double share) {
   VectorXd changes(std::ssize(estimates));
   for (Eigen::Index k = 0; k < changes.size(); ++k) {
-    const FittedEstimate& e = estimates[static_cast<std::size_t>(k)];
+    const FittedEstimate& e = estimates[k];
     const bool is_force = e.quantity != Quantity::contraction_over_stiffness && e.quantity != Quantity::penetration;
     changes(k) = is_force ? share * e.value : 0;
   }

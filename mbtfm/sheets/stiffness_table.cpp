@@ -85,7 +85,7 @@ StiffnessTable::StiffnessTable(const SheetShape& shape, const sheet::OnGel& grou
   const auto n_examples = static_cast<int>(at.size());
   MatrixXd solved(2 * std::ssize(ground.patches()), n_examples * loads.cols());
   numerics::parallel_for(n_examples, threads, [&](int j) {
-    const Stiffnesses& of = at[static_cast<std::size_t>(j)];
+    const Stiffnesses& of = at[j];
     const double nu = shape.poisson_ratio;
     const sheet::Material material{of.sheet_nN_per_um * (1 - nu * nu), nu, 1};  // only its product with the thickness
     solved.middleCols(j * loads.cols(), loads.cols()) =

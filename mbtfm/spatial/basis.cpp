@@ -82,7 +82,7 @@ Basis orthonormal_basis(MatrixXd norm_um2) {
 Basis spot_basis(const TractionMesh& mesh, const Ground& ground, double width_um) {
   const Index n = mesh.n_vertices();
   const auto place = [&](Index v) {
-    const Vec2 at = mesh.quads.points_um[static_cast<std::size_t>(v)];
+    const Vec2 at = mesh.quads.points_um[v];
     return Vec3{at.x, at.y, ground.height_um(at)};
   };
   const Eigen::Map<const VectorXd> areas(mesh.areas_um2.data(), n);

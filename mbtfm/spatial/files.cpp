@@ -82,8 +82,7 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
     row.tangential_kPa = norm(row.traction_kPa - row.normal_kPa * normal);
     if (!resolution.empty()) {
       row.resolution_um = 0;
-      for (const auto& [vertex, share] : shares)
-        *row.resolution_um += share * resolution[static_cast<std::size_t>(vertex)];
+      for (const auto& [vertex, share] : shares) *row.resolution_um += share * resolution[vertex];
     }
     if (r.covariance_kPa2.size() == 0) continue;
     const auto sigma = [&](Eigen::Index c) {

@@ -22,8 +22,7 @@ MatrixXd sums_of(const Problem& problem, const Basis& basis) {
   MatrixXd sums(3 * basis.size(), 3);
   for (Index c = 0; c < 3; ++c) {
     VectorXd areas = VectorXd::Zero(problem.n_unknowns());
-    for (Index v = 0; v < problem.mesh.n_vertices(); ++v)
-      areas[3 * v + c] = problem.mesh.areas_um2[static_cast<std::size_t>(v)];
+    for (Index v = 0; v < problem.mesh.n_vertices(); ++v) areas[3 * v + c] = problem.mesh.areas_um2[v];
     sums.col(c) = basis.transposed(areas);
   }
   return sums;

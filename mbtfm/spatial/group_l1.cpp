@@ -157,7 +157,7 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   // x is the root of the area times what was smoothed: Σ sqrt(area) |x| is the sum of the spots' forces
   ArrayXd weights = areas.array().sqrt();
   for (Index v = 0; v < n; ++v)
-    weights[v] /= std::max(problem.expected.amplitude(problem.mesh.quads.points_um[static_cast<std::size_t>(v)]), 1e-3);
+    weights[v] /= std::max(problem.expected.amplitude(problem.mesh.quads.points_um[v]), 1e-3);
 
   double largest = 0;
   for (Index v = 0; v < n; ++v)

@@ -72,7 +72,7 @@ Weighing weigh(BeadLoss loss, const Observed& observed, const Eigen::VectorXd& r
   const double scale = std::max(observed.states_errors ? 1.0 : 0.0, weighing.scale);
   double score = 0, curvature = 0, square = 0, mean = 0;  // means over the groups
   for (Index b = 0; b < n_groups; ++b) {
-    const double r = lengths[static_cast<std::size_t>(b)] / std::max(scale, 1e-300);
+    const double r = lengths[b] / std::max(scale, 1e-300);
     const double w = loss_weight(loss, r, n);
     weighing.by_row.segment(n * b, n).setConstant(w);
     score += w * w * r * r / n_rows;

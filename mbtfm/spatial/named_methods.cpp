@@ -156,10 +156,10 @@ SpatialReconstruction reconstruct_green(const Problem& problem, const tractions:
   VectorXd roots(n_faces), n_at = VectorXd::Zero(problem.mesh.n_vertices());
   MatrixXd shapes = MatrixXd::Zero(problem.mesh.n_vertices(), n_faces);
   for (Index f = 0; f < n_faces; ++f) {
-    const Leaf& leaf = problem.mesh.leaves[static_cast<std::size_t>(f)];
+    const Leaf& leaf = problem.mesh.leaves[f];
     const Vec2 size = problem.mesh.size_um(leaf), middle = problem.mesh.low_corner_um(leaf) + 0.5 * size;
     roots[f] = problem.expected.amplitude(middle) / std::sqrt(size.x * size.y * problem.ground.stretch(middle));
-    for (const int v : faces[static_cast<std::size_t>(f)]) {
+    for (const int v : faces[f]) {
       if (v >= problem.mesh.n_vertices()) continue;  // it hangs
       shapes(v, f) = 1;
       n_at[v] += 1;

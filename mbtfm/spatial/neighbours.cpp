@@ -68,19 +68,19 @@ AmongNeighbours compared_with(const Observed& observed, const std::vector<int>& 
   const auto& places = std::get<std::vector<Vec3>>(observed.at.points_um);
   const Index n = observed.n_components();
   std::vector<Vec3> theirs;
-  for (const int b : trusted) theirs.push_back(places[static_cast<std::size_t>(b)]);
+  for (const int b : trusted) theirs.push_back(places[b]);
   const numerics::Near near(theirs, observed.distance_um);
   const VectorXd u = observed.displacement_um.cwiseQuotient(observed.sigma_um);
   std::vector<Prediction> predictions;
   std::vector<double> scatters;
   for (int b = 0; b < observed.n_beads; ++b) {
-    const Vec3 at = places[static_cast<std::size_t>(b)];
+    const Vec3 at = places[b];
     MatrixXd offsets(kNeighbours, 3), over_sigma(kNeighbours, n);
     Index k = 0;
     for (const int which : near.nearest(at, kNeighbours + 1)) {
-      const int other = trusted[static_cast<std::size_t>(which)];
+      const int other = trusted[which];
       if (other == b || k == kNeighbours) continue;
-      const Vec3 d = places[static_cast<std::size_t>(other)] - at;
+      const Vec3 d = places[other] - at;
       offsets.row(k) << d.x, d.y, d.z;
       over_sigma.row(k++) = u.segment(n * other, n).transpose();
     }
@@ -151,7 +151,7 @@ AmongNeighbours among_neighbours(const Observed& observed) {
     made = compared_with(observed, trusted);
     trusted.clear();
     for (int b = 0; b < observed.n_beads; ++b) {
-      if (made.distance[static_cast<std::size_t>(b)] < kFar) trusted.push_back(b);
+      if (made.distance[b] < kFar) trusted.push_back(b);
     }
   }
   return made;

@@ -77,7 +77,7 @@ Observed observe(const std::vector<BeadInSpace>& beads, const Gel& gel, const Gr
   observed.displacement_um.resize(n * observed.n_beads);
   observed.sigma_um.resize(n * observed.n_beads);
   for (Eigen::Index i = 0; i < observed.n_beads; ++i) {
-    const BeadInSpace& bead = *taken[static_cast<std::size_t>(i)];
+    const BeadInSpace& bead = *taken[i];
     const double sigma = observed.states_errors ? bead.sigma_um : 1;
     const double sigma_z =
         observed.states_errors && bead.sigma_z_um > 0 ? bead.sigma_z_um : parameters.axial_sigma_ratio * sigma;

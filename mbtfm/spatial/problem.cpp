@@ -82,8 +82,7 @@ MatrixXd facet_response(const substrate::Substrate& model, const TractionMesh& m
     std::array<int, 4> corners{};
     for (std::size_t i = 0; i < 4; ++i) {
       corners[i] = static_cast<int>(apart.points_um.size());
-      apart.points_um.push_back(
-          mesh.quads.points_um[static_cast<std::size_t>(mesh.quads.faces[static_cast<std::size_t>(f)][i])]);
+      apart.points_um.push_back(mesh.quads.points_um[mesh.quads.faces[f][i]]);
       for (Index c = 0; c < 3; ++c) even(3 * Index{corners[i]} + c, 3 * f + c) = 1;
     }
     apart.faces.push_back(corners);
@@ -138,7 +137,7 @@ class OfFreeVertices final : public substrate::Response {
 std::vector<Vec3> Problem::vertices_um() const {
   std::vector<Vec3> places;
   for (int v = 0; v < mesh.n_vertices(); ++v) {
-    const Vec2 p = mesh.quads.points_um[static_cast<std::size_t>(v)];
+    const Vec2 p = mesh.quads.points_um[v];
     places.push_back({p.x, p.y, ground.height_um(p)});
   }
   return places;
@@ -205,8 +204,7 @@ Problem Problem::with_beads(const std::vector<Index>& chosen, Observed of_them) 
   const Index n = observed.n_components();
   const auto rows_of = [&](const MatrixXd& all) {
     MatrixXd rows(all.size() > 0 ? n * std::ssize(chosen) : 0, all.cols());
-    for (Index b = 0; n * b < rows.rows(); ++b)
-      rows.middleRows(n * b, n) = all.middleRows(n * chosen[static_cast<std::size_t>(b)], n);
+    for (Index b = 0; n * b < rows.rows(); ++b) rows.middleRows(n * b, n) = all.middleRows(n * chosen[b], n);
     return rows;
   };
   some.response_um_per_kPa = rows_of(response_um_per_kPa);

@@ -53,13 +53,13 @@ std::vector<bool> faces_to_split(const Problem& problem, const SpatialReconstruc
     std::vector<double> sorted = sizes;
     const auto n_kept = static_cast<std::ptrdiff_t>(std::floor((1 - kShare) * static_cast<double>(sorted.size())));
     std::nth_element(sorted.begin(), sorted.begin() + n_kept, sorted.end());
-    for (std::size_t f = 0; f < split.size(); ++f) split[f] = sizes[f] >= sorted[static_cast<std::size_t>(n_kept)];
+    for (std::size_t f = 0; f < split.size(); ++f) split[f] = sizes[f] >= sorted[n_kept];
   }
   if (rule == Refine::resolved && r.covariance_kPa2.size() > 0) {
     const std::vector<bool> at = is_resolved(r);
     for (std::size_t f = 0; f < split.size(); ++f) {
       for (const int corner : mesh.quads.faces[f]) {
-        if (corner < mesh.n_vertices() && at[static_cast<std::size_t>(corner)]) split[f] = true;
+        if (corner < mesh.n_vertices() && at[corner]) split[f] = true;
       }
     }
   }
@@ -78,7 +78,7 @@ Refined refined(Problem problem, SpatialReconstruction found, Refine rule,
   std::ranges::stable_sort(order, std::ranges::greater{}, [&](std::size_t f) { return sizes[f]; });
   const auto mesh_with = [&](std::ptrdiff_t n_split) {
     std::vector<bool> split(wanted.size(), false);
-    for (std::ptrdiff_t k = 0; k < n_split; ++k) split[order[static_cast<std::size_t>(k)]] = true;
+    for (std::ptrdiff_t k = 0; k < n_split; ++k) split[order[k]] = true;
     return with_split(problem.mesh, problem.ground, split);
   };
   std::ptrdiff_t n_split = std::ssize(order);

@@ -116,11 +116,11 @@ Eigen::MatrixXd adhesion_areas_um2(const TractionMesh& mesh, const Ground& groun
   }
   for (Eigen::Index a = 0; a < areas.rows(); ++a) {
     if (areas.row(a).sum() > 0) continue;  // else smaller than what is sampled: all of it where its middle is
-    const Adhesion& adhesion = adhesions[static_cast<std::size_t>(a)];
+    const Adhesion& adhesion = adhesions[a];
     const Vec2 at = adhesion.position_um;
     Eigen::Index nearest = 0;
     for (Eigen::Index v = 0; v < areas.cols(); ++v) {
-      const auto away = [&](Eigen::Index k) { return norm(mesh.quads.points_um[static_cast<std::size_t>(k)] - at); };
+      const auto away = [&](Eigen::Index k) { return norm(mesh.quads.points_um[k] - at); };
       if (away(v) < away(nearest)) nearest = v;
     }
     areas(a, nearest) = adhesion.area_um2 * ground.stretch(at);

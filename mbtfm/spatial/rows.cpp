@@ -24,7 +24,7 @@ MatrixXd common_motions(const Observed& observed) {
   MatrixXd motions = MatrixXd::Zero(n * observed.n_beads, n + 1);
   for (Index b = 0; b < observed.n_beads; ++b) {
     motions.block(n * b, 0, n, n).setIdentity();
-    const Vec3 d = beads[static_cast<std::size_t>(b)] - centre;
+    const Vec3 d = beads[b] - centre;
     motions(n * b, n) = -d.y;
     motions(n * b + 1, n) = d.x;
   }

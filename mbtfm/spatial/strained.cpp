@@ -18,7 +18,7 @@ double mean_traction_kPa(const Problem& problem, const VectorXd& traction_kPa) {
   double fourth = 0, square = 0;
   for (Index v = 0; v < problem.mesh.n_vertices(); ++v) {
     const double t2 = traction_kPa.segment<3>(3 * v).squaredNorm();
-    const double area = problem.mesh.areas_um2[static_cast<std::size_t>(v)];
+    const double area = problem.mesh.areas_um2[v];
     square += area * t2;
     fourth += area * t2 * t2;
   }

@@ -56,7 +56,7 @@ std::vector<PartForce> parts_of(const Problem& problem, const MatrixXd& areas_um
     Vec3 centre;
     for (Index v = 0; v < areas_um2.cols(); ++v) {
       part.area_um2 += areas_um2(a, v);
-      centre += areas_um2(a, v) * vertices[static_cast<std::size_t>(v)];
+      centre += areas_um2(a, v) * vertices[v];
     }
     if (part.area_um2 > 0) part.position_um = 1 / part.area_um2 * centre;
   }
@@ -137,8 +137,8 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
   MatrixXd sums = MatrixXd::Zero(6, 3 * n);  // forces, moments
   VectorXd inwards(3 * n);                   // contractile moment
   for (Index v = 0; v < n; ++v) {
-    const double area = mesh.areas_um2[static_cast<std::size_t>(v)];
-    const Vec3 arm = vertices[static_cast<std::size_t>(v)] - balance.centre_um;
+    const double area = mesh.areas_um2[v];
+    const Vec3 arm = vertices[v] - balance.centre_um;
     Matrix3d cross_arm;
     cross_arm << 0, -arm.z, arm.y, arm.z, 0, -arm.x, -arm.y, arm.x, 0;
     sums.block<3, 3>(0, 3 * v) = area * Matrix3d::Identity();
@@ -147,8 +147,7 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
   }
   if (r.covariance_kPa2.size() > 0) {
     VectorXd along(3 * n);
-    for (Index v = 0; v < n; ++v)
-      along.segment<3>(3 * v) = mesh.areas_um2[static_cast<std::size_t>(v)] * traction(v).stableNormalized();
+    for (Index v = 0; v < n; ++v) along.segment<3>(3 * v) = mesh.areas_um2[v] * traction(v).stableNormalized();
     balance.total_force_sigma_nN = std::sqrt(std::max(0.0, numerics::quadratic_form(r.covariance_kPa2, along)));
   }
   const VectorXd& summed = summed_tractions_kPa(r);
@@ -161,7 +160,7 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
     const double of_gel = problem.model_error * problem.model_error * balance.total_force_nN;
     for (Index v = 0; v < n; ++v) {
       const auto of_vertex = sums.middleCols<3>(3 * v);  // of a traction there
-      const double area = mesh.areas_um2[static_cast<std::size_t>(v)];
+      const double area = mesh.areas_um2[v];
       of_net += of_gel * traction(v).norm() / area * of_vertex * of_vertex.transpose();
     }
     const Matrix3d of_force = of_net.topLeftCorner<3, 3>(), of_moment = of_net.bottomRightCorner<3, 3>();
@@ -192,7 +191,7 @@ std::vector<double> resolution_um(const Problem& problem, const SpatialReconstru
   std::vector<double> lengths;
   constexpr double kLeast = 1e-6;  // of a share: nothing is seen there
   for (Index v = 0; v < r.resolved.size(); ++v) {
-    const double area = problem.mesh.areas_um2[static_cast<std::size_t>(v)];
+    const double area = problem.mesh.areas_um2[v];
     lengths.push_back(std::sqrt(area / std::max(r.resolved[v], kLeast)));
   }
   return lengths;

@@ -140,7 +140,7 @@ TractionMesh mesh_of(std::vector<Leaf> leaves, Vec2 low_um, Vec2 spacing_um, con
   std::vector<Eigen::Triplet<double>> mass;
   over_faces(mesh, ground, 4, Places::gauss, [&](Vec2, std::span<const VertexShare> shares, double area_um2) {
     for (const VertexShare& a : shares) {
-      mesh.areas_um2[static_cast<std::size_t>(a.vertex)] += a.share * area_um2;
+      mesh.areas_um2[a.vertex] += a.share * area_um2;
       for (const VertexShare& b : shares) mass.emplace_back(a.vertex, b.vertex, a.share * b.share * area_um2);
     }
   });

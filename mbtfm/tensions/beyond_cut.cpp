@@ -266,9 +266,9 @@ DataWithBeyond with_own_forces(DataWithBeyond given, const Cell& cell) {
   const Eigen::Index before = data.motions.shapes.cols(), n_own = 2 * found.n_own;
   Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(n_forces, before + n_own);
   for (Eigen::Index k = 0; k < found.n_own; ++k) {
-    forces.block<2, 2>(2 * near[static_cast<std::size_t>(k)], before + 2 * k)
+    forces.block<2, 2>(2 * near[k], before + 2 * k)
         .diagonal()
-        .setConstant(expected[static_cast<std::size_t>(k)] * std::sqrt(mean_square / variance));
+        .setConstant(expected[k] * std::sqrt(mean_square / variance));
   }
   Eigen::MatrixXd motions(data.motions.shapes.rows(), before + n_own);
   motions << data.motions.shapes, data.response->displace(forces.rightCols(n_own));

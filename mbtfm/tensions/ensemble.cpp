@@ -358,7 +358,7 @@ double variance_beside_model_error(const LinearData& data, const Eigen::VectorXd
 
 Eigen::VectorXd values_of(const EnsembleFit& fit) {
   Eigen::VectorXd values(static_cast<Eigen::Index>(fit.tensions.nN.size()));
-  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = fit.tensions.nN[static_cast<std::size_t>(i)].value;
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = fit.tensions.nN[i].value;
   return values;
 }
 
@@ -500,7 +500,7 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   add_means(all);
   all.forces.own = own_forces_in(all.data);
   add_variances(all);
-  numerics::parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
+  numerics::parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[m], all); });
   all.tensions.network_bias =
       network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data.reduced, adhesion_ids), threads);
   add_estimates(all, networks.front().is_cut());

@@ -165,7 +165,7 @@ VectorXd change_by_other_ellipse(const BudgetInputs& in, const std::vector<Index
   const greens::HalfSpaceEllipse old(in.gel, before), other(in.gel, after);
   VectorXd change(2 * static_cast<Index>(near.size()));
   for (std::size_t i = 0; i < near.size(); ++i) {
-    const Vec2 at = in.beads[static_cast<std::size_t>(near[i])].position_um;
+    const Vec2 at = in.beads[near[i]].position_um;
     const greens::Sym2 a = other.compliance_um_per_nN(at), c = old.compliance_um_per_nN(at);
     const greens::Sym2 g{a.xx - c.xx, a.xy - c.xy, a.yy - c.yy};
     change.segment<2>(2 * static_cast<Index>(i)) << g.xx * force_nN.x + g.xy * force_nN.y,
@@ -216,7 +216,7 @@ AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const n
   changes.displacement.resize(2 * static_cast<Index>(changes.near.size()), n);
   changes.by_vertices = MatrixXd::Zero(n_sums, n);
   for (Index v = 0; v < n; ++v) {
-    const Variation& variation = variations[static_cast<std::size_t>(v)];
+    const Variation& variation = variations[v];
     changes.displacement.col(v) = change_by_other_ellipse(in, changes.near, ellipse, variation.ellipse, force_nN);
     changes.by_vertices.col(v) = sums.to_adhesion(a.adhesion_id, [&](Vec2 point_um) {
       const Vec2 arm = point_um - a.position_um;
@@ -229,22 +229,22 @@ AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const n
 VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers, int threads) {
   const auto sums = in.fit.meshes.front().fit.trial.rest->answer_to_geometry(by_network_adhesion(in, gain.of_model));
   VectorXd tensions_nN(static_cast<Index>(in.fit.tensions.nN.size()));
-  for (Index i = 0; i < tensions_nN.size(); ++i) tensions_nN[i] = in.fit.tensions.nN[static_cast<std::size_t>(i)].value;
+  for (Index i = 0; i < tensions_nN.size(); ++i) tensions_nN[i] = in.fit.tensions.nN[i].value;
   std::vector<AdhesionChanges> changes(in.cell.adhesions.size());
   numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
-    changes[static_cast<std::size_t>(i)] = changes_of(in, static_cast<std::size_t>(i), *sums, gain.of_model.rows());
+    changes[i] = changes_of(in, static_cast<std::size_t>(i), *sums, gain.of_model.rows());
   });
   VectorXd variance = sums->variance_of_free_ends(tensions_nN, in.segmentation.fibre_end_error_um);
   answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
     std::vector<VectorXd> by_adhesion(changes.size());
     numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
-      const AdhesionChanges& c = changes[static_cast<std::size_t>(i)];
+      const AdhesionChanges& c = changes[i];
       MatrixXd answer = c.by_vertices.middleRows(first, of_beads.rows());
       for (std::size_t b = 0; b < c.near.size(); ++b) {
         answer += numerics::small_product(of_beads.middleCols<2>(2 * c.near[b]),
                                           c.displacement.middleRows<2>(2 * static_cast<Index>(b)));
       }
-      by_adhesion[static_cast<std::size_t>(i)] = answer.cwiseAbs2().rowwise().sum();
+      by_adhesion[i] = answer.cwiseAbs2().rowwise().sum();
     });
     for (const VectorXd& v : by_adhesion) variance.segment(first, of_beads.rows()) += v;
   });

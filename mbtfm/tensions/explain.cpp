@@ -25,7 +25,7 @@ std::string sentence(const Change& change, const EnsembleFit& fit) {
   if (change.at_most) return "would change the tensions by at most " + percent;
   Eigen::Index most = 0;
   const double largest = change.by_tension_nN.cwiseAbs().maxCoeff(&most);
-  const int id = fit.tensions.fibre_ids[static_cast<std::size_t>(most)];
+  const int id = fit.tensions.fibre_ids[most];
   return "would change the tensions by " + percent + ", that of " +
          (id == 0 ? "the network" : "fibre " + std::to_string(id)) + " by " + brief(largest) + " nN";
 }

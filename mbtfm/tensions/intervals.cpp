@@ -209,7 +209,7 @@ Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const Fit
   Eigen::MatrixXd deviations(problem.n_tensions(), static_cast<Eigen::Index>(draws.size()));
   numerics::parallel_for(static_cast<int>(draws.size()), threads, [&](int d) {
     // In the reduced data white noise is white again (see ReducedData).
-    std::mt19937_64 engine(draws[static_cast<std::size_t>(d)]);
+    std::mt19937_64 engine(draws[d]);
     const auto uniform = [&] { return (static_cast<double>(engine() >> 11) + 0.5) * 0x1p-53; };
     const auto normal = [&] {  // Box & Muller (1958): the same with every library
       const double length = std::sqrt(-2 * std::log(uniform()));

@@ -66,7 +66,7 @@ class BeadSquares {
         const auto square = squares_.find({i, j});
         if (square == squares_.end()) continue;
         for (const Eigen::Index b : square->second) {
-          const Vec2 d = data_.position_um[static_cast<std::size_t>(b)] - place_um;
+          const Vec2 d = data_.position_um[b] - place_um;
           if (dot(d, d) < kReach_um * kReach_um) found.push_back(b);
         }
       }
@@ -100,7 +100,7 @@ Question ask(Vec2 place_um, const BeadSquares& beads, const DiscField& disc, con
   Block mean = Block::Zero();
   double all = 0;
   for (const Eigen::Index b : q.beads) {
-    q.fields.push_back(disc.at(data.position_um[static_cast<std::size_t>(b)] - place_um));
+    q.fields.push_back(disc.at(data.position_um[b] - place_um));
     mean += weight[2 * b] * q.fields.back();
     all += weight[2 * b];
   }
@@ -182,8 +182,8 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
   };
   std::vector<Question> asked(places.size());
   numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int i) {
-    asked[static_cast<std::size_t>(i)] = ask_at(places[static_cast<std::size_t>(i)]);
-    if (asked[static_cast<std::size_t>(i)].gain < 1) asked[static_cast<std::size_t>(i)].fields = {};
+    asked[i] = ask_at(places[i]);
+    if (asked[i].gain < 1) asked[i].fields = {};
   });
   // chi squared of two numbers exceeds x by chance exp(-x/2)
   const double limit = 2 * std::log(std::max<double>(1, static_cast<double>(places.size())) / 0.01);

@@ -63,7 +63,7 @@ std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
   std::vector<bool> is_placed(static_cast<std::size_t>(n), false);
   std::vector<FibreGroup> groups;
   for (int seed = 1; seed < n; ++seed) {
-    if (is_placed[static_cast<std::size_t>(seed)]) continue;
+    if (is_placed[seed]) continue;
     FibreGroup group{.indices = {seed}, .sum_nN = {}};
     for (std::size_t next = 0; next < group.indices.size(); ++next) {
       for (int j = seed + 1; j < n; ++j) {
@@ -73,7 +73,7 @@ std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
     }
     if (group.indices.size() < 2) continue;
     std::sort(group.indices.begin(), group.indices.end());
-    for (const int i : group.indices) is_placed[static_cast<std::size_t>(i)] = true;
+    for (const int i : group.indices) is_placed[i] = true;
     group.sum_nN = sum_of(fit, group.indices);
     groups.push_back(std::move(group));
   }
@@ -102,7 +102,7 @@ Influence influence_of(const EnsembleFit& fit, const LinearData& data) {
         by_bead[b] = row.segment<2>(2 * b).squaredNorm();
         if (by_bead[b] <= largest[b]) continue;
         largest[b] = by_bead[b];
-        influence.most_informed[static_cast<std::size_t>(b)] = fit.tensions.fibre_ids[static_cast<std::size_t>(i)];
+        influence.most_informed[b] = fit.tensions.fibre_ids[i];
       }
       const double sum_of_squares = by_bead.squaredNorm();
       influence.variance[i] = by_bead.sum();
@@ -135,10 +135,8 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence) {
   std::vector<FibreLeftOut> fibres;
   for (Eigen::Index i = 1; i < static_cast<Eigen::Index>(fit.tensions.fibre_ids.size()); ++i) {
-    FibreLeftOut left{.fibre_id = fit.tensions.fibre_ids[static_cast<std::size_t>(i)],
-                      .chi_squared_rise = 0,
-                      .aic_rise = 0,
-                      .n_informing_beads = 0};
+    FibreLeftOut left{
+        .fibre_id = fit.tensions.fibre_ids[i], .chi_squared_rise = 0, .aic_rise = 0, .n_informing_beads = 0};
     for (const MeshFit& mesh : fit.meshes) {
       // Where t_i is held to t_0, 2 Phi rises by (t_i − t_0)² / Var(t_i − t_0), Var in units of the noise.
       const Eigen::MatrixXd& c = mesh.covariance_nN2;
@@ -189,7 +187,7 @@ class FibresTogether {
       const auto n = static_cast<Eigen::Index>(pairs.size());
       Eigen::MatrixXd chords = Eigen::MatrixXd::Zero(K_.rows(), n);
       for (Eigen::Index k = 0; k < n; ++k) {
-        const auto [a, b] = pairs[static_cast<std::size_t>(k)];
+        const auto [a, b] = pairs[k];
         const Vec2 chord = places_um_[b] - places_um_[a], unit = (1 / norm(chord)) * chord;
         chords.col(k).segment<2>(2 * static_cast<Eigen::Index>(a)) << unit.x, unit.y;
         chords.col(k).segment<2>(2 * static_cast<Eigen::Index>(b)) << -unit.x, -unit.y;

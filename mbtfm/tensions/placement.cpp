@@ -182,7 +182,7 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::E
   for (const substrate::Ellipse& e : ellipses) fields.emplace_back(gel, e);
   Eigen::MatrixXd motions(model_um.size(), 3);
   numerics::parallel_for(static_cast<int>(beads_um.size()), threads, [&](int b) {
-    const Vec2 at = beads_um[static_cast<std::size_t>(b)];
+    const Vec2 at = beads_um[b];
     Slopes sum;
     for (std::size_t k = 0; k < ellipses.size(); ++k) {
       const substrate::Ellipse& e = ellipses[k];
@@ -209,7 +209,7 @@ Eigen::VectorXd carried_um(const Gel& gel, const std::vector<Ellipse>& ellipses,
   Eigen::VectorXd change(by_um.size());
   numerics::parallel_for(static_cast<int>(beads_um.size()), threads, [&](int b) {
     const auto row = 2 * static_cast<Eigen::Index>(b);
-    const Vec2 at = beads_um[static_cast<std::size_t>(b)], by{by_um[row], by_um[row + 1]}, middle = at + 0.5 * by;
+    const Vec2 at = beads_um[b], by{by_um[row], by_um[row + 1]}, middle = at + 0.5 * by;
     Vec2 sum;
     for (std::size_t k = 0; k < ellipses.size(); ++k) {
       const Vec2 offset = middle - ellipses[k].centre_um, F = force_on(forces_nN, k);

@@ -68,7 +68,7 @@ NormalEquations normal_equations(const BeadJacobian& J, const Eigen::VectorXd& b
   std::vector<NormalEquations> sums(kPieces,
                                     {Eigen::MatrixXd::Zero(J.cols(), J.cols()), Eigen::VectorXd::Zero(J.cols())});
   numerics::parallel_for(kPieces, threads, [&](int piece) {
-    NormalEquations& sum = sums[static_cast<std::size_t>(piece)];
+    NormalEquations& sum = sums[piece];
     for (Eigen::Index first = piece * kBeads; first < bead_weights.size(); first += kPieces * kBeads) {
       const Eigen::Index count = std::min(kBeads, bead_weights.size() - first);
       Eigen::VectorXd root(2 * count);
@@ -79,8 +79,8 @@ NormalEquations normal_equations(const BeadJacobian& J, const Eigen::VectorXd& b
     }
   });
   for (int piece = 1; piece < kPieces; ++piece) {
-    sums.front().H += sums[static_cast<std::size_t>(piece)].H;
-    sums.front().b += sums[static_cast<std::size_t>(piece)].b;
+    sums.front().H += sums[piece].H;
+    sums.front().b += sums[piece].b;
   }
   numerics::mirror_upper(sums.front().H);
   return sums.front();
@@ -162,11 +162,11 @@ Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
 
 /// Whether the nearest bead's residual does not go along with that of the bead of this row, by half of it at least.
 bool stands_alone(const LinearData& data, const Eigen::VectorXd& residual, Eigen::Index row) {
-  const Vec2 place = data.position_um[static_cast<std::size_t>(row / 2)];
+  const Vec2 place = data.position_um[row / 2];
   double nearest = std::numeric_limits<double>::infinity(), along = 0;
   for (Eigen::Index other = 0; other < residual.size(); other += 2) {
     if (other == row || data.weight_per_um[other] == 0) continue;
-    const double distance = norm(data.position_um[static_cast<std::size_t>(other / 2)] - place);
+    const double distance = norm(data.position_um[other / 2] - place);
     if (distance >= nearest) continue;
     nearest = distance;
     along = residual.segment<2>(other).dot(residual.segment<2>(row));

@@ -75,8 +75,7 @@ FrameFit described(const SeriesFrame& frame, const EnsembleFit& fit) {
 
 Eigen::VectorXd values_of(const FrameFit& fit) {
   Eigen::VectorXd values_nN(static_cast<Eigen::Index>(fit.tensions.size()));
-  for (Eigen::Index i = 0; i < values_nN.size(); ++i)
-    values_nN[i] = fit.tensions[static_cast<std::size_t>(i)].tension_nN;
+  for (Eigen::Index i = 0; i < values_nN.size(); ++i) values_nN[i] = fit.tensions[i].tension_nN;
   return values_nN;
 }
 

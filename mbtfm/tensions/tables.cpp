@@ -132,7 +132,7 @@ std::vector<ChangeRow> change_rows(const std::vector<Change>& changes, const Ens
   std::vector<ChangeRow> rows;
   for (const Change& change : changes) {
     for (Eigen::Index i = 0; i < change.by_tension_nN.size(); ++i)
-      rows.push_back({change.effect, fit.tensions.fibre_ids[static_cast<std::size_t>(i)], change.by_tension_nN[i]});
+      rows.push_back({change.effect, fit.tensions.fibre_ids[i], change.by_tension_nN[i]});
   }
   return rows;
 }

@@ -22,7 +22,7 @@ MatrixXd affine_motions(const std::vector<Vec2>& places_um) {
   const double side = std::max({high.x - low.x, high.y - low.y, 1.0});
   MatrixXd columns = MatrixXd::Zero(2 * std::ssize(places_um), 6);
   for (Index i = 0; i < std::ssize(places_um); ++i) {
-    const Vec2 at = 2 / side * (places_um[static_cast<std::size_t>(i)] - 0.5 * (low + high));
+    const Vec2 at = 2 / side * (places_um[i] - 0.5 * (low + high));
     columns.row(2 * i) << 1, at.x, at.y, 0, 0, 0;
     columns.row(2 * i + 1) << 0, 0, 0, 1, at.x, at.y;
   }
@@ -78,7 +78,7 @@ std::vector<Vec2> FieldOfAdhesions::um(const DisplacementField& beads) {
   std::vector<Vec2> places_um;
   VectorXd displacement_um(2 * std::ssize(beads)), as_flagged = VectorXd::Zero(displacement_um.size());
   for (Index i = 0; i < std::ssize(beads); ++i) {
-    const Bead& bead = beads[static_cast<std::size_t>(i)];
+    const Bead& bead = beads[i];
     places_um.push_back(bead.position_um);
     displacement_um.segment<2>(2 * i) << bead.displacement_um.x, bead.displacement_um.y;
     if (bead.flag.empty()) as_flagged.segment<2>(2 * i).setOnes();

@@ -85,7 +85,7 @@ std::optional<Prediction> predicted(const DisplacementField& beads, std::size_t 
   Eigen::MatrixXd powers(n, 6), u(n, 2);
   const double scale_um = norm(beads[neighbours.back()].position_um - beads[bead].position_um);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const Bead& b = beads[neighbours[static_cast<std::size_t>(k)]];
+    const Bead& b = beads[neighbours[k]];
     const Vec2 d = 1 / scale_um * (b.position_um - beads[bead].position_um);
     powers.row(k) << 1, d.x, d.y, d.x * d.x, d.x * d.y, d.y * d.y;
     u.row(k) << b.displacement_um.x, b.displacement_um.y;

@@ -28,8 +28,8 @@ struct Recurrence {
     const auto k = static_cast<Index>(alpha.size());
     MatrixXd bidiagonal = MatrixXd::Zero(k + 1, k);
     for (Index j = 0; j < k; ++j) {
-      bidiagonal(j, j) = alpha[static_cast<std::size_t>(j)];
-      if (j < std::ssize(beta)) bidiagonal(j + 1, j) = beta[static_cast<std::size_t>(j)];
+      bidiagonal(j, j) = alpha[j];
+      if (j < std::ssize(beta)) bidiagonal(j + 1, j) = beta[j];
     }
     return {bidiagonal.transpose() * bidiagonal, start * bidiagonal.row(0).transpose(), start * start, n_data};
   }

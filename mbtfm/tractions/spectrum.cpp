@@ -76,10 +76,10 @@ Eigen::Array<bool, Eigen::Dynamic, 1> Spectrum::is_told(double variance) const {
   told.setConstant(false);
   for (Eigen::Index k = 0; k < n; ++k) {
     const Eigen::Index next = std::min(std::max(k, kLeast), n - k);
-    const double squares = up_to[static_cast<std::size_t>(k + next)] - up_to[static_cast<std::size_t>(k)];
+    const double squares = up_to[k + next] - up_to[k];
     const auto m = static_cast<double>(next);
     if (squares <= variance * (m + kChance * std::sqrt(2 * m))) break;
-    told[order[static_cast<std::size_t>(k)]] = true;
+    told[order[k]] = true;
   }
   return told;
 }

@@ -290,8 +290,8 @@ Answer by_fibres_of(const Answer& answer, const Answer& reference) {
   if (reference.map) return reference;
   Answer result{.fibres = answer.fibres, .tensions_nN = {}, .total_force_nN = reference.total_force_nN};
   for (const report::FibreMatch& match : report::match_fibres(answer.fibres, reference.fibres)) {
-    const int found_id = answer.fibres[static_cast<std::size_t>(match.found_index)].fibre_id;
-    const int id = reference.fibres[static_cast<std::size_t>(match.true_index)].fibre_id;
+    const int found_id = answer.fibres[match.found_index].fibre_id;
+    const int id = reference.fibres[match.true_index].fibre_id;
     if (reference.tensions_nN.contains(id)) result.tensions_nN[found_id] = reference.tensions_nN.at(id);
   }
   return result;

@@ -90,7 +90,7 @@ void write_csv(const fs::path& file, const Study& study) {
 std::vector<Vec2> points_of(const std::vector<Measurement>& measurements, const std::vector<int>& indices) {
   std::vector<Vec2> points;
   for (const int i : indices) {
-    const Measurement& m = measurements[static_cast<std::size_t>(i)];
+    const Measurement& m = measurements[i];
     points.push_back({m.cpu_seconds, m.error});
   }
   return points;
@@ -112,7 +112,7 @@ charts::Chart chart_of(const std::string& group, const Study& study, const chart
   for (const auto& [knob, indices] : knobs) {
     const std::string colour = charts::kColours[k++ % std::size(charts::kColours)];
     for (const int i : indices) {
-      const Measurement& m = study.measurements[static_cast<std::size_t>(i)];
+      const Measurement& m = study.measurements[i];
       chart.dot({m.cpu_seconds, m.error}, 5, "fill:" + colour + ";stroke:#fff",
                 fmt::format("{}: {:.2g} s, error {:.3g}", name_of(m.rung), m.cpu_seconds, m.error));
       dots.push_back({{m.cpu_seconds, m.error}, m.rung.value});
@@ -234,7 +234,7 @@ std::vector<int> front_of(const std::vector<Measurement>& measurements) {
   for (std::size_t i = 0; i < measurements.size(); ++i) {
     if (is_measured(measurements[i])) order.push_back(static_cast<int>(i));
   }
-  const auto at = [&](int i) -> const Measurement& { return measurements[static_cast<std::size_t>(i)]; };
+  const auto at = [&](int i) -> const Measurement& { return measurements[i]; };
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return at(a).cpu_seconds < at(b).cpu_seconds; });
   std::vector<int> front;
   for (const int i : order) {
@@ -244,7 +244,7 @@ std::vector<int> front_of(const std::vector<Measurement>& measurements) {
 }
 
 double distance_to_front(const std::vector<Measurement>& measurements, int index) {
-  const Measurement& own = measurements[static_cast<std::size_t>(index)];
+  const Measurement& own = measurements[index];
   double distance = 0;
   for (const Measurement& m : measurements) {
     if (!is_measured(m)) continue;

@@ -11,7 +11,7 @@ void Way::go(Through through, Function function, bool may_end) {
 
 void Way::go(const Way& on) {
   for (int k = 0; k < on.n_; ++k) {
-    const Piece& piece = on.pieces_[static_cast<std::size_t>(k)];
+    const Piece& piece = on.pieces_[k];
     offset_ += piece.offset;
     go(piece.through, piece.function, on.may_end_);
   }
@@ -20,7 +20,7 @@ void Way::go(const Way& on) {
 
 const void* Way::from(const void* row) const {
   for (int k = 0; k < n_; ++k) {
-    const Piece& piece = pieces_[static_cast<std::size_t>(k)];
+    const Piece& piece = pieces_[k];
     row = piece.through(static_cast<const char*>(row) + piece.offset, piece.function);
     if (!row) return nullptr;
   }

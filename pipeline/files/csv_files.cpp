@@ -45,7 +45,7 @@ std::vector<Fibre> read_fibres(const Path& fibres_file, const Path& points_file)
   CsvTable table(points_file);
   const std::vector<FibrePoint> points = rows_of(table, fibre_point_table());
   for (int row = 0; row < table.n_rows(); ++row) {
-    const FibrePoint& point = points[static_cast<std::size_t>(row)];
+    const FibrePoint& point = points[row];
     const auto fibre = by_id.find(point.fibre_id);
     if (fibre == by_id.end()) table.fail(row, "fibre_id", "the label of a fibre of " + fibres_file.string());
     Polyline& line = fibre->second->points_um;
@@ -147,7 +147,7 @@ Outline outline_in(const Path& file) {
   Outline outline{.rings_um = std::vector<Polygon>(1), .is_cut = {}};
   std::vector<Polygon>& rings = outline.rings_um;
   for (int row = 0; row < table.n_rows(); ++row) {
-    const OutlinePoint& point = points[static_cast<std::size_t>(row)];
+    const OutlinePoint& point = points[row];
     const int current = static_cast<int>(rings.size()) - 1;
     if (point.ring != current && point.ring != current + 1) {
       table.fail(row, "ring", std::to_string(current) + " or " + std::to_string(current + 1) + ", rings in order");

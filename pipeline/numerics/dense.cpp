@@ -154,13 +154,13 @@ bool downdate_upper(Eigen::MatrixXd& U, Eigen::MatrixXd B) {
       double* column = U.col(j).data();
       double x = B(b, j);
       for (Eigen::Index k = 0; k < j; ++k) {
-        column[k] = (column[k] - sine[static_cast<std::size_t>(k)] * x) / cosine[static_cast<std::size_t>(k)];
-        x = cosine[static_cast<std::size_t>(k)] * x - sine[static_cast<std::size_t>(k)] * column[k];
+        column[k] = (column[k] - sine[k] * x) / cosine[k];
+        x = cosine[k] * x - sine[k] * column[k];
       }
       const double rest = (column[j] - x) * (column[j] + x);
       if (!(rest > 0)) return false;
-      cosine[static_cast<std::size_t>(j)] = std::sqrt(rest) / column[j];
-      sine[static_cast<std::size_t>(j)] = x / column[j];
+      cosine[j] = std::sqrt(rest) / column[j];
+      sine[j] = x / column[j];
       column[j] = std::sqrt(rest);
     }
   }

@@ -105,9 +105,8 @@ Eigen::Array2d sum_over_parts(Eigen::Index n_waves, int threads,
                               const std::function<Eigen::Array2d(Eigen::Index begin, Eigen::Index end)>& body) {
   constexpr int kParts = 4;  // as many threads as serve: beyond, memory is the limit
   std::array<Eigen::Array2d, kParts> sums;
-  parallel_for(kParts, threads, [&](int part) {
-    sums[static_cast<std::size_t>(part)] = body(n_waves * part / kParts, n_waves * (part + 1) / kParts);
-  });
+  parallel_for(kParts, threads,
+               [&](int part) { sums[part] = body(n_waves * part / kParts, n_waves * (part + 1) / kParts); });
   return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 

@@ -174,7 +174,7 @@ std::optional<Vec3> TractionOnSurface::at(Vec2 p) const {
                                             Corner{i, j + 1, (1 - u) * v}, Corner{i + 1, j + 1, u * v}}) {
     const int k = index(column, row);
     if (k < 0) return std::nullopt;
-    sum += weight * tractions_[static_cast<std::size_t>(k)].traction_kPa;
+    sum += weight * tractions_[k].traction_kPa;
   }
   return sum;
 }

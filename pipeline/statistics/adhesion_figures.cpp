@@ -45,7 +45,7 @@ std::vector<double> shares_between(const std::vector<double>& values, const std:
   for (const double v : values) {
     const auto above = std::upper_bound(edges.begin(), edges.end(), v) - edges.begin();
     const auto bin = std::clamp<std::ptrdiff_t>(above - 1, 0, static_cast<std::ptrdiff_t>(shares.size()) - 1);
-    shares[static_cast<std::size_t>(bin)] += 1.0 / static_cast<double>(values.size());
+    shares[bin] += 1.0 / static_cast<double>(values.size());
   }
   return shares;
 }
@@ -104,13 +104,12 @@ charts::Chart distribution_of(const Sample& sample, const std::string& label) {
     for (int kind = 0; kind < sample.n_kinds(); ++kind) {
       const std::vector<Observation> own = sample.of_group(c, kind);
       if (own.empty()) continue;
-      const std::string name = sample.kinds[static_cast<std::size_t>(kind)];
-      all.push_back(
-          {.label = fmt::format("{}{}: {}, {}", prefix_of(sample.conditions[static_cast<std::size_t>(c)]), name,
-                                counted(std::ssize(own), "adhesions"), counted(n_cells_of(own), "cells")),
-           .colour = sample.n_conditions() == 1 ? condition_colour(kind) : condition_colour(c),
-           .values = values_of(own),
-           .is_dashed = kind == 1});
+      const std::string name = sample.kinds[kind];
+      all.push_back({.label = fmt::format("{}{}: {}, {}", prefix_of(sample.conditions[c]), name,
+                                          counted(std::ssize(own), "adhesions"), counted(n_cells_of(own), "cells")),
+                     .colour = sample.n_conditions() == 1 ? condition_colour(kind) : condition_colour(c),
+                     .values = values_of(own),
+                     .is_dashed = kind == 1});
     }
   }
   return histogram_chart(label, label + " (" + sample.unit + ")", "share of the adhesions", all, low, 1.001 * high,

@@ -30,8 +30,7 @@ void warn_of_few_cells(const Study& study, std::vector<std::string>& warnings) {
   constexpr int kFew = 6;  // medians of five cells and five others cannot differ at p < 0.05 after correction
   for (const CellKind kind : mbtfm::values_of<CellKind>()) {
     std::vector<int> n_of(study.conditions.size(), 0);
-    for (const StudyCell& cell : study.cells)
-      n_of[static_cast<std::size_t>(cell.condition)] += cell.kind() == kind ? 1 : 0;
+    for (const StudyCell& cell : study.cells) n_of[cell.condition] += cell.kind() == kind ? 1 : 0;
     const std::string name = kind == CellKind::sheet ? "sheet" : kind == CellKind::space ? "cell in space" : "cell";
     const std::string names = kind == CellKind::sheet ? "sheets" : kind == CellKind::space ? "cells in space" : "cells";
     for (std::size_t i = 0; i < n_of.size(); ++i) {

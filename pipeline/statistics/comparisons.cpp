@@ -128,9 +128,7 @@ void add_model_tests(const Sample& sample, const Family& family, const SampleMod
   const auto n_groups = static_cast<Eigen::Index>(family.groups.size());
   const auto difference = [&](Eigen::Index a, Eigen::Index b) {
     Eigen::VectorXd weights = Eigen::VectorXd::Zero(model.fit.mean.size());
-    const auto index = [&](Eigen::Index g) {
-      return model.index[static_cast<std::size_t>(family.groups[static_cast<std::size_t>(g)].index)];
-    };
+    const auto index = [&](Eigen::Index g) { return model.index[family.groups[g].index]; };
     weights[index(a)] += 1;
     weights[index(b)] -= 1;
     return weights;
@@ -147,8 +145,7 @@ void add_model_tests(const Sample& sample, const Family& family, const SampleMod
   }
   for (Eigen::Index i = 0; i < n_groups; ++i) {
     for (Eigen::Index k = i + 1; k < n_groups; ++k) {
-      Comparison pair = blank(sample, family, Test::mixed_model, Unit::cell, family.groups[static_cast<std::size_t>(i)],
-                              &family.groups[static_cast<std::size_t>(k)]);
+      Comparison pair = blank(sample, family, Test::mixed_model, Unit::cell, family.groups[i], &family.groups[k]);
       const Contrast c = contrast_of(model.fit, difference(i, k));
       pair.statistic = c.t;
       pair.degrees = c.degrees;
@@ -191,19 +188,15 @@ Family with_medians(Family family) {
 std::vector<Family> families_of(const Sample& sample) {
   std::vector<Family> families;
   for (int c = 0; c < sample.n_conditions() && sample.n_kinds() > 1; ++c) {
-    Family family{
-        .question = Question::between_kinds, .within = sample.conditions[static_cast<std::size_t>(c)], .groups = {}};
+    Family family{.question = Question::between_kinds, .within = sample.conditions[c], .groups = {}};
     for (int k = 0; k < sample.n_kinds(); ++k)
-      family.groups.push_back(
-          {sample.kinds[static_cast<std::size_t>(k)], sample.group_of(c, k), sample.of_group(c, k)});
+      family.groups.push_back({sample.kinds[k], sample.group_of(c, k), sample.of_group(c, k)});
     families.push_back(std::move(family));
   }
   for (int k = 0; k < sample.n_kinds() && sample.n_conditions() > 1; ++k) {
-    Family family{
-        .question = Question::between_conditions, .within = sample.kinds[static_cast<std::size_t>(k)], .groups = {}};
+    Family family{.question = Question::between_conditions, .within = sample.kinds[k], .groups = {}};
     for (int c = 0; c < sample.n_conditions(); ++c)
-      family.groups.push_back(
-          {sample.conditions[static_cast<std::size_t>(c)], sample.group_of(c, k), sample.of_group(c, k)});
+      family.groups.push_back({sample.conditions[c], sample.group_of(c, k), sample.of_group(c, k)});
     families.push_back(std::move(family));
   }
   for (Family& family : families) std::erase_if(family.groups, [](const Group& g) { return g.values.size() < 2; });

@@ -18,8 +18,7 @@ namespace {
 double satterthwaite_degrees(const MixedFit& fit, const VectorXd& weights) {
   const double variance = weights.dot(fit.covariance * weights);
   VectorXd slope(static_cast<Index>(fit.covariance_slopes.size()));
-  for (Index k = 0; k < slope.size(); ++k)
-    slope[k] = weights.dot(fit.covariance_slopes[static_cast<std::size_t>(k)] * weights);
+  for (Index k = 0; k < slope.size(); ++k) slope[k] = weights.dot(fit.covariance_slopes[k] * weights);
   const double spread = slope.dot(fit.variance_covariance * slope);
   const double most = fit.n_observations - static_cast<double>(fit.mean.size());
   return spread > 0 ? std::clamp(2 * variance * variance / spread, 1.0, std::max(1.0, most)) : std::max(1.0, most);

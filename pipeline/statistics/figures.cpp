@@ -48,7 +48,7 @@ std::string colour_of(const Sample& sample, int condition, int kind) {
 charts::Axis kind_axis(const Sample& sample) {
   charts::Axis axis{.label = {}, .low = -0.5, .high = sample.n_kinds() - 0.5};
   for (int kind = 0; kind < sample.n_kinds(); ++kind)
-    axis.names.emplace_back(kind, kind_for_people(sample.kinds[static_cast<std::size_t>(kind)]));
+    axis.names.emplace_back(kind, kind_for_people(sample.kinds[kind]));
   return axis;
 }
 
@@ -76,8 +76,8 @@ void add_condition_keys(charts::Chart& chart, const Sample& sample) {
       cells.insert(o.cell);
       ++n;
     }
-    chart.key(fmt::format("{}: {}, {}", sample.conditions[static_cast<std::size_t>(c)],
-                          counted(n, name_of(sample.each)), counted(std::ssize(cells), "cells")),
+    chart.key(fmt::format("{}: {}, {}", sample.conditions[c], counted(n, name_of(sample.each)),
+                          counted(std::ssize(cells), "cells")),
               condition_colour(c));
   }
 }
@@ -133,15 +133,12 @@ Figure tension_distributions(const Analysis& analysis, const StudyParameters& pa
     std::vector<Histogram> all;
     for (int c = 0; c < sample.n_conditions(); ++c) {
       const std::vector<Observation> own = sample.of_group(c, kind);
-      all.push_back(
-          {.label =
-               own.empty() ? "" : prefix_of(sample.conditions[static_cast<std::size_t>(c)]) + counts(own, sample.each),
-           .colour = colour_of(sample, c, kind),
-           .values = values_of(own)});
+      all.push_back({.label = own.empty() ? "" : prefix_of(sample.conditions[c]) + counts(own, sample.each),
+                     .colour = colour_of(sample, c, kind),
+                     .values = values_of(own)});
     }
-    charts::Chart chart =
-        histogram_chart(kind_for_people(sample.kinds[static_cast<std::size_t>(kind)]), "tension (nN)",
-                        "share of the fibres", all, 0, largest_of(sample) * 1.0001, charts::Scale::linear);
+    charts::Chart chart = histogram_chart(kind_for_people(sample.kinds[kind]), "tension (nN)", "share of the fibres",
+                                          all, 0, largest_of(sample) * 1.0001, charts::Scale::linear);
     chart.upright(parameters.weak_tension_nN, "stroke:#555;stroke-dasharray:4 3");
     chart.upright(parameters.strong_tension_nN, "stroke:#555;stroke-dasharray:4 3");
     figure.charts.push_back(chart);
@@ -264,8 +261,7 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
     for (const Correlation* c : panels[key]) {
       const std::string colour = condition_colour(index_of(study.conditions, c->condition));
       for (std::size_t i = 0; i < c->x.size(); ++i)
-        chart.dot({c->x[i], c->y[i]}, 3.2, "fill:" + colour + ";fill-opacity:.7",
-                  study.cells[static_cast<std::size_t>(c->cells[i])].name);
+        chart.dot({c->x[i], c->y[i]}, 3.2, "fill:" + colour + ";fill-opacity:.7", study.cells[c->cells[i]].name);
       if (!c->line) {
         chart.key(prefix_of(c->condition) + fmt::format("n = {}: too few for a line", c->x.size()), colour);
         continue;

@@ -96,7 +96,7 @@ std::vector<bool> scatter_told(const std::vector<Observation>& rows) {
   std::map<std::pair<int, int>, int> n_of;  // group, kind
   std::vector<bool> is_told(static_cast<std::size_t>(n_kinds), false);
   for (const Observation& o : rows) {
-    if (++n_of[{o.group, o.kind}] > 1) is_told[static_cast<std::size_t>(o.kind)] = true;
+    if (++n_of[{o.group, o.kind}] > 1) is_told[o.kind] = true;
   }
   return is_told;
 }
@@ -132,8 +132,8 @@ Design design_of(std::vector<Observation> observations) {
   design.X = MatrixXd::Zero(n, n_groups);
   design.y.resize(n);
   for (Index i = 0; i < n; ++i) {
-    design.X(i, design.rows[static_cast<std::size_t>(i)].group) = 1;
-    design.y[i] = design.rows[static_cast<std::size_t>(i)].value;
+    design.X(i, design.rows[i].group) = 1;
+    design.y[i] = design.rows[i].value;
   }
   for (int g = 0; g < n_groups; ++g) {
     if (design.X.col(g).sum() == 0) throw InvalidData("group " + std::to_string(g), "an observation", "none");
@@ -164,7 +164,7 @@ class Covariance {
                                    : residual[c.kind]) = v[static_cast<Index>(k)];
     }
     for (Index i = 0; i < weight_.size(); ++i) {
-      const Observation& o = design.rows[static_cast<std::size_t>(i)];
+      const Observation& o = design.rows[i];
       weight_[i] = 1 / (residual[o.kind] + o.error_variance);
       log_determinant_ -= std::log(weight_[i]);
     }
@@ -205,7 +205,7 @@ class Covariance {
       if (component.term == Term::cell_kind) sum += M_[b].trace();
       for (Index i = 0; i < block.size && component.term == Term::residual; ++i) {
         const Index row = block.first + i, k = column(block, i);
-        if (design_->rows[static_cast<std::size_t>(row)].kind != component.kind) continue;
+        if (design_->rows[row].kind != component.kind) continue;
         sum += weight_[row] * (1 - share(b, i)) + share(b, i) * share(b, i) * M_[b](k, k);
       }
     }
@@ -213,7 +213,7 @@ class Covariance {
   }
 
  private:
-  static Index column(const Block& block, Index i) { return block.kind_column[static_cast<std::size_t>(i)]; }
+  static Index column(const Block& block, Index i) { return block.kind_column[i]; }
   /// Of a row in the mean of its cell and kind.
   double share(std::size_t b, Index i) const {
     const Block& block = design_->blocks[b];
@@ -232,14 +232,12 @@ MatrixXd derivative_times(const Design& design, const Component& component, cons
   MatrixXd result = MatrixXd::Zero(m.rows(), m.cols());
   for (const Block& block : design.blocks) {
     MatrixXd sums = MatrixXd::Zero(std::max(1, block.n_kinds), m.cols());
-    const auto column = [&](Index i) {
-      return component.term == Term::cell ? 0 : block.kind_column[static_cast<std::size_t>(i)];
-    };
+    const auto column = [&](Index i) { return component.term == Term::cell ? 0 : block.kind_column[i]; };
     for (Index i = 0; i < block.size; ++i) {
       const Index row = block.first + i;
       if (component.term != Term::residual) {
         sums.row(column(i)) += m.row(row);
-      } else if (design.rows[static_cast<std::size_t>(row)].kind == component.kind) {
+      } else if (design.rows[row].kind == component.kind) {
         result.row(row) = m.row(row);
       }
     }
@@ -286,7 +284,7 @@ Derivatives derivatives_at(const Design& design, const State& s) {
   Derivatives d{.gradient = VectorXd(n), .information = MatrixXd(n, n), .mean_slopes = {}};
   MatrixXd Vr(design.y.size(), n);
   for (Index k = 0; k < n; ++k) {
-    const Component& component = design.components[static_cast<std::size_t>(k)];
+    const Component& component = design.components[k];
     const MatrixXd both =
         derivative_times(design, component, (MatrixXd(s.W.rows(), s.W.cols() + 1) << s.W, s.r).finished());
     const MatrixXd WVW = s.W.transpose() * both.leftCols(s.W.cols());
@@ -341,7 +339,7 @@ VectorXd uphill_step(const Design& design, const State& s, const Derivatives& d)
   for (const Observation& o : design.rows) error += o.error_variance / static_cast<double>(design.rows.size());
   VectorXd step(d.gradient.size());
   for (Index k = 0; k < step.size(); ++k) {
-    const Component& c = design.components[static_cast<std::size_t>(k)];
+    const Component& c = design.components[k];
     double n_levels = 0;
     for (const Block& b : design.blocks) {
       n_levels += c.term == Term::cell ? 1 : c.term == Term::cell_kind ? b.n_kinds : static_cast<double>(b.size);
@@ -372,7 +370,7 @@ void add_variances(const Design& design, const State& s, const Derivatives& d, c
   fit.residual_variance.resize(static_cast<std::size_t>(design.n_kinds()));
   std::vector<Index> estimated;
   for (Index k = 0; k < s.v.size(); ++k) {
-    const Component& component = design.components[static_cast<std::size_t>(k)];
+    const Component& component = design.components[k];
     const bool is_held = s.v[k] <= lower[k];
     const double variance = is_held ? 0 : s.v[k];
     const auto kind = static_cast<std::size_t>(component.kind);
@@ -382,7 +380,7 @@ void add_variances(const Design& design, const State& s, const Derivatives& d, c
     if (component.term == Term::residual) fit.residual_variance[kind] = variance;
     if (is_held) continue;
     estimated.push_back(k);
-    fit.covariance_slopes.push_back(d.mean_slopes[static_cast<std::size_t>(k)]);
+    fit.covariance_slopes.push_back(d.mean_slopes[k]);
   }
   fit.variance_covariance = covariance_of_estimates(d.information, estimated);
 }
@@ -395,7 +393,7 @@ MixedFit fit_mixed_model(std::vector<Observation> observations) {
   VectorXd lower = VectorXd::Zero(n), start(n);
   const double variance = (design.y.array() - design.y.mean()).square().mean();
   for (Index k = 0; k < n; ++k) {
-    const bool is_residual = design.components[static_cast<std::size_t>(k)].term == Term::residual;
+    const bool is_residual = design.components[k].term == Term::residual;
     if (is_residual) lower[k] = design.smallest_residual;
     start[k] = (is_residual ? 0.5 : 0.2) * variance;
   }

@@ -33,7 +33,7 @@ std::map<std::pair<int, std::string>, double> means_of_replicates(const Study& s
   }
   std::map<std::pair<int, std::string>, Mean> by_replicate;
   for (const auto& [index, mean] : by_cell) {
-    const StudyCell& cell = study.cells[static_cast<std::size_t>(index)];
+    const StudyCell& cell = study.cells[index];
     by_replicate[{cell.condition, cell.replicate}].add(mean.value());
   }
   std::map<std::pair<int, std::string>, double> means;
@@ -65,7 +65,7 @@ void compare_replicates(const Study& study, const Sample& sample, int kind, Prim
     if (n < 2) continue;
     const Description d = describe(differences);
     if (!(*d.standard_deviation > 0)) continue;
-    primary.differences.push_back({.condition = sample.conditions[static_cast<std::size_t>(condition)],
+    primary.differences.push_back({.condition = sample.conditions[condition],
                                    .difference = by_students_t(d.mean, *d.standard_deviation / std::sqrt(n), n - 1),
                                    .cells = n_cells_of(sample, condition, kind),
                                    .cells_before = n_cells_of(sample, 0, kind),
@@ -79,11 +79,11 @@ void compare_replicates(const Study& study, const Sample& sample, int kind, Prim
 void compare_cells(const Sample& sample, int kind, const std::optional<SampleModel>& model,
                    const std::vector<Comparison>& comparisons, Primary& primary) {
   primary.test = fmt::format("mixed model with the {} as the unit (Student’s t)", sample.cell_name());
-  if (const int group = sample.group_of(0, kind); model && model->index[static_cast<std::size_t>(group)] >= 0)
-    primary.reference_mean = model->fit.mean[model->index[static_cast<std::size_t>(group)]];
+  if (const int group = sample.group_of(0, kind); model && model->index[group] >= 0)
+    primary.reference_mean = model->fit.mean[model->index[group]];
   for (const Comparison& c : comparisons) {
     if (c.test != Test::mixed_model || c.question != Question::between_conditions || c.group_b.empty()) continue;
-    if (c.within != sample.kinds[static_cast<std::size_t>(kind)]) continue;
+    if (c.within != sample.kinds[kind]) continue;
     // conditions are in their order: the reference can only be the first of a pair
     if (c.group_a != primary.reference || !c.interval) continue;
     const double error = c.statistic != 0 ? std::abs(c.effect / c.statistic) : 0;

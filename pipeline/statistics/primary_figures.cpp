@@ -29,8 +29,7 @@ std::vector<std::string> replicates_of(const Study& study) {
 
 charts::Axis condition_axis(const Sample& sample) {
   charts::Axis axis{.label = {}, .low = -0.5, .high = sample.n_conditions() - 0.5};
-  for (int c = 0; c < sample.n_conditions(); ++c)
-    axis.names.emplace_back(c, sample.conditions[static_cast<std::size_t>(c)]);
+  for (int c = 0; c < sample.n_conditions(); ++c) axis.names.emplace_back(c, sample.conditions[c]);
   return axis;
 }
 
@@ -49,7 +48,7 @@ void draw_column(charts::Chart& chart, const Study& study, const Sample& sample,
   const bool is_one_a_cell = sample.is_one_a_cell();
   int n = 0;
   for (const auto& [index, values] : by_cell) {
-    const StudyCell& cell = study.cells[static_cast<std::size_t>(index)];
+    const StudyCell& cell = study.cells[index];
     if (is_one_a_cell) break;  // its mean says it all
     for (const Observation& o : values)
       chart.dot({condition + kWidth * place_in_column(n++), o.value}, 2, "fill:" + colour(cell) + ";fill-opacity:.35",
@@ -57,7 +56,7 @@ void draw_column(charts::Chart& chart, const Study& study, const Sample& sample,
   }
   n = 0;
   for (const auto& [index, values] : by_cell) {
-    const StudyCell& cell = study.cells[static_cast<std::size_t>(index)];
+    const StudyCell& cell = study.cells[index];
     const double mean = describe(values_of(values)).mean, x = condition + kWidth * place_in_column(n++);
     if (const double half = half_of_95(values.front()); is_one_a_cell && half > 0)
       chart.error({x, mean - half}, {x, mean + half}, "stroke-width:1;stroke:" + colour(cell));
@@ -79,7 +78,7 @@ charts::Chart super_plot(const Study& study, const Measure& m, int kind, const s
     largest = std::max(largest, o.value + half);
   }
   for (const Summary& s : m.summaries) {
-    if (s.kind != sample.kinds[static_cast<std::size_t>(kind)] || !s.model) continue;
+    if (s.kind != sample.kinds[kind] || !s.model) continue;
     least = std::min(least, s.model->low);
     largest = std::max(largest, s.model->high);
   }
@@ -89,7 +88,7 @@ charts::Chart super_plot(const Study& study, const Measure& m, int kind, const s
       charts::Axis{.label = sample.label(), .low = 1.05 * least, .high = end_below_keys(largest, n_keys)});
   for (int c = 0; c < sample.n_conditions(); ++c) draw_column(chart, study, sample, c, kind, replicates);
   for (const Summary& s : m.summaries) {
-    if (s.kind != sample.kinds[static_cast<std::size_t>(kind)] || !s.model) continue;
+    if (s.kind != sample.kinds[kind] || !s.model) continue;
     const double x = index_of(sample.conditions, s.condition);
     chart.error({x + 0.4, s.model->low}, {x + 0.4, s.model->high}, "stroke:#1a1d21;stroke-width:2");
     chart.pieces({{{x + 0.34, s.model->estimate}, {x + 0.46, s.model->estimate}}}, "stroke:#1a1d21;stroke-width:2.4",
@@ -128,7 +127,7 @@ std::vector<charts::Chart> super_plots(const Study& study, const std::vector<Mea
   for (const Measure& m : measures) {
     for (int kind = 0; kind < m.sample.n_kinds(); ++kind) {
       std::string title = m.sample.name;
-      if (m.sample.n_kinds() > 1) title += ": " + m.sample.kinds[static_cast<std::size_t>(kind)];
+      if (m.sample.n_kinds() > 1) title += ": " + m.sample.kinds[kind];
       if (m.sample.each == Observed::adhesions_in_space) title += " of an adhesion";
       list.push_back(super_plot(study, m, kind, title));
     }

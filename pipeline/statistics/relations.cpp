@@ -19,8 +19,8 @@ std::optional<Interval> ratio_interval(const std::map<int, std::pair<double, dou
   for (const CellWeights& w : draws) {
     double a = 0, b = 0;
     for (const auto& [cell, pair] : by_cell) {
-      a += w[static_cast<std::size_t>(cell)] * pair.first;
-      b += w[static_cast<std::size_t>(cell)] * pair.second;
+      a += w[cell] * pair.first;
+      b += w[cell] * pair.second;
     }
     ratios.push_back(b > 0 ? std::optional<double>(a / b) : std::nullopt);
   }
@@ -50,7 +50,7 @@ std::optional<Correlation> correlate(const Study& study, int condition, const Fo
                 .size = size.column,
                 .size_unit = size.unit,
                 .is_of_total = is_of_total,
-                .condition = study.conditions[static_cast<std::size_t>(condition)],
+                .condition = study.conditions[condition],
                 .x = {},
                 .y = {},
                 .cells = {},
@@ -84,8 +84,7 @@ std::vector<SizedForce> sized_forces(const Study& study) {
   std::vector<SizedForce> list;
   for (std::size_t i = 0; i < forces.values.size(); ++i) {
     const Observation& o = forces.values[i];
-    list.push_back(
-        {o.cell, study.cells[static_cast<std::size_t>(o.cell)].condition, o.kind == 0, areas.values[i].value, o.value});
+    list.push_back({o.cell, study.cells[o.cell].condition, o.kind == 0, areas.values[i].value, o.value});
   }
   return list;
 }

@@ -81,7 +81,7 @@ Sample sample_estimates(const Study& study, SheetQuantity quantity) {
   sample.is_never_negative = is_never_negative(quantity);
   const auto visit = [&](const auto& body) {
     for (const int i : cells_of(study, CellKind::sheet)) {
-      const StudyCell& cell = study.cells[static_cast<std::size_t>(i)];
+      const StudyCell& cell = study.cells[i];
       for (const SheetEstimate& e : cell.sheet->estimates)
         if (e.quantity == quantity && enters(e)) body(cell, i, e, kind_of_part(e));
     }
@@ -162,7 +162,7 @@ std::vector<Sample> sample_cells(const Study& study) {
     Sample sample = empty_sample(study, q.column, q.name, q.unit, Observed::cells, {"cell"});
     sample.is_never_negative = q.member != &FitSummary::fibre_force_nN;  // a difference: total less network
     for (const int i : cells_of(study, CellKind::plane)) {
-      const StudyCell& cell = study.cells[static_cast<std::size_t>(i)];
+      const StudyCell& cell = study.cells[i];
       if (q.member != &FitSummary::total_force_nN && !is_network_known(cell)) continue;
       add(sample, cell, i, 0, cell.fit.*q.member, 0.0);
     }
@@ -187,7 +187,7 @@ std::vector<Sample> sample_sheets(const Study& study) {
     Sample sample = empty_sample(study, figure.column, figure.name, figure.unit, Observed::sheets, {kWholeSheet});
     sample.is_never_negative = figure.is_never_negative;
     for (const int i : cells_of(study, CellKind::sheet)) {
-      const StudyCell& cell = study.cells[static_cast<std::size_t>(i)];
+      const StudyCell& cell = study.cells[i];
       if (const auto value = figure.of(*cell.sheet)) add(sample, cell, i, 0, *value, 0.0);
     }
     samples.push_back(std::move(sample));
@@ -223,7 +223,7 @@ std::vector<Sample> sample_in_space(const Study& study) {
     for (const int i : cells) {
       const SpaceFigures& s = figures_in(i);
       if (const Number value = figure.of(s))
-        add(sample, study.cells[static_cast<std::size_t>(i)], i, 0, *value, figure.sigma ? s.*figure.sigma : Number());
+        add(sample, study.cells[i], i, 0, *value, figure.sigma ? s.*figure.sigma : Number());
     }
     samples.push_back(with_typical_errors(std::move(sample)));
   }
@@ -231,7 +231,7 @@ std::vector<Sample> sample_in_space(const Study& study) {
       empty_sample(study, "space_adhesion_force_nN", "force", "nN", Observed::adhesions_in_space, {"adhesion"});
   for (const int i : cells) {
     for (const SpaceFigures::OfAdhesion& a : figures_in(i).adhesions)
-      add(forces, study.cells[static_cast<std::size_t>(i)], i, 0, a.force_nN, a.sigma_nN);
+      add(forces, study.cells[i], i, 0, a.force_nN, a.sigma_nN);
   }
   samples.push_back(with_typical_errors(std::move(forces)));
   std::erase_if(samples, [](const Sample& s) { return s.values.empty(); });

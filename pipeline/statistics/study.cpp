@@ -371,9 +371,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
   return study;
 }
 
-const std::string& condition_of(const Study& study, const StudyCell& cell) {
-  return study.conditions[static_cast<std::size_t>(cell.condition)];
-}
+const std::string& condition_of(const Study& study, const StudyCell& cell) { return study.conditions[cell.condition]; }
 
 FibreType counted_type(const Study& study, FibreType type) {
   return study.n_fibre_types < 4 && type == FibreType::edge ? FibreType::ventral : type;

@@ -42,8 +42,8 @@ std::optional<Interval> mean_interval(const std::vector<Observation>& own, const
   for (const CellWeights& w : draws) {
     double n = 0, sum = 0;
     for (const auto& [cell, pair] : by_cell) {
-      n += w[static_cast<std::size_t>(cell)] * pair.first;
-      sum += w[static_cast<std::size_t>(cell)] * pair.second;
+      n += w[cell] * pair.first;
+      sum += w[cell] * pair.second;
     }
     means.push_back(n > 0 ? std::optional<double>(sum / n) : std::nullopt);
   }
@@ -55,11 +55,11 @@ std::optional<Interval> median_interval(std::vector<Observation> own, const std:
   std::vector<std::optional<double>> medians;
   for (const CellWeights& w : draws) {
     double n = 0, seen = 0;
-    for (const Observation& o : own) n += w[static_cast<std::size_t>(o.cell)];
+    for (const Observation& o : own) n += w[o.cell];
     // the middle one, or the mean of the middle two, as of the values themselves
     std::optional<double> lower, upper;
     for (std::size_t i = 0; i < own.size() && !upper && n > 0; ++i) {
-      seen += w[static_cast<std::size_t>(own[i].cell)];
+      seen += w[own[i].cell];
       if (2 * seen >= n && !lower) lower = own[i].value;
       if (2 * seen > n) upper = own[i].value;
     }
@@ -81,11 +81,11 @@ ModelResult model_of(const Sample& sample) {
   if (n_cells_of(sample.values) < 2)
     return {.model = {}, .obstacle = std::string("there is a single ") + sample.cell_name()};
   std::vector<int> index(static_cast<std::size_t>(sample.n_conditions() * sample.n_kinds()), -1);
-  for (const Observation& o : sample.values) index[static_cast<std::size_t>(o.group)] = 0;
+  for (const Observation& o : sample.values) index[o.group] = 0;
   int n = 0;
   for (int& i : index) i = i < 0 ? -1 : n++;
   std::vector<Observation> data = sample.values;
-  for (Observation& o : data) o.group = index[static_cast<std::size_t>(o.group)];
+  for (Observation& o : data) o.group = index[o.group];
   try {
     MixedFit fit = fit_mixed_model(std::move(data));
     if (!fit.converged) return {.model = {}, .obstacle = "the mixed model did not converge"};
@@ -102,12 +102,11 @@ std::vector<Summary> summarise(const Sample& sample, const std::optional<SampleM
     for (int kind = 0; kind < sample.n_kinds(); ++kind) {
       const std::vector<Observation> own = sample.of_group(condition, kind);
       if (own.empty()) continue;
-      Summary s = plain_summary(sample.conditions[static_cast<std::size_t>(condition)],
-                                sample.kinds[static_cast<std::size_t>(kind)], own);
+      Summary s = plain_summary(sample.conditions[condition], sample.kinds[kind], own);
       s.mean_interval = mean_interval(own, draws);
       s.median_interval = median_interval(own, draws);
       if (model && s.n_cells > 1) {
-        const int g = model->index[static_cast<std::size_t>(sample.group_of(condition, kind))];
+        const int g = model->index[sample.group_of(condition, kind)];
         s.model = contrast_of(model->fit, Eigen::VectorXd::Unit(model->fit.mean.size(), g));
         if (sample.is_never_negative) s.model = with_positive_interval(*s.model);
       }
@@ -122,9 +121,8 @@ std::vector<Summary> summarise_by_cell(const Sample& sample, const Study& study)
   for (const Observation& o : sample.values) groups[{o.cell, o.kind}].push_back(o);
   std::vector<Summary> list;
   for (const auto& [key, own] : groups) {
-    const StudyCell& cell = study.cells[static_cast<std::size_t>(key.first)];
-    list.push_back(plain_summary(study.conditions[static_cast<std::size_t>(cell.condition)],
-                                 sample.kinds[static_cast<std::size_t>(key.second)], own));
+    const StudyCell& cell = study.cells[key.first];
+    list.push_back(plain_summary(study.conditions[cell.condition], sample.kinds[key.second], own));
     list.back().cell = cell.name;
   }
   return list;
@@ -145,8 +143,8 @@ std::vector<ShareAbove> shares_above(const Sample& tensions, const std::vector<d
         std::vector<CellCount> cells;
         for (const auto& [cell, count] : counts) cells.push_back(count);
         list.push_back(
-            {.condition = tensions.conditions[static_cast<std::size_t>(condition)],
-             .kind = tensions.kinds[static_cast<std::size_t>(kind)],
+            {.condition = tensions.conditions[condition],
+             .kind = tensions.kinds[kind],
              .threshold_nN = threshold,
              .n_cells = static_cast<int>(cells.size()),
              .n = static_cast<int>(own.size()),

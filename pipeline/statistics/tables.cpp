@@ -338,8 +338,7 @@ std::vector<TypeRow> type_rows(const Study& study, const Analysis& analysis) {
     TypeRow& row = rows.emplace_back(TypeRow{s, {}});
     for (const double threshold : thresholds_of(analysis)) {
       const auto n = std::count_if(sample.values.begin(), sample.values.end(), [&](const Observation& o) {
-        return study.cells[static_cast<std::size_t>(o.cell)].name == s.cell && o.value > threshold &&
-               sample.kinds[static_cast<std::size_t>(o.kind)] == s.kind;
+        return study.cells[o.cell].name == s.cell && o.value > threshold && sample.kinds[o.kind] == s.kind;
       });
       row.shares.push_back({.value = static_cast<double>(n) / s.n});
     }

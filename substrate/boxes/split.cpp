@@ -128,8 +128,7 @@ class Split final : public substrate::Substrate {
       cases.push_back(case_of(forces));
     }
     add_correction(
-        scene.points_um, scene.ellipses, [&](int column) { return cases[static_cast<std::size_t>(column)]; }, axes,
-        field);
+        scene.points_um, scene.ellipses, [&](int column) { return cases[column]; }, axes, field);
     return field;
   }
 

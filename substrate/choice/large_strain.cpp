@@ -42,7 +42,7 @@ std::vector<Eigen::Index> straining(const std::vector<substrate::Ellipse>& ellip
   double left = 0;
   for (Eigen::Index j = 0; j < std::ssize(ellipses); ++j) {
     const double force = force_on(j, forces_nN);
-    squares.emplace_back(std::pow(force * traction_kPa(ellipses[static_cast<std::size_t>(j)], force), 2), j);
+    squares.emplace_back(std::pow(force * traction_kPa(ellipses[j], force), 2), j);
     left += squares.back().first;
   }
   std::ranges::sort(squares, std::greater());
@@ -60,7 +60,7 @@ std::vector<Eigen::Index> straining(const std::vector<substrate::Ellipse>& ellip
 std::vector<substrate::Ellipse> chosen(const std::vector<substrate::Ellipse>& all,
                                        const std::vector<Eigen::Index>& taken) {
   std::vector<substrate::Ellipse> some;
-  for (const Eigen::Index j : taken) some.push_back(all[static_cast<std::size_t>(j)]);
+  for (const Eigen::Index j : taken) some.push_back(all[j]);
   return some;
 }
 

@@ -355,7 +355,7 @@ class CurvedGel final : public substrate::Substrate {
       const double angle = d * std::numbers::pi / kDirections;
       const Vec2 k = wave_number * Vec2{std::cos(angle), std::sin(angle)};
       for (Index i = 0; i < std::ssize(mesh.points_um); ++i)
-        waves(n_components * i + d % n_components, d) = std::cos(dot(k, mesh.points_um[static_cast<std::size_t>(i)]));
+        waves(n_components * i + d % n_components, d) = std::cos(dot(k, mesh.points_um[i]));
     }
     return waves;
   }

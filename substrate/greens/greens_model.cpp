@@ -55,7 +55,7 @@ substrate::LazyResponse GreensModel::in_space(const substrate::Loads& loads,
     const LayerInside* layer = inside_ ? &*inside_ : nullptr;
     MatrixXd G(n_rows * static_cast<Index>(points_um.size()), n_columns * static_cast<Index>(ellipses.size()));
     numerics::parallel_for(static_cast<int>(ellipses.size()), threads_, [&](int j) {
-      const EllipseInside field(gel_, layer, ellipses[static_cast<std::size_t>(j)]);
+      const EllipseInside field(gel_, layer, ellipses[j]);
       for (std::size_t i = 0; i < points_um.size(); ++i) {
         const auto& [x, y, z] = points_um[i];
         G.block(n_rows * static_cast<Index>(i), n_columns * j, n_rows, n_columns) =

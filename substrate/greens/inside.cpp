@@ -151,8 +151,7 @@ BaseTable::BaseTable(double nu) {
   for (int f = 0; f < kFunctions; ++f) {
     const Eigen::MatrixXd of_r_and_z = *bessel[f] * factor[f];
     for (Eigen::Index row = 0; row < j0.rows(); ++row) {
-      for (int k = 0; k < kNodesOfZ; ++k)
-        values_[static_cast<std::size_t>(row * kNodesOfZ + k)][f] = of_r_and_z(row, k);
+      for (int k = 0; k < kNodesOfZ; ++k) values_[row * kNodesOfZ + k][f] = of_r_and_z(row, k);
     }
   }
 }
@@ -163,7 +162,7 @@ BaseTable::Value BaseTable::at(double r, double z) const {
   const auto of_z = interpolation_weights<kNodesOfZ>(2 * z - 1);
   std::array<double, kFunctions> sum{};
   for (int i = 0; i < kNodesOfR; ++i) {
-    const auto* row = &values_[static_cast<std::size_t>((piece * kNodesOfR + i) * kNodesOfZ)];
+    const auto* row = &values_[(piece * kNodesOfR + i) * kNodesOfZ];
     for (int k = 0; k < kNodesOfZ; ++k) {
       for (int f = 0; f < kFunctions; ++f) sum[f] += of_r[i] * of_z[k] * row[k][f];
     }

@@ -30,7 +30,7 @@ class Voxels {
       if (seen_[at]) continue;
       const Piece piece = mark_piece(at, 1);
       pieces.push_back(piece);
-      Piece& most = largest[static_cast<std::size_t>(is_gel_[at])];
+      Piece& most = largest[is_gel_[at]];
       if (piece.n > most.n) most = piece;
     }
     std::int64_t n = 0;

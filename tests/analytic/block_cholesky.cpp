@@ -146,7 +146,7 @@ TYPED_TEST(OverKinds, refuses_a_matrix_without_stiffness_somewhere_or_holds_that
     std::vector<Real> x(static_cast<std::size_t>(kBlock * matrix.n), 1);
     factor.solve(x.data(), 1);
     for (int node = 0; node < matrix.n; ++node) {
-      const Real last = x[static_cast<std::size_t>(kBlock * factor.elimination().place[node] + kBlock - 1)];
+      const Real last = x[kBlock * factor.elimination().place[node] + kBlock - 1];
       EXPECT_EQ(last == 0, node == 5 || node == 15) << node;
     }
   }

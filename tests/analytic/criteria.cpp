@@ -301,7 +301,7 @@ TEST(DenseProblem, its_degrees_of_freedom_and_covariance_are_those_of_its_answer
     for (int component = 0; component < 2 * kBeads; ++component) {
       DisplacementField one = scene.beads;  // displaced by its standard error in this component, all else still
       for (Bead& b : one) b.displacement_um = {};
-      Bead& bead = one[static_cast<std::size_t>(component / 2)];
+      Bead& bead = one[component / 2];
       (component % 2 == 0 ? bead.displacement_um.x : bead.displacement_um.y) = bead.sigma_um;
       const VectorXd answer = problem_of(scene, one).spectrum().solve(lambda);
       degrees += scene.G.row(component).dot(answer) / bead.sigma_um;

@@ -128,7 +128,7 @@ TEST(Sheet, rings_of_adhesion_and_annuli_are_the_closed_form) {
       rings.sheet.held.assign(static_cast<std::size_t>(rings.elements.n_nodes()), {false, false});
       for (const auto& side : rings.elements.triangles().sides)
         if (side.curve == 1)
-          for (const int node : side.nodes) rings.sheet.held[static_cast<std::size_t>(node)] = {true, true};
+          for (const int node : side.nodes) rings.sheet.held[node] = {true, true};
     }
     rings.solve();
     expect_radial(rings, csv, row);

@@ -74,9 +74,7 @@ double rim_force_error(const files::CsvTable& csv, int first, double from, const
     for (int p = 0; p < Elements::kPoints; ++p) {
       const Shape& shape = solution.elements->at(t, p);
       const double r = norm(shape.place_um);
-      if (r > from * R)
-        ours +=
-            shape.weight_um2 * dot(solution.patches[static_cast<std::size_t>(t)].traction_kPa, 1 / r * shape.place_um);
+      if (r > from * R) ours += shape.weight_um2 * dot(solution.patches[t].traction_kPa, 1 / r * shape.place_um);
     }
   return std::abs(ours / exact - 1);
 }
@@ -146,8 +144,8 @@ TEST(SheetOnGel, the_lattice_answers_as_all_pairs_of_patches_do) {
             1e-14 * dense->diagonal_um_per_nN().norm());
   Eigen::VectorXd inward(2 * patches.n());
   for (int k = 0; k < patches.n(); ++k)
-    inward.segment<2>(2 * k) << -patches.areas_um2[static_cast<std::size_t>(k)] * patches.centre_um(k).x,
-        -patches.areas_um2[static_cast<std::size_t>(k)] * patches.centre_um(k).y;
+    inward.segment<2>(2 * k) << -patches.areas_um2[k] * patches.centre_um(k).x,
+        -patches.areas_um2[k] * patches.centre_um(k).y;
   const Eigen::VectorXd other = Eigen::VectorXd::Random(2 * patches.n());
   for (const Eigen::VectorXd& forces : {inward, other}) {
     const Eigen::VectorXd exact = dense->displace(forces), ours = lattice->displace(forces);

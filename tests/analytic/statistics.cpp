@@ -37,7 +37,7 @@ struct FromR {
   }
   std::vector<std::vector<double>> by_type() const {
     std::vector<std::vector<double>> groups(3);
-    for (const Fibre& f : fibres) groups[static_cast<std::size_t>(f.type)].push_back(f.tension_nN);
+    for (const Fibre& f : fibres) groups[f.type].push_back(f.tension_nN);
     return groups;
   }
 };
@@ -97,7 +97,7 @@ TEST(StatisticsBesideR, mixed_model_of_lme4_with_the_degrees_of_lmerTest) {
   constexpr double kInformation = 0.05;
   for (int g = 0; g < 3; ++g) {
     const Contrast mean = contrast_of(fit, Eigen::VectorXd::Unit(3, g));
-    const std::string& type = kTypes[static_cast<std::size_t>(g)];
+    const std::string& type = kTypes[g];
     r.expect("lmer.mean." + type, mean.estimate, kOptimiser);
     r.expect("lmer.error." + type, mean.standard_error, kOptimiser);
     r.expect("lmer.degrees." + type, mean.degrees, kInformation);
@@ -129,11 +129,11 @@ void expect_nested(const FromR& r, const std::string& name, bool has_errors) {
   r.expect(name + ".cell_variance", *fit.cell_variance, kFlat);
   r.expect(name + ".cell_kind_variance", *fit.cell_kind_variance, kFlat);
   for (int g = 0; g < 3; ++g) {
-    const std::string& type = kTypes[static_cast<std::size_t>(g)];
+    const std::string& type = kTypes[g];
     const Contrast mean = contrast_of(fit, Eigen::VectorXd::Unit(3, g));
     r.expect(name + ".mean." + type, mean.estimate, kOptimiser);
     r.expect(name + ".error." + type, mean.standard_error, kFlat);
-    r.expect(name + ".residual_variance." + type, *fit.residual_variance[static_cast<std::size_t>(g)], kFlat);
+    r.expect(name + ".residual_variance." + type, *fit.residual_variance[g], kFlat);
   }
 }
 
@@ -159,7 +159,7 @@ TEST(MixedModel, balanced_cells_give_the_classical_degrees_of_freedom) {
   const MixedFit fit = fit_mixed_model(data);
   const Contrast mean = contrast_of(fit, Eigen::VectorXd::Ones(1));
   std::vector<double> cell_means(7, 0);
-  for (const Observation& o : data) cell_means[static_cast<std::size_t>(o.cell)] += o.value / 4;
+  for (const Observation& o : data) cell_means[o.cell] += o.value / 4;
   const Description d = describe(cell_means);
   EXPECT_NEAR(mean.estimate, d.mean, 1e-12);
   EXPECT_NEAR(mean.standard_error, *d.standard_deviation / std::sqrt(7.0), 1e-6);
@@ -335,7 +335,7 @@ TEST(Bootstrap, percentiles_make_up_for_few_cells) {
 TEST(Shares, fibres_that_agree_within_cells_count_as_cells) {
   // ten cells of ten fibres, all above or all below: as ten independent observations or fewer
   std::vector<CellCount> cells(10, {.n = 10, .n_with = 0});
-  for (int c = 0; c < 4; ++c) cells[static_cast<std::size_t>(c)].n_with = 10;
+  for (int c = 0; c < 4; ++c) cells[c].n_with = 10;
   const Share share = share_over_cells(cells);
   EXPECT_DOUBLE_EQ(share.value, 0.4);
   EXPECT_LE(share.n_effective, 10);

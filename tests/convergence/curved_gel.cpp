@@ -303,11 +303,11 @@ TEST(AnEllipse, pulls_at_the_centre_of_the_area_that_it_covers_of_the_slope) {
   for (std::size_t node = 0; node < block.mesh().position_um.size(); ++node) {
     const int free = space.nodes().index_of(static_cast<int>(node));
     const Eigen::Vector3d& at = block.mesh().position_um[node];
-    if (free >= 0) place[static_cast<std::size_t>(free)] = {at.x(), at.y()};
+    if (free >= 0) place[free] = {at.x(), at.y()};
   }
   Vec2 pulled, centre;
   const auto loads = load_weights(block, space, {.shapes = std::vector<substrate::Ellipse>{ellipse}});
-  for (const boxes::NodeWeight& w : loads.front()) pulled += w.weight * place[static_cast<std::size_t>(w.node)];
+  for (const boxes::NodeWeight& w : loads.front()) pulled += w.weight * place[w.node];
   double area = 0;
   constexpr int kRings = 400;
   for (int k = 0; k < kRings * kRings; ++k) {

@@ -248,7 +248,7 @@ TEST_F(Errors, check_knows_channels_that_are_exchanged_blur_few_beads_and_a_cell
       const float dark = *std::ranges::min_element(image.pixels);
       for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x)
-          if (x % 256 > 40 || y % 256 > 40) image.pixels[static_cast<std::size_t>(y * image.width + x)] = dark;
+          if (x % 256 > 40 || y % 256 > 40) image.pixels[y * image.width + x] = dark;
     });
   EXPECT_NE(said().find("um apart (limit 3 um)"), std::string::npos) << said();
   for (const char* name : {"paxillin.tif", "actin.tif"})

@@ -116,10 +116,10 @@ TEST(OthersData, discs_of_a_synthetic_cell_carry_their_tractions) {
   double furthest = 0;
   int n_inside = 0;
   for (int row = 0; row < discs.n_rows(); ++row) {
-    const Patch& p = r.patches[static_cast<std::size_t>(row)];
+    const Patch& p = r.patches[row];
     const Vec2 off = 1000 * p.traction_kPa - Vec2{discs.number(row, "tx_Pa"), discs.number(row, "ty_Pa")};
     furthest = std::max(furthest, norm(off));
-    const double sigma_Pa = 1000 * *r.forces[static_cast<std::size_t>(row)].sigma_nN / p.area_um2;
+    const double sigma_Pa = 1000 * *r.forces[row].sigma_nN / p.area_um2;
     n_inside += std::abs(1000 * norm(p.traction_kPa) - discs.number(row, "t_Pa")) <= sigma_Pa;
     if (discs.number(row, "t_Pa") < 50) {
       std::printf("weak disc: %.1f +- %.1f Pa, listed %.1f\n", 1000 * norm(p.traction_kPa), sigma_Pa,
@@ -266,8 +266,8 @@ TEST(OthersData, tractions_of_colonies_are_those_of_the_program_that_published_t
     constexpr int kRim = 20;
     for (int j = kRim; j < colony.n_rows - kRim; ++j)
       for (int i = kRim; i < colony.n_columns - kRim; ++i) {
-        inside.push_back(same[static_cast<std::size_t>(j * colony.n_columns + i)]);
-        inside_published.push_back(colony.published_kPa[static_cast<std::size_t>(j * colony.n_columns + i)]);
+        inside.push_back(same[j * colony.n_columns + i]);
+        inside_published.push_back(colony.published_kPa[j * colony.n_columns + i]);
       }
     const Comparison whole = compare(same, colony.published_kPa), inner = compare(inside, inside_published);
     const ColonySums sums = sums_over(colony, same), theirs = sums_over(colony, colony.published_kPa);

@@ -36,9 +36,9 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
     const double first = tracks.number(i, "tension_nN"), second = tracks.number(n + i, "tension_nN");
     const double sigma = tracks.number(n + i, "sigma_nN");
     // fitted twice, from different starts: the same to less than any bead could tell
-    EXPECT_NEAR(first, single[static_cast<std::size_t>(i)].tension_nN, 0.2 * tracks.number(i, "sigma_nN"));
+    EXPECT_NEAR(first, single[i].tension_nN, 0.2 * tracks.number(i, "sigma_nN"));
     // … and with the same error, that of the cell's place in it; where a fit ends changes it by less
-    const double high = *single[static_cast<std::size_t>(i)].high_nN;
+    const double high = *single[i].high_nN;
     EXPECT_NEAR(tracks.number(i, "high_nN"), high, 1e-3 * high);
     // twice the displacement is twice the tension while no cable is stretched
     EXPECT_NEAR(second, 2 * first, 4 * sigma);

@@ -66,7 +66,7 @@ TEST_F(Stacks, beads_are_followed_to_the_truth_within_their_errors) {
     if (!bead.flag.empty()) continue;
     ++n_good;
     const auto at = near.within(bead.position_um, 1, 1);
-    const BeadInSpace* same = at.empty() ? nullptr : &truth[static_cast<std::size_t>(at[0])];
+    const BeadInSpace* same = at.empty() ? nullptr : &truth[at[0]];
     const Vec3 off = same ? bead.displacement_um - same->displacement_um : Vec3{9, 9, 9};
     if (norm(off) > 1) ++n_wrong;
     across.push_back(std::hypot(off.x, off.y) / bead.sigma_um);
@@ -168,7 +168,7 @@ void expect_a_plan_of(const fs::path& folder) {
   const files::CsvTable forces(folder / "4_traction/traction_adhesion_forces.csv");
   ASSERT_EQ(scene.patches.size(), adhesions.size());
   for (int a = 0; a < forces.n_rows(); ++a) {
-    const plan::SpacePatch& patch = scene.patches[static_cast<std::size_t>(a)];
+    const plan::SpacePatch& patch = scene.patches[a];
     EXPECT_EQ(patch.adhesion.adhesion_id, forces.integer(a, "adhesion_id", 1));
     EXPECT_EQ(patch.force_nN.x, forces.number(a, "fx_nN"));
     EXPECT_EQ(patch.force_nN.z, forces.number(a, "fz_nN"));

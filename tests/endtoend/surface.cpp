@@ -38,7 +38,7 @@ class Surface : public testing::Test {
     for (int k = 0; k < map.n_x * map.n_y; ++k) {
       const Vec2 at = map.vertex_um(static_cast<std::size_t>(k));
       if (std::max(std::abs(at.x), std::abs(at.y)) > 20 - rim_um) continue;
-      largest = std::max(largest, std::abs(map.z_um[static_cast<std::size_t>(k)] - wave(at)));
+      largest = std::max(largest, std::abs(map.z_um[k] - wave(at)));
     }
     return largest;
   }

@@ -153,7 +153,7 @@ TEST_P(Cables, geometry_gradients_agree_with_central_differences) {
   }
   for (std::size_t k = 0; k < net.links.size(); k += 40) {
     if (equilibrium.link_states[k] != CableState::slack) continue;  // there a larger share is more tension, no more
-    const double tension = tensions[static_cast<std::size_t>(net.links[k].fibre_id)];
+    const double tension = tensions[net.links[k].fibre_id];
     const auto pulled = [&](double by) {
       Network other = net;
       other.links[k].share += by / tension;

@@ -57,8 +57,7 @@ MatrixXd ring_and_chords(const Cell& cell) {
   const auto n = static_cast<int>(cell.adhesions.size());
   MatrixXd forces = MatrixXd::Zero(2 * n, 3);
   const auto pull = [&](int column, int a, int b) {
-    const Vec2 d = cell.adhesions[static_cast<std::size_t>(b)].position_um -
-                   cell.adhesions[static_cast<std::size_t>(a)].position_um;
+    const Vec2 d = cell.adhesions[b].position_um - cell.adhesions[a].position_um;
     const Eigen::Vector2d along = Eigen::Vector2d(d.x, d.y).normalized();
     forces.block<2, 1>(2 * a, column) += along;
     forces.block<2, 1>(2 * b, column) -= along;
@@ -96,8 +95,7 @@ TEST(Contractile, a_model_that_is_linear_is_fitted_as_linear_least_squares_has_i
     // the fit stops where a step moves less than a hundredth of the standard errors
     EXPECT_NEAR(values_of(fit)[i], expected[i], 0.05 * sigma) << i;
     EXPECT_NEAR(std::sqrt(fit.tensions.covariance_nN2(i, i)), sigma, 1e-3 * sigma) << i;
-    EXPECT_NEAR(interval_95(fit.tensions.nN[static_cast<std::size_t>(i)]).high - expected[i], 1.96 * sigma,
-                0.07 * sigma);
+    EXPECT_NEAR(interval_95(fit.tensions.nN[i]).high - expected[i], 1.96 * sigma, 0.07 * sigma);
   }
   EXPECT_NEAR((fit.forces.nN - forces * values_of(fit)).norm(), 0, 1e-9 * fit.forces.nN.norm());
 }

@@ -179,7 +179,7 @@ TEST(ErrorBudget, tells_the_bias_of_a_substrate_that_lacks_the_base) {
   const ErrorBudget budget = f.budget(kExact, 0, true);
   double difference = 0;
   for (Eigen::Index i = 1; i < bias.size(); ++i)
-    difference += std::pow(std::abs(bias[i]) - budget.tensions[static_cast<std::size_t>(i)].parts_nN.substrate, 2);
+    difference += std::pow(std::abs(bias[i]) - budget.tensions[i].parts_nN.substrate, 2);
   // to first order: the network's answer to tensions bends by some per cent over a bias of this size
   EXPECT_LT(std::sqrt(difference), 0.1 * bias.tail(bias.size() - 1).norm());
 }

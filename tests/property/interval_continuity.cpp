@@ -63,7 +63,7 @@ Answer answer_of(const Case& c, double relative, unsigned seed) {
   Answer answer{
       .value = Eigen::VectorXd(n), .error = Eigen::VectorXd(n), .low = Eigen::VectorXd(n), .high = Eigen::VectorXd(n)};
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Estimate& e = fit.tensions.nN[static_cast<std::size_t>(i)];
+    const Estimate& e = fit.tensions.nN[i];
     const Interval interval = interval_95(e);
     answer.value[i] = e.value;
     answer.error[i] = e.standard_error;

@@ -306,7 +306,7 @@ TEST(ModelError, widens_the_profile_as_it_does_the_standard_error_where_no_bound
   const Eigen::Matrix2d K = local.H.inverse(), covariance = 1.5 * K + K * local.model_variance * K;
   EXPECT_TRUE(covariance_nN2(local, 1.5).isApprox(covariance, 1e-9));
   for (int i = 0; i < 2; ++i) {
-    const Sides sides = profiles_95(local, 1.5)[static_cast<std::size_t>(i)];
+    const Sides sides = profiles_95(local, 1.5)[i];
     EXPECT_NEAR(sides.below, 1.96 * std::sqrt(covariance(i, i)), 2e-3 * sides.below);
     EXPECT_NEAR(sides.above, 1.96 * std::sqrt(covariance(i, i)), 2e-3 * sides.above);
   }

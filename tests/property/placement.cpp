@@ -168,7 +168,7 @@ TEST(Placement, stray_beads_near_adhesions_do_not_move_the_cell) {
         const Vec2 adhesion = off.cell.adhesions[2 * k].position_um;
         const auto distance = [&](const Bead& bead) { return norm(bead.position_um - adhesion); };
         const auto nearest = std::ranges::min_element(beads, {}, distance) - beads.begin();
-        astray.scene.beads[static_cast<std::size_t>(nearest)].displacement_um += {0, by_um};
+        astray.scene.beads[nearest].displacement_um += {0, by_um};
       }
       const FoundPlacement found = astray.fit_on(network).second;
       // the loss that the fit itself takes leaves a part of each
@@ -235,9 +235,9 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
   };
   for (Eigen::Index i = 0; i < 3; ++i) {
     const double more = fit.misfit.variance * (noise(fit)[i] - noise(with_known)[i]);
-    ASSERT_TRUE(budget.tensions[static_cast<std::size_t>(i)].parts_nN.place);
+    ASSERT_TRUE(budget.tensions[i].parts_nN.place);
     // the two fits end at tensions that differ by a fraction of an error
-    EXPECT_NEAR(std::pow(*budget.tensions[static_cast<std::size_t>(i)].parts_nN.place, 2), more, 0.1 * more) << i;
+    EXPECT_NEAR(std::pow(*budget.tensions[i].parts_nN.place, 2), more, 0.1 * more) << i;
     EXPECT_GT(more, 0);
   }
 }

@@ -139,7 +139,7 @@ TEST(SheetFit, parts_that_contract_each_by_its_own_are_told_apart_where_they_dif
   std::vector<std::vector<double>> parts(2, sheet::even(*disc.elements, 0));
   for (int t = 0; t < disc.elements->n_triangles(); ++t)
     for (int p = 0; p < Elements::kPoints; ++p)
-      parts[norm(disc.elements->at(t, p).place_um) > 18][static_cast<std::size_t>(Elements::kPoints * t + p)] = 1;
+      parts[norm(disc.elements->at(t, p).place_um) > 18][Elements::kPoints * t + p] = 1;
   const StiffnessTable table(
       {.elements = disc.elements, .contractions = parts, .poisson_ratio = kRatio, .n_rims = 1, .has_line = false},
       *disc.ground, disc.gel, 25, 1);
@@ -301,8 +301,7 @@ TEST(SheetFit, the_outlines_part_is_what_a_larger_sheet_makes_of_the_fit) {
   const FittedDisc disc(25);
   const Elements larger = sheet::with_rims_further_out(*disc.elements, 1, kFurther_um);
   for (int i = 0; i < larger.n_nodes(); ++i) {
-    const Vec2 before = disc.elements->triangles().nodes_um[static_cast<std::size_t>(i)],
-               after = larger.triangles().nodes_um[static_cast<std::size_t>(i)];
+    const Vec2 before = disc.elements->triangles().nodes_um[i], after = larger.triangles().nodes_um[i];
     // sides are parabolas, off the circle by some 1e-4 of the radius
     EXPECT_LE(norm(after - (1 + kFurther_um / 25) * before), 0.02 * kFurther_um);
   }
@@ -643,8 +642,7 @@ TEST(SheetFit, beside_adhesions_the_sheet_is_called_for_where_a_sheet_pulls_and_
   DisplacementField pulled = disc.beads;
   Eigen::VectorXd forces = Eigen::VectorXd::Zero(24);
   for (const int k : {0, 6, 2, 8})
-    forces.segment<2>(2 * k) << -5 * adhesions[static_cast<std::size_t>(k)].centre_um.x / 22,
-        -5 * adhesions[static_cast<std::size_t>(k)].centre_um.y / 22;
+    forces.segment<2>(2 * k) << -5 * adhesions[k].centre_um.x / 22, -5 * adhesions[k].centre_um.y / 22;
   const Eigen::VectorXd u = compliance * forces;
   for (std::size_t i = 0; i < pulled.size(); ++i)
     pulled[i].displacement_um = {u(2 * static_cast<Eigen::Index>(i)), u(2 * static_cast<Eigen::Index>(i) + 1)};

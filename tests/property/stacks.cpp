@@ -90,7 +90,7 @@ TEST(Stacks, the_roles_of_the_two_stacks_may_be_exchanged) {
   int n_both = 0, n_other = 0;
   for (std::size_t k = 0; k < there.matches.size(); ++k) {
     if (there.matches[k].flag != TrackFlag::none) continue;
-    const Match& m = back.matches[static_cast<std::size_t>(there.matches[k].partner)];
+    const Match& m = back.matches[there.matches[k].partner];
     if (m.flag != TrackFlag::none) continue;
     m.partner == static_cast<int>(k) ? ++n_both : ++n_other;
   }
@@ -180,7 +180,7 @@ TEST(Stacks, neighbours_add_their_own_errors_along_each_axis) {
   for (std::size_t k = 0; k < clouds.relaxed.size(); ++k) {
     const Match& m = matching.matches[k];
     if (m.flag != TrackFlag::none) continue;
-    const PlacedBead &a = clouds.relaxed[k], &b = clouds.stressed[static_cast<std::size_t>(m.partner)];
+    const PlacedBead &a = clouds.relaxed[k], &b = clouds.stressed[m.partner];
     const double own = a.sigma_um * a.sigma_um + b.sigma_um * b.sigma_um, all = m.sigma_um * m.sigma_um;
     EXPECT_GT(all, own);
     EXPECT_NEAR(m.sigma_z_um * m.sigma_z_um, kAlong * kAlong * all, 1e-9 * all);
@@ -348,7 +348,7 @@ TEST(Stacks, places_have_the_errors_they_claim) {
       if (near.within(found[0][k].position_um, 0.8, 1).empty()) ++errors.n_spurious;
       const Match& m = matching.matches[k];
       if (m.flag != TrackFlag::none || found[0][k].flag != TrackFlag::none) continue;
-      const PlacedBead &a = found[0][k], &b = found[1][static_cast<std::size_t>(m.partner)];
+      const PlacedBead &a = found[0][k], &b = found[1][m.partner];
       const Vec3 off = b.position_um - a.position_um - Vec3{0.21, -0.17, 0.33};
       errors.across.push_back(std::abs(off.x) / std::hypot(a.sigma_um, b.sigma_um));
       errors.across.push_back(std::abs(off.y) / std::hypot(a.sigma_um, b.sigma_um));
@@ -428,8 +428,8 @@ TEST(Stacks, beads_whose_light_is_cut_off_are_flagged_and_the_others_are_not) {
   int n_flagged = 0, n_inside = 0;
   for (std::size_t k = 0; k < scene.relaxed.size(); ++k) {
     const auto at = near.within(scene.relaxed[k].position_um, 0.8, 1);
-    if (at.empty() || beads[static_cast<std::size_t>(at[0])].flag == TrackFlag::edge) continue;
-    const bool is_flagged = beads[static_cast<std::size_t>(at[0])].flag == TrackFlag::saturated;
+    if (at.empty() || beads[at[0]].flag == TrackFlag::edge) continue;
+    const bool is_flagged = beads[at[0]].flag == TrackFlag::saturated;
     if (k < 15) {
       ++n_inside, n_flagged += is_flagged;
     } else {

@@ -121,7 +121,7 @@ TEST(SurfaceFromAlphaSlices, is_the_upper_boundary_of_the_alpha_shape_of_cgal) {
       if ((y - a.x()) * (y - b.x()) > 0) continue;
       highest = std::min(highest, a.y() + (y - a.x()) / (b.x() - a.x()) * (b.y() - a.y()));
     }
-    EXPECT_NEAR(map.z_um[static_cast<std::size_t>(j * map.n_x)], highest, 1e-9) << y;
+    EXPECT_NEAR(map.z_um[j * map.n_x], highest, 1e-9) << y;
   }
 }
 
@@ -150,7 +150,7 @@ TEST(SurfaceFromAlphaSlices, beads_on_a_grid_are_borne) {
   const HeightMap slope = alpha_shape_surface(beads, {.slice_um = 0.2, .radius_um = 0.12}, 0.1);
   for (int j = 0; j < slope.n_y; ++j) {
     const double y = slope.origin_um.y + j * slope.spacing_um.y;
-    EXPECT_NEAR(slope.z_um[static_cast<std::size_t>(j * slope.n_x)], 0.3 + 0.7 * y, 1e-9);
+    EXPECT_NEAR(slope.z_um[j * slope.n_x], 0.3 + 0.7 * y, 1e-9);
   }
 }
 

@@ -29,11 +29,11 @@ TEST(TensionFit, errors_reach_the_Cramer_Rao_limit_and_intervals_cover) {
       measure(scene, noise, 100 + repeat);
       const EnsembleFit fit = fit_own_network(scene);
       for (Eigen::Index i = 0; i < limit.size(); ++i) {
-        const Interval interval = interval_95(fit.tensions.nN[static_cast<std::size_t>(i)]);
+        const Interval interval = interval_95(fit.tensions.nN[i]);
         n_covered += interval.low <= scene.tensions_nN[i] && scene.tensions_nN[i] <= interval.high ? 1 : 0;
         ++n_intervals;
         if (scene.tensions_nN[i] < 3 * limit[i]) continue;  // the bound t >= 0 makes those better than the limit
-        sum += std::pow((fit.tensions.nN[static_cast<std::size_t>(i)].value - scene.tensions_nN[i]) / limit[i], 2);
+        sum += std::pow((fit.tensions.nN[i].value - scene.tensions_nN[i]) / limit[i], 2);
         ++n;
       }
     }
@@ -90,7 +90,7 @@ TEST(TensionFit, the_bias_of_forces_that_bend_is_told_where_noise_is_large) {
     const TensionFit fit = fit_gauss_newton(again, {}, again.evaluate(scene.tensions_nN, &truth));
     const LocalMisfit local = local_misfit(fit.trial, again.jacobian(fit.trial));
     const double error = fit.trial.tensions_nN[0] + past_bounds_nN(local, 1)[0] - scene.tensions_nN[0];
-    rests[static_cast<std::size_t>(repeat)] = error - (covariance * (J.transpose() * noise))[0];
+    rests[repeat] = error - (covariance * (J.transpose() * noise))[0];
   });
   double sum = 0, squares = 0;
   for (const double rest : rests) sum += rest / kRepeats, squares += rest * rest / kRepeats;
@@ -240,7 +240,7 @@ TEST(TensionFit, leaving_a_stray_bead_out_moves_the_tensions_as_foretold) {
     EXPECT_EQ(std::count(strays.begin(), strays.end(), stray), 1);
     const double foretold = harm_done_by(strays, scene.data, residual, mesh.force_derivatives);
     std::vector<bool> is_used(scene.beads.size(), true);
-    for (const Eigen::Index b : strays) is_used[static_cast<std::size_t>(b)] = false;
+    for (const Eigen::Index b : strays) is_used[b] = false;
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN, is_used);
     const EnsembleFit without = fit_own_network(scene, parameters);
     const Eigen::VectorXd moved = values_of(without) - values_of(with);
@@ -250,7 +250,7 @@ TEST(TensionFit, leaving_a_stray_bead_out_moves_the_tensions_as_foretold) {
     EXPECT_NEAR(foretold, found, 0.1 * found);  // forces are not quite linear in the tensions
     if (strays.size() > 1) continue;
     ++n_alone;
-    const Bead& left_out = scene.beads[static_cast<std::size_t>(stray)];
+    const Bead& left_out = scene.beads[stray];
     const Eigen::Vector2d then =
         Eigen::Vector2d(left_out.displacement_um.x, left_out.displacement_um.y) -
         scene.compliance_um_per_nN.middleRows<2>(2 * stray) * without.meshes.front().fit.trial.forces_nN;
@@ -396,7 +396,7 @@ TEST(TensionFit, intervals_by_profile_are_1_96_standard_errors_where_no_bound_is
   local.H << 2, 0.8, 0.8, 1;
   const Eigen::MatrixXd covariance = covariance_nN2(local, 1.5);
   for (int i = 0; i < 2; ++i) {
-    const Sides sides = profiles_95(local, 1.5)[static_cast<std::size_t>(i)];
+    const Sides sides = profiles_95(local, 1.5)[i];
     EXPECT_NEAR(sides.below, 1.96 * std::sqrt(covariance(i, i)), 2e-3 * sides.below);
     EXPECT_NEAR(sides.above, 1.96 * std::sqrt(covariance(i, i)), 2e-3 * sides.above);
   }
@@ -492,7 +492,7 @@ TEST(ModelChecks, missing_fibres_that_cross_have_their_own_ends) {
     test::add_ventral(cell, 1, 7);
     // large adhesions hardly move the gel: beads tell them less well, and the pair of the two small ones stands out
     for (const int large : {12, second_start}) {
-      Adhesion& a = cell.adhesions[static_cast<std::size_t>(large - 1)];
+      Adhesion& a = cell.adhesions[large - 1];
       a.area_um2 *= 36, a.major_axis_um *= 6, a.minor_axis_um *= 6;
     }
     test::add_ventral(cell, 3, 12);

@@ -126,7 +126,7 @@ TEST(Losses, judge_a_bead_by_the_field_around_it_and_not_by_its_size) {
   observed.sigma_um = VectorXd::Constant(3 * kBeads, 0.1);
   observed.displacement_um.resize(3 * kBeads);
   for (int b = 0; b < kBeads; ++b) {
-    const Vec3 p = places[static_cast<std::size_t>(b)];  // up to 120 standard errors
+    const Vec3 p = places[b];  // up to 120 standard errors
     observed.displacement_um.segment<3>(3 * b) << 0.3 * p.x, 0.1 * p.y - 0.2 * p.z, 5;
     for (int c = 0; c < 3; ++c) observed.displacement_um[3 * b + c] += 0.1 * normal(random);
     if (b < kAstray) observed.displacement_um[3 * b + b % 3] += b % 2 ? 4 : -4;

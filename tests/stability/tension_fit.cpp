@@ -99,7 +99,7 @@ TEST(TensionFitHard, a_hundred_fibres) {
   Eigen::VectorXd tensions(101);
   tensions[0] = 0.06;
   for (int i = 0; i < 100; ++i) {  // dorsal ones, inwards from each adhesion
-    const Vec2 start = cell.adhesions[static_cast<std::size_t>(i)].position_um;
+    const Vec2 start = cell.adhesions[i].position_um;
     cell.fibres.push_back({.fibre_id = i + 1,
                            .type = FibreType::dorsal,
                            .width_um = 0.6,

@@ -167,7 +167,7 @@ void add_forces(NoiseRow& row, const TensionScene& scene, const tensions::Ensemb
 void add_tensions(NoiseRow& row, const Eigen::VectorXd& true_nN, const Eigen::VectorXd& limit_nN,
                   const tensions::EnsembleFit& fit) {
   for (Eigen::Index i = 0; i < limit_nN.size(); ++i) {
-    const tensions::Estimate& estimate = fit.tensions.nN[static_cast<std::size_t>(i)];
+    const tensions::Estimate& estimate = fit.tensions.nN[i];
     const double t = true_nN[i], error = estimate.value - t;
     const tensions::Interval interval = tensions::interval_95(estimate);
     const int is_covered = interval.low <= t && t <= interval.high ? 1 : 0;

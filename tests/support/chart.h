@@ -90,11 +90,11 @@ inline Series histogram(const std::string& name, const std::vector<double>& valu
   std::vector<double> counts(static_cast<std::size_t>(n_bins), 0);
   for (const double v : values) {
     const int bin = std::clamp(static_cast<int>((v - low) / (high - low) * n_bins), 0, n_bins - 1);
-    counts[static_cast<std::size_t>(bin)] += 1.0 / static_cast<double>(values.size());
+    counts[bin] += 1.0 / static_cast<double>(values.size());
   }
   for (int b = 0; b < n_bins; ++b) {
     s.x.push_back(low + (b + 0.5) * (high - low) / n_bins);
-    s.y.push_back(counts[static_cast<std::size_t>(b)]);
+    s.y.push_back(counts[b]);
   }
   return s;
 }

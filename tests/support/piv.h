@@ -158,9 +158,7 @@ inline Vec2 piv_displacement(const images::Image& relaxed, const images::Image& 
   for (int b = -kReach - 1; b <= kReach + 1; ++b)
     for (int a = -kReach - 1; a <= kReach + 1; ++a) map.push_back(correlation(a, b));
   const double lowest = *std::min_element(map.begin(), map.end());
-  const auto at = [&](int a, int b) {
-    return map[static_cast<std::size_t>((b + kReach + 1) * kSide + a + kReach + 1)];
-  };
+  const auto at = [&](int a, int b) { return map[(b + kReach + 1) * kSide + a + kReach + 1]; };
   double best = -1e300;
   int a = 0, b = 0;
   for (int j = -kReach; j <= kReach; ++j)

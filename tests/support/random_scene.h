@@ -25,7 +25,7 @@ class Dice {
   bool happens(double chance) { return uniform(0, 1) < chance; }
   template <class T>
   T one_of(const std::vector<T>& values) {
-    return values[static_cast<std::size_t>(whole(0, static_cast<int>(values.size()) - 1))];
+    return values[whole(0, static_cast<int>(values.size()) - 1)];
   }
 
  private:

@@ -108,8 +108,8 @@ TEST(Cut, holds_the_vertices_on_it_and_the_ends_of_fibres_there_and_nothing_else
   std::vector<int> n_links(network.vertices_um.size(), 0);
   for (const Link& link : network.links) {
     if (link.fibre_id == 0) continue;
-    ++n_links[static_cast<std::size_t>(link.vertex_a)];
-    ++n_links[static_cast<std::size_t>(link.vertex_b)];
+    ++n_links[link.vertex_a];
+    ++n_links[link.vertex_b];
   }
   for (std::size_t v = 0; v < network.vertices_um.size(); ++v) {
     n_held += network.held_by_cut[v];

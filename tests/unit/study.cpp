@@ -294,8 +294,8 @@ TEST(Directions, of_a_fibre_that_pulls_its_adhesions_are_zero) {
   Cell cell = test::round_cell();
   cell.adhesions.resize(2);
   for (int i = 0; i < 2; ++i) {
-    cell.adhesions[static_cast<std::size_t>(i)].position_um = {10.0 + 20 * i, 30};
-    cell.adhesions[static_cast<std::size_t>(i)].angle_rad = 0;
+    cell.adhesions[i].position_um = {10.0 + 20 * i, 30};
+    cell.adhesions[i].angle_rad = 0;
   }
   cell.fibres.resize(1);
   cell.fibres[0] = {.fibre_id = 1,
@@ -521,7 +521,7 @@ files::CsvTable table_of(const Study& study, const std::string& name) {
 /// Written as folders and read again.
 Study read_again(const Study& study, const test::TemporaryFolder& folder, const StudyParameters& parameters = {}) {
   for (const StudyCell& cell : study.cells) {
-    const Path at = folder / study.conditions[static_cast<std::size_t>(cell.condition)] / cell.name;
+    const Path at = folder / study.conditions[cell.condition] / cell.name;
     if (cell.kind() == CellKind::sheet) test::write_finished_sheet(at, cell);
     if (cell.kind() == CellKind::space) test::write_finished_cell_in_space(at, cell);
     if (cell.kind() == CellKind::plane) test::write_finished_cell(at, cell);
@@ -588,12 +588,12 @@ TEST(SheetStudy, its_figures_are_those_of_each_sheet_under_their_names_units_and
     EXPECT_EQ(sample->unit, e.unit) << e.column;
     ASSERT_EQ(sample->values.size(), study.cells.size());
     for (const Observation& o : sample->values) {
-      const StudyCell& cell = study.cells[static_cast<std::size_t>(o.cell)];
+      const StudyCell& cell = study.cells[o.cell];
       const double value = e.of(*cell.sheet);
       EXPECT_EQ(o.value, value) << e.column;
       EXPECT_EQ(o.group, cell.condition) << e.column;
       const int row = row_with(cells, {{"cell", cell.name}});
-      EXPECT_EQ(cells.text(row, "condition"), study.conditions[static_cast<std::size_t>(cell.condition)]);
+      EXPECT_EQ(cells.text(row, "condition"), study.conditions[cell.condition]);
       if (*e.in_cells) {
         EXPECT_NEAR(cells.number(row, e.in_cells), value, 1e-5 * value) << e.column << ": six digits";
       }
@@ -665,7 +665,7 @@ TEST(SheetStudy, beside_cells_with_fibres_no_figure_mixes_the_two) {
   EXPECT_EQ(sample_named(analysis, "total_force_nN")->values.size(), 5u);
   EXPECT_EQ(sample_named(analysis, "sheet_force_nN")->values.size(), 6u);
   for (const Correlation& c : analysis.correlations)
-    for (const int cell : c.cells) EXPECT_FALSE(study.cells[static_cast<std::size_t>(cell)].sheet) << c.force;
+    for (const int cell : c.cells) EXPECT_FALSE(study.cells[cell].sheet) << c.force;
   const files::CsvTable cells = table_of(study, "cells.csv");
   int n_of_sheets = 0;
   for (int row = 0; row < cells.n_rows(); ++row) {
@@ -787,7 +787,7 @@ TEST(SpaceStudy, has_the_figures_of_each_cell_and_compares_the_total_force_first
     EXPECT_EQ(sample->unit, e.unit) << e.column;
     ASSERT_EQ(sample->values.size(), 12u) << e.column;
     for (const Observation& o : sample->values) {
-      const std::string name = study.cells[static_cast<std::size_t>(o.cell)].name;
+      const std::string name = study.cells[o.cell].name;
       const auto at =
           std::ranges::find_if(made.cells, [&](const StudyCell& c) { return name.ends_with("/" + c.name); });
       ASSERT_NE(at, made.cells.end()) << name;

@@ -18,9 +18,7 @@ VoxelStack masks_of(const HeightOf& height) {
         s.share.push_back(k * s.step_um > height({(i + 0.5) * s.pixel_um, (j + 0.5) * s.pixel_um}) ? 1 : 0);
   return s;
 }
-float& voxel(VoxelStack& s, int i, int j, int k) {
-  return s.share[static_cast<std::size_t>((k * s.n_y + j) * s.n_x + i)];
-}
+float& voxel(VoxelStack& s, int i, int j, int k) { return s.share[(k * s.n_y + j) * s.n_x + i]; }
 
 double slope(Vec2 p) { return 10 + 0.6 * p.x - 0.3 * p.y; }
 double bump(Vec2 p) { return 20 - 8 * std::exp(-0.02 * (std::pow(p.x - 15, 2) + std::pow(p.y - 12, 2))); }

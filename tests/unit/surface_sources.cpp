@@ -85,7 +85,7 @@ TEST(Height, goes_on_beyond_its_rim_without_a_kink_and_ends_level_at_its_mean) {
 HeightMap with_holes(HeightMap map, const std::function<bool(Vec2)>& is_hole) {
   for (int k = 0; k < map.n_x * map.n_y; ++k) {
     const Vec2 at = map.vertex_um(static_cast<std::size_t>(k));
-    if (is_hole(at)) map.z_um[static_cast<std::size_t>(k)] = kMissing;
+    if (is_hole(at)) map.z_um[k] = kMissing;
   }
   return map;
 }
@@ -130,7 +130,7 @@ TEST(HeightMap, coarser_ones_are_means_and_keep_their_place) {
   const HeightMap fine = sampled(tilted, {0, 0}, {20, 10}, 1), coarse = binned(fine, 2);
   for (int k = 0; k < coarse.n_x * coarse.n_y; ++k) {
     const Vec2 at = coarse.origin_um + Vec2{k % coarse.n_x * 2.0, k / coarse.n_x * 2.0};
-    EXPECT_NEAR(coarse.z_um[static_cast<std::size_t>(k)], tilted(at), 1e-12);
+    EXPECT_NEAR(coarse.z_um[k], tilted(at), 1e-12);
   }
   EXPECT_THROW(binned(fine, 4), InvalidData);
 }
