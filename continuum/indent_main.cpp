@@ -85,17 +85,16 @@ void expect_sense(const Parameters& p, const Setting& setting, const std::vector
   constexpr double kIncompressible = 0.49999;  // 1 - 2 nu = 2e-5: of 16 digits rounding takes ten
   for (const auto& [who, ratio] : {std::pair{"cell", p.poisson_ratio}, std::pair{"gel", p.gel.poisson_ratio}}) {
     if (ratio > kIncompressible)
-      throw UsageError(std::string("[") + who + "] poisson_ratio: expected at most 0.49999, found " +
-                       significant(ratio, 9) +
-                       ". A cell of 1/2 keeps its volume and does not move at all under the same contraction in all "
-                       "directions");
+      throw UsageError(
+          std::string("[") + who + "] poisson_ratio: expected at most 0.49999, found " + significant(ratio, 9) +
+          ". A cell of 1/2 keeps its volume and does not move at all under the same contraction in all directions");
   }
   constexpr double kMostContraction = 0.4;  // beyond it the law of St Venant and Kirchhoff softens in compression
   const double free = setting.cell.free_contraction();
   if (free > kMostContraction)
     throw UsageError(
-        "[cell] contraction_kPa: expected a contraction without hindrance, (1 - 2 nu) stress / modulus, of "
-        "at most 0.4, found " +
+        "[cell] contraction_kPa: expected a contraction without hindrance, (1 - 2 nu) stress / modulus, of at most "
+        "0.4, found " +
         brief(free));
   for (const Case& one : cases) {
     if (one.height_um == 0)
@@ -309,7 +308,7 @@ int main(int argc, char** argv) {
        .files = {{"outline", Kind::optional_input,
                   "outline of a contact that is no circle, as outline.csv of a cell: one ring, in um"},
                  {"out", Kind::output_folder,
-                  "indent.csv, indent.json, indent.vtu (of the deepest case); of a sweep optima.csv and the "
-                  "map, indent.svg"}}},
+                  "indent.csv, indent.json, indent.vtu (of the deepest case); of a sweep optima.csv and the map, "
+                  "indent.svg"}}},
       argc, argv, run);
 }

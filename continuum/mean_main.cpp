@@ -69,10 +69,9 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.add("register_by", p.register_by, "what cells are aligned by: their outlines, or images of them");
   list.add("image", p.image,
            "image in each cell's folder, with register_by = images: its name, or a key of [images] such as actin");
-  list.add(
-      "symmetry", p.symmetry,
-      "motions that leave the shape as it is: C1 none, C4 turns by a quarter, C4v with mirrors, Cinfv a circle; the "
-      "mean is taken over them, too");
+  list.add("symmetry", p.symmetry,
+           "motions that leave the shape as it is: C1 none, C4 turns by a quarter, C4v with mirrors, Cinfv a circle; "
+           "the mean is taken over them, too");
   list.add("mirror", p.mirror, "whether a cell may be mirrored; auto: if the reference is not its own mirror image");
   list.add("largest_misfit", p.largest_misfit, Range::between(1e-3, 1),
            "largest distance of an outline from the reference (root mean square), over the reference's radius");
@@ -232,8 +231,7 @@ std::vector<CellRow> rows_of(stage::StageContext& context, const Parameters& p, 
           cells[k].outline_file.string(),
           "an outline of the reference's shape: cell '" + rows[k].cell + "' is in one mean with the others",
           rows[k].reason,
-          "take the cell out, leave out all such cells (mean.others = left-out), or raise "
-          "mean.largest_misfit");
+          "take the cell out, leave out all such cells (mean.others = left-out), or raise mean.largest_misfit");
   }
   const int n_kept = static_cast<int>(rows.size()) - n_left_out;
   if (n_kept < 2)
@@ -393,8 +391,8 @@ void write_page(stage::StageContext& context, const std::string& picture, const 
       .picture_svg = picture,
       .picture_title = "Mean traction",
       .picture_explained =
-          "A ratio of tips to edge is mostly resolution: set the model through the same blur (--model) "
-          "beside it, never the model as it is.",
+          "A ratio of tips to edge is mostly resolution: set the model through the same blur (--model) beside it, "
+          "never the model as it is.",
       .tables = {{"Registration",
                   "How each cell lies on the reference, and how well its outline fits there.",
                   "registration.csv",

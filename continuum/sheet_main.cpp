@@ -89,22 +89,19 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.add("traction_correlation_um", p.traction_correlation_um, Range::size_um(),
            "with --traction: distance over which neighbours share their error, the resolution of the reconstruction "
            "(um); unset: each patch has an error of its own");
-  list.add(
-      "fit_parts", p.fit_parts,
-      "with --displacement: parts with a contraction of their own: none, all of the sheet alike; edge: the band of "
-      "edge_band_um and what is inside of it; cells: each cell of the label image --cells; field: the contraction "
-      "varies "
-      "smoothly, as much as the beads call for");
+  list.add("fit_parts", p.fit_parts,
+           "with --displacement: parts with a contraction of their own: none, all of the sheet alike; edge: the band "
+           "of edge_band_um and what is inside of it; cells: each cell of the label image --cells; field: the "
+           "contraction varies smoothly, as much as the beads call for");
   list.add(
       "field_points", p.field_points, Range::between(4, 200),
       "with fit_parts = field: approximate number of points at which the contraction is given, bilinear between them");
   list.add("fit_line_tension", p.fit_line_tension, "with --displacement: also fit line_tension_nN");
   list.add("fit_adhesion_stiffness", p.fit_adhesion_stiffness,
            "with --displacement: also fit adhesion_stiffness_nN_per_um3, of springs between sheet and gel");
-  list.add(
-      "outline_error_um", p.outline_error_um, Range::zero_or_size_um(),
-      "with --displacement: standard error of the outline's place, outward, along x and along y (um); it is part of "
-      "the intervals");
+  list.add("outline_error_um", p.outline_error_um, Range::zero_or_size_um(),
+           "with --displacement: standard error of the outline's place, outward, along x and along y (um); it is part "
+           "of the intervals");
   list.add("loss", p.loss,
            "with --displacement: loss function of the beads' residuals; all but squares give less weight to beads that "
            "stray");
@@ -859,8 +856,8 @@ int main(int argc, char** argv) {
            {{"outline", Kind::input,
              "outline of the sheet: outline.csv, a mask (PNG, TIFF) or an ImageJ selection (.roi, .zip)"},
             {"traction", Kind::optional_input,
-             "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 if they lie on no lattice): "
-             "tensions follow from it"},
+             "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 if they lie on no lattice): tensions "
+             "follow from it"},
             {"displacement", Kind::optional_input,
              "displacement.csv of the beads: contraction and stiffness are fitted to them"},
             {"adhesions", Kind::optional_input,
@@ -880,7 +877,6 @@ int main(int argc, char** argv) {
             {"points", Kind::optional_input, "points at which sheet.csv is written: x_um, y_um; else at the nodes"},
             {"out", Kind::output_folder,
              "sheet.csv, traction.csv, sheet.vtu, sheet.svg, sheet.html and sheet.json are written here; of a fit "
-             "sheet_fit.csv, "
-             "sheet_models.csv and displacement.csv, too"}}},
+             "sheet_fit.csv, sheet_models.csv and displacement.csv, too"}}},
       argc, argv, run);
 }

@@ -97,8 +97,7 @@ int main(int argc, char** argv) {
        .purpose = "reconstruct tractions from bead displacements by a standard method",
        .files = {{"displacement", FileArgument::Kind::input,
                   "displacement.csv of the beads, without the column sigma_um their errors are estimated from "
-                  "neighbours; or "
-                  "displacement_3d.csv of beads in space"},
+                  "neighbours; or displacement_3d.csv of beads in space"},
                  {"surface", FileArgument::Kind::optional_input,
                   "surface.vtp of mbtfm-surface, if the gel is not flat; its z = 0 is thickness_um above the base"},
                  {"adhesions", FileArgument::Kind::optional_input, "adhesions.csv: forces are summed up by adhesion"},

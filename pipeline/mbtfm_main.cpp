@@ -418,8 +418,8 @@ int start(int argc, char** argv) {
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
   batch_command
       ->add_option("--pattern", line.patterns,
-                   "make cell folders for images that lie together: KEY=PATTERN with KEY of [images] and "
-                   "{cell} for the cell's name, as in adhesion='{cell}_pax.tif'")
+                   "make cell folders for images that lie together: KEY=PATTERN with KEY of [images] and {cell} for "
+                   "the cell's name, as in adhesion='{cell}_pax.tif'")
       ->allow_extra_args(false);
   batch_command->add_option("--template", line.template_toml, "settings for the cell.toml of these folders");
   batch_command->add_flag("--list", line.only_list, "run nothing; print every cell's stages and their state (CSV)");
@@ -452,9 +452,8 @@ int start(int argc, char** argv) {
   plan_command->set_help_flag();
   plan_command->allow_extras();
   std::vector<std::string> pictures;
-  CLI::App* noise_command = app.add_subcommand("noise",
-                                               "noise and density of beads from two pictures of a place where "
-                                               "no cell pulls: mbtfm noise A.tif B.tif");
+  CLI::App* noise_command = app.add_subcommand(
+      "noise", "noise and density of beads from two pictures of a place where no cell pulls: mbtfm noise A.tif B.tif");
   noise_command->set_help_flag();
   noise_command->allow_extras()->add_option("PICTURES", pictures, "the two pictures")->expected(0, 2);
   fs::path manuals;

@@ -72,9 +72,8 @@ int main(int argc, char** argv) {
   using namespace mbtfm::statistics;
   return stage::run_stage<StudyParameters>(
       {.name = "stats",
-       .purpose =
-           "statistics of stress-fibre tensions, adhesion forces, contracting sheets and forces in space over all "
-           "finished cells of a folder",
+       .purpose = "statistics of stress-fibre tensions, adhesion forces, contracting sheets and forces in space over "
+                  "all finished cells of a folder",
        .files = {{"cells", stage::FileArgument::Kind::input, "folder with cell folders"},
                  {"table", stage::FileArgument::Kind::optional_input,
                   "CSV with a row for each cell: column cell, columns of conditions, column exclude with the reason"},

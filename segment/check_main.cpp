@@ -147,9 +147,8 @@ int main(int argc, char** argv) {
   bool is_fine = true;
   const int code = stage::run_stage(
       {.name = "check",
-       .purpose =
-           "what the images below a folder are good for, before a batch is run: calibration, sizes, saturation, focus, "
-           "beads, margin, pictures that are the same, disk",
+       .purpose = "what the images below a folder are good for, before a batch is run: calibration, sizes, saturation, "
+                  "focus, beads, margin, pictures that are the same, disk",
        .files = {{"cells", stage::FileArgument::Kind::input, "a cell folder, or a folder of cell folders"}}},
       argc, argv, [](auto&) {},
       [&](stage::StageContext& context) { return check(context.input("cells", {}), context.threads, is_fine); });

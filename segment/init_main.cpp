@@ -152,10 +152,9 @@ StageReport init(stage::StageContext& context) {
     throw InputError((folder / "cell.toml").string(), "no cell.toml yet", "one",
                      "it is yours: edit it, or rename it first");
   if (images_in(folder).empty())
-    throw InputError(
-        folder.string(), "images of a cell: TIFF, PNG or JPEG", "none",
-        "files of a microscope (nd2, czi, lif): in Fiji, File > Import > Bio-Formats, then File > Save As > Tiff; "
-        "or bfconvert IN OUT.ome.tif");
+    throw InputError(folder.string(), "images of a cell: TIFF, PNG or JPEG", "none",
+                     "files of a microscope (nd2, czi, lif): in Fiji, File > Import > Bio-Formats, then File > Save As "
+                     "> Tiff; or bfconvert IN OUT.ome.tif");
   const Written written = cell_toml(folder);
   files::write_text(context.output("out"), written.text);
   StageReport report;

@@ -91,7 +91,7 @@ int main(int argc, char** argv) {
        .purpose = "from two pictures of beads where no cell pulls: noise and density of the beads, drift, share lost",
        .files = {{"first", Kind::input, "beads of an unloaded place (TIFF, PNG or JPEG)"},
                  {"second", Kind::input,
-                  "the same place again, as long after as the stressed and the relaxed picture "
-                  "of an experiment are apart"}}},
+                  "the same place again, as long after as the stressed and the relaxed picture of an experiment are "
+                  "apart"}}},
       argc, argv, mbtfm::beads::run);
 }

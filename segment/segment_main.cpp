@@ -68,12 +68,12 @@ std::string assumption_of(const Segmentation& s, bool is_by_itself) {
       return placed + "all over the adhesive pattern under the cell." + doubt_about_pattern(s);
     case AdhesionSource::fibre_ends:
       return placed +
-             "at the ends of the fibres. Which ends are held in truth, and so the types of the fibres, is not "
-             "known. How much this choice matters is not in the error bars.";
+             "at the ends of the fibres. Which ends are held in truth, and so the types of the fibres, is not known. "
+             "How much this choice matters is not in the error bars.";
     case AdhesionSource::cell:
       return placed +
-             "at the ends of the fibres and along the rim of the cell. Which ends are held in truth, and so the "
-             "types of the fibres, is not known.";
+             "at the ends of the fibres and along the rim of the cell. Which ends are held in truth, and so the types "
+             "of the fibres, is not known.";
   }
   throw InternalError("unknown source of adhesions");
 }

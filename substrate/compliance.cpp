@@ -118,9 +118,9 @@ std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel&
                      "'");
   }
   if (gel.poisson_ratio == 0.5 && !model->can.incompressible) {
-    throw UsageError("gel.poisson_ratio = 0.5: the model " + std::string(name_of(model->kind)) +
-                     " computes with the bulk modulus, which is infinite there: set 0.499, or take the model layer "
-                     "or half-space");
+    throw UsageError(
+        "gel.poisson_ratio = 0.5: the model " + std::string(name_of(model->kind)) +
+        " computes with the bulk modulus, which is infinite there: set 0.499, or take the model layer or half-space");
   }
   if (gel.surface && !model->can.surface) {
     throw UsageError("substrate.model = " + std::string(name_of(model->kind)) +

@@ -11,8 +11,8 @@ namespace mbtfm::substrate {
 ModulusProfile profile_of(const std::string& text) {
   const auto fail = [&] {
     throw UsageError(
-        "substrate.modulus_profile: expected depths (um) and moduli (kPa) by rising depth, like '0:16, "
-        "10:16, 10:8.4', found '" +
+        "substrate.modulus_profile: expected depths (um) and moduli (kPa) by rising depth, like '0:16, 10:16, 10:8.4', "
+        "found '" +
         text + "'");
   };
   ModulusProfile profile;

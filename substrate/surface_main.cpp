@@ -73,8 +73,7 @@ void declare(stage::ParameterList& list, Parameters& p) {
            "where the z of the file points: into-gel or out-of-gel; must be given with a file, since no program can "
            "tell a surface from its mirror image");
   list.add("zero_at", p.zero_at,
-           "what becomes z = 0, from where the gel's thickness counts: the zero of the file, or "
-           "the mean height");
+           "what becomes z = 0, from where the gel's thickness counts: the zero of the file, or the mean height");
   list.add("method", p.method,
            "of beads in the volume: the smooth surface of greatest likelihood, or slices with alpha shapes");
   list.add("sigma_z_um", p.sigma_z_um, Range::positive(),

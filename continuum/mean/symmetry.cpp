@@ -33,8 +33,8 @@ Symmetry symmetry_of(const std::string& text) {
   if (!text.starts_with('C') || error != std::errc() || end != digits.data() + digits.size() || symmetry.n_turns < 1 ||
       symmetry.n_turns > kMostTurns)
     throw UsageError(
-        "--symmetry: expected C1 (none), C2, C3, ... C24, with v where it has mirrors (C4v), or Cinfv (a "
-        "circle), found '" +
+        "--symmetry: expected C1 (none), C2, C3, ... C24, with v where it has mirrors (C4v), or Cinfv (a circle), "
+        "found '" +
         text + "'");
   symmetry.has_mirrors = has_v;
   return symmetry;

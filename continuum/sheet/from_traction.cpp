@@ -217,8 +217,7 @@ FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Regi
                      "a net force of " + brief(result.unbalanced.net_force_share) + " and a net torque of " +
                          brief(result.unbalanced.net_torque_share),
                      "give an --area that holds the whole colony and all of its forces; if the tractions do not lie on "
-                     "another field, "
-                     "sheet.most_unbalanced lets more be taken off");
+                     "another field, sheet.most_unbalanced lets more be taken off");
   solution.sheet.material = material;
   solution.sheet.contraction_nN_per_um = even(elements, 0);
   solution.sheet.n_rims = static_cast<int>(region.rims.size());

@@ -21,8 +21,8 @@ void declare(stage::ParameterList& list, SheetParameters& p) {
            "stiffness of the adhesions per area, or of springs that stand for the ground (nN/um3 = kPa/um); unset: the "
            "sheet is bonded to the gel");
   list.add("ground", p.ground,
-           "what carries the sheet; auto: the gel, or springs if no gel is given or the gel is much stiffer than "
-           "the adhesions; none: the tractions are given");
+           "what carries the sheet; auto: the gel, or springs if no gel is given or the gel is much stiffer than the "
+           "adhesions; none: the tractions are given");
   list.add(
       "strain", p.strain,
       "small strains of the sheet or large ones; auto: large on springs if the contraction is large, small on a gel");
@@ -47,8 +47,8 @@ double contraction_of(const SheetParameters& p) {
   if (p.contraction_nN_per_um) return *p.contraction_nN_per_um;
   if (!p.contraction_kPa)
     throw UsageError(
-        "[sheet] contraction_nN_per_um (or contraction_kPa) is missing: give it, or the beads' "
-        "--displacement to fit it");
+        "[sheet] contraction_nN_per_um (or contraction_kPa) is missing: give it, or the beads' --displacement to fit "
+        "it");
   if (!p.thickness_um) throw UsageError("[sheet] thickness_um is missing: contraction_kPa is multiplied by it");
   return *p.contraction_kPa * *p.thickness_um;
 }

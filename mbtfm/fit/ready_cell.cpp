@@ -56,10 +56,9 @@ PlacedCell place_on_beads(const GelUnderCell& on, const DisplacementField& beads
       [&](const DisplacementField& there) { return data_of(on, there); }, p.gel, p.fit, started.start,
       can_be_shifted ? setting : Switch::off, on.threads);
   if (!can_be_shifted) {
-    place.effect =
-        stage::decided(EffectKind::channel_shift, setting, false,
-                       "candidates for adhesions have no place of their own: their lattice would be found, not the "
-                       "cell");
+    place.effect = stage::decided(
+        EffectKind::channel_shift, setting, false,
+        "candidates for adhesions have no place of their own: their lattice would be found, not the cell");
   }
   return place;
 }

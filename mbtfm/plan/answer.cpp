@@ -26,13 +26,11 @@ const Expected& expected_of(const Grid& grid, const Point& p, Quantity quantity)
 std::string about_adhesions(const Plan& plan, const Point& p) {
   const Expected& with = expected_of(plan.grid, p, Quantity::adhesion_force);
   const Expected& alone = expected_of(plan.grid, p, Quantity::free_force);
-  std::string text = "At " + about(p.beads_per_um2) +
-                     " per µm² the force of the middle adhesion has a standard "
-                     "error of " +
-                     about(with.standard_error_nN) + " nN with the network and " + about(alone.standard_error_nN) +
-                     " nN without it, and FTTC errs by " +
-                     about(expected_of(plan.grid, p, Quantity::fttc_force).standard_error_nN) +
-                     " nN; the smallest force seen is three times that. ";
+  std::string text =
+      "At " + about(p.beads_per_um2) + " per µm² the force of the middle adhesion has a standard error of " +
+      about(with.standard_error_nN) + " nN with the network and " + about(alone.standard_error_nN) +
+      " nN without it, and FTTC errs by " + about(expected_of(plan.grid, p, Quantity::fttc_force).standard_error_nN) +
+      " nN; the smallest force seen is three times that. ";
   const std::string pair = "Without the network two adhesions of " + brief(plan.asked.tension_nN) + " nN each are ";
   if (!alone.least_distance_um) return text + pair + "not told apart at any distance in a cell.";
   const std::string distance = about(*alone.least_distance_um) + " µm";

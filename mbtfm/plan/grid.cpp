@@ -231,8 +231,8 @@ std::vector<std::string> warnings_of(const Asked& asked, const Computed& c, cons
     const double left_out = choice::left_out_at_beads(of_modulus(scene.fit.gel, E), own.traction_kPa);
     if (left_out > kBeyondLinear)
       warnings.push_back("On " + brief(E) + " kPa linear elasticity leaves out some " + brief(100 * left_out) +
-                         " % of the displacement, which is strained beyond its range: evaluate with "
-                         "substrate.material = neo-hooke, or take a stiffer gel.");
+                         " % of the displacement, which is strained beyond its range: evaluate with substrate.material "
+                         "= neo-hooke, or take a stiffer gel.");
   }
   return warnings;
 }

@@ -102,9 +102,8 @@ std::vector<DrawnDot> drawn_dots(const Drawn& drawn) {
 constexpr const char* kHow =
     "<p class=\"sub\">The error by the beads is the Cramér–Rao bound of the fit: it grows in proportion to noise and "
     "modulus and falls with the root of the density. The model's part (meshes, segmentation, what is missing in the "
-    "model) is "
-    "the same for all of them: it is where the curves level off. “Never” means that this part alone is larger than the "
-    "target.</p>\n";
+    "model) is the same for all of them: it is where the curves level off. “Never” means that this part alone is "
+    "larger than the target.</p>\n";
 
 }  // namespace
 

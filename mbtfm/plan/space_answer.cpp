@@ -143,14 +143,13 @@ Table<SpaceNeeded> space_needed_table() {
   return {
       .file = "plan/plan_needed.csv of a cell in space",
       .row = "each gel and noise",
-      .columns = {
-          {"youngs_modulus_kPa", "of the gel", &Row::youngs_modulus_kPa, kResult},
-          {"noise_um", "standard deviation of a displacement component along x or y", &Row::noise_um, kResult},
-          {"beads_per_um3",
-           "at which half of the patches are within the target, and no less than the least asked for; empty: more than "
-           "four times the densest asked for",
-           &Row::beads_per_um3, kResult},
-          {"beads_per_um3_for_nine_in_ten", "the same for nine patches in ten", &Row::of_most, kResult}}};
+      .columns = {{"youngs_modulus_kPa", "of the gel", &Row::youngs_modulus_kPa, kResult},
+                  {"noise_um", "standard deviation of a displacement component along x or y", &Row::noise_um, kResult},
+                  {"beads_per_um3",
+                   "at which half of the patches are within the target, and no less than the least asked for; empty: "
+                   "more than four times the densest asked for",
+                   &Row::beads_per_um3, kResult},
+                  {"beads_per_um3_for_nine_in_ten", "the same for nine patches in ten", &Row::of_most, kResult}}};
 }
 
 Table<SpaceDrawnForce> space_drawn_table() {

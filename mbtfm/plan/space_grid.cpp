@@ -243,8 +243,8 @@ std::vector<std::string> warnings_of(const SpaceScene& scene, const Asked& asked
                          "forces of single adhesions then rest on their image. Take more beads, or a softer gel.");
     if (last && last->left_out > kBeyondLinear)
       warnings.push_back("On " + brief(E) + " kPa linear elasticity leaves out some " + brief(100 * last->left_out) +
-                         " % of the displacement, which is strained beyond its range: evaluate with "
-                         "substrate.material = neo-hooke, or take a stiffer gel.");
+                         " % of the displacement, which is strained beyond its range: evaluate with substrate.material "
+                         "= neo-hooke, or take a stiffer gel.");
   }
   return warnings;
 }

@@ -66,9 +66,8 @@ std::vector<DrawnDot> drawn_dots(const SpaceDrawn& drawn) {
 
 constexpr const char* kHow =
     "<p class=\"sub\">Standard errors are those that the reconstruction states, with lambda as data of this noise "
-    "choose "
-    "it. A modulus counts as noise does. More noise makes lambda larger, so that the error grows less than the noise. "
-    "“By background” is the part by tractions beside the patches that the beads do not tell from them.</p>\n";
+    "choose it. A modulus counts as noise does. More noise makes lambda larger, so that the error grows less than the "
+    "noise. “By background” is the part by tractions beside the patches that the beads do not tell from them.</p>\n";
 
 }  // namespace
 

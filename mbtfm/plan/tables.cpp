@@ -41,21 +41,19 @@ Table<Expected> expected_table() {
 
 Table<Needed> needed_table() {
   using Row = Needed;
-  return {
-      .file = "plan/plan_needed.csv",
-      .row = "each gel and noise",
-      .columns = {
-          {"youngs_modulus_kPa", "of the gel", &Row::youngs_modulus_kPa, kResult},
-          {"noise_um", "standard deviation of a displacement component", &Row::noise_um, kResult},
-          {"beads_per_um2",
-           "at which half of the fibres are within the target, and no less than the least asked for; empty: none is "
-           "enough",
-           &Row::beads_per_um2, kResult},
-          {"beads_per_um2_for_nine_in_ten", "the same for nine fibres in ten",
-           [](const Row& row) -> std::optional<double> {
-             return std::isfinite(row.of_most) ? std::optional(row.of_most) : std::nullopt;
-           },
-           kResult}}};
+  return {.file = "plan/plan_needed.csv",
+          .row = "each gel and noise",
+          .columns = {{"youngs_modulus_kPa", "of the gel", &Row::youngs_modulus_kPa, kResult},
+                      {"noise_um", "standard deviation of a displacement component", &Row::noise_um, kResult},
+                      {"beads_per_um2",
+                       "at which half of the fibres are within the target, and no less than the least asked for; "
+                       "empty: none is enough",
+                       &Row::beads_per_um2, kResult},
+                      {"beads_per_um2_for_nine_in_ten", "the same for nine fibres in ten",
+                       [](const Row& row) -> std::optional<double> {
+                         return std::isfinite(row.of_most) ? std::optional(row.of_most) : std::nullopt;
+                       },
+                       kResult}}};
 }
 
 Table<DrawnTension> drawn_table() {

@@ -23,32 +23,31 @@ struct Row {
 };
 
 files::Table<Row> traction_table() {
-  return {
-      .file = "traction_3d.csv",
-      .row =
-          "each vertex of the smallest faces of the tractions of `mbtfm-traction` in space, which are bilinear between "
-          "them",
-      .columns = {
-          {"x_um", "the vertex", files::x_of(&Row::position_um)},
-          {"y_um", "the vertex", files::y_of(&Row::position_um)},
-          {"z_um", "the vertex, into the gel", files::z_of(&Row::position_um)},
-          {"tx_kPa", "traction of the cell on the gel, per area of the relaxed surface",
-           files::x_of(&Row::traction_kPa)},
-          {"ty_kPa", "the same along y", files::y_of(&Row::traction_kPa)},
-          {"tz_kPa", "the same into the gel", files::z_of(&Row::traction_kPa)},
-          {"sigma_tx_kPa", "standard error: the beads' noise, and what they do not resolve", &Row::sigma_x_kPa,
-           kResult},
-          {"sigma_ty_kPa", "the same along y", &Row::sigma_y_kPa, kResult},
-          {"sigma_tz_kPa", "the same into the gel", &Row::sigma_z_kPa, kResult},
-          {"resolution_um",
-           "forces closer together than this look like one; from about twice that on they are mostly seen as two",
-           &Row::resolution_um, kResult},
-          {"normal_kPa", "traction along the normal out of the gel: above 0 it pulls", &Row::normal_kPa, kResult},
-          {"tangential_kPa", "size of the traction along the surface", &Row::tangential_kPa, kResult},
-          {"area_um2", "of the curved surface around the vertex", &Row::area_um2, kResult},
-          {"ux_um", "the model's displacement there", files::x_of(&Row::displacement_um), kResult},
-          {"uy_um", "the model's displacement there", files::y_of(&Row::displacement_um), kResult},
-          {"uz_um", "the model's displacement there, into the gel", files::z_of(&Row::displacement_um), kResult}}};
+  return {.file = "traction_3d.csv",
+          .row =
+              "each vertex of the smallest faces of the tractions of `mbtfm-traction` in space, which are bilinear "
+              "between them",
+          .columns = {
+              {"x_um", "the vertex", files::x_of(&Row::position_um)},
+              {"y_um", "the vertex", files::y_of(&Row::position_um)},
+              {"z_um", "the vertex, into the gel", files::z_of(&Row::position_um)},
+              {"tx_kPa", "traction of the cell on the gel, per area of the relaxed surface",
+               files::x_of(&Row::traction_kPa)},
+              {"ty_kPa", "the same along y", files::y_of(&Row::traction_kPa)},
+              {"tz_kPa", "the same into the gel", files::z_of(&Row::traction_kPa)},
+              {"sigma_tx_kPa", "standard error: the beads' noise, and what they do not resolve", &Row::sigma_x_kPa,
+               kResult},
+              {"sigma_ty_kPa", "the same along y", &Row::sigma_y_kPa, kResult},
+              {"sigma_tz_kPa", "the same into the gel", &Row::sigma_z_kPa, kResult},
+              {"resolution_um",
+               "forces closer together than this look like one; from about twice that on they are mostly seen as two",
+               &Row::resolution_um, kResult},
+              {"normal_kPa", "traction along the normal out of the gel: above 0 it pulls", &Row::normal_kPa, kResult},
+              {"tangential_kPa", "size of the traction along the surface", &Row::tangential_kPa, kResult},
+              {"area_um2", "of the curved surface around the vertex", &Row::area_um2, kResult},
+              {"ux_um", "the model's displacement there", files::x_of(&Row::displacement_um), kResult},
+              {"uy_um", "the model's displacement there", files::y_of(&Row::displacement_um), kResult},
+              {"uz_um", "the model's displacement there, into the gel", files::z_of(&Row::displacement_um), kResult}}};
 }
 
 /// As an even lattice of the smallest faces, which every reader understands.

@@ -13,12 +13,11 @@ std::optional<Loss> loss_of_switch(Switch setting, Loss robust_kind) {
 Effect robust_loss_effect(Switch setting, Loss used_loss) {
   const bool is_robust = used_loss != Loss::squares;
   const std::string why =
-      is_robust
-          ? std::string(name_of(used_loss)) +
-                ": single beads are further off than Gaussian noise explains, and they move a tension by more "
-                "than a tenth of its standard error or widen the standard errors by more than a tenth"
-          : "no single bead is further off than Gaussian noise explains, or such beads move no tension by a tenth "
-            "of its standard error and widen none by a tenth";
+      is_robust ? std::string(name_of(used_loss)) +
+                      ": single beads are further off than Gaussian noise explains, and they move a tension by more "
+                      "than a tenth of its standard error or widen the standard errors by more than a tenth"
+                : "no single bead is further off than Gaussian noise explains, or such beads move no tension by a "
+                  "tenth of its standard error and widen none by a tenth";
   return stage::decided(EffectKind::robust_loss, setting, is_robust, why);
 }
 

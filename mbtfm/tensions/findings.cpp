@@ -62,10 +62,9 @@ Noticed strain_beyond_linear(const FitOutcome& o) {
 
 Noticed noise_unknown(const FitOutcome& o) {
   const bool is_known = o.data.has_errors || o.has_far_beads;
-  return noticed(
-      FindingKind::noise_unknown, is_known ? 0 : static_cast<double>(o.data.position_um.size()),
-      "The noise of the beads is not known: the displacement states no errors, and too few beads lie far from "
-      "the cell. What the model leaves unexplained is taken for noise.");
+  return noticed(FindingKind::noise_unknown, is_known ? 0 : static_cast<double>(o.data.position_um.size()),
+                 "The noise of the beads is not known: the displacement states no errors, and too few beads lie far "
+                 "from the cell. What the model leaves unexplained is taken for noise.");
 }
 
 double stated_noise_um(const LinearData& data) {
@@ -265,8 +264,8 @@ Noticed cell_cut(const FitOutcome& o) {
       "The image's border cuts the cell. The fit holds the network along the cut; " +
           with_error(force.value, force.standard_error) + " nN pass through it. " +
           (o.beyond ? "Forces beyond the cut were allowed for; fibres and adhesions near it have larger errors."
-                    : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are "
-                      "taken for forces of the adhesions near it."),
+                    : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are taken for "
+                      "forces of the adhesions near it."),
       o.beyond ? Severity::note : Severity::caution);
 }
 

@@ -57,10 +57,9 @@ BeadsOfState take_state(const DisplacementField& at_rest, LinearData data,
     const Eigen::VectorXd there = result.data.displacement_um - carried(result.data);
     const double estimate = evidence_of(result.data, result.data.reduced, floor_squared_of(result.data, there));
     if (estimate < kHopeless) {
-      result.effect =
-          stage::decided(kKind, setting, estimate, kHopeless,
-                         "twice the logarithm of the odds, estimated with the forces that explain the beads at rest, "
-                         "is");
+      result.effect = stage::decided(
+          kKind, setting, estimate, kHopeless,
+          "twice the logarithm of the odds, estimated with the forces that explain the beads at rest, is");
       result.effect.seconds = watch.seconds();
       return result;
     }

@@ -53,10 +53,9 @@ Reconstruction reconstruct_by_method(const TractionInputs& inputs, const Tractio
     case TractionMethod::adhesion_forces:
       return reconstruct_adhesion_forces(inputs, parameters, threads);
     default:
-      throw UsageError(
-          std::string(name_of(method)) +
-          " takes beads in space: give a displacement_3d.csv, with z_um and uz_um, or choose fttc, sparse, "
-          "trpf, bem or adhesion-forces");
+      throw UsageError(std::string(name_of(method)) +
+                       " takes beads in space: give a displacement_3d.csv, with z_um and uz_um, or choose fttc, "
+                       "sparse, trpf, bem or adhesion-forces");
   }
 }
 

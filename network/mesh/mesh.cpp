@@ -129,10 +129,9 @@ void declare(stage::ParameterList& list, NetworkParameters& parameters) {
   list.table("network");
   list.add("edge_length_um", parameters.edge_length_um, Range::mesh_um(), "mean length of the network's cables (um)");
   list.add("seed", parameters.seed, "random seed of the vertices' first positions");
-  list.add(
-      "link_weights", parameters.link_weights,
-      "tension and stiffness of the actin network's links: the same for all, or by the width of material that each "
-      "represents");
+  list.add("link_weights", parameters.link_weights,
+           "tension and stiffness of the actin network's links: the same for all, or by the width of material that "
+           "each represents");
   list.add("link_reach", parameters.link_reach,
            "what the actin network's links join: vertices at the two ends of an edge, or also those across from each "
            "other at one, so that links run in twelve directions rather than six");

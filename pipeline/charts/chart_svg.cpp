@@ -137,8 +137,8 @@ std::string svg_of(const Mark& mark, const Frame& frame) {
       return element("path", fmt::format("d=\"M{},{:.1f}h{}\"", kLeft_px, at.y, Chart::kFrameWidth_px), mark);
     case Kind::label:
       return fmt::format(
-          "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\" style=\"font-weight:600;stroke:#fff;stroke-width:4;"
-          "stroke-linejoin:round;paint-order:stroke\">{}</text>\n",
+          "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\" "
+          "style=\"font-weight:600;stroke:#fff;stroke-width:4;stroke-linejoin:round;paint-order:stroke\">{}</text>\n",
           at.x, at.y + 5, html_escaped(mark.text));
     case Kind::picture:
       return fmt::format("<image {} preserveAspectRatio=\"none\" href=\"{}\"/>\n", rectangle(at, to),
@@ -222,8 +222,8 @@ std::string Chart::str() const {
   for (std::size_t i = 0; i < keys_.size(); ++i) {
     const bool is_left = key_side_ == KeySide::left;
     svg += fmt::format(
-        "<text x=\"{}\" y=\"{}\" text-anchor=\"{}\" fill=\"{}\" style=\"stroke:#fff;stroke-width:4;"
-        "stroke-linejoin:round;paint-order:stroke\">{}</text>\n",
+        "<text x=\"{}\" y=\"{}\" text-anchor=\"{}\" fill=\"{}\" "
+        "style=\"stroke:#fff;stroke-width:4;stroke-linejoin:round;paint-order:stroke\">{}</text>\n",
         is_left ? kLeft_px + 10 : right - 10, kTop_px + 20 + 18 * static_cast<double>(i), is_left ? "start" : "end",
         readable_on_white(keys_[i].second), html_escaped(keys_[i].first));
   }

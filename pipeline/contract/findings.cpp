@@ -35,15 +35,14 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Look at the adhesion image: it shows actin where its signal bleeds through or the two channels are exchanged."},
       {bright_actin, "bright-actin", "segment", caution, "length of bright actin that is in no fibre (um)", 0,
        "lines as bright as the cell's middle fibre, 3 um and longer, 3 um and more from the edge: none in six "
-       "simulated cells with fibres, in two of three without, and in four of six real ones; 9 to 26 um if one fibre "
-       "is taken out",
+       "simulated cells with fibres, in two of three without, and in four of six real ones; 9 to 26 um if one fibre is "
+       "taken out",
        "Look at the dots in 1_segment/overlay.png. Draw what is missing by hand (images.fibre_rois; begin with "
        "1_segment/RoiSet.zip)."},
       {bleed_through, "bleed-through", "segment", caution,
        "contrast of the fibres in the adhesion image, over that of the adhesions", 0.1,
        "two simulated cells have 0.00 and a real paxillin image 0.03; a tenth of the actin's light makes it 0.12, with "
-       "7 "
-       "to 12 adhesions of 170 that are none, a fifth 0.25, with 70",
+       "7 to 12 adhesions of 170 that are none, a fifth 0.25, with 70",
        "Look at the adhesion image: fibres that it shows are taken for adhesions. Record with other filters or one "
        "channel after the other, subtract the actin image's share, or draw the adhesions by hand "
        "(images.adhesion_rois)."},
@@ -60,13 +59,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the outlines of five simulated cells and of a real doublet have 0.000; those of another cell 0.005 to 0.16, "
        "nine of eleven above this threshold",
        "Look at 1_segment/overlay.png: is it the outline of this cell, at its place and the same way up? If the cell "
-       "is "
-       "too dim there for the program, the outline may still be right."},
+       "is too dim there for the program, the outline may still be right."},
       {actin_shift, "actin-shift", "segment", note, "1 if the actin image is shifted against the adhesion image", 0,
        "twice the gain in log likelihood is above 16.25 near no shift, which chance makes in one cell of 370, and "
        "above 27 elsewhere",
-       "Nothing if the fibres were moved. If it recurs, measure the shift between the filters with beads that shine "
-       "in both."},
+       "Nothing if the fibres were moved. If it recurs, measure the shift between the filters with beads that shine in "
+       "both."},
       {adhesions_assumed, "adhesions-assumed", "segment", caution, "candidates for adhesions, which no image shows", 0,
        "forces act where adhesions are; candidates are where they may be",
        "Give an adhesion image (images.adhesion; paxillin.tif if nothing is said), a mask of the adhesions "
@@ -85,8 +83,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the pattern is as large as the cell, read sums of forces over neighbours, not single ones."},
       {fibre_ends_anchored, "fibre-ends-anchored", "segment", note,
        "ends of fibres that reach no adhesion and are held by an anchor", 0,
-       "ventral and edge fibres are held at both ends, dorsal ones at one; fibres that span the cell are "
-       "usually ventral",
+       "ventral and edge fibres are held at both ends, dorsal ones at one; fibres that span the cell are usually "
+       "ventral",
        "Check these ends in 1_segment/overlay.png (dashed circles). An adhesion that was missed: lower "
        "segment.adhesion_seed_noise, or draw it. A fibre that is not held there: draw it and name it dorsal or arc."},
       {input_not_used, "input-not-used", "segment", note, "inputs that were not used because another one counts more",
@@ -165,15 +163,13 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "way",
        1.5,
        "it is 1.9 to 13 in simulated cells with images mirrored or transposed, components exchanged or places in "
-       "pixels; "
-       "1.0 if there is another reason, as adhesions of another cell",
+       "pixels; 1.0 if there is another reason, as adhesions of another cell",
        "Correct the images or the table in the way that is named, and run again. Disregard these results."},
       {field_smoothed, "field-smoothed", "fit", caution,
        "what the model leaves of the displacement, over what it leaves if it is smoothed like the displacement", 2,
        "it is some hundred for fields smoothed over 4 um, and 1.0 to 1.6 for all that were not",
        "Take a displacement field that was not smoothed: smaller windows, no filter. Or give the two bead images, "
-       "which "
-       "this program tracks itself. Tensions of a smoothed field are wrong by more than their error bars."},
+       "which this program tracks itself. Tensions of a smoothed field are wrong by more than their error bars."},
       {unexplained_displacement, "unexplained-displacement", "fit", caution,
        "sum of squares that the model leaves of the displacement, over that of the beads' noise", 1.25,
        "up to half of the noise's standard deviation, the model's own error adds less than an eighth to what is left",
@@ -296,8 +292,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "adhesions.csv."},
       {tractions_out_of_balance, "tractions-out-of-balance", "traction", caution,
        "squared net force and net moment over their joint covariance (chi-squared of six numbers)", 22.5,
-       "a cell at rest pulls as much one way as the other; chance exceeds this once in a thousand cells. "
-       "The standard errors contain the error of the gel's model",
+       "a cell at rest pulls as much one way as the other; chance exceeds this once in a thousand cells. The standard "
+       "errors contain the error of the gel's model",
        "Check that the whole cell lies above the beads: forces beyond them are missing in the sum. Look for a cell "
        "beside it, or for a support that holds the cell."},
       {beads_stray, "beads-stray", "traction", caution,
@@ -315,12 +311,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "in sound simulated scenes it is 0.1 to 1.4; of 60 to 100 beads of which some are astray, or of stacks of which "
        "one grew, it is tens to thousands: then the tractions follow errors of the beads, not forces",
        "Use more beads: with 500 it never happened. Set traction.loss = mixture if beads may be astray. Check surface, "
-       "gel "
-       "and sigma_um, and whether one stack "
-       "grew against the other (another focus or temperature): "
-       "the misfit is not the beads' noise. The tractions are those with lambda by "
-       "evidence, and may be smoothed too much. To choose yourself, set traction.lambda_by or "
-       "traction.lambda_um_per_kPa."},
+       "gel and sigma_um, and whether one stack grew against the other (another focus or temperature): the misfit is "
+       "not the beads' noise. The tractions are those with lambda by evidence, and may be smoothed too much. To choose "
+       "yourself, set traction.lambda_by or traction.lambda_um_per_kPa."},
       {modulus_error_unknown, "modulus-error-unknown", "fit", note, "1 if gel.youngs_modulus_sigma_kPa is not given", 0,
        "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
        "Give gel.youngs_modulus_sigma_kPa; the error budget then has a line for it."},
@@ -362,9 +355,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "sum of squares that the sheet leaves of the displacement, over that of the beads' noise", 1.25,
        "up to half of the noise's standard deviation, the sheet's own error adds less than an eighth to what is left",
        "Compare the models in sheet_models.csv. If stress fibres pull, give them (--bundles; for mbtfm run, "
-       "run.bundles). "
-       "If the edge pulls more than the rest, set fit_line_tension or fit_parts. If the sheet adheres in places only, "
-       "give these (--adhesive; for mbtfm run, images.adhesion_mask). Check the gel and the outline."},
+       "run.bundles). If the edge pulls more than the rest, set fit_line_tension or fit_parts. If the sheet adheres in "
+       "places only, give these (--adhesive; for mbtfm run, images.adhesion_mask). Check the gel and the outline."},
       {sheet_expands, "sheet-expands", "sheet", caution,
        "share of the sheet's parts whose best contraction is below zero, or whose 95 % interval holds no contraction",
        0,
@@ -378,8 +370,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Read sheet_fit.csv for what is limited. If the stiffness is known, give sheet.youngs_modulus_kPa."},
       {sheet_cut, "sheet-cut", "sheet", caution,
        "relative difference of the mean tension between a sheet clamped where the image cuts it and one held across "
-       "the "
-       "cut only",
+       "the cut only",
        0, "nothing is known of the sheet beyond the image's border, and each assumption has other tensions near it",
        "Take the tensions far from the cut (cut_reach_um in sheet.json), or images that show the whole colony."},
       {tractions_off_balance, "tractions-off-balance", "sheet", caution,

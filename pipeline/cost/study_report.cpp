@@ -60,8 +60,8 @@ files::Table<CostRow> cost_table() {
               {"peak_memory_MB", "the largest of the stages", member(measured, &Measurement::peak_memory_MB), kResult},
               {"n_runs", "of which the times are the median", member(measured, &Measurement::n_runs)},
               {"tension_error",
-               "‖t − reference‖/‖reference‖ over the fibres; the reference is the truth if it "
-               "is known, else the finest choice",
+               "‖t − reference‖/‖reference‖ over the fibres; the reference is the truth if it is known, else the "
+               "finest choice",
                member(measured_in_plane, &Measurement::error), kResult},
               {"force_error", "of the total force, relative", member(measured, &Measurement::force_error), kResult},
               {"stated_tension_error", "what the error budget says",

@@ -19,8 +19,8 @@ Table<SheetEstimate> sheet_estimate_table() {
       .columns = {
           {"quantity", "with its unit; stiffness is E h / (1 - nu²)", &Row::quantity},
           {"part",
-           "of the sheet, where parts contract each by its own: inside, edge, or a cell of the label image; mean, "
-           "of a contraction that varies; or the bundle; else empty",
+           "of the sheet, where parts contract each by its own: inside, edge, or a cell of the label image; mean, of a "
+           "contraction that varies; or the bundle; else empty",
            &Row::part},
           {"value", "where the misfit is least", &Row::value, kResult},
           {"sigma", "standard error; empty if the beads do not determine the quantity", &Row::sigma, kResult},
@@ -28,8 +28,7 @@ Table<SheetEstimate> sheet_estimate_table() {
           {"high", "upper end of the 95 % interval; empty: none", &Row::high, kResult},
           {"identifiable", "the beads limit it to both sides", &Row::identifiable},
           part("by_beads",
-               "part of sigma by noise of the beads' displacements; the squares of all parts add up to that "
-               "of sigma",
+               "part of sigma by noise of the beads' displacements; the squares of all parts add up to that of sigma",
                &SheetErrorParts::beads),
           part("by_motion", "part by the motion that all beads share; empty: none was allowed for",
                &SheetErrorParts::motion),

@@ -18,28 +18,27 @@ constexpr ColumnOptions kShareMayLack = {.range = {.low = 0, .high = 1}, .may_la
 }  // namespace
 
 Table<Adhesion> adhesion_table() {
-  return {
-      .file = "1_segment/adhesions.csv",
-      .row = "each adhesion",
-      .columns = {{"adhesion_id", "label, from the segmentation to the statistics", &Adhesion::adhesion_id, kId},
-                  {"x_um", "its centre", x_of(&Adhesion::position_um)},
-                  {"y_um", "its centre; y points down", y_of(&Adhesion::position_um)},
-                  {"area_um2", "area of what was segmented, and of the ellipse", &Adhesion::area_um2, kPositive},
-                  {"major_axis_um", "full axis of the ellipse of equal second moments, scaled to the area",
-                   &Adhesion::major_axis_um, kPositive},
-                  {"minor_axis_um", "the other full axis", &Adhesion::minor_axis_um, kPositive},
-                  {"angle_deg", "of the major axis, from +x towards +y",
-                   [](const Adhesion& a) { return a.angle_rad / kDegree_rad; },
-                   [](Adhesion& a, double angle_deg) { a.angle_rad = angle_deg * kDegree_rad; }},
-                  {"eccentricity", "of the ellipse; 0: a disc", &Adhesion::eccentricity, kShare},
-                  {"mean_intensity", "height above the local background", &Adhesion::mean_intensity},
-                  {"origin",
-                   "where it comes from: found in the image or a mask, drawn by hand, put where a fibre must be held, "
-                   "or put where an adhesion may be",
-                   &Adhesion::origin, kMayLack},
-                  {"edge_distance_um", "from the centre to the outline or a hole of the cell",
-                   &Adhesion::edge_distance_um, kMayLack}},
-      .label = "adhesion"};
+  return {.file = "1_segment/adhesions.csv",
+          .row = "each adhesion",
+          .columns = {{"adhesion_id", "label, from the segmentation to the statistics", &Adhesion::adhesion_id, kId},
+                      {"x_um", "its centre", x_of(&Adhesion::position_um)},
+                      {"y_um", "its centre; y points down", y_of(&Adhesion::position_um)},
+                      {"area_um2", "area of what was segmented, and of the ellipse", &Adhesion::area_um2, kPositive},
+                      {"major_axis_um", "full axis of the ellipse of equal second moments, scaled to the area",
+                       &Adhesion::major_axis_um, kPositive},
+                      {"minor_axis_um", "the other full axis", &Adhesion::minor_axis_um, kPositive},
+                      {"angle_deg", "of the major axis, from +x towards +y",
+                       [](const Adhesion& a) { return a.angle_rad / kDegree_rad; },
+                       [](Adhesion& a, double angle_deg) { a.angle_rad = angle_deg * kDegree_rad; }},
+                      {"eccentricity", "of the ellipse; 0: a disc", &Adhesion::eccentricity, kShare},
+                      {"mean_intensity", "height above the local background", &Adhesion::mean_intensity},
+                      {"origin",
+                       "where it comes from: found in the image or a mask, drawn by hand, put where a fibre must be "
+                       "held, or put where an adhesion may be",
+                       &Adhesion::origin, kMayLack},
+                      {"edge_distance_um", "from the centre to the outline or a hole of the cell",
+                       &Adhesion::edge_distance_um, kMayLack}},
+          .label = "adhesion"};
 }
 
 Table<Fibre> fibre_table() {

@@ -87,8 +87,8 @@ std::string arrow_legend(const ArrowScale& scale, const std::string& unit) {
   // --frame: width of the frame in that of the charts' SVG; set by the page's script
   return fmt::format(
       "<span class=\"arrow\"><svg viewBox=\"0 -6 {0:.1f} 12\" preserveAspectRatio=\"none\" "
-      "style=\"width:calc({0:.1f}px*var(--frame,1))\"><path d=\"{1}\" style=\"fill:none;stroke:#111;stroke-width:1.6;"
-      "vector-effect:non-scaling-stroke\"/></svg>{2} {3}</span>",
+      "style=\"width:calc({0:.1f}px*var(--frame,1))\"><path d=\"{1}\" "
+      "style=\"fill:none;stroke:#111;stroke-width:1.6;vector-effect:non-scaling-stroke\"/></svg>{2} {3}</span>",
       length_px, charts::arrow_path({length_px, 0}), charts::readable(value), unit);
 }
 

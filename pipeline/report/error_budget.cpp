@@ -128,12 +128,11 @@ std::string error_budget_html(const std::vector<BudgetLine>& budget, const std::
   }
   std::stable_sort(fibres.begin(), fibres.end(),
                    [](const BudgetLine& a, const BudgetLine& b) { return a.total_nN > b.total_nN; });
-  std::string html =
-      "<div class=\"grid\">" +
-      figure(chart_of(fibres),
-             "The largest first. A bar is as long as the standard error; the sources’ squares add up, so "
-             "each has the share of the bar that it has of the square.") +
-      "</div>\n";
+  std::string html = "<div class=\"grid\">" +
+                     figure(chart_of(fibres),
+                            "The largest first. A bar is as long as the standard error; the sources’ squares add up, "
+                            "so each has the share of the bar that it has of the square.") +
+                     "</div>\n";
   return html + folded("Error budget in numbers", html_of(table, {cell + "_error_budget.csv", csv + "\n"}));
 }
 

@@ -123,17 +123,17 @@ std::string quality(const FitSummary& fit) {
         two_digits(1000 * fit.noise_um), percent(fit.relative_l2), percent(fit.expected_relative_l2));
   } else {
     text = fmt::format(
-        "Of the displacement that the model leaves unexplained, {:.0f} % is the noise of the beads ({} "
-        "nm a component) and {:.0f} % the error of the model (mesh, segmentation, gel), as shares of the "
-        "sum of squares. Relative L2 {}, by noise alone {}.",
+        "Of the displacement that the model leaves unexplained, {:.0f} % is the noise of the beads ({} nm a component) "
+        "and {:.0f} % the error of the model (mesh, segmentation, gel), as shares of the sum of squares. Relative L2 "
+        "{}, by noise alone {}.",
         100 * noise2 / left2, two_digits(1000 * fit.noise_um), 100 * (1 - noise2 / left2), percent(fit.relative_l2),
         percent(fit.expected_relative_l2));
   }
   constexpr double kLarge = 0.3;  // a reader may take it for a bad fit
   if (fit.expected_relative_l2 > kLarge) {
     text +=
-        " These are large because relative L2 counts every bead, also the many far from the cell that move less "
-        "than their noise.";
+        " These are large because relative L2 counts every bead, also the many far from the cell that move less than "
+        "their noise.";
   }
   return text;
 }

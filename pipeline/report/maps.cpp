@@ -166,8 +166,7 @@ Figure original_network(const CellResults& results) {
   return {map,
           fmt::format("Stress fibres (dorsal d, arc a, ventral v, edge e) with their numbers, coloured by their fitted "
                       "tension, in the network of the first mesh before it contracts: {} vertices, {} links (grey: "
-                      "actin network). Blue: {}, which "
-                      "hold the vertices inside them.",
+                      "actin network). Blue: {}, which hold the vertices inside them.",
                       results.network.vertices_um.size(), results.network.links.size(),
                       has_origin(results.cell, AdhesionOrigin::candidate) ? "candidates for adhesions" : "adhesions") +
               caption_of_cut(results.cell),
@@ -321,13 +320,12 @@ Figure bead_map(const CellResults& results) {
     map.dot(bead.position_um, 3.5, "fill:#fff;fill-opacity:0.01;stroke-width:1.2;stroke:#ffe14d",
             "left out: " + bead.flag);
   }
-  return {
-      map,
-      fmt::format("Relaxed image green, stressed image purple, without their drift; white: beads that did not move. "
-                  "Yellow rings: {} beads that were left out, with the reason.",
-                  n_flagged) +
-          caption_of_cut(results.cell),
-      ""};
+  return {map,
+          fmt::format("Relaxed image green, stressed image purple, without their drift; white: beads that did not "
+                      "move. Yellow rings: {} beads that were left out, with the reason.",
+                      n_flagged) +
+              caption_of_cut(results.cell),
+          ""};
 }
 
 Figure adhesion_map(const CellResults& results) {
@@ -348,11 +346,10 @@ Figure adhesion_map(const CellResults& results) {
     map.arrow(by_id.at(force.adhesion_id)->position_um, scale.px_per_unit * force.force_nN,
               "stroke-width:1.4;stroke:#111");
   }
-  const std::string of_candidates =
-      has_origin(results.cell, AdhesionOrigin::candidate)
-          ? " Candidates are no adhesions that were seen: read their colours as a traction density (force over the "
-            "area of a lattice cell)."
-          : "";
+  const std::string of_candidates = has_origin(results.cell, AdhesionOrigin::candidate)
+                                        ? " Candidates are no adhesions that were seen: read their colours as a "
+                                          "traction density (force over the area of a lattice cell)."
+                                        : "";
   return {map,
           std::string(are_all_candidates(results.cell)
                           ? "Each candidate is coloured by the traction at its place; the arrow is the force"
@@ -380,13 +377,13 @@ Figure usual_method_map(const CellResults& results) {
           : "";
   return {
       map,
-      fmt::format("Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on "
-                  "squares of {:.2g} µm; the largest is {} kPa. Its scale of colours is not that of “Forces on the "
-                  "substrate”. FTTC knows neither adhesions nor fibres: a traction spreads around its adhesion, and "
-                  "noise makes tractions everywhere. Total force in the outline, noise included: {} nN; by the "
-                  "model: {} nN. White: outline and adhesions.",
-                  lambda, usual.spacing_um, charts::readable(largest_kPa), charts::readable(usual.total_force_nN),
-                  charts::readable(results.fit.total_force_nN)) +
+      fmt::format(
+          "Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on squares of "
+          "{:.2g} µm; the largest is {} kPa. Its scale of colours is not that of “Forces on the substrate”. FTTC knows "
+          "neither adhesions nor fibres: a traction spreads around its adhesion, and noise makes tractions everywhere. "
+          "Total force in the outline, noise included: {} nN; by the model: {} nN. White: outline and adhesions.",
+          lambda, usual.spacing_um, charts::readable(largest_kPa), charts::readable(usual.total_force_nN),
+          charts::readable(results.fit.total_force_nN)) +
           caption_of_cut(results.cell),
       legend(colour_bar(colours))};
 }
@@ -409,19 +406,18 @@ std::vector<Figure> displacement_maps(const CellResults& results) {
     const std::string explained = draw_arrows(map, field, scale, what, "µm");
     return Figure{map, caption, explained};
   };
-  std::vector<Figure> figures = {
-      drawn(means.means, "Measured displacement", "displacement",
-            fmt::format(
-                "Each arrow is the mean of the beads in a square of {:.1f} µm, {:.0f} on average, so that their noise "
-                "fades; it begins where they lie on the relaxed gel. The fit uses every bead by itself.",
-                side_um, means.mean_members))};
+  std::vector<Figure> figures = {drawn(
+      means.means, "Measured displacement", "displacement",
+      fmt::format("Each arrow is the mean of the beads in a square of {:.1f} µm, {:.0f} on average, so that their "
+                  "noise fades; it begins where they lie on the relaxed gel. The fit uses every bead by itself.",
+                  side_um, means.mean_members))};
   if (!results.residual) return figures;
   residual = {results.residual->positions_um, results.residual->residual_um};
   fitted = measured;
   for (std::size_t i = 0; i < fitted.vectors.size(); ++i) fitted.vectors[i] = fitted.vectors[i] - residual.vectors[i];
-  figures.push_back(drawn(averaged(fitted, box, side_um).means, "Fitted displacement", "displacement",
-                          "What the model says at the same beads, averaged in the same squares and drawn to the same "
-                          "scale."));
+  figures.push_back(
+      drawn(averaged(fitted, box, side_um).means, "Fitted displacement", "displacement",
+            "What the model says at the same beads, averaged in the same squares and drawn to the same scale."));
   figures.push_back(drawn(averaged(residual, box, side_um).means, "Measured minus fitted", "difference",
                           "Same squares, same scale. Bead noise points anywhere; arrows that point the same way over a "
                           "region are the model’s error."));

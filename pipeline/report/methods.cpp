@@ -15,8 +15,8 @@ namespace {
 
 std::string of_the_gel(const Gel& gel) {
   return fmt::format(
-      "The gel was taken as an elastic layer on a rigid base (Young’s modulus {} kPa, Poisson’s ratio {}, "
-      "thickness {} µm).",
+      "The gel was taken as an elastic layer on a rigid base (Young’s modulus {} kPa, Poisson’s ratio {}, thickness {} "
+      "µm).",
       charts::readable(gel.youngs_modulus_kPa), charts::readable(gel.poisson_ratio),
       charts::readable(gel.thickness_um));
 }
@@ -39,8 +39,7 @@ std::string of_the_fit(const CellResults& results) {
       "A network of {} contractile cables with {} stress fibres in it, held at {} adhesions, was fitted to them: {} "
       "tensions, by least squares with tensions of zero or more and without regularisation. {}Intervals are 95 % "
       "intervals from the noise of the beads{}. The fit left {} of the displacement (relative L2; the noise alone "
-      "would "
-      "leave {}).",
+      "would leave {}).",
       results.network.links.size(), results.cell.fibres.size(), results.cell.adhesions.size(), results.tensions.size(),
       is_ensemble ? fmt::format("Tensions are means over {} independent meshes. ", fit.n_meshes) : "",
       is_ensemble ? " and the spread between the meshes" : "", charts::readable(fit.relative_l2),

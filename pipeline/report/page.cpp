@@ -117,9 +117,8 @@ std::string figure(const charts::Chart& chart, const std::string& caption, const
 }
 
 std::string page(const std::string& title, const std::string& head, const std::string& body) {
-  return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
-         "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
-         "<link rel=\"icon\" href=\"data:,\"><title>" +
+  return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+         "content=\"width=device-width,initial-scale=1\"><link rel=\"icon\" href=\"data:,\"><title>" +
          charts::html_escaped(title) + "</title><style>" + std::string(kStyle) + "</style></head>\n<body><main>\n" +
          head + contents(body) + "<noscript><p>The charts of this page need JavaScript.</p></noscript>\n" + body +
          "</main>" + script(kVega) + script(kScript) + "</body></html>\n";

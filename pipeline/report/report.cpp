@@ -42,14 +42,14 @@ std::string by_type(const CellResults& results) {
 }
 
 std::string tension_section(const CellResults& results) {
-  return section("Tensions",
-                 "<div class=\"grid\">\n" +
-                     figure(tension_plot(results),
-                            "By type, the strongest first. The interval holds the bead noise and, if several meshes "
-                            "were fitted, the spread between them.",
-                            tension_plot_legend(results)) +
-                     by_type(results) + html_of(network_map(results, NetworkForm::original)) + "</div>\n" +
-                     html_of(tension_table(results), file_of(results, "4_fit/tensions.csv")) + tension_notes(results));
+  return section("Tensions", "<div class=\"grid\">\n" +
+                                 figure(tension_plot(results),
+                                        "By type, the strongest first. The interval holds the bead noise and, if "
+                                        "several meshes were fitted, the spread between them.",
+                                        tension_plot_legend(results)) +
+                                 by_type(results) + html_of(network_map(results, NetworkForm::original)) + "</div>\n" +
+                                 html_of(tension_table(results), file_of(results, "4_fit/tensions.csv")) +
+                                 tension_notes(results));
 }
 
 /// Why the usual method has no map.
@@ -62,8 +62,7 @@ std::string usual_method_note(const CellResults& results) {
 std::string map_section(const CellResults& results) {
   std::string html =
       "<p class=\"sub screen\">Rest the mouse on something to read about it. Ctrl and wheel, or the buttons, zoom; "
-      "dragging moves; "
-      "a double click shows all again.</p><div class=\"grid\">\n" +
+      "dragging moves; a double click shows all again.</p><div class=\"grid\">\n" +
       html_of(segmentation_map(results));
   if (results.bead_images) html += html_of(bead_map(results));
   html += html_of(adhesion_map(results));
@@ -71,8 +70,8 @@ std::string map_section(const CellResults& results) {
   for (const Figure& map : displacement_maps(results)) html += html_of(map);
   html += html_of(network_map(results, NetworkForm::contracted));
   return section("Maps", html + "</div>\n" + usual_method_note(results) +
-                             "<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the "
-                             "outer corner of its top left pixel.</p>");
+                             "<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the outer "
+                             "corner of its top left pixel.</p>");
 }
 
 std::string adhesion_section(const CellResults& results) {
@@ -122,8 +121,7 @@ std::string adhesion_section(const CellResults& results) {
   if (are_candidates)
     html +=
         "<p class=\"sub\">Candidates are places where an adhesion may be. Nobody saw one there: read their tractions "
-        "as "
-        "a traction density (force over the area of a lattice cell), and sums over neighbours rather than single "
+        "as a traction density (force over the area of a lattice cell), and sums over neighbours rather than single "
         "forces.</p>\n";
   html += html_of(top, file_of(results, "4_fit/adhesion_forces.csv"));
   if (all.rows.size() > kTop) html += folded(fmt::format("All {} adhesions", all.rows.size()), html_of(all));

@@ -65,9 +65,9 @@ std::string signed_colour(double share) {
 
 std::string signed_bar(double top) {
   return fmt::format(
-      "<span class=\"bar\"><span class=\"ink\"><i style=\"background:linear-gradient(90deg,{},#fff,{})\"></i>"
-      "<span style=\"left:0%\">−{}</span><span style=\"left:50%\">0</span><span style=\"left:100%\">{}</span></span>"
-      "normal traction (kPa), above 0 out of the gel</span>",
+      "<span class=\"bar\"><span class=\"ink\"><i style=\"background:linear-gradient(90deg,{},#fff,{})\"></i><span "
+      "style=\"left:0%\">−{}</span><span style=\"left:50%\">0</span><span style=\"left:100%\">{}</span></span>normal "
+      "traction (kPa), above 0 out of the gel</span>",
       signed_colour(-1), signed_colour(1), charts::readable(top), charts::readable(top));
 }
 

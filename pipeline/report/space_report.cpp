@@ -53,11 +53,11 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   const Sum force = sum_of(r, "net_force", "nN"), moment = sum_of(r, "moment", "nN_um");
   const double total = r.number("total_force_nN");
   std::vector<std::string> facts;
-  facts.push_back(fmt::format(
-      "The cell pulls and presses with {} in total, the sum of the sizes of its tractions over {}; {} nN of it are "
-      "along the surface’s normal. The largest traction is {} kPa.",
-      with_error(total, r.find("total_force_sigma_nN"), "nN"), r.texts.at("tractions_over"),
-      readable(r.number("normal_force_nN")), readable(largest_traction_kPa(r))));
+  facts.push_back(
+      fmt::format("The cell pulls and presses with {} in total, the sum of the sizes of its tractions over {}; {} nN "
+                  "of it are along the surface’s normal. The largest traction is {} kPa.",
+                  with_error(total, r.find("total_force_sigma_nN"), "nN"), r.texts.at("tractions_over"),
+                  readable(r.number("normal_force_nN")), readable(largest_traction_kPa(r))));
   facts.push_back(fmt::format("The strain energy of the gel is {} fJ.", readable(r.number("strain_energy_fJ"))));
   if (const auto moment_found = r.find("contractile_moment_nN_um"))
     facts.back() += fmt::format(
@@ -65,8 +65,7 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
         with_error(*moment_found, r.find("contractile_moment_sigma_nN_um"), "nN µm"));
   facts.push_back(
       fmt::format("Balance: the forces add up to {} ({} % of the sum of their sizes), the moments about their centre "
-                  "to {}. A cell that "
-                  "nothing else holds has neither.",
+                  "to {}. A cell that nothing else holds has neither.",
                   with_error(force.size, force.sigma, "nN"), readable(total > 0 ? 100 * force.size / total : 0),
                   with_error(moment.size, moment.sigma, "nN µm")));
   if (const auto imbalance = r.find("imbalance_chi_squared")) {
@@ -86,10 +85,10 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
                     "beside what the tracker took off. It was found with the tractions.");
   }
   if (const auto resolution = r.find("median_resolution_um")) {
-    facts.push_back(fmt::format(
-        "Forces closer together than {} µm look like one (median over the surface); from about twice that on they are "
-        "mostly seen as two. {} numbers of {} are resolved.",
-        readable(*resolution), readable(r.number("effective_unknowns")), readable(r.number("n_unknowns"))));
+    facts.push_back(
+        fmt::format("Forces closer together than {} µm look like one (median over the surface); from about twice that "
+                    "on they are mostly seen as two. {} numbers of {} are resolved.",
+                    readable(*resolution), readable(r.number("effective_unknowns")), readable(r.number("n_unknowns"))));
   }
   return facts;
 }
@@ -179,10 +178,10 @@ std::string force_section(const SpaceResults& r) {
                           fmt::format("{:.1f}", f.at_um.z)});
   }
   const Path file = r.folder / "4_traction/traction_adhesion_forces.csv";
-  return section("Forces of the adhesions",
-                 "<p>The adhesions were seen from above and laid onto the surface; their area is that of the "
-                 "surface.</p>\n" +
-                     html_of(table, {r.name + "_" + file.filename().string(), files::read_text(file)}));
+  return section(
+      "Forces of the adhesions",
+      "<p>The adhesions were seen from above and laid onto the surface; their area is that of the surface.</p>\n" +
+          html_of(table, {r.name + "_" + file.filename().string(), files::read_text(file)}));
 }
 
 std::string methods(const SpaceResults& r, const Provenance& provenance) {
@@ -203,12 +202,9 @@ std::string methods(const SpaceResults& r, const Provenance& provenance) {
                         readable(1000 * numerics::median(sigma)), readable(1000 * numerics::median(sigma_z)));
   text += fmt::format(
       ". The surface of the gel was found from data, too. The gel was taken as linear elastic on a rigid base (Young’s "
-      "modulus "
-      "{} kPa, Poisson’s ratio {}, thickness {} µm) and its answer to tractions computed by finite elements that "
-      "follow "
-      "the surface. Tractions at the vertices of a lattice of {} × {} µm ({} unknowns) were fitted to the "
-      "displacements "
-      "by the method {} over {}. {} {}.",
+      "modulus {} kPa, Poisson’s ratio {}, thickness {} µm) and its answer to tractions computed by finite elements "
+      "that follow the surface. Tractions at the vertices of a lattice of {} × {} µm ({} unknowns) were fitted to the "
+      "displacements by the method {} over {}. {} {}.",
       readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio), readable(r.gel.thickness_um),
       readable(r.number("spacing_x_um")), readable(r.number("spacing_y_um")), r.number("n_unknowns"),
       r.texts.at("method"), r.texts.at("tractions_over"), how_lambda(r),

@@ -118,10 +118,10 @@ void add_arrows(const SpaceResults& results, const Paper& paper, std::vector<Pie
     const Vec3 from = t->at_um, to = from + um_per_kPa * t->traction_kPa;
     const Vec2 start = paper.px(from), shift = paper.px(to) - start;
     constexpr double kOverItsFacet_um = 3;  // else the next facet hides its foot
-    pieces.push_back({std::max(seen(from).near, seen(to).near) + kOverItsFacet_um,
-                      fmt::format("<path transform=\"translate({})\" d=\"{}\" fill=\"none\" stroke=\"#111\" "
-                                  "stroke-width=\"1.3\"/>",
-                                  point(start), charts::arrow_path(shift))});
+    pieces.push_back(
+        {std::max(seen(from).near, seen(to).near) + kOverItsFacet_um,
+         fmt::format("<path transform=\"translate({})\" d=\"{}\" fill=\"none\" stroke=\"#111\" stroke-width=\"1.3\"/>",
+                     point(start), charts::arrow_path(shift))});
   }
 }
 

@@ -135,8 +135,8 @@ std::string tension_notes(const CellResults& results) {
       charts::readable(results.fit.network_surface_tension_nN_per_um));
   if (results.comparison) {
     html +=
-        " Error: fitted minus true tension, in per cent of the truth and in halves of the 95 % interval: between "
-        "−1 and +1 the interval holds the truth.";
+        " Error: fitted minus true tension, in per cent of the truth and in halves of the 95 % interval: between −1 "
+        "and +1 the interval holds the truth.";
   }
   html += "</p>\n";
   return results.comparison ? html + missed_fibres(*results.comparison) : html;

@@ -29,8 +29,8 @@ constexpr ImageKey kImages[] = {
     {"beads_stressed", &N::beads_stressed, "image of the beads while the cell pulls"},
     {"beads_relaxed", &N::beads_relaxed, "image of the beads after the cell was removed"},
     {"surface_beads", &N::surface_beads,
-     "stack of beads of another colour on the gel's surface, relaxed, if the file is there: the surface is found "
-     "from them"},
+     "stack of beads of another colour on the gel's surface, relaxed, if the file is there: the surface is found from "
+     "them"},
     {"outline_roi", &N::outline_roi, "ImageJ area used as the cell's outline, if the file is there"},
     {"adhesion_rois", &N::adhesion_rois, "ImageJ areas used as adhesions, if the file is there"},
     {"fibre_rois", &N::fibre_rois, "ImageJ lines used as fibres, if the file is there"},

@@ -74,9 +74,8 @@ std::string options(const DeclaredCommand& command, Groups groups) {
 
 std::string exit_codes() {
   return "0 done, 1 some cells failed, 2 wrong flag, 3 bad input, 4 not converged (outputs are there, marked), 5 "
-         "cannot "
-         "write, 6 out of memory or time, 7 no answer (nothing written), 70 our bug, 75 cell is busy, 130 interrupted, "
-         "128 + n killed by signal n.";
+         "cannot write, 6 out of memory or time, 7 no answer (nothing written), 70 our bug, 75 cell is busy, 130 "
+         "interrupted, 128 + n killed by signal n.";
 }
 
 std::string manual_page(const CLI::App& app) {

@@ -64,39 +64,34 @@ const std::vector<PlausibleQuantity>& plausible_quantities() {
        .quantity = "Young's modulus of the gel",
        .usual = Range::between(0.1, 100),
        .possible = Range::between(0.01, 1000),
-       .source =
-           "Tissues and the gels that stand for them have 0.1 kPa (brain) to 40 kPa (bone before it mineralises): "
-           "Discher, Janmey & Wang, Science 310 (2005) 1139; gels for traction are made up to 100 kPa. Above 1000 kPa "
-           "the strongest adhesions known, 10 kPa "
-           "over a radius of 1 um, move beads by 20 nm (2.25 t a / E), which images do not show; below 0.01 kPa a "
-           "gel does not keep its shape",
+       .source = "Tissues and the gels that stand for them have 0.1 kPa (brain) to 40 kPa (bone before it "
+                 "mineralises): Discher, Janmey & Wang, Science 310 (2005) 1139; gels for traction are made up to 100 "
+                 "kPa. Above 1000 kPa the strongest adhesions known, 10 kPa over a radius of 1 um, move beads by 20 nm "
+                 "(2.25 t a / E), which images do not show; below 0.01 kPa a gel does not keep its shape",
        .remedy = "check the modulus and its unit, kPa"},
       {.id = "poisson_ratio",
        .quantity = "Poisson's ratio of the gel",
        .usual = Range::between(0.3, 0.5),
        .possible = Range::between(0, 0.5),
-       .source =
-           "Water in a gel has no time to leave it: 0.45 to 0.5 for polyacrylamide and silicone (Takigawa et al., "
-           "Polym. Gels Netw. 4 (1996) 1: 0.457). 0.5 is the limit of an elastic body, and no gel gets thicker where "
-           "it is pulled",
+       .source = "Water in a gel has no time to leave it: 0.45 to 0.5 for polyacrylamide and silicone (Takigawa et "
+                 "al., Polym. Gels Netw. 4 (1996) 1: 0.457). 0.5 is the limit of an elastic body, and no gel gets "
+                 "thicker where it is pulled",
        .remedy = "take 0.49 for polyacrylamide, 0.5 or 0.499 for silicone"},
       {.id = "thickness_um",
        .quantity = "thickness of the gel",
        .usual = Range::between(10, 1000),
        .possible = Range::between(1, 1e5),
-       .source =
-           "Gels for traction force microscopy are cast 20 to 100 um thick. Below some 10 um the displacements are "
-           "set by the glass below (Merkel et al., Biophys. J. 93 (2007) 3314); beyond 1000 um no objective with "
-           "the resolution for beads looks through",
+       .source = "Gels for traction force microscopy are cast 20 to 100 um thick. Below some 10 um the displacements "
+                 "are set by the glass below (Merkel et al., Biophys. J. 93 (2007) 3314); beyond 1000 um no objective "
+                 "with the resolution for beads looks through",
        .remedy = "measure the thickness by focusing on the glass and on the surface; for a half-space set gel_model or "
                  "the effect finite_thickness"},
       {.id = kPixelSize,
        .quantity = "pixel size",
        .usual = Range::between(0.02, 1.3),
        .possible = Range::between(0.005, 7),
-       .source =
-           "Camera pixels of 2 to 16 um behind lenses of 10 to 100 times: 0.02 to 1.3 um; 7 um is a camera without "
-           "a lens",
+       .source = "Camera pixels of 2 to 16 um behind lenses of 10 to 100 times: 0.02 to 1.3 um; 7 um is a camera "
+                 "without a lens",
        .remedy = "check the pixel size and its unit, um: the camera's pixel over the magnification, times the camera's "
                  "binning"},
       {.id = "beads_per_um2",
@@ -112,10 +107,9 @@ const std::vector<PlausibleQuantity>& plausible_quantities() {
        .quantity = "width (standard deviation) of the beads in the images",
        .usual = Range::between(0.075, 1),
        .possible = Range::between(0.01, 20),
-       .source =
-           "No lens shows a point smaller than 0.21 wavelengths over its aperture: 0.075 um at the 515 nm of "
-           "yellow-green beads and an aperture of 1.45 (Zhang, Zerubia & Olivo-Marin, Appl. Opt. 46 (2007) 1819). "
-           "1 um is a bead of 4 um across. Below 0.01 and above 20 um no microscope shows single beads",
+       .source = "No lens shows a point smaller than 0.21 wavelengths over its aperture: 0.075 um at the 515 nm of "
+                 "yellow-green beads and an aperture of 1.45 (Zhang, Zerubia & Olivo-Marin, Appl. Opt. 46 (2007) "
+                 "1819). 1 um is a bead of 4 um across. Below 0.01 and above 20 um no microscope shows single beads",
        .remedy = "check the pixel size: were the images binned or reduced after it was measured? Forces go with its "
                  "square. Beads of super-resolved images may be smaller"},
       {.id = "adhesion_area_um2",
@@ -145,20 +139,17 @@ const std::vector<PlausibleQuantity>& plausible_quantities() {
        .quantity = "tension of a stress fibre",
        .usual = Range::between(0, 150),
        .possible = Range::between(0, 400),
-       .source =
-           "An isolated stress fibre breaks at 380 nN and carried about 10 nN in the cell (Deguchi, Ohashi & Sato, "
-           "J. Biomech. 39 (2006) 2603)",
+       .source = "An isolated stress fibre breaks at 380 nN and carried about 10 nN in the cell (Deguchi, Ohashi & "
+                 "Sato, J. Biomech. 39 (2006) 2603)",
        .remedy = "check the modulus (kPa) and the pixel size (um), and whether a fibre is missing beside it"},
       {.id = "traction_kPa",
        .quantity = "traction of the adhesions that bear half of the force",
        .usual = Range::between(0, 15),
        .possible = Range::between(0, 100),
-       .source =
-           "Adhesions carry 5.5 kPa (Balaban et al., Nat. Cell Biol. 3 (2001) 466), supermature ones 12 kPa (Goffin "
-           "et al., J. Cell Biol. 172 (2006) 259). 100 kPa are 2500 bonds of 40 pN on each um²",
-       .remedy =
-           "check the modulus (kPa) and the pixel size (um), and the adhesion's ellipse: a force on too small an area "
-           "is a large traction"},
+       .source = "Adhesions carry 5.5 kPa (Balaban et al., Nat. Cell Biol. 3 (2001) 466), supermature ones 12 kPa "
+                 "(Goffin et al., J. Cell Biol. 172 (2006) 259). 100 kPa are 2500 bonds of 40 pN on each um²",
+       .remedy = "check the modulus (kPa) and the pixel size (um), and the adhesion's ellipse: a force on too small an "
+                 "area is a large traction"},
   };
   return table;
 }

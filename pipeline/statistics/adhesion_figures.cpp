@@ -174,8 +174,8 @@ Figure directions(const Analysis& analysis) {
   Figure figure{.name = "directions",
                 .title = "Directions",
                 .caption =
-                    "Angles at the adhesions. Broken line: what chance would give. In brackets: 95 % interval "
-                    "of the mean angle, cells resampled.",
+                    "Angles at the adhesions. Broken line: what chance would give. In brackets: 95 % interval of the "
+                    "mean angle, cells resampled.",
                 .charts = {},
                 .n_columns = 2};
   const std::vector<std::string>& conditions = analysis.tensions.sample.conditions;

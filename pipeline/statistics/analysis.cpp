@@ -40,8 +40,8 @@ void warn_of_few_cells(const Study& study, std::vector<std::string>& warnings) {
                                        where, name, names));
       } else if (n_of[i] > 0 && n_of[i] < kFew) {
         warnings.push_back(
-            fmt::format("{0}{1} {2} only: intervals with the {3} as the unit are wide, and rest on the "
-                        "assumption that {2} scatter normally.",
+            fmt::format("{0}{1} {2} only: intervals with the {3} as the unit are wide, and rest on the assumption that "
+                        "{2} scatter normally.",
                         where, n_of[i], names, kind == CellKind::sheet ? "sheet" : "cell"));
       }
     }
@@ -59,10 +59,10 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
     }
   }
   if (n_unknown > 0) {
-    warnings.push_back(fmt::format(
-        "The tensions of {} of {} could not be identified and do not enter: if these are the weak ones, the "
-        "means of the others are too large.",
-        n_unknown, counted(n_fibres, "fibres")));
+    warnings.push_back(
+        fmt::format("The tensions of {} of {} could not be identified and do not enter: if these are the weak ones, "
+                    "the means of the others are too large.",
+                    n_unknown, counted(n_fibres, "fibres")));
   }
   if (const int n_without = n_of_kind(study, CellKind::plane) - static_cast<int>(with.size()); n_without > 0) {
     warnings.push_back(
@@ -81,17 +81,17 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
   for (const Summary& s : tensions.summaries) {
     if (s.n > 2 && s.typical_error && s.without_error->reliability < 0.5 && *s.plain.standard_deviation > 0) {
       warnings.push_back(
-          fmt::format("{}more than half of the scatter of the tensions of {} fibres is the error of "
-                      "their measurement (typically {} nN).",
+          fmt::format("{}more than half of the scatter of the tensions of {} fibres is the error of their measurement "
+                      "(typically {} nN).",
                       prefix_of(s.condition), kind_for_people(s.kind), charts::readable(*s.typical_error)));
     }
     if (!s.model || !s.mean_interval) continue;
     if (std::abs(s.model->estimate - s.plain.mean) > 2 * s.model->standard_error) {
-      warnings.push_back(fmt::format(
-          "{}the mixed model's mean tension of {} fibres, {} nN, is far from the plain mean, {} nN: fibres with large "
-          "error bars, or cells with many fibres, differ from the others. Give both.",
-          prefix_of(s.condition), kind_for_people(s.kind), charts::readable(s.model->estimate),
-          charts::readable(s.plain.mean)));
+      warnings.push_back(
+          fmt::format("{}the mixed model's mean tension of {} fibres, {} nN, is far from the plain mean, {} nN: fibres "
+                      "with large error bars, or cells with many fibres, differ from the others. Give both.",
+                      prefix_of(s.condition), kind_for_people(s.kind), charts::readable(s.model->estimate),
+                      charts::readable(s.plain.mean)));
     }
   }
 }
@@ -101,8 +101,8 @@ void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
                                [](const StudyCell& cell) { return !is_network_known(cell); });
   if (n == 0) return;
   warnings.push_back(
-      fmt::format("The network's tension of {} of {} could not be identified: how their total force is shared out "
-                  "to network and fibres is not known and does not enter, nor does the network's surface tension.",
+      fmt::format("The network's tension of {} of {} could not be identified: how their total force is shared out to "
+                  "network and fibres is not known and does not enter, nor does the network's surface tension.",
                   n, counted(n_of_kind(study, CellKind::plane), "cells")));
 }
 
@@ -118,10 +118,10 @@ void warn_of_sheets(const Study& study, std::vector<std::string>& warnings) {
       }
     }
     if (n_unknown == 0) continue;
-    warnings.push_back(fmt::format(
-        "The beads limit the {} of sheets to one side only, or not at all, in {} of {}. What is not known does "
-        "not enter, and the mean of the rest may be biased.",
-        for_people(quantity).name, n_unknown, counted(n, "fits")));
+    warnings.push_back(
+        fmt::format("The beads limit the {} of sheets to one side only, or not at all, in {} of {}. What is not known "
+                    "does not enter, and the mean of the rest may be biased.",
+                    for_people(quantity).name, n_unknown, counted(n, "fits")));
   }
 }
 

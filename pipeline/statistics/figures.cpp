@@ -114,8 +114,8 @@ Figure tensions_by_type(const Study& study, const Analysis& analysis) {
   return {.name = "tensions_by_type",
           .title = "Tension of each fibre",
           .caption =
-              "One dot a fibre; bar: median; ring: mean of the mixed model with its 95 % interval, the cell "
-              "being the unit.",
+              "One dot a fibre; bar: median; ring: mean of the mixed model with its 95 % interval, the cell being the "
+              "unit.",
           .charts = {chart}};
 }
 
@@ -151,8 +151,8 @@ Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters
   Figure figure{.name = "fibres_above",
                 .title = "Share of the fibres above a tension",
                 .caption =
-                    "Bars: 95 % interval (Wilson’s, at the number of independent fibres that would scatter as "
-                    "the cells do). Cross: the share without the blur of the measurement’s error.",
+                    "Bars: 95 % interval (Wilson’s, at the number of independent fibres that would scatter as the "
+                    "cells do). Cross: the share without the blur of the measurement’s error.",
                 .charts = {},
                 .n_columns = 2};
   for (const double threshold : thresholds_nN(parameters)) {
@@ -213,8 +213,8 @@ Figure forces_by_cell(const Study& study) {
   return {.name = "forces_by_cell",
           .title = "Total force of each cell",
           .caption =
-              "Sum of the force magnitudes over adhesions, the strongest cell first: what the fibres add, on "
-              "what the network has without them.",
+              "Sum of the force magnitudes over adhesions, the strongest cell first: what the fibres add, on what the "
+              "network has without them.",
           .charts = {chart}};
 }
 
@@ -236,8 +236,8 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
   Figure figure{.name = "force_correlations",
                 .title = "Forces and size of the cell",
                 .caption =
-                    "One dot a cell. Lines through the origin by least squares: slope ± standard error, and "
-                    "Pearson’s correlation r, from five cells on.",
+                    "One dot a cell. Lines through the origin by least squares: slope ± standard error, and Pearson’s "
+                    "correlation r, from five cells on.",
                 .charts = {},
                 .n_columns = 3};
   std::map<std::pair<std::string, std::string>, std::vector<const Correlation*>> panels;

@@ -165,14 +165,14 @@ std::optional<Figure> primary_figure(const Study& study, const Analysis& analysi
 }
 
 Figure sheet_figure(const Study& study, const Analysis& analysis) {
-  Figure figure{.name = "sheets",
-                .title = "Sheets",
-                .caption =
-                    "A dot with its 95 % interval is a sheet. Where a sheet has several parts of a kind, these are "
-                    "small dots, and the large one is their mean. Black: mean of the mixed model with its 95 % "
-                    "interval.",
-                .charts = super_plots(study, analysis.sheets),
-                .n_columns = 3};
+  Figure figure{
+      .name = "sheets",
+      .title = "Sheets",
+      .caption =
+          "A dot with its 95 % interval is a sheet. Where a sheet has several parts of a kind, these are small dots, "
+          "and the large one is their mean. Black: mean of the mixed model with its 95 % interval.",
+      .charts = super_plots(study, analysis.sheets),
+      .n_columns = 3};
   return figure;
 }
 

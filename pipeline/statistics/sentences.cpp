@@ -139,8 +139,7 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
   for (const ShareAbove& s : analysis.shares) {
     if (s.threshold_nN != parameters.strong_tension_nN) continue;
     list.push_back(capitalised(
-        fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %; {} of {}], "
-                    "{:.0f} % "
+        fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %; {} of {}], {:.0f} % "
                     "without the blur of the measurement.",
                     prefix_of(s.condition), 100 * s.share.value, plural_of(analysis.tensions.sample, s.kind),
                     charts::readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high,

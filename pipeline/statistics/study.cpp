@@ -264,20 +264,19 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
            "source of a cell's condition: `folder` (the first folder below the study's), `folder2` (the one below "
            "that), or the name of a column of --table; empty: the column `condition` if the table has one");
   list.add("conditions", parameters.conditions,
-           "order of the conditions, with commas between them; the first is the reference that the others are "
-           "compared with; empty: by the alphabet. Example: \"control, blebbistatin\"");
+           "order of the conditions, with commas between them; the first is the reference that the others are compared "
+           "with; empty: by the alphabet. Example: \"control, blebbistatin\"");
   list.add("replicate_from", parameters.replicate_from,
            "source of a cell's replicate (day, dish, animal): `folder`, `folder2`, … or the name of a column of "
            "--table; empty: the column `replicate` or `day` if the table has one");
   list.add("exclude_findings", parameters.exclude_findings,
            "cells with one of these open findings are left out; identities with commas between them. Example: "
            "\"explains-little, cell-cut\"");
-  list.add(
-      "primary", parameters.primary,
-      "what the study compares first between conditions; tension: of the fibres of primary_type; total-force: of "
-      "the cells; contraction, mean-tension: of the sheets; strain-energy: of the cells in space, or of the sheets; "
-      "contractile-moment: of the cells in space; auto: tension, contraction of sheets or total-force of cells in "
-      "space, whichever the study has most cells of; total-force and strain-energy go by that, too");
+  list.add("primary", parameters.primary,
+           "what the study compares first between conditions; tension: of the fibres of primary_type; total-force: of "
+           "the cells; contraction, mean-tension: of the sheets; strain-energy: of the cells in space, or of the "
+           "sheets; contractile-moment: of the cells in space; auto: tension, contraction of sheets or total-force of "
+           "cells in space, whichever the study has most cells of; total-force and strain-energy go by that, too");
   list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
   list.add("with_not_converged", parameters.with_not_converged, "include cells whose fit did not converge");
   list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
@@ -290,8 +289,8 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
            "number of draws of cells that give the intervals of means and medians");
   list.add("bootstrap_seed", parameters.bootstrap_seed, "random seed of the draws of cells");
   list.add("fibre_types", parameters.fibre_types, Range::between(3, 4),
-           "number of fibre types; 3: dorsal, arc and ventral, edge fibres count as ventral; 4: edge "
-           "fibres are a type of their own");
+           "number of fibre types; 3: dorsal, arc and ventral, edge fibres count as ventral; 4: edge fibres are a type "
+           "of their own");
 }
 
 std::vector<double> thresholds_nN(const StudyParameters& parameters) {

@@ -291,8 +291,8 @@ std::string findings_text(const Study& study, const std::string& table_html) {
   const auto n_open = std::ranges::count_if(study.cells, [](const StudyCell& c) { return has_open(c.findings); });
   if (n_open == 0) return "<p><b>✓</b> No finding is open in any cell that enters.</p>\n";
   return fmt::format(
-             "<p>Findings are open in {} of {}: what they name may be off by more than the error bars say. The "
-             "column <code>exclude</code> of the table of conditions leaves a cell out.</p>\n",
+             "<p>Findings are open in {} of {}: what they name may be off by more than the error bars say. The column "
+             "<code>exclude</code> of the table of conditions leaves a cell out.</p>\n",
              n_open, counted(study.cells.size(), "cells")) +
          table_html;
 }
@@ -321,8 +321,7 @@ std::string gallery(const Study& study, const Path& page_folder) {
   return html +
          "</div>\n<p class=\"sub\">Total force of each cell; a click opens its page. <b>!</b>: findings are open. To "
          "leave cells out by a rule: <code>--exclude_findings</code>; one by one: a column <code>exclude</code> with "
-         "the "
-         "reason in <code>--table</code>.</p>\n";
+         "the reason in <code>--table</code>.</p>\n";
 }
 
 std::string list_of(const std::vector<std::string>& sentences) {
@@ -345,11 +344,9 @@ std::string overview(const Study& study, const Analysis& analysis) {
             in_space = n_of_kind(study, CellKind::space);
   std::string html = "<p>";
   if (with_fibres > 0) {
-    html += fmt::format(
-        "{} with {} and {}; the tensions of {} of them could be identified and enter the "
-        "statistics. ",
-        counted(with_fibres, "cells"), counted(n_adhesions, "adhesions"), counted(n_fibres, "stress fibres"),
-        analysis.tensions.sample.values.size());
+    html += fmt::format("{} with {} and {}; the tensions of {} of them could be identified and enter the statistics. ",
+                        counted(with_fibres, "cells"), counted(n_adhesions, "adhesions"),
+                        counted(n_fibres, "stress fibres"), analysis.tensions.sample.values.size());
   }
   if (sheets > 0) {
     html += fmt::format(
@@ -402,10 +399,8 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
 constexpr const char* kHowToRead =
     "<p class=\"sub\">Two-sided. The fibres of a cell are not independent: tests whose unit is the observation "
     "overstate the evidence; those with the unit cell do not (clustered rank sum: Datta &amp; Satten 2005; mixed "
-    "model: "
-    "random effects of the cell and of each kind in it, known error of each value, Satterthwaite’s degrees of "
-    "freedom). "
-    "Holm’s correction is over the pairs that one question compares.</p>\n";
+    "model: random effects of the cell and of each kind in it, known error of each value, Satterthwaite’s degrees of "
+    "freedom). Holm’s correction is over the pairs that one question compares.</p>\n";
 
 /// Which type edge fibres count as; empty without any.
 std::string on_edge_fibres(const Study& study) {
@@ -423,16 +418,14 @@ std::string on_edge_fibres(const Study& study) {
 
 constexpr const char* kHowToReadSheets =
     "<p class=\"sub\">Errors of the fit are known of what the beads were asked for; the others have none. What the "
-    "gel’s "
-    "numbers and its model add to them is left out: sheets on gels of one kind share it. A number that the beads limit "
-    "to one side only, or that was given, does not enter.</p>\n";
+    "gel’s numbers and its model add to them is left out: sheets on gels of one kind share it. A number that the beads "
+    "limit to one side only, or that was given, does not enter.</p>\n";
 
 constexpr const char* kHowToReadSpace =
     "<p class=\"sub\">Total force: sum of the sizes of all tractions. Contractile moment: −∫ (x − centre) · t dA, "
-    "above "
-    "zero where the cell contracts. Share of the normal force: of the sizes. Smoothing takes from force, energy and "
-    "largest traction, the more the coarser the maps are: compare the resolution first. Net force and net moment of a "
-    "cell that nothing else holds are errors alone; they are listed with the cells and not compared.</p>\n";
+    "above zero where the cell contracts. Share of the normal force: of the sizes. Smoothing takes from force, energy "
+    "and largest traction, the more the coarser the maps are: compare the resolution first. Net force and net moment "
+    "of a cell that nothing else holds are errors alone; they are listed with the cells and not compared.</p>\n";
 
 /// "Stress-fibre tensions of 8 cells, contraction of 4 sheets and forces of 6 cells in space"
 std::string title_of(const Study& study) {

@@ -179,11 +179,10 @@ std::vector<int> cells_in(const LabelMask& parts, const Field& field, const Outl
 void require_size_of_adhesion(const LabelMask& mask, const Adhesion& a) {
   constexpr double kLargest_um2 = 100;  // a small cell; the largest adhesions have 10
   if (a.area_um2 <= kLargest_um2) return;
-  throw InputError(
-      mask.name + ": part at (" + brief(a.position_um.x) + ", " + brief(a.position_um.y) + ") um",
-      "an adhesion, of at most " + shortest(kLargest_um2) + " um²", brief(a.area_um2) + " um²",
-      "a mask of the adhesive pattern goes with segment.adhesions = pattern, one of the cell is an outline_mask; of "
-      "adhesions, check pixel_size_um and that they do not touch each other");
+  throw InputError(mask.name + ": part at (" + brief(a.position_um.x) + ", " + brief(a.position_um.y) + ") um",
+                   "an adhesion, of at most " + shortest(kLargest_um2) + " um²", brief(a.area_um2) + " um²",
+                   "a mask of the adhesive pattern goes with segment.adhesions = pattern, one of the cell is an "
+                   "outline_mask; of adhesions, check pixel_size_um and that they do not touch each other");
 }
 
 std::string listed(std::vector<int> labels) {

@@ -125,8 +125,8 @@ void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string&
            "frame of " + image + ", from 1; must be given if the file has several");
   list.add(prefix + "_page", choice.page, {.low = 1},
            "page of " + image +
-               " as it lies in the file, from 1, instead of channel, z and time; unset: the first of a "
-               "file that does not state its dimensions");
+               " as it lies in the file, from 1, instead of channel, z and time; unset: the first of a file that does "
+               "not state its dimensions");
 }
 
 namespace {

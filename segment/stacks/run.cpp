@@ -35,10 +35,9 @@ Frame frame_of(const std::string& name, const std::vector<images::Image>& slices
 
 void require_same_size(const Frame& first, const Frame& other) {
   if (first.size() == other.size()) return;
-  throw InputError(
-      other.name, first.size() + " as in " + first.name, other.size(),
-      "both stacks must show the same field at the same magnification, from the same depth to the same; cut "
-      "the longer one in ImageJ (Image > Stacks > Tools > Make Substack)");
+  throw InputError(other.name, first.size() + " as in " + first.name, other.size(),
+                   "both stacks must show the same field at the same magnification, from the same depth to the same; "
+                   "cut the longer one in ImageJ (Image > Stacks > Tools > Make Substack)");
 }
 
 void require_slices(const Frame& frame) {
@@ -57,10 +56,9 @@ double step_um(const Frame& first, const Frame& other, const StackParameters& p)
   }
   if (first.step_um) return *first.step_um;
   if (other.step_um) return *other.step_um;
-  throw InputError(
-      first.name, "the distance of its slices in the file", "none",
-      "set track.z_step_um, how far the stage moved between two slices; or track.dimensions = plane, which "
-      "follows beads in the maximum projection");
+  throw InputError(first.name, "the distance of its slices in the file", "none",
+                   "set track.z_step_um, how far the stage moved between two slices; or track.dimensions = plane, "
+                   "which follows beads in the maximum projection");
 }
 
 double pixel_um(const Frame& first, const Frame& other, std::optional<double> given_um) {

@@ -86,11 +86,10 @@ void look_at_beads(const CellImages& cell, int threads, Survey& survey) {
   if (size_relaxed == 0 || size_stressed == 0) return;
   const double ratio = size_stressed / size_relaxed, unlike = std::max(ratio, 1 / ratio);
   if (unlike > kUnlikeSizes)
-    survey.doubts.push_back(
-        "The beads of " + (ratio > 1 ? cell.beads_stressed : cell.beads_relaxed)->name + " are wider by a factor of " +
-        brief(unlike) + " (limit " + brief(kUnlikeSizes) +
-        "). Focus both images on the same beads, or take the slice that is as sharp. If one of them shows another "
-        "channel, name the right files in [images] of cell.toml.");
+    survey.doubts.push_back("The beads of " + (ratio > 1 ? cell.beads_stressed : cell.beads_relaxed)->name +
+                            " are wider by a factor of " + brief(unlike) + " (limit " + brief(kUnlikeSizes) +
+                            "). Focus both images on the same beads, or take the slice that is as sharp. If one of "
+                            "them shows another channel, name the right files in [images] of cell.toml.");
   const std::size_t n_beads = beads::detect_beads(relaxed, beads::TrackParameters{}.detection_snr, threads).size();
   const double field_um2 = relaxed.width * pixel_um * relaxed.height * pixel_um;
   const double spacing_um = std::sqrt(field_um2 / static_cast<double>(std::max<std::size_t>(1, n_beads)));

@@ -62,10 +62,10 @@ void check_filled(const Lattice& l, const std::vector<Vec3>& beads) {
   if (empty == is_near.end()) return;
   const int at = static_cast<int>(empty - is_near.begin());
   const Vec2 middle = at_place(l, {at % l.n_x + 0.5, at / l.n_x + 0.5});
-  throw InvalidData("beads in the gel",
-                    "beads all over the rectangle that they span: cut it to where they are, and leave out those that "
-                    "lie far off",
-                    "none near x, y = " + brief(middle.x) + ", " + brief(middle.y) + " um");
+  throw InvalidData(
+      "beads in the gel",
+      "beads all over the rectangle that they span: cut it to where they are, and leave out those that lie far off",
+      "none near x, y = " + brief(middle.x) + ", " + brief(middle.y) + " um");
 }
 
 /// @throws InvalidData where the beads lie in sheets: down to `most_um`, a gap wider than `gap_um`

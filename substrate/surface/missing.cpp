@@ -119,8 +119,7 @@ FilledMap filled(HeightMap map, double widest_um) {
   if (hole.width_um > widest_um) {
     throw InvalidData("height map near x, y = " + brief(hole.middle_um.x) + ", " + brief(hole.middle_um.y) + " um",
                       "no hole wider than " + brief(widest_um) +
-                          " um (largest_hole_um): cut the map to where it is whole (low_x_um …), or allow "
-                          "wider ones",
+                          " um (largest_hole_um): cut the map to where it is whole (low_x_um …), or allow wider ones",
                       "none within " + brief(hole.width_um / 2) + " um");
   }
   std::vector<Eigen::Triplet<double>> entries;

@@ -72,8 +72,8 @@ class PointFitter {
       constexpr double kStill = 0.01;  // of its logarithm: far below what the evidence can tell
       if (std::abs(std::log(stiffness_ / stiffness)) < kStill && std::abs(std::log(scale_ / scale)) < kStill) break;
       if (round + 1 == kMostRounds)
-        throw NotSolved(Report{.reason = "no smooth surface through the points: their errors and the smoothness did "
-                                         "not settle"});
+        throw NotSolved(
+            Report{.reason = "no smooth surface through the points: their errors and the smoothness did not settle"});
     }
     PointFit fit{.lattice = l_,
                  .coefficients_um = coefficients_.array() + middle_um_,

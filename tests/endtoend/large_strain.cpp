@@ -76,8 +76,7 @@ TEST_F(LargeStrains, a_cell_seen_under_load_is_led_back_to_the_gel_at_rest) {
   const std::string truth = (cell() / "truth").string();
   const Outcome moved = run_program(
       "mbtfm-substrate --quiet --youngs_modulus_kPa 11 --material neo-hooke --large_strain on --displacement_tolerance "
-      "0 "
-      "--elements_across_adhesion 2 --growth 8 --adhesions " +
+      "0 --elements_across_adhesion 2 --growth 8 --adhesions " +
       truth + "/adhesions.csv --forces " + truth + "/adhesion_forces.csv --points " +
       (cell() / "centres.csv").string() + " --out " + (cell() / "moved.csv").string());
   ASSERT_EQ(moved.code, 0) << moved.output;

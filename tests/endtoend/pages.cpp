@@ -52,19 +52,15 @@ class Pages : public testing::Test {
 /// Moves the mouse to the middle of what has this text, in the chart of this title. @returns where
 Vec2 rest_on(Browser& browser, const std::string& chart, const std::string& text) {
   const test::json at = browser.evaluate(
-      "(() => { const figure = [...document.querySelectorAll('figure')]"
-      ".find(f => f.querySelector('h3').textContent === '" +
+      "(() => { const figure = [...document.querySelectorAll('figure')].find(f => f.querySelector('h3').textContent "
+      "=== '" +
       chart +
-      "');"
-      "const path = [...figure.querySelectorAll('svg path')]"
-      ".find(e => e.__data__ && String(e.__data__.tooltip).startsWith(" +
+      "');const path = [...figure.querySelectorAll('svg path')].find(e => e.__data__ && "
+      "String(e.__data__.tooltip).startsWith(" +
       test::json(text).dump() +
-      "));"
-      "path.scrollIntoView({block: 'center'});"
-      "const b = path.getBBox();"  // a line, or the middle of a rectangle
-      "const p = (path.hasAttribute('stroke') ? path.getPointAtLength(path.getTotalLength() / 3)"
-      " : new DOMPoint(b.x + b.width / 2, b.y + b.height / 2)).matrixTransform(path.getScreenCTM());"
-      "return [p.x, p.y]; })()");
+      "));path.scrollIntoView({block: 'center'});const b = path.getBBox();"  // a line, or the middle of a rectangle
+      "const p = (path.hasAttribute('stroke') ? path.getPointAtLength(path.getTotalLength() / 3) : new DOMPoint(b.x + "
+      "b.width / 2, b.y + b.height / 2)).matrixTransform(path.getScreenCTM());return [p.x, p.y]; })()");
   browser.mouse("mouseMoved", at[0], at[1]);
   return {at[0], at[1]};
 }
@@ -122,9 +118,9 @@ TEST_F(Pages, charts_zoom_about_the_mouse_move_and_come_back) {
   const std::string chart = "Segmentation";
   const auto ink = [&] {
     return browser.evaluate(
-        "(() => { const r = [...document.querySelectorAll('figure')].find(f => f.querySelector('h3')"
-        ".textContent === 'Segmentation').querySelector('path[stroke=\"#00805C\"]')"
-        ".getBoundingClientRect(); return [r.left, r.width]; })()");
+        "(() => { const r = [...document.querySelectorAll('figure')].find(f => f.querySelector('h3').textContent === "
+        "'Segmentation').querySelector('path[stroke=\"#00805C\"]').getBoundingClientRect(); return [r.left, r.width]; "
+        "})()");
   };
   const Vec2 at = rest_on(browser, chart, "fibre 1 (");
   const test::json before = ink();
@@ -176,8 +172,9 @@ TEST_F(Pages, all_that_can_be_used_or_looked_at_has_a_name) {
     browser.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)");
     const test::json found_lists = browser.evaluate("look.lists()");
     for (const auto& [what, found] : found_lists.items()) EXPECT_EQ(found, test::json::array()) << page << ": " << what;
-    EXPECT_EQ(browser.evaluate("[document.querySelectorAll('main').length, document.querySelectorAll('h1').length,"
-                               "document.documentElement.lang, document.title !== '']"),
+    EXPECT_EQ(browser.evaluate(
+                  "[document.querySelectorAll('main').length, "
+                  "document.querySelectorAll('h1').length,document.documentElement.lang, document.title !== '']"),
               test::json::array({1, 1, "en", true}))
         << page;
   }
@@ -198,8 +195,8 @@ TEST_F(Pages, all_text_stands_out_from_what_is_behind_it) {
 TEST_F(Pages, a_click_on_a_title_sorts_the_table) {
   Browser& browser = opened(cell_page());
   const std::string column =
-      "[...document.querySelector('#Forces-of-the-adhesions table').tBodies[0].rows]"
-      ".map(r => parseFloat(r.cells[5].textContent))";
+      "[...document.querySelector('#Forces-of-the-adhesions table').tBodies[0].rows].map(r => "
+      "parseFloat(r.cells[5].textContent))";
   for (const bool is_first : {true, false}) {
     browser.evaluate("document.querySelectorAll('#Forces-of-the-adhesions th span')[5].click()");
     std::vector<double> tractions = browser.evaluate(column);
@@ -223,8 +220,8 @@ TEST_F(Pages, print_whole) {
     constexpr int kPaper_px = (210 - 2 * 14) * 96 / 25.4;
     browser.call("Emulation.setEmulatedMedia", {{"media", "print"}});
     browser.resize(kPaper_px, 1000);
-    EXPECT_LE(browser.evaluate("Math.max(...[...document.querySelectorAll('main *')].map(e => "
-                               "e.getBoundingClientRect().right))"),
+    EXPECT_LE(browser.evaluate(
+                  "Math.max(...[...document.querySelectorAll('main *')].map(e => e.getBoundingClientRect().right))"),
               kPaper_px + 0.5)
         << page;
     const std::string pdf = browser.call("Page.printToPDF", {{"preferCSSPageSize", true}})["data"];

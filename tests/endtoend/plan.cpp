@@ -54,12 +54,11 @@ TEST(Plan, a_finished_cell_is_planned_with_by_its_own_tensions_beads_and_gel) {
 
 TEST(Plan, a_gel_that_hardly_moves_or_moves_too_far_is_warned_of) {
   const test::TemporaryFolder folder;
-  const std::string said =
-      run_program(
-          "mbtfm plan --scenario two-adhesions --noise_um 0.02 --beads_per_um2 0.5 --youngs_modulus_kPa "
-          "0.05,8.4,1000 --drawn 0 --out " +
-          (folder / "plan").string())
-          .output;
+  const std::string said = run_program(
+                               "mbtfm plan --scenario two-adhesions --noise_um 0.02 --beads_per_um2 0.5 "
+                               "--youngs_modulus_kPa 0.05,8.4,1000 --drawn 0 --out " +
+                               (folder / "plan").string())
+                               .output;
   EXPECT_NE(said.find("Mind: On 0.05 kPa linear elasticity leaves out"), said.npos) << said;
   EXPECT_NE(said.find("Mind: On 1000 kPa no bead moves by more than"), said.npos) << said;
   EXPECT_EQ(said.find("Mind: On 8.4 kPa"), said.npos) << said;

@@ -127,8 +127,8 @@ class TractionInSpace : public testing::Test {
                       "[gel]\nyoungs_modulus_kPa = 10\npoisson_ratio = 0.45\nthickness_um = 30\n[substrate]\n"
                       "displacement_tolerance = 0\n");
     const auto surface = test::run_program(
-        "mbtfm-surface --formula 'wave amplitude_um=3 period_um=40' --low_x_um -24 "
-        "--low_y_um -24 --high_x_um 24 --high_y_um 24 --out " +
+        "mbtfm-surface --formula 'wave amplitude_um=3 period_um=40' --low_x_um -24 --low_y_um -24 --high_x_um 24 "
+        "--high_y_um 24 --out " +
         at("surface.vtp"));
     ASSERT_EQ(surface.code, 0) << surface.output;
     files::write_text(

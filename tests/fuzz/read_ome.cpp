@@ -8,18 +8,15 @@ namespace mbtfm::fuzz::ome_readers {
 namespace {
 
 std::vector<std::string> samples() {
-  return {
-      "ImageJ=1.53t\nimages=6\nchannels=2\nslices=3\nunit=micron\nhyperstack=true\n",
-      "<?xml version=\"1.0\"?><OME UUID='urn:uuid:a'><Image><Pixels DimensionOrder='XYZCT' SizeC='2' SizeZ='3' "
-      "SizeT='1' "
-      "PhysicalSizeX='0.1' PhysicalSizeXUnit='\xC2\xB5m' PhysicalSizeY='0.1'><Channel Name='a'/><Channel Name='b &amp; "
-      "c' "
-      "SamplesPerPixel='1'/><TiffData IFD='0' FirstC='1' PlaneCount='3'><UUID FileName='a.tif'>urn:uuid:a</UUID>"
-      "</TiffData><TiffData IFD='3'/></Pixels></Image></OME>",
-      "<!DOCTYPE OME [<!ENTITY e 'eeee'>]><ome:OME xmlns:ome='u'><ome:BinaryOnly MetadataFile='m.ome'/><ome:Image>"
-      "<ome:Pixels SizeT='40' SizeC='1'><ome:Channel Name='&e;&e;'/><ome:TiffData FirstT='3'/></ome:Pixels></ome:Image>"
-      "</ome:OME>",
-      "Volocity\rXCalibrationMicrons=0.1625\rYCalibrationMicrons=0.1625\r"};
+  return {"ImageJ=1.53t\nimages=6\nchannels=2\nslices=3\nunit=micron\nhyperstack=true\n",
+          "<?xml version=\"1.0\"?><OME UUID='urn:uuid:a'><Image><Pixels DimensionOrder='XYZCT' SizeC='2' SizeZ='3' "
+          "SizeT='1' PhysicalSizeX='0.1' PhysicalSizeXUnit='\xC2\xB5m' PhysicalSizeY='0.1'><Channel Name='a'/><Channel "
+          "Name='b &amp; c' SamplesPerPixel='1'/><TiffData IFD='0' FirstC='1' PlaneCount='3'><UUID "
+          "FileName='a.tif'>urn:uuid:a</UUID></TiffData><TiffData IFD='3'/></Pixels></Image></OME>",
+          "<!DOCTYPE OME [<!ENTITY e 'eeee'>]><ome:OME xmlns:ome='u'><ome:BinaryOnly "
+          "MetadataFile='m.ome'/><ome:Image><ome:Pixels SizeT='40' SizeC='1'><ome:Channel Name='&e;&e;'/><ome:TiffData "
+          "FirstT='3'/></ome:Pixels></ome:Image></ome:OME>",
+          "Volocity\rXCalibrationMicrons=0.1625\rYCalibrationMicrons=0.1625\r"};
 }
 
 void read(std::string_view bytes) {

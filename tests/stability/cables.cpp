@@ -59,8 +59,8 @@ TEST(HardCables, only_the_network_or_only_the_fibres_pull) {
 
 TEST(HardCables, a_fibre_alone_collapses_in_a_slack_network_however_weakly_it_pulls) {
   test::hard_case(
-      "a free fibre draws in a network that does not pull: forces over seven orders of magnitude, stiffness "
-      "over seventeen",
+      "a free fibre draws in a network that does not pull: forces over seven orders of magnitude, stiffness over "
+      "seventeen",
       "convergence for 10 to 1e-9 nN");
   const std::vector<Vec2> rim = test::on_circle(0, 360, 4);
   const cables::CableNetwork cables(test::mesh_of({rim, {{rim[1], {1, 2}}}}));

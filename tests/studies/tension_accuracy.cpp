@@ -223,8 +223,8 @@ void noise(const Arguments& a) {
       implied{.name = "Cramér–Rao", .x = levels, .y = {}};
   std::printf(
       "noise,relative_l2,total_force,network_force,uncorrected_total,uncorrected_network,mean_relative_deviation,"
-      "implied_by_limit,rms_over_limit,coverage,near_zero,coverage_near_zero,robust,total_without_chance,"
-      "its_error,network_without_chance,its_error\n");
+      "implied_by_limit,rms_over_limit,coverage,near_zero,coverage_near_zero,robust,total_without_chance,its_error,"
+      "network_without_chance,its_error\n");
   std::vector<TensionScene> scenes;
   for (int c = 1; c <= a.n_cells; ++c) scenes.push_back(thesis_scene(static_cast<std::uint64_t>(c), 10000, 0));
   unsigned seed = 1;

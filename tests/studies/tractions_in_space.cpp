@@ -67,9 +67,9 @@ void tell(const Known& known, const char* what, double noise, double astray, con
   const ForceErrors forces = known.forces(r);
   const spatial::Balance balance = balance_of(known.problem, r);
   std::printf(
-      "%-12s %-11s noise %.2f astray %.1f  map %.3f (%.2f x best)  forces %.3f  error/stated %.2f  total %.0f nN  "
-      "net %.0f +- %.0f nN  energy %.0f fJ  degrees %.0f"
-      "  scale %.2f  lambda %.3g (%s; risk %.3g evidence %.3g gcv %.3g; sums %.3g)\n",
+      "%-12s %-11s noise %.2f astray %.1f  map %.3f (%.2f x best)  forces %.3f  error/stated %.2f  total %.0f nN  net "
+      "%.0f +- %.0f nN  energy %.0f fJ  degrees %.0f  scale %.2f  lambda %.3g (%s; risk %.3g evidence %.3g gcv %.3g; "
+      "sums %.3g)\n",
       known.scene.name.c_str(), what, noise, astray, error, best > 0 ? error / best : 0.0, forces.mean,
       forces.over_stated, balance.total_force_nN, norm(balance.force_nN), norm(balance.force_sigma_nN),
       balance.strain_energy_fJ, r.degrees, r.weighing.scale, r.lambda.value_or(0),

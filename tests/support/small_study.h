@@ -162,8 +162,8 @@ inline void write_finished_cell_in_space(const fs::path& folder, const statistic
                                      {{{s.total_force_nN, 2, 3}, {0.1, 0, 0}, 0.02, 0.06, {}}});
   files::write_surface(folder / "3_surface/surface.vtp", {{0, 0}, {10, 10}, 4, 4, std::vector<double>(16), {}});
   std::string tractions =
-      "x_um,y_um,z_um,tx_kPa,ty_kPa,tz_kPa,sigma_tx_kPa,sigma_ty_kPa,sigma_tz_kPa,resolution_um,normal_kPa,"
-      "tangential_kPa,area_um2\n";
+      "x_um,y_um,z_um,tx_kPa,ty_kPa,tz_kPa,sigma_tx_kPa,sigma_ty_kPa,sigma_tz_kPa,resolution_um,normal_kPa,tangential_"
+      "kPa,area_um2\n";
   const auto add = [&](double x, double y, double z) {
     std::ostringstream row;
     row.precision(17);

@@ -105,11 +105,10 @@ TEST(ImagePlanes, ome_states_which_dimension_runs_fastest) {
 TEST(ImagePlanes, ome_pages_may_lie_in_any_order) {
   const TemporaryFolder folder;
   const fs::path file = folder / "a.ome.tif";
-  write_pages(
-      file, 4,
-      ome("DimensionOrder='XYCZT' SizeC='2' SizeZ='2' SizeT='1'",
-          "<TiffData FirstC='1' IFD='0'/><TiffData FirstC='0' IFD='3'/>"
-          "<TiffData FirstZ='1' IFD='1' PlaneCount='2'><UUID FileName='other.tif'>urn:uuid:a</UUID></TiffData>"));
+  write_pages(file, 4,
+              ome("DimensionOrder='XYCZT' SizeC='2' SizeZ='2' SizeT='1'",
+                  "<TiffData FirstC='1' IFD='0'/><TiffData FirstC='0' IFD='3'/><TiffData FirstZ='1' IFD='1' "
+                  "PlaneCount='2'><UUID FileName='other.tif'>urn:uuid:a</UUID></TiffData>"));
   EXPECT_EQ(value_of(file, {.channel = "2", .z = "1"}), 0);
   EXPECT_EQ(value_of(file, {.channel = "1", .z = "1"}), 3);
   EXPECT_EQ(value_of(file, {.channel = "1", .z = "2"}), 1);
@@ -120,8 +119,8 @@ TEST(ImagePlanes, a_plane_in_another_file_of_an_ome_set_is_an_error) {
   const TemporaryFolder folder;
   write_pages(folder / "a.ome.tif", 1,
               ome("SizeC='2' SizeZ='1' SizeT='1'",
-                  "<TiffData IFD='0'><UUID FileName='a.ome.tif'>urn:uuid:a</UUID></TiffData>"
-                  "<TiffData FirstC='1' IFD='0'><UUID FileName='b.ome.tif'>urn:uuid:b</UUID></TiffData>"));
+                  "<TiffData IFD='0'><UUID FileName='a.ome.tif'>urn:uuid:a</UUID></TiffData><TiffData FirstC='1' "
+                  "IFD='0'><UUID FileName='b.ome.tif'>urn:uuid:b</UUID></TiffData>"));
   EXPECT_EQ(value_of(folder / "a.ome.tif", {.channel = "1"}), 0);
   EXPECT_NE(refusal(folder / "a.ome.tif", {.channel = "2"}).find("another file of the set"), std::string::npos);
 }

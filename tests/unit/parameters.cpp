@@ -101,9 +101,9 @@ TEST(Parameters, an_unknown_key_names_the_line_and_the_nearest_known_one) {
             "cell.toml:3: expected a known key of [network], found 'lenght_um' | did you mean 'length_um'?");
   EXPECT_EQ(message_of("[netwrk]\na = 2\n"),
             "cell.toml:1: expected a known table, found [netwrk] | did you mean 'network'?");
-  EXPECT_EQ(message_of("pixelsize_um = 2\n"),
-            "cell.toml:1: expected a known key above the first table, found 'pixelsize_um' | did you mean "
-            "'pixel_size_um'?");
+  EXPECT_EQ(
+      message_of("pixelsize_um = 2\n"),
+      "cell.toml:1: expected a known key above the first table, found 'pixelsize_um' | did you mean 'pixel_size_um'?");
 }
 
 TEST(Parameters, a_key_in_the_wrong_table_is_told_where_it_belongs_and_one_that_is_like_none_is_not_guessed) {
@@ -114,10 +114,9 @@ TEST(Parameters, a_key_in_the_wrong_table_is_told_where_it_belongs_and_one_that_
 }
 
 TEST(Parameters, a_deleted_key_is_told_from_a_misspelt_one) {
-  EXPECT_EQ(
-      message_of("[network]\nseeds = 'jittered'\n"),
-      "cell.toml:2: expected a known key of [network], found 'seeds' | this version computes as its default did and "
-      "has no such key: take the line out (CHANGELOG.md)");
+  EXPECT_EQ(message_of("[network]\nseeds = 'jittered'\n"),
+            "cell.toml:2: expected a known key of [network], found 'seeds' | this version computes as its default did "
+            "and has no such key: take the line out (CHANGELOG.md)");
 }
 
 TEST(Parameters, keys_of_other_stages_are_left_to_them) { EXPECT_EQ(message_of("[fit]\nwhatever = 2\n"), "read"); }
@@ -136,9 +135,9 @@ TEST(Parameters, a_repeated_key_a_wrong_type_and_a_value_out_of_range_are_refuse
 }
 
 TEST(Parameters, a_choice_knows_its_words_and_names_the_one_that_was_meant) {
-  EXPECT_EQ(message_of("[network]\nmethod = 'exakt'\n"),
-            "cell.toml:2: [network] method: expected one of fast, exact, found 'exakt' | did you mean 'exact'? (which "
-            "way)");
+  EXPECT_EQ(
+      message_of("[network]\nmethod = 'exakt'\n"),
+      "cell.toml:2: [network] method: expected one of fast, exact, found 'exakt' | did you mean 'exact'? (which way)");
   EXPECT_EQ(message_of("[network]\nmethod = 'slow'\n"),
             "cell.toml:2: [network] method: expected one of fast, exact, found 'slow' | which way");
   Example e;

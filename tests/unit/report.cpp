@@ -63,11 +63,9 @@ TEST(StagePage, its_picture_has_a_name_and_keeps_to_the_page_and_its_tables_have
                         .picture_title = "Tension",
                         .picture_explained = "Left: a \"map\".",
                         .figures = {{"n", std::int64_t(1)}}});
-  EXPECT_NE(
-      html.find(
-          "<svg role=\"img\" aria-label=\"Tension. Left: a &quot;map&quot;.\" style=\"max-width:100%;height:auto\" "
-          "width=\"920\""),
-      std::string::npos);
+  EXPECT_NE(html.find("<svg role=\"img\" aria-label=\"Tension. Left: a &quot;map&quot;.\" "
+                      "style=\"max-width:100%;height:auto\" width=\"920\""),
+            std::string::npos);
   std::size_t n_tables = 0, n_captions = 0;
   for (std::size_t at = 0; (at = html.find("<table>", at)) != std::string::npos; ++at) ++n_tables;
   for (std::size_t at = 0; (at = html.find("<table><caption", at)) != std::string::npos; ++at) ++n_captions;

@@ -880,9 +880,9 @@ TEST(SpaceStudy, leaves_out_a_copy_one_without_its_tractions_and_one_that_did_no
   files::write_text(folder / "b/space_3/run.json",
                     "{\"stages\": {\"traction\": {\"converged\": false}}, \"findings\": []}");
   const Study study = read_study(folder.path(), {.condition_from = "folder"}, {}, 2);
-  EXPECT_EQ(reason_of(study, "a/space_9"),
-            "the same cell as a/space_0: their 2_track/displacement_3d.csv are the same bytes and their outlines "
-            "overlap");
+  EXPECT_EQ(
+      reason_of(study, "a/space_9"),
+      "the same cell as a/space_0: their 2_track/displacement_3d.csv are the same bytes and their outlines overlap");
   EXPECT_EQ(reason_of(study, "a/space_8"),
             "the same cell as a/space_1: their 2_track/displacement_3d.csv are the same bytes");
   EXPECT_EQ(reason_of(study, "a/space_2"), "no fit: 4_traction/traction.json is not there");
