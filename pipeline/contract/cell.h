@@ -65,7 +65,7 @@ struct Fibre {
 /// A segmented cell.
 struct Cell {
   std::vector<Adhesion> adhesions;
-  std::vector<Fibre> fibres;
+  std::vector<Fibre> fibres = {};
   Polygon outline_um;
   std::vector<Polygon> holes_um;  ///< gaps in the cell, inside the outline
   /// By piece of the outline, from its point to the next: it is a cut, along the image's border, and the cell goes on

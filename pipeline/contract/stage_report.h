@@ -14,8 +14,8 @@ namespace mbtfm {
 struct StageReport {
   bool converged = true;
   std::string summary;  ///< what was found, and what was skipped, in one line
-  Figures figures;
-  std::vector<Effect> effects;
+  Figures figures = {};
+  std::vector<Effect> effects = {};
   std::vector<Finding> findings;
 };
 

@@ -14,8 +14,8 @@ struct HeightMap {
   Vec2 origin_um;   ///< the first vertex
   Vec2 spacing_um;  ///< between neighbours, positive
   int n_x = 0, n_y = 0;
-  std::vector<double> z_um;      ///< by vertex, x fastest
-  std::vector<double> sigma_um;  ///< standard error of each; empty: exact
+  std::vector<double> z_um = {};      ///< by vertex, x fastest
+  std::vector<double> sigma_um = {};  ///< standard error of each; empty: exact
 
   Vec2 place_um(double column, double row) const { return origin_um + Vec2{column * spacing_um.x, row * spacing_um.y}; }
   Vec2 vertex_um(std::size_t k) const {

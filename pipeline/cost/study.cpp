@@ -37,7 +37,7 @@ double median(std::vector<double> values) {
 /// What one run took, and how it ended.
 struct Run {
   double seconds = 0, cpu_seconds = 0, peak_memory_MB = 0;
-  std::string failure;
+  std::string failure = {};
 
   void add(const Run& other) {
     seconds += other.seconds;
@@ -48,8 +48,8 @@ struct Run {
 };
 
 struct Answer {
-  std::vector<Fibre> fibres;
-  std::map<int, double> tensions_nN;  ///< of the fibres
+  std::vector<Fibre> fibres = {};
+  std::map<int, double> tensions_nN = {};  ///< of the fibres
   double total_force_nN = 0;
   std::optional<SpaceMap> map = {};  ///< of a cell in space, in place of the fibres
 };
@@ -274,7 +274,7 @@ Rung finest(CellKind kind, double spacing_um) {
 Answer truth_of(const fs::path& cell, CellKind kind) {
   if (kind == CellKind::space) {
     const SpaceMap map = true_space_map(cell);
-    return {.fibres = {}, .tensions_nN = {}, .total_force_nN = map.total_force_nN, .map = map};
+    return {.tensions_nN = {}, .total_force_nN = map.total_force_nN, .map = map};
   }
   const report::Comparison comparison = report::compare_with_truth(cell);
   Answer truth;
@@ -288,7 +288,7 @@ Answer truth_of(const fs::path& cell, CellKind kind) {
 /// The reference's tensions by the fibres of another segmentation; a map as it is.
 Answer by_fibres_of(const Answer& answer, const Answer& reference) {
   if (reference.map) return reference;
-  Answer result{.fibres = answer.fibres, .tensions_nN = {}, .total_force_nN = reference.total_force_nN};
+  Answer result{.fibres = answer.fibres, .total_force_nN = reference.total_force_nN};
   for (const report::FibreMatch& match : report::match_fibres(answer.fibres, reference.fibres)) {
     const int found_id = answer.fibres[match.found_index].fibre_id;
     const int id = reference.fibres[match.true_index].fibre_id;
@@ -315,7 +315,7 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
   };
   Scratch scratch(cell, options);
   const bool is_in_space = scratch.kind() == CellKind::space;
-  Study study{.kind = scratch.kind(), .reference = "the truth", .has_images = scratch.has_images(), .measurements = {}};
+  Study study{.kind = scratch.kind(), .reference = "the truth", .has_images = scratch.has_images()};
   const double spacing_um =
       is_in_space ? files::JsonRecord(cell / "4_traction/traction.json", "a summary as mbtfm-traction writes it")
                         .at("spacing_x_um")

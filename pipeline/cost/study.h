@@ -39,7 +39,7 @@ struct Study {
   CellKind kind = CellKind::plane;
   std::string reference;    ///< what errors are against: "the truth", or the finest rung
   bool has_images = false;  ///< times are those of all stages; else of network and fit, and nothing is segmented anew
-  std::vector<Measurement> measurements;
+  std::vector<Measurement> measurements = {};
 };
 
 /// Runs the stages in a scratch folder below CELL/cost. Of a cell without images, or without all of them, segmentation

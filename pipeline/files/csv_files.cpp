@@ -121,9 +121,7 @@ HeightMap read_heights(const Path& file) {
   HeightMap map{.origin_um = {x.first, y.first},
                 .spacing_um = {x.step, y.step},
                 .n_x = static_cast<int>(x.n),
-                .n_y = static_cast<int>(y.n),
-                .z_um = {},
-                .sigma_um = {}};
+                .n_y = static_cast<int>(y.n)};
   map.z_um.assign(x.n * y.n, std::numeric_limits<double>::quiet_NaN());
   std::vector<char> has_row(map.z_um.size(), 0);
   for (int row = 0; row < table.n_rows(); ++row) {
@@ -138,13 +136,13 @@ namespace {
 
 struct Outline {
   std::vector<Polygon> rings_um;
-  std::vector<bool> is_cut;  ///< by piece of the outer ring; empty: none
+  std::vector<bool> is_cut = {};  ///< by piece of the outer ring; empty: none
 };
 
 Outline outline_in(const Path& file) {
   CsvTable table(file);
   const std::vector<OutlinePoint> points = rows_of(table, outline_table());
-  Outline outline{.rings_um = std::vector<Polygon>(1), .is_cut = {}};
+  Outline outline{.rings_um = std::vector<Polygon>(1)};
   std::vector<Polygon>& rings = outline.rings_um;
   for (int row = 0; row < table.n_rows(); ++row) {
     const OutlinePoint& point = points[row];

@@ -44,11 +44,11 @@ std::string kind_of(const Json& value) {
 
 struct JsonRecord::File {
   std::string name, kind, hint;
-  Json json;
+  Json json = {};
 };
 
 JsonRecord::JsonRecord(const std::filesystem::path& file, std::string kind, std::string hint) {
-  File whole{.name = file.string(), .kind = std::move(kind), .hint = std::move(hint), .json = {}};
+  File whole{.name = file.string(), .kind = std::move(kind), .hint = std::move(hint)};
   const auto refuse = [&](const std::string& found) { throw InputError(whole.name, whole.kind, found, whole.hint); };
   std::error_code error;
   if (std::filesystem::file_size(file, error) > kLargestText_bytes && !error) refuse("a file of more than 256 MB");

@@ -12,8 +12,8 @@ namespace mbtfm::files {
 /// carries the unit.
 struct PointArray {
   std::string name;
-  std::vector<double> scalars;
-  std::vector<Vec2> vectors;
+  std::vector<double> scalars = {};
+  std::vector<Vec2> vectors = {};
 };
 
 }  // namespace mbtfm::files

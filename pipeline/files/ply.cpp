@@ -42,7 +42,7 @@ struct PlyProperty {
 struct PlyElement {
   std::string_view name;
   int n = 0;
-  std::vector<PlyProperty> properties;
+  std::vector<PlyProperty> properties = {};
 };
 
 struct PlyHead {
@@ -78,7 +78,7 @@ PlyHead take_head(TextRest& text) {
       head.format = ply_format(words[1], text.where());
     } else if (key == "element" && words.size() == 3) {
       const int n = index_of(number_of(words[2], text.where()), text.where());
-      head.elements.push_back({.name = words[1], .n = n, .properties = {}});
+      head.elements.push_back({.name = words[1], .n = n});
     } else if (key == "property" && (words.size() == 3 || is_list) && !head.elements.empty()) {
       const PlyType* type = ply_type(words[words.size() - 2], text.where());
       const PlyType* count = is_list ? ply_type(words[2], text.where()) : nullptr;

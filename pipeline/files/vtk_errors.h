@@ -27,7 +27,7 @@ class VtkErrors {
     vtkTypeMacro(Window, vtkOutputWindow);
     void DisplayText(const char* message) override { text += message; }
     void DisplayWarningText(const char*) override {}
-    std::string text;
+    std::string text = {};
   };
   vtkNew<Window> window_;
   vtkSmartPointer<vtkOutputWindow> before_;

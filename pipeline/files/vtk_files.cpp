@@ -107,8 +107,8 @@ vtkNew<vtkUnstructuredGrid> grid_of(const Network& network, const std::vector<Ve
   }
   grid->Allocate(static_cast<vtkIdType>(network.links.size()));
   const auto fibre = int_array("fibre_id");
-  PointArray rest{.name = "rest_length_um", .scalars = {}, .vectors = {}};
-  PointArray share{.name = "share", .scalars = {}, .vectors = {}};
+  PointArray rest{.name = "rest_length_um"};
+  PointArray share{.name = "share"};
   for (const Link& link : network.links) {
     const vtkIdType ends[2] = {link.vertex_a, link.vertex_b};
     grid->InsertNextCell(VTK_LINE, 2, ends);
@@ -240,8 +240,7 @@ void write_surface(const Path& file, const HeightMap& map) {
   poly->SetPoints(points);
   poly->SetPolys(quads);
   if (!map.sigma_um.empty())
-    poly->GetPointData()->AddArray(
-        double_array(PointArray{.name = "height_sigma_um", .scalars = map.sigma_um, .vectors = {}}));
+    poly->GetPointData()->AddArray(double_array(PointArray{.name = "height_sigma_um", .scalars = map.sigma_um}));
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }
 
@@ -256,13 +255,13 @@ void write_contracted_network(const Path& file, const Network& network, const st
   MBTFM_ASSERT(positions_um.size() == network.vertices_um.size() && link_force_nN.size() == network.links.size() &&
                link_states.size() == network.links.size());
   const auto grid = grid_of(network, positions_um);
-  grid->GetCellData()->AddArray(double_array({.name = "force_nN", .scalars = link_force_nN, .vectors = {}}));
+  grid->GetCellData()->AddArray(double_array({.name = "force_nN", .scalars = link_force_nN}));
   const auto state = int_array("state");  // 0 slack, 1 taut, 2 collapsed
   for (const CableState s : link_states) state->InsertNextValue(static_cast<int>(s));
   grid->GetCellData()->AddArray(state);
   std::vector<Vec2> moves_um;
   for (std::size_t v = 0; v < positions_um.size(); ++v) moves_um.push_back(positions_um[v] - network.vertices_um[v]);
-  grid->GetPointData()->AddArray(double_array({.name = "contraction_um", .scalars = {}, .vectors = moves_um}));
+  grid->GetPointData()->AddArray(double_array({.name = "contraction_um", .vectors = moves_um}));
   write_xml<vtkXMLUnstructuredGridWriter>(file, grid.Get());
 }
 

@@ -24,14 +24,14 @@ void write_surface(const Path& file, const HeightMap& map);
 struct GridArray {
   std::string name;
   int components = 1;
-  std::vector<double> values;
+  std::vector<double> values = {};
 };
 /// Quadrilaterals (4 corners, round), hexahedra (8 corners: one face round, then the face across) or quadratic
 /// triangles (3 corners, then the points between them: 6).
 struct Grid {
   int corners = 4;
   std::vector<std::array<double, 3>> points_um;
-  std::vector<int> cells;  ///< points of the corners, cell by cell
+  std::vector<int> cells = {};  ///< points of the corners, cell by cell
   std::vector<GridArray> point_arrays, cell_arrays;
 };
 void write_grid_vtu(const Path& file, const Grid& grid);

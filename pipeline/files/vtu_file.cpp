@@ -111,8 +111,7 @@ struct Structure {
                                       .type = attributes["type"],
                                       .format = attributes["format"],
                                       .offset = attributes["offset"],
-                                      .n_components = attributes["NumberOfComponents"],
-                                      .text = {}});
+                                      .n_components = attributes["NumberOfComponents"]});
     }
     if (element == "AppendedData") {
       appended = std::move(attributes);

@@ -37,7 +37,7 @@ class VtuFile {
 
   struct Array {
     VtuSection section;
-    std::string name, type, format, offset, n_components, text;
+    std::string name, type, format, offset, n_components, text = {};
   };
   struct Piece {
     std::uint64_t n_points = 0, n_cells = 0;     ///< all cells

@@ -45,7 +45,7 @@ AveragedField averaged(const VectorField& field, const Box& box, double side_um)
     squares[{static_cast<int>((p.y - box.low.y) / side_um), static_cast<int>((p.x - box.low.x) / side_um)}].push_back(
         i);
   }
-  AveragedField result{.means = {}, .side_um = side_um, .mean_members = 0};
+  AveragedField result{.side_um = side_um, .mean_members = 0};
   for (const auto& [place, members] : squares) {
     if (members.size() < kFewest) continue;
     Vec2 position, vector;

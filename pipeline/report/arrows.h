@@ -15,12 +15,12 @@ struct Box {
 
 /// Vectors at points, to be drawn as arrows.
 struct VectorField {
-  std::vector<Vec2> positions_um, vectors;
+  std::vector<Vec2> positions_um, vectors = {};
 };
 
 /// Means over square cells that hold at least three points.
 struct AveragedField {
-  VectorField means;
+  VectorField means = {};
   double side_um = 0;       ///< of the squares
   double mean_members = 0;  ///< points a square
 };

@@ -20,7 +20,7 @@ struct ComparedFibre {
 };
 
 struct Comparison {
-  std::vector<ComparedFibre> fibres;  ///< the found ones in order of id, then the missed ones
+  std::vector<ComparedFibre> fibres = {};  ///< the found ones in order of id, then the missed ones
   Tension network;
   std::optional<double> true_network_nN;
   double relative_error = 0;  ///< |t − truth| / |truth| over the fibres that are found

@@ -89,7 +89,7 @@ using Pieces = std::vector<std::pair<Vec2, Vec2>>;
 /// A network's links sorted by what they belong to.
 struct SortedLinks {
   Pieces web;
-  std::map<int, Pieces> fibres;
+  std::map<int, Pieces> fibres = {};
   std::map<int, std::vector<double>> carried_nN;  ///< by the links of each fibre; empty where there are no forces
 };
 

@@ -17,14 +17,14 @@ struct Table {
     std::string title;
     bool is_number = false;
   };
-  std::vector<Column> columns;
-  std::vector<std::vector<std::string>> rows;
+  std::vector<Column> columns = {};
+  std::vector<std::vector<std::string>> rows = {};
   std::string caption = {};  ///< what it lists, for those who hear the page
 };
 
 /// A file that a reader can take out of the page.
 struct Download {
-  std::string name, text;
+  std::string name, text = {};
 };
 
 /// A table whose rows sort by a click on a column's title.

@@ -16,7 +16,7 @@ struct StageLine {
   std::string seconds, peak_memory_MB;  ///< for people; empty where not known
   bool converged = true;
   /// name, value
-  std::vector<std::pair<std::string, std::string>> parameters, figures;
+  std::vector<std::pair<std::string, std::string>> parameters, figures = {};
   /// file, SHA-256
   std::vector<std::pair<std::string, std::string>> inputs;
 };
@@ -39,8 +39,8 @@ struct Provenance {
   std::string started, ended, processor;  ///< of the run; empty: not known
   std::string preset;                     ///< empty: none was asked for
   std::optional<WantedAccuracy> accuracy;
-  std::vector<StageLine> stages;
-  std::vector<EffectLine> effects;
+  std::vector<StageLine> stages = {};
+  std::vector<EffectLine> effects = {};
   std::vector<Finding> findings;
 };
 

@@ -23,13 +23,13 @@ struct OfType {
 
 struct Result {
   FitSummary fit;
-  std::optional<double> total_error_nN;  ///< of the whole error budget
-  std::map<FibreType, OfType> types;
+  std::optional<double> total_error_nN = {};  ///< of the whole error budget
+  std::map<FibreType, OfType> types = {};
   int n_fibres = 0, n_uncertain = 0;
 };
 
 Result result_of(const Path& cell) {
-  Result result{.fit = files::read_fit_summary(cell / "4_fit/fit.json"), .total_error_nN = {}, .types = {}};
+  Result result{.fit = files::read_fit_summary(cell / "4_fit/fit.json")};
   if (result.fit.error_budget) result.total_error_nN = total(result.fit.error_budget->total_force_parts_nN);
   std::map<int, FibreType> types;
   for (const Fibre& fibre : files::read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv"))

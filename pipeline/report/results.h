@@ -34,14 +34,14 @@ struct UsualMethod {
   double total_force_nN = 0;
   std::optional<double> lambda_um_per_kPa;  ///< none if no bead has moved
   std::string lambda_by;                    ///< the criterion that chose it
-  std::string obstacle;                     ///< why it has no tractions; empty: it has
+  std::string obstacle = {};                ///< why it has no tractions; empty: it has
 };
 
 struct CellResults {
   Path folder;
   std::string name;
   Gel gel;
-  Cell cell;
+  Cell cell = {};
   DisplacementField displacement;
   Network network;
   ContractedNetwork contracted;
@@ -51,7 +51,7 @@ struct CellResults {
   std::optional<Residual> residual;
   std::optional<UsualMethod> usual_method;
   std::optional<Comparison> comparison;  ///< of a simulated cell
-  std::optional<Images> images;          ///< of the cell
+  std::optional<Images> images = {};     ///< of the cell
   std::optional<Images> bead_images;     ///< both on each other
   std::vector<MissingFibre> missing_fibres;
   std::vector<MissingAdhesion> missing_adhesions;

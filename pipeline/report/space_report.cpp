@@ -34,11 +34,11 @@ std::string with_error(double value, std::optional<double> sigma, const char* un
 /// Net force or moment, with its standard error where there is one.
 struct Sum {
   double size = 0;
-  std::optional<double> sigma;  ///< along itself
+  std::optional<double> sigma = {};  ///< along itself
 };
 Sum sum_of(const SpaceResults& r, const std::string& name, const std::string& unit) {
   const Vec3 v = r.vector(name, unit);
-  Sum sum{.size = norm(v), .sigma = {}};
+  Sum sum{.size = norm(v)};
   if (sum.size > 0) sum.sigma = r.find(name + "_sigma_along_" + unit);
   return sum;
 }

@@ -35,7 +35,7 @@ std::string shown(const std::string& text) {
 
 std::string section_of(const Listing& listing) {
   const files::CsvTable csv(listing.csv, listing.name);
-  Table table{.columns = {}, .rows = {}, .caption = listing.title};
+  Table table{.rows = {}, .caption = listing.title};
   table.rows.resize(static_cast<std::size_t>(csv.n_rows()));
   for (const std::string& column : listing.columns) {
     std::vector<std::string> texts;

@@ -13,7 +13,7 @@ namespace mbtfm::report {
 struct Listing {
   std::string title, explained;
   std::string name, csv;  ///< of the file, and what is in it
-  std::vector<std::string> columns;
+  std::vector<std::string> columns = {};
 };
 
 /// A section with the table.

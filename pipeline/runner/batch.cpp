@@ -57,7 +57,7 @@ ProcessLimits limits_of_cell(const ProcessLimits& of_stage) {
   constexpr double kMargin_s = 60;
   if (!of_stage.seconds) return {};
   constexpr double kMostStages = 4;  // a cell has, of either kind
-  return {.seconds = kMostStages * *of_stage.seconds + kMargin_s, .memory_bytes = {}};
+  return {.seconds = kMostStages * *of_stage.seconds + kMargin_s};
 }
 
 void tell_that_unreadable(const std::exception& error, BatchCell& cell) {
@@ -82,7 +82,7 @@ void tell_of_failure(BatchCell& cell) {
 BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
   std::vector<std::string> command = {options.program.string(), "run", cell.string(), "--quiet"};
   command.insert(command.end(), options.arguments.begin(), options.arguments.end());
-  BatchCell outcome{.cell = cell, .message = {}, .failed_stage = {}, .how = {}};
+  BatchCell outcome{.cell = cell};
   try {
     files::write_text(cell / "run.log", "");
     const auto record_before = time_of_record(cell);
@@ -108,8 +108,8 @@ BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
 struct Look {
   enum class Finding { done, to_run, busy };
   Finding finding = Finding::to_run;
-  std::vector<std::string> stages;  ///< that may run
-  BatchCell outcome;                ///< of a cell that is done, or cannot be read
+  std::vector<std::string> stages = {};  ///< that may run
+  BatchCell outcome;                     ///< of a cell that is done, or cannot be read
 };
 
 /// Is there anything to do for the cell? Where it is not even readable, `mbtfm run` tells why.

@@ -17,7 +17,7 @@ struct SkippedFolder {
 };
 
 struct FoundCells {
-  std::vector<std::filesystem::path> cells;  ///< in alphabetical order
+  std::vector<std::filesystem::path> cells = {};  ///< in alphabetical order
   std::vector<SkippedFolder> skipped;
 };
 
@@ -29,7 +29,7 @@ struct BatchCell;
 
 struct BatchOptions {
   std::filesystem::path program;                     ///< mbtfm itself
-  std::vector<std::string> arguments;                ///< passed on to `mbtfm run`
+  std::vector<std::string> arguments = {};           ///< passed on to `mbtfm run`
   int jobs = 1;                                      ///< cells at a time
   int threads = 1;                                   ///< to look at cells with
   RunOptions run;                                    ///< what `arguments` say, to tell which cells are done
@@ -39,12 +39,12 @@ struct BatchOptions {
 };
 
 struct BatchCell {
-  std::filesystem::path cell;
+  std::filesystem::path cell = {};
   int exit_code = 0;
   double seconds = 0;
-  std::string message;       ///< why it failed: the first error it printed
-  std::string failed_stage;  ///< empty where it failed outside of one
-  std::string how;           ///< "exit code 3", "timed out after 60 s"
+  std::string message = {};       ///< why it failed: the first error it printed
+  std::string failed_stage = {};  ///< empty where it failed outside of one
+  std::string how = {};           ///< "exit code 3", "timed out after 60 s"
 };
 
 /// `mbtfm run` for every cell that is not up to date; what it prints goes to run.log in the cell folder. Cells that

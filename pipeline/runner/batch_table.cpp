@@ -26,7 +26,7 @@ namespace {
 /// What a stage that has ended says of itself.
 struct StageSays {
   std::string summary;
-  std::vector<std::pair<std::string, std::string>> figures;  ///< name, value
+  std::vector<std::pair<std::string, std::string>> figures = {};  ///< name, value
   std::vector<Finding> findings;
 };
 
@@ -49,7 +49,7 @@ std::optional<StageSays> record_of(const fs::path& cell, const Stage& stage) {
   if (!files::is_own_file(file)) return std::nullopt;
   try {
     const files::JsonRecord record(file, "a stage's record");
-    StageSays says{.summary = record.text_or("summary", ""), .figures = {}, .findings = files::findings_of(record)};
+    StageSays says{.summary = record.text_or("summary", ""), .findings = files::findings_of(record)};
     for (const auto& [name, value] : record.at("figures").members()) {
       // null: not a number, in JSON
       says.figures.emplace_back(name, value.json().is_null() ? std::string() : text_of(value.figure()));
@@ -70,7 +70,7 @@ std::vector<Stage> stages_told_of(const fs::path& cell) {
 }
 
 struct BatchRow {
-  BatchCell cell;
+  BatchCell cell = {};
   std::vector<Finding> findings = {};
   std::map<std::string, std::string> figures = {};  ///< by column
 };

@@ -36,28 +36,20 @@ Stage tracking() {
 Stage surface() {
   return {.name = "surface",
           .folder = "3_surface",
-          .images = {},
-          .optional_images = {},
           .arguments = {{"beads", kDisplacement}},
           .output = {"out", kSurface},
           .reads = {kDisplacement},
-          .reads_where_there = {},
           .writes = {kSurface},
-          .series = {},
           .tables = {"", "surface", "checks"},
-          .effects = {},
           .settings = {{"surface", "z_points", "into-gel"}}};  // as tables of the tracker are
 }
 
 Stage traction() {
   return {.name = "traction",
           .folder = "4_traction",
-          .images = {},
-          .optional_images = {},
           .arguments = {{"displacement", kDisplacement}, {"surface", kSurface}},
           .output = {"out", "4_traction/traction.csv"},
           .reads = {kDisplacement, kSurface},
-          .reads_where_there = {},
           .writes = {"4_traction/traction.csv", "4_traction/traction.vtp", "4_traction/traction.json"},
           .series = {"4_traction/traction_*"},
           .tables = {"", "gel", "traction", "substrate", "checks"},
@@ -67,12 +59,10 @@ Stage traction() {
 Stage sheet() {
   return {.name = "sheet",
           .folder = "3_sheet",
-          .images = {},
           .optional_images = {{"adhesive", "adhesion_mask"}, {"cells", "cell_labels"}},
           .arguments = {{"displacement", "2_track/displacement.csv"}},
           .output = {"out", "3_sheet"},
           .reads = {"2_track/displacement.csv"},
-          .reads_where_there = {},
           .writes = {"3_sheet/sheet_fit.csv", "3_sheet/sheet_models.csv", "3_sheet/sheet.csv", "3_sheet/traction.csv",
                      "3_sheet/displacement.csv", "3_sheet/sheet.json", "3_sheet/sheet.svg", "3_sheet/sheet.html",
                      "3_sheet/sheet.vtu"},
@@ -139,7 +129,7 @@ bool take_given_outline(const fs::path& cell, const ImageNames& images, CellStag
 }
 
 CellStages stages_as_sheet(const fs::path& cell, const ImageNames& images, const RunSettings& settings) {
-  CellStages of{.kind = CellKind::sheet, .why = "run.model is sheet", .stages = {}, .chains = {}};
+  CellStages of{.kind = CellKind::sheet, .why = "run.model is sheet"};
   Stage track = stage_named("track"), last = sheet();
   track.keeps_frames = false;
   const bool has_images = has_image(cell, images, "adhesion") || has_image(cell, images, "actin");
@@ -219,7 +209,7 @@ std::string stage_names() {
 
 CellStages stages_of(const fs::path& cell, const ImageNames& images) {
   const toml::table toml = files::parse_toml(cell / "cell.toml");
-  CellStages of{.kind = CellKind::space, .why = why_in_space(cell, toml), .stages = {}, .chains = {}};
+  CellStages of{.kind = CellKind::space, .why = why_in_space(cell, toml)};
   const RunSettings settings = toml.contains("run") ? read_run_settings(cell) : RunSettings{};  // most have none
   if (settings.model == PullModel::sheet) {
     if (of.why.empty()) return stages_as_sheet(cell, images, settings);

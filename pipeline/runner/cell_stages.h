@@ -30,9 +30,9 @@ RunSettings read_run_settings(const std::filesystem::path& cell);
 struct CellStages {
   CellKind kind = CellKind::plane;
   std::string why;  ///< "track.z_points is set": for people
-  std::vector<Stage> stages;
-  std::vector<int> first = {};           ///< before all others
-  std::vector<std::vector<int>> chains;  ///< which run beside each other; the last stage needs them all
+  std::vector<Stage> stages = {};
+  std::vector<int> first = {};                ///< before all others
+  std::vector<std::vector<int>> chains = {};  ///< which run beside each other; the last stage needs them all
 };
 
 /// Decided by cell.toml and the files beside it. A folder without images and settings of space is one of the plane.

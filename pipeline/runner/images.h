@@ -38,7 +38,7 @@ const std::string& name_of_image(const ImageNames& names, const std::string& key
 std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names);
 
 struct ImageMatch {
-  std::vector<std::filesystem::path> files;  ///< in alphabetical order
+  std::vector<std::filesystem::path> files = {};  ///< in alphabetical order
   std::string pattern;
 };
 /// Files of `folder` that a name or glob (*, ?, [abc] in its last part) stands for, or one of several with | between

@@ -21,7 +21,7 @@ void throw_if_interrupted();
 /// (setrlimit) would refuse it more instead, which libraries do not bear: OpenBLAS asks again for ever.
 struct ProcessLimits {
   std::optional<double> seconds;
-  std::optional<std::uint64_t> memory_bytes;
+  std::optional<std::uint64_t> memory_bytes = {};
 };
 
 struct ProcessResult {

@@ -199,8 +199,7 @@ CellOutcome CellRun::look() {
     outcome.stages.push_back(
         {.stage = stage.name,
          .status = now.status,
-         .converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged,
-         .failure = {}});
+         .converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged});
   }
   hashes_.save();
   return outcome;
@@ -250,7 +249,7 @@ void CellRun::bring_up_to_date(const Stage& stage, int threads, StageOutcome& ou
     outcome.status = now.status;
     if (now.status.state == StageState::must_run) return start(stage, now, threads, outcome);
     outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
-    say({.stage = stage.name, .status = now.status, .converged = outcome.converged, .report = {}});
+    say({.stage = stage.name, .status = now.status, .converged = outcome.converged});
   });
 }
 
@@ -261,7 +260,7 @@ Hashes CellRun::outputs_of(const Stage& stage, const Present& before) {
   Hashes outputs = hashes_.hash(names);
   for (const std::string& file : stage.writes) {
     if (outputs.contains(file)) continue;
-    throw StageFailed(stage.name, {.exit_code = exit_code::kBug, .how = "did not write " + file, .message = {}});
+    throw StageFailed(stage.name, {.exit_code = exit_code::kBug, .how = "did not write " + file});
   }
   if (!before.record) return outputs;
   for (const auto& [name, hash] : before.record->outputs) {

@@ -33,9 +33,9 @@ struct RunOptions {
 
 /// How a stage that ended with an error did so.
 struct StageFailure {
-  int exit_code = 0;  ///< as the shell counts
-  std::string how;    ///< "exit code 3", "timed out after 60 s"
-  std::string message;
+  int exit_code = 0;     ///< as the shell counts
+  std::string how = {};  ///< "exit code 3", "timed out after 60 s"
+  std::string message = {};
 };
 
 /// What became of a stage in this run.
@@ -45,12 +45,12 @@ struct StageOutcome {
   bool was_run = false;
   bool converged = true;
   double seconds = 0;  ///< of this run
-  std::optional<StageFailure> failure;
+  std::optional<StageFailure> failure = {};
 };
 
 struct CellOutcome {
   std::string started, ended;  ///< UTC, ISO 8601; empty: not run, or not ended yet
-  std::vector<StageOutcome> stages;
+  std::vector<StageOutcome> stages = {};
   bool converged() const;
   /// "fit, network"; empty where all did
   std::string not_converged() const;
@@ -58,7 +58,7 @@ struct CellOutcome {
 
 /// A stage ended with an error, which it has printed itself.
 struct StageFailed : std::runtime_error {
-  StageFailure failure;
+  StageFailure failure = {};
   StageFailed(const std::string& stage, StageFailure what)
       : std::runtime_error("mbtfm-" + stage + ": " + what.how), failure(std::move(what)) {}
 };

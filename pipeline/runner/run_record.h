@@ -28,7 +28,7 @@ std::string recorded_state(const std::filesystem::path& cell, const std::string&
 
 /// "segment", "exit code 3", …: the failure that run.json tells of; empty where it tells of none.
 struct RecordedFailure {
-  std::string stage, how, message;
+  std::string stage, how = {}, message = {};
 };
 std::optional<RecordedFailure> recorded_failure(const std::filesystem::path& cell);
 

@@ -34,21 +34,21 @@ struct Setting {
 struct Stage {
   std::string name;    ///< the executable is mbtfm-NAME
   std::string folder;  ///< of its outputs and its record
-  std::vector<ImageInput> images;
-  std::optional<ImageInput> instead = {};   ///< of the images, where [images] names it
-  std::vector<ImageInput> optional_images;  ///< used where they are there
-  std::vector<ImageInput> beside = {};      ///< of others, which it looks at where they are there before anything runs
-  std::vector<PathArgument> arguments;      ///< further inputs that earlier stages write
+  std::vector<ImageInput> images = {};
+  std::optional<ImageInput> instead = {};        ///< of the images, where [images] names it
+  std::vector<ImageInput> optional_images = {};  ///< used where they are there
+  std::vector<ImageInput> beside = {};       ///< of others, which it looks at where they are there before anything runs
+  std::vector<PathArgument> arguments = {};  ///< further inputs that earlier stages write
   PathArgument output;
-  std::vector<std::string> reads;              ///< files behind `arguments`, relative to the cell folder
-  std::vector<std::string> reads_where_there;  ///< further ones, which the stage before writes in some cases only
-  std::vector<std::string> writes;             ///< files without which the stage is not done
-  std::vector<std::string> series;             ///< globs: files that it writes in some cases only, as of a time series
-  std::vector<std::string> tables;     ///< of cell.toml that its result depends on; empty: above the first table
-  std::vector<std::string> effects;    ///< keys of [effects] that it depends on
-  std::vector<Setting> settings = {};  ///< that hold whatever cell.toml says
-  bool explains = false;               ///< what is off would change: it takes --explain
-  bool keeps_frames = false;           ///< of a time series, those that still hold: it takes --kept
+  std::vector<std::string> reads = {};              ///< files behind `arguments`, relative to the cell folder
+  std::vector<std::string> reads_where_there = {};  ///< further ones, which the stage before writes in some cases only
+  std::vector<std::string> writes;                  ///< files without which the stage is not done
+  std::vector<std::string> series = {};   ///< globs: files that it writes in some cases only, as of a time series
+  std::vector<std::string> tables;        ///< of cell.toml that its result depends on; empty: above the first table
+  std::vector<std::string> effects = {};  ///< keys of [effects] that it depends on
+  std::vector<Setting> settings = {};     ///< that hold whatever cell.toml says
+  bool explains = false;                  ///< what is off would change: it takes --explain
+  bool keeps_frames = false;              ///< of a time series, those that still hold: it takes --kept
 };
 
 /// Of a cell on a flat gel; those of others: cell_stages.h.

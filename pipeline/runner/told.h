@@ -15,7 +15,7 @@ struct StageTold {
   bool was_run = false;
   bool converged = true;
   double seconds = 0, peak_memory_MB = 0;
-  std::optional<StageReport> report;  ///< of a stage that was run
+  std::optional<StageReport> report = {};  ///< of a stage that was run
 };
 
 enum class Detail {

@@ -12,7 +12,7 @@ struct RunOptions;
 
 struct Verification {
   int n_files = 0;
-  std::vector<std::string> differences;  ///< a line each: "4_fit/tensions.csv differs (output of fit)"
+  std::vector<std::string> differences = {};  ///< a line each: "4_fit/tensions.csv differs (output of fit)"
 };
 
 /// Hash every input and output that run.json names, without any short cut, and compare the parameters of cell.toml.

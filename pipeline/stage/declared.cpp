@@ -20,7 +20,7 @@ DeclaredOption option_of(const CLI::Option& option) {
 }  // namespace
 
 DeclaredCommand declared(const CLI::App& app) {
-  DeclaredCommand command{.name = app.get_name(), .meaning = app.get_description(), .options = {}, .subcommands = {}};
+  DeclaredCommand command{.name = app.get_name(), .meaning = app.get_description()};
   for (const CLI::Option* option : app.get_options()) {
     if (!option->get_group().empty()) command.options.push_back(option_of(*option));
   }

@@ -17,8 +17,8 @@ struct DeclaredOption {
 
 struct DeclaredCommand {
   std::string name, meaning;
-  std::vector<DeclaredOption> options;  ///< positionals first, each in the order of its declaration
-  std::vector<DeclaredCommand> subcommands;
+  std::vector<DeclaredOption> options = {};  ///< positionals first, each in the order of its declaration
+  std::vector<DeclaredCommand> subcommands = {};
 };
 
 /// Without what is hidden from --help.

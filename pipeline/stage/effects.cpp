@@ -87,8 +87,6 @@ Effect decided(EffectKind kind, Switch setting, bool is_called_for, const std::s
   return {.kind = kind,
           .setting = setting,
           .is_on = setting == Switch::automatic ? is_called_for : setting == Switch::on,
-          .number = {},
-          .threshold = {},
           .why = why};
 }
 

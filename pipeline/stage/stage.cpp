@@ -36,7 +36,7 @@ using namespace exit_code;
 
 /// What the command line says, before any of it is believed.
 struct CommandLine {
-  std::map<std::string, std::string> files, values;
+  std::map<std::string, std::string> files = {}, values = {};
   std::string config, record, manuals;
   int threads = numerics::available_threads();
   bool is_quiet = false, is_json = false, only_check = false, only_parameters = false, only_version = false;
@@ -315,8 +315,6 @@ StageReport read_report(const fs::path& record_file) {
   const files::JsonRecord record(record_file, "a stage's record");
   StageReport report{.converged = record.at("converged").is_true(),
                      .summary = record.at("summary").text(),
-                     .figures = {},
-                     .effects = {},
                      .findings = files::findings_of(record)};
   for (const auto& [name, value] : record.at("figures").members()) report.figures.emplace_back(name, value.figure());
   for (const files::JsonRecord& effect : record.at("effects").list())

@@ -27,7 +27,7 @@ struct FileArgument {
 struct StageDescription {
   std::string name;  ///< the executable is mbtfm-NAME
   std::string purpose;
-  std::vector<FileArgument> files;
+  std::vector<FileArgument> files = {};
 };
 
 /// A stage's files and surroundings. Outputs go to temporary names and take their own only when the stage is done.

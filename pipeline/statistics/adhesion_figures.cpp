@@ -176,7 +176,6 @@ Figure directions(const Analysis& analysis) {
                 .caption =
                     "Angles at the adhesions. Broken line: what chance would give. In brackets: 95 % interval of the "
                     "mean angle, cells resampled.",
-                .charts = {},
                 .n_columns = 2};
   const std::vector<std::string>& conditions = analysis.tensions.sample.conditions;
   for (const Relation relation : kRelations) {
@@ -208,8 +207,7 @@ std::vector<Figure> adhesion_figures_of(const Analysis& analysis) {
   if (analysis.adhesion_forces.sample.values.empty()) {
     figures.push_back({.name = "adhesion_distributions",
                        .title = "Area and force of the adhesions",
-                       .caption = "no cell has an adhesion with a force.",
-                       .charts = {}});
+                       .caption = "no cell has an adhesion with a force."});
   } else {
     figures.push_back(adhesion_distributions(analysis));
     figures.push_back(force_by_area(analysis));

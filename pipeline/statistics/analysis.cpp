@@ -17,7 +17,7 @@ namespace {
 using charts::readable;
 
 Measure measure(Sample sample, const std::vector<CellWeights>& draws) {
-  Measure m{.sample = std::move(sample), .model = {}, .obstacle = {}, .summaries = {}, .comparisons = {}};
+  Measure m{.sample = std::move(sample), .model = {}};
   ModelResult result = model_of(m.sample);
   m.model = std::move(result.model);
   m.obstacle = std::move(result.obstacle);

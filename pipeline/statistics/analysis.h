@@ -15,9 +15,9 @@ namespace mbtfm::statistics {
 struct Measure {
   Sample sample;
   std::optional<SampleModel> model;
-  std::string obstacle;  ///< why there is no model; empty: there is one
-  std::vector<Summary> summaries;
-  std::vector<Comparison> comparisons;
+  std::string obstacle = {};  ///< why there is no model; empty: there is one
+  std::vector<Summary> summaries = {};
+  std::vector<Comparison> comparisons = {};
 };
 
 struct Analysis {
@@ -27,7 +27,7 @@ struct Analysis {
   std::vector<Summary> tensions_by_cell;
   std::vector<ShareAbove> shares;
   Measure adhesion_forces, adhesion_areas;
-  std::vector<Measure> cells, sheets, in_space;
+  std::vector<Measure> cells = {}, sheets, in_space;
   std::vector<Correlation> correlations;
   std::vector<AreaBin> area_bins;
   std::vector<DirectionSummary> directions;

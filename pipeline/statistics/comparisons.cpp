@@ -13,14 +13,14 @@ namespace {
 struct Group {
   std::string name;
   int index = 0;  ///< of the sample's groups
-  std::vector<Observation> values;
+  std::vector<Observation> values = {};
 };
 
 /// Groups that one question compares.
 struct Family {
   Question question = Question::between_kinds;
   std::string within;
-  std::vector<Group> groups;
+  std::vector<Group> groups = {};
 };
 
 std::vector<Observation> medians_by_cell(const std::vector<Observation>& observations) {
@@ -43,15 +43,12 @@ Comparison blank(const Sample& sample, const Family& family, Test test, Unit uni
           .n_b = b == nullptr ? 0 : static_cast<int>(b->values.size()),
           .cells_a = n_cells_of(a.values),
           .cells_b = b == nullptr ? 0 : n_cells_of(b->values),
-          .degrees = {},
-          .p_holm = {},
-          .effect_name = {},
-          .interval = {}};
+          .p_holm = {}};
 }
 
 /// All observations of a family as one group, for the line of all groups together.
 Group all_of(const std::vector<Group>& groups) {
-  Group all{.name = "all", .values = {}};
+  Group all{.name = "all"};
   for (const Group& g : groups) all.values.insert(all.values.end(), g.values.begin(), g.values.end());
   return all;
 }
@@ -188,13 +185,13 @@ Family with_medians(Family family) {
 std::vector<Family> families_of(const Sample& sample) {
   std::vector<Family> families;
   for (int c = 0; c < sample.n_conditions() && sample.n_kinds() > 1; ++c) {
-    Family family{.question = Question::between_kinds, .within = sample.conditions[c], .groups = {}};
+    Family family{.question = Question::between_kinds, .within = sample.conditions[c]};
     for (int k = 0; k < sample.n_kinds(); ++k)
       family.groups.push_back({sample.kinds[k], sample.group_of(c, k), sample.of_group(c, k)});
     families.push_back(std::move(family));
   }
   for (int k = 0; k < sample.n_kinds() && sample.n_conditions() > 1; ++k) {
-    Family family{.question = Question::between_conditions, .within = sample.kinds[k], .groups = {}};
+    Family family{.question = Question::between_conditions, .within = sample.kinds[k]};
     for (int c = 0; c < sample.n_conditions(); ++c)
       family.groups.push_back({sample.conditions[c], sample.group_of(c, k), sample.of_group(c, k)});
     families.push_back(std::move(family));

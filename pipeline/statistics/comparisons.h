@@ -30,12 +30,12 @@ struct Comparison {
   int n_a = 0, n_b = 0;          ///< observations
   int cells_a = 0, cells_b = 0;
   double statistic = 0;
-  std::optional<double> degrees;  ///< of freedom, of the statistic's denominator
+  std::optional<double> degrees = {};  ///< of freedom, of the statistic's denominator
   double p_value = 1;
   std::optional<double> p_holm;  ///< corrected for all pairs of the same test and question
   double effect = 0;
-  std::string effect_name;           ///< what the effect is: see docs/statistics.md
-  std::optional<Interval> interval;  ///< 95 %, of the effect
+  std::string effect_name = {};           ///< what the effect is: see docs/statistics.md
+  std::optional<Interval> interval = {};  ///< 95 %, of the effect
 };
 
 /// All tests of a sample; left out where a group has fewer than two observations, or all are equal.

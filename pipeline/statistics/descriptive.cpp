@@ -21,7 +21,7 @@ double sum_of(const std::vector<double>& values) { return std::accumulate(values
 Description describe(std::vector<double> values) {
   need_values(values);
   std::sort(values.begin(), values.end());
-  Description d{.standard_deviation = {}};
+  Description d{};
   d.n = static_cast<int>(values.size());
   d.mean = sum_of(values) / d.n;
   d.median = (values[(values.size() - 1) / 2] + values[values.size() / 2]) / 2;
@@ -52,7 +52,7 @@ Share share_over_cells(const std::vector<CellCount>& cells) {
     n_cells += c.n > 0 ? 1 : 0;
   }
   if (n == 0) throw InvalidData("a sample", "at least one value", "none");
-  Share share{.value = with / n, .interval = {}, .n_effective = n_cells};
+  Share share{.value = with / n, .n_effective = n_cells};
   if (with > 0 && with < n && n_cells > 1) {
     double squares = 0;  // of the residuals of the ratio, by cell
     for (const CellCount& c : cells) squares += std::pow(c.n_with - share.value * c.n, 2);
@@ -66,7 +66,7 @@ Share share_over_cells(const std::vector<CellCount>& cells) {
 }
 
 LineThroughOrigin line_through_origin(const std::vector<double>& x, const std::vector<double>& y) {
-  LineThroughOrigin line{.n = static_cast<int>(x.size()), .slope = 0, .slope_error = {}, .correlation = {}};
+  LineThroughOrigin line{.n = static_cast<int>(x.size()), .slope = 0};
   const double xx = std::inner_product(x.begin(), x.end(), x.begin(), 0.0);
   if (!(xx > 0)) throw InvalidData("a line through the origin", "a point beside it", "none");
   line.slope = std::inner_product(x.begin(), x.end(), y.begin(), 0.0) / xx;

@@ -9,7 +9,7 @@ namespace mbtfm::statistics {
 struct Description {
   int n = 0;
   double mean = 0, median = 0;
-  std::optional<double> standard_deviation;  ///< with n − 1; none of one value
+  std::optional<double> standard_deviation = {};  ///< with n − 1; none of one value
 };
 /// @throws InvalidData where there is no value
 Description describe(std::vector<double> values);
@@ -32,7 +32,7 @@ Interval wilson_interval(double share, double n);
 /// have the property the cells cannot tell how they scatter: each then counts once.
 struct Share {
   double value = 0;
-  Interval interval;  ///< 95 %
+  Interval interval = {};  ///< 95 %
   double n_effective = 0;
 };
 struct CellCount {
@@ -45,8 +45,8 @@ Share share_over_cells(const std::vector<CellCount>& cells);
 struct LineThroughOrigin {
   int n = 0;
   double slope = 0;
-  std::optional<double> slope_error;  ///< standard error; none of one point
-  std::optional<double> correlation;  ///< Pearson's; none where x or y does not vary
+  std::optional<double> slope_error = {};  ///< standard error; none of one point
+  std::optional<double> correlation = {};  ///< Pearson's; none where x or y does not vary
 };
 /// @throws InvalidData where no x differs from zero
 LineThroughOrigin line_through_origin(const std::vector<double>& x, const std::vector<double>& y);

@@ -21,7 +21,7 @@ double end_below_keys(double largest, std::size_t n_keys);
 struct Histogram {
   std::string label;  ///< of the key; empty: none
   std::string colour;
-  std::vector<double> values;
+  std::vector<double> values = {};
   bool is_dashed = false;
 };
 /// As the rule of Sturges gives the largest sample, ten at least.

@@ -127,7 +127,6 @@ Figure tension_distributions(const Analysis& analysis, const StudyParameters& pa
                 .caption = fmt::format("Share of a type's fibres by tension. Upright lines: {} and {} nN.",
                                        charts::readable(parameters.weak_tension_nN),
                                        charts::readable(parameters.strong_tension_nN)),
-                .charts = {},
                 .n_columns = 3};
   for (int kind = 0; kind < sample.n_kinds(); ++kind) {
     std::vector<Histogram> all;
@@ -153,7 +152,6 @@ Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters
                 .caption =
                     "Bars: 95 % interval (Wilson’s, at the number of independent fibres that would scatter as the "
                     "cells do). Cross: the share without the blur of the measurement’s error.",
-                .charts = {},
                 .n_columns = 2};
   for (const double threshold : thresholds_nN(parameters)) {
     charts::Chart chart(
@@ -238,7 +236,6 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
                 .caption =
                     "One dot a cell. Lines through the origin by least squares: slope ± standard error, and Pearson’s "
                     "correlation r, from five cells on.",
-                .charts = {},
                 .n_columns = 3};
   std::map<std::pair<std::string, std::string>, std::vector<const Correlation*>> panels;
   std::vector<std::pair<std::string, std::string>> order;
@@ -286,10 +283,8 @@ std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, con
   if (!analysis.in_space.empty()) figures.push_back(space_figure(study, analysis));
   if (!analysis.has_fibres) return figures;
   if (analysis.tensions.sample.values.empty()) {
-    figures.push_back({.name = "tensions_by_type",
-                       .title = "Tension of each fibre",
-                       .caption = "no fibre has a known tension.",
-                       .charts = {}});
+    figures.push_back(
+        {.name = "tensions_by_type", .title = "Tension of each fibre", .caption = "no fibre has a known tension."});
   } else {
     figures.push_back(tensions_by_type(study, analysis));
     figures.push_back(strong_fibres(analysis, parameters));

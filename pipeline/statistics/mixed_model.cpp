@@ -32,10 +32,10 @@ struct Block {
 };
 
 struct Design {
-  std::vector<Observation> rows;  ///< by cell
+  std::vector<Observation> rows = {};  ///< by cell
   std::vector<Block> blocks;
   MatrixXd X;  ///< 1 where the row is of the group
-  VectorXd y;
+  VectorXd y = {};
   std::vector<Component> components;
   std::vector<bool> is_scatter_told;  ///< by kind: a group has two observations of it
   double smallest_residual = 0;
@@ -251,14 +251,14 @@ MatrixXd derivative_times(const Design& design, const Component& component, cons
 struct State {
   VectorXd v;
   Covariance inverse;
-  MatrixXd W;        ///< V⁻¹ X
-  MatrixXd C;        ///< (Xᵀ V⁻¹ X)⁻¹
-  VectorXd mean, r;  ///< r = V⁻¹ (y − X mean) = P y
+  MatrixXd W = {};             ///< V⁻¹ X
+  MatrixXd C = {};             ///< (Xᵀ V⁻¹ X)⁻¹
+  VectorXd mean = {}, r = {};  ///< r = V⁻¹ (y − X mean) = P y
   double log_likelihood = 0;
 };
 
 State state_at(const Design& design, const VectorXd& v) {
-  State s{.v = v, .inverse = Covariance(design, v), .W = {}, .C = {}, .mean = {}, .r = {}};
+  State s{.v = v, .inverse = Covariance(design, v)};
   s.W = s.inverse.solve(design.X);
   const MatrixXd information = design.X.transpose() * s.W;
   const Eigen::LLT<MatrixXd> llt(information);
@@ -276,12 +276,12 @@ State state_at(const Design& design, const VectorXd& v) {
 
 struct Derivatives {
   VectorXd gradient;
-  MatrixXd information;               // average of observed and expected
-  std::vector<MatrixXd> mean_slopes;  // of C by each variance
+  MatrixXd information;                    // average of observed and expected
+  std::vector<MatrixXd> mean_slopes = {};  // of C by each variance
 };
 Derivatives derivatives_at(const Design& design, const State& s) {
   const Index n = static_cast<Index>(design.components.size());
-  Derivatives d{.gradient = VectorXd(n), .information = MatrixXd(n, n), .mean_slopes = {}};
+  Derivatives d{.gradient = VectorXd(n), .information = MatrixXd(n, n)};
   MatrixXd Vr(design.y.size(), n);
   for (Index k = 0; k < n; ++k) {
     const Component& component = design.components[k];

@@ -22,7 +22,7 @@ struct Observation {
 /// two kinds or no kind two observations in a cell: it could not be told from the others. Both are left out where no
 /// group has two cells: the groups' means take up all that cells differ by.
 struct MixedFit {
-  Eigen::VectorXd mean;                      ///< by group
+  Eigen::VectorXd mean = {};                 ///< by group
   Eigen::MatrixXd covariance;                ///< of the means
   std::optional<double> cell_variance;       ///< of a; none where a is left out
   std::optional<double> cell_kind_variance;  ///< of b; none where b is left out

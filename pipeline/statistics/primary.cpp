@@ -120,8 +120,7 @@ Primary primary_of(const Study& study, const std::string& name, const Sample& sa
                   .unit = sample.unit,
                   .cells = sample.cells_name(),
                   .reference = study.conditions.front(),
-                  .test = {},
-                  .differences = {}};
+                  .test = {}};
   if (study.conditions.size() < 2) {
     primary.obstacle = "the study has one condition";
     return primary;

@@ -26,7 +26,7 @@ struct Primary {
   std::string cells = "cells";  ///< what they are called: "sheets"
   std::string reference;
   std::string test;  ///< in words, with its source
-  std::vector<PrimaryDifference> differences;
+  std::vector<PrimaryDifference> differences = {};
   /// Mean of the reference: of the model, or of the replicates' means.
   double reference_mean = 0;
   std::string obstacle = {};  ///< why nothing is compared; empty: something is

@@ -50,12 +50,7 @@ std::optional<Correlation> correlate(const Study& study, int condition, const Fo
                 .size = size.column,
                 .size_unit = size.unit,
                 .is_of_total = is_of_total,
-                .condition = study.conditions[condition],
-                .x = {},
-                .y = {},
-                .cells = {},
-                .line = {},
-                .slope_interval = {}};
+                .condition = study.conditions[condition]};
   std::map<int, std::pair<double, double>> products;
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
     if (study.cells[i].condition != condition || study.cells[i].kind() != CellKind::plane) continue;
@@ -130,8 +125,7 @@ std::vector<AreaBin> bin_by_area(const Study& study, const std::vector<CellWeigh
         AreaBin bin{.condition = study.conditions[condition],
                     .is_connected = is_connected,
                     .low_um2 = edges[b],
-                    .high_um2 = edges[b + 1],
-                    .interval_nN = {}};
+                    .high_um2 = edges[b + 1]};
         std::map<int, std::pair<double, double>> by_cell;
         const bool is_last = b + 2 == edges.size();
         for (const SizedForce& a : adhesions) {
@@ -159,11 +153,7 @@ std::vector<DirectionSummary> summarise_directions(const Study& study, const std
   std::vector<DirectionSummary> list;
   for (const Relation relation : kRelations) {
     for (std::size_t condition = 0; condition < study.conditions.size(); ++condition) {
-      DirectionSummary s{.relation = relation,
-                         .condition = study.conditions[condition],
-                         .angles_deg = {},
-                         .angle_interval_deg = {},
-                         .cosine_interval = {}};
+      DirectionSummary s{.relation = relation, .condition = study.conditions[condition]};
       std::map<int, std::pair<double, double>> angles, cosines;
       for (std::size_t i = 0; i < study.cells.size(); ++i) {
         if (study.cells[i].condition != static_cast<int>(condition)) continue;

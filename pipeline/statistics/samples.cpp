@@ -18,8 +18,7 @@ Sample empty_sample(const Study& study, std::string column, std::string name, st
           .unit = std::move(unit),
           .each = each,
           .kinds = std::move(kinds),
-          .conditions = study.conditions,
-          .values = {}};
+          .conditions = study.conditions};
 }
 
 void add(Sample& sample, const StudyCell& cell, int index, int kind, double value,

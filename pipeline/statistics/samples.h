@@ -28,7 +28,7 @@ struct Sample {
   std::string name, unit;  ///< for people
   Observed each = Observed::fibres;
   std::vector<std::string> kinds, conditions;
-  std::vector<Observation> values;
+  std::vector<Observation> values = {};
   int n_without_error = 0;  ///< observations whose error is not known: that of the others is taken, or zero if none is
   bool is_never_negative = true;
 

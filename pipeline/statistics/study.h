@@ -99,7 +99,7 @@ struct Study {
   /// As the parameters order them, the others by the alphabet; the first is the reference. One without a name where
   /// none were asked for.
   std::vector<std::string> conditions;
-  std::vector<StudyCell> cells;  ///< those that enter
+  std::vector<StudyCell> cells = {};  ///< those that enter
   std::vector<LeftOutCell> left_out;
   Path folder = {};       ///< names are relative to it
   int n_fibre_types = 3;  ///< 4: edge fibres are a type of their own; 3: they count as ventral

@@ -22,7 +22,7 @@ std::string pages_of_tables();
 struct Figure {
   std::string name;  ///< of its files, without the ending
   std::string title, caption;
-  std::vector<charts::Chart> charts;
+  std::vector<charts::Chart> charts = {};
   int n_columns = 1;
 };
 /// The one that answers the study's question: it comes first in the report.

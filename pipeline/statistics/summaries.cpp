@@ -19,16 +19,13 @@ Summary plain_summary(const std::string& condition, const std::string& kind, con
   const std::vector<double> values = values_of(own), errors = error_variances_of(own);
   double error = 0;
   for (const double e : errors) error += e / static_cast<double>(errors.size());
-  return {.cell = {},
-          .condition = condition,
+  return {.condition = condition,
           .kind = kind,
           .n_cells = n_cells_of(own),
           .n = static_cast<int>(own.size()),
           .plain = describe(values),
           .typical_error = error > 0 ? std::optional(std::sqrt(error)) : std::nullopt,
           .without_error = own.size() > 1 ? std::optional(deconvolved_moments(values, errors)) : std::nullopt,
-          .mean_interval = {},
-          .median_interval = {},
           .model = {}};
 }
 

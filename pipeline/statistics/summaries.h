@@ -14,14 +14,14 @@ namespace mbtfm::statistics {
 std::vector<CellWeights> draw_cells(const Study& study, const StudyParameters& parameters);
 
 struct Summary {
-  std::string cell;  ///< empty: all of the condition
+  std::string cell = {};  ///< empty: all of the condition
   std::string condition, kind;
   int n_cells = 0, n = 0;
   Description plain;                         ///< each observation counts the same
   std::optional<double> typical_error;       ///< root mean square of the standard errors; none where none is known
   std::optional<Deconvolved> without_error;  ///< the scatter that the measurement's errors leave; none of one value
-  std::optional<Interval> mean_interval, median_interval;  ///< by the bootstrap of cells; none of one cell
-  std::optional<Contrast> model;                           ///< mean of the mixed model; none of a group in one cell
+  std::optional<Interval> mean_interval = {}, median_interval = {};  ///< by the bootstrap of cells; none of one cell
+  std::optional<Contrast> model;  ///< mean of the mixed model; none of a group in one cell
 };
 
 /// The mixed model of a sample, by the groups that have observations.

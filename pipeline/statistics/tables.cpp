@@ -34,7 +34,7 @@ auto ends_of(const std::string& low, const std::string& high, const std::string&
 /// A row of what belongs to a cell.
 template <class Of>
 struct InCell {
-  std::string cell, condition;
+  std::string cell = {}, condition;
   Of of;
 };
 template <class Of>
@@ -362,7 +362,7 @@ Table<QuantityRow> summary_table() {
 
 struct VarianceRow {
   std::string quantity, component;
-  std::optional<double> standard_deviation;
+  std::optional<double> standard_deviation = {};
   std::string remark;
 };
 Table<VarianceRow> variance_table() {
