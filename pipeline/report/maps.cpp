@@ -42,8 +42,8 @@ Box map_box(const CellResults& results) {
   return {box.low - margin, box.high + margin};
 }
 
-charts::Chart empty_map(const Box& box, const std::string& title) {
-  charts::Chart map(title, {"x (µm)", box.low.x, box.high.x}, {"y (µm)", box.high.y, box.low.y});
+Chart empty_map(const Box& box, const std::string& title) {
+  Chart map(title, {"x (µm)", box.low.x, box.high.x}, {"y (µm)", box.high.y, box.low.y});
   map.same_scales();
   return map;
 }
@@ -51,7 +51,7 @@ charts::Chart empty_map(const Box& box, const std::string& title) {
 constexpr const char* kCutStyle = "fill:none;stroke:#777;stroke-width:2.6;stroke-dasharray:9 5";
 
 /// The outline, and over it where the image cuts the cell.
-void draw_outline(charts::Chart& map, const Cell& cell, const std::string& style) {
+void draw_outline(Chart& map, const Cell& cell, const std::string& style) {
   map.polygon(cell.outline_um, style);
   Polyline cut;
   for (const auto& [a, b] : cuts_of(cell)) {
@@ -69,15 +69,15 @@ std::string caption_of_cut(const Cell& cell) {
   return cuts_of(cell).empty() ? "" : " Heavy grey dashes: the cut, where the image ends and the cell goes on.";
 }
 
-charts::Chart new_map(const CellResults& results, const std::string& title) {
-  charts::Chart map = empty_map(map_box(results), title);
+Chart new_map(const CellResults& results, const std::string& title) {
+  Chart map = empty_map(map_box(results), title);
   draw_outline(map, results.cell, kOutlineStyle);
   return map;
 }
 
 enum class Hover { none, whole };  // texts make the page large: not on each map
 
-void draw_adhesions(charts::Chart& map, const CellResults& results, const std::string& style, Hover hover) {
+void draw_adhesions(Chart& map, const CellResults& results, const std::string& style, Hover hover) {
   for (const Adhesion& adhesion : results.cell.adhesions) {
     map.polygon(ellipse_corners(adhesion, kEllipseCorners), style,
                 hover == Hover::whole ? hover_of(adhesion, results) : std::string());
@@ -110,9 +110,9 @@ std::map<int, std::string> fibre_texts(const CellResults& results) {
   return texts;
 }
 
-void draw_fibre_ids(charts::Chart& map, const CellResults& results) {
+void draw_fibre_ids(Chart& map, const CellResults& results) {
   const Box box = map_box(results);
-  const double clear_um = 15 * (box.high.x - box.low.x) / charts::Chart::kFrameWidth_px;  // about a label's width
+  const double clear_um = 15 * (box.high.x - box.low.x) / Chart::kFrameWidth_px;  // about a label's width
   for (const Fibre& fibre : results.cell.fibres) {
     map.label(label_places_um(fibre, results.cell.fibres, clear_um).front(),
               letter_of(fibre.type) + std::to_string(fibre.fibre_id));
@@ -129,7 +129,7 @@ ColourScale tension_scale(const CellResults& results, NetworkForm form) {
   return scale;
 }
 
-void draw_web(charts::Chart& map, const CellResults& results, const Pieces& web, Hover hover) {
+void draw_web(Chart& map, const CellResults& results, const Pieces& web, Hover hover) {
   map.pieces(web, "stroke:#bbb;stroke-width:0.5");
   draw_adhesions(map, results, "fill:#cfe3f3;stroke:#7aa6c8;stroke-width:0.5", hover);
 }
@@ -151,7 +151,7 @@ bool are_all_candidates(const Cell& cell) {
 }
 
 Figure original_network(const CellResults& results) {
-  charts::Chart map = new_map(results, "Where the fibres are");
+  Chart map = new_map(results, "Where the fibres are");
   const ColourScale scale = tension_scale(results, NetworkForm::original);
   const SortedLinks links = sorted_links(results.network, {});
   const std::map<int, std::string> texts = fibre_texts(results);
@@ -174,7 +174,7 @@ Figure original_network(const CellResults& results) {
 }
 
 Figure contracted_network(const CellResults& results) {
-  charts::Chart map = new_map(results, "Network in equilibrium");
+  Chart map = new_map(results, "Network in equilibrium");
   const ColourScale scale = tension_scale(results, NetworkForm::contracted);
   const SortedLinks links = sorted_links(results.contracted.network, results.contracted.link_force_nN);
   const std::map<int, std::string> texts = fibre_texts(results);
@@ -251,7 +251,7 @@ std::string html_of(const Figure& map) { return figure(map.chart, map.caption, m
 
 Figure segmentation_map(const CellResults& results) {
   const bool is_dark = results.images.has_value();
-  charts::Chart map =
+  Chart map =
       empty_map(is_dark ? Box{results.images->low_um, results.images->high_um} : map_box(results), "Segmentation");
   if (is_dark) {
     map.picture(results.images->low_um, results.images->high_um,
@@ -310,7 +310,7 @@ Figure segmentation_map(const CellResults& results) {
 
 Figure bead_map(const CellResults& results) {
   const Images& images = results.bead_images.value();
-  charts::Chart map = empty_map({images.low_um, images.high_um}, "Beads");
+  Chart map = empty_map({images.low_um, images.high_um}, "Beads");
   map.picture(images.low_um, images.high_um, "data:image/jpeg;base64," + files::base64(files::read_text(images.file)));
   draw_outline(map, results.cell, "fill:none;stroke-width:1.3;stroke:#ddd");
   int n_flagged = 0;
@@ -329,7 +329,7 @@ Figure bead_map(const CellResults& results) {
 }
 
 Figure adhesion_map(const CellResults& results) {
-  charts::Chart map = new_map(results, "Forces on the substrate");
+  Chart map = new_map(results, "Forces on the substrate");
   const auto by_id = adhesions_by_id(results.cell);
   std::vector<Vec2> forces;
   for (const AdhesionForce& force : results.forces) forces.push_back(force.force_nN);
@@ -363,7 +363,7 @@ Figure adhesion_map(const CellResults& results) {
 Figure usual_method_map(const CellResults& results) {
   const UsualMethod& usual = results.usual_method.value();
   const Box box = map_box(results);
-  charts::Chart map = empty_map(box, "What the usual method says");
+  Chart map = empty_map(box, "What the usual method says");
   double largest_kPa = 0;
   for (const Vec2 t : usual.tractions_kPa) largest_kPa = std::max(largest_kPa, norm(t));
   // its own: smoothed, they are so much smaller that the model's colours show nothing
@@ -401,7 +401,7 @@ std::vector<Figure> displacement_maps(const CellResults& results) {
   const ArrowScale scale = arrow_scale(means.means.vectors);
   const auto drawn = [&](const VectorField& field, const std::string& title, const std::string& what,
                          const std::string& caption) {
-    charts::Chart map = new_map(results, title);
+    Chart map = new_map(results, title);
     draw_adhesions(map, results, "fill:#ddd", Hover::none);
     const std::string explained = draw_arrows(map, field, scale, what, "µm");
     return Figure{map, caption, explained};

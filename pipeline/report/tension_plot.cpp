@@ -27,7 +27,7 @@ double largest_nN(const std::vector<FibreRow>& rows) {
   return largest > 0 ? 1.03 * largest : 1;
 }
 
-void draw_row(charts::Chart& chart, const FibreRow& row, double y, const CellResults& results) {
+void draw_row(Chart& chart, const FibreRow& row, double y, const CellResults& results) {
   const std::string colour = colour_of(row.fibre->type);
   std::string hover = hover_of(*row.fibre, results);
   if (row.true_tension_nN) hover += "\ntruth " + charts::readable(*row.true_tension_nN) + " nN";
@@ -118,20 +118,20 @@ std::vector<FibreRow> fibre_rows(const CellResults& results) {
   return rows;
 }
 
-charts::Chart tension_plot(const CellResults& results) {
+Chart tension_plot(const CellResults& results) {
   const std::vector<FibreRow> rows = fibre_rows(results);
   std::vector<std::string> names;
   for (const FibreRow& row : rows) names.push_back(fmt::format("{} {}", name_of(row.fibre->type), row.fibre->fibre_id));
   const double largest = largest_nN(rows);
   // from a little below zero: the mark of a tension of zero is seen whole
-  charts::Chart chart("Tension of each fibre", {"tension (nN)", -0.02 * largest, largest}, charts::row_axis(names));
+  Chart chart("Tension of each fibre", {"tension (nN)", -0.02 * largest, largest}, charts::row_axis(names));
   constexpr double kRow_px = 20;
   chart.frame_height(kRow_px * static_cast<double>(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i) draw_row(chart, rows[i], static_cast<double>(i), results);
   return chart;
 }
 
-std::optional<charts::Chart> tensions_by_type(const CellResults& results) {
+std::optional<Chart> tensions_by_type(const CellResults& results) {
   const std::vector<FibreRow> rows = fibre_rows(results);
   std::vector<std::vector<const FibreRow*>> columns;  // those of a type follow each other
   for (const FibreRow& row : rows) {
@@ -146,7 +146,7 @@ std::optional<charts::Chart> tensions_by_type(const CellResults& results) {
                              fmt::format("{} ({})", name_of(column.front()->fibre->type), column.size()));
   }
   const double largest = largest_nN(rows);
-  charts::Chart chart("Tensions by type", types, {"tension (nN)", -0.02 * largest, largest});
+  Chart chart("Tensions by type", types, {"tension (nN)", -0.02 * largest, largest});
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const auto& column = columns[i];
     const FibreType type = column.front()->fibre->type;

@@ -31,11 +31,11 @@ int index_of(const std::vector<std::string>& list, const std::string& name) {
 
 namespace {
 
-std::vector<double> edges_between(double low, double high, int n_bins, charts::Scale scale) {
+std::vector<double> edges_between(double low, double high, int n_bins, Scale scale) {
   std::vector<double> edges;
   for (int b = 0; b <= n_bins; ++b) {
     const double share = static_cast<double>(b) / n_bins;
-    edges.push_back(scale == charts::Scale::linear ? low + share * (high - low) : low * std::pow(high / low, share));
+    edges.push_back(scale == Scale::linear ? low + share * (high - low) : low * std::pow(high / low, share));
   }
   return edges;
 }
@@ -58,8 +58,8 @@ int n_bins_of(const std::vector<Histogram>& histograms) {
   return std::max(10, static_cast<int>(std::ceil(std::log2(n))) + 1);
 }
 
-charts::Chart histogram_chart(const std::string& title, const std::string& x_label, const std::string& y_label,
-                              const std::vector<Histogram>& histograms, double low, double high, charts::Scale scale) {
+Chart histogram_chart(const std::string& title, const std::string& x_label, const std::string& y_label,
+                      const std::vector<Histogram>& histograms, double low, double high, Scale scale) {
   std::size_t n_keys = 0;
   for (const Histogram& h : histograms) n_keys += h.label.empty() ? 0 : 1;
   const auto edges = edges_between(low, high, n_bins_of(histograms), scale);
@@ -69,8 +69,8 @@ charts::Chart histogram_chart(const std::string& title, const std::string& x_lab
     shares.push_back(shares_between(h.values, edges));
     largest = std::max(largest, *std::max_element(shares.back().begin(), shares.back().end()));
   }
-  charts::Chart chart(title, charts::Axis{.label = x_label, .low = low, .high = high, .scale = scale},
-                      charts::Axis{.label = y_label, .low = 0, .high = end_below_keys(largest, n_keys)});
+  Chart chart(title, Axis{.label = x_label, .low = low, .high = high, .scale = scale},
+              Axis{.label = y_label, .low = 0, .high = end_below_keys(largest, n_keys)});
   for (std::size_t h = 0; h < histograms.size(); ++h) {
     if (histograms[h].values.empty()) continue;
     std::vector<Vec2> steps = {{edges.front(), 0}};
@@ -90,7 +90,7 @@ charts::Chart histogram_chart(const std::string& title, const std::string& x_lab
 namespace {
 
 /// Connected adhesions in full lines, the others dashed.
-charts::Chart distribution_of(const Sample& sample, const std::string& label) {
+Chart distribution_of(const Sample& sample, const std::string& label) {
   double low = INFINITY, high = 0;
   for (const Observation& o : sample.values) {
     if (o.value > 0) low = std::min(low, o.value);
@@ -113,7 +113,7 @@ charts::Chart distribution_of(const Sample& sample, const std::string& label) {
     }
   }
   return histogram_chart(label, label + " (" + sample.unit + ")", "share of the adhesions", all, low, 1.001 * high,
-                         charts::Scale::logarithmic);
+                         Scale::logarithmic);
 }
 
 Figure adhesion_distributions(const Analysis& analysis) {
@@ -132,10 +132,9 @@ Figure force_by_area(const Analysis& analysis) {
     x_end = std::max(x_end, b.mean_area_um2);
     y_end = std::max({y_end, b.mean_force_nN, b.interval_nN ? std::min(b.interval_nN->high, 2 * b.mean_force_nN) : 0});
   }
-  charts::Chart chart(
-      "Mean force of an adhesion by its area", charts::Axis{.label = "area (µm²)", .low = 0, .high = 1.08 * x_end},
-      charts::Axis{.label = "mean force (nN)", .low = 0, .high = end_below_keys(y_end, 2 * sample.conditions.size())});
-  chart.put_key(charts::Chart::KeySide::left);
+  Chart chart("Mean force of an adhesion by its area", Axis{.label = "area (µm²)", .low = 0, .high = 1.08 * x_end},
+              Axis{.label = "mean force (nN)", .low = 0, .high = end_below_keys(y_end, 2 * sample.conditions.size())});
+  chart.put_key(Chart::KeySide::left);
   for (std::size_t c = 0; c < sample.conditions.size(); ++c) {
     for (const bool is_connected : {true, false}) {
       const std::string colour =
@@ -154,7 +153,7 @@ Figure force_by_area(const Analysis& analysis) {
         chart.dot(line.back(), 3.6,
                   "fill:" + std::string(is_connected ? colour : "#fff") + ";stroke:" + colour + ";stroke-width:1.6",
                   fmt::format("{} of {}: {} nN", counted(b.n_adhesions, "adhesions"), counted(b.n_cells, "cells"),
-                              charts::readable(b.mean_force_nN)));
+                              readable(b.mean_force_nN)));
       }
       if (line.empty()) continue;
       chart.curve(line, "stroke:" + colour + ";stroke-width:1.4" + (is_connected ? "" : ";stroke-dasharray:5 3"));
@@ -191,8 +190,8 @@ Figure directions(const Analysis& analysis) {
     }
     if (all.empty()) continue;
     const double end = largest_angle_deg(relation);
-    charts::Chart chart = histogram_chart(std::string(full_name_of(relation)), "angle between them (°)", "share", all,
-                                          0, end, charts::Scale::linear);
+    Chart chart = histogram_chart(std::string(full_name_of(relation)), "angle between them (°)", "share", all, 0, end,
+                                  Scale::linear);
     chart.level(1.0 / n_bins_of(all), "stroke:#555;stroke-dasharray:4 3");
     figure.charts.push_back(chart);
   }

@@ -83,15 +83,14 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
       warnings.push_back(
           fmt::format("{}more than half of the scatter of the tensions of {} fibres is the error of their measurement "
                       "(typically {} nN).",
-                      prefix_of(s.condition), kind_for_people(s.kind), charts::readable(*s.typical_error)));
+                      prefix_of(s.condition), kind_for_people(s.kind), readable(*s.typical_error)));
     }
     if (!s.model || !s.mean_interval) continue;
     if (std::abs(s.model->estimate - s.plain.mean) > 2 * s.model->standard_error) {
-      warnings.push_back(
-          fmt::format("{}the mixed model's mean tension of {} fibres, {} nN, is far from the plain mean, {} nN: fibres "
-                      "with large error bars, or cells with many fibres, differ from the others. Give both.",
-                      prefix_of(s.condition), kind_for_people(s.kind), charts::readable(s.model->estimate),
-                      charts::readable(s.plain.mean)));
+      warnings.push_back(fmt::format(
+          "{}the mixed model's mean tension of {} fibres, {} nN, is far from the plain mean, {} nN: fibres "
+          "with large error bars, or cells with many fibres, differ from the others. Give both.",
+          prefix_of(s.condition), kind_for_people(s.kind), readable(s.model->estimate), readable(s.plain.mean)));
     }
   }
 }
@@ -170,7 +169,7 @@ void warn_of_pseudo_replication(const Measure& m, std::vector<std::string>& warn
         "{}{}: {} and {} {} differ if each counts for itself (p = {}), not with the cell as the unit (p = {}): to "
         "claim the former would be pseudo-replication.",
         prefix_of(by_value.within), m.sample.name, kind_for_people(by_value.group_a), kind_for_people(by_value.group_b),
-        name_of(m.sample.each), charts::readable(*by_value.p_holm), charts::readable(smallest)));
+        name_of(m.sample.each), readable(*by_value.p_holm), readable(smallest)));
   }
 }
 

@@ -45,8 +45,8 @@ std::string colour_of(const Sample& sample, int condition, int kind) {
 }
 
 /// The kinds side by side.
-charts::Axis kind_axis(const Sample& sample) {
-  charts::Axis axis{.label = {}, .low = -0.5, .high = sample.n_kinds() - 0.5};
+Axis kind_axis(const Sample& sample) {
+  Axis axis{.label = {}, .low = -0.5, .high = sample.n_kinds() - 0.5};
   for (int kind = 0; kind < sample.n_kinds(); ++kind)
     axis.names.emplace_back(kind, kind_for_people(sample.kinds[kind]));
   return axis;
@@ -67,7 +67,7 @@ std::string counts_by_kind(const Sample& sample) {
 
 std::size_t n_keys_of(const Sample& sample) { return sample.n_conditions() > 1 ? sample.conditions.size() : 0; }
 
-void add_condition_keys(charts::Chart& chart, const Sample& sample) {
+void add_condition_keys(Chart& chart, const Sample& sample) {
   for (int c = 0; c < sample.n_conditions() && sample.n_conditions() > 1; ++c) {
     std::set<int> cells;
     int n = 0;
@@ -84,9 +84,8 @@ void add_condition_keys(charts::Chart& chart, const Sample& sample) {
 
 Figure tensions_by_type(const Study& study, const Analysis& analysis) {
   const Sample& sample = analysis.tensions.sample;
-  charts::Chart chart(
-      "Tension by fibre type", kind_axis(sample),
-      charts::Axis{.label = "tension (nN)", .low = 0, .high = end_below_keys(largest_of(sample), n_keys_of(sample))});
+  Chart chart("Tension by fibre type", kind_axis(sample),
+              Axis{.label = "tension (nN)", .low = 0, .high = end_below_keys(largest_of(sample), n_keys_of(sample))});
   chart.subtitle(counts_by_kind(sample), "#555");
   const std::vector<MeasuredFibre> fibres = measured_fibres(study);
   std::map<int, std::size_t> n_of;
@@ -95,10 +94,9 @@ Figure tensions_by_type(const Study& study, const Analysis& analysis) {
   for (std::size_t i = 0; i < fibres.size(); ++i) {
     const Observation& o = sample.values[i];  // in the order of the fibres
     const int condition = o.group / sample.n_kinds();
-    chart.dot(
-        {place_of(sample, condition, o.kind) + kDots * width * spread(n_of[o.group]++), o.value}, 2.6,
-        "fill:" + colour_of(sample, condition, o.kind) + ";fill-opacity:.5",
-        fmt::format("{}, fibre {}: {} nN", fibres[i].cell->name, fibres[i].fibre->fibre_id, charts::readable(o.value)));
+    chart.dot({place_of(sample, condition, o.kind) + kDots * width * spread(n_of[o.group]++), o.value}, 2.6,
+              "fill:" + colour_of(sample, condition, o.kind) + ";fill-opacity:.5",
+              fmt::format("{}, fibre {}: {} nN", fibres[i].cell->name, fibres[i].fibre->fibre_id, readable(o.value)));
   }
   for (const Summary& s : analysis.tensions.summaries) {
     const double x = place_of(sample, index_of(sample.conditions, s.condition), index_of(sample.kinds, s.kind));
@@ -108,7 +106,7 @@ Figure tensions_by_type(const Study& study, const Analysis& analysis) {
     const double beside = x + 0.42 * width;
     chart.error({beside, s.model->low}, {beside, s.model->high}, "stroke:#000;stroke-width:1.6");
     chart.dot({beside, s.model->estimate}, 3.4, "fill:#fff;stroke:#000;stroke-width:1.6",
-              fmt::format("mean {} nN", charts::readable(s.model->estimate)));
+              fmt::format("mean {} nN", readable(s.model->estimate)));
   }
   add_condition_keys(chart, sample);
   return {.name = "tensions_by_type",
@@ -125,8 +123,7 @@ Figure tension_distributions(const Analysis& analysis, const StudyParameters& pa
   Figure figure{.name = "tension_distributions",
                 .title = "Distribution of the tensions",
                 .caption = fmt::format("Share of a type's fibres by tension. Upright lines: {} and {} nN.",
-                                       charts::readable(parameters.weak_tension_nN),
-                                       charts::readable(parameters.strong_tension_nN)),
+                                       readable(parameters.weak_tension_nN), readable(parameters.strong_tension_nN)),
                 .n_columns = 3};
   for (int kind = 0; kind < sample.n_kinds(); ++kind) {
     std::vector<Histogram> all;
@@ -136,8 +133,8 @@ Figure tension_distributions(const Analysis& analysis, const StudyParameters& pa
                      .colour = colour_of(sample, c, kind),
                      .values = values_of(own)});
     }
-    charts::Chart chart = histogram_chart(kind_for_people(sample.kinds[kind]), "tension (nN)", "share of the fibres",
-                                          all, 0, largest_of(sample) * 1.0001, charts::Scale::linear);
+    Chart chart = histogram_chart(kind_for_people(sample.kinds[kind]), "tension (nN)", "share of the fibres", all, 0,
+                                  largest_of(sample) * 1.0001, charts::Scale::linear);
     chart.upright(parameters.weak_tension_nN, "stroke:#555;stroke-dasharray:4 3");
     chart.upright(parameters.strong_tension_nN, "stroke:#555;stroke-dasharray:4 3");
     figure.charts.push_back(chart);
@@ -154,9 +151,8 @@ Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters
                     "cells do). Cross: the share without the blur of the measurement’s error.",
                 .n_columns = 2};
   for (const double threshold : thresholds_nN(parameters)) {
-    charts::Chart chart(
-        "Above " + charts::readable(threshold) + " nN", kind_axis(sample),
-        charts::Axis{.label = "share of the fibres (%)", .low = 0, .high = end_below_keys(100, n_keys_of(sample))});
+    Chart chart("Above " + readable(threshold) + " nN", kind_axis(sample),
+                Axis{.label = "share of the fibres (%)", .low = 0, .high = end_below_keys(100, n_keys_of(sample))});
     chart.subtitle(counts_by_kind(sample), "#555");
     for (const ShareAbove& s : analysis.shares) {
       if (s.threshold_nN != threshold) continue;
@@ -167,7 +163,7 @@ Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters
                   "stroke:" + colour + ";stroke-width:1.6");
       chart.dot({x, 100 * s.share.value}, 4, "fill:" + colour,
                 fmt::format("{}{}: {} % of {}", prefix_of(s.condition), kind_for_people(s.kind),
-                            charts::readable(100 * s.share.value), counted(s.n, "fibres")));
+                            readable(100 * s.share.value), counted(s.n, "fibres")));
       const double y = 100 * s.without_error, r = 0.04;
       chart.curve({{x + 2 * r, y - 1.5}, {x + 4 * r, y + 1.5}}, "stroke:#000;stroke-width:1.6");
       chart.curve({{x + 2 * r, y + 1.5}, {x + 4 * r, y - 1.5}}, "stroke:#000;stroke-width:1.6");
@@ -190,18 +186,17 @@ Figure forces_by_cell(const Study& study) {
     return a->condition != b->condition ? a->condition < b->condition : a->fit.total_force_nN > b->fit.total_force_nN;
   });
   const double n = static_cast<double>(cells.size());
-  charts::Chart chart(
-      "Total force of each cell",
-      charts::Axis{.label = counted(std::ssize(cells), "cells"), .low = 0, .high = n, .names = {{n / 2, ""}}},
-      charts::Axis{.label = "force (nN)", .low = 0, .high = end_below_keys(largest, study.conditions.size() + 1)});
+  Chart chart("Total force of each cell",
+              Axis{.label = counted(std::ssize(cells), "cells"), .low = 0, .high = n, .names = {{n / 2, ""}}},
+              Axis{.label = "force (nN)", .low = 0, .high = end_below_keys(largest, study.conditions.size() + 1)});
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const FitSummary& fit = cells[i]->fit;
     const double left = static_cast<double>(i) + 0.1, right = left + 0.8;
     const bool is_known = is_network_known(*cells[i]);
     const double network = is_known ? std::clamp(fit.network_force_nN, 0.0, std::max(0.0, fit.total_force_nN)) : 0;
-    const std::string of_network = is_known ? charts::readable(network) + " nN" : "unknown";
+    const std::string of_network = is_known ? readable(network) + " nN" : "unknown";
     const std::string hover =
-        fmt::format("{}: {} nN, of the network {}", cells[i]->name, charts::readable(fit.total_force_nN), of_network);
+        fmt::format("{}: {} nN, of the network {}", cells[i]->name, readable(fit.total_force_nN), of_network);
     chart.bar({left, network}, {right, fit.total_force_nN}, "fill:" + condition_colour(cells[i]->condition), hover);
     chart.bar({left, 0}, {right, network}, "fill:#c9ccd1", hover);
   }
@@ -250,11 +245,10 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
       for (const double x : c->x) x_end = std::max(x_end, x);
       for (const double y : c->y) y_end = std::max(y_end, y);
     }
-    charts::Chart chart(
-        without_unit(labels().at(key.second)) + " by " + without_unit(labels().at(key.first)),
-        charts::Axis{.label = labels().at(key.first), .low = 0, .high = 1.05 * x_end},
-        charts::Axis{.label = labels().at(key.second), .low = 0, .high = end_below_keys(y_end, panels[key].size())});
-    chart.put_key(charts::Chart::KeySide::left);
+    Chart chart(without_unit(labels().at(key.second)) + " by " + without_unit(labels().at(key.first)),
+                Axis{.label = labels().at(key.first), .low = 0, .high = 1.05 * x_end},
+                Axis{.label = labels().at(key.second), .low = 0, .high = end_below_keys(y_end, panels[key].size())});
+    chart.put_key(Chart::KeySide::left);
     for (const Correlation* c : panels[key]) {
       const std::string colour = condition_colour(index_of(study.conditions, c->condition));
       for (std::size_t i = 0; i < c->x.size(); ++i)
@@ -264,9 +258,9 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
         continue;
       }
       chart.curve({{0, 0}, {x_end, c->line->slope * x_end}}, "stroke:" + colour + ";stroke-width:1.6");
-      std::string text = prefix_of(c->condition) + charts::readable(c->line->slope);
+      std::string text = prefix_of(c->condition) + readable(c->line->slope);
       if (c->line->slope_error) text += fmt::format(" ± {:.2g}", *c->line->slope_error);
-      if (c->line->correlation) text += ", r = " + charts::readable(std::round(100 * *c->line->correlation) / 100);
+      if (c->line->correlation) text += ", r = " + readable(std::round(100 * *c->line->correlation) / 100);
       chart.key(text + fmt::format(", n = {}", c->x.size()), colour);
     }
     figure.charts.push_back(chart);

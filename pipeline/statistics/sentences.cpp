@@ -35,8 +35,8 @@ std::string mean_text(const Summary& s, const Measure& m) {
     const std::string reason = s.n_cells == 1 ? std::string("there is a single ") + m.sample.cell_name() : m.obstacle;
     return fmt::format("{} (no interval: {})", m.sample.amount(s.plain.mean), reason);
   }
-  return fmt::format("{} [95 % CI {} to {}]", m.sample.amount(s.model->estimate), charts::readable(s.model->low),
-                     charts::readable(s.model->high));
+  return fmt::format("{} [95 % CI {} to {}]", m.sample.amount(s.model->estimate), readable(s.model->low),
+                     readable(s.model->high));
 }
 
 /// "ventral fibres carry a tension of 4.1 nN [95 % CI …; the cell as the unit, 12 cells, 80 fibres]".
@@ -118,8 +118,8 @@ void add_differences(const Measure& m, Findings& findings) {
                                   plural_of(m.sample, c.within),
                                   is_clear ? m.sample.amount(std::abs(c.effect)) : "not demonstrably", larger, smaller);
     text += fmt::format(" (difference {} [95 % CI {} to {}]; mixed model, t({}) = {}, {}",
-                        m.sample.amount(std::abs(c.effect)), charts::readable(low), charts::readable(high),
-                        charts::readable(*c.degrees), charts::readable(std::abs(c.statistic)), p_text(*c.p_holm));
+                        m.sample.amount(std::abs(c.effect)), readable(low), readable(high), readable(*c.degrees),
+                        readable(std::abs(c.statistic)), p_text(*c.p_holm));
     const bool is_one_a_cell = m.sample.is_one_a_cell();
     const Comparison* ranks = same_pair(m, c, is_one_a_cell ? Test::mann_whitney : Test::clustered_rank_sum);
     if (ranks != nullptr)
@@ -142,7 +142,7 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
         fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %; {} of {}], {:.0f} % "
                     "without the blur of the measurement.",
                     prefix_of(s.condition), 100 * s.share.value, plural_of(analysis.tensions.sample, s.kind),
-                    charts::readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high,
+                    readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high,
                     counted(s.n, "fibres"), counted(s.n_cells, "cells"), 100 * s.without_error)));
   }
   return list;
@@ -152,11 +152,10 @@ std::vector<std::string> lines(const Analysis& analysis) {
   std::vector<std::string> list;
   for (const Correlation& c : analysis.correlations) {
     if (!c.is_of_total || !c.line) continue;
-    const std::string error = c.line->slope_error ? " ± " + charts::readable(*c.line->slope_error) : "";
-    std::string text =
-        fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition),
-                    charts::readable(c.line->slope), error, c.size_unit, counted(std::ssize(c.x), "cells"));
-    if (c.line->correlation) text += ", r = " + charts::readable(*c.line->correlation);
+    const std::string error = c.line->slope_error ? " ± " + readable(*c.line->slope_error) : "";
+    std::string text = fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition),
+                                   readable(c.line->slope), error, c.size_unit, counted(std::ssize(c.x), "cells"));
+    if (c.line->correlation) text += ", r = " + readable(*c.line->correlation);
     list.push_back(capitalised(text + ")."));
   }
   return list;

@@ -20,12 +20,12 @@ using charts::html_escaped;
 using charts::readable;
 using report::Table;
 
-std::string p_cell(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : charts::readable(p); }
+std::string p_cell(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : readable(p); }
 
-std::string number_text(const std::optional<double>& value) { return value ? charts::readable(*value) : "–"; }
+std::string number_text(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
 
 std::string interval_text(const std::optional<Interval>& interval) {
-  return interval ? charts::readable(interval->low) + " to " + charts::readable(interval->high) : "–";
+  return interval ? readable(interval->low) + " to " + readable(interval->high) : "–";
 }
 
 bool has_conditions(const Study& study) { return study.conditions.size() > 1 || !study.conditions.front().empty(); }
@@ -34,42 +34,42 @@ bool has_conditions(const Study& study) { return study.conditions.size() > 1 || 
 std::string charts_of(const Figure& figure) {
   std::string html = "<div class=\"grid\">\n";
   for (const charts::Chart& chart : figure.charts) html += report::figure(chart, {});
-  return html + "</div>\n<p class=\"sub\">" + charts::html_escaped(figure.caption) + "</p>\n";
+  return html + "</div>\n<p class=\"sub\">" + html_escaped(figure.caption) + "</p>\n";
 }
 
 std::string embedded(const Figure& figure) {
   if (figure.charts.empty())
-    return "<h3>" + charts::html_escaped(figure.title) +
-           "</h3>\n<p class=\"sub\">Not drawn: " + charts::html_escaped(figure.caption) + "</p>\n";
+    return "<h3>" + html_escaped(figure.title) + "</h3>\n<p class=\"sub\">Not drawn: " + html_escaped(figure.caption) +
+           "</p>\n";
   const bool is_named = figure.charts.size() == 1 && figure.charts.front().title() == figure.title;
-  return (is_named ? "" : "<h3>" + charts::html_escaped(figure.title) + "</h3>\n") + charts_of(figure);
+  return (is_named ? "" : "<h3>" + html_escaped(figure.title) + "</h3>\n") + charts_of(figure);
 }
 
-void without_column(report::Table& table, std::ptrdiff_t column) {
+void without_column(Table& table, std::ptrdiff_t column) {
   table.columns.erase(table.columns.begin() + column);
   for (auto& row : table.rows) row.erase(row.begin() + column);
 }
 
-report::Table types_table(const Study& study, const Analysis& analysis) {
-  report::Table table{{{"condition"},
-                       {"type"},
-                       {"cells", true},
-                       {"fibres", true},
-                       {"mean, mixed model (nN)", true},
-                       {"95 %", true},
-                       {"plain mean (nN)", true},
-                       {"95 %, cells resampled", true},
-                       {"median (nN)", true},
-                       {"SD (nN)", true},
-                       {"SD without error (nN)", true}},
-                      {},
-                      "Tension by fibre type"};
+Table types_table(const Study& study, const Analysis& analysis) {
+  Table table{{{"condition"},
+               {"type"},
+               {"cells", true},
+               {"fibres", true},
+               {"mean, mixed model (nN)", true},
+               {"95 %", true},
+               {"plain mean (nN)", true},
+               {"95 %, cells resampled", true},
+               {"median (nN)", true},
+               {"SD (nN)", true},
+               {"SD without error (nN)", true}},
+              {},
+              "Tension by fibre type"};
   for (const Summary& s : analysis.tensions.summaries) {
     table.rows.push_back(
-        {charts::html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n),
-         s.model ? charts::readable(s.model->estimate) : "–",
+        {html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n),
+         s.model ? readable(s.model->estimate) : "–",
          interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
-         charts::readable(s.plain.mean), interval_text(s.mean_interval), charts::readable(s.plain.median),
+         readable(s.plain.mean), interval_text(s.mean_interval), readable(s.plain.median),
          number_text(s.plain.standard_deviation),
          number_text(s.without_error ? std::optional(s.without_error->standard_deviation) : std::nullopt)});
   }
@@ -85,20 +85,20 @@ std::string figure_name(const Sample& sample) {
 
 /// What the sheets, or the cells in space, are like: a row for each figure, kind of part and condition.
 /// @param cells  what they are called
-report::Table figures_table(const Study& study, const std::vector<Measure>& measures, const std::string& title,
-                            const std::string& cells) {
-  report::Table table{{{"figure"},
-                       {"condition"},
-                       {"of"},
-                       {cells, true},
-                       {"mean, mixed model", true},
-                       {"95 %", true},
-                       {"plain mean", true},
-                       {"95 %, " + cells + " resampled", true},
-                       {"SD", true},
-                       {"SD without error", true}},
-                      {},
-                      title};
+Table figures_table(const Study& study, const std::vector<Measure>& measures, const std::string& title,
+                    const std::string& cells) {
+  Table table{{{"figure"},
+               {"condition"},
+               {"of"},
+               {cells, true},
+               {"mean, mixed model", true},
+               {"95 %", true},
+               {"plain mean", true},
+               {"95 %, " + cells + " resampled", true},
+               {"SD", true},
+               {"SD without error", true}},
+              {},
+              title};
   for (const Measure& m : measures) {
     for (const Summary& s : m.summaries) {
       table.rows.push_back(
@@ -115,59 +115,57 @@ report::Table figures_table(const Study& study, const std::vector<Measure>& meas
   return table;
 }
 
-report::Table tests_table(const Measure& m) {
-  report::Table table{{{"within"},
-                       {"test"},
-                       {"unit"},
-                       {"groups"},
-                       {"observations"},
-                       {"cells"},
-                       {"statistic", true},
-                       {"d.f.", true},
-                       {"p", true},
-                       {"p (Holm)", true},
-                       {"effect", true},
-                       {"95 %"},
-                       {"effect is"}},
-                      {},
-                      "Tests of the " + m.sample.name};
+Table tests_table(const Measure& m) {
+  Table table{{{"within"},
+               {"test"},
+               {"unit"},
+               {"groups"},
+               {"observations"},
+               {"cells"},
+               {"statistic", true},
+               {"d.f.", true},
+               {"p", true},
+               {"p (Holm)", true},
+               {"effect", true},
+               {"95 %"},
+               {"effect is"}},
+              {},
+              "Tests of the " + m.sample.name};
   for (const Comparison& t : m.comparisons) {
     const bool is_pair = !t.group_b.empty();
-    table.rows.push_back({charts::html_escaped(t.within), name_of(t.test), name_of(t.unit),
-                          charts::html_escaped(is_pair ? t.group_a + " – " + t.group_b : t.group_a),
+    table.rows.push_back({html_escaped(t.within), name_of(t.test), name_of(t.unit),
+                          html_escaped(is_pair ? t.group_a + " – " + t.group_b : t.group_a),
                           is_pair ? fmt::format("{}, {}", t.n_a, t.n_b) : std::to_string(t.n_a),
                           is_pair ? fmt::format("{}, {}", t.cells_a, t.cells_b) : std::to_string(t.cells_a),
-                          charts::readable(t.statistic), t.degrees ? charts::readable(*t.degrees) : "–",
-                          p_cell(t.p_value), t.p_holm ? p_cell(*t.p_holm) : "–",
-                          t.effect_name.empty() ? "–" : charts::readable(t.effect), interval_text(t.interval),
-                          charts::html_escaped(t.effect_name)});
+                          readable(t.statistic), t.degrees ? readable(*t.degrees) : "–", p_cell(t.p_value),
+                          t.p_holm ? p_cell(*t.p_holm) : "–", t.effect_name.empty() ? "–" : readable(t.effect),
+                          interval_text(t.interval), html_escaped(t.effect_name)});
   }
   return table;
 }
 
 std::string enters_text(const StudyCell& c) { return c.fit.converged ? "yes" : "yes, not converged"; }
 
-report::Table cells_table(const Study& study) {
-  report::Table table{{{"cell"},
-                       {"condition"},
-                       {"fibres", true},
-                       {"adhesions", true},
-                       {"total force (nN)", true},
-                       {"of fibres (nN)", true},
-                       {"of network (nN)", true},
-                       {"relative L2", true},
-                       {"expected", true},
-                       {"enters"}},
-                      {},
-                      "Cells with fibres"};
+Table cells_table(const Study& study) {
+  Table table{{{"cell"},
+               {"condition"},
+               {"fibres", true},
+               {"adhesions", true},
+               {"total force (nN)", true},
+               {"of fibres (nN)", true},
+               {"of network (nN)", true},
+               {"relative L2", true},
+               {"expected", true},
+               {"enters"}},
+              {},
+              "Cells with fibres"};
   for (const StudyCell& c : study.cells) {
     if (c.kind() != CellKind::plane) continue;
-    table.rows.push_back(
-        {charts::html_escaped(c.name), charts::html_escaped(condition_of(study, c)),
-         std::to_string(c.cell.fibres.size()), std::to_string(c.cell.adhesions.size()),
-         charts::readable(c.fit.total_force_nN), is_network_known(c) ? charts::readable(c.fit.fibre_force_nN) : "–",
-         is_network_known(c) ? charts::readable(c.fit.network_force_nN) : "–", charts::readable(c.fit.relative_l2),
-         charts::readable(c.fit.expected_relative_l2), enters_text(c)});
+    table.rows.push_back({html_escaped(c.name), html_escaped(condition_of(study, c)),
+                          std::to_string(c.cell.fibres.size()), std::to_string(c.cell.adhesions.size()),
+                          readable(c.fit.total_force_nN), is_network_known(c) ? readable(c.fit.fibre_force_nN) : "–",
+                          is_network_known(c) ? readable(c.fit.network_force_nN) : "–", readable(c.fit.relative_l2),
+                          readable(c.fit.expected_relative_l2), enters_text(c)});
   }
   return table;
 }
@@ -189,20 +187,20 @@ std::string estimates_text(const StudyCell& c, SheetQuantity quantity) {
   return text.empty() ? "–" : text;
 }
 
-report::Table sheets_table(const Study& study) {
-  report::Table table{{{"sheet"},
-                       {"condition"},
-                       {"contraction (nN/µm)", true},
-                       {"stiffness (nN/µm)", true},
-                       {"mean tension (nN/µm)", true},
-                       {"total force (nN)", true},
-                       {"strain energy (fJ)", true},
-                       {"area (µm²)", true},
-                       {"relative L2", true},
-                       {"expected", true},
-                       {"enters"}},
-                      {},
-                      "Sheets"};
+Table sheets_table(const Study& study) {
+  Table table{{{"sheet"},
+               {"condition"},
+               {"contraction (nN/µm)", true},
+               {"stiffness (nN/µm)", true},
+               {"mean tension (nN/µm)", true},
+               {"total force (nN)", true},
+               {"strain energy (fJ)", true},
+               {"area (µm²)", true},
+               {"relative L2", true},
+               {"expected", true},
+               {"enters"}},
+              {},
+              "Sheets"};
   for (const StudyCell& c : study.cells) {
     if (!c.sheet) continue;
     table.rows.push_back({html_escaped(c.name), html_escaped(condition_of(study, c)),
@@ -221,23 +219,23 @@ std::string with_error(double value, const std::optional<double>& sigma) {
   return report::rounded(value, decimals) + " ± " + report::rounded(*sigma, decimals);
 }
 
-report::Table cells_in_space_table(const Study& study) {
-  report::Table table{{{"cell"},
-                       {"condition"},
-                       {"method"},
-                       {"total force (nN)", true},
-                       {"strain energy (fJ)", true},
-                       {"contractile moment (nN µm)", true},
-                       {"normal share", true},
-                       {"largest traction (kPa)", true},
-                       {"net force (nN)", true},
-                       {"net moment (nN µm)", true},
-                       {"resolution (µm)", true},
-                       {"adhesions", true},
-                       {"relative L2", true},
-                       {"enters"}},
-                      {},
-                      "Cells in space"};
+Table cells_in_space_table(const Study& study) {
+  Table table{{{"cell"},
+               {"condition"},
+               {"method"},
+               {"total force (nN)", true},
+               {"strain energy (fJ)", true},
+               {"contractile moment (nN µm)", true},
+               {"normal share", true},
+               {"largest traction (kPa)", true},
+               {"net force (nN)", true},
+               {"net moment (nN µm)", true},
+               {"resolution (µm)", true},
+               {"adhesions", true},
+               {"relative L2", true},
+               {"enters"}},
+              {},
+              "Cells in space"};
   for (const StudyCell& c : study.cells) {
     if (!c.space) continue;
     const SpaceFigures& s = *c.space;
@@ -252,8 +250,8 @@ report::Table cells_in_space_table(const Study& study) {
   return table;
 }
 
-report::Table left_out_table(const Study& study) {
-  report::Table table{{{"cell"}, {"condition"}, {"why"}}, {}, "Left out"};
+Table left_out_table(const Study& study) {
+  Table table{{{"cell"}, {"condition"}, {"why"}}, {}, "Left out"};
   for (const LeftOutCell& c : study.left_out)
     table.rows.push_back({html_escaped(c.name), html_escaped(c.condition), html_escaped(c.reason)});
   return table;
@@ -268,8 +266,8 @@ std::string first_of(const std::vector<std::string>& names) {
 }
 
 /// Open findings, each with the cells that have it.
-report::Table findings_table(const Study& study) {
-  report::Table table{{{"finding"}, {"severity"}, {"cells", true}, {"of them"}, {"what to do"}}, {}, "Open findings"};
+Table findings_table(const Study& study) {
+  Table table{{{"finding"}, {"severity"}, {"cells", true}, {"of them"}, {"what to do"}}, {}, "Open findings"};
   std::map<std::string, std::pair<const Finding*, std::vector<std::string>>> by_id;
   for (const StudyCell& c : study.cells) {
     for (const Finding& f : c.findings) {
@@ -281,8 +279,8 @@ report::Table findings_table(const Study& study) {
   }
   for (const auto& [id, found] : by_id) {
     const auto& [finding, cells] = found;
-    table.rows.push_back({charts::html_escaped(id), name_of(finding->severity), std::to_string(cells.size()),
-                          charts::html_escaped(first_of(cells)), charts::html_escaped(finding->remedy)});
+    table.rows.push_back({html_escaped(id), name_of(finding->severity), std::to_string(cells.size()),
+                          html_escaped(first_of(cells)), html_escaped(finding->remedy)});
   }
   return table;
 }
@@ -326,7 +324,7 @@ std::string gallery(const Study& study, const Path& page_folder) {
 
 std::string list_of(const std::vector<std::string>& sentences) {
   std::string html = "<ul>\n";
-  for (const std::string& s : sentences) html += "<li>" + charts::html_escaped(s) + "</li>\n";
+  for (const std::string& s : sentences) html += "<li>" + html_escaped(s) + "</li>\n";
   return html + "</ul>\n";
 }
 
@@ -462,7 +460,7 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
     if (figure.name != kPrimaryFigure) pictures += embedded(figure);
   }
   const auto files = tables_of(study, analysis);
-  const auto with_file = [&](const report::Table& table, const std::string& name) {
+  const auto with_file = [&](const Table& table, const std::string& name) {
     const auto file = std::find_if(files.begin(), files.end(), [&](const auto& f) { return f.first == name; });
     return report::html_of(table, {file->first, file->second});
   };
@@ -490,7 +488,7 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   }
   body += report::section("Exploratory tests", tests + kHowToRead);
   std::string cells = gallery(study, page_folder);
-  for (const report::Table& table :
+  for (const Table& table :
        {cells_table(study), sheets_table(study), cells_in_space_table(study), left_out_table(study)})
     if (!table.rows.empty()) cells += with_file(table, "cells.csv");
   body += report::section("Cells", cells);
