@@ -242,12 +242,7 @@ class Blocked final : public KeptResponse {
 /// Points in a part of the plane, halved across its longer side until they are few.
 void split(const std::vector<Vec2>& points_um, std::vector<Index> points, std::size_t most,
            std::vector<std::vector<Index>>& parts) {
-  Vec2 low = points_um[points.front()], high = low;
-  for (const Index p : points) {
-    const Vec2 at = points_um[p];
-    low = {std::min(low.x, at.x), std::min(low.y, at.y)};
-    high = {std::max(high.x, at.x), std::max(high.y, at.y)};
-  }
+  const auto [low, high] = mbtfm::extent_of(points, [&](Index p) { return points_um[p]; });
   if (points.size() <= most || low == high) return parts.push_back(std::move(points));
   const bool is_wide = high.x - low.x >= high.y - low.y;
   const double middle = is_wide ? 0.5 * (low.x + high.x) : 0.5 * (low.y + high.y);

@@ -6,6 +6,7 @@
 #include "pipeline/charts/chart.h"
 #include "pipeline/charts/colour_map.h"
 #include "pipeline/contract/counted.h"
+#include "pipeline/contract/extent.h"
 
 namespace mbtfm::mean {
 namespace {
@@ -16,11 +17,7 @@ struct Frame {
   charts::Axis x, y;
 };
 Frame frame_of(const Scene& scene) {
-  Vec2 low = scene.nodes.front().position_um, high = low;
-  for (const NodeMean& node : scene.nodes) {
-    low = {std::min(low.x, node.position_um.x), std::min(low.y, node.position_um.y)};
-    high = {std::max(high.x, node.position_um.x), std::max(high.y, node.position_um.y)};
-  }
+  const auto [low, high] = extent_of(scene.nodes, &NodeMean::position_um);
   return {{.label = "x (µm)", .low = low.x, .high = high.x}, {.label = "y (µm)", .low = high.y, .high = low.y}};
 }
 

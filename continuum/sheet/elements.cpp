@@ -106,12 +106,7 @@ Locator::Locator(const Elements& elements) : elements_(elements) {
   rows_ = static_cast<int>(size.y / bin_um_) + 1;
   bins_.resize(static_cast<std::size_t>(columns_) * rows_);
   for (int t = 0; t < elements.n_triangles(); ++t) {
-    Vec2 a = nodes[elements.nodes(t)[0]], b = a;
-    for (const int node : elements.nodes(t)) {
-      const Vec2 p = nodes[node];
-      a = {std::min(a.x, p.x), std::min(a.y, p.y)};
-      b = {std::max(b.x, p.x), std::max(b.y, p.y)};
-    }
+    const auto [a, b] = extent_of(elements.nodes(t), [&](int node) { return nodes[node]; });
     const double reach = 0.05 * norm(b - a);
     const auto clamped = [](double v, int n) { return static_cast<int>(std::clamp(v, 0.0, n - 1.0)); };
     for (int y = clamped((a.y - reach - low_um_.y) / bin_um_, rows_);

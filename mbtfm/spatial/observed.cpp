@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::spatial {
@@ -11,13 +12,8 @@ namespace {
 
 /// Between neighbours: in a plane where they lie in a sheet thinner than that.
 double distance_between_um(const std::vector<Vec3>& points, const std::vector<double>& depths) {
-  Vec2 low{points[0].x, points[0].y}, high = low;
-  for (const Vec3& p : points) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
   const auto n = static_cast<double>(points.size());
-  const double area = (high.x - low.x) * (high.y - low.y);
+  const double area = extent_of(points).area_um2();
   if (!(area > 0)) throw InvalidData("displacement", "beads spread over an area", "all of them on one line");
   const double deepest = numerics::quantile(depths, 0.95);
   const double in_plane = std::sqrt(area / n);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::tractions {
@@ -19,12 +20,8 @@ constexpr std::size_t kNeighbours = 20;  // for six numbers each way: their own 
 class Boxes {
  public:
   explicit Boxes(const DisplacementField& beads) : beads_(beads) {
-    low_ = beads.front().position_um;
-    Vec2 high = low_;
-    for (const Bead& b : beads) {
-      low_ = {std::min(low_.x, b.position_um.x), std::min(low_.y, b.position_um.y)};
-      high = {std::max(high.x, b.position_um.x), std::max(high.y, b.position_um.y)};
-    }
+    const auto [low, high] = extent_of(beads, &Bead::position_um);
+    low_ = low;
     side_um_ = std::sqrt(2 * (high.x - low_.x) * (high.y - low_.y) / static_cast<double>(beads.size()));
     n_columns_ = 1 + static_cast<int>((high.x - low_.x) / side_um_);
     n_rows_ = 1 + static_cast<int>((high.y - low_.y) / side_um_);

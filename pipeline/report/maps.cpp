@@ -7,6 +7,7 @@
 #include <map>
 
 #include "pipeline/contract/beads.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/network.h"
 #include "pipeline/contract/polyline.h"
 #include "pipeline/files/base64.h"
@@ -33,13 +34,9 @@ constexpr double kMargin_um = 5;
 Box map_box(const CellResults& results) {
   std::vector<Vec2> points = results.cell.outline_um;
   for (const Adhesion& adhesion : results.cell.adhesions) points.push_back(adhesion.position_um);
-  Box box{points.front(), points.front()};
-  for (const Vec2 p : points) {
-    box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y)};
-    box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y)};
-  }
+  const auto [low, high] = extent_of(points);
   const Vec2 margin{kMargin_um, kMargin_um};
-  return {box.low - margin, box.high + margin};
+  return {low - margin, high + margin};
 }
 
 Chart empty_map(const Box& box, const std::string& title) {

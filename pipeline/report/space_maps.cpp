@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pipeline/charts/colour_map.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/arrows.h"
 #include "pipeline/report/colours.h"
@@ -19,11 +20,7 @@ using charts::Chart;
 Vec2 spacing_of(const SpaceResults& r) { return {r.number("spacing_x_um"), r.number("spacing_y_um")}; }
 
 Chart empty_map(const SpaceResults& r, const std::string& title) {
-  Vec2 low{1e300, 1e300}, high{-1e300, -1e300};
-  for (const SurfaceTraction& t : r.tractions) {
-    low = {std::min(low.x, t.at_um.x), std::min(low.y, t.at_um.y)};
-    high = {std::max(high.x, t.at_um.x), std::max(high.y, t.at_um.y)};
-  }
+  const auto [low, high] = extent_of(r.tractions, &SurfaceTraction::at_um);
   const Vec2 half = 0.5 * spacing_of(r);
   Chart map(title, {"x (µm)", low.x - half.x, high.x + half.x}, {"y (µm)", high.y + half.y, low.y - half.y});
   map.same_scales();

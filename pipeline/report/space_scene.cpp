@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/extent.h"
 
 namespace mbtfm::report {
 namespace {
@@ -143,12 +144,9 @@ std::string edges(const Heights& heights, const Paper& paper) {
 }  // namespace
 
 TractionOnSurface::TractionOnSurface(const std::vector<SurfaceTraction>& tractions, Vec2 spacing_um)
-    : tractions_(tractions), origin_um_{1e300, 1e300}, spacing_um_(spacing_um) {
-  Vec2 high{-1e300, -1e300};
-  for (const SurfaceTraction& t : tractions) {
-    origin_um_ = {std::min(origin_um_.x, t.at_um.x), std::min(origin_um_.y, t.at_um.y)};
-    high = {std::max(high.x, t.at_um.x), std::max(high.y, t.at_um.y)};
-  }
+    : tractions_(tractions), spacing_um_(spacing_um) {
+  const auto [low, high] = extent_of(tractions, &SurfaceTraction::at_um);
+  origin_um_ = low;
   n_x_ = static_cast<int>(std::lround((high.x - origin_um_.x) / spacing_um.x)) + 1;
   n_y_ = static_cast<int>(std::lround((high.y - origin_um_.y) / spacing_um.y)) + 1;
   vertex_.assign(static_cast<std::size_t>(n_x_) * static_cast<std::size_t>(n_y_), -1);
