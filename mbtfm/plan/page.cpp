@@ -47,19 +47,12 @@ std::string needed_text(const Plan& plan, const Needed& n) {
 }
 
 report::Table expected_rows(const Plan& plan) {
-  report::Table table{.columns = {{"gel (kPa)", true},
-                                  {"beads per µm²", true},
-                                  {"noise (µm)", true},
-                                  {"quantity"},
-                                  {"number", true},
-                                  {"standard error (nN)", true},
-                                  {"by beads", true},
-                                  {"by mesh", true},
-                                  {"by segmentation", true},
-                                  {"by the rest", true},
-                                  {"within target (%)", true},
-                                  {"two apart from (µm)", true}},
-                      .rows = {}};
+  report::Table table{.columns = {report::number("gel (kPa)"), report::number("beads per µm²"),
+                                  report::number("noise (µm)"), "quantity", report::number("number"),
+                                  report::number("standard error (nN)"), report::number("by beads"),
+                                  report::number("by mesh"), report::number("by segmentation"),
+                                  report::number("by the rest"), report::number("within target (%)"),
+                                  report::number("two apart from (µm)")}};
   for (const Expected& e : plan.grid.expected) {
     table.rows.push_back({brief(e.point.youngs_modulus_kPa), brief(e.point.beads_per_um2), brief(e.point.noise_um),
                           name_of(e.quantity), std::to_string(e.n), brief(e.standard_error_nN), brief(e.from_beads_nN),
@@ -70,16 +63,12 @@ report::Table expected_rows(const Plan& plan) {
 }
 
 report::Table cell_rows(const Plan& plan) {
-  report::Table table{.columns = {{"type"},
-                                  {"mean (nN)", true},
-                                  {"between cells (nN)", true},
-                                  {"within (nN)", true},
-                                  {"error (nN)", true},
-                                  {"difference (%)", true},
-                                  {"fibres per cell", true},
-                                  {"cells of each condition", true}},
-                      .rows = {}};
-  for (const int cells : kCells) table.columns.push_back({"chance with " + std::to_string(cells) + " cells (%)", true});
+  report::Table table{.columns = {"type", report::number("mean (nN)"), report::number("between cells (nN)"),
+                                  report::number("within (nN)"), report::number("error (nN)"),
+                                  report::number("difference (%)"), report::number("fibres per cell"),
+                                  report::number("cells of each condition")}};
+  for (const int cells : kCells)
+    table.columns.push_back(report::number("chance with " + std::to_string(cells) + " cells (%)"));
   for (const CellNumbers& n : plan.cells) {
     std::vector<std::string> row = {
         name_of(n.scatter.type),           brief(n.scatter.mean_nN),

@@ -43,8 +43,9 @@ charts::Chart drawn_chart(const std::string& what, const std::vector<DrawnDot>& 
 template <class Needed>
 report::Table needed_rows(const Asked& asked, const std::vector<Needed>& needed,
                           const std::function<std::string(const Needed&)>& text_of) {
-  report::Table table{.columns = {{"gel (kPa)", true}}, .rows = {}};
-  for (const double noise_um : asked.noise_um) table.columns.push_back({"noise " + brief(noise_um) + " µm", true});
+  report::Table table{.columns = {report::number("gel (kPa)")}};
+  for (const double noise_um : asked.noise_um)
+    table.columns.push_back(report::number("noise " + brief(noise_um) + " µm"));
   for (const double E : asked.youngs_modulus_kPa) {
     std::vector<std::string> row = {brief(E)};
     for (const Needed& n : needed)

@@ -48,7 +48,7 @@ void add_figures(Comparison& comparison) {
   comparison.relative_error = truth2 > 0 ? std::sqrt(error2 / truth2) : 0;
 }
 
-std::string number(const std::optional<double>& value) { return value ? fmt::format("{:.3g}", *value) : "–"; }
+std::string short_number(const std::optional<double>& value) { return value ? fmt::format("{:.3g}", *value) : "–"; }
 std::string label(const std::optional<Fibre>& fibre) { return fibre ? std::to_string(fibre->fibre_id) : "–"; }
 
 }  // namespace
@@ -112,16 +112,16 @@ std::string comparison_text(const fs::path& cell) {
   std::string text =
       fmt::format(fmt::runtime(kRow), "fibre", "true", "type", "true", "tension", "low", "high", "truth");
   text += fmt::format(fmt::runtime(kRow), "id", "id", "", "type", "nN", "nN", "nN", "nN");
-  text += fmt::format(fmt::runtime(kRow), 0, 0, "network", "network", number(comparison.network.tension_nN),
-                      number(comparison.network.low_nN), number(comparison.network.high_nN),
-                      number(comparison.true_network_nN));
+  text += fmt::format(fmt::runtime(kRow), 0, 0, "network", "network", short_number(comparison.network.tension_nN),
+                      short_number(comparison.network.low_nN), short_number(comparison.network.high_nN),
+                      short_number(comparison.true_network_nN));
   for (const ComparedFibre& fibre : comparison.fibres) {
     const Tension none;
     const Tension& t = fibre.tension ? *fibre.tension : none;
     text += fmt::format(fmt::runtime(kRow), label(fibre.found), label(fibre.truth),
                         fibre.found ? name_of(fibre.found->type) : "–", fibre.truth ? name_of(fibre.truth->type) : "–",
-                        fibre.tension ? number(t.tension_nN) : "–", number(t.low_nN), number(t.high_nN),
-                        number(fibre.true_tension_nN));
+                        fibre.tension ? short_number(t.tension_nN) : "–", short_number(t.low_nN),
+                        short_number(t.high_nN), short_number(fibre.true_tension_nN));
   }
   text += fmt::format("\ntensions of the {} fibres found: |t - truth| / |truth| = {:.3f}\n", comparison.n_matched,
                       comparison.relative_error);

@@ -107,10 +107,10 @@ std::vector<BudgetLine> read_error_budget(const std::filesystem::path& run_file)
 std::string error_budget_html(const std::vector<BudgetLine>& budget, const std::string& cell) {
   if (budget.empty()) return {};
   std::vector<BudgetLine> fibres;
-  Table table{{{"of"}, {"value (nN)", true}, {"standard error (nN)", true}}, {}, "Error budget"};
+  Table table{{"of", number("value (nN)"), number("standard error (nN)")}, {}, "Error budget"};
   std::string csv = "fibre_id,type,value_nN,total_nN";
   for (const auto& [source, part] : budget.front().parts_nN) {
-    table.columns.push_back({source + " (nN)", true});
+    table.columns.push_back(number(source + " (nN)"));
     csv += "," + source + "_nN";
   }
   for (const BudgetLine& line : budget) {

@@ -11,16 +11,20 @@ namespace mbtfm::report {
 
 using charts::html_escaped;
 
-/// Cells are HTML already; `is_number` columns are aligned to the right and sorted as numbers.
+/// Cells are HTML already.
 struct Table {
   struct Column {
+    Column(const char* text) : title(text) {}
+    Column(std::string text, bool of_numbers) : title(std::move(text)), is_number(of_numbers) {}
     std::string title;
-    bool is_number = false;
+    bool is_number = false;  ///< aligned to the right and sorted as numbers
   };
   std::vector<Column> columns = {};
   std::vector<std::vector<std::string>> rows = {};
   std::string caption = {};  ///< what it lists, for those who hear the page
 };
+
+inline Table::Column number(std::string title) { return {std::move(title), true}; }
 
 /// A file that a reader can take out of the page.
 struct Download {

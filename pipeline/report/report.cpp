@@ -79,22 +79,14 @@ std::string adhesion_section(const CellResults& results) {
   std::vector<AdhesionForce> forces = results.forces;
   std::stable_sort(forces.begin(), forces.end(),
                    [](const AdhesionForce& a, const AdhesionForce& b) { return norm(a.force_nN) > norm(b.force_nN); });
-  Table all{{{"adhesion", true},
-             {"force (nN)", true},
-             {"std. error (nN)", true},
-             {"Fx (nN)", true},
-             {"Fy (nN)", true},
-             {"traction (kPa)", true},
-             {"area (µm²)", true},
-             {"x (µm)", true},
-             {"y (µm)", true},
-             {"fibre ends on it"}},
+  Table all{{number("adhesion"), number("force (nN)"), number("std. error (nN)"), number("Fx (nN)"), number("Fy (nN)"),
+             number("traction (kPa)"), number("area (µm²)"), number("x (µm)"), number("y (µm)"), "fibre ends on it"},
             {},
             "Forces of the adhesions"};
   const bool has_assumed = std::ranges::any_of(by_id, [](const auto& a) { return is_assumed(a.second->origin); });
   const bool are_candidates =
       std::ranges::any_of(by_id, [](const auto& a) { return a.second->origin == AdhesionOrigin::candidate; });
-  if (has_assumed) all.columns.push_back({"seen"});
+  if (has_assumed) all.columns.push_back("seen");
   for (const AdhesionForce& force : forces) {
     const Adhesion& adhesion = *by_id.at(force.adhesion_id);
     const double magnitude = norm(force.force_nN);
@@ -147,8 +139,8 @@ std::string figure_pairs(const CellResults& results) {
 std::string effects_table(const Provenance& provenance) {
   const bool are_timed = std::any_of(provenance.effects.begin(), provenance.effects.end(),
                                      [](const EffectLine& effect) { return !effect.seconds.empty(); });
-  Table table{{{"effect"}, {"stage"}, {"on"}, {"why"}}, {}, "Effects, and why they are on or off"};
-  if (are_timed) table.columns.push_back({"seconds", true});
+  Table table{{"effect", "stage", "on", "why"}, {}, "Effects, and why they are on or off"};
+  if (are_timed) table.columns.push_back(number("seconds"));
   for (const EffectLine& effect : provenance.effects) {
     std::vector<std::string> row = {charts::html_escaped(effect.name), charts::html_escaped(effect.stage),
                                     effect.is_on ? "on" : "off", charts::html_escaped(effect.why)};
@@ -161,7 +153,7 @@ std::string effects_table(const Provenance& provenance) {
 }  // namespace
 
 std::string provenance_section(const Provenance& provenance, const std::string& figures) {
-  Table stages{{{"stage"}, {"state"}, {"result"}, {"seconds", true}, {"memory (MB)", true}, {"version"}}, {}, "Stages"};
+  Table stages{{"stage", "state", "result", number("seconds"), number("memory (MB)"), "version"}, {}, "Stages"};
   for (const StageLine& stage : provenance.stages) {
     stages.rows.push_back({charts::html_escaped(stage.name), charts::html_escaped(stage.state),
                            charts::html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,

@@ -157,18 +157,11 @@ std::string force_section(const SpaceResults& r) {
   if (r.forces.empty()) return {};
   std::vector<ForceInSpace> forces = r.forces;
   std::ranges::stable_sort(forces, std::greater{}, [](const ForceInSpace& f) { return norm(f.force_nN); });
-  Table table{{{"adhesion", true},
-               {"force (nN)", true},
-               {"std. error (nN)", true},
-               {"Fx (nN)", true},
-               {"Fy (nN)", true},
-               {"Fz (nN), into the gel", true},
-               {"area (µm²)", true},
-               {"x (µm)", true},
-               {"y (µm)", true},
-               {"z (µm)", true}},
-              {},
-              "Forces of the adhesions"};
+  Table table{
+      {number("adhesion"), number("force (nN)"), number("std. error (nN)"), number("Fx (nN)"), number("Fy (nN)"),
+       number("Fz (nN), into the gel"), number("area (µm²)"), number("x (µm)"), number("y (µm)"), number("z (µm)")},
+      {},
+      "Forces of the adhesions"};
   for (const ForceInSpace& f : forces) {
     const auto decimals = f.sigma_nN && *f.sigma_nN > 0 ? std::optional(decimals_for(*f.sigma_nN)) : std::nullopt;
     table.rows.push_back({std::to_string(f.adhesion_id), rounded(norm(f.force_nN), decimals),

@@ -99,15 +99,15 @@ std::string missed_fibres(const Comparison& comparison) {
 
 Table tension_table(const CellResults& results) {
   Table table{
-      {{"fibre", true}, {"type"}, {"tension (nN)", true}, {"95 % interval (nN)", true}}, {}, "Tension of each fibre"};
+      {number("fibre"), "type", number("tension (nN)"), number("95 % interval (nN)")}, {}, "Tension of each fibre"};
   const bool has_truth = results.comparison.has_value();
   if (has_truth) {
     for (const char* title : {"truth (nN)", "error (%)", "error / half interval", "true fibre"}) {
-      table.columns.push_back({title, true});
+      table.columns.push_back(number(title));
     }
   }
-  table.columns.push_back({"length (µm)", true});
-  table.columns.push_back({"adhesions"});
+  table.columns.push_back(number("length (µm)"));
+  table.columns.push_back("adhesions");
   if (const auto t = results.tensions.find(0); t != results.tensions.end()) {
     table.rows.push_back(network_row(results, t->second));
   }

@@ -18,6 +18,7 @@ namespace {
 
 using charts::html_escaped;
 using charts::readable;
+using report::number;
 using report::Table;
 
 std::string p_cell(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : readable(p); }
@@ -51,17 +52,9 @@ void without_column(Table& table, std::ptrdiff_t column) {
 }
 
 Table types_table(const Study& study, const Analysis& analysis) {
-  Table table{{{"condition"},
-               {"type"},
-               {"cells", true},
-               {"fibres", true},
-               {"mean, mixed model (nN)", true},
-               {"95 %", true},
-               {"plain mean (nN)", true},
-               {"95 %, cells resampled", true},
-               {"median (nN)", true},
-               {"SD (nN)", true},
-               {"SD without error (nN)", true}},
+  Table table{{"condition", "type", number("cells"), number("fibres"), number("mean, mixed model (nN)"), number("95 %"),
+               number("plain mean (nN)"), number("95 %, cells resampled"), number("median (nN)"), number("SD (nN)"),
+               number("SD without error (nN)")},
               {},
               "Tension by fibre type"};
   for (const Summary& s : analysis.tensions.summaries) {
@@ -87,16 +80,8 @@ std::string figure_name(const Sample& sample) {
 /// @param cells  what they are called
 Table figures_table(const Study& study, const std::vector<Measure>& measures, const std::string& title,
                     const std::string& cells) {
-  Table table{{{"figure"},
-               {"condition"},
-               {"of"},
-               {cells, true},
-               {"mean, mixed model", true},
-               {"95 %", true},
-               {"plain mean", true},
-               {"95 %, " + cells + " resampled", true},
-               {"SD", true},
-               {"SD without error", true}},
+  Table table{{"figure", "condition", "of", number(cells), number("mean, mixed model"), number("95 %"),
+               number("plain mean"), number("95 %, " + cells + " resampled"), number("SD"), number("SD without error")},
               {},
               title};
   for (const Measure& m : measures) {
@@ -116,19 +101,8 @@ Table figures_table(const Study& study, const std::vector<Measure>& measures, co
 }
 
 Table tests_table(const Measure& m) {
-  Table table{{{"within"},
-               {"test"},
-               {"unit"},
-               {"groups"},
-               {"observations"},
-               {"cells"},
-               {"statistic", true},
-               {"d.f.", true},
-               {"p", true},
-               {"p (Holm)", true},
-               {"effect", true},
-               {"95 %"},
-               {"effect is"}},
+  Table table{{"within", "test", "unit", "groups", "observations", "cells", number("statistic"), number("d.f."),
+               number("p"), number("p (Holm)"), number("effect"), "95 %", "effect is"},
               {},
               "Tests of the " + m.sample.name};
   for (const Comparison& t : m.comparisons) {
@@ -147,18 +121,11 @@ Table tests_table(const Measure& m) {
 std::string enters_text(const StudyCell& c) { return c.fit.converged ? "yes" : "yes, not converged"; }
 
 Table cells_table(const Study& study) {
-  Table table{{{"cell"},
-               {"condition"},
-               {"fibres", true},
-               {"adhesions", true},
-               {"total force (nN)", true},
-               {"of fibres (nN)", true},
-               {"of network (nN)", true},
-               {"relative L2", true},
-               {"expected", true},
-               {"enters"}},
-              {},
-              "Cells with fibres"};
+  Table table{
+      {"cell", "condition", number("fibres"), number("adhesions"), number("total force (nN)"), number("of fibres (nN)"),
+       number("of network (nN)"), number("relative L2"), number("expected"), "enters"},
+      {},
+      "Cells with fibres"};
   for (const StudyCell& c : study.cells) {
     if (c.kind() != CellKind::plane) continue;
     table.rows.push_back({html_escaped(c.name), html_escaped(condition_of(study, c)),
@@ -188,17 +155,9 @@ std::string estimates_text(const StudyCell& c, SheetQuantity quantity) {
 }
 
 Table sheets_table(const Study& study) {
-  Table table{{{"sheet"},
-               {"condition"},
-               {"contraction (nN/µm)", true},
-               {"stiffness (nN/µm)", true},
-               {"mean tension (nN/µm)", true},
-               {"total force (nN)", true},
-               {"strain energy (fJ)", true},
-               {"area (µm²)", true},
-               {"relative L2", true},
-               {"expected", true},
-               {"enters"}},
+  Table table{{"sheet", "condition", number("contraction (nN/µm)"), number("stiffness (nN/µm)"),
+               number("mean tension (nN/µm)"), number("total force (nN)"), number("strain energy (fJ)"),
+               number("area (µm²)"), number("relative L2"), number("expected"), "enters"},
               {},
               "Sheets"};
   for (const StudyCell& c : study.cells) {
@@ -220,20 +179,10 @@ std::string with_error(double value, const std::optional<double>& sigma) {
 }
 
 Table cells_in_space_table(const Study& study) {
-  Table table{{{"cell"},
-               {"condition"},
-               {"method"},
-               {"total force (nN)", true},
-               {"strain energy (fJ)", true},
-               {"contractile moment (nN µm)", true},
-               {"normal share", true},
-               {"largest traction (kPa)", true},
-               {"net force (nN)", true},
-               {"net moment (nN µm)", true},
-               {"resolution (µm)", true},
-               {"adhesions", true},
-               {"relative L2", true},
-               {"enters"}},
+  Table table{{"cell", "condition", "method", number("total force (nN)"), number("strain energy (fJ)"),
+               number("contractile moment (nN µm)"), number("normal share"), number("largest traction (kPa)"),
+               number("net force (nN)"), number("net moment (nN µm)"), number("resolution (µm)"), number("adhesions"),
+               number("relative L2"), "enters"},
               {},
               "Cells in space"};
   for (const StudyCell& c : study.cells) {
@@ -251,7 +200,7 @@ Table cells_in_space_table(const Study& study) {
 }
 
 Table left_out_table(const Study& study) {
-  Table table{{{"cell"}, {"condition"}, {"why"}}, {}, "Left out"};
+  Table table{{"cell", "condition", "why"}, {}, "Left out"};
   for (const LeftOutCell& c : study.left_out)
     table.rows.push_back({html_escaped(c.name), html_escaped(c.condition), html_escaped(c.reason)});
   return table;
@@ -267,7 +216,7 @@ std::string first_of(const std::vector<std::string>& names) {
 
 /// Open findings, each with the cells that have it.
 Table findings_table(const Study& study) {
-  Table table{{{"finding"}, {"severity"}, {"cells", true}, {"of them"}, {"what to do"}}, {}, "Open findings"};
+  Table table{{"finding", "severity", number("cells"), "of them", "what to do"}, {}, "Open findings"};
   std::map<std::string, std::pair<const Finding*, std::vector<std::string>>> by_id;
   for (const StudyCell& c : study.cells) {
     for (const Finding& f : c.findings) {
