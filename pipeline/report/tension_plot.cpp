@@ -40,50 +40,22 @@ void draw_row(Chart& chart, const FibreRow& row, double y, const CellResults& re
   }
 }
 
+struct Look {
+  const char *name, *colour, *bright_colour;
+};
+const Look& look_of(FibreType type) {
+  static constexpr Look kLooks[] = {{"dorsal", "#0072B2", "#56b4ff"},
+                                    {"transverse arc", "#B87A00", "#ffb728"},
+                                    {"ventral", "#00805C", "#00d68f"},
+                                    {"edge", "#B5482A", "#ff7a52"}};
+  return kLooks[static_cast<int>(type)];
+}
+
 }  // namespace
 
-const char* colour_of(FibreType type) {
-  switch (type) {
-    case FibreType::dorsal:
-      return "#0072B2";
-    case FibreType::arc:
-      return "#B87A00";
-    case FibreType::ventral:
-      return "#00805C";
-    case FibreType::edge:
-      return "#B5482A";
-  }
-  return "#555";
-}
-
-const char* full_name_of(FibreType type) {
-  switch (type) {
-    case FibreType::dorsal:
-      return "dorsal";
-    case FibreType::arc:
-      return "transverse arc";
-    case FibreType::ventral:
-      return "ventral";
-    case FibreType::edge:
-      return "edge";
-  }
-  return "";
-}
-
-const char* bright_colour_of(FibreType type) {
-  switch (type) {
-    case FibreType::dorsal:
-      return "#56b4ff";
-    case FibreType::arc:
-      return "#ffb728";
-    case FibreType::ventral:
-      return "#00d68f";
-    case FibreType::edge:
-      return "#ff7a52";
-  }
-  return "#ddd";
-}
-
+const char* colour_of(FibreType type) { return look_of(type).colour; }
+const char* full_name_of(FibreType type) { return look_of(type).name; }
+const char* bright_colour_of(FibreType type) { return look_of(type).bright_colour; }
 const char* dashes_of(FibreType type) { return type == FibreType::edge ? ";stroke-dasharray:9 4 2 4" : ""; }
 
 std::string swatch_of(FibreType type, const std::string& colour) {

@@ -160,53 +160,17 @@ std::string unknown_key_hint(const ParameterList& list, const std::vector<std::s
 
 }  // namespace
 
-void ParameterList::add(Parameter parameter) {
-  parameter.table = table_;
+void ParameterList::add_member(std::string name, ParameterMember member, const Range& range, std::string meaning) {
+  Parameter parameter{.table = table_,
+                      .name = std::move(name),
+                      .member = std::move(member),
+                      .range = range,
+                      .meaning = std::move(meaning)};
   parameter.default_value = to_text(parameter);
   const auto is_namesake = [&](const Parameter& other) { return other.name == parameter.name; };
   parameter.flag = std::ranges::any_of(parameters_, is_namesake) ? table_ + "." + parameter.name : parameter.name;
   for (const Parameter& other : parameters_) MBTFM_ASSERT(other.flag != parameter.flag);
   parameters_.push_back(std::move(parameter));
-}
-
-namespace {
-Parameter parameter(std::string name, auto& member, Range range, std::string meaning) {
-  Parameter p;
-  p.name = std::move(name);
-  p.member = &member;
-  p.range = range;
-  p.meaning = std::move(meaning);
-  return p;
-}
-}  // namespace
-
-void ParameterList::add(std::string name, double& member, Range range, std::string meaning) {
-  add(parameter(std::move(name), member, range, std::move(meaning)));
-}
-void ParameterList::add(std::string name, std::optional<double>& member, Range range, std::string meaning) {
-  add(parameter(std::move(name), member, range, std::move(meaning)));
-}
-void ParameterList::add(std::string name, int& member, Range range, std::string meaning) {
-  add(parameter(std::move(name), member, range, std::move(meaning)));
-}
-void ParameterList::add(std::string name, std::optional<int>& member, Range range, std::string meaning) {
-  add(parameter(std::move(name), member, range, std::move(meaning)));
-}
-void ParameterList::add(std::string name, std::uint64_t& member, std::string meaning) {
-  add(parameter(std::move(name), member, Range::not_negative(), std::move(meaning)));
-}
-void ParameterList::add(std::string name, bool& member, std::string meaning) {
-  add(parameter(std::move(name), member, Range::any(), std::move(meaning)));
-}
-void ParameterList::add(std::string name, std::string& member, std::string meaning) {
-  add(parameter(std::move(name), member, Range::any(), std::move(meaning)));
-}
-void ParameterList::add(std::string name, std::string meaning, Choice choice) {
-  Parameter p;
-  p.name = std::move(name);
-  p.member = std::move(choice);
-  p.meaning = std::move(meaning);
-  add(std::move(p));
 }
 
 void read_toml(ParameterList& list, const std::filesystem::path& file) {

@@ -24,15 +24,18 @@ struct Choice {
   std::function<void(std::size_t)> set;
 };
 
+/// A number that is optional may stay unset; its meaning says what holds then.
+using ParameterMember = std::variant<double*, std::optional<double>*, int*, std::optional<int>*, std::uint64_t*, bool*,
+                                     std::string*, Choice>;
+
 struct Parameter {
-  std::string table;  ///< of cell.toml; empty: above the first table
-  std::string name;   ///< key in the table
-  std::string flag;   ///< without dashes: the name, or table.name where another table has a key of that name before
-  std::variant<double*, std::optional<double>*, int*, std::optional<int>*, std::uint64_t*, bool*, std::string*, Choice>
-      member;
+  std::string table;      ///< of cell.toml; empty: above the first table
+  std::string name;       ///< key in the table
+  std::string flag = {};  ///< without dashes: the name, or table.name where another table has a key of that name before
+  ParameterMember member;
   Range range;
-  std::string meaning;        ///< one sentence, with the unit
-  std::string default_value;  ///< as printed
+  std::string meaning;             ///< one sentence, with the unit
+  std::string default_value = {};  ///< as printed
   bool is_required = false;
   bool is_set = false;
 };
@@ -41,14 +44,20 @@ class ParameterList {
  public:
   /// The following parameters belong to [name] of cell.toml.
   void table(std::string name) { table_ = std::move(name); }
-  void add(std::string name, double& member, Range range, std::string meaning);
-  /// May stay unset; `meaning` says what holds then.
-  void add(std::string name, std::optional<double>& member, Range range, std::string meaning);
-  void add(std::string name, int& member, Range range, std::string meaning);
-  void add(std::string name, std::optional<int>& member, Range range, std::string meaning);
-  void add(std::string name, std::uint64_t& member, std::string meaning);
-  void add(std::string name, bool& member, std::string meaning);
-  void add(std::string name, std::string& member, std::string meaning);
+  /// @param member  a number, or an optional one
+  template <class Number>
+  void add(std::string name, Number& member, const Range& range, std::string meaning) {
+    add_member(std::move(name), &member, range, std::move(meaning));
+  }
+  void add(std::string name, std::uint64_t& seed, std::string meaning) {
+    add_member(std::move(name), &seed, Range::not_negative(), std::move(meaning));
+  }
+  void add(std::string name, bool& member, std::string meaning) {
+    add_member(std::move(name), &member, Range::any(), std::move(meaning));
+  }
+  void add(std::string name, std::string& member, std::string meaning) {
+    add_member(std::move(name), &member, Range::any(), std::move(meaning));
+  }
   /// One of the words of its type, or of those `allowed`.
   template <Worded E>
   void add(std::string name, E& member, std::string meaning, const std::vector<E>& allowed = values_of<E>());
@@ -62,8 +71,7 @@ class ParameterList {
   const std::vector<Parameter>& all() const { return parameters_; }
 
  private:
-  void add(Parameter parameter);
-  void add(std::string name, std::string meaning, Choice choice);
+  void add_member(std::string name, ParameterMember member, const Range& range, std::string meaning);
   std::string table_;
   std::vector<Parameter> parameters_;
 };
@@ -101,7 +109,7 @@ template <Worded E>
 void ParameterList::add(std::string name, E& member, std::string meaning, const std::vector<E>& allowed) {
   std::vector<std::string> words;
   for (const E value : allowed) words.emplace_back(name_of(value));
-  add(std::move(name), std::move(meaning), choice_of(member, std::move(words), allowed));
+  add_member(std::move(name), choice_of(member, std::move(words), allowed), {}, std::move(meaning));
 }
 
 template <Worded E>
@@ -112,7 +120,7 @@ void ParameterList::add(std::string name, std::optional<E>& member, std::string 
     words.emplace_back(name_of(value));
     values.emplace_back(value);
   }
-  add(std::move(name), std::move(meaning), choice_of(member, std::move(words), values));
+  add_member(std::move(name), choice_of(member, std::move(words), values), {}, std::move(meaning));
 }
 
 }  // namespace mbtfm::stage
