@@ -212,8 +212,7 @@ int batch(const CommandLine& line) {
                                                         .say = line.is_quiet || line.is_json ? nullptr : say,
                                                         .ended = line.is_json ? tell_of_cell : nullptr,
                                                         .show = line.is_quiet || !is_terminal() ? nullptr : show});
-  const auto n_failed =
-      std::count_if(outcomes.begin(), outcomes.end(), [](const auto& cell) { return cell.exit_code != 0; });
+  const auto n_failed = std::ranges::count_if(outcomes, [](const auto& cell) { return cell.exit_code != 0; });
   const fs::path table = line.folder / "batch.csv";
   if (n_failed > 0) say("failed:" + runner::failure_table(line.folder, outcomes));
   runner::write_batch_table(table, line.folder, outcomes, line.only);

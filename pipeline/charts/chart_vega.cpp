@@ -236,7 +236,7 @@ void add_marks(ordered_json& spec, const std::vector<Mark>& marks, std::size_t f
                const Axes& axes) {
   ordered_json rows = ordered_json::array();
   for (std::size_t i = first; i < last; ++i) {
-    const bool has_place = std::all_of(marks[i].points.begin(), marks[i].points.end(), [&](Vec2 p) {
+    const bool has_place = std::ranges::all_of(marks[i].points, [&](Vec2 p) {
       return std::isfinite(share(axes.x, p.x)) && std::isfinite(share(axes.y, p.y));
     });
     if (has_place || is_path(marks[i].kind)) rows.push_back(row_of(marks[i], axes));

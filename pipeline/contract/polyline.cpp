@@ -30,7 +30,7 @@ std::vector<Vec2> label_places_um(const Fibre& fibre, const std::vector<Fibre>& 
     places.push_back(point_along_um(fibre.points_um, share));
   }
   std::stable_partition(places.begin(), places.end(), [&](Vec2 place) {
-    return std::none_of(fibres.begin(), fibres.end(), [&](const Fibre& other) {
+    return std::ranges::none_of(fibres, [&](const Fibre& other) {
       return other.fibre_id != fibre.fibre_id && distance_to_line_um(other.points_um, place) < clear_um;
     });
   });

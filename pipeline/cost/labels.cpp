@@ -50,8 +50,7 @@ void add_names(charts::Chart& chart, const charts::Axis& x, const charts::Axis& 
       const Vec2 centre = in_frame(dot.at) + shift;
       const Box box = box_around(centre, width, kLine_px);
       const bool is_inside = box.low.x >= 0 && box.low.y >= 0 && box.high.x <= frame.x && box.high.y <= frame.y;
-      if (!is_inside || std::any_of(taken.begin(), taken.end(), [&](const Box& b) { return overlap(box, b); }))
-        continue;
+      if (!is_inside || std::ranges::any_of(taken, [&](const Box& b) { return overlap(box, b); })) continue;
       chart.label({value_at(x, centre.x / frame.x), value_at(y, 1 - centre.y / frame.y)}, dot.name);
       taken.push_back(box);
       break;

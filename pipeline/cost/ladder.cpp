@@ -42,8 +42,8 @@ void add_slow(std::vector<Rung>& rungs) {
 
 bool needs_images(const Rung& rung) {
   static const std::set<std::string> kOfImages = {"segment", "track"};
-  return std::any_of(rung.settings.begin(), rung.settings.end(),
-                     [](const runner::Setting& setting) { return kOfImages.contains(setting.table); });
+  return std::ranges::any_of(rung.settings,
+                             [](const runner::Setting& setting) { return kOfImages.contains(setting.table); });
 }
 
 std::vector<Rung> ladder(Extent extent) {

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 namespace {
 
 double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   const std::size_t n = values.size();
   return n == 0 ? 0 : 0.5 * (values[(n - 1) / 2] + values[n / 2]);
 }
@@ -374,7 +374,7 @@ Study combined(const std::vector<Study>& studies) {
     m.seconds = m.cpu_seconds = m.peak_memory_MB = 0;
     m.n_fibres = 0;
     for (const Study& study : studies) {
-      const auto same = std::find_if(study.measurements.begin(), study.measurements.end(), [&](const Measurement& o) {
+      const auto same = std::ranges::find_if(study.measurements, [&](const Measurement& o) {
         return o.rung.knob == m.rung.knob && o.rung.value == m.rung.value;
       });
       const Measurement of_cell = same == study.measurements.end() ? Measurement{.rung = m.rung} : *same;

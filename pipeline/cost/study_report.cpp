@@ -235,7 +235,7 @@ std::vector<int> front_of(const std::vector<Measurement>& measurements) {
     if (is_measured(measurements[i])) order.push_back(static_cast<int>(i));
   }
   const auto at = [&](int i) -> const Measurement& { return measurements[i]; };
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return at(a).cpu_seconds < at(b).cpu_seconds; });
+  std::ranges::stable_sort(order, [&](int a, int b) { return at(a).cpu_seconds < at(b).cpu_seconds; });
   std::vector<int> front;
   for (const int i : order) {
     if (front.empty() || at(i).error < at(front.back()).error) front.push_back(i);

@@ -220,7 +220,7 @@ Vec2 lattice_spacing_um(const std::vector<Vec2>& points, const Path& file) {
   const auto step = [&](double Vec2::*axis) {
     std::vector<double> values;
     for (const Vec2& p : points) values.push_back(p.*axis);
-    std::sort(values.begin(), values.end());
+    std::ranges::sort(values);
     double smallest = 0;
     for (std::size_t k = 1; k < values.size(); ++k) {
       const double gap = values[k] - values[k - 1];

@@ -31,7 +31,7 @@ Lists neighbours(const BlockPattern& pattern) {
       result[column].push_back(pattern.row[k]);
       result[pattern.row[k]].push_back(column);
     }
-  for (std::vector<int>& list : result) std::sort(list.begin(), list.end());
+  for (std::vector<int>& list : result) std::ranges::sort(list);
   return result;
 }
 
@@ -138,7 +138,7 @@ void Elimination::find_panels(const Lists& graph, const std::vector<int>& node_a
     std::vector<int> rows, joined;
     for (const int neighbour : graph[node_at[k]])
       if (place[neighbour] > k) rows.push_back(place[neighbour]);
-    std::sort(rows.begin(), rows.end());
+    std::ranges::sort(rows);
     for (const int child : children[k]) {
       const std::vector<int>& more = panels[child].rows;
       joined.clear();
@@ -233,8 +233,8 @@ void Elimination::find_stages() {
     stages.back().subtrees.back().push_back(k);
   }
   for (Stage& stage : stages)
-    std::stable_sort(stage.subtrees.begin(), stage.subtrees.end(),
-                     [&](const auto& a, const auto& b) { return work[a.back()] > work[b.back()]; });
+    std::ranges::stable_sort(stage.subtrees,
+                             [&](const auto& a, const auto& b) { return work[a.back()] > work[b.back()]; });
 }
 
 std::size_t Elimination::n_blocks() const { return panels.empty() ? 0 : panels.back().at + panels.back().n_blocks(); }

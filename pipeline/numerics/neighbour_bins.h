@@ -37,7 +37,7 @@ class Grid {
     found_.clear();
     for_each_bin(a, b, reach,
                  [&](std::size_t bin) { found_.insert(found_.end(), bins_[bin].begin(), bins_[bin].end()); });
-    std::sort(found_.begin(), found_.end());
+    std::ranges::sort(found_);
     found_.erase(std::unique(found_.begin(), found_.end()), found_.end());
     for (const int item : found_) body(item);
   }

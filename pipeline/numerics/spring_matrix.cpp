@@ -14,7 +14,7 @@ BlockMatrix<2> matrix_of_pairs(int n_blocks, const std::vector<std::array<int, 2
   matrix.start = {0};
   for (int column = 0; column < n_blocks; ++column) {
     std::vector<int>& below = rows[column];
-    std::sort(below.begin(), below.end());
+    std::ranges::sort(below);
     below.erase(std::unique(below.begin(), below.end()), below.end());
     matrix.row.push_back(column);
     matrix.row.insert(matrix.row.end(), below.begin(), below.end());

@@ -27,8 +27,7 @@ bool is_inside(const Box& box, Vec2 p) {
 
 double averaging_side_um(const VectorField& field, const Box& box) {
   const Vec2 size = box.high - box.low;
-  const auto n_inside =
-      std::count_if(field.positions_um.begin(), field.positions_um.end(), [&](Vec2 p) { return is_inside(box, p); });
+  const auto n_inside = std::ranges::count_if(field.positions_um, [&](Vec2 p) { return is_inside(box, p); });
   const double area_um2 = size.x * size.y;
   const double needed_um = n_inside > 0 ? std::sqrt(kMembers * area_um2 / static_cast<double>(n_inside)) : size.x;
   // a whole number of squares across

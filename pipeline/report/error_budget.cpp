@@ -126,8 +126,7 @@ std::string error_budget_html(const std::vector<BudgetLine>& budget, const std::
     }
     table.rows.push_back(std::move(row));
   }
-  std::stable_sort(fibres.begin(), fibres.end(),
-                   [](const BudgetLine& a, const BudgetLine& b) { return a.total_nN > b.total_nN; });
+  std::ranges::stable_sort(fibres, [](const BudgetLine& a, const BudgetLine& b) { return a.total_nN > b.total_nN; });
   std::string html = "<div class=\"grid\">" +
                      figure(chart_of(fibres),
                             "The largest first. A bar is as long as the standard error; the sources’ squares add up, "

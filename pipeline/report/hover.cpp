@@ -33,8 +33,8 @@ std::string hover_of(const Adhesion& adhesion, const CellResults& results) {
   std::string text =
       fmt::format("{} {}", is_assumed(adhesion.origin) ? name_of(adhesion.origin) : "adhesion", adhesion.adhesion_id);
   if (is_assumed(adhesion.origin)) text += " (assumed, not seen)";
-  const auto force = std::find_if(results.forces.begin(), results.forces.end(),
-                                  [&](const AdhesionForce& f) { return f.adhesion_id == adhesion.adhesion_id; });
+  const auto force = std::ranges::find_if(
+      results.forces, [&](const AdhesionForce& f) { return f.adhesion_id == adhesion.adhesion_id; });
   if (force == results.forces.end()) {
     text += "\nnot fitted";
   } else {

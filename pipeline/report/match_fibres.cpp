@@ -37,7 +37,7 @@ std::vector<FibreMatch> match_fibres(const std::vector<Fibre>& found, const std:
       if (distance <= parameters.largest_distance_um) candidates.push_back({i, k, distance});
     }
   }
-  std::sort(candidates.begin(), candidates.end(), [](const FibreMatch& a, const FibreMatch& b) {
+  std::ranges::sort(candidates, [](const FibreMatch& a, const FibreMatch& b) {
     return std::tie(a.distance_um, a.found_index, a.true_index) < std::tie(b.distance_um, b.found_index, b.true_index);
   });
   std::vector<bool> is_found_taken(found.size()), is_true_taken(truth.size());

@@ -77,8 +77,8 @@ std::string map_section(const CellResults& results) {
 std::string adhesion_section(const CellResults& results) {
   const auto by_id = adhesions_by_id(results.cell);
   std::vector<AdhesionForce> forces = results.forces;
-  std::stable_sort(forces.begin(), forces.end(),
-                   [](const AdhesionForce& a, const AdhesionForce& b) { return norm(a.force_nN) > norm(b.force_nN); });
+  std::ranges::stable_sort(
+      forces, [](const AdhesionForce& a, const AdhesionForce& b) { return norm(a.force_nN) > norm(b.force_nN); });
   Table all{{number("adhesion"), number("force (nN)"), number("std. error (nN)"), number("Fx (nN)"), number("Fy (nN)"),
              number("traction (kPa)"), number("area (µm²)"), number("x (µm)"), number("y (µm)"), "fibre ends on it"},
             {},
@@ -137,8 +137,8 @@ std::string figure_pairs(const CellResults& results) {
 }
 
 std::string effects_table(const Provenance& provenance) {
-  const bool are_timed = std::any_of(provenance.effects.begin(), provenance.effects.end(),
-                                     [](const EffectLine& effect) { return !effect.seconds.empty(); });
+  const bool are_timed =
+      std::ranges::any_of(provenance.effects, [](const EffectLine& effect) { return !effect.seconds.empty(); });
   Table table{{"effect", "stage", "on", "why"}, {}, "Effects, and why they are on or off"};
   if (are_timed) table.columns.push_back(number("seconds"));
   for (const EffectLine& effect : provenance.effects) {
@@ -194,7 +194,7 @@ std::string fingerprint(const std::filesystem::path& cell) {
       if (files::is_own_file(entry.path())) files.push_back(entry.path());
     }
   }
-  std::sort(files.begin(), files.end());
+  std::ranges::sort(files);
   const Provenance provenance = read_provenance(cell / "run.json");
   std::string all =
       std::string(kVersion) + " " + provenance.preset + " " + (provenance.accuracy ? provenance.accuracy->verdict : "");

@@ -84,7 +84,7 @@ std::vector<FibreRow> fibre_rows(const CellResults& results) {
     }
     rows.push_back(row);
   }
-  std::stable_sort(rows.begin(), rows.end(), [](const FibreRow& a, const FibreRow& b) {
+  std::ranges::stable_sort(rows, [](const FibreRow& a, const FibreRow& b) {
     return a.fibre->type != b.fibre->type ? a.fibre->type < b.fibre->type : a.tension.tension_nN > b.tension.tension_nN;
   });
   return rows;

@@ -198,7 +198,7 @@ FoundCells find_cells(const fs::path& folder) {
     throw InputError(folder.string(), "cell folders (with a cell.toml) at or below it", "none" + skipped,
                      "write a cell.toml beside each cell's images");
   }
-  std::sort(found.cells.begin(), found.cells.end());
+  std::ranges::sort(found.cells);
   std::ranges::sort(found.skipped, {}, &SkippedFolder::folder);
   return found;
 }

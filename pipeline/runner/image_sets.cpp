@@ -56,7 +56,7 @@ std::vector<fs::path> files_below(const fs::path& folder) {
   std::vector<fs::path> files;
   collect_files(folder, files);
   for (fs::path& file : files) file = file.lexically_relative(folder);
-  std::sort(files.begin(), files.end());
+  std::ranges::sort(files);
   return files;
 }
 

@@ -78,7 +78,7 @@ ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) 
     for (const std::string& part : {name_or_glob.substr(0, bar), name_or_glob.substr(bar + 1)}) {
       for (fs::path& file : match_image(folder, part).files) match.files.push_back(std::move(file));
     }
-    std::sort(match.files.begin(), match.files.end());
+    std::ranges::sort(match.files);
     match.files.erase(std::unique(match.files.begin(), match.files.end()), match.files.end());
     return match;
   }
@@ -91,7 +91,7 @@ ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) 
       match.files.push_back(entry->path());
     }
   }
-  std::sort(match.files.begin(), match.files.end());
+  std::ranges::sort(match.files);
   return match;
 }
 

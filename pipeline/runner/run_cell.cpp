@@ -328,7 +328,7 @@ void CellRun::run_chains(CellOutcome& outcome) {
   for (const int i : of_.first) bring_up_to_date(all[i], options_.threads, outcome.stages[i]);
   const std::vector<std::vector<int>>& chains = of_.chains;
   const auto is_wanted = [&](const std::vector<int>& chain) {
-    return std::any_of(chain.begin(), chain.end(), [&](int i) { return is_asked(all[i], options_.only); });
+    return std::ranges::any_of(chain, [&](int i) { return is_asked(all[i], options_.only); });
   };
   const int workers = std::ranges::count_if(chains, is_wanted) > 1 ? std::min(options_.threads, 2) : 1;
   // Two at least: one chain ends before the other, which then has the processors to itself.
@@ -355,9 +355,8 @@ CellOutcome CellRun::run() {
   outcome.started = numerics::utc_now();
   if (of_.kind == CellKind::space && options_.note) options_.note("beads in space, as " + of_.why);
   if (of_.kind == CellKind::sheet && options_.note) options_.note("a contracting sheet, as " + of_.why);
-  const bool has_work = std::any_of(outcome.stages.begin(), outcome.stages.end(), [](const StageOutcome& stage) {
-    return stage.status.state == StageState::must_run;
-  });
+  const bool has_work = std::ranges::any_of(
+      outcome.stages, [](const StageOutcome& stage) { return stage.status.state == StageState::must_run; });
   try {
     check_before_start(outcome);
     if (has_work) write_run_record(cell_, options_, outcome);  // unfinished: what a kill leaves
@@ -392,7 +391,7 @@ void expect_known(const RunOptions& options) {
 }  // namespace
 
 bool CellOutcome::converged() const {
-  return std::all_of(stages.begin(), stages.end(), [](const StageOutcome& stage) { return stage.converged; });
+  return std::ranges::all_of(stages, [](const StageOutcome& stage) { return stage.converged; });
 }
 
 std::string CellOutcome::not_converged() const {

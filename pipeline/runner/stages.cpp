@@ -79,8 +79,8 @@ const std::vector<Stage>& stages() {
 }
 
 bool is_of_series(const Stage& stage, const std::string& file) {
-  return std::any_of(stage.series.begin(), stage.series.end(),
-                     [&](const std::string& glob) { return fnmatch(glob.c_str(), file.c_str(), FNM_PATHNAME) == 0; });
+  return std::ranges::any_of(
+      stage.series, [&](const std::string& glob) { return fnmatch(glob.c_str(), file.c_str(), FNM_PATHNAME) == 0; });
 }
 
 bool is_asked(const Stage& stage, const std::vector<std::string>& only) {

@@ -90,7 +90,7 @@ bool may_be_read(const fs::path& name, const fs::path& folder, const std::vector
   std::error_code error;
   const fs::path file = fs::weakly_canonical(folder / name, error);
   const auto is_same = [&](const fs::path& image) { return fs::weakly_canonical(image, error) == file; };
-  if (!error && std::any_of(images.begin(), images.end(), is_same)) return true;
+  if (!error && std::ranges::any_of(images, is_same)) return true;
   try {
     files::inside(folder, name, "");
     return true;
@@ -114,8 +114,8 @@ void compare(const KnownFile& known, const fs::path& folder, const std::vector<f
 }
 
 bool is_output(const KnownFile& file, const std::vector<KnownFile>& files) {
-  return std::any_of(files.begin(), files.end(),
-                     [&](const KnownFile& other) { return other.kind == FileKind::output && other.path == file.path; });
+  return std::ranges::any_of(
+      files, [&](const KnownFile& other) { return other.kind == FileKind::output && other.path == file.path; });
 }
 
 bool is_given(const std::optional<files::JsonRecord>& entry) {

@@ -33,9 +33,8 @@ void add_words(const DeclaredCommand& command, std::vector<std::string>& words) 
 }  // namespace
 
 std::string nearest(const std::vector<std::string>& known, std::string_view word) {
-  const auto closest = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
-    return edit_distance(a, word) < edit_distance(b, word);
-  });
+  const auto closest = std::ranges::min_element(
+      known, [&](const auto& a, const auto& b) { return edit_distance(a, word) < edit_distance(b, word); });
   return closest == known.end() ? std::string() : *closest;
 }
 

@@ -96,8 +96,7 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
 }
 
 void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
-  const auto n = std::count_if(study.cells.begin(), study.cells.end(),
-                               [](const StudyCell& cell) { return !is_network_known(cell); });
+  const auto n = std::ranges::count_if(study.cells, [](const StudyCell& cell) { return !is_network_known(cell); });
   if (n == 0) return;
   warnings.push_back(
       fmt::format("The network's tension of {} of {} could not be identified: how their total force is shared out to "

@@ -31,7 +31,7 @@ std::optional<Interval> bootstrap_interval(std::vector<std::optional<double>> va
     if (v) defined.push_back(*v);
   }
   if (static_cast<double>(defined.size()) < 0.95 * static_cast<double>(values.size())) return std::nullopt;
-  std::sort(defined.begin(), defined.end());
+  std::ranges::sort(defined);
   const double t = numerics::student_quantile(n_cells - 1, 0.025);
   const double share = numerics::normal_below(t * std::sqrt(n_cells / (n_cells - 1.0)));
   const double last = static_cast<double>(defined.size()) - 1;

@@ -18,7 +18,7 @@ class Distribution {
  public:
   void add(double value, double weight) { sorted_.push_back({value, weight}); }
   void finish() {
-    std::sort(sorted_.begin(), sorted_.end());
+    std::ranges::sort(sorted_);
     double sum = 0;
     for (auto& [value, weight] : sorted_) weight = sum += weight;  // from here on cumulated
   }

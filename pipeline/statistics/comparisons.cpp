@@ -216,8 +216,7 @@ std::vector<Comparison> compare(const Sample& sample, const std::optional<Sample
         add_corrected(list, [&](auto& tests) { add_rank_tests(sample, medians, Unit::cell_median, tests); });
       add_corrected(list, [&](auto& tests) { add_clustered_tests(sample, family, tests); });
     }
-    const bool has_cells = std::all_of(family.groups.begin(), family.groups.end(),
-                                       [](const Group& g) { return n_cells_of(g.values) > 1; });
+    const bool has_cells = std::ranges::all_of(family.groups, [](const Group& g) { return n_cells_of(g.values) > 1; });
     if (model && has_cells) add_corrected(list, [&](auto& tests) { add_model_tests(sample, family, *model, tests); });
   }
   return list;

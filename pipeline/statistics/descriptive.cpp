@@ -20,7 +20,7 @@ double sum_of(const std::vector<double>& values) { return std::accumulate(values
 
 Description describe(std::vector<double> values) {
   need_values(values);
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   Description d{};
   d.n = static_cast<int>(values.size());
   d.mean = sum_of(values) / d.n;
@@ -33,7 +33,7 @@ Description describe(std::vector<double> values) {
 
 double fraction_above(const std::vector<double>& values, double threshold) {
   need_values(values);
-  const auto n = std::count_if(values.begin(), values.end(), [&](double v) { return v > threshold; });
+  const auto n = std::ranges::count_if(values, [&](double v) { return v > threshold; });
   return static_cast<double>(n) / static_cast<double>(values.size());
 }
 
@@ -98,7 +98,7 @@ double deconvolved_fraction_above(const std::vector<double>& values, const std::
   need_values(values);
   // The grid has the threshold half way between two of its points; finer than 80 of them changes nothing: errors blur
   // it.
-  const double largest = *std::max_element(values.begin(), values.end());
+  const double largest = *std::ranges::max_element(values);
   constexpr int kPoints = 80, kSteps = 100;  // the mass above a threshold then changes by less than its sampling error
   const double widest = std::max(largest, threshold);
   const int n_below = std::max(1, static_cast<int>(std::lround(kPoints * threshold / widest)));

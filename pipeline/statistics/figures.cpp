@@ -57,8 +57,7 @@ std::string counts_by_kind(const Sample& sample) {
   std::string n, cells;
   for (int kind = 0; kind < sample.n_kinds(); ++kind) {
     std::vector<Observation> own;
-    std::copy_if(sample.values.begin(), sample.values.end(), std::back_inserter(own),
-                 [&](const Observation& o) { return o.kind == kind; });
+    std::ranges::copy_if(sample.values, std::back_inserter(own), [&](const Observation& o) { return o.kind == kind; });
     n += (kind == 0 ? "" : ", ") + std::to_string(own.size());
     cells += (kind == 0 ? "" : ", ") + std::to_string(n_cells_of(own));
   }
@@ -182,7 +181,7 @@ Figure forces_by_cell(const Study& study) {
     cells.push_back(&cell);
     largest = std::max(largest, cell.fit.total_force_nN);
   }
-  std::stable_sort(cells.begin(), cells.end(), [](const StudyCell* a, const StudyCell* b) {
+  std::ranges::stable_sort(cells, [](const StudyCell* a, const StudyCell* b) {
     return a->condition != b->condition ? a->condition < b->condition : a->fit.total_force_nN > b->fit.total_force_nN;
   });
   const double n = static_cast<double>(cells.size());

@@ -60,8 +60,7 @@ void check_scatter(const Design& design) {
   const VectorXd means = (design.X.transpose() * design.y).cwiseQuotient(n);
   constexpr double kRounding = 1e-12;  // of the values
   const double scatter = (design.y - design.X * means).cwiseAbs().maxCoeff();
-  const bool has_errors =
-      std::any_of(design.rows.begin(), design.rows.end(), [](const Observation& o) { return o.error_variance > 0; });
+  const bool has_errors = std::ranges::any_of(design.rows, [](const Observation& o) { return o.error_variance > 0; });
   if (has_errors || scatter > kRounding * design.y.cwiseAbs().maxCoeff()) return;
   throw InvalidData("the sample", "values that differ within a group, or errors", "neither");
 }
@@ -85,9 +84,8 @@ std::vector<Block> blocks_of(const std::vector<Observation>& rows) {
 
 bool has_group_of_two_cells(const std::vector<Observation>& rows) {
   std::map<int, int> cell_of;  // the first of each group
-  return std::any_of(rows.begin(), rows.end(), [&](const Observation& o) {
-    return cell_of.try_emplace(o.group, o.cell).first->second != o.cell;
-  });
+  return std::ranges::any_of(
+      rows, [&](const Observation& o) { return cell_of.try_emplace(o.group, o.cell).first->second != o.cell; });
 }
 
 std::vector<bool> scatter_told(const std::vector<Observation>& rows) {
@@ -104,10 +102,9 @@ std::vector<bool> scatter_told(const std::vector<Observation>& rows) {
 /// The random effects that the design can tell from the scatter and from each other.
 std::vector<Component> components_of(const std::vector<Observation>& rows, const std::vector<Block>& blocks) {
   const bool has_two_cells = has_group_of_two_cells(rows);
-  const bool has_two_in_a_cell = std::any_of(blocks.begin(), blocks.end(), [](const Block& b) { return b.size > 1; });
-  const bool has_two_kinds = std::any_of(blocks.begin(), blocks.end(), [](const Block& b) { return b.n_kinds > 1; });
-  const bool has_two_of_a_kind =
-      std::any_of(blocks.begin(), blocks.end(), [](const Block& b) { return b.size > b.n_kinds; });
+  const bool has_two_in_a_cell = std::ranges::any_of(blocks, [](const Block& b) { return b.size > 1; });
+  const bool has_two_kinds = std::ranges::any_of(blocks, [](const Block& b) { return b.n_kinds > 1; });
+  const bool has_two_of_a_kind = std::ranges::any_of(blocks, [](const Block& b) { return b.size > b.n_kinds; });
   std::vector<Component> components;
   if (has_two_cells && has_two_in_a_cell) components.push_back({.term = Term::cell});
   if (has_two_cells && has_two_kinds && has_two_of_a_kind) components.push_back({.term = Term::cell_kind});
@@ -121,8 +118,7 @@ Design design_of(std::vector<Observation> observations) {
   check_data(observations);
   Design design;
   design.rows = std::move(observations);
-  std::stable_sort(design.rows.begin(), design.rows.end(),
-                   [](const Observation& a, const Observation& b) { return a.cell < b.cell; });
+  std::ranges::stable_sort(design.rows, [](const Observation& a, const Observation& b) { return a.cell < b.cell; });
   design.blocks = blocks_of(design.rows);
   design.components = components_of(design.rows, design.blocks);
   design.is_scatter_told = scatter_told(design.rows);

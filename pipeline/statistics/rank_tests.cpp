@@ -18,7 +18,7 @@ struct Ranks {
 Ranks ranks_of(const std::vector<double>& values) {
   std::vector<std::size_t> order(values.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
+  std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
   Ranks ranks;
   ranks.rank.resize(values.size());
   for (std::size_t first = 0; first < order.size();) {
@@ -80,7 +80,7 @@ TestResult mann_whitney(const std::vector<double>& a, const std::vector<double>&
 std::vector<double> holm(const std::vector<double>& p_values) {
   std::vector<std::size_t> order(p_values.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p_values[a] < p_values[b]; });
+  std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return p_values[a] < p_values[b]; });
   std::vector<double> corrected(p_values.size());
   double largest = 0;
   for (std::size_t i = 0; i < order.size(); ++i) {

@@ -61,7 +61,7 @@ std::optional<Correlation> correlate(const Study& study, int condition, const Fo
     c.y.push_back(study.cells[i].fit.*force.member);
     products[cell] = {c.x.back() * c.y.back(), c.x.back() * c.x.back()};
   }
-  if (std::all_of(c.x.begin(), c.x.end(), [](double x) { return x == 0; })) return std::nullopt;
+  if (std::ranges::all_of(c.x, [](double x) { return x == 0; })) return std::nullopt;
   if (c.x.size() < kFewestForALine) return c;
   c.line = line_through_origin(c.x, c.y);
   c.slope_interval = ratio_interval(products, draws);
@@ -90,7 +90,7 @@ std::vector<double> bin_edges(const std::vector<SizedForce>& adhesions) {
   constexpr int kFewestInABin = 20;  // five connected ones, where a quarter are: else fewer bins
   std::vector<double> areas;
   for (const SizedForce& a : adhesions) areas.push_back(a.area_um2);
-  std::sort(areas.begin(), areas.end());
+  std::ranges::sort(areas);
   const int n_bins = std::clamp(static_cast<int>(areas.size()) / kFewestInABin, 1, kBins);
   std::set<double> edges = {areas.front(), areas.back()};
   for (int b = 1; b < n_bins; ++b)

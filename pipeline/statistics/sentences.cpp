@@ -63,7 +63,7 @@ std::vector<std::string> means(const Measure& m) {
 }
 
 const Comparison* same_pair(const Measure& m, const Comparison& c, Test test) {
-  const auto at = std::find_if(m.comparisons.begin(), m.comparisons.end(), [&](const Comparison& o) {
+  const auto at = std::ranges::find_if(m.comparisons, [&](const Comparison& o) {
     return o.test == test && o.unit == Unit::cell && o.question == c.question && o.within == c.within &&
            o.group_a == c.group_a && o.group_b == c.group_b;
   });
@@ -80,9 +80,8 @@ int n_different(const std::vector<Summary>& summaries, std::string Summary::*mem
 /// A sentence for each question that no test with the cell for the unit could answer.
 void add_unanswered(const Measure& m, Findings& findings) {
   const auto add = [&](Question question, const std::string& who) {
-    const bool is_answered = std::any_of(m.comparisons.begin(), m.comparisons.end(), [&](const Comparison& c) {
-      return c.question == question && c.test == Test::mixed_model;
-    });
+    const bool is_answered = std::ranges::any_of(
+        m.comparisons, [&](const Comparison& c) { return c.question == question && c.test == Test::mixed_model; });
     if (is_answered) return;
     findings.sentences.push_back(fmt::format(
         "Whether the {} of {} differs between {} cannot be said: {}.", m.sample.name, name_of(m.sample.each), who,

@@ -390,8 +390,7 @@ std::vector<MeasuredFibre> measured_fibres(const Study& study) {
 }
 
 bool is_network_known(const StudyCell& cell) {
-  return std::none_of(cell.tensions.begin(), cell.tensions.end(),
-                      [](const Tension& t) { return t.fibre_id == 0 && !t.identifiable; });
+  return std::ranges::none_of(cell.tensions, [](const Tension& t) { return t.fibre_id == 0 && !t.identifiable; });
 }
 
 std::optional<double> standard_error_nN(const Tension& t) {

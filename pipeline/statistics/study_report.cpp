@@ -410,7 +410,7 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   }
   const auto files = tables_of(study, analysis);
   const auto with_file = [&](const Table& table, const std::string& name) {
-    const auto file = std::find_if(files.begin(), files.end(), [&](const auto& f) { return f.first == name; });
+    const auto file = std::ranges::find_if(files, [&](const auto& f) { return f.first == name; });
     return report::html_of(table, {file->first, file->second});
   };
   body += report::section("What the program noticed",

@@ -48,7 +48,7 @@ std::optional<Interval> mean_interval(const std::vector<Observation>& own, const
 }
 
 std::optional<Interval> median_interval(std::vector<Observation> own, const std::vector<CellWeights>& draws) {
-  std::sort(own.begin(), own.end(), [](const Observation& a, const Observation& b) { return a.value < b.value; });
+  std::ranges::sort(own, [](const Observation& a, const Observation& b) { return a.value < b.value; });
   std::vector<std::optional<double>> medians;
   for (const CellWeights& w : draws) {
     double n = 0, seen = 0;

@@ -337,7 +337,7 @@ std::vector<TypeRow> type_rows(const Study& study, const Analysis& analysis) {
   for (const Summary& s : analysis.tensions_by_cell) {
     TypeRow& row = rows.emplace_back(TypeRow{s, {}});
     for (const double threshold : thresholds_of(analysis)) {
-      const auto n = std::count_if(sample.values.begin(), sample.values.end(), [&](const Observation& o) {
+      const auto n = std::ranges::count_if(sample.values, [&](const Observation& o) {
         return study.cells[o.cell].name == s.cell && o.value > threshold && sample.kinds[o.kind] == s.kind;
       });
       row.shares.push_back({.value = static_cast<double>(n) / s.n});
