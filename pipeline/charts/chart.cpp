@@ -12,24 +12,12 @@
 namespace mbtfm::charts {
 
 std::string html_escaped(std::string_view text) {
+  using Entity = std::pair<char, std::string_view>;
+  static constexpr Entity kEntities[] = {{'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}};
   std::string safe;
   for (const char c : files::shown_name(text)) {
-    switch (c) {
-      case '&':
-        safe += "&amp;";
-        break;
-      case '<':
-        safe += "&lt;";
-        break;
-      case '>':
-        safe += "&gt;";
-        break;
-      case '"':
-        safe += "&quot;";
-        break;
-      default:
-        safe += c;
-    }
+    const auto entity = std::ranges::find(kEntities, c, &Entity::first);
+    safe += entity == std::end(kEntities) ? std::string_view(&c, 1) : entity->second;
   }
   return safe;
 }

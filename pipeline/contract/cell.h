@@ -44,7 +44,7 @@ double area_stood_for_um2(const Adhesion& adhesion);
 enum class FibreType { dorsal, arc, ventral, edge };
 constexpr auto words(FibreType) { return std::array{"dorsal", "arc", "ventral", "edge"}; }
 /// The first of its name, for labels: types are told apart without colour, too.
-constexpr char letter_of(FibreType type) { return words(type)[type][0]; }
+constexpr char letter_of(FibreType type) { return name_of(type)[0]; }
 inline constexpr FibreType kFibreTypes[] = {FibreType::dorsal, FibreType::arc, FibreType::ventral, FibreType::edge};
 /// How many of its ends the type says are held.
 int n_held_ends(FibreType type);

@@ -122,27 +122,17 @@ std::vector<std::string> groups_of(CellKind kind) {
 }
 
 std::string group_of(const std::string& knob, CellKind kind) {
-  static const std::map<std::string, std::string> groups = {{"model", "gel"},
-                                                            {"cells_per_thickness", "gel"},
-                                                            {"elements_across_adhesion", "gel"},
-                                                            {"margin_thicknesses", "gel"},
-                                                            {"displacement_tolerance", "gel"},
-                                                            {"growth", "gel"},
-                                                            {"material", "gel"},
-                                                            {"surface_lines", "gel"},
-                                                            {"n_meshes", "network and meshes"},
-                                                            {"edge_length_um", "network and meshes"},
-                                                            {"spacing_um", "tractions"},
-                                                            {"refine", "tractions"},
-                                                            {"beads", "data, presets, threads"},
-                                                            {"with_axial", "data, presets, threads"},
-                                                            {"image_scale", "data, presets, threads"},
-                                                            {"robust_loss", "data, presets, threads"},
-                                                            {"preset", "data, presets, threads"},
-                                                            {"threads", "data, presets, threads"},
-                                                            {"bootstrap", "data, presets, threads"}};
-  const auto found = groups.find(knob);
-  if (found != groups.end()) return found->second;
+  static const std::map<std::string, std::set<std::string>> kKnobs = {
+      {"gel",
+       {"model", "cells_per_thickness", "elements_across_adhesion", "margin_thicknesses", "displacement_tolerance",
+        "growth", "material", "surface_lines"}},
+      {"network and meshes", {"n_meshes", "edge_length_um"}},
+      {"tractions", {"spacing_um", "refine"}},
+      {"data, presets, threads",
+       {"beads", "with_axial", "image_scale", "robust_loss", "preset", "threads", "bootstrap"}}};
+  for (const auto& [group, knobs] : kKnobs) {
+    if (knobs.contains(knob)) return group;
+  }
   return kind == CellKind::space ? "method" : "equilibrium and fit";
 }
 

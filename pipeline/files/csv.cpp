@@ -178,11 +178,6 @@ int CsvTable::integer(int row, const std::string& column, int smallest) const {
   return value;
 }
 
-std::optional<int> CsvTable::optional_integer(int row, const std::string& column, int smallest) const {
-  if (text(row, column).empty()) return std::nullopt;
-  return integer(row, column, smallest);
-}
-
 bool CsvTable::truth(int row, const std::string& column) const {
   const std::string& field = rows_[row].fields[index_of(column)];
   const bool is_true = field == "TRUE" || field == "true" || field == "True";

@@ -29,7 +29,6 @@ class CsvTable {
   double number(int row, const std::string& column, Range range = Range::any()) const;
   std::optional<double> optional_number(int row, const std::string& column) const;
   int integer(int row, const std::string& column, int smallest) const;
-  std::optional<int> optional_integer(int row, const std::string& column, int smallest) const;
   bool truth(int row, const std::string& column) const;  ///< TRUE, True and true are true
 
   [[noreturn]] void fail(int row, const std::string& column, const std::string& expected,

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <random>
 
 #include "pipeline/contract/errors.h"
@@ -42,6 +41,20 @@ std::optional<Interval> bootstrap_interval(std::vector<std::optional<double>> va
     return defined[below] + (place - static_cast<double>(below)) * (next - defined[below]);
   };
   return Interval{at(share), at(1 - share)};
+}
+
+std::optional<Interval> ratio_interval(const std::map<int, std::pair<double, double>>& by_cell,
+                                       const std::vector<CellWeights>& draws) {
+  std::vector<std::optional<double>> ratios;
+  for (const CellWeights& w : draws) {
+    double a = 0, b = 0;
+    for (const auto& [cell, pair] : by_cell) {
+      a += w[cell] * pair.first;
+      b += w[cell] * pair.second;
+    }
+    ratios.push_back(b > 0 ? std::optional<double>(a / b) : std::nullopt);
+  }
+  return bootstrap_interval(std::move(ratios), static_cast<int>(by_cell.size()));
 }
 
 }  // namespace mbtfm::statistics

@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "pipeline/statistics/descriptive.h"
@@ -25,5 +27,8 @@ std::vector<CellWeights> draw_cells(const std::vector<int>& stratum_of_cell, int
 /// @param n_cells  independent cells behind the statistic, 2 at least
 /// @returns none where the statistic is undefined in more than one of twenty draws
 std::optional<Interval> bootstrap_interval(std::vector<std::optional<double>> values, int n_cells);
+/// Interval of Σ a / Σ b over cells: of a mean (b the numbers), of a slope through the origin (x y and x²).
+std::optional<Interval> ratio_interval(const std::map<int, std::pair<double, double>>& by_cell,
+                                       const std::vector<CellWeights>& draws);
 
 }  // namespace mbtfm::statistics

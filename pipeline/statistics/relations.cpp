@@ -12,21 +12,6 @@
 namespace mbtfm::statistics {
 namespace {
 
-/// Interval of Σ a / Σ b over cells: of a mean (b the numbers), of a slope through the origin (x y and x²).
-std::optional<Interval> ratio_interval(const std::map<int, std::pair<double, double>>& by_cell,
-                                       const std::vector<CellWeights>& draws) {
-  std::vector<std::optional<double>> ratios;
-  for (const CellWeights& w : draws) {
-    double a = 0, b = 0;
-    for (const auto& [cell, pair] : by_cell) {
-      a += w[cell] * pair.first;
-      b += w[cell] * pair.second;
-    }
-    ratios.push_back(b > 0 ? std::optional<double>(a / b) : std::nullopt);
-  }
-  return bootstrap_interval(std::move(ratios), static_cast<int>(by_cell.size()));
-}
-
 struct Force {
   const char* column;
   double FitSummary::*member;

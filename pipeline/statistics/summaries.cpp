@@ -30,21 +30,12 @@ Summary plain_summary(const std::string& condition, const std::string& kind, con
 }
 
 std::optional<Interval> mean_interval(const std::vector<Observation>& own, const std::vector<CellWeights>& draws) {
-  std::map<int, std::pair<double, double>> by_cell;  // number, sum
+  std::map<int, std::pair<double, double>> by_cell;  // sum, number
   for (const Observation& o : own) {
-    by_cell[o.cell].first += 1;
-    by_cell[o.cell].second += o.value;
+    by_cell[o.cell].first += o.value;
+    by_cell[o.cell].second += 1;
   }
-  std::vector<std::optional<double>> means;
-  for (const CellWeights& w : draws) {
-    double n = 0, sum = 0;
-    for (const auto& [cell, pair] : by_cell) {
-      n += w[cell] * pair.first;
-      sum += w[cell] * pair.second;
-    }
-    means.push_back(n > 0 ? std::optional<double>(sum / n) : std::nullopt);
-  }
-  return bootstrap_interval(std::move(means), static_cast<int>(by_cell.size()));
+  return ratio_interval(by_cell, draws);
 }
 
 std::optional<Interval> median_interval(std::vector<Observation> own, const std::vector<CellWeights>& draws) {

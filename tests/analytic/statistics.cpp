@@ -37,7 +37,7 @@ struct FromR {
   }
   std::vector<std::vector<double>> by_type() const {
     std::vector<std::vector<double>> groups(3);
-    for (const Fibre& f : fibres) groups[f.type].push_back(f.tension_nN);
+    for (const Fibre& f : fibres) groups[static_cast<std::size_t>(f.type)].push_back(f.tension_nN);
     return groups;
   }
 };
