@@ -28,7 +28,9 @@ struct Network {
                                     ///< none. No adhesion holds it, too
 };
 /// By an adhesion or by the cut.
-bool is_held(const Network& network, std::size_t vertex);
+inline bool is_held(const Network& network, std::size_t vertex) {
+  return network.adhesion_id[vertex] != 0 || (!network.held_by_cut.empty() && network.held_by_cut[vertex]);
+}
 
 /// A network in equilibrium: its vertices are where the cables have drawn them; force_nN is carried by each link.
 struct ContractedNetwork {

@@ -1,27 +1,16 @@
 #include "pipeline/contract/sheet_results.h"
 
-#include "pipeline/contract/errors.h"
-
 namespace mbtfm {
 
 NameAndUnit for_people(SheetQuantity quantity) {
-  switch (quantity) {
-    case SheetQuantity::contraction:
-      return {"contraction", "nN/µm"};
-    case SheetQuantity::stiffness:
-      return {"stiffness", "nN/µm"};
-    case SheetQuantity::line_tension:
-      return {"line tension", "nN"};
-    case SheetQuantity::contraction_over_stiffness:
-      return {"contraction over stiffness", ""};
-    case SheetQuantity::adhesion_stiffness:
-      return {"adhesion stiffness", "nN/µm³"};
-    case SheetQuantity::penetration:
-      return {"penetration length", "µm"};
-    case SheetQuantity::bundle_tension:
-      return {"tension", "nN"};
-  }
-  throw InternalError("unknown quantity of a sheet");
+  static constexpr NameAndUnit kNames[] = {{"contraction", "nN/µm"},
+                                           {"stiffness", "nN/µm"},
+                                           {"line tension", "nN"},
+                                           {"contraction over stiffness", ""},
+                                           {"adhesion stiffness", "nN/µm³"},
+                                           {"penetration length", "µm"},
+                                           {"tension", "nN"}};
+  return kNames[static_cast<int>(quantity)];
 }
 
 std::string kind_of_part(const SheetEstimate& estimate) {

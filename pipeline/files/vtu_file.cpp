@@ -35,30 +35,23 @@ std::optional<std::uint64_t> count_of(const std::string& text) {
   return value;
 }
 
+/// By VtuSection.
+struct Section {
+  std::string_view element, name;
+};
+constexpr Section kSections[] = {{"PointData", "point array"},
+                                 {"CellData", "cell array"},
+                                 {"Points", "array of points"},
+                                 {"Cells", "array of cells"},
+                                 {"Polys", "array of polygons"}};
+
 std::optional<VtuSection> section_of(std::string_view element) {
-  if (element == "PointData") return VtuSection::point_data;
-  if (element == "CellData") return VtuSection::cell_data;
-  if (element == "Points") return VtuSection::points;
-  if (element == "Cells") return VtuSection::cells;
-  if (element == "Polys") return VtuSection::polygons;
-  return std::nullopt;
+  const auto found = std::ranges::find(kSections, element, &Section::element);
+  if (found == std::end(kSections)) return std::nullopt;
+  return static_cast<VtuSection>(found - kSections);
 }
 
-std::string name_of(VtuSection section) {
-  switch (section) {
-    case VtuSection::point_data:
-      return "point array";
-    case VtuSection::cell_data:
-      return "cell array";
-    case VtuSection::points:
-      return "array of points";
-    case VtuSection::cells:
-      return "array of cells";
-    case VtuSection::polygons:
-      return "array of polygons";
-  }
-  throw InternalError("unknown section of a VTK file");
-}
+std::string name_of(VtuSection section) { return std::string(kSections[static_cast<int>(section)].name); }
 
 using Attributes = std::map<std::string, std::string>;
 

@@ -7,15 +7,8 @@
 namespace mbtfm::runner {
 
 std::optional<std::string> PathArgument::condition() const {
-  switch (given) {
-    case Given::always:
-      return std::nullopt;
-    case Given::if_there:
-      return path;
-    case Given::if_series:
-      return path + "/frames.csv";
-  }
-  return std::nullopt;
+  if (given == Given::always) return std::nullopt;
+  return given == Given::if_there ? path : path + "/frames.csv";
 }
 
 const std::vector<Stage>& stages() {

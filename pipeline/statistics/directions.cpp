@@ -86,17 +86,10 @@ class NearBeads {
 }  // namespace
 
 std::string_view full_name_of(Relation relation) {
-  switch (relation) {
-    case Relation::adhesion_fibre:
-      return "adhesion and fibre";
-    case Relation::fibre_displacement:
-      return "fibre and displacement";
-    case Relation::model_measured:
-      return "displacement of the model and measured";
-    case Relation::without_fibres_measured:
-      break;
-  }
-  return "displacement without fibres and measured";
+  static constexpr const char* kNames[] = {"adhesion and fibre", "fibre and displacement",
+                                           "displacement of the model and measured",
+                                           "displacement without fibres and measured"};
+  return kNames[static_cast<int>(relation)];
 }
 
 double largest_angle_deg(Relation relation) { return relation == Relation::adhesion_fibre ? 90 : 180; }
