@@ -47,12 +47,10 @@ std::string needed_text(const Plan& plan, const Needed& n) {
 }
 
 report::Table expected_rows(const Plan& plan) {
-  report::Table table{.columns = {report::number("gel (kPa)"), report::number("beads per µm²"),
-                                  report::number("noise (µm)"), "quantity", report::number("number"),
-                                  report::number("standard error (nN)"), report::number("by beads"),
-                                  report::number("by mesh"), report::number("by segmentation"),
-                                  report::number("by the rest"), report::number("within target (%)"),
-                                  report::number("two apart from (µm)")}};
+  report::Table table{.columns = {number("gel (kPa)"), number("beads per µm²"), number("noise (µm)"), "quantity",
+                                  number("number"), number("standard error (nN)"), number("by beads"),
+                                  number("by mesh"), number("by segmentation"), number("by the rest"),
+                                  number("within target (%)"), number("two apart from (µm)")}};
   for (const Expected& e : plan.grid.expected) {
     table.rows.push_back({brief(e.point.youngs_modulus_kPa), brief(e.point.beads_per_um2), brief(e.point.noise_um),
                           name_of(e.quantity), std::to_string(e.n), brief(e.standard_error_nN), brief(e.from_beads_nN),
@@ -63,12 +61,10 @@ report::Table expected_rows(const Plan& plan) {
 }
 
 report::Table cell_rows(const Plan& plan) {
-  report::Table table{.columns = {"type", report::number("mean (nN)"), report::number("between cells (nN)"),
-                                  report::number("within (nN)"), report::number("error (nN)"),
-                                  report::number("difference (%)"), report::number("fibres per cell"),
-                                  report::number("cells of each condition")}};
-  for (const int cells : kCells)
-    table.columns.push_back(report::number("chance with " + std::to_string(cells) + " cells (%)"));
+  report::Table table{.columns = {"type", number("mean (nN)"), number("between cells (nN)"), number("within (nN)"),
+                                  number("error (nN)"), number("difference (%)"), number("fibres per cell"),
+                                  number("cells of each condition")}};
+  for (const int cells : kCells) table.columns.push_back(number("chance with " + std::to_string(cells) + " cells (%)"));
   for (const CellNumbers& n : plan.cells) {
     std::vector<std::string> row = {
         name_of(n.scatter.type),           brief(n.scatter.mean_nN),

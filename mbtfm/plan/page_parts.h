@@ -12,6 +12,8 @@
 
 namespace mbtfm::plan {
 
+using report::number;
+
 /// A point of a curve of standard errors.
 struct ErrorDot {
   double density = 0, standard_error_nN = 0, from_beads_nN = 0;
@@ -43,9 +45,8 @@ charts::Chart drawn_chart(const std::string& what, const std::vector<DrawnDot>& 
 template <class Needed>
 report::Table needed_rows(const Asked& asked, const std::vector<Needed>& needed,
                           const std::function<std::string(const Needed&)>& text_of) {
-  report::Table table{.columns = {report::number("gel (kPa)")}};
-  for (const double noise_um : asked.noise_um)
-    table.columns.push_back(report::number("noise " + brief(noise_um) + " µm"));
+  report::Table table{.columns = {number("gel (kPa)")}};
+  for (const double noise_um : asked.noise_um) table.columns.push_back(number("noise " + brief(noise_um) + " µm"));
   for (const double E : asked.youngs_modulus_kPa) {
     std::vector<std::string> row = {brief(E)};
     for (const Needed& n : needed)

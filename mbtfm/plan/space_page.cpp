@@ -33,12 +33,10 @@ std::vector<charts::Chart> charts_of(const SpacePlan& plan) {
 }
 
 report::Table expected_rows(const SpacePlan& plan) {
-  report::Table table{.columns = {report::number("gel (kPa)"), report::number("beads per µm³"),
-                                  report::number("noise (µm)"), "quantity", report::number("number"),
-                                  report::number("standard error (nN)"), report::number("by beads"),
-                                  report::number("by background"), report::number("within target (%)"),
-                                  report::number("map resolves (µm)"), report::number("two told from (µm)"),
-                                  report::number("numbers told")}};
+  report::Table table{.columns = {number("gel (kPa)"), number("beads per µm³"), number("noise (µm)"), "quantity",
+                                  number("number"), number("standard error (nN)"), number("by beads"),
+                                  number("by background"), number("within target (%)"), number("map resolves (µm)"),
+                                  number("two told from (µm)"), number("numbers told")}};
   for (const SpaceExpected& e : plan.grid.expected) {
     table.rows.push_back({brief(e.point.youngs_modulus_kPa), brief(e.point.beads_per_um3), brief(e.point.noise_um),
                           name_of(e.quantity), std::to_string(e.n), brief(e.standard_error_nN), brief(e.from_beads_nN),
