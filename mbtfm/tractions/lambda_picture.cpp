@@ -25,7 +25,7 @@ double exp_of(double x) { return std::exp(x); }
 double at_lambda(const Refinement& fine, const std::vector<double>& values, double lambda) {
   const double n = static_cast<double>(values.size()) - 1;
   const double at = n * std::log(lambda / fine.lambdas.front()) / std::log(fine.lambdas.back() / fine.lambdas.front());
-  return values[std::clamp(std::round(at), 0.0, n)];
+  return values[static_cast<std::size_t>(std::clamp(std::round(at), 0.0, n))];
 }
 
 struct Units {
