@@ -15,10 +15,7 @@
 namespace mbtfm::substrate {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::MatrixXf;
-using Eigen::VectorXd;
 
 constexpr int kNodes = 6;         // along each axis of a square
 constexpr double kFarFrom = 3.0;  // half sides from its centre

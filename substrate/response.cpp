@@ -8,10 +8,6 @@
 namespace mbtfm::substrate {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 class Dense final : public KeptResponse {
  public:
   Dense(MatrixXd compliance_um_per_nN, int threads) : matrix_(std::move(compliance_um_per_nN)), threads_(threads) {}

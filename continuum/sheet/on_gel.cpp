@@ -13,10 +13,6 @@
 namespace mbtfm::sheet {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// W u and Wᵀ F, by column.
 struct Means {
   const Elements& elements;

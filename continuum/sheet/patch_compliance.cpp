@@ -9,10 +9,6 @@
 namespace mbtfm::sheet {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 class DenseCompliance final : public PatchCompliance {
  public:
   DenseCompliance(const Patches& patches, const substrate::Substrate& gel, int threads)

@@ -15,9 +15,6 @@
 namespace mbtfm::sheets {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 using tensions::LinearData;
 
 constexpr int kStiffnesses = 80;                      // an eighth of an e-fold apart

@@ -10,8 +10,6 @@
 
 namespace mbtfm::sheets {
 
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 using tensions::LinearData;
 
 namespace {

@@ -16,8 +16,6 @@
 namespace mbtfm::sheets {
 namespace {
 
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 using tensions::LinearData;
 
 /// The range of a quantity over all stiffnesses that the beads do not exclude.

@@ -10,10 +10,6 @@
 namespace mbtfm::sheets {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 constexpr double kSoftest = 0.03, kStiffest = 300;   // M / (mu R)
 constexpr double kWeakest = 0.03, kStrongest = 500;  // kappa R / mu
 constexpr int kSheets = 12;                          // solved for, where the bond is known

@@ -7,10 +7,6 @@
 
 namespace mbtfm::spatial {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 MatrixXd Basis::response(const MatrixXd& by_traction, int threads) const {
   const Index n = shapes_.rows();
   MatrixXd response(by_traction.rows(), 3 * size()), columns(by_traction.rows(), n);

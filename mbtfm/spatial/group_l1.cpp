@@ -13,9 +13,6 @@
 namespace mbtfm::spatial {
 
 using Eigen::ArrayXd;
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 namespace {
 

@@ -13,10 +13,6 @@
 
 namespace mbtfm::spatial {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 namespace {
 
 /// |W (u − A x)|² + lambda² |x|², of which tikhonov found the minimum.

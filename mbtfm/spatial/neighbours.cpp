@@ -17,10 +17,7 @@
 namespace mbtfm::spatial {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
-using Eigen::VectorXd;
 
 constexpr int kNeighbours = 16;
 constexpr int kLinear = 4;  ///< numbers of a linear field, for each component

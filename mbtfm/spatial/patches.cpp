@@ -13,10 +13,6 @@
 
 namespace mbtfm::spatial {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 namespace {
 
 /// By adhesion: the tractions at the vertices that stand for a force of one on it; in the answer of the beads it is the

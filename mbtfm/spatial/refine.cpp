@@ -8,7 +8,6 @@
 
 namespace mbtfm::spatial {
 
-using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 

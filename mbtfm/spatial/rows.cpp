@@ -12,10 +12,6 @@
 
 namespace mbtfm::spatial {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 MatrixXd common_motions(const Observed& observed) {
   const auto& beads = std::get<std::vector<Vec3>>(observed.at.points_um);
   const Index n = observed.n_components();

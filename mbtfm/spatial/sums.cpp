@@ -10,11 +10,8 @@
 
 namespace mbtfm::spatial {
 
-using Eigen::Index;
 using Eigen::Matrix3d;
-using Eigen::MatrixXd;
 using Eigen::Vector3d;
-using Eigen::VectorXd;
 
 namespace {
 

@@ -11,10 +11,6 @@
 
 namespace mbtfm::spatial {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 namespace {
 
 struct Fit {

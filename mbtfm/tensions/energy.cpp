@@ -12,9 +12,6 @@
 
 namespace mbtfm::tensions {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 namespace {
 
 /// On the unit disc: exact for polynomials of fifth degree. Source: Stroud, Approximate Calculation of Multiple

@@ -18,9 +18,6 @@ namespace mbtfm::tensions {
 
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 using substrate::Ellipse;
 
 /// Sums of forces that have a budget of their own beside the tensions, by force: the total; through the cut, if any.

@@ -14,7 +14,6 @@ namespace mbtfm::tractions {
 
 namespace {
 
-using Eigen::Index;
 using substrate::Ellipse;
 
 /// u = G F at the beads with weights 1/sigma, or equal ones where not all beads state their error.

@@ -17,8 +17,6 @@ namespace mbtfm::tractions {
 
 namespace {
 
-using Eigen::Index;
-
 /// A "point" is a disc smaller than any adhesion one sees: beads next to it feel a point, none on it infinity.
 constexpr double kPointRadius_um = 0.1;
 

@@ -8,8 +8,6 @@
 
 namespace mbtfm::tractions {
 
-using Eigen::Index;
-
 struct DenseProblem::Range {
   std::size_t begin, end;
 };

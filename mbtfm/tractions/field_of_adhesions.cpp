@@ -12,10 +12,6 @@
 namespace mbtfm::tractions {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// Shift, and what changes linearly over the field: six columns of order 1.
 MatrixXd affine_motions(const std::vector<Vec2>& places_um) {
   const auto [low, high] = extent_of(places_um);

@@ -11,8 +11,6 @@ namespace mbtfm::tractions {
 
 namespace {
 
-using Eigen::Index;
-
 constexpr double kTolerance = 1e-3;  // in energy: a thirtieth of a standard error
 
 /// Wᵀ D and Wᵀ u for one m.

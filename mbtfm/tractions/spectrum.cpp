@@ -11,8 +11,6 @@
 namespace mbtfm::tractions {
 
 using Eigen::ArrayXd;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 namespace {
 

@@ -32,8 +32,6 @@ namespace mbtfm::numerics {
 
 namespace {
 
-using Eigen::MatrixXd;
-
 constexpr double kOne = 1, kZero = 0;
 constexpr int kStrip = 128;  // columns that one thread takes at a time: enough for BLAS' own blocks
 
@@ -187,8 +185,6 @@ SymmetricEigen symmetric_eigen(MatrixXd A) {
   eigen.vectors = std::move(A);
   return eigen;
 }
-
-using Eigen::VectorXd;
 
 VectorXd matvec(const MatrixView& A, const VectorView& x) { return A * x; }
 VectorXd transposed_matvec(const MatrixView& A, const VectorView& x) { return A.transpose() * x; }

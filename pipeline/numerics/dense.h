@@ -6,6 +6,12 @@
 #include <Eigen/Core>
 #include <memory>
 
+namespace mbtfm {
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+}  // namespace mbtfm
+
 namespace mbtfm::numerics {
 
 /// A B

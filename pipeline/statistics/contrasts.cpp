@@ -9,10 +9,6 @@
 
 namespace mbtfm::statistics {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 namespace {
 
 double satterthwaite_degrees(const MixedFit& fit, const VectorXd& weights) {

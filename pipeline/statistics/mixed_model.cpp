@@ -12,10 +12,6 @@
 namespace mbtfm::statistics {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// A variance component: a random effect shared by the observations of a cell (and of one kind), or the scatter of a
 /// kind.
 enum class Term { cell, cell_kind, residual };
