@@ -33,8 +33,6 @@
 namespace mbtfm::mean {
 namespace {
 
-namespace fs = std::filesystem;
-
 enum class Others { refused, left_out };
 constexpr auto words(Others) { return std::array{"refused", "left-out"}; }
 

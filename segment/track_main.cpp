@@ -27,8 +27,6 @@
 namespace mbtfm::beads {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr double kRadian_deg = 180 / std::numbers::pi;
 
 void write_field_vtp(stage::StageContext& context, const DisplacementField& field, const std::string& name) {

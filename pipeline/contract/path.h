@@ -5,6 +5,7 @@
 
 namespace mbtfm {
 
-using Path = std::filesystem::path;
+namespace fs = std::filesystem;
+using Path = fs::path;
 
 }  // namespace mbtfm

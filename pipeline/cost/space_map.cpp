@@ -11,7 +11,6 @@
 #include "pipeline/report/space_results.h"
 
 namespace mbtfm::cost {
-namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kTruth = "truth/surface_traction.csv";

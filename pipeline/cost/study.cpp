@@ -25,7 +25,6 @@
 #include "pipeline/runner/settings.h"
 
 namespace mbtfm::cost {
-namespace fs = std::filesystem;
 namespace {
 
 double median(std::vector<double> values) {

@@ -11,7 +11,6 @@
 #include "pipeline/files/text.h"
 
 namespace mbtfm::cost {
-namespace fs = std::filesystem;
 namespace {
 
 constexpr double kFrame_px = 340;  // the height of each: room for the names of the rungs

@@ -13,7 +13,6 @@
 #include "pipeline/report/match_fibres.h"
 
 namespace mbtfm::report {
-namespace fs = std::filesystem;
 namespace {
 
 double sum_of_magnitudes(const std::vector<AdhesionForce>& forces) {

@@ -13,7 +13,6 @@
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::report {
-namespace fs = std::filesystem;
 namespace {
 
 /// Both files hold the unflagged beads in the same order. @throws InputError where they do not

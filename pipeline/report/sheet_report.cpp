@@ -19,7 +19,6 @@
 #include "pipeline/report/space_report.h"
 
 namespace mbtfm::report {
-namespace fs = std::filesystem;
 namespace {
 
 struct SheetResults {

@@ -22,7 +22,6 @@
 #include "pipeline/report/space_scene.h"
 
 namespace mbtfm::report {
-namespace fs = std::filesystem;
 namespace {
 
 std::string with_error(double value, std::optional<double> sigma, const char* unit) {

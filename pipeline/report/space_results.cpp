@@ -11,7 +11,6 @@
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::report {
-namespace fs = std::filesystem;
 namespace {
 
 Vec3 vector_in(const files::CsvTable& table, int row, const char* x, const char* y, const char* z) {

@@ -19,7 +19,6 @@
 #include "pipeline/runner/run_cell.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 
 namespace {
 

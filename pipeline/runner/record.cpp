@@ -16,7 +16,6 @@
 #include "pipeline/runner/cell_stages.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 using nlohmann::json;
 
 namespace {

@@ -26,7 +26,6 @@
 #include "pipeline/statistics/descriptive.h"
 
 namespace mbtfm::statistics {
-namespace fs = std::filesystem;
 namespace {
 
 std::optional<DisplacementField> field_where_there(const Path& file) {

@@ -16,8 +16,6 @@
 namespace mbtfm::stacks {
 namespace {
 
-namespace fs = std::filesystem;
-
 /// What must be the same of two stacks.
 struct Frame {
   std::string name;
