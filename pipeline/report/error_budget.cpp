@@ -38,9 +38,9 @@ std::string name_of(const BudgetLine& line) {
 const char* colour(std::size_t i) { return charts::kColours[i % std::size(charts::kColours)]; }
 
 std::string share_text(const BudgetLine& line, const std::string& source, double part_nN) {
-  return fmt::format("{}: {} ± {} nN\n{}: {} nN, {:.0f} % of the squared error", name_of(line),
-                     charts::readable(line.value_nN), charts::readable(line.total_nN), source,
-                     charts::readable(part_nN), 100 * part_nN * part_nN / (line.total_nN * line.total_nN));
+  return fmt::format("{}: {} ± {} nN\n{}: {} nN, {:.0f} % of the squared error", name_of(line), readable(line.value_nN),
+                     readable(line.total_nN), source, readable(part_nN),
+                     100 * part_nN * part_nN / (line.total_nN * line.total_nN));
 }
 
 /// A bar as long as the standard error, each source's piece by its share of the square.
@@ -116,12 +116,11 @@ std::string error_budget_html(const std::vector<BudgetLine>& budget, const std::
   for (const BudgetLine& line : budget) {
     // the network's tension is that of a cable, hundreds of times smaller
     if (line.fibre_id && *line.fibre_id > 0) fibres.push_back(line);
-    std::vector<std::string> row = {charts::html_escaped(name_of(line)), charts::readable(line.value_nN),
-                                    charts::readable(line.total_nN)};
+    std::vector<std::string> row = {html_escaped(name_of(line)), readable(line.value_nN), readable(line.total_nN)};
     csv += fmt::format("\n{},{},{},{}", line.fibre_id ? std::to_string(*line.fibre_id) : "", line.type,
                        shortest(line.value_nN), shortest(line.total_nN));
     for (const auto& [source, part] : line.parts_nN) {
-      row.push_back(part ? charts::readable(*part) : "–");
+      row.push_back(part ? readable(*part) : "–");
       csv += "," + (part ? shortest(*part) : std::string());
     }
     table.rows.push_back(std::move(row));

@@ -36,8 +36,8 @@ std::string of_cut(const FitSummary& fit) {
   return fmt::format(
       " The image cuts the cell: {} ± {} nN (x {} ± {}, y {} ± {}; y points down) pass through the cut and balance the "
       "forces of the adhesions in view.",
-      charts::readable(cut->force_nN), charts::readable(cut->sigma_nN), charts::readable(cut->x_nN),
-      charts::readable(cut->x_sigma_nN), charts::readable(cut->y_nN), charts::readable(cut->y_sigma_nN));
+      readable(cut->force_nN), readable(cut->sigma_nN), readable(cut->x_nN), readable(cut->x_sigma_nN),
+      readable(cut->y_nN), readable(cut->y_sigma_nN));
 }
 
 /// Those that were seen, and those that were put where nobody saw one.
@@ -71,8 +71,8 @@ std::string parts_of_total(const CellResults& results) {
   const auto network = results.tensions.find(0);
   if (network != results.tensions.end() && !network->second.identifiable)
     return ". The beads do not show how much of it comes from the actin network.";
-  return fmt::format(": {} nN by the fibres, {} nN by the actin network.", charts::readable(results.fit.fibre_force_nN),
-                     charts::readable(results.fit.network_force_nN));
+  return fmt::format(": {} nN by the fibres, {} nN by the actin network.", readable(results.fit.fibre_force_nN),
+                     readable(results.fit.network_force_nN));
 }
 
 std::string what(const CellResults& results) {
@@ -84,7 +84,7 @@ std::string what(const CellResults& results) {
              counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
              counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
              n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell),
-             charts::readable(results.fit.total_force_nN), parts_of_total(results)) +
+             readable(results.fit.total_force_nN), parts_of_total(results)) +
          of_candidates(results.cell) + of_cut(results.fit);
 }
 
@@ -157,7 +157,7 @@ std::string energy_and_moment(const FitSummary& fit) {
   if (moment && moment_sigma && major && minor && axis) {
     text += fmt::format(
         "Contractile moment: {}, of which {} along the main axis ({:.0f}° from x towards y) and {} across it.",
-        with_error(*moment, *moment_sigma, "nN µm"), charts::readable(*major), *axis, charts::readable(*minor));
+        with_error(*moment, *moment_sigma, "nN µm"), readable(*major), *axis, readable(*minor));
   }
   return text;
 }
@@ -183,7 +183,7 @@ constexpr const char* kNothingOpen =
 std::string printed(const std::string& text) {
   static const std::regex length(R"(\bum\b)"), area(R"(\bum2\b)"), plus_minus(R"(\+-)");
   const std::string lengths = std::regex_replace(text, length, "µm"), all = std::regex_replace(lengths, area, "µm²");
-  return charts::html_escaped(std::regex_replace(all, plus_minus, "±"));
+  return html_escaped(std::regex_replace(all, plus_minus, "±"));
 }
 
 std::string item(const char* kind, const char* mark, const std::string& text, const std::string& more = {}) {
@@ -198,12 +198,11 @@ std::string details_of(const Finding& f) {
   std::string html;
   if (is_open(f) && !f.remedy.empty()) html += "<br><i>What to do:</i> " + printed(f.remedy);
   if (f.number && f.threshold) {
-    html += fmt::format("<details><summary>{}</summary>{}: {}. Threshold: {}; {}.{}</details>",
-                        charts::html_escaped(f.id), printed(f.number_is), charts::readable(*f.number),
-                        charts::readable(*f.threshold), printed(f.reason), is_open(f) ? "" : " " + printed(f.remedy));
+    html += fmt::format("<details><summary>{}</summary>{}: {}. Threshold: {}; {}.{}</details>", html_escaped(f.id),
+                        printed(f.number_is), readable(*f.number), readable(*f.threshold), printed(f.reason),
+                        is_open(f) ? "" : " " + printed(f.remedy));
   }
-  return html +
-         (is_open(f) ? fmt::format(" <span class=\"page\">({}: “{}”)</span>", kPage, charts::html_escaped(f.id)) : "");
+  return html + (is_open(f) ? fmt::format(" <span class=\"page\">({}: “{}”)</span>", kPage, html_escaped(f.id)) : "");
 }
 
 std::string item_of(const Finding& f) {

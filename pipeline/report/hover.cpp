@@ -16,12 +16,12 @@ std::string hover_of(const Fibre& fibre, const CellResults& results) {
     text += "\nnot fitted";
   } else {
     const Tension& t = found->second;
-    text += "\ntension " + charts::readable(t.tension_nN) + " nN";
+    text += "\ntension " + readable(t.tension_nN) + " nN";
     if (t.low_nN && t.high_nN)
-      text += fmt::format(" (95 % interval {} to {})", charts::readable(*t.low_nN), charts::readable(*t.high_nN));
+      text += fmt::format(" (95 % interval {} to {})", readable(*t.low_nN), readable(*t.high_nN));
     if (!t.identifiable) text += "\nnot identifiable: disregard";
   }
-  text += fmt::format("\n{} µm long", charts::readable(length_um(fibre.points_um)));
+  text += fmt::format("\n{} µm long", readable(length_um(fibre.points_um)));
   std::string ends;
   for (const auto& id : {fibre.start_adhesion_id, fibre.end_adhesion_id}) {
     if (id) ends += (ends.empty() ? "" : " and ") + std::to_string(*id);
@@ -43,10 +43,10 @@ std::string hover_of(const Adhesion& adhesion, const CellResults& results) {
     const std::optional<int> decimals = has_error ? std::optional(decimals_for(*force->sigma_nN)) : std::nullopt;
     text += "\nforce " + rounded(force_nN, decimals);
     if (has_error) text += " ± " + rounded(*force->sigma_nN, decimals);
-    text += " nN\ntraction " + charts::readable(force_nN / area_stood_for_um2(adhesion)) + " kPa";
+    text += " nN\ntraction " + readable(force_nN / area_stood_for_um2(adhesion)) + " kPa";
   }
   text += (adhesion.origin == AdhesionOrigin::candidate ? "\nlattice cell " : "\narea ") +
-          charts::readable(area_stood_for_um2(adhesion)) + " µm²";
+          readable(area_stood_for_um2(adhesion)) + " µm²";
   std::string fibres;
   for (const Fibre& fibre : results.cell.fibres) {
     if (fibre.start_adhesion_id == adhesion.adhesion_id || fibre.end_adhesion_id == adhesion.adhesion_id)

@@ -181,7 +181,7 @@ Figure contracted_network(const CellResults& results) {
     map.pieces(pieces, kHalo, texts.at(id));
     for (std::size_t k = 0; k < pieces.size(); ++k) {
       map.pieces({pieces[k]}, kThick + scale.colour(carried_nN[k]),
-                 fmt::format("{}\nthis link carries {} nN", texts.at(id), charts::readable(carried_nN[k])));
+                 fmt::format("{}\nthis link carries {} nN", texts.at(id), readable(carried_nN[k])));
     }
   }
   return {map,
@@ -278,19 +278,17 @@ Figure segmentation_map(const CellResults& results) {
   draw_fibre_ids(map, results);
   const auto by_id = adhesions_by_id(results.cell);
   for (const MissingFibre& f : results.missing_fibres) {
-    map.curve(
-        {by_id.at(f.start_adhesion_id)->position_um, by_id.at(f.end_adhesion_id)->position_um},
-        std::string("stroke-width:2.2;stroke-dasharray:7 5;stroke:") + (is_dark ? "#ffe14d" : "#b00020"),
-        fmt::format("called for by the beads, not segmented\nfrom adhesion {} to {}\n{} ± {} nN", f.start_adhesion_id,
-                    f.end_adhesion_id, charts::readable(f.tension_nN), charts::readable(sigma_nN(f))));
+    map.curve({by_id.at(f.start_adhesion_id)->position_um, by_id.at(f.end_adhesion_id)->position_um},
+              std::string("stroke-width:2.2;stroke-dasharray:7 5;stroke:") + (is_dark ? "#ffe14d" : "#b00020"),
+              fmt::format("called for by the beads, not segmented\nfrom adhesion {} to {}\n{} ± {} nN",
+                          f.start_adhesion_id, f.end_adhesion_id, readable(f.tension_nN), readable(sigma_nN(f))));
   }
   for (const MissingAdhesion& a : results.missing_adhesions) {
     const Adhesion circle{.adhesion_id = 0, .position_um = a.position_um, .major_axis_um = 2, .minor_axis_um = 2};
-    map.polygon(
-        ellipse_corners(circle, 24),
-        std::string("fill:#fff;fill-opacity:0.01;stroke-width:2.2;stroke-dasharray:4 3;stroke:") +
-            (is_dark ? "#ffe14d" : "#b00020"),
-        fmt::format("a force that the beads call for, no adhesion found\n{} nN", charts::readable(norm(a.force_nN))));
+    map.polygon(ellipse_corners(circle, 24),
+                std::string("fill:#fff;fill-opacity:0.01;stroke-width:2.2;stroke-dasharray:4 3;stroke:") +
+                    (is_dark ? "#ffe14d" : "#b00020"),
+                fmt::format("a force that the beads call for, no adhesion found\n{} nN", readable(norm(a.force_nN))));
   }
   const std::string missing =
       results.missing_fibres.empty() && results.missing_adhesions.empty()
@@ -368,10 +366,9 @@ Figure usual_method_map(const CellResults& results) {
   map.picture(box.low, box.high, picture_of_squares(usual, box, colours));
   draw_outline(map, results.cell, "fill:none;stroke-width:1.3;stroke:#fff;stroke-dasharray:5 3");
   draw_adhesions(map, results, "fill:none;stroke:#fff;stroke-width:0.7", Hover::none);
-  const std::string lambda =
-      usual.lambda_um_per_kPa
-          ? fmt::format(", λ = {} µm/kPa (criterion: {})", charts::readable(*usual.lambda_um_per_kPa), usual.lambda_by)
-          : "";
+  const std::string lambda = usual.lambda_um_per_kPa ? fmt::format(", λ = {} µm/kPa (criterion: {})",
+                                                                   readable(*usual.lambda_um_per_kPa), usual.lambda_by)
+                                                     : "";
   return {
       map,
       fmt::format(
@@ -379,8 +376,8 @@ Figure usual_method_map(const CellResults& results) {
           "{:.2g} µm; the largest is {} kPa. Its scale of colours is not that of “Forces on the substrate”. FTTC knows "
           "neither adhesions nor fibres: a traction spreads around its adhesion, and noise makes tractions everywhere. "
           "Total force in the outline, noise included: {} nN; by the model: {} nN. White: outline and adhesions.",
-          lambda, usual.spacing_um, charts::readable(largest_kPa), charts::readable(usual.total_force_nN),
-          charts::readable(results.fit.total_force_nN)) +
+          lambda, usual.spacing_um, readable(largest_kPa), readable(usual.total_force_nN),
+          readable(results.fit.total_force_nN)) +
           caption_of_cut(results.cell),
       legend(colour_bar(colours))};
 }

@@ -23,7 +23,7 @@ std::string with_minus(const std::string& text) {
 int decimals_for(double error) { return std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 9); }
 
 std::string rounded(double value, std::optional<int> decimals) {
-  if (!decimals) return charts::readable(value);
+  if (!decimals) return readable(value);
   const int exponent = value != 0 ? static_cast<int>(std::floor(std::log10(std::abs(value)))) : 0;
   return with_minus(fmt::format("{:.{}f}", value, std::clamp(2 - exponent, 0, *decimals)));
 }
@@ -39,7 +39,7 @@ std::string text_of_figure(const Value& value) {
         if constexpr (!std::is_arithmetic_v<V> && !std::is_same_v<V, std::string>) return listed(v);
         if constexpr (std::is_same_v<V, std::string>) return v;
         if constexpr (std::is_same_v<V, bool>) return v ? "yes" : "no";
-        if constexpr (std::is_same_v<V, double>) return charts::readable(v);
+        if constexpr (std::is_same_v<V, double>) return readable(v);
         if constexpr (std::is_same_v<V, std::int64_t>) return std::to_string(v);
       },
       value);

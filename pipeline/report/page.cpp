@@ -28,7 +28,7 @@ std::string inside_script(std::string text) {
 
 /// Heard, not seen: a heading above the table says the same.
 std::string caption_of(const std::string& text) {
-  return text.empty() ? "" : "<caption class=\"heard\">" + charts::html_escaped(text) + "</caption>";
+  return text.empty() ? "" : "<caption class=\"heard\">" + html_escaped(text) + "</caption>";
 }
 
 std::string script(std::string_view text) { return "<script>" + std::string(text) + "</script>\n"; }
@@ -53,7 +53,7 @@ std::string html_of(const Table& table) {
   std::string html = "<div class=\"scroll\"><table>" + caption_of(table.caption) + "<thead><tr>";
   for (const Table::Column& column : table.columns) {
     html += std::string("<th") + (column.is_number ? " class=\"n\"" : "") +
-            "><span role=\"button\" tabindex=\"0\" title=\"click to sort\">" + charts::html_escaped(column.title) +
+            "><span role=\"button\" tabindex=\"0\" title=\"click to sort\">" + html_escaped(column.title) +
             "</span></th>";
   }
   html += "</tr></thead><tbody>\n";
@@ -71,14 +71,14 @@ std::string html_of(const Table& table, const Download& csv) {
   return "<div class=\"table\">" + html_of(table) +
          fmt::format(
              "<a class=\"download\" download=\"{0}\" href=\"data:text/csv;base64,{1}\">Download {0}</a></div>\n",
-             charts::html_escaped(csv.name), files::base64(csv.text));
+             html_escaped(csv.name), files::base64(csv.text));
 }
 
 std::string html_of_pairs(const std::string& caption, const std::vector<std::pair<std::string, std::string>>& pairs) {
   std::string html = "<div class=\"scroll\"><table>" + caption_of(caption) + "<tbody>\n";
   for (const auto& [name, value] : pairs) {
-    html += "<tr><th scope=\"row\">" + charts::html_escaped(name) + "</th><td class=\"long\">" +
-            charts::html_escaped(value) + "</td></tr>\n";
+    html += "<tr><th scope=\"row\">" + html_escaped(name) + "</th><td class=\"long\">" + html_escaped(value) +
+            "</td></tr>\n";
   }
   return html + "</tbody></table></div>\n";
 }
@@ -89,39 +89,38 @@ std::string capitalised(std::string text) {
 }
 
 std::string section(const std::string& title, const std::string& content) {
-  return "<section id=\"" + charts::html_escaped(anchor_of(title)) + "\"><h2>" + charts::html_escaped(title) +
-         "</h2>\n" + content + "</section>\n";
+  return "<section id=\"" + html_escaped(anchor_of(title)) + "\"><h2>" + html_escaped(title) + "</h2>\n" + content +
+         "</section>\n";
 }
 
 std::string folded(const std::string& title, const std::string& content) {
-  return "<details><summary>" + charts::html_escaped(title) + "</summary>\n" + content + "</details>\n";
+  return "<details><summary>" + html_escaped(title) + "</summary>\n" + content + "</details>\n";
 }
 
 std::string figure(const charts::Chart& chart, const std::string& caption, const std::string& legend) {
-  std::string html = "<figure><h3>" + charts::html_escaped(chart.title()) + "</h3>\n";
+  std::string html = "<figure><h3>" + html_escaped(chart.title()) + "</h3>\n";
   if (!chart.subtitle().empty()) {
     html += fmt::format("<div class=\"note\" style=\"color:{}\">{}</div>\n",
-                        charts::readable_on_white(chart.subtitle_colour()), charts::html_escaped(chart.subtitle()));
+                        charts::readable_on_white(chart.subtitle_colour()), html_escaped(chart.subtitle()));
   }
   if (!chart.keys().empty()) {
     html += "<div class=\"keys\">";
     for (const auto& [text, colour] : chart.keys()) {
-      html += fmt::format("<span style=\"color:{}\">{}</span>", charts::readable_on_white(colour),
-                          charts::html_escaped(text));
+      html += fmt::format("<span style=\"color:{}\">{}</span>", charts::readable_on_white(colour), html_escaped(text));
     }
     html += "</div>\n";
   }
   return html + "<div class=\"chart\"></div><script type=\"application/json\">" + inside_script(chart.vega()) +
-         "</script>\n" + legend +
-         (caption.empty() ? "" : "<figcaption>" + charts::html_escaped(caption) + "</figcaption>") + "</figure>\n";
+         "</script>\n" + legend + (caption.empty() ? "" : "<figcaption>" + html_escaped(caption) + "</figcaption>") +
+         "</figure>\n";
 }
 
 std::string page(const std::string& title, const std::string& head, const std::string& body) {
   return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
          "content=\"width=device-width,initial-scale=1\"><link rel=\"icon\" href=\"data:,\"><title>" +
-         charts::html_escaped(title) + "</title><style>" + std::string(kStyle) + "</style></head>\n<body><main>\n" +
-         head + contents(body) + "<noscript><p>The charts of this page need JavaScript.</p></noscript>\n" + body +
-         "</main>" + script(kVega) + script(kScript) + "</body></html>\n";
+         html_escaped(title) + "</title><style>" + std::string(kStyle) + "</style></head>\n<body><main>\n" + head +
+         contents(body) + "<noscript><p>The charts of this page need JavaScript.</p></noscript>\n" + body + "</main>" +
+         script(kVega) + script(kScript) + "</body></html>\n";
 }
 
 }  // namespace mbtfm::report

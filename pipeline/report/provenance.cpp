@@ -18,7 +18,7 @@ std::string text_of(const ordered_json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
   if (value.is_null()) return "not set";
-  if (value.is_number_float()) return charts::readable(value.get<double>());
+  if (value.is_number_float()) return readable(value.get<double>());
   return value.dump();
 }
 
@@ -45,7 +45,7 @@ Pairs flat(const std::optional<files::JsonRecord>& record, const char* key) {
 
 std::string number_of(const std::optional<files::JsonRecord>& record, const char* key) {
   const auto member = record ? record->find(key) : std::nullopt;
-  return member ? charts::readable(member->number()) : std::string();
+  return member ? readable(member->number()) : std::string();
 }
 
 StageLine stage_of(const std::string& name, const files::JsonRecord& record) {

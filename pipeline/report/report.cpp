@@ -56,7 +56,7 @@ std::string tension_section(const CellResults& results) {
 std::string usual_method_note(const CellResults& results) {
   if (!results.usual_method || results.usual_method->obstacle.empty()) return {};
   return "<p class=\"sub\">The usual method (FTTC) has no answer for these beads: " +
-         charts::html_escaped(results.usual_method->obstacle) + ".</p>\n";
+         html_escaped(results.usual_method->obstacle) + ".</p>\n";
 }
 
 std::string map_section(const CellResults& results) {
@@ -123,12 +123,12 @@ std::string adhesion_section(const CellResults& results) {
 std::string figure_pairs(const CellResults& results) {
   const FitSummary& fit = results.fit;
   std::vector<std::pair<std::string, std::string>> pairs = {
-      {"relative L2", charts::readable(fit.relative_l2)},
-      {"relative L2 expected of the noise", charts::readable(fit.expected_relative_l2)},
-      {"noise of a displacement component (nm)", charts::readable(1000 * fit.noise_um)},
-      {"total force (nN)", charts::readable(fit.total_force_nN)},
-      {"force of the network (nN)", charts::readable(fit.network_force_nN)},
-      {"force of the fibres (nN)", charts::readable(fit.fibre_force_nN)},
+      {"relative L2", readable(fit.relative_l2)},
+      {"relative L2 expected of the noise", readable(fit.expected_relative_l2)},
+      {"noise of a displacement component (nm)", readable(1000 * fit.noise_um)},
+      {"total force (nN)", readable(fit.total_force_nN)},
+      {"force of the network (nN)", readable(fit.network_force_nN)},
+      {"force of the fibres (nN)", readable(fit.fibre_force_nN)},
       {"meshes", std::to_string(fit.n_meshes)},
       {"iterations", std::to_string(fit.iterations)},
       {"converged", fit.converged ? "yes" : "no"}};
@@ -142,8 +142,8 @@ std::string effects_table(const Provenance& provenance) {
   Table table{{"effect", "stage", "on", "why"}, {}, "Effects, and why they are on or off"};
   if (are_timed) table.columns.push_back(number("seconds"));
   for (const EffectLine& effect : provenance.effects) {
-    std::vector<std::string> row = {charts::html_escaped(effect.name), charts::html_escaped(effect.stage),
-                                    effect.is_on ? "on" : "off", charts::html_escaped(effect.why)};
+    std::vector<std::string> row = {html_escaped(effect.name), html_escaped(effect.stage), effect.is_on ? "on" : "off",
+                                    html_escaped(effect.why)};
     if (are_timed) row.push_back(effect.seconds);
     table.rows.push_back(row);
   }
@@ -155,18 +155,18 @@ std::string effects_table(const Provenance& provenance) {
 std::string provenance_section(const Provenance& provenance, const std::string& figures) {
   Table stages{{"stage", "state", "result", number("seconds"), number("memory (MB)"), "version"}, {}, "Stages"};
   for (const StageLine& stage : provenance.stages) {
-    stages.rows.push_back({charts::html_escaped(stage.name), charts::html_escaped(stage.state),
-                           charts::html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
-                           stage.peak_memory_MB, charts::html_escaped(stage.version)});
+    stages.rows.push_back({html_escaped(stage.name), html_escaped(stage.state),
+                           html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
+                           stage.peak_memory_MB, html_escaped(stage.version)});
   }
   std::string html = html_of(stages);
   if (!provenance.started.empty())
-    html += fmt::format("<p class=\"sub\">Run by mbtfm {} from {} to {} on {}.</p>\n",
-                        charts::html_escaped(provenance.version), charts::html_escaped(provenance.started),
-                        charts::html_escaped(provenance.ended), charts::html_escaped(provenance.processor));
+    html += fmt::format("<p class=\"sub\">Run by mbtfm {} from {} to {} on {}.</p>\n", html_escaped(provenance.version),
+                        html_escaped(provenance.started), html_escaped(provenance.ended),
+                        html_escaped(provenance.processor));
   if (!provenance.preset.empty())
     html += fmt::format("<p class=\"sub\">Preset: {}; it holds for all that cell.toml does not set.</p>\n",
-                        charts::html_escaped(provenance.preset));
+                        html_escaped(provenance.preset));
   if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
   html += figures;
   for (const StageLine& stage : provenance.stages) {
@@ -229,8 +229,8 @@ std::string report_html(const std::filesystem::path& cell) {
       "<h1>{}</h1><p class=\"what\">Tensions of the stress fibres and forces of the adhesions of one cell, by "
       "model-based traction force microscopy</p>\n<p class=\"sub\">Gel: Young’s modulus {} kPa, Poisson’s ratio {}, {} "
       "µm thick · mbtfm {}</p>\n",
-      charts::html_escaped(results.name), charts::readable(results.gel.youngs_modulus_kPa),
-      charts::readable(results.gel.poisson_ratio), charts::readable(results.gel.thickness_um), kVersion);
+      html_escaped(results.name), readable(results.gel.youngs_modulus_kPa), readable(results.gel.poisson_ratio),
+      readable(results.gel.thickness_um), kVersion);
   std::string body = findings_section(facts_of(results), provenance);
   if (!results.cell.fibres.empty()) body += tension_section(results);
   body += map_section(results) + adhesion_section(results);

@@ -35,9 +35,8 @@ void draw_cells(Chart& map, const SpaceResults& r, const Value& value, const Col
     const std::optional<double> v = value(t);
     if (!v) continue;
     const Vec2 at{t.at_um.x, t.at_um.y};
-    map.bar(
-        at - half, at + half, "fill:" + colour(*v) + ";stroke:none",
-        fmt::format("{} {} at x, y, z = {:.1f}, {:.1f}, {:.1f} µm", charts::readable(*v), unit, at.x, at.y, t.at_um.z));
+    map.bar(at - half, at + half, "fill:" + colour(*v) + ";stroke:none",
+            fmt::format("{} {} at x, y, z = {:.1f}, {:.1f}, {:.1f} µm", readable(*v), unit, at.x, at.y, t.at_um.z));
   }
 }
 
@@ -65,7 +64,7 @@ std::string signed_bar(double top) {
       "<span class=\"bar\"><span class=\"ink\"><i style=\"background:linear-gradient(90deg,{},#fff,{})\"></i><span "
       "style=\"left:0%\">−{}</span><span style=\"left:50%\">0</span><span style=\"left:100%\">{}</span></span>normal "
       "traction (kPa), above 0 out of the gel</span>",
-      signed_colour(-1), signed_colour(1), charts::readable(top), charts::readable(top));
+      signed_colour(-1), signed_colour(1), readable(top), readable(top));
 }
 
 /// Of a map of values from zero on.

@@ -30,7 +30,7 @@ double largest_nN(const std::vector<FibreRow>& rows) {
 void draw_row(Chart& chart, const FibreRow& row, double y, const CellResults& results) {
   const std::string colour = colour_of(row.fibre->type);
   std::string hover = hover_of(*row.fibre, results);
-  if (row.true_tension_nN) hover += "\ntruth " + charts::readable(*row.true_tension_nN) + " nN";
+  if (row.true_tension_nN) hover += "\ntruth " + readable(*row.true_tension_nN) + " nN";
   const Tension& t = row.tension;
   if (t.low_nN && t.high_nN) chart.error({*t.low_nN, y}, {*t.high_nN, y}, "stroke-width:2;stroke:" + colour, hover);
   chart.dot({t.tension_nN, y}, 4.5, "stroke-width:2;stroke:" + colour + ";fill:" + (t.identifiable ? colour : "#fff"),
@@ -140,7 +140,7 @@ std::optional<Chart> tensions_by_type(const CellResults& results) {
     }
     const double mean = sum / static_cast<double>(column.size()), x = static_cast<double>(i);
     chart.pieces({{{x - 0.5 * kColumnWidth, mean}, {x + 0.5 * kColumnWidth, mean}}}, "stroke:#333;stroke-width:1.6",
-                 fmt::format("mean of the {} fibres: {} nN", full_name_of(type), charts::readable(mean)));
+                 fmt::format("mean of the {} fibres: {} nN", full_name_of(type), readable(mean)));
   }
   return chart;
 }

@@ -90,7 +90,7 @@ std::string missed_fibres(const Comparison& comparison) {
     if (fibre.found) continue;
     list += fmt::format("{}{} ({}, {} nN, {} µm)", list.empty() ? "" : ", ", fibre.truth->fibre_id,
                         full_name_of(fibre.truth->type), rounded(fibre.true_tension_nN, {}),
-                        charts::readable(length_um(fibre.truth->points_um)));
+                        readable(length_um(fibre.truth->points_um)));
   }
   return list.empty() ? "" : "<p class=\"sub\">True fibres that were not found: " + list + ".</p>\n";
 }
@@ -132,7 +132,7 @@ std::string tension_notes(const CellResults& results) {
   std::string html = fmt::format(
       "<p class=\"sub\">The tension of the actin network is that of one cable of the mesh; as a surface tension it is "
       "{} nN/µm, which does not depend on the mesh.",
-      charts::readable(results.fit.network_surface_tension_nN_per_um));
+      readable(results.fit.network_surface_tension_nN_per_um));
   if (results.comparison) {
     html +=
         " Error: fitted minus true tension, in per cent of the truth and in halves of the 95 % interval: between −1 "
