@@ -260,7 +260,7 @@ Tile tile_around(const std::vector<Vec2>& points_um) {
 Block block_of(const MatrixAt& matrix_at, const std::vector<Vec2>& points_um, std::vector<Index> points,
                const std::vector<Ellipse>& ellipses) {
   std::vector<Vec2> own_um;
-  for (const Index p : points) own_um.push_back(points_um[static_cast<std::size_t>(p)]);
+  for (const Index p : points) own_um.push_back(points_um[p]);
   const Tile square = tile_around(own_um);
   std::vector<Ellipse> far, near;
   std::vector<Index> far_columns, near_columns;

@@ -221,7 +221,7 @@ auto z_of(To... vector) {
 struct AnyColumn {
   std::string name;     ///< with its unit
   std::string meaning;  ///< a phrase for the page
-  ColumnOptions options = {};
+  ColumnOptions options;
   Way way;
   const FieldType* type = nullptr;
   std::function<std::string(const void* part, int digits)> get;  ///< of what is not kept as it is written
@@ -313,7 +313,7 @@ template <class Row>
 struct Table {
   const char* file = "";
   const char* row = "";  ///< what a row is of, for the page
-  Columns<Row> columns = {};
+  Columns<Row> columns;
   const char* label = "";  ///< in messages a row is called after it and its first column: "adhesion 11"
 };
 

@@ -215,7 +215,7 @@ std::vector<Sample> sample_in_space(const Study& study) {
       {kResolution, "resolution", "µm", &SpaceFigures::resolution_um}};
   std::vector<Sample> samples;
   const std::vector<int> cells = cells_of(study, CellKind::space);
-  const auto figures_in = [&](int i) -> const SpaceFigures& { return *study.cells[static_cast<std::size_t>(i)].space; };
+  const auto figures_in = [&](int i) -> const SpaceFigures& { return *study.cells[i].space; };
   for (const Measured& figure : figures) {
     Sample sample = empty_sample(study, figure.column, figure.name, figure.unit, Observed::cells_in_space, {"cell"});
     sample.is_never_negative = figure.is_never_negative;

@@ -136,8 +136,8 @@ TEST(SurfaceFromAlphaSlices, turns_with_the_beads_and_their_slices) {
   EXPECT_DOUBLE_EQ(turned.spacing_um.y, map.spacing_um.x);
   for (int j = 0; j < map.n_y; ++j)
     for (int i = 0; i < map.n_x; ++i)
-      EXPECT_DOUBLE_EQ(turned.z_um[static_cast<std::size_t>(i * turned.n_x + j)],
-                       map.z_um[static_cast<std::size_t>(j * map.n_x + i)]);
+      EXPECT_DOUBLE_EQ(turned.z_um[i * turned.n_x + j],
+                       map.z_um[j * map.n_x + i]);
 }
 
 TEST(SurfaceFromAlphaSlices, beads_on_a_grid_are_borne) {
