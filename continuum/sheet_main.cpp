@@ -507,22 +507,16 @@ DisplacementField read_beads(stage::StageContext& context) {
   DisplacementField beads = files::read_displacement(context.input("displacement"));
   std::erase_if(beads, [](const Bead& bead) { return !bead.flag.empty(); });
   context.expect_plausible("beads_per_um2", beads_per_um2(beads));
-  if (std::ranges::all_of(beads, [](const Bead& b) { return b.sigma_um > 0; })) return beads;
-  const std::optional<double> sigma_um = tractions::noise_from_neighbours_um(beads);
-  const bool is_found = sigma_um && *sigma_um > 0;  // a computed field has none
-  for (Bead& bead : beads) bead.sigma_um = is_found ? *sigma_um : 0;
-  if (is_found) context.assumed.push_back(stage::assumed_noise(*sigma_um));
+  if (const auto sigma_um = tractions::assume_noise_um(beads))
+    context.assumed.push_back(stage::assumed_noise(*sigma_um));
   return beads;
 }
 
 tensions::LinearData data_of_adhesions(const DisplacementField& beads, stage::StageContext& context,
                                        const substrate::Substrate& model, bool has_motion) {
-  std::vector<substrate::Ellipse> ellipses;
-  for (const Adhesion& a : files::read_adhesions(context.input("adhesions")))
-    ellipses.push_back(substrate::ellipse_of(a));
-  const std::vector<Vec2> places = tensions::points_of(beads);
-  return tensions::reduce(beads, substrate::dense_response(model.compliance_um_per_nN(places, ellipses), 1), {}, 1,
-                          has_motion ? tensions::affine_motions(beads) : Eigen::MatrixXd());
+  const auto ellipses = substrate::ellipses_of(files::read_adhesions(context.input("adhesions")));
+  return tensions::reduce(beads, substrate::dense_response(model.compliance_um_per_nN(points_of(beads), ellipses), 1),
+                          {}, 1, has_motion ? tensions::affine_motions(beads) : Eigen::MatrixXd());
 }
 
 std::string sentence_of(const SheetEstimate& e) {
@@ -734,7 +728,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   if (context.has_input("adhesions"))
     compare_with_adhesions(fit, data_of_adhesions(found.beads, context, *model, question.has_motion));
   Run result{.solution = std::move(found.solution), .figures = {}, .effects = effects_of(*model)};
-  write_beads(context, *model, result.solution, tensions::points_of(beads), tensions::points_of(found.beads));
+  write_beads(context, *model, result.solution, points_of(beads), points_of(found.beads));
   const Path estimates_file = context.output("out", "sheet_fit.csv"),
              models_file = context.output("out", "sheet_models.csv");
   write_estimates(estimates_file, fit);

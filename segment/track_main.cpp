@@ -30,17 +30,11 @@ namespace {
 constexpr double kRadian_deg = 180 / std::numbers::pi;
 
 void write_field_vtp(stage::StageContext& context, const DisplacementField& field, const std::string& name) {
-  std::vector<Vec2> points;
-  files::PointArray displacement{.name = "displacement_um", .scalars = {}, .vectors = {}};
-  files::PointArray sigma{.name = "sigma_um", .scalars = {}, .vectors = {}};
-  files::PointArray is_good{.name = "is_good", .scalars = {}, .vectors = {}};
-  for (const Bead& bead : field) {
-    points.push_back(bead.position_um);
-    displacement.vectors.push_back(bead.displacement_um);
-    sigma.scalars.push_back(bead.sigma_um);
-    is_good.scalars.push_back(bead.flag.empty() ? 1 : 0);
-  }
-  files::write_points_vtp(context.output("out", name + ".vtp"), points, {displacement, sigma, is_good});
+  files::write_points_vtp(
+      context.output("out", name + ".vtp"), points_of(field),
+      {files::array_of("displacement_um", field, &Bead::displacement_um),
+       files::array_of("sigma_um", field, &Bead::sigma_um),
+       files::array_of("is_good", field, [](const Bead& bead) { return bead.flag.empty() ? 1 : 0; })});
 }
 
 void write_field(stage::StageContext& context, const DisplacementField& field, const std::string& name) {

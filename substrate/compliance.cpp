@@ -20,6 +20,12 @@ Ellipse ellipse_of(const Adhesion& adhesion) {
           .angle_rad = adhesion.angle_rad};
 }
 
+std::vector<Ellipse> ellipses_of(const std::vector<Adhesion>& adhesions) {
+  std::vector<Ellipse> ellipses;
+  for (const Adhesion& a : adhesions) ellipses.push_back(ellipse_of(a));
+  return ellipses;
+}
+
 void declare(stage::ParameterList& list, SubstrateParameters& p) {
   list.table("substrate");
   list.add("model", p.model, "elastic model of the gel; auto: the cheapest that has the effects that are on");

@@ -20,6 +20,7 @@
 namespace mbtfm::substrate {
 
 Ellipse ellipse_of(const Adhesion& adhesion);
+std::vector<Ellipse> ellipses_of(const std::vector<Adhesion>& adhesions);
 
 enum class ModelKind {
   half_space,  ///< neither base nor sides

@@ -96,25 +96,21 @@ void write_blur(const Path& file, const std::vector<WaveShare>& shares) {
 void write_mean(const Path& table, const Path& points, const std::vector<NodeMean>& nodes,
                 const std::vector<Vec2>& model_kPa) {
   std::vector<MeanRow> rows;
-  std::vector<Vec2> places;
-  std::vector<files::PointArray> arrays = {{"displacement_um", {}, {}},
-                                           {"traction_kPa", {}, {}},
-                                           {"displacement_sigma_um", {}, {}},
-                                           {"traction_sigma_kPa", {}, {}},
-                                           {"n_cells", {}, {}}};
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    const NodeMean& node = nodes[k];
-    rows.push_back({node, model_kPa.empty() ? std::nullopt : std::optional(model_kPa[k])});
-    places.push_back(node.position_um);
-    const Sample sigma = node.sigma.value_or(Sample{});
-    arrays[0].vectors.push_back(node.mean.displacement_um);
-    arrays[1].vectors.push_back(node.mean.traction_kPa);
-    arrays[2].vectors.push_back(sigma.displacement_um);
-    arrays[3].vectors.push_back(sigma.traction_kPa);
-    arrays[4].scalars.push_back(node.n_cells);
-  }
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    rows.push_back({nodes[k], model_kPa.empty() ? std::nullopt : std::optional(model_kPa[k])});
   files::write(table, table_of_mean(), rows);
-  files::write_points_vtp(points, places, arrays);
+  const auto of_mean = [](Vec2 Sample::*value) { return [value](const NodeMean& node) { return node.mean.*value; }; };
+  const auto of_sigma = [](Vec2 Sample::*value) {
+    return [value](const NodeMean& node) { return node.sigma.value_or(Sample{}).*value; };
+  };
+  std::vector<Vec2> places;
+  for (const NodeMean& node : nodes) places.push_back(node.position_um);
+  files::write_points_vtp(points, places,
+                          {files::array_of("displacement_um", nodes, of_mean(&Sample::displacement_um)),
+                           files::array_of("traction_kPa", nodes, of_mean(&Sample::traction_kPa)),
+                           files::array_of("displacement_sigma_um", nodes, of_sigma(&Sample::displacement_um)),
+                           files::array_of("traction_sigma_kPa", nodes, of_sigma(&Sample::traction_kPa)),
+                           files::array_of("n_cells", nodes, &NodeMean::n_cells)});
 }
 
 std::string pages_of_tables() {

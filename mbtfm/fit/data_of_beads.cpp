@@ -34,7 +34,7 @@ Effect rest_of_series(Switch setting) {
 }  // namespace
 
 substrate::SharedResponse response_of(const GelUnderCell& on, const DisplacementField& beads) {
-  return on.gel.response({ellipses_of(on.cell)}, {points_of(beads)})->kept();
+  return on.gel.response({substrate::ellipses_of(on.cell.adhesions)}, {points_of(beads)})->kept();
 }
 
 std::vector<bool> beads_in_region(const DisplacementField& beads, const Cell& cell, const FitParameters& p) {
@@ -63,8 +63,8 @@ BeadsOfState in_their_state(const GelUnderCell& on, const DisplacementField& at_
   const stage::EffectSwitches& effects = on.parameters.effects;
   if (is_series) return {at_rest, std::move(data), rest_of_series(effects.beads_under_load)};
   const auto carried = [&](const LinearData& rest) {
-    return carried_um(on.parameters.gel, ellipses_of(on.cell), free_forces_nN(rest.reduced), rest.position_um,
-                      rest.displacement_um, on.threads);
+    return carried_um(on.parameters.gel, substrate::ellipses_of(on.cell.adhesions), free_forces_nN(rest.reduced),
+                      rest.position_um, rest.displacement_um, on.threads);
   };
   return take_state(
       at_rest, std::move(data), [&](const DisplacementField& beads) { return data_of(on, beads); },

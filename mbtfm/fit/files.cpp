@@ -42,14 +42,12 @@ std::optional<Cell> read_second_placement(stage::StageContext& context, const Ce
 }
 
 files::PointArray most_informed_array(const Influence& influence) {
-  return {.name = "informs_fibre_id",
-          .scalars = {influence.most_informed.begin(), influence.most_informed.end()},
-          .vectors = {}};
+  return {.name = "informs_fibre_id", .scalars = {influence.most_informed.begin(), influence.most_informed.end()}};
 }
 
 /// What the loss and the region leave of each bead.
 files::PointArray weight_array(const LinearData& data) {
-  files::PointArray array{.name = "weight", .scalars = {}, .vectors = {}};
+  files::PointArray array{.name = "weight"};
   for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b) {
     array.scalars.push_back(data.weight_per_um[2 * b] > 0 ? data.bead_weight[b] : 0);
   }
@@ -105,7 +103,8 @@ void write_surface(stage::StageContext& context, const FittedCell& cell) {
   std::vector<Vec2> forces_nN;
   for (const AdhesionForce& f : cell.found.forces) forces_nN.push_back(f.force_nN);
   substrate::write_substrate_vtu(context.output("out", "substrate.vtu"), *cell.ready.gel,
-                                 ellipses_of(cell.ready.scene.cell), forces_nN, cell.parameters.fit.surface_lines);
+                                 substrate::ellipses_of(cell.ready.scene.cell.adhesions), forces_nN,
+                                 cell.parameters.fit.surface_lines);
 }
 
 }  // namespace

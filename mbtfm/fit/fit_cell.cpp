@@ -20,10 +20,10 @@ using namespace tensions;
 namespace {
 
 EnsembleFit fit_networks(const ReadyCell& cell, LinearData data, const FitParameters& p, const Work& work) {
-  const SolvedMisfit misfit =
-      p.substrate == TrialDisplacement::per_evaluation
-          ? solved_misfit(*cell.gel, points_of(cell.scene.beads), ellipses_of(cell.scene.cell), data)
-          : SolvedMisfit{};
+  const SolvedMisfit misfit = p.substrate == TrialDisplacement::per_evaluation
+                                  ? solved_misfit(*cell.gel, points_of(cell.scene.beads),
+                                                  substrate::ellipses_of(cell.scene.cell.adhesions), data)
+                                  : SolvedMisfit{};
   return fit_ensemble(cell.networks, std::move(data), adhesion_ids_of(cell.scene.cell), p, work, misfit, &cell.start);
 }
 

@@ -22,7 +22,9 @@ struct AtRest {
   std::vector<Vec2> beads_um;
 };
 
-AtRest as_seen(const StrainedScene& scene) { return {ellipses_of(scene.on.cell), points_of(scene.beads)}; }
+AtRest as_seen(const StrainedScene& scene) {
+  return {substrate::ellipses_of(scene.on.cell.adhesions), points_of(scene.beads)};
+}
 
 /// @param by_um  of the adhesions' centres, 2·adhesions
 AtRest led_back(AtRest scene, const DisplacementField& beads, const Eigen::VectorXd& by_um) {
@@ -72,7 +74,8 @@ Effect decide_strain(const GelUnderCell& on, const EnsembleFit& fit, bool is_ser
   asked.material = p.substrate.material;
   asked.effects.large_strain = p.effects.large_strain;
   asked.effects.effect_tolerance = p.effects.effect_tolerance;
-  const double traction_kPa = choice::mean_traction_kPa(ellipses_of(on.cell), adhesion_forces_nN(fit));
+  const double traction_kPa =
+      choice::mean_traction_kPa(substrate::ellipses_of(on.cell.adhesions), adhesion_forces_nN(fit));
   Effect effect = choice::decide_large_strain(asked, choice::left_out_at_beads(p.gel, traction_kPa));
   if (!effect.is_on) return effect;
   const std::vector<Effect> of_gel = on.gel.effects();
@@ -93,7 +96,7 @@ EnsembleFit fit_on_strained_gel(const StrainedScene& scene, EnsembleFit fit, con
   constexpr double kSettled = 0.01;  // of what matters at all
   const Parameters& p = scene.on.parameters;
   const Eigen::VectorXd measured = fit.data.displacement_um;
-  const std::vector<substrate::Ellipse> ellipses = ellipses_of(scene.on.cell);
+  const std::vector<substrate::Ellipse> ellipses = substrate::ellipses_of(scene.on.cell.adhesions);
   const auto left_out = [&](const Eigen::VectorXd& forces) {
     return choice::left_out_at_beads(p.gel, choice::mean_traction_kPa(ellipses, forces));
   };

@@ -19,7 +19,7 @@ namespace {
 
 LinearData data_of(const Scene& scene, const Experiment& e, const Point& point, int threads) {
   const auto gel = choice::make_substrate(gel_of(scene, point), scene.fit.substrate, threads);
-  auto response = gel->response({ellipses_of(e.cell)}, {points_of(e.beads)})->kept();
+  auto response = gel->response({substrate::ellipses_of(e.cell.adhesions)}, {points_of(e.beads)})->kept();
   return reduce(e.beads, std::move(response), {}, threads,
                 allows_common_motion(scene.fit.effects) ? affine_motions(e.beads) : Eigen::MatrixXd());
 }

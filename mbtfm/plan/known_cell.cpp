@@ -73,7 +73,7 @@ KnownCell known_cell(const Scene& scene, const Work& work) {
   work.tell(0.02, "the cell's own network");
   const experiment::Experiment own = own_network(scene, work.threads);
   KnownCell cell{.adhesion_ids = adhesion_ids_of(own.cell),
-                 .ellipses = ellipses_of(own.cell),
+                 .ellipses = substrate::ellipses_of(own.cell.adhesions),
                  .networks = {},
                  .fibre_ids = {},
                  .tensions_nN = {},

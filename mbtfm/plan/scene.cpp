@@ -58,7 +58,7 @@ Scene measured_scene(const std::filesystem::path& folder, const Parameters& para
   }
   const DisplacementField beads = files::read_displacement(folder / "2_track/displacement.csv");
   if (beads.empty()) throw InputError((folder / "2_track/displacement.csv").string(), "beads", "none");
-  scene.field = extent_of(tensions::points_of(beads));
+  scene.field = extent_of(points_of(beads));
   drawing::ScenarioParameters& p = scene.experiment;
   p.seed = parameters.seed;
   p.gel = scene.fit.gel;

@@ -186,7 +186,7 @@ BeadFit fit_beads(const Question& q, const DisplacementField& beads, const Gel& 
   const Fitter fitter(q, unknowns, gel, model, threads);
   tell(0.5, "fitting");
   tensions::BeadsOfState state = state_of(q, fitter, beads);
-  const std::vector<Vec2> places = tensions::points_of(state.beads);
+  const std::vector<Vec2> places = points_of(state.beads);
   Fitter::Found found = fitter.fit(state.data);
   const std::vector<FittedEstimate> on_own_mesh = found.fit.estimates;
 

@@ -213,9 +213,7 @@ class Estimates {
 
 LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
                    const substrate::Substrate& gel, int threads, MatrixXd motions) {
-  std::vector<Vec2> points;
-  for (const Bead& bead : beads) points.push_back(bead.position_um);
-  const auto response = gel.response({ground.patches(), 2}, {points});
+  const auto response = gel.response({ground.patches(), 2}, {points_of(beads)});
   return tensions::reduce(beads, substrate::dense_response(response->displace(table.forces_nN()), threads), {}, threads,
                           std::move(motions));
 }

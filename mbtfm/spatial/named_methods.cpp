@@ -41,18 +41,13 @@ Basis basis_of(const Problem& problem) {
 }
 
 /// The displacement of the beads around a vertex, by the inverse of their distance.
-Eigen::Vector3d interpolated_um(const Problem& problem, const Vec3& at) {
-  constexpr std::size_t kNearest = 4;
-  const auto& beads = std::get<std::vector<Vec3>>(problem.observed.at.points_um);
-  std::vector<std::pair<double, std::size_t>> by_distance;
-  for (std::size_t b = 0; b < beads.size(); ++b) by_distance.emplace_back(norm(beads[b] - at), b);
-  std::partial_sort(by_distance.begin(), by_distance.begin() + kNearest, by_distance.end());
+Eigen::Vector3d interpolated_um(const Problem& problem, const numerics::Near& beads, const Vec3& at) {
+  constexpr int kNearest = 4;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double weights = 0;
-  for (std::size_t k = 0; k < kNearest; ++k) {
-    const double weight = 1 / std::max(by_distance[k].first, 1e-6);
-    const auto row = 3 * static_cast<Index>(by_distance[k].second);
-    sum += weight * problem.observed.displacement_um.segment<3>(row);
+  for (const int b : beads.nearest(at, kNearest)) {
+    const double weight = 1 / std::max(norm(beads.points()[b] - at), 1e-6);
+    sum += weight * problem.observed.displacement_um.segment<3>(3 * b);
     weights += weight;
   }
   return sum / weights;
@@ -122,9 +117,10 @@ SpatialReconstruction reconstruct_direct(const Problem& problem, int threads) {
   if (problem.observed.n_components() != 3) throw UsageError("direct: displacement along z is missing");
   SpatialReconstruction r;
   const std::vector<Vec3> vertices = problem.vertices_um();
+  const numerics::Near beads = near_beads(problem.observed);
   VectorXd imposed(problem.n_unknowns());
   for (std::size_t v = 0; v < vertices.size(); ++v)
-    imposed.segment<3>(3 * static_cast<Index>(v)) = interpolated_um(problem, vertices[v]);
+    imposed.segment<3>(3 * static_cast<Index>(v)) = interpolated_um(problem, beads, vertices[v]);
   // by normal equations: the compliance of the surface is symmetric but for the lattice
   MatrixXd normal = numerics::gram(problem.surface_um_per_kPa, threads);
   MatrixXd right = numerics::transposed_matvec(problem.surface_um_per_kPa, imposed);

@@ -22,6 +22,10 @@ double distance_between_um(const std::vector<Vec3>& points, const std::vector<do
 
 }  // namespace
 
+numerics::Near near_beads(const Observed& observed) {
+  return {std::get<std::vector<Vec3>>(observed.at.points_um), observed.distance_um};
+}
+
 Observed observe(const std::vector<BeadInSpace>& beads, const Gel& gel, const Ground& ground,
                  const SpatialParameters& parameters) {
   check(beads);

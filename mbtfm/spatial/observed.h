@@ -8,6 +8,7 @@
 #include "mbtfm/spatial/traction_mesh.h"
 #include "pipeline/contract/beads_in_space.h"
 #include "pipeline/contract/gel.h"
+#include "pipeline/numerics/near.h"
 #include "substrate/loads.h"
 
 namespace mbtfm::spatial {
@@ -29,6 +30,8 @@ struct Observed {
   double depth_um = 0;   ///< below the surface, the median
   Eigen::Index n_components() const { return at.n_components(); }
 };
+
+numerics::Near near_beads(const Observed& observed);
 
 /// @throws InvalidData where numbers are not finite, or fewer than four beads are left in the gel
 Observed observe(const std::vector<BeadInSpace>& beads, const Gel& gel, const Ground& ground,

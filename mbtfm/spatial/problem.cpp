@@ -247,9 +247,8 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
     map->displace(Eigen::VectorXd::Zero(problem.n_unknowns()));  // makes the mesh, whose error is asked below
   }
   if (meshing.has_patches && !inputs.adhesions.empty()) {
-    std::vector<substrate::Ellipse> ellipses;
-    for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
-    problem.patch_response_um_per_nN = model->response({ellipses, 3}, problem.observed.at)->matrix();
+    problem.patch_response_um_per_nN =
+        model->response({substrate::ellipses_of(inputs.adhesions), 3}, problem.observed.at)->matrix();
     problem.adhesion_areas_um2 = adhesion_areas_um2(problem.mesh, ground, inputs.adhesions, 0);
   }
   if (meshing.has_facets) problem.facet_response_um_per_kPa = facet_response(*model, problem.mesh, problem.observed.at);

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "mbtfm/spatial/reconstruction.h"
 #include "pipeline/contract/errors.h"
@@ -39,13 +38,11 @@ SpatialReconstruction by_method(TractionMethod method, const Problem& problem,
 
 /// From the middle of what may carry tractions to the nearest bead.
 double distance_to_beads_um(const Problem& problem) {
-  const auto& beads = std::get<std::vector<Vec3>>(problem.observed.at.points_um);
+  const numerics::Near beads = near_beads(problem.observed);
   std::vector<double> distances;
   for (const Vec3& v : problem.vertices_um()) {
     if (!problem.expected.is_part({v.x, v.y})) continue;
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const Vec3& b : beads) nearest = std::min(nearest, norm(b - v));
-    distances.push_back(nearest);
+    distances.push_back(norm(beads.points()[beads.nearest(v, 1).front()] - v));
   }
   return numerics::median(std::move(distances));
 }

@@ -22,8 +22,7 @@ Vec2 centre_of(const std::vector<Vec2>& places) {
 }  // namespace
 
 Eigen::MatrixXd affine_motions(const DisplacementField& beads) {
-  std::vector<Vec2> places_um;
-  for (const Bead& bead : beads) places_um.push_back(bead.position_um);
+  const std::vector<Vec2> places_um = points_of(beads);
   const Vec2 centre = centre_of(places_um);
   Eigen::MatrixXd motions(2 * static_cast<Eigen::Index>(beads.size()), 6);
   for (std::size_t i = 0; i < beads.size(); ++i) {
@@ -39,8 +38,7 @@ namespace {
 /// 2·beads × 14, about the beads' centre and of size 1 or so.
 Eigen::MatrixXd curved_motions(const DisplacementField& beads) {
   constexpr int kPowers[7][2] = {{2, 0}, {1, 1}, {0, 2}, {3, 0}, {2, 1}, {1, 2}, {0, 3}};
-  std::vector<Vec2> places_um;
-  for (const Bead& bead : beads) places_um.push_back(bead.position_um);
+  const std::vector<Vec2> places_um = points_of(beads);
   const Vec2 centre = centre_of(places_um);
   double squares = 0;
   for (const Vec2 place : places_um) squares += dot(place - centre, place - centre);

@@ -87,7 +87,7 @@ Figures moments_of(const EnsembleFit& fit, const std::vector<substrate::Ellipse>
 }  // namespace
 
 Figures energy_and_moments(const EnsembleFit& fit, const Cell& cell, const Gel& gel, bool is_even_gel, int threads) {
-  const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
+  const std::vector<substrate::Ellipse> ellipses = substrate::ellipses_of(cell.adhesions);
   const VectorXd forces_nN = adhesion_forces_nN(fit);
   Figures figures;
   if (is_even_gel) {

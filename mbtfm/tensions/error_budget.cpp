@@ -282,13 +282,9 @@ VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const Bea
 
 /// What the beads would show more if the gel were another.
 VectorXd change_by_other_gel_um(const BudgetInputs& in, const Gel& other, int threads) {
-  std::vector<Vec2> points;
-  for (const Bead& bead : in.beads) points.push_back(bead.position_um);
-  std::vector<substrate::Ellipse> ellipses;
-  for (const Adhesion& a : in.cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
   const auto field = [&](const Gel& gel) {
     return greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads)
-        ->response({ellipses}, {points})
+        ->response({substrate::ellipses_of(in.cell.adhesions)}, {points_of(in.beads)})
         ->kept()
         ->displace(in.fit.forces.nN);
   };

@@ -50,18 +50,6 @@ std::vector<int> adhesion_ids_of(const Cell& cell) {
   return ids;
 }
 
-std::vector<substrate::Ellipse> ellipses_of(const Cell& cell) {
-  std::vector<substrate::Ellipse> ellipses;
-  for (const Adhesion& a : cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
-  return ellipses;
-}
-
-std::vector<Vec2> points_of(const DisplacementField& beads) {
-  std::vector<Vec2> points;
-  for (const Bead& b : beads) points.push_back(b.position_um);
-  return points;
-}
-
 namespace {
 
 std::optional<double> if_finite(double number) { return std::isfinite(number) ? std::optional(number) : std::nullopt; }
@@ -202,29 +190,21 @@ DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementF
 
 void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,
                             const std::vector<files::PointArray>& more) {
-  std::vector<Vec2> points;
-  files::PointArray u{.name = "measured_um", .scalars = {}, .vectors = {}};
-  files::PointArray model{.name = "fitted_um", .scalars = {}, .vectors = {}};
-  files::PointArray residual{.name = "residual_um", .scalars = {}, .vectors = {}};
-  for (std::size_t i = 0; i < measured.size(); ++i) {
-    points.push_back(measured[i].position_um);
-    u.vectors.push_back(measured[i].displacement_um);
-    model.vectors.push_back(fitted[i].displacement_um);
+  files::PointArray residual{.name = "residual_um"};
+  for (std::size_t i = 0; i < measured.size(); ++i)
     residual.vectors.push_back(measured[i].displacement_um - fitted[i].displacement_um);
-  }
-  std::vector<files::PointArray> arrays = {std::move(u), std::move(model), std::move(residual)};
+  std::vector<files::PointArray> arrays = {files::array_of("measured_um", measured, &Bead::displacement_um),
+                                           files::array_of("fitted_um", fitted, &Bead::displacement_um), residual};
   arrays.insert(arrays.end(), more.begin(), more.end());
-  files::write_points_vtp(file, points, arrays);
+  files::write_points_vtp(file, points_of(measured), arrays);
 }
 
 void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces) {
-  files::PointArray force{.name = "force_nN", .scalars = {}, .vectors = {}};
-  files::PointArray traction{.name = "traction_kPa", .scalars = {}, .vectors = {}};
-  for (std::size_t a = 0; a < forces.size(); ++a) {
-    force.vectors.push_back(forces[a].force_nN);
+  files::PointArray traction{.name = "traction_kPa"};
+  for (std::size_t a = 0; a < forces.size(); ++a)
     traction.vectors.push_back(1 / area_stood_for_um2(cell.adhesions[a]) * forces[a].force_nN);
-  }
-  files::write_ellipses_vtp(file, cell.adhesions, {force, traction});
+  files::write_ellipses_vtp(file, cell.adhesions,
+                            {files::array_of("force_nN", forces, &AdhesionForce::force_nN), traction});
 }
 
 }  // namespace mbtfm::tensions

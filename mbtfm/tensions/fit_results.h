@@ -26,8 +26,6 @@ struct CellOnBeads {
 void check_place(const DisplacementField& beads, const Cell& cell);
 
 std::vector<int> adhesion_ids_of(const Cell& cell);
-std::vector<substrate::Ellipse> ellipses_of(const Cell& cell);
-std::vector<Vec2> points_of(const DisplacementField& beads);
 
 /// By group, with 95 % intervals.
 std::vector<Tension> tensions_of(const EnsembleFit& fit);

@@ -121,12 +121,12 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
   data.threads = threads;
   data.motions.shapes = std::move(motions);
   data.n_used = -data.motions.shapes.cols();
-  data.has_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
+  data.has_errors = state_errors(beads);
+  data.position_um = points_of(beads);
   data.displacement_um.resize(n_rows);
   data.weight_per_um = Eigen::VectorXd::Zero(n_rows);
   for (std::size_t i = 0; i < beads.size(); ++i) {
     const Eigen::Index row = 2 * static_cast<Eigen::Index>(i);
-    data.position_um.push_back(beads[i].position_um);
     data.displacement_um.segment<2>(row) << beads[i].displacement_um.x, beads[i].displacement_um.y;
     if (!is_used.empty() && !is_used[i]) continue;
     data.weight_per_um.segment<2>(row).setConstant(data.has_errors ? 1 / beads[i].sigma_um : 1);

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 
 #include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/near.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/half_space.h"
 
@@ -49,37 +49,28 @@ class DiscField {
   std::array<Vec2, 241> table_;
 };
 
-/// Beads by squares as wide as the reach.
-class BeadSquares {
+/// The beads in use.
+class UsedBeads {
  public:
-  explicit BeadSquares(const LinearData& data) : data_(data) {
-    for (std::size_t b = 0; b < data.position_um.size(); ++b) {
-      if (data.weight_per_um[2 * static_cast<Eigen::Index>(b)] <= 0) continue;
-      squares_[square_of(data.position_um[b])].push_back(static_cast<Eigen::Index>(b));
+  explicit UsedBeads(const LinearData& data) {
+    std::vector<Vec3> places;
+    for (Index b = 0; b < std::ssize(data.position_um); ++b) {
+      if (data.weight_per_um[2 * b] <= 0) continue;
+      beads_.push_back(b);
+      places.push_back({data.position_um[b].x, data.position_um[b].y, 0});
     }
+    near_ = numerics::Near(std::move(places), kReach_um);
   }
-  std::vector<Eigen::Index> near(Vec2 place_um) const {
-    std::vector<Eigen::Index> found;
-    const auto [x, y] = square_of(place_um);
-    for (int j = y - 1; j <= y + 1; ++j) {
-      for (int i = x - 1; i <= x + 1; ++i) {
-        const auto square = squares_.find({i, j});
-        if (square == squares_.end()) continue;
-        for (const Eigen::Index b : square->second) {
-          const Vec2 d = data_.position_um[b] - place_um;
-          if (dot(d, d) < kReach_um * kReach_um) found.push_back(b);
-        }
-      }
-    }
+  std::vector<Index> near(Vec2 place_um) const {
+    std::vector<Index> found;
+    for (const int k : near_.within({place_um.x, place_um.y, 0}, kReach_um, static_cast<int>(beads_.size())))
+      found.push_back(beads_[k]);
     return found;
   }
 
  private:
-  static std::pair<int, int> square_of(Vec2 p) {
-    return {static_cast<int>(std::floor(p.x / kReach_um)), static_cast<int>(std::floor(p.y / kReach_um))};
-  }
-  const LinearData& data_;
-  std::map<std::pair<int, int>, std::vector<Eigen::Index>> squares_;
+  std::vector<Index> beads_;
+  numerics::Near near_;
 };
 
 /// A place, asked.
@@ -92,7 +83,7 @@ struct Question {
   double gain = 0;               ///< of noise alone
 };
 
-Question ask(Vec2 place_um, const BeadSquares& beads, const DiscField& disc, const LinearData& data,
+Question ask(Vec2 place_um, const UsedBeads& beads, const DiscField& disc, const LinearData& data,
              const Eigen::VectorXd& weight, const Eigen::VectorXd& residual, double variance) {
   Question q{.place_um = place_um, .beads = beads.near(place_um), .fields = {}};
   constexpr std::size_t kFewest = 10;  // beads for two numbers and a mean
@@ -174,7 +165,7 @@ MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const Linear
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const LinearData& data, const Cell& cell,
                                                const Gel& gel, int threads) {
   const std::vector<Vec2> places = free_places(cell);
-  const BeadSquares beads(data);
+  const UsedBeads beads(data);
   const DiscField disc(gel);
   const Eigen::VectorXd weight = squared_weights(data), residual = residual_um(data, fit.forces.nN);
   const auto ask_at = [&](Vec2 place_um) {

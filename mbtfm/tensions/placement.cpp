@@ -228,8 +228,9 @@ Eigen::VectorXd carried_um(const Gel& gel, const std::vector<Ellipse>& ellipses,
 
 LinearData with_place(LinearData data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN,
                       Vec2 centre_um, int threads) {
-  const Eigen::MatrixXd motions = placement_motions(gel, ellipses_of(cell), forces_nN, data.position_um,
-                                                    data.response->displace(forces_nN), centre_um, threads);
+  const Eigen::MatrixXd motions =
+      placement_motions(gel, substrate::ellipses_of(cell.adhesions), forces_nN, data.position_um,
+                        data.response->displace(forces_nN), centre_um, threads);
   return with_more_motions(std::move(data), motions);
 }
 
@@ -245,7 +246,7 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
   constexpr double kSmall = 0.5, kSmallAtRest = 3;
   constexpr int kMostPasses = 12;  // far off it takes four
   const double width_um = mean_semi_minor_um(cell);
-  const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
+  const std::vector<substrate::Ellipse> ellipses = substrate::ellipses_of(cell.adhesions);
   const Placement none{.centre_um = centre_of(cell), .shift_um = {}};
   const double lever_um = lever_of(cell, none.centre_um);
   PlacedCell result{.placement = none, .data = {}, .start = start, .effect = {}};

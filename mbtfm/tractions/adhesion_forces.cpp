@@ -25,11 +25,11 @@ struct WeightedBeads {
 
 WeightedBeads weighted(const DisplacementField& beads) {
   WeightedBeads w;
-  w.states_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
+  w.states_errors = state_errors(beads);
+  w.positions_um = points_of(beads);
   w.weight.resize(2 * static_cast<Index>(beads.size()));
   w.displacement.resize(w.weight.size());
   for (std::size_t i = 0; i < beads.size(); ++i) {
-    w.positions_um.push_back(beads[i].position_um);
     const double weight = w.states_errors ? 1 / beads[i].sigma_um : 1;
     const Index row = 2 * static_cast<Index>(i);
     w.weight.segment<2>(row).setConstant(weight);
@@ -120,8 +120,7 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
                       std::to_string(inputs.beads.size()));
   }
   const auto gel = greens::make_greens(inputs.gel, {.model = substrate::kind_of(parameters.gel_model)}, threads);
-  std::vector<substrate::Ellipse> ellipses;
-  for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  const std::vector<Ellipse> ellipses = substrate::ellipses_of(inputs.adhesions);
   const WeightedBeads beads = weighted(inputs.beads);
   const Eigen::MatrixXd G = weighted_compliance(*gel, beads, ellipses);
   const Eigen::MatrixXd normal_matrix = numerics::small_transposed_product(G, G);

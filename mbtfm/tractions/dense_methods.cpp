@@ -46,9 +46,9 @@ struct Model {
 };
 
 Compliance even_forces(const TractionInputs& inputs, const substrate::Substrate& gel) {
-  std::vector<substrate::Ellipse> ellipses;
-  for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
-  return [&gel, ellipses](const std::vector<Vec2>& at) { return gel.compliance_um_per_nN(at, ellipses); };
+  return [&gel, ellipses = substrate::ellipses_of(inputs.adhesions)](const std::vector<Vec2>& at) {
+    return gel.compliance_um_per_nN(at, ellipses);
+  };
 }
 
 /// Choose lambda and solve. `length_at_unit_density_um` is lambda E for lambda = 1 in the problem's own unit and one
@@ -114,11 +114,11 @@ Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const Trac
                                         int threads) {
   if (inputs.adhesions.empty()) throw UsageError("trpf: --adhesions is missing or holds none");
   const auto gel = greens::make_greens(inputs.gel, {.model = substrate::kind_of(parameters.gel_model)}, threads);
-  std::vector<substrate::Ellipse> points, ellipses;
+  const std::vector<substrate::Ellipse> ellipses = substrate::ellipses_of(inputs.adhesions);
+  std::vector<substrate::Ellipse> points;
   double area = 0;
   for (const Adhesion& a : inputs.adhesions) {
     points.push_back({a.position_um, kPointRadius_um, kPointRadius_um, 0});
-    ellipses.push_back(substrate::ellipse_of(a));
     area += a.area_um2 / static_cast<double>(inputs.adhesions.size());
   }
   Reconstruction r;

@@ -48,7 +48,7 @@ DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance
                           " unknown components",
                       std::to_string(beads.size()));
   }
-  const bool states_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
+  const bool states_errors = state_errors(beads);
   double sum = 0;
   for (const Bead& b : beads) {
     weights_.push_back(states_errors ? 1 / (b.sigma_um * b.sigma_um) : 1);

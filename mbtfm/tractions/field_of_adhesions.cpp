@@ -66,16 +66,14 @@ VectorXd weighted_fit(const MatrixXd& shapes, const VectorXd& displacement_um, c
 
 }  // namespace
 
-FieldOfAdhesions::FieldOfAdhesions(const std::vector<Adhesion>& adhesions, int threads) : threads_(threads) {
-  for (const Adhesion& a : adhesions) ellipses_.push_back(substrate::ellipse_of(a));
-}
+FieldOfAdhesions::FieldOfAdhesions(const std::vector<Adhesion>& adhesions, int threads)
+    : ellipses_(substrate::ellipses_of(adhesions)), threads_(threads) {}
 
 std::vector<Vec2> FieldOfAdhesions::um(const DisplacementField& beads) {
-  std::vector<Vec2> places_um;
+  std::vector<Vec2> places_um = points_of(beads);
   VectorXd displacement_um(2 * std::ssize(beads)), as_flagged = VectorXd::Zero(displacement_um.size());
   for (Index i = 0; i < std::ssize(beads); ++i) {
     const Bead& bead = beads[i];
-    places_um.push_back(bead.position_um);
     displacement_um.segment<2>(2 * i) << bead.displacement_um.x, bead.displacement_um.y;
     if (bead.flag.empty()) as_flagged.segment<2>(2 * i).setOnes();
   }

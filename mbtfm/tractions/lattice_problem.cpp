@@ -73,9 +73,7 @@ std::optional<double> lattice_spacing_um(const DisplacementField& beads, const E
 }
 
 Lattice field_of(const DisplacementField& beads, const LatticeOptions& options) {
-  std::vector<Vec2> places_um;
-  for (const Bead& b : beads) places_um.push_back(b.position_um);
-  const Extent e = extent_of(places_um);
+  const Extent e = extent_of(beads, &Bead::position_um);
   const Vec2 size = e.high_um - e.low_um;
   if (!(size.x > 0 && size.y > 0)) {
     throw InvalidData("displacement", "beads spread over an area", "all on one line");
@@ -146,7 +144,7 @@ LatticeProblem::LatticeProblem(const DisplacementField& beads, const Gel& gel, c
       greens::wave_compliance(gel, options.model, 2 * std::numbers::pi / longest_um).across_um_per_kPa;
   n_beads_ = beads.size();
 
-  const bool states_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
+  const bool states_errors = state_errors(beads);
   double sum = 0;
   for (const Bead& b : beads) sum += states_errors ? 1 / (b.sigma_um * b.sigma_um) : 1;
   const double n_nodes = static_cast<double>(field_.n_nodes());

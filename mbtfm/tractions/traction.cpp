@@ -147,12 +147,8 @@ Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, GelModel gel
                              .parts = "beads",
                              .bytes_each = 3 * 4 * sizeof(double) * static_cast<double>(inputs.adhesions.size()),
                              .remedy = "leave --adhesions out, or take fewer beads"});
-  std::vector<Vec2> points;
-  for (const Bead& b : inputs.beads) points.push_back(b.position_um);
-  std::vector<substrate::Ellipse> ellipses;
-  for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
   return greens::make_greens(inputs.gel, {.model = substrate::kind_of(gel_model)}, threads)
-      ->compliance_um_per_nN(points, ellipses);
+      ->compliance_um_per_nN(points_of(inputs.beads), substrate::ellipses_of(inputs.adhesions));
 }
 
 Vec2 direction_of(Vec2 force_nN) {
@@ -249,17 +245,10 @@ std::string pages_of_tables() { return page_of(patch_table()) + page_of(lambda_t
 void write_tractions(const Path& file, const std::vector<Patch>& patches) { write(file, patch_table(), patches); }
 
 void write_tractions_vtp(const Path& file, const std::vector<Patch>& patches) {
-  std::vector<Vec2> positions;
-  files::PointArray traction{.name = "traction_kPa", .scalars = {}, .vectors = {}};
-  files::PointArray displacement{.name = "displacement_um", .scalars = {}, .vectors = {}};
-  files::PointArray area{.name = "area_um2", .scalars = {}, .vectors = {}};
-  for (const Patch& p : patches) {
-    positions.push_back(p.position_um);
-    traction.vectors.push_back(p.traction_kPa);
-    displacement.vectors.push_back(p.displacement_um);
-    area.scalars.push_back(p.area_um2);
-  }
-  files::write_points_vtp(file, positions, {traction, displacement, area});
+  files::write_points_vtp(file, positions_of(patches),
+                          {files::array_of("traction_kPa", patches, &Patch::traction_kPa),
+                           files::array_of("displacement_um", patches, &Patch::displacement_um),
+                           files::array_of("area_um2", patches, &Patch::area_um2)});
 }
 
 void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_um_per_lambda) {
@@ -274,14 +263,10 @@ void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_u
 
 std::vector<files::PointArray> columns_of(const std::vector<Sensitivity>& sensitivities) {
   if (sensitivities.empty()) return {};
-  const auto column = [&](const char* name, double Sensitivity::*member) {
-    files::PointArray array{.name = name, .scalars = {}, .vectors = {}};
-    for (const Sensitivity& s : sensitivities) array.scalars.push_back(s.*member);
-    return array;
-  };
-  return {column("shift_along_nN", &Sensitivity::shift_along_nN),
-          column("shift_across_nN", &Sensitivity::shift_across_nN), column("size_nN", &Sensitivity::size_nN),
-          column("angle_nN", &Sensitivity::angle_nN)};
+  return {files::array_of("shift_along_nN", sensitivities, &Sensitivity::shift_along_nN),
+          files::array_of("shift_across_nN", sensitivities, &Sensitivity::shift_across_nN),
+          files::array_of("size_nN", sensitivities, &Sensitivity::size_nN),
+          files::array_of("angle_nN", sensitivities, &Sensitivity::angle_nN)};
 }
 
 Figures summary_of(const Reconstruction& r, const TractionSums& sums) {

@@ -16,6 +16,9 @@ struct Bead {
   std::string flag;     ///< why it must not be used; empty: good
 };
 using DisplacementField = std::vector<Bead>;
+std::vector<Vec2> points_of(const DisplacementField& beads);
+/// Each of them a standard error.
+bool state_errors(const DisplacementField& beads);
 /// Over the rectangle that holds them; 0 where they spread over no area.
 double beads_per_um2(const DisplacementField& beads);
 

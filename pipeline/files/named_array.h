@@ -1,7 +1,9 @@
 /// Numbers by name, for tables and VTK files.
 #pragma once
 
+#include <functional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
@@ -15,5 +17,19 @@ struct PointArray {
   std::vector<double> scalars = {};
   std::vector<Vec2> vectors = {};
 };
+
+/// @param value  of each thing: a number or a Vec2
+template <class Things, class Value>
+PointArray array_of(std::string name, const Things& things, Value value) {
+  PointArray array{.name = std::move(name)};
+  for (const auto& thing : things) {
+    if constexpr (std::is_convertible_v<decltype(std::invoke(value, thing)), Vec2>) {
+      array.vectors.push_back(std::invoke(value, thing));
+    } else {
+      array.scalars.push_back(std::invoke(value, thing));
+    }
+  }
+  return array;
+}
 
 }  // namespace mbtfm::files

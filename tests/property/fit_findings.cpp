@@ -44,7 +44,7 @@ class FitFindings : public ::testing::Test {
   /// A further force on the gel.
   void push(Vec2 at_um, Vec2 force_nN) {
     const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::layer}, 1);
-    const Eigen::VectorXd u = gel->compliance_um_per_nN(tensions::points_of(inputs_.beads), {{at_um, 0.4, 0.4, 0}}) *
+    const Eigen::VectorXd u = gel->compliance_um_per_nN(points_of(inputs_.beads), {{at_um, 0.4, 0.4, 0}}) *
                               Eigen::Vector2d(force_nN.x, force_nN.y);
     for (std::size_t i = 0; i < inputs_.beads.size(); ++i) {
       const auto row = 2 * static_cast<Eigen::Index>(i);

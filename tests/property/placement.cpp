@@ -71,15 +71,16 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
     for (const Vec2 p : beads) places.push_back({.position_um = p});
     const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::half_space}, 1);
     const Eigen::VectorXd seen =
-        gel->compliance_um_per_nN(points_of(in_cell_frame(places, at)), ellipses_of(cell)) * forces;
+        gel->compliance_um_per_nN(points_of(in_cell_frame(places, at)), substrate::ellipses_of(cell.adhesions)) *
+        forces;
     Eigen::VectorXd u(seen.size());
     for (Eigen::Index row = 0; row < seen.size(); row += 2)
       u.segment<2>(row) = Eigen::Rotation2Dd(at.turn_rad) * seen.segment<2>(row);
     return u;
   };
   const Vec2 centre{30, 30};
-  const Eigen::MatrixXd motions =
-      placement_motions(test::kGel, ellipses_of(cell), forces, beads, model({.centre_um = centre}), centre, 2);
+  const Eigen::MatrixXd motions = placement_motions(test::kGel, substrate::ellipses_of(cell.adhesions), forces, beads,
+                                                    model({.centre_um = centre}), centre, 2);
   constexpr double kStep = 1e-3;
   const Placement steps[] = {{centre, {kStep, 0}, 0}, {centre, {0, kStep}, 0}, {centre, {}, kStep}};
   for (int k = 0; k < 3; ++k) {
@@ -103,7 +104,7 @@ TEST(Placement, what_carries_a_bead_changes_its_displacement_by_as_much_as_the_f
   }
   for (int i = 0; i < 14; ++i) forces[i] = std::sin(1 + i);
   const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::half_space}, 1);
-  const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
+  const std::vector<substrate::Ellipse> ellipses = substrate::ellipses_of(cell.adhesions);
   const Eigen::VectorXd wanted =
       (gel->compliance_um_per_nN(carried, ellipses) - gel->compliance_um_per_nN(beads, ellipses)) * forces;
   // Exact near an adhesion. From r = 4 a on by the slope halfway, which leaves way² / (4 r²) of 1/r.

@@ -60,8 +60,8 @@ TEST(StrainedGel, forces_that_made_a_displacement_on_it_are_found_again) {
   Experiment e = two_adhesions();
   const auto linear = choice::make_substrate(e.parameters.gel, e.parameters.substrate, 1);
   const GelUnderCell on{*linear, e.cell, e.parameters};
-  const auto ellipses = tensions::ellipses_of(e.cell);
-  const auto points = tensions::points_of(e.beads);
+  const auto ellipses = substrate::ellipses_of(e.cell.adhesions);
+  const auto points = points_of(e.beads);
   const VectorXd displacement =
       linear->response({ellipses}, {points})->displace(e.forces_nN) +
       choice::LargeStrain(e.parameters.gel, ellipses, points, e.forces_nN, 1).about(e.forces_nN).displacement_um;

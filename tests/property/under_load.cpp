@@ -31,8 +31,8 @@ struct PullingCell {
   }
   Carried carried() const {
     return [this](const LinearData& data) {
-      return carried_um(test::kGel, ellipses_of(cell), free_forces_nN(data.reduced), data.position_um,
-                        data.displacement_um, 1);
+      return carried_um(test::kGel, substrate::ellipses_of(cell.adhesions), free_forces_nN(data.reduced),
+                        data.position_um, data.displacement_um, 1);
     };
   }
   /// Fitted on the network that made the forces.

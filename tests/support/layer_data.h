@@ -12,7 +12,7 @@ namespace mbtfm::test {
 inline tensions::LinearData data_on_layer(const DisplacementField& beads, const Cell& cell, const Gel& gel) {
   const auto greens = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, 1);
   const Eigen::MatrixXd compliance =
-      greens->compliance_um_per_nN(tensions::points_of(beads), tensions::ellipses_of(cell));
+      greens->compliance_um_per_nN(points_of(beads), substrate::ellipses_of(cell.adhesions));
   return tensions::reduce(beads, substrate::dense_response(compliance), {}, 1, tensions::affine_motions(beads));
 }
 
