@@ -9,13 +9,16 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/report.h"
+#include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/stopwatch.h"
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/boxes/load_cases.h"
 #include "substrate/boxes/models.h"
 #include "substrate/boxes/refined_mesh.h"
 #include "substrate/boxes/volume.h"
-#include "substrate/greens/greens_model.h"
+#include "substrate/loads.h"
 #include "substrate/models.h"
+#include "substrate/response.h"
 
 namespace mbtfm::boxes {
 namespace {
@@ -140,7 +143,7 @@ class Refined final : public substrate::Substrate {
     check(request.ellipses);
     const auto n_rows = static_cast<Eigen::Index>(request.axes.size() * request.points_um.size());
     if (n_rows == 0 || request.ellipses.empty()) return Eigen::MatrixXd::Zero(n_rows, request.n_columns);
-    const auto start = std::chrono::steady_clock::now();
+    const stage::Stopwatch watch;
     Fineness fineness = first_fineness(request.ellipses.size());
     Eigen::MatrixXd columns;
     std::vector<double> errors;
@@ -152,7 +155,7 @@ class Refined final : public substrate::Substrate {
       columns = solve_on(fineness, request);
       errors = refine_until_right(fineness, request, columns);
     }
-    note_errors(errors, greens::seconds_since(start));
+    note_errors(errors, watch.seconds());
     return columns;
   }
 
@@ -231,9 +234,9 @@ class Refined final : public substrate::Substrate {
   }
 
   Eigen::MatrixXd solve_on(const Fineness& fineness, const Request& request) const {
-    const auto start = std::chrono::steady_clock::now();
+    const stage::Stopwatch watch;
     const ElasticSystem system = system_for(fineness, request.points_um, request.ellipses);
-    const double setup_s = greens::seconds_since(start);
+    const double setup_s = watch.seconds();
     std::vector<std::vector<NodeWeight>> samples(request.points_um.size()), loads(request.ellipses.size());
     numerics::parallel_for(static_cast<int>(samples.size()), threads_,
                            [&](int i) { samples[i] = system.surface_weights(request.points_um[i]); });

@@ -5,16 +5,18 @@
 /// grid does, and it knows nothing of the adhesions: one factorisation for all scenes that cover the same squares.
 /// Valid for a homogeneous gel with a flat surface; sides about a thickness away from the adhesions at least.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <mutex>
 
+#include "pipeline/stage/stopwatch.h"
 #include "substrate/boxes/load_cases.h"
 #include "substrate/boxes/models.h"
 #include "substrate/boxes/split_block.h"
-#include "substrate/greens/greens_model.h"
+#include "substrate/greens/columns.h"
+#include "substrate/loads.h"
 #include "substrate/models.h"
+#include "substrate/response.h"
 
 namespace mbtfm::boxes {
 namespace {
@@ -156,9 +158,9 @@ class Split final : public substrate::Substrate {
     const Footprint footprint = footprint_of(scene, gel_, parameters_);
     if (block_ && block_->footprint == footprint) return *block_;
     block_.reset();  // not two at a time in memory
-    const auto start = std::chrono::steady_clock::now();
+    const stage::Stopwatch watch;
     block_ = make_split_block(footprint, gel_, parameters_, threads_);
-    setup_s_ = greens::seconds_since(start);
+    setup_s_ = watch.seconds();
     return *block_;
   }
 
@@ -167,7 +169,7 @@ class Split final : public substrate::Substrate {
   void add_correction(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
                       const CaseOf& case_of_column, const std::vector<int>& axes, Eigen::MatrixXd& columns) const {
     const SplitBlock& block = block_around(substrate::extent_of(points_um, ellipses));
-    const auto start = std::chrono::steady_clock::now();
+    const stage::Stopwatch watch;
     std::vector<std::vector<NodeWeight>> samples(points_um.size());
     numerics::parallel_for(static_cast<int>(samples.size()), threads_,
                            [&](int i) { samples[i] = block.system.surface_weights(points_um[i]); });
@@ -177,7 +179,7 @@ class Split final : public substrate::Substrate {
           for (const auto& [j, force] : case_of_column(column)) add_data(block, ellipses[j], force, b);
         },
         [&](int column, const numerics::NodalColumn& w) { add_samples(samples, axes, w, columns.col(column).data()); });
-    solve_s_ = greens::seconds_since(start);
+    solve_s_ = watch.seconds();
   }
 
   /// Right-hand side of w for a force on one ellipse.

@@ -1,6 +1,5 @@
 /// A gel under a surface that is not flat: finite elements bent onto it.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -10,6 +9,7 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/stopwatch.h"
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/curved/linear.h"
 #include "substrate/curved/models.h"
@@ -229,14 +229,13 @@ class CurvedGel final : public substrate::Substrate {
 
   /// Under forces on the free nodes.
   LargeSolution solve_large(const System& system, Vectors forces_nN) const {
-    const auto start = std::chrono::steady_clock::now();
+    const stage::Stopwatch watch;
     LargeSolution solution =
         solve_neo_hooke(gel_, system.space, {.at_nodes_nN = std::move(forces_nN)}, 1, factor_options());
     const std::lock_guard lock(mutex_);
-    newton_figures_ = {
-        {"substrate_load_steps", std::int64_t{solution.load_steps}},
-        {"substrate_newton_steps", std::int64_t{solution.most_iterations}},
-        {"substrate_newton_s", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()}};
+    newton_figures_ = {{"substrate_load_steps", std::int64_t{solution.load_steps}},
+                       {"substrate_newton_steps", std::int64_t{solution.most_iterations}},
+                       {"substrate_newton_s", watch.seconds()}};
     return solution;
   }
 
@@ -244,7 +243,7 @@ class CurvedGel final : public substrate::Substrate {
   /// @param keeps_factor  of small strains; else it is gone, with its memory, once the mesh is known
   std::unique_ptr<const System> system_for(const substrate::Loads& loads, const substrate::Observations& observations,
                                            Axes load_axes, Axes point_axes, bool keeps_factor) const {
-    const auto start = std::chrono::steady_clock::now();
+    const stage::Stopwatch watch;
     Fineness fineness = first_fineness();
     const double tolerance = parameters_.displacement_tolerance;
     const MatrixXd probes = probes_of(loads);
@@ -272,7 +271,7 @@ class CurvedGel final : public substrate::Substrate {
         error = estimated_error(before, now);
       }
     }
-    note(*system, error, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    note(*system, error, watch.seconds());
     if (!keeps_factor) system->factor.reset();
     return system;
   }
