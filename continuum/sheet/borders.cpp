@@ -137,20 +137,18 @@ std::vector<Border> borders_of(const CellLabels& cells, const Solution& solution
 
 std::vector<CellTension> cell_tensions(const CellLabels& cells, const Solution& solution) {
   std::map<int, CellTension> by_label;
-  for (int t = 0; t < solution.elements->n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const Shape& shape = solution.elements->at(t, p);
-      const Vec2 at = 1 / cells.pixel_um * shape.place_um;
-      if (!(at.x >= 0 && at.y >= 0 && at.x < cells.width && at.y < cells.height)) continue;
-      const int label = cells.at(static_cast<int>(at.x), static_cast<int>(at.y));
-      if (label == 0) continue;
-      const Tensor& S = solution.at_points[Elements::kPoints * t + p];
-      CellTension& cell = by_label[label];
-      cell.cell = label;
-      cell.area_um2 += shape.weight_um2;
-      cell.mean_tension_nN_per_um += shape.weight_um2 * mean_of(S);
-      cell.max_shear_nN_per_um += shape.weight_um2 * largest_shear(S);
-    }
+  solution.elements->for_each_point([&](int t, int p, const Shape& shape) {
+    const Vec2 at = 1 / cells.pixel_um * shape.place_um;
+    if (!(at.x >= 0 && at.y >= 0 && at.x < cells.width && at.y < cells.height)) return;
+    const int label = cells.at(static_cast<int>(at.x), static_cast<int>(at.y));
+    if (label == 0) return;
+    const Tensor& S = solution.at_points[Elements::kPoints * t + p];
+    CellTension& cell = by_label[label];
+    cell.cell = label;
+    cell.area_um2 += shape.weight_um2;
+    cell.mean_tension_nN_per_um += shape.weight_um2 * mean_of(S);
+    cell.max_shear_nN_per_um += shape.weight_um2 * largest_shear(S);
+  });
   std::vector<CellTension> result;
   for (auto& [label, cell] : by_label) {
     cell.mean_tension_nN_per_um /= cell.area_um2;

@@ -30,6 +30,12 @@ class Elements {
   const std::array<int, 6>& nodes(int triangle) const { return triangles_.nodes[triangle]; }
   /// At point 0 … kPoints − 1 of the triangle.
   const Shape& at(int triangle, int point) const { return shapes_[kPoints * triangle + point]; }
+  /// body(triangle, point, shape) at all points of all triangles, in turn.
+  template <class Body>
+  void for_each_point(const Body& body) const {
+    for (int t = 0; t < n_triangles(); ++t)
+      for (int p = 0; p < kPoints; ++p) body(t, p, at(t, p));
+  }
   double area_um2(int triangle) const;
   double area_um2() const;
   /// At barycentric coordinates (1 − r − s, r, s) of a triangle; weight_um2 is the Jacobian's.

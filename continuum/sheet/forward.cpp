@@ -84,17 +84,15 @@ std::vector<double> contraction_at_points(const Elements& elements, const Region
                                           const Contraction& contraction) {
   std::vector<double> s = even(elements, contraction.nN_per_um);
   if (contraction.at)
-    for (int t = 0; t < elements.n_triangles(); ++t)
-      for (int p = 0; p < Elements::kPoints; ++p)
-        s[Elements::kPoints * t + p] = contraction.at(elements.at(t, p).place_um);
+    elements.for_each_point(
+        [&](int t, int p, const Shape& shape) { s[Elements::kPoints * t + p] = contraction.at(shape.place_um); });
   if (!contraction.edge_band_um) return s;
-  for (int t = 0; t < elements.n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      double nearest = std::numeric_limits<double>::infinity();
-      for (const Curve& rim : region.rims)
-        nearest = std::min(nearest, distance_to_boundary_um(rim.points_um(), elements.at(t, p).place_um));
-      if (nearest > *contraction.edge_band_um) s[Elements::kPoints * t + p] = 0;
-    }
+  elements.for_each_point([&](int t, int p, const Shape& shape) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Curve& rim : region.rims)
+      nearest = std::min(nearest, distance_to_boundary_um(rim.points_um(), shape.place_um));
+    if (nearest > *contraction.edge_band_um) s[Elements::kPoints * t + p] = 0;
+  });
   return s;
 }
 

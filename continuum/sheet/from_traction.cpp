@@ -244,16 +244,14 @@ FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Regi
 TensionFigures figures_inside(const Solution& solution, const Polygon& outline_um) {
   TensionFigures figures;
   double sum = 0, squares = 0, shear = 0;
-  for (int t = 0; t < solution.elements->n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const Shape& shape = solution.elements->at(t, p);
-      if (!contains(outline_um, shape.place_um)) continue;
-      const Tensor& S = solution.at_points[Elements::kPoints * t + p];
-      figures.area_um2 += shape.weight_um2;
-      sum += shape.weight_um2 * mean_of(S);
-      squares += shape.weight_um2 * mean_of(S) * mean_of(S);
-      shear += shape.weight_um2 * S.xy;
-    }
+  solution.elements->for_each_point([&](int t, int p, const Shape& shape) {
+    if (!contains(outline_um, shape.place_um)) return;
+    const Tensor& S = solution.at_points[Elements::kPoints * t + p];
+    figures.area_um2 += shape.weight_um2;
+    sum += shape.weight_um2 * mean_of(S);
+    squares += shape.weight_um2 * mean_of(S) * mean_of(S);
+    shear += shape.weight_um2 * S.xy;
+  });
   if (figures.area_um2 == 0) return figures;
   figures.mean_nN_per_um = sum / figures.area_um2;
   const double variance = squares / figures.area_um2 - figures.mean_nN_per_um * figures.mean_nN_per_um;
@@ -264,15 +262,13 @@ TensionFigures figures_inside(const Solution& solution, const Polygon& outline_u
 
 double reach_of_cuts_um(const Solution& a, const Solution& b, const Cuts& cuts, double difference_nN_per_um) {
   double reach = 0;
-  for (int t = 0; t < a.elements->n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const auto k = static_cast<std::size_t>(Elements::kPoints * t + p);
-      if (std::abs(mean_of(a.at_points[k]) - mean_of(b.at_points[k])) <= difference_nN_per_um) continue;
-      double distance = std::numeric_limits<double>::infinity();
-      for (const auto& [from, to] : cuts)
-        distance = std::min(distance, distance_to_segment_um(a.elements->at(t, p).place_um, from, to));
-      reach = std::max(reach, distance);
-    }
+  a.elements->for_each_point([&](int t, int p, const Shape& shape) {
+    const auto k = static_cast<std::size_t>(Elements::kPoints * t + p);
+    if (std::abs(mean_of(a.at_points[k]) - mean_of(b.at_points[k])) <= difference_nN_per_um) return;
+    double distance = std::numeric_limits<double>::infinity();
+    for (const auto& [from, to] : cuts) distance = std::min(distance, distance_to_segment_um(shape.place_um, from, to));
+    reach = std::max(reach, distance);
+  });
   return reach;
 }
 

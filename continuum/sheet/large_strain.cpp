@@ -112,18 +112,16 @@ double LargeSheet::energy_fJ(const NodeVectors& u, double share) const {
 
 NodeVectors LargeSheet::left_nN(const NodeVectors& u, double share) const {
   NodeVectors f = NodeVectors::Zero(u.size());
-  for (int t = 0; t < elements_.n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const Shape& shape = elements_.at(t, p);
-      const Matrix2d P = law_at(sheet_, measure_, t, p, share, gradient_of(u, elements_.nodes(t), shape)).stress();
-      const Vec2 at = value_of(u, elements_.nodes(t), shape);
-      const double k = spring_at(springs_of(sheet_, t), p);
-      for (int i = 0; i < 6; ++i) {
-        const Eigen::Vector2d g(shape.gradient_per_um[i].x, shape.gradient_per_um[i].y);
-        f.segment<2>(2 * elements_.nodes(t)[i]) -=
-            shape.weight_um2 * (P * g + k * shape.value[i] * Eigen::Vector2d(at.x, at.y));
-      }
+  elements_.for_each_point([&](int t, int p, const Shape& shape) {
+    const Matrix2d P = law_at(sheet_, measure_, t, p, share, gradient_of(u, elements_.nodes(t), shape)).stress();
+    const Vec2 at = value_of(u, elements_.nodes(t), shape);
+    const double k = spring_at(springs_of(sheet_, t), p);
+    for (int i = 0; i < 6; ++i) {
+      const Eigen::Vector2d g(shape.gradient_per_um[i].x, shape.gradient_per_um[i].y);
+      f.segment<2>(2 * elements_.nodes(t)[i]) -=
+          shape.weight_um2 * (P * g + k * shape.value[i] * Eigen::Vector2d(at.x, at.y));
     }
+  });
   for (std::size_t i = 0; i < sheet_.held.size(); ++i)
     for (int a = 0; a < 2; ++a)
       if (sheet_.held[i][a]) f(2 * static_cast<Eigen::Index>(i) + a) = 0;
@@ -153,18 +151,16 @@ void LargeSheet::add_to(Stiffness& stiffness, const NodeVectors& u, double share
 
 NodeVectors LargeSheet::change_nN(const NodeVectors& u, double share, const NodeVectors& change) const {
   NodeVectors f = NodeVectors::Zero(u.size());
-  for (int t = 0; t < elements_.n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const Shape& shape = elements_.at(t, p);
-      const Matrix2d dP = law_at(sheet_, measure_, t, p, share, gradient_of(u, elements_.nodes(t), shape))
-                              .change(gradient_of(change, elements_.nodes(t), shape));
-      const Vec2 at = value_of(change, elements_.nodes(t), shape);
-      const double k = spring_at(springs_of(sheet_, t), p);
-      for (std::size_t i = 0; i < 6; ++i)
-        f.segment<2>(2 * elements_.nodes(t)[i]) +=
-            shape.weight_um2 * (dP * Eigen::Vector2d(shape.gradient_per_um[i].x, shape.gradient_per_um[i].y) +
-                                k * shape.value[i] * Eigen::Vector2d(at.x, at.y));
-    }
+  elements_.for_each_point([&](int t, int p, const Shape& shape) {
+    const Matrix2d dP = law_at(sheet_, measure_, t, p, share, gradient_of(u, elements_.nodes(t), shape))
+                            .change(gradient_of(change, elements_.nodes(t), shape));
+    const Vec2 at = value_of(change, elements_.nodes(t), shape);
+    const double k = spring_at(springs_of(sheet_, t), p);
+    for (std::size_t i = 0; i < 6; ++i)
+      f.segment<2>(2 * elements_.nodes(t)[i]) +=
+          shape.weight_um2 * (dP * Eigen::Vector2d(shape.gradient_per_um[i].x, shape.gradient_per_um[i].y) +
+                              k * shape.value[i] * Eigen::Vector2d(at.x, at.y));
+  });
   return f;
 }
 
@@ -202,13 +198,12 @@ LargeStrain in_load_steps(const LoadedSheet& sheet, Eigen::Index n_unknowns) {
 std::vector<Tensor> large_tension_at_points(const Elements& elements, const Sheet& sheet, ContractionMeasure measure,
                                             const NodeVectors& u) {
   std::vector<Tensor> tension;
-  for (int t = 0; t < elements.n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const double s = sheet.contraction_nN_per_um[Elements::kPoints * t + p];
-      const PointLaw law(sheet.material, s, measure, gradient_of(u, elements.nodes(t), elements.at(t, p)));
-      const Matrix2d cauchy = law.stress() * law.F.transpose() / law.F.determinant();
-      tension.push_back({cauchy(0, 0), cauchy(1, 1), 0.5 * (cauchy(0, 1) + cauchy(1, 0))});
-    }
+  elements.for_each_point([&](int t, int p, const Shape& shape) {
+    const double s = sheet.contraction_nN_per_um[Elements::kPoints * t + p];
+    const PointLaw law(sheet.material, s, measure, gradient_of(u, elements.nodes(t), shape));
+    const Matrix2d cauchy = law.stress() * law.F.transpose() / law.F.determinant();
+    tension.push_back({cauchy(0, 0), cauchy(1, 1), 0.5 * (cauchy(0, 1) + cauchy(1, 0))});
+  });
   return tension;
 }
 

@@ -348,10 +348,10 @@ KnownOfTension known_on_springs(const Elements& elements, const Sheet& sheet, co
                        .n_rims = sheet.n_rims,
                        .is_free = {},
                        .at_nodes = {}};
-  for (int t = 0; t < elements.n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p)
-      known.divergence_kPa.push_back(sheet.spring_nN_per_um3[Elements::kPoints * t + p] *
-                                     value_of(u, elements.nodes(t), elements.at(t, p)));
+  elements.for_each_point([&](int t, int p, const Shape& shape) {
+    known.divergence_kPa.push_back(sheet.spring_nN_per_um3[Elements::kPoints * t + p] *
+                                   value_of(u, elements.nodes(t), shape));
+  });
   for (const Triangles::Side& side : elements.triangles().sides) {
     const auto middle = static_cast<std::size_t>(side.nodes[2]);
     const bool is_held = !sheet.held.empty() && (sheet.held[middle][0] || sheet.held[middle][1]);
@@ -371,26 +371,23 @@ double relative_error(const Elements& elements, const std::vector<Tensor>& at_po
                       const std::vector<Tensor>& at_nodes) {
   const auto squared = [](const Tensor& a) { return a.xx * a.xx + a.yy * a.yy + 2 * a.xy * a.xy; };
   double error = 0, whole = 0;
-  for (int t = 0; t < elements.n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const Shape& shape = elements.at(t, p);
-      const Tensor smooth = value_of(at_nodes, elements.nodes(t), shape);
-      const Tensor& own = at_points[Elements::kPoints * t + p];
-      error += shape.weight_um2 * squared(smooth + (-1.0) * own);
-      whole += shape.weight_um2 * squared(smooth);
-    }
+  elements.for_each_point([&](int t, int p, const Shape& shape) {
+    const Tensor smooth = value_of(at_nodes, elements.nodes(t), shape);
+    const Tensor& own = at_points[Elements::kPoints * t + p];
+    error += shape.weight_um2 * squared(smooth + (-1.0) * own);
+    whole += shape.weight_um2 * squared(smooth);
+  });
   return whole > 0 ? std::sqrt(error / whole) : 0;
 }
 
 Tensor mean_over(const Elements& elements, const std::vector<Tensor>& at_points) {
   Tensor sum;
   double area = 0;
-  for (int t = 0; t < elements.n_triangles(); ++t)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const double weight = elements.at(t, p).weight_um2;
-      sum = sum + weight * at_points[Elements::kPoints * t + p];
-      area += weight;
-    }
+  elements.for_each_point([&](int t, int p, const Shape& shape) {
+    const double weight = shape.weight_um2;
+    sum = sum + weight * at_points[Elements::kPoints * t + p];
+    area += weight;
+  });
   return 1 / area * sum;
 }
 

@@ -36,16 +36,13 @@ Tensor strain_of(const NodeVectors& u, const std::array<int, 6>& nodes, const Sh
 
 NodeVectors forces_of_contraction_nN(const Elements& elements, const Sheet& sheet) {
   NodeVectors f = NodeVectors::Zero(2 * elements.n_nodes());
-  for (int t = 0; t < elements.n_triangles(); ++t) {
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const Shape& shape = elements.at(t, p);
-      const double pull = shape.weight_um2 * sheet.contraction_nN_per_um[Elements::kPoints * t + p];
-      for (int i = 0; i < 6; ++i) {
-        f(2 * elements.nodes(t)[i]) -= pull * shape.gradient_per_um[i].x;
-        f(2 * elements.nodes(t)[i] + 1) -= pull * shape.gradient_per_um[i].y;
-      }
+  elements.for_each_point([&](int t, int p, const Shape& shape) {
+    const double pull = shape.weight_um2 * sheet.contraction_nN_per_um[Elements::kPoints * t + p];
+    for (int i = 0; i < 6; ++i) {
+      f(2 * elements.nodes(t)[i]) -= pull * shape.gradient_per_um[i].x;
+      f(2 * elements.nodes(t)[i] + 1) -= pull * shape.gradient_per_um[i].y;
     }
-  }
+  });
   if (sheet.line_tension_nN == 0) return f;
   // −Λ ∫ t · dv/ds ds, three Gauss points on each side
   constexpr std::array<double, 3> kAt = {-0.7745966692414834, 0, 0.7745966692414834};
@@ -69,14 +66,11 @@ NodeVectors forces_of_contraction_nN(const Elements& elements, const Sheet& shee
 
 std::vector<Tensor> tension_at_points(const Elements& elements, const Sheet& sheet, const NodeVectors& u) {
   std::vector<Tensor> tension(sheet.contraction_nN_per_um.size());
-  for (int t = 0; t < elements.n_triangles(); ++t) {
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const auto k = static_cast<std::size_t>(Elements::kPoints * t + p);
-      const double s = sheet.contraction_nN_per_um[k];
-      tension[k] =
-          elastic_tension(sheet.material, strain_of(u, elements.nodes(t), elements.at(t, p))) + Tensor{s, s, 0};
-    }
-  }
+  elements.for_each_point([&](int t, int p, const Shape& shape) {
+    const auto k = static_cast<std::size_t>(Elements::kPoints * t + p);
+    const double s = sheet.contraction_nN_per_um[k];
+    tension[k] = elastic_tension(sheet.material, strain_of(u, elements.nodes(t), shape)) + Tensor{s, s, 0};
+  });
   return tension;
 }
 

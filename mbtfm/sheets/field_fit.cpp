@@ -256,11 +256,10 @@ ContractionLattice::ContractionLattice(const sheet::Elements& elements, int n_po
   low_um_ = extent_of(elements.triangles().nodes_um).low_um;
   std::map<std::array<int, 2>, int> point_at;
   std::set<std::array<int, 2>> touched;
-  for (int t = 0; t < elements.n_triangles(); ++t)
-    for (int p = 0; p < sheet::Elements::kPoints; ++p) {
-      const Vec2 at = 1 / spacing_um_ * (elements.at(t, p).place_um - low_um_);
-      touched.insert({static_cast<int>(std::floor(at.x)), static_cast<int>(std::floor(at.y))});
-    }
+  elements.for_each_point([&](int, int, const sheet::Shape& shape) {
+    const Vec2 at = 1 / spacing_um_ * (shape.place_um - low_um_);
+    touched.insert({static_cast<int>(std::floor(at.x)), static_cast<int>(std::floor(at.y))});
+  });
   const auto point = [&](int column, int row) {
     const auto [found, is_new] = point_at.emplace(std::array{column, row}, static_cast<int>(points_.size()));
     if (is_new) points_.push_back({column, row});
@@ -285,10 +284,9 @@ VectorXd ContractionLattice::shares_at(Vec2 place_um) const {
 
 std::vector<std::vector<double>> ContractionLattice::shares_on(const sheet::Elements& elements) const {
   std::vector<std::vector<double>> shares(points_.size());
-  for (int t = 0; t < elements.n_triangles(); ++t)
-    for (int p = 0; p < sheet::Elements::kPoints; ++p)
-      for (std::size_t k = 0; k < points_.size(); ++k)
-        shares[k].push_back(share(static_cast<int>(k), elements.at(t, p).place_um));
+  elements.for_each_point([&](int, int, const sheet::Shape& shape) {
+    for (std::size_t k = 0; k < points_.size(); ++k) shares[k].push_back(share(static_cast<int>(k), shape.place_um));
+  });
   return shares;
 }
 
@@ -305,9 +303,8 @@ MatrixXd ContractionLattice::roughness() const {
 
 VectorXd means_over(const sheet::Elements& elements, const ContractionLattice& lattice) {
   VectorXd mean = VectorXd::Zero(lattice.n_points());
-  for (int t = 0; t < elements.n_triangles(); ++t)
-    for (int p = 0; p < sheet::Elements::kPoints; ++p)
-      mean += elements.at(t, p).weight_um2 * lattice.shares_at(elements.at(t, p).place_um);
+  elements.for_each_point(
+      [&](int, int, const sheet::Shape& shape) { mean += shape.weight_um2 * lattice.shares_at(shape.place_um); });
   return mean / elements.area_um2();
 }
 
