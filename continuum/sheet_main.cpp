@@ -516,7 +516,7 @@ tensions::LinearData data_of_adhesions(const DisplacementField& beads, stage::St
                                        const substrate::Substrate& model, bool has_motion) {
   const auto ellipses = substrate::ellipses_of(files::read_adhesions(context.input("adhesions")));
   return tensions::reduce(beads, substrate::dense_response(model.compliance_um_per_nN(points_of(beads), ellipses), 1),
-                          {}, 1, has_motion ? tensions::affine_motions(beads) : Eigen::MatrixXd());
+                          {}, 1, has_motion ? tensions::affine_motions(beads) : MatrixXd());
 }
 
 std::string sentence_of(const SheetEstimate& e) {

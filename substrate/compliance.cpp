@@ -79,22 +79,22 @@ void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>&
 
 std::vector<Effect> Substrate::effects() const { return effects_of_model(parameters_, capabilities_).list(); }
 
-Eigen::MatrixXd Substrate::compliance_um_per_nN(const std::vector<Vec2>& points_um,
-                                                const std::vector<Ellipse>& ellipses) const {
+MatrixXd Substrate::compliance_um_per_nN(const std::vector<Vec2>& points_um,
+                                         const std::vector<Ellipse>& ellipses) const {
   return response({ellipses}, {points_um})->matrix();
 }
 
-Eigen::VectorXd column_of(const std::vector<Vec2>& vectors) {
-  Eigen::VectorXd column(2 * static_cast<Eigen::Index>(vectors.size()));
+VectorXd column_of(const std::vector<Vec2>& vectors) {
+  VectorXd column(2 * static_cast<Index>(vectors.size()));
   for (std::size_t i = 0; i < vectors.size(); ++i)
-    column.segment<2>(2 * static_cast<Eigen::Index>(i)) << vectors[i].x, vectors[i].y;
+    column.segment<2>(2 * static_cast<Index>(i)) << vectors[i].x, vectors[i].y;
   return column;
 }
 
-std::vector<Vec2> vectors_of(const Eigen::VectorXd& column) {
+std::vector<Vec2> vectors_of(const VectorXd& column) {
   std::vector<Vec2> vectors;
   vectors.reserve(static_cast<std::size_t>(column.size() / 2));
-  for (Eigen::Index row = 0; row < column.size(); row += 2) vectors.push_back({column[row], column[row + 1]});
+  for (Index row = 0; row < column.size(); row += 2) vectors.push_back({column[row], column[row + 1]});
   return vectors;
 }
 
@@ -107,7 +107,7 @@ std::vector<Vec2> Substrate::displacements_um(const std::vector<Vec2>& points_um
 std::vector<double> Substrate::vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                            const std::vector<Vec2>& forces_nN) const {
   check_forces(ellipses, forces_nN);
-  const Eigen::VectorXd u = response({ellipses}, {points_um, Components::normal})->displace(column_of(forces_nN));
+  const VectorXd u = response({ellipses}, {points_um, Components::normal})->displace(column_of(forces_nN));
   return {u.begin(), u.end()};
 }
 

@@ -1,7 +1,6 @@
 /// Surface displacements of an elastic gel under forces spread evenly over ellipses. Linear, so one matrix a cell.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <memory>
 #include <optional>
@@ -12,7 +11,7 @@
 #include "pipeline/contract/figures.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/geometry.h"
-#include "pipeline/numerics/precision.h"
+#include "pipeline/numerics/dense.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/parameters_fwd.h"
 #include "substrate/ellipse.h"
@@ -122,7 +121,7 @@ class Substrate {
 
   /// Displacement (um) of each point for a unit force (1 nN) on each ellipse: rows 2i, 2i+1 are x, y at points[i];
   /// columns 2j, 2j+1 are a force along x, y on ellipses[j]. @throws as response
-  Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const;
+  MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const;
   /// The same for given forces, without forming the matrix.
   /// @throws as response, and InvalidData where a force is not finite or their number differs
   std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,

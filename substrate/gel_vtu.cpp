@@ -107,9 +107,8 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
 }
 
 void write_traction_vtu(const std::filesystem::path& file, const Substrate& substrate, const SurfaceMesh& mesh,
-                        const Eigen::VectorXd& traction_kPa, const SurfaceShape& shape) {
-  const Eigen::VectorXd u =
-      substrate.response({mesh, 3}, {mesh.points_um, Components::all})->displace(traction_kPa).col(0);
+                        const VectorXd& traction_kPa, const SurfaceShape& shape) {
+  const VectorXd u = substrate.response({mesh, 3}, {mesh.points_um, Components::all})->displace(traction_kPa).col(0);
   files::Grid grid;
   for (const Vec2 p : mesh.points_um) grid.points_um.push_back({p.x, p.y, shape.height_um(p)});
   for (const auto& face : mesh.faces) grid.cells.insert(grid.cells.end(), face.begin(), face.end());

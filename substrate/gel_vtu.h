@@ -30,7 +30,7 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
 /// The quads that carry tractions, with `displacement_um` and `traction_kPa` by point.
 /// @param traction_kPa  three a vertex
 void write_traction_vtu(const std::filesystem::path& file, const Substrate& substrate, const SurfaceMesh& mesh,
-                        const Eigen::VectorXd& traction_kPa, const SurfaceShape& shape);
+                        const VectorXd& traction_kPa, const SurfaceShape& shape);
 
 /// Write the gel's inside: the boxes of `field`, with `displacement_um` by point and `stress_kPa` by box (xx, yy, zz,
 /// xy, yz, xz) where it has one. @throws OutputError

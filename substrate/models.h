@@ -31,8 +31,8 @@ std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel&
 void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN);
 
 /// Forces or displacements x, y as a column, and back.
-Eigen::VectorXd column_of(const std::vector<Vec2>& vectors);
-std::vector<Vec2> vectors_of(const Eigen::VectorXd& column);
+VectorXd column_of(const std::vector<Vec2>& vectors);
+std::vector<Vec2> vectors_of(const VectorXd& column);
 
 /// Whether the displacement along z is wanted, too.
 bool asks_for_vertical(const SubstrateParameters& parameters);

@@ -2,12 +2,12 @@
 /// with hundreds of thousands of points and thousands of ellipses fits into memory.
 #pragma once
 
-#include <Eigen/Core>
 #include <functional>
 #include <memory>
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
+#include "pipeline/numerics/dense.h"
 #include "substrate/ellipse.h"
 
 namespace mbtfm::substrate {
@@ -20,7 +20,7 @@ using LazyResponse = std::shared_ptr<const Response>;
 
 /// About forces F₀: u(F) = displacement_um + response (F − F₀), to first order.
 struct Tangent {
-  Eigen::VectorXd displacement_um;
+  VectorXd displacement_um;
   LazyResponse response;
 };
 
@@ -30,42 +30,42 @@ struct Tangent {
 class Response : public std::enable_shared_from_this<Response> {
  public:
   virtual ~Response() = default;
-  virtual Eigen::Index rows() const = 0;
-  virtual Eigen::Index cols() const = 0;
+  virtual Index rows() const = 0;
+  virtual Index cols() const = 0;
   /// G F: rows() × any number
-  virtual Eigen::MatrixXd displace(const Eigen::MatrixXd& forces_nN) const = 0;
+  virtual MatrixXd displace(const MatrixXd& forces_nN) const = 0;
   /// Gᵀ D: cols() × any number
-  virtual Eigen::MatrixXd pull_back(const Eigen::MatrixXd& displacements) const = 0;
+  virtual MatrixXd pull_back(const MatrixXd& displacements) const = 0;
   /// G: rows() × cols(); not where it is too large to be held
-  virtual Eigen::MatrixXd matrix() const = 0;
+  virtual MatrixXd matrix() const = 0;
   /// The same in memory, for many calls: as its matrix, or something that needs less room.
   virtual SharedResponse kept() const = 0;
   /// Of a linear model: its displacement, and itself. @param forces_nN  one column of displace()
-  virtual Tangent about(const Eigen::VectorXd& forces_nN) const { return {displace(forces_nN), shared_from_this()}; }
+  virtual Tangent about(const VectorXd& forces_nN) const { return {displace(forces_nN), shared_from_this()}; }
 };
 
 /// A response in memory, which needs its model no more.
 class KeptResponse : public Response {
  public:
-  Eigen::MatrixXd matrix() const override;
+  MatrixXd matrix() const override;
   SharedResponse kept() const override { return std::static_pointer_cast<const KeptResponse>(shared_from_this()); }
   /// Gᵀ diag(weight) G, cols() square, on and above its diagonal; zero or rubbish below
   /// @param weight  by row, not negative
-  virtual Eigen::MatrixXd upper_gram(const Eigen::VectorXd& weight) const = 0;
+  virtual MatrixXd upper_gram(const VectorXd& weight) const = 0;
   /// The same at some of the points, in this order.
-  virtual SharedResponse at_points(const std::vector<Eigen::Index>& points) const = 0;
+  virtual SharedResponse at_points(const std::vector<Index>& points) const = 0;
 };
 
 /// All numbers in memory. @param compliance_um_per_nN  2·points × 2·ellipses
-SharedResponse dense_response(Eigen::MatrixXd compliance_um_per_nN, int threads = 1);
+SharedResponse dense_response(MatrixXd compliance_um_per_nN, int threads = 1);
 
 /// How a model answers: by its matrix, by displacing, or both; what is empty is made of the other.
 struct Answers {
-  Eigen::Index rows = 0, cols = 0;
-  std::function<Eigen::MatrixXd()> matrix = {};
-  std::function<Eigen::MatrixXd(const Eigen::MatrixXd& forces_nN)> displace = {};
+  Index rows = 0, cols = 0;
+  std::function<MatrixXd()> matrix = {};
+  std::function<MatrixXd(const MatrixXd& forces_nN)> displace = {};
   std::function<SharedResponse()> kept = {};
-  std::function<Tangent(const Eigen::VectorXd& forces_nN)> about = {};
+  std::function<Tangent(const VectorXd& forces_nN)> about = {};
 };
 LazyResponse lazy_response(Answers answers);
 
@@ -73,8 +73,7 @@ LazyResponse lazy_response(Answers answers);
 LazyResponse joined(LazyResponse along, LazyResponse normal);
 
 /// The matrix of some points along the surface, of a model whose columns cost as much as they have points.
-using MatrixAt =
-    std::function<Eigen::MatrixXd(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses)>;
+using MatrixAt = std::function<MatrixXd(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses)>;
 
 /// Far fields interpolated: points in squares of some hundred; ellipses at three half sides or more from a square's
 /// centre act on it by their field at 6 × 6 Chebyshev nodes, the nearer ones on each point by itself. Of each far

@@ -45,7 +45,7 @@ void declare(stage::ParameterList& list, Parameters& p) {
 /// Tractions of a lattice on a surface that is not flat: bilinear, as they are.
 struct SurfaceLoad {
   substrate::SurfaceMesh mesh;
-  Eigen::VectorXd traction_kPa;  ///< three a vertex
+  VectorXd traction_kPa;  ///< three a vertex
 };
 struct Load {
   std::vector<substrate::Ellipse> ellipses;
@@ -85,7 +85,7 @@ SurfaceLoad read_surface_tractions(const Path& file) {
   const auto place = [&](Vec2 p) {
     return std::array{std::llround((p.x - points[0].x) / spacing.x), std::llround((p.y - points[0].y) / spacing.y)};
   };
-  SurfaceLoad load{{points, {}}, Eigen::VectorXd(3 * static_cast<Eigen::Index>(points.size()))};
+  SurfaceLoad load{{points, {}}, VectorXd(3 * static_cast<Index>(points.size()))};
   for (int row = 0; row < table.n_rows(); ++row) {
     const Vec2 p = points[row];
     const auto at = place(p);
@@ -156,14 +156,14 @@ bool is_in_space(stage::StageContext& context, const Load& load, const Gel& gel)
 
 struct UnitLoads {
   substrate::Loads loads;
-  Eigen::VectorXd amounts;  ///< nN of each ellipse, kPa at each vertex of a lattice
+  VectorXd amounts;  ///< nN of each ellipse, kPa at each vertex of a lattice
 };
 UnitLoads in_space(const Load& load) {
   if (load.lattice) return {{load.lattice->mesh, 3}, load.lattice->traction_kPa};
-  Eigen::VectorXd amounts = Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(load.ellipses.size()));
+  VectorXd amounts = VectorXd::Zero(3 * static_cast<Index>(load.ellipses.size()));
   for (std::size_t j = 0; j < load.ellipses.size(); ++j) {
     const double into = load.into_the_gel_nN.empty() ? 0 : load.into_the_gel_nN[j];
-    amounts.segment<3>(3 * static_cast<Eigen::Index>(j)) << load.forces_nN[j].x, load.forces_nN[j].y, into;
+    amounts.segment<3>(3 * static_cast<Index>(j)) << load.forces_nN[j].x, load.forces_nN[j].y, into;
   }
   return {{load.ellipses, 3}, amounts};
 }
@@ -193,11 +193,11 @@ void write_in_space(stage::StageContext& context, const substrate::Substrate& mo
   substrate::Observations observed{points, substrate::Components::all};
   if (!has_depth) observed.points_um = files::read_points(file);  // on the surface, to the last digit
   const auto [loads, amounts] = in_space(load);
-  const Eigen::VectorXd u = model.response(loads, observed)->displace(amounts).col(0);
+  const VectorXd u = model.response(loads, observed)->displace(amounts).col(0);
   std::vector<BeadInSpace> field;
   double largest_um = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d at_point = u.segment<3>(3 * static_cast<Eigen::Index>(i));
+    const Eigen::Vector3d at_point = u.segment<3>(3 * static_cast<Index>(i));
     field.push_back({.position_um = points[i],
                      .displacement_um = {at_point.x(), at_point.y(), at_point.z()},
                      .sigma_um = 0,
@@ -267,14 +267,14 @@ void write_result(stage::StageContext& context, const substrate::Substrate& mode
 double traction_of(const Load& load) {
   double largest = 0;
   if (load.lattice) {
-    for (Eigen::Index k = 0; k < load.lattice->traction_kPa.size(); k += 3)
+    for (Index k = 0; k < load.lattice->traction_kPa.size(); k += 3)
       largest = std::max(largest, load.lattice->traction_kPa.segment<3>(k).norm());
     return largest;
   }
-  Eigen::VectorXd forces_nN(2 * std::ssize(load.ellipses));
+  VectorXd forces_nN(2 * std::ssize(load.ellipses));
   for (std::size_t j = 0; j < load.ellipses.size(); ++j) {
     const double into = load.into_the_gel_nN.empty() ? 0 : load.into_the_gel_nN[j];
-    forces_nN.segment<2>(2 * static_cast<Eigen::Index>(j)) << norm(load.forces_nN[j]), into;
+    forces_nN.segment<2>(2 * static_cast<Index>(j)) << norm(load.forces_nN[j]), into;
   }
   return choice::mean_traction_kPa(load.ellipses, forces_nN);
 }

@@ -64,7 +64,7 @@ Solution solved_on(const OnGel& ground, Solution solution, const Scene& scene) {
   solution.at_nodes = recovered(elements, solution.at_points);
   for (int t = 0; t < elements.n_triangles(); ++t)
     solution.patches.push_back({patch_of(elements, t).centre_um, elements.area_um2(t), {}, {}});
-  const Eigen::VectorXd gel_um = ground.gel_um(found.forces_nN);
+  const VectorXd gel_um = ground.gel_um(found.forces_nN);
   for (std::size_t k = 0; k < ground.triangles().size(); ++k) {
     GroundPatch& patch = solution.patches[ground.triangles()[k]];
     patch.traction_kPa = 1 / patch.area_um2 * at_node(found.forces_nN, static_cast<int>(k));
@@ -166,9 +166,9 @@ std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Soluti
   return gel.displacements_um(points_um, patches, forces);
 }
 
-Eigen::VectorXd as_vector(const std::vector<Vec2>& u) {
-  Eigen::VectorXd all(2 * std::ssize(u));
-  for (std::size_t i = 0; i < u.size(); ++i) all.segment<2>(2 * static_cast<Eigen::Index>(i)) << u[i].x, u[i].y;
+VectorXd as_vector(const std::vector<Vec2>& u) {
+  VectorXd all(2 * std::ssize(u));
+  for (std::size_t i = 0; i < u.size(); ++i) all.segment<2>(2 * static_cast<Index>(i)) << u[i].x, u[i].y;
   return all;
 }
 
@@ -186,13 +186,13 @@ FinerMesh::FinerMesh(const Scene& scene, double share, const substrate::Substrat
       elements_(elements_of(on_finer_triangles(scene, share))),
       ground_(*elements_, gel, adhering_triangles(*elements_, scene.adhesive_um), threads) {}
 
-Eigen::VectorXd FinerMesh::displacements_um(const Scene& scene, const std::vector<Vec2>& points_um) const {
+VectorXd FinerMesh::displacements_um(const Scene& scene, const std::vector<Vec2>& points_um) const {
   MBTFM_ASSERT(scene.strain == Strain::small);
   return as_vector(sheet::displacements_um(gel_, solve_on(ground_, elements_, scene), points_um));
 }
 
-Eigen::MatrixXd changes_by_outline_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,
-                                      const std::vector<Vec2>& points_um, double error_um, int threads) {
+MatrixXd changes_by_outline_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,
+                               const std::vector<Vec2>& points_um, double error_um, int threads) {
   Solution larger;
   larger.elements =
       std::make_shared<const Elements>(with_rims_further_out(*solution.elements, solution.sheet.n_rims, error_um));
@@ -204,8 +204,8 @@ Eigen::MatrixXd changes_by_outline_um(const Scene& scene, const Solution& soluti
     for (Vec2& place : places) place = place - shift_um;
     return as_vector(displacements_um(gel, solution, places));
   };
-  const Eigen::VectorXd here = seen_from({});
-  Eigen::MatrixXd changes(here.size(), 3);
+  const VectorXd here = seen_from({});
+  MatrixXd changes(here.size(), 3);
   changes << as_vector(displacements_um(gel, larger, points_um)) - here, seen_from({error_um, 0}) - here,
       seen_from({0, error_um}) - here;
   return changes;

@@ -90,7 +90,7 @@ Solution solve_on_gel(const Scene& scene, const substrate::Substrate& gel, int t
 std::vector<Vec2> displacements_um(const substrate::Substrate& gel, const Solution& solution,
                                    const std::vector<Vec2>& points_um);
 /// x and y of each in turn: 2·points.
-Eigen::VectorXd as_vector(const std::vector<Vec2>& displacements_um);
+VectorXd as_vector(const std::vector<Vec2>& displacements_um);
 /// A scene on triangles of a share of their size, for sheets of any stiffness and contraction. Triangles fall
 /// differently on each mesh, and displacements beside the edge, where tractions are singular, change without order from
 /// one to the next.
@@ -99,7 +99,7 @@ class FinerMesh {
   /// @param gel  must outlive it
   FinerMesh(const Scene& scene, double share, const substrate::Substrate& gel, int threads);
   /// 2·points. @param scene  of the same outline and adhesive area, of small strains @throws NotSolved
-  Eigen::VectorXd displacements_um(const Scene& scene, const std::vector<Vec2>& points_um) const;
+  VectorXd displacements_um(const Scene& scene, const std::vector<Vec2>& points_um) const;
 
  private:
   const substrate::Substrate& gel_;
@@ -109,8 +109,8 @@ class FinerMesh {
 /// What errors of the outline's place change of them (2·points × 3), on the same triangles: the rims lie further out by
 /// this much, or the sheet further along x, or along y.
 /// @param solution  of this scene on a gel
-Eigen::MatrixXd changes_by_outline_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,
-                                      const std::vector<Vec2>& points_um, double error_um, int threads);
+MatrixXd changes_by_outline_um(const Scene& scene, const Solution& solution, const substrate::Substrate& gel,
+                               const std::vector<Vec2>& points_um, double error_um, int threads);
 
 /// What must hold of any solution.
 struct Balance {

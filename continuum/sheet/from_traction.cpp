@@ -164,7 +164,7 @@ TensionErrors errors_by(const TractionNoise& noise, Parts parts, const Solution&
   std::normal_distribution<double> normal(0, noise.sigma_kPa);
   TensionErrors errors;
   std::vector<double> squares(static_cast<std::size_t>(elements.n_triangles()));
-  Eigen::MatrixXd loads(2 * elements.n_nodes(), TensionErrors::kDraws);
+  MatrixXd loads(2 * elements.n_nodes(), TensionErrors::kDraws);
   for (int draw = 0; draw < TensionErrors::kDraws; ++draw) {
     std::map<std::pair<long, long>, Vec2> by_square;
     for (Part& part : parts.inside) {
@@ -179,7 +179,7 @@ TensionErrors errors_by(const TractionNoise& noise, Parts parts, const Solution&
     balance(parts, hold);
     loads.col(draw) = load_of(parts, elements);
   }
-  const Eigen::MatrixXd u = stiffness.solve(loads);
+  const MatrixXd u = stiffness.solve(loads);
   for (int draw = 0; draw < TensionErrors::kDraws; ++draw) {
     const std::vector<Tensor> S = tension_at_points(elements, solution.sheet, u.col(draw));
     errors.mean_nN_per_um += std::pow(mean_of(mean_over(elements, S)), 2) / TensionErrors::kDraws;

@@ -124,7 +124,7 @@ NodeVectors LargeSheet::left_nN(const NodeVectors& u, double share) const {
   });
   for (std::size_t i = 0; i < sheet_.held.size(); ++i)
     for (int a = 0; a < 2; ++a)
-      if (sheet_.held[i][a]) f(2 * static_cast<Eigen::Index>(i) + a) = 0;
+      if (sheet_.held[i][a]) f(2 * static_cast<Index>(i) + a) = 0;
   return f;
 }
 
@@ -170,7 +170,7 @@ bool factorise_shifted(Stiffness& stiffness, int threads) {
   return is_definite;
 }
 
-LargeStrain in_load_steps(const LoadedSheet& sheet, Eigen::Index n_unknowns) {
+LargeStrain in_load_steps(const LoadedSheet& sheet, Index n_unknowns) {
   constexpr double kSmallestStep = 1.0 / 256;
   LargeStrain result{NodeVectors::Zero(n_unknowns), {}};
   double share = 0, step = 1;

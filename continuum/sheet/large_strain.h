@@ -51,7 +51,7 @@ struct LargeStrain {
 };
 /// In load steps that are halved where Newton's method with a line search does not find the equilibrium.
 /// @throws NotSolved where the smallest step finds none: the sheet collapses
-LargeStrain in_load_steps(const LoadedSheet& sheet, Eigen::Index n_unknowns);
+LargeStrain in_load_steps(const LoadedSheet& sheet, Index n_unknowns);
 
 /// A direction by the factor of a tangent, made definite by shifts. @returns whether it is
 bool factorise_shifted(Stiffness& stiffness, int threads);

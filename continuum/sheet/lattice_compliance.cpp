@@ -10,10 +10,6 @@
 namespace mbtfm::sheet {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 constexpr int kOrder = 6;              // nodes along each axis of a polynomial: of degree 5
 constexpr double kApart = 6;           // spacings between patches that the lattice alone answers for
 constexpr double kHalfWidth = 0.9;     // of a patch, in roots of its area: what is subtracted from a distance
@@ -210,11 +206,11 @@ void LatticeCompliance::set_near(const Patches& patches, const substrate::Substr
   near_.setFromTriplets(all.begin(), all.end());
 }
 
-Eigen::MatrixXd LatticeCompliance::displace(const Eigen::MatrixXd& forces_nN) const {
+MatrixXd LatticeCompliance::displace(const MatrixXd& forces_nN) const {
   using Component = Eigen::Map<VectorXd, 0, Eigen::InnerStride<2>>;
   using GivenComponent = Eigen::Map<const VectorXd, 0, Eigen::InnerStride<2>>;
   const Index n = means_.rows();
-  Eigen::MatrixXd u = near_.selfadjointView<Eigen::Lower>() * forces_nN;
+  MatrixXd u = near_.selfadjointView<Eigen::Lower>() * forces_nN;
   for (Index c = 0; c < forces_nN.cols(); ++c) {
     const double* forces = forces_nN.col(c).data();
     numerics::NodeField field;

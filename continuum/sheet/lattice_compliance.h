@@ -21,8 +21,8 @@ class LatticeCompliance final : public PatchCompliance {
  public:
   /// @throws as substrate::Substrate::response
   LatticeCompliance(const Patches& patches, const substrate::Substrate& gel, int threads);
-  Eigen::MatrixXd displace(const Eigen::MatrixXd& forces_nN) const override;
-  Eigen::VectorXd diagonal_um_per_nN() const override { return diagonal_; }
+  MatrixXd displace(const MatrixXd& forces_nN) const override;
+  VectorXd diagonal_um_per_nN() const override { return diagonal_; }
 
   const numerics::Lattice& lattice() const { return lattice_; }  ///< without its padding
 
@@ -43,8 +43,8 @@ class LatticeCompliance final : public PatchCompliance {
   Kernel kernel_of(const substrate::Substrate& gel) const;
   Stencil stencil_of(const Patches& patches, int patch) const;
   /// P K Pᵀ of patches by patch j, 2·of × 2.
-  static Eigen::MatrixXd by_lattice(const std::vector<Stencil>& stencils, const std::vector<int>& of, int j,
-                                    const Kernel& kernel);
+  static MatrixXd by_lattice(const std::vector<Stencil>& stencils, const std::vector<int>& of, int j,
+                             const Kernel& kernel);
   void set_means(const std::vector<Stencil>& stencils);
   void set_waves(const Kernel& kernel);
   void set_near(const Patches& patches, const substrate::Substrate& gel, const std::vector<Stencil>& stencils,
@@ -56,7 +56,7 @@ class LatticeCompliance final : public PatchCompliance {
   std::array<Eigen::ArrayXd, 3> waves_;  ///< K's transform, xx, xy, yy: real, as K is the same to both sides
   Eigen::SparseMatrix<double, Eigen::RowMajor> means_;  ///< P, on the padded lattice
   Eigen::SparseMatrix<double> near_;                    ///< N, lower half
-  Eigen::VectorXd diagonal_;
+  VectorXd diagonal_;
 };
 
 }  // namespace mbtfm::sheet

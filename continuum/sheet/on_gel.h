@@ -30,7 +30,7 @@ class OnGel {
 
   struct Solution {
     NodeVectors u;
-    Eigen::VectorXd forces_nN;  ///< by patch, x and y
+    VectorXd forces_nN;  ///< by patch, x and y
     Report report;
   };
   /// Small strains. @param adhesion_nN_per_um3  unset: bonded
@@ -39,11 +39,11 @@ class OnGel {
   Solution solve(const Material& material, std::optional<double> adhesion_nN_per_um3, const NodeVectors& load_nN) const;
   /// The same of several loads side by side, u and forces by column, which takes far less time than one by one.
   struct Solutions {
-    Eigen::MatrixXd u, forces_nN;
+    MatrixXd u, forces_nN;
     Report report;
   };
   Solutions solve_all(const Material& material, std::optional<double> adhesion_nN_per_um3,
-                      const Eigen::MatrixXd& loads_nN) const;
+                      const MatrixXd& loads_nN) const;
 
   /// Large strains of the sheet; those of the gel are small, and its forces act where its surface is at rest. Energy of
   /// the sheet and ½ (W u)ᵀ (C + 1 / κA)⁻¹ W u of what holds it, by Newton's method in load steps.
@@ -54,22 +54,22 @@ class OnGel {
   ///
   ///   (Vᵀ C V + Vᵀ A⁻¹ V / κ + Vᵀ W K₁⁻¹ Wᵀ V / M) a = Vᵀ W K₁⁻¹ f / M,   K₁ of a sheet with M = 1
   struct Reduced {
-    Eigen::MatrixXd gel, slip, sheet, pull;  ///< the last by load
+    MatrixXd gel, slip, sheet, pull;  ///< the last by load
   };
   /// @param forces_nN  V: by patch and component × any number  @param loads_nN  as of solve_all()
-  Reduced reduced(const Eigen::MatrixXd& forces_nN, double poisson_ratio, const Eigen::MatrixXd& loads_nN) const;
+  Reduced reduced(const MatrixXd& forces_nN, double poisson_ratio, const MatrixXd& loads_nN) const;
 
   const std::vector<int>& triangles() const { return patches_.triangles; }  ///< by patch
   const std::vector<substrate::Ellipse>& patches() const { return patches_.ellipses; }
   const std::vector<double>& areas_um2() const { return patches_.areas_um2; }
   Held held() const { return held_; }
   /// Displacement of the gel under each patch.
-  Eigen::MatrixXd gel_um(const Eigen::MatrixXd& forces_nN) const { return compliance_->displace(forces_nN); }
+  MatrixXd gel_um(const MatrixXd& forces_nN) const { return compliance_->displace(forces_nN); }
 
  private:
-  Eigen::VectorXd slip_um_per_nN(std::optional<double> adhesion_nN_per_um3) const;
-  Eigen::VectorXd spring_nN_per_um(const Eigen::VectorXd& slip_um_per_nN) const;
-  void add_springs(Stiffness& stiffness, const Eigen::VectorXd& spring_nN_per_um) const;
+  VectorXd slip_um_per_nN(std::optional<double> adhesion_nN_per_um3) const;
+  VectorXd spring_nN_per_um(const VectorXd& slip_um_per_nN) const;
+  void add_springs(Stiffness& stiffness, const VectorXd& spring_nN_per_um) const;
   Patches patches_;
   int threads_;
   Held held_;

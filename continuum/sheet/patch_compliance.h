@@ -16,9 +16,9 @@ namespace mbtfm::sheet {
 class PatchCompliance {
  public:
   virtual ~PatchCompliance() = default;
-  virtual Eigen::MatrixXd displace(const Eigen::MatrixXd& forces_nN) const = 0;
-  virtual Eigen::VectorXd diagonal_um_per_nN() const = 0;
-  virtual Eigen::MatrixXd matrix_um_per_nN() const;  ///< C itself: of few patches
+  virtual MatrixXd displace(const MatrixXd& forces_nN) const = 0;
+  virtual VectorXd diagonal_um_per_nN() const = 0;
+  virtual MatrixXd matrix_um_per_nN() const;  ///< C itself: of few patches
 };
 
 /// How C is held.
@@ -38,7 +38,7 @@ std::unique_ptr<PatchCompliance> compliance_of(const Patches& patches, const sub
 inline constexpr double kMeanReach = 2.5;  ///< sizes of both patches: beyond, the centre's value is the mean to 1 %
 
 /// C of pairs of near patches, by patch j: of near[j], 2·near[j] × 2, by a unit force on j; means within the reach.
-std::vector<Eigen::MatrixXd> near_columns(const Patches& patches, const substrate::Substrate& gel,
-                                          const std::vector<std::vector<int>>& near, int threads);
+std::vector<MatrixXd> near_columns(const Patches& patches, const substrate::Substrate& gel,
+                                   const std::vector<std::vector<int>>& near, int threads);
 
 }  // namespace mbtfm::sheet

@@ -5,11 +5,11 @@
 /// S is a tension (nN/um), T the traction of the sheet on its ground (kPa); s > 0 pulls together.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <vector>
 
 #include "continuum/sheet/elements.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::sheet {
 
@@ -47,7 +47,7 @@ struct Sheet {
 std::vector<double> even(const Elements& elements, double value);
 
 /// Displacements x, y by node.
-using NodeVectors = Eigen::VectorXd;
+using NodeVectors = VectorXd;
 inline Vec2 at_node(const NodeVectors& u, int node) { return {u(2 * node), u(2 * node + 1)}; }
 /// At a point.
 Vec2 value_of(const NodeVectors& u, const std::array<int, 6>& nodes, const Shape& shape);

@@ -75,11 +75,11 @@ bool Stiffness::factorise(double shift, int threads) {
   return factor_.factorise(matrix_, {.shift = shift * diagonal, .threads = threads});
 }
 
-Eigen::MatrixXd Stiffness::solve(const Eigen::MatrixXd& forces_nN) const {
+MatrixXd Stiffness::solve(const MatrixXd& forces_nN) const {
   using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  constexpr Eigen::Index kAtATime = numerics::kRightHandSides<double>;
-  const Eigen::Index n_given = forces_nN.cols();
-  const Eigen::Index n = n_given == 1 ? 1 : (n_given + kAtATime - 1) / kAtATime * kAtATime;
+  constexpr Index kAtATime = numerics::kRightHandSides<double>;
+  const Index n_given = forces_nN.cols();
+  const Index n = n_given == 1 ? 1 : (n_given + kAtATime - 1) / kAtATime * kAtATime;
   Columns in_order = Columns::Zero(forces_nN.rows(), n);
   const std::vector<int>& place = factor_.elimination().place;
   const auto row_of = [&](int node, int axis) { return 2 * place[node] + axis; };
@@ -87,7 +87,7 @@ Eigen::MatrixXd Stiffness::solve(const Eigen::MatrixXd& forces_nN) const {
     for (int a = 0; a < 2; ++a)
       if (!held_[i][a]) in_order.row(row_of(i, a)).leftCols(n_given) = forces_nN.row(2 * i + a);
   factor_.solve(in_order.data(), static_cast<std::size_t>(n));
-  Eigen::MatrixXd u(forces_nN.rows(), n_given);
+  MatrixXd u(forces_nN.rows(), n_given);
   for (int i = 0; i < matrix_.n; ++i)
     for (int a = 0; a < 2; ++a) u.row(2 * i + a) = in_order.row(row_of(i, a)).leftCols(n_given);
   return u;

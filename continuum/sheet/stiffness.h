@@ -21,7 +21,7 @@ class Stiffness {
   /// @returns whether it is positive definite. @param shift  times the mean diagonal, added to the diagonal
   bool factorise(double shift = 0, int threads = 1);
   /// With the last factor; what is held stays. @param forces_nN  2·nodes × any number
-  Eigen::MatrixXd solve(const Eigen::MatrixXd& forces_nN) const;
+  MatrixXd solve(const MatrixXd& forces_nN) const;
 
  private:
   double mean_diagonal() const;

@@ -49,7 +49,7 @@ std::vector<bool> beads_in_region(const DisplacementField& beads, const Cell& ce
 DataOfBeads data_of(const GelUnderCell& on, const DisplacementField& beads, substrate::SharedResponse response) {
   const Parameters& p = on.parameters;
   DataOfBeads result{.data = reduce(beads, std::move(response), beads_in_region(beads, on.cell, p.fit), on.threads,
-                                    allows_common_motion(p.effects) ? affine_motions(beads) : Eigen::MatrixXd())};
+                                    allows_common_motion(p.effects) ? affine_motions(beads) : MatrixXd())};
   if (!allows_forces_beyond(p.effects, on.cell)) return result;
   auto [data, beyond] = with_forces_beyond(std::move(result.data), on.cell, p.gel);
   return {std::move(data), beyond};

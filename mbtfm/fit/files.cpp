@@ -48,7 +48,7 @@ files::PointArray most_informed_array(const Influence& influence) {
 /// What the loss and the region leave of each bead.
 files::PointArray weight_array(const LinearData& data) {
   files::PointArray array{.name = "weight"};
-  for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b) {
+  for (Index b = 0; b < data.bead_weight.size(); ++b) {
     array.scalars.push_back(data.weight_per_um[2 * b] > 0 ? data.bead_weight[b] : 0);
   }
   return array;

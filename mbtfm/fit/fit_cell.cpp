@@ -10,7 +10,7 @@
 #include "mbtfm/tensions/second_placement.h"
 #include "mbtfm/tensions/solved_misfit.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/stage/stopwatch.h"
+#include "pipeline/contract/stopwatch.h"
 #include "substrate/choice/large_strain.h"
 
 namespace mbtfm::fit {
@@ -39,7 +39,7 @@ GelUnderCell under(const ReadyCell& cell, const Parameters& p, int threads) {
 /// With `auto`, the linear fit where there is none: its effect says why.
 EnsembleFit on_strained_gel(ReadyCell& ready, EnsembleFit fit, const Inputs& inputs, const Parameters& p,
                             const Work& work) {
-  const stage::Stopwatch watch;
+  const Stopwatch watch;
   Effect& effect = ready.decisions.strain;
   const GelUnderCell on = under(ready, p, work.threads);
   effect = decide_strain(on, fit, !inputs.frames.empty());
@@ -126,7 +126,7 @@ Found found_by(const ReadyCell& cell, const EnsembleFit& fit, const std::optiona
                             cables::surface_tension_nN_per_um(cell.networks.front().network(),
                                                               cell.scene.cell.outline_um, fit.tensions.nN[0].value),
                             p.fit)};
-  const stage::Stopwatch watch;
+  const Stopwatch watch;
   found.summary.error_budget = budget_of(cell, fit, p, work.threads);
   if (second) {
     work.tell(0.9, "candidates at other places");
@@ -142,7 +142,7 @@ std::vector<FrameFit> fit_frames(const ReadyCell& cell, const EnsembleFit& first
                                  const Parameters& p, const Work& work) {
   const SeriesOnGel& series = cell.series;
   if (series.frames.empty()) return {};
-  const auto allow = [&](LinearData of_frame, const Eigen::VectorXd& forces_nN) {
+  const auto allow = [&](LinearData of_frame, const VectorXd& forces_nN) {
     if (cell.beyond) of_frame = with_forces_beyond(std::move(of_frame), cell.scene.cell, p.gel).data;
     if (!cell.decisions.placement.is_on) return of_frame;
     // the same place for all, but each frame has the error of it
@@ -156,7 +156,7 @@ std::vector<FrameFit> fit_frames(const ReadyCell& cell, const EnsembleFit& first
 
 ModelFields fields_of(const ReadyCell& cell, const EnsembleFit& fit, const ModelChecks& checks,
                       const DisplacementField& tracked) {
-  const auto field = [&](const Eigen::VectorXd& forces_nN) {
+  const auto field = [&](const VectorXd& forces_nN) {
     return in_bead_frame(field_of(forces_nN, cell.scene.beads, fit.data), tracked, cell.placement);
   };
   return {.fitted = field(fit.forces.nN), .without_fibres = field(checks.models.front().forces_nN)};
@@ -192,7 +192,7 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
   ModelFields fields = fields_of(ready, fit, checks, inputs.beads);
   std::optional<Reading> reading, smoothing;
   if (unexplained_share(found.summary) > kMuchUnexplained) {
-    const Eigen::MatrixXd& by_tension = fit.meshes.front().force_derivatives;
+    const MatrixXd& by_tension = fit.meshes.front().force_derivatives;
     reading = best_reading(under(ready, p, work.threads), inputs.beads, by_tension, found.summary.noise_um);
     smoothing = best_smoothing(fit.data, by_tension, found.summary.noise_um);
     append(found.summary.more, {{"best_reading_leaves", reading->unexplained_share},

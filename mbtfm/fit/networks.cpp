@@ -13,17 +13,17 @@ using namespace tensions;
 
 namespace {
 
-Eigen::VectorXd tensions_of_groups(const std::vector<int>& fibre_ids, const std::vector<Tension>& before) {
+VectorXd tensions_of_groups(const std::vector<int>& fibre_ids, const std::vector<Tension>& before) {
   std::map<int, double> known;
   double sum = 0;
   for (const Tension& t : before) {
     known[t.fibre_id] = t.tension_nN;
     sum += t.tension_nN;
   }
-  Eigen::VectorXd tensions_nN(static_cast<Eigen::Index>(fibre_ids.size()));
+  VectorXd tensions_nN(static_cast<Index>(fibre_ids.size()));
   for (std::size_t i = 0; i < fibre_ids.size(); ++i) {
     const auto found = known.find(fibre_ids[i]);
-    tensions_nN[static_cast<Eigen::Index>(i)] =
+    tensions_nN[static_cast<Index>(i)] =
         found != known.end() ? found->second : sum / static_cast<double>(std::max<std::size_t>(1, known.size()));
   }
   return tensions_nN;
@@ -81,7 +81,7 @@ StartedNetworks with_cables_called_for(std::vector<cables::CableNetwork> network
                                        const std::vector<int>& adhesion_ids,
                                        const std::optional<std::vector<Tension>>& before, const Parameters& p) {
   Trial start = start_on(networks.front(), data, adhesion_ids, before);
-  const Eigen::VectorXd& t = start.tensions_nN;
+  const VectorXd& t = start.tensions_nN;
   Effect elasticity = cables::decide_elasticity(networks.front(), {t.data(), t.data() + t.size()}, p.effects);
   if (!elasticity.is_on) {
     networks = of_cables(networks, inelastic(p.cables));

@@ -29,10 +29,10 @@ struct Unexplained {
 
 /// @param noise_um  of a component, as far beads show it: of a field that was smoothed it is far below what is stated
 Unexplained unexplained_of(const LinearData& data, double noise_um) {
-  const Eigen::VectorXd all = data.weight_per_um.cwiseProduct(less_motion(data, data.displacement_um));
+  const VectorXd all = data.weight_per_um.cwiseProduct(less_motion(data, data.displacement_um));
   const double shown = noise_um * noise_um * data.weight_per_um.squaredNorm() / static_cast<double>(all.size());
   const double variance = data.has_errors ? std::min(1.0, shown) : shown;
-  const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - data.reduced.n_felt));
+  const auto n_free = static_cast<double>(std::max<Index>(1, data.n_used - data.reduced.n_felt));
   const double left = data.reduced.floor_squared - variance * n_free;
   const double moved = all.squaredNorm() - variance * static_cast<double>(data.n_used);
   // below its own scatter the difference from noise tells nothing
@@ -145,19 +145,19 @@ Scale best_scale(double rough, const UnexplainedAt& unexplained_at) {
 
 /// What a program shows of these fields that smooths them with a Gaussian of this standard deviation.
 /// @param fields  2·beads × any number
-Eigen::MatrixXd smoothed(const Eigen::MatrixXd& fields, const std::vector<Vec2>& beads_um, double sigma_um) {
+MatrixXd smoothed(const MatrixXd& fields, const std::vector<Vec2>& beads_um, double sigma_um) {
   const double reach_um = 3 * sigma_um;
   numerics::Grid grid(beads_um, reach_um);
   for (std::size_t i = 0; i < beads_um.size(); ++i) grid.add(static_cast<int>(i), beads_um[i], beads_um[i]);
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(fields.rows(), fields.cols());
+  MatrixXd result = MatrixXd::Zero(fields.rows(), fields.cols());
   for (std::size_t i = 0; i < beads_um.size(); ++i) {
     double sum = 0;
-    const auto row = 2 * static_cast<Eigen::Index>(i);
+    const auto row = 2 * static_cast<Index>(i);
     grid.for_each_near(beads_um[i], beads_um[i], reach_um, [&](int j) {
       const Vec2 d = beads_um[j] - beads_um[i];
       if (dot(d, d) > reach_um * reach_um) return;
       const double weight = std::exp(-0.5 * dot(d, d) / (sigma_um * sigma_um));
-      result.middleRows<2>(row) += weight * fields.middleRows<2>(2 * static_cast<Eigen::Index>(j));
+      result.middleRows<2>(row) += weight * fields.middleRows<2>(2 * static_cast<Index>(j));
       sum += weight;
     });
     result.middleRows<2>(row) /= sum;
@@ -169,7 +169,7 @@ Eigen::MatrixXd smoothed(const Eigen::MatrixXd& fields, const std::vector<Vec2>&
 DisplacementField beads_of(const LinearData& data) {
   DisplacementField beads(data.position_um.size());
   for (std::size_t i = 0; i < beads.size(); ++i) {
-    const auto row = 2 * static_cast<Eigen::Index>(i);
+    const auto row = 2 * static_cast<Index>(i);
     const double weight = data.weight_per_um[row];
     beads[i] = {.position_um = data.position_um[i],
                 .displacement_um = {data.displacement_um[row], data.displacement_um[row + 1]},
@@ -181,13 +181,13 @@ DisplacementField beads_of(const LinearData& data) {
 
 }  // namespace
 
-Reading best_smoothing(const LinearData& data, const Eigen::MatrixXd& force_derivatives, double noise_um) {
-  const Eigen::MatrixXd fields = data.response->displace(force_derivatives);
+Reading best_smoothing(const LinearData& data, const MatrixXd& force_derivatives, double noise_um) {
+  const MatrixXd fields = data.response->displace(force_derivatives);
   const DisplacementField beads = beads_of(data);
-  const Eigen::MatrixXd motions = affine_motions(beads);
+  const MatrixXd motions = affine_motions(beads);
   std::vector<bool> is_used;
-  for (Eigen::Index row = 0; row < data.weight_per_um.size(); row += 2) is_used.push_back(data.weight_per_um[row] > 0);
-  const auto left_by = [&](Eigen::MatrixXd of) {
+  for (Index row = 0; row < data.weight_per_um.size(); row += 2) is_used.push_back(data.weight_per_um[row] > 0);
+  const auto left_by = [&](MatrixXd of) {
     return unexplained_of(reduce(beads, substrate::dense_response(std::move(of)), is_used, data.threads, motions),
                           noise_um);
   };
@@ -202,11 +202,11 @@ Reading best_smoothing(const LinearData& data, const Eigen::MatrixXd& force_deri
   return best.reading;
 }
 
-Reading best_reading(const GelUnderCell& on, const DisplacementField& given, const Eigen::MatrixXd& force_derivatives,
+Reading best_reading(const GelUnderCell& on, const DisplacementField& given, const MatrixXd& force_derivatives,
                      double noise_um) {
   const DisplacementField beads = some_of(given);
   const auto left_of = [&](const DisplacementField& as) {
-    Eigen::MatrixXd fields = response_of(on, as)->displace(force_derivatives);
+    MatrixXd fields = response_of(on, as)->displace(force_derivatives);
     return unexplained_of(reduce(as, substrate::dense_response(std::move(fields)), {}, on.threads, affine_motions(as)),
                           noise_um);
   };

@@ -28,12 +28,12 @@ inline constexpr double kMuchUnexplained = 0.05;
 /// @param force_derivatives  of the adhesions' forces by tension: 2·adhesions × tensions. Forces independent of each
 ///                           other would explain much of what is read wrongly, too
 /// @param noise_um  of a component, as beads far from the cell show it
-Reading best_reading(const GelUnderCell& on, const DisplacementField& beads, const Eigen::MatrixXd& force_derivatives,
+Reading best_reading(const GelUnderCell& on, const DisplacementField& beads, const MatrixXd& force_derivatives,
                      double noise_um);
 
 /// The smoothing under which the model explains the displacement best: a Gaussian of 0.5 to 6 um over its beads.
 /// @param force_derivatives, noise_um  as above
-Reading best_smoothing(const tensions::LinearData& data, const Eigen::MatrixXd& force_derivatives, double noise_um);
+Reading best_smoothing(const tensions::LinearData& data, const MatrixXd& force_derivatives, double noise_um);
 
 /// @param kind  read_otherwise or field_smoothed
 std::optional<Finding> noticed_reading(FindingKind kind, const Reading& reading);

@@ -27,9 +27,9 @@ AtRest as_seen(const StrainedScene& scene) {
 }
 
 /// @param by_um  of the adhesions' centres, 2·adhesions
-AtRest led_back(AtRest scene, const DisplacementField& beads, const Eigen::VectorXd& by_um) {
+AtRest led_back(AtRest scene, const DisplacementField& beads, const VectorXd& by_um) {
   for (std::size_t j = 0; j < scene.ellipses.size(); ++j) {
-    const auto row = 2 * static_cast<Eigen::Index>(j);
+    const auto row = 2 * static_cast<Index>(j);
     scene.ellipses[j].centre_um += Vec2{-by_um[row], -by_um[row + 1]};
   }
   for (std::size_t i = 0; i < beads.size(); ++i) scene.beads_um[i] += -1 * beads[i].displacement_um;
@@ -37,8 +37,8 @@ AtRest led_back(AtRest scene, const DisplacementField& beads, const Eigen::Vecto
 }
 
 /// Of the ellipses' centres by these forces on them, 2·ellipses.
-Eigen::VectorXd displaced_um(const substrate::Substrate& gel, const std::vector<substrate::Ellipse>& ellipses,
-                             const Eigen::VectorXd& forces_nN) {
+VectorXd displaced_um(const substrate::Substrate& gel, const std::vector<substrate::Ellipse>& ellipses,
+                      const VectorXd& forces_nN) {
   std::vector<Vec2> centres;
   for (const substrate::Ellipse& e : ellipses) centres.push_back(e.centre_um);
   return gel.response({ellipses}, {centres})->displace(forces_nN);
@@ -48,14 +48,13 @@ Eigen::VectorXd displaced_um(const substrate::Substrate& gel, const std::vector<
 class GelAtRest {
  public:
   /// @param near_nN  forces like those to come
-  GelAtRest(const StrainedScene& scene, const AtRest& rest, substrate::SharedResponse linear,
-            const Eigen::VectorXd& near_nN)
+  GelAtRest(const StrainedScene& scene, const AtRest& rest, substrate::SharedResponse linear, const VectorXd& near_nN)
       : linear_(std::move(linear)),
         large_(scene.on.parameters.gel, rest.ellipses, rest.beads_um, near_nN, scene.on.threads) {}
 
-  substrate::Tangent about(const Eigen::VectorXd& forces_nN) const {
+  substrate::Tangent about(const VectorXd& forces_nN) const {
     const substrate::Tangent change = large_.about(forces_nN);
-    Eigen::MatrixXd response = linear_->matrix();
+    MatrixXd response = linear_->matrix();
     response += change.response->matrix();
     return {.displacement_um = linear_->displace(forces_nN) + change.displacement_um,
             .response = substrate::dense_response(std::move(response))};
@@ -95,12 +94,12 @@ EnsembleFit fit_on_strained_gel(const StrainedScene& scene, EnsembleFit fit, con
   constexpr int kMostFits = 6;
   constexpr double kSettled = 0.01;  // of what matters at all
   const Parameters& p = scene.on.parameters;
-  const Eigen::VectorXd measured = fit.data.displacement_um;
+  const VectorXd measured = fit.data.displacement_um;
   const std::vector<substrate::Ellipse> ellipses = substrate::ellipses_of(scene.on.cell.adhesions);
-  const auto left_out = [&](const Eigen::VectorXd& forces) {
+  const auto left_out = [&](const VectorXd& forces) {
     return choice::left_out_at_beads(p.gel, choice::mean_traction_kPa(ellipses, forces));
   };
-  Eigen::VectorXd forces = adhesion_forces_nN(fit);
+  VectorXd forces = adhesion_forces_nN(fit);
   AtRest rest = as_seen(scene);
   substrate::SharedResponse linear = fit.data.response;
   if (scene.is_under_load) {
@@ -113,9 +112,9 @@ EnsembleFit fit_on_strained_gel(const StrainedScene& scene, EnsembleFit fit, con
     const substrate::Tangent tangent = gel.about(forces);
     const auto response = std::static_pointer_cast<const substrate::KeptResponse>(tangent.response);
     // forces beside the network's stay linear: they are among the motions
-    Eigen::VectorXd offset = tangent.displacement_um - response->displace(forces);
+    VectorXd offset = tangent.displacement_um - response->displace(forces);
     fit = refit(about_forces(std::move(fit.data), response, measured, std::move(offset)), next_start(fit));
-    const Eigen::VectorXd before = std::exchange(forces, adhesion_forces_nN(fit));
+    const VectorXd before = std::exchange(forces, adhesion_forces_nN(fit));
     // a tangent is off by what linear theory is, times the square of how far it is followed
     const double followed = (forces - before).norm() / std::max(forces.norm(), 1e-300);
     if (left_out(forces) * followed * followed < kSettled * p.effects.effect_tolerance) return fit;

@@ -13,10 +13,6 @@
 namespace mbtfm::sheets {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// The sheet of a question on triangles, and what of it is fitted.
 struct Unknowns {
   SheetShape shape;

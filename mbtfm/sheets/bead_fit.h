@@ -66,8 +66,8 @@ BeadFit fit_beads(
 /// columns whose squares add up to a standard error's. Meshes differ without order, so that is the root mean square of
 /// the differences between three of them: its own, one of 0.7 of the size, and the finest.
 struct MeshChange {
-  Eigen::VectorXd um;
-  Eigen::MatrixXd left_um;
+  VectorXd um;
+  MatrixXd left_um;
   sheet::TriangleSize size;  ///< of the finest triangles
 };
 /// The finer meshes of an outline, for what is found on it.

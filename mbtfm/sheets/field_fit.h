@@ -22,9 +22,9 @@ class ContractionLattice {
   /// By point, at the points of the elements: for SheetShape::contractions.
   std::vector<std::vector<double>> shares_on(const sheet::Elements& elements) const;
   /// All φ_k at a place.
-  Eigen::VectorXd shares_at(Vec2 place_um) const;
+  VectorXd shares_at(Vec2 place_um) const;
   /// L: ∫ |∇s|² dA = cᵀ L c, over all squares of the lattice that the sheet touches.
-  Eigen::MatrixXd roughness() const;
+  MatrixXd roughness() const;
 
  private:
   struct Square {
@@ -39,8 +39,8 @@ class ContractionLattice {
 /// A sheet whose contraction varies.
 struct FieldFit {
   SheetFit sheet;                    ///< its contractions are means over the sheet
-  Eigen::VectorXd contractions;      ///< c, nN/um: the mean of what the beads leave possible
-  Eigen::MatrixXd covariance;        ///< of c
+  VectorXd contractions;             ///< c, nN/um: the mean of what the beads leave possible
+  MatrixXd covariance;               ///< of c
   double smoothing = 0;              ///< λ (um²/nN²)
   bool is_smoothing_at_end = false;  ///< as smooth as was tried: the beads call for no variation
   double degrees = 0;                ///< how many numbers of the contraction the beads tell
@@ -57,11 +57,10 @@ struct FieldFit {
 /// @param table  with the shares of the lattice as its contractions; known adhesions
 /// @param mean  of each φ over the sheet's area
 FieldFit fit_field(tensions::LinearData data, const StiffnessTable& table, tensions::Loss loss,
-                   std::optional<double> stiffness_nN_per_um, const ContractionLattice& lattice,
-                   const Eigen::VectorXd& mean);
+                   std::optional<double> stiffness_nN_per_um, const ContractionLattice& lattice, const VectorXd& mean);
 
 /// As of a SheetFit, also of the contraction at each place.
-void add_error(FieldFit& fit, std::optional<double> SheetErrorParts::*part, const Eigen::MatrixXd& changes_um);
+void add_error(FieldFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um);
 
 /// The contraction at a place.
 struct ContractionAt {
@@ -73,6 +72,6 @@ std::vector<ContractionAt> contractions_at(const sheet::Elements& elements, cons
                                            const FieldFit& fit);
 
 /// Of each φ over the area of the sheet.
-Eigen::VectorXd means_over(const sheet::Elements& elements, const ContractionLattice& lattice);
+VectorXd means_over(const sheet::Elements& elements, const ContractionLattice& lattice);
 
 }  // namespace mbtfm::sheets

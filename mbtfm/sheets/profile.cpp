@@ -59,7 +59,7 @@ LinearData reweighed(LinearData data, tensions::Loss loss, const std::function<V
     const double scale = fixed_scale.value_or(tensions::robust_scale(data, residual));
     if (!(scale > 0)) break;
     VectorXd weight(residual.size() / 2);
-    for (Eigen::Index b = 0; b < weight.size(); ++b)
+    for (Index b = 0; b < weight.size(); ++b)
       weight(b) = tensions::robust_weight(loss, residual.segment<2>(2 * b).norm() / scale);
     const double change = (weight - data.bead_weight).cwiseAbs().maxCoeff();
     data = tensions::reweighted(std::move(data), weight);
@@ -70,7 +70,7 @@ LinearData reweighed(LinearData data, tensions::Loss loss, const std::function<V
 
 }  // namespace
 
-VectorXd best_loads(const MatrixXd& H, const VectorXd& right, Eigen::Index n_bundles) {
+VectorXd best_loads(const MatrixXd& H, const VectorXd& right, Index n_bundles) {
   VectorXd loads = numerics::solve_symmetric(H, right);
   if (n_bundles == 0 || loads.tail(n_bundles).minCoeff() >= 0) return loads;
   VectorXd low = VectorXd::Constant(loads.size(), -std::numeric_limits<double>::infinity());
@@ -78,14 +78,14 @@ VectorXd best_loads(const MatrixXd& H, const VectorXd& right, Eigen::Index n_bun
   return tensions::bounded_quadratic_minimum(H, -right, low);
 }
 
-tensions::Sides Profile::reach(Eigen::Index load, double room) const {
+tensions::Sides Profile::reach(Index load, double room) const {
   if (n_bundles == 0) {
     const double half = std::sqrt(room * numerics::inverse_symmetric(normal)(load, load));
     return {half, half};
   }
   // what may take both signs is given a bound that it never meets
   tensions::LocalMisfit local{.tensions_nN = loads, .H = normal, .g = gradient};
-  for (Eigen::Index k = 0; k < loads.size() - n_bundles; ++k)
+  for (Index k = 0; k < loads.size() - n_bundles; ++k)
     local.tensions_nN[k] = 1e3 * (std::abs(loads[k]) + std::sqrt(room / normal(k, k)));
   constexpr double kNormal95 = tensions::kNormal95;
   return tensions::profiles_95(local, room / (kNormal95 * kNormal95))[load];
@@ -132,7 +132,7 @@ Profile Search::best() const {
 }
 
 MatrixXd of_even_parts(const StiffnessTable& table) {
-  const Eigen::Index n = table.n_contractions(), n_others = table.n_loads() - n;
+  const Index n = table.n_contractions(), n_others = table.n_loads() - n;
   MatrixXd joined = MatrixXd::Zero(n + n_others, 1 + n_others);
   joined.topLeftCorner(n, 1).setOnes();
   joined.bottomRightCorner(n_others, n_others).setIdentity();
@@ -162,11 +162,11 @@ Directions directions_about(const StiffnessTable& table, const Stiffnesses& at, 
     if (moved.adhesion_nN_per_um3) *moved.adhesion_nN_per_um3 *= std::exp(log_adhesion);
     return numerics::matvec(table.shares(moved), loads);
   };
-  const Eigen::Index n = table.n_loads(), first_bundle = n - std::ssize(table.bundles());
+  const Index n = table.n_loads(), first_bundle = n - std::ssize(table.bundles());
   Directions all{.forces = MatrixXd(table.shares(at).rows(), n + 2), .unknown = {}};
   all.forces << table.shares(at), (forces(kStep, 0) - forces(-kStep, 0)) / (2 * kStep),
       (forces(0, kStep) - forces(0, -kStep)) / (2 * kStep);
-  for (Eigen::Index k = 0; k < n; ++k)
+  for (Index k = 0; k < n; ++k)
     if (k < first_bundle || loads[k] > 0) all.unknown.push_back(k);
   if (!is_sheet_known) all.unknown.push_back(n);
   if (table.adhesion_nN_per_um3()) all.unknown.push_back(n + 1);
@@ -193,8 +193,8 @@ Linearised linearised(const LinearData& data, const Directions& about, double va
   const MatrixXd inverse = solved(about);
   // a stiffness that the beads do not tell within a factor of e follows no straight line
   Directions told = about;
-  const Eigen::Index n_loads = about.forces.cols() - 2;
-  std::erase_if(told.unknown, [&](Eigen::Index k) { return k >= n_loads && variance * inverse(k, k) > 1; });
+  const Index n_loads = about.forces.cols() - 2;
+  std::erase_if(told.unknown, [&](Index k) { return k >= n_loads && variance * inverse(k, k) > 1; });
   const MatrixXd forces = numerics::small_product(about.forces, solved(told));
   return {.covariance = variance * inverse,
           .without_motion = variance * padded(numerics::inverse_symmetric(about.normal_without_motion(data) +

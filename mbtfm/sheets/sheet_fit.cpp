@@ -76,7 +76,7 @@ class Allowed {
   const Limits& of_sheet() const { return of_sheet_; }
   const Limits& of_adhesion() const { return of_adhesion_; }
   /// At each pair of stiffnesses a load may lie so far from its best as the misfit has room left.
-  Limits of_load(Eigen::Index load, Quantity quantity) const {
+  Limits of_load(Index load, Quantity quantity) const {
     Limits limits;
     for_each([&](const Profile& p, double room) {
       const bool is_share = quantity == Quantity::contraction_over_stiffness;
@@ -153,19 +153,19 @@ class Estimates {
       : table_(table), best_(best), covariance_(covariance), allowed_(allowed) {}
 
   std::vector<FittedEstimate> of(const std::vector<std::string>& parts) const {
-    const Eigen::Index at_M = table_.n_loads(), at_kappa = at_M + 1;
+    const Index at_M = table_.n_loads(), at_kappa = at_M + 1;
     const double M = sheet_of(best_);
     std::vector<FittedEstimate> all;
     const auto add = [&](Quantity quantity, const std::string& part, double value, const VectorXd& by_unknown,
                          const Limits& limits) { all.push_back(one(quantity, part, value, by_unknown, limits)); };
-    const auto part_of = [&](Eigen::Index k) { return parts.empty() ? "" : parts[k]; };
-    for (Eigen::Index k = 0; k < table_.n_contractions(); ++k)
+    const auto part_of = [&](Index k) { return parts.empty() ? "" : parts[k]; };
+    for (Index k = 0; k < table_.n_contractions(); ++k)
       add(Quantity::contraction, part_of(k), best_.loads(k), by(k, 1), allowed_.of_load(k, Quantity::contraction));
     add(Quantity::stiffness, {}, M, by(at_M, M), allowed_.of_sheet());
-    for (Eigen::Index k = 0; k < table_.n_contractions(); ++k)
+    for (Index k = 0; k < table_.n_contractions(); ++k)
       add(Quantity::contraction_over_stiffness, part_of(k), best_.loads(k) / M,
           by(k, 1 / M) - by(at_M, best_.loads(k) / M), allowed_.of_load(k, Quantity::contraction_over_stiffness));
-    Eigen::Index load = table_.n_contractions();
+    Index load = table_.n_contractions();
     const auto tension = [&](Quantity quantity, const std::string& of_what) {
       add(quantity, of_what, best_.loads(load), by(load, 1), allowed_.of_load(load, quantity));
       ++load;
@@ -184,9 +184,7 @@ class Estimates {
   }
 
  private:
-  VectorXd by(Eigen::Index unknown, double factor) const {
-    return factor * VectorXd::Unit(table_.n_loads() + 2, unknown);
-  }
+  VectorXd by(Index unknown, double factor) const { return factor * VectorXd::Unit(table_.n_loads() + 2, unknown); }
   FittedEstimate one(Quantity quantity, const std::string& part, double value, const VectorXd& by_unknown,
                      const Limits& limits) const {
     FittedEstimate e{{.quantity = quantity,
@@ -222,7 +220,7 @@ void add_error(std::vector<FittedEstimate>& estimates, std::optional<double> She
                const VectorXd& sizes) {
   for (std::size_t k = 0; k < estimates.size(); ++k) {
     FittedEstimate& e = estimates[k];
-    const double size = sizes(static_cast<Eigen::Index>(k)), more = tensions::kNormal95 * size;
+    const double size = sizes(static_cast<Index>(k)), more = tensions::kNormal95 * size;
     if (e.low) {
       const double wider = e.value - std::hypot(e.value - *e.low, more);
       e.low = *e.low >= 0 ? std::max(0.0, wider) : wider;  // what cannot be negative stays so
@@ -237,13 +235,13 @@ void add_error(std::vector<FittedEstimate>& estimates, std::optional<double> She
 void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um) {
   const MatrixXd moved = numerics::small_product(fit.answers, changes_um);
   VectorXd sizes(std::ssize(fit.estimates));
-  for (Eigen::Index k = 0; k < sizes.size(); ++k) sizes(k) = (fit.estimates[k].by_unknown.transpose() * moved).norm();
+  for (Index k = 0; k < sizes.size(); ++k) sizes(k) = (fit.estimates[k].by_unknown.transpose() * moved).norm();
   add_error(fit.estimates, part, sizes);
 }
 
 VectorXd changes_by_modulus(const std::vector<FittedEstimate>& estimates, double share) {
   VectorXd changes(std::ssize(estimates));
-  for (Eigen::Index k = 0; k < changes.size(); ++k) {
+  for (Index k = 0; k < changes.size(); ++k) {
     const FittedEstimate& e = estimates[k];
     const bool is_force = e.quantity != Quantity::contraction_over_stiffness && e.quantity != Quantity::penetration;
     changes(k) = is_force ? share * e.value : 0;
@@ -257,7 +255,7 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
     const Search search(of, table, known);
     return search.amplitudes(search.best());
   });
-  const Eigen::Index n_unknowns = table.n_loads() + (known ? 0 : 1) + (table.adhesion_nN_per_um3() ? 1 : 0);
+  const Index n_unknowns = table.n_loads() + (known ? 0 : 1) + (table.adhesion_nN_per_um3() ? 1 : 0);
   const Search search(data, table, known);
   const Profile best = search.best();
   SheetFit fit;
@@ -270,7 +268,7 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   fit.variance = tensions::misfit_variance(data, fit.node_amplitudes, n_unknowns, loss);
   Linearised about = linearised(data, directions_about(table, best.at, best.loads, known.has_value()), fit.variance);
   const MatrixXd& covariance = about.covariance;
-  const Eigen::Index at_M = table.n_loads();
+  const Index at_M = table.n_loads();
   if (!known) fit.correlation = covariance(0, at_M) / std::sqrt(covariance(0, 0) * covariance(at_M, at_M));
   const Allowed allowed(table, search, best, fit.variance, known.has_value());
   fit.estimates = Estimates(table, best, covariance, allowed).of(parts);
@@ -286,7 +284,7 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
     return std::string("sheet") + (table.has_line() ? "-with-line" : "") + (has.bundles ? "-with-bundles" : "") +
            (has.springs ? "-on-springs" : "") + (has.parts ? "-in-parts" : "");
   };
-  const auto simpler = [&](const Has& has, Eigen::Index n_fewer, const Search& its, const Profile& p) {
+  const auto simpler = [&](const Has& has, Index n_fewer, const Search& its, const Profile& p) {
     models.add(name(has), static_cast<int>(n_unknowns - n_fewer), its.amplitudes(p));
   };
   if (has_bundles) {

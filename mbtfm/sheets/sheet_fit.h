@@ -15,7 +15,7 @@ namespace mbtfm::sheets {
 using Quantity = SheetQuantity;
 
 struct FittedEstimate : SheetEstimate {
-  Eigen::VectorXd by_unknown = {};  ///< how it follows the loads, log M and log κ
+  VectorXd by_unknown = {};  ///< how it follows the loads, log M and log κ
 };
 
 /// A model of the gel's motion: nothing, the sheet, the sheet with a cable along its edge, with bundles in it, on
@@ -29,9 +29,9 @@ struct SheetModel {
 struct SheetFit {
   std::vector<FittedEstimate> estimates;
   Stiffnesses stiffnesses;
-  Eigen::VectorXd loads;            ///< contractions by part, line tension, tensions of bundles
-  Eigen::VectorXd node_amplitudes;  ///< of the table's forces: what the sheet does at the solution
-  Eigen::MatrixXd answers;   ///< how the loads, log M and log κ follow the beads' displacements (2·beads), by row
+  VectorXd loads;            ///< contractions by part, line tension, tensions of bundles
+  VectorXd node_amplitudes;  ///< of the table's forces: what the sheet does at the solution
+  MatrixXd answers;          ///< how the loads, log M and log κ follow the beads' displacements (2·beads), by row
   bool is_at_bound = false;  ///< the best stiffness of the sheet is the table's first or last
   double correlation = 0;    ///< of the errors of the first contraction and log stiffness
   double variance = 1;       ///< of a weighted component of a bead, that the error bars are made with
@@ -55,19 +55,19 @@ void compare_with_adhesions(SheetFit& fit, const tensions::LinearData& adhesions
 /// @param ground  whose patches carry the table's forces
 /// @param motions  that the beads may share besides, found with the sheet: 2·beads × some
 tensions::LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
-                             const substrate::Substrate& gel, int threads, Eigen::MatrixXd motions = {});
+                             const substrate::Substrate& gel, int threads, MatrixXd motions = {});
 
 /// One more error of the estimates, independent of the others: their standard errors and intervals grow by it.
 /// @param part  the source, whose part grows, too
 /// @param sizes  a standard error each
 void add_error(std::vector<FittedEstimate>& estimates, std::optional<double> SheetErrorParts::*part,
-               const Eigen::VectorXd& sizes);
+               const VectorXd& sizes);
 /// The same by what they change if the beads moved otherwise.
 /// @param changes_um  2·beads × errors that are independent of each other
-void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const Eigen::MatrixXd& changes_um);
+void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um);
 /// What they change by if all forces and stiffnesses grow by a share: the beads' displacements are measured, so that is
 /// what another modulus of the gel does, if no stiffness is given.
-Eigen::VectorXd changes_by_modulus(const std::vector<FittedEstimate>& estimates, double share);
+VectorXd changes_by_modulus(const std::vector<FittedEstimate>& estimates, double share);
 
 /// Least squares (or a robust loss) over all stiffnesses of the table: of each the best loads are linear, so the misfit
 /// is a function of one number, or of two where the adhesions are fitted, which are scanned and then refined (variable

@@ -1,7 +1,6 @@
 /// What a contracting sheet on a gel does to the gel, for any stiffness of the sheet and of its adhesions.
 #pragma once
 
-#include <Eigen/Core>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "continuum/sheet/bundles.h"
 #include "continuum/sheet/on_gel.h"
 #include "pipeline/contract/gel.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::sheets {
 
@@ -63,12 +63,12 @@ class StiffnessTable {
   /// Where it is not; unset: bonded.
   std::optional<double> known_adhesion_nN_per_um3() const { return known_adhesion_; }
   /// Forces of the patches that make up all others, orthogonal: 2·patches × any.
-  const Eigen::MatrixXd& forces_nN() const { return forces_nN_; }
+  const MatrixXd& forces_nN() const { return forces_nN_; }
   /// How much of each, by load.
-  Eigen::MatrixXd shares(const Stiffnesses& at) const;
+  MatrixXd shares(const Stiffnesses& at) const;
 
  private:
-  std::vector<Stiffnesses> examples(Eigen::Index n_loads) const;
+  std::vector<Stiffnesses> examples(Index n_loads) const;
   int n_contractions_ = 1;
   bool has_line_ = false;
   std::vector<sheet::Bundle> bundles_;
@@ -76,7 +76,7 @@ class StiffnessTable {
   std::optional<StiffnessRange> adhesion_;
   std::optional<double> known_adhesion_;
   sheet::OnGel::Reduced equations_;
-  Eigen::MatrixXd forces_nN_;
+  MatrixXd forces_nN_;
 };
 
 }  // namespace mbtfm::sheets

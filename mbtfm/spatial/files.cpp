@@ -57,7 +57,7 @@ struct Shown {
 };
 
 Shown shown(const Problem& problem, const SpatialReconstruction& r) {
-  const Eigen::VectorXd u = problem.surface_displacement_um(r.traction_kPa);
+  const VectorXd u = problem.surface_displacement_um(r.traction_kPa);
   const std::vector<double> resolution = resolution_um(problem, r);
   const bool is_even = problem.mesh.finest_level() == 0;
   Shown all{evened(problem.mesh, problem.ground), {}};
@@ -65,7 +65,7 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
     const Vec2 place = all.lattice.quads.points_um[v];
     const std::vector<VertexShare> shares =
         is_even ? std::vector<VertexShare>{{static_cast<int>(v), 1}} : shares_at(problem.mesh, place);
-    const auto vector = [&](const Eigen::VectorXd& of) {
+    const auto vector = [&](const VectorXd& of) {
       Vec3 sum;
       for (const auto& [vertex, share] : shares)
         sum += share * Vec3{of[3 * vertex], of[3 * vertex + 1], of[3 * vertex + 2]};
@@ -84,7 +84,7 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
       for (const auto& [vertex, share] : shares) *row.resolution_um += share * resolution[vertex];
     }
     if (r.covariance_kPa2.size() == 0) continue;
-    const auto sigma = [&](Eigen::Index c) {
+    const auto sigma = [&](Index c) {
       double variance = 0;
       for (const VertexShare& a : shares) {
         for (const VertexShare& b : shares)

@@ -15,8 +15,8 @@ struct Foreseen {
   double degrees = 0;  ///< how many numbers the beads tell
   /// Of the forces on adhesions, x, y, z of each in turn: as forces_beside_background() states it, and its part by the
   /// noise of the beads. The rest is the background that they do not tell from the forces.
-  Eigen::MatrixXd covariance_nN2, by_noise_nN2;
-  Eigen::VectorXd mean_nN;                          ///< those forces, in the mean
+  MatrixXd covariance_nN2, by_noise_nN2;
+  VectorXd mean_nN;                                 ///< those forces, in the mean
   Eigen::Matrix3d net_force_nN2, net_by_noise_nN2;  ///< the same of the sum over the surface
   std::vector<double> resolution_um;                ///< by vertex
 };
@@ -37,12 +37,12 @@ class Foresight {
   const Problem& problem_;
   tractions::TractionParameters traction_;
   std::optional<tractions::Spectrum> spectrum_;  ///< of A, the weighed answers to the unknowns
-  Eigen::MatrixXd patches_;                      ///< PᵀP, P the weighed answers to forces
-  Eigen::MatrixXd hidden_;                       ///< Vᵀ Aᵀ P
-  Eigen::VectorXd pulled_by_patches_;            ///< Pᵀ u
-  Eigen::VectorXd pulled_;                       ///< Vᵀ Aᵀ u
-  Eigen::MatrixXd sums_;                         ///< Vᵀ of the sum over the surface, x, y, z
-  Eigen::MatrixXd shown_;  ///< by vertex and direction: what of a change of its traction lies along it
+  MatrixXd patches_;                             ///< PᵀP, P the weighed answers to forces
+  MatrixXd hidden_;                              ///< Vᵀ Aᵀ P
+  VectorXd pulled_by_patches_;                   ///< Pᵀ u
+  VectorXd pulled_;                              ///< Vᵀ Aᵀ u
+  MatrixXd sums_;                                ///< Vᵀ of the sum over the surface, x, y, z
+  MatrixXd shown_;  ///< by vertex and direction: what of a change of its traction lies along it
 };
 
 }  // namespace mbtfm::spatial

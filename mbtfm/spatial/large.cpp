@@ -12,10 +12,6 @@
 
 namespace mbtfm::spatial {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 namespace {
 
 /// P W S G L and its transpose, by solutions of the gel.

@@ -244,7 +244,7 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
   } else {
     problem.model = model;
     problem.map = map;
-    map->displace(Eigen::VectorXd::Zero(problem.n_unknowns()));  // makes the mesh, whose error is asked below
+    map->displace(VectorXd::Zero(problem.n_unknowns()));  // makes the mesh, whose error is asked below
   }
   if (meshing.has_patches && !inputs.adhesions.empty()) {
     problem.patch_response_um_per_nN =

@@ -23,38 +23,37 @@ struct Problem {
   Ground ground;
   Expected expected;
   TractionMesh mesh;
-  Eigen::MatrixXd response_um_per_kPa = {};  ///< G by row of `observed`; empty where there is only the map
-  Eigen::MatrixXd surface_um_per_kPa = {};   ///< displacement of the vertices; likewise
+  MatrixXd response_um_per_kPa = {};  ///< G by row of `observed`; empty where there is only the map
+  MatrixXd surface_um_per_kPa = {};   ///< displacement of the vertices; likewise
   std::shared_ptr<const substrate::Substrate> model = {};  ///< of the map
   substrate::LazyResponse map = {};                        ///< to all_observed(); null where there are matrices
-  Eigen::VectorXd offset_um = {}, surface_offset_um = {};  ///< u_0 of beads and vertices; empty: zero
+  VectorXd offset_um = {}, surface_offset_um = {};         ///< u_0 of beads and vertices; empty: zero
   // where forces on adhesions are asked for:
-  Eigen::MatrixXd patch_response_um_per_nN = {};  ///< to forces spread evenly over them, x, y, z of each in turn
-  Eigen::MatrixXd adhesion_areas_um2 = {};  ///< adhesions × vertices: the area of each, as weights of the vertices
-  Eigen::MatrixXd facet_response_um_per_kPa = {};  ///< to even tractions on the faces, where they are asked for
-  Eigen::MatrixXd common_um = {};                  ///< what all beads may do together beside; no columns: nothing
-  double model_error = 0;                          ///< relative, of G, as the gel's model states it
-  Figures figures = {};                            ///< of that model
+  MatrixXd patch_response_um_per_nN = {};   ///< to forces spread evenly over them, x, y, z of each in turn
+  MatrixXd adhesion_areas_um2 = {};         ///< adhesions × vertices: the area of each, as weights of the vertices
+  MatrixXd facet_response_um_per_kPa = {};  ///< to even tractions on the faces, where they are asked for
+  MatrixXd common_um = {};                  ///< what all beads may do together beside; no columns: nothing
+  double model_error = 0;                   ///< relative, of G, as the gel's model states it
+  Figures figures = {};                     ///< of that model
 
-  Eigen::Index n_unknowns() const { return 3 * Eigen::Index{mesh.n_vertices()}; }
+  Index n_unknowns() const { return 3 * Index{mesh.n_vertices()}; }
   std::vector<Vec3> vertices_um() const;
   /// What the gel answers to: the beads, then the vertices.
   substrate::Observations all_observed() const;
   /// The rows of `observed`, of those of all_observed().
-  Eigen::MatrixXd at_beads(const Eigen::MatrixXd& of_all) const;
+  MatrixXd at_beads(const MatrixXd& of_all) const;
   /// The displacement that tractions explain: measured less u_0.
-  Eigen::VectorXd displacement_um() const;
+  VectorXd displacement_um() const;
   /// Of the vertices.
-  Eigen::VectorXd surface_displacement_um(const Eigen::VectorXd& traction_kPa) const;
+  VectorXd surface_displacement_um(const VectorXd& traction_kPa) const;
   /// S r, r the rows (um) less the common motion that beads of these weights see in them.
-  Eigen::VectorXd over_errors(const Eigen::VectorXd& rows_um, const Eigen::VectorXd& weights_by_row) const;
+  VectorXd over_errors(const VectorXd& rows_um, const VectorXd& weights_by_row) const;
   /// The same of u − u_0 − G t.
-  Eigen::VectorXd residual(const Eigen::VectorXd& traction_kPa, const Eigen::VectorXd& weights_by_row) const;
+  VectorXd residual(const VectorXd& traction_kPa, const VectorXd& weights_by_row) const;
   /// The same with other answers: G = `matrix`, and u = `displacement_um` under the tractions `about_kPa`.
-  Problem with_response(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& displaced_um,
-                        const Eigen::VectorXd& about_kPa) const;
+  Problem with_response(const MatrixXd& matrix, const VectorXd& displaced_um, const VectorXd& about_kPa) const;
   /// The same of some of its beads. @param of_them  what observe() makes of these, in this order
-  Problem with_beads(const std::vector<Eigen::Index>& chosen, Observed of_them) const;
+  Problem with_beads(const std::vector<Index>& chosen, Observed of_them) const;
   /// Of a datum, in units of sigma²: one where errors are stated, or what the model's error leaves if that is more.
   double least_variance() const;
   double variance_of_model() const;  ///< what the model's error alone leaves of it
@@ -80,7 +79,7 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
 
 /// Least squares of the weighed beads over the unknowns of a basis, the common motion found besides.
 /// @param response  of the beads to them
-tractions::Spectrum spectrum_of(const Problem& problem, const Eigen::MatrixXd& response,
-                                const Eigen::VectorXd& weights_by_row, double n_data, int threads);
+tractions::Spectrum spectrum_of(const Problem& problem, const MatrixXd& response, const VectorXd& weights_by_row,
+                                double n_data, int threads);
 
 }  // namespace mbtfm::spatial

@@ -48,12 +48,12 @@ double distance_to_beads_um(const Problem& problem) {
 }
 
 /// Share of the beads whose residuals noise does not have.
-double share_astray(const Problem& problem, const Eigen::VectorXd& residual) {
+double share_astray(const Problem& problem, const VectorXd& residual) {
   constexpr double kFar = 5;  // of a component's standard deviation, as most beads have it
-  const Eigen::Index n = problem.observed.n_components();
+  const Index n = problem.observed.n_components();
   const double scale = weigh(BeadLoss::biweight, problem.observed, residual, 0).scale;
   int n_far = 0;
-  for (Eigen::Index b = 0; b < problem.observed.n_beads; ++b) n_far += residual.segment(n * b, n).norm() > kFar * scale;
+  for (Index b = 0; b < problem.observed.n_beads; ++b) n_far += residual.segment(n * b, n).norm() > kFar * scale;
   return scale > 0 ? static_cast<double>(n_far) / problem.observed.n_beads : 0;
 }
 

@@ -27,18 +27,18 @@ struct PartForce {
 /// Tractions whose sums over parts of the surface are better than those of the map, which is smoothed or shortened for
 /// the sake of its single places: a sum has less noise than these, and as much of the bias.
 struct Summands {
-  Eigen::VectorXd traction_kPa;
-  Eigen::MatrixXd covariance_kPa2;
+  VectorXd traction_kPa;
+  MatrixXd covariance_kPa2;
   std::optional<double> lambda;  ///< of the least expected error of the displacement, where the map has one by the risk
 };
 
 struct SpatialReconstruction {
   tractions::TractionMethod method{};
-  Eigen::VectorXd traction_kPa;  ///< three a vertex
+  VectorXd traction_kPa;  ///< three a vertex
   /// Of tractions: by the noise, and by what is not resolved. Empty: the method tells none.
-  Eigen::MatrixXd covariance_kPa2;
+  MatrixXd covariance_kPa2;
   std::optional<Summands> summands;  ///< unset: the map's
-  Eigen::VectorXd resolved;          ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
+  VectorXd resolved;                 ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
   std::optional<tractions::LambdaScan> scan;
   std::optional<double> lambda;                         ///< of |S (u − G t)|² + lambda² |s|²
   std::optional<double> length_um;                      ///< lambda times E, the same for every method
@@ -68,7 +68,7 @@ SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& i
 
 /// The minimum of |S (u − G t)|² + lambda² |x|² over the unknowns of a basis, with its loss and its lambda by the data.
 /// @param response  of the beads to the unknowns
-SpatialReconstruction reconstruct_in(const Basis& basis, const Eigen::MatrixXd& response, const Problem& problem,
+SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& response, const Problem& problem,
                                      const tractions::TractionParameters& traction, const SpatialParameters& parameters,
                                      int threads);
 
@@ -112,7 +112,7 @@ SpatialReconstruction reconstruct_tikhonov(const Problem& problem, const tractio
 
 /// By vertex: the mean over its components of the diagonal of I − C Q, C the covariance of the tractions with what was
 /// known before, Q the inverse of the latter alone, the same for each component.
-Eigen::VectorXd resolved_shares(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& precision_before);
+VectorXd resolved_shares(const MatrixXd& covariance, const MatrixXd& precision_before);
 
 SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractions::TractionParameters& traction,
                                            const SpatialParameters& parameters, int threads);
@@ -143,16 +143,16 @@ SpatialReconstruction reconstruct_green(const Problem& problem, const tractions:
 /// I − A (AᵀA + lambda²)⁻¹ Aᵀ.
 /// @param background  of the beads to the unknowns of the background, |x|² their norm
 /// @param reconstruction  with its lambda, weights and variance
-std::vector<PartForce> forces_beside_background(const Problem& problem, const Eigen::MatrixXd& background,
+std::vector<PartForce> forces_beside_background(const Problem& problem, const MatrixXd& background,
                                                 const SpatialReconstruction& reconstruction, int threads);
 
 /// What forces, moments and their errors are sums of.
-const Eigen::VectorXd& summed_tractions_kPa(const SpatialReconstruction& reconstruction);
-const Eigen::MatrixXd& covariance_of_summed_kPa2(const SpatialReconstruction& reconstruction);
+const VectorXd& summed_tractions_kPa(const SpatialReconstruction& reconstruction);
+const MatrixXd& covariance_of_summed_kPa2(const SpatialReconstruction& reconstruction);
 
 /// The forces of the tractions to be summed, and their errors where the reconstruction has a covariance.
 std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruction& reconstruction,
-                                 const Eigen::MatrixXd& areas_um2);
+                                 const MatrixXd& areas_um2);
 
 /// Sums over the surface.
 struct Balance {

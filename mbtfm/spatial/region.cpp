@@ -95,9 +95,9 @@ Expected expected_tractions(const SpatialInputs& inputs, const Observed& observe
   return {parameters.background > 0 ? known : seen, shape.is_part, shape.name, parameters.background};
 }
 
-Eigen::MatrixXd adhesion_areas_um2(const TractionMesh& mesh, const Ground& ground,
-                                   const std::vector<Adhesion>& adhesions, double grow_um) {
-  Eigen::MatrixXd areas = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(adhesions.size()), mesh.n_vertices());
+MatrixXd adhesion_areas_um2(const TractionMesh& mesh, const Ground& ground, const std::vector<Adhesion>& adhesions,
+                            double grow_um) {
+  MatrixXd areas = MatrixXd::Zero(static_cast<Index>(adhesions.size()), mesh.n_vertices());
   constexpr int kParts = 8;  // of a face's side: a rim is met to an eighth of it
   std::vector<Vec2> places;
   struct Share {
@@ -114,13 +114,13 @@ Eigen::MatrixXd adhesion_areas_um2(const TractionMesh& mesh, const Ground& groun
     if (owner[k] < 0) continue;
     for (const auto& [vertex, share] : all[k].of_vertices) areas(owner[k], vertex) += share * all[k].area_um2;
   }
-  for (Eigen::Index a = 0; a < areas.rows(); ++a) {
+  for (Index a = 0; a < areas.rows(); ++a) {
     if (areas.row(a).sum() > 0) continue;  // else smaller than what is sampled: all of it where its middle is
     const Adhesion& adhesion = adhesions[a];
     const Vec2 at = adhesion.position_um;
-    Eigen::Index nearest = 0;
-    for (Eigen::Index v = 0; v < areas.cols(); ++v) {
-      const auto away = [&](Eigen::Index k) { return norm(mesh.quads.points_um[k] - at); };
+    Index nearest = 0;
+    for (Index v = 0; v < areas.cols(); ++v) {
+      const auto away = [&](Index k) { return norm(mesh.quads.points_um[k] - at); };
       if (away(v) < away(nearest)) nearest = v;
     }
     areas(a, nearest) = adhesion.area_um2 * ground.stretch(at);

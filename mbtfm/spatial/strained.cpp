@@ -11,9 +11,6 @@
 
 namespace mbtfm::spatial {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 double mean_traction_kPa(const Problem& problem, const VectorXd& traction_kPa) {
   double fourth = 0, square = 0;
   for (Index v = 0; v < problem.mesh.n_vertices(); ++v) {

@@ -8,12 +8,11 @@
 namespace mbtfm::spatial {
 
 /// The root mean square of the tractions, by their own squares, as these make the squares of the displacement.
-double mean_traction_kPa(const Problem& problem, const Eigen::VectorXd& traction_kPa);
+double mean_traction_kPa(const Problem& problem, const VectorXd& traction_kPa);
 
 /// Whether they call for large strains, by the switch and the material; its number is what linear theory leaves out of
 /// the displacement. @throws UsageError as choice::decide
-Effect decide_strain(const Problem& problem, const Eigen::VectorXd& traction_kPa,
-                     const substrate::SubstrateParameters& gel);
+Effect decide_strain(const Problem& problem, const VectorXd& traction_kPa, const substrate::SubstrateParameters& gel);
 
 /// Gauss and Newton: the gel's tangent about the tractions found, and the tractions anew, until they stay.
 /// @param at_rest   the problem of small strains

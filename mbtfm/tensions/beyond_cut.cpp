@@ -82,15 +82,15 @@ class Tiling {
 
 /// Of data with noise of variance s² and random effects of variance κ s²: those along which they do not mix.
 struct Spectrum {
-  Eigen::VectorXd information;  ///< d: signal over noise, in squares, at κ = 1
-  Eigen::VectorXd found;        ///< c² / s²: its mean is d (1 + κ d)
-  double variance = 0;          ///< s²
+  VectorXd information;  ///< d: signal over noise, in squares, at κ = 1
+  VectorXd found;        ///< c² / s²: its mean is d (1 + κ d)
+  double variance = 0;   ///< s²
 };
 
 /// −2 log likelihood of κ, but for a constant.
 double surprise(const Spectrum& s, double kappa) {
   double sum = 0;
-  for (Eigen::Index i = 0; i < s.information.size(); ++i) {
+  for (Index i = 0; i < s.information.size(); ++i) {
     const double total = 1 + kappa * s.information[i];
     sum += std::log(total) - kappa * s.found[i] / total;
   }
@@ -112,20 +112,20 @@ double likeliest_kappa(const Spectrum& s) {
 }
 
 /// What the forces inside and the motions leave of the data tells of the random effects Z.
-Spectrum spectrum_of(const LinearData& data, const Eigen::MatrixXd& Z) {
-  const Eigen::VectorXd weight = squared_weights(data);
-  const Eigen::MatrixXd weighted = weight.asDiagonal() * less_motion(data, Z);
-  const Eigen::MatrixXd pulled = data.response->pull_back(weighted);  // Gᵀ W² P Z
-  const Eigen::MatrixXd left = numerics::transposed_product(Z, weighted) -
-                               numerics::transposed_product(pulled, solve_normal(data.reduced, pulled));
-  const Eigen::VectorXd residual = residual_um(data, free_forces_nN(data.reduced));
-  const Eigen::VectorXd b = numerics::transposed_matvec(Z, weight.cwiseProduct(residual));
+Spectrum spectrum_of(const LinearData& data, const MatrixXd& Z) {
+  const VectorXd weight = squared_weights(data);
+  const MatrixXd weighted = weight.asDiagonal() * less_motion(data, Z);
+  const MatrixXd pulled = data.response->pull_back(weighted);  // Gᵀ W² P Z
+  const MatrixXd left = numerics::transposed_product(Z, weighted) -
+                        numerics::transposed_product(pulled, solve_normal(data.reduced, pulled));
+  const VectorXd residual = residual_um(data, free_forces_nN(data.reduced));
+  const VectorXd b = numerics::transposed_matvec(Z, weight.cwiseProduct(residual));
   const auto [values, vectors] = numerics::symmetric_eigen(0.5 * (left + left.transpose()));
   const double rounding = 1e-10 * std::max(values.maxCoeff(), 1e-300);
   Spectrum s{values, numerics::transposed_matvec(vectors, b).cwiseAbs2(), 0};
   double explained = 0;
   auto n_left = static_cast<double>(data.n_used - data.reduced.n_felt);
-  for (Eigen::Index i = 0; i < s.information.size(); ++i) {
+  for (Index i = 0; i < s.information.size(); ++i) {
     if (s.information[i] <= rounding) {
       s.information[i] = s.found[i] = 0;
     } else {
@@ -142,21 +142,21 @@ Spectrum spectrum_of(const LinearData& data, const Eigen::MatrixXd& Z) {
 /// Of a component of the adhesions' forces, as forces independent of each other have it: less their noise, and each by
 /// what the beads tell of it. @param variance  of the beads' weighted components
 double mean_square_force(const LinearData& data, double variance) {
-  const Eigen::Index n = data.response->cols();
-  const Eigen::VectorXd noise = variance * solve_normal(data.reduced, Eigen::MatrixXd::Identity(n, n)).diagonal();
-  const Eigen::VectorXd squares = free_forces_nN(data.reduced).cwiseAbs2();
+  const Index n = data.response->cols();
+  const VectorXd noise = variance * solve_normal(data.reduced, MatrixXd::Identity(n, n)).diagonal();
+  const VectorXd squares = free_forces_nN(data.reduced).cwiseAbs2();
   return std::max(0.0, (squares - noise).cwiseQuotient(noise).sum() / std::max(noise.cwiseInverse().sum(), 1e-300));
 }
 
 /// These motions, and those by an even traction along x and along y: out there the cell pulls inwards as a whole, which
 /// is no chance, so nothing is expected of its size.
-Eigen::MatrixXd with_even_traction(const Eigen::MatrixXd& motions, const std::vector<substrate::Ellipse>& places,
-                                   const Eigen::MatrixXd& compliance_um_per_nN) {
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(compliance_um_per_nN.rows(), motions.cols() + 2);
+MatrixXd with_even_traction(const MatrixXd& motions, const std::vector<substrate::Ellipse>& places,
+                            const MatrixXd& compliance_um_per_nN) {
+  MatrixXd result = MatrixXd::Zero(compliance_um_per_nN.rows(), motions.cols() + 2);
   if (motions.cols() > 0) result.leftCols(motions.cols()) = motions;
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double area_um2 = std::numbers::pi * places[i].semi_major_um * places[i].semi_minor_um;
-    result.rightCols<2>() += area_um2 * compliance_um_per_nN.middleCols<2>(2 * static_cast<Eigen::Index>(i));
+    result.rightCols<2>() += area_um2 * compliance_um_per_nN.middleCols<2>(2 * static_cast<Index>(i));
   }
   return result;
 }
@@ -184,55 +184,55 @@ std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um
 namespace {
 
 /// Of each place the displacement by forces of 1 nN/um times the root of its area.
-Eigen::MatrixXd by_root_of_area(Eigen::MatrixXd compliance_um_per_nN, const std::vector<substrate::Ellipse>& places) {
+MatrixXd by_root_of_area(MatrixXd compliance_um_per_nN, const std::vector<substrate::Ellipse>& places) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double side_um = std::sqrt(std::numbers::pi) * places[i].semi_major_um;
-    compliance_um_per_nN.middleCols<2>(2 * static_cast<Eigen::Index>(i)) *= side_um;
+    compliance_um_per_nN.middleCols<2>(2 * static_cast<Index>(i)) *= side_um;
   }
   return compliance_um_per_nN;
 }
 
 /// The motions by random forces Z that stand out of the noise, of unit variance.
-Eigen::MatrixXd motions_that_stand_out(const LinearData& data, const Eigen::MatrixXd& Z, double kappa) {
+MatrixXd motions_that_stand_out(const LinearData& data, const MatrixXd& Z, double kappa) {
   // What together stands out by a tenth of the noise of one component changes no weight by a per cent.
   constexpr double kUnseen = 0.01;
-  const Eigen::MatrixXd square = kappa * numerics::transposed_product(Z, squared_weights(data).asDiagonal() * Z);
+  const MatrixXd square = kappa * numerics::transposed_product(Z, squared_weights(data).asDiagonal() * Z);
   const auto [values, vectors] = numerics::symmetric_eigen(square);
-  const Eigen::Index n_motions = (values.array() > kUnseen).count();
+  const Index n_motions = (values.array() > kUnseen).count();
   return numerics::small_product(std::sqrt(kappa), Z, vectors.rightCols(n_motions));
 }
 
 }  // namespace
 
 DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::Ellipse>& places,
-                                  const Eigen::MatrixXd& compliance_um_per_nN, double area_um2) {
+                                  const MatrixXd& compliance_um_per_nN, double area_um2) {
   MBTFM_ASSERT(data.motions.precision.size() == 0);
-  const Eigen::MatrixXd Z = by_root_of_area(compliance_um_per_nN, places);
-  const Eigen::Index n_affine = data.motions.shapes.cols();
-  Eigen::MatrixXd with_even = with_even_traction(data.motions.shapes, places, compliance_um_per_nN);
+  const MatrixXd Z = by_root_of_area(compliance_um_per_nN, places);
+  const Index n_affine = data.motions.shapes.cols();
+  MatrixXd with_even = with_even_traction(data.motions.shapes, places, compliance_um_per_nN);
   data = with_motions(std::move(data), std::move(with_even));
   const Spectrum spectrum = spectrum_of(data, Z);
   // With few beads at the cut the likelihood is flat down to zero; then what is hidden is as strong as what is seen.
   const double n_adhesions = 0.5 * static_cast<double>(data.response->cols());
   const double seen = n_adhesions / area_um2 * mean_square_force(data, spectrum.variance) / spectrum.variance;
   const double kappa = std::max(seen, likeliest_kappa(spectrum));
-  const Eigen::MatrixXd random = motions_that_stand_out(data, Z, kappa);
-  const Eigen::Index n_free = data.motions.shapes.cols();
-  Eigen::MatrixXd motions(Z.rows(), n_free + random.cols());
+  const MatrixXd random = motions_that_stand_out(data, Z, kappa);
+  const Index n_free = data.motions.shapes.cols();
+  MatrixXd motions(Z.rows(), n_free + random.cols());
   if (n_free > 0) motions.leftCols(n_free) = data.motions.shapes;
   motions.rightCols(random.cols()) = random;
   // An even traction is free, so that what these motions have of it may be left to it. Both together would be the same
   // motion twice, whose square no rounding leaves definite.
-  const Eigen::MatrixXd even = motions.middleCols(n_affine, n_free - n_affine);
-  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * even;
+  const MatrixXd even = motions.middleCols(n_affine, n_free - n_affine);
+  const MatrixXd weighted = squared_weights(data).asDiagonal() * even;
   motions.rightCols(random.cols()) -= numerics::small_product(
       even,
       numerics::shortest_solution(numerics::small_transposed_product(even, weighted),
                                   numerics::small_transposed_product(weighted, motions.rightCols(random.cols()))));
-  Eigen::VectorXd precision = Eigen::VectorXd::Ones(motions.cols());
+  VectorXd precision = VectorXd::Ones(motions.cols());
   precision.head(n_free).setZero();
   if (n_affine > 0) precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
-  const ForcesBeyond beyond{.n_places = static_cast<Eigen::Index>(places.size()),
+  const ForcesBeyond beyond{.n_places = static_cast<Index>(places.size()),
                             .n_motions = random.cols(),
                             .intensity_nN_per_um = std::sqrt(kappa * spectrum.variance)};
   return {with_motions(std::move(data), std::move(motions), std::move(precision)), beyond};
@@ -249,30 +249,30 @@ double expected_own(double distance_um) {
 DataWithBeyond with_own_forces(DataWithBeyond given, const Cell& cell) {
   auto& [data, found] = given;
   constexpr double kLeast = 0.02;  // nothing beside the errors that forces have in whole cells, too (0.1)
-  std::vector<Eigen::Index> near;
+  std::vector<Index> near;
   std::vector<double> expected;
   for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
     const Adhesion& adhesion = cell.adhesions[a];
     const double of_own = expected_own(distance_to_cut_um(cell, adhesion.position_um) - 0.5 * adhesion.major_axis_um);
     if (of_own < kLeast) continue;
-    near.push_back(static_cast<Eigen::Index>(a));
+    near.push_back(static_cast<Index>(a));
     expected.push_back(of_own);
   }
-  const Eigen::Index n_forces = data.response->cols();
+  const Index n_forces = data.response->cols();
   const double variance = noise_variance(data), mean_square = mean_square_force(data, variance);
   if (near.empty() || mean_square <= 0) return given;
-  found.n_own = static_cast<Eigen::Index>(near.size());
+  found.n_own = static_cast<Index>(near.size());
   found.own_nN = std::sqrt(mean_square);
-  const Eigen::Index before = data.motions.shapes.cols(), n_own = 2 * found.n_own;
-  Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(n_forces, before + n_own);
-  for (Eigen::Index k = 0; k < found.n_own; ++k) {
+  const Index before = data.motions.shapes.cols(), n_own = 2 * found.n_own;
+  MatrixXd forces = MatrixXd::Zero(n_forces, before + n_own);
+  for (Index k = 0; k < found.n_own; ++k) {
     forces.block<2, 2>(2 * near[k], before + 2 * k)
         .diagonal()
         .setConstant(expected[k] * std::sqrt(mean_square / variance));
   }
-  Eigen::MatrixXd motions(data.motions.shapes.rows(), before + n_own);
+  MatrixXd motions(data.motions.shapes.rows(), before + n_own);
   motions << data.motions.shapes, data.response->displace(forces.rightCols(n_own));
-  Eigen::VectorXd precision = Eigen::VectorXd::Ones(before + n_own);
+  VectorXd precision = VectorXd::Ones(before + n_own);
   precision.head(before) = data.motions.precision;
   data = with_motions(std::move(data), std::move(motions), std::move(precision));
   data.motions.forces = std::move(forces);
@@ -285,8 +285,8 @@ DataWithBeyond with_forces_beyond(LinearData data, const Cell& cell, const Gel& 
   const double density = beads_per_um2(beads);
   if (density <= 0) return {std::move(data), {}};
   const auto places = places_beyond(cell, spacing.finest / std::sqrt(density), spacing.growth);
-  const Eigen::MatrixXd compliance = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
-                                         ->compliance_um_per_nN(data.position_um, places);
+  const MatrixXd compliance = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
+                                  ->compliance_um_per_nN(data.position_um, places);
   return with_own_forces(
       with_forces_beyond(std::move(data), places, compliance, std::abs(signed_area_um2(cell.outline_um))), cell);
 }

@@ -32,14 +32,14 @@ std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um
 
 /// What was allowed for.
 struct ForcesBeyond {
-  Eigen::Index n_places = 0;
-  Eigen::Index n_motions = 0;  ///< of the beads, that stand out of their noise
+  Index n_places = 0;
+  Index n_motions = 0;  ///< of the beads, that stand out of their noise
   /// Standard deviation of a component of the forces by square root of the area that they act on (nN/um); forces
   /// independent of each other over an area A have a sum of this times √A.
   double intensity_nN_per_um = 0;
   /// Adhesions so near to the cut that they may have forces beside the network's, and the standard deviation of a
   /// component of the adhesions' forces in this cell, of which these may have all next to the cut.
-  Eigen::Index n_own = 0;
+  Index n_own = 0;
   double own_nN = 0;
 };
 
@@ -57,7 +57,7 @@ struct DataWithBeyond {
 /// @param compliance_um_per_nN  2·beads × 2·places
 /// @param area_um2  of the part of the cell that is in view
 DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::Ellipse>& places,
-                                  const Eigen::MatrixXd& compliance_um_per_nN, double area_um2);
+                                  const MatrixXd& compliance_um_per_nN, double area_um2);
 /// Adhesions near the cut may have forces of their own, beside the network's: a fibre of which less than 3 um is in
 /// view is not segmented (segment.fibre_shortest_um) and may pull on them; and at the cut the network is held where it
 /// is, while the cell's own gave way, which fades over 10 um. They pass through the cut. Expected is a part of the size

@@ -21,13 +21,13 @@ Vec2 centre_of(const std::vector<Vec2>& places) {
 
 }  // namespace
 
-Eigen::MatrixXd affine_motions(const DisplacementField& beads) {
+MatrixXd affine_motions(const DisplacementField& beads) {
   const std::vector<Vec2> places_um = points_of(beads);
   const Vec2 centre = centre_of(places_um);
-  Eigen::MatrixXd motions(2 * static_cast<Eigen::Index>(beads.size()), 6);
+  MatrixXd motions(2 * static_cast<Index>(beads.size()), 6);
   for (std::size_t i = 0; i < beads.size(); ++i) {
     const Vec2 d = places_um[i] - centre;
-    motions.middleRows<2>(2 * static_cast<Eigen::Index>(i)) << 1, 0, -d.y, d.x, d.x, d.y,  //
+    motions.middleRows<2>(2 * static_cast<Index>(i)) << 1, 0, -d.y, d.x, d.x, d.y,  //
         0, 1, d.x, d.y, -d.y, d.x;
   }
   return motions;
@@ -36,18 +36,18 @@ Eigen::MatrixXd affine_motions(const DisplacementField& beads) {
 namespace {
 
 /// 2·beads × 14, about the beads' centre and of size 1 or so.
-Eigen::MatrixXd curved_motions(const DisplacementField& beads) {
+MatrixXd curved_motions(const DisplacementField& beads) {
   constexpr int kPowers[7][2] = {{2, 0}, {1, 1}, {0, 2}, {3, 0}, {2, 1}, {1, 2}, {0, 3}};
   const std::vector<Vec2> places_um = points_of(beads);
   const Vec2 centre = centre_of(places_um);
   double squares = 0;
   for (const Vec2 place : places_um) squares += dot(place - centre, place - centre);
   const double unit_um = std::sqrt(squares / std::max(1.0, static_cast<double>(places_um.size())));
-  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(beads.size()), 14);
+  MatrixXd motions = MatrixXd::Zero(2 * static_cast<Index>(beads.size()), 14);
   if (!(unit_um > 0)) return motions;
   for (std::size_t i = 0; i < places_um.size(); ++i) {
     const Vec2 d = (1 / unit_um) * (places_um[i] - centre);
-    const auto row = 2 * static_cast<Eigen::Index>(i);
+    const auto row = 2 * static_cast<Index>(i);
     for (int k = 0; k < 7; ++k) {
       motions(row, 2 * k) = motions(row + 1, 2 * k + 1) = std::pow(d.x, kPowers[k][0]) * std::pow(d.y, kPowers[k][1]);
     }
@@ -58,15 +58,15 @@ Eigen::MatrixXd curved_motions(const DisplacementField& beads) {
 }  // namespace
 
 MotionsBeside motions_beside(const LinearData& data, const EnsembleFit& fit) {
-  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
-  const Eigen::MatrixXd by_force =
+  const MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
+  const MatrixXd by_force =
       numerics::small_product(data.motions.inverse, data.response->pull_back(weighted).transpose());
   return {.values = motion_in(data, data.displacement_um - data.response->displace(fit.forces.nN)),
           .sigma = covariance_of_estimates(fit, data.motions.inverse, by_force).diagonal().cwiseMax(0).cwiseSqrt()};
 }
 
 FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um) {
-  const Eigen::VectorXd& a = motions.values;
+  const VectorXd& a = motions.values;
   return {.motion = {.shift = {a[0], a[1]},
                      .turn_rad = a[2],
                      .growth = a[3],
@@ -77,17 +77,17 @@ FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<
 }
 
 CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementField& beads, const EnsembleFit& fit) {
-  const Eigen::MatrixXd motions = less_motion(data, curved_motions(beads));
-  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * motions;
-  const Eigen::VectorXd scores = numerics::transposed_matvec(weighted, residual_um(data, fit.forces.nN));
-  const Eigen::MatrixXd by_force = data.response->pull_back(weighted).transpose();
-  const Eigen::MatrixXd of_noise = numerics::small_transposed_product(weighted, motions);
-  const Eigen::MatrixXd covariance = covariance_of_scores(fit, of_noise, by_force);
+  const MatrixXd motions = less_motion(data, curved_motions(beads));
+  const MatrixXd weighted = squared_weights(data).asDiagonal() * motions;
+  const VectorXd scores = numerics::transposed_matvec(weighted, residual_um(data, fit.forces.nN));
+  const MatrixXd by_force = data.response->pull_back(weighted).transpose();
+  const MatrixXd of_noise = numerics::small_transposed_product(weighted, motions);
+  const MatrixXd covariance = covariance_of_scores(fit, of_noise, by_force);
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
-  const Eigen::MatrixXd information =
+  const MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
+  const MatrixXd information =
       of_noise - numerics::congruence(by_tension, mesh.noise_covariance_nN2) / fit.misfit.variance;
-  const Eigen::VectorXd moved = numerics::small_product(motions, numerics::shortest_solution(information, scores));
+  const VectorXd moved = numerics::small_product(motions, numerics::shortest_solution(information, scores));
   return {.chi_squared = scores.dot(numerics::shortest_solution(covariance, scores).col(0)),
           .rms_um = std::sqrt(2.0) * moved.norm() / std::sqrt(std::max(1.0, static_cast<double>(moved.size())))};
 }

@@ -19,11 +19,11 @@ struct EnsembleFit;
 
 /// The six motions of unit size as displacements of the beads, 2·beads × 6: shift (um), then turn, growth and shears
 /// (relative).
-Eigen::MatrixXd affine_motions(const DisplacementField& beads);
+MatrixXd affine_motions(const DisplacementField& beads);
 
 /// How much of each motion the fit finds besides, with standard errors; in the order of the data's motions.
 struct MotionsBeside {
-  Eigen::VectorXd values, sigma;
+  VectorXd values, sigma;
 };
 MotionsBeside motions_beside(const LinearData& data, const EnsembleFit& fit);
 
@@ -36,7 +36,7 @@ inline constexpr double kUsualGrowth = 0.003;
 /// A common motion with the standard errors of its numbers, in the order of affine_motions().
 struct FoundMotion {
   AffineMotion motion;  ///< um
-  Eigen::VectorXd sigma;
+  VectorXd sigma;
 };
 /// @param motions  the first six those of affine_motions()
 FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um);

@@ -21,7 +21,7 @@ class Minimisation {
   TensionFit& fit() { return fit_; }
   bool is_exhausted() const { return fit_.n_evaluations >= parameters_.max_evaluations; }
 
-  Eigen::VectorXd gradient() {
+  VectorXd gradient() {
     if (parameters_.gradients == Gradients::exact) return problem_.gradient(fit_.trial);
     fit_.n_evaluations += 2 * problem_.n_tensions();
     return problem_.finite_difference_gradient(fit_.trial, threads_);
@@ -29,7 +29,7 @@ class Minimisation {
 
   /// Go along `direction` to about the lowest point, on t >= 0: double the step while it pays, else halve it.
   /// @return the step taken, in units of `direction`; 0 where no step pays
-  double search_line(const Eigen::VectorXd& direction, double first_step) {
+  double search_line(const VectorXd& direction, double first_step) {
     double step = first_step;
     Trial best = at(step, direction);
     if (best.objective < fit_.trial.objective) {
@@ -60,7 +60,7 @@ class Minimisation {
   }
 
  private:
-  Trial at(double step, const Eigen::VectorXd& direction) {
+  Trial at(double step, const VectorXd& direction) {
     Trial trial = problem_.evaluate((fit_.trial.tensions_nN + step * direction).cwiseMax(0.0), &fit_.trial);
     ++fit_.n_evaluations;
     return trial;
@@ -72,8 +72,8 @@ class Minimisation {
 };
 
 /// The gradient on a block's tensions only, without what would push one below zero.
-Eigen::VectorXd projected(const Eigen::VectorXd& gradient, const Eigen::VectorXd& tensions, const Block& block) {
-  Eigen::VectorXd part = Eigen::VectorXd::Zero(gradient.size());
+VectorXd projected(const VectorXd& gradient, const VectorXd& tensions, const Block& block) {
+  VectorXd part = VectorXd::Zero(gradient.size());
   for (const int i : block.tensions) {
     if (tensions[i] > 0 || gradient[i] < 0) part[i] = gradient[i];
   }
@@ -88,18 +88,18 @@ TensionFit fit_conjugate_gradients(const TensionProblem& problem, const FitParam
   TensionFit& fit = minimisation.fit();
   std::vector<double> first_step(blocks.size(), 0);
   while (!minimisation.is_exhausted() && !fit.report.converged) {
-    const Eigen::VectorXd before = fit.trial.tensions_nN;
+    const VectorXd before = fit.trial.tensions_nN;
     const double objective_before = fit.trial.objective;
     for (std::size_t b = 0; b < blocks.size(); ++b) {
-      Eigen::VectorXd last_descent, direction;
+      VectorXd last_descent, direction;
       for (int step = 0; step < blocks[b].n_steps && !minimisation.is_exhausted(); ++step) {
-        const Eigen::VectorXd descent = -projected(minimisation.gradient(), fit.trial.tensions_nN, blocks[b]);
+        const VectorXd descent = -projected(minimisation.gradient(), fit.trial.tensions_nN, blocks[b]);
         if (descent.squaredNorm() == 0) break;
         // Polak–Ribière, restarted where it would go uphill
         const bool is_first = direction.size() == 0;
         const double beta =
             is_first ? 0 : std::max(0.0, descent.dot(descent - last_descent) / last_descent.squaredNorm());
-        direction = is_first ? descent : Eigen::VectorXd(descent + beta * direction);
+        direction = is_first ? descent : VectorXd(descent + beta * direction);
         if (direction.dot(descent) <= 0) direction = descent;
         last_descent = descent;
         if (first_step[b] == 0) first_step[b] = 0.1 * fit.trial.tensions_nN.maxCoeff() / direction.norm();

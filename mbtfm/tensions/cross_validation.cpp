@@ -28,10 +28,10 @@ CrossValidation cross_validate(const TensionProblem& problem, const LinearData& 
     const auto draw = static_cast<std::size_t>(is_exchanged ? k - n_draws : k);
     // the same numbers for both, so that they differ by the types alone
     std::mt19937_64 random(seed + 1000003 * (draw + 1));
-    Eigen::VectorXd drawn = around.tensions_nN;
+    VectorXd drawn = around.tensions_nN;
     for (std::size_t i = 0; i < types.size(); ++i) {
       const std::vector<double>& choice = tensions.at(is_exchanged ? exchanged(types[i]) : types[i]);
-      drawn[static_cast<Eigen::Index>(i) + 1] = choice[random() % choice.size()];
+      drawn[static_cast<Index>(i) + 1] = choice[random() % choice.size()];
     }
     (is_exchanged ? result.exchanged : result.own)[draw] =
         relative_l2(data, problem.evaluate(drawn, &around).forces_nN);

@@ -53,8 +53,8 @@ VectorXd mean_displacement_um(const std::vector<substrate::Ellipse>& ellipses, c
 
 /// Of a number that changes by `gradient` with the forces.
 double standard_error(const EnsembleFit& fit, const VectorXd& gradient) {
-  const Eigen::MatrixXd network = by_network_force(fit, gradient);
-  const double variance = covariance_of_estimates(fit, Eigen::MatrixXd::Zero(1, 1), network.transpose())(0, 0);
+  const MatrixXd network = by_network_force(fit, gradient);
+  const double variance = covariance_of_estimates(fit, MatrixXd::Zero(1, 1), network.transpose())(0, 0);
   return std::sqrt(variance + own_variances(fit, gradient)[0]);
 }
 

@@ -15,7 +15,7 @@ namespace mbtfm::tensions {
 
 namespace {
 
-void check_suffice(Eigen::Index n_components, Eigen::Index n_tensions) {
+void check_suffice(Index n_components, Index n_tensions) {
   if (n_components >= n_tensions) return;
   throw InvalidData("displacement",
                     "at least " + std::to_string((n_tensions + 1) / 2) + " good beads in the region of the fit for " +
@@ -24,10 +24,10 @@ void check_suffice(Eigen::Index n_components, Eigen::Index n_tensions) {
 }
 
 /// Forces with every fibre at the network's tension.
-Eigen::VectorXd network_forces_nN(const TensionProblem& problem, const Trial& trial) {
+VectorXd network_forces_nN(const TensionProblem& problem, const Trial& trial) {
   const double tension = trial.tensions_nN[0];
-  if (tension <= kNoTension * trial.tensions_nN.maxCoeff()) return Eigen::VectorXd::Zero(trial.forces_nN.size());
-  return problem.evaluate(Eigen::VectorXd::Constant(trial.tensions_nN.size(), tension), &trial).forces_nN;
+  if (tension <= kNoTension * trial.tensions_nN.maxCoeff()) return VectorXd::Zero(trial.forces_nN.size());
+  return problem.evaluate(VectorXd::Constant(trial.tensions_nN.size(), tension), &trial).forces_nN;
 }
 
 MeshFit describe(const TensionProblem& problem, TensionFit fit) {
@@ -44,8 +44,8 @@ MeshFit describe(const TensionProblem& problem, TensionFit fit) {
 }
 
 void add_errors(MeshFit& mesh, const EnsembleFit& all) {
-  const Eigen::MatrixXd J = displace(all.data.reduced, mesh.force_derivatives);
-  const Eigen::MatrixXd by_slope = numerics::transposed_product(J, *all.data.reduced.compliance);
+  const MatrixXd J = displace(all.data.reduced, mesh.force_derivatives);
+  const MatrixXd by_slope = numerics::transposed_product(J, *all.data.reduced.compliance);
   if (all.model_error)
     mesh.local.model_variance = numerics::weighted_outer(by_slope, all.model_error->force_variance_nN2);
   mesh.response = response_of(mesh.local, all.misfit.variance);
@@ -63,9 +63,8 @@ double network_bias(const MeshFit& mesh, const TensionProblem& problem, int thre
   const double tension = mesh.local.tensions_nN[0], standard_error = std::sqrt(mesh.covariance_nN2(0, 0));
   if (tension <= 0 || standard_error <= kWellKnown * tension) return 0;
   const double share = std::min(1.0, (standard_error / tension - kWellKnown) / (kBadlyKnown - kWellKnown));
-  const Eigen::MatrixXd J = displace(problem.data(), mesh.force_derivatives);
-  const Eigen::VectorXd bias_nN =
-      bending_bias_nN(problem, mesh.fit.trial, J, mesh.response, mesh.covariance_nN2, threads);
+  const MatrixXd J = displace(problem.data(), mesh.force_derivatives);
+  const VectorXd bias_nN = bending_bias_nN(problem, mesh.fit.trial, J, mesh.response, mesh.covariance_nN2, threads);
   return share * std::clamp(bias_nN[0], -standard_error, standard_error) / tension;
 }
 
@@ -78,11 +77,11 @@ void add_bootstrap(EnsembleFit& all, const network::Ensemble& networks, const st
     std::vector<std::uint64_t> draws;
     for (std::size_t d = m; d < static_cast<std::size_t>(parameters.bootstrap); d += n_meshes) draws.push_back(d + 1);
     const TensionProblem problem(networks[m], all.data.reduced, adhesion_ids);
-    const Eigen::MatrixXd of_mesh = bootstrap_deviations_nN(
-        problem, parameters, all.meshes[m].fit.trial, all.misfit.variance,
-        all.model_error ? all.model_error->force_variance_nN2 : Eigen::VectorXd(), draws, threads);
+    const MatrixXd of_mesh =
+        bootstrap_deviations_nN(problem, parameters, all.meshes[m].fit.trial, all.misfit.variance,
+                                all.model_error ? all.model_error->force_variance_nN2 : VectorXd(), draws, threads);
     for (std::size_t i = 0; i < deviations.size(); ++i) {
-      const auto row = of_mesh.row(static_cast<Eigen::Index>(i));
+      const auto row = of_mesh.row(static_cast<Index>(i));
       deviations[i].insert(deviations[i].end(), row.begin(), row.end());
     }
   }
@@ -96,8 +95,8 @@ void add_bootstrap(EnsembleFit& all, const network::Ensemble& networks, const st
 
 /// Quantities that are linear in the tensions about a mesh's solution.
 struct Quantities {
-  Eigen::VectorXd values;
-  Eigen::MatrixXd gradients;  ///< tensions × quantities
+  VectorXd values;
+  MatrixXd gradients;  ///< tensions × quantities
 };
 
 /// Their means over the meshes, and errors.
@@ -107,34 +106,34 @@ struct Quantities {
 /// @param is_single  each quantity is of one adhesion
 /// @param more_noise  further variances by the beads' noise; empty: none
 template <class OfMesh>
-std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh, const Eigen::MatrixXd& along = {},
-                                   bool is_single = false, const Eigen::VectorXd& more_noise = {}) {
+std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh, const MatrixXd& along = {},
+                                   bool is_single = false, const VectorXd& more_noise = {}) {
   const auto n_meshes = static_cast<double>(all.meshes.size());
-  Eigen::VectorXd value, noise;
-  Eigen::MatrixXd model;  // variances by force
+  VectorXd value, noise;
+  MatrixXd model;  // variances by force
   for (const MeshFit& mesh : all.meshes) {
     const Quantities q = of_mesh(mesh);
-    const Eigen::VectorXd own_noise =
+    const VectorXd own_noise =
         q.gradients.cwiseProduct(numerics::product(mesh.noise_covariance_nN2, q.gradients)).colwise().sum();
     if (value.size() == 0) {
-      value = noise = Eigen::VectorXd::Zero(q.values.size());
-      model = Eigen::MatrixXd::Zero(all.model_error ? all.forces.nN.size() : 0, q.values.size());
+      value = noise = VectorXd::Zero(q.values.size());
+      model = MatrixXd::Zero(all.model_error ? all.forces.nN.size() : 0, q.values.size());
     }
     value += q.values / n_meshes;
     noise += own_noise / n_meshes;
     if (model.size() == 0) continue;
-    Eigen::MatrixXd by_force = numerics::transposed_product(mesh.by_force, q.gradients);
+    MatrixXd by_force = numerics::transposed_product(mesh.by_force, q.gradients);
     if (along.size() > 0) by_force -= (is_single ? std::sqrt(all.model_error->of_single) : 1.0) * along;
     model += all.model_error->force_variance_nN2.asDiagonal() * by_force.cwiseAbs2() / n_meshes;
   }
   if (more_noise.size() > 0) noise += more_noise;
   std::vector<Estimate> estimates;
-  for (Eigen::Index i = 0; i < value.size(); ++i) {
+  for (Index i = 0; i < value.size(); ++i) {
     const double from_noise = std::max(0.0, noise[i]);
     const double variance = from_noise + (model.size() > 0 ? model.col(i).sum() : 0);
     Estimate estimate{.value = value[i], .noise = std::sqrt(from_noise), .standard_error = std::sqrt(variance)};
     double squares = 0;  // Welch–Satterthwaite, over the adhesions
-    for (Eigen::Index row = 0; row < model.rows(); row += 2) squares += std::pow(model(row, i) + model(row + 1, i), 2);
+    for (Index row = 0; row < model.rows(); row += 2) squares += std::pow(model(row, i) + model(row + 1, i), 2);
     if (squares > 0) estimate.degrees = std::min(1e6, variance * variance / squares * kDegreesByAdhesion);
     estimates.push_back(estimate);
   }
@@ -144,18 +143,18 @@ std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh
 /// The same for one quantity.
 template <class ValueOf, class GradientOf>
 Estimate estimate_of(const EnsembleFit& all, const ValueOf& value_of, const GradientOf& gradient_of,
-                     const Eigen::VectorXd& along = {}) {
+                     const VectorXd& along = {}) {
   const auto of_mesh = [&](const MeshFit& mesh) {
-    return Quantities{Eigen::VectorXd::Constant(1, value_of(mesh)), gradient_of(mesh)};
+    return Quantities{VectorXd::Constant(1, value_of(mesh)), gradient_of(mesh)};
   };
-  return estimates_of(all, of_mesh, Eigen::MatrixXd(along)).front();
+  return estimates_of(all, of_mesh, MatrixXd(along)).front();
 }
 
 /// Sums of the forces that adhesions exert, those of their own included. @param sums  weights by force × sums
 template <class ValueOf>
-std::vector<Estimate> with_own_forces(const EnsembleFit& all, const Eigen::MatrixXd& sums, const ValueOf& value_of,
+std::vector<Estimate> with_own_forces(const EnsembleFit& all, const MatrixXd& sums, const ValueOf& value_of,
                                       bool is_single = false) {
-  const Eigen::MatrixXd along = by_network_force(all, sums);
+  const MatrixXd along = by_network_force(all, sums);
   const auto of_mesh = [&](const MeshFit& mesh) {
     return Quantities{value_of(mesh), numerics::small_transposed_product(mesh.force_derivatives, along)};
   };
@@ -163,33 +162,33 @@ std::vector<Estimate> with_own_forces(const EnsembleFit& all, const Eigen::Matri
 }
 
 /// R + E a, of one mesh.
-Eigen::VectorXd exerted_nN(const EnsembleFit& all, const Eigen::VectorXd& network_nN) {
-  return all.forces.own ? Eigen::VectorXd(numerics::matvec(all.forces.own->left, network_nN) + all.forces.own->found_nN)
+VectorXd exerted_nN(const EnsembleFit& all, const VectorXd& network_nN) {
+  return all.forces.own ? VectorXd(numerics::matvec(all.forces.own->left, network_nN) + all.forces.own->found_nN)
                         : network_nN;
 }
 
 /// Of the adhesions' forces, along the mean over meshes.
 std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
-  constexpr Eigen::Index kAtOnce = 256;  // adhesions: some MB of numbers
-  const Eigen::Index n = all.forces.nN.size() / 2;
-  const Eigen::VectorXd forces_nN = adhesion_forces_nN(all);
+  constexpr Index kAtOnce = 256;  // adhesions: some MB of numbers
+  const Index n = all.forces.nN.size() / 2;
+  const VectorXd forces_nN = adhesion_forces_nN(all);
   std::vector<Estimate> magnitudes;
-  for (Eigen::Index first = 0; first < n; first += kAtOnce) {
-    const Eigen::Index count = std::min(kAtOnce, n - first);
-    Eigen::MatrixXd along = Eigen::MatrixXd::Zero(all.forces.nN.size(), count);
-    for (Eigen::Index k = 0; k < count; ++k) {
+  for (Index first = 0; first < n; first += kAtOnce) {
+    const Index count = std::min(kAtOnce, n - first);
+    MatrixXd along = MatrixXd::Zero(all.forces.nN.size(), count);
+    for (Index k = 0; k < count; ++k) {
       const Eigen::Vector2d force = forces_nN.segment<2>(2 * (first + k));
       along.col(k).segment<2>(2 * (first + k)) =
           force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
     }
     if (all.forces.own) {
-      const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
+      const auto value_of = [&](const MeshFit& mesh) -> VectorXd {
         return numerics::transposed_matvec(along, exerted_nN(all, mesh.fit.trial.forces_nN));
       };
       for (const Estimate& magnitude : with_own_forces(all, along, value_of, true)) magnitudes.push_back(magnitude);
       continue;
     }
-    const Eigen::MatrixXd own = along.middleRows(2 * first, 2 * count);  // the others are zero
+    const MatrixXd own = along.middleRows(2 * first, 2 * count);  // the others are zero
     const auto of_mesh = [&](const MeshFit& mesh) {
       return Quantities{numerics::transposed_matvec(own, mesh.fit.trial.forces_nN.segment(2 * first, 2 * count)),
                         numerics::transposed_product(mesh.force_derivatives.middleRows(2 * first, 2 * count), own)};
@@ -207,11 +206,11 @@ CutForce cut_force_of(const EnsembleFit& all) {
     cut.reaction.torque_nN_um += mesh.cut.torque_nN_um / static_cast<double>(all.meshes.size());
   }
   const auto along_of = [&](const Eigen::Vector2d& direction) -> Estimate {
-    const Eigen::VectorXd along = along_cut(direction, all.forces.nN.size());
-    const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
-      const Eigen::VectorXd& network_nN = mesh.fit.trial.forces_nN;
-      return Eigen::VectorXd::Constant(
-          1, direction.dot(mesh.cut.force_nN) + along.dot(exerted_nN(all, network_nN) - network_nN));
+    const VectorXd along = along_cut(direction, all.forces.nN.size());
+    const auto value_of = [&](const MeshFit& mesh) -> VectorXd {
+      const VectorXd& network_nN = mesh.fit.trial.forces_nN;
+      return VectorXd::Constant(1,
+                                direction.dot(mesh.cut.force_nN) + along.dot(exerted_nN(all, network_nN) - network_nN));
     };
     return with_own_forces(all, along, value_of).front();
   };
@@ -233,11 +232,11 @@ Sides mean_sides(const std::vector<MeshFit>& meshes, std::size_t i) {
 
 /// Errors by way of the forces' directions in the mean over meshes.
 Estimate total_force_of(const EnsembleFit& all) {
-  const Eigen::VectorXd forces_nN = adhesion_forces_nN(all), along = directions_of(forces_nN);
-  const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
-    const Eigen::MatrixXd derivatives =
+  const VectorXd forces_nN = adhesion_forces_nN(all), along = directions_of(forces_nN);
+  const auto value_of = [&](const MeshFit& mesh) -> VectorXd {
+    const MatrixXd derivatives =
         all.forces.own ? numerics::small_product(all.forces.own->left, mesh.force_derivatives) : mesh.force_derivatives;
-    return Eigen::VectorXd::Constant(
+    return VectorXd::Constant(
         1, along.dot(exerted_nN(all, mesh.fit.trial.forces_nN) + numerics::matvec(derivatives, mesh.past_bounds_nN)) -
                magnitude_bias_nN(forces_nN, derivatives, mesh.covariance_nN2));
   };
@@ -251,7 +250,7 @@ Estimate total_force_of(const EnsembleFit& all) {
 
 /// Proportional to the network's tension.
 Estimate network_force_of(const EnsembleFit& all) {
-  const Eigen::VectorXd along = directions_of(all.forces.of_network_nN);
+  const VectorXd along = directions_of(all.forces.of_network_nN);
   const auto per_tension = [&](const MeshFit& mesh) {
     const double tension = mesh.local.tensions_nN[0];
     return tension > 0 ? along.dot(mesh.network_forces_nN) / tension : 0;
@@ -262,16 +261,14 @@ Estimate network_force_of(const EnsembleFit& all) {
         return per_tension(mesh) *
                std::max(0.0, (1 - all.tensions.network_bias) * mesh.local.tensions_nN[0] + mesh.past_bounds_nN[0]);
       },
-      [&](const MeshFit& mesh) -> Eigen::VectorXd {
-        return per_tension(mesh) * Eigen::VectorXd::Unit(mesh.local.g.size(), 0);
-      });
+      [&](const MeshFit& mesh) -> VectorXd { return per_tension(mesh) * VectorXd::Unit(mesh.local.g.size(), 0); });
 }
 
 void add_means(EnsembleFit& all) {
   const auto n_meshes = static_cast<double>(all.meshes.size());
   const MeshFit& first = all.meshes.front();
-  all.forces.nN = all.forces.of_network_nN = Eigen::VectorXd::Zero(first.fit.trial.forces_nN.size());
-  all.forces.torques_nN_um = Eigen::VectorXd::Zero(first.torques_nN_um.size());
+  all.forces.nN = all.forces.of_network_nN = VectorXd::Zero(first.fit.trial.forces_nN.size());
+  all.forces.torques_nN_um = VectorXd::Zero(first.torques_nN_um.size());
   all.report.converged = true;
   for (const MeshFit& mesh : all.meshes) {
     const Report& report = mesh.fit.report;
@@ -286,12 +283,12 @@ void add_means(EnsembleFit& all) {
 }
 
 void add_estimates(EnsembleFit& all, bool is_cut) {
-  const auto n_tensions = static_cast<Eigen::Index>(all.tensions.fibre_ids.size());
-  all.tensions.covariance_nN2 = Eigen::MatrixXd::Zero(n_tensions, n_tensions);
+  const auto n_tensions = static_cast<Index>(all.tensions.fibre_ids.size());
+  all.tensions.covariance_nN2 = MatrixXd::Zero(n_tensions, n_tensions);
   for (const MeshFit& mesh : all.meshes) {
     all.tensions.covariance_nN2 += mesh.covariance_nN2 / static_cast<double>(all.meshes.size());
   }
-  for (Eigen::Index i = 0; i < n_tensions; ++i) {
+  for (Index i = 0; i < n_tensions; ++i) {
     all.tensions.nN.push_back(sum_of(all, {static_cast<int>(i)}));
     all.tensions.nN.back().sides_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
   }
@@ -313,8 +310,8 @@ Loss loss_called_for(std::optional<Loss> loss, const LinearData& data, const Ten
                      const Trial& trial) {
   if (loss) return *loss;
   constexpr double kHarm = 0.1;  // of a standard error
-  const Eigen::MatrixXd derivatives = problem.force_derivatives(trial);
-  const std::vector<Eigen::Index> strays = stray_beads(data, studentized(data, trial, derivatives));
+  const MatrixXd derivatives = problem.force_derivatives(trial);
+  const std::vector<Index> strays = stray_beads(data, studentized(data, trial, derivatives));
   const bool harm =
       !strays.empty() && harm_done_by(strays, data, weighted_residual(data, trial.forces_nN), derivatives) > kHarm;
   return harm ? Loss::huber : Loss::squares;
@@ -335,7 +332,7 @@ FirstFit fit_first(const network::Contractile& network, LinearData data, const s
 
 /// What each mesh makes of the mean tensions, by its derivatives about its own.
 std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
-  Eigen::VectorXd mean_nN = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(all.tensions.fibre_ids.size()));
+  VectorXd mean_nN = VectorXd::Zero(static_cast<Index>(all.tensions.fibre_ids.size()));
   for (const MeshFit& mesh : all.meshes) mean_nN += mesh.fit.trial.tensions_nN / static_cast<double>(all.meshes.size());
   std::vector<MeshForces> forces;
   for (const MeshFit& mesh : all.meshes) {
@@ -347,18 +344,17 @@ std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
 }
 
 /// The beads' own variance, or the misfit's where the data are too few to tell it or the loss is a robust one.
-double variance_beside_model_error(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
-                                   Loss loss) {
-  constexpr Eigen::Index kEnough = 50;  // known to 20 %
+double variance_beside_model_error(const LinearData& data, const VectorXd& forces_nN, Index n_tensions, Loss loss) {
+  constexpr Index kEnough = 50;  // known to 20 %
   const bool is_told = data.n_used - data.reduced.n_felt >= kEnough;
   return loss == Loss::squares && is_told ? noise_variance(data) : misfit_variance(data, forces_nN, n_tensions, loss);
 }
 
 }  // namespace
 
-Eigen::VectorXd values_of(const EnsembleFit& fit) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(fit.tensions.nN.size()));
-  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = fit.tensions.nN[i].value;
+VectorXd values_of(const EnsembleFit& fit) {
+  VectorXd values(static_cast<Index>(fit.tensions.nN.size()));
+  for (Index i = 0; i < values.size(); ++i) values[i] = fit.tensions.nN[i].value;
   return values;
 }
 
@@ -368,9 +364,9 @@ Trial next_start(const EnsembleFit& fit) {
   return start;
 }
 
-Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN) {
-  Eigen::VectorXd along = Eigen::VectorXd::Zero(forces_nN.size());
-  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) {
+VectorXd directions_of(const VectorXd& forces_nN) {
+  VectorXd along = VectorXd::Zero(forces_nN.size());
+  for (Index row = 0; row < forces_nN.size(); row += 2) {
     const double size = forces_nN.segment<2>(row).norm();
     if (size > 0) along.segment<2>(row) = forces_nN.segment<2>(row) / size;
   }
@@ -379,14 +375,13 @@ Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN) {
 
 namespace {
 /// @param sign  of what the tensions' answer to noise adds: + to estimates beside them, − to scores
-Eigen::MatrixXd covariance_beside(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
-                                  const Eigen::MatrixXd& by_force, int sign) {
+MatrixXd covariance_beside(const EnsembleFit& fit, const MatrixXd& of_noise, const MatrixXd& by_force, int sign) {
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
-  Eigen::MatrixXd covariance =
+  const MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
+  MatrixXd covariance =
       fit.misfit.variance * of_noise + sign * numerics::congruence(by_tension, mesh.noise_covariance_nN2);
   if (fit.model_error) {
-    const Eigen::MatrixXd left =
+    const MatrixXd left =
         numerics::minus_product(by_force, by_tension, mesh.by_force);  // of errors of the forces, tensions following
     covariance += numerics::weighted_outer(left, fit.model_error->force_variance_nN2);
   }
@@ -394,24 +389,22 @@ Eigen::MatrixXd covariance_beside(const EnsembleFit& fit, const Eigen::MatrixXd&
 }
 }  // namespace
 
-Eigen::MatrixXd covariance_of_estimates(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
-                                        const Eigen::MatrixXd& by_force) {
+MatrixXd covariance_of_estimates(const EnsembleFit& fit, const MatrixXd& of_noise, const MatrixXd& by_force) {
   return covariance_beside(fit, of_noise, by_force, +1);
 }
 
-Eigen::MatrixXd covariance_of_scores(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
-                                     const Eigen::MatrixXd& by_force) {
+MatrixXd covariance_of_scores(const EnsembleFit& fit, const MatrixXd& of_noise, const MatrixXd& by_force) {
   return covariance_beside(fit, of_noise, by_force, -1);
 }
 
-Eigen::VectorXd adhesion_forces_nN(const EnsembleFit& fit) { return exerted_nN(fit, fit.forces.nN); }
+VectorXd adhesion_forces_nN(const EnsembleFit& fit) { return exerted_nN(fit, fit.forces.nN); }
 
-Eigen::MatrixXd by_network_force(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
+MatrixXd by_network_force(const EnsembleFit& fit, const MatrixXd& sums) {
   return fit.forces.own ? numerics::small_transposed_product(fit.forces.own->left, sums) : sums;
 }
 
-Eigen::VectorXd own_variances(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
-  if (!fit.forces.own) return Eigen::VectorXd::Zero(sums.cols());
+VectorXd own_variances(const EnsembleFit& fit, const MatrixXd& sums) {
+  if (!fit.forces.own) return VectorXd::Zero(sums.cols());
   return fit.misfit.variance * numerics::quadratic_forms(fit.forces.own->covariance, sums);
 }
 
@@ -420,12 +413,10 @@ Eigen::Vector2d CutForce::direction() const {
   return force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
 }
 
-Eigen::VectorXd along_cut(const Eigen::Vector2d& direction, Eigen::Index n_forces) {
-  return -direction.replicate(n_forces / 2, 1);
-}
+VectorXd along_cut(const Eigen::Vector2d& direction, Index n_forces) { return -direction.replicate(n_forces / 2, 1); }
 
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
-  Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.tensions.fibre_ids.size()));
+  VectorXd ones = VectorXd::Zero(static_cast<Index>(fit.tensions.fibre_ids.size()));
   for (const int i : indices) ones[i] = 1;
   return estimate_of(
       fit, [&](const MeshFit& mesh) { return ones.dot(mesh.fit.trial.tensions_nN); },
@@ -441,7 +432,7 @@ std::vector<MeshFit> fit_meshes(const network::Ensemble& networks, const Reduced
                                 const std::function<void()>& tell) {
   const int n_meshes = static_cast<int>(networks.size());
   std::vector<MeshFit> meshes(networks.size());
-  const Eigen::VectorXd answer = first.trial.tensions_nN;
+  const VectorXd answer = first.trial.tensions_nN;
   const int inner = std::max(1, threads / std::max(1, n_meshes - 1));  // the first has only to be described
   numerics::parallel_for(n_meshes, threads, [&](int m) {
     const auto i = static_cast<std::size_t>(m);
@@ -455,9 +446,9 @@ std::vector<MeshFit> fit_meshes(const network::Ensemble& networks, const Reduced
 
 /// Of the beads, and of the model where two meshes or more tell it.
 void add_variances(EnsembleFit& all) {
-  const auto n_tensions = static_cast<Eigen::Index>(all.tensions.fibre_ids.size());
+  const auto n_tensions = static_cast<Index>(all.tensions.fibre_ids.size());
   all.misfit.chi_squared_per_degree = weighted_residual(all.data, all.forces.nN).squaredNorm() /
-                                      static_cast<double>(std::max<Eigen::Index>(1, all.data.n_used - n_tensions));
+                                      static_cast<double>(std::max<Index>(1, all.data.n_used - n_tensions));
   all.misfit.variance = misfit_variance(all.data, all.forces.nN, n_tensions, all.misfit.loss);
   if (all.meshes.size() < 2) return;
   all.model_error = model_error(forces_at_mean(all), all.data.reduced,
@@ -481,7 +472,7 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   const int n_meshes = static_cast<int>(networks.size());
   EnsembleFit all;
   all.tensions.fibre_ids = networks.front().fibre_ids();
-  check_suffice(data.n_used, static_cast<Eigen::Index>(all.tensions.fibre_ids.size()));
+  check_suffice(data.n_used, static_cast<Index>(all.tensions.fibre_ids.size()));
   std::mutex mutex;
   int n_done = 0;
   const auto tell = [&] {

@@ -31,17 +31,17 @@ struct Estimate {
 /// What one mesh says.
 struct MeshFit {
   TensionFit fit;
-  Eigen::MatrixXd force_derivatives;  ///< dR/dt at the solution
+  MatrixXd force_derivatives;  ///< dR/dt at the solution
   LocalMisfit local;
-  Eigen::MatrixXd response;                          ///< of the tensions to −Jᵀ r, as response_of() has it
-  Eigen::MatrixXd by_force;                          ///< what an error of each force makes of the tensions
-  Eigen::MatrixXd covariance_nN2;                    ///< of the tensions, from noise and model
-  Eigen::MatrixXd noise_covariance_nN2;              ///< of the tensions, from the beads' noise
-  Eigen::VectorXd past_bounds_nN;                    ///< from the tensions to the unbounded minimum
-  std::vector<Sides> intervals_95;                   ///< of the tensions, from noise and model
-  Eigen::VectorXd network_forces_nN, torques_nN_um;  ///< by adhesion; see EnsembleFit
+  MatrixXd response;                          ///< of the tensions to −Jᵀ r, as response_of() has it
+  MatrixXd by_force;                          ///< what an error of each force makes of the tensions
+  MatrixXd covariance_nN2;                    ///< of the tensions, from noise and model
+  MatrixXd noise_covariance_nN2;              ///< of the tensions, from the beads' noise
+  VectorXd past_bounds_nN;                    ///< from the tensions to the unbounded minimum
+  std::vector<Sides> intervals_95;            ///< of the tensions, from noise and model
+  VectorXd network_forces_nN, torques_nN_um;  ///< by adhesion; see EnsembleFit
   CutReaction cut;
-  Eigen::VectorXd network_part_nN;  ///< of the forces: what the links of the actin network bring
+  VectorXd network_part_nN;  ///< of the forces: what the links of the actin network bring
 };
 
 /// The force that passes through the cut: the part of the cell that is seen pulls the unseen one with it, and so much
@@ -56,17 +56,17 @@ struct CutForce {
 struct FoundTensions {
   std::vector<int> fibre_ids;  ///< front() is 0, the actin network
   std::vector<Estimate> nN;
-  Eigen::MatrixXd covariance_nN2;  ///< mean over the meshes
-  double network_bias = 0;         ///< of the network's, relative: by forces that bend within its error
+  MatrixXd covariance_nN2;  ///< mean over the meshes
+  double network_bias = 0;  ///< of the network's, relative: by forces that bend within its error
 };
 
 /// What the adhesions carry, fx and fy by adhesion; means over the meshes.
 struct FoundForces {
-  Eigen::VectorXd nN;                ///< of the network
+  VectorXd nN;                       ///< of the network
   std::optional<OwnForces> own;      ///< that adhesions near a cut have beside these
-  Eigen::VectorXd torques_nN_um;     ///< by adhesion, about the origin
+  VectorXd torques_nN_um;            ///< by adhesion, about the origin
   std::vector<Estimate> magnitudes;  ///< by adhesion
-  Eigen::VectorXd of_network_nN;     ///< with every fibre at the network's tension: the network's part
+  VectorXd of_network_nN;            ///< with every fibre at the network's tension: the network's part
 };
 
 /// What the mean over meshes leaves of the beads.
@@ -110,31 +110,29 @@ Interval interval_95(const Estimate& estimate);
 Trial next_start(const EnsembleFit& fit);
 
 /// The tensions alone.
-Eigen::VectorXd values_of(const EnsembleFit& fit);
+VectorXd values_of(const EnsembleFit& fit);
 
 /// Unit vectors of forces (fx, fy by adhesion), zero where a force is: the change of the sum of their magnitudes is
 /// along them.
-Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN);
+VectorXd directions_of(const VectorXd& forces_nN);
 
 /// Covariance of numbers that are linear in what the fit leaves of the beads, from their noise and the model's error,
 /// the tensions following both: of estimates of what the beads do besides, and of scores for what they might do.
 /// @param of_noise  of the numbers for noise of variance 1, the tensions held
 /// @param by_force  the numbers by adhesion force: some × 2·adhesions
-Eigen::MatrixXd covariance_of_estimates(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
-                                        const Eigen::MatrixXd& by_force);
-Eigen::MatrixXd covariance_of_scores(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
-                                     const Eigen::MatrixXd& by_force);
+MatrixXd covariance_of_estimates(const EnsembleFit& fit, const MatrixXd& of_noise, const MatrixXd& by_force);
+MatrixXd covariance_of_scores(const EnsembleFit& fit, const MatrixXd& of_noise, const MatrixXd& by_force);
 
 /// What the adhesions exert on the gel: the network's forces and their own.
-Eigen::VectorXd adhesion_forces_nN(const EnsembleFit& fit);
+VectorXd adhesion_forces_nN(const EnsembleFit& fit);
 /// How sums of these answer to the network's: weights by force × sums, of the network's.
-Eigen::MatrixXd by_network_force(const EnsembleFit& fit, const Eigen::MatrixXd& sums);
+MatrixXd by_network_force(const EnsembleFit& fit, const MatrixXd& sums);
 /// Variances of such sums by the beads' noise, the tensions held.
-Eigen::VectorXd own_variances(const EnsembleFit& fit, const Eigen::MatrixXd& sums);
+VectorXd own_variances(const EnsembleFit& fit, const MatrixXd& sums);
 
 /// By force (fx, fy by adhesion): how a force through the cut in this direction answers to those of the adhesions,
 /// which it balances.
-Eigen::VectorXd along_cut(const Eigen::Vector2d& direction, Eigen::Index n_forces);
+VectorXd along_cut(const Eigen::Vector2d& direction, Index n_forces);
 
 /// Of the sum of these tensions.
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices);

@@ -35,7 +35,7 @@ struct BudgetInputs {
   double substrate_error = 0;
   bool lacks_base = false;  ///< the substrate is a half-space
   SegmentationErrors segmentation;
-  Eigen::Index n_of_place = 0;  ///< of the data's motions, the last ones: they are the cell's place
+  Index n_of_place = 0;  ///< of the data's motions, the last ones: they are the cell's place
 };
 
 /// The gel with another thickness, and with another Poisson's ratio, by what is stated of their errors: one each.

@@ -8,14 +8,14 @@
 namespace mbtfm::tensions {
 
 Change change_between(EffectKind effect, const EnsembleFit& without, const EnsembleFit& with) {
-  const Eigen::VectorXd before = values_of(without);
+  const VectorXd before = values_of(without);
   return {effect, values_of(with).head(before.size()) - before};
 }
 
 double relative(const Change& change, const EnsembleFit& fit) {
   if (change.at_most) return *change.at_most;
-  const Eigen::VectorXd tensions = values_of(fit);
-  const Eigen::Index n = tensions.size() > 1 ? tensions.size() - 1 : 1;
+  const VectorXd tensions = values_of(fit);
+  const Index n = tensions.size() > 1 ? tensions.size() - 1 : 1;
   const double size = tensions.tail(n).norm();
   return size > 0 ? change.by_tension_nN.tail(n).norm() / size : 0;
 }
@@ -23,7 +23,7 @@ double relative(const Change& change, const EnsembleFit& fit) {
 std::string sentence(const Change& change, const EnsembleFit& fit) {
   const std::string percent = brief(100 * relative(change, fit)) + " %";
   if (change.at_most) return "would change the tensions by at most " + percent;
-  Eigen::Index most = 0;
+  Index most = 0;
   const double largest = change.by_tension_nN.cwiseAbs().maxCoeff(&most);
   const int id = fit.tensions.fibre_ids[most];
   return "would change the tensions by " + percent + ", that of " +

@@ -37,8 +37,7 @@ Noticed explains_little(const FitOutcome& o) {
   if (noise <= 0 || noise >= 1) return {};
   const double share = unexplained_share(o.summary);
   // of the noise's squares, which far beads tell, and of what is left
-  const double sigma =
-      2 * noise / (1 - noise) / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, o.data.n_used)));
+  const double sigma = 2 * noise / (1 - noise) / std::sqrt(static_cast<double>(std::max<Index>(1, o.data.n_used)));
   return noticed(FindingKind::explains_little, share - 3 * sigma,
                  "The model explains " + brief(100 * (1 - share)) +
                      " % of what the beads do beyond their noise. It is the wrong model of these beads.");
@@ -69,7 +68,7 @@ Noticed noise_unknown(const FitOutcome& o) {
 
 double stated_noise_um(const LinearData& data) {
   double squares = 0, n = 0;
-  for (Eigen::Index i = 0; i < data.weight_per_um.size(); ++i) {
+  for (Index i = 0; i < data.weight_per_um.size(); ++i) {
     if (data.weight_per_um[i] <= 0) continue;
     squares += 1 / (data.weight_per_um[i] * data.weight_per_um[i]);
     n += 1;
@@ -99,9 +98,9 @@ struct Region {
 };
 
 /// The one whose beads the model explains worst.
-Region worst_region(const LinearData& data, const Eigen::VectorXd& forces_nN, double noise_um) {
+Region worst_region(const LinearData& data, const VectorXd& forces_nN, double noise_um) {
   constexpr double kBeads = 60, kFewest = 30;
-  const Eigen::VectorXd residual = residual_um(data, forces_nN);
+  const VectorXd residual = residual_um(data, forces_nN);
   const Extent field = extent_of(data.position_um);
   const Vec2 low = field.low_um;
   const double n = static_cast<double>(data.position_um.size());
@@ -112,7 +111,7 @@ Region worst_region(const LinearData& data, const Eigen::VectorXd& forces_nN, do
   };
   std::map<std::pair<int, int>, Sum> sums;
   for (std::size_t b = 0; b < data.position_um.size(); ++b) {
-    const auto row = 2 * static_cast<Eigen::Index>(b);
+    const auto row = 2 * static_cast<Index>(b);
     if (data.weight_per_um[row] <= 0) continue;
     const Vec2 at = (1 / side_um) * (data.position_um[b] - low);
     Sum& sum = sums[{static_cast<int>(at.x), static_cast<int>(at.y)}];
@@ -327,7 +326,7 @@ std::vector<int> adhesions_without_beads(const std::vector<Adhesion>& adhesions,
 
 Imbalance imbalance_of(const EnsembleFit& fit) {
   Eigen::Vector2d net_nN = Eigen::Vector2d::Zero();
-  for (Eigen::Index i = 0; i < fit.forces.nN.size(); i += 2) net_nN += fit.forces.nN.segment<2>(i);
+  for (Index i = 0; i < fit.forces.nN.size(); i += 2) net_nN += fit.forces.nN.segment<2>(i);
   const CutReaction cut = fit.cut ? fit.cut->reaction : CutReaction{};
   constexpr double kTiny = 1e-300;  // a cell without any force is balanced
   return {.force = (net_nN + cut.force_nN).norm() / std::max(total_nN(fit.forces.nN), kTiny),

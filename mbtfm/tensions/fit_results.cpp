@@ -81,12 +81,12 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
     if (f.start_adhesion_id) connected.insert(*f.start_adhesion_id);
     if (f.end_adhesion_id) connected.insert(*f.end_adhesion_id);
   }
-  const Eigen::VectorXd exerted_nN = adhesion_forces_nN(fit);  // forces of their own act at the centres
+  const VectorXd exerted_nN = adhesion_forces_nN(fit);  // forces of their own act at the centres
   std::vector<AdhesionForce> forces;
   for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
-    const auto at = 2 * static_cast<Eigen::Index>(a);
+    const auto at = 2 * static_cast<Index>(a);
     const Vec2 network_nN{fit.forces.nN[at], fit.forces.nN[at + 1]};
-    const double about_origin_nN_um = fit.forces.torques_nN_um[static_cast<Eigen::Index>(a)];
+    const double about_origin_nN_um = fit.forces.torques_nN_um[static_cast<Index>(a)];
     const Vec2 force_nN{exerted_nN[at], exerted_nN[at + 1]};
     const Estimate& magnitude_nN = fit.forces.magnitudes[a];
     const double student = quantile_975(magnitude_nN) / kNormal95;  // as in interval_95
@@ -116,9 +116,9 @@ double over_fibres(const EnsembleFit& fit, const Part& part) {
 Figures figures_of(const CutForce& cut, const EnsembleFit& fit, const std::vector<Adhesion>& adhesions) {
   const Interval interval = interval_95(cut.magnitude_nN);
   double torque_nN_um = cut.reaction.torque_nN_um;  // and of the adhesions' own forces, at their centres
-  const Eigen::VectorXd own_nN = adhesion_forces_nN(fit) - fit.forces.nN;
+  const VectorXd own_nN = adhesion_forces_nN(fit) - fit.forces.nN;
   for (std::size_t a = 0; a < adhesions.size(); ++a) {
-    const auto at = 2 * static_cast<Eigen::Index>(a);
+    const auto at = 2 * static_cast<Index>(a);
     torque_nN_um -= cross(adhesions[a].position_um, {own_nN[at], own_nN[at + 1]});
   }
   return {{"cut_force_x_nN", cut.x_nN.value},       {"cut_force_x_sigma_nN", cut.x_nN.standard_error},
@@ -172,8 +172,8 @@ FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double s
   return s;
 }
 
-DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementField& beads, const LinearData& data) {
-  Eigen::VectorXd model = moved_by(data, forces_nN);
+DisplacementField field_of(const VectorXd& forces_nN, const DisplacementField& beads, const LinearData& data) {
+  VectorXd model = moved_by(data, forces_nN);
   if (data.motions.shapes.cols() > 0) {
     model += numerics::small_product(data.motions.shapes,
                                      motion_in(data, data.displacement_um - data.response->displace(forces_nN)))
@@ -181,7 +181,7 @@ DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementF
   }
   DisplacementField field = beads;
   for (std::size_t i = 0; i < field.size(); ++i) {
-    const auto row = 2 * static_cast<Eigen::Index>(i);
+    const auto row = 2 * static_cast<Index>(i);
     field[i].displacement_um = {model[row], model[row + 1]};
     field[i].sigma_um = 0;
   }

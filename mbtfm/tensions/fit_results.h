@@ -34,7 +34,7 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell);
 FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double surface_tension_nN_per_um,
                       const FitParameters& parameters);
 /// The model's displacement at the beads.
-DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementField& beads, const LinearData& data);
+DisplacementField field_of(const VectorXd& forces_nN, const DisplacementField& beads, const LinearData& data);
 
 /// @param more  further arrays, by bead
 void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,

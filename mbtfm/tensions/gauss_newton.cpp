@@ -46,22 +46,22 @@ double negligible(const TensionProblem& problem, double objective, Search search
   const double part = (search == Search::best ? kNegligible : kNegligibleAtFirst) * problem.n_tensions();
   const ReducedData& data = problem.data();
   const double whole = objective + 0.5 * data.floor_squared;
-  return std::max(part * whole / static_cast<double>(std::max<Eigen::Index>(1, data.n_components)),
+  return std::max(part * whole / static_cast<double>(std::max<Index>(1, data.n_components)),
                   kRounding * data.target.squaredNorm());
 }
 
 /// How far each tension may fall in one step.
-Eigen::VectorXd lowest_step(const Eigen::VectorXd& tensions_nN) {
+VectorXd lowest_step(const VectorXd& tensions_nN) {
   const double largest = tensions_nN.maxCoeff();
-  Eigen::VectorXd low = -tensions_nN;
-  for (Eigen::Index i = 0; i < low.size(); ++i) {
+  VectorXd low = -tensions_nN;
+  for (Index i = 0; i < low.size(); ++i) {
     if (tensions_nN[i] > (i == 0 ? kNoTension : kLetGo) * largest) low[i] *= kLargestDrop;
   }
   return low;
 }
 
 /// None where these tensions have no equilibrium that can be found: a step too far, to be shortened.
-std::optional<Trial> try_evaluate(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, TensionFit& fit,
+std::optional<Trial> try_evaluate(const TensionProblem& problem, const VectorXd& tensions_nN, TensionFit& fit,
                                   double force_tolerance) {
   ++fit.n_evaluations;
   try {
@@ -80,7 +80,7 @@ double force_tolerance(const Trial& trial, const TensionProblem& problem, double
 }
 
 struct Step {
-  Eigen::VectorXd change_nN;
+  VectorXd change_nN;
   double predicted = 0;  ///< by how much it lowers Phi, if that is quadratic
 };
 
@@ -88,36 +88,35 @@ struct Step {
 /// Gay & Welsch, ACM Trans. Math. Softw. 7 (1981) 348). Where noise leaves residuals and cables pass their rest length,
 /// JᵀJ alone promises several times what a step gains, and shorter and shorter steps are all that helps.
 /// @param before, after  trials before and after a step, with their Jacobians
-void learn_bend(Eigen::MatrixXd& bend, const Trial& before, const Eigen::MatrixXd& jacobian_before, const Trial& after,
-                const Eigen::MatrixXd& jacobian_after) {
-  const Eigen::VectorXd s = after.tensions_nN - before.tensions_nN;
-  const Eigen::VectorXd gradient = numerics::transposed_matvec(jacobian_after, after.residual);
-  const Eigen::VectorXd y = gradient - numerics::transposed_matvec(jacobian_before, before.residual);
-  const Eigen::VectorXd wanted =
-      gradient - numerics::transposed_matvec(jacobian_before, after.residual);  // of bend · s
+void learn_bend(MatrixXd& bend, const Trial& before, const MatrixXd& jacobian_before, const Trial& after,
+                const MatrixXd& jacobian_after) {
+  const VectorXd s = after.tensions_nN - before.tensions_nN;
+  const VectorXd gradient = numerics::transposed_matvec(jacobian_after, after.residual);
+  const VectorXd y = gradient - numerics::transposed_matvec(jacobian_before, before.residual);
+  const VectorXd wanted = gradient - numerics::transposed_matvec(jacobian_before, after.residual);  // of bend · s
   const double y_s = y.dot(s);
   constexpr double kLeast = 1e-3;  // less curvature than that part of JᵀJ's is no minimum's
   if (y_s <= kLeast * numerics::matvec(jacobian_after, s).squaredNorm()) return;
   const double size = numerics::quadratic_form(bend, s);
   if (size != 0) bend *= std::min(1.0, std::abs(s.dot(wanted) / size));
-  const Eigen::VectorXd rest = numerics::minus_matvec(wanted, bend, s);
+  const VectorXd rest = numerics::minus_matvec(wanted, bend, s);
   bend += (rest * y.transpose() + y * rest.transpose()) / y_s - rest.dot(s) / (y_s * y_s) * y * y.transpose();
 }
 
 /// @param bend  see learn_bend(); left out where it takes more than half of the curvature away
-Step damped_step(const Trial& trial, const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& bend, double damping) {
-  const Eigen::MatrixXd straight = numerics::gram(jacobian);
-  const Eigen::VectorXd gradient = numerics::transposed_matvec(jacobian, trial.residual);
+Step damped_step(const Trial& trial, const MatrixXd& jacobian, const MatrixXd& bend, double damping) {
+  const MatrixXd straight = numerics::gram(jacobian);
+  const VectorXd gradient = numerics::transposed_matvec(jacobian, trial.residual);
   // A tension that hardly any bead feels would run away: a thousandth of the middle one's weight
   // damps its steps, but moves no minimum.
-  const Eigen::VectorXd scale = straight.diagonal();
-  const Eigen::VectorXd weak = Eigen::VectorXd::Constant(
-      scale.size(), 1e-6 * numerics::median(std::vector(scale.begin(), scale.end())) + 1e-300);
-  const Eigen::MatrixXd least = 0.5 * straight + bend + Eigen::MatrixXd(weak.asDiagonal());
+  const VectorXd scale = straight.diagonal();
+  const VectorXd weak =
+      VectorXd::Constant(scale.size(), 1e-6 * numerics::median(std::vector(scale.begin(), scale.end())) + 1e-300);
+  const MatrixXd least = 0.5 * straight + bend + MatrixXd(weak.asDiagonal());
   const bool is_convex = numerics::SmallCholesky(least).is_definite();
-  const Eigen::MatrixXd H = is_convex ? straight + bend : straight;
-  const Eigen::MatrixXd damped = H + Eigen::MatrixXd((damping * scale + weak).asDiagonal());
-  const Eigen::VectorXd step = bounded_quadratic_minimum(damped, gradient, lowest_step(trial.tensions_nN));
+  const MatrixXd H = is_convex ? straight + bend : straight;
+  const MatrixXd damped = H + MatrixXd((damping * scale + weak).asDiagonal());
+  const VectorXd step = bounded_quadratic_minimum(damped, gradient, lowest_step(trial.tensions_nN));
   return {.change_nN = step, .predicted = -(gradient.dot(step) + 0.5 * numerics::quadratic_form(H, step))};
 }
 
@@ -139,8 +138,8 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Sea
     fit.report.converged = true;
     fit.report.reason = reason;
   };
-  Eigen::MatrixXd jacobian = problem.jacobian(fit.trial);
-  Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(jacobian.cols(), jacobian.cols());
+  MatrixXd jacobian = problem.jacobian(fit.trial);
+  MatrixXd bend = MatrixXd::Zero(jacobian.cols(), jacobian.cols());
   for (int i = 0; i < parameters.max_steps; ++i) {
     if (is_enough && is_enough(fit.trial)) return has_ended("nothing else is to be found there");
     fit.report.iterations = i + 1;
@@ -165,7 +164,7 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Sea
     if ((predicted < told && damping <= 1e-2) || (gain > 0 && gained_of_late(fit) < told))
       return has_ended("the last steps lower the misfit by less than any bead could tell");
     if (gain > 0) {
-      Eigen::MatrixXd after = problem.jacobian(fit.trial);
+      MatrixXd after = problem.jacobian(fit.trial);
       learn_bend(bend, *next, jacobian, fit.trial, after);
       jacobian = std::move(after);
     }
@@ -177,21 +176,19 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Sea
 }
 
 /// H⁻¹ b, in blocks where rounding leaves H positive definite.
-Eigen::VectorXd solve_positive(const Eigen::MatrixXd& H, const Eigen::VectorXd& b) {
+VectorXd solve_positive(const MatrixXd& H, const VectorXd& b) {
   const numerics::SmallCholesky quick(H);
-  return quick.is_definite() ? quick.solve(b) : Eigen::VectorXd(numerics::solve_symmetric(H, b));
+  return quick.is_definite() ? quick.solve(b) : VectorXd(numerics::solve_symmetric(H, b));
 }
 
-bool is_slack(const Eigen::VectorXd& tensions_nN, Eigen::Index i) {
-  return tensions_nN[i] <= kSlack * tensions_nN.maxCoeff();
-}
+bool is_slack(const VectorXd& tensions_nN, Index i) { return tensions_nN[i] <= kSlack * tensions_nN.maxCoeff(); }
 
 /// Whether a trial has come back to where the minimum was: the same fibres slack, and no further than a standard error.
 Enough is_back_at(const TensionProblem& problem, const Trial& minimum) {
   const double whole = 2 * minimum.objective + problem.data().floor_squared;
-  const double variance = whole / static_cast<double>(std::max<Eigen::Index>(1, problem.data().n_components));
+  const double variance = whole / static_cast<double>(std::max<Index>(1, problem.data().n_components));
   return [jacobian = problem.jacobian(minimum), at = minimum.tensions_nN, variance](const Trial& trial) {
-    for (Eigen::Index i = 1; i < at.size(); ++i) {
+    for (Index i = 1; i < at.size(); ++i) {
       if (is_slack(trial.tensions_nN, i) != is_slack(at, i)) return false;
     }
     return numerics::matvec(jacobian, trial.tensions_nN - at).squaredNorm() < variance;
@@ -199,15 +196,15 @@ Enough is_back_at(const TensionProblem& problem, const Trial& minimum) {
 }
 
 /// Tensions that came out slack, set to the median of the others; none where there are none.
-std::optional<Eigen::VectorXd> slack_ones_raised(const Eigen::VectorXd& tensions_nN) {
+std::optional<VectorXd> slack_ones_raised(const VectorXd& tensions_nN) {
   std::vector<double> taut;
-  for (Eigen::Index i = 1; i < tensions_nN.size(); ++i) {
+  for (Index i = 1; i < tensions_nN.size(); ++i) {
     if (!is_slack(tensions_nN, i)) taut.push_back(tensions_nN[i]);
   }
   if (taut.empty() || taut.size() + 1 == static_cast<std::size_t>(tensions_nN.size())) return std::nullopt;
   const double middle = numerics::median_in(taut);
-  Eigen::VectorXd raised = tensions_nN;
-  for (Eigen::Index i = 1; i < raised.size(); ++i) {
+  VectorXd raised = tensions_nN;
+  for (Index i = 1; i < raised.size(); ++i) {
     if (is_slack(tensions_nN, i)) raised[i] = middle;
   }
   return raised;
@@ -217,7 +214,7 @@ std::optional<Eigen::VectorXd> slack_ones_raised(const Eigen::VectorXd& tensions
 void look_beyond_slack(const TensionProblem& problem, const FitParameters& parameters, TensionFit& fit) {
   constexpr int kMaxRounds = 3;
   for (int round = 0; round < kMaxRounds; ++round) {
-    const std::optional<Eigen::VectorXd> raised = slack_ones_raised(fit.trial.tensions_nN);
+    const std::optional<VectorXd> raised = slack_ones_raised(fit.trial.tensions_nN);
     if (!raised) break;
     TensionFit other = fit;
     const std::optional<Trial> raised_trial =
@@ -233,22 +230,21 @@ void look_beyond_slack(const TensionProblem& problem, const FitParameters& param
 
 }  // namespace
 
-Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
-                                          const Eigen::VectorXd& low) {
+VectorXd bounded_quadratic_minimum(const MatrixXd& H, const VectorXd& g, const VectorXd& low) {
   // Primal active set: walk from a feasible point to the minimum on the free variables; hold the first bound that is
   // met; where none is met, release the held variable that wants to leave its bound most. The objective falls with
   // each release, so no set comes twice; the bound on the steps only guards against rounding.
   const int n = static_cast<int>(g.size());
-  Eigen::VectorXd x = low.cwiseMax(0.0);
+  VectorXd x = low.cwiseMax(0.0);
   // What is pressed against its bound from the start is held from the start: found one by one, each costs a step.
   std::vector<bool> is_held(n, false);
-  const Eigen::VectorXd slope = numerics::matvec(H, x) + g;
+  const VectorXd slope = numerics::matvec(H, x) + g;
   for (int i = 0; i < n; ++i) is_held[i] = x[i] <= low[i] && slope[i] > 0;
   for (int step = 0; step < 20 * n + 20; ++step) {
     const std::vector<int> free = indices_where(is_held, false);
-    Eigen::VectorXd wanted = x;
+    VectorXd wanted = x;
     if (!free.empty()) {
-      const Eigen::VectorXd gradient = numerics::matvec(H, x) + g;
+      const VectorXd gradient = numerics::matvec(H, x) + g;
       wanted(free) -= solve_positive(H(free, free), gradient(free));
     }
     double fraction = 1;
@@ -267,7 +263,7 @@ Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen:
       is_held[blocking] = true;
       continue;
     }
-    const Eigen::VectorXd gradient = numerics::matvec(H, x) + g;
+    const VectorXd gradient = numerics::matvec(H, x) + g;
     int leaving = -1;
     double steepest = -1e-14 * (g.cwiseAbs().maxCoeff() + std::numeric_limits<double>::min());
     for (const int i : indices_where(is_held, true)) {

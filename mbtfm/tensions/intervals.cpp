@@ -22,28 +22,28 @@ constexpr double kPressedByMoreThanChance = 3;
 
 /// H⁻¹; eigenvalues lost in rounding count as its limit. So far a tension moves that no bead feels that its square is
 /// still a number.
-Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& H) {
+MatrixXd inverse_of(const MatrixXd& H) {
   const double least = std::max(1e-30 * H.diagonal().maxCoeff(), 1e-100);
-  const Eigen::VectorXd scale = H.diagonal().cwiseMax(least).cwiseSqrt().cwiseInverse();
+  const VectorXd scale = H.diagonal().cwiseMax(least).cwiseSqrt().cwiseInverse();
   const auto [values, vectors] = numerics::symmetric_eigen(numerics::scaled_on_both_sides(H, scale));
   const double smallest = 1e-12 * std::max(values.maxCoeff(), 1e-300);  // rounding of JᵀJ
-  const Eigen::VectorXd roots = values.cwiseMax(smallest).cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd half = scale.asDiagonal() * vectors * roots.asDiagonal();
+  const VectorXd roots = values.cwiseMax(smallest).cwiseSqrt().cwiseInverse();
+  const MatrixXd half = scale.asDiagonal() * vectors * roots.asDiagonal();
   return numerics::small_product(half, half.transpose());
 }
 
-Eigen::MatrixXd sandwich(const LocalMisfit& local, double variance, const Eigen::MatrixXd& K) {
+MatrixXd sandwich(const LocalMisfit& local, double variance, const MatrixXd& K) {
   if (local.model_variance.size() == 0) return variance * K;
   return numerics::plus_product(variance * K, numerics::small_product(K, local.model_variance), K);
 }
 
 /// By tension: 1 where it is free, 0 where the data press it against zero by a standard error more than `half_held`,
 /// and smooth in between.
-Eigen::VectorXd freedom_of(const LocalMisfit& local, double variance, double half_held) {
-  const Eigen::MatrixXd K = inverse_of(local.H);
-  const Eigen::MatrixXd covariance = sandwich(local, variance, K);
-  Eigen::VectorXd freedom = Eigen::VectorXd::Ones(local.g.size());
-  for (Eigen::Index i = 0; i < freedom.size(); ++i) {
+VectorXd freedom_of(const LocalMisfit& local, double variance, double half_held) {
+  const MatrixXd K = inverse_of(local.H);
+  const MatrixXd covariance = sandwich(local, variance, K);
+  VectorXd freedom = VectorXd::Ones(local.g.size());
+  for (Index i = 0; i < freedom.size(); ++i) {
     if (local.tensions_nN[i] > 0) continue;
     // without its bound t_i would go to −K_ii g_i
     const double pressed = local.g[i] * K(i, i) / std::max(std::sqrt(covariance(i, i)), 1e-300);
@@ -55,8 +55,8 @@ Eigen::VectorXd freedom_of(const LocalMisfit& local, double variance, double hal
 
 /// H⁻¹ with tensions held as much as they lack freedom: f (f H f + (1 − f²) diag H)⁻¹ f. Without the held ones where
 /// all are 0 or 1.
-Eigen::MatrixXd held_inverse(const Eigen::MatrixXd& H, const Eigen::VectorXd& freedom) {
-  Eigen::MatrixXd held = numerics::scaled_on_both_sides(H, freedom);
+MatrixXd held_inverse(const MatrixXd& H, const VectorXd& freedom) {
+  MatrixXd held = numerics::scaled_on_both_sides(H, freedom);
   held.diagonal() = H.diagonal();
   return numerics::scaled_on_both_sides(inverse_of(held), freedom);
 }
@@ -71,14 +71,14 @@ Rise rise(const LocalMisfit& local, int i, double shift) {
   std::vector<int> others(local.g.size());
   std::iota(others.begin(), others.end(), 0);
   others.erase(others.begin() + i);
-  const Eigen::VectorXd column = local.H.col(i);
+  const VectorXd column = local.H.col(i);
   Rise rise{.value = 2 * local.g[i] * shift + local.H(i, i) * shift * shift,
             .slope = 2 * (local.g[i] + local.H(i, i) * shift)};
   if (others.empty()) return rise;
-  const Eigen::MatrixXd H = local.H(others, others);
-  const Eigen::VectorXd g = local.g(others) + shift * column(others);
-  const Eigen::VectorXd low = -local.tensions_nN(others);
-  const Eigen::VectorXd s = bounded_quadratic_minimum(H, g, low);
+  const MatrixXd H = local.H(others, others);
+  const VectorXd g = local.g(others) + shift * column(others);
+  const VectorXd low = -local.tensions_nN(others);
+  const VectorXd s = bounded_quadratic_minimum(H, g, low);
   rise.value += 2 * g.dot(s) + numerics::quadratic_form(H, s);
   rise.slope += 2 * column(others).dot(s);
   return rise;
@@ -111,70 +111,69 @@ double shift_at(const LocalMisfit& local, int i, double wanted, double first, do
 /// rest; and directions that no bead feels must not make it singular.
 LocalMisfit at_minimum(LocalMisfit local) {
   local.H.diagonal() += 1e-12 * local.H.diagonal();
-  for (Eigen::Index k = 0; k < local.g.size(); ++k) {
+  for (Index k = 0; k < local.g.size(); ++k) {
     local.g[k] = local.tensions_nN[k] > 0 ? 0 : std::max(0.0, local.g[k]);
   }
   return local;
 }
 
 /// Whether no tension meets its bound where tension i goes `half` to either side and the others follow it.
-bool is_unbounded(const LocalMisfit& local, const Eigen::MatrixXd& K, int i, double half) {
-  const Eigen::VectorXd follow = half / K(i, i) * K.col(i).cwiseAbs();
+bool is_unbounded(const LocalMisfit& local, const MatrixXd& K, int i, double half) {
+  const VectorXd follow = half / K(i, i) * K.col(i).cwiseAbs();
   return (local.tensions_nN.array() > follow.array()).all();
 }
 
 }  // namespace
 
-LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian) {
+LocalMisfit local_misfit(const Trial& trial, const MatrixXd& jacobian) {
   return {.tensions_nN = trial.tensions_nN,
           .H = numerics::gram(jacobian),
           .g = numerics::transposed_matvec(jacobian, trial.residual)};
 }
 
-Eigen::MatrixXd response_of(const LocalMisfit& local, double variance) {
+MatrixXd response_of(const LocalMisfit& local, double variance) {
   return held_inverse(local.H, freedom_of(local, variance, kHalfHeld));
 }
 
-Eigen::MatrixXd covariance_nN2(const LocalMisfit& local, double variance) {
+MatrixXd covariance_nN2(const LocalMisfit& local, double variance) {
   return sandwich(local, variance, response_of(local, variance));
 }
 
-Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance) {
-  Eigen::VectorXd pressed = Eigen::VectorXd::Zero(local.g.size());  // a free tension's gradient is a last step's rest
-  for (Eigen::Index i = 0; i < pressed.size(); ++i)
+VectorXd past_bounds_nN(const LocalMisfit& local, double variance) {
+  VectorXd pressed = VectorXd::Zero(local.g.size());  // a free tension's gradient is a last step's rest
+  for (Index i = 0; i < pressed.size(); ++i)
     if (local.tensions_nN[i] <= 0) pressed[i] = std::max(0.0, local.g[i]);
   return numerics::matvec(-held_inverse(local.H, freedom_of(local, variance, kPressedByMoreThanChance)), pressed);
 }
 
-Eigen::VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, const Eigen::MatrixXd& jacobian,
-                                const Eigen::MatrixXd& response, const Eigen::MatrixXd& covariance_nN2, int threads) {
+VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, const MatrixXd& jacobian,
+                         const MatrixXd& response, const MatrixXd& covariance_nN2, int threads) {
   constexpr double kRough = 1e-4;  // of an equilibrium: what bends is a hundredth of the forces and more
   const numerics::SymmetricEigen eigen = numerics::symmetric_eigen(covariance_nN2);
   const double largest = solution.tensions_nN.maxCoeff();
-  Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(jacobian.rows(), jacobian.cols());  // by direction
+  MatrixXd bend = MatrixXd::Zero(jacobian.rows(), jacobian.cols());  // by direction
   numerics::parallel_for(static_cast<int>(jacobian.cols()), threads, [&](int k) {
-    const Eigen::VectorXd deviation = std::sqrt(std::max(0.0, eigen.values[k])) * eigen.vectors.col(k);
+    const VectorXd deviation = std::sqrt(std::max(0.0, eigen.values[k])) * eigen.vectors.col(k);
     const double size = deviation.cwiseAbs().maxCoeff();
     if (size == 0) return;                              // held
     const double part = std::min(1.0, largest / size);  // what no bead tells of deviates without bounds
     for (const double step : {part, -part}) {
-      const Eigen::VectorXd there = (solution.tensions_nN + step * deviation).cwiseMax(0.0);
-      const Eigen::VectorXd straight = numerics::plus_matvec(solution.residual, jacobian, there - solution.tensions_nN);
+      const VectorXd there = (solution.tensions_nN + step * deviation).cwiseMax(0.0);
+      const VectorXd straight = numerics::plus_matvec(solution.residual, jacobian, there - solution.tensions_nN);
       bend.col(k) += (problem.evaluate(there, &solution, kRough).residual - straight) / (part * part);
     }
   });
   return numerics::matvec(-0.5 * response, numerics::transposed_matvec(jacobian, bend.rowwise().sum()));
 }
 
-double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd& derivatives,
-                         const Eigen::MatrixXd& covariance_nN2) {
+double magnitude_bias_nN(const VectorXd& forces_nN, const MatrixXd& derivatives, const MatrixXd& covariance_nN2) {
   double bias = 0;
-  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) {
+  for (Index row = 0; row < forces_nN.size(); row += 2) {
     const Eigen::Vector2d force = forces_nN.segment<2>(row);
     const double size = force.norm();
     if (size <= 0) continue;
     const Eigen::Vector2d across(-force.y() / size, force.x() / size);
-    const Eigen::VectorXd gradient = derivatives.middleRows<2>(row).transpose() * across;
+    const VectorXd gradient = derivatives.middleRows<2>(row).transpose() * across;
     // No more than the force itself: where the error is as large as the force the second order says nothing.
     bias += std::min(size, numerics::quadratic_form(covariance_nN2, gradient) / (2 * size));
   }
@@ -183,8 +182,8 @@ double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd
 
 std::vector<Sides> profiles_95(const LocalMisfit& local, double variance) {
   const LocalMisfit minimum = at_minimum(local);
-  const Eigen::MatrixXd K = inverse_of(local.H);
-  const Eigen::MatrixXd covariance = sandwich(local, variance, K);
+  const MatrixXd K = inverse_of(local.H);
+  const MatrixXd covariance = sandwich(local, variance, K);
   constexpr double kAnywhere = std::numeric_limits<double>::infinity();
   std::vector<Sides> profiles;
   for (int i = 0; i < static_cast<int>(local.g.size()); ++i) {
@@ -202,11 +201,10 @@ std::vector<Sides> profiles_95(const LocalMisfit& local, double variance) {
   return profiles;
 }
 
-Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const FitParameters& parameters,
-                                        const Trial& solution, double variance,
-                                        const Eigen::VectorXd& force_variance_nN2,
-                                        const std::vector<std::uint64_t>& draws, int threads) {
-  Eigen::MatrixXd deviations(problem.n_tensions(), static_cast<Eigen::Index>(draws.size()));
+MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const FitParameters& parameters, const Trial& solution,
+                                 double variance, const VectorXd& force_variance_nN2,
+                                 const std::vector<std::uint64_t>& draws, int threads) {
+  MatrixXd deviations(problem.n_tensions(), static_cast<Index>(draws.size()));
   numerics::parallel_for(static_cast<int>(draws.size()), threads, [&](int d) {
     // In the reduced data white noise is white again (see ReducedData).
     std::mt19937_64 engine(draws[d]);
@@ -216,9 +214,9 @@ Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const Fit
       return length * std::cos(6.283185307179586 * uniform());
     };
     ReducedData drawn = problem.data();
-    for (Eigen::Index k = 0; k < drawn.target.size(); ++k)
+    for (Index k = 0; k < drawn.target.size(); ++k)
       drawn.target[k] += solution.residual[k] + std::sqrt(variance) * normal();
-    Eigen::VectorXd of_model = force_variance_nN2.cwiseSqrt();
+    VectorXd of_model = force_variance_nN2.cwiseSqrt();
     for (double& e : of_model) e *= normal();
     if (of_model.size() > 0) drawn.target += numerics::matvec(*drawn.compliance, of_model);
     const TensionProblem again(problem.cell(), drawn, problem.adhesion_ids());

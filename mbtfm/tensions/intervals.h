@@ -16,40 +16,39 @@ inline constexpr double kNormal95 = 1.959963984540054;  ///< two-sided 95 % of a
 /// Around a solution t: 2 Phi(t + s) ≈ 2 Phi(t) + 2 gᵀ s + sᵀ H s, in units of a variance (see misfit_variance). By the
 /// noise alone g has that variance times H.
 struct LocalMisfit {
-  Eigen::VectorXd tensions_nN;
-  Eigen::MatrixXd H;                    ///< Jᵀ J
-  Eigen::VectorXd g;                    ///< Jᵀ r
-  Eigen::MatrixXd model_variance = {};  ///< of g by the error of the model, beside that of the noise; empty: none
+  VectorXd tensions_nN;
+  MatrixXd H;                    ///< Jᵀ J
+  VectorXd g;                    ///< Jᵀ r
+  MatrixXd model_variance = {};  ///< of g by the error of the model, beside that of the noise; empty: none
 };
-LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian);
+LocalMisfit local_misfit(const Trial& trial, const MatrixXd& jacobian);
 
 /// K = H⁻¹: how the tensions follow −g. Those that the data press against zero by three standard errors or more are
 /// held: they do not move, and the others as without them; by one or less they are free. Between, they pass from the
 /// one to the other smoothly, so that nothing jumps where the data change by rounding. A direction of which no bead
 /// tells anything moves far.
-Eigen::MatrixXd response_of(const LocalMisfit& local, double variance);
+MatrixXd response_of(const LocalMisfit& local, double variance);
 
 /// K Var(g) K: of both errors (the sandwich; White, Econometrica 50 (1982) 1).
-Eigen::MatrixXd covariance_nN2(const LocalMisfit& local, double variance);
+MatrixXd covariance_nN2(const LocalMisfit& local, double variance);
 
 /// From the solution to where the misfit would be least without the bounds. Estimates that end at a bound are biased
 /// towards the inside, and those of other tensions with them; sums over many tensions are not where each is counted
 /// from there (without bounds least squares are unbiased). Tensions that more than chance presses against zero (two
 /// standard errors; none by four) stay there.
-Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance);
+VectorXd past_bounds_nN(const LocalMisfit& local, double variance);
 
 /// Mean error of the tensions by the bending of forces that are not linear in them (Box, J. R. Stat. Soc. B 33 (1971)
 /// 171): two equilibria for each tension, a standard error up and down along uncorrelated directions of them.
 /// @param response, covariance_nN2  as response_of() and covariance_nN2() have them
-Eigen::VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, const Eigen::MatrixXd& jacobian,
-                                const Eigen::MatrixXd& response, const Eigen::MatrixXd& covariance_nN2, int threads);
+VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, const MatrixXd& jacobian,
+                         const MatrixXd& response, const MatrixXd& covariance_nN2, int threads);
 
 /// By how much noise makes the sum of the forces' magnitudes too large, to second order: an error across a force F
 /// lengthens it by its square over 2 F.
 /// @param forces_nN  by adhesion: fx, fy
 /// @param derivatives  of the forces, by tension
-double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd& derivatives,
-                         const Eigen::MatrixXd& covariance_nN2);
+double magnitude_bias_nN(const VectorXd& forces_nN, const MatrixXd& derivatives, const MatrixXd& covariance_nN2);
 
 /// Distance to either end of an interval.
 struct Sides {
@@ -65,10 +64,9 @@ std::vector<Sides> profiles_95(const LocalMisfit& local, double variance);
 /// Parametric bootstrap: fits to displacements that the solution gives, with noise of this variance drawn anew, less
 /// the solution. One column a draw; the draws' random numbers follow from their index.
 /// @param force_variance_nN2  of the model's error, drawn too; empty: none
-Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const FitParameters& parameters,
-                                        const Trial& solution, double variance,
-                                        const Eigen::VectorXd& force_variance_nN2,
-                                        const std::vector<std::uint64_t>& draws, int threads);
+MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const FitParameters& parameters, const Trial& solution,
+                                 double variance, const VectorXd& force_variance_nN2,
+                                 const std::vector<std::uint64_t>& draws, int threads);
 /// Ends of the middle 95 % of the draws.
 Sides percentiles_95(std::vector<double> deviations);
 

@@ -13,16 +13,16 @@ namespace {
 /// U with Uᵀ U = A, and how many of its pivots are more than rounding. What no bead feels gets a small stiffness: any
 /// force there explains as much as another.
 struct Root {
-  Eigen::MatrixXd U;
-  Eigen::Index n_felt = 0;
+  MatrixXd U;
+  Index n_felt = 0;
 };
 
 /// Of a normal matrix: what of its trace before anything was taken off it is rounding.
 constexpr double kRounding = 1e-13;
 
 /// @param trace  of the normal matrix before anything was taken off it: its rounding stays
-Root root_of(Eigen::MatrixXd A, double trace, int threads) {
-  const Eigen::VectorXd diagonal = A.diagonal();
+Root root_of(MatrixXd A, double trace, int threads) {
+  const VectorXd diagonal = A.diagonal();
   const double least = kRounding * std::max(trace, 1e-300);
   numerics::mirror_upper(A);  // Cholesky takes the upper half: the lower one keeps it for a second try
   bool is_definite = numerics::upper_cholesky(A, threads);
@@ -32,15 +32,15 @@ Root root_of(Eigen::MatrixXd A, double trace, int threads) {
     is_definite = numerics::upper_cholesky(A, threads);
     MBTFM_ASSERT(is_definite);
   }
-  const Eigen::Index n_felt = (A.diagonal().array().square() > 4 * least).count();
+  const Index n_felt = (A.diagonal().array().square() > 4 * least).count();
   numerics::clear_below_diagonal(A);
   return {std::move(A), n_felt};
 }
 
 /// The root of UᵀU − FFᵀ.
-Root root_less(const Eigen::MatrixXd& U, const Eigen::MatrixXd& F, int threads) {
+Root root_less(const MatrixXd& U, const MatrixXd& F, int threads) {
   const double trace = U.squaredNorm(), least = kRounding * std::max(trace, 1e-300);
-  Eigen::MatrixXd root = U;
+  MatrixXd root = U;
   const bool is_definite = numerics::downdate_upper(root, F.transpose());
   if (is_definite && root.diagonal().cwiseAbs2().minCoeff() > 4 * least) return {std::move(root), U.cols()};
   root.setZero();
@@ -51,16 +51,16 @@ Root root_less(const Eigen::MatrixXd& U, const Eigen::MatrixXd& F, int threads) 
 
 /// (MᵀW²M + Λ)⁻¹, by rank. With Λ motions of different units go together: each counts as a multiple of itself.
 /// @param square  MᵀW²M
-Eigen::MatrixXd inverse_of_motions(Eigen::MatrixXd square, const Eigen::VectorXd& precision) {
+MatrixXd inverse_of_motions(MatrixXd square, const VectorXd& precision) {
   if (square.cols() == 0) return square;
   if (precision.size() == 0) return numerics::pseudo_inverse(square);
   square.diagonal() += precision;
-  const Eigen::VectorXd size = square.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const VectorXd size = square.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   square = numerics::scaled_on_both_sides(square, size);
   return numerics::scaled_on_both_sides(numerics::pseudo_inverse(square), size);
 }
 
-Eigen::MatrixXd inverse_of_motions(const LinearData& data, const Eigen::VectorXd& weight) {
+MatrixXd inverse_of_motions(const LinearData& data, const VectorXd& weight) {
   return inverse_of_motions(
       numerics::small_transposed_product(data.motions.shapes, weight.asDiagonal() * data.motions.shapes),
       data.motions.precision);
@@ -68,32 +68,31 @@ Eigen::MatrixXd inverse_of_motions(const LinearData& data, const Eigen::VectorXd
 
 /// F with FFᵀ what these motions explain of a Gram matrix Gᵀ W² P G.
 /// @param inverse  of their own square, Λ included
-Eigen::MatrixXd explained_by(const LinearData& data, const Eigen::VectorXd& weight, const Eigen::MatrixXd& motions,
-                             const Eigen::MatrixXd& inverse) {
-  if (motions.cols() == 0) return Eigen::MatrixXd(data.response->cols(), 0);
+MatrixXd explained_by(const LinearData& data, const VectorXd& weight, const MatrixXd& motions,
+                      const MatrixXd& inverse) {
+  if (motions.cols() == 0) return MatrixXd(data.response->cols(), 0);
   const auto [values, vectors] = numerics::symmetric_eigen(inverse);
-  const Eigen::MatrixXd unit = numerics::small_product(motions, vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal());
+  const MatrixXd unit = numerics::small_product(motions, vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal());
   return data.response->pull_back(weight.asDiagonal() * unit);
 }
 
 struct Explained {
-  Eigen::VectorXd target;    ///< y = C⁻ᵀ Gᵀ W² P u
+  VectorXd target;           ///< y = C⁻ᵀ Gᵀ W² P u
   double floor_squared = 0;  ///< uᵀ W² P u − |y|², Λ included
 };
 
 /// @param root  C
-Explained explained(const LinearData& data, const Eigen::VectorXd& weight, const Eigen::MatrixXd& root,
-                    const Eigen::VectorXd& u) {
-  const Eigen::VectorXd weighted = weight.cwiseProduct(less_motion(data, u));
-  Eigen::MatrixXd target = data.response->pull_back(weighted);
+Explained explained(const LinearData& data, const VectorXd& weight, const MatrixXd& root, const VectorXd& u) {
+  const VectorXd weighted = weight.cwiseProduct(less_motion(data, u));
+  MatrixXd target = data.response->pull_back(weighted);
   numerics::solve_upper_transposed(root, target);
   return {.target = target, .floor_squared = std::max(0.0, weighted.dot(u) - target.squaredNorm())};
 }
 
 /// From C with Gᵀ W² P G = Cᵀ C, and y = C⁻ᵀ Gᵀ W² P u.
-ReducedData reduced_by(const LinearData& data, const Eigen::VectorXd& weight, Root C) {
+ReducedData reduced_by(const LinearData& data, const VectorXd& weight, Root C) {
   auto [target, floor_squared] = explained(data, weight, C.U, data.displacement_um);
-  return {.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(C.U)),
+  return {.compliance = std::make_shared<const MatrixXd>(std::move(C.U)),
           .target = std::move(target),
           .floor_squared = floor_squared,
           .n_components = data.n_used,
@@ -102,20 +101,19 @@ ReducedData reduced_by(const LinearData& data, const Eigen::VectorXd& weight, Ro
 }
 
 /// Motions that cost a component of the beads each, as nothing is known of their sizes.
-Eigen::Index n_unexpected(const Eigen::MatrixXd& motions, const Eigen::VectorXd& precision) {
+Index n_unexpected(const MatrixXd& motions, const VectorXd& precision) {
   return motions.cols() - (precision.array() > 0).count();
 }
 
 }  // namespace
 
-LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
-                  const std::vector<bool>& is_used) {
+LinearData reduce(const DisplacementField& beads, MatrixXd compliance_um_per_nN, const std::vector<bool>& is_used) {
   return reduce(beads, substrate::dense_response(std::move(compliance_um_per_nN)), is_used);
 }
 
 LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response, const std::vector<bool>& is_used,
-                  int threads, Eigen::MatrixXd motions) {
-  const Eigen::Index n_rows = 2 * static_cast<Eigen::Index>(beads.size());
+                  int threads, MatrixXd motions) {
+  const Index n_rows = 2 * static_cast<Index>(beads.size());
   MBTFM_ASSERT(response->rows() == n_rows);
   LinearData data;
   data.threads = threads;
@@ -124,36 +122,36 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
   data.has_errors = state_errors(beads);
   data.position_um = points_of(beads);
   data.displacement_um.resize(n_rows);
-  data.weight_per_um = Eigen::VectorXd::Zero(n_rows);
+  data.weight_per_um = VectorXd::Zero(n_rows);
   for (std::size_t i = 0; i < beads.size(); ++i) {
-    const Eigen::Index row = 2 * static_cast<Eigen::Index>(i);
+    const Index row = 2 * static_cast<Index>(i);
     data.displacement_um.segment<2>(row) << beads[i].displacement_um.x, beads[i].displacement_um.y;
     if (!is_used.empty() && !is_used[i]) continue;
     data.weight_per_um.segment<2>(row).setConstant(data.has_errors ? 1 / beads[i].sigma_um : 1);
     data.n_used += 2;
   }
   data.response = std::move(response);
-  return reweighted(std::move(data), Eigen::VectorXd::Ones(n_rows / 2));
+  return reweighted(std::move(data), VectorXd::Ones(n_rows / 2));
 }
 
-LinearData with_motions(LinearData data, Eigen::MatrixXd motions, Eigen::VectorXd precision) {
+LinearData with_motions(LinearData data, MatrixXd motions, VectorXd precision) {
   MBTFM_ASSERT(precision.size() == 0 || precision.size() == motions.cols());
   data.n_used += n_unexpected(data.motions.shapes, data.motions.precision) - n_unexpected(motions, precision);
   data.motions.shapes = std::move(motions);
   data.motions.precision = std::move(precision);
-  const Eigen::VectorXd as_they_are = data.bead_weight;
+  const VectorXd as_they_are = data.bead_weight;
   return reweighted(std::move(data), as_they_are);
 }
 
-LinearData with_more_motions(LinearData data, const Eigen::MatrixXd& motions) {
-  const Eigen::VectorXd weight = squared_weights(data);
-  const Eigen::MatrixXd beside = less_motion(data, motions);
+LinearData with_more_motions(LinearData data, const MatrixXd& motions) {
+  const VectorXd weight = squared_weights(data);
+  const MatrixXd beside = less_motion(data, motions);
   Root root = root_less(
       *data.reduced.compliance,
       explained_by(data, weight, beside,
                    inverse_of_motions(numerics::small_transposed_product(motions, weight.asDiagonal() * beside), {})),
       data.threads);
-  const Eigen::Index before = data.motions.shapes.cols(), n = motions.cols();
+  const Index before = data.motions.shapes.cols(), n = motions.cols();
   data.n_used -= n;
   data.motions.shapes.conservativeResize(motions.rows(), before + n);
   data.motions.shapes.rightCols(n) = motions;
@@ -170,38 +168,38 @@ LinearData with_more_motions(LinearData data, const Eigen::MatrixXd& motions) {
   return data;
 }
 
-Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
-  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
+MatrixXd motion_in(const LinearData& data, const MatrixXd& displacements) {
+  const MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
   return numerics::small_product(data.motions.inverse, numerics::small_transposed_product(weighted, displacements));
 }
 
 std::optional<OwnForces> own_forces_in(const LinearData& data) {
-  const Eigen::MatrixXd& E = data.motions.forces;
+  const MatrixXd& E = data.motions.forces;
   if (E.size() == 0) return std::nullopt;
-  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
-  const Eigen::MatrixXd gain = numerics::small_product(E, data.motions.inverse);
-  return OwnForces{.left = numerics::minus_product(Eigen::MatrixXd::Identity(E.rows(), E.rows()), gain,
+  const MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions.shapes;
+  const MatrixXd gain = numerics::small_product(E, data.motions.inverse);
+  return OwnForces{.left = numerics::minus_product(MatrixXd::Identity(E.rows(), E.rows()), gain,
                                                    data.response->pull_back(weighted).transpose()),
                    .found_nN = numerics::matvec(gain, numerics::transposed_matvec(weighted, data.displacement_um)),
                    .covariance = numerics::small_product(gain, E.transpose())};
 }
 
-Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements) {
+MatrixXd less_motion(const LinearData& data, MatrixXd displacements) {
   if (data.motions.shapes.cols() > 0)
     displacements -= numerics::small_product(data.motions.shapes, motion_in(data, displacements));
   return displacements;
 }
 
-Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& forces_nN) {
+VectorXd residual_um(const LinearData& data, const VectorXd& forces_nN) {
   return less_motion(data, data.displacement_um - data.response->displace(forces_nN));
 }
 
-LinearData reweighted(LinearData data, const Eigen::VectorXd& bead_weight) {
+LinearData reweighted(LinearData data, const VectorXd& bead_weight) {
   data.bead_weight = bead_weight;
   data.reduced.compliance.reset();  // not two of them in memory
-  const Eigen::VectorXd weight = squared_weights(data);
+  const VectorXd weight = squared_weights(data);
   data.motions.inverse = inverse_of_motions(data, weight);
-  Eigen::MatrixXd A = data.response->upper_gram(weight);
+  MatrixXd A = data.response->upper_gram(weight);
   const double trace = A.diagonal().sum();
   numerics::add_upper_gram(explained_by(data, weight, data.motions.shapes, data.motions.inverse).transpose(), A,
                            data.threads, -1);
@@ -210,93 +208,92 @@ LinearData reweighted(LinearData data, const Eigen::VectorXd& bead_weight) {
 }
 
 LinearData unweighted(LinearData data) {
-  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(data.bead_weight.size());
+  const VectorXd ones = VectorXd::Ones(data.bead_weight.size());
   if (data.bead_weight == ones) return data;
   return reweighted(std::move(data), ones);
 }
 
 LinearData with_response(LinearData data, substrate::SharedResponse response) {
   data.response = std::move(response);
-  const Eigen::Index n_beads = data.bead_weight.size();
-  return reweighted(std::move(data), Eigen::VectorXd::Ones(n_beads));
+  const Index n_beads = data.bead_weight.size();
+  return reweighted(std::move(data), VectorXd::Ones(n_beads));
 }
 
-LinearData about_forces(LinearData data, substrate::SharedResponse response, const Eigen::VectorXd& measured_um,
-                        Eigen::VectorXd offset_um) {
+LinearData about_forces(LinearData data, substrate::SharedResponse response, const VectorXd& measured_um,
+                        VectorXd offset_um) {
   data.displacement_um = measured_um - offset_um;
   data.offset_um = std::move(offset_um);
   return with_response(std::move(data), std::move(response));
 }
 
-Eigen::VectorXd moved_by(const LinearData& data, const Eigen::VectorXd& forces_nN) {
-  Eigen::VectorXd moved = data.response->displace(forces_nN);
+VectorXd moved_by(const LinearData& data, const VectorXd& forces_nN) {
+  VectorXd moved = data.response->displace(forces_nN);
   if (data.offset_um.size() > 0) moved += data.offset_um;
   return moved;
 }
 
-Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads) {
+MatrixXd displace(const ReducedData& data, const MatrixXd& forces_nN, int threads) {
   if (!data.is_upper) return numerics::product(*data.compliance, forces_nN, threads);
-  Eigen::MatrixXd displaced = forces_nN;
+  MatrixXd displaced = forces_nN;
   numerics::multiply_upper(*data.compliance, displaced, threads);
   return displaced;
 }
 
-Eigen::VectorXd squared_weights(const LinearData& data) {
-  Eigen::VectorXd weight = data.weight_per_um.cwiseAbs2();
-  for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b) weight.segment<2>(2 * b) *= data.bead_weight[b];
+VectorXd squared_weights(const LinearData& data) {
+  VectorXd weight = data.weight_per_um.cwiseAbs2();
+  for (Index b = 0; b < data.bead_weight.size(); ++b) weight.segment<2>(2 * b) *= data.bead_weight[b];
   return weight;
 }
 
-Eigen::VectorXd free_forces_nN(const ReducedData& reduced) {
-  Eigen::MatrixXd forces = reduced.target;
+VectorXd free_forces_nN(const ReducedData& reduced) {
+  MatrixXd forces = reduced.target;
   numerics::solve_upper(*reduced.compliance, forces);
   return forces;
 }
 
-Eigen::MatrixXd solve_normal(const ReducedData& reduced, Eigen::MatrixXd X) {
+MatrixXd solve_normal(const ReducedData& reduced, MatrixXd X) {
   numerics::solve_upper_transposed(*reduced.compliance, X);
   numerics::solve_upper(*reduced.compliance, X);
   return X;
 }
 
-BeadAnswers::BeadAnswers(const LinearData& data, Eigen::MatrixXd by_force)
-    : data_(data), by_force_(std::move(by_force)) {
+BeadAnswers::BeadAnswers(const LinearData& data, MatrixXd by_force) : data_(data), by_force_(std::move(by_force)) {
   MBTFM_ASSERT(by_force_.cols() == data.response->cols());
 }
 
-void BeadAnswers::for_each_block(const std::function<void(Eigen::Index, const Eigen::MatrixXd&)>& body) const {
-  constexpr Eigen::Index kNumbers = 16'000'000;  // of a block: 128 MB
-  const Eigen::Index at_once = std::max<Eigen::Index>(1, kNumbers / std::max<Eigen::Index>(1, data_.response->rows()));
-  const Eigen::VectorXd weight = squared_weights(data_);
-  for (Eigen::Index first = 0; first < n_rows(); first += at_once) {
-    const Eigen::Index count = std::min(at_once, n_rows() - first);
-    const Eigen::MatrixXd forces = by_force_.middleRows(first, count).transpose();
+void BeadAnswers::for_each_block(const std::function<void(Index, const MatrixXd&)>& body) const {
+  constexpr Index kNumbers = 16'000'000;  // of a block: 128 MB
+  const Index at_once = std::max<Index>(1, kNumbers / std::max<Index>(1, data_.response->rows()));
+  const VectorXd weight = squared_weights(data_);
+  for (Index first = 0; first < n_rows(); first += at_once) {
+    const Index count = std::min(at_once, n_rows() - first);
+    const MatrixXd forces = by_force_.middleRows(first, count).transpose();
     body(first, less_motion(data_, data_.response->displace(forces)).transpose() * weight.asDiagonal());
   }
 }
 
-Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN) {
+VectorXd weighted_residual(const LinearData& data, const VectorXd& forces_nN) {
   return data.weight_per_um.cwiseProduct(residual_um(data, forces_nN));
 }
 
-double total_nN(const Eigen::VectorXd& forces_nN) {
+double total_nN(const VectorXd& forces_nN) {
   double sum = 0;
-  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) sum += forces_nN.segment<2>(row).norm();
+  for (Index row = 0; row < forces_nN.size(); row += 2) sum += forces_nN.segment<2>(row).norm();
   return sum;
 }
 
-double floor_squared_of(const LinearData& data, const Eigen::VectorXd& displacement_um) {
+double floor_squared_of(const LinearData& data, const VectorXd& displacement_um) {
   return explained(data, squared_weights(data), *data.reduced.compliance, displacement_um).floor_squared;
 }
 
 double noise_variance(const LinearData& data) {
-  const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - data.reduced.n_felt));
+  const auto n_free = static_cast<double>(std::max<Index>(1, data.n_used - data.reduced.n_felt));
   return std::max(data.has_errors ? 1.0 : 1e-300, data.reduced.floor_squared / n_free);
 }
 
-double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN) {
-  const Eigen::VectorXd is_used = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1.0 : 0.0; });
-  const Eigen::VectorXd residual = residual_um(data, forces_nN);
+double relative_l2(const LinearData& data, const VectorXd& forces_nN) {
+  const VectorXd is_used = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1.0 : 0.0; });
+  const VectorXd residual = residual_um(data, forces_nN);
   const double scale = is_used.cwiseProduct(moved_by(data, forces_nN) + residual).norm();  // u less the motion
   const double misfit = is_used.cwiseProduct(residual).norm();
   return scale > 0 ? misfit / scale : misfit;

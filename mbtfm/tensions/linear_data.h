@@ -17,36 +17,36 @@ namespace mbtfm::tensions {
 /// is expected of their sizes counts: aᵀΛa is part of the left side).
 /// White noise of W u is white in y.
 struct ReducedData {
-  std::shared_ptr<const Eigen::MatrixXd> compliance;  ///< C: 2·adhesions × 2·adhesions; shared, as it may be large
-  Eigen::VectorXd target;                             ///< y: 2·adhesions
-  double floor_squared = 0;                           ///< what no force can explain
-  Eigen::Index n_components = 0;                      ///< of the beads' displacements that it stands for
-  Eigen::Index n_felt = 0;                            ///< directions of the forces that any bead feels
-  bool is_upper = false;                              ///< C is an upper triangle
+  std::shared_ptr<const MatrixXd> compliance;  ///< C: 2·adhesions × 2·adhesions; shared, as it may be large
+  VectorXd target;                             ///< y: 2·adhesions
+  double floor_squared = 0;                    ///< what no force can explain
+  Index n_components = 0;                      ///< of the beads' displacements that it stands for
+  Index n_felt = 0;                            ///< directions of the forces that any bead feels
+  bool is_upper = false;                       ///< C is an upper triangle
 };
 /// C F: 2·adhesions × any number
-Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads = 1);
+MatrixXd displace(const ReducedData& data, const MatrixXd& forces_nN, int threads = 1);
 
 /// What the beads may do besides following the forces: sums of some shapes, of sizes that are found with these.
 struct Motions {
-  Eigen::MatrixXd shapes;     ///< M: 2·beads × motions
-  Eigen::VectorXd precision;  ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its size, in
-                              ///< units of the noise's; 0 where nothing is known of it; empty: all 0
-  Eigen::MatrixXd inverse;  ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place tell no turn from a shift. The covariance
-                            ///< of the sizes by noise of variance 1
-  Eigen::MatrixXd forces;  ///< E: by motion, the forces of adhesions that it comes of, beside those found as forces;
-                           ///< 2·adhesions × motions; empty: none
+  MatrixXd shapes;     ///< M: 2·beads × motions
+  VectorXd precision;  ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its size, in
+                       ///< units of the noise's; 0 where nothing is known of it; empty: all 0
+  MatrixXd inverse;    ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place tell no turn from a shift. The covariance
+                       ///< of the sizes by noise of variance 1
+  MatrixXd forces;     ///< E: by motion, the forces of adhesions that it comes of, beside those found as forces;
+                       ///< 2·adhesions × motions; empty: none
 };
 
 struct LinearData {
   std::vector<Vec2> position_um;       ///< of the beads
   substrate::SharedResponse response;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
-  Eigen::VectorXd displacement_um;     ///< u: 2·beads, in the same order, less the offset
-  Eigen::VectorXd offset_um;           ///< of a gel that is not linear: G F + offset moves its beads; empty: 0
-  Eigen::VectorXd weight_per_um;       ///< W, diagonal, 2·beads: 1/sigma; 0 where the bead is not used
-  Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
+  VectorXd displacement_um;            ///< u: 2·beads, in the same order, less the offset
+  VectorXd offset_um;                  ///< of a gel that is not linear: G F + offset moves its beads; empty: 0
+  VectorXd weight_per_um;              ///< W, diagonal, 2·beads: 1/sigma; 0 where the bead is not used
+  VectorXd bead_weight;                ///< by bead, 0 … 1: what a robust loss leaves of W²
   Motions motions;
-  Eigen::Index n_used = 0;  ///< components of the beads that are used, less one for each motion of precision 0
+  Index n_used = 0;         ///< components of the beads that are used, less one for each motion of precision 0
   bool has_errors = false;  ///< the beads state their sigma; without, W is 1 and the misfit tells the error
   int threads = 1;          ///< to reduce it with
   ReducedData reduced;      ///< of all that, bead_weight included
@@ -56,20 +56,19 @@ struct LinearData {
 /// @param response  2·beads × 2·adhesions
 /// @param is_used  by bead; empty: all
 LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response,
-                  const std::vector<bool>& is_used = {}, int threads = 1, Eigen::MatrixXd motions = {});
+                  const std::vector<bool>& is_used = {}, int threads = 1, MatrixXd motions = {});
 /// The same with the matrix of the response.
-LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
-                  const std::vector<bool>& is_used = {});
+LinearData reduce(const DisplacementField& beads, MatrixXd compliance_um_per_nN, const std::vector<bool>& is_used = {});
 
 // New data of the same beads. Who moves the old ones in has no two matrices in memory.
 
 /// The beads may move by any sum of these (2·beads × some) besides, instead of those that were allowed. Reduces again.
 /// @param precision  by motion, see Motions::precision
-LinearData with_motions(LinearData data, Eigen::MatrixXd motions, Eigen::VectorXd precision = {});
+LinearData with_motions(LinearData data, MatrixXd motions, VectorXd precision = {});
 /// They may move by any sum of these too, of precision 0: quicker.
-LinearData with_more_motions(LinearData data, const Eigen::MatrixXd& motions);
+LinearData with_more_motions(LinearData data, const MatrixXd& motions);
 /// Reduced again with these weights by bead.
-LinearData reweighted(LinearData data, const Eigen::VectorXd& bead_weight);
+LinearData reweighted(LinearData data, const VectorXd& bead_weight);
 /// Without what a robust loss has made of the weights.
 LinearData unweighted(LinearData data);
 
@@ -78,67 +77,67 @@ LinearData with_response(LinearData data, substrate::SharedResponse response);
 /// Of a gel that is not linear: it moves the beads by response · F + offset_um near the forces that are found. Without
 /// what a robust loss has made of the weights.
 /// @param measured_um  of the beads, 2·beads
-LinearData about_forces(LinearData data, substrate::SharedResponse response, const Eigen::VectorXd& measured_um,
-                        Eigen::VectorXd offset_um);
+LinearData about_forces(LinearData data, substrate::SharedResponse response, const VectorXd& measured_um,
+                        VectorXd offset_um);
 /// What forces make of the beads: G F and the offset; um, 2·beads.
-Eigen::VectorXd moved_by(const LinearData& data, const Eigen::VectorXd& forces_nN);
+VectorXd moved_by(const LinearData& data, const VectorXd& forces_nN);
 
 /// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed and the motions
 /// expected: (MᵀW²M + Λ)⁻¹ MᵀW² D
-Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements);
+MatrixXd motion_in(const LinearData& data, const MatrixXd& displacements);
 /// Forces that adhesions have of their own, E a beside R: the a that explain best what R leaves. Linear in R, so
 /// R + E a = left · R + found, and what the beads' noise makes of a given R is covariance times its variance.
 struct OwnForces {
-  Eigen::MatrixXd left;        ///< 1 − E (MᵀW²M + Λ)⁻¹ MᵀW²G: 2·adhesions square
-  Eigen::VectorXd found_nN;    ///< E (MᵀW²M + Λ)⁻¹ MᵀW²u: 2·adhesions
-  Eigen::MatrixXd covariance;  ///< E (MᵀW²M + Λ)⁻¹ Eᵀ: 2·adhesions square
+  MatrixXd left;        ///< 1 − E (MᵀW²M + Λ)⁻¹ MᵀW²G: 2·adhesions square
+  VectorXd found_nN;    ///< E (MᵀW²M + Λ)⁻¹ MᵀW²u: 2·adhesions
+  MatrixXd covariance;  ///< E (MᵀW²M + Λ)⁻¹ Eᵀ: 2·adhesions square
 };
 /// None where no motion comes of them.
 std::optional<OwnForces> own_forces_in(const LinearData& data);
 
 /// What no motion explains of these displacements: P D, P = 1 − M (MᵀW²M + Λ)⁻¹ MᵀW². With Λ, W²P is the inverse of the
 /// covariance W⁻² + M Λ⁻¹ Mᵀ of noise and motions together.
-Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements);
+MatrixXd less_motion(const LinearData& data, MatrixXd displacements);
 /// What forces and motions leave: P (u − G R), um, 2·beads.
-Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& forces_nN);
+VectorXd residual_um(const LinearData& data, const VectorXd& forces_nN);
 
 /// W² and the weights by bead: 2·beads.
-Eigen::VectorXd squared_weights(const LinearData& data);
+VectorXd squared_weights(const LinearData& data);
 
 /// Forces independent of each other that explain the beads best: C⁻¹ y, 2·adhesions.
 /// @param reduced  of reduce(), as for the next one
-Eigen::VectorXd free_forces_nN(const ReducedData& reduced);
+VectorXd free_forces_nN(const ReducedData& reduced);
 /// (CᵀC)⁻¹ X, both 2·adhesions × any number
-Eigen::MatrixXd solve_normal(const ReducedData& reduced, Eigen::MatrixXd X);
+MatrixXd solve_normal(const ReducedData& reduced, MatrixXd X);
 
 /// Answers to the displacements of the beads, M Gᵀ W², some rows at a time: a whole is too large for large scenes.
 class BeadAnswers {
  public:
   /// @param by_force  M: any number × 2·adhesions
-  BeadAnswers(const LinearData& data, Eigen::MatrixXd by_force);
-  Eigen::Index n_rows() const { return by_force_.rows(); }
+  BeadAnswers(const LinearData& data, MatrixXd by_force);
+  Index n_rows() const { return by_force_.rows(); }
   /// Calls body(first, block) with rows first, first + 1, … of the answers: some × 2·beads.
-  void for_each_block(const std::function<void(Eigen::Index first, const Eigen::MatrixXd& block)>& body) const;
+  void for_each_block(const std::function<void(Index first, const MatrixXd& block)>& body) const;
 
  private:
   const LinearData& data_;
-  Eigen::MatrixXd by_force_;
+  MatrixXd by_force_;
 };
 
 /// Sum of the magnitudes of forces (fx, fy by adhesion).
-double total_nN(const Eigen::VectorXd& forces_nN);
+double total_nN(const VectorXd& forces_nN);
 
 /// residual_um, times W: 2·beads
-Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN);
+VectorXd weighted_residual(const LinearData& data, const VectorXd& forces_nN);
 
 /// What no force explains of these displacements (um, 2·beads) in place of the data's: reduced.floor_squared of them.
-double floor_squared_of(const LinearData& data, const Eigen::VectorXd& displacement_um);
+double floor_squared_of(const LinearData& data, const VectorXd& displacement_um);
 
 /// Variance of a weighted component that is the beads' alone: what even forces independent of each other leave. Not
 /// below the stated errors'.
 double noise_variance(const LinearData& data);
 
 /// |residual| / |u less the common motion| over the beads that are used
-double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN);
+double relative_l2(const LinearData& data, const VectorXd& forces_nN);
 
 }  // namespace mbtfm::tensions

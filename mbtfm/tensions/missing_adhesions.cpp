@@ -76,7 +76,7 @@ class UsedBeads {
 /// A place, asked.
 struct Question {
   Vec2 place_um;
-  std::vector<Eigen::Index> beads;
+  std::vector<Index> beads;
   std::vector<Block> fields;  ///< by bead, less their mean
   Eigen::Vector2d score = Eigen::Vector2d::Zero();
   Block square = Block::Zero();  ///< gᵀ W² g
@@ -84,19 +84,19 @@ struct Question {
 };
 
 Question ask(Vec2 place_um, const UsedBeads& beads, const DiscField& disc, const LinearData& data,
-             const Eigen::VectorXd& weight, const Eigen::VectorXd& residual, double variance) {
+             const VectorXd& weight, const VectorXd& residual, double variance) {
   Question q{.place_um = place_um, .beads = beads.near(place_um), .fields = {}};
   constexpr std::size_t kFewest = 10;  // beads for two numbers and a mean
   if (q.beads.size() < kFewest) return q;
   Block mean = Block::Zero();
   double all = 0;
-  for (const Eigen::Index b : q.beads) {
+  for (const Index b : q.beads) {
     q.fields.push_back(disc.at(data.position_um[b] - place_um));
     mean += weight[2 * b] * q.fields.back();
     all += weight[2 * b];
   }
   for (std::size_t k = 0; k < q.beads.size(); ++k) {
-    const Eigen::Index row = 2 * q.beads[k];
+    const Index row = 2 * q.beads[k];
     q.fields[k] -= mean / all;
     q.score += weight[row] * q.fields[k] * residual.segment<2>(row);
     q.square += weight[row] * q.fields[k] * q.fields[k];
@@ -142,17 +142,16 @@ std::vector<Vec2> free_places(const Cell& cell) {
 }
 
 /// With what noise and errors of the model's forces make of the score, the tensions following.
-MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const LinearData& data,
-                         const Eigen::VectorXd& weight) {
-  Eigen::MatrixXd weighted = Eigen::MatrixXd::Zero(data.displacement_um.size(), 2);
+MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const LinearData& data, const VectorXd& weight) {
+  MatrixXd weighted = MatrixXd::Zero(data.displacement_um.size(), 2);
   for (std::size_t k = 0; k < q.beads.size(); ++k) {
     weighted.middleRows<2>(2 * q.beads[k]) = weight[2 * q.beads[k]] * q.fields[k];
   }
-  const Eigen::MatrixXd by_force = data.response->pull_back(weighted).transpose();
-  const Eigen::MatrixXd covariance = covariance_of_scores(fit, q.square, by_force);
+  const MatrixXd by_force = data.response->pull_back(weighted).transpose();
+  const MatrixXd covariance = covariance_of_scores(fit, q.square, by_force);
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
-  const Eigen::MatrixXd information =
+  const MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
+  const MatrixXd information =
       q.square - numerics::congruence(by_tension, mesh.noise_covariance_nN2) / fit.misfit.variance;
   const Eigen::Vector2d force = numerics::solve_symmetric(information, q.score);
   return {.position_um = q.place_um,
@@ -167,7 +166,7 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
   const std::vector<Vec2> places = free_places(cell);
   const UsedBeads beads(data);
   const DiscField disc(gel);
-  const Eigen::VectorXd weight = squared_weights(data), residual = residual_um(data, fit.forces.nN);
+  const VectorXd weight = squared_weights(data), residual = residual_um(data, fit.forces.nN);
   const auto ask_at = [&](Vec2 place_um) {
     return ask(place_um, beads, disc, data, weight, residual, fit.misfit.variance);
   };

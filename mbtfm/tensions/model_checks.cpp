@@ -30,16 +30,16 @@ ModelScore score(const std::string& name, int n_parameters, double misfit, doubl
 
 /// Forces of the one tension of all cables that fits best: Gauss–Newton in one variable. Zero where the beads want the
 /// cables to push: less tension is better then down to none, as forces are proportional to a small one.
-Eigen::VectorXd best_uniform_nN(const TensionProblem& problem) {
-  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(problem.n_tensions());
+VectorXd best_uniform_nN(const TensionProblem& problem) {
+  const VectorXd ones = VectorXd::Ones(problem.n_tensions());
   Trial trial = scaled_to_data(problem, ones);
   constexpr int kMaxSteps = 20;  // forces are all but proportional to the tension: three do
   for (int i = 0; i < kMaxSteps; ++i) {
     const double tension = trial.tensions_nN[0];
-    const Eigen::VectorXd slope = numerics::matvec(problem.jacobian(trial), ones);
+    const VectorXd slope = numerics::matvec(problem.jacobian(trial), ones);
     const double step = -slope.dot(trial.residual) / std::max(slope.squaredNorm(), 1e-300);
     const bool is_pushed = tension + step <= 0 && 0.5 * problem.data().target.squaredNorm() <= trial.objective;
-    if (is_pushed) return Eigen::VectorXd::Zero(trial.forces_nN.size());
+    if (is_pushed) return VectorXd::Zero(trial.forces_nN.size());
     const double next = std::max(0.1 * tension, tension + step);
     Trial moved = problem.evaluate(next * ones, &trial);
     if (moved.objective >= trial.objective) break;
@@ -51,14 +51,14 @@ Eigen::VectorXd best_uniform_nN(const TensionProblem& problem) {
 
 }  // namespace
 
-Eigen::MatrixXd correlation_of(const EnsembleFit& fit) {
-  Eigen::VectorXd scale = fit.tensions.covariance_nN2.diagonal().cwiseSqrt();
+MatrixXd correlation_of(const EnsembleFit& fit) {
+  VectorXd scale = fit.tensions.covariance_nN2.diagonal().cwiseSqrt();
   for (double& s : scale) s = s > 0 ? 1 / s : 0;
   return numerics::scaled_on_both_sides(fit.tensions.covariance_nN2, scale);
 }
 
 std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
-  const Eigen::MatrixXd correlation = correlation_of(fit);
+  const MatrixXd correlation = correlation_of(fit);
   const int n = static_cast<int>(correlation.rows());
   std::vector<bool> is_placed(static_cast<std::size_t>(n), false);
   std::vector<FibreGroup> groups;
@@ -85,20 +85,20 @@ Influence influence_of(const EnsembleFit& fit, const LinearData& data) {
   // a component's own standard error is 1/w.
   const MeshFit& mesh = fit.meshes.front();
   const BeadAnswers answers(data, solve_normal(data.reduced, mesh.by_force.transpose()).transpose());
-  const Eigen::VectorXd own_error = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1 / w : 0; });
-  const Eigen::Index n_beads = data.bead_weight.size();
+  const VectorXd own_error = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1 / w : 0; });
+  const Index n_beads = data.bead_weight.size();
   Influence influence{
-      .variance = Eigen::VectorXd(answers.n_rows()),
-      .n_informing_beads = Eigen::VectorXd(answers.n_rows()),
+      .variance = VectorXd(answers.n_rows()),
+      .n_informing_beads = VectorXd(answers.n_rows()),
       .most_informed = std::vector<int>(static_cast<std::size_t>(n_beads), fit.tensions.fibre_ids.front())};
-  Eigen::VectorXd largest = Eigen::VectorXd::Zero(n_beads);
-  answers.for_each_block([&](Eigen::Index first, const Eigen::MatrixXd& block) {
-    for (Eigen::Index k = 0; k < block.rows(); ++k) {
-      const Eigen::Index i = first + k;
+  VectorXd largest = VectorXd::Zero(n_beads);
+  answers.for_each_block([&](Index first, const MatrixXd& block) {
+    for (Index k = 0; k < block.rows(); ++k) {
+      const Index i = first + k;
       const double standard_error = std::max(std::sqrt(mesh.covariance_nN2(i, i)), 1e-300);
-      const Eigen::VectorXd row = block.row(k).transpose().cwiseProduct(own_error) / standard_error;
-      Eigen::VectorXd by_bead(n_beads);
-      for (Eigen::Index b = 0; b < n_beads; ++b) {
+      const VectorXd row = block.row(k).transpose().cwiseProduct(own_error) / standard_error;
+      VectorXd by_bead(n_beads);
+      for (Index b = 0; b < n_beads; ++b) {
         by_bead[b] = row.segment<2>(2 * b).squaredNorm();
         if (by_bead[b] <= largest[b]) continue;
         largest[b] = by_bead[b];
@@ -117,10 +117,10 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
                                        const std::vector<int>& adhesion_ids) {
   const ReducedData& reduced = data.reduced;
   const double variance = noise_variance(data);
-  const auto misfit = [&](const Eigen::VectorXd& forces) {
+  const auto misfit = [&](const VectorXd& forces) {
     return (numerics::matvec(*reduced.compliance, forces) - reduced.target).squaredNorm() + reduced.floor_squared;
   };
-  const Eigen::VectorXd uniform = best_uniform_nN(TensionProblem(first_network, reduced, adhesion_ids));
+  const VectorXd uniform = best_uniform_nN(TensionProblem(first_network, reduced, adhesion_ids));
   std::vector<ModelScore> models = {
       score("no-fibres", 1, misfit(uniform), variance, data),
       score("full", static_cast<int>(fit.tensions.fibre_ids.size()), misfit(fit.forces.nN), variance, data),
@@ -134,12 +134,12 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
 
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence) {
   std::vector<FibreLeftOut> fibres;
-  for (Eigen::Index i = 1; i < static_cast<Eigen::Index>(fit.tensions.fibre_ids.size()); ++i) {
+  for (Index i = 1; i < static_cast<Index>(fit.tensions.fibre_ids.size()); ++i) {
     FibreLeftOut left{
         .fibre_id = fit.tensions.fibre_ids[i], .chi_squared_rise = 0, .aic_rise = 0, .n_informing_beads = 0};
     for (const MeshFit& mesh : fit.meshes) {
       // Where t_i is held to t_0, 2 Phi rises by (t_i − t_0)² / Var(t_i − t_0), Var in units of the noise.
-      const Eigen::MatrixXd& c = mesh.covariance_nN2;
+      const MatrixXd& c = mesh.covariance_nN2;
       const double difference = mesh.local.tensions_nN[i] - mesh.local.tensions_nN[0];
       const double variance = c(i, i) + c(0, 0) - 2 * c(i, 0);
       if (difference <= 0 || variance <= 0) continue;  // no stronger than the network: it costs nothing to leave it out
@@ -152,12 +152,12 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
   return fibres;
 }
 
-Eigen::VectorXd segmentation_variance_nN2(const Eigen::VectorXd& forces_nN, const std::vector<Adhesion>& adhesions,
-                                          const SegmentationErrors& errors) {
-  Eigen::VectorXd variance(forces_nN.size());
+VectorXd segmentation_variance_nN2(const VectorXd& forces_nN, const std::vector<Adhesion>& adhesions,
+                                   const SegmentationErrors& errors) {
+  VectorXd variance(forces_nN.size());
   const double turn_rad = errors.adhesion_angle_error_deg * std::numbers::pi / 180;
   for (std::size_t a = 0; a < adhesions.size(); ++a) {
-    const auto row = 2 * static_cast<Eigen::Index>(a);
+    const auto row = 2 * static_cast<Index>(a);
     const double shift = errors.adhesion_shift_error_um / substrate::ellipse_of(adhesions[a]).semi_minor_um;
     const double share = std::hypot(shift, errors.adhesion_area_error / 2, turn_rad);
     variance.segment<2>(row).setConstant(share * share * forces_nN.segment<2>(row).squaredNorm());
@@ -173,29 +173,29 @@ class FibresTogether {
   using Pair = std::array<std::size_t, 2>;  ///< of adhesions, by their place in the list
 
   /// @param K, q  curvature and slope of the misfit by the forces on these adhesions, in units of the noise
-  FibresTogether(std::vector<Vec2> places_um, Eigen::MatrixXd K, Eigen::VectorXd q)
+  FibresTogether(std::vector<Vec2> places_um, MatrixXd K, VectorXd q)
       : places_um_(std::move(places_um)), K_(std::move(K)), q_(std::move(q)) {}
 
   struct Told {
-    std::vector<Pair> pairs;               ///< those that pull
-    Eigen::VectorXd tension_nN, sigma_nN;  ///< of each
-    double gain = 0;                       ///< how much less misfit all of them leave
+    std::vector<Pair> pairs;        ///< those that pull
+    VectorXd tension_nN, sigma_nN;  ///< of each
+    double gain = 0;                ///< how much less misfit all of them leave
   };
   /// Least squares with tensions of zero or more; those that would push are left out, the hardest pushing first.
   Told told_of(std::vector<Pair> pairs) const {
     while (!pairs.empty()) {
-      const auto n = static_cast<Eigen::Index>(pairs.size());
-      Eigen::MatrixXd chords = Eigen::MatrixXd::Zero(K_.rows(), n);
-      for (Eigen::Index k = 0; k < n; ++k) {
+      const auto n = static_cast<Index>(pairs.size());
+      MatrixXd chords = MatrixXd::Zero(K_.rows(), n);
+      for (Index k = 0; k < n; ++k) {
         const auto [a, b] = pairs[k];
         const Vec2 chord = places_um_[b] - places_um_[a], unit = (1 / norm(chord)) * chord;
-        chords.col(k).segment<2>(2 * static_cast<Eigen::Index>(a)) << unit.x, unit.y;
-        chords.col(k).segment<2>(2 * static_cast<Eigen::Index>(b)) << -unit.x, -unit.y;
+        chords.col(k).segment<2>(2 * static_cast<Index>(a)) << unit.x, unit.y;
+        chords.col(k).segment<2>(2 * static_cast<Index>(b)) << -unit.x, -unit.y;
       }
-      const Eigen::MatrixXd inverse =
+      const MatrixXd inverse =
           numerics::inverse_symmetric(numerics::small_product(numerics::small_transposed_product(chords, K_), chords));
-      const Eigen::VectorXd slopes = numerics::transposed_matvec(chords, q_), t = numerics::matvec(inverse, slopes);
-      Eigen::Index least = 0;
+      const VectorXd slopes = numerics::transposed_matvec(chords, q_), t = numerics::matvec(inverse, slopes);
+      Index least = 0;
       if (t.minCoeff(&least) > 0)
         return {std::move(pairs), t, inverse.diagonal().cwiseMax(0).cwiseSqrt(), slopes.dot(t)};
       pairs.erase(pairs.begin() + least);
@@ -227,8 +227,8 @@ class FibresTogether {
 
  private:
   std::vector<Vec2> places_um_;
-  Eigen::MatrixXd K_;
-  Eigen::VectorXd q_;
+  MatrixXd K_;
+  VectorXd q_;
 };
 
 }  // namespace
@@ -245,32 +245,31 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
     error.force_variance_nN2 += segmentation_variance_nN2(fit.forces.nN, adhesions, segmentation);
     data = whitened(data, error, threads);
   }
-  const Eigen::MatrixXd& C = *data.compliance;
-  const Eigen::VectorXd residual = data.target - displace(data, fit.forces.nN);
+  const MatrixXd& C = *data.compliance;
+  const VectorXd residual = data.target - displace(data, fit.forces.nN);
   // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.
-  const Eigen::MatrixXd CJ = displace(data, mesh.force_derivatives, threads);
-  const Eigen::MatrixXd cross_terms = numerics::transposed_product(CJ, C, threads);
-  Eigen::MatrixXd H = numerics::small_transposed_product(CJ, CJ);
-  H.diagonal() += 1e-9 * H.diagonal() + Eigen::VectorXd::Constant(H.rows(), 1e-300);
+  const MatrixXd CJ = displace(data, mesh.force_derivatives, threads);
+  const MatrixXd cross_terms = numerics::transposed_product(CJ, C, threads);
+  MatrixXd H = numerics::small_transposed_product(CJ, CJ);
+  H.diagonal() += 1e-9 * H.diagonal() + VectorXd::Constant(H.rows(), 1e-300);
   const numerics::SmallCholesky solver(H);
-  const Eigen::MatrixXd explained = solver.solve_lower(cross_terms);
-  const Eigen::VectorXd q =
-      numerics::transposed_matvec(C, residual) -
-      numerics::transposed_matvec(cross_terms, solver.solve(numerics::transposed_matvec(CJ, residual)));
+  const MatrixXd explained = solver.solve_lower(cross_terms);
+  const VectorXd q = numerics::transposed_matvec(C, residual) -
+                     numerics::transposed_matvec(cross_terms, solver.solve(numerics::transposed_matvec(CJ, residual)));
 
   std::vector<MissingFibre> found;
   std::vector<Eigen::Matrix2d> own(adhesions.size());  // blocks of K = Cᵀ P C on its diagonal
-  numerics::for_each_gram_block(C, threads, [&](Eigen::Index first, const Eigen::MatrixXd& gram) {
-    const Eigen::MatrixXd K = gram - numerics::transposed_product(explained.leftCols(gram.rows()),
-                                                                  explained.middleCols(first, gram.cols()), threads);
-    for (auto b = static_cast<std::size_t>(first / 2); 2 * static_cast<Eigen::Index>(b) < gram.rows(); ++b) {
-      const auto j = 2 * static_cast<Eigen::Index>(b);
+  numerics::for_each_gram_block(C, threads, [&](Index first, const MatrixXd& gram) {
+    const MatrixXd K = gram - numerics::transposed_product(explained.leftCols(gram.rows()),
+                                                           explained.middleCols(first, gram.cols()), threads);
+    for (auto b = static_cast<std::size_t>(first / 2); 2 * static_cast<Index>(b) < gram.rows(); ++b) {
+      const auto j = 2 * static_cast<Index>(b);
       own[b] = K.block<2, 2>(j, j - first).selfadjointView<Eigen::Upper>();
       for (std::size_t a = 0; a < b; ++a) {
         const Vec2 chord = adhesions[b].position_um - adhesions[a].position_um;
         const Vec2 unit = (1 / norm(chord)) * chord;
         const Eigen::Vector2d e(unit.x, unit.y);  // the fibre pulls a towards b, and b towards a
-        const auto i = 2 * static_cast<Eigen::Index>(a);
+        const auto i = 2 * static_cast<Index>(a);
         const double slope = e.dot(q.segment<2>(i) - q.segment<2>(j));
         const double curvature = e.dot((own[a] + own[b]) * e) - 2 * e.dot(K.block<2, 2>(i, j - first) * e);
         if (slope <= 0 || curvature <= 0) continue;
@@ -298,23 +297,23 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
     const std::size_t a = place(f.start_adhesion_id), b = place(f.end_adhesion_id);
     if (!is_end(a) && !is_end(b)) ends.insert(ends.end(), {a, b});
   }
-  std::vector<Eigen::Index> components;
+  std::vector<Index> components;
   std::vector<Vec2> places_um;
   std::vector<Pair> pairs;
   for (std::size_t k = 0; k < ends.size(); ++k) {
-    for (const Eigen::Index c : {0, 1}) components.push_back(2 * static_cast<Eigen::Index>(ends[k]) + c);
+    for (const Index c : {0, 1}) components.push_back(2 * static_cast<Index>(ends[k]) + c);
     places_um.push_back(adhesions[ends[k]].position_um);
     if (k % 2 == 1) pairs.push_back({k - 1, k});
   }
-  const Eigen::MatrixXd C_there = C(Eigen::all, components), explained_there = explained(Eigen::all, components);
+  const MatrixXd C_there = C(Eigen::all, components), explained_there = explained(Eigen::all, components);
   const FibresTogether together(std::move(places_um),
                                 (numerics::small_transposed_product(C_there, C_there) -
                                  numerics::small_transposed_product(explained_there, explained_there)) /
                                     fit.misfit.variance,
                                 q(components) / fit.misfit.variance);
   FibresTogether::Told told = together.with_best_partners(std::move(pairs));
-  const auto gains = [&] { return Eigen::VectorXd(told.tension_nN.cwiseQuotient(told.sigma_nN).cwiseAbs2()); };
-  for (Eigen::Index least = 0; !told.pairs.empty() && gains().minCoeff(&least) < limit * limit;) {
+  const auto gains = [&] { return VectorXd(told.tension_nN.cwiseQuotient(told.sigma_nN).cwiseAbs2()); };
+  for (Index least = 0; !told.pairs.empty() && gains().minCoeff(&least) < limit * limit;) {
     told.pairs.erase(told.pairs.begin() + least);
     told = together.told_of(std::move(told.pairs));
   }
@@ -324,8 +323,8 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
     const auto [first, second] = std::minmax(ends[a], ends[b]);
     best.push_back({.start_adhesion_id = adhesions[first].adhesion_id,
                     .end_adhesion_id = adhesions[second].adhesion_id,
-                    .tension_nN = told.tension_nN[static_cast<Eigen::Index>(k)],
-                    .chi_squared_gain = gains()[static_cast<Eigen::Index>(k)]});
+                    .tension_nN = told.tension_nN[static_cast<Index>(k)],
+                    .chi_squared_gain = gains()[static_cast<Index>(k)]});
   }
   std::ranges::stable_sort(best, std::greater(), &MissingFibre::chi_squared_gain);
   return best;

@@ -19,7 +19,7 @@ struct FibreGroup {
 /// Fibres joined by correlations beyond −0.95: the partner then takes nine tenths of what the beads tell of each.
 std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit);
 /// Of the tensions, from the beads' noise.
-Eigen::MatrixXd correlation_of(const EnsembleFit& fit);
+MatrixXd correlation_of(const EnsembleFit& fit);
 
 /// A model and what speaks for it. chi² and the criteria are in units of the noise: the beads' stated errors, or larger
 /// ones where even independent adhesion forces leave more than these (Burnham & Anderson 2002, 2.5: QAIC).
@@ -27,9 +27,9 @@ struct ModelScore {
   std::string name;
   int n_parameters = 0;
   double chi_squared = 0, relative_l2 = 0;
-  double aic = 0;             ///< chi² + 2 k
-  double bic = 0;             ///< chi² + k ln n
-  Eigen::VectorXd forces_nN;  ///< by adhesion: fx, fy
+  double aic = 0;      ///< chi² + 2 k
+  double bic = 0;      ///< chi² + k ln n
+  VectorXd forces_nN;  ///< by adhesion: fx, fy
 };
 /// no-fibres: a network of one tension; full: ours; adhesion-forces: every force for itself (thesis' null model).
 std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData& data,
@@ -38,9 +38,9 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
 /// What the beads tell of each tension. Influence: by how many of its standard errors a tension changes (on the first
 /// mesh) where a bead's displacement component changes by one of its own, as the fit weighs beads and meshes.
 struct Influence {
-  Eigen::VectorXd variance;           ///< by tension: sum of the squared influence over all components
-  Eigen::VectorXd n_informing_beads;  ///< by tension, over which it is spread: (sum q)² / sum q², q by bead
-  std::vector<int> most_informed;     ///< by bead: the fibre whose tension it moves most; 0: the network
+  VectorXd variance;               ///< by tension: sum of the squared influence over all components
+  VectorXd n_informing_beads;      ///< by tension, over which it is spread: (sum q)² / sum q², q by bead
+  std::vector<int> most_informed;  ///< by bead: the fibre whose tension it moves most; 0: the network
 };
 Influence influence_of(const EnsembleFit& fit, const LinearData& data);
 
@@ -69,7 +69,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
 ///
 /// δ the error of the centre, b the semi-minor axis (over which the displacement falls off), ε the relative error of
 /// the area (the displacement on an adhesion goes as one over the root of its area), φ that of the angle.
-Eigen::VectorXd segmentation_variance_nN2(const Eigen::VectorXd& forces_nN, const std::vector<Adhesion>& adhesions,
-                                          const SegmentationErrors& errors);
+VectorXd segmentation_variance_nN2(const VectorXd& forces_nN, const std::vector<Adhesion>& adhesions,
+                                   const SegmentationErrors& errors);
 
 }  // namespace mbtfm::tensions

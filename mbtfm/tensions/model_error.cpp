@@ -12,9 +12,8 @@ namespace {
 
 MeshForces mean_of(const std::vector<MeshForces>& meshes) {
   const auto n = static_cast<double>(meshes.size());
-  MeshForces mean{Eigen::VectorXd::Zero(meshes.front().forces_nN.size()),
-                  Eigen::VectorXd::Zero(meshes.front().forces_nN.size()),
-                  Eigen::MatrixXd::Zero(meshes.front().derivatives.rows(), meshes.front().derivatives.cols())};
+  MeshForces mean{VectorXd::Zero(meshes.front().forces_nN.size()), VectorXd::Zero(meshes.front().forces_nN.size()),
+                  MatrixXd::Zero(meshes.front().derivatives.rows(), meshes.front().derivatives.cols())};
   for (const MeshForces& mesh : meshes) {
     mean.forces_nN += mesh.forces_nN / n;
     mean.network_part_nN += mesh.network_part_nN / n;
@@ -24,10 +23,10 @@ MeshForces mean_of(const std::vector<MeshForces>& meshes) {
 }
 
 /// L_a, once for each component.
-Eigen::VectorXd loads_nN(const MeshForces& mean) {
+VectorXd loads_nN(const MeshForces& mean) {
   constexpr double kOfFibres = 0.05;
-  Eigen::VectorXd loads(mean.forces_nN.size());
-  for (Eigen::Index row = 0; row < loads.size(); row += 2) {
+  VectorXd loads(mean.forces_nN.size());
+  for (Index row = 0; row < loads.size(); row += 2) {
     const Eigen::Vector2d network = mean.network_part_nN.segment<2>(row);
     loads.segment<2>(row).setConstant(network.norm() + kOfFibres * (mean.forces_nN.segment<2>(row) - network).norm());
   }
@@ -35,7 +34,7 @@ Eigen::VectorXd loads_nN(const MeshForces& mean) {
 }
 
 /// Of one further mesh about the mean of these: all adhesions and meshes together tell it.
-double least_phi_nN(const std::vector<MeshForces>& meshes, const Eigen::VectorXd& mean_nN, double sum_of_loads_nN) {
+double least_phi_nN(const std::vector<MeshForces>& meshes, const VectorXd& mean_nN, double sum_of_loads_nN) {
   const auto n = static_cast<double>(meshes.size());
   double squares = 0;
   for (const MeshForces& mesh : meshes) squares += (mesh.forces_nN - mean_nN).squaredNorm();
@@ -52,13 +51,13 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
   const double mean_square = (data.target.squaredNorm() + data.floor_squared) / static_cast<double>(data.n_components);
   const double noise_variance = std::max(beads_variance, kLeastShare * kLeastShare * mean_square);
   const MeshForces mean = mean_of(meshes);
-  const Eigen::VectorXd loads = loads_nN(mean);
+  const VectorXd loads = loads_nN(mean);
   const double least = least_phi_nN(meshes, mean.forces_nN, loads.sum());
 
   // E |P r|² = s² (rows − tensions) + phi tr(P C diag(L) Cᵀ P), P taking out what the tensions can follow
-  const Eigen::MatrixXd& C = *data.compliance;
-  const Eigen::MatrixXd followed = numerics::orthonormal_basis(displace(data, mean.derivatives));
-  const auto left_of = [&](const Eigen::MatrixXd& columns) {
+  const MatrixXd& C = *data.compliance;
+  const MatrixXd followed = numerics::orthonormal_basis(displace(data, mean.derivatives));
+  const auto left_of = [&](const MatrixXd& columns) {
     return columns.squaredNorm() - numerics::transposed_product(followed, columns).squaredNorm();
   };
   double squares = 0, left_of_squares = 0;
@@ -68,15 +67,15 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
   }
   const double left = left_of(numerics::minus_matvec(data.target, C, mean.forces_nN));
   double per_phi = 0;
-  constexpr Eigen::Index kAtOnce = 512;  // columns: a whole is as large as C
-  for (Eigen::Index first = 0; first < C.cols(); first += kAtOnce) {
-    const Eigen::Index count = std::min(kAtOnce, C.cols() - first);
+  constexpr Index kAtOnce = 512;  // columns: a whole is as large as C
+  for (Index first = 0; first < C.cols(); first += kAtOnce) {
+    const Index count = std::min(kAtOnce, C.cols() - first);
     per_phi += left_of(C.middleCols(first, count) * loads.segment(first, count).cwiseSqrt().asDiagonal());
   }
   const double beyond_noise = left - noise_variance * static_cast<double>(data.n_felt - followed.cols());
   const double measured = per_phi > 0 ? std::max(0.0, beyond_noise / per_phi) : 0;
   // From few adhesions the misfit tells next to nothing of single forces: of twenty numbers a third, of one nothing.
-  constexpr Eigen::Index kEnough = 20;
+  constexpr Index kEnough = 20;
   const bool is_told = data.n_felt - followed.cols() >= kEnough;
   const double phi = std::max(least, measured);
   return {.phi_nN = phi,
@@ -90,10 +89,10 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
           .noise_variance = noise_variance};
 }
 
-RoughnessOfTotal roughness_of_total(const Eigen::VectorXd& forces_nN, const ModelError& error) {
+RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError& error) {
   const auto longer_nN = [&](double phi) {
     double sum = 0;
-    for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) {
+    for (Index row = 0; row < forces_nN.size(); row += 2) {
       const double force = forces_nN.segment<2>(row).norm();
       const double across = std::min(std::sqrt(phi * error.loads_nN[row]), force);  // no error turns a force round
       sum += std::hypot(force, across) - force;
@@ -117,8 +116,8 @@ RoughnessOfTotal roughness_of_total(const Eigen::VectorXd& forces_nN, const Mode
 
 ReducedData whitened(const ReducedData& data, const ModelError& error, int threads) {
   MBTFM_ASSERT(data.is_upper);
-  const Eigen::MatrixXd& C = *data.compliance;
-  Eigen::MatrixXd root = Eigen::MatrixXd::Identity(C.rows(), C.rows()), target = data.target;
+  const MatrixXd& C = *data.compliance;
+  MatrixXd root = MatrixXd::Identity(C.rows(), C.rows()), target = data.target;
   numerics::add_triangle_outer(C, error.force_variance_nN2 / error.noise_variance, root, threads);
   const bool is_definite = numerics::upper_root(root, threads);
   MBTFM_ASSERT(is_definite);
@@ -126,7 +125,7 @@ ReducedData whitened(const ReducedData& data, const ModelError& error, int threa
   numerics::solve_upper(root, target);
   white.target = target;
   numerics::divide_into(C, root, threads);
-  white.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(root));
+  white.compliance = std::make_shared<const MatrixXd>(std::move(root));
   return white;
 }
 

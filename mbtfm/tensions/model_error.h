@@ -23,12 +23,12 @@ struct ModelError {
   double measured_phi_nN = 0;  ///< as the misfit alone has it, of the cell's network and the mean's together;
                                ///< the mean's where there are too few adhesions to tell it
   double phi_of_mean_nN = 0;   ///< what the meshes tell of their mean's own
-  Eigen::VectorXd loads_nN;    ///< L_a, by component of the forces
+  VectorXd loads_nN;           ///< L_a, by component of the forces
   /// Variance of a single adhesion's error over phi L_a. What one adhesion lacks its neighbours have, as a rule: beads
   /// and tensions see less of that than of errors independent of each other. So do the meshes, and tell by how much.
   double of_single = 1;
-  Eigen::VectorXd force_variance_nN2;  ///< phi L_a, by component of the forces
-  double noise_variance = 0;           ///< s²: 1 where the beads' errors are as stated
+  VectorXd force_variance_nN2;  ///< phi L_a, by component of the forces
+  double noise_variance = 0;    ///< s²: 1 where the beads' errors are as stated
 };
 
 /// Of the variance of an adhesion's error: from cell to cell its logarithm scatters about the law's by 1.0 to 1.3, as
@@ -37,8 +37,8 @@ inline constexpr double kDegreesByAdhesion = 2;
 
 /// Forces that one mesh gives for the tensions common to all, and their derivatives.
 struct MeshForces {
-  Eigen::VectorXd forces_nN, network_part_nN;
-  Eigen::MatrixXd derivatives;
+  VectorXd forces_nN, network_part_nN;
+  MatrixXd derivatives;
 };
 
 /// A rough network has larger adhesion forces than a smooth one of the same tensions: an error e across a force R makes
@@ -47,7 +47,7 @@ struct MeshForces {
 struct RoughnessOfTotal {
   double lacking_nN = 0, surplus_nN = 0, sigma_nN = 0;
 };
-RoughnessOfTotal roughness_of_total(const Eigen::VectorXd& forces_nN, const ModelError& error);
+RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError& error);
 
 /// phi by moments: what the meshes' mean leaves of the data, the tensions following, is s² and C Var(e) Cᵀ together.
 /// @param meshes  at least two

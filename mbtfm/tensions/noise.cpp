@@ -20,14 +20,14 @@ bool has_far_beads(const std::vector<Vec2>& beads_um, const Polygon& outline_um,
   return std::ranges::count_if(beads_um, [&](Vec2 b) { return is_far(b, outline_um, far_distance_um); }) >= kFewest;
 }
 
-NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const Eigen::VectorXd& forces_nN,
+NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const VectorXd& forces_nN,
                        const Polygon& outline_um, double far_distance_um) {
-  const Eigen::VectorXd residual = residual_um(data, forces_nN);
+  const VectorXd residual = residual_um(data, forces_nN);
   const bool has_far = has_far_beads(data.position_um, outline_um, far_distance_um);
   std::vector<double> used;
   for (std::size_t i = 0; i < beads.size(); ++i) {
     if (has_far && !is_far(beads[i].position_um, outline_um, far_distance_um)) continue;
-    const auto row = 2 * static_cast<Eigen::Index>(i);
+    const auto row = 2 * static_cast<Index>(i);
     for (const double r : {residual[row], residual[row + 1]}) used.push_back(std::abs(r));
   }
   if (used.empty()) return {};

@@ -17,7 +17,7 @@ struct NoiseLevel {
 
 /// From what the model leaves unexplained at beads further than `far_distance_um` outside the outline: 1.4826 × the
 /// median magnitude of a component, which outliers do not move. Without far beads: of all beads.
-NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const Eigen::VectorXd& forces_nN,
+NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const VectorXd& forces_nN,
                        const Polygon& outline_um, double far_distance_um);
 
 }  // namespace mbtfm::tensions

@@ -10,11 +10,11 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/stopwatch.h"
 #include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/effects.h"
-#include "pipeline/stage/stopwatch.h"
 #include "substrate/compliance.h"
 #include "substrate/greens/half_space.h"
 
@@ -59,8 +59,8 @@ bool is_far(const Ellipse& ellipse, Vec2 offset) {
   return dot(offset, offset) > reach * reach;
 }
 
-Vec2 force_on(const Eigen::VectorXd& forces_nN, std::size_t ellipse) {
-  const auto row = 2 * static_cast<Eigen::Index>(ellipse);
+Vec2 force_on(const VectorXd& forces_nN, std::size_t ellipse) {
+  const auto row = 2 * static_cast<Index>(ellipse);
   return {forces_nN[row], forces_nN[row + 1]};
 }
 
@@ -69,23 +69,22 @@ struct Step {
   Eigen::Vector3d value, sigma;
 };
 
-Step step_of(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& derivatives,
-             const Eigen::MatrixXd& placement) {
-  const Eigen::MatrixXd of_free = of_free_tensions(derivatives, trial);
+Step step_of(const LinearData& data, const Trial& trial, const MatrixXd& derivatives, const MatrixXd& placement) {
+  const MatrixXd of_free = of_free_tensions(derivatives, trial);
   // all by way of the forces: beads × tensions are too many numbers
-  Eigen::MatrixXd weighted(placement.rows(), 4);
+  MatrixXd weighted(placement.rows(), 4);
   weighted << less_motion(data, placement), residual_um(data, trial.forces_nN);
   weighted = squared_weights(data).asDiagonal() * weighted;
-  const Eigen::MatrixXd pulled = numerics::small_transposed_product(of_free, data.response->pull_back(weighted));
-  const Eigen::Index n = 3 + of_free.cols();
-  Eigen::MatrixXd H(n, n);
+  const MatrixXd pulled = numerics::small_transposed_product(of_free, data.response->pull_back(weighted));
+  const Index n = 3 + of_free.cols();
+  MatrixXd H(n, n);
   H.topLeftCorner<3, 3>() = numerics::small_transposed_product(placement, weighted.leftCols<3>());
   H.bottomLeftCorner(of_free.cols(), 3) = pulled.leftCols<3>();
   H.topRightCorner(3, of_free.cols()) = pulled.leftCols<3>().transpose();
   H.bottomRightCorner(of_free.cols(), of_free.cols()) = numerics::gram(displace(data.reduced, of_free, data.threads));
-  Eigen::VectorXd g(n);
+  VectorXd g(n);
   g << numerics::transposed_matvec(placement, weighted.col(3)), pulled.col(3);
-  const Eigen::MatrixXd inverse = numerics::pseudo_inverse(H);
+  const MatrixXd inverse = numerics::pseudo_inverse(H);
   return {.value = numerics::matvec(inverse, g).head<3>(),
           .sigma = (noise_variance(data) * inverse.diagonal().head<3>()).cwiseSqrt()};
 }
@@ -102,13 +101,12 @@ std::string in_words(Vec2 shift_um, const Eigen::Vector3d& sigma) {
 
 /// A stray bead near an adhesion, where the field is steep, moves a cell by several of its errors.
 /// @param motions  by the placement, which follow such a bead as the tensions do
-LinearData without_strays(LinearData data, const Trial& trial, const Eigen::MatrixXd& derivatives,
-                          const Eigen::MatrixXd& motions) {
-  const std::vector<Eigen::Index> strays =
+LinearData without_strays(LinearData data, const Trial& trial, const MatrixXd& derivatives, const MatrixXd& motions) {
+  const std::vector<Index> strays =
       stray_beads(data, studentized(with_more_motions(data, motions), trial, derivatives));
   if (strays.empty()) return data;
-  Eigen::VectorXd weight = Eigen::VectorXd::Ones(data.weight_per_um.size() / 2);
-  for (const Eigen::Index bead : strays) weight[bead] = 0;
+  VectorXd weight = VectorXd::Ones(data.weight_per_um.size() / 2);
+  for (const Index bead : strays) weight[bead] = 0;
   return reweighted(std::move(data), weight);
 }
 
@@ -174,13 +172,12 @@ DisplacementField in_bead_frame(DisplacementField fitted, const DisplacementFiel
   return fitted;
 }
 
-Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
-                                  const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
-                                  const Eigen::VectorXd& model_um, Vec2 centre_um, int threads) {
+MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN,
+                           const std::vector<Vec2>& beads_um, const VectorXd& model_um, Vec2 centre_um, int threads) {
   constexpr double kStep = 0.05;  // of the semi-minor axis, over which differences are taken
   std::vector<greens::HalfSpaceEllipse> fields;
   for (const substrate::Ellipse& e : ellipses) fields.emplace_back(gel, e);
-  Eigen::MatrixXd motions(model_um.size(), 3);
+  MatrixXd motions(model_um.size(), 3);
   numerics::parallel_for(static_cast<int>(beads_um.size()), threads, [&](int b) {
     const Vec2 at = beads_um[b];
     Slopes sum;
@@ -195,20 +192,20 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::E
     }
     // a cell that goes forth leaves the beads behind; a turn carries the displacement along
     const Vec2 d = at - centre_um;
-    const auto row = 2 * static_cast<Eigen::Index>(b);
+    const auto row = 2 * static_cast<Index>(b);
     const Vec2 turned = Vec2{-model_um[row + 1], model_um[row]} + d.y * sum.by_x - d.x * sum.by_y;
     motions.middleRows<2>(row) << -sum.by_x.x, -sum.by_y.x, turned.x, -sum.by_x.y, -sum.by_y.y, turned.y;
   });
   return motions;
 }
 
-Eigen::VectorXd carried_um(const Gel& gel, const std::vector<Ellipse>& ellipses, const Eigen::VectorXd& forces_nN,
-                           const std::vector<Vec2>& beads_um, const Eigen::VectorXd& by_um, int threads) {
+VectorXd carried_um(const Gel& gel, const std::vector<Ellipse>& ellipses, const VectorXd& forces_nN,
+                    const std::vector<Vec2>& beads_um, const VectorXd& by_um, int threads) {
   std::vector<greens::HalfSpaceEllipse> fields;
   for (const Ellipse& e : ellipses) fields.emplace_back(gel, e);
-  Eigen::VectorXd change(by_um.size());
+  VectorXd change(by_um.size());
   numerics::parallel_for(static_cast<int>(beads_um.size()), threads, [&](int b) {
-    const auto row = 2 * static_cast<Eigen::Index>(b);
+    const auto row = 2 * static_cast<Index>(b);
     const Vec2 at = beads_um[b], by{by_um[row], by_um[row + 1]}, middle = at + 0.5 * by;
     Vec2 sum;
     for (std::size_t k = 0; k < ellipses.size(); ++k) {
@@ -226,18 +223,17 @@ Eigen::VectorXd carried_um(const Gel& gel, const std::vector<Ellipse>& ellipses,
   return change;
 }
 
-LinearData with_place(LinearData data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN,
-                      Vec2 centre_um, int threads) {
-  const Eigen::MatrixXd motions =
-      placement_motions(gel, substrate::ellipses_of(cell.adhesions), forces_nN, data.position_um,
-                        data.response->displace(forces_nN), centre_um, threads);
+LinearData with_place(LinearData data, const Cell& cell, const Gel& gel, const VectorXd& forces_nN, Vec2 centre_um,
+                      int threads) {
+  const MatrixXd motions = placement_motions(gel, substrate::ellipses_of(cell.adhesions), forces_nN, data.position_um,
+                                             data.response->displace(forces_nN), centre_um, threads);
   return with_more_motions(std::move(data), motions);
 }
 
 PlacedCell place_cell(const Cell& cell, const network::Contractile& network, const DisplacementField& beads,
                       LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
                       const Trial& start, Switch setting, int threads) {
-  const stage::Stopwatch watch;
+  const Stopwatch watch;
   constexpr double kFarthest_um = 5;  // filters are off by a micrometre at most, a stage that comes back by some
   constexpr double kLinear = 0.25;    // semi-minor axes: what its square adds is as a shift by an eighth of that
   // Standard errors by noise. A step is a tenth to a third too short (docs/theory/fit.md), so that the rest of one is
@@ -268,10 +264,10 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
         problem, rough, threads, pass == 0 ? start : scaled_to_data(problem, result.start.tensions_nN, &result.start),
         Search::nearest);
     result.start = fit.trial;
-    const Eigen::VectorXd model_um = there.response->displace(fit.trial.forces_nN);
-    const Eigen::MatrixXd motions =
+    const VectorXd model_um = there.response->displace(fit.trial.forces_nN);
+    const MatrixXd motions =
         placement_motions(gel, ellipses, fit.trial.forces_nN, there.position_um, model_um, none.centre_um, threads);
-    const Eigen::MatrixXd derivatives = problem.force_derivatives(fit.trial);
+    const MatrixXd derivatives = problem.force_derivatives(fit.trial);
     if (parameters.loss != Loss::squares) there = without_strays(std::move(there), fit.trial, derivatives, motions);
     const Step step = step_of(there, fit.trial, derivatives, motions);
     const double length_um = way_um(step.value, lever_um), sigma_um = std::max(step.sigma[0], step.sigma[1]);

@@ -40,20 +40,18 @@ DisplacementField in_bead_frame(DisplacementField fitted, const DisplacementFiel
 /// and all: 2·beads × 3. By the half-space's field, beyond four semi-axes that of a point force: the base and the sides
 /// of a gel change little so near to an adhesion that its place matters.
 /// @param model_um  displacement of the beads by these forces, 2·beads
-Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
-                                  const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
-                                  const Eigen::VectorXd& model_um, Vec2 centre_um, int threads);
+MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN,
+                           const std::vector<Vec2>& beads_um, const VectorXd& model_um, Vec2 centre_um, int threads);
 
 /// By how much the displacement by these forces changes where each bead goes `by_um` (2·beads). By the half-space's
 /// field, as above.
-Eigen::VectorXd carried_um(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
-                           const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
-                           const Eigen::VectorXd& by_um, int threads);
+VectorXd carried_um(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN,
+                    const std::vector<Vec2>& beads_um, const VectorXd& by_um, int threads);
 
 /// The beads may move by a shift and a turn of the cell besides: the error bars then hold what they do not know of
 /// them.
-LinearData with_place(LinearData data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN,
-                      Vec2 centre_um, int threads);
+LinearData with_place(LinearData data, const Cell& cell, const Gel& gel, const VectorXd& forces_nN, Vec2 centre_um,
+                      int threads);
 
 /// A cell where the beads want it.
 struct PlacedCell {

@@ -18,17 +18,17 @@ constexpr double kHuber = 1.500, kTukey = 5.123;  // see robust_weight
 constexpr double kSmallest = 0.01;
 
 /// Length of each bead's residual, of the beads in use.
-std::vector<double> used_lengths(const LinearData& data, const Eigen::VectorXd& residual) {
+std::vector<double> used_lengths(const LinearData& data, const VectorXd& residual) {
   std::vector<double> lengths;
-  for (Eigen::Index i = 0; i < residual.size(); i += 2) {
+  for (Index i = 0; i < residual.size(); i += 2) {
     if (data.weight_per_um[i] > 0) lengths.push_back(residual.segment<2>(i).norm());
   }
   return lengths;
 }
 
-Eigen::VectorXd weights_of(Loss loss, const Eigen::VectorXd& residual, double scale) {
-  Eigen::VectorXd weights(residual.size() / 2);
-  for (Eigen::Index i = 0; i < weights.size(); ++i) {
+VectorXd weights_of(Loss loss, const VectorXd& residual, double scale) {
+  VectorXd weights(residual.size() / 2);
+  for (Index i = 0; i < weights.size(); ++i) {
     weights[i] = robust_weight(loss, residual.segment<2>(2 * i).norm() / scale);
   }
   return weights;
@@ -42,11 +42,11 @@ bool is_exact(const LinearData& data, double scale) {
 /// Changes of the weighted displacements by tension, 2·beads × tensions. Single precision: weights settle to 1e-4.
 using BeadJacobian = Eigen::MatrixXf;
 
-BeadJacobian bead_jacobian(const LinearData& data, const Eigen::MatrixXd& force_derivatives) {
-  constexpr Eigen::Index kColumns = 64;  // at a time in double precision
+BeadJacobian bead_jacobian(const LinearData& data, const MatrixXd& force_derivatives) {
+  constexpr Index kColumns = 64;  // at a time in double precision
   BeadJacobian J(data.weight_per_um.size(), force_derivatives.cols());
-  for (Eigen::Index first = 0; first < J.cols(); first += kColumns) {
-    const Eigen::Index count = std::min(kColumns, J.cols() - first);
+  for (Index first = 0; first < J.cols(); first += kColumns) {
+    const Index count = std::min(kColumns, J.cols() - first);
     J.middleCols(first, count) =
         (data.weight_per_um.asDiagonal() *
          less_motion(data, data.response->displace(force_derivatives.middleCols(first, count))))
@@ -57,23 +57,22 @@ BeadJacobian bead_jacobian(const LinearData& data, const Eigen::MatrixXd& force_
 
 /// Jᵀ W J and Jᵀ W r, W the weights by bead.
 struct NormalEquations {
-  Eigen::MatrixXd H;
-  Eigen::VectorXd b;
+  MatrixXd H;
+  VectorXd b;
 };
 
-NormalEquations normal_equations(const BeadJacobian& J, const Eigen::VectorXd& bead_weights,
-                                 const Eigen::VectorXd& residual, int threads) {
-  constexpr int kPieces = 8;             // that sums are made of, whatever the threads
-  constexpr Eigen::Index kBeads = 4096;  // at a time in double precision
-  std::vector<NormalEquations> sums(kPieces,
-                                    {Eigen::MatrixXd::Zero(J.cols(), J.cols()), Eigen::VectorXd::Zero(J.cols())});
+NormalEquations normal_equations(const BeadJacobian& J, const VectorXd& bead_weights, const VectorXd& residual,
+                                 int threads) {
+  constexpr int kPieces = 8;      // that sums are made of, whatever the threads
+  constexpr Index kBeads = 4096;  // at a time in double precision
+  std::vector<NormalEquations> sums(kPieces, {MatrixXd::Zero(J.cols(), J.cols()), VectorXd::Zero(J.cols())});
   numerics::parallel_for(kPieces, threads, [&](int piece) {
     NormalEquations& sum = sums[piece];
-    for (Eigen::Index first = piece * kBeads; first < bead_weights.size(); first += kPieces * kBeads) {
-      const Eigen::Index count = std::min(kBeads, bead_weights.size() - first);
-      Eigen::VectorXd root(2 * count);
-      for (Eigen::Index b = 0; b < count; ++b) root.segment<2>(2 * b).setConstant(std::sqrt(bead_weights[first + b]));
-      const Eigen::MatrixXd weighted = root.asDiagonal() * J.middleRows(2 * first, 2 * count).cast<double>();
+    for (Index first = piece * kBeads; first < bead_weights.size(); first += kPieces * kBeads) {
+      const Index count = std::min(kBeads, bead_weights.size() - first);
+      VectorXd root(2 * count);
+      for (Index b = 0; b < count; ++b) root.segment<2>(2 * b).setConstant(std::sqrt(bead_weights[first + b]));
+      const MatrixXd weighted = root.asDiagonal() * J.middleRows(2 * first, 2 * count).cast<double>();
       numerics::add_upper_gram(weighted, sum.H, 1);
       sum.b += numerics::transposed_matvec(weighted, root.cwiseProduct(residual.segment(2 * first, 2 * count)));
     }
@@ -87,27 +86,27 @@ NormalEquations normal_equations(const BeadJacobian& J, const Eigen::VectorXd& b
 }
 
 /// J s, by parts of the rows.
-Eigen::VectorXd times(const BeadJacobian& J, const Eigen::VectorXd& s, int threads) {
-  constexpr Eigen::Index kRows = 8192;
+VectorXd times(const BeadJacobian& J, const VectorXd& s, int threads) {
+  constexpr Index kRows = 8192;
   const Eigen::VectorXf step = s.cast<float>();
-  Eigen::VectorXd moved(J.rows());
+  VectorXd moved(J.rows());
   numerics::parallel_for(static_cast<int>((J.rows() + kRows - 1) / kRows), threads, [&](int part) {
-    const Eigen::Index first = part * kRows, count = std::min(kRows, J.rows() - first);
+    const Index first = part * kRows, count = std::min(kRows, J.rows() - first);
     moved.segment(first, count) = (J.middleRows(first, count) * step).cast<double>();
   });
   return moved;
 }
 
 /// The robust fit of the linearised problem r − J s, s >= low: the weights it ends with.
-Eigen::VectorXd linear_weights(Loss loss, const Eigen::VectorXd& residual, const BeadJacobian& J,
-                               const Eigen::VectorXd& low, double scale, int threads) {
-  Eigen::VectorXd step = Eigen::VectorXd::Zero(J.cols());
-  Eigen::VectorXd weights = weights_of(loss, residual, scale);
+VectorXd linear_weights(Loss loss, const VectorXd& residual, const BeadJacobian& J, const VectorXd& low, double scale,
+                        int threads) {
+  VectorXd step = VectorXd::Zero(J.cols());
+  VectorXd weights = weights_of(loss, residual, scale);
   constexpr int kMaxSteps = 50;  // the weights settle linearly, in some ten steps
   for (int i = 0; i < kMaxSteps; ++i) {
     auto [H, b] = normal_equations(J, weights, residual, threads);
-    H.diagonal() += 1e-12 * H.diagonal().maxCoeff() * Eigen::VectorXd::Ones(H.rows());  // a tension that no bead feels
-    const Eigen::VectorXd next = bounded_quadratic_minimum(H, -b, low);
+    H.diagonal() += 1e-12 * H.diagonal().maxCoeff() * VectorXd::Ones(H.rows());  // a tension that no bead feels
+    const VectorXd next = bounded_quadratic_minimum(H, -b, low);
     const double change = (next - step).norm();
     step = next;
     weights = weights_of(loss, residual - times(J, step, threads), scale);
@@ -123,14 +122,13 @@ WeighedFit fit_with_loss(LinearData data, const network::Contractile& network, c
   constexpr double kSettled = 0.022;  // of a standard error, mean over the directions: a tenth along one of twenty
   for (int round = 0; round < kMaxRounds; ++round) {
     const Trial last = fit.trial;
-    const Eigen::VectorXd& before = last.tensions_nN;
-    const Eigen::VectorXd residual = weighted_residual(data, fit.trial.forces_nN);
+    const VectorXd& before = last.tensions_nN;
+    const VectorXd residual = weighted_residual(data, fit.trial.forces_nN);
     const double scale = fixed_scale ? *fixed_scale : robust_scale(data, residual);
     if (is_exact(data, scale)) break;
     const TensionProblem problem(network, data.reduced, adhesion_ids, {}, threads);
-    const Eigen::MatrixXd derivatives = problem.force_derivatives(fit.trial);
-    const Eigen::VectorXd weights =
-        linear_weights(loss, residual, bead_jacobian(data, derivatives), -before, scale, threads);
+    const MatrixXd derivatives = problem.force_derivatives(fit.trial);
+    const VectorXd weights = linear_weights(loss, residual, bead_jacobian(data, derivatives), -before, scale, threads);
     data = reweighted(std::move(data), weights);
     const TensionProblem weighed(network, data.reduced, adhesion_ids, {}, threads);
     const auto fit_again = [&](const Trial& start, Search search) {
@@ -140,9 +138,9 @@ WeighedFit fit_with_loss(LinearData data, const network::Contractile& network, c
     };
     const auto is_settled = [&] {
       // or a thousandth of the largest tension: at a kink of the forces fits may end on either side in turn
-      const Eigen::VectorXd change = fit.trial.tensions_nN - before;
+      const VectorXd change = fit.trial.tensions_nN - before;
       const double settled = kSettled * scale * std::sqrt(static_cast<double>(change.size()));
-      const Eigen::VectorXd changed = less_motion(data, data.response->displace(numerics::matvec(derivatives, change)));
+      const VectorXd changed = less_motion(data, data.response->displace(numerics::matvec(derivatives, change)));
       const double moved = data.weight_per_um.cwiseProduct(changed).norm();
       return moved <= settled || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff();
     };
@@ -155,16 +153,16 @@ WeighedFit fit_with_loss(LinearData data, const network::Contractile& network, c
 }
 
 /// R with R Rᵀ this covariance.
-Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
+MatrixXd root_of(const MatrixXd& covariance) {
   const auto [values, vectors] = numerics::symmetric_eigen(covariance);
   return vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
 /// Whether the nearest bead's residual does not go along with that of the bead of this row, by half of it at least.
-bool stands_alone(const LinearData& data, const Eigen::VectorXd& residual, Eigen::Index row) {
+bool stands_alone(const LinearData& data, const VectorXd& residual, Index row) {
   const Vec2 place = data.position_um[row / 2];
   double nearest = std::numeric_limits<double>::infinity(), along = 0;
-  for (Eigen::Index other = 0; other < residual.size(); other += 2) {
+  for (Index other = 0; other < residual.size(); other += 2) {
     if (other == row || data.weight_per_um[other] == 0) continue;
     const double distance = norm(data.position_um[other / 2] - place);
     if (distance >= nearest) continue;
@@ -176,35 +174,35 @@ bool stands_alone(const LinearData& data, const Eigen::VectorXd& residual, Eigen
 
 }  // namespace
 
-Eigen::MatrixXd of_free_tensions(const Eigen::MatrixXd& force_derivatives, const Trial& trial) {
-  std::vector<Eigen::Index> free;
-  for (Eigen::Index i = 0; i < force_derivatives.cols(); ++i) {
+MatrixXd of_free_tensions(const MatrixXd& force_derivatives, const Trial& trial) {
+  std::vector<Index> free;
+  for (Index i = 0; i < force_derivatives.cols(); ++i) {
     if (trial.tensions_nN[i] > 0) free.push_back(i);
   }
   return force_derivatives(Eigen::all, free);
 }
 
-Studentized studentized(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& force_derivatives) {
-  const Eigen::MatrixXd of_free = of_free_tensions(force_derivatives, trial);
-  const Eigen::VectorXd weight = squared_weights(data).cwiseSqrt();
+Studentized studentized(const LinearData& data, const Trial& trial, const MatrixXd& force_derivatives) {
+  const MatrixXd of_free = of_free_tensions(force_derivatives, trial);
+  const VectorXd weight = squared_weights(data).cwiseSqrt();
   Eigen::Matrix3Xd hat = Eigen::Matrix3Xd::Zero(3, weight.size() / 2);  // its blocks: xx, xy, yy
-  const auto add = [&](const Eigen::MatrixXd& independent) {            // columns Z of a part Z Zᵀ
-    for (Eigen::Index b = 0; b < hat.cols(); ++b) {
+  const auto add = [&](const MatrixXd& independent) {                   // columns Z of a part Z Zᵀ
+    for (Index b = 0; b < hat.cols(); ++b) {
       const auto x = independent.row(2 * b), y = independent.row(2 * b + 1);
       hat.col(b) += Eigen::Vector3d(x.squaredNorm(), x.dot(y), y.squaredNorm());
     }
   };
   if (data.motions.shapes.cols() > 0)
     add(numerics::small_product(weight.asDiagonal() * data.motions.shapes, root_of(data.motions.inverse)));
-  const Eigen::MatrixXd unit = numerics::small_product(
+  const MatrixXd unit = numerics::small_product(
       of_free, root_of(numerics::pseudo_inverse(numerics::gram(displace(data.reduced, of_free, data.threads)))));
-  constexpr Eigen::Index kColumns = 64;  // at a time: beads × tensions are too many numbers
-  for (Eigen::Index first = 0; first < unit.cols(); first += kColumns) {
-    const Eigen::Index count = std::min(kColumns, unit.cols() - first);
+  constexpr Index kColumns = 64;  // at a time: beads × tensions are too many numbers
+  for (Index first = 0; first < unit.cols(); first += kColumns) {
+    const Index count = std::min(kColumns, unit.cols() - first);
     add(weight.asDiagonal() * less_motion(data, data.response->displace(unit.middleCols(first, count))));
   }
-  Eigen::VectorXd residual = weighted_residual(data, trial.forces_nN);
-  for (Eigen::Index b = 0; b < hat.cols(); ++b) {
+  VectorXd residual = weighted_residual(data, trial.forces_nN);
+  for (Index b = 0; b < hat.cols(); ++b) {
     Eigen::Matrix2d left;
     left << 1 - hat(0, b), -hat(1, b), -hat(1, b), 1 - hat(2, b);
     constexpr double kLeast = 0.01;  // a bead that tells all by itself leaves rounding, not a residual
@@ -213,38 +211,38 @@ Studentized studentized(const LinearData& data, const Trial& trial, const Eigen:
   return {.residual = std::move(residual), .leverage = (hat.row(0) + hat.row(2)).transpose()};
 }
 
-std::vector<Eigen::Index> stray_beads(const LinearData& data, const Studentized& beads) {
-  const Eigen::VectorXd& residual = beads.residual;
+std::vector<Index> stray_beads(const LinearData& data, const Studentized& beads) {
+  const VectorXd& residual = beads.residual;
   const double scale = robust_scale(data, residual);
   if (is_exact(data, scale)) return {};
   constexpr double kChance = 0.05;
   const double n_beads = 0.5 * static_cast<double>(data.n_used), all = beads.leverage.sum();
-  std::vector<Eigen::Index> strays;
+  std::vector<Index> strays;
   std::size_t n_large = 0;
-  for (Eigen::Index b = 0; b < beads.leverage.size(); ++b) {
+  for (Index b = 0; b < beads.leverage.size(); ++b) {
     if (data.weight_per_um[2 * b] == 0) continue;
     const double share = 0.5 / n_beads + 0.5 * (all > 0 ? beads.leverage[b] / all : 1 / n_beads);
     if (residual.segment<2>(2 * b).norm() <= scale * std::sqrt(-2 * std::log(kChance * share))) continue;
     ++n_large;
     if (stands_alone(data, residual, 2 * b)) strays.push_back(b);
   }
-  return 2 * strays.size() > n_large ? strays : std::vector<Eigen::Index>();
+  return 2 * strays.size() > n_large ? strays : std::vector<Index>();
 }
 
-double harm_done_by(const std::vector<Eigen::Index>& strays, const LinearData& data,
-                    const Eigen::VectorXd& weighted_residual, const Eigen::MatrixXd& force_derivatives) {
-  Eigen::VectorXd residual(2 * strays.size()), weight(2 * strays.size());
+double harm_done_by(const std::vector<Index>& strays, const LinearData& data, const VectorXd& weighted_residual,
+                    const MatrixXd& force_derivatives) {
+  VectorXd residual(2 * strays.size()), weight(2 * strays.size());
   for (std::size_t k = 0; k < strays.size(); ++k) {
-    residual.segment<2>(2 * static_cast<Eigen::Index>(k)) = weighted_residual.segment<2>(2 * strays[k]);
-    weight.segment<2>(2 * static_cast<Eigen::Index>(k)) = data.weight_per_um.segment<2>(2 * strays[k]);
+    residual.segment<2>(2 * static_cast<Index>(k)) = weighted_residual.segment<2>(2 * strays[k]);
+    weight.segment<2>(2 * static_cast<Index>(k)) = data.weight_per_um.segment<2>(2 * strays[k]);
   }
-  const Eigen::MatrixXd of_strays = weight.asDiagonal() * data.response->at_points(strays)->displace(force_derivatives);
-  const Eigen::MatrixXd all = numerics::gram(displace(data.reduced, force_derivatives, data.threads));
-  const Eigen::MatrixXd others = all - numerics::gram(of_strays);
-  const Eigen::VectorXd moved =
+  const MatrixXd of_strays = weight.asDiagonal() * data.response->at_points(strays)->displace(force_derivatives);
+  const MatrixXd all = numerics::gram(displace(data.reduced, force_derivatives, data.threads));
+  const MatrixXd others = all - numerics::gram(of_strays);
+  const VectorXd moved =
       numerics::shortest_solution(others, numerics::transposed_matvec(of_strays, residual)).cwiseAbs();
-  const Eigen::VectorXd variance = numerics::pseudo_inverse(all).diagonal();
-  const Eigen::VectorXd in_errors = moved.cwiseQuotient(variance.cwiseMax(1e-300).cwiseSqrt());
+  const VectorXd variance = numerics::pseudo_inverse(all).diagonal();
+  const VectorXd in_errors = moved.cwiseQuotient(variance.cwiseMax(1e-300).cwiseSqrt());
   const double most_moved =
       (variance.array() > 0).select(in_errors, 0).maxCoeff() / robust_scale(data, weighted_residual);
   const double without_them = weighted_residual.squaredNorm() - residual.squaredNorm();
@@ -266,7 +264,7 @@ double robust_weight(Loss loss, double residual) {
   throw InternalError("unknown loss");
 }
 
-double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_residual) {
+double robust_scale(const LinearData& data, const VectorXd& weighted_residual) {
   std::vector<double> lengths = used_lengths(data, weighted_residual);
   return lengths.empty() ? 0 : numerics::median_in(lengths) / std::sqrt(2 * std::log(2.0));
 }
@@ -282,9 +280,9 @@ WeighedFit fit_reweighted(LinearData data, const network::Contractile& network, 
                        scale);
 }
 
-double misfit_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions, Loss loss) {
-  const Eigen::VectorXd residual = weighted_residual(data, forces_nN);
-  const auto degrees = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
+double misfit_variance(const LinearData& data, const VectorXd& forces_nN, Index n_tensions, Loss loss) {
+  const VectorXd residual = weighted_residual(data, forces_nN);
+  const auto degrees = static_cast<double>(std::max<Index>(1, data.n_used - n_tensions));
   double variance = residual.squaredNorm() / degrees;
   const double scale = robust_scale(data, residual);
   if (loss != Loss::squares && scale > 0) {

@@ -29,13 +29,13 @@ void check_same_beads(const Path& file, const DisplacementField& beads, const Di
 }
 
 /// Which of `all` are `beads`; nothing where not all of them are there, in that order.
-std::optional<std::vector<Eigen::Index>> places_among(const DisplacementField& all, const DisplacementField& beads) {
-  std::vector<Eigen::Index> places;
+std::optional<std::vector<Index>> places_among(const DisplacementField& all, const DisplacementField& beads) {
+  std::vector<Index> places;
   for (std::size_t i = 0, next = 0; next < beads.size(); ++i) {
     if (i == all.size()) return std::nullopt;
     if (all[i].position_um != beads[next].position_um) continue;
     ++next;
-    places.push_back(static_cast<Eigen::Index>(i));
+    places.push_back(static_cast<Index>(i));
   }
   return places;
 }
@@ -50,12 +50,12 @@ struct FrameData {
 FrameData good_beads_of(const SeriesFrame& frame, const substrate::SharedResponse& response,
                         const std::vector<bool>& is_used) {
   FrameData data;
-  std::vector<Eigen::Index> good;
+  std::vector<Index> good;
   for (std::size_t i = 0; i < frame.beads.size(); ++i) {
     if (!frame.beads[i].flag.empty()) continue;
     data.beads.push_back(frame.beads[i]);
     data.is_used.push_back(is_used.empty() || is_used[i]);
-    good.push_back(static_cast<Eigen::Index>(i));
+    good.push_back(static_cast<Index>(i));
   }
   data.response = response->at_points(good);
   return data;
@@ -73,9 +73,9 @@ FrameFit described(const SeriesFrame& frame, const EnsembleFit& fit) {
           .converged = fit.report.converged};
 }
 
-Eigen::VectorXd values_of(const FrameFit& fit) {
-  Eigen::VectorXd values_nN(static_cast<Eigen::Index>(fit.tensions.size()));
-  for (Eigen::Index i = 0; i < values_nN.size(); ++i) values_nN[i] = fit.tensions[i].tension_nN;
+VectorXd values_of(const FrameFit& fit) {
+  VectorXd values_nN(static_cast<Index>(fit.tensions.size()));
+  for (Index i = 0; i < values_nN.size(); ++i) values_nN[i] = fit.tensions[i].tension_nN;
   return values_nN;
 }
 
@@ -208,7 +208,7 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames, const n
   const auto fitted = [&](const SeriesFrame& frame) {
     FrameData good = good_beads_of(frame, response, is_used);
     LinearData data = reduce(good.beads, std::move(good.response), good.is_used, work.threads,
-                             moves ? affine_motions(good.beads) : Eigen::MatrixXd());
+                             moves ? affine_motions(good.beads) : MatrixXd());
     const TensionProblem problem(networks.front(), data.reduced, adhesion_ids, {}, work.threads);
     const Trial begin = problem.evaluate(start.tensions_nN, &start);
     if (allow) data = allow(std::move(data), begin.forces_nN);

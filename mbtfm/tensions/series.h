@@ -55,7 +55,7 @@ std::vector<FrameFit> read_fits(const Path& folder);
 
 /// The data of a frame whose beads may do more beside forces and common motion. @param forces_nN  of the network, with
 /// which the frame's fit starts
-using AllowMore = std::function<LinearData(LinearData, const Eigen::VectorXd& forces_nN)>;
+using AllowMore = std::function<LinearData(LinearData, const VectorXd& forces_nN)>;
 
 /// @param response  of all beads
 /// @param is_used  by bead, as by reduce(); flagged beads are left out anyway

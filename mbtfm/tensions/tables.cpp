@@ -69,12 +69,12 @@ Table<FitOfFrame> frame_fit_table() {
 }
 
 std::vector<CorrelationRow> correlation_rows(const EnsembleFit& fit) {
-  const Eigen::MatrixXd correlation = correlation_of(fit);
+  const MatrixXd correlation = correlation_of(fit);
   std::vector<CorrelationRow> rows;
   for (std::size_t i = 0; i < fit.tensions.fibre_ids.size(); ++i) {
     for (std::size_t j = i + 1; j < fit.tensions.fibre_ids.size(); ++j) {
       rows.push_back({fit.tensions.fibre_ids[i], fit.tensions.fibre_ids[j],
-                      correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))});
+                      correlation(static_cast<Index>(i), static_cast<Index>(j))});
     }
   }
   return rows;
@@ -131,7 +131,7 @@ Table<DrawRow> draw_table() {
 std::vector<ChangeRow> change_rows(const std::vector<Change>& changes, const EnsembleFit& fit) {
   std::vector<ChangeRow> rows;
   for (const Change& change : changes) {
-    for (Eigen::Index i = 0; i < change.by_tension_nN.size(); ++i)
+    for (Index i = 0; i < change.by_tension_nN.size(); ++i)
       rows.push_back({change.effect, fit.tensions.fibre_ids[i], change.by_tension_nN[i]});
   }
   return rows;

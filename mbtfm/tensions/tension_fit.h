@@ -94,7 +94,6 @@ TensionFit fit_conjugate_gradients(const TensionProblem& problem, const FitParam
                                    const Trial& start, const std::vector<Block>& blocks);
 
 /// The minimiser of ½ xᵀ H x + gᵀ x over x >= low, for symmetric positive definite H, by an active set.
-Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
-                                          const Eigen::VectorXd& low);
+VectorXd bounded_quadratic_minimum(const MatrixXd& H, const VectorXd& g, const VectorXd& low);
 
 }  // namespace mbtfm::tensions

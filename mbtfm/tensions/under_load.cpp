@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/contract/stopwatch.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/stage/effects.h"
-#include "pipeline/stage/stopwatch.h"
 
 namespace mbtfm::tensions {
 
@@ -45,7 +45,7 @@ BeadsOfState take_state(const DisplacementField& at_rest, LinearData data,
   constexpr EffectKind kKind = EffectKind::beads_under_load;
   constexpr double kVeryStrong = 10;
   constexpr double kHopeless = -100;  // estimates of -230 to -450 were -350 to -470
-  const stage::Stopwatch watch;
+  const Stopwatch watch;
   BeadsOfState result{.beads = at_rest, .data = std::move(data), .effect = {}};
   const double largest = largest_displacement_um(at_rest);
   if (setting == Switch::off || (setting == Switch::automatic && !(largest > tolerance * size_um))) {
@@ -54,7 +54,7 @@ BeadsOfState take_state(const DisplacementField& at_rest, LinearData data,
     return result;
   }
   if (setting == Switch::automatic && carried) {  // the exact answer costs as much as all that went before
-    const Eigen::VectorXd there = result.data.displacement_um - carried(result.data);
+    const VectorXd there = result.data.displacement_um - carried(result.data);
     const double estimate = evidence_of(result.data, result.data.reduced, floor_squared_of(result.data, there));
     if (estimate < kHopeless) {
       result.effect = stage::decided(

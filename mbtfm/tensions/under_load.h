@@ -27,7 +27,7 @@ struct BeadsOfState {
 };
 
 /// Of data of beads at rest: by how much more the beads would move under load, by the forces that explain them at rest.
-using Carried = std::function<Eigen::VectorXd(const LinearData&)>;
+using Carried = std::function<VectorXd(const LinearData&)>;
 
 /// auto: under load where the beads say so. No cell model is asked: forces of the adhesions, all independent, leave the
 /// squares S of the beads, and n ln(S_rest/S_load) is twice the logarithm of the odds, as both states have the same

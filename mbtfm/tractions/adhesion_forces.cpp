@@ -19,7 +19,7 @@ using substrate::Ellipse;
 /// u = G F at the beads with weights 1/sigma, or equal ones where not all beads state their error.
 struct WeightedBeads {
   std::vector<Vec2> positions_um;
-  Eigen::VectorXd weight, displacement;  ///< displacement: times the weight
+  VectorXd weight, displacement;  ///< displacement: times the weight
   bool states_errors = false;
 };
 
@@ -38,9 +38,9 @@ WeightedBeads weighted(const DisplacementField& beads) {
   return w;
 }
 
-Eigen::MatrixXd weighted_compliance(const substrate::Substrate& gel, const WeightedBeads& beads,
-                                    const std::vector<substrate::Ellipse>& ellipses) {
-  Eigen::MatrixXd matrix = gel.compliance_um_per_nN(beads.positions_um, ellipses);
+MatrixXd weighted_compliance(const substrate::Substrate& gel, const WeightedBeads& beads,
+                             const std::vector<substrate::Ellipse>& ellipses) {
+  MatrixXd matrix = gel.compliance_um_per_nN(beads.positions_um, ellipses);
   for (Index column = 0; column < matrix.cols(); ++column) {
     matrix.col(column).array() *= beads.weight.array();
   }
@@ -48,7 +48,7 @@ Eigen::MatrixXd weighted_compliance(const substrate::Substrate& gel, const Weigh
 }
 
 /// @param values  of the normal matrix
-void check_solvable(const Eigen::VectorXd& values) {
+void check_solvable(const VectorXd& values) {
   constexpr double kRounding = 1e-13;  // of the normal matrix
   const auto n_lost = (values.array() <= kRounding * values.maxCoeff()).count();
   if (n_lost == 0) return;
@@ -61,23 +61,22 @@ void check_solvable(const Eigen::VectorXd& values) {
 }
 
 /// The force of ellipse a, were that ellipse another and the rest as they are.
-Vec2 force_with(const substrate::Substrate& gel, const WeightedBeads& beads, const Eigen::MatrixXd& G,
-                const Eigen::MatrixXd& normal, const Eigen::VectorXd& pulled, Index a,
-                const substrate::Ellipse& other) {
-  const Eigen::MatrixXd columns = weighted_compliance(gel, beads, {other});
-  Eigen::MatrixXd A = normal;
-  Eigen::VectorXd b = pulled;
+Vec2 force_with(const substrate::Substrate& gel, const WeightedBeads& beads, const MatrixXd& G, const MatrixXd& normal,
+                const VectorXd& pulled, Index a, const substrate::Ellipse& other) {
+  const MatrixXd columns = weighted_compliance(gel, beads, {other});
+  MatrixXd A = normal;
+  VectorXd b = pulled;
   A.middleCols<2>(2 * a) = numerics::small_transposed_product(G, columns);
   A.block<2, 2>(2 * a, 2 * a) = numerics::small_transposed_product(columns, columns);
   A.middleRows<2>(2 * a) = A.middleCols<2>(2 * a).transpose().eval();
   b.segment<2>(2 * a) = numerics::transposed_matvec(columns, beads.displacement);
-  const Eigen::VectorXd forces = numerics::solve_symmetric(A, b);
+  const VectorXd forces = numerics::solve_symmetric(A, b);
   return {forces[2 * a], forces[2 * a + 1]};
 }
 
 /// A force is stationary where its ellipse fits best, so derivatives would say little: finite errors do.
-Sensitivity sensitivity(const substrate::Substrate& gel, const WeightedBeads& beads, const Eigen::MatrixXd& G,
-                        const Eigen::MatrixXd& normal, const Eigen::VectorXd& pulled, Vec2 force_nN,
+Sensitivity sensitivity(const substrate::Substrate& gel, const WeightedBeads& beads, const MatrixXd& G,
+                        const MatrixXd& normal, const VectorXd& pulled, Vec2 force_nN,
                         const substrate::Ellipse& ellipse, Index a) {
   // errors of an ellipse as segmentations have them
   constexpr double kShift_um = 0.3, kSize = 0.2, kTurn_deg = 10;
@@ -122,20 +121,20 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
   const auto gel = greens::make_greens(inputs.gel, {.model = substrate::kind_of(parameters.gel_model)}, threads);
   const std::vector<Ellipse> ellipses = substrate::ellipses_of(inputs.adhesions);
   const WeightedBeads beads = weighted(inputs.beads);
-  const Eigen::MatrixXd G = weighted_compliance(*gel, beads, ellipses);
-  const Eigen::MatrixXd normal_matrix = numerics::small_transposed_product(G, G);
+  const MatrixXd G = weighted_compliance(*gel, beads, ellipses);
+  const MatrixXd normal_matrix = numerics::small_transposed_product(G, G);
   const auto [values, vectors] = numerics::symmetric_eigen(normal_matrix);
   check_solvable(values);
-  const Eigen::MatrixXd inverse = numerics::weighted_outer(vectors, values.cwiseInverse());
-  const Eigen::VectorXd pulled = numerics::transposed_matvec(G, beads.displacement);
-  const Eigen::VectorXd forces = numerics::matvec(inverse, pulled);
-  const Eigen::VectorXd residual = numerics::minus_matvec(beads.displacement, G, forces);
+  const MatrixXd inverse = numerics::weighted_outer(vectors, values.cwiseInverse());
+  const VectorXd pulled = numerics::transposed_matvec(G, beads.displacement);
+  const VectorXd forces = numerics::matvec(inverse, pulled);
+  const VectorXd residual = numerics::minus_matvec(beads.displacement, G, forces);
 
   Reconstruction r;
   const double chi_squared = residual.squaredNorm() / static_cast<double>(G.rows() - G.cols());
   // As for the tensions (7): the errors stated, or the larger ones that the misfit tells of.
   const double variance = beads.states_errors ? std::max(1.0, chi_squared) : chi_squared;
-  const Eigen::MatrixXd covariance = variance * inverse;
+  const MatrixXd covariance = variance * inverse;
   std::vector<Vec2> forces_nN;
   for (std::size_t a = 0; a < ellipses.size(); ++a) {
     const auto at = 2 * static_cast<Index>(a);

@@ -29,9 +29,9 @@ double density_per_um2(const DisplacementField& beads) {
 
 /// Forces or tractions with what is known of their errors.
 struct Loads {
-  Eigen::VectorXd values;
-  Eigen::MatrixXd covariance;  ///< by the noise
-  Eigen::MatrixXd response;    ///< to a force of one on each adhesion
+  VectorXd values;
+  MatrixXd covariance;  ///< by the noise
+  MatrixXd response;    ///< to a force of one on each adhesion
   Vec2 at(std::size_t load) const {
     return {values[2 * static_cast<Index>(load)], values[2 * static_cast<Index>(load) + 1]};
   }
@@ -60,14 +60,14 @@ Loads regularised(const TractionInputs& inputs, const TractionParameters& parame
   const DenseProblem problem(inputs.beads, model.compliance, n, model.truth, n_true);
   if (problem.spectrum().data_squared() == 0) {
     r.remark = "no bead has moved: there is no traction";
-    return {Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n_true)};
+    return {VectorXd::Zero(n), MatrixXd::Zero(n, n), MatrixXd::Zero(n, n_true)};
   }
   const double length_um = length_at_unit_density_um / std::sqrt(density_per_um2(inputs.beads));
   r.scan = problem.scan();
   r.lambda = parameters.lambda_um_per_kPa ? *parameters.lambda_um_per_kPa * inputs.gel.youngs_modulus_kPa / length_um
                                           : chosen_lambda(*r.scan, parameters.lambda_by);
   r.length_um = *r.lambda * length_um;
-  const Eigen::VectorXd loads = problem.spectrum().solve(*r.lambda);
+  const VectorXd loads = problem.spectrum().solve(*r.lambda);
   r.relative_l2 = problem.spectrum().relative_l2(*r.lambda);
   return {loads, problem.spectrum().covariance(*r.lambda, r.scan->variance), problem.response_to_truth(*r.lambda)};
 }
@@ -75,10 +75,10 @@ Loads regularised(const TractionInputs& inputs, const TractionParameters& parame
 /// Standard errors of the forces' magnitudes, which are `sums` (rows 2a, 2a+1 for adhesion a) of the loads: by the
 /// noise, and by what penalty and model make of forces spread over their adhesions.
 /// docs/theory/reconstructions.md (17).
-void state_errors(const Loads& loads, const Eigen::MatrixXd& sums, std::vector<AdhesionForce>& forces) {
-  const Eigen::MatrixXd covariance = numerics::congruence(sums, loads.covariance);
-  const Eigen::MatrixXd missed =
-      numerics::small_product(sums, loads.response) - Eigen::MatrixXd::Identity(sums.rows(), loads.response.cols());
+void state_errors(const Loads& loads, const MatrixXd& sums, std::vector<AdhesionForce>& forces) {
+  const MatrixXd covariance = numerics::congruence(sums, loads.covariance);
+  const MatrixXd missed =
+      numerics::small_product(sums, loads.response) - MatrixXd::Identity(sums.rows(), loads.response.cols());
   for (std::size_t a = 0; a < forces.size(); ++a) {
     const Vec2 along = direction_of(forces[a].force_nN);
     const Eigen::RowVector2d e(along.x, along.y);
@@ -142,7 +142,7 @@ Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const Trac
     const std::vector<Vec2> u = gel->displacements_um({adhesion.position_um}, ellipses, forces);
     r.patches.push_back({adhesion.position_um, adhesion.area_um2, 1 / adhesion.area_um2 * forces[a], u.front()});
   }
-  state_errors(loads, Eigen::MatrixXd::Identity(loads.values.size(), loads.values.size()), r.forces);
+  state_errors(loads, MatrixXd::Identity(loads.values.size(), loads.values.size()), r.forces);
   return r;
 }
 
@@ -170,14 +170,14 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
                     .truth = even_forces(inputs, *gel),
                     .n_adhesions = inputs.adhesions.size()};
   const Loads loads = regularised(inputs, parameters, model, inputs.gel.youngs_modulus_kPa / std::sqrt(area), r);
-  const Eigen::VectorXd u = compliance(centres) * loads.values;
+  const VectorXd u = compliance(centres) * loads.values;
   for (std::size_t j = 0; j < centres.size(); ++j) {
     const auto at = 2 * static_cast<Index>(j);
     r.patches.push_back({centres[j], area, loads.at(j), {u[at], u[at + 1]}});
   }
   r.forces = forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um);
   const std::vector<int> owner = adhesion_of_patches(centres, inputs.adhesions, parameters.grow_um);
-  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(2 * static_cast<Index>(r.forces.size()), loads.values.size());
+  MatrixXd sums = MatrixXd::Zero(2 * static_cast<Index>(r.forces.size()), loads.values.size());
   for (std::size_t i = 0; i < centres.size(); ++i) {
     if (owner[i] >= 0) sums.block<2, 2>(2 * owner[i], 2 * static_cast<Index>(i)) = area * Eigen::Matrix2d::Identity();
   }

@@ -12,10 +12,10 @@ struct DenseProblem::Range {
   std::size_t begin, end;
 };
 
-Eigen::MatrixXd DenseProblem::weighted(const Compliance& compliance, const Range& range) const {
+MatrixXd DenseProblem::weighted(const Compliance& compliance, const Range& range) const {
   std::vector<Vec2> points;
   for (std::size_t i = range.begin; i < range.end; ++i) points.push_back(beads_[i].position_um);
-  Eigen::MatrixXd G = compliance(points);
+  MatrixXd G = compliance(points);
   for (std::size_t i = range.begin; i < range.end; ++i) {
     G.middleRows<2>(2 * static_cast<Index>(i - range.begin)) *= std::sqrt(weights_[i]);
   }
@@ -27,8 +27,8 @@ void DenseProblem::for_blocks(const Use& use) const {
   constexpr std::size_t kBlock = 1024;  // beads at a time: G as a whole may be too large for memory
   for (std::size_t begin = 0; begin < beads_.size(); begin += kBlock) {
     const Range range{begin, std::min(begin + kBlock, beads_.size())};
-    const Eigen::MatrixXd G = weighted(compliance_, range);
-    Eigen::VectorXd u(G.rows());
+    const MatrixXd G = weighted(compliance_, range);
+    VectorXd u(G.rows());
     for (std::size_t i = begin; i < range.end; ++i) {
       const double root = std::sqrt(weights_[i]);
       u.segment<2>(2 * static_cast<Index>(i - begin)) << root * beads_[i].displacement_um.x,
@@ -59,10 +59,10 @@ DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance
   if (states_errors) stated_variance_ = 1 / mean;
 
   double data_squared = 0;
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n_loads, n_loads);
-  Eigen::VectorXd pulled = Eigen::VectorXd::Zero(n_loads);
-  Eigen::MatrixXd pulled_by_truth = Eigen::MatrixXd::Zero(n_loads, n_true);
-  for_blocks([&](const Range& range, const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
+  MatrixXd normal = MatrixXd::Zero(n_loads, n_loads);
+  VectorXd pulled = VectorXd::Zero(n_loads);
+  MatrixXd pulled_by_truth = MatrixXd::Zero(n_loads, n_true);
+  for_blocks([&](const Range& range, const MatrixXd& G, const VectorXd& u) {
     numerics::add_upper_gram(G, normal);
     pulled += numerics::transposed_matvec(G, u);
     if (n_true > 0) pulled_by_truth += numerics::small_transposed_product(G, weighted(truth, range));
@@ -72,8 +72,8 @@ DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance
   projected_truth_ = numerics::small_transposed_product(spectrum_->vectors(), pulled_by_truth);
 }
 
-Eigen::MatrixXd DenseProblem::response_to_truth(double lambda) const {
-  const Eigen::VectorXd shares = (spectrum_->values() + lambda * lambda).inverse().matrix();
+MatrixXd DenseProblem::response_to_truth(double lambda) const {
+  const VectorXd shares = (spectrum_->values() + lambda * lambda).inverse().matrix();
   return numerics::small_product(spectrum_->vectors(), shares.asDiagonal() * projected_truth_);
 }
 

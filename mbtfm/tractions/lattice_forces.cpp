@@ -15,16 +15,16 @@ constexpr double kTolerance = 1e-3;  // in energy: a thirtieth of a standard err
 
 /// Wᵀ D and Wᵀ u for one m.
 struct Normal {
-  Eigen::MatrixXd matrix;
-  Eigen::VectorXd right;
+  MatrixXd matrix;
+  VectorXd right;
 };
 
-Normal normal_for(const LatticeProblem& problem, const Eigen::MatrixXd& D, double m, int threads) {
-  Normal normal{Eigen::MatrixXd(D.cols(), D.cols()), Eigen::VectorXd(D.cols())};
+Normal normal_for(const LatticeProblem& problem, const MatrixXd& D, double m, int threads) {
+  Normal normal{MatrixXd(D.cols(), D.cols()), VectorXd(D.cols())};
   numerics::parallel_for(static_cast<int>(D.cols()), threads, [&](int a) {
     TikhonovSolver solver(problem, problem.pulled_back(problem.spread_of(D.col(a))), 1);
     solver.solve(m, kTolerance);
-    const Eigen::VectorXd w = D.col(a) - problem.at_beads(problem.displaced(solver.solution()));
+    const VectorXd w = D.col(a) - problem.at_beads(problem.displaced(solver.solution()));
     normal.matrix.row(a) = (D.transpose() * w).transpose();
     normal.right[a] = w.dot(problem.data());
   });
@@ -35,8 +35,8 @@ Normal normal_for(const LatticeProblem& problem, const Eigen::MatrixXd& D, doubl
 /// What is known of the forces for one m, with the s² that makes the data most likely.
 struct Known {
   double log_likelihood = -std::numeric_limits<double>::infinity();  ///< of the forces' part
-  Eigen::VectorXd mean;
-  Eigen::MatrixXd covariance;
+  VectorXd mean;
+  MatrixXd covariance;
 };
 
 Known known_from(const Normal& normal, double variance) {
@@ -75,7 +75,7 @@ std::vector<double> log_likelihoods_of(const LambdaScan& scan) {
 
 /// From next to no background, which is quickly solved, to that of (9) by cross-validation, which explains the data
 /// without any adhesion: until it gets less likely.
-Known most_likely(const ForceData& data, const Eigen::MatrixXd& D, int threads) {
+Known most_likely(const ForceData& data, const MatrixXd& D, int threads) {
   const std::vector<double> without = log_likelihoods_of(data.scan);
   Known best;
   double likeliest = -std::numeric_limits<double>::infinity();

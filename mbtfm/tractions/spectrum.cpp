@@ -60,20 +60,20 @@ LambdaScan Spectrum::scan(std::optional<double> stated_variance, SignalIn signal
 }
 
 Eigen::Array<bool, Eigen::Dynamic, 1> Spectrum::is_told(double variance) const {
-  constexpr Eigen::Index kLeast = 30;  // squares of noise whose sum is nearly Gaussian
-  constexpr double kChance = 3;        // standard deviations of that sum
+  constexpr Index kLeast = 30;   // squares of noise whose sum is nearly Gaussian
+  constexpr double kChance = 3;  // standard deviations of that sum
   const Eigen::Array<bool, Eigen::Dynamic, 1> felt = is_felt(values_);
-  std::vector<Eigen::Index> order;  // felt most first
-  for (Eigen::Index k = 0; k < values_.size(); ++k)
+  std::vector<Index> order;  // felt most first
+  for (Index k = 0; k < values_.size(); ++k)
     if (felt[k]) order.push_back(k);
-  std::ranges::sort(order, std::greater{}, [&](Eigen::Index k) { return values_[k]; });
+  std::ranges::sort(order, std::greater{}, [&](Index k) { return values_[k]; });
   const auto n = std::ssize(order);
   std::vector<double> up_to = {0};  // sums of squares, each with this variance if it is noise
-  for (const Eigen::Index k : order) up_to.push_back(up_to.back() + projected_[k] * projected_[k] / values_[k]);
+  for (const Index k : order) up_to.push_back(up_to.back() + projected_[k] * projected_[k] / values_[k]);
   Eigen::Array<bool, Eigen::Dynamic, 1> told(values_.size());
   told.setConstant(false);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const Eigen::Index next = std::min(std::max(k, kLeast), n - k);
+  for (Index k = 0; k < n; ++k) {
+    const Index next = std::min(std::max(k, kLeast), n - k);
     const double squares = up_to[k + next] - up_to[k];
     const auto m = static_cast<double>(next);
     if (squares <= variance * (m + kChance * std::sqrt(2 * m))) break;
@@ -100,7 +100,7 @@ std::optional<double> Spectrum::variance_felt_least() const {
   std::vector<std::pair<double, double>> coefficients;  // by value
   double followed = 0;
   const Eigen::Array<bool, Eigen::Dynamic, 1> felt = is_felt(values_);
-  for (Eigen::Index k = 0; k < values_.size(); ++k) {
+  for (Index k = 0; k < values_.size(); ++k) {
     if (!felt[k]) continue;
     const double square = projected_[k] * projected_[k] / values_[k];
     coefficients.emplace_back(values_[k], square);

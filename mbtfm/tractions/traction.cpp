@@ -140,7 +140,7 @@ std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches,
   return forces;
 }
 
-Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, GelModel gel_model, int threads) {
+MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, GelModel gel_model, int threads) {
   const auto n_beads = static_cast<double>(inputs.beads.size());
   numerics::expect_room_for({.what = "the compliance of the adhesions",
                              .count = n_beads,

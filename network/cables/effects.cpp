@@ -5,7 +5,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
-#include "pipeline/stage/stopwatch.h"
+#include "pipeline/contract/stopwatch.h"
 
 namespace mbtfm::cables {
 
@@ -35,7 +35,7 @@ Effect decide_elasticity(const CableNetwork& cables, const std::vector<double>& 
   constexpr EffectKind kKind = EffectKind::cable_elasticity;
   if (switches.cable_elasticity != Switch::automatic)
     return stage::decided(kKind, switches.cable_elasticity, true, "as asked");
-  const stage::Stopwatch watch;
+  const Stopwatch watch;
   const double share =
       stretch_share(cables.network(), cables.equilibrium(tensions_nN), cables.parameters().axial_stiffness_nN);
   Effect effect = stage::decided(kKind, Switch::automatic, share, switches.effect_tolerance,

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pipeline/numerics/block_cholesky.h"
-#include "pipeline/numerics/precision.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::numerics {
 

@@ -37,7 +37,7 @@ constexpr int kStrip = 128;  // columns that one thread takes at a time: enough 
 
 /// body(begin, count) over strips of columns.
 template <class Body>
-void over_strips(Eigen::Index n_columns, int threads, const Body& body) {
+void over_strips(Index n_columns, int threads, const Body& body) {
   const int n = static_cast<int>(n_columns);
   parallel_for((n + kStrip - 1) / kStrip, threads, [&](int s) { body(s * kStrip, std::min(kStrip, n - s * kStrip)); });
 }
@@ -104,13 +104,13 @@ void add_upper_outer(const MatrixXd& A, MatrixXd& square, int threads) {
 }
 
 void mirror_upper(MatrixXd& square) {
-  for (Eigen::Index j = 0; j < square.cols(); ++j)
-    for (Eigen::Index i = j + 1; i < square.rows(); ++i) square(i, j) = square(j, i);
+  for (Index j = 0; j < square.cols(); ++j)
+    for (Index i = j + 1; i < square.rows(); ++i) square(i, j) = square(j, i);
 }
 
 void mirror_lower(MatrixXd& square) {
-  for (Eigen::Index j = 0; j < square.cols(); ++j)
-    for (Eigen::Index i = j + 1; i < square.rows(); ++i) square(j, i) = square(i, j);
+  for (Index j = 0; j < square.cols(); ++j)
+    for (Index i = j + 1; i < square.rows(); ++i) square(j, i) = square(i, j);
 }
 
 void clear_below_diagonal(MatrixXd& square) { square.triangularView<Eigen::StrictlyLower>().setZero(); }
@@ -144,14 +144,14 @@ bool upper_cholesky(MatrixXd& A, int threads) {
   return true;
 }
 
-bool downdate_upper(Eigen::MatrixXd& U, Eigen::MatrixXd B) {
+bool downdate_upper(MatrixXd& U, MatrixXd B) {
   std::vector<double> cosine(static_cast<std::size_t>(U.rows())), sine(cosine.size());
-  for (Eigen::Index b = 0; b < B.rows(); ++b) {
+  for (Index b = 0; b < B.rows(); ++b) {
     // column by column, which takes the rotations of all rows above
-    for (Eigen::Index j = 0; j < U.cols(); ++j) {
+    for (Index j = 0; j < U.cols(); ++j) {
       double* column = U.col(j).data();
       double x = B(b, j);
-      for (Eigen::Index k = 0; k < j; ++k) {
+      for (Index k = 0; k < j; ++k) {
         column[k] = (column[k] - sine[k] * x) / cosine[k];
         x = cosine[k] * x - sine[k] * column[k];
       }
@@ -171,7 +171,7 @@ void solve_upper_transposed(const MatrixXd& U, MatrixXd& B, int threads) { with_
 
 SymmetricEigen symmetric_eigen(MatrixXd A) {
   const int n = static_cast<int>(A.rows());
-  SymmetricEigen eigen{Eigen::VectorXd(n), {}};
+  SymmetricEigen eigen{VectorXd(n), {}};
   if (n == 0) return eigen;
   int info = 0, n_integers = -1, n_work = -1, integers_wanted = 0;
   double work_wanted = 0;
@@ -242,7 +242,7 @@ MatrixXd orthonormal_basis(const MatrixXd& A) {
 MatrixXd principal_directions(MatrixXd A, double least_part) {
   const int m = static_cast<int>(A.rows()), n = static_cast<int>(A.cols()), k = std::min(m, n);
   MatrixXd left(m, k), right(k, n);
-  Eigen::VectorXd sizes(k);
+  VectorXd sizes(k);
   std::vector<int> integers(static_cast<std::size_t>(8 * k));
   int info = 0, n_work = -1;
   double work_wanted = 0;

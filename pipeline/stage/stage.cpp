@@ -10,6 +10,7 @@
 
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/listed.h"
+#include "pipeline/contract/stopwatch.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/json.h"
@@ -23,7 +24,6 @@
 #include "pipeline/stage/events.h"
 #include "pipeline/stage/manual.h"
 #include "pipeline/stage/parameters.h"
-#include "pipeline/stage/stopwatch.h"
 #include "pipeline/stage/suggest.h"
 
 namespace mbtfm::stage {

@@ -56,7 +56,7 @@ std::map<int, Vec2> forces_by_adhesion(const Network& network, const std::vector
   }
   const cables::Equilibrium equilibrium = cables.equilibrium(by_group);
   if (!equilibrium.report.converged) throw NotSolved(equilibrium.report);
-  const Eigen::VectorXd forces = cables.adhesion_forces_nN(by_group, equilibrium);
+  const VectorXd forces = cables.adhesion_forces_nN(by_group, equilibrium);
   std::map<int, Vec2> result;
   for (std::size_t i = 0; i < cables.adhesion_ids().size(); ++i) {
     result[cables.adhesion_ids()[i]] = {forces[2 * i], forces[2 * i + 1]};
@@ -96,7 +96,7 @@ DisplacementField displacement_of(const Experiment& e, const drawing::ScenarioPa
   std::vector<Vec2> displacements = gel->displacements_um(beads, ellipses, forces);
   if (p.mechanics.simulation_material == MaterialLaw::neo_hooke) {
     constexpr double kElementsAcross = 2;  // finer than a fit's, as the network is
-    const Eigen::VectorXd at_adhesions = substrate::column_of(forces);
+    const VectorXd at_adhesions = substrate::column_of(forces);
     const choice::LargeStrain large(p.gel, ellipses, beads, at_adhesions, threads, kElementsAcross);
     const std::vector<Vec2> change = substrate::vectors_of(large.about(at_adhesions).displacement_um);
     for (std::size_t i = 0; i < beads.size(); ++i) displacements[i] += change[i];

@@ -5,10 +5,10 @@
 #include <numbers>
 
 #include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/contract/stopwatch.h"
 #include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
-#include "pipeline/stage/stopwatch.h"
 #include "segment/beads/at_rest.h"
 #include "segment/beads/far_field.h"
 #include "segment/beads/plane.h"
@@ -59,7 +59,7 @@ std::string affine_in_words(const CommonMotion& c) {
 
 MotionTaken motion_taken(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, Vec2 corner,
                          double width, double height, Switch setting, double tolerance, double large) {
-  const stage::Stopwatch watch;
+  const Stopwatch watch;
   const WholeMotion whole =
       whole_motion(positions, displacements, corner, width, height, {Drift::translation, Drift::affine});
   const FarField &shifted = whole.of[0], &affine = whole.of[1];

@@ -7,10 +7,10 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/stopwatch.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/parameters.h"
-#include "pipeline/stage/stopwatch.h"
 #include "segment/beads/alignment.h"
 #include "segment/beads/beads.h"
 #include "segment/beads/coarse_field.h"
@@ -339,7 +339,7 @@ Tracking RelaxedBeads::track_by_any(const images::Image& stressed, double pixel_
         stage::decided(EffectKind::correlation_windows, Switch::automatic, false, "single beads can be followed");
     return result;
   } catch (const NotFollowed& beads) {
-    const stage::Stopwatch watch;
+    const Stopwatch watch;
     std::optional<Tracking> result;
     try {
       result = by(TrackMethod::correlation);

@@ -13,14 +13,14 @@ namespace {
 
 /// The two places along z between which a bead lies, and its shares of them.
 struct Between {
-  Eigen::Index place[2];
+  Index place[2];
   double share[2];
 };
 Between between(const std::vector<double>& z, double at) {
-  const auto last = static_cast<Eigen::Index>(z.size()) - 1;
-  if (last == 0 || at <= z.front()) return {{0, std::min<Eigen::Index>(1, last)}, {1, 0}};
+  const auto last = static_cast<Index>(z.size()) - 1;
+  if (last == 0 || at <= z.front()) return {{0, std::min<Index>(1, last)}, {1, 0}};
   if (at >= z.back()) return {{last - 1, last}, {0, 1}};
-  const auto above = static_cast<Eigen::Index>(std::ranges::upper_bound(z, at) - z.begin());
+  const auto above = static_cast<Index>(std::ranges::upper_bound(z, at) - z.begin());
   const double share = (at - z[above - 1]) / (z[above] - z[above - 1]);
   return {{above - 1, above}, {1 - share, share}};
 }
@@ -41,16 +41,16 @@ std::vector<double> places_along_z(const std::vector<Moved>& beads, const Slices
 
 /// The unknowns: turn, shift along z, then x and y for each place along z.
 struct Fit {
-  Eigen::VectorXd solution;
-  Eigen::MatrixXd covariance;
+  VectorXd solution;
+  MatrixXd covariance;
   std::vector<double> weights;
   double scale = 1;  ///< of the beads at rest over their standard errors
 };
 
 Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 centre) {
-  const auto n_places = static_cast<Eigen::Index>(z.size());
-  const Eigen::Index n = 2 + 2 * n_places;
-  Fit fit{.solution = Eigen::VectorXd::Zero(n), .covariance = {}, .weights = {}};
+  const auto n_places = static_cast<Index>(z.size());
+  const Index n = 2 + 2 * n_places;
+  Fit fit{.solution = VectorXd::Zero(n), .covariance = {}, .weights = {}};
   std::vector<double> x, y, along, sigmas, sigmas_z;
   for (const Moved& b : beads) {
     x.push_back(b.displacement_um.x), y.push_back(b.displacement_um.y), along.push_back(b.displacement_um.z);
@@ -58,20 +58,20 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
   }
   const double mx = numerics::median(x), my = numerics::median(y);
   fit.solution[1] = numerics::median(along);
-  for (Eigen::Index k = 0; k < n_places; ++k) fit.solution[2 + 2 * k] = mx, fit.solution[3 + 2 * k] = my;
+  for (Index k = 0; k < n_places; ++k) fit.solution[2 + 2 * k] = mx, fit.solution[3 + 2 * k] = my;
   const double unit = std::max(1e-6, numerics::median(sigmas)), unit_z = std::max(1e-6, numerics::median(sigmas_z));
   fit.weights.assign(beads.size(), 0);
   constexpr int kRounds = 15;
   double scale = 0;
   for (int round = 0; round < kRounds; ++round) {
-    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
+    MatrixXd normal = MatrixXd::Zero(n, n);
+    VectorXd right = VectorXd::Zero(n);
     std::vector<Eigen::Vector3d> left(beads.size());
     std::vector<double> sizes;
     for (std::size_t b = 0; b < beads.size(); ++b) {
       const Vec3 d = beads[b].place_um - centre, u = beads[b].displacement_um;
       const Between at = between(z, beads[b].place_um.z);
-      const Eigen::Index low = 2 + 2 * at.place[0], high = 2 + 2 * at.place[1];
+      const Index low = 2 + 2 * at.place[0], high = 2 + 2 * at.place[1];
       const double s = at.share[1];
       left[b] = {u.x - (1 - s) * fit.solution[low] - s * fit.solution[high] + fit.solution[0] * d.y,
                  u.y - (1 - s) * fit.solution[low + 1] - s * fit.solution[high + 1] - fit.solution[0] * d.x,
@@ -87,10 +87,10 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
       if (fit.weights[b] == 0) continue;
       const Vec3 d = beads[b].place_um - centre;
       const Between at = between(z, beads[b].place_um.z);
-      const Eigen::Index low = 2 + 2 * at.place[0], high = 2 + 2 * at.place[1];
+      const Index low = 2 + 2 * at.place[0], high = 2 + 2 * at.place[1];
       const double s = at.share[1];
       const double w = fit.weights[b] / (unit * unit), wz = fit.weights[b] / (unit_z * unit_z);
-      const Eigen::Index at_x[] = {0, low, high}, at_y[] = {0, low + 1, high + 1};
+      const Index at_x[] = {0, low, high}, at_y[] = {0, low + 1, high + 1};
       const double of_x[] = {-d.y, 1 - s, s}, of_y[] = {d.x, 1 - s, s};
       for (int p = 0; p < 3; ++p) {
         right[at_x[p]] += w * of_x[p] * left[b][0];
@@ -104,7 +104,7 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
     }
     // places that no bead at rest sees take after their neighbours: a bead's worth of smoothness
     const double stiff = 1 / (unit * unit);
-    for (Eigen::Index k = 2; k + 2 < n; ++k) {
+    for (Index k = 2; k + 2 < n; ++k) {
       const double step = fit.solution[k + 2] - fit.solution[k];
       normal(k, k) += stiff, normal(k + 2, k + 2) += stiff;
       normal(k, k + 2) -= stiff, normal(k + 2, k) -= stiff;
@@ -165,9 +165,9 @@ struct Means {
 };
 
 Means means_by_depth(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 centre, const Fit& fit) {
-  const auto n = static_cast<Eigen::Index>(z.size());
+  const auto n = static_cast<Index>(z.size());
   Scatter scatter = scatter_by_depth(beads, z, centre, fit);
-  Eigen::VectorXd n_beads = Eigen::VectorXd::Zero(n), weight = n_beads, sum_z_um = n_beads, noise_um2 = n_beads;
+  VectorXd n_beads = VectorXd::Zero(n), weight = n_beads, sum_z_um = n_beads, noise_um2 = n_beads;
   for (std::size_t b = 0; b < beads.size(); ++b) {
     const Between at = between(z, beads[b].place_um.z);
     for (int p = 0; p < 2; ++p) {
@@ -179,11 +179,11 @@ Means means_by_depth(const std::vector<Moved>& beads, const std::vector<double>&
     }
   }
   const std::vector<double> by_place(n_beads.begin(), n_beads.end());
-  Means means{.across = {z, Eigen::MatrixX2d(n, 2), Eigen::MatrixXd(n, n), std::move(scatter.across_um), by_place},
-              .along = {z, Eigen::MatrixX2d(n, 2), Eigen::MatrixXd::Zero(n, n), std::move(scatter.along_um), by_place}};
-  for (Eigen::Index i = 0; i < n; ++i) {
+  Means means{.across = {z, Eigen::MatrixX2d(n, 2), MatrixXd(n, n), std::move(scatter.across_um), by_place},
+              .along = {z, Eigen::MatrixX2d(n, 2), MatrixXd::Zero(n, n), std::move(scatter.along_um), by_place}};
+  for (Index i = 0; i < n; ++i) {
     means.across.um.row(i) << fit.solution[2 + 2 * i], fit.solution[3 + 2 * i];
-    for (Eigen::Index j = 0; j < n; ++j) means.across.noise_um2(i, j) = fit.covariance(2 + 2 * i, 2 + 2 * j);
+    for (Index j = 0; j < n; ++j) means.across.noise_um2(i, j) = fit.covariance(2 + 2 * i, 2 + 2 * j);
     const double seen = std::max(weight[i], 1e-3);  // a place without beads says nothing
     means.along.um.row(i).setConstant(fit.solution[1] + sum_z_um[i] / seen);
     means.along.noise_um2(i, i) = std::max(noise_um2[i] / seen, 1e-12) / seen;
@@ -243,7 +243,7 @@ CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, 
   motion.slice_drift_ratio = std::sqrt(2 * across.log_likelihood_gain);
   motion.has_slice_drift =
       slice_drift == Switch::on || (slice_drift == Switch::automatic && motion.slice_drift_ratio > kCertain);
-  for (Eigen::Index k = 0; k < across.um.rows(); ++k) {
+  for (Index k = 0; k < across.um.rows(); ++k) {
     motion.slices_um.push_back({across.drift_um(k, 0), across.drift_um(k, 1)});
     motion.slices_sigma_um.push_back(across.sigma_um[k]);
     motion.drift_sigma_um.push_back(across.drift_sigma_um[k]);

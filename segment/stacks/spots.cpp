@@ -96,8 +96,8 @@ SpotShape SpotShape::through(const std::vector<Sample>& samples, const Volume& v
   const auto n = static_cast<int>(samples.size());
   const int n_terms = n >= 240 ? kTerms : n >= 80 ? 2 : 1;
   const auto fitted = [&](std::array<double, kTerms>& into, Bounds& bounds, const auto& value) {
-    Eigen::VectorXd weight = Eigen::VectorXd::Ones(n), y(n), solution;
-    Eigen::MatrixXd a(n, n_terms);
+    VectorXd weight = VectorXd::Ones(n), y(n), solution;
+    MatrixXd a(n, n_terms);
     for (int k = 0; k < n; ++k) {
       const auto t = shape.terms(samples[k].place);
       for (int m = 0; m < n_terms; ++m) a(k, m) = t[m];
@@ -105,10 +105,10 @@ SpotShape SpotShape::through(const std::vector<Sample>& samples, const Volume& v
     }
     constexpr int kRounds = 10;
     for (int round = 0; round < kRounds; ++round) {
-      Eigen::MatrixXd normal = a.transpose() * weight.asDiagonal() * a;
+      MatrixXd normal = a.transpose() * weight.asDiagonal() * a;
       normal.diagonal().array() += 1e-9 * n;
       solution = numerics::solve_symmetric(normal, a.transpose() * (weight.array() * y.array()).matrix());
-      const Eigen::VectorXd left = (y - a * solution).cwiseAbs();
+      const VectorXd left = (y - a * solution).cwiseAbs();
       const double scale = 1.4826 * numerics::median(std::vector<double>(left.data(), left.data() + n)) + 1e-6;
       for (int k = 0; k < n; ++k) {
         const double r = left[k] / (4.685 * scale);  // biweight: 95 % efficient

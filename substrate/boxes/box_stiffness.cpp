@@ -34,7 +34,7 @@ Shapes shapes_at(int order, std::array<double, 3> size, std::array<double, 3> t)
 
 }  // namespace
 
-Eigen::MatrixXd box_stiffness(const substrate::Material& material, int order, const Box& box) {
+MatrixXd box_stiffness(const substrate::Material& material, int order, const Box& box) {
   const Gel& gel = material.gel;
   const std::array<double, 3>& size_um = box.size_um;
   const double mu = substrate::shear_modulus_kPa(gel);
@@ -42,9 +42,9 @@ Eigen::MatrixXd box_stiffness(const substrate::Material& material, int order, co
   const int n_nodes = (order + 1) * (order + 1) * (order + 1);
   const int n_pressures = order == 1 ? 1 : 4;  // 1, and x, y, z from the centre
   const double volume = size_um[0] * size_um[1] * size_um[2];
-  Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(3 * n_nodes, 3 * n_nodes);
-  Eigen::MatrixXd divergence = Eigen::MatrixXd::Zero(3 * n_nodes, n_pressures);       // (q_m, div v)
-  Eigen::MatrixXd compressibility = Eigen::MatrixXd::Zero(n_pressures, n_pressures);  // (q_m, q_n / lambda)
+  MatrixXd stiffness = MatrixXd::Zero(3 * n_nodes, 3 * n_nodes);
+  MatrixXd divergence = MatrixXd::Zero(3 * n_nodes, n_pressures);       // (q_m, div v)
+  MatrixXd compressibility = MatrixXd::Zero(n_pressures, n_pressures);  // (q_m, q_n / lambda)
   const double middle_um = box.low_um[2] + 0.5 * size_um[2];
   const numerics::GaussRule gauss = numerics::gauss_legendre(order + 1);
   const int n = order + 1;

@@ -19,7 +19,7 @@ namespace {
 class StiffnessOfBox {
  public:
   StiffnessOfBox(const substrate::Material& material, int order) : material_(material), order_(order) {}
-  Eigen::MatrixXd operator()(const Box& box) {
+  MatrixXd operator()(const Box& box) {
     constexpr double kDigits = 1e9;  // sides equal to rounding are equal
     const std::array<double, 3>& size = box.size_um;
     const auto even = substrate::even_modulus(material_, box.low_um[2], box.low_um[2] + size[2]);
@@ -40,7 +40,7 @@ class StiffnessOfBox {
  private:
   substrate::Material material_;
   int order_;
-  std::map<std::array<long, 4>, Eigen::MatrixXd> known_;
+  std::map<std::array<long, 4>, MatrixXd> known_;
 };
 
 std::string shown(Vec2 point) { return "(" + std::to_string(point.x) + ", " + std::to_string(point.y) + ")"; }
@@ -82,7 +82,7 @@ numerics::BlockMatrix<3> ElasticSystem::assemble(const substrate::Material& mate
   for (int cell = 0; cell < nodes_.n_cells(); ++cell) {
     nodes_.add(cell, stiffness_of(mesh_.cells[cell]), matrix, add_bottom);
   }
-  bottom_stiffness_.resize(n_unknowns(), 3 * static_cast<Eigen::Index>(nodes_.held().size()));
+  bottom_stiffness_.resize(n_unknowns(), 3 * static_cast<Index>(nodes_.held().size()));
   bottom_stiffness_.setFromTriplets(bottom.begin(), bottom.end());
   return matrix;
 }

@@ -53,7 +53,7 @@ class ElasticSystem {
 };
 
 /// Stiffness of one box of order 1 or 2, (3 nodes)² by columns; unknown 3 k + i is axis i of node k, x fastest.
-Eigen::MatrixXd box_stiffness(const substrate::Material& material, int order, const Box& box);
+MatrixXd box_stiffness(const substrate::Material& material, int order, const Box& box);
 
 /// What `memory_limit_GB` stands for: 0 is four fifths of the machine's memory.
 double allowed_GB(double memory_limit_GB);

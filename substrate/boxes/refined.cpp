@@ -9,8 +9,8 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/report.h"
+#include "pipeline/contract/stopwatch.h"
 #include "pipeline/numerics/parallel.h"
-#include "pipeline/stage/stopwatch.h"
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/boxes/load_cases.h"
 #include "substrate/boxes/models.h"
@@ -73,8 +73,8 @@ class Refined final : public substrate::Substrate {
     // all axes for one, too: the error is a share of the whole displacement, and this part vanishes with 1 - 2 nu
     const std::vector<int> axes =
         components == substrate::Components::along ? std::vector<int>{0, 1} : std::vector<int>{0, 1, 2};
-    const Eigen::Index n_rows = observations.n_components() * observations.size();
-    const auto asked = [=](const Eigen::MatrixXd& field) -> Eigen::MatrixXd {
+    const Index n_rows = observations.n_components() * observations.size();
+    const auto asked = [=](const MatrixXd& field) -> MatrixXd {
       if (components != substrate::Components::normal) return field;
       return field(Eigen::seq(2, Eigen::last, 3), Eigen::all);
     };
@@ -86,9 +86,9 @@ class Refined final : public substrate::Substrate {
                return asked(solve({points_um, ellipses, 2 * static_cast<int>(ellipses.size()), unit_case, axes}));
              },
          .displace =
-             [=, this](const Eigen::MatrixXd& forces_nN) {
-               Eigen::MatrixXd field(n_rows, forces_nN.cols());
-               for (Eigen::Index column = 0; column < field.cols(); ++column) {
+             [=, this](const MatrixXd& forces_nN) {
+               MatrixXd field(n_rows, forces_nN.cols());
+               for (Index column = 0; column < field.cols(); ++column) {
                  const LoadCase all = case_of(substrate::vectors_of(forces_nN.col(column)));
                  field.col(column) = asked(solve({points_um, ellipses, 1, [&all](int) { return all; }, axes}));
                }
@@ -138,14 +138,14 @@ class Refined final : public substrate::Substrate {
   };
 
   /// One mesh, or finer and finer ones until the estimated error is below the tolerance.
-  Eigen::MatrixXd solve(const Request& request) const {
+  MatrixXd solve(const Request& request) const {
     substrate::check_points(request.points_um);
     check(request.ellipses);
-    const auto n_rows = static_cast<Eigen::Index>(request.axes.size() * request.points_um.size());
-    if (n_rows == 0 || request.ellipses.empty()) return Eigen::MatrixXd::Zero(n_rows, request.n_columns);
-    const stage::Stopwatch watch;
+    const auto n_rows = static_cast<Index>(request.axes.size() * request.points_um.size());
+    if (n_rows == 0 || request.ellipses.empty()) return MatrixXd::Zero(n_rows, request.n_columns);
+    const Stopwatch watch;
     Fineness fineness = first_fineness(request.ellipses.size());
-    Eigen::MatrixXd columns;
+    MatrixXd columns;
     std::vector<double> errors;
     if (parameters_.displacement_tolerance == 0) {
       columns = solve_on(fineness, request);
@@ -171,15 +171,15 @@ class Refined final : public substrate::Substrate {
 
   /// Halve the elements on the adhesions whose columns are worst, those far away by as much as they matter.
   /// @return the estimated error of each adhesion's columns
-  std::vector<double> refine_until_right(Fineness& fineness, const Request& request, Eigen::MatrixXd& columns) const {
+  std::vector<double> refine_until_right(Fineness& fineness, const Request& request, MatrixXd& columns) const {
     std::vector<double> errors(request.ellipses.size(), std::numeric_limits<double>::infinity());
     for (int level = 0; level < kMostRefinements; ++level) {
       const std::vector<std::size_t> finer_ones = worst(errors);
       for (const std::size_t j : finer_ones) ++fineness.halvings[j];
       fineness.growth /= far_step();
-      Eigen::MatrixXd finer = solve_finer(fineness, request, errors);
+      MatrixXd finer = solve_finer(fineness, request, errors);
       for (const std::size_t j : finer_ones) {
-        errors[j] = estimated_error(columns, finer, static_cast<Eigen::Index>(j));
+        errors[j] = estimated_error(columns, finer, static_cast<Index>(j));
       }
       columns.swap(finer);
       if (mean(errors) <= parameters_.displacement_tolerance) return errors;
@@ -205,8 +205,7 @@ class Refined final : public substrate::Substrate {
     return order;
   }
 
-  Eigen::MatrixXd solve_finer(const Fineness& fineness, const Request& request,
-                              const std::vector<double>& errors) const {
+  MatrixXd solve_finer(const Fineness& fineness, const Request& request, const std::vector<double>& errors) const {
     try {
       return solve_on(fineness, request);
     } catch (NotSolved& error) {
@@ -222,9 +221,9 @@ class Refined final : public substrate::Substrate {
   /// From two meshes of which the finer has half the side. The error falls by q = 2^(3/2), and the finer solution's
   /// error is orthogonal in energy to the difference (the meshes are nested), so that about
   /// |difference|² = (q² - 1) |error of the finer|².
-  static double estimated_error(const Eigen::MatrixXd& coarse, const Eigen::MatrixXd& fine, Eigen::Index ellipse) {
+  static double estimated_error(const MatrixXd& coarse, const MatrixXd& fine, Index ellipse) {
     const bool is_matrix = fine.cols() > 1;
-    const Eigen::Index first = is_matrix ? 2 * ellipse : 0, n = is_matrix ? 2 : 1;
+    const Index first = is_matrix ? 2 * ellipse : 0, n = is_matrix ? 2 : 1;
     const double size = fine.middleCols(first, n).norm();
     return size == 0 ? 0 : (fine - coarse).middleCols(first, n).norm() / (std::sqrt(kFall * kFall - 1) * size);
   }
@@ -233,8 +232,8 @@ class Refined final : public substrate::Substrate {
     return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
   }
 
-  Eigen::MatrixXd solve_on(const Fineness& fineness, const Request& request) const {
-    const stage::Stopwatch watch;
+  MatrixXd solve_on(const Fineness& fineness, const Request& request) const {
+    const Stopwatch watch;
     const ElasticSystem system = system_for(fineness, request.points_um, request.ellipses);
     const double setup_s = watch.seconds();
     std::vector<std::vector<NodeWeight>> samples(request.points_um.size()), loads(request.ellipses.size());
@@ -243,8 +242,7 @@ class Refined final : public substrate::Substrate {
     numerics::parallel_for(static_cast<int>(loads.size()), threads_,
                            [&](int j) { loads[j] = system.load_weights(request.ellipses[j]); });
     const std::vector<int> order = request.n_columns == 1 ? std::vector<int>{0} : columns_by_place(request.ellipses);
-    Eigen::MatrixXd columns =
-        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(request.axes.size() * samples.size()), request.n_columns);
+    MatrixXd columns = MatrixXd::Zero(static_cast<Index>(request.axes.size() * samples.size()), request.n_columns);
     system.factor().solve(
         request.n_columns, nodes_of(samples),
         [&](int k, const numerics::NodalColumn& b) { add_loads(loads, request.case_of_column(order[k]), b); },

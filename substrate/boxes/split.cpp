@@ -9,7 +9,7 @@
 #include <memory>
 #include <mutex>
 
-#include "pipeline/stage/stopwatch.h"
+#include "pipeline/contract/stopwatch.h"
 #include "substrate/boxes/load_cases.h"
 #include "substrate/boxes/models.h"
 #include "substrate/boxes/split_block.h"
@@ -65,12 +65,12 @@ class Split final : public substrate::Substrate {
                                    const substrate::Observations& observations) const override {
     const Scene scene{surface_points_of(observations), ellipses_of(loads)};
     const auto of = [=, this](const std::vector<int>& axes) {
-      const auto rows = static_cast<Eigen::Index>(axes.size() * scene.points_um.size());
+      const auto rows = static_cast<Index>(axes.size() * scene.points_um.size());
       return substrate::lazy_response(
           {.rows = rows,
-           .cols = 2 * static_cast<Eigen::Index>(scene.ellipses.size()),
+           .cols = 2 * static_cast<Index>(scene.ellipses.size()),
            .matrix = axes.size() == 2 ? std::function([=, this] { return matrix(scene); }) : nullptr,
-           .displace = [=, this](const Eigen::MatrixXd& forces_nN) { return displaced(scene, axes, forces_nN); }});
+           .displace = [=, this](const MatrixXd& forces_nN) { return displaced(scene, axes, forces_nN); }});
     };
     switch (observations.components) {
       case substrate::Components::along:
@@ -108,9 +108,9 @@ class Split final : public substrate::Substrate {
     std::vector<substrate::Ellipse> ellipses;
   };
 
-  Eigen::MatrixXd matrix(const Scene& scene) const {
+  MatrixXd matrix(const Scene& scene) const {
     const std::lock_guard lock(mutex_);
-    Eigen::MatrixXd matrix =
+    MatrixXd matrix =
         greens::compliance_by_columns(scene.points_um, scene.ellipses, threads_,
                                       [this](const auto& ellipse) { return greens::HalfSpaceEllipse(gel_, ellipse); });
     if (matrix.size() > 0) add_correction(scene.points_um, scene.ellipses, unit_case, {0, 1}, matrix);
@@ -118,13 +118,12 @@ class Split final : public substrate::Substrate {
   }
 
   /// By each column of forces: the near field, then the correction.
-  Eigen::MatrixXd displaced(const Scene& scene, const std::vector<int>& axes, const Eigen::MatrixXd& forces_nN) const {
-    Eigen::MatrixXd field =
-        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(axes.size() * scene.points_um.size()), forces_nN.cols());
+  MatrixXd displaced(const Scene& scene, const std::vector<int>& axes, const MatrixXd& forces_nN) const {
+    MatrixXd field = MatrixXd::Zero(static_cast<Index>(axes.size() * scene.points_um.size()), forces_nN.cols());
     if (field.size() == 0 || scene.ellipses.empty()) return field;
     const std::lock_guard lock(mutex_);
     std::vector<LoadCase> cases;
-    for (Eigen::Index column = 0; column < forces_nN.cols(); ++column) {
+    for (Index column = 0; column < forces_nN.cols(); ++column) {
       const std::vector<Vec2> forces = substrate::vectors_of(forces_nN.col(column));
       field.col(column) = axes.size() == 2 ? near_field(scene, forces) : near_normal(scene, forces);
       cases.push_back(case_of(forces));
@@ -134,10 +133,10 @@ class Split final : public substrate::Substrate {
     return field;
   }
 
-  Eigen::VectorXd near_field(const Scene& scene, const std::vector<Vec2>& forces_nN) const {
+  VectorXd near_field(const Scene& scene, const std::vector<Vec2>& forces_nN) const {
     std::vector<greens::HalfSpaceEllipse> near;
     for (const substrate::Ellipse& ellipse : scene.ellipses) near.emplace_back(gel_, ellipse);
-    Eigen::VectorXd field = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(scene.points_um.size()));
+    VectorXd field = VectorXd::Zero(2 * static_cast<Index>(scene.points_um.size()));
     numerics::parallel_for(static_cast<int>(scene.points_um.size()), threads_, [&](int i) {
       for (std::size_t j = 0; j < near.size(); ++j) {
         const greens::Sym2 g = near[j].compliance_um_per_nN(scene.points_um[i]);
@@ -148,17 +147,17 @@ class Split final : public substrate::Substrate {
     return field;
   }
 
-  Eigen::VectorXd near_normal(const Scene& scene, const std::vector<Vec2>& forces_nN) const {
+  VectorXd near_normal(const Scene& scene, const std::vector<Vec2>& forces_nN) const {
     const std::vector<double> near =
         greens::half_space_vertical_um(gel_, scene.points_um, scene.ellipses, forces_nN, threads_);
-    return Eigen::Map<const Eigen::VectorXd>(near.data(), static_cast<Eigen::Index>(near.size()));
+    return Eigen::Map<const VectorXd>(near.data(), static_cast<Index>(near.size()));
   }
 
   const SplitBlock& block_around(const substrate::Extent& scene) const {
     const Footprint footprint = footprint_of(scene, gel_, parameters_);
     if (block_ && block_->footprint == footprint) return *block_;
     block_.reset();  // not two at a time in memory
-    const stage::Stopwatch watch;
+    const Stopwatch watch;
     block_ = make_split_block(footprint, gel_, parameters_, threads_);
     setup_s_ = watch.seconds();
     return *block_;
@@ -167,9 +166,9 @@ class Split final : public substrate::Substrate {
   /// Add w at the points, along these axes, to each column, whose forces on ellipses are given by `case_of_column`.
   template <class CaseOf>
   void add_correction(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
-                      const CaseOf& case_of_column, const std::vector<int>& axes, Eigen::MatrixXd& columns) const {
+                      const CaseOf& case_of_column, const std::vector<int>& axes, MatrixXd& columns) const {
     const SplitBlock& block = block_around(substrate::extent_of(points_um, ellipses));
-    const stage::Stopwatch watch;
+    const Stopwatch watch;
     std::vector<std::vector<NodeWeight>> samples(points_um.size());
     numerics::parallel_for(static_cast<int>(samples.size()), threads_,
                            [&](int i) { samples[i] = block.system.surface_weights(points_um[i]); });
@@ -191,7 +190,7 @@ class Split final : public substrate::Substrate {
     const std::vector<substrate::DiscPoint> rule = substrate::ellipse_rule(ellipse, degree);
     const ElasticSystem& system = block.system;
     const std::vector<int>& bottom = system.bottom_nodes();
-    Eigen::VectorXd on_bottom(3 * bottom.size());
+    VectorXd on_bottom(3 * bottom.size());
     for (std::size_t k = 0; k < bottom.size(); ++k) {
       const auto field = averaged_field(gel_, ellipse, rule, system.mesh().position_um[bottom[k]]);
       for (int i = 0; i < 3; ++i) {
@@ -199,8 +198,8 @@ class Split final : public substrate::Substrate {
       }
     }
     // w = -u_c there, on the left side
-    const Eigen::VectorXd data = system.bottom_stiffness() * on_bottom;
-    for (Eigen::Index k = 0; k < data.size(); ++k) b(static_cast<int>(k / 3), static_cast<int>(k % 3)) += data[k];
+    const VectorXd data = system.bottom_stiffness() * on_bottom;
+    for (Index k = 0; k < data.size(); ++k) b(static_cast<int>(k / 3), static_cast<int>(k % 3)) += data[k];
 
     const double mu = substrate::shear_modulus_kPa(gel_);
     const double lambda = 2 * mu * gel_.poisson_ratio / (1 - 2 * gel_.poisson_ratio);

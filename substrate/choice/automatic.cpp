@@ -5,8 +5,8 @@
 #include <mutex>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/stopwatch.h"
 #include "pipeline/stage/effects.h"
-#include "pipeline/stage/stopwatch.h"
 #include "substrate/choice/decide.h"
 #include "substrate/choice/factory.h"
 #include "substrate/effects.h"
@@ -66,7 +66,7 @@ const substrate::Model& model_for(const Gel& gel, const substrate::SubstratePara
 class Automatic final : public substrate::Substrate {
   template <class Ask>
   auto timed(const Ask& ask) const {
-    const stage::Stopwatch watch;
+    const Stopwatch watch;
     auto answer = ask();
     const std::lock_guard lock(mutex_);
     seconds_ += watch.seconds();
@@ -89,10 +89,9 @@ class Automatic final : public substrate::Substrate {
         {.rows = answer->rows(),
          .cols = answer->cols(),
          .matrix = [=, this] { return timed([&] { return answer->matrix(); }); },
-         .displace = [=,
-                      this](const Eigen::MatrixXd& forces) { return timed([&] { return answer->displace(forces); }); },
+         .displace = [=, this](const MatrixXd& forces) { return timed([&] { return answer->displace(forces); }); },
          .kept = [=, this] { return timed([&] { return answer->kept(); }); },
-         .about = [=, this](const Eigen::VectorXd& forces) { return timed([&] { return answer->about(forces); }); }});
+         .about = [=, this](const VectorXd& forces) { return timed([&] { return answer->about(forces); }); }});
   }
   substrate::VolumeField volume(const std::vector<substrate::Ellipse>& ellipses,
                                 const std::vector<Vec2>& forces_nN) const override {

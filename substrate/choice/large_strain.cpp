@@ -33,21 +33,21 @@ double traction_kPa(const substrate::Ellipse& e, double force_nN) {
 }
 
 /// Magnitude of the force on an ellipse.
-double force_on(Eigen::Index j, const Eigen::VectorXd& forces_nN) { return forces_nN.segment<2>(2 * j).norm(); }
+double force_on(Index j, const VectorXd& forces_nN) { return forces_nN.segment<2>(2 * j).norm(); }
 
 /// Those that matter: what one strains the gel by makes a displacement as its force times its traction.
-std::vector<Eigen::Index> straining(const std::vector<substrate::Ellipse>& ellipses, const Eigen::VectorXd& forces_nN) {
+std::vector<Index> straining(const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN) {
   constexpr double kLeftOut = 1e-2;  // of the sum of squares: a tenth of the change, which is some per cent
-  std::vector<std::pair<double, Eigen::Index>> squares;
+  std::vector<std::pair<double, Index>> squares;
   double left = 0;
-  for (Eigen::Index j = 0; j < std::ssize(ellipses); ++j) {
+  for (Index j = 0; j < std::ssize(ellipses); ++j) {
     const double force = force_on(j, forces_nN);
     squares.emplace_back(std::pow(force * traction_kPa(ellipses[j], force), 2), j);
     left += squares.back().first;
   }
   std::ranges::sort(squares, std::greater());
   const double most = kLeftOut * left;
-  std::vector<Eigen::Index> taken;
+  std::vector<Index> taken;
   for (const auto& [square, j] : squares) {
     if (left <= most) break;
     taken.push_back(j);
@@ -57,37 +57,36 @@ std::vector<Eigen::Index> straining(const std::vector<substrate::Ellipse>& ellip
   return taken;
 }
 
-std::vector<substrate::Ellipse> chosen(const std::vector<substrate::Ellipse>& all,
-                                       const std::vector<Eigen::Index>& taken) {
+std::vector<substrate::Ellipse> chosen(const std::vector<substrate::Ellipse>& all, const std::vector<Index>& taken) {
   std::vector<substrate::Ellipse> some;
-  for (const Eigen::Index j : taken) some.push_back(all[j]);
+  for (const Index j : taken) some.push_back(all[j]);
   return some;
 }
 
 }  // namespace
 
 LargeStrain::LargeStrain(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
-                         const std::vector<Vec2>& points_um, const Eigen::VectorXd& near_nN, int threads,
+                         const std::vector<Vec2>& points_um, const VectorXd& near_nN, int threads,
                          double elements_across)
     : taken_(straining(ellipses, near_nN)),
       elements_(neo_hookean(gel, elements_across, threads)),
       response_(elements_->response({chosen(ellipses, taken_)}, {points_um})) {}
 
-substrate::Tangent LargeStrain::about(const Eigen::VectorXd& forces_nN) const {
-  Eigen::VectorXd forces(response_->cols());
+substrate::Tangent LargeStrain::about(const VectorXd& forces_nN) const {
+  VectorXd forces(response_->cols());
   for (std::size_t k = 0; k < taken_.size(); ++k)
-    forces.segment<2>(2 * static_cast<Eigen::Index>(k)) = forces_nN.segment<2>(2 * taken_[k]);
-  const auto rest = response_->about(Eigen::VectorXd::Zero(forces.size())).response;
+    forces.segment<2>(2 * static_cast<Index>(k)) = forces_nN.segment<2>(2 * taken_[k]);
+  const auto rest = response_->about(VectorXd::Zero(forces.size())).response;
   const substrate::Tangent there = response_->about(forces);
   return {.displacement_um = there.displacement_um - rest->displace(forces),
           .response =
               substrate::lazy_response({.rows = response_->rows(),
                                         .cols = forces_nN.size(),
                                         .matrix = [taken = taken_, n = forces_nN.size(), there = there.response, rest] {
-                                          const Eigen::MatrixXd a = there->matrix(), b = rest->matrix();
-                                          Eigen::MatrixXd change = Eigen::MatrixXd::Zero(a.rows(), n);
+                                          const MatrixXd a = there->matrix(), b = rest->matrix();
+                                          MatrixXd change = MatrixXd::Zero(a.rows(), n);
                                           for (std::size_t k = 0; k < taken.size(); ++k) {
-                                            const auto from = 2 * static_cast<Eigen::Index>(k);
+                                            const auto from = 2 * static_cast<Index>(k);
                                             change.middleCols<2>(2 * taken[k]) =
                                                 a.middleCols<2>(from) - b.middleCols<2>(from);
                                           }
@@ -95,10 +94,10 @@ substrate::Tangent LargeStrain::about(const Eigen::VectorXd& forces_nN) const {
                                         }})};
 }
 
-double mean_traction_kPa(const std::vector<substrate::Ellipse>& ellipses, const Eigen::VectorXd& forces_nN) {
+double mean_traction_kPa(const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN) {
   double squares = 0, weight = 0;
   for (std::size_t j = 0; j < ellipses.size(); ++j) {
-    const double force = force_on(static_cast<Eigen::Index>(j), forces_nN);
+    const double force = force_on(static_cast<Index>(j), forces_nN);
     squares += std::pow(force * traction_kPa(ellipses[j], force), 2);
     weight += force * force;
   }

@@ -18,14 +18,14 @@ class LargeStrain {
   /// @param elements_across  the square root of an ellipse's area over the side of the elements that carry it
   /// @throws as Substrate::response
   LargeStrain(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses, const std::vector<Vec2>& points_um,
-              const Eigen::VectorXd& near_nN, int threads, double elements_across = 1);
+              const VectorXd& near_nN, int threads, double elements_across = 1);
   /// By how much the points move otherwise than by G F, to first order about these forces; 2·points, and
   /// 2·points × 2·ellipses.
   /// @throws NotSolved where the gel finds no state under them
-  substrate::Tangent about(const Eigen::VectorXd& forces_nN) const;
+  substrate::Tangent about(const VectorXd& forces_nN) const;
 
  private:
-  std::vector<Eigen::Index> taken_;  ///< of the ellipses, ascending
+  std::vector<Index> taken_;  ///< of the ellipses, ascending
   std::unique_ptr<substrate::Substrate> elements_;
   substrate::LazyResponse response_;  ///< of those taken
 };
@@ -35,7 +35,7 @@ constexpr double kStrainElementsError = 0.35;
 
 /// Of forces spread over ellipses: the root mean square of the tractions, by the squares of the forces, as these make
 /// the squares of the displacement.
-double mean_traction_kPa(const std::vector<substrate::Ellipse>& ellipses, const Eigen::VectorXd& forces_nN);
+double mean_traction_kPa(const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN);
 
 /// What linear theory leaves out of the displacement, as a share of its L2 norm, within a factor of two: everywhere in
 /// the gel, or at beads all over its surface, most of them far from the adhesions, which are small. Measured

@@ -8,8 +8,8 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/report.h"
+#include "pipeline/contract/stopwatch.h"
 #include "pipeline/numerics/parallel.h"
-#include "pipeline/stage/stopwatch.h"
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/curved/linear.h"
 #include "substrate/curved/models.h"
@@ -23,9 +23,6 @@
 
 namespace mbtfm::curved {
 namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
 
 constexpr substrate::Capabilities kCurvedCan{.base = true,
                                              .sides = true,
@@ -155,7 +152,7 @@ class CurvedResponse final : public substrate::Response {
   }
   MatrixXd matrix() const override { return is_empty() ? MatrixXd::Zero(rows(), cols()) : at_rest().matrix(); }
   substrate::SharedResponse kept() const override;
-  substrate::Tangent about(const Eigen::VectorXd& forces) const override;
+  substrate::Tangent about(const VectorXd& forces) const override;
 
  private:
   bool is_empty() const { return rows() == 0 || cols() == 0; }
@@ -166,8 +163,8 @@ class CurvedResponse final : public substrate::Response {
   const FactoredResponse& at_rest() const;
   std::shared_ptr<const FactoredResponse> tangent_at(const LargeState& state) const;
   MatrixXd displace_far(const MatrixXd& forces) const;
-  Vectors forces_on_nodes(const System& system, const Eigen::VectorXd& forces) const;
-  Eigen::VectorXd at_points(const System& system, const Vectors& free_um) const;
+  Vectors forces_on_nodes(const System& system, const VectorXd& forces) const;
+  VectorXd at_points(const System& system, const Vectors& free_um) const;
 
   const CurvedGel& gel_;
   substrate::Loads loads_;
@@ -229,7 +226,7 @@ class CurvedGel final : public substrate::Substrate {
 
   /// Under forces on the free nodes.
   LargeSolution solve_large(const System& system, Vectors forces_nN) const {
-    const stage::Stopwatch watch;
+    const Stopwatch watch;
     LargeSolution solution =
         solve_neo_hooke(gel_, system.space, {.at_nodes_nN = std::move(forces_nN)}, 1, factor_options());
     const std::lock_guard lock(mutex_);
@@ -243,7 +240,7 @@ class CurvedGel final : public substrate::Substrate {
   /// @param keeps_factor  of small strains; else it is gone, with its memory, once the mesh is known
   std::unique_ptr<const System> system_for(const substrate::Loads& loads, const substrate::Observations& observations,
                                            Axes load_axes, Axes point_axes, bool keeps_factor) const {
-    const stage::Stopwatch watch;
+    const Stopwatch watch;
     Fineness fineness = first_fineness();
     const double tolerance = parameters_.displacement_tolerance;
     const MatrixXd probes = probes_of(loads);
@@ -491,7 +488,7 @@ MatrixXd CurvedResponse::displace(const MatrixXd& forces) const {
   return gel_.is_large() ? displace_far(forces) : at_rest().displace(forces);
 }
 
-Vectors CurvedResponse::forces_on_nodes(const System& s, const Eigen::VectorXd& forces) const {
+Vectors CurvedResponse::forces_on_nodes(const System& s, const VectorXd& forces) const {
   const Axes axes = load_axes();
   Vectors at_nodes(s.space.nodes().size(), Eigen::Vector3d::Zero());
   for (std::size_t j = 0; j < s.loads.size(); ++j) {
@@ -502,9 +499,9 @@ Vectors CurvedResponse::forces_on_nodes(const System& s, const Eigen::VectorXd& 
   return at_nodes;
 }
 
-Eigen::VectorXd CurvedResponse::at_points(const System& s, const Vectors& free_um) const {
+VectorXd CurvedResponse::at_points(const System& s, const Vectors& free_um) const {
   const Axes axes = point_axes();
-  Eigen::VectorXd values = Eigen::VectorXd::Zero(rows());
+  VectorXd values = VectorXd::Zero(rows());
   for (std::size_t i = 0; i < s.points.size(); ++i) {
     for (Index axis = axes.first; axis < axes.first + axes.n; ++axis) {
       for (const auto& [node, weight] : s.points[i]) values[axes.row(i, axis)] += weight * free_um[node][axis];
@@ -532,11 +529,11 @@ std::shared_ptr<const FactoredResponse> CurvedResponse::tangent_at(const LargeSt
   return std::make_shared<const FactoredResponse>(system_, std::move(tangent), load_axes(), point_axes());
 }
 
-substrate::Tangent CurvedResponse::about(const Eigen::VectorXd& forces) const {
+substrate::Tangent CurvedResponse::about(const VectorXd& forces) const {
   MBTFM_ASSERT(forces.size() == cols());
   if (!gel_.is_large() || is_empty()) return Response::about(forces);
   at_rest();
-  if (forces.isZero(0)) return {.displacement_um = Eigen::VectorXd::Zero(rows()), .response = at_rest_};
+  if (forces.isZero(0)) return {.displacement_um = VectorXd::Zero(rows()), .response = at_rest_};
   const System& s = *system_;
   const LargeSolution solution = gel_.solve_large(s, forces_on_nodes(s, forces));
   return {.displacement_um = at_points(s, s.space.of_free_nodes(solution.state.at_nodes_um)),

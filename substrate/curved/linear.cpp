@@ -17,7 +17,7 @@ Eigen::Matrix3d Field::gradient(const Location& location) const {
   return space->values_of(location.cell, at_nodes_um) * slopes * jacobian.inverse();
 }
 
-std::function<Eigen::MatrixXd(int cell)> linear_stiffness_of(const Gel& gel, const Mesh& mesh) {
+std::function<MatrixXd(int cell)> linear_stiffness_of(const Gel& gel, const Mesh& mesh) {
   const double mu = substrate::shear_modulus_kPa(gel), lambda = substrate::lame_modulus_kPa(gel);
   return [=, &mesh](int cell) { return linear_stiffness(Element(mesh.positions_of(cell)), mu, lambda); };
 }
@@ -33,7 +33,7 @@ Field solve_linear(const Gel& gel, std::shared_ptr<const Block> block, const Loa
     const Vectors by_held = space->gather([&](int cell) -> NodeValues {
       const NodeValues u = space->values_of(cell, held);
       if (u.isZero()) return NodeValues::Zero();
-      return NodeValues((stiffness_of(cell) * Eigen::Map<const Eigen::VectorXd>(u.data(), kUnknowns)).eval().data());
+      return NodeValues((stiffness_of(cell) * Eigen::Map<const VectorXd>(u.data(), kUnknowns)).eval().data());
     });
     for (std::size_t k = 0; k < forces.size(); ++k) forces[k] -= by_held[k];
   }

@@ -25,7 +25,7 @@ struct Field {
 };
 
 /// By cell of a mesh, which must outlive it.
-std::function<Eigen::MatrixXd(int cell)> linear_stiffness_of(const Gel& gel, const Mesh& mesh);
+std::function<MatrixXd(int cell)> linear_stiffness_of(const Gel& gel, const Mesh& mesh);
 
 /// @throws NotSolved where memory would not suffice
 Field solve_linear(const Gel& gel, std::shared_ptr<const Block> block, const Loading& loading,

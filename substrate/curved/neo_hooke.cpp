@@ -25,7 +25,7 @@ constexpr std::array<std::pair<int, int>, 6> kPairs = {{{0, 0}, {0, 1}, {0, 2}, 
 /// The equations of an element about a state, pressure and dilatation eliminated:
 /// tangent du = -residual, then d theta and dp from du.
 struct Condensed {
-  Eigen::MatrixXd tangent;
+  MatrixXd tangent;
   CellVector residual;
   CellPressures divergence;  ///< B: (J F^-T : grad v, q)
   Eigen::Matrix4d mass_inverse, bulk;
@@ -44,9 +44,9 @@ Condensed condensed(const NeoHooke& law, const Element& element, const NodeValue
   c.pressure_gap.setZero();
   c.mass_inverse = element.mass.inverse();
   // the tangent's blocks of directions i <= k: slopes_a,J A(iJ, kL) slopes_b,L, summed over all points at once
-  const Eigen::Index n_slopes = with_tangent ? 3 * std::ssize(element.points) : 0;
-  Eigen::MatrixXd slopes(kNodes, n_slopes), weighed(kPairs.size() * kNodes, n_slopes);
-  Eigen::Index at = 0;
+  const Index n_slopes = with_tangent ? 3 * std::ssize(element.points) : 0;
+  MatrixXd slopes(kNodes, n_slopes), weighed(kPairs.size() * kNodes, n_slopes);
+  Index at = 0;
   for (const QuadraturePoint& point : element.points) {
     const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + u * point.slopes;
     const double J = F.determinant(), theta = dilatation.dot(point.pressures), p = pressure.dot(point.pressures);
@@ -86,7 +86,7 @@ Condensed condensed(const NeoHooke& law, const Element& element, const NodeValue
   c.residual += by_mass * (c.bulk * (c.mass_inverse * c.volume_gap) + c.pressure_gap);
   if (with_tangent) {
     c.tangent = by_mass * c.bulk * by_mass.transpose();
-    const Eigen::MatrixXd blocks = weighed * slopes.transpose();
+    const MatrixXd blocks = weighed * slopes.transpose();
     for (std::size_t pair = 0; pair < kPairs.size(); ++pair) {
       const auto [i, k] = kPairs[pair];
       const auto block = blocks.middleRows<kNodes>(pair * kNodes);
@@ -319,8 +319,7 @@ LargeSolution solve_neo_hooke(const Gel& gel, const Space& space, const LargeLoa
                                    where + ": are units right, and areas of adhesions not too small?"});
 }
 
-std::function<Eigen::MatrixXd(int cell)> large_stiffness_of(const Gel& gel, const Space& space,
-                                                            const LargeState& state) {
+std::function<MatrixXd(int cell)> large_stiffness_of(const Gel& gel, const Space& space, const LargeState& state) {
   return [law = NeoHooke(gel), &space, &state](int cell) {
     return condensed(law, Element(space.mesh().positions_of(cell)), space.values_of(cell, state.at_nodes_um),
                      state.pressure_kPa[cell], state.dilatation[cell], true)

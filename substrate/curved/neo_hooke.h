@@ -64,8 +64,7 @@ LargeSolution solve_neo_hooke_as_far(const Gel& gel, const Space& space, const L
                                      const numerics::FactorOptions& options);
 
 /// By cell of the space's mesh: the tangent about a state. Both must outlive it.
-std::function<Eigen::MatrixXd(int cell)> large_stiffness_of(const Gel& gel, const Space& space,
-                                                            const LargeState& state);
+std::function<MatrixXd(int cell)> large_stiffness_of(const Gel& gel, const Space& space, const LargeState& state);
 
 /// Cauchy's, of a state.
 StressLaw large_stress(const Gel& gel, const LargeState& state);

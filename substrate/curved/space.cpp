@@ -28,15 +28,15 @@ void in_batches(int n_cells, int threads, const Make& make, const Take& take) {
 Space::Space(const Mesh& mesh, int threads)
     : mesh_(mesh), threads_(threads), nodes_(mesh.cell_nodes, kNodes, mesh.hanging, mesh.is_held) {}
 
-numerics::BlockMatrix<3> Space::assemble(const std::function<Eigen::MatrixXd(int cell)>& stiffness_of) const {
+numerics::BlockMatrix<3> Space::assemble(const std::function<MatrixXd(int cell)>& stiffness_of) const {
   numerics::BlockMatrix<3> matrix = nodes_.pattern();
-  in_batches<Eigen::MatrixXd>(mesh_.n_cells(), threads_, stiffness_of,
-                              [&](int cell, const Eigen::MatrixXd& of_cell) { nodes_.add(cell, of_cell, matrix); });
+  in_batches<MatrixXd>(mesh_.n_cells(), threads_, stiffness_of,
+                       [&](int cell, const MatrixXd& of_cell) { nodes_.add(cell, of_cell, matrix); });
   return matrix;
 }
 
-std::shared_ptr<const numerics::SparseCholesky> Space::factorise(
-    const std::function<Eigen::MatrixXd(int cell)>& stiffness_of, const numerics::FactorOptions& options) const {
+std::shared_ptr<const numerics::SparseCholesky> Space::factorise(const std::function<MatrixXd(int cell)>& stiffness_of,
+                                                                 const numerics::FactorOptions& options) const {
   const numerics::BlockMatrix<3> matrix = assemble(stiffness_of);
   std::call_once(order_->is_found, [&] {
     order_->elimination = std::make_shared<const numerics::Elimination>(matrix, numerics::Search::quick);

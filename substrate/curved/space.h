@@ -29,10 +29,10 @@ class Space {
   int n_unknowns() const { return 3 * nodes_.size(); }
 
   /// The matrix over the free nodes. `stiffness_of` is called concurrently.
-  numerics::BlockMatrix<3> assemble(const std::function<Eigen::MatrixXd(int cell)>& stiffness_of) const;
+  numerics::BlockMatrix<3> assemble(const std::function<MatrixXd(int cell)>& stiffness_of) const;
   /// Its factor. Any matrix over the nodes has the same order of elimination, which is looked for once.
-  std::shared_ptr<const numerics::SparseCholesky> factorise(
-      const std::function<Eigen::MatrixXd(int cell)>& stiffness_of, const numerics::FactorOptions& options) const;
+  std::shared_ptr<const numerics::SparseCholesky> factorise(const std::function<MatrixXd(int cell)>& stiffness_of,
+                                                            const numerics::FactorOptions& options) const;
   /// Forces on the free nodes, by cell and node of it; called concurrently.
   Vectors gather(const std::function<NodeValues(int cell)>& forces_of) const;
   /// Consistent forces (nN) of a traction on the surface.

@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-namespace mbtfm::stage {
+namespace mbtfm {
 
 /// Seconds since it was made.
 class Stopwatch {
@@ -13,4 +13,4 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-}  // namespace mbtfm::stage
+}  // namespace mbtfm
