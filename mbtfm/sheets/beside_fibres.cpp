@@ -1,7 +1,5 @@
 #include "mbtfm/sheets/beside_fibres.h"
 
-#include <cmath>
-
 #include "continuum/sheet/forward.h"
 #include "continuum/sheet/mesh_size.h"
 #include "mbtfm/sheets/sheet_fit.h"
@@ -68,14 +66,8 @@ std::optional<tensions::ModelScore> score_of_sheet(const tensions::LinearData& d
   const double misfit =
       (tensions::displace(of_sheet.reduced, fit.node_amplitudes) - of_sheet.reduced.target).squaredNorm() +
       of_sheet.reduced.floor_squared;
-  const double chi_squared = misfit / tensions::noise_variance(data);
-  return tensions::ModelScore{.name = "sheet",
-                              .n_parameters = kParameters,
-                              .chi_squared = chi_squared,
-                              .relative_l2 = tensions::relative_l2(of_sheet, fit.node_amplitudes),
-                              .aic = chi_squared + 2.0 * kParameters,
-                              .bic = chi_squared + kParameters * std::log(static_cast<double>(data.n_used)),
-                              .forces_nN = {}};
+  return tensions::score_of("sheet", kParameters, misfit / tensions::noise_variance(data),
+                            tensions::relative_l2(of_sheet, fit.node_amplitudes), data);
 }
 
 }  // namespace mbtfm::sheets

@@ -202,19 +202,13 @@ double quantile(const Posterior& posterior, double share) {
 
 FittedEstimate estimate(Quantity quantity, const std::string& part, double value, double variance, Open open,
                         VectorXd by_unknown) {
-  const double sigma = std::sqrt(std::max(0.0, variance));
-  FittedEstimate e{{.quantity = quantity,
-                    .part = part,
-                    .value = value,
-                    .sigma = sigma,
-                    .low = value - tensions::kNormal95 * sigma,
-                    .high = value + tensions::kNormal95 * sigma},
-                   std::move(by_unknown)};
-  if (open.below) e.low = std::nullopt;
-  if (open.above) e.high = std::nullopt;
-  e.identifiable = e.low && e.high;
-  if (!e.identifiable) e.sigma = std::nullopt;
-  return e;
+  const double reach = tensions::kNormal95 * std::sqrt(std::max(0.0, variance));
+  return fitted_estimate({.quantity = quantity,
+                          .part = part,
+                          .value = value,
+                          .low = open.below ? std::nullopt : std::optional(value - reach),
+                          .high = open.above ? std::nullopt : std::optional(value + reach)},
+                         variance, std::move(by_unknown));
 }
 
 std::vector<FittedEstimate> estimates_of(const Posterior& p, const StiffnessTable& table, const VectorXd& mean) {
@@ -367,8 +361,8 @@ FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss 
   const std::string name =
       std::string("sheet") + (table.has_line() ? "-with-line" : "") + (table.bundles().empty() ? "" : "-with-bundles");
   const Search even(data, table, known, of_even_parts(table));
-  models.add(name, static_cast<int>(1 + table.n_loads() - n) + (known ? 0 : 1), even.amplitudes(even.best()));
-  models.add(name + "-in-field", static_cast<int>(std::lround(n_numbers)), s.node_amplitudes);
+  models.add(name, 1 + table.n_loads() - n + (known ? 0 : 1), even.amplitudes(even.best()));
+  models.add(name + "-in-field", std::lround(n_numbers), s.node_amplitudes);
   s.models = models.all();
   s.own_model = s.models.size() - 1;
   s.report = {.converged = true, .iterations = kStiffnesses, .last_change = 0, .reason = "scanned over the stiffness"};

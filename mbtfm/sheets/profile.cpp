@@ -204,6 +204,12 @@ Linearised linearised(const LinearData& data, const Directions& about, double va
                      tensions::squared_weights(data).asDiagonal()};
 }
 
+FittedEstimate fitted_estimate(SheetEstimate estimate, double variance, VectorXd by_unknown) {
+  estimate.identifiable = estimate.low && estimate.high;
+  if (estimate.identifiable) estimate.sigma = std::sqrt(std::max(0.0, variance));
+  return {std::move(estimate), std::move(by_unknown)};
+}
+
 void split_by_noise(std::vector<FittedEstimate>& estimates, const Linearised& about, double variance,
                     const LinearData& data) {
   const double by_beads = data.has_errors ? std::min(1.0, tensions::noise_variance(data) / variance) : 1;
@@ -239,18 +245,14 @@ void add_misfit(SheetFit& fit, const LinearData& data, VectorXd node_amplitudes,
 
 Models::Models(const LinearData& data, double noise_variance)
     : data_(data), noise_(std::max(noise_variance, std::numeric_limits<double>::min())) {
-  add("nothing", 0, data.reduced.target.squaredNorm() + data.reduced.floor_squared, 1);
+  all_.push_back(tensions::score_of(
+      "nothing", 0, (data.reduced.target.squaredNorm() + data.reduced.floor_squared) / noise_, 1, data));
 }
 
-void Models::add(const std::string& name, int n_parameters, const VectorXd& amplitudes) {
+void Models::add(const std::string& name, Index n_parameters, const VectorXd& amplitudes) {
   const VectorXd left = tensions::displace(data_.reduced, amplitudes) - data_.reduced.target;
-  add(name, n_parameters, left.squaredNorm() + data_.reduced.floor_squared, tensions::relative_l2(data_, amplitudes));
-}
-
-void Models::add(const std::string& name, int n_parameters, double chi_squared, double relative_l2) {
-  const double chi = chi_squared / noise_;
-  all_.push_back({name, n_parameters, chi, relative_l2, chi + 2 * n_parameters,
-                  chi + n_parameters * std::log(static_cast<double>(data_.n_used))});
+  all_.push_back(tensions::score_of(name, n_parameters, (left.squaredNorm() + data_.reduced.floor_squared) / noise_,
+                                    tensions::relative_l2(data_, amplitudes), data_));
 }
 
 }  // namespace mbtfm::sheets

@@ -103,6 +103,9 @@ Linearised linearised(const tensions::LinearData& data, const Directions& about,
 void split_by_noise(std::vector<FittedEstimate>& estimates, const Linearised& about, double variance,
                     const tensions::LinearData& data);
 
+/// An estimate with its standard error; none where an end of its interval is open.
+FittedEstimate fitted_estimate(SheetEstimate estimate, double variance, VectorXd by_unknown);
+
 /// Weights of the beads by a robust loss, until they stay. Tukey's has several minima: it starts from Huber's, whose
 /// scale it keeps.
 /// @param amplitudes  of the table's forces, as the fit to such data has them
@@ -117,11 +120,10 @@ class Models {
  public:
   Models(const tensions::LinearData& data, double noise_variance);
   /// @param amplitudes  of the table's forces
-  void add(const std::string& name, int n_parameters, const VectorXd& amplitudes);
+  void add(const std::string& name, Index n_parameters, const VectorXd& amplitudes);
   const std::vector<SheetModel>& all() const { return all_; }
 
  private:
-  void add(const std::string& name, int n_parameters, double chi_squared, double relative_l2);
   const tensions::LinearData& data_;
   double noise_;
   std::vector<SheetModel> all_;

@@ -187,18 +187,12 @@ class Estimates {
   VectorXd by(Index unknown, double factor) const { return factor * VectorXd::Unit(table_.n_loads() + 2, unknown); }
   FittedEstimate one(Quantity quantity, const std::string& part, double value, const VectorXd& by_unknown,
                      const Limits& limits) const {
-    FittedEstimate e{{.quantity = quantity,
-                      .part = part,
-                      .value = value,
-                      .sigma = std::sqrt(std::max(0.0, numerics::quadratic_form(covariance_, by_unknown))),
-                      .low = limits.low,
-                      .high = limits.high},
-                     by_unknown};
-    if (limits.is_open_below) e.low = std::nullopt;
-    if (limits.is_open_above) e.high = std::nullopt;
-    e.identifiable = e.low && e.high;
-    if (!e.identifiable) e.sigma = std::nullopt;
-    return e;
+    return fitted_estimate({.quantity = quantity,
+                            .part = part,
+                            .value = value,
+                            .low = limits.is_open_below ? std::nullopt : std::optional(limits.low),
+                            .high = limits.is_open_above ? std::nullopt : std::optional(limits.high)},
+                           numerics::quadratic_form(covariance_, by_unknown), by_unknown);
   }
 
   const StiffnessTable& table_;
@@ -285,7 +279,7 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
            (has.springs ? "-on-springs" : "") + (has.parts ? "-in-parts" : "");
   };
   const auto simpler = [&](const Has& has, Index n_fewer, const Search& its, const Profile& p) {
-    models.add(name(has), static_cast<int>(n_unknowns - n_fewer), its.amplitudes(p));
+    models.add(name(has), n_unknowns - n_fewer, its.amplitudes(p));
   };
   if (has_bundles) {
     const Search its(data, table, known, without_bundles(table));
@@ -313,15 +307,12 @@ std::vector<FittedEstimate> expanding(const SheetFit& fit) {
 
 void compare_with_adhesions(SheetFit& fit, const LinearData& adhesions) {
   const double noise = tensions::noise_variance(adhesions), old_noise = fit.variance;
-  const auto n_used = static_cast<double>(adhesions.n_used);
-  fit.models.push_back({"adhesion-forces", static_cast<int>(adhesions.reduced.n_felt),
-                        adhesions.reduced.floor_squared / old_noise,
-                        tensions::relative_l2(adhesions, tensions::free_forces_nN(adhesions.reduced)), 0, 0});
-  for (SheetModel& model : fit.models) {
-    model.chi_squared *= old_noise / noise;
-    model.aic = model.chi_squared + 2 * model.n_parameters;
-    model.bic = model.chi_squared + model.n_parameters * std::log(n_used);
-  }
+  fit.models.push_back({.name = "adhesion-forces",
+                        .n_parameters = static_cast<int>(adhesions.reduced.n_felt),
+                        .chi_squared = adhesions.reduced.floor_squared / old_noise,
+                        .relative_l2 = tensions::relative_l2(adhesions, tensions::free_forces_nN(adhesions.reduced))});
+  for (SheetModel& m : fit.models)
+    m = tensions::score_of(m.name, m.n_parameters, m.chi_squared * (old_noise / noise), m.relative_l2, adhesions);
 }
 
 }  // namespace mbtfm::sheets

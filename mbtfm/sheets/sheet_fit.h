@@ -20,11 +20,7 @@ struct FittedEstimate : SheetEstimate {
 
 /// A model of the gel's motion: nothing, the sheet, the sheet with a cable along its edge, with bundles in it, on
 /// springs, or with parts that contract each by its own.
-struct SheetModel {
-  std::string name;
-  int n_parameters = 0;
-  double chi_squared = 0, relative_l2 = 0, aic = 0, bic = 0;
-};
+using SheetModel = tensions::ModelScore;
 
 struct SheetFit {
   std::vector<FittedEstimate> estimates;

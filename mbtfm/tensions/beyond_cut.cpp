@@ -148,17 +148,15 @@ double mean_square_force(const LinearData& data, double variance) {
   return std::max(0.0, (squares - noise).cwiseQuotient(noise).sum() / std::max(noise.cwiseInverse().sum(), 1e-300));
 }
 
-/// These motions, and those by an even traction along x and along y: out there the cell pulls inwards as a whole, which
-/// is no chance, so nothing is expected of its size.
-MatrixXd with_even_traction(const MatrixXd& motions, const std::vector<substrate::Ellipse>& places,
-                            const MatrixXd& compliance_um_per_nN) {
-  MatrixXd result = MatrixXd::Zero(compliance_um_per_nN.rows(), motions.cols() + 2);
-  if (motions.cols() > 0) result.leftCols(motions.cols()) = motions;
+/// By an even traction along x and along y: out there the cell pulls inwards as a whole, which is no chance, so nothing
+/// is expected of its size.
+Motions by_even_traction(const std::vector<substrate::Ellipse>& places, const MatrixXd& compliance_um_per_nN) {
+  Motions even{.shapes = MatrixXd::Zero(compliance_um_per_nN.rows(), 2)};
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double area_um2 = std::numbers::pi * places[i].semi_major_um * places[i].semi_minor_um;
-    result.rightCols<2>() += area_um2 * compliance_um_per_nN.middleCols<2>(2 * static_cast<Index>(i));
+    even.shapes += area_um2 * compliance_um_per_nN.middleCols<2>(2 * static_cast<Index>(i));
   }
-  return result;
+  return even;
 }
 
 double length_um(const Cuts& cuts) {
@@ -209,33 +207,29 @@ DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::
   MBTFM_ASSERT(data.motions.precision.size() == 0);
   const MatrixXd Z = by_root_of_area(compliance_um_per_nN, places);
   const Index n_affine = data.motions.shapes.cols();
-  MatrixXd with_even = with_even_traction(data.motions.shapes, places, compliance_um_per_nN);
-  data = with_motions(std::move(data), std::move(with_even));
+  const Motions even = by_even_traction(places, compliance_um_per_nN);
+  Motions motions = joined(data.motions, even);
+  data = with_motions(std::move(data), motions);
   const Spectrum spectrum = spectrum_of(data, Z);
   // With few beads at the cut the likelihood is flat down to zero; then what is hidden is as strong as what is seen.
   const double n_adhesions = 0.5 * static_cast<double>(data.response->cols());
   const double seen = n_adhesions / area_um2 * mean_square_force(data, spectrum.variance) / spectrum.variance;
   const double kappa = std::max(seen, likeliest_kappa(spectrum));
-  const MatrixXd random = motions_that_stand_out(data, Z, kappa);
-  const Index n_free = data.motions.shapes.cols();
-  MatrixXd motions(Z.rows(), n_free + random.cols());
-  if (n_free > 0) motions.leftCols(n_free) = data.motions.shapes;
-  motions.rightCols(random.cols()) = random;
+  MatrixXd random = motions_that_stand_out(data, Z, kappa);
+  const Index n_random = random.cols();
   // An even traction is free, so that what these motions have of it may be left to it. Both together would be the same
   // motion twice, whose square no rounding leaves definite.
-  const MatrixXd even = motions.middleCols(n_affine, n_free - n_affine);
-  const MatrixXd weighted = squared_weights(data).asDiagonal() * even;
-  motions.rightCols(random.cols()) -= numerics::small_product(
-      even,
-      numerics::shortest_solution(numerics::small_transposed_product(even, weighted),
-                                  numerics::small_transposed_product(weighted, motions.rightCols(random.cols()))));
-  VectorXd precision = VectorXd::Ones(motions.cols());
-  precision.head(n_free).setZero();
-  if (n_affine > 0) precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
+  const MatrixXd weighted = squared_weights(data).asDiagonal() * even.shapes;
+  random -= numerics::small_product(
+      even.shapes, numerics::shortest_solution(numerics::small_transposed_product(even.shapes, weighted),
+                                               numerics::small_transposed_product(weighted, random)));
+  motions.precision = VectorXd::Zero(motions.shapes.cols());
+  if (n_affine > 0) motions.precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
+  motions = joined(std::move(motions), {.shapes = std::move(random), .precision = VectorXd::Ones(n_random)});
   const ForcesBeyond beyond{.n_places = static_cast<Index>(places.size()),
-                            .n_motions = random.cols(),
+                            .n_motions = n_random,
                             .intensity_nN_per_um = std::sqrt(kappa * spectrum.variance)};
-  return {with_motions(std::move(data), std::move(motions), std::move(precision)), beyond};
+  return {with_motions(std::move(data), std::move(motions)), beyond};
 }
 
 /// Standard deviation that a component of an adhesion's own force is expected to have at this distance from the cut, in
@@ -263,19 +257,13 @@ DataWithBeyond with_own_forces(DataWithBeyond given, const Cell& cell) {
   if (near.empty() || mean_square <= 0) return given;
   found.n_own = static_cast<Index>(near.size());
   found.own_nN = std::sqrt(mean_square);
-  const Index before = data.motions.shapes.cols(), n_own = 2 * found.n_own;
-  MatrixXd forces = MatrixXd::Zero(n_forces, before + n_own);
-  for (Index k = 0; k < found.n_own; ++k) {
-    forces.block<2, 2>(2 * near[k], before + 2 * k)
-        .diagonal()
-        .setConstant(expected[k] * std::sqrt(mean_square / variance));
-  }
-  MatrixXd motions(data.motions.shapes.rows(), before + n_own);
-  motions << data.motions.shapes, data.response->displace(forces.rightCols(n_own));
-  VectorXd precision = VectorXd::Ones(before + n_own);
-  precision.head(before) = data.motions.precision;
-  data = with_motions(std::move(data), std::move(motions), std::move(precision));
-  data.motions.forces = std::move(forces);
+  MatrixXd forces = MatrixXd::Zero(n_forces, 2 * found.n_own);
+  for (Index k = 0; k < found.n_own; ++k)
+    forces.block<2, 2>(2 * near[k], 2 * k).diagonal().setConstant(expected[k] * std::sqrt(mean_square / variance));
+  Motions motions =
+      joined(data.motions,
+             {.shapes = data.response->displace(forces), .precision = VectorXd::Ones(forces.cols()), .forces = forces});
+  data = with_motions(std::move(data), std::move(motions));
   return given;
 }
 

@@ -79,16 +79,10 @@ FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<
 CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementField& beads, const EnsembleFit& fit) {
   const MatrixXd motions = less_motion(data, curved_motions(beads));
   const MatrixXd weighted = squared_weights(data).asDiagonal() * motions;
-  const VectorXd scores = numerics::transposed_matvec(weighted, residual_um(data, fit.forces.nN));
-  const MatrixXd by_force = data.response->pull_back(weighted).transpose();
-  const MatrixXd of_noise = numerics::small_transposed_product(weighted, motions);
-  const MatrixXd covariance = covariance_of_scores(fit, of_noise, by_force);
-  const MeshFit& mesh = fit.meshes.front();
-  const MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
-  const MatrixXd information =
-      of_noise - numerics::congruence(by_tension, mesh.noise_covariance_nN2) / fit.misfit.variance;
-  const VectorXd moved = numerics::small_product(motions, numerics::shortest_solution(information, scores));
-  return {.chi_squared = scores.dot(numerics::shortest_solution(covariance, scores).col(0)),
+  const ScoreTest test = score_test(fit, data, weighted, numerics::small_transposed_product(weighted, motions),
+                                    numerics::transposed_matvec(weighted, residual_um(data, fit.forces.nN)));
+  const VectorXd moved = numerics::small_product(motions, test.sizes);
+  return {.chi_squared = test.chi_squared,
           .rms_um = std::sqrt(2.0) * moved.norm() / std::sqrt(std::max(1.0, static_cast<double>(moved.size())))};
 }
 

@@ -45,8 +45,7 @@ FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<
 double rms_um(const AffineMotion& motion, const std::vector<Vec2>& places_um);
 
 /// What all beads do together that is not affine, as stitched tiles, a rolling shutter or a lens make it: displacements
-/// of second and third degree in x and y, fourteen numbers. A score test (Rao, Math Proc Camb Phil Soc 44:50, 1948):
-/// what the fit leaves of the beads is compared with them, and with what noise and the model's error leave of them.
+/// of second and third degree in x and y, fourteen numbers. By a score test.
 struct CurvedMotion {
   double chi_squared = 0;  ///< 14 degrees of freedom where there is none
   double rms_um = 0;       ///< of the beads' displacement by the best of them, the tensions following

@@ -393,8 +393,16 @@ MatrixXd covariance_of_estimates(const EnsembleFit& fit, const MatrixXd& of_nois
   return covariance_beside(fit, of_noise, by_force, +1);
 }
 
-MatrixXd covariance_of_scores(const EnsembleFit& fit, const MatrixXd& of_noise, const MatrixXd& by_force) {
-  return covariance_beside(fit, of_noise, by_force, -1);
+ScoreTest score_test(const EnsembleFit& fit, const LinearData& data, const MatrixXd& weighted, const MatrixXd& square,
+                     const VectorXd& scores) {
+  const MatrixXd by_force = data.response->pull_back(weighted).transpose();
+  const MatrixXd covariance = covariance_beside(fit, square, by_force, -1);
+  const MeshFit& mesh = fit.meshes.front();
+  const MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
+  const MatrixXd information =
+      square - numerics::congruence(by_tension, mesh.noise_covariance_nN2) / fit.misfit.variance;
+  return {.chi_squared = scores.dot(numerics::shortest_solution(covariance, scores).col(0)),
+          .sizes = numerics::shortest_solution(information, scores)};
 }
 
 VectorXd adhesion_forces_nN(const EnsembleFit& fit) { return exerted_nN(fit, fit.forces.nN); }

@@ -101,9 +101,7 @@ ReducedData reduced_by(const LinearData& data, const VectorXd& weight, Root C) {
 }
 
 /// Motions that cost a component of the beads each, as nothing is known of their sizes.
-Index n_unexpected(const MatrixXd& motions, const VectorXd& precision) {
-  return motions.cols() - (precision.array() > 0).count();
-}
+Index n_unexpected(const Motions& motions) { return motions.shapes.cols() - (motions.precision.array() > 0).count(); }
 
 }  // namespace
 
@@ -134,11 +132,25 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
   return reweighted(std::move(data), VectorXd::Ones(n_rows / 2));
 }
 
-LinearData with_motions(LinearData data, MatrixXd motions, VectorXd precision) {
-  MBTFM_ASSERT(precision.size() == 0 || precision.size() == motions.cols());
-  data.n_used += n_unexpected(data.motions.shapes, data.motions.precision) - n_unexpected(motions, precision);
-  data.motions.shapes = std::move(motions);
-  data.motions.precision = std::move(precision);
+Motions joined(Motions those, const Motions& these) {
+  const Index n = those.shapes.cols(), n_more = these.shapes.cols();
+  const auto join = [&](const MatrixXd& first, const MatrixXd& then) {  // by column; zero of those that have none
+    MatrixXd both =
+        MatrixXd::Zero(std::max(first.rows(), then.rows()), first.size() + then.size() > 0 ? n + n_more : 0);
+    if (first.size() > 0) both.leftCols(n) = first;
+    if (then.size() > 0) both.rightCols(n_more) = then;
+    return both;
+  };
+  those.shapes = join(those.shapes, these.shapes);
+  those.precision = join(those.precision.transpose(), these.precision.transpose()).transpose();
+  those.forces = join(those.forces, these.forces);
+  return those;
+}
+
+LinearData with_motions(LinearData data, Motions motions) {
+  MBTFM_ASSERT(motions.precision.size() == 0 || motions.precision.size() == motions.shapes.cols());
+  data.n_used += n_unexpected(data.motions) - n_unexpected(motions);
+  data.motions = std::move(motions);
   const VectorXd as_they_are = data.bead_weight;
   return reweighted(std::move(data), as_they_are);
 }
@@ -151,18 +163,8 @@ LinearData with_more_motions(LinearData data, const MatrixXd& motions) {
       explained_by(data, weight, beside,
                    inverse_of_motions(numerics::small_transposed_product(motions, weight.asDiagonal() * beside), {})),
       data.threads);
-  const Index before = data.motions.shapes.cols(), n = motions.cols();
-  data.n_used -= n;
-  data.motions.shapes.conservativeResize(motions.rows(), before + n);
-  data.motions.shapes.rightCols(n) = motions;
-  if (data.motions.precision.size() > 0) {
-    data.motions.precision.conservativeResize(before + n);
-    data.motions.precision.tail(n).setZero();
-  }
-  if (data.motions.forces.size() > 0) {
-    data.motions.forces.conservativeResize(Eigen::NoChange, before + n);
-    data.motions.forces.rightCols(n).setZero();
-  }
+  data.n_used -= motions.cols();
+  data.motions = joined(std::move(data.motions), {.shapes = motions});
   data.motions.inverse = inverse_of_motions(data, weight);
   data.reduced = reduced_by(data, weight, std::move(root));
   return data;
@@ -289,6 +291,17 @@ double floor_squared_of(const LinearData& data, const VectorXd& displacement_um)
 double noise_variance(const LinearData& data) {
   const auto n_free = static_cast<double>(std::max<Index>(1, data.n_used - data.reduced.n_felt));
   return std::max(data.has_errors ? 1.0 : 1e-300, data.reduced.floor_squared / n_free);
+}
+
+ModelScore score_of(const std::string& name, Index n_parameters, double chi_squared, double relative_l2,
+                    const LinearData& data) {
+  const auto k = static_cast<double>(n_parameters);
+  return {.name = name,
+          .n_parameters = static_cast<int>(n_parameters),
+          .chi_squared = chi_squared,
+          .relative_l2 = relative_l2,
+          .aic = chi_squared + 2 * k,
+          .bic = chi_squared + k * std::log(static_cast<double>(data.n_used))};
 }
 
 double relative_l2(const LinearData& data, const VectorXd& forces_nN) {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "pipeline/contract/beads.h"
@@ -29,14 +30,17 @@ MatrixXd displace(const ReducedData& data, const MatrixXd& forces_nN, int thread
 
 /// What the beads may do besides following the forces: sums of some shapes, of sizes that are found with these.
 struct Motions {
-  MatrixXd shapes;     ///< M: 2·beads × motions
-  VectorXd precision;  ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its size, in
-                       ///< units of the noise's; 0 where nothing is known of it; empty: all 0
-  MatrixXd inverse;    ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place tell no turn from a shift. The covariance
-                       ///< of the sizes by noise of variance 1
-  MatrixXd forces;     ///< E: by motion, the forces of adhesions that it comes of, beside those found as forces;
-                       ///< 2·adhesions × motions; empty: none
+  MatrixXd shapes = {};     ///< M: 2·beads × motions
+  VectorXd precision = {};  ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its size, in
+                            ///< units of the noise's; 0 where nothing is known of it; empty: all 0
+  MatrixXd inverse = {};  ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place tell no turn from a shift. The covariance
+                          ///< of the sizes by noise of variance 1
+  MatrixXd forces = {};  ///< E: by motion, the forces of adhesions that it comes of, beside those found as forces;
+                         ///< 2·adhesions × motions; empty: none
 };
+
+/// These beside those: each stays what it is.
+Motions joined(Motions those, const Motions& these);
 
 struct LinearData {
   std::vector<Vec2> position_um;       ///< of the beads
@@ -62,10 +66,9 @@ LinearData reduce(const DisplacementField& beads, MatrixXd compliance_um_per_nN,
 
 // New data of the same beads. Who moves the old ones in has no two matrices in memory.
 
-/// The beads may move by any sum of these (2·beads × some) besides, instead of those that were allowed. Reduces again.
-/// @param precision  by motion, see Motions::precision
-LinearData with_motions(LinearData data, MatrixXd motions, VectorXd precision = {});
-/// They may move by any sum of these too, of precision 0: quicker.
+/// The beads may move by any sum of these besides, instead of those that were allowed. Reduces again.
+LinearData with_motions(LinearData data, Motions motions);
+/// They may move by any sum of these shapes too, of precision 0: quicker.
 LinearData with_more_motions(LinearData data, const MatrixXd& motions);
 /// Reduced again with these weights by bead.
 LinearData reweighted(LinearData data, const VectorXd& bead_weight);
@@ -136,6 +139,20 @@ double floor_squared_of(const LinearData& data, const VectorXd& displacement_um)
 /// Variance of a weighted component that is the beads' alone: what even forces independent of each other leave. Not
 /// below the stated errors'.
 double noise_variance(const LinearData& data);
+
+/// A model and what speaks for it. chi² and the criteria are in units of the noise: the beads' stated errors, or larger
+/// ones where even independent adhesion forces leave more than these (Burnham & Anderson 2002, 2.5: QAIC).
+struct ModelScore {
+  std::string name;
+  int n_parameters = 0;
+  double chi_squared = 0, relative_l2 = 0;
+  double aic = 0;           ///< chi² + 2 k
+  double bic = 0;           ///< chi² + k ln n
+  VectorXd forces_nN = {};  ///< by adhesion: fx, fy
+};
+/// @param chi_squared  of the data
+ModelScore score_of(const std::string& name, Index n_parameters, double chi_squared, double relative_l2,
+                    const LinearData& data);
 
 /// |residual| / |u less the common motion| over the beads that are used
 double relative_l2(const LinearData& data, const VectorXd& forces_nN);

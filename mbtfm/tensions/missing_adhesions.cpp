@@ -147,16 +147,8 @@ MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const Linear
   for (std::size_t k = 0; k < q.beads.size(); ++k) {
     weighted.middleRows<2>(2 * q.beads[k]) = weight[2 * q.beads[k]] * q.fields[k];
   }
-  const MatrixXd by_force = data.response->pull_back(weighted).transpose();
-  const MatrixXd covariance = covariance_of_scores(fit, q.square, by_force);
-  const MeshFit& mesh = fit.meshes.front();
-  const MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
-  const MatrixXd information =
-      q.square - numerics::congruence(by_tension, mesh.noise_covariance_nN2) / fit.misfit.variance;
-  const Eigen::Vector2d force = numerics::solve_symmetric(information, q.score);
-  return {.position_um = q.place_um,
-          .force_nN = {force[0], force[1]},
-          .chi_squared_gain = q.score.dot(Eigen::Vector2d(numerics::solve_symmetric(covariance, q.score)))};
+  const ScoreTest test = score_test(fit, data, weighted, q.square, q.score);
+  return {.position_um = q.place_um, .force_nN = {test.sizes[0], test.sizes[1]}, .chi_squared_gain = test.chi_squared};
 }
 
 }  // namespace

@@ -17,17 +17,6 @@ namespace {
 
 constexpr double kTradeOff = -0.95;  // see fibres_not_told_apart
 
-ModelScore score(const std::string& name, int n_parameters, double misfit, double variance, const LinearData& data) {
-  const double chi_squared = misfit / variance;
-  return {.name = name,
-          .n_parameters = n_parameters,
-          .chi_squared = chi_squared,
-          .relative_l2 = 0,
-          .aic = chi_squared + 2.0 * n_parameters,
-          .bic = chi_squared + n_parameters * std::log(static_cast<double>(data.n_used)),
-          .forces_nN = {}};
-}
-
 /// Forces of the one tension of all cables that fits best: Gauss–Newton in one variable. Zero where the beads want the
 /// cables to push: less tension is better then down to none, as forces are proportional to a small one.
 VectorXd best_uniform_nN(const TensionProblem& problem) {
@@ -121,15 +110,14 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
     return (numerics::matvec(*reduced.compliance, forces) - reduced.target).squaredNorm() + reduced.floor_squared;
   };
   const VectorXd uniform = best_uniform_nN(TensionProblem(first_network, reduced, adhesion_ids));
-  std::vector<ModelScore> models = {
-      score("no-fibres", 1, misfit(uniform), variance, data),
-      score("full", static_cast<int>(fit.tensions.fibre_ids.size()), misfit(fit.forces.nN), variance, data),
-      score("adhesion-forces", static_cast<int>(reduced.n_felt), reduced.floor_squared, variance, data)};
-  models[0].forces_nN = uniform;
-  models[1].forces_nN = fit.forces.nN;
-  models[2].forces_nN = free_forces_nN(reduced);
-  for (ModelScore& model : models) model.relative_l2 = relative_l2(data, model.forces_nN);
-  return models;
+  const auto scored = [&](const char* name, Index n_parameters, double left, const VectorXd& forces_nN) {
+    ModelScore model = score_of(name, n_parameters, left / variance, relative_l2(data, forces_nN), data);
+    model.forces_nN = forces_nN;
+    return model;
+  };
+  return {scored("no-fibres", 1, misfit(uniform), uniform),
+          scored("full", std::ssize(fit.tensions.fibre_ids), misfit(fit.forces.nN), fit.forces.nN),
+          scored("adhesion-forces", reduced.n_felt, reduced.floor_squared, free_forces_nN(reduced))};
 }
 
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence) {

@@ -21,16 +21,6 @@ std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit);
 /// Of the tensions, from the beads' noise.
 MatrixXd correlation_of(const EnsembleFit& fit);
 
-/// A model and what speaks for it. chi² and the criteria are in units of the noise: the beads' stated errors, or larger
-/// ones where even independent adhesion forces leave more than these (Burnham & Anderson 2002, 2.5: QAIC).
-struct ModelScore {
-  std::string name;
-  int n_parameters = 0;
-  double chi_squared = 0, relative_l2 = 0;
-  double aic = 0;      ///< chi² + 2 k
-  double bic = 0;      ///< chi² + k ln n
-  VectorXd forces_nN;  ///< by adhesion: fx, fy
-};
 /// no-fibres: a network of one tension; full: ours; adhesion-forces: every force for itself (thesis' null model).
 std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData& data,
                                        const network::Contractile& first_network, const std::vector<int>& adhesion_ids);

@@ -161,7 +161,8 @@ TEST(CutCells, motions_of_expected_size_are_a_covariance_of_the_beads) {
   DisplacementField beads(s.beads.begin(), s.beads.begin() + 40);
   const Eigen::MatrixXd G = Eigen::MatrixXd::Random(80, 6), M = Eigen::MatrixXd::Random(80, 9);
   const Eigen::VectorXd precision = Eigen::VectorXd::LinSpaced(9, 0.3, 1e7);
-  const tensions::LinearData data = tensions::with_motions(tensions::reduce(beads, G), M, precision);
+  const tensions::LinearData data =
+      tensions::with_motions(tensions::reduce(beads, G), {.shapes = M, .precision = precision});
   const Eigen::VectorXd weight = tensions::squared_weights(data), forces = Eigen::VectorXd::Random(6);
   Eigen::MatrixXd covariance = M * precision.cwiseInverse().asDiagonal() * M.transpose();
   covariance.diagonal() += weight.cwiseInverse();
