@@ -169,10 +169,7 @@ std::function<double(Vec2)> contraction_by_cell(const Parameters& p, stage::Stag
       throw InputError(file.string(), "a row for each cell of the label image", "none of cell " + std::to_string(label),
                        "add it, or give contraction_nN_per_um of all other cells");
   return [=](Vec2 place) {
-    const int column = static_cast<int>(std::floor(place.x / cells->pixel_um)),
-              row = static_cast<int>(std::floor(place.y / cells->pixel_um));
-    const bool is_seen = column >= 0 && row >= 0 && column < cells->width && row < cells->height;
-    const auto found = by_cell.find(is_seen ? cells->at(column, row) : 0);
+    const auto found = by_cell.find(cells->at_um(place));
     return found == by_cell.end() ? rest : found->second;
   };
 }
@@ -589,17 +586,11 @@ std::vector<Part> parts_of_cells(const Parameters& p, stage::StageContext& conte
   if (labels.size() > kMost)
     throw InputError(context.input("cells").string(), "at most 30 cells with contractions of their own",
                      std::to_string(labels.size()), "join cells, or take fit_parts = edge");
-  const auto label_at = [cells](Vec2 place) {
-    const int column = static_cast<int>(std::floor(place.x / cells->pixel_um)),
-              row = static_cast<int>(std::floor(place.y / cells->pixel_um));
-    const bool is_seen = column >= 0 && row >= 0 && column < cells->width && row < cells->height;
-    return is_seen ? cells->at(column, row) : 0;
-  };
   std::vector<Part> parts;
   for (const int label : labels)
     parts.push_back(
-        {"cell " + std::to_string(label), [=](Vec2 place) { return label_at(place) == label ? 1.0 : 0.0; }});
-  parts.push_back({"no cell", [=](Vec2 place) { return label_at(place) == 0 ? 1.0 : 0.0; }});
+        {"cell " + std::to_string(label), [=](Vec2 place) { return cells->at_um(place) == label ? 1.0 : 0.0; }});
+  parts.push_back({"no cell", [=](Vec2 place) { return cells->at_um(place) == 0 ? 1.0 : 0.0; }});
   return parts;
 }
 

@@ -1,9 +1,11 @@
 /// Tensions between the cells of a sheet, and in each of them.
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/geometry.h"
 #include "pipeline/contract/path.h"
 
 namespace mbtfm::sheet {
@@ -16,6 +18,12 @@ struct CellLabels {
   double pixel_um = 1;
   std::vector<int> labels;
   int at(int column, int row) const { return labels[static_cast<std::size_t>(row) * width + column]; }
+  /// 0 outside of the image.
+  int at_um(Vec2 place_um) const {
+    const double column = std::floor(place_um.x / pixel_um), row = std::floor(place_um.y / pixel_um);
+    const bool is_seen = column >= 0 && row >= 0 && column < width && row < height;
+    return is_seen ? at(static_cast<int>(column), static_cast<int>(row)) : 0;
+  }
 };
 
 /// With the lines between cells, as masks often draw them, given to the nearest cell. @param widest_px  that is a line

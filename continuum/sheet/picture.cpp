@@ -11,46 +11,39 @@
 #include "continuum/sheet/recovery.h"
 #include "pipeline/charts/chart.h"
 #include "pipeline/charts/colour_map.h"
+#include "pipeline/contract/extent.h"
 
 namespace mbtfm::sheet {
 namespace {
 
 using charts::Chart;
 
-struct Frame {
-  Vec2 low, high;
-};
-
-Frame frame_of(const Elements& elements) {
-  Frame frame{elements.triangles().nodes_um.front(), elements.triangles().nodes_um.front()};
-  for (const Vec2 p : elements.triangles().nodes_um) {
-    frame.low = {std::min(frame.low.x, p.x), std::min(frame.low.y, p.y)};
-    frame.high = {std::max(frame.high.x, p.x), std::max(frame.high.y, p.y)};
-  }
-  const double rim = 0.04 * std::max(frame.high.x - frame.low.x, frame.high.y - frame.low.y);
-  return {frame.low - Vec2{rim, rim}, frame.high + Vec2{rim, rim}};
+Extent frame_of(const Elements& elements) {
+  const auto [low, high] = extent_of(elements.triangles().nodes_um);
+  const double rim = 0.04 * std::max(high.x - low.x, high.y - low.y);
+  return {low - Vec2{rim, rim}, high + Vec2{rim, rim}};
 }
 
-Chart map_of(const std::string& title, const Frame& frame) {
-  Chart map(title, {.label = "x (µm)", .low = frame.low.x, .high = frame.high.x},
-            {.label = "y (µm)", .low = frame.high.y, .high = frame.low.y});
+Chart map_of(const std::string& title, const Extent& frame) {
+  Chart map(title, {.label = "x (µm)", .low = frame.low_um.x, .high = frame.high_um.x},
+            {.label = "y (µm)", .low = frame.high_um.y, .high = frame.low_um.y});
   map.same_scales();
   return map;
 }
 
 /// Squares of a lattice over the frame, by their middle.
-void for_each_square(const Frame& frame, int most_across, const std::function<void(Vec2 middle, double half)>& body) {
-  const Vec2 size = frame.high - frame.low;
+void for_each_square(const Extent& frame, int most_across, const std::function<void(Vec2 middle, double half)>& body) {
+  const Vec2 size = frame.high_um - frame.low_um;
   const double side = std::max(size.x, size.y) / most_across;
-  for (double y = frame.low.y + 0.5 * side; y < frame.high.y; y += side)
-    for (double x = frame.low.x + 0.5 * side; x < frame.high.x; x += side) body({x, y}, 0.5 * side);
+  for (double y = frame.low_um.y + 0.5 * side; y < frame.high_um.y; y += side)
+    for (double x = frame.low_um.x + 0.5 * side; x < frame.high_um.x; x += side) body({x, y}, 0.5 * side);
 }
 
 /// Where a map's colours begin.
 enum class Colours { from_least, from_zero };
 
 /// Values at places of the sheet, in colours up to their largest.
-void draw_values(Chart& map, const Solution& solution, const Frame& frame, const std::string& unit,
+void draw_values(Chart& map, const Solution& solution, const Extent& frame, const std::string& unit,
                  const std::function<double(const Locator::Place&, const Shape&)>& value_at,
                  Colours colours = Colours::from_least) {
   constexpr int kAcross = 80;
@@ -95,16 +88,16 @@ void draw_rims(Chart& map, const Solution& solution) {
 }
 
 /// Means of the tractions over squares, the longest a square's side and a half.
-void draw_tractions(Chart& map, const Solution& solution, const Frame& frame) {
+void draw_tractions(Chart& map, const Solution& solution, const Extent& frame) {
   constexpr int kAcross = 18;
-  const double side = std::max(frame.high.x - frame.low.x, frame.high.y - frame.low.y) / kAcross;
+  const double side = std::max(frame.high_um.x - frame.low_um.x, frame.high_um.y - frame.low_um.y) / kAcross;
   struct Sum {
     Vec2 place, force;
     double area = 0;
   };
   std::map<std::pair<int, int>, Sum> sums;
   for (const GroundPatch& patch : solution.patches) {
-    const Vec2 d = 1 / side * (patch.position_um - frame.low);
+    const Vec2 d = 1 / side * (patch.position_um - frame.low_um);
     Sum& sum = sums[{static_cast<int>(d.x), static_cast<int>(d.y)}];
     sum.place += patch.area_um2 * patch.position_um;
     sum.force += patch.area_um2 * patch.traction_kPa;
@@ -133,7 +126,7 @@ bool is_even(const std::vector<double>& values) {
 }  // namespace
 
 std::string picture_of(const Solution& solution, const std::string& caption) {
-  const Frame frame = frame_of(*solution.elements);
+  const Extent frame = frame_of(*solution.elements);
   Chart tension = map_of("Mean tension", frame), traction = map_of("Traction on the ground", frame);
   draw_values(tension, solution, frame, "nN/µm", [&](const Locator::Place& place, const Shape& shape) {
     return mean_of(value_of(solution.at_nodes, solution.elements->nodes(place.triangle), shape));

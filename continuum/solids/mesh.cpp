@@ -81,13 +81,13 @@ std::vector<double> turned(const std::vector<double>& lines) {
   return other;
 }
 
-Nodes Mesh::positions_of(int element) const {
-  Nodes positions(2, square.n_nodes());
+Nodes Mesh::values_of(const std::vector<Vec2>& by_node, int element) const {
+  Nodes values(2, square.n_nodes());
   for (int k = 0; k < square.n_nodes(); ++k) {
-    const Vec2 at = position_um[nodes_of(element)[k]];
-    positions.col(k) << at.x, at.y;
+    const Vec2 at = by_node[nodes_of(element)[k]];
+    values.col(k) << at.x, at.y;
   }
-  return positions;
+  return values;
 }
 
 Mesh::Place Mesh::place_in(int patch, Vec2 unit) const {

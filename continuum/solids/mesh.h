@@ -39,7 +39,8 @@ struct Mesh {
 
   int n_elements() const { return static_cast<int>(part.size()); }
   const int* nodes_of(int element) const { return &nodes[static_cast<std::size_t>(element) * square.n_nodes()]; }
-  Nodes positions_of(int element) const;
+  Nodes values_of(const std::vector<Vec2>& by_node, int element) const;
+  Nodes positions_of(int element) const { return values_of(position_um, element); }
   /// A place of a patch, as an element and a place in it.
   struct Place {
     int element = 0;

@@ -19,15 +19,6 @@ struct Assembled {
   bool is_sound = true;
 };
 
-Nodes values_of(const Mesh& mesh, const std::vector<Vec2>& values, int element) {
-  Nodes of(2, mesh.square.n_nodes());
-  for (int k = 0; k < mesh.square.n_nodes(); ++k) {
-    const Vec2 at = values[mesh.nodes_of(element)[k]];
-    of.col(k) << at.x, at.y;
-  }
-  return of;
-}
-
 /// With a part of the contraction.
 Solid at_share(Solid solid, double share) {
   solid.contraction_kPa *= share;
@@ -44,7 +35,7 @@ class Equilibrium {
     Assembled sum;
     sum.forces_nN.assign(2 * mesh.position_um.size(), 0);
     for (int e = 0; e < mesh.n_elements(); ++e) {
-      const Equations of_element = equations_of(mesh.square, mesh.positions_of(e), values_of(mesh, u, e),
+      const Equations of_element = equations_of(mesh.square, mesh.positions_of(e), mesh.values_of(u, e),
                                                 at_share(body_.solids[mesh.part[e]], share), strain_,
                                                 matrix == nullptr ? Wanted::forces : Wanted::stiffness);
       if (!of_element.is_sound) {
@@ -232,7 +223,7 @@ numerics::BlockMatrix<2> Unknowns::matrix() const {
   return matrix;
 }
 
-Nodes Deformed::displacement_of(int element) const { return values_of(*body.mesh, displacement_um, element); }
+Nodes Deformed::displacement_of(int element) const { return body.mesh->values_of(displacement_um, element); }
 
 Vec2 Deformed::displacement_um_at(const Mesh::Place& place) const {
   const Eigen::Vector2d u = displacement_of(place.element) * body.mesh->square.shapes_at(place.unit);

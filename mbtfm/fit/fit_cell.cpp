@@ -1,5 +1,7 @@
 #include "mbtfm/fit/fit_cell.h"
 
+#include <mutex>
+
 #include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/fit/effects.h"
 #include "mbtfm/fit/networks.h"
@@ -8,10 +10,10 @@
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/findings.h"
 #include "mbtfm/tensions/second_placement.h"
-#include "mbtfm/tensions/solved_misfit.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/stopwatch.h"
 #include "substrate/choice/large_strain.h"
+#include "substrate/models.h"
 
 namespace mbtfm::fit {
 
@@ -19,11 +21,23 @@ using namespace tensions;
 
 namespace {
 
+/// The thesis' way to a trial's misfit: its displacements are solved for afresh (3.2.5). For comparison. One solution
+/// at a time, as the substrate has threads of its own.
+SolvedMisfit solved_misfit(const ReadyCell& cell, LinearData data) {
+  data.reduced = {};  // not asked for, and large
+  return [&gel = *cell.gel, data = std::move(data), points_um = points_of(cell.scene.beads),
+          ellipses = substrate::ellipses_of(cell.scene.cell.adhesions),
+          one_at_a_time = std::make_shared<std::mutex>()](const VectorXd& forces_nN) {
+    const std::lock_guard lock(*one_at_a_time);
+    const VectorXd u_um =
+        substrate::column_of(gel.displacements_um(points_um, ellipses, substrate::vectors_of(forces_nN)));
+    return data.weight_per_um.cwiseProduct(less_motion(data, data.displacement_um - u_um)).squaredNorm();
+  };
+}
+
 EnsembleFit fit_networks(const ReadyCell& cell, LinearData data, const FitParameters& p, const Work& work) {
-  const SolvedMisfit misfit = p.substrate == TrialDisplacement::per_evaluation
-                                  ? solved_misfit(*cell.gel, points_of(cell.scene.beads),
-                                                  substrate::ellipses_of(cell.scene.cell.adhesions), data)
-                                  : SolvedMisfit{};
+  const SolvedMisfit misfit =
+      p.substrate == TrialDisplacement::per_evaluation ? solved_misfit(cell, data) : SolvedMisfit{};
   return fit_ensemble(cell.networks, std::move(data), adhesion_ids_of(cell.scene.cell), p, work, misfit, &cell.start);
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/memory.h"
 #include "pipeline/numerics/parallel.h"
 #include "samples/drawing/geometry.h"
@@ -24,14 +25,10 @@ struct Box {
 
 Box box_around(const images::Image& image, const Polyline& points, double margin_um) {
   const double pixel = *image.pixel_size_um;
-  double low_x = 1e300, low_y = 1e300, high_x = -1e300, high_y = -1e300;
-  for (const Vec2 p : points) {
-    low_x = std::min(low_x, p.x), high_x = std::max(high_x, p.x);
-    low_y = std::min(low_y, p.y), high_y = std::max(high_y, p.y);
-  }
+  const auto [low, high] = extent_of(points);
   const auto clipped = [&](double um, int n) { return static_cast<int>(std::clamp(um / pixel, 0.0, 1.0 * n)); };
-  return {clipped(low_x - margin_um, image.width), clipped(low_y - margin_um, image.height),
-          clipped(high_x + margin_um + pixel, image.width), clipped(high_y + margin_um + pixel, image.height)};
+  return {clipped(low.x - margin_um, image.width), clipped(low.y - margin_um, image.height),
+          clipped(high.x + margin_um + pixel, image.width), clipped(high.y + margin_um + pixel, image.height)};
 }
 
 Vec2 centre_of(const images::Image& image, int column, int row) {

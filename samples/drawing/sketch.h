@@ -53,6 +53,11 @@ void draw_free_adhesions(Sketch& sketch, Random& random);
 
 /// Add a fibre with adhesions at the ends that have one; gives labels and types.
 void add_fibre(Sketch& sketch, Polyline points_um, const Adhesion* start, const Adhesion* end);
+/// Add a fibre of this type to adhesions that are there.
+void add_fibre(Sketch& sketch, Polyline points_um, FibreType type, std::optional<int> start_id,
+               std::optional<int> end_id);
+/// @returns its label
+int add_adhesion(Sketch& sketch, const Adhesion& adhesion);
 /// An adhesion that holds a fibre of this tension at the end of it, along its direction.
 Adhesion holding_adhesion(const CellParameters& parameters, Vec2 position_um, Vec2 along, double tension_nN,
                           Random& random);

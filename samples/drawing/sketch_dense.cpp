@@ -80,19 +80,9 @@ bool fits(const Sketch& sketch, const Plan& plan) {
 }
 
 void place(Sketch& sketch, Plan plan) {
-  const auto id_of = [&](const End& end) -> std::optional<int> {
-    if (!end.fresh) return end.shared_id;
-    sketch.adhesions.push_back(*end.fresh);
-    return sketch.adhesions.back().adhesion_id = static_cast<int>(sketch.adhesions.size());
-  };
-  Fibre fibre;
-  fibre.fibre_id = static_cast<int>(sketch.fibres.size()) + 1;
-  fibre.width_um = sketch.parameters.fibre_width_um;
-  fibre.start_adhesion_id = id_of(plan.start);
-  fibre.end_adhesion_id = id_of(plan.end);
-  fibre.type = plan.type;
-  fibre.points_um = std::move(plan.points_um);
-  sketch.fibres.push_back(std::move(fibre));
+  for (End* end : {&plan.start, &plan.end})
+    if (end->fresh) end->shared_id = add_adhesion(sketch, *end->fresh);
+  add_fibre(sketch, std::move(plan.points_um), plan.type, plan.start.shared_id, plan.end.shared_id);
 }
 
 Adhesion at_end(const Sketch& sketch, const Polyline& line, bool is_start, double tension_nN, Random& random) {

@@ -175,22 +175,28 @@ Adhesion holding_adhesion(const CellParameters& p, Vec2 position_um, Vec2 along,
   return make_adhesion(position_um, area, aspect, std::atan2(along.y, along.x));
 }
 
-void add_fibre(Sketch& sketch, Polyline points_um, const Adhesion* start, const Adhesion* end) {
-  const auto added = [&](const Adhesion* adhesion) -> std::optional<int> {
-    if (adhesion == nullptr) return std::nullopt;
-    sketch.adhesions.push_back(*adhesion);
-    return sketch.adhesions.back().adhesion_id = static_cast<int>(sketch.adhesions.size());
-  };
-  Fibre fibre;
-  fibre.fibre_id = static_cast<int>(sketch.fibres.size()) + 1;
+int add_adhesion(Sketch& sketch, const Adhesion& adhesion) {
+  sketch.adhesions.push_back(adhesion);
+  return sketch.adhesions.back().adhesion_id = static_cast<int>(sketch.adhesions.size());
+}
+
+void add_fibre(Sketch& sketch, Polyline points_um, FibreType type, std::optional<int> start_id,
+               std::optional<int> end_id) {
+  Fibre& fibre = sketch.fibres.emplace_back();
+  fibre.fibre_id = static_cast<int>(sketch.fibres.size());
   fibre.width_um = sketch.parameters.fibre_width_um;
-  fibre.start_adhesion_id = added(start);
-  fibre.end_adhesion_id = added(end);
-  fibre.type = start != nullptr && end != nullptr   ? FibreType::ventral
-               : start != nullptr || end != nullptr ? FibreType::dorsal
-                                                    : FibreType::arc;
+  fibre.start_adhesion_id = start_id;
+  fibre.end_adhesion_id = end_id;
+  fibre.type = type;
   fibre.points_um = std::move(points_um);
-  sketch.fibres.push_back(std::move(fibre));
+}
+
+void add_fibre(Sketch& sketch, Polyline points_um, const Adhesion* start, const Adhesion* end) {
+  std::optional<int> start_id, end_id;
+  if (start) start_id = add_adhesion(sketch, *start);
+  if (end) end_id = add_adhesion(sketch, *end);
+  const FibreType type = start && end ? FibreType::ventral : start || end ? FibreType::dorsal : FibreType::arc;
+  add_fibre(sketch, std::move(points_um), type, start_id, end_id);
 }
 
 void draw_fibre(Sketch& sketch, FibreType type, double tension_nN, Random& random) {

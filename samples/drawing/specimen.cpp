@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/contract/extent.h"
 #include "samples/drawing/geometry.h"
 #include "samples/drawing/render.h"
 
@@ -52,13 +53,9 @@ images::Image thickness_of(const Cell& cell, double bulge_share, double least, c
 
 /// A point of the cell, anywhere.
 Vec2 point_inside(const Polygon& outline, Random& random) {
-  double low_x = 1e300, low_y = 1e300, high_x = -1e300, high_y = -1e300;
-  for (const Vec2 p : outline) {
-    low_x = std::min(low_x, p.x), high_x = std::max(high_x, p.x);
-    low_y = std::min(low_y, p.y), high_y = std::max(high_y, p.y);
-  }
+  const auto [low, high] = extent_of(outline);
   while (true) {  // the outline fills more than a tenth of its box
-    const Vec2 p{random.uniform(low_x, high_x), random.uniform(low_y, high_y)};
+    const Vec2 p{random.uniform(low.x, high.x), random.uniform(low.y, high.y)};
     if (contains(outline, p)) return p;
   }
 }
