@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <string>
 
 #include "mbtfm/tensions/findings.h"
 #include "mbtfm/tensions/noise.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/dense.h"
@@ -19,17 +19,11 @@ namespace mbtfm::tensions {
 
 namespace {
 
-/// Along one axis.
-struct Reach {
-  double low_um = std::numeric_limits<double>::infinity(), high_um = -low_um;
-  void add(double at_um) { low_um = std::min(low_um, at_um), high_um = std::max(high_um, at_um); }
-  std::string in_words() const { return brief(low_um) + " to " + brief(high_um) + " um"; }
-};
-
-void check_along(const char* axis, const Reach& beads, const Reach& cell) {
-  if (beads.low_um <= cell.high_um && cell.low_um <= beads.high_um) return;
-  throw InvalidData("the displacement", std::string("beads about the cell, whose ") + axis + " is " + cell.in_words(),
-                    std::string("beads whose ") + axis + " is " + beads.in_words() +
+void check_along(const char* axis, double Vec2::*of, const Extent& beads, const Extent& cell) {
+  if (beads.low_um.*of <= cell.high_um.*of && cell.low_um.*of <= beads.high_um.*of) return;
+  const auto in_words = [of](const Extent& e) { return brief(e.low_um.*of) + " to " + brief(e.high_um.*of) + " um"; };
+  throw InvalidData("the displacement", std::string("beads about the cell, whose ") + axis + " is " + in_words(cell),
+                    std::string("beads whose ") + axis + " is " + in_words(beads) +
                         ": has this coordinate another sign, unit or origin?");
 }
 
@@ -37,11 +31,10 @@ void check_along(const char* axis, const Reach& beads, const Reach& cell) {
 
 void check_place(const DisplacementField& beads, const Cell& cell) {
   if (beads.empty() || cell.adhesions.empty()) return;
-  Reach beads_x, beads_y, cell_x, cell_y;
-  for (const Bead& bead : beads) beads_x.add(bead.position_um.x), beads_y.add(bead.position_um.y);
-  for (const Adhesion& a : cell.adhesions) cell_x.add(a.position_um.x), cell_y.add(a.position_um.y);
-  check_along("x", beads_x, cell_x);
-  check_along("y", beads_y, cell_y);
+  const Extent of_beads = extent_of(beads, &Bead::position_um),
+               of_cell = extent_of(cell.adhesions, &Adhesion::position_um);
+  check_along("x", &Vec2::x, of_beads, of_cell);
+  check_along("y", &Vec2::y, of_beads, of_cell);
 }
 
 std::vector<int> adhesion_ids_of(const Cell& cell) {
