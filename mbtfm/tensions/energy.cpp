@@ -14,39 +14,22 @@ namespace mbtfm::tensions {
 
 namespace {
 
-/// On the unit disc: exact for polynomials of fifth degree. Source: Stroud, Approximate Calculation of Multiple
-/// Integrals (1971), S2 5-1.
-struct DiscPoint {
-  Vec2 at;
-  double weight;
-};
-std::vector<DiscPoint> disc_rule() {
-  constexpr int kRing = 6;
-  const double radius = std::sqrt(2.0 / 3);
-  std::vector<DiscPoint> rule = {{{0, 0}, 0.25}};
-  for (int k = 0; k < kRing; ++k) {
-    const double angle = 2 * std::numbers::pi * k / kRing;
-    rule.push_back({{radius * std::cos(angle), radius * std::sin(angle)}, 0.125});
-  }
-  return rule;
-}
-
 /// By adhesion (x, y): the mean displacement under it.
 VectorXd mean_displacement_um(const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN,
                               const Gel& gel, int threads) {
-  const std::vector<DiscPoint> rule = disc_rule();
+  std::vector<std::vector<substrate::DiscPoint>> rules;
   std::vector<Vec2> points_um;
   for (const substrate::Ellipse& e : ellipses) {
-    const Vec2 along = {std::cos(e.angle_rad), std::sin(e.angle_rad)}, across = {-along.y, along.x};
-    for (const auto& [at, weight] : rule)
-      points_um.push_back(e.centre_um + at.x * e.semi_major_um * along + at.y * e.semi_minor_um * across);
+    rules.push_back(substrate::ellipse_rule(e, 5));
+    for (const substrate::DiscPoint& p : rules.back()) points_um.push_back(e.centre_um + p.position);
   }
   const auto layer = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads);
   const VectorXd at_points = layer->response({ellipses}, {points_um})->displace(forces_nN);
   VectorXd mean = VectorXd::Zero(forces_nN.size());
+  Index point = 0;
   for (Index a = 0; a < std::ssize(ellipses); ++a) {
-    for (Index k = 0; k < std::ssize(rule); ++k)
-      mean.segment<2>(2 * a) += rule[k].weight * at_points.segment<2>(2 * (a * std::ssize(rule) + k));
+    for (const substrate::DiscPoint& p : rules[a])
+      mean.segment<2>(2 * a) += p.weight * at_points.segment<2>(2 * point++);
   }
   return mean;
 }
