@@ -6,11 +6,12 @@
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/stage/effects.h"
+#include "substrate/material.h"
 
 namespace mbtfm::sheet {
 
 double gel_over_adhesions(const Material& material, double adhesion_nN_per_um3, const Gel& gel) {
-  const double mu = gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio));
+  const double mu = substrate::shear_modulus_kPa(gel);
   const double l_um = std::sqrt(material.stiffness_nN_per_um() / adhesion_nN_per_um3);
   return adhesion_nN_per_um3 * (1 - gel.poisson_ratio) * l_um / mu;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pipeline/numerics/order_statistics.h"
+#include "substrate/material.h"
 
 namespace mbtfm::sheet {
 
@@ -32,7 +33,7 @@ TriangleSize size_on_springs(const Region& region, double penetration_um) {
 TriangleSize size_on_gel(const Region& region, const Material& material, const Gel& gel,
                          std::optional<double> adhesion_nN_per_um3, const substrate::Capabilities& can, Strain strain) {
   const double narrow = narrow_um(region);
-  const double mu = gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio));
+  const double mu = substrate::shear_modulus_kPa(gel);
   // how far into the sheet its edge is felt: the gel's counterpart of a penetration length
   double reach = material.stiffness_nN_per_um() * (1 - gel.poisson_ratio) / mu;
   if (adhesion_nN_per_um3) reach = std::max(reach, std::sqrt(material.stiffness_nN_per_um() / *adhesion_nN_per_um3));

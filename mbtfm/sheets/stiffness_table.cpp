@@ -6,6 +6,7 @@
 
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
+#include "substrate/material.h"
 
 namespace mbtfm::sheets {
 namespace {
@@ -73,7 +74,7 @@ StiffnessTable::StiffnessTable(const SheetShape& shape, const sheet::OnGel& grou
       has_line_(shape.has_line),
       bundles_(shape.bundles),
       known_adhesion_(shape.adhesion_nN_per_um3) {
-  const double mu = gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio));
+  const double mu = substrate::shear_modulus_kPa(gel);
   sheet_ = {kSoftest * mu * size_um, kStiffest * mu * size_um};
   if (shape.bond == Bond::fitted) adhesion_ = {kWeakest * mu / size_um, kStrongest * mu / size_um};
   const MatrixXd loads = loads_of(shape);

@@ -202,7 +202,7 @@ class Split final : public substrate::Substrate {
     for (Index k = 0; k < data.size(); ++k) b(static_cast<int>(k / 3), static_cast<int>(k % 3)) += data[k];
 
     const double mu = substrate::shear_modulus_kPa(gel_);
-    const double lambda = 2 * mu * gel_.poisson_ratio / (1 - 2 * gel_.poisson_ratio);
+    const double lambda = substrate::lame_modulus_kPa(gel_);
     for (const SidePoint& point : block.side_points) {
       const auto field = averaged_field(gel_, ellipse, rule, point.position_um);
       double g[3][3];
