@@ -297,7 +297,7 @@ Samples samples_of(std::size_t n_cells, const std::vector<Vec2>& nodes, const st
 std::function<Vec2(Vec2)> model_in(const Path& file) {
   const files::CsvTable table(file);
   table.require({"x_um", "y_um", "tx_kPa", "ty_kPa"});
-  std::vector<tractions::Patch> patches;
+  std::vector<GroundPatch> patches;
   std::set<double> columns;
   for (int row = 0; row < table.n_rows(); ++row) {
     patches.push_back({.position_um = {table.number(row, "x_um"), table.number(row, "y_um")},
@@ -309,12 +309,12 @@ std::function<Vec2(Vec2)> model_in(const Path& file) {
   if (n_columns < 2 || n_rows < 2 || n_columns * n_rows != patches.size())
     throw InputError(file.string(), "tractions on a whole lattice of at least two columns and rows",
                      std::to_string(patches.size()) + " rows, " + std::to_string(n_columns) + " columns");
-  std::ranges::sort(patches, [](const tractions::Patch& a, const tractions::Patch& b) {
+  std::ranges::sort(patches, [](const GroundPatch& a, const GroundPatch& b) {
     return std::pair(a.position_um.y, a.position_um.x) < std::pair(b.position_um.y, b.position_um.x);
   });
   const Vec2 low = patches.front().position_um, high = patches.back().position_um;
   const double spacing = (high.x - low.x) / static_cast<double>(n_columns - 1);
-  for (tractions::Patch& patch : patches) patch.area_um2 = spacing * spacing;
+  for (GroundPatch& patch : patches) patch.area_um2 = spacing * spacing;
   const CellField field(patches, {}, low, high);
   return [field](Vec2 place) { return field.at(place).value_or(Sample{}).traction_kPa; };
 }

@@ -174,20 +174,6 @@ std::function<double(Vec2)> contraction_by_cell(const Parameters& p, stage::Stag
   };
 }
 
-std::vector<GroundPatch> read_tractions(const Path& file) {
-  const files::CsvTable table(file);
-  const std::vector<Vec2> points = files::read_points(file);
-  const bool has_areas = table.has("area_um2");
-  const Vec2 spacing = has_areas ? Vec2{} : files::lattice_spacing_um(points, file);
-  std::vector<GroundPatch> patches;
-  for (int row = 0; row < table.n_rows(); ++row)
-    patches.push_back({points[row],
-                       has_areas ? table.number(row, "area_um2", Range::positive()) : spacing.x * spacing.y,
-                       {table.number(row, "tx_kPa"), table.number(row, "ty_kPa")},
-                       {}});
-  return patches;
-}
-
 /// What is known of adhesions' tractions holds of a colony's, which are weaker: pascals in the columns of kPa are seen.
 std::optional<stage::Doubt> doubt_about_tractions(const std::vector<GroundPatch>& patches) {
   std::vector<stage::Load> loads;
@@ -202,20 +188,13 @@ std::optional<stage::Doubt> doubt_about_tractions(const std::vector<GroundPatch>
 
 // --- outputs
 
-void write_patches(const Path& file, const Solution& solution) {
-  std::vector<tractions::Patch> patches;
-  for (const GroundPatch& p : solution.patches)
-    patches.push_back({p.position_um, p.area_um2, p.traction_kPa, p.displacement_um});
-  tractions::write_tractions(file, patches);
-}
-
 /// sheet.csv, traction.csv, sheet.vtu. @returns points that lie outside
 std::size_t write_solution(stage::StageContext& context, const Solution& solution) {
   const std::vector<SheetPoint> rows = context.has_input("points")
                                            ? at_points_of(solution, files::read_points(context.input("points")))
                                            : at_nodes_of(solution);
   write_sheet(context.output("out", "sheet.csv"), rows);
-  write_patches(context.output("out", "traction.csv"), solution);
+  tractions::write_tractions(context.output("out", "traction.csv"), solution.patches);
   write_sheet_vtu(context.output("out", "sheet.vtu"), solution);
   files::write_text(context.output("out", "sheet.svg"), picture_of(solution, "mbtfm-sheet; x to the right, y down"));
   return static_cast<std::size_t>(std::ranges::count_if(rows, [](const SheetPoint& row) { return !row.ux_um; }));
@@ -443,7 +422,7 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
   if (p.sheet.strain == Strain::large)
     throw UsageError("strain = large is for a sheet of given contraction: tensions from tractions have small strains");
   context.assumed.clear();  // of a gel: none takes part
-  const std::vector<GroundPatch> tractions = read_tractions(context.input("traction"));
+  const std::vector<GroundPatch> tractions = files::read_tractions(context.input("traction"));
   context.doubt(doubt_about_tractions(tractions), context.input("traction").string() + ": tractions");
   const Region area = area_around(region, context, p);
   // any modulus gives the same tensions

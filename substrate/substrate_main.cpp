@@ -115,19 +115,17 @@ SurfaceLoad read_surface_tractions(const Path& file) {
 /// Each patch as a disc of its area: the same force; the second moment is 5 % off, a side away 0.4 % of its field.
 Load read_tractions(const Path& file) {
   const files::CsvTable table(file);
-  const std::vector<Vec2> points = files::read_points(file);
-  const bool has_areas = table.has("area_um2"), is_in_space = table.has("tz_kPa");
-  const Vec2 spacing = has_areas ? Vec2{} : files::lattice_spacing_um(points, file);
+  const bool is_in_space = table.has("tz_kPa");
   Load load;
-  for (int row = 0; row < table.n_rows(); ++row) {
-    const double area = has_areas ? table.number(row, "area_um2", Range::positive()) : spacing.x * spacing.y;
-    const Vec2 traction = {table.number(row, "tx_kPa"), table.number(row, "ty_kPa")};
+  int row = 0;
+  for (const GroundPatch& patch : files::read_tractions(file)) {
     const double into_the_gel = is_in_space ? table.number(row, "tz_kPa") : 0;
-    if (traction.x == 0 && traction.y == 0 && into_the_gel == 0) continue;
-    if (is_in_space) load.into_the_gel_nN.push_back(area * into_the_gel);
-    const double radius = std::sqrt(area / std::numbers::pi);
-    load.ellipses.push_back({points[row], radius, radius, 0});
-    load.forces_nN.push_back(area * traction);
+    ++row;
+    if (patch.traction_kPa == Vec2{} && into_the_gel == 0) continue;
+    if (is_in_space) load.into_the_gel_nN.push_back(patch.area_um2 * into_the_gel);
+    const double radius = std::sqrt(patch.area_um2 / std::numbers::pi);
+    load.ellipses.push_back({patch.position_um, radius, radius, 0});
+    load.forces_nN.push_back(patch.area_um2 * patch.traction_kPa);
   }
   return load;
 }

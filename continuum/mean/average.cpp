@@ -36,8 +36,7 @@ struct Pulls {
 
 }  // namespace
 
-CellField::CellField(const std::vector<tractions::Patch>& patches, const Motion& motion, Vec2 seen_low_um,
-                     Vec2 seen_high_um)
+CellField::CellField(const std::vector<GroundPatch>& patches, const Motion& motion, Vec2 seen_low_um, Vec2 seen_high_um)
     : motion_(motion), seen_low_um_(seen_low_um), seen_high_um_(seen_high_um), origin_um_(patches.at(0).position_um) {
   spacing_um_ = std::sqrt(patches.front().area_um2);
   n_columns_ = 1;
@@ -46,7 +45,7 @@ CellField::CellField(const std::vector<tractions::Patch>& patches, const Motion&
     ++n_columns_;
   n_rows_ = static_cast<int>(std::ssize(patches)) / n_columns_;
   MBTFM_ASSERT(static_cast<std::size_t>(n_columns_) * n_rows_ == patches.size());
-  for (const tractions::Patch& patch : patches) nodes_.push_back({patch.displacement_um, patch.traction_kPa});
+  for (const GroundPatch& patch : patches) nodes_.push_back({patch.displacement_um, patch.traction_kPa});
 }
 
 std::optional<Sample> CellField::at(Vec2 place_um) const {

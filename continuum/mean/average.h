@@ -23,7 +23,7 @@ class CellField {
   /// @param patches   of a lattice in the cell's own frame, rows first
   /// @param motion    from there to the reference
   /// @param seen_low_um, seen_high_um  the rectangle of the beads in the cell's own frame
-  CellField(const std::vector<tractions::Patch>& patches, const Motion& motion, Vec2 seen_low_um, Vec2 seen_high_um);
+  CellField(const std::vector<GroundPatch>& patches, const Motion& motion, Vec2 seen_low_um, Vec2 seen_high_um);
   /// None where the beads do not reach.
   std::optional<Sample> at(Vec2 place_um) const;
   /// The mean over the motions of a symmetric shape: at each place of what stands at all its equivalents.

@@ -8,6 +8,7 @@
 
 #include "continuum/sheet/bundles.h"
 #include "continuum/sheet/on_gel.h"
+#include "pipeline/contract/results.h"
 #include "pipeline/contract/words.h"
 #include "substrate/compliance.h"
 
@@ -48,14 +49,6 @@ struct Scene {
   Strain strain = Strain::small;
   ContractionMeasure measure = ContractionMeasure::surface_tension;
   TriangleSize size;
-};
-
-/// A part of the ground, and what acts on it.
-struct GroundPatch {
-  Vec2 position_um;
-  double area_um2 = 0;
-  Vec2 traction_kPa;
-  Vec2 displacement_um;  ///< of the gel, or of the sheet on springs
 };
 
 struct Solution {

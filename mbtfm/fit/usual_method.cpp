@@ -15,10 +15,10 @@ namespace mbtfm::fit {
 namespace {
 
 /// Those in the outline's box and a little around it: a field far larger than the cell would fill the disk.
-std::vector<tractions::Patch> near(const Polygon& outline_um, std::vector<tractions::Patch> patches) {
+std::vector<GroundPatch> near(const Polygon& outline_um, std::vector<GroundPatch> patches) {
   constexpr double kMargin_um = 5;  // as around the report's maps
   const Extent box = extent_of(outline_um);
-  std::erase_if(patches, [&](const tractions::Patch& patch) {
+  std::erase_if(patches, [&](const GroundPatch& patch) {
     const Vec2 p = patch.position_um;
     return p.x < box.low_um.x - kMargin_um || p.x > box.high_um.x + kMargin_um || p.y < box.low_um.y - kMargin_um ||
            p.y > box.high_um.y + kMargin_um;

@@ -64,10 +64,10 @@ LatticeOptions lattice_options(const TractionParameters& p, int threads) {
           .threads = threads};
 }
 
-std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions,
-                              const NodeField& displacements) {
+std::vector<GroundPatch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions,
+                                    const NodeField& displacements) {
   const Lattice& field = problem.field();
-  std::vector<Patch> patches;
+  std::vector<GroundPatch> patches;
   for (int j = 0; j < field.n_rows; ++j) {
     for (int i = 0; i < field.n_columns; ++i) {
       const Eigen::Index at = i + static_cast<Eigen::Index>(problem.box().n_columns) * j;

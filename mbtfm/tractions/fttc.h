@@ -20,8 +20,8 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver);
 LatticeOptions lattice_options(const TractionParameters& parameters, int threads);
 
 /// The nodes of the field, rows first. @param displacements  of the box
-std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions_kPa,
-                              const NodeField& displacements);
+std::vector<GroundPatch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions_kPa,
+                                    const NodeField& displacements);
 
 /// Vectors at the nodes of the field, rows first.
 std::vector<Vec2> on_field(const LatticeProblem& problem, const NodeField& nodes);

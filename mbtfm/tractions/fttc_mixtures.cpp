@@ -42,8 +42,9 @@ FttcMixtures::FttcMixtures(const DisplacementField& field, const DisplacementFie
   Eigen::MatrixX2d data(2 * std::ssize(field), 2);
   data << problem.data(), problem.weighted(components_of(noise));
   std::vector<Vec2> nodes_um;
-  for (const Patch& p : patches_of(problem, std::vector<Vec2>(static_cast<std::size_t>(problem.field().n_nodes())),
-                                   problem.transform().no_field()))
+  for (const GroundPatch& p :
+       patches_of(problem, std::vector<Vec2>(static_cast<std::size_t>(problem.field().n_nodes())),
+                  problem.transform().no_field()))
     nodes_um.push_back(p.position_um);
   const std::vector<int> owners = adhesion_of_patches(nodes_um, adhesions, parameters.grow_um);
 

@@ -115,14 +115,14 @@ std::vector<int> adhesion_of_patches(const std::vector<Vec2>& positions_um, cons
   return owner;
 }
 
-std::vector<Vec2> positions_of(const std::vector<Patch>& patches) {
+std::vector<Vec2> positions_of(const std::vector<GroundPatch>& patches) {
   std::vector<Vec2> positions;
-  for (const Patch& p : patches) positions.push_back(p.position_um);
+  for (const GroundPatch& p : patches) positions.push_back(p.position_um);
   return positions;
 }
 
-std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
-                                              double grow_um) {
+std::vector<AdhesionForce> forces_by_adhesion(const std::vector<GroundPatch>& patches,
+                                              const std::vector<Adhesion>& adhesions, double grow_um) {
   const std::vector<Vec2> positions = positions_of(patches);
   const std::vector<int> owner = adhesion_of_patches(positions, adhesions, grow_um);
   std::vector<AdhesionForce> forces;
@@ -157,7 +157,7 @@ Vec2 direction_of(Vec2 force_nN) {
 }
 
 TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs& inputs, double grow_um) {
-  const std::vector<Patch>& patches = reconstruction.patches;
+  const std::vector<GroundPatch>& patches = reconstruction.patches;
   TractionSums sums;
   const std::vector<Vec2> positions = positions_of(patches);
   std::vector<bool> is_near(patches.size(), true);
@@ -204,16 +204,17 @@ namespace {
 
 using files::kResult;
 
-files::Table<Patch> patch_table() {
-  return {.file = "traction.csv",
-          .row = "each point or patch of `mbtfm-traction`",
-          .columns = {{"x_um", "the point", files::x_of(&Patch::position_um)},
-                      {"y_um", "the point", files::y_of(&Patch::position_um)},
-                      {"tx_kPa", "traction of the cell on the gel", files::x_of(&Patch::traction_kPa)},
-                      {"ty_kPa", "traction of the cell on the gel", files::y_of(&Patch::traction_kPa)},
-                      {"area_um2", "of the patch around the point", &Patch::area_um2},
-                      {"ux_um", "the model's displacement there", files::x_of(&Patch::displacement_um), kResult},
-                      {"uy_um", "the model's displacement there", files::y_of(&Patch::displacement_um), kResult}}};
+files::Table<GroundPatch> patch_table() {
+  return {
+      .file = "traction.csv",
+      .row = "each point or patch of `mbtfm-traction`",
+      .columns = {{"x_um", "the point", files::x_of(&GroundPatch::position_um)},
+                  {"y_um", "the point", files::y_of(&GroundPatch::position_um)},
+                  {"tx_kPa", "traction of the cell on the gel", files::x_of(&GroundPatch::traction_kPa)},
+                  {"ty_kPa", "traction of the cell on the gel", files::y_of(&GroundPatch::traction_kPa)},
+                  {"area_um2", "of the patch around the point", &GroundPatch::area_um2},
+                  {"ux_um", "the model's displacement there", files::x_of(&GroundPatch::displacement_um), kResult},
+                  {"uy_um", "the model's displacement there", files::y_of(&GroundPatch::displacement_um), kResult}}};
 }
 
 struct LambdaRow {
@@ -242,13 +243,13 @@ files::Table<LambdaRow> lambda_table() {
 
 std::string pages_of_tables() { return page_of(patch_table()) + page_of(lambda_table()); }
 
-void write_tractions(const Path& file, const std::vector<Patch>& patches) { write(file, patch_table(), patches); }
+void write_tractions(const Path& file, const std::vector<GroundPatch>& patches) { write(file, patch_table(), patches); }
 
-void write_tractions_vtp(const Path& file, const std::vector<Patch>& patches) {
+void write_tractions_vtp(const Path& file, const std::vector<GroundPatch>& patches) {
   files::write_points_vtp(file, positions_of(patches),
-                          {files::array_of("traction_kPa", patches, &Patch::traction_kPa),
-                           files::array_of("displacement_um", patches, &Patch::displacement_um),
-                           files::array_of("area_um2", patches, &Patch::area_um2)});
+                          {files::array_of("traction_kPa", patches, &GroundPatch::traction_kPa),
+                           files::array_of("displacement_um", patches, &GroundPatch::displacement_um),
+                           files::array_of("area_um2", patches, &GroundPatch::area_um2)});
 }
 
 void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_um_per_lambda) {

@@ -25,15 +25,7 @@ struct TractionInputs {
   Polygon outline_um;               ///< may be empty
 };
 
-/// A patch of surface with its traction, or a point with its force over an area of one.
-struct Patch {
-  Vec2 position_um;
-  double area_um2 = 0;
-  Vec2 traction_kPa;
-  Vec2 displacement_um;  ///< of the surface there, as the model has it
-};
-
-std::vector<Vec2> positions_of(const std::vector<Patch>& patches);
+std::vector<Vec2> positions_of(const std::vector<GroundPatch>& patches);
 
 /// How far a force moves (length of the change of its vector) where its ellipse is wrong by what a segmentation errs.
 struct Sensitivity {
@@ -47,7 +39,7 @@ enum class LambdaUnit { um_per_kPa, um_per_nN };
 constexpr auto words(LambdaUnit) { return std::array{"um_per_kPa", "um_per_nN"}; }
 
 struct Reconstruction {
-  std::vector<Patch> patches;
+  std::vector<GroundPatch> patches;
   std::vector<AdhesionForce> forces;       ///< by adhesion, where there are any
   std::vector<Sensitivity> sensitivities;  ///< by adhesion, adhesion-forces only
   std::optional<LambdaScan> scan;
@@ -77,8 +69,8 @@ Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const Trac
 Reconstruction reconstruct_elements(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
 
 /// Each adhesion's force: the sum over the patches on its grown ellipse; without errors.
-std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
-                                              double grow_um);
+std::vector<AdhesionForce> forces_by_adhesion(const std::vector<GroundPatch>& patches,
+                                              const std::vector<Adhesion>& adhesions, double grow_um);
 
 /// Displacements of the beads by a force of one spread evenly over each adhesion: 2·beads × 2·adhesions.
 Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, GelModel gel_model, int threads);
@@ -108,8 +100,8 @@ std::vector<int> adhesion_of_patches(const std::vector<Vec2>& positions_um, cons
 // files beside traction.csv
 /// Their part of docs/columns.md.
 std::string pages_of_tables();
-void write_tractions(const Path& file, const std::vector<Patch>& patches);
-void write_tractions_vtp(const Path& file, const std::vector<Patch>& patches);
+void write_tractions(const Path& file, const std::vector<GroundPatch>& patches);
+void write_tractions_vtp(const Path& file, const std::vector<GroundPatch>& patches);
 void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_um_per_lambda);
 /// The criteria over lambda in both its units, an SVG. @param chosen_by  for people; the reconstruction has a scan
 void write_lambda_picture(const Path& file, const Reconstruction& reconstruction, const std::string& chosen_by);

@@ -29,6 +29,14 @@ struct AdhesionForce {
   std::optional<double> low_nN{}, high_nN{};  ///< 95 % interval of the magnitude
 };
 
+/// A part of the ground with its traction, or a point with its force over an area of one.
+struct GroundPatch {
+  Vec2 position_um;
+  double area_um2 = 0;
+  Vec2 traction_kPa;
+  Vec2 displacement_um;  ///< as the model has it: of the gel, or of a sheet on springs
+};
+
 /// A straight fibre between two adhesions that would explain more than chance of what the model leaves.
 struct MissingFibre {
   int start_adhesion_id = 0, end_adhesion_id = 0;

@@ -235,6 +235,20 @@ Vec2 lattice_spacing_um(const std::vector<Vec2>& points, const Path& file) {
                    std::to_string(points.size()) + " rows");
 }
 
+std::vector<GroundPatch> read_tractions(const Path& file) {
+  const CsvTable table(file);
+  const std::vector<Vec2> points = read_points(file);
+  const bool has_areas = table.has("area_um2");
+  const Vec2 spacing = has_areas ? Vec2{} : lattice_spacing_um(points, file);
+  std::vector<GroundPatch> patches;
+  for (int row = 0; row < table.n_rows(); ++row)
+    patches.push_back({points[row],
+                       has_areas ? table.number(row, "area_um2", Range::positive()) : spacing.x * spacing.y,
+                       {table.number(row, "tx_kPa"), table.number(row, "ty_kPa")},
+                       {}});
+  return patches;
+}
+
 std::vector<Tension> read_tensions(const Path& file) {
   std::vector<Tension> tensions;
   for (const FibreTension& row : read(file, tension_table())) tensions.push_back(row.tension);

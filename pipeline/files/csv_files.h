@@ -48,6 +48,8 @@ HeightMap read_heights(const Path& file);
 /// Between the columns and rows of points that lie on a lattice.
 /// @param file  they are from, for the message. @throws InputError where there are less than two columns or rows
 Vec2 lattice_spacing_um(const std::vector<Vec2>& points_um, const Path& file);
+/// Columns x_um, y_um, tx_kPa, ty_kPa; area_um2 where the points lie on no lattice. Displacements stay nought.
+std::vector<GroundPatch> read_tractions(const Path& file);
 
 /// Columns fibre_id, tension_nN at least.
 std::vector<Tension> read_tensions(const Path& file);

@@ -140,7 +140,7 @@ std::vector<Vec2> Contracting::displaced_um(const std::vector<Vec2>& points_um,
   std::vector<substrate::Ellipse> patches;
   std::vector<Vec2> forces;
   for (int t = 0; t < elements.n_triangles(); ++t) {
-    const sheet::GroundPatch& patch = solution_.patches[t];
+    const GroundPatch& patch = solution_.patches[t];
     if (norm(patch.traction_kPa) == 0) continue;  // where it does not adhere
     patches.push_back(sheet::patch_of(elements, t));
     forces.push_back(patch.area_um2 * patch.traction_kPa);

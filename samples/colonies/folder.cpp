@@ -29,7 +29,7 @@ void write_numbers(const std::filesystem::path& file, const sheet::Solution& sol
 
 void write_tractions(const std::filesystem::path& file, const sheet::Solution& solution, const Pose& pose) {
   files::CsvText csv({"x_um", "y_um", "area_um2", "tx_kPa", "ty_kPa"});
-  for (const sheet::GroundPatch& patch : solution.patches) {
+  for (const GroundPatch& patch : solution.patches) {
     const Vec2 place = pose.at(patch.position_um), traction = pose.vector(patch.traction_kPa);
     csv.add(place.x).add(place.y).add(patch.area_um2).add(traction.x).add(traction.y).end_row();
   }

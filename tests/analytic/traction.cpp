@@ -185,7 +185,7 @@ TEST(Tractions, that_swirl_around_an_adhesions_centre_have_a_moment_of_their_sen
                                             .angle_rad = 0,
                                             .eccentricity = 0,
                                             .mean_intensity = 1}};
-  const std::vector<Patch> patches = {{{10.5, 10}, 0.5, {0, 4}, {}}, {{9.5, 10}, 0.5, {0, -4}, {}}};
+  const std::vector<GroundPatch> patches = {{{10.5, 10}, 0.5, {0, 4}, {}}, {{9.5, 10}, 0.5, {0, -4}, {}}};
   const std::vector<AdhesionForce> forces = forces_by_adhesion(patches, adhesions, 0.1);
   EXPECT_NEAR(norm(forces.front().force_nN), 0, 1e-12);
   EXPECT_NEAR(*forces.front().moment_nN_um, 2, 1e-12);
@@ -302,7 +302,7 @@ TEST(FttcMixtures, forces_are_those_of_a_reconstruction_with_as_much_noise) {
 
 std::vector<Vec2> map_of(const Reconstruction& r) {
   std::vector<Vec2> tractions;
-  for (const Patch& p : r.patches) tractions.push_back(p.traction_kPa);
+  for (const GroundPatch& p : r.patches) tractions.push_back(p.traction_kPa);
   return tractions;
 }
 

@@ -37,7 +37,7 @@ Comparison compare(const std::vector<Vec2>& one, const std::vector<Vec2>& other)
 
 std::vector<Vec2> tractions_of(const Reconstruction& r) {
   std::vector<Vec2> tractions;
-  for (const Patch& p : r.patches) tractions.push_back(p.traction_kPa);
+  for (const GroundPatch& p : r.patches) tractions.push_back(p.traction_kPa);
   return tractions;
 }
 
@@ -116,7 +116,7 @@ TEST(OthersData, discs_of_a_synthetic_cell_carry_their_tractions) {
   double furthest = 0;
   int n_inside = 0;
   for (int row = 0; row < discs.n_rows(); ++row) {
-    const Patch& p = r.patches[row];
+    const GroundPatch& p = r.patches[row];
     const Vec2 off = 1000 * p.traction_kPa - Vec2{discs.number(row, "tx_Pa"), discs.number(row, "ty_Pa")};
     furthest = std::max(furthest, norm(off));
     const double sigma_Pa = 1000 * *r.forces[row].sigma_nN / p.area_um2;
@@ -335,7 +335,7 @@ TEST(OthersData, tensions_of_colonies_are_those_of_the_program_that_published_th
        {Published{"WT03", 3.00, 0.268, -0.418, 0.05, 1.25, 3.09}, {"KO04", 5.18, 0.279, 0.134, 0.08, 2.83, 6.00}}) {
     const Colony colony = read_colony(folder, published.name);
     const images::Image mask = images::read_image(folder / (std::string(published.name) + "_mask.png"));
-    std::vector<sheet::GroundPatch> tractions;
+    std::vector<GroundPatch> tractions;
     for (std::size_t p = 0; p < colony.published_kPa.size(); ++p)
       tractions.push_back(
           {colony.inputs.beads[p].position_um, colony.step_um * colony.step_um, colony.published_kPa[p], {}});

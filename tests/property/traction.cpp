@@ -279,7 +279,7 @@ TEST(Tractions, where_nothing_moves_there_is_no_traction_and_that_is_said) {
   for (const TractionMethod method : kMethods) {
     parameters.method = method;
     const Reconstruction r = reconstruct(inputs, parameters, 1);
-    for (const Patch& p : r.patches) EXPECT_EQ(p.traction_kPa, (Vec2{})) << name_of(method);
+    for (const GroundPatch& p : r.patches) EXPECT_EQ(p.traction_kPa, (Vec2{})) << name_of(method);
     EXPECT_FALSE(r.patches.empty());
     EXPECT_NE(r.remark.find("no bead has moved"), std::string::npos) << name_of(method);
   }

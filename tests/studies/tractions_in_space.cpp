@@ -394,7 +394,7 @@ double error_along(const TractionScene& scene, const std::function<Vec2(Vec2)>& 
 }
 
 /// The traction of the nearest patch.
-Vec2 nearest_kPa(const std::vector<tractions::Patch>& patches, Vec2 at) {
+Vec2 nearest_kPa(const std::vector<GroundPatch>& patches, Vec2 at) {
   const auto nearer = [&](const auto& a, const auto& b) { return norm(a.position_um - at) < norm(b.position_um - at); };
   return std::min_element(patches.begin(), patches.end(), nearer)->traction_kPa;
 }
