@@ -86,13 +86,10 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
                                                                 : std::vector<double>(points.size());
 
   files::Grid grid;
-  grid.point_arrays = {{"displacement_um", 3, {}}};
-  grid.cell_arrays = {{"traction_kPa", 3, {}}};
+  std::vector<Vec3> displacements_um;
   for (std::size_t i = 0; i < points.size(); ++i) {
     grid.points_um.push_back({points[i].x, points[i].y, shape ? shape->height_um(points[i]) : 0});
-    for (const double u : {displacements[i].x, displacements[i].y, vertical[i]}) {
-      grid.point_arrays[0].values.push_back(u);
-    }
+    displacements_um.push_back({displacements[i].x, displacements[i].y, vertical[i]});
   }
   const int columns = static_cast<int>(x.size()) - 1;
   const std::vector<Vec2> tractions = tractions_kPa(ellipses, forces_nN, x, y);
@@ -100,9 +97,9 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
     const int i = cell % columns, j = cell / columns;
     const int first = j * (columns + 1) + i, next = first + columns + 1;
     for (const int corner : {first, first + 1, next + 1, next}) grid.cells.push_back(corner);
-    const Vec2 t = tractions[cell];
-    for (const double value : {t.x, t.y, 0.0}) grid.cell_arrays[0].values.push_back(value);
   }
+  grid.point_arrays = {files::array_of("displacement_um", displacements_um)};
+  grid.cell_arrays = {files::array_of("traction_kPa", tractions)};
   files::write_grid_vtu(file, grid);
 }
 
@@ -120,16 +117,10 @@ void write_traction_vtu(const std::filesystem::path& file, const Substrate& subs
 void write_volume_vtu(const std::filesystem::path& file, const VolumeField& field) {
   files::Grid grid;
   grid.corners = 8;
-  grid.points_um = field.points_um;
+  for (const auto& p : field.points_um) grid.points_um.push_back({p[0], p[1], p[2]});
   grid.cells = field.box_corners;
-  files::GridArray displacement{"displacement_um", 3, {}};
-  for (const auto& u : field.displacement_um) displacement.values.insert(displacement.values.end(), u.begin(), u.end());
-  grid.point_arrays.push_back(std::move(displacement));
-  if (!field.stress_kPa.empty()) {
-    files::GridArray stress{"stress_kPa", 6, {}};
-    for (const auto& s : field.stress_kPa) stress.values.insert(stress.values.end(), s.begin(), s.end());
-    grid.cell_arrays.push_back(std::move(stress));
-  }
+  grid.point_arrays = {files::array_of("displacement_um", field.displacement_um)};
+  if (!field.stress_kPa.empty()) grid.cell_arrays = {files::array_of("stress_kPa", field.stress_kPa)};
   files::write_grid_vtu(file, grid);
 }
 

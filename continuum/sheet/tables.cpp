@@ -1,7 +1,9 @@
 #include "continuum/sheet/tables.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <ranges>
 
 #include "continuum/sheet/elements.h"
 #include "continuum/sheet/forward.h"
@@ -74,28 +76,24 @@ void write_sheet(const Path& file, const std::vector<SheetPoint>& points) { file
 void write_sheet_vtu(const Path& file, const Solution& solution) {
   const Elements& elements = *solution.elements;
   files::Grid grid{.corners = 6, .points_um = {}, .cells = {}, .point_arrays = {}, .cell_arrays = {}};
-  files::GridArray u{"displacement_um", 3, {}}, S{"tension_nN_per_um", 3, {}}, mean{"mean_tension_nN_per_um", 1, {}},
-      shear{"max_shear_nN_per_um", 1, {}}, axis{"largest_tension_axis", 3, {}}, traction{"traction_kPa", 3, {}},
-      gel{"ground_displacement_um", 3, {}};
-  for (int i = 0; i < elements.n_nodes(); ++i) {
-    const Vec2 x = elements.triangles().nodes_um[i], at = at_node(solution.u, i);
-    const Tensor& s = solution.at_nodes[i];
-    grid.points_um.push_back({x.x, x.y, 0});
-    u.values.insert(u.values.end(), {at.x, at.y, 0});
-    S.values.insert(S.values.end(), {s.xx, s.yy, s.xy});
-    mean.values.push_back(mean_of(s));
-    shear.values.push_back(largest_shear(s));
-    const double angle = 0.5 * std::atan2(2 * s.xy, s.xx - s.yy);
-    axis.values.insert(axis.values.end(), {std::cos(angle), std::sin(angle), 0});
-  }
-  for (int t = 0; t < elements.n_triangles(); ++t) {
+  for (const Vec2 node : elements.triangles().nodes_um) grid.points_um.push_back({node.x, node.y, 0});
+  for (int t = 0; t < elements.n_triangles(); ++t)
     grid.cells.insert(grid.cells.end(), elements.nodes(t).begin(), elements.nodes(t).end());
-    const GroundPatch& patch = solution.patches[t];
-    traction.values.insert(traction.values.end(), {patch.traction_kPa.x, patch.traction_kPa.y, 0});
-    gel.values.insert(gel.values.end(), {patch.displacement_um.x, patch.displacement_um.y, 0});
-  }
-  grid.point_arrays = {u, S, mean, shear, axis};
-  grid.cell_arrays = {traction, gel};
+  const auto axis = [](const Tensor& s) {
+    const double angle = 0.5 * std::atan2(2 * s.xy, s.xx - s.yy);
+    return Vec2{std::cos(angle), std::sin(angle)};
+  };
+  grid.point_arrays = {files::array_of("displacement_um", std::views::iota(0, elements.n_nodes()),
+                                       [&](int node) { return at_node(solution.u, node); }),
+                       files::array_of("tension_nN_per_um", solution.at_nodes,
+                                       [](const Tensor& s) {
+                                         return std::array{s.xx, s.yy, s.xy};
+                                       }),
+                       files::array_of("mean_tension_nN_per_um", solution.at_nodes, mean_of),
+                       files::array_of("max_shear_nN_per_um", solution.at_nodes, largest_shear),
+                       files::array_of("largest_tension_axis", solution.at_nodes, axis)};
+  grid.cell_arrays = {files::array_of("traction_kPa", solution.patches, &GroundPatch::traction_kPa),
+                      files::array_of("ground_displacement_um", solution.patches, &GroundPatch::displacement_um)};
   files::write_grid_vtu(file, grid);
 }
 

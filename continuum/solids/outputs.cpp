@@ -68,12 +68,9 @@ void write_optima(const Path& file, const std::vector<Optimum>& optima) {
 void write_deformed_vtu(const Path& file, const Deformed& deformed) {
   const Mesh& mesh = *deformed.body.mesh;
   files::Grid grid{.points_um = {}, .cells = {}, .point_arrays = {}, .cell_arrays = {}};
-  grid.point_arrays = {{"displacement_um", 3, {}}};
-  for (std::size_t k = 0; k < mesh.position_um.size(); ++k) {
-    grid.points_um.push_back({mesh.position_um[k].x, 0, mesh.position_um[k].y});
-    const Vec2 u = deformed.displacement_um[k];
-    for (const double value : {u.x, 0.0, u.y}) grid.point_arrays[0].values.push_back(value);
-  }
+  const auto in_space = [](Vec2 v) { return Vec3{v.x, 0, v.y}; };
+  for (const Vec2 at : mesh.position_um) grid.points_um.push_back(in_space(at));
+  grid.point_arrays = {files::array_of("displacement_um", deformed.displacement_um, in_space)};
   grid.cell_arrays = {{"part", 1, {}}, {"stress_kPa", 4, {}}};
   const int order = mesh.square.order();
   const std::vector<double>& nodes = mesh.square.nodes();
@@ -95,16 +92,9 @@ void write_deformed_vtu(const Path& file, const Deformed& deformed) {
 
 void write_deformed_vtu(const Path& file, const RevolvedBody& deformed) {
   const RevolvedMesh& mesh = deformed.mesh;
-  files::Grid grid{.corners = 8, .points_um = {}, .cells = {}, .point_arrays = {}, .cell_arrays = {}};
-  grid.point_arrays = {{"displacement_um", 3, {}}};
-  for (std::size_t k = 0; k < mesh.position_um.size(); ++k) {
-    const Vec3 at = mesh.position_um[k], u = deformed.displacement_um[k];
-    grid.points_um.push_back({at.x, at.y, at.z});
-    for (const double value : {u.x, u.y, u.z}) grid.point_arrays[0].values.push_back(value);
-  }
-  grid.cell_arrays = {{"part", 1, {}}, {"stress_kPa", 6, {}}};
-  for (const auto& stress : deformed.stress_kPa())
-    grid.cell_arrays[1].values.insert(grid.cell_arrays[1].values.end(), stress.begin(), stress.end());
+  files::Grid grid{.corners = 8, .points_um = mesh.position_um, .cells = {}, .point_arrays = {}, .cell_arrays = {}};
+  grid.point_arrays = {files::array_of("displacement_um", deformed.displacement_um)};
+  grid.cell_arrays = {{"part", 1, {}}, files::array_of("stress_kPa", deformed.stress_kPa())};
   const int order = mesh.half_plane.mesh->square.order(), row = order + 1;
   for (int e = 0; e < mesh.n_elements(); ++e) {
     for (int first = 0; first < order * row * row; ++first) {

@@ -41,15 +41,15 @@ std::optional<Cell> read_second_placement(stage::StageContext& context, const Ce
   return second;
 }
 
-files::PointArray most_informed_array(const Influence& influence) {
-  return {.name = "informs_fibre_id", .scalars = {influence.most_informed.begin(), influence.most_informed.end()}};
+files::NamedArray most_informed_array(const Influence& influence) {
+  return files::array_of("informs_fibre_id", influence.most_informed);
 }
 
 /// What the loss and the region leave of each bead.
-files::PointArray weight_array(const LinearData& data) {
-  files::PointArray array{.name = "weight"};
+files::NamedArray weight_array(const LinearData& data) {
+  files::NamedArray array{.name = "weight"};
   for (Index b = 0; b < data.bead_weight.size(); ++b) {
-    array.scalars.push_back(data.weight_per_um[2 * b] > 0 ? data.bead_weight[b] : 0);
+    array.values.push_back(data.weight_per_um[2 * b] > 0 ? data.bead_weight[b] : 0);
   }
   return array;
 }

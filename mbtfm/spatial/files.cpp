@@ -130,24 +130,18 @@ void write_tractions(const Path& csv, const Path& vtp, const Problem& problem,
   write(csv, traction_table(), all.rows);
   files::Grid grid;
   for (const auto& face : all.lattice.quads.faces) grid.cells.insert(grid.cells.end(), face.begin(), face.end());
-  const auto array = [&](const char* name, int components) -> std::vector<double>& {
-    return grid.point_arrays.emplace_back(files::GridArray{name, components, {}}).values;
-  };
-  grid.point_arrays.reserve(7);
-  auto &traction = array("traction_kPa", 3), &normal = array("normal_kPa", 1), &tangential = array("tangential_kPa", 1),
-       &displacement = array("displacement_um", 3);
-  const bool has_errors = reconstruction.covariance_kPa2.size() > 0, is_resolved = reconstruction.resolved.size() > 0;
-  auto* sigma = has_errors ? &array("sigma_traction_kPa", 3) : nullptr;
-  auto* resolution = is_resolved ? &array("resolution_um", 1) : nullptr;
-  for (const Row& row : all.rows) {
-    grid.points_um.push_back({row.position_um.x, row.position_um.y, row.position_um.z});
-    traction.insert(traction.end(), {row.traction_kPa.x, row.traction_kPa.y, row.traction_kPa.z});
-    displacement.insert(displacement.end(), {row.displacement_um.x, row.displacement_um.y, row.displacement_um.z});
-    normal.push_back(row.normal_kPa);
-    tangential.push_back(row.tangential_kPa);
-    if (sigma) sigma->insert(sigma->end(), {*row.sigma_x_kPa, *row.sigma_y_kPa, *row.sigma_z_kPa});
-    if (resolution) resolution->push_back(*row.resolution_um);
+  for (const Row& row : all.rows) grid.points_um.push_back(row.position_um);
+  grid.point_arrays = {files::array_of("traction_kPa", all.rows, &Row::traction_kPa),
+                       files::array_of("normal_kPa", all.rows, &Row::normal_kPa),
+                       files::array_of("tangential_kPa", all.rows, &Row::tangential_kPa),
+                       files::array_of("displacement_um", all.rows, &Row::displacement_um)};
+  if (reconstruction.covariance_kPa2.size() > 0) {
+    const auto sigma_kPa = [](const Row& row) { return Vec3{*row.sigma_x_kPa, *row.sigma_y_kPa, *row.sigma_z_kPa}; };
+    grid.point_arrays.push_back(files::array_of("sigma_traction_kPa", all.rows, sigma_kPa));
   }
+  if (reconstruction.resolved.size() > 0)
+    grid.point_arrays.push_back(
+        files::array_of("resolution_um", all.rows, [](const Row& row) { return *row.resolution_um; }));
   files::write_quads_vtp(vtp, grid);
 }
 

@@ -182,22 +182,24 @@ DisplacementField field_of(const VectorXd& forces_nN, const DisplacementField& b
 }
 
 void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,
-                            const std::vector<files::PointArray>& more) {
-  files::PointArray residual{.name = "residual_um"};
+                            const std::vector<files::NamedArray>& more) {
+  std::vector<Vec2> residual_um;
   for (std::size_t i = 0; i < measured.size(); ++i)
-    residual.vectors.push_back(measured[i].displacement_um - fitted[i].displacement_um);
-  std::vector<files::PointArray> arrays = {files::array_of("measured_um", measured, &Bead::displacement_um),
-                                           files::array_of("fitted_um", fitted, &Bead::displacement_um), residual};
+    residual_um.push_back(measured[i].displacement_um - fitted[i].displacement_um);
+  std::vector<files::NamedArray> arrays = {files::array_of("measured_um", measured, &Bead::displacement_um),
+                                           files::array_of("fitted_um", fitted, &Bead::displacement_um),
+                                           files::array_of("residual_um", residual_um)};
   arrays.insert(arrays.end(), more.begin(), more.end());
   files::write_points_vtp(file, points_of(measured), arrays);
 }
 
 void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces) {
-  files::PointArray traction{.name = "traction_kPa"};
+  std::vector<Vec2> traction_kPa;
   for (std::size_t a = 0; a < forces.size(); ++a)
-    traction.vectors.push_back(1 / area_stood_for_um2(cell.adhesions[a]) * forces[a].force_nN);
-  files::write_ellipses_vtp(file, cell.adhesions,
-                            {files::array_of("force_nN", forces, &AdhesionForce::force_nN), traction});
+    traction_kPa.push_back(1 / area_stood_for_um2(cell.adhesions[a]) * forces[a].force_nN);
+  files::write_ellipses_vtp(
+      file, cell.adhesions,
+      {files::array_of("force_nN", forces, &AdhesionForce::force_nN), files::array_of("traction_kPa", traction_kPa)});
 }
 
 }  // namespace mbtfm::tensions

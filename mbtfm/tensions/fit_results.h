@@ -38,7 +38,7 @@ DisplacementField field_of(const VectorXd& forces_nN, const DisplacementField& b
 
 /// @param more  further arrays, by bead
 void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,
-                            const std::vector<files::PointArray>& more = {});
+                            const std::vector<files::NamedArray>& more = {});
 void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces);
 
 }  // namespace mbtfm::tensions

@@ -262,7 +262,7 @@ void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_u
   write(file, lambda_table(), rows);
 }
 
-std::vector<files::PointArray> columns_of(const std::vector<Sensitivity>& sensitivities) {
+std::vector<files::NamedArray> columns_of(const std::vector<Sensitivity>& sensitivities) {
   if (sensitivities.empty()) return {};
   return {files::array_of("shift_along_nN", sensitivities, &Sensitivity::shift_along_nN),
           files::array_of("shift_across_nN", sensitivities, &Sensitivity::shift_across_nN),

@@ -105,7 +105,7 @@ void write_tractions_vtp(const Path& file, const std::vector<GroundPatch>& patch
 void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_um_per_lambda);
 /// The criteria over lambda in both its units, an SVG. @param chosen_by  for people; the reconstruction has a scan
 void write_lambda_picture(const Path& file, const Reconstruction& reconstruction, const std::string& chosen_by);
-std::vector<files::PointArray> columns_of(const std::vector<Sensitivity>& sensitivities);
+std::vector<files::NamedArray> columns_of(const std::vector<Sensitivity>& sensitivities);
 Figures summary_of(const Reconstruction& reconstruction, const TractionSums& sums);
 
 }  // namespace mbtfm::tractions

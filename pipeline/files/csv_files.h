@@ -59,7 +59,7 @@ void write_tensions(const Path& file, const std::vector<Tension>& tensions, cons
 std::vector<AdhesionForce> read_adhesion_forces(const Path& file);
 /// @param more  further columns, by force; their names carry the unit
 void write_adhesion_forces(const Path& file, const std::vector<AdhesionForce>& forces,
-                           const std::vector<Adhesion>& adhesions, const std::vector<PointArray>& more = {});
+                           const std::vector<Adhesion>& adhesions, const std::vector<NamedArray>& more = {});
 
 /// Columns vertex, fx_nN, fy_nN: the force of the network on the substrate at each held vertex.
 void write_reactions(const Path& file, const std::vector<int>& vertices, const std::vector<Vec2>& forces_nN);

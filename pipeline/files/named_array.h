@@ -10,23 +10,34 @@
 
 namespace mbtfm::files {
 
-/// A named array over the points or cells of a VTK file or the rows of a table, one value or (x, y) each; the name
-/// carries the unit.
-struct PointArray {
+/// A named array over the points or cells of a VTK file or the rows of a table, some numbers each; the name carries the
+/// unit.
+struct NamedArray {
   std::string name;
-  std::vector<double> scalars = {};
-  std::vector<Vec2> vectors = {};
+  int components = 1;
+  std::vector<double> values = {};
 };
 
-/// @param value  of each thing: a number or a Vec2
-template <class Things, class Value>
-PointArray array_of(std::string name, const Things& things, Value value) {
-  PointArray array{.name = std::move(name)};
+/// @param value  of each thing: a number, an array or a vector; one in the plane gets a z of 0, as ParaView draws
+/// arrows of vectors in space only
+template <class Things, class Value = std::identity>
+NamedArray array_of(std::string name, const Things& things, Value value = {}) {
+  NamedArray array{.name = std::move(name)};
+  const auto add = [&](const auto& numbers) {
+    array.components = static_cast<int>(std::size(numbers));
+    array.values.insert(array.values.end(), std::begin(numbers), std::end(numbers));
+  };
   for (const auto& thing : things) {
-    if constexpr (std::is_convertible_v<decltype(std::invoke(value, thing)), Vec2>) {
-      array.vectors.push_back(std::invoke(value, thing));
+    const auto& of = std::invoke(value, thing);
+    using Of = std::remove_cvref_t<decltype(of)>;
+    if constexpr (std::is_same_v<Of, Vec2>) {
+      add(std::initializer_list<double>{of.x, of.y, 0});
+    } else if constexpr (std::is_same_v<Of, Vec3>) {
+      add(std::initializer_list<double>{of.x, of.y, of.z});
+    } else if constexpr (std::is_arithmetic_v<Of>) {
+      array.values.push_back(of);
     } else {
-      array.scalars.push_back(std::invoke(value, thing));
+      add(of);
     }
   }
   return array;

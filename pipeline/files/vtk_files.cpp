@@ -41,10 +41,16 @@ void write_xml(const Path& file, Data* data) {
   write_text(file, writer->GetOutputString());
 }
 
-vtkNew<vtkPoints> points_of(const std::vector<Vec2>& positions_um) {
+std::vector<Vec3> in_space(const std::vector<Vec2>& positions_um) {
+  std::vector<Vec3> points;
+  for (const Vec2 p : positions_um) points.push_back({p.x, p.y, 0});
+  return points;
+}
+
+vtkNew<vtkPoints> points_of(const std::vector<Vec3>& positions_um) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
-  for (const Vec2 p : positions_um) points->InsertNextPoint(p.x, p.y, 0);
+  for (const Vec3& p : positions_um) points->InsertNextPoint(p.x, p.y, p.z);
   return points;
 }
 
@@ -54,15 +60,21 @@ vtkNew<vtkIntArray> int_array(const char* name) {
   return array;
 }
 
-vtkNew<vtkDoubleArray> double_array(const PointArray& values) {
+vtkNew<vtkDoubleArray> double_array(const NamedArray& values) {
   vtkNew<vtkDoubleArray> array;
   array->SetName(values.name.c_str());
-  for (const double v : values.scalars) array->InsertNextValue(v);
-  if (!values.vectors.empty()) {
-    array->SetNumberOfComponents(3);  // ParaView draws arrows of vectors in space only
-    for (const Vec2 v : values.vectors) array->InsertNextTuple3(v.x, v.y, 0);
-  }
+  array->SetNumberOfComponents(values.components);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(values.values.size()) / values.components);
+  for (std::size_t k = 0; k < values.values.size(); ++k) array->SetValue(static_cast<vtkIdType>(k), values.values[k]);
   return array;
+}
+
+/// @param n  points or cells that the data has
+void add(const std::vector<NamedArray>& arrays, std::size_t n, vtkFieldData* data) {
+  for (const NamedArray& array : arrays) {
+    MBTFM_ASSERT(array.values.size() == n * static_cast<std::size_t>(array.components));
+    data->AddArray(double_array(array));
+  }
 }
 
 constexpr int kEllipseCorners = 32;  // enough to look smooth
@@ -86,16 +98,16 @@ class Shapes {
     cells->InsertNextCell(static_cast<int>(corners.size()));
     for (const Vec2 p : corners) {
       cells->InsertCellPoint(static_cast<vtkIdType>(points_um_.size()));
-      points_um_.push_back(p);
+      points_um_.push_back({p.x, p.y, 0});
     }
   }
-  std::vector<Vec2> points_um_;
+  std::vector<Vec3> points_um_;
   vtkNew<vtkCellArray> lines_, polygons_;
 };
 
 vtkNew<vtkUnstructuredGrid> grid_of(const Network& network, const std::vector<Vec2>& positions_um) {
   vtkNew<vtkUnstructuredGrid> grid;
-  const vtkNew<vtkPoints> points = points_of(positions_um);
+  const vtkNew<vtkPoints> points = points_of(in_space(positions_um));
   grid->SetPoints(points);
   const auto adhesion = int_array("adhesion_id");
   for (const int id : network.adhesion_id) adhesion->InsertNextValue(id);
@@ -107,28 +119,16 @@ vtkNew<vtkUnstructuredGrid> grid_of(const Network& network, const std::vector<Ve
   }
   grid->Allocate(static_cast<vtkIdType>(network.links.size()));
   const auto fibre = int_array("fibre_id");
-  PointArray rest{.name = "rest_length_um"};
-  PointArray share{.name = "share"};
   for (const Link& link : network.links) {
     const vtkIdType ends[2] = {link.vertex_a, link.vertex_b};
     grid->InsertNextCell(VTK_LINE, 2, ends);
     fibre->InsertNextValue(link.fibre_id);
-    rest.scalars.push_back(link.rest_length_um);
-    share.scalars.push_back(link.share);
   }
   grid->GetCellData()->AddArray(fibre);
-  grid->GetCellData()->AddArray(double_array(rest));
-  grid->GetCellData()->AddArray(double_array(share));
+  add({array_of("rest_length_um", network.links, &Link::rest_length_um),
+       array_of("share", network.links, &Link::share)},
+      network.links.size(), grid->GetCellData());
   return grid;
-}
-
-vtkNew<vtkDoubleArray> double_array(const GridArray& values) {
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(values.name.c_str());
-  array->SetNumberOfComponents(values.components);
-  array->SetNumberOfTuples(static_cast<vtkIdType>(values.values.size()) / values.components);
-  for (std::size_t k = 0; k < values.values.size(); ++k) array->SetValue(static_cast<vtkIdType>(k), values.values[k]);
-  return array;
 }
 
 /// An id or the number of a vertex. @throws InputError
@@ -222,26 +222,19 @@ HeightMap read_surface(const Path& file) {
 
 void write_surface(const Path& file, const HeightMap& map) {
   check(map);
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
+  Grid grid{.points_um = {}, .point_arrays = {}, .cell_arrays = {}};
   for (std::size_t k = 0; k < map.z_um.size(); ++k) {
     const Vec2 at = map.vertex_um(k);
-    points->InsertNextPoint(at.x, at.y, map.z_um[k]);
+    grid.points_um.push_back({at.x, at.y, map.z_um[k]});
   }
-  vtkNew<vtkCellArray> quads;
   for (int j = 0; j + 1 < map.n_y; ++j) {
     for (int i = 0; i + 1 < map.n_x; ++i) {
-      const vtkIdType first = i + vtkIdType{map.n_x} * j, next = first + map.n_x;
-      const vtkIdType corners[] = {first, first + 1, next + 1, next};
-      quads->InsertNextCell(4, corners);
+      const int first = i + map.n_x * j, next = first + map.n_x;
+      grid.cells.insert(grid.cells.end(), {first, first + 1, next + 1, next});
     }
   }
-  vtkNew<vtkPolyData> poly;
-  poly->SetPoints(points);
-  poly->SetPolys(quads);
-  if (!map.sigma_um.empty())
-    poly->GetPointData()->AddArray(double_array(PointArray{.name = "height_sigma_um", .scalars = map.sigma_um}));
-  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+  if (!map.sigma_um.empty()) grid.point_arrays = {array_of("height_sigma_um", map.sigma_um)};
+  write_quads_vtp(file, grid);
 }
 
 ContractedNetwork read_contracted_network(const Path& file) {
@@ -255,13 +248,13 @@ void write_contracted_network(const Path& file, const Network& network, const st
   MBTFM_ASSERT(positions_um.size() == network.vertices_um.size() && link_force_nN.size() == network.links.size() &&
                link_states.size() == network.links.size());
   const auto grid = grid_of(network, positions_um);
-  grid->GetCellData()->AddArray(double_array({.name = "force_nN", .scalars = link_force_nN}));
+  grid->GetCellData()->AddArray(double_array(array_of("force_nN", link_force_nN)));
   const auto state = int_array("state");  // 0 slack, 1 taut, 2 collapsed
   for (const CableState s : link_states) state->InsertNextValue(static_cast<int>(s));
   grid->GetCellData()->AddArray(state);
   std::vector<Vec2> moves_um;
   for (std::size_t v = 0; v < positions_um.size(); ++v) moves_um.push_back(positions_um[v] - network.vertices_um[v]);
-  grid->GetPointData()->AddArray(double_array({.name = "contraction_um", .vectors = moves_um}));
+  grid->GetPointData()->AddArray(double_array(array_of("contraction_um", moves_um)));
   write_xml<vtkXMLUnstructuredGridWriter>(file, grid.Get());
 }
 
@@ -299,40 +292,23 @@ void write_cell_vtp(const Path& file, const Cell& cell) {
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }
 
-void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, const std::vector<PointArray>& arrays) {
+void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, const std::vector<NamedArray>& arrays) {
+  write_points_vtp(file, in_space(points_um), arrays);
+}
+
+void write_points_vtp(const Path& file, const std::vector<Vec3>& points_um, const std::vector<NamedArray>& arrays) {
   vtkNew<vtkPolyData> poly;
   const vtkNew<vtkPoints> points = points_of(points_um);
   poly->SetPoints(points);
   vtkNew<vtkCellArray> vertices;
   for (vtkIdType i = 0; i < points->GetNumberOfPoints(); ++i) vertices->InsertNextCell(1, &i);
   poly->SetVerts(vertices);
-  for (const PointArray& array : arrays) {
-    MBTFM_ASSERT(array.scalars.size() + array.vectors.size() == points_um.size());
-    poly->GetPointData()->AddArray(double_array(array));
-  }
-  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
-}
-
-void write_points_vtp(const Path& file, const std::vector<Vec3>& points_um, const std::vector<GridArray>& arrays) {
-  vtkNew<vtkPolyData> poly;
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  vtkNew<vtkCellArray> vertices;
-  for (const Vec3& p : points_um) {
-    const vtkIdType i = points->InsertNextPoint(p.x, p.y, p.z);
-    vertices->InsertNextCell(1, &i);
-  }
-  poly->SetPoints(points);
-  poly->SetVerts(vertices);
-  for (const GridArray& array : arrays) {
-    MBTFM_ASSERT(array.values.size() == points_um.size() * static_cast<std::size_t>(array.components));
-    poly->GetPointData()->AddArray(double_array(array));
-  }
+  add(arrays, points_um.size(), poly->GetPointData());
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }
 
 void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions,
-                        const std::vector<PointArray>& arrays) {
+                        const std::vector<NamedArray>& arrays) {
   check(adhesions);
   Shapes shapes;
   const auto label = int_array("adhesion_id");
@@ -342,18 +318,12 @@ void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions
   }
   const auto poly = shapes.data();
   poly->GetCellData()->AddArray(label);
-  for (const PointArray& array : arrays) {
-    MBTFM_ASSERT(array.scalars.size() + array.vectors.size() == adhesions.size());
-    poly->GetCellData()->AddArray(double_array(array));
-  }
+  add(arrays, adhesions.size(), poly->GetCellData());
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }
 
 void write_quads_vtp(const Path& file, const Grid& grid) {
   MBTFM_ASSERT(grid.corners == 4);
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (const auto& p : grid.points_um) points->InsertNextPoint(p.data());
   vtkNew<vtkCellArray> quads;
   for (std::size_t first = 0; first < grid.cells.size(); first += 4) {
     vtkIdType corners[4];
@@ -361,19 +331,16 @@ void write_quads_vtp(const Path& file, const Grid& grid) {
     quads->InsertNextCell(4, corners);
   }
   vtkNew<vtkPolyData> poly;
-  poly->SetPoints(points);
+  poly->SetPoints(points_of(grid.points_um));
   poly->SetPolys(quads);
-  for (const GridArray& array : grid.point_arrays) poly->GetPointData()->AddArray(double_array(array));
-  for (const GridArray& array : grid.cell_arrays) poly->GetCellData()->AddArray(double_array(array));
+  add(grid.point_arrays, grid.points_um.size(), poly->GetPointData());
+  add(grid.cell_arrays, grid.cells.size() / grid.corners, poly->GetCellData());
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }
 
 void write_grid_vtu(const Path& file, const Grid& grid) {
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (const auto& p : grid.points_um) points->InsertNextPoint(p.data());
   vtkNew<vtkUnstructuredGrid> data;
-  data->SetPoints(points);
+  data->SetPoints(points_of(grid.points_um));
   const int type = grid.corners == 4 ? VTK_QUAD : grid.corners == 6 ? VTK_QUADRATIC_TRIANGLE : VTK_HEXAHEDRON;
   data->Allocate(static_cast<vtkIdType>(grid.cells.size()) / grid.corners);
   for (std::size_t first = 0; first < grid.cells.size(); first += grid.corners) {
@@ -381,8 +348,8 @@ void write_grid_vtu(const Path& file, const Grid& grid) {
     std::copy_n(grid.cells.begin() + static_cast<std::ptrdiff_t>(first), grid.corners, corners);
     data->InsertNextCell(type, grid.corners, corners);
   }
-  for (const GridArray& array : grid.point_arrays) data->GetPointData()->AddArray(double_array(array));
-  for (const GridArray& array : grid.cell_arrays) data->GetCellData()->AddArray(double_array(array));
+  add(grid.point_arrays, grid.points_um.size(), data->GetPointData());
+  add(grid.cell_arrays, grid.cells.size() / grid.corners, data->GetCellData());
   write_xml<vtkXMLUnstructuredGridWriter>(file, data.Get());
 }
 

@@ -1,7 +1,6 @@
 /// VTK files (XML, binary appended, compressed). Readers and writers call `check` and throw InputError and OutputError.
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -20,19 +19,13 @@ void write_network(const Path& file, const Network& network);
 HeightMap read_surface(const Path& file);
 void write_surface(const Path& file, const HeightMap& map);
 
-/// Values of a grid in space, some numbers each; the name carries the unit.
-struct GridArray {
-  std::string name;
-  int components = 1;
-  std::vector<double> values = {};
-};
 /// Quadrilaterals (4 corners, round), hexahedra (8 corners: one face round, then the face across) or quadratic
 /// triangles (3 corners, then the points between them: 6).
 struct Grid {
   int corners = 4;
-  std::vector<std::array<double, 3>> points_um;
+  std::vector<Vec3> points_um;
   std::vector<int> cells = {};  ///< points of the corners, cell by cell
-  std::vector<GridArray> point_arrays, cell_arrays;
+  std::vector<NamedArray> point_arrays, cell_arrays;
 };
 void write_grid_vtu(const Path& file, const Grid& grid);
 /// The same of quadrilaterals, as a surface.
@@ -41,12 +34,12 @@ void write_quads_vtp(const Path& file, const Grid& grid);
 /// Outline, adhesion ellipses and fibres as polygons and lines, with adhesion_id, fibre_id and fibre_type by cell.
 void write_cell_vtp(const Path& file, const Cell& cell);
 /// A point cloud with arrays.
-void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, const std::vector<PointArray>& arrays);
+void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, const std::vector<NamedArray>& arrays);
 /// The same in space.
-void write_points_vtp(const Path& file, const std::vector<Vec3>& points_um, const std::vector<GridArray>& arrays);
+void write_points_vtp(const Path& file, const std::vector<Vec3>& points_um, const std::vector<NamedArray>& arrays);
 /// Adhesion ellipses with arrays by adhesion.
 void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions,
-                        const std::vector<PointArray>& arrays);
+                        const std::vector<NamedArray>& arrays);
 ContractedNetwork read_contracted_network(const Path& file);
 void write_contracted_network(const Path& file, const Network& network, const std::vector<Vec2>& positions_um,
                               const std::vector<double>& link_force_nN, const std::vector<CableState>& link_states);

@@ -122,16 +122,13 @@ auto with_names(const std::string& names, const Body& body) {
 void write_field(stage::StageContext& context, const std::vector<BeadInSpace>& field) {
   files::write_displacement_in_space(context.output("out", "displacement_3d.csv"), field);
   std::vector<Vec3> points;
-  files::GridArray u{"displacement_um", 3, {}}, sigma{"sigma_um", 1, {}}, sigma_z{"sigma_z_um", 1, {}},
-      good{"is_good", 1, {}};
-  for (const BeadInSpace& bead : field) {
-    points.push_back(bead.position_um);
-    for (const double c : {bead.displacement_um.x, bead.displacement_um.y, bead.displacement_um.z})
-      u.values.push_back(c);
-    sigma.values.push_back(bead.sigma_um), sigma_z.values.push_back(bead.sigma_z_um);
-    good.values.push_back(bead.flag.empty() ? 1 : 0);
-  }
-  files::write_points_vtp(context.output("out", "displacement_3d.vtp"), points, {u, sigma, sigma_z, good});
+  for (const BeadInSpace& bead : field) points.push_back(bead.position_um);
+  files::write_points_vtp(
+      context.output("out", "displacement_3d.vtp"), points,
+      {files::array_of("displacement_um", field, &BeadInSpace::displacement_um),
+       files::array_of("sigma_um", field, &BeadInSpace::sigma_um),
+       files::array_of("sigma_z_um", field, &BeadInSpace::sigma_z_um),
+       files::array_of("is_good", field, [](const BeadInSpace& bead) { return bead.flag.empty() ? 1 : 0; })});
 }
 
 void write_slices(stage::StageContext& context, const CommonMotion& common) {
