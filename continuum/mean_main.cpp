@@ -216,9 +216,8 @@ Reference reference_of(stage::StageContext& context, const Parameters& p, const 
 /// @throws InputError at the first cell of another shape, where those are refused
 std::vector<CellRow> rows_of(stage::StageContext& context, const Parameters& p, const std::vector<Cell>& cells,
                              const Reference& reference, const Alignment& alignment) {
-  std::vector<CellRow> rows = p.register_by == By::images
-                                  ? aligned_by_images(cells, reference.cell->image, alignment, context.threads)
-                                  : aligned(cells, alignment, context.threads);
+  const Brightness* image = p.register_by == By::images ? &reference.cell->image : nullptr;
+  std::vector<CellRow> rows = aligned(cells, alignment, context.threads, image);
   int n_left_out = 0, n_ambiguous = 0;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     n_ambiguous += rows[k].is_kept && rows[k].is_ambiguous && !symmetry_of(p.symmetry).is_circle ? 1 : 0;

@@ -58,43 +58,25 @@ void judge(CellRow& row, const Alignment& alignment) {
                " um from the reference (root mean square), more than " + brief(allowed) + " um";
 }
 
-CellRow row_of(const Cell& cell, const Way& way) {
-  return {.cell = cell.name, .way = way, .n_beads = static_cast<int>(cell.beads.size())};
-}
-
 }  // namespace
 
-std::vector<CellRow> aligned(const std::vector<Cell>& cells, const Alignment& alignment, int threads) {
+std::vector<CellRow> aligned(const std::vector<Cell>& cells, const Alignment& alignment, int threads,
+                             const Brightness* image) {
   std::vector<CellRow> rows(cells.size());
   numerics::parallel_for(static_cast<int>(cells.size()), threads, [&](int k) {
-    const std::vector<Way> ways = ways_onto(cells[k].outline_um, alignment.reference_um, alignment.mirrors);
-    CellRow& row = rows[k] = row_of(cells[k], ways.front());
+    const Cell& cell = cells[k];
+    std::vector<Way> ways = image ? ways_by_images(cell.image, *image, alignment.mirrors)
+                                  : ways_onto(cell.outline_um, alignment.reference_um, alignment.mirrors);
+    if (image) {
+      for (Way& way : ways) way.misfit_um = misfit_um(moved(cell.outline_um, way.motion), alignment.reference_um);
+    }
+    CellRow& row = rows[k] = {.cell = cell.name, .way = ways.front(), .n_beads = static_cast<int>(cell.beads.size())};
     const auto second = std::ranges::find_if(
         ways, [&](const Way& way) { return !are_equivalent(way, ways.front(), alignment.motions); });
     if (second != ways.end()) {
       row.second_misfit_um = second->misfit_um;
-      row.is_ambiguous = fit_equally(ways.front(), *second, size_um(alignment.reference_um));
-    }
-    judge(row, alignment);
-  });
-  return rows;
-}
-
-std::vector<CellRow> aligned_by_images(const std::vector<Cell>& cells, const Brightness& reference,
-                                       const Alignment& alignment, int threads) {
-  std::vector<CellRow> rows(cells.size());
-  numerics::parallel_for(static_cast<int>(cells.size()), threads, [&](int k) {
-    const std::vector<ImageWay> found = ways_by_images(cells[k].image, reference, alignment.mirrors);
-    std::vector<Way> ways;
-    for (const ImageWay& way : found)
-      ways.push_back({way.motion, misfit_um(moved(cells[k].outline_um, way.motion), alignment.reference_um),
-                      way.shift_error_um, way.angle_error_rad});
-    CellRow& row = rows[k] = row_of(cells[k], ways.front());
-    for (std::size_t second = 1; second < ways.size(); ++second) {
-      if (are_equivalent(ways[second], ways.front(), alignment.motions)) continue;
-      row.second_misfit_um = ways[second].misfit_um;
-      row.is_ambiguous = correlate_equally(found.front(), found[second]);
-      break;
+      row.is_ambiguous = image ? correlate_equally(ways.front(), *second)
+                               : fit_equally(ways.front(), *second, size_um(alignment.reference_um));
     }
     judge(row, alignment);
   });

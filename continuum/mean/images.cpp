@@ -123,7 +123,7 @@ Step step_at(const Laid& image, const Raster& reference, Vec2 centre_um) {
   return step;
 }
 
-ImageWay refined(const Raster& image, const Raster& reference, Motion motion) {
+Way refined(const Raster& image, const Raster& reference, Motion motion) {
   constexpr int kMostSteps = 40;
   constexpr double kStill = 1e-3;  // pixels
   Step now = step_at(laid(image, reference, motion), reference, motion.to_um);
@@ -145,7 +145,7 @@ ImageWay refined(const Raster& image, const Raster& reference, Motion motion) {
     if (!is_better || moved < kStill * reference.pixel_um) break;
   }
   motion.angle_rad = std::remainder(motion.angle_rad, 2 * std::numbers::pi);
-  ImageWay way{.motion = motion, .correlation = now.correlation};
+  Way way{.motion = motion, .correlation = now.correlation};
   if (!(now.residual2 > 0)) return way;
   constexpr double kBlur = 16;  // pixels that share their noise after the blur: 4 pi s² and the interpolation's
   const Eigen::Matrix<double, 5, 5> covariance = kBlur * now.residual2 / now.n * now.matrix.inverse();
@@ -156,7 +156,7 @@ ImageWay refined(const Raster& image, const Raster& reference, Motion motion) {
 
 }  // namespace
 
-std::vector<ImageWay> ways_by_images(const Brightness& image, const Brightness& reference, Mirrors mirrors) {
+std::vector<Way> ways_by_images(const Brightness& image, const Brightness& reference, Mirrors mirrors) {
   const auto pixel = [&](int most_px) {
     const double longer = std::max(reference.width, reference.height) * reference.pixel_size_um;
     return std::max(reference.pixel_size_um, longer / most_px);
@@ -186,16 +186,16 @@ std::vector<ImageWay> ways_by_images(const Brightness& image, const Brightness& 
   std::ranges::stable_sort(starts, std::greater(), &Start::height);
   if (starts.size() > kWays) starts.resize(kWays);
   const Raster fine = raster_of(image, pixel(kFine_px)), fine_reference = raster_of(reference, pixel(kFine_px));
-  std::vector<ImageWay> ways;
+  std::vector<Way> ways;
   for (const Start& start : starts)
     ways.push_back(refined(fine, fine_reference, refined(coarse, coarse_reference, start.motion).motion));
-  std::ranges::stable_sort(ways, std::greater(), &ImageWay::correlation);
+  std::ranges::stable_sort(ways, std::greater(), &Way::correlation);
   return ways;
 }
 
-bool correlate_equally(const ImageWay& a, const ImageWay& b) {
+bool correlate_equally(const Way& a, const Way& b) {
   constexpr double kTenth = 1.1, kSeen = 1e-3;
-  const auto unexplained = [](const ImageWay& way) { return std::sqrt(std::max(kSeen * kSeen, 1 - way.correlation)); };
+  const auto unexplained = [](const Way& way) { return std::sqrt(std::max(kSeen * kSeen, 1 - way.correlation)); };
   return unexplained(b) < kTenth * unexplained(a);
 }
 

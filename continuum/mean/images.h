@@ -14,18 +14,13 @@ struct Brightness {
   std::vector<float> values;
 };
 
-struct ImageWay {
-  Motion motion;
-  double correlation = 0;  ///< of the two images where they overlap, 1 at best
-  double shift_error_um = 0, angle_error_rad = 0;
-};
-
-/// The ways that fit best, the best first. The image is laid onto the reference at 120 angles, each where their
-/// correlation is largest; from the largest of these, shift and angle are refined so that the difference of the images,
-/// up to gain and offset, is least. Source: Evangelidis, Psarakis, IEEE PAMI 30 (2008) 1858 (the measure).
-std::vector<ImageWay> ways_by_images(const Brightness& image, const Brightness& reference, Mirrors mirrors);
+/// The ways that fit best, the best first, without their outlines' misfit. The image is laid onto the reference at 120
+/// angles, each where their correlation is largest; from the largest of these, shift and angle are refined so that the
+/// difference of the images, up to gain and offset, is least. Source: Evangelidis, Psarakis, IEEE PAMI 30 (2008) 1858
+/// (the measure).
+std::vector<Way> ways_by_images(const Brightness& image, const Brightness& reference, Mirrors mirrors);
 
 /// As fit_equally, of what the correlation leaves unexplained.
-bool correlate_equally(const ImageWay& a, const ImageWay& b);
+bool correlate_equally(const Way& a, const Way& b);
 
 }  // namespace mbtfm::mean

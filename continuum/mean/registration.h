@@ -31,6 +31,7 @@ struct Way {
   Motion motion;
   double misfit_um = 0;  ///< root mean square distance, of each outline's points from the other
   double shift_error_um = 0, angle_error_rad = 0;  ///< from the misfit, as many independent parts as it has
+  double correlation = 0;                          ///< of two images where they overlap, 1 at best
 };
 
 /// Root mean square distance of each outline's points from the other.
