@@ -247,20 +247,11 @@ std::vector<CellRow> rows_of(stage::StageContext& context, const Parameters& p, 
 }
 
 Registered registered(const Cell& cell, const Way& way) {
-  Registered there{.beads = cell.beads,
-                   .gel = cell.gel,
-                   .motion = way.motion,
-                   .seen_low_um = cell.beads.front().position_um,
-                   .seen_high_um = cell.beads.front().position_um,
-                   .shift_error_um = way.shift_error_um,
-                   .angle_error_rad = way.angle_error_rad};
-  for (const Bead& bead : cell.beads) {
-    there.seen_low_um.x = std::min(there.seen_low_um.x, bead.position_um.x);
-    there.seen_low_um.y = std::min(there.seen_low_um.y, bead.position_um.y);
-    there.seen_high_um.x = std::max(there.seen_high_um.x, bead.position_um.x);
-    there.seen_high_um.y = std::max(there.seen_high_um.y, bead.position_um.y);
-  }
-  return there;
+  return {.beads = cell.beads,
+          .gel = cell.gel,
+          .motion = way.motion,
+          .shift_error_um = way.shift_error_um,
+          .angle_error_rad = way.angle_error_rad};
 }
 
 /// By cell that is kept.
@@ -314,7 +305,7 @@ std::function<Vec2(Vec2)> model_in(const Path& file) {
   const Vec2 low = patches.front().position_um, high = patches.back().position_um;
   const double spacing = (high.x - low.x) / static_cast<double>(n_columns - 1);
   for (GroundPatch& patch : patches) patch.area_um2 = spacing * spacing;
-  const CellField field(patches, {}, low, high);
+  const CellField field(patches, {}, {low, high});
   return [field](Vec2 place) { return field.at(place).value_or(Sample{}).traction_kPa; };
 }
 

@@ -36,8 +36,8 @@ struct Pulls {
 
 }  // namespace
 
-CellField::CellField(const std::vector<GroundPatch>& patches, const Motion& motion, Vec2 seen_low_um, Vec2 seen_high_um)
-    : motion_(motion), seen_low_um_(seen_low_um), seen_high_um_(seen_high_um), origin_um_(patches.at(0).position_um) {
+CellField::CellField(const std::vector<GroundPatch>& patches, const Motion& motion, const Extent& seen)
+    : motion_(motion), seen_(seen), origin_um_(patches.at(0).position_um) {
   spacing_um_ = std::sqrt(patches.front().area_um2);
   n_columns_ = 1;
   while (n_columns_ < std::ssize(patches) &&
@@ -49,10 +49,9 @@ CellField::CellField(const std::vector<GroundPatch>& patches, const Motion& moti
 }
 
 std::optional<Sample> CellField::at(Vec2 place_um) const {
-  const Vec2 seen = motion_.back_um(place_um);
-  if (seen.x < seen_low_um_.x || seen.y < seen_low_um_.y || seen.x > seen_high_um_.x || seen.y > seen_high_um_.y)
-    return std::nullopt;
-  const Vec2 at = (1 / spacing_um_) * (seen - origin_um_);
+  const Vec2 there = motion_.back_um(place_um), low = seen_.low_um, high = seen_.high_um;
+  if (there.x < low.x || there.y < low.y || there.x > high.x || there.y > high.y) return std::nullopt;
+  const Vec2 at = (1 / spacing_um_) * (there - origin_um_);
   const int column = static_cast<int>(std::floor(at.x)), row = static_cast<int>(std::floor(at.y));
   if (column < 0 || row < 0 || column >= n_columns_ || row >= n_rows_) return std::nullopt;
   const auto by_column = keys(at.x - column), by_row = keys(at.y - row);

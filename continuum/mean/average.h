@@ -7,6 +7,7 @@
 
 #include "continuum/mean/registration.h"
 #include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/extent.h"
 
 namespace mbtfm::mean {
 
@@ -22,8 +23,8 @@ class CellField {
  public:
   /// @param patches   of a lattice in the cell's own frame, rows first
   /// @param motion    from there to the reference
-  /// @param seen_low_um, seen_high_um  the rectangle of the beads in the cell's own frame
-  CellField(const std::vector<GroundPatch>& patches, const Motion& motion, Vec2 seen_low_um, Vec2 seen_high_um);
+  /// @param seen      of the beads in the cell's own frame
+  CellField(const std::vector<GroundPatch>& patches, const Motion& motion, const Extent& seen);
   /// None where the beads do not reach.
   std::optional<Sample> at(Vec2 place_um) const;
   /// The mean over the motions of a symmetric shape: at each place of what stands at all its equivalents.
@@ -31,7 +32,8 @@ class CellField {
 
  private:
   Motion motion_;
-  Vec2 seen_low_um_, seen_high_um_, origin_um_;
+  Extent seen_;
+  Vec2 origin_um_;
   double spacing_um_ = 0;
   int n_columns_ = 0, n_rows_ = 0;
   std::vector<Sample> nodes_;

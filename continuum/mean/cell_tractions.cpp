@@ -21,7 +21,7 @@ CellField solved(const tractions::LatticeProblem& problem, tractions::TikhonovSo
   const tractions::WaveField waves = solver.solution();
   return {tractions::patches_of(problem, tractions::tractions_kPa(problem, waves, parameters.read_out, 0),
                                 problem.displaced(waves)),
-          cell.motion, cell.seen_low_um, cell.seen_high_um};
+          cell.motion, extent_of(cell.beads, &Bead::position_um)};
 }
 
 }  // namespace

@@ -15,7 +15,6 @@ struct Registered {
   DisplacementField beads;
   Gel gel;
   Motion motion;
-  Vec2 seen_low_um, seen_high_um;  ///< the rectangle of its beads in its own frame
   double shift_error_um = 0, angle_error_rad = 0;
 };
 

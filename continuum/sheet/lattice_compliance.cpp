@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <ranges>
 
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 
@@ -28,13 +30,8 @@ std::array<double, kOrder> weights_at(double x) {
 
 /// Around all patches, with room for the polynomials; as fine as the middle patch.
 numerics::Lattice lattice_around(const Patches& patches) {
-  Vec2 low = patches.centre_um(0), high = low;
-  for (int i = 0; i < patches.n(); ++i)
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const Vec2 at = patches.at(i, p).place_um;
-      low = {std::min(low.x, at.x), std::min(low.y, at.y)};
-      high = {std::max(high.x, at.x), std::max(high.y, at.y)};
-    }
+  const auto place_um = [&](int k) { return patches.at(k / Elements::kPoints, k % Elements::kPoints).place_um; };
+  const auto [low, high] = extent_of(std::views::iota(0, patches.n() * Elements::kPoints), place_um);
   const Vec2 size = high - low;
   const double spacing =
       std::max(std::sqrt(numerics::median(patches.areas_um2)), std::sqrt(size.x * size.y / kMostNodes));

@@ -22,12 +22,7 @@ Extent rectangle_of(const substrate::Square& square) {
 
 /// @throws InvalidData where it is no rectangle along the axes
 Extent rectangle_of(const substrate::SurfaceMesh& mesh, const std::array<int, 4>& face) {
-  Extent r{mesh.points_um.at(face[0]), mesh.points_um.at(face[0])};
-  for (const int corner : face) {
-    const Vec2 p = mesh.points_um.at(corner);
-    r = {{std::min(r.low_um.x, p.x), std::min(r.low_um.y, p.y)},
-         {std::max(r.high_um.x, p.x), std::max(r.high_um.y, p.y)}};
-  }
+  const Extent r = extent_of(face, [&](int corner) { return mesh.points_um.at(corner); });
   const double size = std::max(r.high_um.x - r.low_um.x, r.high_um.y - r.low_um.y);
   const auto is_end = [size](double low, double high, double x) {
     return std::min(std::abs(x - low), std::abs(x - high)) <= 1e-9 * size;

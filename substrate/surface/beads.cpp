@@ -25,27 +25,22 @@ std::pair<Lattice, double> lattice_for(const std::vector<Vec3>& beads, const std
   if (beads.size() < kFewest) {
     throw InvalidData("beads in the gel", "at least " + std::to_string(kFewest), std::to_string(beads.size()));
   }
-  Vec2 low = {beads.front().x, beads.front().y}, high = low;
   std::vector<double> z_um;
   for (std::size_t i = 0; i < beads.size(); ++i) {
     if (!is_finite(beads[i]) || !std::isfinite(sigma[i]) || sigma[i] <= 0) {
       throw InvalidData("bead " + std::to_string(i), "finite numbers, and a standard error above 0", "others");
     }
-    low = {std::min(low.x, beads[i].x), std::min(low.y, beads[i].y)};
-    high = {std::max(high.x, beads[i].x), std::max(high.y, beads[i].y)};
     z_um.push_back(beads[i].z);
   }
-  const Vec2 size = high - low;
+  const Extent extent = mbtfm::extent_of(beads);
+  const Vec2 size = extent.high_um - extent.low_um;
   const double depth = numerics::quantile(z_um, 0.99) - numerics::quantile(z_um, 0.01);  // few may lie far off
   if (!(std::min({size.x, size.y, depth}) > 0)) {
     throw InvalidData("beads in the gel", "beads all over a volume", "all in one plane or line");
   }
   const double density = static_cast<double>(beads.size()) / (size.x * size.y * depth);
-  const double side = std::max(1.1 / std::cbrt(density), std::max(size.x, size.y) / 150);
-  const auto n = [&](double length) { return std::max(1, static_cast<int>(std::ceil(length / side))); };
   // no further than the beads: where none can be, nothing holds the surface
-  const int n_x = n(size.x), n_y = n(size.y);
-  return {{low, {size.x / n_x, size.y / n_y}, n_x, n_y}, density};
+  return {rectangles_over(extent, 1.1 / std::cbrt(density)), density};
 }
 
 /// Where no bead holds the surface it would sink without end. @throws InvalidData by place, where a rectangle and all

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <ranges>
 #include <string>
 #include <utility>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::surface {
@@ -34,22 +36,17 @@ double longest_plan_edge(const Corners& t) {
   return longest;
 }
 
-struct Extent {
-  Vec2 low_um, high_um;
-  double largest_um = 0;  ///< of all coordinates
-};
-
 Extent extent_of(const TriangleMesh& mesh) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Extent e{{kInfinity, kInfinity}, {-kInfinity, -kInfinity}};
-  for (const auto& triangle : mesh.triangles) {
-    for (const Vec3 p : corners_of(mesh, triangle)) {
-      e.low_um = {std::min(e.low_um.x, p.x), std::min(e.low_um.y, p.y)};
-      e.high_um = {std::max(e.high_um.x, p.x), std::max(e.high_um.y, p.y)};
-      e.largest_um = std::max({e.largest_um, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-    }
+  return mbtfm::extent_of(mesh.triangles | std::views::join, [&](int corner) { return mesh.points_um[corner]; });
+}
+
+double largest_coordinate_um(const TriangleMesh& mesh) {
+  double largest = 0;
+  for (const int corner : mesh.triangles | std::views::join) {
+    const Vec3 p = mesh.points_um[corner];
+    largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
   }
-  return e;
+  return largest;
 }
 
 HeightMap lattice_over(const Extent& extent, double spacing_um) {
@@ -138,9 +135,8 @@ class Sampler {
  public:
   Sampler(const TriangleMesh& mesh, double spacing_um)
       : mesh_(mesh),
-        extent_(extent_of(mesh)),
-        map_(lattice_over(extent_, spacing_um)),
-        reach_um_(extent_.largest_um * std::numeric_limits<float>::epsilon()),
+        map_(lattice_over(extent_of(mesh), spacing_um)),
+        reach_um_(largest_coordinate_um(mesh) * std::numeric_limits<float>::epsilon()),
         jump_um_(1e-3 * std::min(map_.spacing_um.x, map_.spacing_um.y) + 2 * reach_um_),
         hits_(map_.z_um.size()) {}
 
@@ -247,7 +243,6 @@ class Sampler {
   }
 
   const TriangleMesh& mesh_;
-  Extent extent_;
   HeightMap map_;
   double reach_um_;  ///< rounding of coordinates that were floats
   double jump_um_;   ///< what differs less is one height

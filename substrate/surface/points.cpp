@@ -20,13 +20,10 @@ Lattice lattice_over(const std::vector<Vec3>& points) {
   constexpr std::size_t kFewest = 16;
   if (points.size() < kFewest)
     throw InvalidData("points of the surface", "at least " + std::to_string(kFewest), std::to_string(points.size()));
-  Vec2 low = {points[0].x, points[0].y}, high = low;
   double xx = 0, xy = 0, yy = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vec3& p = points[i];
     if (!is_finite(p)) throw InvalidData("point " + std::to_string(i), "finite coordinates", "NaN or infinity");
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
     const Vec2 from = {p.x - points[0].x, p.y - points[0].y};
     xx += from.x * from.x;
     xy += from.x * from.y;
@@ -34,12 +31,8 @@ Lattice lattice_over(const std::vector<Vec3>& points) {
   }
   if (!(xx * yy - xy * xy > 1e-9 * xx * yy))
     throw InvalidData("points of the surface", "points all over it", "all on one line, seen from above");
-  const Vec2 size = high - low;
-  const double side =
-      std::max(std::sqrt(size.x * size.y / static_cast<double>(points.size())), std::max(size.x, size.y) / 150);
-  const auto n = [&](double length) { return std::max(1, static_cast<int>(std::ceil(length / side))); };
-  const int n_x = n(size.x), n_y = n(size.y);
-  return {low, {size.x / n_x, size.y / n_y}, n_x, n_y};
+  const Extent extent = mbtfm::extent_of(points);
+  return rectangles_over(extent, std::sqrt(extent.area_um2() / static_cast<double>(points.size())));
 }
 
 class PointFitter {

@@ -21,6 +21,14 @@ struct Spline {
 
 }  // namespace
 
+Lattice rectangles_over(const Extent& extent, double side_um) {
+  const Vec2 size = extent.high_um - extent.low_um;
+  const double side = std::max(side_um, std::max(size.x, size.y) / 150);
+  const auto n = [&](double length) { return std::max(1, static_cast<int>(std::ceil(length / side))); };
+  const int n_x = n(size.x), n_y = n(size.y);
+  return {extent.low_um, {size.x / n_x, size.y / n_y}, n_x, n_y};
+}
+
 std::array<int, 2> square_of(const Lattice& l, Vec2 at) {
   const Vec2 place = place_in(l, at);
   return {std::clamp(static_cast<int>(std::floor(place.x)), 0, l.n_x - 1),

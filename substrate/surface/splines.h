@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "pipeline/contract/geometry.h"
+#include "pipeline/contract/extent.h"
 #include "substrate/surface/band.h"
 
 namespace mbtfm::surface {
@@ -16,6 +16,9 @@ struct Lattice {
   int n_x = 1, n_y = 1;
   int n_splines() const { return (n_x + 3) * (n_y + 3); }
 };
+
+/// Nearly squares of this side, a 150th of the longer side of all at least.
+Lattice rectangles_over(const Extent& extent, double side_um);
 
 inline constexpr int kLocal = 16;  ///< splines over a rectangle
 
