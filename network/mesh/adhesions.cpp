@@ -27,14 +27,6 @@ Side side_of(Vec2 point, const std::vector<Adhesion>& others, const Boundary& bo
 
 }  // namespace
 
-bool covers(const Adhesion& adhesion, Vec2 point_um) {
-  const Vec2 offset = point_um - adhesion.position_um;
-  const Vec2 axis = {std::cos(adhesion.angle_rad), std::sin(adhesion.angle_rad)};
-  const double along = 2 * dot(offset, axis) / adhesion.major_axis_um;
-  const double across = 2 * cross(axis, offset) / adhesion.minor_axis_um;
-  return along * along + across * across <= 1;
-}
-
 std::pair<std::vector<Adhesion>, std::vector<int>> separated(std::vector<Adhesion> adhesions, const SizeField& size,
                                                              double distance) {
   std::vector<int> moved;

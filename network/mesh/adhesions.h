@@ -11,9 +11,6 @@
 
 namespace mbtfm::mesh {
 
-/// The adhesion's ellipse contains the point.
-bool covers(const Adhesion& adhesion, Vec2 point_um);
-
 /// Adhesions at the same place moved apart, so that each can hold a vertex; and the labels of those moved.
 /// @param distance  between centres, in wanted edge lengths
 std::pair<std::vector<Adhesion>, std::vector<int>> separated(std::vector<Adhesion> adhesions, const SizeField& size,

@@ -15,16 +15,24 @@ double area_stood_for_um2(const Adhesion& adhesion) {
   return adhesion.origin == AdhesionOrigin::candidate ? kCellOverDisc * adhesion.area_um2 : adhesion.area_um2;
 }
 
-Polygon ellipse_corners(const Adhesion& adhesion, int n_corners) {
+Polygon ellipse_corners(const Adhesion& adhesion, int n_corners, double margin_um) {
   const Vec2 along{std::cos(adhesion.angle_rad), std::sin(adhesion.angle_rad)};
   const Vec2 across{-along.y, along.x};
   Polygon corners;
   for (int i = 0; i < n_corners; ++i) {
     const double phi = 2 * std::numbers::pi * i / n_corners;
-    corners.push_back(adhesion.position_um + 0.5 * adhesion.major_axis_um * std::cos(phi) * along +
-                      0.5 * adhesion.minor_axis_um * std::sin(phi) * across);
+    corners.push_back(adhesion.position_um + (0.5 * adhesion.major_axis_um + margin_um) * std::cos(phi) * along +
+                      (0.5 * adhesion.minor_axis_um + margin_um) * std::sin(phi) * across);
   }
   return corners;
+}
+
+bool covers(const Adhesion& adhesion, Vec2 point_um, double margin_um) {
+  const Vec2 offset = point_um - adhesion.position_um;
+  const Vec2 axis = {std::cos(adhesion.angle_rad), std::sin(adhesion.angle_rad)};
+  const double along = dot(offset, axis) / (0.5 * adhesion.major_axis_um + margin_um);
+  const double across = cross(axis, offset) / (0.5 * adhesion.minor_axis_um + margin_um);
+  return along * along + across * across <= 1;
 }
 
 Cuts cuts_of(const Cell& cell) {

@@ -79,8 +79,10 @@ double distance_to_cut_um(const Cell& cell, Vec2 point);
 /// To the nearest ring of the outline, of a hole as of the cell.
 double distance_to_edge_um(const Cell& cell, Vec2 point);
 
-/// The ellipse of an adhesion as a polygon.
-Polygon ellipse_corners(const Adhesion& adhesion, int n_corners);
+/// The ellipse of an adhesion, each axis grown by the margin on either side, as a polygon.
+Polygon ellipse_corners(const Adhesion& adhesion, int n_corners, double margin_um = 0);
+/// Whether the point lies in that ellipse.
+bool covers(const Adhesion& adhesion, Vec2 point_um, double margin_um = 0);
 
 /// State what must hold of a value. @throws InvalidData naming the element and the finding.
 void check(const std::vector<Adhesion>& adhesions);

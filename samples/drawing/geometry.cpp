@@ -71,30 +71,12 @@ Polyline parabola(Vec2 a, Vec2 b, double sag_um, double spacing_um) {
   return resampled(fine, spacing_um);
 }
 
-Polygon ellipse_points(const Adhesion& a, double margin_um, int n_points) {
-  const Vec2 along = (0.5 * a.major_axis_um + margin_um) * direction(a.angle_rad);
-  const Vec2 across = (0.5 * a.minor_axis_um + margin_um) * left_of(direction(a.angle_rad));
-  Polygon points;
-  for (int i = 0; i < n_points; ++i) {
-    const double angle = 2 * std::numbers::pi * i / n_points;
-    points.push_back(a.position_um + std::cos(angle) * along + std::sin(angle) * across);
-  }
-  return points;
-}
-
-bool covers(const Adhesion& a, double margin_um, Vec2 point) {
-  const Vec2 axis = direction(a.angle_rad);
-  const Vec2 offset = point - a.position_um;
-  return std::hypot(dot(offset, axis) / (0.5 * a.major_axis_um + margin_um),
-                    cross(axis, offset) / (0.5 * a.minor_axis_um + margin_um)) <= 1;
-}
-
 bool too_near(const Adhesion& a, const Adhesion& b, double clearance_um) {
   const double reach = 0.5 * (a.major_axis_um + b.major_axis_um) + clearance_um;
   if (norm(a.position_um - b.position_um) > reach) return false;
   const auto is_covered = [&](const Adhesion& by, const Adhesion& other) {
-    if (covers(by, clearance_um, other.position_um)) return true;
-    return std::ranges::any_of(ellipse_points(other, 0), [&](Vec2 p) { return covers(by, clearance_um, p); });
+    if (covers(by, other.position_um, clearance_um)) return true;
+    return std::ranges::any_of(ellipse_corners(other, 24), [&](Vec2 p) { return covers(by, p, clearance_um); });
   };
   return is_covered(a, b) || is_covered(b, a);
 }

@@ -23,10 +23,6 @@ Vec2 tangent(const Polyline& line, std::size_t i);
 /// A parabola from `a` to `b` whose middle lies `sag_um` to the left of the chord.
 Polyline parabola(Vec2 a, Vec2 b, double sag_um, double spacing_um);
 
-/// Points on an adhesion's ellipse, each axis grown by `margin_um` on either side.
-Polygon ellipse_points(const Adhesion& adhesion, double margin_um, int n_points = 24);
-/// Is the point inside the ellipse grown by the margin?
-bool covers(const Adhesion& adhesion, double margin_um, Vec2 point);
 /// Do the ellipses come nearer than the clearance? (to the fineness of 24 points on each)
 bool too_near(const Adhesion& a, const Adhesion& b, double clearance_um);
 

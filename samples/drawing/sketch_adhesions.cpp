@@ -83,12 +83,12 @@ bool has_room(const Sketch& sketch, const Adhesion& adhesion) {
   }
   for (const Fibre& f : sketch.fibres) {
     const double margin = 0.5 * f.width_um + p.adhesion_clearance_um;
-    if (std::ranges::any_of(f.points_um, [&](Vec2 q) { return covers(adhesion, margin, q); })) return false;
+    if (std::ranges::any_of(f.points_um, [&](Vec2 q) { return covers(adhesion, q, margin); })) return false;
     const double end_margin = p.free_end_clearance_um;
-    if (!f.start_adhesion_id && covers(adhesion, end_margin, f.points_um.front())) return false;
-    if (!f.end_adhesion_id && covers(adhesion, end_margin, f.points_um.back())) return false;
+    if (!f.start_adhesion_id && covers(adhesion, f.points_um.front(), end_margin)) return false;
+    if (!f.end_adhesion_id && covers(adhesion, f.points_um.back(), end_margin)) return false;
   }
-  for (const Vec2 point : ellipse_points(adhesion, kRim_um)) {
+  for (const Vec2 point : ellipse_corners(adhesion, 24, kRim_um)) {
     if (!contains(sketch.outline_um, point)) return false;
   }
   return true;

@@ -65,12 +65,12 @@ bool fits(const Sketch& sketch, const Plan& plan) {
   for (const Adhesion& a : sketch.adhesions) {
     const bool is_own = plan.start.shared_id == a.adhesion_id || plan.end.shared_id == a.adhesion_id;
     const double margin = 0.5 * p.fibre_width_um + p.adhesion_clearance_um;
-    if (!is_own && std::ranges::any_of(plan.points_um, [&](Vec2 q) { return covers(a, margin, q); })) return false;
-    if (!plan.start.is_held() && covers(a, p.free_end_clearance_um, plan.points_um.front())) return false;
-    if (!plan.end.is_held() && covers(a, p.free_end_clearance_um, plan.points_um.back())) return false;
+    if (!is_own && std::ranges::any_of(plan.points_um, [&](Vec2 q) { return covers(a, q, margin); })) return false;
+    if (!plan.start.is_held() && covers(a, plan.points_um.front(), p.free_end_clearance_um)) return false;
+    if (!plan.end.is_held() && covers(a, plan.points_um.back(), p.free_end_clearance_um)) return false;
   }
   if (plan.start.fresh && !plan.end.is_held() &&
-      covers(*plan.start.fresh, p.free_end_clearance_um, plan.points_um.back()))
+      covers(*plan.start.fresh, plan.points_um.back(), p.free_end_clearance_um))
     return false;
   if (plan.start.fresh && plan.end.fresh && too_near(*plan.start.fresh, *plan.end.fresh, p.adhesion_clearance_um))
     return false;

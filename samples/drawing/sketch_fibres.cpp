@@ -56,13 +56,13 @@ bool collide(const Polyline& a, const Polyline& b, double spacing_um) {
 
 bool lies_on(const Sketch& sketch, const Polyline& points, const Adhesion& adhesion) {
   const double margin = 0.5 * sketch.parameters.fibre_width_um + sketch.parameters.adhesion_clearance_um;
-  return std::ranges::any_of(points, [&](Vec2 p) { return covers(adhesion, margin, p); });
+  return std::ranges::any_of(points, [&](Vec2 p) { return covers(adhesion, p, margin); });
 }
 
 bool is_free_end_near(const Sketch& sketch, const Proposal& proposal, const Adhesion& adhesion) {
   const double margin = sketch.parameters.free_end_clearance_um;
-  return (!proposal.start && covers(adhesion, margin, proposal.points_um.front())) ||
-         (!proposal.end && covers(adhesion, margin, proposal.points_um.back()));
+  return (!proposal.start && covers(adhesion, proposal.points_um.front(), margin)) ||
+         (!proposal.end && covers(adhesion, proposal.points_um.back(), margin));
 }
 
 bool fits(const Sketch& sketch, const Proposal& proposal, double spacing_um) {

@@ -31,7 +31,7 @@ void draw_line(Sketch& sketch) {
   spindle.position_um = sketch.centre_um;
   spindle.major_axis_um = 2 * reach;
   spindle.minor_axis_um = 2 * reach / p.elongation;
-  sketch.outline_um = resampled_closed(ellipse_points(spindle, 0, 720), kOutlineSpacing_um);
+  sketch.outline_um = resampled_closed(ellipse_corners(spindle, 720), kOutlineSpacing_um);
 }
 
 void draw_ring(Sketch& sketch) {
@@ -40,7 +40,7 @@ void draw_ring(Sketch& sketch) {
   Adhesion disc;
   disc.position_um = sketch.centre_um;
   disc.major_axis_um = disc.minor_axis_um = 2 * (radius + 2 * kSkirt_um);
-  sketch.outline_um = resampled_closed(ellipse_points(disc, 0, 720), kOutlineSpacing_um);
+  sketch.outline_um = resampled_closed(ellipse_corners(disc, 720), kOutlineSpacing_um);
   for (int i = 0; i < p.n_adhesions; ++i) {
     const Vec2 outward = direction(2 * std::numbers::pi * i / p.n_adhesions);
     Adhesion adhesion = regular_adhesion(p, sketch.centre_um + radius * outward, std::atan2(outward.y, outward.x));

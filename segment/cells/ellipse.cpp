@@ -60,17 +60,6 @@ Adhesion measure_ellipse(const std::vector<CoveredPixel>& pixels, double pixel_s
   return adhesion;
 }
 
-Polygon ellipse_polygon(const Adhesion& a, int n) {
-  Polygon polygon;
-  const Vec2 e{std::cos(a.angle_rad), std::sin(a.angle_rad)}, normal{-e.y, e.x};
-  for (int i = 0; i < n; ++i) {
-    const double t = 2 * std::numbers::pi * i / n;
-    polygon.push_back(a.position_um + (a.major_axis_um / 2 * std::cos(t)) * e +
-                      (a.minor_axis_um / 2 * std::sin(t)) * normal);
-  }
-  return polygon;
-}
-
 double distance_to_ellipse_um(const Adhesion& adhesion, Vec2 point_um) {
   const Vec2 p = along_axes(adhesion, point_um);
   const double a = adhesion.major_axis_um / 2, b = adhesion.minor_axis_um / 2;

@@ -25,9 +25,6 @@ struct CoveredPixel {
 /// @param pixels  at least one with a positive share
 Adhesion measure_ellipse(const std::vector<CoveredPixel>& pixels, double pixel_size_um);
 
-/// `adhesion` seen as a closed polygon of n points.
-Polygon ellipse_polygon(const Adhesion& adhesion, int n);
-
 /// Distance (um) from a point to the rim of the ellipse grown by nothing: negative inside. First order in the distance
 /// (the implicit function over its gradient), within a few per cent for points nearer than the minor axis.
 double distance_to_ellipse_um(const Adhesion& adhesion, Vec2 point_um);

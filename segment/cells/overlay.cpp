@@ -6,7 +6,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pipeline/contract/polyline.h"
-#include "segment/cells/ellipse.h"
 #include "segment/cells/grid.h"
 #include "segment/cells/palette.h"
 
@@ -162,7 +161,7 @@ void draw_labels(Canvas& canvas, const Cell& cell) {
   for (const Fibre& f : cell.fibres)
     canvas.label(label_places_um(f, cell.fibres, kClear_px * canvas.pixel_um()),
                  letter_of(f.type) + std::to_string(f.fibre_id), scalar(colour_of(f.type)), kFibreText);
-  for (const Adhesion& a : cell.adhesions) canvas.occupy(ellipse_polygon(a, 16));
+  for (const Adhesion& a : cell.adhesions) canvas.occupy(ellipse_corners(a, 16));
   std::vector<const Adhesion*> large_first;
   for (const Adhesion& a : cell.adhesions) {
     if (a.origin != AdhesionOrigin::candidate) large_first.push_back(&a);  // of a lattice numbers would hide the cell
@@ -259,7 +258,7 @@ void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
   for (const Polygon& hole : cell.holes_um) canvas.line(hole, true, scalar(kOutlineColour), thickness);
   constexpr double kRingDash_px = 7, kFibreDash_px = 22;
   for (const Adhesion& a : cell.adhesions) {
-    const Polygon ring = ellipse_polygon(a, 32);
+    const Polygon ring = ellipse_corners(a, 32);
     if (is_assumed(a.origin))
       canvas.dashed_line(ring, true, scalar(kAdhesionColour), a.origin == AdhesionOrigin::anchor ? thickness : 1,
                          kRingDash_px);

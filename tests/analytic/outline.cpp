@@ -35,7 +35,7 @@ TEST(Outline, lies_on_a_blurred_step) {
     const Polygon outline = find_outline(drawn_disc(noise, 1), {}, kPixel_um, {});
     ASSERT_GE(outline.size(), 8u);
     EXPECT_NEAR(mean_offset_um(outline, kDisc), 0, 0.05);
-    EXPECT_GT(intersection_over_union(outline, ellipse_polygon(kDisc, 200)), 0.98);
+    EXPECT_GT(intersection_over_union(outline, ellipse_corners(kDisc, 200)), 0.98);
   }
 }
 
@@ -43,12 +43,12 @@ TEST(Outline, lies_in_the_middle_of_a_cortex_that_the_microscope_cannot_resolve)
   for (const double width_um : {0.35, 0.6}) {
     SCOPED_TRACE(width_um);
     images::Image image = drawn_disc(5, 2);
-    Polyline edge = ellipse_polygon(kDisc, 100);
+    Polyline edge = ellipse_corners(kDisc, 100);
     edge.push_back(edge.front());
     draw_line(image, edge, 300, width_um, kPixel_um);
     const Polygon outline = find_outline(image, {}, kPixel_um, {});
     EXPECT_NEAR(mean_offset_um(outline, kDisc), 0, 0.1);  // its half-height is 0.2 and 0.3 um further out
-    EXPECT_GT(intersection_over_union(outline, ellipse_polygon(kDisc, 200)), 0.98);
+    EXPECT_GT(intersection_over_union(outline, ellipse_corners(kDisc, 200)), 0.98);
   }
 }
 
@@ -65,7 +65,7 @@ TEST(Outline, lies_on_the_edge_of_a_cell_and_not_of_its_haze) {
     const Polygon outline = find_outline(image, {}, kPixel_um, {});
     // the step of the mask's grid, and what the median of a curved cell lacks of its plateau
     EXPECT_NEAR(mean_offset_um(outline, cell), 0, 0.5);
-    EXPECT_GT(intersection_over_union(outline, ellipse_polygon(cell, 200)), 0.93);
+    EXPECT_GT(intersection_over_union(outline, ellipse_corners(cell, 200)), 0.93);
   }
 }
 
@@ -76,7 +76,7 @@ TEST(Outline, keeps_a_dim_lamella_whose_edge_is_sharp) {
   draw_ellipse(image, body, 200, 0.5, kPixel_um);  // three times as bright
   add_noise(image, 5, 7);
   const Polygon outline = find_outline(image, {}, kPixel_um, {});
-  EXPECT_GT(intersection_over_union(outline, ellipse_polygon(lamella, 200)), 0.95);  // 0.75 is the body
+  EXPECT_GT(intersection_over_union(outline, ellipse_corners(lamella, 200)), 0.95);  // 0.75 is the body
 }
 
 TEST(Outline, of_a_real_doublet_is_its_authors_outline) {
@@ -112,7 +112,7 @@ TEST(Outline, tells_how_far_each_adhesion_lies_beyond_what_the_image_shows) {
 TEST(Outline, the_share_of_one_that_lies_beyond_others_is_that_of_rings_and_of_what_is_apart) {
   const auto disc = [](Vec2 middle_um, double radius_um) {
     CellOutline cell;
-    cell.outer_um = ellipse_polygon(ellipse(1, middle_um, 2 * radius_um, 2 * radius_um, 0), 400);
+    cell.outer_um = ellipse_corners(ellipse(1, middle_um, 2 * radius_um, 2 * radius_um, 0), 400);
     return cell;
   };
   const CellOutline one = disc({20, 20}, 12);
@@ -132,7 +132,7 @@ TEST(Outline, a_gap_as_dark_as_outside_is_a_hole_and_what_lies_in_it_is_not_in_t
   const auto cells = find_cells(image, {}, kPixel_um, {}).cells;
   ASSERT_EQ(cells.size(), 1u);
   ASSERT_EQ(cells[0].holes_um.size(), 1u);
-  EXPECT_GT(intersection_over_union(cells[0].holes_um[0], ellipse_polygon(gap, 100)), 0.9);
+  EXPECT_GT(intersection_over_union(cells[0].holes_um[0], ellipse_corners(gap, 100)), 0.9);
   EXPECT_NEAR(cells[0].area_um2, kDisc.area_um2 - gap.area_um2, 0.02 * kDisc.area_um2);
   const auto kept = inside(cells[0], {ellipse(1, {21, 19}, 1, 0.5, 0), ellipse(2, {13, 19}, 1, 0.5, 0)});
   ASSERT_EQ(kept.size(), 1u);
@@ -155,8 +155,8 @@ TEST(Outline, several_cells_come_by_area_and_the_border_cuts_one) {
   add_noise(image, 10, 5);
   const auto cells = find_cells(image, {}, kPixel_um, {}).cells;
   ASSERT_EQ(cells.size(), 3u);
-  EXPECT_GT(intersection_over_union(cells[0].outer_um, ellipse_polygon(large, 200)), 0.98);
-  EXPECT_GT(intersection_over_union(cells[1].outer_um, ellipse_polygon(small, 200)), 0.97);
+  EXPECT_GT(intersection_over_union(cells[0].outer_um, ellipse_corners(large, 200)), 0.98);
+  EXPECT_GT(intersection_over_union(cells[1].outer_um, ellipse_corners(small, 200)), 0.97);
   EXPECT_FALSE(cells[0].is_cut_by_border());
   EXPECT_FALSE(cells[1].is_cut_by_border());
   EXPECT_TRUE(cells[2].is_cut_by_border());

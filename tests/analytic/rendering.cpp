@@ -120,7 +120,7 @@ TEST(AdhesionImage, has_half_its_brightness_on_the_ellipse) {
   drawing::add_ellipse(image, ellipse, 1, 0.06, 0);
   // the rim of the dome is 0.8 bright, half of that on the ellipse; a pixel's centre lies up to 0.018 um off it,
   // where a rim of 0.06 um changes by 0.018 / (0.06 sqrt(2 pi)) = 0.12
-  for (const Vec2 p : drawing::ellipse_points(ellipse, 0)) {
+  for (const Vec2 p : ellipse_corners(ellipse, 24)) {
     const int column = static_cast<int>(p.x / *image.pixel_size_um), row = static_cast<int>(p.y / *image.pixel_size_um);
     EXPECT_NEAR(image.at(column, row), 0.4, 0.12);
   }

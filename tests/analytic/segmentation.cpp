@@ -17,7 +17,7 @@ TEST(Segmentation, the_edge_of_a_cell_is_its_outline_and_no_fibre) {
   const Polygon outline = find_outline(image, {}, 0.1, OutlineParameters{});
   ASSERT_GE(outline.size(), 8u);
   // an error of half a pixel all around (57 um) would be 2.8 um² of 251
-  EXPECT_GT(intersection_over_union(outline, ellipse_polygon(cell, 200)), 0.97);
+  EXPECT_GT(intersection_over_union(outline, ellipse_corners(cell, 200)), 0.97);
   for (const Fibre& f : find_fibres(image, outline, {}, 0.1, FibreParameters{})) EXPECT_LT(f.confidence, 0.5);
 }
 

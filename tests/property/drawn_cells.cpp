@@ -57,7 +57,7 @@ TEST(DrawnCell, keeps_adhesions_inside_the_outline_and_apart) {
     const Cell& cell = cell_of_seed(seed).cell;
     EXPECT_GT(signed_area_um2(cell.outline_um), 0) << "the outline turns the wrong way";
     for (std::size_t i = 0; i < cell.adhesions.size(); ++i) {
-      for (const Vec2 point : drawing::ellipse_points(cell.adhesions[i], 0))
+      for (const Vec2 point : ellipse_corners(cell.adhesions[i], 24))
         EXPECT_TRUE(contains(cell.outline_um, point)) << "adhesion " << cell.adhesions[i].adhesion_id;
       for (std::size_t j = 0; j < i; ++j)
         EXPECT_FALSE(drawing::too_near(cell.adhesions[i], cell.adhesions[j], p.adhesion_clearance_um))
@@ -85,7 +85,7 @@ TEST(DrawnCell, types_fibres_by_the_adhesions_at_their_ends) {
           if (id == a.adhesion_id) {
             EXPECT_LT(norm(a.position_um - end), 1e-9) << "fibre " << f.fibre_id;
           } else if (!id) {
-            EXPECT_FALSE(drawing::covers(a, p.free_end_clearance_um - 1e-9, end)) << "fibre " << f.fibre_id;
+            EXPECT_FALSE(covers(a, end, p.free_end_clearance_um - 1e-9)) << "fibre " << f.fibre_id;
           }
       }
     }

@@ -1,7 +1,6 @@
 #include "segment/cells/hand_drawn.h"
 #include "pipeline/contract/errors.h"
 #include "segment/cells/cell_rois.h"
-#include "segment/cells/ellipse.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/test.h"
@@ -58,7 +57,7 @@ TEST(HandDrawn, a_polygon_has_the_ellipse_of_its_second_moments) {
 
 TEST(HandDrawn, a_polygon_around_an_ellipse_has_this_ellipse) {
   const Adhesion truth = test::ellipse(1, {12, 7}, 2.4, 0.9, 0.8);
-  const Adhesion a = ellipse_of_polygon(ellipse_polygon(truth, 400));
+  const Adhesion a = ellipse_of_polygon(ellipse_corners(truth, 400));
   EXPECT_NEAR(a.area_um2, truth.area_um2, 1e-4 * truth.area_um2);  // 400 corners lack 4e-5
   EXPECT_NEAR(a.major_axis_um, truth.major_axis_um, 1e-4 * truth.major_axis_um);
   EXPECT_NEAR(a.angle_rad, truth.angle_rad, 1e-9);

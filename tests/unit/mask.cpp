@@ -130,7 +130,7 @@ TEST(Mask, a_cell_at_the_border_is_cut_there_and_nowhere_else) {
 TEST(Mask, an_adhesion_has_the_moments_of_its_pixels) {
   images::Image image = empty();
   const Adhesion truth = test::ellipse(1, {12, 9}, 4, 2, 0.7);
-  paint(image, 3, [&](double x, double y) { return contains(ellipse_polygon(truth, 200), kPixel_um * Vec2{x, y}); });
+  paint(image, 3, [&](double x, double y) { return contains(ellipse_corners(truth, 200), kPixel_um * Vec2{x, y}); });
   paint_disc(image, 9, {50, 200}, 6);
   const LabelMask m = mask(image);
   const auto found = mask_adhesions(m, std::nullopt, kMaskField);
