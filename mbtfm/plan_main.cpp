@@ -5,7 +5,6 @@
 #include "mbtfm/plan/space_page.h"
 #include "mbtfm/plan/tables.h"
 #include "pipeline/contract/counted.h"
-#include "pipeline/contract/numbers.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/stage.h"

@@ -39,7 +39,6 @@
 
 namespace {
 
-namespace fs = std::filesystem;
 using namespace mbtfm;
 
 using namespace exit_code;

@@ -7,7 +7,6 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 
 #include "pipeline/numerics/dense.h"
 

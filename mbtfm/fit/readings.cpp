@@ -10,7 +10,6 @@
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/extent.h"
-#include "pipeline/contract/findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/neighbour_bins.h"
 #include "substrate/response.h"

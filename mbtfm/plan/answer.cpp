@@ -1,10 +1,8 @@
 #include "mbtfm/plan/answer.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "pipeline/contract/listed.h"
-#include "pipeline/contract/numbers.h"
 
 namespace mbtfm::plan {
 

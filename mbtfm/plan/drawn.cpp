@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "mbtfm/fit/networks.h"
-#include "mbtfm/plan/experiment.h"
 #include "mbtfm/plan/grid.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"

@@ -1,7 +1,6 @@
 /// Experiments drawn to check what the plan says of them.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "mbtfm/plan/experiment.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "pipeline/contract/numbers.h"
 #include "pipeline/contract/version.h"
 
 namespace mbtfm::plan {

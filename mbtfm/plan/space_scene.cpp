@@ -1,7 +1,6 @@
 #include "mbtfm/plan/space_scene.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "continuum/sheet/parameters.h"

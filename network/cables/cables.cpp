@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 #include <set>
-#include <string>
 
 #include "network/cables/cable_energy.h"
 #include "network/cables/minimise.h"

@@ -1,7 +1,6 @@
 #include "network/cables/effects.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"

@@ -5,7 +5,6 @@
 #include <limits>
 #include <map>
 #include <set>
-#include <string>
 #include <tuple>
 
 #include "network/mesh/adhesions.h"

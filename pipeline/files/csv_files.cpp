@@ -6,9 +6,7 @@
 #include <utility>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/named_array.h"
 #include "pipeline/files/tables.h"
 
 namespace mbtfm::files {

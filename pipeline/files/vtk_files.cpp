@@ -18,7 +18,6 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/files/named_array.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_errors.h"
 #include "pipeline/files/vtk_files.h"

@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-
 #include "pipeline/charts/chart.h"
 #include "pipeline/charts/colour_map.h"
 

@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <regex>
-#include <string>
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/stage_state.h"

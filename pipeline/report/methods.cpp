@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <set>
-#include <string>
 
 #include "pipeline/contract/polyline.h"
 #include "pipeline/report/page.h"

@@ -31,7 +31,7 @@ namespace {
 
 /// A file of the cell as it lies in its folder.
 Download file_of(const CellResults& results, const std::string& file) {
-  const std::filesystem::path path = results.folder / file;
+  const fs::path path = results.folder / file;
   return {results.name + "_" + path.filename().string(), files::read_text(path)};
 }
 
@@ -184,8 +184,7 @@ namespace {
 
 /// Of the program's version and all that the report shows: the outputs of the stages, the truth, cell.toml, and which
 /// preset or accuracy was asked for.
-std::string fingerprint(const std::filesystem::path& cell) {
-  namespace fs = std::filesystem;
+std::string fingerprint(const fs::path& cell) {
   std::vector<fs::path> files = {cell / "cell.toml"};
   for (const char* folder :
        {"1_segment", "2_track", "3_network", "4_fit", "3_surface", "4_traction", "3_sheet", "truth"}) {
@@ -206,9 +205,9 @@ std::string fingerprint(const std::filesystem::path& cell) {
 
 }  // namespace
 
-CellKind kind_of(const std::filesystem::path& cell) { return read_provenance(cell / "run.json").kind; }
+CellKind kind_of(const fs::path& cell) { return read_provenance(cell / "run.json").kind; }
 
-bool has_results(const std::filesystem::path& cell) {
+bool has_results(const fs::path& cell) {
   switch (kind_of(cell)) {
     case CellKind::plane:
       return files::is_own_file(cell / "4_fit/fit.json");
@@ -220,7 +219,7 @@ bool has_results(const std::filesystem::path& cell) {
   throw InternalError("unknown kind of cell");
 }
 
-std::string report_html(const std::filesystem::path& cell) {
+std::string report_html(const fs::path& cell) {
   const Provenance provenance = read_provenance(cell / "run.json");
   if (provenance.kind == CellKind::space) return report_in_space(cell);
   if (provenance.kind == CellKind::sheet) return report_of_sheet(cell);
@@ -241,14 +240,14 @@ std::string report_html(const std::filesystem::path& cell) {
   return page(results.name + " – mbtfm", head, body);
 }
 
-void update_report(const std::filesystem::path& cell) {
+void update_report(const fs::path& cell) {
   files::check_cell_folder(cell);
   if (const CellKind kind = kind_of(cell); kind != CellKind::sheet) {  // ParaView shows 3_sheet/sheet.vtu as it is
-    const std::filesystem::path script = cell / "view_in_paraview.py";
+    const fs::path script = cell / "view_in_paraview.py";
     const std::string view(kind == CellKind::space ? kParaviewScriptInSpace : kParaviewScript);
     if (!files::is_own_text(script) || files::read_text(script) != view) files::write_whole(script, view);
   }
-  const std::filesystem::path file = cell / "report.html";
+  const fs::path file = cell / "report.html";
   const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
   if (files::is_own_text(file) && files::read_text(file).ends_with(signature)) return;
   files::write_whole(file, report_html(cell) + signature);

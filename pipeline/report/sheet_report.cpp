@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "pipeline/contract/version.h"
 #include "pipeline/files/json.h"

@@ -9,7 +9,6 @@
 #include "pipeline/contract/extent.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/arrows.h"
-#include "pipeline/report/colours.h"
 #include "pipeline/report/numbers.h"
 
 namespace mbtfm::report {

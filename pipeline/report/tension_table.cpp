@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/numbers.h"

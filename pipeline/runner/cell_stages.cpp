@@ -8,7 +8,6 @@
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 namespace {
 
 constexpr const char *kDisplacement = "2_track/displacement_3d.csv", *kSurfaceBeads = "2_track/surface_beads.csv",

@@ -13,7 +13,6 @@
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kCell = "{cell}";

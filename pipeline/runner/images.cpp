@@ -11,7 +11,6 @@
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 
 namespace {
 

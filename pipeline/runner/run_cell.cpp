@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <exception>
-#include <iomanip>
 #include <mutex>
-#include <sstream>
-#include <string>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/own_files.h"
@@ -20,7 +17,6 @@
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 namespace {
 
 bool contains_name(const std::vector<std::string>& names, const std::string& name) {

@@ -16,7 +16,6 @@
 #include "pipeline/runner/run_cell.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 namespace {

@@ -18,7 +18,6 @@
 #include "pipeline/runner/run_record.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 namespace {

@@ -1,6 +1,5 @@
 #include "pipeline/stage/parameters.h"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -9,7 +8,6 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/contract/range.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
 #include "pipeline/stage/effects.h"

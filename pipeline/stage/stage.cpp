@@ -28,8 +28,6 @@
 
 namespace mbtfm::stage {
 
-namespace fs = std::filesystem;
-
 namespace {
 
 using namespace exit_code;

@@ -1,7 +1,6 @@
 #include "pipeline/statistics/conditions.h"
 
 #include <algorithm>
-#include <map>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"

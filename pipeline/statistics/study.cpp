@@ -7,7 +7,6 @@
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/findings.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"

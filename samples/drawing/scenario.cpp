@@ -8,8 +8,6 @@
 
 namespace mbtfm::drawing {
 
-namespace fs = std::filesystem;
-
 namespace {
 
 constexpr int kMostBeads = 10'000'000;

@@ -1,6 +1,5 @@
 #include "segment/cells/outline.h"
 
-#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 

@@ -1,7 +1,6 @@
 #include "segment/cells/segment_cell.h"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 
 #include "pipeline/contract/counted.h"

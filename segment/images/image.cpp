@@ -2,7 +2,6 @@
 
 #include <array>
 #include <fstream>
-#include <string>
 #include <string_view>
 #include <system_error>
 

@@ -4,8 +4,6 @@
 
 #include <cstdio>
 #include <cstring>
-#include <memory>
-#include <string>
 
 #include "pipeline/contract/errors.h"
 #include "segment/images/file_handle.h"

@@ -4,7 +4,6 @@
 /// names its pair of adhesions among as many rows as were taken out, the tension it states there and its standard
 /// error, and the open findings.
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
