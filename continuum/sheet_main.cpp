@@ -136,11 +136,10 @@ std::vector<Polygon> adhesive_area(const Parameters& p, stage::StageContext& con
 Region with_borders_of(Region region, const std::vector<Polygon>& adhesive_um) {
   constexpr double kClear_um = 0.1;  // nearer to the rim a border would ask for slivers
   const Polygon& rim = region.rims.front().points_um();
-  for (const Polygon& border : adhesive_um) {
+  for (const Polygon& border : adhesive_um)
     if (std::ranges::all_of(border,
                             [&](Vec2 p) { return contains(rim, p) && distance_to_boundary_um(rim, p) > kClear_um; }))
       region.lines.emplace_back(border);
-  }
   return region;
 }
 
@@ -149,6 +148,14 @@ CellLabels read_labels(const Path& file, const std::optional<double>& pixel_um) 
   constexpr int kWidestLine_px = 15;
   const cells::LabelMask mask = cells::with_parts_labelled(cells::read_mask(file));
   return with_lines_filled({mask.width, mask.height, *pixel_um, mask.labels}, kWidestLine_px);
+}
+
+/// 0 outside of the image, too.
+int label_at(const CellLabels& cells, Vec2 place) {
+  const int column = static_cast<int>(std::floor(place.x / cells.pixel_um)),
+            row = static_cast<int>(std::floor(place.y / cells.pixel_um));
+  const bool is_seen = column >= 0 && row >= 0 && column < cells.width && row < cells.height;
+  return is_seen ? cells.at(column, row) : 0;
 }
 
 /// Contraction by cell of the label image; of what has no label, the sheet's own.
@@ -169,10 +176,7 @@ std::function<double(Vec2)> contraction_by_cell(const Parameters& p, stage::Stag
       throw InputError(file.string(), "a row for each cell of the label image", "none of cell " + std::to_string(label),
                        "add it, or give contraction_nN_per_um of all other cells");
   return [=](Vec2 place) {
-    const int column = static_cast<int>(std::floor(place.x / cells->pixel_um)),
-              row = static_cast<int>(std::floor(place.y / cells->pixel_um));
-    const bool is_seen = column >= 0 && row >= 0 && column < cells->width && row < cells->height;
-    const auto found = by_cell.find(is_seen ? cells->at(column, row) : 0);
+    const auto found = by_cell.find(label_at(*cells, place));
     return found == by_cell.end() ? rest : found->second;
   };
 }
@@ -507,11 +511,8 @@ DisplacementField read_beads(stage::StageContext& context) {
   DisplacementField beads = files::read_displacement(context.input("displacement"));
   std::erase_if(beads, [](const Bead& bead) { return !bead.flag.empty(); });
   context.expect_plausible("beads_per_um2", beads_per_um2(beads));
-  if (std::ranges::all_of(beads, [](const Bead& b) { return b.sigma_um > 0; })) return beads;
-  const std::optional<double> sigma_um = tractions::noise_from_neighbours_um(beads);
-  const bool is_found = sigma_um && *sigma_um > 0;  // a computed field has none
-  for (Bead& bead : beads) bead.sigma_um = is_found ? *sigma_um : 0;
-  if (is_found) context.assumed.push_back(stage::assumed_noise(*sigma_um));
+  if (const auto sigma_um = tractions::assume_noise_um(beads))
+    context.assumed.push_back(stage::assumed_noise(*sigma_um));
   return beads;
 }
 
@@ -595,17 +596,11 @@ std::vector<Part> parts_of_cells(const Parameters& p, stage::StageContext& conte
   if (labels.size() > kMost)
     throw InputError(context.input("cells").string(), "at most 30 cells with contractions of their own",
                      std::to_string(labels.size()), "join cells, or take fit_parts = edge");
-  const auto label_at = [cells](Vec2 place) {
-    const int column = static_cast<int>(std::floor(place.x / cells->pixel_um)),
-              row = static_cast<int>(std::floor(place.y / cells->pixel_um));
-    const bool is_seen = column >= 0 && row >= 0 && column < cells->width && row < cells->height;
-    return is_seen ? cells->at(column, row) : 0;
-  };
   std::vector<Part> parts;
   for (const int label : labels)
     parts.push_back(
-        {"cell " + std::to_string(label), [=](Vec2 place) { return label_at(place) == label ? 1.0 : 0.0; }});
-  parts.push_back({"no cell", [=](Vec2 place) { return label_at(place) == 0 ? 1.0 : 0.0; }});
+        {"cell " + std::to_string(label), [=](Vec2 place) { return label_at(*cells, place) == label ? 1.0 : 0.0; }});
+  parts.push_back({"no cell", [=](Vec2 place) { return label_at(*cells, place) == 0 ? 1.0 : 0.0; }});
   return parts;
 }
 
@@ -682,13 +677,11 @@ sheets::Question question_of(const Parameters& p, stage::StageContext& context, 
 std::string told_by(const sheets::SheetFit& fit) {
   std::string told;
   std::vector<double> bundles_nN;
-  for (const SheetEstimate& e : fit.estimates) {
-    if (e.quantity == sheets::Quantity::bundle_tension) {
+  for (const SheetEstimate& e : fit.estimates)
+    if (e.quantity == sheets::Quantity::bundle_tension)
       bundles_nN.push_back(e.value);
-    } else {
+    else
       told += (told.empty() ? "" : "; ") + sentence_of(e);
-    }
-  }
   if (bundles_nN.empty()) return told;
   const auto [least, most] = std::ranges::minmax(bundles_nN);  // sheet_fit.csv has each
   return told +
