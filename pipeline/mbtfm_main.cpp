@@ -406,9 +406,8 @@ int start(int argc, char** argv) {
   add_stage_options(run_command, line);
   run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
   run_command->add_flag("--explain", line.explain, "fit again and say what each effect that is off would change");
-  for (CLI::App* command : {run_command, demo_command}) {
+  for (CLI::App* command : {run_command, demo_command})
     command->add_flag("--verbose", line.is_verbose, "print every effect with its number, and why a stage is run");
-  }
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", kFolder);
   for (CLI::App* command : {run_command, batch_command})
     command->add_flag("--json", line.is_json, "print events as JSON, one object a line (docs/formats.md)");

@@ -117,10 +117,9 @@ std::vector<Vec2> lattice_over(const Polygon& reference_um, double margin_um, do
     return static_cast<int>(std::ceil((to - from + margin_um) / spacing_um));
   };
   std::vector<Vec2> nodes;
-  for (int j = -reach(low.y, middle.y); j <= reach(middle.y, high.y); ++j) {
+  for (int j = -reach(low.y, middle.y); j <= reach(middle.y, high.y); ++j)
     for (int i = -reach(low.x, middle.x); i <= reach(middle.x, high.x); ++i)
       nodes.push_back(middle + spacing_um * Vec2{static_cast<double>(i), static_cast<double>(j)});
-  }
   return nodes;
 }
 
@@ -130,7 +129,8 @@ std::vector<Vec2> tips_of(const Polygon& reference_um) {
   const Vec2 centre = centroid_um(reference_um);
   const double size = size_um(reference_um);
   std::vector<Vec2> far = reference_um;
-  std::erase_if(far, [&](Vec2 p) { return norm(p - centre) < kReachesOut * size; });
+  std::erase_if(
+      far, [&](Vec2 p) { return norm(p - centre) < kReachesOut * size; });
   std::ranges::stable_sort(far, std::greater(), [&](Vec2 p) { return norm(p - centre); });
   std::vector<Vec2> tips;
   for (const Vec2 p : far) {

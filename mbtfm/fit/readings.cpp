@@ -192,12 +192,10 @@ Reading best_smoothing(const LinearData& data, const Eigen::MatrixXd& force_deri
   };
   Best best(left_by(fields));
   // a field that was smoothed widely is nearer to one smoothed a little than to none
-  for (const double sigma_um : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0}) {
+  for (const double sigma_um : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0})
     if (!best.consider("once it is smoothed, too, over " + brief(2 * sigma_um) + " um",
-                       left_by(smoothed(fields, data.position_um, sigma_um)))) {
+                       left_by(smoothed(fields, data.position_um, sigma_um))))
       break;
-    }
-  }
   return best.reading;
 }
 

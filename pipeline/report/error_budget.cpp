@@ -16,9 +16,8 @@ namespace {
 
 BudgetLine line_of(const files::JsonRecord& record, const char* value) {
   BudgetLine line{.value_nN = record.at(value).number(), .total_nN = record.at("total_nN").number()};
-  for (const auto& [source, part] : record.at("parts_nN").members()) {
+  for (const auto& [source, part] : record.at("parts_nN").members())
     line.parts_nN.emplace_back(source, part.json().is_null() ? std::nullopt : std::optional(part.number()));
-  }
   return line;
 }
 
@@ -68,10 +67,9 @@ charts::Chart chart_of(const std::vector<BudgetLine>& lines) {
       from_nN = to_nN;
     }
   }
-  if (!lines.empty()) {
+  if (!lines.empty())
     for (std::size_t k = 0; k < lines.front().parts_nN.size(); ++k)
       chart.key(lines.front().parts_nN[k].first, colour(k));
-  }
   return chart;
 }
 

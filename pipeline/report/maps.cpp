@@ -119,9 +119,8 @@ void draw_fibre_ids(Chart& map, const CellResults& results) {
 ColourScale tension_scale(const CellResults& results, NetworkForm form) {
   ColourScale scale{
       .low = 0, .high = 0, .label = form == NetworkForm::original ? "fitted tension (nN)" : "force carried (nN)"};
-  for (const auto& [id, tension] : results.tensions) {
+  for (const auto& [id, tension] : results.tensions)
     if (id != 0) scale.high = std::max(scale.high, tension.tension_nN);
-  }
   scale.high = round_end(scale.high);
   return scale;
 }
@@ -136,15 +135,18 @@ constexpr const char* kHalo = "stroke:#fff;stroke-width:7;stroke-linecap:round";
 constexpr const char* kThick = "stroke-width:3;stroke-linecap:round;stroke:";
 
 bool has_edge_fibres(const Cell& cell) {
-  return std::ranges::any_of(cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; });
+  return std::ranges::any_of(
+      cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; });
 }
 
 bool has_origin(const Cell& cell, AdhesionOrigin origin) {
-  return std::ranges::any_of(cell.adhesions, [&](const Adhesion& a) { return a.origin == origin; });
+  return std::ranges::any_of(
+      cell.adhesions, [&](const Adhesion& a) { return a.origin == origin; });
 }
 
 bool are_all_candidates(const Cell& cell) {
-  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
+  return std::ranges::all_of(
+      cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
 }
 
 Figure original_network(const CellResults& results) {

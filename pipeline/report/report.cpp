@@ -83,7 +83,8 @@ std::string adhesion_section(const CellResults& results) {
              number("traction (kPa)"), number("area (µm²)"), number("x (µm)"), number("y (µm)"), "fibre ends on it"},
             {},
             "Forces of the adhesions"};
-  const bool has_assumed = std::ranges::any_of(by_id, [](const auto& a) { return is_assumed(a.second->origin); });
+  const bool has_assumed = std::ranges::any_of(
+      by_id, [](const auto& a) { return is_assumed(a.second->origin); });
   const bool are_candidates =
       std::ranges::any_of(by_id, [](const auto& a) { return a.second->origin == AdhesionOrigin::candidate; });
   if (has_assumed) all.columns.push_back("seen");
@@ -189,17 +190,15 @@ std::string fingerprint(const fs::path& cell) {
   for (const char* folder :
        {"1_segment", "2_track", "3_network", "4_fit", "3_surface", "4_traction", "3_sheet", "truth"}) {
     if (!files::is_folder(cell / folder)) continue;
-    for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder)) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder))
       if (files::is_own_file(entry.path())) files.push_back(entry.path());
-    }
   }
   std::ranges::sort(files);
   const Provenance provenance = read_provenance(cell / "run.json");
   std::string all =
       std::string(kVersion) + " " + provenance.preset + " " + (provenance.accuracy ? provenance.accuracy->verdict : "");
-  for (const fs::path& file : files) {
+  for (const fs::path& file : files)
     all += "\n" + file.lexically_relative(cell).generic_string() + " " + files::sha256_of_file(file);
-  }
   return files::sha256(all);
 }
 

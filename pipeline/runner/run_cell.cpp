@@ -34,12 +34,10 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
     command.push_back("--" + flag);
     command.push_back(value);
   };
-  for (const ImageInput& image : images_of(stage, images)) {
+  for (const ImageInput& image : images_of(stage, images))
     if (const auto file = resolve_image(cell, images, image)) add(image.flag, file->string());
-  }
-  for (const ImageInput& image : stage.optional_images) {
+  for (const ImageInput& image : stage.optional_images)
     if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
-  }
   for (const PathArgument& argument : stage.arguments) {
     const auto condition = argument.condition();
     if (!condition || files::is_own_file(cell / *condition)) add(argument.flag, (cell / argument.path).string());
@@ -75,9 +73,8 @@ std::vector<std::string> to_look_at(const Stage& stage, const fs::path& cell, co
 std::vector<std::string> command_to_tell(std::vector<std::string> command, const fs::path& cell) {
   command.front() = fs::path(command.front()).filename().string();
   const std::string prefix = (cell / "").string();
-  for (std::string& argument : command) {
+  for (std::string& argument : command)
     if (argument.starts_with(prefix)) argument.erase(0, prefix.size());
-  }
   return command;
 }
 
@@ -85,9 +82,8 @@ std::vector<std::string> command_to_tell(std::vector<std::string> command, const
 void remove_partial_files(const fs::path& folder) {
   std::error_code error;
   std::vector<fs::path> partial;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
     if (entry->path().filename().string().starts_with(files::kPartialPrefix)) partial.push_back(entry->path());
-  }
   for (const fs::path& file : partial)
     fs::remove(file, error);  // a link, not what it points to; no folder that is full
 }
@@ -240,13 +236,15 @@ std::optional<StageReport> report_in(const fs::path& record_file) {
 }
 
 void CellRun::bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome) {
-  note_failure(outcome, [&] {
-    const Present now = present(stage);
-    outcome.status = now.status;
-    if (now.status.state == StageState::must_run) return start(stage, now, threads, outcome);
-    outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
-    say({.stage = stage.name, .status = now.status, .converged = outcome.converged});
-  });
+  note_failure(
+      outcome,
+      [&] {
+        const Present now = present(stage);
+        outcome.status = now.status;
+        if (now.status.state == StageState::must_run) return start(stage, now, threads, outcome);
+        outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
+        say({.stage = stage.name, .status = now.status, .converged = outcome.converged});
+      });
 }
 
 /// Of what the stage has just written. Files of a series that it does not write any more go.
@@ -338,9 +336,8 @@ void CellRun::run_chains(CellOutcome& outcome) {
       errors[chain] = std::current_exception();
     }
   });
-  for (const std::exception_ptr& error : errors) {
+  for (const std::exception_ptr& error : errors)
     if (error) std::rethrow_exception(error);
-  }
   bring_up_to_date(all.back(), options_.threads, outcome.stages.back());
 }
 
@@ -387,14 +384,14 @@ void expect_known(const RunOptions& options) {
 }  // namespace
 
 bool CellOutcome::converged() const {
-  return std::ranges::all_of(stages, [](const StageOutcome& stage) { return stage.converged; });
+  return std::ranges::all_of(
+      stages, [](const StageOutcome& stage) { return stage.converged; });
 }
 
 std::string CellOutcome::not_converged() const {
   std::string names;
-  for (const StageOutcome& stage : stages) {
+  for (const StageOutcome& stage : stages)
     if (!stage.converged) names += (names.empty() ? "" : ", ") + stage.stage;
-  }
   return names;
 }
 

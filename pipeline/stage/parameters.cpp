@@ -149,10 +149,9 @@ std::string unknown_key_hint(const ParameterList& list, const std::vector<std::s
   const std::string closest = nearest(known, key);
   if (!closest.empty() && is_alike(closest, key)) return did_you_mean(closest);
   if (std::ranges::find(kMoreOfGel, key) != kMoreOfGel.end()) return "it belongs under [gel]";
-  for (const Parameter& p : list.all()) {
+  for (const Parameter& p : list.all())
     if (p.name == key)
       return p.table.empty() ? "it belongs above the first table" : "it belongs under [" + p.table + "]";
-  }
   return "docs/parameters.md has all keys";
 }
 
@@ -260,11 +259,9 @@ Parameter& parameter_named(ParameterList& list, const std::string& name) {
 }
 
 void check_complete(const ParameterList& list) {
-  for (const Parameter& p : list.all()) {
-    if (p.is_required && !p.is_set) {
+  for (const Parameter& p : list.all())
+    if (p.is_required && !p.is_set)
       throw UsageError(in_table(p) + " is missing: give it in cell.toml or as --" + p.flag + " (" + p.meaning + ")");
-    }
-  }
 }
 
 std::string to_markdown(const ParameterList& list) {

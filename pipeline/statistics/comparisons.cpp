@@ -82,10 +82,9 @@ void add_rank_tests(const Sample& sample, const Family& family, Unit unit, std::
 
 TestResult clustered_test(const std::vector<const Group*>& groups) {
   std::vector<ClusteredValue> values;
-  for (std::size_t g = 0; g < groups.size(); ++g) {
+  for (std::size_t g = 0; g < groups.size(); ++g)
     for (const Observation& o : groups[g]->values)
       values.push_back({.value = o.value, .group = static_cast<int>(g), .cell = o.cell});
-  }
   return clustered_rank_test(values);
 }
 
@@ -165,9 +164,8 @@ void add_corrected(std::vector<Comparison>& list, Add&& add_tests) {
     return;
   }
   std::vector<double> p_values;
-  for (const Comparison& c : tests) {
+  for (const Comparison& c : tests)
     if (!c.group_b.empty()) p_values.push_back(c.p_value);
-  }
   const std::vector<double> corrected = holm(p_values);
   std::size_t next = 0;
   for (Comparison& c : tests) {
@@ -196,7 +194,9 @@ std::vector<Family> families_of(const Sample& sample) {
       family.groups.push_back({sample.conditions[c], sample.group_of(c, k), sample.of_group(c, k)});
     families.push_back(std::move(family));
   }
-  for (Family& family : families) std::erase_if(family.groups, [](const Group& g) { return g.values.size() < 2; });
+  for (Family& family : families)
+    std::erase_if(
+        family.groups, [](const Group& g) { return g.values.size() < 2; });
   std::erase_if(families, [](const Family& family) { return family.groups.size() < 2; });
   return families;
 }
@@ -213,7 +213,8 @@ std::vector<Comparison> compare(const Sample& sample, const std::optional<Sample
     if (!is_one_a_cell) {
       const Family medians = with_medians(family);
       if (medians.groups.size() > 1)
-        add_corrected(list, [&](auto& tests) { add_rank_tests(sample, medians, Unit::cell_median, tests); });
+        add_corrected(
+            list, [&](auto& tests) { add_rank_tests(sample, medians, Unit::cell_median, tests); });
       add_corrected(list, [&](auto& tests) { add_clustered_tests(sample, family, tests); });
     }
     const bool has_cells = std::ranges::all_of(family.groups, [](const Group& g) { return n_cells_of(g.values) > 1; });

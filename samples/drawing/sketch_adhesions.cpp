@@ -76,9 +76,8 @@ Adhesion propose_central(const Sketch& sketch, double area, double aspect, Rando
 
 bool has_room(const Sketch& sketch, const Adhesion& adhesion) {
   const CellParameters& p = sketch.parameters;
-  for (const Adhesion& other : sketch.adhesions) {
+  for (const Adhesion& other : sketch.adhesions)
     if (too_near(adhesion, other, p.adhesion_clearance_um)) return false;
-  }
   for (const Fibre& f : sketch.fibres) {
     const double margin = 0.5 * f.width_um + p.adhesion_clearance_um;
     if (std::ranges::any_of(f.points_um, [&](Vec2 q) { return covers(adhesion, margin, q); })) return false;
@@ -86,9 +85,8 @@ bool has_room(const Sketch& sketch, const Adhesion& adhesion) {
     if (!f.start_adhesion_id && covers(adhesion, end_margin, f.points_um.front())) return false;
     if (!f.end_adhesion_id && covers(adhesion, end_margin, f.points_um.back())) return false;
   }
-  for (const Vec2 point : ellipse_points(adhesion, kRim_um)) {
+  for (const Vec2 point : ellipse_points(adhesion, kRim_um))
     if (!contains(sketch.outline_um, point)) return false;
-  }
   return true;
 }
 

@@ -288,7 +288,8 @@ Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const s
 
 /// A gap whose ring crosses the outline is a bay.
 bool is_inside(const Polygon& hole, const Polygon& outer) {
-  return std::all_of(hole.begin(), hole.end(), [&](Vec2 p) { return contains(outer, p); });
+  return std::all_of(
+      hole.begin(), hole.end(), [&](Vec2 p) { return contains(outer, p); });
 }
 
 }  // namespace
@@ -371,9 +372,8 @@ CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um) {
     result.is_cut.push_back(true);
     index.push_back(n);
   }
-  for (std::size_t k = 0; k < index.size(); ++k) {
+  for (std::size_t k = 0; k < index.size(); ++k)
     if (index[k] < n) put_onto(result.points_um[k], onto[index[k]]);
-  }
   return result;
 }
 

@@ -164,9 +164,8 @@ void draw_labels(Canvas& canvas, const Cell& cell) {
                  letter_of(f.type) + std::to_string(f.fibre_id), scalar(colour_of(f.type)), kFibreText);
   for (const Adhesion& a : cell.adhesions) canvas.occupy(ellipse_polygon(a, 16));
   std::vector<const Adhesion*> large_first;
-  for (const Adhesion& a : cell.adhesions) {
+  for (const Adhesion& a : cell.adhesions)
     if (a.origin != AdhesionOrigin::candidate) large_first.push_back(&a);  // of a lattice numbers would hide the cell
-  }
   std::stable_sort(large_first.begin(), large_first.end(),
                    [](const Adhesion* a, const Adhesion* b) { return a->area_um2 > b->area_um2; });
   for (const Adhesion* a : large_first)
@@ -206,8 +205,10 @@ std::vector<Entry> entries_of(const Segmentation& s, double pixel_um, int width)
     entries.push_back({name + " " + std::to_string(n), scalar(kAdhesionColour)});
     entries.back().is_dashed = is_dashed;
   };
-  add_adhesions("adhesion", false, [](const Adhesion& a) { return !is_assumed(a.origin); });
-  add_adhesions("anchor", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::anchor; });
+  add_adhesions(
+      "adhesion", false, [](const Adhesion& a) { return !is_assumed(a.origin); });
+  add_adhesions(
+      "anchor", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::anchor; });
   add_adhesions("candidate", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
   if (!s.unexplained_um.empty()) entries.push_back({"bright actin in no fibre", scalar(kUnexplainedColour)});
   entries.push_back({"outline", cv::Scalar(150, 150, 150), 56, 4});
@@ -266,12 +267,11 @@ void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
     else
       canvas.line(ring, true, scalar(kAdhesionColour), thickness);
   }
-  for (const Fibre& f : cell.fibres) {
+  for (const Fibre& f : cell.fibres)
     if (f.type == FibreType::edge)
       canvas.dashed_line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1, kFibreDash_px);
     else
       canvas.line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1);
-  }
 }
 
 }  // namespace

@@ -25,9 +25,8 @@ bool run(const std::string& command) {
 
 std::string open_findings(const fs::path& cell) {
   std::string ids;
-  for (const files::JsonRecord& finding : files::JsonRecord(cell / "run.json", "a run").at("findings").list()) {
+  for (const files::JsonRecord& finding : files::JsonRecord(cell / "run.json", "a run").at("findings").list())
     if (finding.at("severity").text() != "note") ids += (ids.empty() ? "" : "; ") + finding.at("id").text();
-  }
   return ids;
 }
 

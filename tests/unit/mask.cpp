@@ -22,7 +22,11 @@ void paint(images::Image& image, float value, const IsIn& is_in) {
 images::Image empty() { return test::even_image(kSide, kSide, 0); }
 
 void paint_disc(images::Image& image, float value, Vec2 centre_px, double radius_px) {
-  paint(image, value, [&](double x, double y) { return norm(Vec2{x, y} - centre_px) < radius_px; });
+  paint(
+      image, value,
+      [&](double x, double y) {
+        return norm(Vec2{x, y} - centre_px) < radius_px;
+      });
 }
 
 LabelMask mask(const images::Image& image) { return mask_of(image, "mask.tif"); }

@@ -47,9 +47,8 @@ TEST(Plausible, what_published_experiments_used_and_found_is_not_doubted) {
                                                                                        {"total_force_nN", 204},
                                                                                        {"total_force_nN", 920},
                                                                                        {"fibre_tension_nN", 103},
-                                                                                       {"traction_kPa", 5.5}}) {
+                                                                                       {"traction_kPa", 5.5}})
     EXPECT_FALSE(stage::doubt_about(id, value)) << id << " = " << value;
-  }
 }
 
 TEST(Plausible, a_modulus_in_pascal_is_refused_and_the_unit_named) {

@@ -594,9 +594,7 @@ TEST(SheetStudy, its_figures_are_those_of_each_sheet_under_their_names_units_and
       EXPECT_EQ(o.group, cell.condition) << e.column;
       const int row = row_with(cells, {{"cell", cell.name}});
       EXPECT_EQ(cells.text(row, "condition"), study.conditions[cell.condition]);
-      if (*e.in_cells) {
-        EXPECT_NEAR(cells.number(row, e.in_cells), value, 1e-5 * value) << e.column << ": six digits";
-      }
+      if (*e.in_cells) EXPECT_NEAR(cells.number(row, e.in_cells), value, 1e-5 * value) << e.column << ": six digits";
     }
   }
 }

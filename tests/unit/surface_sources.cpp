@@ -118,9 +118,11 @@ TEST(HeightMap, a_hole_in_a_biharmonic_quartic_is_filled_exactly) {
 }
 
 TEST(HeightMap, a_wide_hole_is_refused_by_place) {
-  const HeightMap map = with_holes(sampled(bumpy, {-20, -20}, {20, 20}, 0.5), [](Vec2 p) {
-    return norm(p - Vec2{5, 3}) < 3;
-  });
+  const HeightMap map = with_holes(
+      sampled(bumpy, {-20, -20}, {20, 20}, 0.5),
+      [](Vec2 p) {
+        return norm(p - Vec2{5, 3}) < 3;
+      });
   const InvalidData error = test::thrown<InvalidData>([&] { filled(map, 5); });
   EXPECT_NE(error.element.find("x, y = 5, 3"), std::string::npos) << error.what();
 }
@@ -180,9 +182,7 @@ TEST(SurfacePoints, the_surface_lies_nearer_than_they_and_knows_its_error) {
       EXPECT_LT(misfit.rms_um, 0.5 * kError) << "seed " << seed;
       EXPECT_NEAR(misfit.rms_over_sigma, 1, 0.35) << "seed " << seed;
       EXPECT_LE(fit.strays.size(), 1u);  // Student's errors are narrower than the points' own
-      if (!is_known) {
-        EXPECT_NEAR(fit.error_scale, kError, 0.3 * kError);
-      }
+      if (!is_known) EXPECT_NEAR(fit.error_scale, kError, 0.3 * kError);
     }
   }
 }

@@ -151,9 +151,8 @@ TEST(VtuFiles, a_cell_is_a_line_between_points_of_the_file) {
                                                                                      {"rest_length_um", "nan"},
                                                                                      {"rest_length_um", "0"},
                                                                                      {"adhesion_id", "-1"},
-                                                                                     {"types", "1e300"}}) {
+                                                                                     {"types", "1e300"}})
     EXPECT_NE(refusal(folder, in_array(array, value)), "read") << array << ": " << value;
-  }
 }
 
 /// Two triangles and a quadrilateral, in two pieces, beside a line.
