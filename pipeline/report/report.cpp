@@ -83,8 +83,7 @@ std::string adhesion_section(const CellResults& results) {
              number("traction (kPa)"), number("area (µm²)"), number("x (µm)"), number("y (µm)"), "fibre ends on it"},
             {},
             "Forces of the adhesions"};
-  const bool has_assumed = std::ranges::any_of(
-      by_id, [](const auto& a) { return is_assumed(a.second->origin); });
+  const bool has_assumed = std::ranges::any_of(by_id, [](const auto& a) { return is_assumed(a.second->origin); });
   const bool are_candidates =
       std::ranges::any_of(by_id, [](const auto& a) { return a.second->origin == AdhesionOrigin::candidate; });
   if (has_assumed) all.columns.push_back("seen");
@@ -232,8 +231,7 @@ std::string report_html(const fs::path& cell) {
   std::string body = findings_section(facts_of(results), provenance);
   if (!results.cell.fibres.empty()) body += tension_section(results);
   body += map_section(results) + adhesion_section(results);
-  if (const auto budget = read_error_budget(cell / "run.json"); !budget.empty())
-    body += section("Error budget", error_budget_html(budget, results.name));
+  if (results.fit.error_budget) body += section("Error budget", error_budget_html(results));
   body += section("For your methods section", methods_paragraph(results, provenance)) +
           provenance_section(provenance, folded("Figures of the fit", figure_pairs(results)));
   return page(results.name + " – mbtfm", head, body);
