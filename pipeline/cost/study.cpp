@@ -92,6 +92,8 @@ class Scratch {
       stages_ = {of.stages.back()};  // traction
     else
       has_images_ = has_all_images(cell, images_);
+    for (runner::Stage& stage : stages_)  // of a time series the first frame alone is fitted
+      std::erase_if(stage.arguments, [](const auto& a) { return a.given == runner::PathArgument::Given::if_series; });
     for (const std::string& file : needed()) {
       if (files::is_file(cell / file)) continue;
       throw InputError((cell / file).string(), "a cell whose images were segmented and tracked", "none",
@@ -198,24 +200,8 @@ class Scratch {
   }
 
   std::vector<std::string> command_of(const runner::Stage& stage, const Rung& rung) const {
-    std::vector<std::string> command = {(options_.stage_folder / ("mbtfm-" + stage.name)).string()};
-    const auto add = [&](const std::string& flag, const std::string& value) {
-      command.push_back("--" + flag);
-      command.push_back(value);
-    };
-    for (const runner::ImageInput& image : runner::images_of(stage, images_))
-      if (const auto file = runner::resolve_image(cell_, images_, image)) add(image.flag, file->string());
-    for (const runner::ImageInput& image : stage.optional_images)
-      if (const auto file = runner::resolve_optional_image(cell_, images_, image.key)) add(image.flag, file->string());
-    for (const runner::PathArgument& argument : stage.arguments) {
-      const auto condition = argument.condition();
-      if (argument.given != runner::PathArgument::Given::if_series &&
-          (!condition || files::is_own_file(folder_ / *condition)))
-        add(argument.flag, (folder_ / argument.path).string());
-    }
-    add("config", (folder_ / "cell.toml").string());
-    add(stage.output.flag, (folder_ / stage.output.path).string());
-    add("threads", std::to_string(rung.threads.value_or(options_.threads)));
+    std::vector<std::string> command = runner::command_of(stage, options_.stage_folder, cell_, folder_, images_,
+                                                          rung.threads.value_or(options_.threads));
     command.emplace_back("--quiet");
     for (const std::string& flag : runner::flags_of(stage, rung.settings)) command.push_back(flag);
     return command;

@@ -23,33 +23,8 @@ bool contains_name(const std::vector<std::string>& names, const std::string& nam
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-std::string executable_of(const Stage& stage, const RunOptions& options) {
-  return (options.stage_folder / ("mbtfm-" + stage.name)).string();
-}
-
-std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, const ImageNames& images,
-                                    const RunOptions& options, int threads) {
-  std::vector<std::string> command = {executable_of(stage, options)};
-  const auto add = [&](const std::string& flag, const std::string& value) {
-    command.push_back("--" + flag);
-    command.push_back(value);
-  };
-  for (const ImageInput& image : images_of(stage, images))
-    if (const auto file = resolve_image(cell, images, image)) add(image.flag, file->string());
-  for (const ImageInput& image : stage.optional_images)
-    if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
-  for (const PathArgument& argument : stage.arguments) {
-    const auto condition = argument.condition();
-    if (!condition || files::is_own_file(cell / *condition)) add(argument.flag, (cell / argument.path).string());
-  }
-  add("config", (cell / "cell.toml").string());
-  for (const Setting& setting : stage.settings) add(setting.key, setting.value);
-  add(stage.output.flag, (cell / stage.output.path).string());
-  add("threads", std::to_string(threads));
-  add("record", record_file_of(cell, stage).string());
-  if (options.is_quiet) command.push_back("--quiet");
-  if (options.explain && stage.explains) command.push_back("--explain");
-  return command;
+std::string executable_of(const Stage& stage, const fs::path& stage_folder) {
+  return (stage_folder / ("mbtfm-" + stage.name)).string();
 }
 
 /// Flags and files of the images that a stage compares with those of others; none where it looks at no others.
@@ -236,15 +211,13 @@ std::optional<StageReport> report_in(const fs::path& record_file) {
 }
 
 void CellRun::bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome) {
-  note_failure(
-      outcome,
-      [&] {
-        const Present now = present(stage);
-        outcome.status = now.status;
-        if (now.status.state == StageState::must_run) return start(stage, now, threads, outcome);
-        outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
-        say({.stage = stage.name, .status = now.status, .converged = outcome.converged});
-      });
+  note_failure(outcome, [&] {
+    const Present now = present(stage);
+    outcome.status = now.status;
+    if (now.status.state == StageState::must_run) return start(stage, now, threads, outcome);
+    outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
+    say({.stage = stage.name, .status = now.status, .converged = outcome.converged});
+  });
 }
 
 /// Of what the stage has just written. Files of a series that it does not write any more go.
@@ -275,7 +248,10 @@ void CellRun::start(const Stage& stage, const Present& before, int threads, Stag
     }
   }
   const fs::path record_file = record_file_of(cell_, stage);
-  std::vector<std::string> command = command_of(stage, cell_, images_, options_, threads);
+  std::vector<std::string> command = command_of(stage, options_.stage_folder, cell_, cell_, images_, threads);
+  command.insert(command.end(), {"--record", record_file.string()});
+  if (options_.is_quiet) command.emplace_back("--quiet");
+  if (options_.explain && stage.explains) command.emplace_back("--explain");
   for (const std::string& flag : flags_of(stage, beneath_)) command.push_back(flag);
   const bool had_record = files::is_own_file(record_file);
   const std::string record_before = had_record ? files::read_text(record_file) : std::string();
@@ -384,8 +360,7 @@ void expect_known(const RunOptions& options) {
 }  // namespace
 
 bool CellOutcome::converged() const {
-  return std::ranges::all_of(
-      stages, [](const StageOutcome& stage) { return stage.converged; });
+  return std::ranges::all_of(stages, [](const StageOutcome& stage) { return stage.converged; });
 }
 
 std::string CellOutcome::not_converged() const {
@@ -395,9 +370,32 @@ std::string CellOutcome::not_converged() const {
   return names;
 }
 
+std::vector<std::string> command_of(const Stage& stage, const fs::path& stage_folder, const fs::path& cell,
+                                    const fs::path& folder, const ImageNames& images, int threads) {
+  std::vector<std::string> command = {executable_of(stage, stage_folder)};
+  const auto add = [&](const std::string& flag, const std::string& value) {
+    command.push_back("--" + flag);
+    command.push_back(value);
+  };
+  for (const ImageInput& image : images_of(stage, images))
+    if (const auto file = resolve_image(cell, images, image)) add(image.flag, file->string());
+  for (const ImageInput& image : stage.optional_images)
+    if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
+  for (const PathArgument& argument : stage.arguments) {
+    const auto condition = argument.condition();
+    if (!condition || files::is_own_file(folder / *condition)) add(argument.flag, (folder / argument.path).string());
+  }
+  add("config", (folder / "cell.toml").string());
+  for (const Setting& setting : stage.settings) add(setting.key, setting.value);
+  add(stage.output.flag, (folder / stage.output.path).string());
+  add("threads", std::to_string(threads));
+  return command;
+}
+
 void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOptions& options, const Sink& sink,
                       const std::vector<std::string>& inputs) {
-  std::vector<std::string> command = {executable_of(stage, options), "--check", "--config", toml_file.string()};
+  std::vector<std::string> command = {executable_of(stage, options.stage_folder), "--check", "--config",
+                                      toml_file.string()};
   command.insert(command.end(), inputs.begin(), inputs.end());
   const ProcessResult check = run_process(command, options.limits, sink);
   if (check.exit_code == 0 && !check.signal) return;
