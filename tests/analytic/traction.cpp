@@ -16,17 +16,7 @@ namespace {
 
 using test::ellipse_scene;
 using test::EllipseScene;
-
-TractionParameters half_space(TractionMethod method = TractionMethod::fttc) {
-  TractionParameters parameters;
-  parameters.method = method;
-  parameters.gel_model = GelModel::half_space;
-  return parameters;
-}
-
-TractionInputs inputs_of(const EllipseScene& scene) {
-  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions};
-}
+using test::half_space;
 
 std::vector<Vec2> forces_of(const Reconstruction& r) {
   std::vector<Vec2> forces;

@@ -22,11 +22,7 @@ void paint(images::Image& image, float value, const IsIn& is_in) {
 images::Image empty() { return test::even_image(kSide, kSide, 0); }
 
 void paint_disc(images::Image& image, float value, Vec2 centre_px, double radius_px) {
-  paint(
-      image, value,
-      [&](double x, double y) {
-        return norm(Vec2{x, y} - centre_px) < radius_px;
-      });
+  paint(image, value, [&](double x, double y) { return norm(Vec2{x, y} - centre_px) < radius_px; });
 }
 
 LabelMask mask(const images::Image& image) { return mask_of(image, "mask.tif"); }
@@ -36,12 +32,8 @@ int n_pixels(const LabelMask& m) {
 }
 
 std::string refusal_of(const auto& body) {
-  try {
-    body();
-  } catch (const InputError& error) {
-    return error.where + ": " + error.expected + "; " + error.found;
-  }
-  return "no error";
+  const auto error = test::caught<InputError>(body);
+  return error ? error->where + ": " + error->expected + "; " + error->found : "no error";
 }
 
 std::string hint_of(const auto& body) {

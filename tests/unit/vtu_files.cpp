@@ -22,12 +22,8 @@ Network read_back(const TemporaryFolder& folder, const std::string& text) {
 }
 
 std::string refusal(const TemporaryFolder& folder, const std::string& text) {
-  try {
-    read_back(folder, text);
-  } catch (const InputError& error) {
-    return error.what() + std::string("; ") + error.hint;
-  }
-  return "read";
+  const auto error = test::caught<InputError>([&] { read_back(folder, text); });
+  return error ? error->what() + std::string("; ") + error->hint : "read";
 }
 
 std::string with(std::string text, const std::string& old, const std::string& now) {
