@@ -438,8 +438,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
     model =
         blurred_model(model_in(context.input("model")), kept, lambdas, fttc, nodes, alignment, p.seed, context.threads);
   Blur blur{.shares = wave_shares(kept, lambdas, p.gel_model, size)};
-  blur.fttc_um = gaussian_um(
-      blur.shares, [](const WaveShare& s) { return 0.5 * (s.along + s.across); });
+  blur.fttc_um = gaussian_um(blur.shares, [](const WaveShare& s) { return 0.5 * (s.along + s.across); });
   blur.registration_um = gaussian_um(blur.shares, [](const WaveShare& s) { return s.registration; });
 
   const Path registration_file = context.output("out", "registration.csv");

@@ -129,8 +129,7 @@ std::vector<Vec2> tips_of(const Polygon& reference_um) {
   const Vec2 centre = centroid_um(reference_um);
   const double size = size_um(reference_um);
   std::vector<Vec2> far = reference_um;
-  std::erase_if(
-      far, [&](Vec2 p) { return norm(p - centre) < kReachesOut * size; });
+  std::erase_if(far, [&](Vec2 p) { return norm(p - centre) < kReachesOut * size; });
   std::ranges::stable_sort(far, std::greater(), [&](Vec2 p) { return norm(p - centre); });
   std::vector<Vec2> tips;
   for (const Vec2 p : far) {

@@ -126,8 +126,7 @@ double mean_contraction_of(const Solution& solution, int triangle) {
 }
 
 bool is_even(const std::vector<double>& values) {
-  return std::ranges::all_of(
-      values, [&](double value) { return value == values.front(); });
+  return std::ranges::all_of(values, [&](double value) { return value == values.front(); });
 }
 
 }  // namespace
@@ -135,11 +134,9 @@ bool is_even(const std::vector<double>& values) {
 std::string picture_of(const Solution& solution, const std::string& caption) {
   const Frame frame = frame_of(*solution.elements);
   Chart tension = map_of("Mean tension", frame), traction = map_of("Traction on the ground", frame);
-  draw_values(
-      tension, solution, frame, "nN/µm",
-      [&](const Locator::Place& place, const Shape& shape) {
-        return mean_of(value_of(solution.at_nodes, solution.elements->nodes(place.triangle), shape));
-      });
+  draw_values(tension, solution, frame, "nN/µm", [&](const Locator::Place& place, const Shape& shape) {
+    return mean_of(value_of(solution.at_nodes, solution.elements->nodes(place.triangle), shape));
+  });
   draw_values(traction, solution, frame, "kPa", [&](const Locator::Place& place, const Shape&) {
     return norm(solution.patches[place.triangle].traction_kPa);
   });

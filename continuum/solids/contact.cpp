@@ -68,8 +68,7 @@ Contact::Contact(const Polygon& outline_um) {
 double Contact::equal_radius_um() const { return std::sqrt(area_um2_ / std::numbers::pi); }
 
 double Contact::largest_radius_um() const {
-  return norm(*std::ranges::max_element(
-      from_centroid_um_, {}, [](Vec2 at) { return norm(at); }));
+  return norm(*std::ranges::max_element(from_centroid_um_, {}, [](Vec2 at) { return norm(at); }));
 }
 
 double Contact::radius_um_at(double angle) const {

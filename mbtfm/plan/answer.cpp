@@ -16,8 +16,8 @@ bool can_be_had(const Needed& n, double most_beads_per_um2) { return n.density &
 
 /// The gel of the list that the answer speaks of: the cell's own, or the nearest to it.
 double answered_gel_kPa(const Asked& asked, double own_kPa) {
-  return *std::ranges::min_element(
-      asked.youngs_modulus_kPa, {}, [&](double E) { return std::abs(std::log(E / own_kPa)); });
+  return *std::ranges::min_element(asked.youngs_modulus_kPa, {},
+                                   [&](double E) { return std::abs(std::log(E / own_kPa)); });
 }
 
 const Needed& needed_of(const std::vector<Needed>& needed, double youngs_modulus_kPa, double noise_um) {

@@ -110,8 +110,7 @@ spatial::Foreseen scaled(spatial::Foreseen f, double factor) {
 }
 
 std::size_t index_of(const std::vector<double>& list, double value) {
-  return static_cast<std::size_t>(std::ranges::min_element(
-                                      list, {}, [&](double v) { return std::abs(v - value); }) -
+  return static_cast<std::size_t>(std::ranges::min_element(list, {}, [&](double v) { return std::abs(v - value); }) -
                                   list.begin());
 }
 
@@ -189,8 +188,7 @@ double left_out(Gel gel, double youngs_modulus_kPa, double traction_kPa) {
 /// them as the noise of the beads has it, never below them. None beyond most_beads_per_um3().
 std::optional<double> needed_beads(const std::vector<double>& densities, const std::vector<double>& errors_nN,
                                    double target_nN) {
-  const auto first = std::ranges::find_if(
-      errors_nN, [&](double e) { return e <= target_nN; });
+  const auto first = std::ranges::find_if(errors_nN, [&](double e) { return e <= target_nN; });
   const auto by_law = [&](std::size_t k) { return densities[k] * std::pow(errors_nN[k] / target_nN, 2); };
   if (first == errors_nN.begin()) return densities.front();
   if (first == errors_nN.end()) {

@@ -118,21 +118,13 @@ Line Search::over_sheet(std::optional<double> adhesion) const {
 }
 
 Line Search::over_adhesion() const {
-  return searched(
-      *table_.adhesion_nN_per_um3(), kScanOfTwo, [&](double kappa) { return over_sheet(kappa).best; });
+  return searched(*table_.adhesion_nN_per_um3(), kScanOfTwo, [&](double kappa) { return over_sheet(kappa).best; });
 }
 
 Line Search::over_sheet_with_best_adhesion() const {
-  return searched(
-      table_.sheet_nN_per_um(), kScanOfTwo,
-      [&](double M) {
-        return searched(
-                   *table_.adhesion_nN_per_um3(), kScanOfTwo,
-                   [&](double kappa) {
-                     return at({M, kappa});
-                   })
-            .best;
-      });
+  return searched(table_.sheet_nN_per_um(), kScanOfTwo, [&](double M) {
+    return searched(*table_.adhesion_nN_per_um3(), kScanOfTwo, [&](double kappa) { return at({M, kappa}); }).best;
+  });
 }
 
 Profile Search::best() const {

@@ -93,15 +93,13 @@ bool merge_close(PlanarGraph& graph, const SizeField& size, double relative_tole
     int into = v;
     double nearest = tolerance;
     if (graph.rank[v] != kHeld) {
-      kept.for_each_near(
-          graph.points_um[v], graph.points_um[v], tolerance,
-          [&](int other) {
-            const double distance = norm(graph.points_um[other] - graph.points_um[v]);
-            if (distance < nearest) {
-              nearest = distance;
-              into = other;
-            }
-          });
+      kept.for_each_near(graph.points_um[v], graph.points_um[v], tolerance, [&](int other) {
+        const double distance = norm(graph.points_um[other] - graph.points_um[v]);
+        if (distance < nearest) {
+          nearest = distance;
+          into = other;
+        }
+      });
     }
     name[v] = into;
     if (into == v) kept.add(v, graph.points_um[v], graph.points_um[v]);

@@ -49,9 +49,9 @@ void AnyColumns::add(const AnyColumns& more, const Way& part) {
 }
 
 void AnyColumns::keep(const std::vector<std::string>& names, bool are_kept) {
-  std::erase_if(
-      all_,
-      [&](const AnyColumn& column) { return (std::ranges::find(names, column.name) != names.end()) != are_kept; });
+  std::erase_if(all_, [&](const AnyColumn& column) {
+    return (std::ranges::find(names, column.name) != names.end()) != are_kept;
+  });
 }
 
 std::string AnyColumns::text_of(const void* rows, std::size_t n_rows, std::size_t size) const {

@@ -207,8 +207,7 @@ const VtuFile::Array* VtuFile::find(const Piece& piece, VtuSection section, cons
 }
 
 bool VtuFile::has(VtuSection section, const std::string& array) const {
-  return std::ranges::all_of(
-      pieces_, [&](const Piece& piece) { return find(piece, section, array) != nullptr; });
+  return std::ranges::all_of(pieces_, [&](const Piece& piece) { return find(piece, section, array) != nullptr; });
 }
 
 std::vector<double> VtuFile::numbers(const Piece& piece, VtuSection section, const std::string& array,

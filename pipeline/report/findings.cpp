@@ -230,12 +230,10 @@ constexpr auto words(Judging) { return std::array{"fit", "traction"}; }
 
 /// Without one there is nothing that a tick could stand for.
 bool was_asked(const Provenance& provenance) {
-  return std::ranges::any_of(
-      provenance.stages,
-      [](const StageLine& stage) {
-        const auto state = named<StageState>(stage.state);
-        return named<Judging>(stage.name) && (state == StageState::must_run || state == StageState::up_to_date);
-      });
+  return std::ranges::any_of(provenance.stages, [](const StageLine& stage) {
+    const auto state = named<StageState>(stage.state);
+    return named<Judging>(stage.name) && (state == StageState::must_run || state == StageState::up_to_date);
+  });
 }
 
 }  // namespace

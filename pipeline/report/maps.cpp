@@ -135,18 +135,15 @@ constexpr const char* kHalo = "stroke:#fff;stroke-width:7;stroke-linecap:round";
 constexpr const char* kThick = "stroke-width:3;stroke-linecap:round;stroke:";
 
 bool has_edge_fibres(const Cell& cell) {
-  return std::ranges::any_of(
-      cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; });
+  return std::ranges::any_of(cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; });
 }
 
 bool has_origin(const Cell& cell, AdhesionOrigin origin) {
-  return std::ranges::any_of(
-      cell.adhesions, [&](const Adhesion& a) { return a.origin == origin; });
+  return std::ranges::any_of(cell.adhesions, [&](const Adhesion& a) { return a.origin == origin; });
 }
 
 bool are_all_candidates(const Cell& cell) {
-  return std::ranges::all_of(
-      cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
+  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
 }
 
 Figure original_network(const CellResults& results) {

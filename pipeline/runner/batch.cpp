@@ -171,8 +171,7 @@ void check_parameters_once(std::vector<Look>& looks, const BatchOptions& options
     const auto stage = std::find_if(all_stages().begin(), all_stages().end(),
                                     [&, &key = key](const Stage& s) { return s.name == key.first; });
     try {
-      check_parameters(
-          *stage, same.front()->outcome.cell / "cell.toml", options.run, [](std::string_view) {});
+      check_parameters(*stage, same.front()->outcome.cell / "cell.toml", options.run, [](std::string_view) {});
     } catch (const StageFailed& error) {
       for (Look* look : same) {
         look->finding = Look::Finding::done;

@@ -87,8 +87,7 @@ files::Table<BatchRow> batch_table(const fs::path& folder) {
 }
 
 files::Columns<BatchRow> figure_column(const std::string& name) {
-  return {name, "a figure that a stage reported",
-          [name](const BatchRow& row) {
+  return {name, "a figure that a stage reported", [name](const BatchRow& row) {
             const auto figure = row.figures.find(name);
             return figure == row.figures.end() ? std::string() : figure->second;
           }};

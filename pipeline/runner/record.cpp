@@ -60,8 +60,7 @@ bool is_of_frames(const std::string& file) {
 
 /// Nothing differs but, maybe, files that an earlier stage wrote of single frames.
 bool are_of_series(const std::vector<Difference>& differences) {
-  return std::ranges::all_of(
-      differences, [](const Difference& difference) { return is_of_frames(difference.name); });
+  return std::ranges::all_of(differences, [](const Difference& difference) { return is_of_frames(difference.name); });
 }
 
 /// Those of a time series that the tracker wrote, one for each frame that it did not refuse.

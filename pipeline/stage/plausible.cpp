@@ -235,8 +235,7 @@ std::vector<Doubt> doubts_about(const ParameterList& list, const std::vector<std
 }
 
 bool has_plausible_quantity(const ParameterList& list) {
-  return std::ranges::any_of(
-      list.all(), [](const Parameter& p) { return find(p.flag) != nullptr; });
+  return std::ranges::any_of(list.all(), [](const Parameter& p) { return find(p.flag) != nullptr; });
 }
 
 std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um) {

@@ -202,8 +202,7 @@ CellKind most_of(const Study& study) {
 
 PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
   const auto among = [](const std::vector<Measure>& measures, const std::string& column, const std::string& name) {
-    const auto at = std::ranges::find_if(
-        measures, [&](const Measure& m) { return m.sample.column == column; });
+    const auto at = std::ranges::find_if(measures, [&](const Measure& m) { return m.sample.column == column; });
     return PrimaryChoice{at == measures.end() ? nullptr : &*at, 0, name};
   };
   const auto of_sheets = [&](const std::string& column, const std::string& name) {

@@ -194,9 +194,7 @@ std::vector<Family> families_of(const Sample& sample) {
       family.groups.push_back({sample.conditions[c], sample.group_of(c, k), sample.of_group(c, k)});
     families.push_back(std::move(family));
   }
-  for (Family& family : families)
-    std::erase_if(
-        family.groups, [](const Group& g) { return g.values.size() < 2; });
+  for (Family& family : families) std::erase_if(family.groups, [](const Group& g) { return g.values.size() < 2; });
   std::erase_if(families, [](const Family& family) { return family.groups.size() < 2; });
   return families;
 }
@@ -213,8 +211,7 @@ std::vector<Comparison> compare(const Sample& sample, const std::optional<Sample
     if (!is_one_a_cell) {
       const Family medians = with_medians(family);
       if (medians.groups.size() > 1)
-        add_corrected(
-            list, [&](auto& tests) { add_rank_tests(sample, medians, Unit::cell_median, tests); });
+        add_corrected(list, [&](auto& tests) { add_rank_tests(sample, medians, Unit::cell_median, tests); });
       add_corrected(list, [&](auto& tests) { add_clustered_tests(sample, family, tests); });
     }
     const bool has_cells = std::ranges::all_of(family.groups, [](const Group& g) { return n_cells_of(g.values) > 1; });

@@ -97,10 +97,8 @@ std::vector<bool> scatter_told(const std::vector<Observation>& rows) {
 /// The random effects that the design can tell from the scatter and from each other.
 std::vector<Component> components_of(const std::vector<Observation>& rows, const std::vector<Block>& blocks) {
   const bool has_two_cells = has_group_of_two_cells(rows);
-  const bool has_two_in_a_cell = std::ranges::any_of(
-      blocks, [](const Block& b) { return b.size > 1; });
-  const bool has_two_kinds = std::ranges::any_of(
-      blocks, [](const Block& b) { return b.n_kinds > 1; });
+  const bool has_two_in_a_cell = std::ranges::any_of(blocks, [](const Block& b) { return b.size > 1; });
+  const bool has_two_kinds = std::ranges::any_of(blocks, [](const Block& b) { return b.n_kinds > 1; });
   const bool has_two_of_a_kind = std::ranges::any_of(blocks, [](const Block& b) { return b.size > b.n_kinds; });
   std::vector<Component> components;
   if (has_two_cells && has_two_in_a_cell) components.push_back({.term = Term::cell});

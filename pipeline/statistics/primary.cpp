@@ -43,8 +43,7 @@ std::map<std::pair<int, std::string>, double> means_of_replicates(const Study& s
 int n_cells_of(const Sample& sample, int condition, int kind) { return n_cells_of(sample.of_group(condition, kind)); }
 
 bool has_replicates(const Study& study) {
-  return std::ranges::any_of(
-      study.cells, [](const StudyCell& cell) { return !cell.replicate.empty(); });
+  return std::ranges::any_of(study.cells, [](const StudyCell& cell) { return !cell.replicate.empty(); });
 }
 
 void compare_replicates(const Study& study, const Sample& sample, int kind, Primary& primary) {

@@ -292,8 +292,7 @@ std::vector<double> thresholds_nN(const StudyParameters& parameters) {
 }
 
 int n_of_kind(const Study& study, CellKind kind) {
-  return static_cast<int>(std::ranges::count_if(
-      study.cells, [&](const StudyCell& c) { return c.kind() == kind; }));
+  return static_cast<int>(std::ranges::count_if(study.cells, [&](const StudyCell& c) { return c.kind() == kind; }));
 }
 
 const std::vector<std::string>& files_of_a_cell(CellKind kind) {
@@ -384,8 +383,7 @@ std::vector<MeasuredFibre> measured_fibres(const Study& study) {
 }
 
 bool is_network_known(const StudyCell& cell) {
-  return std::ranges::none_of(
-      cell.tensions, [](const Tension& t) { return t.fibre_id == 0 && !t.identifiable; });
+  return std::ranges::none_of(cell.tensions, [](const Tension& t) { return t.fibre_id == 0 && !t.identifiable; });
 }
 
 std::optional<double> standard_error_nN(const Tension& t) {

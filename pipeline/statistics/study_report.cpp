@@ -280,8 +280,8 @@ std::string overview(const Study& study, const Analysis& analysis) {
   std::size_t n_fibres = 0, n_adhesions = 0, n_contractions = 0;
   for (const StudyCell& c : study.cells) {
     n_fibres += c.cell.fibres.size();
-    n_adhesions += static_cast<std::size_t>(std::ranges::count_if(
-        c.cell.adhesions, [](const Adhesion& a) { return !is_assumed(a.origin); }));
+    n_adhesions += static_cast<std::size_t>(
+        std::ranges::count_if(c.cell.adhesions, [](const Adhesion& a) { return !is_assumed(a.origin); }));
     n_contractions += c.sheet && std::ranges::any_of(c.sheet->estimates, [](const SheetEstimate& e) {
                         return e.quantity == SheetQuantity::contraction && enters(e);
                       });

@@ -509,8 +509,8 @@ std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, c
   add(adhesion_table(),
       rows_by_cell(study, [](const StudyCell& c) { return files::forces_on(c.cell.adhesions, c.forces); }));
   add(fibre_table(), rows_by_cell(study, measured_tensions_of));
-  add(estimate_table(), rows_by_cell(
-                            study, [](const StudyCell& c) { return c.sheet.value_or(SheetSummary{}).estimates; }));
+  add(estimate_table(),
+      rows_by_cell(study, [](const StudyCell& c) { return c.sheet.value_or(SheetSummary{}).estimates; }));
   add(space_force_table(),
       rows_by_cell(study, [](const StudyCell& c) { return c.space.value_or(SpaceFigures{}).adhesions; }));
   add(type_table(thresholds_of(analysis)), type_rows(study, analysis));

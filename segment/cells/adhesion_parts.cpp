@@ -93,9 +93,8 @@ std::vector<std::vector<CoveredPixel>> parts_of(const cv::Mat& image_above_backg
 }
 
 bool reaches_seed(const std::vector<CoveredPixel>& pixels, const cv::Mat& seeds) {
-  return std::any_of(
-      pixels.begin(), pixels.end(),
-      [&](const CoveredPixel& p) { return p.share > 0.5 && seeds.at<uchar>(p.row, p.column); });
+  return std::any_of(pixels.begin(), pixels.end(),
+                     [&](const CoveredPixel& p) { return p.share > 0.5 && seeds.at<uchar>(p.row, p.column); });
 }
 
 }  // namespace

@@ -414,8 +414,7 @@ std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhes
     lead_to_cut(t.fibre, cuts, p.fibre_reach_um);
     fibres.push_back(std::move(t.fibre));
   }
-  std::erase_if(
-      fibres, [&](const Fibre& f) { return length_um(f.points_um) < p.fibre_shortest_um; });
+  std::erase_if(fibres, [&](const Fibre& f) { return length_um(f.points_um) < p.fibre_shortest_um; });
   std::stable_sort(fibres.begin(), fibres.end(),
                    [](const Fibre& a, const Fibre& b) { return length_um(a.points_um) > length_um(b.points_um); });
   for (std::size_t i = 0; i < fibres.size(); ++i) fibres[i].fibre_id = static_cast<int>(i) + 1;

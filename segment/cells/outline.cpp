@@ -288,8 +288,7 @@ Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const s
 
 /// A gap whose ring crosses the outline is a bay.
 bool is_inside(const Polygon& hole, const Polygon& outer) {
-  return std::all_of(
-      hole.begin(), hole.end(), [&](Vec2 p) { return contains(outer, p); });
+  return std::all_of(hole.begin(), hole.end(), [&](Vec2 p) { return contains(outer, p); });
 }
 
 }  // namespace

@@ -205,10 +205,8 @@ std::vector<Entry> entries_of(const Segmentation& s, double pixel_um, int width)
     entries.push_back({name + " " + std::to_string(n), scalar(kAdhesionColour)});
     entries.back().is_dashed = is_dashed;
   };
-  add_adhesions(
-      "adhesion", false, [](const Adhesion& a) { return !is_assumed(a.origin); });
-  add_adhesions(
-      "anchor", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::anchor; });
+  add_adhesions("adhesion", false, [](const Adhesion& a) { return !is_assumed(a.origin); });
+  add_adhesions("anchor", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::anchor; });
   add_adhesions("candidate", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
   if (!s.unexplained_um.empty()) entries.push_back({"bright actin in no fibre", scalar(kUnexplainedColour)});
   entries.push_back({"outline", cv::Scalar(150, 150, 150), 56, 4});

@@ -30,8 +30,7 @@ cv::Mat in_units(const cv::Mat& noise, Response response) {
 }
 
 cv::Mat in_units(const cv::Mat& noise, const cv::Mat& response) {
-  return in_units(
-      noise, [&](int y) { return [h = response.ptr<float>(y)](int x) { return h[x]; }; });
+  return in_units(noise, [&](int y) { return [h = response.ptr<float>(y)](int x) { return h[x]; }; });
 }
 
 /// Half-way between two filters the cubic through four of them: a line there is seen by neither as high as it is.
@@ -53,15 +52,13 @@ Ways::Ways(const Ridges& ridges, const WayRule& rule)
       n_steps_(std::max(1, cvRound(rule.reach_px / rule.step_px))),
       over_noise_(2 * ridges.response.size()),
       strongest_(in_units(ridges.noise, ridges.strongest)) {
-  cv::parallel_for_(
-      cv::Range(0, ridges.n_directions()),
-      [&](const cv::Range& range) {
-        for (int i = range.start; i < range.end; ++i) {
-          const auto k = static_cast<std::size_t>(i);
-          over_noise_[2 * k] = in_units(ridges.noise, ridges.response[k]);
-          over_noise_[2 * k + 1] = between(ridges, k);
-        }
-      });
+  cv::parallel_for_(cv::Range(0, ridges.n_directions()), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      over_noise_[2 * k] = in_units(ridges.noise, ridges.response[k]);
+      over_noise_[2 * k + 1] = between(ridges, k);
+    }
+  });
 }
 
 Ways::Turn Ways::turn_of(double curvature) const {

@@ -19,8 +19,7 @@ constexpr std::array kActin = {"actin", "phall", "_act", "act_", "fiber", "fibre
 
 template <class Words>
 bool has_any(std::string_view name, const Words& words) {
-  return std::ranges::any_of(
-      words, [&](std::string_view word) { return name.find(word) != name.npos; });
+  return std::ranges::any_of(words, [&](std::string_view word) { return name.find(word) != name.npos; });
 }
 
 /// Empty where the name tells nothing.

@@ -169,9 +169,8 @@ TEST(Solids, forces_balance_and_the_energy_is_half_the_work) {
 
 /// A ball that nothing holds.
 Deformed free_ball(double contraction_kPa, Strain strain) {
-  return solve(body_of(
-                   ball(10, 0), 4, [](Vec2 at) { return Held{.along_z = std::abs(at.y) < 1e-9}; },
-                   {Solid{10, 0.45, contraction_kPa}}),
+  return solve(body_of(ball(10, 0), 4, [](Vec2 at) { return Held{.along_z = std::abs(at.y) < 1e-9}; },
+                       {Solid{10, 0.45, contraction_kPa}}),
                strain);
 }
 

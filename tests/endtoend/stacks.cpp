@@ -97,25 +97,18 @@ TEST_F(Stacks, what_does_not_go_together_is_refused_with_the_remedy) {
     int code = 3;
     std::string of = {};  ///< the file that is not as expected
   };
-  const std::string narrower = changed(
-      "narrower.tif",
-      [](auto& s) {
-        for (auto& slice : s) {
-          --slice.height;
-          slice.pixels.resize(slice.pixels.size() - static_cast<std::size_t>(slice.width));
-        }
-      });
-  const std::string shorter = changed(
-      "shorter.tif", [](auto& s) { s.resize(s.size() - 2); });
-  const std::string unscaled = changed(
-      "unscaled.tif", [](auto& s) { s.front().z_step_um.reset(); });
-  const std::string coarser = changed(
-      "coarser.tif", [](auto& s) { s.front().z_step_um = 0.7; });
-  const std::string dark = changed(
-      "dark.tif",
-      [](auto& s) {
-        for (auto& slice : s) std::ranges::fill(slice.pixels, 100.0f);
-      });
+  const std::string narrower = changed("narrower.tif", [](auto& s) {
+    for (auto& slice : s) {
+      --slice.height;
+      slice.pixels.resize(slice.pixels.size() - static_cast<std::size_t>(slice.width));
+    }
+  });
+  const std::string shorter = changed("shorter.tif", [](auto& s) { s.resize(s.size() - 2); });
+  const std::string unscaled = changed("unscaled.tif", [](auto& s) { s.front().z_step_um.reset(); });
+  const std::string coarser = changed("coarser.tif", [](auto& s) { s.front().z_step_um = 0.7; });
+  const std::string dark = changed("dark.tif", [](auto& s) {
+    for (auto& slice : s) std::ranges::fill(slice.pixels, 100.0f);
+  });
   const auto into_out2 = [](const std::string& one, const std::string& other, const std::string& more = {}) {
     return track(one, other, more, "out2");
   };

@@ -19,12 +19,10 @@ Cell ordinary_cell(std::uint64_t seed) {
 
 bool are_equal(const Network& a, const Network& b) {
   return a.vertices_um == b.vertices_um && a.adhesion_id == b.adhesion_id &&
-         std::equal(
-             a.links.begin(), a.links.end(), b.links.begin(), b.links.end(),
-             [](const Link& s, const Link& t) {
-               return s.vertex_a == t.vertex_a && s.vertex_b == t.vertex_b && s.fibre_id == t.fibre_id &&
-                      s.rest_length_um == t.rest_length_um && s.share == t.share;
-             });
+         std::equal(a.links.begin(), a.links.end(), b.links.begin(), b.links.end(), [](const Link& s, const Link& t) {
+           return s.vertex_a == t.vertex_a && s.vertex_b == t.vertex_b && s.fibre_id == t.fibre_id &&
+                  s.rest_length_um == t.rest_length_um && s.share == t.share;
+         });
 }
 
 Cell moved(Cell cell, double angle, Vec2 shift) {

@@ -29,8 +29,7 @@ struct Model {
     for (int i = 0; i < kForces; ++i) deviation[i] = std::sqrt(0.02 * forces_nN.segment<2>(i / 2 * 2).norm());
   }
   Eigen::MatrixXd draw(Eigen::Index rows, Eigen::Index columns) {
-    return Eigen::MatrixXd::NullaryExpr(
-        rows, columns, [&] { return normal(engine); });
+    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(engine); });
   }
   Eigen::VectorXd forces(double size) { return D * tensions + size * deviation.cwiseProduct(draw(kForces, 1).col(0)); }
   std::vector<MeshForces> meshes(int n) {

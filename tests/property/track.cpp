@@ -27,9 +27,9 @@ images::Image rearranged(const images::Image& image, const Place& place) {
 
 /// The bead nearest to a place.
 const Bead& nearest(const DisplacementField& field, Vec2 place) {
-  return *std::min_element(
-      field.begin(), field.end(),
-      [&](const Bead& a, const Bead& b) { return norm(a.position_um - place) < norm(b.position_um - place); });
+  return *std::min_element(field.begin(), field.end(), [&](const Bead& a, const Bead& b) {
+    return norm(a.position_um - place) < norm(b.position_um - place);
+  });
 }
 
 /// `turned` tracks the same scene under a symmetry; `back` brings a vector, `back_place` a place of it home.

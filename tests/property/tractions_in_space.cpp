@@ -42,8 +42,7 @@ TEST(Recurrences, agree_with_the_dense_decomposition_at_every_lambda_and_in_thei
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
   constexpr double kNoise = 0.02;
-  const VectorXd truth = VectorXd::NullaryExpr(
-      240, [&]() { return normal(random); });
+  const VectorXd truth = VectorXd::NullaryExpr(240, [&]() { return normal(random); });
   const VectorXd u = A * truth + kNoise * VectorXd::NullaryExpr(500, [&]() { return normal(random); });
   const tractions::Spectrum dense(A.transpose() * A, A.transpose() * u, u.squaredNorm(), 500);
   const tractions::LinearMap map{[&](const MatrixXd& x) { return MatrixXd(A * x); },
@@ -73,10 +72,7 @@ TEST(Spectra, tell_an_error_that_can_be_followed_from_noise_that_is_everywhere) 
   constexpr int kSeeds = 20;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     std::mt19937_64 random(seed);
-    const auto draw = [&](int n) {
-      return VectorXd(VectorXd::NullaryExpr(
-          n, [&]() { return normal(random); }));
-    };
+    const auto draw = [&](int n) { return VectorXd(VectorXd::NullaryExpr(n, [&]() { return normal(random); })); };
     const auto felt_least = [&](const VectorXd& u) {
       return tractions::Spectrum(A.transpose() * A, A.transpose() * u, u.squaredNorm(), 500).variance_felt_least();
     };

@@ -86,11 +86,7 @@ TEST(RealFibres, are_the_same_in_brighter_turned_and_mirrored_images) {
         turned.at(image.height - 1 - row, column) = image.at(column, row);
         mirrored.at(image.width - 1 - column, row) = image.at(column, row);
       }
-    expect_same(
-        "turned", turned,
-        [&](Vec2 p) {
-          return Vec2{p.y, height_um - p.x};
-        });
+    expect_same("turned", turned, [&](Vec2 p) { return Vec2{p.y, height_um - p.x}; });
     expect_same("mirrored", mirrored, [&](Vec2 p) { return Vec2{width_um - p.x, p.y}; });
   }
   for (const auto& [change, f1] : mean) EXPECT_GE(f1, 0.9) << change;

@@ -24,8 +24,8 @@ double share_wrong(const Tracking& tracking, const std::vector<test::Peak>& peak
 
 /// Whether a bead went where none of those around went, one of which it is.
 bool is_stranger(Vec2 displacement, const std::vector<int>& around, const test::BeadPair& pair) {
-  return std::none_of(
-      around.begin(), around.end(), [&](int k) { return norm(displacement - pair.displacements[k]) < 1; });
+  return std::none_of(around.begin(), around.end(),
+                      [&](int k) { return norm(displacement - pair.displacements[k]) < 1; });
 }
 
 TEST(TrackStability, lost_beads_uneven_light_and_another_exposure_cost_beads_but_not_trust) {

@@ -94,8 +94,7 @@ struct Scene {
 };
 
 bool are_candidates(const Cell& cell) {
-  return std::ranges::all_of(
-      cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
+  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
 }
 
 void expect_apart(const Cell& cell, double least_um) {

@@ -118,11 +118,9 @@ TEST(HeightMap, a_hole_in_a_biharmonic_quartic_is_filled_exactly) {
 }
 
 TEST(HeightMap, a_wide_hole_is_refused_by_place) {
-  const HeightMap map = with_holes(
-      sampled(bumpy, {-20, -20}, {20, 20}, 0.5),
-      [](Vec2 p) {
-        return norm(p - Vec2{5, 3}) < 3;
-      });
+  const HeightMap map = with_holes(sampled(bumpy, {-20, -20}, {20, 20}, 0.5), [](Vec2 p) {
+    return norm(p - Vec2{5, 3}) < 3;
+  });
   const InvalidData error = test::thrown<InvalidData>([&] { filled(map, 5); });
   EXPECT_NE(error.element.find("x, y = 5, 3"), std::string::npos) << error.what();
 }
