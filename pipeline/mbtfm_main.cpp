@@ -362,20 +362,9 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
 int demo(CommandLine line) {
   if (line.folder.empty()) line.folder = "mbtfm-demo";
   if (!line.is_quiet) say("simulating a cell in " + line.folder.string());
-  std::vector<std::string> command = {(line.stage_folder / "mbtfm-simulate").string(),
-                                      "--scenario",
-                                      "u2os",
-                                      "--seed",
-                                      "1",
-                                      "--noise",
-                                      "0.07",
-                                      "--beads",
-                                      "10000",
-                                      "--images",
-                                      "--out",
-                                      line.folder.string(),
-                                      "--threads",
-                                      std::to_string(line.threads)};
+  std::vector<std::string> command = {(line.stage_folder / "mbtfm-simulate").string()};
+  command.insert(command.end(), {"--scenario", "u2os", "--seed", "1", "--noise", "0.07", "--beads", "10000"});
+  command.insert(command.end(), {"--images", "--out", line.folder.string(), "--threads", std::to_string(line.threads)});
   if (line.is_quiet) command.emplace_back("--quiet");
   const runner::ProcessResult simulated = runner::run_process(command);
   if (const int code = runner::exit_code_of(simulated); code != kDone) return code;
