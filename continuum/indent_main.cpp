@@ -96,10 +96,9 @@ void expect_sense(const Parameters& p, const Setting& setting, const std::vector
         "[cell] contraction_kPa: expected a contraction without hindrance, (1 - 2 nu) stress / modulus, of at most "
         "0.4, found " +
         brief(free));
-  for (const Case& one : cases) {
+  for (const Case& one : cases)
     if (one.height_um == 0)
       throw UsageError("[cell] height_um is missing: give it in cell.toml, as --height_um or in the sweep");
-  }
 }
 
 void notice_large_contraction(stage::StageContext& context, const Setting& setting) {
@@ -161,9 +160,8 @@ std::string summary_of(const Setting& setting, const std::vector<Indentation>& s
 /// @throws NotSolved where none is solved
 void notice_failures(stage::StageContext& context, const std::vector<Indentation>& solved) {
   std::vector<const Indentation*> failed;
-  for (const Indentation& one : solved) {
+  for (const Indentation& one : solved)
     if (one.failure) failed.push_back(&one);
-  }
   if (failed.empty()) return;
   const Indentation& first = *failed.front();
   if (failed.size() == solved.size()) {

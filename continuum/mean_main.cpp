@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <numbers>
 #include <random>
 #include <set>
@@ -85,9 +84,8 @@ void declare(stage::ParameterList& list, Parameters& p) {
 
 /// The first of some names that a folder has; empty: none.
 Path first_of(const Path& folder, std::initializer_list<const char*> names) {
-  for (const char* name : names) {
+  for (const char* name : names)
     if (files::is_file(folder / name)) return name;
-  }
   return {};
 }
 
@@ -115,9 +113,8 @@ OwnSettings settings_of(const Path& cell, const Parameters& otherwise) {
 Path outline_in(const Path& folder, const runner::ImageNames& names) {
   const Path found = first_of(folder, {"1_segment/outline.csv", "outline.csv"});
   if (!found.empty()) return found;
-  for (const char* key : {"outline_roi", "outline_mask"}) {
+  for (const char* key : {"outline_roi", "outline_mask"})
     if (const auto given = resolve_optional_image(folder, names, key)) return given->lexically_relative(folder);
-  }
   return {};
 }
 
@@ -415,9 +412,8 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   fttc.gel_model = p.gel_model;
   fttc.spacing_um = spacing;
   const std::vector<double> lambdas = lambdas_of(kept, p, fttc, context.threads);
-  for (std::size_t k = 0, of_kept = 0; k < rows.size(); ++k) {
+  for (std::size_t k = 0, of_kept = 0; k < rows.size(); ++k)
     if (rows[k].is_kept) rows[k].lambda_um_per_kPa = lambdas[of_kept++];
-  }
   const std::vector<Vec2> nodes = lattice_over(alignment.reference_um, size / 5, spacing);
   const Samples samples = samples_of(kept.size(), nodes, alignment.motions, context.threads,
                                      [&](int k) { return field_of(kept[k], fttc, lambdas[k]); });

@@ -136,11 +136,10 @@ std::vector<Polygon> adhesive_area(const Parameters& p, stage::StageContext& con
 Region with_borders_of(Region region, const std::vector<Polygon>& adhesive_um) {
   constexpr double kClear_um = 0.1;  // nearer to the rim a border would ask for slivers
   const Polygon& rim = region.rims.front().points_um();
-  for (const Polygon& border : adhesive_um) {
+  for (const Polygon& border : adhesive_um)
     if (std::ranges::all_of(border,
                             [&](Vec2 p) { return contains(rim, p) && distance_to_boundary_um(rim, p) > kClear_um; }))
       region.lines.emplace_back(border);
-  }
   return region;
 }
 
@@ -646,13 +645,11 @@ sheets::Question question_of(const Parameters& p, stage::StageContext& context, 
 std::string told_by(const sheets::SheetFit& fit) {
   std::string told;
   std::vector<double> bundles_nN;
-  for (const SheetEstimate& e : fit.estimates) {
-    if (e.quantity == sheets::Quantity::bundle_tension) {
+  for (const SheetEstimate& e : fit.estimates)
+    if (e.quantity == sheets::Quantity::bundle_tension)
       bundles_nN.push_back(e.value);
-    } else {
+    else
       told += (told.empty() ? "" : "; ") + sentence_of(e);
-    }
-  }
   if (bundles_nN.empty()) return told;
   const auto [least, most] = std::ranges::minmax(bundles_nN);  // sheet_fit.csv has each
   return told +

@@ -36,9 +36,8 @@ struct Cells {
 Cells read_cells(stage::StageContext& context) {
   const Path folder = context.input("cells", {});
   std::vector<Path> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
     if (files::is_own_file(entry.path() / "4_fit/fit.json")) paths.push_back(entry.path());
-  }
   std::sort(paths.begin(), paths.end());
   Cells cells;
   for (const Path& path : paths) {
@@ -135,9 +134,8 @@ constexpr const char* kOneToOne = "stroke:#333;stroke-width:1.6;stroke-dasharray
 charts::Chart forces_chart(const std::vector<FittedCell>& cells, const std::vector<Comparison>& shown) {
   double largest_fitted = 0, largest = 0;
   for (const FittedCell& cell : cells) largest_fitted = std::max(largest_fitted, 1.08 * cell.fitted_force_nN);
-  for (const Comparison& c : shown) {
+  for (const Comparison& c : shown)
     for (const double force : c.fttc_nN) largest = std::max({largest, 1.05 * force, c.line.slope * largest_fitted});
-  }
   charts::Chart chart("Total force of a cell", {"model-based fit (nN)", 0, largest_fitted, charts::Scale::linear},
                       {"FTTC (nN)", 0, std::max(largest, largest_fitted), charts::Scale::linear});
   chart.curve({{0, 0}, {largest_fitted, largest_fitted}}, kOneToOne);
@@ -145,9 +143,8 @@ charts::Chart forces_chart(const std::vector<FittedCell>& cells, const std::vect
   for (std::size_t i = 0; i < shown.size(); ++i) {
     const std::string colour = charts::kColours[i % std::size(charts::kColours)];
     chart.curve({{0, 0}, {largest_fitted, shown[i].line.slope * largest_fitted}}, "stroke-width:1.2;stroke:" + colour);
-    for (std::size_t c = 0; c < cells.size(); ++c) {
+    for (std::size_t c = 0; c < cells.size(); ++c)
       chart.dot({cells[c].fitted_force_nN, shown[i].fttc_nN[c]}, 4, "fill:" + colour, cells[c].name);
-    }
     chart.key(says(shown[i]), colour);
   }
   return chart;
@@ -187,9 +184,8 @@ void write_tables(stage::StageContext& context, const std::vector<FittedCell>& c
   files::CsvText by_cell({"cell", "length_um", "fttc_total_force_nN", "fit_total_force_nN"});
   for (const Comparison& s : series) {
     table.add(s.length_um).add(s.line.slope).add(s.line.correlation).add(static_cast<int>(cells.size())).end_row();
-    for (std::size_t c = 0; c < cells.size(); ++c) {
+    for (std::size_t c = 0; c < cells.size(); ++c)
       by_cell.add(cells[c].name).add(s.length_um).add(s.fttc_nN[c]).add(cells[c].fitted_force_nN).end_row();
-    }
   }
   files::write_text(context.output("out"), table.str());
   files::write_text(context.output_beside("out", "_cells.csv"), by_cell.str());
@@ -231,9 +227,8 @@ StageReport calibrate(const TractionParameters& p, stage::StageContext& context)
     report.summary += ": no lambda between " + brief(kSmallest_um) + " and " + brief(kLargest_um) +
                       " um gives FTTC the forces of the fit";
   }
-  if (n_not_converged > 0) {
+  if (n_not_converged > 0)
     report.summary += "; " + std::to_string(n_not_converged) + " left out, whose fit has not converged";
-  }
   return report;
 }
 

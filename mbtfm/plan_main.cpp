@@ -1,11 +1,8 @@
 /// mbtfm-plan: how many beads, which gel, how little noise and how many cells a question takes.
 #include "mbtfm/plan/answer.h"
 #include "mbtfm/plan/page.h"
-#include "mbtfm/plan/space_answer.h"
-#include "mbtfm/plan/space_page.h"
 #include "mbtfm/plan/tables.h"
 #include "pipeline/contract/counted.h"
-#include "pipeline/contract/numbers.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/stage.h"
@@ -36,13 +33,11 @@ Plan plan_of(const Parameters& parameters, stage::StageContext& context) {
   const Computed computed = compute(scene, asked, work);
   Plan plan{.name = scene.name,
             .own_kPa = own_kPa,
-            .parameters = parameters,
             .asked = asked,
             .grid = grid_of(scene, asked, computed, context.threads),
-            .most_beads_per_um2 = most_beads_per_um2(scene),
-            .drawn = {},
-            .cells = {}};
-  const Point point = answered_point(asked, plan.grid, own_kPa);
+            .parameters = parameters,
+            .most_beads_per_um2 = most_beads_per_um2(scene)};
+  const Point point = answered_point(asked, plan.grid.needed, own_kPa);
   plan.cells = cells_of(scene, computed, point, parameters, context);
   if (parameters.drawn > 0) plan.drawn = draw_experiments(scene, computed, point, parameters.drawn, work);
   return plan;
@@ -52,30 +47,6 @@ void write_picture(const std::string& svg, std::size_t n_charts, stage::StageCon
   files::write_text(context.output("out", "plan.svg"), svg);
   constexpr double kColumn_mm = 90, kDotsPerInch = 300;  // of a page with two columns
   statistics::write_png(context.output("out", "plan.png"), svg, kColumn_mm * (n_charts > 1 ? 2 : 1), kDotsPerInch);
-}
-
-void write(const Plan& plan, stage::StageContext& context) {
-  const auto out = [&](const char* file) { return context.output("out", file); };
-  files::write(out("plan.csv"), expected_table(), plan.grid.expected);
-  files::write(out("plan_needed.csv"), needed_table(), plan.grid.needed);
-  files::write(out("plan_cells.csv"), cell_table(), plan.cells);
-  if (plan.drawn) files::write(out("plan_drawn.csv"), drawn_table(), plan.drawn->tensions);
-  write_picture(svg_of(plan), plan.asked.noise_um.size(), context);
-  files::write_text(out("plan.html"), html_of(plan));
-}
-
-void tell(const std::string& answer, const std::vector<std::string>& further,
-          const std::vector<std::string>& warnings) {
-  stage::print(answer + "\n");
-  for (const std::string& sentence : further) stage::print(sentence + "\n");
-  for (const std::string& warning : warnings) stage::print("Mind: " + warning + "\n");
-}
-
-std::string summary_of(const std::string& name, const Asked& asked, std::size_t n_densities,
-                       const stage::StageContext& context) {
-  return name + ": " + counted(asked.youngs_modulus_kPa.size(), "gel", "gels") + ", " +
-         counted(n_densities, "density", "densities") + ", " + counted(asked.noise_um.size(), "noise", "noises") +
-         "; plan.html in " + context.outputs_.at("out").string();
 }
 
 SpaceScene space_scene_of(const Parameters& parameters, stage::StageContext& context) {
@@ -93,33 +64,39 @@ SpacePlan space_plan_of(const Parameters& parameters, stage::StageContext& conte
   const SpaceForeseen foreseen = foresee(scene, asked, pools, work);
   SpacePlan plan{.name = scene.name,
                  .own_kPa = scene.gel.youngs_modulus_kPa,
-                 .axial_noise = scene.spatial.axial_sigma_ratio,
-                 .volume_um3 = scene.volume_um3(),
                  .asked = asked,
                  .grid = grid_of(scene, asked, pools, foreseen, pairs_of(scene, asked, {}, context.threads)),
-                 .drawn = {}};
-  const SpacePoint point = answered_point(asked, plan.grid, plan.own_kPa);
+                 .axial_noise = scene.spatial.axial_sigma_ratio,
+                 .volume_um3 = scene.volume_um3()};
+  const Point point = answered_point(asked, plan.grid.needed, plan.own_kPa);
   if (parameters.drawn > 0)
-    plan.drawn = draw_experiments(scene, pools[foreseen.index_of_density(point.beads_per_um3)], foreseen, point,
+    plan.drawn = draw_experiments(scene, pools[foreseen.index_of_density(point.density)], foreseen, point,
                                   parameters.drawn, work);
   return plan;
 }
 
-StageReport run_in_space(const Parameters& parameters, stage::StageContext& context) {
-  if (context.has_input("study"))
-    throw UsageError("study: the scatter of a study is that of tensions, and a cell in space has none");
-  const SpacePlan plan = space_plan_of(parameters, context);
+/// Write the tables, the picture and the page, and print the answer.
+template <class Quantity>
+StageReport report_of(const PlanOf<Quantity>& plan, stage::StageContext& context) {
+  constexpr bool kIsFlat = std::is_same_v<Quantity, plan::Quantity>;
   const auto out = [&](const char* file) { return context.output("out", file); };
-  files::write(out("plan.csv"), space_expected_table(), plan.grid.expected);
-  files::write(out("plan_needed.csv"), space_needed_table(), plan.grid.needed);
-  if (plan.drawn) files::write(out("plan_drawn.csv"), space_drawn_table(), plan.drawn->forces);
+  files::write(out("plan.csv"), expected_table(Quantity{}), plan.grid.expected);
+  files::write(out("plan_needed.csv"), needed_table(Quantity{}), plan.grid.needed);
+  if (kIsFlat) files::write(out("plan_cells.csv"), cell_table(), plan.cells);
+  if (plan.drawn) files::write(out("plan_drawn.csv"), drawn_table(Quantity{}), plan.drawn->numbers);
   write_picture(svg_of(plan), plan.asked.noise_um.size(), context);
   files::write_text(out("plan.html"), html_of(plan));
   context.progress(1, "done");
-  tell(answer_sentence(plan), further_sentences(plan), plan.grid.warnings);
+  stage::print(answer_sentence(plan) + "\n");
+  for (const std::string& sentence : further_sentences(plan)) stage::print(sentence + "\n");
+  for (const std::string& warning : plan.grid.warnings) stage::print("Mind: " + warning + "\n");
   StageReport report;
-  report.summary = summary_of(plan.name, plan.asked, plan.asked.beads_per_um3.size(), context);
+  report.summary = plan.name + ": " + counted(std::ssize(plan.asked.youngs_modulus_kPa), "gels") + ", " +
+                   counted(std::ssize(plan.asked.densities), "density", "densities") + ", " +
+                   counted(std::ssize(plan.asked.noise_um), "noises") + "; plan.html in " +
+                   context.outputs_.at("out").string();
   report.figures = {{"target_nN", plan.asked.target_nN}};
+  if (kIsFlat) report.figures.emplace_back("model_error_nN", plan.grid.model_error_nN);
   if (plan.drawn) report.figures.emplace_back("error_over_predicted", plan.drawn->error_over_predicted);
   return report;
 }
@@ -130,18 +107,14 @@ bool is_in_space(const Parameters& parameters, const stage::StageContext& contex
 }
 
 StageReport run(const Parameters& parameters, stage::StageContext& context) {
-  if (is_in_space(parameters, context)) return run_in_space(parameters, context);
+  if (is_in_space(parameters, context)) {
+    if (context.has_input("study"))
+      throw UsageError("study: the scatter of a study is that of tensions, and a cell in space has none");
+    return report_of(space_plan_of(parameters, context), context);
+  }
   if (!parameters.beads_per_um3.empty())
     throw UsageError("beads_per_um3: beads of a flat gel lie at its surface: give beads_per_um2");
-  const Plan plan = plan_of(parameters, context);
-  write(plan, context);
-  context.progress(1, "done");
-  tell(answer_sentence(plan), further_sentences(plan), plan.grid.warnings);
-  StageReport report;
-  report.summary = summary_of(plan.name, plan.asked, plan.asked.beads_per_um2.size(), context);
-  report.figures = {{"target_nN", plan.asked.target_nN}, {"model_error_nN", plan.grid.model_error_nN}};
-  if (plan.drawn) report.figures.emplace_back("error_over_predicted", plan.drawn->error_over_predicted);
-  return report;
+  return report_of(plan_of(parameters, context), context);
 }
 
 }  // namespace

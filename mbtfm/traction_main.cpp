@@ -76,9 +76,8 @@ StageReport run(const spatial::StageParameters& p, stage::StageContext& context)
   if (!r.report.converged) report.summary += "; " + r.report.reason;
   if (!r.remark.empty()) report.summary += "; " + r.remark;
   constexpr double kOutward = -0.5;  // no cell pushes so; noise has a share near zero
-  if (sums.inward_share < kOutward) {
+  if (sums.inward_share < kOutward)
     report.summary += "; WARNING: the tractions push outward everywhere: are stressed and relaxed swapped?";
-  }
   report.figures = summary_of(r, sums);
   const bool is_layer = p.traction.gel_model == GelModel::layer;
   report.effects = {stage::decided(EffectKind::finite_thickness, switched(is_layer), is_layer,

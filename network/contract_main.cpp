@@ -21,12 +21,11 @@ std::vector<double> tensions_by_group(const std::vector<int>& fibre_ids, const s
   for (const Tension& row : rows) given[row.fibre_id] = row.tension_nN;
   std::vector<double> result;
   std::string missing;
-  for (const int id : fibre_ids) {
+  for (const int id : fibre_ids)
     if (given.contains(id))
       result.push_back(given[id]);
     else
       missing += (missing.empty() ? "" : ", ") + std::to_string(id);
-  }
   if (!missing.empty())
     throw InputError(file.string(), "a row for each fibre of the network", "none for fibre_id " + missing,
                      "fibre_id 0 is the actin network");

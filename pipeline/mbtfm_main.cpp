@@ -39,7 +39,6 @@
 
 namespace {
 
-namespace fs = std::filesystem;
 using namespace mbtfm;
 
 using namespace exit_code;
@@ -363,20 +362,9 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
 int demo(CommandLine line) {
   if (line.folder.empty()) line.folder = "mbtfm-demo";
   if (!line.is_quiet) say("simulating a cell in " + line.folder.string());
-  std::vector<std::string> command = {(line.stage_folder / "mbtfm-simulate").string(),
-                                      "--scenario",
-                                      "u2os",
-                                      "--seed",
-                                      "1",
-                                      "--noise",
-                                      "0.07",
-                                      "--beads",
-                                      "10000",
-                                      "--images",
-                                      "--out",
-                                      line.folder.string(),
-                                      "--threads",
-                                      std::to_string(line.threads)};
+  std::vector<std::string> command = {(line.stage_folder / "mbtfm-simulate").string()};
+  command.insert(command.end(), {"--scenario", "u2os", "--seed", "1", "--noise", "0.07", "--beads", "10000"});
+  command.insert(command.end(), {"--images", "--out", line.folder.string(), "--threads", std::to_string(line.threads)});
   if (line.is_quiet) command.emplace_back("--quiet");
   const runner::ProcessResult simulated = runner::run_process(command);
   if (const int code = runner::exit_code_of(simulated); code != kDone) return code;
@@ -407,9 +395,8 @@ int start(int argc, char** argv) {
   add_stage_options(run_command, line);
   run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
   run_command->add_flag("--explain", line.explain, "fit again and say what each effect that is off would change");
-  for (CLI::App* command : {run_command, demo_command}) {
+  for (CLI::App* command : {run_command, demo_command})
     command->add_flag("--verbose", line.is_verbose, "print every effect with its number, and why a stage is run");
-  }
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", kFolder);
   for (CLI::App* command : {run_command, batch_command})
     command->add_flag("--json", line.is_json, "print events as JSON, one object a line (docs/formats.md)");

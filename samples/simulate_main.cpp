@@ -28,9 +28,8 @@ std::string scenario_named(int argc, char** argv, const std::string& otherwise) 
 
 /// Images beside the true segmentation of an earlier experiment would never be looked at: it would pass for the user's.
 void refuse_given_segmentation(const std::filesystem::path& cell) {
-  if (std::filesystem::exists(cell / "1_segment") && !std::filesystem::exists(cell / "run.json")) {
+  if (std::filesystem::exists(cell / "1_segment") && !std::filesystem::exists(cell / "run.json"))
     throw UsageError(cell.string() + " holds an experiment without images: choose another folder or remove it");
-  }
 }
 
 struct SimulateParameters {

@@ -16,10 +16,9 @@ Vec2 centre_of_adhesion(const std::vector<Roi>& rois, int adhesion_id, const std
   constexpr double kCentre_px = 0.5;
   const std::string id = " " + std::to_string(adhesion_id), name = "adhesion" + id;
   const std::set<std::string> names = {name, "anchor" + id, "candidate" + id};
-  for (const Roi& roi : rois) {
+  for (const Roi& roi : rois)
     if (names.contains(roi.name) && roi.points_px.size() == 2)
       return 0.5 * (roi.points_px[0] + roi.points_px[1]) - Vec2{kCentre_px, kCentre_px};
-  }
   throw InputError(file, "an ellipse called '" + name + "'", "none",
                    "RoiSet.zip and missing_fibres.csv must be of the same run: mbtfm run CELL");
 }
@@ -28,9 +27,8 @@ StageReport add_fibres(stage::StageContext& context) {
   const auto rois_file = context.input("rois"), missing_file = context.input("missing");
   const std::vector<Roi> rois = read_rois(rois_file);
   std::vector<Roi> fibres;
-  for (const Roi& roi : rois) {
+  for (const Roi& roi : rois)
     if (is_line(roi.shape)) fibres.push_back(roi);
-  }
   const auto n_segmented = static_cast<std::int64_t>(fibres.size());
   const std::vector<MissingFibre> missing = files::read(missing_file, files::missing_fibre_table());
   for (std::size_t k = 0; k < missing.size(); ++k) {

@@ -18,7 +18,6 @@
 
 namespace {
 
-namespace fs = std::filesystem;
 using namespace mbtfm;
 
 /// Which planes cell.toml chooses, as the stages will read them. @throws InputError where a key or value is wrong

@@ -19,7 +19,6 @@
 
 namespace {
 
-namespace fs = std::filesystem;
 using namespace mbtfm;
 
 constexpr std::string_view kImages[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};

@@ -184,13 +184,12 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
         noticed(FindingKind::adhesions_assumed,
                 static_cast<double>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::candidate, &Adhesion::origin)),
                 assumption_of(s, is_assumed_by_itself), severity_of(s)),
-        noticed(FindingKind::fibre_ends_anchored, s.n_anchors,
-                (s.n_anchors == 1
-                     ? "One end of a fibre that must be held reaches no adhesion. It is held by an anchor."
-                     : std::to_string(s.n_anchors) +
-                           " ends of fibres that must be held reach no adhesion. They are held by anchors."))}) {
+        noticed(
+            FindingKind::fibre_ends_anchored, s.n_anchors,
+            (s.n_anchors == 1 ? "One end of a fibre that must be held reaches no adhesion. It is held by an anchor."
+                              : std::to_string(s.n_anchors) +
+                                    " ends of fibres that must be held reach no adhesion. They are held by anchors."))})
     if (found) report.findings.push_back(std::move(*found));
-  }
   if (s.pattern) {
     for (std::optional<Finding>& found : findings_of(*s.pattern, s.cell.adhesions))
       if (found) report.findings.push_back(std::move(*found));
@@ -271,9 +270,8 @@ void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
 void expect_plausible(stage::StageContext& context, const Segmentation& s) {
   context.expect_plausible("cell_area_um2", s.area_um2);
   std::vector<double> areas_um2;
-  for (const Adhesion& a : s.cell.adhesions) {
+  for (const Adhesion& a : s.cell.adhesions)
     if (!is_assumed(a.origin)) areas_um2.push_back(a.area_um2);
-  }
   if (areas_um2.empty()) return;
   context.expect_plausible("adhesion_area_um2", numerics::median_in(areas_um2));
 }

@@ -80,9 +80,8 @@ StageReport report_of(const DisplacementField& field) {
        {noticed(FindingKind::nothing_moves, still,
                 "Nothing moves: " + std::to_string(figures.n_surely_moving) + " of " + std::to_string(figures.n_good) +
                     " beads by more than six standard errors."),
-        noticed(FindingKind::moves_outward, outwardness(field), "The gel is pushed outward everywhere.")}) {
+        noticed(FindingKind::moves_outward, outwardness(field), "The gel is pushed outward everywhere.")})
     if (found) report.findings.push_back(std::move(*found));
-  }
   return report;
 }
 
@@ -200,9 +199,8 @@ std::vector<Frame> frames_of(stage::StageContext& context, const TrackParameters
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(given)) {
     const std::string extension = entry.path().extension().string();
-    if (std::ranges::find(kImageExtensions, extension) != std::end(kImageExtensions)) {
+    if (std::ranges::find(kImageExtensions, extension) != std::end(kImageExtensions))
       names.push_back(entry.path().filename().string());
-    }
   }
   if (names.empty()) throw InputError(given.string(), "images (.tif, .tiff, .png, .jpg, .jpeg)", "none");
   std::sort(names.begin(), names.end());
@@ -252,9 +250,8 @@ TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, 
     context.notice(images::noticed_loss(*image));
     context.notice(images::noticed_saturation(*image));
   }
-  if (stressed.image.pixels == relaxed.image.pixels) {
+  if (stressed.image.pixels == relaxed.image.pixels)
     throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both");
-  }
   Tracking tracking = with_names(relaxed.name + ", " + stressed.name,
                                  [&] { return beads.track(stressed.image, pixel_size_um, progress); });
   images::Picture picture =
@@ -332,9 +329,8 @@ StageReport track_series(const std::vector<Frame>& frames, stage::StageContext& 
 std::optional<fs::path> earlier_run(const stage::StageContext& context) {
   if (!context.has_input("kept")) return std::nullopt;
   const fs::path folder = context.inputs_.at("kept");
-  for (const char* name : {"frames.csv", "displacement.csv", "record.json"}) {
+  for (const char* name : {"frames.csv", "displacement.csv", "record.json"})
     if (!fs::is_regular_file(folder / name)) return std::nullopt;
-  }
   return folder;
 }
 
@@ -385,9 +381,8 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
     return tracked(relaxed, beads, frame, parameters, binning, progress, context);
   };
   const std::optional<fs::path> earlier = earlier_run(context);
-  if (earlier && files::read(*earlier / "frames.csv", files::frame_table()).size() == frames.size()) {
+  if (earlier && files::read(*earlier / "frames.csv", files::frame_table()).size() == frames.size())
     return complete_series(frames, context, *earlier, tracked_frame);
-  }
   if (frames.size() > 1) return track_series(frames, context, tracked_frame);
   const auto [tracking, pixel_size_um, picture] = tracked_frame(frames.front(), context.progress);
   if (!tracking.windows.is_on) {
@@ -456,11 +451,9 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
     report.summary = std::to_string(field.size()) + " displacements read" + report.summary;
     return report;
   }
-  for (const char* name : {"stressed", "relaxed"}) {
-    if (!context.has_input(name)) {
+  for (const char* name : {"stressed", "relaxed"})
+    if (!context.has_input(name))
       throw UsageError("--" + std::string(name) + " is missing: the two bead images, or --displacement");
-    }
-  }
   if (stacks::are_in_space(parameters, given.in_space))
     return stacks::run(parameters, given.surface_plane, given.in_space, context);
   return track(parameters, given.binning, context);

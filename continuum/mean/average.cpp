@@ -115,10 +115,9 @@ std::vector<Vec2> lattice_over(const Polygon& reference_um, double margin_um, do
     return static_cast<int>(std::ceil((to - from + margin_um) / spacing_um));
   };
   std::vector<Vec2> nodes;
-  for (int j = -reach(low.y, middle.y); j <= reach(middle.y, high.y); ++j) {
+  for (int j = -reach(low.y, middle.y); j <= reach(middle.y, high.y); ++j)
     for (int i = -reach(low.x, middle.x); i <= reach(middle.x, high.x); ++i)
       nodes.push_back(middle + spacing_um * Vec2{static_cast<double>(i), static_cast<double>(j)});
-  }
   return nodes;
 }
 

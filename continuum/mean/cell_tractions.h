@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 
 #include "continuum/mean/average.h"
 #include "pipeline/contract/beads.h"

@@ -7,7 +7,6 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 
 #include "pipeline/numerics/dense.h"
 
@@ -92,10 +91,9 @@ Step step_at(const Laid& image, const Raster& reference, Vec2 centre_um) {
   cv::Sobel(image.values, by_y, CV_32F, 0, 1, 3, 1 / (8 * reference.pixel_um));
   const auto for_each = [&](const auto& body) {
     for (int j = 1; j + 1 < image.values.rows; ++j) {
-      for (int i = 1; i + 1 < image.values.cols; ++i) {
+      for (int i = 1; i + 1 < image.values.cols; ++i)
         if (image.seen.at<float>(j, i) > 0.999F)
           body(j, i, image.values.at<float>(j, i), reference.values.at<float>(j, i));
-      }
     }
   };
   Step step;

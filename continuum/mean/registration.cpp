@@ -164,10 +164,9 @@ std::vector<double> starts(const Polygon& few, const Polygon& of_reference, cons
     misfit.push_back(mean_square(pairs_of(moved(few, motion), of_reference)));
   }
   std::vector<double> angles;
-  for (int k = 0; k < kAngles; ++k) {
+  for (int k = 0; k < kAngles; ++k)
     if (misfit[k] <= misfit[(k + 1) % kAngles] && misfit[k] < misfit[(k + kAngles - 1) % kAngles])
       angles.push_back(angle(k));
-  }
   if (angles.empty()) angles.push_back(0);
   return angles;
 }

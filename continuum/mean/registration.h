@@ -1,7 +1,6 @@
 /// One outline laid onto another of the same shape: shift, turn and mirror.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "pipeline/contract/geometry.h"

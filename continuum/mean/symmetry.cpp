@@ -16,9 +16,8 @@ constexpr int kMostTurns = 24;
 
 /// Of the axis of a mirror, where the shape has one.
 std::optional<double> axis_angle_rad(const Polygon& reference) {
-  for (const Way& way : ways_onto(reference, reference, Mirrors::tried)) {
+  for (const Way& way : ways_onto(reference, reference, Mirrors::tried))
     if (way.motion.is_mirrored) return way.motion.angle_rad / 2;
-  }
   return std::nullopt;
 }
 

@@ -1,6 +1,5 @@
 #include "continuum/outlines/rings.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "continuum/sheet/curve.h"

@@ -73,13 +73,12 @@ Curve::Curve(const Polygon& given_um) : points_um_(is_stepped(given_um) ? withou
   for (std::size_t i = 0; i < n; ++i) {  // towards a corner: the parabola's end, or straight
     const std::size_t next = (i + 1) % n;
     const Vec2 chord = 1 / (start_um_[i + 1] - start_um_[i]) * (points_um_[next] - points_um_[i]);
-    if (is_corner[i] && is_corner[next]) {
+    if (is_corner[i] && is_corner[next])
       tangent_out_[i] = tangent_in_[next] = chord;
-    } else if (is_corner[i]) {
+    else if (is_corner[i])
       tangent_out_[i] = 2 * chord - tangent_in_[next];
-    } else if (is_corner[next]) {
+    else if (is_corner[next])
       tangent_in_[next] = 2 * chord - tangent_out_[i];
-    }
   }
 }
 

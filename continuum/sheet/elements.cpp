@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"

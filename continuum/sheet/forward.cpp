@@ -1,7 +1,6 @@
 #include "continuum/sheet/forward.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "continuum/sheet/mesh_size.h"

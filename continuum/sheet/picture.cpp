@@ -1,7 +1,6 @@
 #include "continuum/sheet/picture.h"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <limits>
 #include <map>

@@ -178,11 +178,10 @@ Patch fitted(const Around& around, std::size_t corner) {
         for (const EdgePlace& place :
              places_of(elements.triangles(), elements.triangles().sides[side], around.known->line_tension_nN)) {
           const std::optional<Tensor>& value = around.known->at_nodes[place.node];
-          if (value) {
+          if (value)
             fit.add_value(place.place_um, place.weight_um2, *value);
-          } else {
+          else
             fit.add_edge(place.place_um, place.normal, place.pull_nN_per_um, place.weight_um2);
-          }
         }
   }
   return fit.solved();

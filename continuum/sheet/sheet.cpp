@@ -1,7 +1,5 @@
 #include "continuum/sheet/sheet.h"
 
-#include <cmath>
-
 namespace mbtfm::sheet {
 
 Tensor elastic_tension(const Material& material, const Tensor& strain) {

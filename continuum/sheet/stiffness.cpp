@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "pipeline/numerics/dense_panel.h"
 #include "pipeline/numerics/spring_matrix.h"

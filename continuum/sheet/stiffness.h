@@ -1,7 +1,6 @@
 /// The stiffness of a sheet's nodes, 2 × 2 blocks, and its factor. The pattern stays while values change.
 #pragma once
 
-#include <memory>
 #include <vector>
 
 #include "continuum/sheet/sheet.h"

@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"

@@ -43,9 +43,8 @@ Eigen::VectorXd pressures_at(Vec2 unit, int order) {
   const auto u = legendre(unit.x, order), v = legendre(unit.y, order);
   Eigen::VectorXd values(order * (order + 1) / 2);
   int k = 0;
-  for (int i = 0; i < order; ++i) {
+  for (int i = 0; i < order; ++i)
     for (int j = 0; i + j < order; ++j) values[k++] = u[i] * v[j];
-  }
   return values;
 }
 
@@ -155,19 +154,17 @@ Square::OneSide Square::along_side(double unit) const {
 Eigen::VectorXd Square::shapes_at(Vec2 unit) const {
   const OneSide u = along_side(unit.x), v = along_side(unit.y);
   Eigen::VectorXd shapes(n_nodes());
-  for (int j = 0; j <= order_; ++j) {
+  for (int j = 0; j <= order_; ++j)
     for (int i = 0; i <= order_; ++i) shapes[j * (order_ + 1) + i] = u.values[i] * v.values[j];
-  }
   return shapes;
 }
 
 Eigen::MatrixX2d Square::slopes_at(Vec2 unit) const {
   const OneSide u = along_side(unit.x), v = along_side(unit.y);
   Eigen::MatrixX2d slopes(n_nodes(), 2);
-  for (int j = 0; j <= order_; ++j) {
+  for (int j = 0; j <= order_; ++j)
     for (int i = 0; i <= order_; ++i)
       slopes.row(j * (order_ + 1) + i) << u.slopes[i] * v.values[j], u.values[i] * v.slopes[j];
-  }
   return slopes;
 }
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "pipeline/contract/errors.h"
@@ -96,9 +95,7 @@ Reading read_planes(const Rays& rays, const std::vector<double>& depths_um, cons
     }
     return of_all;
   };
-  for (const double depth : depths_um) {
-    reading.depth_um.push_back(largest(depth, 1).value);
-  }
+  for (const double depth : depths_um) reading.depth_um.push_back(largest(depth, 1).value);
   reading.lift_um = std::max(0.0, largest(0, -1).value);
   return reading;
 }
@@ -216,9 +213,8 @@ std::optional<std::array<Largest, 3>> around_best(const ByHeight& solved, std::s
   const auto best =
       std::max_element(solved.begin(), solved.end(), [&](const auto& a, const auto& b) { return value(a) < value(b); });
   if (solved.size() < 3 || best == solved.begin() || std::next(best) == solved.end()) return std::nullopt;
-  for (const auto& of_three : {std::prev(best), best, std::next(best)}) {
+  for (const auto& of_three : {std::prev(best), best, std::next(best)})
     if (of_three->second.failure) return std::nullopt;
-  }
   const auto point = [&](auto entry) { return Largest{entry->first, value(*entry)}; };
   return std::array{point(std::prev(best)), point(best), point(std::next(best))};
 }
@@ -314,9 +310,8 @@ std::vector<Optimum> optima(const Setting& setting, const std::vector<Indentatio
     found[k] = optimum_of(setting, by_ratio.at(ratio), ratio, k % n_depths, at);
   });
   std::vector<Optimum> optima;
-  for (const auto& one : found) {
+  for (const auto& one : found)
     if (one) optima.push_back(*one);
-  }
   return optima;
 }
 

@@ -100,10 +100,9 @@ void write_deformed_vtu(const Path& file, const RevolvedBody& deformed) {
     for (int first = 0; first < order * row * row; ++first) {
       if (first % row == order || first / row % row == order) continue;  // the last node of a side begins nothing
       // (u, v, angle) turn the other way round than (x, y, z): the face further on comes first
-      for (const int face : {first + row * row, first}) {
+      for (const int face : {first + row * row, first})
         for (const int corner : {face, face + 1, face + row + 1, face + row})
           grid.cells.push_back(mesh.nodes_of(e)[corner]);
-      }
       grid.cell_arrays[0].values.push_back(mesh.part[e]);
     }
   }

@@ -29,9 +29,8 @@ Depths depths_of(const std::vector<Indentation>& solved, std::size_t read_at) {
 
 double largest_of(const Depths& depths) {
   double largest = 0;
-  for (const auto& [ratio, by_height] : depths) {
+  for (const auto& [ratio, by_height] : depths)
     for (const auto& [height, depth] : by_height) largest = std::max(largest, depth.value_or(0));
-  }
   return largest;
 }
 
@@ -90,13 +89,11 @@ charts::Chart map_chart(const Setting& setting, const Depths& depths, const std:
 /// Of neighbouring heights that are solved.
 std::vector<std::vector<Vec2>> pieces_of(const DepthByHeight& by_height) {
   std::vector<std::vector<Vec2>> pieces(1);
-  for (const auto& [height, depth] : by_height) {
-    if (depth) {
+  for (const auto& [height, depth] : by_height)
+    if (depth)
       pieces.back().push_back({height, *depth});
-    } else if (!pieces.back().empty()) {
+    else if (!pieces.back().empty())
       pieces.emplace_back();
-    }
-  }
   if (pieces.back().empty()) pieces.pop_back();
   return pieces;
 }
@@ -115,10 +112,9 @@ charts::Chart curves_chart(const Setting& setting, const Depths& depths, const s
       chart.curve(points, "stroke:" + colour + ";stroke-width:1.6;fill:none", "ratio " + charts::readable(ratio));
       for (const Vec2 point : points) chart.dot(point, 2, "fill:" + colour);
     }
-    for (const Optimum& best : optima) {
+    for (const Optimum& best : optima)
       if (best.modulus_ratio == ratio && best.read_at_um == setting.depths_um[read_at])
         chart.diamond({best.height_um, best.depth_um}, 5, "fill:" + colour + ";stroke:#ffffff;stroke-width:1");
-    }
     chart.key(charts::readable(ratio), colour);
   }
   return chart;

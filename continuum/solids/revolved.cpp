@@ -37,10 +37,9 @@ Eigen::VectorXd times(const Eigen::VectorXd& of_square, const std::vector<double
 Eigen::VectorXd pressures_at(Vec2 unit, double share, int order) {
   std::vector<double> values;
   for (int i = 0; i < order; ++i) {
-    for (int j = 0; i + j < order; ++j) {
+    for (int j = 0; i + j < order; ++j)
       for (int k = 0; i + j + k < order; ++k)
         values.push_back(std::pow(2 * unit.x - 1, i) * std::pow(2 * unit.y - 1, j) * std::pow(2 * share - 1, k));
-    }
   }
   return Eigen::Map<Eigen::VectorXd>(values.data(), std::ssize(values));
 }
@@ -201,10 +200,9 @@ void expect_not_turned_over(const Cube& cube, const RevolvedMesh& mesh) {
 /// Places of nodes between the sectors' angles: the last is the first again.
 std::vector<double> angles_of_nodes(const std::vector<double>& angles, const std::vector<double>& nodes) {
   std::vector<double> all;
-  for (std::size_t s = 0; s + 1 < angles.size(); ++s) {
+  for (std::size_t s = 0; s + 1 < angles.size(); ++s)
     for (std::size_t k = 0; k + 1 < nodes.size(); ++k)
       all.push_back((1 - nodes[k]) * angles[s] + nodes[k] * angles[s + 1]);
-  }
   return all;
 }
 
@@ -327,10 +325,9 @@ RevolvedMesh revolved_mesh(const Contact& contact, const Sectors& sectors, doubl
   for (int e = 0; e < plane.n_elements(); ++e) {
     for (int s = 0; s < sectors.n(); ++s) {
       mesh.part.push_back(plane.part[e]);
-      for (int w = 0; w <= order; ++w) {
+      for (int w = 0; w <= order; ++w)
         for (int k = 0; k < plane.square.n_nodes(); ++k)
           mesh.nodes.push_back(node_of(plane.nodes_of(e)[k], plane.part[e], (s * order + w) % n_around));
-      }
     }
   }
   return mesh;

@@ -72,9 +72,8 @@ Patch slab_patch(const Slab& slab, double a, int towards_rim) {
   const std::vector<double> graded = lines_towards_zero(towards_rim);
   std::vector<double> r = even_lines(kEvenInside), z;
   for (double& line : r) line *= a / 2;
-  for (const double share : turned(graded)) {
+  for (const double share : turned(graded))
     if (share > 0) r.push_back(a / 2 + a / 2 * share);
-  }
   const double beside = std::min(a / 2, (slab.radius_um - a) / 2), below = std::min(a / 2, slab.thickness_um / 2);
   for (const double share : graded) {
     if (share > 0) r.push_back(a + beside * share);

@@ -62,9 +62,8 @@ class Equilibrium {
   std::vector<Vec2> step(const std::vector<double>& forces_nN) const {
     const std::vector<int>& place = body_.unknowns->elimination()->place;
     std::vector<double> x(forces_nN.size());
-    for (std::size_t k = 0; k < place.size(); ++k) {
+    for (std::size_t k = 0; k < place.size(); ++k)
       for (std::size_t i = 0; i < 2; ++i) x[2 * place[k] + i] = -forces_nN[2 * k + i];
-    }
     factor_.solve(x.data(), 1);
     std::vector<Vec2> u(place.size());
     for (std::size_t k = 0; k < place.size(); ++k)
@@ -80,10 +79,9 @@ class Equilibrium {
         if (nodes[a] < nodes[b]) continue;
         double* block = matrix.block(nodes[a], nodes[b]);
         for (int i = 0; i < 2; ++i) {
-          for (int j = 0; j < 2; ++j) {
+          for (int j = 0; j < 2; ++j)
             if (!body_.unknowns->is_held(nodes[a], i) && !body_.unknowns->is_held(nodes[b], j))
               block[2 * i + j] += stiffness(2 * a + i, 2 * b + j);
-          }
         }
       }
     }
@@ -92,9 +90,8 @@ class Equilibrium {
   /// What is held has an equation of its own: no displacement.
   void hold(numerics::BlockMatrix<2>& matrix) const {
     for (int k = 0; k < body_.unknowns->n_nodes(); ++k) {
-      for (int i = 0; i < 2; ++i) {
+      for (int i = 0; i < 2; ++i)
         if (body_.unknowns->is_held(k, i)) matrix.block(k, k)[3 * i] = 1;
-      }
     }
   }
 
@@ -188,11 +185,9 @@ void solve_large(Equilibrium& equilibrium, Deformed& deformed) {
 
 numerics::BlockPattern pattern_of(int n_nodes, const std::vector<int>& nodes, int per_element) {
   std::vector<std::vector<int>> below(n_nodes);
-  for (auto of = nodes.begin(); of != nodes.end(); of += per_element) {
-    for (auto a = of; a != of + per_element; ++a) {
+  for (auto of = nodes.begin(); of != nodes.end(); of += per_element)
+    for (auto a = of; a != of + per_element; ++a)
       std::copy_if(of, of + per_element, std::back_inserter(below[*a]), [&](int b) { return b >= *a; });
-    }
-  }
   numerics::BlockPattern pattern{.n = n_nodes, .start = {0}, .row = {}};
   for (std::vector<int>& rows : below) {
     std::sort(rows.begin(), rows.end());
@@ -254,11 +249,10 @@ Deformed solve(const Body& body, Strain strain) {
                     .displacement_um = std::vector<Vec2>(body.mesh->position_um.size()),
                     .energy_fJ = 0};
   Equilibrium equilibrium(deformed.body, strain);
-  if (strain == Strain::small) {
+  if (strain == Strain::small)
     solve_small(equilibrium, deformed);
-  } else {
+  else
     solve_large(equilibrium, deformed);
-  }
   return deformed;
 }
 

@@ -59,9 +59,8 @@ std::vector<double> values_in(const std::string& text, const std::string& name, 
     }
   }
   if (values.empty()) refuse(name, text);
-  for (const double value : values) {
+  for (const double value : values)
     if (!std::isfinite(value) || value < 0 || (value == 0 && zero == Zero::is_refused)) refuse(name, text);
-  }
   return values;
 }
 
@@ -77,9 +76,8 @@ std::vector<Case> cases_of(const std::string& sweep, const Case& otherwise) {
         values_in(word.substr(equals + 1), std::string("sweep of ") + name_of(*swept), Zero::is_refused);
   }
   std::vector<Case> cases;
-  for (const double ratio : ratios) {
+  for (const double ratio : ratios)
     for (const double height : heights) cases.push_back({height, ratio});
-  }
   return cases;
 }
 

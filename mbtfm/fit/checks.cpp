@@ -80,9 +80,8 @@ ModelChecks check_model(const ReadyCell& cell, const EnsembleFit& fit, const Par
 Figures figures_of(const ModelChecks& checks, const EnsembleFit& fit) {
   const auto best = std::ranges::min_element(checks.models, {}, &ModelScore::bic);
   std::vector<std::int64_t> unsupported;
-  for (const FibreLeftOut& f : checks.left_out) {
+  for (const FibreLeftOut& f : checks.left_out)
     if (f.aic_rise <= 0) unsupported.push_back(f.fibre_id);
-  }
   return {{"best_model_by_bic", best->name},
           {"fibres_not_told_apart", names_of_groups(fit)},
           {"fibres_without_support", unsupported},
@@ -93,9 +92,8 @@ std::vector<std::string> names_of_groups(const EnsembleFit& fit) {
   std::vector<std::string> names;
   for (const FibreGroup& group : fibres_not_told_apart(fit)) {
     std::string& text = names.emplace_back();
-    for (std::size_t k = 0; k < group.indices.size(); ++k) {
+    for (std::size_t k = 0; k < group.indices.size(); ++k)
       text += (k > 0 ? " + " : "") + std::to_string(fit.tensions.fibre_ids[group.indices[k]]);
-    }
     text += ": " + brief(group.sum_nN.value) + " ± " + brief(group.sum_nN.standard_error) + " nN";
   }
   return names;

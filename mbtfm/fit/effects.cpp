@@ -143,9 +143,8 @@ const std::vector<EffectRow>& table_of_effects() {
 
 std::vector<std::string> effect_keys() {
   std::vector<std::string> keys = {"effect_tolerance"};
-  for (const EffectRow& row : table_of_effects()) {
+  for (const EffectRow& row : table_of_effects())
     if (!row.key.empty()) keys.emplace_back(row.key);
-  }
   return keys;
 }
 

@@ -21,9 +21,8 @@ std::vector<SeriesFrame> read_frames(stage::StageContext& context) {
   if (!context.has_input("frames")) return {};
   std::vector<SeriesFrame> frames = read_series(context.input("frames", {"frames.csv"}));
   std::vector<std::string> names;
-  for (const SeriesFrame& frame : frames) {
+  for (const SeriesFrame& frame : frames)
     if (frame.refused.empty()) names.push_back(files::displacement_of_frame(frame.frame));
-  }
   context.input("frames", names);
   return frames;
 }
@@ -48,9 +47,8 @@ files::NamedArray most_informed_array(const Influence& influence) {
 /// What the loss and the region leave of each bead.
 files::NamedArray weight_array(const LinearData& data) {
   files::NamedArray array{.name = "weight"};
-  for (Index b = 0; b < data.bead_weight.size(); ++b) {
+  for (Index b = 0; b < data.bead_weight.size(); ++b)
     array.values.push_back(data.weight_per_um[2 * b] > 0 ? data.bead_weight[b] : 0);
-  }
   return array;
 }
 

@@ -10,7 +10,6 @@
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/extent.h"
-#include "pipeline/contract/findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/neighbour_bins.h"
 #include "substrate/response.h"
@@ -193,12 +192,10 @@ Reading best_smoothing(const LinearData& data, const MatrixXd& force_derivatives
   };
   Best best(left_by(fields));
   // a field that was smoothed widely is nearer to one smoothed a little than to none
-  for (const double sigma_um : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0}) {
+  for (const double sigma_um : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0})
     if (!best.consider("once it is smoothed, too, over " + brief(2 * sigma_um) + " um",
-                       left_by(smoothed(fields, data.position_um, sigma_um)))) {
+                       left_by(smoothed(fields, data.position_um, sigma_um))))
       break;
-    }
-  }
   return best.reading;
 }
 

@@ -1,5 +1,3 @@
-#include "mbtfm/plan/drawn.h"
-
 #include <cmath>
 
 #include "mbtfm/fit/networks.h"
@@ -30,19 +28,19 @@ EnsembleFit fit_of(const Scene& scene, const KnownCell& cell, const Experiment& 
   return fit_ensemble(networks, std::move(data), cell.adhesion_ids, scene.fit.fit, threads);
 }
 
+}  // namespace
+
 void sum_up(Drawn& drawn) {
   double squares = 0;
-  for (const DrawnTension& t : drawn.tensions) squares += std::pow((t.found_nN - t.true_nN) / t.predicted_error_nN, 2);
-  const auto n = static_cast<double>(drawn.tensions.size());
+  for (const DrawnNumber& t : drawn.numbers) squares += std::pow((t.found_nN - t.true_nN) / t.predicted_error_nN, 2);
+  const auto n = static_cast<double>(drawn.numbers.size());
   if (n == 0) return;
   drawn.error_over_predicted = std::sqrt(squares / n);
   drawn.by_chance = std::sqrt(0.5 / n);  // of normal errors, were they independent
 }
 
-}  // namespace
-
 Drawn draw_experiments(const Scene& scene, const Computed& c, const Point& point, int n_experiments, const Work& work) {
-  Drawn drawn{.point = point, .tensions = {}, .forces = {}, .n_experiments = n_experiments};
+  Drawn drawn{.point = point, .n_experiments = n_experiments};
   std::vector<double> with_network, alone, fttc;
   for (int k = 0; k < n_experiments; ++k) {
     work.tell(0.6 + 0.35 * k / n_experiments, "drawing experiments");
@@ -53,12 +51,12 @@ Drawn draw_experiments(const Scene& scene, const Computed& c, const Point& point
     add_errors_along(with_network, adhesion_forces_nN(fit), c.cell.forces_nN);
     add_errors_along(fttc, fttc_forces_nN(scene, e, point, work.threads), c.cell.forces_nN);
     for (std::size_t i = 1; i < fit.tensions.fibre_ids.size(); ++i)
-      drawn.tensions.push_back({.experiment = k + 1,
-                                .fibre_id = fit.tensions.fibre_ids[i],
-                                .true_nN = c.cell.tensions_nN[static_cast<Eigen::Index>(i)],
-                                .found_nN = fit.tensions.nN[i].value,
-                                .predicted_error_nN = standard_error_nN(c, i, point),
-                                .stated_error_nN = fit.tensions.nN[i].standard_error});
+      drawn.numbers.push_back({.experiment = k + 1,
+                               .id = fit.tensions.fibre_ids[i],
+                               .true_nN = c.cell.tensions_nN[static_cast<Eigen::Index>(i)],
+                               .found_nN = fit.tensions.nN[i].value,
+                               .predicted_error_nN = standard_error_nN(c, i, point),
+                               .stated_error_nN = fit.tensions.nN[i].standard_error});
   }
   drawn.forces = {robust_error(with_network), robust_error(alone), robust_error(fttc)};
   sum_up(drawn);

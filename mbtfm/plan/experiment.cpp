@@ -30,7 +30,7 @@ Experiment experiment_of(const Scene& scene, const KnownCell& cell, const Point&
   constexpr std::uint64_t kFirst = 100;  // the plan itself takes the first draws of beads
   drawing::Random noise(scene.experiment.seed, drawing::Stream::noise, kFirst + draw),
       segmentation(scene.experiment.seed, drawing::Stream::specimen, kFirst + draw);
-  const BeadsOnGel beads = beads_on_gel(scene, cell, point.beads_per_um2, kFirst + draw, threads);
+  const BeadsOnGel beads = beads_on_gel(scene, cell, point.density, kFirst + draw, threads);
   return {as_segmented(scene.cell.cell, scene.fit.segmentation, segmentation),
           measured(beads, cell.forces_nN, point, noise)};
 }

@@ -6,16 +6,13 @@
 #include <vector>
 
 #include "mbtfm/plan/known_cell.h"
+#include "mbtfm/plan/plan.h"
 #include "mbtfm/plan/scene.h"
 #include "samples/drawing/random.h"
 
 namespace mbtfm::plan {
 
 struct BeadsOnGel;
-
-struct Point {
-  double youngs_modulus_kPa = 0, beads_per_um2 = 0, noise_um = 0;
-};
 
 struct Experiment {
   Cell cell;  ///< as segmented

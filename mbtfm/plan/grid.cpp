@@ -76,7 +76,8 @@ double median_of(const std::vector<Errors>& errors, const Of& of) {
 }
 
 Expected expected_of(const Point& point, Quantity quantity, const std::vector<Errors>& errors, double target_nN) {
-  const auto is_within = [&](const Errors& e) { return e.total_nN() <= target_nN; };
+  std::vector<double> totals_nN;
+  for (const Errors& e : errors) totals_nN.push_back(e.total_nN());
   return {.point = point,
           .quantity = quantity,
           .n = static_cast<int>(errors.size()),
@@ -86,10 +87,8 @@ Expected expected_of(const Point& point, Quantity quantity, const std::vector<Er
           .from_segmentation_nN = median_of(errors, [](const Errors& e) { return e.other.segmentation_nN; }),
           .from_other_nN = median_of(errors, [](const Errors& e) { return e.other.other_nN; }),
           .target_nN = target_nN,
-          .share_within =
-              static_cast<double>(std::ranges::count_if(errors, is_within)) / static_cast<double>(errors.size()),
-          .smallest_seen_nN = Grid::kSeen * median_of(errors, [](const Errors& e) { return e.total_nN(); }),
-          .least_distance_um = {}};
+          .share_within = share_within(totals_nN, target_nN),
+          .smallest_seen_nN = kSeen * median_of(errors, [](const Errors& e) { return e.total_nN(); })};
 }
 
 double median_area_um2(const Scene& scene) {
@@ -171,23 +170,21 @@ std::vector<double> errors_of_fttc(const FttcExperiment& e, const Computed& c, c
 }
 
 Expected expected_of_fttc(const Point& point, const std::vector<double>& errors_nN, double target_nN) {
-  const auto n_within = std::ranges::count_if(errors_nN, [&](double e) { return e <= target_nN; });
   const double error_nN = robust_error(errors_nN);
   return {.point = point,
           .quantity = Quantity::fttc_force,
           .n = static_cast<int>(errors_nN.size()),
           .standard_error_nN = error_nN,
           .target_nN = target_nN,
-          .share_within = static_cast<double>(n_within) / static_cast<double>(errors_nN.size()),
-          .smallest_seen_nN = Grid::kSeen * error_nN,
-          .least_distance_um = {}};
+          .share_within = share_within(errors_nN, target_nN),
+          .smallest_seen_nN = kSeen * error_nN};
 }
 
 /// By gel, density, noise.
 std::vector<Point> points_of(const Asked& asked) {
   std::vector<Point> points;
   for (const double E : asked.youngs_modulus_kPa)
-    for (const double density : asked.beads_per_um2)
+    for (const double density : asked.densities)
       for (const double noise_um : asked.noise_um) points.push_back({E, density, noise_um});
   return points;
 }
@@ -208,36 +205,51 @@ double needed_beads_per_um2(const Computed& c, std::size_t label, double target_
 }
 
 /// At which this share of the fibres has it.
-double needed_by_share(const Computed& c, double share, double target_nN, double scale) {
+std::optional<double> needed_by_share(const Computed& c, double share, double target_nN, double scale) {
   std::vector<double> needed;
   for (std::size_t i = 1; i < c.cell.fibre_ids.size(); ++i)
     needed.push_back(needed_beads_per_um2(c, i, target_nN, scale));
-  const auto rank = std::min(needed.size() - 1, static_cast<std::size_t>(share * static_cast<double>(needed.size())));
-  return std::max(c.densities.beads_per_um2.front(), numerics::of_rank_in(needed, rank));
+  const std::optional<double> density = density_of_share(std::move(needed), share);
+  return density ? std::optional(std::max(c.densities.beads_per_um2.front(), *density)) : std::nullopt;
 }
 
 std::vector<std::string> warnings_of(const Asked& asked, const Computed& c, const Scene& scene) {
-  constexpr double kOfNoise = 3;          // less is not told from noise bead by bead
-  constexpr double kBeyondLinear = 0.05;  // the caution strain-beyond-linear of the fit
   const OnOwnGel own = on_own_gel(c);
   std::vector<std::string> warnings;
   for (const double E : asked.youngs_modulus_kPa) {
     const double largest_um = own.largest_displacement_um * c.densest.modulus_kPa / E;
     for (const double noise_um : asked.noise_um)
-      if (largest_um < kOfNoise * noise_um)
-        warnings.push_back("On " + brief(E) + " kPa no bead moves by more than " + brief(largest_um) +
-                           " µm, less than three times the noise of " + brief(noise_um) +
-                           " µm: the cell is hardly seen. Take a softer gel.");
+      if (largest_um < kOfNoise * noise_um) warnings.push_back(sentence_of_noise(E, largest_um, noise_um));
     const double left_out = choice::left_out_at_beads(of_modulus(scene.fit.gel, E), own.traction_kPa);
-    if (left_out > kBeyondLinear)
-      warnings.push_back("On " + brief(E) + " kPa linear elasticity leaves out some " + brief(100 * left_out) +
-                         " % of the displacement, which is strained beyond its range: evaluate with substrate.material "
-                         "= neo-hooke, or take a stiffer gel.");
+    if (left_out > kBeyondLinear) warnings.push_back(sentence_of_strain(E, left_out));
   }
   return warnings;
 }
 
 }  // namespace
+
+double share_within(const std::vector<double>& errors_nN, double target_nN) {
+  const auto n_within = std::ranges::count_if(errors_nN, [&](double e) { return e <= target_nN; });
+  return static_cast<double>(n_within) / static_cast<double>(errors_nN.size());
+}
+
+std::optional<double> density_of_share(std::vector<double> needed, double share) {
+  const auto rank = std::min(needed.size() - 1, static_cast<std::size_t>(share * static_cast<double>(needed.size())));
+  const double density = numerics::of_rank_in(needed, rank);
+  return std::isfinite(density) ? std::optional(density) : std::nullopt;
+}
+
+std::string sentence_of_noise(double youngs_modulus_kPa, double largest_um, double noise_um) {
+  return "On " + brief(youngs_modulus_kPa) + " kPa no bead moves by more than " + brief(largest_um) +
+         " µm, less than three times the noise of " + brief(noise_um) +
+         " µm: the cell is hardly seen. Take a softer gel.";
+}
+
+std::string sentence_of_strain(double youngs_modulus_kPa, double left_out) {
+  return "On " + brief(youngs_modulus_kPa) + " kPa linear elasticity leaves out some " + brief(100 * left_out) +
+         " % of the displacement, which is strained beyond its range: evaluate with substrate.material = neo-hooke, or "
+         "take a stiffer gel.";
+}
 
 double most_beads_per_um2(const Scene& scene) {
   // of discs at random that keep this distance: they jam at 0.547 of the area (Feder, J. Theor. Biol. 87, 237 (1980)),
@@ -260,7 +272,7 @@ double unit_error(const Densities& d, std::size_t label, double beads_per_um2) {
 }
 
 double standard_error_nN(const Computed& c, std::size_t label, const Point& point) {
-  return std::hypot(scale_of(point) * unit_error(c.densities, label, point.beads_per_um2),
+  return std::hypot(scale_of(point) * unit_error(c.densities, label, point.density),
                     c.model.tensions[label].total_nN());
 }
 
@@ -277,11 +289,11 @@ void check_densities(const Scene& scene, const std::vector<double>& beads_per_um
 }
 
 Computed compute(const Scene& scene, const Asked& asked, const Work& work) {
-  check_densities(scene, asked.beads_per_um2);
+  check_densities(scene, asked.densities);
   Computed c{.cell = known_cell(scene, work.part(0, 0.2)), .densest = {}, .densities = {}, .model = {}};
-  c.densities = precision_at(scene, c.cell, asked.beads_per_um2, work.part(0.2, 0.3));
+  c.densities = precision_at(scene, c.cell, asked.densities, work.part(0.2, 0.3));
   work.tell(0.5, "the model's own error");
-  c.densest = beads_on_gel(scene, c.cell, asked.beads_per_um2.back(), 0, work.threads);
+  c.densest = beads_on_gel(scene, c.cell, asked.densities.back(), 0, work.threads);
   c.model = model_errors(
       scene, c.cell, exact_beads(c.densest.places_um, *c.densest.response, c.cell.forces_nN, asked.noise_um.front()),
       c.densest.response, work);
@@ -291,24 +303,24 @@ Computed compute(const Scene& scene, const Asked& asked, const Work& work) {
 Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c, int threads) {
   Grid grid;
   const OnOwnGel own = on_own_gel(c);
-  const PairResolution pairs(scene.fit.gel, median_area_um2(scene), asked.beads_per_um2, threads);
+  const PairResolution pairs(scene.fit.gel, median_area_um2(scene), asked.densities, threads);
   grid.touching_um = pairs.touching_um();
   const double force_nN = asked.target_nN / asked.within;
   const std::vector<Point> points = points_of(asked);
   std::vector<std::vector<double>> of_fttc(points.size());
-  const auto n_densities = static_cast<int>(asked.beads_per_um2.size());
+  const auto n_densities = static_cast<int>(asked.densities.size());
   numerics::parallel_for(n_densities, threads, [&](int i) {
     // the densest, which takes longest, first
-    const double density = asked.beads_per_um2[n_densities - 1 - i];
-    const FttcExperiment experiment = fttc_experiment(scene, c, density / asked.beads_per_um2.back());
+    const double density = asked.densities[n_densities - 1 - i];
+    const FttcExperiment experiment = fttc_experiment(scene, c, density / asked.densities.back());
     for (std::size_t k = 0; k < points.size(); ++k)
-      if (points[k].beads_per_um2 == density) of_fttc[k] = errors_of_fttc(experiment, c, points[k]);
+      if (points[k].density == density) of_fttc[k] = errors_of_fttc(experiment, c, points[k]);
   });
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point& point = points[i];
     const double E = point.youngs_modulus_kPa;
-    const auto density = static_cast<std::size_t>(std::ranges::find(asked.beads_per_um2, point.beads_per_um2) -
-                                                  asked.beads_per_um2.begin());
+    const auto density =
+        static_cast<std::size_t>(std::ranges::find(asked.densities, point.density) - asked.densities.begin());
     std::vector<Expected> all = at_point(scene, asked, c, c.densities.precision[density], point);
     all.push_back(expected_of_fttc(point, of_fttc[i], asked.target_nN));
     for (Expected& e : all) {
@@ -323,11 +335,8 @@ Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c, int thre
     for (const double E : asked.youngs_modulus_kPa) {
       for (const double noise_um : asked.noise_um) {
         constexpr double kMost = 0.9;
-        const double middle = needed_by_share(c, 0.5, asked.target_nN, noise_um * E);
-        grid.needed.push_back({.youngs_modulus_kPa = E,
-                               .noise_um = noise_um,
-                               .beads_per_um2 = std::isfinite(middle) ? std::optional(middle) : std::nullopt,
-                               .of_most = needed_by_share(c, kMost, asked.target_nN, noise_um * E)});
+        const auto needed = [&](double share) { return needed_by_share(c, share, asked.target_nN, noise_um * E); };
+        grid.needed.push_back({E, noise_um, needed(0.5), needed(kMost)});
       }
     }
     std::vector<double> other_nN;

@@ -2,17 +2,17 @@
 #pragma once
 
 #include <string>
-#include <vector>
-
-#include "pipeline/charts/chart.h"
 
 namespace mbtfm::plan {
 
-struct Plan;
+template <class Quantity>
+struct PlanOf;
 
-/// A chart for each noise: standard error of the middle fibre over density, a curve for each gel, the target as a line.
-std::vector<charts::Chart> charts_of(const Plan& plan);
-std::string svg_of(const Plan& plan);
-std::string html_of(const Plan& plan);
+/// A chart for each noise: standard error of the middle fibre or patch over density, a curve for each gel, the target
+/// as a line.
+template <class Quantity>
+std::string svg_of(const PlanOf<Quantity>& plan);
+template <class Quantity>
+std::string html_of(const PlanOf<Quantity>& plan);
 
 }  // namespace mbtfm::plan

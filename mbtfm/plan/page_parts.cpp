@@ -67,6 +67,19 @@ charts::Chart drawn_chart(const std::string& what, const std::vector<DrawnDot>& 
   return chart;
 }
 
+report::Table needed_rows(const Asked& asked, const std::vector<Needed>& needed,
+                          const std::function<std::string(const Needed&)>& text_of) {
+  report::Table table{.columns = {number("gel (kPa)")}};
+  for (const double noise_um : asked.noise_um) table.columns.push_back(number("noise " + brief(noise_um) + " µm"));
+  for (const double E : asked.youngs_modulus_kPa) {
+    std::vector<std::string> row = {brief(E)};
+    for (const Needed& n : needed)
+      if (n.youngs_modulus_kPa == E) row.push_back(text_of(n));
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
 std::string paragraphs(const std::vector<std::string>& texts) {
   std::string html;
   for (const std::string& text : texts) html += "<p>" + report::html_escaped(text) + "</p>\n";

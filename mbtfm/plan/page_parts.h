@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "mbtfm/plan/parameters.h"
+#include "mbtfm/plan/plan.h"
 #include "pipeline/charts/chart.h"
-#include "pipeline/contract/numbers.h"
 #include "pipeline/report/page.h"
 
 namespace mbtfm::plan {
@@ -42,19 +42,8 @@ struct DrawnDot {
 charts::Chart drawn_chart(const std::string& what, const std::vector<DrawnDot>& dots);
 
 /// By gel and noise, of a plan's `needed`. @param text_of  its field, HTML
-template <class Needed>
 report::Table needed_rows(const Asked& asked, const std::vector<Needed>& needed,
-                          const std::function<std::string(const Needed&)>& text_of) {
-  report::Table table{.columns = {number("gel (kPa)")}};
-  for (const double noise_um : asked.noise_um) table.columns.push_back(number("noise " + brief(noise_um) + " µm"));
-  for (const double E : asked.youngs_modulus_kPa) {
-    std::vector<std::string> row = {brief(E)};
-    for (const Needed& n : needed)
-      if (n.youngs_modulus_kPa == E) row.push_back(text_of(n));
-    table.rows.push_back(std::move(row));
-  }
-  return table;
-}
+                          const std::function<std::string(const Needed&)>& text_of);
 
 std::string paragraphs(const std::vector<std::string>& texts);
 /// Name, version, and the answer before all else.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <optional>
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
@@ -91,14 +90,12 @@ void declare(stage::ParameterList& list, Parameters& p) {
 Asked asked_by(const Parameters& p, double own_kPa) {
   Asked asked;
   asked.noise_um = numbers_in("noise_um", p.noise_um, Range::between(1e-5, 10));
-  asked.beads_per_um2 = numbers_in("beads_per_um2", p.beads_per_um2, Range::between(1e-4, 25));
+  asked.densities = p.beads_per_um3.empty() ? numbers_in("beads_per_um2", p.beads_per_um2, Range::between(1e-4, 25))
+                                            : numbers_in("beads_per_um3", p.beads_per_um3, Range::between(1e-6, 10));
   asked.youngs_modulus_kPa = p.youngs_modulus_kPa.empty()
                                  ? std::vector<double>{0.5 * own_kPa, own_kPa, 2 * own_kPa}
                                  : numbers_in("youngs_modulus_kPa", p.youngs_modulus_kPa, Range::modulus_kPa());
-  if (!p.beads_per_um3.empty())
-    asked.beads_per_um3 = numbers_in("beads_per_um3", p.beads_per_um3, Range::between(1e-6, 10));
-  std::ranges::sort(asked.beads_per_um2);
-  std::ranges::sort(asked.beads_per_um3);
+  std::ranges::sort(asked.densities);
   std::ranges::sort(asked.youngs_modulus_kPa);
   asked.within = share_in("within", p.within);
   asked.tension_nN = p.tension_nN.value_or(1);

@@ -31,9 +31,9 @@ void declare(stage::ParameterList& list, Parameters& parameters);
 
 /// The lists as numbers.
 struct Asked {
-  std::vector<double> noise_um, beads_per_um2, beads_per_um3, youngs_modulus_kPa;
-  double tension_nN = 0;  ///< that is to be seen
-  double target_nN = 0;   ///< the standard error that it may have
+  std::vector<double> noise_um, densities, youngs_modulus_kPa;  ///< beads by area, or by volume if that is asked for
+  double tension_nN = 0;                                        ///< that is to be seen
+  double target_nN = 0;                                         ///< the standard error that it may have
   double within = 0;
 };
 /// @param own_kPa  the cell's own gel

@@ -10,7 +10,6 @@
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/intervals.h"
 #include "pipeline/numerics/dense.h"
-#include "samples/drawing/random.h"
 #include "substrate/choice/factory.h"
 #include "substrate/loads.h"
 

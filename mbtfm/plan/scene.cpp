@@ -8,7 +8,6 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/stage/parameters.h"
-#include "samples/experiment/experiment.h"
 
 namespace mbtfm::plan {
 

@@ -1,10 +1,9 @@
-#include "mbtfm/plan/space_drawn.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "mbtfm/plan/space_grid.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::plan {
@@ -32,7 +31,7 @@ std::vector<spatial::PartForce> found_in(const SpaceScene& scene, const spatial:
   return spatial::reconstruct(problem, inputs, traction, scene.spatial, 1).forces;
 }
 
-void add_components(std::vector<SpaceDrawnForce>& all, int experiment, const SpacePatch& patch, const Vec3& found_nN,
+void add_components(std::vector<DrawnNumber>& all, int experiment, const SpacePatch& patch, const Vec3& found_nN,
                     const Eigen::Matrix3d& covariance_nN2, const Eigen::Matrix3d& directions) {
   const Vector3d along = directions.col(1), normal = directions.col(2);
   const std::pair<SpaceComponent, Vector3d> components[] = {{SpaceComponent::tangential, along},
@@ -41,33 +40,25 @@ void add_components(std::vector<SpaceDrawnForce>& all, int experiment, const Spa
   const Vector3d truth(patch.force_nN.x, patch.force_nN.y, patch.force_nN.z), found(found_nN.x, found_nN.y, found_nN.z);
   for (const auto& [component, e] : components)
     all.push_back({.experiment = experiment,
-                   .adhesion_id = patch.adhesion.adhesion_id,
+                   .id = patch.adhesion.adhesion_id,
                    .component = component,
                    .true_nN = e.dot(truth),
                    .found_nN = e.dot(found),
                    .predicted_error_nN = std::sqrt(e.dot(covariance_nN2 * e))});
 }
 
-void sum_up(SpaceDrawn& drawn) {
-  double squares = 0;
-  for (const SpaceDrawnForce& f : drawn.forces) squares += std::pow((f.found_nN - f.true_nN) / f.predicted_error_nN, 2);
-  const auto n = static_cast<double>(drawn.forces.size());
-  drawn.error_over_predicted = std::sqrt(squares / n);
-  drawn.by_chance = std::sqrt(0.5 / n);  // of normal errors, were they independent
-}
-
 }  // namespace
 
-SpaceDrawn draw_experiments(const SpaceScene& scene, const SpacePool& pool, const SpaceForeseen& foreseen,
-                            const SpacePoint& point, int n_experiments, const Work& work) {
-  SpaceDrawn drawn{.point = point, .forces = {}, .n_experiments = n_experiments};
+Drawn draw_experiments(const SpaceScene& scene, const SpacePool& pool, const SpaceForeseen& foreseen,
+                       const Point& point, int n_experiments, const Work& work) {
+  Drawn drawn{.point = point, .n_experiments = n_experiments};
   work.tell(0.8, "drawing experiments");
   std::vector<std::vector<spatial::PartForce>> found(static_cast<std::size_t>(n_experiments));
   numerics::parallel_for(n_experiments, work.threads, [&](int k) {
     constexpr std::uint64_t kFirst = 100;  // far from the stream of the pool
     drawing::Random places(scene.seed, drawing::Stream::beads, kFirst + static_cast<std::uint64_t>(k)),
         noise(scene.seed, drawing::Stream::noise, kFirst + static_cast<std::uint64_t>(k));
-    const std::vector<Index> chosen = random_part(pool.beads.size(), n_beads_of(scene, point.beads_per_um3), places);
+    const std::vector<Index> chosen = random_part(pool.beads.size(), n_beads_of(scene, point.density), places);
     // a stiffer gel is more noise
     const double over_stated = point.noise_um * point.youngs_modulus_kPa / scene.gel.youngs_modulus_kPa;
     found[k] = found_in(scene, part_of(scene, pool, chosen, over_stated, &noise));
@@ -75,8 +66,8 @@ SpaceDrawn draw_experiments(const SpaceScene& scene, const SpacePool& pool, cons
   for (std::size_t k = 0; k < found.size(); ++k) {
     for (std::size_t a = 0; a < scene.patches.size(); ++a) {
       const auto at = 3 * static_cast<Index>(a);
-      add_components(drawn.forces, static_cast<int>(k) + 1, scene.patches[a], found[k][a].force_nN,
-                     foreseen.of(point).covariance_nN2.block<3, 3>(at, at), directions_of(scene, scene.patches[a]));
+      add_components(drawn.numbers, static_cast<int>(k) + 1, scene.patches[a], found[k][a].force_nN,
+                     foreseen.of(point).covariance_nN2.block<3, 3>(at, at), patch_directions(scene, scene.patches[a]));
     }
   }
   sum_up(drawn);

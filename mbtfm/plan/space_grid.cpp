@@ -21,8 +21,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kDraws = 2;    // of beads: errors of a patch then differ by some per cent from one pool to another
-constexpr double kSeen = 3;  // standard errors: chance passes them once in 700 times
+constexpr int kDraws = 2;  // of beads: errors of a patch then differ by some per cent from one pool to another
 
 Vector3d vector(const Vec3& v) { return {v.x, v.y, v.z}; }
 
@@ -133,7 +132,7 @@ Errors errors_of(const SpaceScene& scene, const spatial::Foreseen& f, SpaceQuant
   VectorXd along = VectorXd::Zero(3 * std::ssize(scene.patches));
   for (std::size_t a = 0; a < scene.patches.size(); ++a) {
     const auto at = 3 * static_cast<Index>(a);
-    const Eigen::Matrix3d directions = directions_of(scene, scene.patches[a]);
+    const Eigen::Matrix3d directions = patch_directions(scene, scene.patches[a]);
     along.segment<3>(at) = directions.col(0);
     if (quantity == SpaceQuantity::total_force) continue;
     const Vector3d e = directions.col(quantity == SpaceQuantity::force              ? 0
@@ -201,28 +200,23 @@ std::optional<double> needed_beads(const std::vector<double>& densities, const s
   return densities[k - 1] * std::pow(densities[k] / densities[k - 1], share);
 }
 
-SpaceNeeded needed_of(const SpaceScene& scene, const Asked& asked, const SpaceForeseen& foreseen, double E,
-                      double noise_um) {
+Needed needed_of(const SpaceScene& scene, const Asked& asked, const SpaceForeseen& foreseen, double E,
+                 double noise_um) {
   std::vector<std::vector<double>> by_patch(scene.patches.size());
-  for (const double density : asked.beads_per_um3) {
+  for (const double density : asked.densities) {
     const Errors errors = errors_of(scene, foreseen.of({E, density, noise_um}), SpaceQuantity::force);
     for (std::size_t a = 0; a < by_patch.size(); ++a) by_patch[a].push_back(errors.all_nN[a]);
   }
   std::vector<double> needed;
   for (const std::vector<double>& errors : by_patch)
     needed.push_back(
-        needed_beads(asked.beads_per_um3, errors, asked.target_nN).value_or(std::numeric_limits<double>::infinity()));
-  const auto of_share = [&](double share) {
-    const auto rank = std::min(needed.size() - 1, static_cast<std::size_t>(share * static_cast<double>(needed.size())));
-    const double density = numerics::of_rank_in(needed, rank);
-    return std::isfinite(density) ? std::optional(density) : std::nullopt;
-  };
+        needed_beads(asked.densities, errors, asked.target_nN).value_or(std::numeric_limits<double>::infinity()));
   constexpr double kMost = 0.9;
-  return {E, noise_um, of_share(0.5), of_share(kMost)};
+  return {E, noise_um, density_of_share(needed, 0.5), density_of_share(needed, kMost)};
 }
 
 std::vector<std::string> warnings_of(const SpaceScene& scene, const Asked& asked, const SpaceGrid& grid) {
-  constexpr double kOfNoise = 3, kBeyondLinear = 0.05, kFewNumbers = 24;  // as those of flat gels and of the stage
+  constexpr double kFewNumbers = 24;  // as of the stage
   std::vector<std::string> warnings = scene.warnings;
   for (const double E : asked.youngs_modulus_kPa) {
     double told = 0;
@@ -230,21 +224,15 @@ std::vector<std::string> warnings_of(const SpaceScene& scene, const Asked& asked
     for (const SpaceExpected& e : grid.expected) {
       if (e.quantity != SpaceQuantity::force || e.point.youngs_modulus_kPa != E) continue;
       last = &e;
-      if (e.point.beads_per_um3 == asked.beads_per_um3.front() &&
-          e.largest_displacement_um < kOfNoise * e.point.noise_um)
-        warnings.push_back("On " + brief(E) + " kPa no bead moves by more than " + brief(e.largest_displacement_um) +
-                           " µm, less than three times the noise of " + brief(e.point.noise_um) +
-                           " µm: the cell is hardly seen. Take a softer gel.");
+      if (e.point.density == asked.densities.front() && e.largest_displacement_um < kOfNoise * e.point.noise_um)
+        warnings.push_back(sentence_of_noise(E, e.largest_displacement_um, e.point.noise_um));
       if (e.point.noise_um == asked.noise_um.front()) told = std::max(told, e.degrees);
     }
     if (told < kFewNumbers)
       warnings.push_back("On " + brief(E) + " kPa the beads tell " + brief(told) +
                          " numbers of the tractions at most: " +
                          "forces of single adhesions then rest on their image. Take more beads, or a softer gel.");
-    if (last && last->left_out > kBeyondLinear)
-      warnings.push_back("On " + brief(E) + " kPa linear elasticity leaves out some " + brief(100 * last->left_out) +
-                         " % of the displacement, which is strained beyond its range: evaluate with substrate.material "
-                         "= neo-hooke, or take a stiffer gel.");
+    if (last && last->left_out > kBeyondLinear) warnings.push_back(sentence_of_strain(E, last->left_out));
   }
   return warnings;
 }
@@ -259,17 +247,17 @@ std::size_t n_beads_of(const SpaceScene& scene, double beads_per_um3) {
 
 std::vector<SpacePool> pools_of(const SpaceScene& scene, const Asked& asked, const Work& work) {
   work.tell(0.02, "the gel's answer to tractions");
-  const std::size_t n_densest = n_beads_of(scene, asked.beads_per_um3.back());
+  const std::size_t n_densest = n_beads_of(scene, asked.densities.back());
   constexpr std::size_t kFewest = 20;
-  if (n_beads_of(scene, asked.beads_per_um3.front()) < kFewest)
-    throw UsageError("beads_per_um3: " + brief(asked.beads_per_um3.front()) + " are fewer than 20 beads in the " +
+  if (n_beads_of(scene, asked.densities.front()) < kFewest)
+    throw UsageError("beads_per_um3: " + brief(asked.densities.front()) + " are fewer than 20 beads in the " +
                      brief(scene.volume_um3()) + " um³ of the scene");
   constexpr std::size_t kMost = 20000;
   if (kDraws * n_densest > kMost)
-    throw UsageError("beads_per_um3: " + brief(asked.beads_per_um3.back()) + " are " + std::to_string(n_densest) +
+    throw UsageError("beads_per_um3: " + brief(asked.densities.back()) + " are " + std::to_string(n_densest) +
                      " beads in the " + brief(scene.volume_um3()) + " um³ of the scene; a plan takes up to 10000");
   std::vector<SpacePool> pools;
-  for (const double density : asked.beads_per_um3) pools.push_back(pool_of(scene, density, work));
+  for (const double density : asked.densities) pools.push_back(pool_of(scene, density, work));
   return pools;
 }
 
@@ -291,16 +279,16 @@ spatial::Problem part_of(const SpaceScene& scene, const SpacePool& pool, const s
 
 std::size_t SpaceForeseen::index_of_density(double density) const { return index_of(beads_per_um3, density); }
 
-const spatial::Foreseen& SpaceForeseen::of(const SpacePoint& p) const {
-  return at[index_of_density(p.beads_per_um3)][index_of(noise_kPa_um, p.noise_um * p.youngs_modulus_kPa)];
+const spatial::Foreseen& SpaceForeseen::of(const Point& p) const {
+  return at[index_of_density(p.density)][index_of(noise_kPa_um, p.noise_um * p.youngs_modulus_kPa)];
 }
 
 SpaceForeseen foresee(const SpaceScene& scene, const Asked& asked, const std::vector<SpacePool>& pools,
                       const Work& work) {
-  SpaceForeseen foreseen{.beads_per_um3 = asked.beads_per_um3, .noise_kPa_um = {}, .at = {}};
+  SpaceForeseen foreseen{.beads_per_um3 = asked.densities, .noise_kPa_um = {}, .at = {}};
   for (const double E : asked.youngs_modulus_kPa)
     for (const double noise_um : asked.noise_um) foreseen.noise_kPa_um.push_back(noise_um * E);
-  const std::size_t n_densities = asked.beads_per_um3.size();
+  const std::size_t n_densities = asked.densities.size();
   std::vector<std::vector<spatial::Foreseen>> by_job(kDraws * n_densities);
   numerics::parallel_for(static_cast<int>(by_job.size()), work.threads, [&](int j) {
     // the densest, which takes longest, first
@@ -326,12 +314,9 @@ SpaceForeseen foresee(const SpaceScene& scene, const Asked& asked, const std::ve
 PairResolution pairs_of(const SpaceScene& scene, const Asked& asked, const PairDraws& draws, int threads) {
   std::vector<double> areas_um2;
   for (const SpacePatch& patch : scene.patches) areas_um2.push_back(patch.adhesion.area_um2);
-  return {scene.gel,
-          numerics::median_in(areas_um2),
-          asked.beads_per_um3,
-          {.depth_um = scene.bead_depth_um, .axial_noise = scene.spatial.axial_sigma_ratio},
-          draws,
-          threads};
+  return {scene.gel,       numerics::median_in(areas_um2),
+          asked.densities, {.depth_um = scene.bead_depth_um, .axial_noise = scene.spatial.axial_sigma_ratio},
+          draws,           threads};
 }
 
 SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector<SpacePool>& pools,
@@ -343,26 +328,24 @@ SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector
   const double total_nN = total_of(scene);
   for (const double E : asked.youngs_modulus_kPa) {
     for (std::size_t k = 0; k < pools.size(); ++k) {
-      const double density = asked.beads_per_um3[k];
+      const double density = asked.densities[k];
       for (const double noise_um : asked.noise_um) {
-        const SpacePoint point{E, density, noise_um};
+        const Point point{E, density, noise_um};
         const spatial::Foreseen& f = foreseen.of(point);
         for (const SpaceQuantity quantity : {force, tangential_force, normal_force, total_force, net_force}) {
           Errors errors = errors_of(scene, f, quantity);
           const bool is_of_cell = quantity == total_force || quantity == net_force;
           const double target_nN = is_of_cell ? asked.within * total_nN : asked.target_nN;
-          const auto n_within = std::ranges::count_if(errors.all_nN, [&](double e) { return e <= target_nN; });
-          const auto n = static_cast<double>(errors.all_nN.size());
           const double error_nN = numerics::median_in(errors.all_nN), beads_nN = numerics::median_in(errors.beads_nN);
           grid.expected.push_back(
               {.point = point,
                .quantity = quantity,
-               .n = static_cast<int>(n),
+               .n = static_cast<int>(errors.all_nN.size()),
                .standard_error_nN = error_nN,
                .from_beads_nN = beads_nN,
                .from_background_nN = std::sqrt(std::max(0.0, error_nN * error_nN - beads_nN * beads_nN)),
                .target_nN = target_nN,
-               .share_within = static_cast<double>(n_within) / n,
+               .share_within = share_within(errors.all_nN, target_nN),
                .smallest_seen_nN = kSeen * error_nN,
                .resolution_um =
                    quantity == force ? std::optional(resolution_at_patches(scene, pools[k].problem, f)) : std::nullopt,
@@ -380,7 +363,7 @@ SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector
   return grid;
 }
 
-Eigen::Matrix3d directions_of(const SpaceScene& scene, const SpacePatch& patch) {
+Eigen::Matrix3d patch_directions(const SpaceScene& scene, const SpacePatch& patch) {
   const spatial::Ground ground(scene.gel.surface.get());
   const Vector3d n = vector(ground.normal(patch.adhesion.position_um)), force = vector(patch.force_nN);
   const Vector3d along = force - force.dot(n) * n;

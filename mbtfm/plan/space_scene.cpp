@@ -1,7 +1,6 @@
 #include "mbtfm/plan/space_scene.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "continuum/sheet/parameters.h"
@@ -193,10 +192,9 @@ Asked asked_in_space(const Parameters& parameters, const SpaceScene& scene) {
     throw UsageError("beads_per_um2: beads of a cell in space fill a volume: give beads_per_um3, " +
                      brief(scene.own_beads_per_um3) + " is this cell's own");
   Parameters in_space = parameters;
-  if (in_space.beads_per_um3.empty()) {
+  if (in_space.beads_per_um3.empty())
     for (const double factor : {0.5, 1.0, 2.0})
       in_space.beads_per_um3 += (factor > 0.5 ? "," : "") + brief(factor * scene.own_beads_per_um3);
-  }
   if (!in_space.tension_nN) {
     std::vector<double> forces;
     for (const SpacePatch& patch : scene.patches) forces.push_back(norm(patch.force_nN));

@@ -1,17 +1,17 @@
-/// plan.csv, plan_needed.csv, plan_drawn.csv, plan_cells.csv.
+/// plan.csv, plan_needed.csv, plan_drawn.csv of flat cells and of cells in space, plan_cells.csv.
 #pragma once
 
-#include <string>
-
 #include "mbtfm/plan/cell_numbers.h"
-#include "mbtfm/plan/drawn.h"
 #include "pipeline/files/columns.h"
 
 namespace mbtfm::plan {
 
-files::Table<Expected> expected_table();
-files::Table<Needed> needed_table();
-files::Table<DrawnTension> drawn_table();
+files::Table<Expected> expected_table(Quantity);
+files::Table<SpaceExpected> expected_table(SpaceQuantity);
+files::Table<Needed> needed_table(Quantity);
+files::Table<Needed> needed_table(SpaceQuantity);
+files::Table<DrawnNumber> drawn_table(Quantity);
+files::Table<DrawnNumber> drawn_table(SpaceQuantity);
 files::Table<CellNumbers> cell_table();
 
 /// Their part of docs/columns.md.

@@ -299,9 +299,8 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
 
 std::vector<FittedEstimate> expanding(const SheetFit& fit) {
   std::vector<FittedEstimate> found;
-  for (const FittedEstimate& e : fit.estimates) {
+  for (const FittedEstimate& e : fit.estimates)
     if (e.quantity == Quantity::contraction && (e.value < 0 || (e.high && *e.high < 0))) found.push_back(e);
-  }
   return found;
 }
 

@@ -16,8 +16,6 @@ namespace mbtfm::tensions {
 
 namespace {
 
-using Block = Eigen::Matrix<double, 2, 2>;
-
 constexpr double kStep_um = 1;    // of the places tried: adhesions are as long
 constexpr double kDisc_um = 0.5;  // radius of an ordinary adhesion
 constexpr double kReach_um = 6;   // of the beads asked: beyond, a force's field is that of many others
@@ -34,14 +32,14 @@ class DiscField {
       table_[i] = {g.xx, g.yy};
     }
   }
-  Block at(Vec2 offset_um) const {
+  Eigen::Matrix2d at(Vec2 offset_um) const {
     const double r = std::sqrt(dot(offset_um, offset_um)), place = std::min(r / kReach_um * kLast, kLast - 1e-9);
     const auto i = static_cast<std::size_t>(place);
     const double share = place - static_cast<double>(i);
     const Vec2 along_across = (1 - share) * table_[i] + share * table_[i + 1];
-    if (r <= 0) return along_across.x * Block::Identity();
+    if (r <= 0) return along_across.x * Eigen::Matrix2d::Identity();
     const Eigen::Vector2d e(offset_um.x / r, offset_um.y / r);
-    return along_across.y * Block::Identity() + (along_across.x - along_across.y) * e * e.transpose();
+    return along_across.y * Eigen::Matrix2d::Identity() + (along_across.x - along_across.y) * e * e.transpose();
   }
 
  private:
@@ -77,10 +75,10 @@ class UsedBeads {
 struct Question {
   Vec2 place_um;
   std::vector<Index> beads;
-  std::vector<Block> fields;  ///< by bead, less their mean
+  std::vector<Eigen::Matrix2d> fields;  ///< by bead, less their mean
   Eigen::Vector2d score = Eigen::Vector2d::Zero();
-  Block square = Block::Zero();  ///< gᵀ W² g
-  double gain = 0;               ///< of noise alone
+  Eigen::Matrix2d square = Eigen::Matrix2d::Zero();  ///< gᵀ W² g
+  double gain = 0;                                   ///< of noise alone
 };
 
 Question ask(Vec2 place_um, const UsedBeads& beads, const DiscField& disc, const LinearData& data,
@@ -88,7 +86,7 @@ Question ask(Vec2 place_um, const UsedBeads& beads, const DiscField& disc, const
   Question q{.place_um = place_um, .beads = beads.near(place_um), .fields = {}};
   constexpr std::size_t kFewest = 10;  // beads for two numbers and a mean
   if (q.beads.size() < kFewest) return q;
-  Block mean = Block::Zero();
+  Eigen::Matrix2d mean = Eigen::Matrix2d::Zero();
   double all = 0;
   for (const Index b : q.beads) {
     q.fields.push_back(disc.at(data.position_um[b] - place_um));

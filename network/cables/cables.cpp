@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 #include <set>
-#include <string>
 
 #include "network/cables/cable_energy.h"
 #include "network/cables/minimise.h"
@@ -332,9 +331,8 @@ GeometryGradient CableNetwork::geometry_gradient(const std::vector<double>& tens
 // regular triangulation of edge h this is sqrt(3) t / h (docs/theory/network.md, (4)).
 double surface_tension_nN_per_um(const Network& network, const Polygon& outline_um, double tension_nN) {
   double sum_um = 0;
-  for (const Link& link : network.links) {
+  for (const Link& link : network.links)
     if (link.fibre_id == 0) sum_um += link.share * link.rest_length_um;
-  }
   return tension_nN * sum_um / (2 * std::abs(signed_area_um2(outline_um)));
 }
 

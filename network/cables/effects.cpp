@@ -1,7 +1,6 @@
 #include "network/cables/effects.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
@@ -10,9 +9,8 @@
 namespace mbtfm::cables {
 
 Effect take_fibres(Cell& cell, Switch setting) {
-  if (setting == Switch::on && cell.fibres.empty()) {
+  if (setting == Switch::on && cell.fibres.empty())
     throw InvalidData("effects.stress_fibres = on", "a stress fibre in fibres.csv", "none");
-  }
   const Effect effect =
       stage::decided(EffectKind::stress_fibres, setting, static_cast<double>(cell.fibres.size()), 0, "number found:");
   if (!effect.is_on) cell.fibres.clear();

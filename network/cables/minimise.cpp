@@ -1,6 +1,5 @@
 #include "network/cables/minimise.h"
 
-#include <limits>
 #include <optional>
 #include <sstream>
 #include <utility>

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "network/mesh/polyline.h"
 #include "pipeline/contract/polyline.h"

@@ -128,9 +128,8 @@ class Builder {
   /// Within the outline, holes included: a fibre spans these.
   bool may_hold(Vec2 point, const Fibre& fibre) const {
     if (boundary_.is_within_outline(point) || boundary_.place(point).distance_um < kBind * edge_) return true;
-    for (const auto& end : {fibre.start_adhesion_id, fibre.end_adhesion_id}) {
+    for (const auto& end : {fibre.start_adhesion_id, fibre.end_adhesion_id})
       if (end && norm(point - graph_.points_um[vertex_of_adhesion_.at(*end)]) < kSnapReach * edge_) return true;
-    }
     return false;
   }
 
@@ -156,9 +155,8 @@ class Builder {
       Polyline part(dense.begin() + from, dense.begin() + to + 1);
       if (first > 0 && from > 0) part.insert(part.begin(), crossing_of_outline(dense[from], dense[from - 1]));
       if (last < n - 1 && to < n - 1) part.push_back(crossing_of_outline(dense[to], dense[to + 1]));
-      if (length_um(part) > kShortestPiece * edge_) {
+      if (length_um(part) > kShortestPiece * edge_)
         has_part = add_fibre_part(fibre, part, first == 0, last == n - 1) || has_part;
-      }
       first = last + 1;
     }
     if (!has_part) {
@@ -245,9 +243,8 @@ class Builder {
   std::vector<std::vector<Knot>> boundary_knots() const {
     std::vector<std::vector<Knot>> knots(boundary_.rings().size());
     std::vector<char> is_used(graph_.points_um.size(), 0);
-    for (const Chain& chain : graph_.chains) {
+    for (const Chain& chain : graph_.chains)
       for (const int v : chain.vertices) is_used[v] = 1;
-    }
     for (const auto& [id, v] : vertex_of_adhesion_) is_used[v] = 1;
     for (int v = 0; v < static_cast<int>(is_used.size()); ++v) {
       if (!is_used[v]) continue;
@@ -331,13 +328,12 @@ class Builder {
         FrameSegment& segment = segments[{a, b}];
         segment.vertex_a = a;
         segment.vertex_b = b;
-        if (chain.fibre_id > 0) {
+        if (chain.fibre_id > 0)
           segment.fibre_ids.push_back(chain.fibre_id);
-        } else if (chain.adhesion_id > 0) {
+        else if (chain.adhesion_id > 0)
           frame_.rim_adhesion_id[a] = frame_.rim_adhesion_id[b] = chain.adhesion_id;
-        } else {
+        else
           ++segment.outline_count;
-        }
       }
     }
     std::vector<int> degree(frame_.points_um.size(), 0);
@@ -352,9 +348,8 @@ class Builder {
       if (ids.empty() && segment.outline_count == 1) continue;
       for (const int v : {segment.vertex_a, segment.vertex_b}) frame_.ring[v] = -1;
     }
-    for (std::size_t v = 0; v < degree.size(); ++v) {
+    for (std::size_t v = 0; v < degree.size(); ++v)
       if (degree[v] != 2) frame_.ring[v] = -1;
-    }
   }
 
   const Cell& cell_;
@@ -392,9 +387,8 @@ void expect_room_for_mesh(const SizeField& size, const Boundary& boundary) {
   const double step = std::sqrt((high.x - low.x) * (high.y - low.y) / kSquares);
   double count = 0;
   for (double y = low.y + 0.5 * step; y < high.y; y += step) {
-    for (double x = low.x + 0.5 * step; x < high.x; x += step) {
+    for (double x = low.x + 0.5 * step; x < high.x; x += step)
       if (boundary.is_within_outline({x, y})) count += step * step / area_of_vertex_um2(size.at({x, y}));
-    }
   }
   expect_room_for_vertices(count);
 }

@@ -52,9 +52,8 @@ class Shares {
       : points_(mesh.points_um), edges_(mesh.triangulation.edges) {
     // in a regular triangulation an edge of length h has the dual width h / sqrt(3)
     const double regular_width = parameters.edge_length_um / std::sqrt(3.0);
-    for (const Edge& e : edges_) {
+    for (const Edge& e : edges_)
       of_edge_.push_back(parameters.link_weights == LinkWeights::width ? dual_width_um(points_, e) / regular_width : 1);
-    }
     of_reaching_.assign(edges_.size(), 0);
     if (parameters.link_reach == LinkReach::second_neighbours) hand_on();
     for (double& share : of_edge_) share = std::max(kSmallestShare, share);
@@ -100,9 +99,8 @@ class Shares {
   void hand_on() {
     const std::vector<Reaching> links = reaching();
     std::vector<int> n_takers(edges_.size(), 0);
-    for (const Reaching& r : links) {
+    for (const Reaching& r : links)
       for (const int side : r.sides) ++n_takers[side];
-    }
     std::vector<double> change(edges_.size(), 0);
     for (const Reaching& r : links) {
       double pull_per_um = std::numeric_limits<double>::infinity();
@@ -129,9 +127,8 @@ class Shares {
 
 std::vector<Link> links_of(const Frame& frame, const RelaxedMesh& mesh, const NetworkParameters& parameters) {
   std::map<std::pair<int, int>, const FrameSegment*> fibre_segments;
-  for (const FrameSegment& s : frame.segments) {
+  for (const FrameSegment& s : frame.segments)
     if (!s.fibre_ids.empty()) fibre_segments[{s.vertex_a, s.vertex_b}] = &s;
-  }
   const Shares shares(mesh, parameters);
   std::vector<Link> links;
   const auto add = [&](int a, int b, int fibre_id, double share) {
@@ -151,9 +148,8 @@ std::vector<Link> links_of(const Frame& frame, const RelaxedMesh& mesh, const Ne
     if (shares.of_reaching(k) > 0) add(e.apexes[0], e.apexes[1], 0, shares.of_reaching(k));
   }
   // a fibre in a neck so thin that no triangle is left there
-  for (const auto& [ends, segment] : fibre_segments) {
+  for (const auto& [ends, segment] : fibre_segments)
     for (const int id : segment->fibre_ids) add(ends.first, ends.second, id, 1);
-  }
   return links;
 }
 

@@ -5,7 +5,6 @@
 #include <limits>
 #include <map>
 #include <set>
-#include <string>
 #include <tuple>
 
 #include "network/mesh/adhesions.h"
@@ -66,9 +65,8 @@ void leave_out_loose_vertices(Network& network) {
   std::vector<char> is_joined(n, 0);
   for (const Link& link : network.links) is_joined[link.vertex_a] = is_joined[link.vertex_b] = 1;
   std::set<int> held;
-  for (std::size_t v = 0; v < n; ++v) {
+  for (std::size_t v = 0; v < n; ++v)
     if (is_joined[v]) held.insert(network.adhesion_id[v]);
-  }
   for (std::size_t v = 0; v < n; ++v) {
     if (is_joined[v] || network.adhesion_id[v] == 0 || !held.insert(network.adhesion_id[v]).second) continue;
     std::size_t nearest = n;

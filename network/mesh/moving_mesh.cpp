@@ -52,15 +52,13 @@ void MovingMesh::join_neighbours(const Triangulation& triangulation) {
 
 void MovingMesh::index_stars() {
   star_begin_.assign(points_um_.size() + 1, 0);
-  for (const auto& t : vertices_) {
+  for (const auto& t : vertices_)
     for (const int v : t) ++star_begin_[v + 1];
-  }
   for (std::size_t v = 0; v < points_um_.size(); ++v) star_begin_[v + 1] += star_begin_[v];
   stars_.resize(3 * vertices_.size());
   std::vector<int> filled(star_begin_.begin(), star_begin_.end() - 1);
-  for (int t = 0; t < static_cast<int>(vertices_.size()); ++t) {
+  for (int t = 0; t < static_cast<int>(vertices_.size()); ++t)
     for (const int v : vertices_[t]) stars_[filled[v]++] = t;
-  }
 }
 
 bool MovingMesh::move(int vertex, Vec2 to_um) {
@@ -122,9 +120,8 @@ std::vector<int> MovingMesh::restore_delaunay(const std::vector<int>& moved) {
   std::vector<std::pair<int, int>> open;
   for (const int v : moved) {
     for (const int t : triangles_of(v)) {
-      for (int i = 0; i < 3; ++i) {
+      for (int i = 0; i < 3; ++i)
         if (should_flip(t, i)) open.push_back({t, i});
-      }
     }
   }
   std::vector<int> changed;

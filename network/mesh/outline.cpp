@@ -35,9 +35,8 @@ std::vector<int> corner_indices(const Polygon& smooth) {
   for (int i = 0; i < n; ++i) {
     if (turns[i] < kCornerTurn) continue;
     bool is_peak = true;
-    for (int k = 1; k <= reach; ++k) {
+    for (int k = 1; k <= reach; ++k)
       is_peak = is_peak && turns[i] >= turns[(i + k) % n] && turns[i] > turns[(i + n - k) % n];
-    }
     if (is_peak) corners.push_back(i);
   }
   return corners;
@@ -52,11 +51,9 @@ OutlineCurve::OutlineCurve(const Polygon& outline_um, double edge_um) {
   const int n = std::max(6 * kSamplesPerEdge, static_cast<int>(std::lround(kSamplesPerEdge * perimeter / edge_um)));
   const Polygon dense = evenly_resampled(outline, n);
   points_um_.resize(n);
-  for (int i = 0; i < n; ++i) {
-    for (int k = -kHalfWindow; k <= kHalfWindow; ++k) {
+  for (int i = 0; i < n; ++i)
+    for (int k = -kHalfWindow; k <= kHalfWindow; ++k)
       points_um_[i] += (1.0 / (2 * kHalfWindow + 1)) * dense[(i + k + n) % n];
-    }
-  }
   const std::vector<int> corners = corner_indices(points_um_);
   for (const int c : corners) {  // the average rounds them off: take the line itself back
     for (int k = -kHalfWindow; k <= kHalfWindow; ++k) points_um_[(c + k + n) % n] = dense[(c + k + n) % n];
@@ -132,13 +129,11 @@ OutlineCurve::Nearest OutlineCurve::nearest_on_piece(std::size_t piece, Vec2 poi
 Boundary::Boundary(const Cell& cell, double edge_um) : edge_um_(edge_um) {
   rings_.emplace_back(cell.outline_um, edge_um);
   const double smallest_um2 = 0.25 * std::numbers::sqrt3 * edge_um * edge_um;
-  for (const Polygon& hole : cell.holes_um) {
-    if (std::abs(signed_area_um2(hole)) < smallest_um2) {
+  for (const Polygon& hole : cell.holes_um)
+    if (std::abs(signed_area_um2(hole)) < smallest_um2)
       ++n_filled_holes_;
-    } else {
+    else
       rings_.emplace_back(hole, edge_um);
-    }
-  }
   grid_ = numerics::Grid(rings_.front().polygon(), edge_um);
   for (int ring = 0; ring < static_cast<int>(rings_.size()); ++ring) {
     const Polygon& corners = rings_[ring].polygon();
@@ -151,9 +146,8 @@ Boundary::Boundary(const Cell& cell, double edge_um) : edge_um_(edge_um) {
 
 BoundaryPlace Boundary::place(Vec2 point_um) const {
   BoundaryPlace place;
-  for (std::size_t ring = 1; ring < rings_.size(); ++ring) {
+  for (std::size_t ring = 1; ring < rings_.size(); ++ring)
     place.is_in_hole = place.is_in_hole || rings_[ring].contains(point_um);
-  }
   place.is_inside = is_within_outline(point_um) && !place.is_in_hole;
   place.distance_um = std::numeric_limits<double>::infinity();
   const auto look_at = [&](int piece) {
@@ -165,9 +159,8 @@ BoundaryPlace Boundary::place(Vec2 point_um) const {
     place.distance_um = distance_um;
   };
   grid_.for_each_near(point_um, point_um, edge_um_, look_at);
-  if (!place.is_inside && place.distance_um > edge_um_) {
+  if (!place.is_inside && place.distance_um > edge_um_)
     for (int piece = 0; piece < static_cast<int>(pieces_.size()); ++piece) look_at(piece);
-  }
   if (place.distance_um > edge_um_ && place.is_inside) place.distance_um = std::numeric_limits<double>::infinity();
   return place;
 }

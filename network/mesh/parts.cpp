@@ -51,12 +51,10 @@ void keep_vertices(Network& network, const std::vector<char>& is_kept) {
 int leave_out_loose_parts(Network& network) {
   const std::vector<int> part = parts_of(network);
   std::vector<char> is_held(part.size(), 0), is_kept(part.size(), 0);
-  for (std::size_t v = 0; v < part.size(); ++v) {
+  for (std::size_t v = 0; v < part.size(); ++v)
     if (network.adhesion_id[v] != 0) is_held[part[v]] = 1;
-  }
-  for (const Link& link : network.links) {
+  for (const Link& link : network.links)
     if (link.fibre_id != 0) is_held[part[link.vertex_a]] = 1;
-  }
   if (std::ranges::find(is_held, 1) == is_held.end()) return 0;  // a cell without adhesions is another error's
   int n_loose = 0;
   for (std::size_t v = 0; v < part.size(); ++v) {

@@ -37,18 +37,16 @@ std::vector<Segment> segments_of(const PlanarGraph& graph) {
   for (int c = 0; c < static_cast<int>(graph.chains.size()); ++c) {
     const Chain& chain = graph.chains[c];
     const int n = static_cast<int>(chain.vertices.size());
-    for (int i = 0; i < (chain.is_closed ? n : n - 1); ++i) {
+    for (int i = 0; i < (chain.is_closed ? n : n - 1); ++i)
       segments.push_back({c, i, chain.vertices[i], chain.vertices[(i + 1) % n]});
-    }
   }
   return segments;
 }
 
 std::vector<char> used_vertices(const PlanarGraph& graph) {
   std::vector<char> is_used(graph.points_um.size(), 0);
-  for (const Chain& chain : graph.chains) {
+  for (const Chain& chain : graph.chains)
     for (const int v : chain.vertices) is_used[v] = 1;
-  }
   for (std::size_t v = 0; v < is_used.size(); ++v) is_used[v] |= graph.rank[v] == kHeld;
   return is_used;
 }
@@ -73,9 +71,8 @@ void rename(PlanarGraph& graph, const std::vector<int>& name) {
   for (Chain& chain : graph.chains) {
     for (int& v : chain.vertices) v = name[v];
     collapse_backtracks(graph, chain.vertices);
-    while (chain.is_closed && chain.vertices.size() > 1 && chain.vertices.front() == chain.vertices.back()) {
+    while (chain.is_closed && chain.vertices.size() > 1 && chain.vertices.front() == chain.vertices.back())
       chain.vertices.pop_back();
-    }
   }
   std::erase_if(graph.chains, [](const Chain& chain) { return chain.vertices.size() < 2; });
 }
@@ -122,9 +119,8 @@ void apply(PlanarGraph& graph, std::vector<Cut> cuts) {
   for (int c = 0; c < static_cast<int>(graph.chains.size()); ++c) {
     for (int i = 0; i < static_cast<int>(graph.chains[c].vertices.size()); ++i) {
       longer[c].push_back(graph.chains[c].vertices[i]);
-      for (; next < cuts.size() && cuts[next].chain == c && cuts[next].place == i; ++next) {
+      for (; next < cuts.size() && cuts[next].chain == c && cuts[next].place == i; ++next)
         longer[c].push_back(cuts[next].vertex);
-      }
     }
     graph.chains[c].vertices = std::move(longer[c]);
   }
@@ -157,9 +153,8 @@ bool split_at_close_vertices(PlanarGraph& graph, const SizeField& size, double r
   const std::vector<Segment> segments = segments_of(graph);
   const std::vector<char> is_used = used_vertices(graph);
   numerics::Grid vertices(graph.points_um, segment_grid_cell(graph, segments));
-  for (int v = 0; v < static_cast<int>(graph.points_um.size()); ++v) {
+  for (int v = 0; v < static_cast<int>(graph.points_um.size()); ++v)
     if (is_used[v]) vertices.add(v, graph.points_um[v], graph.points_um[v]);
-  }
   const double widest = relative_tolerance * size.edge_um();
   std::vector<Cut> cuts;
   for (const Segment& s : segments) {
@@ -170,9 +165,8 @@ bool split_at_close_vertices(PlanarGraph& graph, const SizeField& size, double r
       const double along = dot(graph.points_um[v] - a, step) / dot(step, step);
       if (along <= 0 || along >= 1) return;
       const double distance = norm(graph.points_um[v] - (a + along * step));
-      if (distance < widest && distance < relative_tolerance * size.at(graph.points_um[v])) {
+      if (distance < widest && distance < relative_tolerance * size.at(graph.points_um[v]))
         cuts.push_back({s.chain, s.place, along, v});
-      }
     });
   }
   if (cuts.empty()) return false;
@@ -285,11 +279,10 @@ void divide_evenly(PlanarGraph& graph, const SizeField& size) {
       const auto [entry, is_new] = done.try_emplace(is_forward ? run : back);
       if (is_new) entry->second = divide_run(graph, entry->first, rank_of_points(chain), size);
       const std::vector<int>& inner = entry->second;
-      if (is_forward) {
+      if (is_forward)
         divided.insert(divided.end(), inner.begin(), inner.end());
-      } else {
+      else
         divided.insert(divided.end(), inner.rbegin(), inner.rend());
-      }
       divided.push_back(run.back());
       run = {run.back()};
     }

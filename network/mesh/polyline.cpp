@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 #include "pipeline/contract/polyline.h"
 
@@ -33,9 +32,8 @@ Polyline simplified(const Polyline& points_um, double tolerance_um) {
     open.push_back({furthest, last});
   }
   Polyline kept;
-  for (int i = 0; i < n; ++i) {
+  for (int i = 0; i < n; ++i)
     if (is_kept[i]) kept.push_back(points_um[i]);
-  }
   return kept;
 }
 
@@ -43,9 +41,8 @@ Polyline without_short_pieces(Polyline points_um, double shortest_um) {
   while (points_um.size() > 2) {
     // of the shortest piece, the inner end whose loss moves the line less
     std::size_t piece = 1;
-    for (std::size_t i = 1; i < points_um.size(); ++i) {
+    for (std::size_t i = 1; i < points_um.size(); ++i)
       if (norm(points_um[i] - points_um[i - 1]) < norm(points_um[piece] - points_um[piece - 1])) piece = i;
-    }
     if (norm(points_um[piece] - points_um[piece - 1]) >= shortest_um) break;
     std::size_t lost = piece;
     if (piece == points_um.size() - 1) {
@@ -62,9 +59,8 @@ Polyline without_short_pieces(Polyline points_um, double shortest_um) {
 
 Polyline evenly_divided(const Polyline& points_um, const SizeField& size, int fewest) {
   std::vector<double> start = {0};
-  for (std::size_t i = 1; i < points_um.size(); ++i) {
+  for (std::size_t i = 1; i < points_um.size(); ++i)
     start.push_back(start.back() + norm(points_um[i] - points_um[i - 1]));
-  }
   const auto at = [&](double s) {
     const auto next = std::upper_bound(start.begin() + 1, start.end() - 1, s);
     const auto i = next - start.begin();
@@ -72,9 +68,8 @@ Polyline evenly_divided(const Polyline& points_um, const SizeField& size, int fe
   };
   Polyline inner;
   for (const double s : even_division_um(
-           start.back(), [&](double s) { return size.at(at(s)); }, fewest)) {
+           start.back(), [&](double s) { return size.at(at(s)); }, fewest))
     inner.push_back(at(s));
-  }
   return inner;
 }
 

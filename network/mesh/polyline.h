@@ -1,8 +1,6 @@
 /// Lines brought to the resolution of the mesh.
 #pragma once
 
-#include <vector>
-
 #include "network/mesh/size_field.h"
 
 namespace mbtfm::mesh {

@@ -75,9 +75,8 @@ class Relaxation {
     }
     if (report.converged) report.reason = "at rest";
     // with sweeps used up something may still crowd
-    for (int round = 0; !report.converged && round < kDensityRounds; ++round) {
+    for (int round = 0; !report.converged && round < kDensityRounds; ++round)
       if (!change_density(Density::thin_out)) break;
-    }
     result.points_um = mesh_.points_um();
     result.triangulation = mesh_.triangulation();
     result.size_um = std::move(size_um_);
@@ -93,9 +92,8 @@ class Relaxation {
       std::copy(frame_.points_um.begin(), frame_.points_um.end(), points.begin());
       triangulation = triangulate(points, frame_.segments);
     }
-    if (!triangulation) {
+    if (!triangulation)
       throw InvalidData("outline and fibres", "lines that a mesh of this edge length can follow", "lines that cross");
-    }
     leave_out_unused(points, *triangulation);
     return {std::move(points), *triangulation};
   }
@@ -104,9 +102,8 @@ class Relaxation {
   void leave_out_unused(std::vector<Vec2>& points, Triangulation& triangulation) const {
     std::vector<char> is_used(points.size(), 0);
     std::fill(is_used.begin(), is_used.begin() + n_frame_, 1);
-    for (const auto& t : triangulation.triangles) {
+    for (const auto& t : triangulation.triangles)
       for (const int v : t) is_used[v] = 1;
-    }
     std::vector<int> number(points.size(), -1);
     int n_kept = 0;
     for (std::size_t v = 0; v < points.size(); ++v) {
@@ -115,9 +112,8 @@ class Relaxation {
       number[v] = n_kept++;
     }
     points.resize(n_kept);
-    for (auto& t : triangulation.triangles) {
+    for (auto& t : triangulation.triangles)
       for (int& v : t) v = number[v];
-    }
     for (auto& e : triangulation.edges) {
       e.vertex_a = number[e.vertex_a];
       e.vertex_b = number[e.vertex_b];
@@ -146,9 +142,8 @@ class Relaxation {
       if (move > 0) moved.push_back(v);
       if (move < kStill) continue;
       furthest = std::max(furthest, move);
-      for (const int t : mesh_.triangles_of(v)) {
+      for (const int t : mesh_.triangles_of(v))
         for (const int w : mesh_.triangles()[t]) is_awake[w] = 1;
-      }
     }
     for (const int v : mesh_.restore_delaunay(moved)) is_awake[v] = 1;
     is_awake_ = std::move(is_awake);
@@ -287,16 +282,14 @@ class Relaxation {
       if (e.is_of_frame || !is_untouched(e)) continue;
       added.push_back(0.5 * (points[e.vertex_a] + points[e.vertex_b]));
       is_touched[e.vertex_a] = is_touched[e.vertex_b] = 1;
-      for (const int apex : e.apexes) {
+      for (const int apex : e.apexes)
         if (apex >= 0) is_touched[apex] = 1;
-      }
       has_changed = true;
     }
     if (!has_changed) return false;
     std::vector<Vec2> changed;
-    for (std::size_t v = 0; v < points.size(); ++v) {
+    for (std::size_t v = 0; v < points.size(); ++v)
       if (is_kept[v]) changed.push_back(points[v]);
-    }
     changed.insert(changed.end(), added.begin(), added.end());
     mesh_ = triangulated(std::move(changed));
     start_moving();

@@ -1,7 +1,6 @@
 /// The inside of a frame filled with vertices, and these brought to even distances.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "network/mesh/frame.h"

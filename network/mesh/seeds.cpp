@@ -24,9 +24,8 @@ class Clearance {
       grid_.add(k, frame.points_um[s.vertex_a], frame.points_um[s.vertex_b]);
       is_on_segment[s.vertex_a] = is_on_segment[s.vertex_b] = 1;
     }
-    for (int v = 0; v < static_cast<int>(is_on_segment.size()); ++v) {
+    for (int v = 0; v < static_cast<int>(is_on_segment.size()); ++v)
       if (!is_on_segment[v]) grid_.add(-1 - v, frame.points_um[v], frame.points_um[v]);
-    }
   }
 
   bool is_clear(Vec2 p) {

@@ -9,7 +9,6 @@
 #include <CGAL/property_map.h>
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <set>
 #include <utility>

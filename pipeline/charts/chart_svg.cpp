@@ -95,9 +95,8 @@ std::string error_bar(const Mark& mark, Vec2 a, Vec2 b) {
   const double length = norm(along);
   const Vec2 stop = length > 0 ? (kStop_px / length) * Vec2{-along.y, along.x} : Vec2{kStop_px, 0};
   std::string path = fmt::format("M{:.1f},{:.1f}L{:.1f},{:.1f}", a.x, a.y, b.x, b.y);
-  for (const Vec2 end : {a, b}) {
+  for (const Vec2 end : {a, b})
     path += fmt::format("M{:.1f},{:.1f}L{:.1f},{:.1f}", end.x - stop.x, end.y - stop.y, end.x + stop.x, end.y + stop.y);
-  }
   return element("path", "d=\"" + path + "\"", mark, "fill:none;");
 }
 
@@ -245,9 +244,8 @@ std::string svg_file(const std::vector<Chart>& charts, int n_columns, const std:
             "</g>\n";
   }
   below += row_height;
-  for (std::size_t i = 0; i < caption.size(); ++i) {
+  for (std::size_t i = 0; i < caption.size(); ++i)
     body += text(20, below + kCaptionLine_px * (static_cast<double>(i) + 0.7), "start", caption[i]);
-  }
   const double height = below + kCaptionLine_px * (static_cast<double>(caption.size()) + 0.5);
   return fmt::format(
              "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" "

@@ -211,9 +211,8 @@ ordered_json mark_of(Kind kind, const std::string& data, ordered_json& rows) {
   static const std::set<std::string> kPlaces = {"x", "y", "x2", "y2"};
   std::vector<std::string> names;
   for (const ordered_json& row : rows) {
-    for (const auto& [name, value] : row.items()) {
+    for (const auto& [name, value] : row.items())
       if (!kPlaces.contains(name) && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-    }
   }
   for (const std::string& name : names) {
     const bool is_shared = std::all_of(rows.begin(), rows.end(), [&](const ordered_json& row) {
@@ -247,9 +246,8 @@ void add_marks(ordered_json& spec, const std::vector<Mark>& marks, std::size_t f
   const ordered_json mark = mark_of(kind, data, rows);
   if (kind == Kind::label) spec["marks"].push_back(rim_of(mark));
   spec["marks"].push_back(mark);
-  if (kind == Kind::error) {
+  if (kind == Kind::error)
     for (const ordered_json& stop : stops_of(mark)) spec["marks"].push_back(stop);
-  }
   spec["data"].push_back({{"name", data}, {"values", rows}});
 }
 

@@ -1,6 +1,5 @@
 #include "pipeline/contract/beads.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "pipeline/contract/beads_in_space.h"

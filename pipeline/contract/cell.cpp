@@ -38,9 +38,8 @@ bool covers(const Adhesion& adhesion, Vec2 point_um, double margin_um) {
 Cuts cuts_of(const Cell& cell) {
   Cuts cuts;
   const std::size_t n = cell.outline_um.size();
-  for (std::size_t i = 0; i < cell.is_cut.size(); ++i) {
+  for (std::size_t i = 0; i < cell.is_cut.size(); ++i)
     if (cell.is_cut[i]) cuts.emplace_back(cell.outline_um[i], cell.outline_um[(i + 1) % n]);
-  }
   return cuts;
 }
 

@@ -25,9 +25,8 @@ constexpr const char* kNeedLess = "fewer threads, a coarser mesh or fewer beads 
 bool is_want_of_memory(const std::exception& error) {
   const auto* system = dynamic_cast<const std::system_error*>(&error);
   if (system &&
-      (system->code() == std::errc::not_enough_memory || system->code() == std::errc::resource_unavailable_try_again)) {
+      (system->code() == std::errc::not_enough_memory || system->code() == std::errc::resource_unavailable_try_again))
     return true;
-  }
   return dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
          dynamic_cast<const std::length_error*>(&error) != nullptr ||  // a vector larger than any memory
          std::string_view(error.what()).find("Insufficient memory") != std::string_view::npos;

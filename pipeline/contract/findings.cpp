@@ -421,9 +421,8 @@ std::string line_of(const Finding& finding) {
 std::string open_ids(const std::vector<Finding>& findings) {
   std::set<std::string> seen;
   std::string ids;
-  for (const Finding& finding : findings) {
+  for (const Finding& finding : findings)
     if (is_open(finding) && seen.insert(finding.id).second) ids += (ids.empty() ? "" : "; ") + finding.id;
-  }
   return ids;
 }
 

@@ -1,7 +1,6 @@
 #include "pipeline/contract/geometry.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace mbtfm {

@@ -11,11 +11,10 @@ std::string listed(const Texts& texts) {
   std::string list;
   for (const auto& text : texts) {
     if (!list.empty()) list += ", ";
-    if constexpr (std::is_integral_v<std::remove_cvref_t<decltype(text)>>) {
+    if constexpr (std::is_integral_v<std::remove_cvref_t<decltype(text)>>)
       list += std::to_string(text);
-    } else {
+    else
       list += text;
-    }
   }
   return list;
 }

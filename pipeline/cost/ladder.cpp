@@ -61,9 +61,8 @@ std::vector<Rung> ladder(Extent extent) {
   add(rungs, "fit", "n_meshes", {"1", "4", "8"});
   add(rungs, "network", "edge_length_um", {"3", "2"});
   add(rungs, "substrate", "model", {"half-space", "layer", "split"});
-  for (const double share : {0.125, 0.25, 0.5}) {
+  for (const double share : {0.125, 0.25, 0.5})
     rungs.push_back({.knob = "beads", .value = shortest(share), .bead_share = share});
-  }
   add(rungs, "fit", "surface_lines", {"40", "160"});
   add(rungs, "fit", "tolerance", {"0.1", "0.01", "0.0001"});
   add(rungs, "cables", "smoothing", {"0.01", "0.001", "1e-07"});
@@ -130,9 +129,8 @@ std::string group_of(const std::string& knob, CellKind kind) {
       {"tractions", {"spacing_um", "refine"}},
       {"data, presets, threads",
        {"beads", "with_axial", "image_scale", "robust_loss", "preset", "threads", "bootstrap"}}};
-  for (const auto& [group, knobs] : kKnobs) {
+  for (const auto& [group, knobs] : kKnobs)
     if (knobs.contains(knob)) return group;
-  }
   return kind == CellKind::space ? "method" : "equilibrium and fit";
 }
 

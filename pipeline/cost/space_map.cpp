@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"

@@ -58,9 +58,8 @@ bool is_from_images(const runner::Stage& stage) { return !stage.images.empty(); 
 /// All that segmentation and tracking read is there.
 bool has_all_images(const fs::path& cell, const runner::ImageNames& names) {
   for (const runner::Stage& stage : runner::stages()) {
-    for (const runner::ImageInput& image : runner::images_of(stage, names)) {
+    for (const runner::ImageInput& image : runner::images_of(stage, names))
       if (runner::match_image(cell, runner::name_of_image(names, image.key)).files.size() != 1) return false;
-    }
   }
   return true;
 }
@@ -68,9 +67,8 @@ bool has_all_images(const fs::path& cell, const runner::ImageNames& names) {
 /// The files of a folder, without what lies in folders below it.
 void copy_files(const fs::path& from, const fs::path& to) {
   fs::create_directories(to);
-  for (const fs::directory_entry& entry : fs::directory_iterator(from)) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(from))
     if (files::is_own_file(entry.path())) fs::copy_file(entry.path(), to / entry.path().filename());
-  }
 }
 
 /// A folder that looks like the cell, whose stages are run anew by each rung.
@@ -90,11 +88,12 @@ class Scratch {
                        "a sheet (" + of.why + ")",
                        "its report lists how long each stage took; sheet.mesh_um sets how many triangles there are");
     stages_ = runner::stages();
-    if (kind_ == CellKind::space) {
+    if (kind_ == CellKind::space)
       stages_ = {of.stages.back()};  // traction
-    } else {
+    else
       has_images_ = has_all_images(cell, images_);
-    }
+    for (runner::Stage& stage : stages_)  // of a time series the first frame alone is fitted
+      std::erase_if(stage.arguments, [](const auto& a) { return a.given == runner::PathArgument::Given::if_series; });
     for (const std::string& file : needed()) {
       if (files::is_file(cell / file)) continue;
       throw InputError((cell / file).string(), "a cell whose images were segmented and tracked", "none",
@@ -139,9 +138,8 @@ class Scratch {
       return answer;
     }
     answer.fibres = files::read_cell(folder_ / "1_segment").fibres;
-    for (const Tension& t : files::read_tensions(folder_ / "4_fit/tensions.csv")) {
+    for (const Tension& t : files::read_tensions(folder_ / "4_fit/tensions.csv"))
       if (t.fibre_id != 0) answer.tensions_nN[t.fibre_id] = t.tension_nN;
-    }
     answer.total_force_nN = files::read_fit_summary(folder_ / "4_fit/fit.json").total_force_nN;
     return answer;
   }
@@ -202,26 +200,8 @@ class Scratch {
   }
 
   std::vector<std::string> command_of(const runner::Stage& stage, const Rung& rung) const {
-    std::vector<std::string> command = {(options_.stage_folder / ("mbtfm-" + stage.name)).string()};
-    const auto add = [&](const std::string& flag, const std::string& value) {
-      command.push_back("--" + flag);
-      command.push_back(value);
-    };
-    for (const runner::ImageInput& image : runner::images_of(stage, images_)) {
-      if (const auto file = runner::resolve_image(cell_, images_, image)) add(image.flag, file->string());
-    }
-    for (const runner::ImageInput& image : stage.optional_images) {
-      if (const auto file = runner::resolve_optional_image(cell_, images_, image.key)) add(image.flag, file->string());
-    }
-    for (const runner::PathArgument& argument : stage.arguments) {
-      const auto condition = argument.condition();
-      if (argument.given != runner::PathArgument::Given::if_series &&
-          (!condition || files::is_own_file(folder_ / *condition)))
-        add(argument.flag, (folder_ / argument.path).string());
-    }
-    add("config", (folder_ / "cell.toml").string());
-    add(stage.output.flag, (folder_ / stage.output.path).string());
-    add("threads", std::to_string(rung.threads.value_or(options_.threads)));
+    std::vector<std::string> command = runner::command_of(stage, options_.stage_folder, cell_, folder_, images_,
+                                                          rung.threads.value_or(options_.threads));
     command.emplace_back("--quiet");
     for (const std::string& flag : runner::flags_of(stage, rung.settings)) command.push_back(flag);
     return command;
@@ -277,9 +257,8 @@ Answer truth_of(const fs::path& cell, CellKind kind) {
   }
   const report::Comparison comparison = report::compare_with_truth(cell);
   Answer truth;
-  for (const report::ComparedFibre& fibre : comparison.fibres) {
+  for (const report::ComparedFibre& fibre : comparison.fibres)
     if (fibre.found && fibre.true_tension_nN) truth.tensions_nN[fibre.found->fibre_id] = *fibre.true_tension_nN;
-  }
   truth.total_force_nN = comparison.true_total_force_nN.value_or(comparison.total_force_nN);
   return truth;
 }
@@ -320,10 +299,9 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
                         .at("spacing_x_um")
                         .number()
                   : 0;
-  for (Rung& rung : is_in_space ? ladder_in_space(options.extent, spacing_um) : ladder(options.extent)) {
+  for (Rung& rung : is_in_space ? ladder_in_space(options.extent, spacing_um) : ladder(options.extent))
     if (scratch.has_images() || rung.knob == kPreset || !needs_images(rung))
       study.measurements.push_back({.rung = std::move(rung)});
-  }
   std::vector<std::vector<Run>> runs(study.measurements.size());
   std::optional<Answer> finest_answer;
   if (!(is_in_space ? has_space_truth(cell) : report::has_truth(cell))) {

@@ -121,9 +121,8 @@ charts::Chart chart_of(const std::string& group, const Study& study, const chart
   }
   add_names(chart, x, y, kFrame_px, dots, key);
   const Measurement& own = study.measurements.front();
-  if (is_measured(own)) {
+  if (is_measured(own))
     chart.dot({own.cpu_seconds, own.error}, 8, "fill:none;stroke:#000;stroke-width:2.5", "the cell's own settings");
-  }
   return chart;
 }
 
@@ -173,9 +172,8 @@ std::string table_of_halving(const std::vector<Measurement>& all) {
   std::string text = "| knob | half the error costs | the least error it reaches | at |\n|---|---|---|---|\n";
   for (const std::string& knob : knobs_of(all)) {
     const Measurement* least = nullptr;
-    for (const Measurement& m : all) {
+    for (const Measurement& m : all)
       if (is_measured(m) && m.rung.knob == knob && (!least || m.error < least->error)) least = &m;
-    }
     if (!least) continue;
     const Measurement* half = quickest(all, knob, 0.5 * own.error);
     text += fmt::format("| `{}` | {} | × {:.2f} | {}, time × {:.2g} |\n", knob,
@@ -230,15 +228,13 @@ std::string page(const Study& study, const std::string& cell_name) {
 
 std::vector<int> front_of(const std::vector<Measurement>& measurements) {
   std::vector<int> order;
-  for (std::size_t i = 0; i < measurements.size(); ++i) {
+  for (std::size_t i = 0; i < measurements.size(); ++i)
     if (is_measured(measurements[i])) order.push_back(static_cast<int>(i));
-  }
   const auto at = [&](int i) -> const Measurement& { return measurements[i]; };
   std::ranges::stable_sort(order, [&](int a, int b) { return at(a).cpu_seconds < at(b).cpu_seconds; });
   std::vector<int> front;
-  for (const int i : order) {
+  for (const int i : order)
     if (front.empty() || at(i).error < at(front.back()).error) front.push_back(i);
-  }
   return front;
 }
 

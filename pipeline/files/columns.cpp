@@ -70,9 +70,8 @@ std::string AnyColumns::text_of(const void* rows, std::size_t n_rows, std::size_
 }
 
 void AnyColumns::take(void* rows, std::size_t size, CsvTable& table, const char* label) const {
-  for (const AnyColumn& column : all_) {
+  for (const AnyColumn& column : all_)
     if (column.is_read() && !column.options.may_lack) table.require({column.name});
-  }
   if (*label != 0) table.label_rows_by(all_.front().name, label);
   for (const AnyColumn& column : all_) {
     if (!column.is_read() || !table.has(column.name)) continue;

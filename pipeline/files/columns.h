@@ -52,19 +52,18 @@ inline constexpr bool kIsOptional<std::optional<T>> = true;
 
 template <class T>
 std::string field_of(const T& value, int digits) {
-  if constexpr (kIsOptional<T>) {
+  if constexpr (kIsOptional<T>)
     return value ? field_of(*value, digits) : std::string();
-  } else if constexpr (std::is_same_v<T, bool>) {
+  else if constexpr (std::is_same_v<T, bool>)
     return value ? "TRUE" : "FALSE";
-  } else if constexpr (std::is_floating_point_v<T>) {
+  else if constexpr (std::is_floating_point_v<T>)
     return digits > 0 ? significant(value, digits) : shortest(value);
-  } else if constexpr (std::is_integral_v<T>) {
+  else if constexpr (std::is_integral_v<T>)
     return std::to_string(value);
-  } else if constexpr (Worded<T>) {
+  else if constexpr (Worded<T>)
     return name_of(value);
-  } else {
+  else
     return std::string(value);
-  }
 }
 
 /// @throws InputError naming the place of the field
@@ -91,19 +90,18 @@ void take(T& value, const CsvTable& table, int row, const std::string& column, c
 /// What its fields hold, for the page.
 template <class T>
 std::string kind_of(const Range& range) {
-  if constexpr (kIsOptional<T>) {
+  if constexpr (kIsOptional<T>)
     return kind_of<typename T::value_type>(range).append(", or empty");
-  } else if constexpr (std::is_same_v<T, bool>) {
+  else if constexpr (std::is_same_v<T, bool>)
     return "`TRUE` or `FALSE`";
-  } else if constexpr (std::is_floating_point_v<T>) {
+  else if constexpr (std::is_floating_point_v<T>)
     return describe("number", range);
-  } else if constexpr (std::is_integral_v<T>) {
+  else if constexpr (std::is_integral_v<T>)
     return describe("whole number", range);
-  } else if constexpr (Worded<T>) {
+  else if constexpr (Worded<T>)
     return listed(words(T{}));
-  } else {
+  else
     return "text";
-  }
 }
 
 /// The same of a value whose type is forgotten.

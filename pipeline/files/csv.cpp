@@ -93,9 +93,8 @@ CsvTable::CsvTable(std::string_view text, std::string name) : name_(std::move(na
                      "formats, R with write.csv(), pandas with to_csv()");
   }
   std::unordered_set<std::string> seen;
-  for (const std::string& column : header_) {
+  for (const std::string& column : header_)
     if (!seen.insert(column).second) throw InputError(name_ + ":1", "each column once", "'" + column + "' twice");
-  }
   while (!splitter.at_end()) {
     Row row{.line = splitter.line(), .fields = splitter.record()};
     if (row.fields.size() != header_.size()) {
@@ -128,9 +127,8 @@ int CsvTable::index_of(const std::string& column) const {
 
 void CsvTable::label_rows_by(const std::string& column, const std::string& kind) {
   std::unordered_set<int> seen;
-  for (int row = 0; row < n_rows(); ++row) {
+  for (int row = 0; row < n_rows(); ++row)
     if (!seen.insert(integer(row, column, 0)).second) fail(row, column, "each label once");
-  }
   label_column_ = column;
   label_kind_ = kind;
 }
@@ -172,9 +170,8 @@ int CsvTable::integer(int row, const std::string& column, int smallest) const {
   const std::string& field = rows_[row].fields[index_of(column)];
   int value = 0;
   const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (error != std::errc() || end != field.data() + field.size() || value < smallest) {
+  if (error != std::errc() || end != field.data() + field.size() || value < smallest)
     fail(row, column, "an integer >= " + std::to_string(smallest));
-  }
   return value;
 }
 

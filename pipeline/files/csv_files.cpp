@@ -6,9 +6,7 @@
 #include <utility>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/named_array.h"
 #include "pipeline/files/tables.h"
 
 namespace mbtfm::files {
@@ -49,9 +47,8 @@ std::vector<Fibre> read_fibres(const Path& fibres_file, const Path& points_file)
     const auto fibre = by_id.find(point.fibre_id);
     if (fibre == by_id.end()) table.fail(row, "fibre_id", "the label of a fibre of " + fibres_file.string());
     Polyline& line = fibre->second->points_um;
-    if (point.point != static_cast<int>(line.size())) {
+    if (point.point != static_cast<int>(line.size()))
       table.fail(row, "point", std::to_string(line.size()) + ", the fibre's next point");
-    }
     line.push_back(point.position_um);
   }
   check_read(points_file, fibres);
@@ -147,9 +144,8 @@ Outline outline_in(const Path& file) {
   for (int row = 0; row < table.n_rows(); ++row) {
     const OutlinePoint& point = points[row];
     const int current = static_cast<int>(rings.size()) - 1;
-    if (point.ring != current && point.ring != current + 1) {
+    if (point.ring != current && point.ring != current + 1)
       table.fail(row, "ring", std::to_string(current) + " or " + std::to_string(current + 1) + ", rings in order");
-    }
     if (point.ring > current) rings.emplace_back();
     rings.back().push_back(point.position_um);
     if (point.ring > 0 && point.is_cut) table.fail(row, "is_cut", "FALSE: the rim of a hole is no cut");

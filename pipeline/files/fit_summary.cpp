@@ -45,9 +45,8 @@ nlohmann::ordered_json json_of_budget(const ErrorBudget& budget, const std::vect
   nlohmann::ordered_json json = {{"fibres", nlohmann::ordered_json::array()}};
   for (const TensionError& t : budget.tensions) {
     nlohmann::ordered_json row = {{"fibre_id", t.fibre_id}, {"type", "network"}, {"tension_nN", t.tension_nN}};
-    for (const Fibre& f : fibres) {
+    for (const Fibre& f : fibres)
       if (f.fibre_id == t.fibre_id) row["type"] = name_of(f.type);
-    }
     row["parts_nN"] = json_of_parts(t.parts_nN);
     row["total_nN"] = total(t.parts_nN);
     json["fibres"].push_back(row);

@@ -80,9 +80,8 @@ Finding finding_of(const JsonRecord& record) {
 
 std::vector<Finding> findings_of(const JsonRecord& record) {
   std::vector<Finding> findings;
-  if (const auto list = record.find("findings")) {
+  if (const auto list = record.find("findings"))
     for (const JsonRecord& finding : list->list()) findings.push_back(finding_of(finding));
-  }
   return findings;
 }
 
@@ -92,13 +91,11 @@ nlohmann::ordered_json in_utf8(const nlohmann::ordered_json& json) {
   if (json.is_string()) return shown_name(json.get_ref<const std::string&>());
   if (!json.is_structured()) return json;
   nlohmann::ordered_json escaped = json.is_array() ? nlohmann::ordered_json::array() : nlohmann::ordered_json::object();
-  for (const auto& [key, value] : json.items()) {
-    if (json.is_array()) {
+  for (const auto& [key, value] : json.items())
+    if (json.is_array())
       escaped.push_back(in_utf8(value));
-    } else {
+    else
       escaped[shown_name(key)] = in_utf8(value);
-    }
-  }
   return escaped;
 }
 

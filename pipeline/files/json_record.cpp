@@ -27,9 +27,8 @@ Json parse(const std::string& text) {
 /// What a message repeats of a file that may be anyone's: a short piece of plain characters.
 std::string shown(std::string text) {
   constexpr std::size_t kLongest = 80;
-  for (char& c : text) {
+  for (char& c : text)
     if (c < ' ' || c > '~') c = '?';
-  }
   return text.size() <= kLongest ? text : text.substr(0, kLongest) + "...";
 }
 

@@ -32,9 +32,8 @@ std::size_t utf8_length(std::string_view text) {
   if (byte(0) < 0x80) return 1;
   const std::size_t n = byte(0) >= 0xF0 ? 4 : byte(0) >= 0xE0 ? 3 : 2;
   if (byte(0) < 0xC2 || byte(0) > 0xF4 || text.size() < n) return 0;
-  for (std::size_t i = 1; i < n; ++i) {
+  for (std::size_t i = 1; i < n; ++i)
     if ((byte(i) & 0xC0) != 0x80) return 0;
-  }
   // longer than it need be, half of a surrogate pair, beyond the last character (RFC 3629)
   const bool is_allowed = !(byte(0) == 0xE0 && byte(1) < 0xA0) && !(byte(0) == 0xED && byte(1) >= 0xA0) &&
                           !(byte(0) == 0xF0 && byte(1) < 0x90) && !(byte(0) == 0xF4 && byte(1) >= 0x90);

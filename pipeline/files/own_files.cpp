@@ -5,7 +5,6 @@
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::files {
-namespace fs = std::filesystem;
 namespace {
 
 /// Of the file itself, links not followed; `none` where it cannot be looked at.

@@ -51,9 +51,8 @@ struct PlyHead {
 };
 
 const PlyType* ply_type(std::string_view name, const std::string& where) {
-  for (const PlyType& type : kPlyTypes) {
+  for (const PlyType& type : kPlyTypes)
     if (name == type.name || name == type.other_name) return &type;
-  }
   throw InputError(where, "a type of PLY's numbers", "'" + std::string(name) + "'");
 }
 

@@ -18,7 +18,6 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/files/named_array.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_errors.h"
 #include "pipeline/files/vtk_files.h"
@@ -150,10 +149,9 @@ Network network_of(const VtuFile& vtu, const Path& file) {
   const std::vector<double> xyz_um = vtu.coordinates(), ends = vtu.line_ends();
   for (std::size_t at = 0; at < xyz_um.size(); at += 3) network.vertices_um.push_back({xyz_um[at], xyz_um[at + 1]});
   network.adhesion_id = whole_numbers(vtu, VtuSection::point_data, "adhesion_id", file);
-  if (vtu.has(VtuSection::point_data, "held_by_cut")) {
+  if (vtu.has(VtuSection::point_data, "held_by_cut"))
     for (const int is_held : whole_numbers(vtu, VtuSection::point_data, "held_by_cut", file))
       network.held_by_cut.push_back(is_held != 0);
-  }
   const std::vector<int> fibre_id = whole_numbers(vtu, VtuSection::cell_data, "fibre_id", file);
   const std::vector<double> rest_um = vtu.scalars(VtuSection::cell_data, "rest_length_um");
   std::vector<double> share(fibre_id.size(), 1.0);

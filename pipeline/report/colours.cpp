@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-
 #include "pipeline/charts/chart.h"
 #include "pipeline/charts/colour_map.h"
 
@@ -22,9 +19,8 @@ double round_end(double value) {
 std::string colour_bar(const ColourScale& scale) {
   if (!(scale.high > scale.low)) return {};
   std::string stops, numbers;
-  for (const double share : charts::stops_of(charts::ColourMap::plasma)) {
+  for (const double share : charts::stops_of(charts::ColourMap::plasma))
     stops += "," + scale.colour(scale.low + share * (scale.high - scale.low));
-  }
   for (const double tick : charts::ticks(scale.low, scale.high)) {
     numbers += fmt::format("<span style=\"left:{:.1f}%\">{}</span>",
                            100 * (tick - scale.low) / (scale.high - scale.low), charts::readable(tick));

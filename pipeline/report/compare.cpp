@@ -2,11 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <map>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/own_files.h"
@@ -24,11 +22,10 @@ double sum_of_magnitudes(const std::vector<AdhesionForce>& forces) {
 /// Index of the true fibre by found fibre.
 std::map<int, int> partners(const std::vector<Fibre>& found, const std::vector<Fibre>& truth, bool by_place) {
   std::map<int, int> partner;
-  if (by_place) {
+  if (by_place)
     for (const FibreMatch& match : match_fibres(found, truth)) partner[match.found_index] = match.true_index;
-  } else {
+  else
     for (std::size_t i = 0; i < found.size(); ++i) partner[static_cast<int>(i)] = static_cast<int>(i);
-  }
   return partner;
 }
 
@@ -56,9 +53,8 @@ bool has_truth(const fs::path& cell) { return files::is_own_file(cell / "truth/t
 
 Comparison compare_with_truth(const fs::path& cell) {
   files::check_cell_folder(cell);
-  if (!has_truth(cell)) {
+  if (!has_truth(cell))
     throw InputError((cell / "truth/tensions.csv").string(), "the true tensions of a simulated cell", "none");
-  }
   const std::vector<Fibre> found =
       files::read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv");
   const bool by_place = files::is_own_file(cell / "truth/fibres.csv");
@@ -82,9 +78,8 @@ Comparison compare_with_truth(const fs::path& cell) {
     if (const auto p = partner.find(i); p != partner.end()) {
       is_true_found[p->second] = true;
       fibre.truth = truth[p->second];
-      if (const auto t = true_tension_nN.find(fibre.truth->fibre_id); t != true_tension_nN.end()) {
+      if (const auto t = true_tension_nN.find(fibre.truth->fibre_id); t != true_tension_nN.end())
         fibre.true_tension_nN = t->second;
-      }
     }
     comparison.fibres.push_back(std::move(fibre));
   }
@@ -92,16 +87,14 @@ Comparison compare_with_truth(const fs::path& cell) {
     if (is_true_found[k]) continue;
     ComparedFibre missed;
     missed.truth = truth[k];
-    if (const auto t = true_tension_nN.find(truth[k].fibre_id); t != true_tension_nN.end()) {
+    if (const auto t = true_tension_nN.find(truth[k].fibre_id); t != true_tension_nN.end())
       missed.true_tension_nN = t->second;
-    }
     comparison.fibres.push_back(std::move(missed));
   }
   add_figures(comparison);
   comparison.total_force_nN = files::read_fit_summary(cell / "4_fit/fit.json").total_force_nN;
-  if (files::is_own_file(cell / "truth/adhesion_forces.csv")) {
+  if (files::is_own_file(cell / "truth/adhesion_forces.csv"))
     comparison.true_total_force_nN = sum_of_magnitudes(files::read_adhesion_forces(cell / "truth/adhesion_forces.csv"));
-  }
   return comparison;
 }
 

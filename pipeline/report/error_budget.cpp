@@ -3,30 +3,39 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "pipeline/contract/numbers.h"
-#include "pipeline/files/json_record.h"
-#include "pipeline/files/own_files.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
+#include "pipeline/report/results.h"
 
 namespace mbtfm::report {
 namespace {
 
-BudgetLine line_of(const files::JsonRecord& record, const char* value) {
-  BudgetLine line{.value_nN = record.at(value).number(), .total_nN = record.at("total_nN").number()};
-  for (const auto& [source, part] : record.at("parts_nN").members()) {
-    line.parts_nN.emplace_back(source, part.json().is_null() ? std::nullopt : std::optional(part.number()));
-  }
-  return line;
-}
+/// A quantity with its standard error and what each source adds to it; in squares these add up.
+struct BudgetLine {
+  std::optional<int> fibre_id = {};  ///< none: a sum of forces; 0: the actin network
+  std::string type = {};             ///< of the fibre, or the sum's name
+  double value_nN = 0, total_nN = 0;
+  /// source, standard error; none where it is not known
+  std::vector<std::pair<std::string, std::optional<double>>> parts_nN = {};
+};
 
-/// The table has a column for each source of the first line.
-void expect_same_sources(const files::JsonRecord& record, const BudgetLine& line, const BudgetLine& first) {
-  const bool is_same = std::ranges::equal(line.parts_nN, first.parts_nN,
-                                          [](const auto& a, const auto& b) { return a.first == b.first; });
-  if (!is_same) record.at("parts_nN").fail("of the same sources as the first");
+std::vector<BudgetLine> lines_of(const ErrorBudget& budget, const std::vector<Fibre>& fibres) {
+  std::vector<BudgetLine> lines;
+  const auto add = [&](std::optional<int> fibre_id, const std::string& type, double value_nN, const ErrorParts& parts) {
+    BudgetLine& line = lines.emplace_back(BudgetLine{fibre_id, type, value_nN, total(parts)});
+    for_each_part(parts, [&](const char* source, const std::optional<double>& part) {
+      line.parts_nN.emplace_back(source, part);
+    });
+  };
+  for (const TensionError& t : budget.tensions) {
+    const auto fibre = std::ranges::find(fibres, t.fibre_id, &Fibre::fibre_id);
+    add(t.fibre_id, fibre == fibres.end() ? "network" : mbtfm::name_of(fibre->type), t.tension_nN, t.parts_nN);
+  }
+  add({}, "total force", budget.total_force_nN, budget.total_force_parts_nN);
+  if (budget.cut_force) add({}, "force through the cut", budget.cut_force->force_nN, budget.cut_force->parts_nN);
+  return lines;
 }
 
 std::string name_of(const BudgetLine& line) {
@@ -68,44 +77,17 @@ charts::Chart chart_of(const std::vector<BudgetLine>& lines) {
       from_nN = to_nN;
     }
   }
-  if (!lines.empty()) {
+  if (!lines.empty())
     for (std::size_t k = 0; k < lines.front().parts_nN.size(); ++k)
       chart.key(lines.front().parts_nN[k].first, colour(k));
-  }
   return chart;
 }
 
 }  // namespace
 
-std::vector<BudgetLine> read_error_budget(const std::filesystem::path& run_file) {
-  std::vector<BudgetLine> lines;
-  if (!files::is_own_file(run_file)) return lines;
-  const files::JsonRecord run(run_file, "a run.json as mbtfm run writes it",
-                              "delete it; if that does not help, 4_fit/fit.json, too");
-  const auto budget = run.find("error_budget");
-  if (!budget) return lines;
-  const auto add = [&](const files::JsonRecord& record, BudgetLine line) {
-    if (!lines.empty()) expect_same_sources(record, line, lines.front());
-    lines.push_back(std::move(line));
-  };
-  const auto add_sum = [&](const files::JsonRecord& record, const char* name, const char* value) {
-    BudgetLine line = line_of(record, value);
-    line.type = name;
-    add(record, std::move(line));
-  };
-  for (const files::JsonRecord& fibre : budget->at("fibres").list()) {
-    BudgetLine line = line_of(fibre, "tension_nN");
-    line.fibre_id = fibre.at("fibre_id").integer();
-    line.type = fibre.at("type").text();
-    add(fibre, std::move(line));
-  }
-  if (const auto force = budget->find("total_force")) add_sum(*force, "total force", "total_force_nN");
-  if (const auto force = budget->find("cut_force")) add_sum(*force, "force through the cut", "cut_force_nN");
-  return lines;
-}
-
-std::string error_budget_html(const std::vector<BudgetLine>& budget, const std::string& cell) {
-  if (budget.empty()) return {};
+std::string error_budget_html(const CellResults& results) {
+  if (!results.fit.error_budget) return {};
+  const std::vector<BudgetLine> budget = lines_of(*results.fit.error_budget, results.cell.fibres);
   std::vector<BudgetLine> fibres;
   Table table{{"of", number("value (nN)"), number("standard error (nN)")}, {}, "Error budget"};
   std::string csv = "fibre_id,type,value_nN,total_nN";
@@ -131,7 +113,7 @@ std::string error_budget_html(const std::vector<BudgetLine>& budget, const std::
                             "The largest first. A bar is as long as the standard error; the sources’ squares add up, "
                             "so each has the share of the bar that it has of the square.") +
                      "</div>\n";
-  return html + folded("Error budget in numbers", html_of(table, {cell + "_error_budget.csv", csv + "\n"}));
+  return html + folded("Error budget in numbers", html_of(table, {results.name + "_error_budget.csv", csv + "\n"}));
 }
 
 }  // namespace mbtfm::report

@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <regex>
-#include <string>
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/stage_state.h"
@@ -94,9 +92,8 @@ std::string truth(const CellResults& results) {
       "This cell was simulated, so the truth is known. Over the {} found, the tensions deviate from it by {} (root of "
       "the summed squares, relative)",
       counted(comparison.n_matched, "fibre", "fibres"), percent(comparison.relative_error));
-  if (const Coverage coverage = coverage_of(results); coverage.n > 0) {
+  if (const Coverage coverage = coverage_of(results); coverage.n > 0)
     text += fmt::format("; the 95 % interval holds the truth for {} of {}", coverage.n_inside, coverage.n);
-  }
   if (comparison.n_long > 0) {
     text += fmt::format("; {} of {} longer than {:g} µm {} found and typed right", comparison.n_long_found_and_typed,
                         counted(comparison.n_long, "true fibre", "true fibres"), kLongFibre_um,
@@ -111,9 +108,8 @@ std::string truth(const CellResults& results) {
 
 /// The displacement that the model explains, against what the noise would allow.
 std::string quality(const FitSummary& fit) {
-  if (!(fit.expected_relative_l2 > 0)) {
+  if (!(fit.expected_relative_l2 > 0))
     return fmt::format("The model leaves {} of the displacement unexplained (relative L2).", percent(fit.relative_l2));
-  }
   const double left2 = std::pow(fit.relative_l2, 2), noise2 = std::pow(fit.expected_relative_l2, 2);
   std::string text;
   if (left2 <= noise2) {

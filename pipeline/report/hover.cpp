@@ -23,9 +23,8 @@ std::string hover_of(const Fibre& fibre, const CellResults& results) {
   }
   text += fmt::format("\n{} µm long", readable(length_um(fibre.points_um)));
   std::string ends;
-  for (const auto& id : {fibre.start_adhesion_id, fibre.end_adhesion_id}) {
+  for (const auto& id : {fibre.start_adhesion_id, fibre.end_adhesion_id})
     if (id) ends += (ends.empty() ? "" : " and ") + std::to_string(*id);
-  }
   return text + (ends.empty() ? ", on no adhesion" : ", on adhesion " + ends);
 }
 
@@ -48,10 +47,9 @@ std::string hover_of(const Adhesion& adhesion, const CellResults& results) {
   text += (adhesion.origin == AdhesionOrigin::candidate ? "\nlattice cell " : "\narea ") +
           readable(area_stood_for_um2(adhesion)) + " µm²";
   std::string fibres;
-  for (const Fibre& fibre : results.cell.fibres) {
+  for (const Fibre& fibre : results.cell.fibres)
     if (fibre.start_adhesion_id == adhesion.adhesion_id || fibre.end_adhesion_id == adhesion.adhesion_id)
       fibres += (fibres.empty() ? "" : ", ") + std::to_string(fibre.fibre_id);
-  }
   return text + (fibres.empty() ? ", no fibre ends on it" : ", fibre " + fibres);
 }
 

@@ -119,9 +119,8 @@ void draw_fibre_ids(Chart& map, const CellResults& results) {
 ColourScale tension_scale(const CellResults& results, NetworkForm form) {
   ColourScale scale{
       .low = 0, .high = 0, .label = form == NetworkForm::original ? "fitted tension (nN)" : "force carried (nN)"};
-  for (const auto& [id, tension] : results.tensions) {
+  for (const auto& [id, tension] : results.tensions)
     if (id != 0) scale.high = std::max(scale.high, tension.tension_nN);
-  }
   scale.high = round_end(scale.high);
   return scale;
 }

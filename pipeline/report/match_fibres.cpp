@@ -14,9 +14,7 @@ double directed_distance_um(const Polyline& a, const Polyline& b, double step_um
   for (std::size_t i = 1; i < a.size(); ++i) {
     const double piece = norm(a[i] - a[i - 1]);
     const int n = std::max(1, static_cast<int>(std::ceil(piece / step_um)));
-    for (int k = 0; k < n; ++k) {
-      sum += piece / n * distance_to_line_um(b, a[i - 1] + (k + 0.5) / n * (a[i] - a[i - 1]));
-    }
+    for (int k = 0; k < n; ++k) sum += piece / n * distance_to_line_um(b, a[i - 1] + (k + 0.5) / n * (a[i] - a[i - 1]));
     length += piece;
   }
   return sum / length;

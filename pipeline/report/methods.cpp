@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <set>
-#include <string>
 
 #include "pipeline/contract/polyline.h"
 #include "pipeline/report/page.h"
@@ -49,9 +48,8 @@ std::string of_the_fit(const CellResults& results) {
 std::string effects_that_are_on(const Provenance& provenance) {
   std::string list;
   std::set<std::string> named;  // stages share effects
-  for (const EffectLine& effect : provenance.effects) {
+  for (const EffectLine& effect : provenance.effects)
     if (effect.is_on && named.insert(effect.name).second) list += (list.empty() ? "" : ", ") + effect.name;
-  }
   return list.empty() ? "" : " Effects that were computed: " + list + ".";
 }
 

@@ -59,9 +59,8 @@ std::string html_of(const Table& table) {
   html += "</tr></thead><tbody>\n";
   for (const auto& row : table.rows) {
     html += "<tr>";
-    for (std::size_t i = 0; i < row.size(); ++i) {
+    for (std::size_t i = 0; i < row.size(); ++i)
       html += std::string(table.columns[i].is_number ? "<td class=\"n\">" : "<td>") + row[i] + "</td>";
-    }
     html += "</tr>\n";
   }
   return html + "</tbody></table></div>\n";
@@ -105,9 +104,8 @@ std::string figure(const charts::Chart& chart, const std::string& caption, const
   }
   if (!chart.keys().empty()) {
     html += "<div class=\"keys\">";
-    for (const auto& [text, colour] : chart.keys()) {
+    for (const auto& [text, colour] : chart.keys())
       html += fmt::format("<span style=\"color:{}\">{}</span>", charts::readable_on_white(colour), html_escaped(text));
-    }
     html += "</div>\n";
   }
   return html + "<div class=\"chart\"></div><script type=\"application/json\">" + inside_script(chart.vega()) +

@@ -26,11 +26,10 @@ std::string text_of(const ordered_json& value) {
 void flatten(const ordered_json& json, const std::string& prefix, Pairs& pairs) {
   for (const auto& [key, value] : json.items()) {
     const std::string name = prefix.empty() ? key : prefix + "." + key;
-    if (value.is_object()) {
+    if (value.is_object())
       flatten(value, name, pairs);
-    } else {
+    else
       pairs.emplace_back(name, text_of(value));
-    }
   }
 }
 

@@ -31,7 +31,7 @@ namespace {
 
 /// A file of the cell as it lies in its folder.
 Download file_of(const CellResults& results, const std::string& file) {
-  const std::filesystem::path path = results.folder / file;
+  const fs::path path = results.folder / file;
   return {results.name + "_" + path.filename().string(), files::read_text(path)};
 }
 
@@ -184,31 +184,28 @@ namespace {
 
 /// Of the program's version and all that the report shows: the outputs of the stages, the truth, cell.toml, and which
 /// preset or accuracy was asked for.
-std::string fingerprint(const std::filesystem::path& cell) {
-  namespace fs = std::filesystem;
+std::string fingerprint(const fs::path& cell) {
   std::vector<fs::path> files = {cell / "cell.toml"};
   for (const char* folder :
        {"1_segment", "2_track", "3_network", "4_fit", "3_surface", "4_traction", "3_sheet", "truth"}) {
     if (!files::is_folder(cell / folder)) continue;
-    for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder)) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder))
       if (files::is_own_file(entry.path())) files.push_back(entry.path());
-    }
   }
   std::ranges::sort(files);
   const Provenance provenance = read_provenance(cell / "run.json");
   std::string all =
       std::string(kVersion) + " " + provenance.preset + " " + (provenance.accuracy ? provenance.accuracy->verdict : "");
-  for (const fs::path& file : files) {
+  for (const fs::path& file : files)
     all += "\n" + file.lexically_relative(cell).generic_string() + " " + files::sha256_of_file(file);
-  }
   return files::sha256(all);
 }
 
 }  // namespace
 
-CellKind kind_of(const std::filesystem::path& cell) { return read_provenance(cell / "run.json").kind; }
+CellKind kind_of(const fs::path& cell) { return read_provenance(cell / "run.json").kind; }
 
-bool has_results(const std::filesystem::path& cell) {
+bool has_results(const fs::path& cell) {
   switch (kind_of(cell)) {
     case CellKind::plane:
       return files::is_own_file(cell / "4_fit/fit.json");
@@ -220,7 +217,7 @@ bool has_results(const std::filesystem::path& cell) {
   throw InternalError("unknown kind of cell");
 }
 
-std::string report_html(const std::filesystem::path& cell) {
+std::string report_html(const fs::path& cell) {
   const Provenance provenance = read_provenance(cell / "run.json");
   if (provenance.kind == CellKind::space) return report_in_space(cell);
   if (provenance.kind == CellKind::sheet) return report_of_sheet(cell);
@@ -234,21 +231,20 @@ std::string report_html(const std::filesystem::path& cell) {
   std::string body = findings_section(facts_of(results), provenance);
   if (!results.cell.fibres.empty()) body += tension_section(results);
   body += map_section(results) + adhesion_section(results);
-  if (const auto budget = read_error_budget(cell / "run.json"); !budget.empty())
-    body += section("Error budget", error_budget_html(budget, results.name));
+  if (results.fit.error_budget) body += section("Error budget", error_budget_html(results));
   body += section("For your methods section", methods_paragraph(results, provenance)) +
           provenance_section(provenance, folded("Figures of the fit", figure_pairs(results)));
   return page(results.name + " – mbtfm", head, body);
 }
 
-void update_report(const std::filesystem::path& cell) {
+void update_report(const fs::path& cell) {
   files::check_cell_folder(cell);
   if (const CellKind kind = kind_of(cell); kind != CellKind::sheet) {  // ParaView shows 3_sheet/sheet.vtu as it is
-    const std::filesystem::path script = cell / "view_in_paraview.py";
+    const fs::path script = cell / "view_in_paraview.py";
     const std::string view(kind == CellKind::space ? kParaviewScriptInSpace : kParaviewScript);
     if (!files::is_own_text(script) || files::read_text(script) != view) files::write_whole(script, view);
   }
-  const std::filesystem::path file = cell / "report.html";
+  const fs::path file = cell / "report.html";
   const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
   if (files::is_own_text(file) && files::read_text(file).ends_with(signature)) return;
   files::write_whole(file, report_html(cell) + signature);

@@ -1,6 +1,5 @@
 #include "pipeline/report/result_line.h"
 
-#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 

@@ -145,9 +145,8 @@ std::optional<CutForce> cut_force_of(const FitSummary& fit) {
 Balance balance_of(const CellResults& results) {
   const auto by_id = adhesions_by_id(results.cell);
   Vec2 centre;
-  for (const Adhesion& adhesion : results.cell.adhesions) {
+  for (const Adhesion& adhesion : results.cell.adhesions)
     centre += (1.0 / static_cast<double>(results.cell.adhesions.size())) * adhesion.position_um;
-  }
   Vec2 net;
   double torque = 0, magnitudes = 0, lever = 0;
   bool has_moments = true;

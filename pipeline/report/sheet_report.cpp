@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "pipeline/contract/version.h"
 #include "pipeline/files/json.h"
@@ -49,9 +48,8 @@ std::vector<std::string> facts_of(const SheetResults& r) {
 std::string parameter(const Provenance& provenance, const std::string& name) {
   for (const StageLine& stage : provenance.stages) {
     if (stage.name != "sheet") continue;
-    for (const auto& [key, value] : stage.parameters) {
+    for (const auto& [key, value] : stage.parameters)
       if (key == name) return value;
-    }
   }
   return "?";
 }

@@ -9,7 +9,6 @@
 #include "pipeline/contract/extent.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/arrows.h"
-#include "pipeline/report/colours.h"
 #include "pipeline/report/numbers.h"
 
 namespace mbtfm::report {
@@ -73,9 +72,8 @@ Figure scalar_map(const SpaceResults& r, const std::string& title, const std::st
                   const Value& value, const std::string& caption) {
   Chart map = empty_map(r, title);
   std::vector<double> values;
-  for (const SurfaceTraction& t : r.tractions) {
+  for (const SurfaceTraction& t : r.tractions)
     if (const std::optional<double> v = value(t)) values.push_back(*v);
-  }
   constexpr double kNearlyAll = 0.99;  // a cell at the rim must not take all the colours
   const ColourScale scale{0, round_end(numerics::quantile(values, kNearlyAll)), what + " (" + unit + ")"};
   draw_cells(

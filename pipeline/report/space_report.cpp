@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/kinds_of_findings.h"
@@ -129,9 +128,8 @@ std::string space_section(const SpaceResults& r) {
 
 std::string map_section(const SpaceResults& r) {
   std::string html = "<div class=\"grid\">\n" + html_of(normal_map(r)) + html_of(tangential_map(r));
-  for (const auto& map : {error_map(r), resolution_map(r)}) {
+  for (const auto& map : {error_map(r), resolution_map(r)})
     if (map) html += html_of(*map);
-  }
   return section("Tractions", html + "</div>\n");
 }
 

@@ -1,7 +1,6 @@
 /// The surface of a gel in space, as a picture.
 #pragma once
 
-#include <functional>
 #include <string>
 
 #include "pipeline/report/colours.h"

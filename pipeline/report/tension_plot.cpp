@@ -35,9 +35,8 @@ void draw_row(Chart& chart, const FibreRow& row, double y, const CellResults& re
   if (t.low_nN && t.high_nN) chart.error({*t.low_nN, y}, {*t.high_nN, y}, "stroke-width:2;stroke:" + colour, hover);
   chart.dot({t.tension_nN, y}, 4.5, "stroke-width:2;stroke:" + colour + ";fill:" + (t.identifiable ? colour : "#fff"),
             hover);
-  if (row.true_tension_nN) {
+  if (row.true_tension_nN)
     chart.diamond({*row.true_tension_nN, y}, 5.5, "fill:#fff;stroke:#000;stroke-width:1.4", hover);
-  }
 }
 
 struct Look {
@@ -132,11 +131,10 @@ std::optional<Chart> tensions_by_type(const CellResults& results) {
       const Vec2 at{static_cast<double>(i) + kColumnWidth * (share - 0.5), t.tension_nN};
       const std::string style = "stroke-width:2;stroke:" + colour + ";fill:" + (t.identifiable ? colour : "#fff");
       const std::string hover = hover_of(*column[k]->fibre, results);
-      if (type == FibreType::edge) {
+      if (type == FibreType::edge)
         chart.diamond(at, 5, style, hover);
-      } else {
+      else
         chart.dot(at, 4.5, style, hover);
-      }
     }
     const double mean = sum / static_cast<double>(column.size()), x = static_cast<double>(i);
     chart.pieces({{{x - 0.5 * kColumnWidth, mean}, {x + 0.5 * kColumnWidth, mean}}}, "stroke:#333;stroke-width:1.6",

@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/numbers.h"
@@ -27,9 +24,8 @@ std::optional<double> half_interval_nN(const Tension& t) {
 /// Decimals that suit most fibres: those of the median error. None: as many as each number needs.
 std::optional<int> common_decimals(const std::vector<FibreRow>& rows) {
   std::vector<double> errors;
-  for (const FibreRow& row : rows) {
+  for (const FibreRow& row : rows)
     if (const auto half = half_interval_nN(row.tension)) errors.push_back(*half);
-  }
   if (errors.empty()) return {};
   return decimals_for(numerics::median_in(errors));
 }
@@ -55,18 +51,16 @@ std::vector<std::string> truth_cells(const Tension& t, const std::optional<doubl
 std::string true_fibre_cell(const FibreRow& row) {
   if (!row.true_fibre_id) return "none";
   std::string cell = std::to_string(*row.true_fibre_id);
-  if (row.true_type && *row.true_type != row.fibre->type) {
+  if (row.true_type && *row.true_type != row.fibre->type)
     cell += fmt::format(", <b>{}</b>", full_name_of(*row.true_type));
-  }
   return cell;
 }
 
 /// The adhesions that hold the fibre.
 std::string ends_cell(const Fibre& fibre) {
   std::string cell;
-  for (const auto& id : {fibre.start_adhesion_id, fibre.end_adhesion_id}) {
+  for (const auto& id : {fibre.start_adhesion_id, fibre.end_adhesion_id})
     if (id) cell += (cell.empty() ? "" : ", ") + std::to_string(*id);
-  }
   return cell.empty() ? "–" : cell;
 }
 
@@ -101,16 +95,13 @@ Table tension_table(const CellResults& results) {
   Table table{
       {number("fibre"), "type", number("tension (nN)"), number("95 % interval (nN)")}, {}, "Tension of each fibre"};
   const bool has_truth = results.comparison.has_value();
-  if (has_truth) {
-    for (const char* title : {"truth (nN)", "error (%)", "error / half interval", "true fibre"}) {
+  if (has_truth)
+    for (const char* title : {"truth (nN)", "error (%)", "error / half interval", "true fibre"})
       table.columns.push_back(number(title));
-    }
-  }
   table.columns.push_back(number("length (µm)"));
   table.columns.push_back("adhesions");
-  if (const auto t = results.tensions.find(0); t != results.tensions.end()) {
+  if (const auto t = results.tensions.find(0); t != results.tensions.end())
     table.rows.push_back(network_row(results, t->second));
-  }
   const std::vector<FibreRow> rows = fibre_rows(results);
   const std::optional<int> decimals = common_decimals(rows);
   for (const FibreRow& fibre : rows) {

@@ -18,7 +18,6 @@
 #include "pipeline/runner/run_record.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 namespace {
 
 /// What cannot be read is skipped: a study may hold lost+found, or a folder of somebody else.

@@ -1,34 +1,34 @@
 /// Many cells, each in processes of its own: a crash, a hang or a hunger for memory never touches the others.
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/path.h"
 #include "pipeline/runner/run_cell.h"
 
 namespace mbtfm::runner {
 
 /// A folder that could not be searched for cells.
 struct SkippedFolder {
-  std::filesystem::path folder;
+  fs::path folder;
   std::string why;
 };
 
 struct FoundCells {
-  std::vector<std::filesystem::path> cells = {};  ///< in alphabetical order
+  std::vector<fs::path> cells = {};  ///< in alphabetical order
   std::vector<SkippedFolder> skipped;
 };
 
 /// Folders with a cell.toml at or below `folder`. A cell folder is not searched for more, nor are links followed.
 /// @throws InputError where there is none
-FoundCells find_cells(const std::filesystem::path& folder);
+FoundCells find_cells(const fs::path& folder);
 
 struct BatchCell;
 
 struct BatchOptions {
-  std::filesystem::path program;                     ///< mbtfm itself
+  fs::path program;                                  ///< mbtfm itself
   std::vector<std::string> arguments = {};           ///< passed on to `mbtfm run`
   int jobs = 1;                                      ///< cells at a time
   int threads = 1;                                   ///< to look at cells with
@@ -39,7 +39,7 @@ struct BatchOptions {
 };
 
 struct BatchCell {
-  std::filesystem::path cell = {};
+  fs::path cell = {};
   int exit_code = 0;
   double seconds = 0;
   std::string message = {};       ///< why it failed: the first error it printed
@@ -50,14 +50,13 @@ struct BatchCell {
 /// `mbtfm run` for every cell that is not up to date; what it prints goes to run.log in the cell folder. Cells that
 /// another batch works on come last: what it leaves undone is done then.
 /// @throws Interrupted
-std::vector<BatchCell> run_batch(const std::vector<std::filesystem::path>& cells, const BatchOptions& options);
+std::vector<BatchCell> run_batch(const std::vector<fs::path>& cells, const BatchOptions& options);
 
 /// The same for the cells as they are: runs nothing. What is left undone counts as failed.
-std::vector<BatchCell> outcomes_so_far(const std::vector<std::filesystem::path>& cells, const RunOptions& options,
-                                       int threads);
+std::vector<BatchCell> outcomes_so_far(const std::vector<fs::path>& cells, const RunOptions& options, int threads);
 
 /// A table, as CSV, of each stage of each cell: cell, stage, state, why. Runs nothing. A cell that cannot be read has
 /// one row, state "unreadable".
-std::string list_cells(const std::vector<std::filesystem::path>& cells, const RunOptions& options, int threads);
+std::string list_cells(const std::vector<fs::path>& cells, const RunOptions& options, int threads);
 
 }  // namespace mbtfm::runner

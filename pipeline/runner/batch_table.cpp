@@ -33,11 +33,10 @@ std::string text_of(const Value& value) {
   return std::visit(
       [](const auto& v) {
         using V = std::decay_t<decltype(v)>;
-        if constexpr (std::is_arithmetic_v<V> || std::is_same_v<V, std::string>) {
+        if constexpr (std::is_arithmetic_v<V> || std::is_same_v<V, std::string>)
           return files::field_of(v, 0);
-        } else {
+        else
           return listed(v);
-        }
       },
       value);
 }
@@ -138,14 +137,12 @@ std::string failure_table(const fs::path& folder, const std::vector<BatchCell>& 
   }
   if (rows.size() == 1) return {};
   std::array<std::size_t, 4> widths{};
-  for (const auto& row : rows) {
+  for (const auto& row : rows)
     for (std::size_t k = 0; k + 1 < row.size(); ++k) widths[k] = std::max(widths[k], row[k].size());
-  }
   std::ostringstream text;
-  for (const auto& row : rows) {
+  for (const auto& row : rows)
     for (std::size_t k = 0; k < row.size(); ++k)
       text << (k == 0 ? "\n  " : "   ") << std::left << std::setw(static_cast<int>(widths[k])) << row[k];
-  }
   return text.str();
 }
 

@@ -8,7 +8,6 @@
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 namespace {
 
 constexpr const char *kDisplacement = "2_track/displacement_3d.csv", *kSurfaceBeads = "2_track/surface_beads.csv",
@@ -86,9 +85,8 @@ std::string why_in_space(const fs::path& cell, const toml::table& toml) {
   const std::string dimensions = text_in(toml, "track", "dimensions");
   if (dimensions == "plane") return {};
   if (dimensions == "space") return "track.dimensions is space";
-  for (const char* one : {"relaxed_z", "stressed_z", "relaxed_page", "stressed_page"}) {
+  for (const char* one : {"relaxed_z", "stressed_z", "relaxed_page", "stressed_page"})
     if (toml["track"][one]) return {};
-  }
   if (toml["track"]["z_points"]) return "track.z_points is set: the bead images are stacks";
   if (files::is_own_file(cell / kDisplacement) && !files::is_own_file(cell / "2_track/displacement.csv"))
     return std::string(kDisplacement) + " is there";
@@ -191,9 +189,8 @@ const std::vector<Stage>& all_stages() {
   static const std::vector<Stage> list = [] {
     std::vector<Stage> all = stages();
     for (const auto& others : {stages_in_space(), stages_of_sheet()}) {
-      for (const Stage& stage : others) {
+      for (const Stage& stage : others)
         if (std::ranges::find(all, stage.name, &Stage::name) == all.end()) all.push_back(stage);
-      }
     }
     return all;
   }();

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <array>
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "pipeline/contract/cell_kind.h"
+#include "pipeline/contract/path.h"
 #include "pipeline/contract/words.h"
 #include "pipeline/runner/images.h"
 #include "pipeline/runner/stages.h"
@@ -25,7 +25,7 @@ struct RunSettings {
 };
 void declare(stage::ParameterList& list, RunSettings& settings);
 /// @throws InputError for an unknown key or value, naming file and line
-RunSettings read_run_settings(const std::filesystem::path& cell);
+RunSettings read_run_settings(const fs::path& cell);
 
 struct CellStages {
   CellKind kind = CellKind::plane;
@@ -37,7 +37,7 @@ struct CellStages {
 
 /// Decided by cell.toml and the files beside it. A folder without images and settings of space is one of the plane.
 /// @throws InputError where cell.toml cannot be read
-CellStages stages_of(const std::filesystem::path& cell, const ImageNames& images);
+CellStages stages_of(const fs::path& cell, const ImageNames& images);
 
 /// In space, all of them: segment, track, surface, traction.
 const std::vector<Stage>& stages_in_space();

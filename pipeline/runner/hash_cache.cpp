@@ -15,7 +15,6 @@
 #include "pipeline/files/text.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 namespace {
 
 // The coarsest clock of a file system in use: FAT's 2 s; of others it is 10 ms at most.

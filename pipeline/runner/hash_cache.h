@@ -3,12 +3,13 @@
 
 #include <array>
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "pipeline/contract/path.h"
 
 namespace mbtfm::runner {
 
@@ -23,7 +24,7 @@ using Hashes = std::map<std::string, std::string>;
 /// Threads may share one.
 class HashCache {
  public:
-  explicit HashCache(std::filesystem::path cell);
+  explicit HashCache(fs::path cell);
 
   /// Of the files that exist; the others are left out.
   Hashes hash(const std::vector<std::string>& names);
@@ -37,10 +38,10 @@ class HashCache {
     Stamp stamp{};
     std::string sha256;
   };
-  static std::optional<Stamp> stamp_of(const std::filesystem::path& file);
+  static std::optional<Stamp> stamp_of(const fs::path& file);
   bool has_rested(const Stamp& stamp);
 
-  std::filesystem::path cell_;
+  fs::path cell_;
   std::map<std::string, Entry> entries_;
   std::optional<std::int64_t> began_ns_;  ///< by the file system's clock, before the first hash; 0: unknown
   bool is_changed_ = false;

@@ -13,7 +13,6 @@
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kCell = "{cell}";
@@ -43,13 +42,11 @@ using ImageSet = std::map<std::string, fs::path>;
 /// Folders that cannot be read have no images: the patterns then find none of theirs.
 void collect_files(const fs::path& folder, std::vector<fs::path>& files) {
   std::error_code error, is_gone;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    if (!entry->is_symlink(is_gone) && entry->is_directory(is_gone)) {
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    if (!entry->is_symlink(is_gone) && entry->is_directory(is_gone))
       collect_files(entry->path(), files);
-    } else if (files::is_file(entry->path())) {
+    else if (files::is_file(entry->path()))
       files.push_back(entry->path());
-    }
-  }
 }
 
 std::vector<fs::path> files_below(const fs::path& folder) {

@@ -1,9 +1,10 @@
 /// Cell folders for images that lie together in one folder and belong together by their names.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <vector>
+
+#include "pipeline/contract/path.h"
 
 namespace mbtfm::runner {
 
@@ -20,8 +21,7 @@ ImagePattern parse_pattern(const std::string& text);
 /// an [images] table. A cell.toml that is there already stays as it is.
 /// @returns the names of the cells, in alphabetical order
 /// @throws InputError where no file fits, two files are the same image of one cell, or the template has [images] itself
-std::vector<std::string> make_cell_folders(const std::filesystem::path& folder,
-                                           const std::vector<ImagePattern>& patterns,
-                                           const std::filesystem::path& template_toml);
+std::vector<std::string> make_cell_folders(const fs::path& folder, const std::vector<ImagePattern>& patterns,
+                                           const fs::path& template_toml);
 
 }  // namespace mbtfm::runner

@@ -11,7 +11,6 @@
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -75,9 +74,8 @@ ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) 
     return match;
   }
   if (const auto bar = name_or_glob.find('|'); bar != std::string::npos) {
-    for (const std::string& part : {name_or_glob.substr(0, bar), name_or_glob.substr(bar + 1)}) {
+    for (const std::string& part : {name_or_glob.substr(0, bar), name_or_glob.substr(bar + 1)})
       for (fs::path& file : match_image(folder, part).files) match.files.push_back(std::move(file));
-    }
     std::ranges::sort(match.files);
     match.files.erase(std::unique(match.files.begin(), match.files.end()), match.files.end());
     return match;
@@ -87,9 +85,8 @@ ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) 
   std::error_code error;  // of a folder that is not there, or cannot be read: no file of it is found
   for (fs::directory_iterator entry(parent, error), end; !error && entry != end; entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    if (fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0 && files::is_file(entry->path())) {
+    if (fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0 && files::is_file(entry->path()))
       match.files.push_back(entry->path());
-    }
   }
   std::ranges::sort(match.files);
   return match;
@@ -113,9 +110,8 @@ std::string advice_on_missing(const fs::path& folder, const std::string& name, c
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
     there.push_back(entry->path().filename());
   std::ranges::sort(there);
-  for (const fs::path& file : there) {
+  for (const fs::path& file : there)
     if (lower(file.string()) == lower(name)) return "there is '" + file.string() + "': capitals count";
-  }
   for (const fs::path& file : there) {
     const std::string type = lower(file.extension().string());
     if (std::ranges::find(kOfMicroscopes, type) != std::end(kOfMicroscopes))

@@ -1,11 +1,11 @@
 /// Which image files belong to a cell: the [images] table of cell.toml.
 #pragma once
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/path.h"
 #include "pipeline/runner/stages.h"
 #include "pipeline/stage/parameters_fwd.h"
 
@@ -38,23 +38,20 @@ const std::string& name_of_image(const ImageNames& names, const std::string& key
 std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names);
 
 struct ImageMatch {
-  std::vector<std::filesystem::path> files = {};  ///< in alphabetical order
+  std::vector<fs::path> files = {};  ///< in alphabetical order
   std::string pattern;
 };
 /// Files of `folder` that a name or glob (*, ?, [abc] in its last part) stands for, or one of several with | between
 /// them. A file of exactly that name wins over a glob.
-ImageMatch match_image(const std::filesystem::path& folder, const std::string& name_or_glob);
+ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob);
 
 /// The one file that is meant. @throws InputError where there is none, or several: lists them
-std::filesystem::path resolve_image(const std::filesystem::path& folder, const ImageNames& names,
-                                    const std::string& key);
+fs::path resolve_image(const fs::path& folder, const ImageNames& names, const std::string& key);
 
 /// The file of a stage's image; none where it need not be there and is not.
-std::optional<std::filesystem::path> resolve_image(const std::filesystem::path& folder, const ImageNames& names,
-                                                   const ImageInput& image);
+std::optional<fs::path> resolve_image(const fs::path& folder, const ImageNames& names, const ImageInput& image);
 
 /// The same of a file that need not be there where its name is left at the default.
-std::optional<std::filesystem::path> resolve_optional_image(const std::filesystem::path& folder,
-                                                            const ImageNames& names, const std::string& key);
+std::optional<fs::path> resolve_optional_image(const fs::path& folder, const ImageNames& names, const std::string& key);
 
 }  // namespace mbtfm::runner

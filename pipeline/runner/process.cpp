@@ -192,15 +192,14 @@ ProcessResult run_process(const std::vector<std::string>& command, const Process
 
 std::string how_it_ended(const ProcessResult& result) {
   std::ostringstream text;
-  if (result.exceeded == ProcessResult::Limit::memory) {
+  if (result.exceeded == ProcessResult::Limit::memory)
     text << "took too much memory (" << std::lround(result.peak_memory_MB) << " MB)";
-  } else if (result.exceeded == ProcessResult::Limit::seconds) {
+  else if (result.exceeded == ProcessResult::Limit::seconds)
     text << "timed out after " << brief(result.seconds) << " s";
-  } else if (result.signal) {
+  else if (result.signal)
     text << "killed by signal " << *result.signal << " (" << strsignal(*result.signal) << ")";
-  } else {
+  else
     text << "exit code " << result.exit_code;
-  }
   return text.str();
 }
 

@@ -45,9 +45,8 @@ std::vector<Difference> differences(const Hashes& before, const Hashes& now) {
     if (found == before.end()) result.push_back({name, " is new"});
     if (found != before.end() && found->second != hash) result.push_back({name, " has changed"});
   }
-  for (const auto& [name, hash] : before) {
+  for (const auto& [name, hash] : before)
     if (!now.contains(name)) result.push_back({name, " is gone"});
-  }
   return result;
 }
 
@@ -163,9 +162,8 @@ Settings read_settings(const fs::path& toml_file, const std::vector<Stage>& stag
     }
     toml::table effects;
     if (const toml::table* all = whole["effects"].as_table()) {
-      for (const auto& [key, value] : *all) {
+      for (const auto& [key, value] : *all)
         if (std::ranges::find(stage.effects, key.str()) != stage.effects.end()) effects.insert(key, value);
-      }
     }
     if (!effects.empty()) relevant.insert("effects", effects);
     std::ostringstream text;
@@ -216,9 +214,8 @@ std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, con
 Hashes outputs_now(const Stage& stage, const std::optional<StageRecord>& record, HashCache& hashes) {
   std::vector<std::string> outputs = stage.writes;
   if (record) {
-    for (const auto& [name, hash] : record->outputs) {
+    for (const auto& [name, hash] : record->outputs)
       if (std::find(outputs.begin(), outputs.end(), name) == outputs.end()) outputs.push_back(name);
-    }
   }
   return hashes.hash(outputs);
 }
@@ -248,9 +245,8 @@ std::optional<StageStatus> changed_by_hand(const Stage& stage, const std::option
 StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& record, const StageSurroundings& now) {
   if (const auto by_hand = changed_by_hand(stage, record, now.outputs)) return *by_hand;
   std::vector<std::string> missing;
-  for (const std::string& name : stage.writes) {
+  for (const std::string& name : stage.writes)
     if (!now.outputs.contains(name)) missing.push_back(name);
-  }
   if (!record) {
     if (missing.size() == stage.writes.size()) return {StageState::must_run, "not run yet"};
     throw InputError(stage.folder, "all outputs of the stage, or none", "no " + missing.front(),
@@ -261,15 +257,12 @@ StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& reco
   const std::vector<Difference> of_inputs = differences(record->inputs, now.inputs);
   const bool is_same = record->version == now.version && record->settings == now.settings;
   const bool keeps_frames = stage.keeps_frames && is_same && are_of_series(of_inputs);
-  for (const auto& [name, hash] : record->outputs) {
+  for (const auto& [name, hash] : record->outputs)
     if (!now.outputs.contains(name)) return {StageState::must_run, name + " is gone", keeps_frames};
-  }
   if (!stage.images.empty() && !now.has_images) return {StageState::given, "its images are gone: outputs kept"};
   if (record->version != now.version) return {StageState::must_run, "was made by version " + record->version};
   if (record->settings != now.settings) return {StageState::must_run, "its parameters have changed"};
-  if (!of_inputs.empty()) {
-    return {StageState::must_run, of_inputs.front().name + of_inputs.front().what, keeps_frames};
-  }
+  if (!of_inputs.empty()) return {StageState::must_run, of_inputs.front().name + of_inputs.front().what, keeps_frames};
   return {StageState::up_to_date, "same version, parameters and inputs"};
 }
 

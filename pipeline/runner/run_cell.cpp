@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <exception>
-#include <iomanip>
 #include <mutex>
-#include <sstream>
-#include <string>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/own_files.h"
@@ -20,42 +17,14 @@
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 namespace {
 
 bool contains_name(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-std::string executable_of(const Stage& stage, const RunOptions& options) {
-  return (options.stage_folder / ("mbtfm-" + stage.name)).string();
-}
-
-std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, const ImageNames& images,
-                                    const RunOptions& options, int threads) {
-  std::vector<std::string> command = {executable_of(stage, options)};
-  const auto add = [&](const std::string& flag, const std::string& value) {
-    command.push_back("--" + flag);
-    command.push_back(value);
-  };
-  for (const ImageInput& image : images_of(stage, images)) {
-    if (const auto file = resolve_image(cell, images, image)) add(image.flag, file->string());
-  }
-  for (const ImageInput& image : stage.optional_images) {
-    if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
-  }
-  for (const PathArgument& argument : stage.arguments) {
-    const auto condition = argument.condition();
-    if (!condition || files::is_own_file(cell / *condition)) add(argument.flag, (cell / argument.path).string());
-  }
-  add("config", (cell / "cell.toml").string());
-  for (const Setting& setting : stage.settings) add(setting.key, setting.value);
-  add(stage.output.flag, (cell / stage.output.path).string());
-  add("threads", std::to_string(threads));
-  add("record", record_file_of(cell, stage).string());
-  if (options.is_quiet) command.push_back("--quiet");
-  if (options.explain && stage.explains) command.push_back("--explain");
-  return command;
+std::string executable_of(const Stage& stage, const fs::path& stage_folder) {
+  return (stage_folder / ("mbtfm-" + stage.name)).string();
 }
 
 /// Flags and files of the images that a stage compares with those of others; none where it looks at no others.
@@ -79,9 +48,8 @@ std::vector<std::string> to_look_at(const Stage& stage, const fs::path& cell, co
 std::vector<std::string> command_to_tell(std::vector<std::string> command, const fs::path& cell) {
   command.front() = fs::path(command.front()).filename().string();
   const std::string prefix = (cell / "").string();
-  for (std::string& argument : command) {
+  for (std::string& argument : command)
     if (argument.starts_with(prefix)) argument.erase(0, prefix.size());
-  }
   return command;
 }
 
@@ -89,9 +57,8 @@ std::vector<std::string> command_to_tell(std::vector<std::string> command, const
 void remove_partial_files(const fs::path& folder) {
   std::error_code error;
   std::vector<fs::path> partial;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
     if (entry->path().filename().string().starts_with(files::kPartialPrefix)) partial.push_back(entry->path());
-  }
   for (const fs::path& file : partial)
     fs::remove(file, error);  // a link, not what it points to; no folder that is full
 }
@@ -281,7 +248,10 @@ void CellRun::start(const Stage& stage, const Present& before, int threads, Stag
     }
   }
   const fs::path record_file = record_file_of(cell_, stage);
-  std::vector<std::string> command = command_of(stage, cell_, images_, options_, threads);
+  std::vector<std::string> command = command_of(stage, options_.stage_folder, cell_, cell_, images_, threads);
+  command.insert(command.end(), {"--record", record_file.string()});
+  if (options_.is_quiet) command.emplace_back("--quiet");
+  if (options_.explain && stage.explains) command.emplace_back("--explain");
   for (const std::string& flag : flags_of(stage, beneath_)) command.push_back(flag);
   const bool had_record = files::is_own_file(record_file);
   const std::string record_before = had_record ? files::read_text(record_file) : std::string();
@@ -342,9 +312,8 @@ void CellRun::run_chains(CellOutcome& outcome) {
       errors[chain] = std::current_exception();
     }
   });
-  for (const std::exception_ptr& error : errors) {
+  for (const std::exception_ptr& error : errors)
     if (error) std::rethrow_exception(error);
-  }
   bring_up_to_date(all.back(), options_.threads, outcome.stages.back());
 }
 
@@ -396,15 +365,37 @@ bool CellOutcome::converged() const {
 
 std::string CellOutcome::not_converged() const {
   std::string names;
-  for (const StageOutcome& stage : stages) {
+  for (const StageOutcome& stage : stages)
     if (!stage.converged) names += (names.empty() ? "" : ", ") + stage.stage;
-  }
   return names;
+}
+
+std::vector<std::string> command_of(const Stage& stage, const fs::path& stage_folder, const fs::path& cell,
+                                    const fs::path& folder, const ImageNames& images, int threads) {
+  std::vector<std::string> command = {executable_of(stage, stage_folder)};
+  const auto add = [&](const std::string& flag, const std::string& value) {
+    command.push_back("--" + flag);
+    command.push_back(value);
+  };
+  for (const ImageInput& image : images_of(stage, images))
+    if (const auto file = resolve_image(cell, images, image)) add(image.flag, file->string());
+  for (const ImageInput& image : stage.optional_images)
+    if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
+  for (const PathArgument& argument : stage.arguments) {
+    const auto condition = argument.condition();
+    if (!condition || files::is_own_file(folder / *condition)) add(argument.flag, (folder / argument.path).string());
+  }
+  add("config", (folder / "cell.toml").string());
+  for (const Setting& setting : stage.settings) add(setting.key, setting.value);
+  add(stage.output.flag, (folder / stage.output.path).string());
+  add("threads", std::to_string(threads));
+  return command;
 }
 
 void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOptions& options, const Sink& sink,
                       const std::vector<std::string>& inputs) {
-  std::vector<std::string> command = {executable_of(stage, options), "--check", "--config", toml_file.string()};
+  std::vector<std::string> command = {executable_of(stage, options.stage_folder), "--check", "--config",
+                                      toml_file.string()};
   command.insert(command.end(), inputs.begin(), inputs.end());
   const ProcessResult check = run_process(command, options.limits, sink);
   if (check.exit_code == 0 && !check.signal) return;

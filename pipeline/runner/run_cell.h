@@ -1,11 +1,11 @@
 /// All stages of one cell that are not up to date.
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/path.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/record.h"
 #include "pipeline/runner/told.h"
@@ -13,7 +13,7 @@
 namespace mbtfm::runner {
 
 struct RunOptions {
-  std::filesystem::path stage_folder;  ///< where the stages' executables are
+  fs::path stage_folder;  ///< where the stages' executables are
   int threads = 1;
   bool is_quiet = false;
   bool is_checked = false;                     ///< every stage is known to accept its parameters
@@ -66,20 +66,25 @@ struct StageFailed : std::runtime_error {
 /// Bring the stages of a cell folder up to date and write run.json, also where a stage fails.
 /// A stage that does not converge marks its outputs; the later ones still run.
 /// @throws InputError where an input lacks, UsageError for an unknown stage, CellBusy, StageFailed
-CellOutcome run_cell(const std::filesystem::path& cell, const RunOptions& options);
+CellOutcome run_cell(const fs::path& cell, const RunOptions& options);
 
 /// What run_cell would find, without starting anything: by stage, its status. @throws InputError, UsageError
-CellOutcome look_at_cell(const std::filesystem::path& cell, const RunOptions& options);
+CellOutcome look_at_cell(const fs::path& cell, const RunOptions& options);
 
 /// Of look_at_cell: there is nothing left to do for the stages asked for, and run.json and the report tell of it.
-bool is_done(const std::filesystem::path& cell, const RunOptions& options, const CellOutcome& now);
+bool is_done(const fs::path& cell, const RunOptions& options, const CellOutcome& now);
+
+/// The program of a stage and its flags. @param cell  that its images lie in  @param folder  of cell.toml and of what
+/// the stages write: the cell's own, or a copy of it
+std::vector<std::string> command_of(const Stage& stage, const fs::path& stage_folder, const fs::path& cell,
+                                    const fs::path& folder, const ImageNames& images, int threads);
 
 /// Does the stage accept this cell.toml? It prints why not. @throws StageFailed where it does not
 /// @param inputs  flags and files that it looks at, too
-void check_parameters(const Stage& stage, const std::filesystem::path& toml_file, const RunOptions& options,
+void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOptions& options,
                       const Sink& sink = print_on, const std::vector<std::string>& inputs = {});
 
 /// Names of [images] from cell.toml. @throws InputError where there is no cell.toml, or for an unknown table or key
-ImageNames read_image_names(const std::filesystem::path& cell);
+ImageNames read_image_names(const fs::path& cell);
 
 }  // namespace mbtfm::runner

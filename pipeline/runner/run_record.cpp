@@ -16,7 +16,6 @@
 #include "pipeline/runner/run_cell.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 namespace {
@@ -89,12 +88,10 @@ ordered_json stage_entry(const Stage& stage, const StageOutcome& told, const fs:
   const fs::path record_file = record_file_of(cell, stage);
   if (!files::is_own_file(record_file)) return entry;
   const files::JsonRecord record(record_file, "a record of mbtfm run", "delete it to run the stage again");
-  for (const auto& [key, value] : record.members()) {
+  for (const auto& [key, value] : record.members())
     if (!entry.contains(key)) entry[key] = value.json();
-  }
-  if (const auto effects = record.find("effects")) {
+  if (const auto effects = record.find("effects"))
     for (const files::JsonRecord& effect : effects->list()) effect.expect_object();
-  }
   files::findings_of(record);  // are such
   return entry;
 }

@@ -2,9 +2,10 @@
 #pragma once
 
 #include <array>
-#include <filesystem>
 #include <optional>
 #include <string>
+
+#include "pipeline/contract/path.h"
 
 namespace mbtfm::runner {
 
@@ -18,18 +19,18 @@ constexpr auto words(RunOutcome) { return std::array{"done", "failed", "unfinish
 /// Merge the records of all stages, and what became of them in this run, to run.json. Of stages that this run was not
 /// asked for, it keeps what an earlier one told.
 /// @throws OutputError
-void write_run_record(const std::filesystem::path& cell, const RunOptions& options, const CellOutcome& outcome);
+void write_run_record(const fs::path& cell, const RunOptions& options, const CellOutcome& outcome);
 
 /// run.json is there and tells that every stage asked for is done.
-bool run_record_tells_of(const std::filesystem::path& cell, const RunOptions& options);
+bool run_record_tells_of(const fs::path& cell, const RunOptions& options);
 
 /// The state of a stage that run.json tells of; empty where it tells of none.
-std::string recorded_state(const std::filesystem::path& cell, const std::string& stage);
+std::string recorded_state(const fs::path& cell, const std::string& stage);
 
 /// "segment", "exit code 3", …: the failure that run.json tells of; empty where it tells of none.
 struct RecordedFailure {
   std::string stage, how = {}, message = {};
 };
-std::optional<RecordedFailure> recorded_failure(const std::filesystem::path& cell);
+std::optional<RecordedFailure> recorded_failure(const fs::path& cell);
 
 }  // namespace mbtfm::runner

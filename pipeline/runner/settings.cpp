@@ -10,9 +10,8 @@ std::vector<Setting> unset_in(const std::filesystem::path& toml_file, const std:
   if (settings.empty()) return {};
   const toml::table whole = files::parse_toml(toml_file);
   std::vector<Setting> unset;
-  for (const Setting& setting : settings) {
+  for (const Setting& setting : settings)
     if (!whole[setting.table][setting.key]) unset.push_back(setting);
-  }
   return unset;
 }
 

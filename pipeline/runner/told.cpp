@@ -29,10 +29,9 @@ std::string result_of(const StageTold& told) {
 
 std::string effects_on(const std::vector<Effect>& effects) {
   std::string names;
-  for (const Effect& effect : effects) {
+  for (const Effect& effect : effects)
     if (effect.is_on && effect.setting == Switch::automatic)
       names += (names.empty() ? "" : ", ") + std::string(name_of(effect.kind));
-  }
   return names;
 }
 
@@ -53,11 +52,10 @@ std::string text_of(const StageTold& told, Detail detail) {
     const std::string line = "\n  " + line_of(finding);
     text << (is_open(finding) ? stage::warning(line) : line);
   }
-  if (detail == Detail::all) {
+  if (detail == Detail::all)
     for (const Effect& effect : told.report->effects) text << "\n  " << stage::line_of(effect);
-  } else if (const std::string names = effects_on(told.report->effects); !names.empty()) {
+  else if (const std::string names = effects_on(told.report->effects); !names.empty())
     text << "\n  on as your data call for it: " << names;
-  }
   return text.str();
 }
 

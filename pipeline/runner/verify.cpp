@@ -18,7 +18,6 @@
 #include "pipeline/runner/run_record.h"
 
 namespace mbtfm::runner {
-namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 namespace {
@@ -62,10 +61,9 @@ std::vector<KnownFile> files_in(const files::JsonRecord& run, const fs::path& ru
     if (!entry) continue;
     add_files(FileKind::input, stage, *entry, files);
     add_files(FileKind::output, stage, *entry, files);
-    for (const KnownFile& file : files) {
+    for (const KnownFile& file : files)
       if (file.stage == stage.name && file.kind == FileKind::output)
         output_file(run_json.parent_path(), stage, file.path, run_json.string());
-    }
   }
   return files;
 }
@@ -76,10 +74,9 @@ std::vector<fs::path> named_images(const fs::path& cell) {
   std::vector<fs::path> files;
   for (const Stage& stage : stages_of(cell, names).stages) {
     for (const auto& inputs : {images_of(stage, names), stage.optional_images}) {
-      for (const ImageInput& image : inputs) {
+      for (const ImageInput& image : inputs)
         for (fs::path& file : match_image(cell, name_of_image(names, image.key)).files)
           files.push_back(std::move(file));
-      }
     }
   }
   return files;
@@ -104,13 +101,12 @@ void compare(const KnownFile& known, const fs::path& folder, const std::vector<f
   const std::string name = known.path.generic_string(),
                     role = std::string(" (") + name_of(known.kind) + " of " + known.stage + ")";
   const fs::path file = files::file_shown_as(folder, name);
-  if (!may_be_read(file.lexically_relative(folder), folder, images)) {
+  if (!may_be_read(file.lexically_relative(folder), folder, images))
     found.differences.push_back(name + " is outside of the cell folder, and no setting names it: not read" + role);
-  } else if (!files::is_file(file)) {
+  else if (!files::is_file(file))
     found.differences.push_back(name + " is gone" + role);
-  } else if (files::sha256_of_file(file) != known.sha256) {
+  else if (files::sha256_of_file(file) != known.sha256)
     found.differences.push_back(name + " differs" + role);
-  }
 }
 
 bool is_output(const KnownFile& file, const std::vector<KnownFile>& files) {
@@ -126,9 +122,8 @@ bool is_given(const std::optional<files::JsonRecord>& entry) {
 bool is_given(const files::JsonRecord& run, const std::string& stage) { return is_given(run.at("stages").find(stage)); }
 
 void add_values(const ordered_json& table, std::string& text) {
-  for (const auto& [key, value] : table.items()) {
+  for (const auto& [key, value] : table.items())
     if (!value.is_object() && !value.is_null()) text += key + " = " + value.dump() + "\n";  // as TOML writes them, too
-  }
 }
 
 /// The images that a run had, by key of [images].
@@ -163,9 +158,8 @@ std::string toml_of(const files::JsonRecord& run, const fs::path& inputs, const 
     add_values(of_run->json(), text);
   }
   text += "\n[images]\n";
-  for (const auto& [key, file] : images_in(run, inputs)) {
+  for (const auto& [key, file] : images_in(run, inputs))
     if (files::is_file(file)) text += key + " = " + files::json_text(fs::proximate(file, out).generic_string()) + "\n";
-  }
   return text;
 }
 
@@ -215,11 +209,10 @@ Verification verify_cell(const fs::path& cell) {
     const auto entry = run.at("stages").find(stage.name);
     if (is_given(entry)) continue;
     const auto of_runner = entry ? entry->find("run") : std::nullopt;
-    if (!of_runner || !of_runner->is_true_or("finished", false)) {
+    if (!of_runner || !of_runner->is_true_or("finished", false))
       found.differences.push_back("stage " + stage.name + " has not ended");
-    } else if (of_runner->at("settings").json().dump() != ordered_json::parse(settings.at(stage.name)).dump()) {
+    else if (of_runner->at("settings").json().dump() != ordered_json::parse(settings.at(stage.name)).dump())
       found.differences.push_back("cell.toml differs (parameters of " + stage.name + ")");
-    }
   }
   return found;
 }
@@ -238,9 +231,8 @@ Verification repeat_run(const fs::path& run_json, const fs::path& inputs, const 
   prepare(run, files, inputs, out);
   run_cell(out, options);
   Verification found;
-  for (const KnownFile& file : files) {
+  for (const KnownFile& file : files)
     if (file.kind == FileKind::output) compare(file, out, {}, found);
-  }
   return found;
 }
 

@@ -1,10 +1,11 @@
 /// Are the files of a cell still those that its run.json tells of, and does it come out the same once more?
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
+
+#include "pipeline/contract/path.h"
 
 namespace mbtfm::runner {
 
@@ -17,14 +18,13 @@ struct Verification {
 
 /// Hash every input and output that run.json names, without any short cut, and compare the parameters of cell.toml.
 /// @throws InputError where there is no run.json, or a damaged one
-Verification verify_cell(const std::filesystem::path& cell);
+Verification verify_cell(const fs::path& cell);
 
 /// Repeat the run that `run_json` tells of in the new cell folder `out`: its inputs where they lie (below `inputs`,
 /// which is the old cell folder as a rule), their hashes checked, its parameters, and its version, or `note` says that
 /// this is another one. Then compare all outputs.
 /// @throws InputError where an input is gone or has changed, or where `out` is there already; what run_cell throws
-Verification repeat_run(const std::filesystem::path& run_json, const std::filesystem::path& inputs,
-                        const std::filesystem::path& out, const RunOptions& options,
-                        const std::function<void(const std::string&)>& note);
+Verification repeat_run(const fs::path& run_json, const fs::path& inputs, const fs::path& out,
+                        const RunOptions& options, const std::function<void(const std::string&)>& note);
 
 }  // namespace mbtfm::runner

@@ -23,9 +23,8 @@ std::string joined(const std::vector<std::string>& words) {
 
 std::string flags_of(const DeclaredCommand& command) {
   std::vector<std::string> flags;
-  for (const DeclaredOption& option : command.options) {
+  for (const DeclaredOption& option : command.options)
     if (!option.flag.empty()) flags.push_back(option.flag);
-  }
   return joined(flags);
 }
 
@@ -57,11 +56,10 @@ std::string zsh_arguments(const DeclaredCommand& command, const WordsOfFlags& wo
     std::ranges::replace(spec, '\n', ' ');
     if (option.takes_value && !option.flag.empty()) spec += ":" + option.name;
     const auto found = words.find(option.flag);
-    if (found != words.end() && option.takes_value) {
+    if (found != words.end() && option.takes_value)
       spec += ":(" + joined(found->second) + ")";
-    } else if (option.takes_value) {
+    else if (option.takes_value)
       spec += is_file(option) ? ":_files" : ":";
-    }
     text += " \\\n    " + quoted(spec, "'\\''");
   }
   return text;
@@ -85,9 +83,8 @@ std::string bash_completion(const CLI::App& app, const WordsOfFlags& words) {
   std::string text = "# bash completion for " + program.name + "\n" + name + "() {\n" +
                      "  local now=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} flags\n" +
                      "  case $before in\n";
-  for (const auto& [flag, allowed] : words) {
+  for (const auto& [flag, allowed] : words)
     text += "    " + flag + ") COMPREPLY=($(compgen -W '" + joined(allowed) + "' -- \"$now\")); return ;;\n";
-  }
   text += "  esac\n";
   if (program.subcommands.empty()) {
     text += "  flags='" + flags_of(program) + "'\n";
@@ -110,31 +107,27 @@ std::string zsh_completion(const CLI::App& app, const WordsOfFlags& words) {
   std::string text = "#compdef " + program.name + "\n";
   if (program.subcommands.empty()) return text + "_arguments" + zsh_arguments(program, words) + "\n";
   text += "local -a commands=(\n";
-  for (const DeclaredCommand& command : program.subcommands) {
+  for (const DeclaredCommand& command : program.subcommands)
     text += "  " + quoted(command.name + ":" + command.meaning, "'\\''") + "\n";
-  }
   text +=
       ")\nif (( CURRENT == 2 )); then\n  _describe command commands\n  return\nfi\nlocal command=$words[2]\n"
       "shift words\n(( CURRENT-- ))\ncase $command in\n";
-  for (const DeclaredCommand& command : program.subcommands) {
+  for (const DeclaredCommand& command : program.subcommands)
     text += "  " + command.name + ") _arguments" + zsh_arguments(command, words) + " ;;\n";
-  }
   return text + "esac\n";
 }
 
 std::string fish_completion(const CLI::App& app, const WordsOfFlags& words) {
   const DeclaredCommand program = declared(app);
   std::string text;
-  for (const DeclaredOption& option : program.options) {
+  for (const DeclaredOption& option : program.options)
     if (!option.flag.empty()) text += fish_line(program.name, "", option, words);
-  }
   for (const DeclaredCommand& command : program.subcommands) {
     text += "complete -c " + program.name + " -n __fish_use_subcommand -a " + command.name + " -d " +
             quoted(command.meaning, "\\'") + "\n";
     const std::string condition = " -n '__fish_seen_subcommand_from " + command.name + "'";
-    for (const DeclaredOption& option : command.options) {
+    for (const DeclaredOption& option : command.options)
       if (!option.flag.empty()) text += fish_line(program.name, condition, option, words);
-    }
   }
   return text;
 }

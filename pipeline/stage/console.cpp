@@ -57,13 +57,12 @@ std::string warning(const std::string& text) {
 std::string readable_duration(double seconds) {
   constexpr double kMinute = 60, kHour = 3600;
   std::ostringstream text;
-  if (seconds < 1.5 * kMinute) {
+  if (seconds < 1.5 * kMinute)
     text << std::lround(seconds) << " s";
-  } else if (seconds < 1.5 * kHour) {
+  else if (seconds < 1.5 * kHour)
     text << std::lround(seconds / kMinute) << " min";
-  } else {
+  else
     text << std::fixed << std::setprecision(1) << seconds / kHour << " h";
-  }
   return text.str();
 }
 

@@ -21,14 +21,12 @@ DeclaredOption option_of(const CLI::Option& option) {
 
 DeclaredCommand declared(const CLI::App& app) {
   DeclaredCommand command{.name = app.get_name(), .meaning = app.get_description()};
-  for (const CLI::Option* option : app.get_options()) {
+  for (const CLI::Option* option : app.get_options())
     if (!option->get_group().empty()) command.options.push_back(option_of(*option));
-  }
   std::stable_partition(command.options.begin(), command.options.end(),
                         [](const DeclaredOption& option) { return option.flag.empty(); });
-  for (const CLI::App* subcommand : app.get_subcommands([](const CLI::App*) { return true; })) {
+  for (const CLI::App* subcommand : app.get_subcommands([](const CLI::App*) { return true; }))
     if (!subcommand->get_group().empty()) command.subcommands.push_back(declared(*subcommand));
-  }
   return command;
 }
 

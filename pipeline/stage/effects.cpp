@@ -56,9 +56,7 @@ constexpr const char* kTolerance = "effect_tolerance";
 
 std::vector<std::string> effect_keys() {
   std::vector<std::string> keys;
-  for (const Key& key : switches()) {
-    keys.push_back(key.name);
-  }
+  for (const Key& key : switches()) keys.push_back(key.name);
   keys.emplace_back(kTolerance);
   return keys;
 }
@@ -66,9 +64,8 @@ std::vector<std::string> effect_keys() {
 void declare(ParameterList& list, EffectSwitches& values, const std::vector<std::string>& names) {
   list.table("effects");
   const auto is_named = [&](const std::string& name) { return std::ranges::find(names, name) != names.end(); };
-  for (const Key& key : switches()) {
+  for (const Key& key : switches())
     if (is_named(key.name)) list.add(key.name, values.*key.member, key.meaning);
-  }
   if (!is_named(kTolerance)) return;
   list.add(kTolerance, values.effect_tolerance, Range{.low = 0, .high = 1, .excludes_low = true},
            "an effect that changes the displacement by less than this share is left out if its switch is auto");

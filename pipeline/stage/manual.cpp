@@ -43,9 +43,8 @@ std::string italic(const std::string& text) { return "\\fI" + troff(text) + "\\f
 std::string synopsis(const std::string& name, const DeclaredCommand& command) {
   std::string line = ".B " + troff(name) + "\n";
   if (!command.subcommands.empty()) return line + italic("COMMAND") + " \\&...\n";
-  for (const DeclaredOption& option : command.options) {
+  for (const DeclaredOption& option : command.options)
     if (option.flag.empty()) line += italic(option.name) + "\n";
-  }
   return line + "[" + italic("OPTIONS") + "]\n";
 }
 

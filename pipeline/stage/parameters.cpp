@@ -1,6 +1,5 @@
 #include "pipeline/stage/parameters.h"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -9,7 +8,6 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/contract/range.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
 #include "pipeline/stage/effects.h"
@@ -151,10 +149,9 @@ std::string unknown_key_hint(const ParameterList& list, const std::vector<std::s
   const std::string closest = nearest(known, key);
   if (!closest.empty() && is_alike(closest, key)) return did_you_mean(closest);
   if (std::ranges::find(kMoreOfGel, key) != kMoreOfGel.end()) return "it belongs under [gel]";
-  for (const Parameter& p : list.all()) {
+  for (const Parameter& p : list.all())
     if (p.name == key)
       return p.table.empty() ? "it belongs above the first table" : "it belongs under [" + p.table + "]";
-  }
   return "docs/parameters.md has all keys";
 }
 
@@ -262,11 +259,9 @@ Parameter& parameter_named(ParameterList& list, const std::string& name) {
 }
 
 void check_complete(const ParameterList& list) {
-  for (const Parameter& p : list.all()) {
-    if (p.is_required && !p.is_set) {
+  for (const Parameter& p : list.all())
+    if (p.is_required && !p.is_set)
       throw UsageError(in_table(p) + " is missing: give it in cell.toml or as --" + p.flag + " (" + p.meaning + ")");
-    }
-  }
 }
 
 std::string to_markdown(const ParameterList& list) {

@@ -31,9 +31,8 @@ const PlausibleQuantity& quantity_of(std::string_view id) {
 std::string unit_of(std::string_view id) {
   constexpr std::pair<const char*, const char*> kUnits[] = {
       {"_per_um2", "per um²"}, {"_kPa", "kPa"}, {"_um2", "um²"}, {"_um", "um"}, {"_nN", "nN"}};
-  for (const auto& [suffix, unit] : kUnits) {
+  for (const auto& [suffix, unit] : kUnits)
     if (id.ends_with(suffix)) return unit;
-  }
   return {};
 }
 
@@ -284,9 +283,8 @@ double traction_of_half_the_force_kPa(std::vector<Load> loads) {
 
 double surest_fibre_tension_nN(const std::vector<Tension>& tensions) {
   double largest = 0;
-  for (const Tension& t : tensions) {
+  for (const Tension& t : tensions)
     if (t.fibre_id != 0) largest = std::max(largest, t.low_nN.value_or(t.tension_nN));
-  }
   return largest;
 }
 

@@ -28,8 +28,6 @@
 
 namespace mbtfm::stage {
 
-namespace fs = std::filesystem;
-
 namespace {
 
 using namespace exit_code;
@@ -73,27 +71,24 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
     std::string meaning = p.meaning + words_in(p);
     if (!p.default_value.empty() && !p.is_required) meaning += " [" + p.default_value + "]";
     const std::string group = p.table.empty() ? "Parameters of the image" : "Parameters [" + p.table + "]";
-    if (std::holds_alternative<bool*>(p.member)) {
+    if (std::holds_alternative<bool*>(p.member))
       app.add_flag("--" + p.flag + "{true}", line.values[p.flag], meaning)->group(group);
-    } else {
+    else
       app.add_option("--" + p.flag, line.values[p.flag], meaning)->type_name("")->group(group);
-    }
   }
 }
 
 WordsOfFlags words_of_flags(const ParameterList& list) {
   WordsOfFlags words;
-  for (const Parameter& p : list.all()) {
+  for (const Parameter& p : list.all())
     if (const auto* choice = std::get_if<Choice>(&p.member)) words["--" + p.name] = choice->words;
-  }
   return words;
 }
 
 void set_parameters(ParameterList& list, const CommandLine& line, const CLI::App& app) {
   if (!line.config.empty()) read_toml(list, fs::path(line.config));
-  for (Parameter& p : list.all()) {
+  for (Parameter& p : list.all())
     if (app.count("--" + p.flag) > 0) set_from_text(p, line.values.at(p.flag));
-  }
   check_complete(list);
 }
 
@@ -104,9 +99,8 @@ void set_files(StageContext& context, const StageDescription& description, const
   for (const FileArgument& file : description.files) {
     const std::string& path = line.files.at(file.name);
     const bool is_output = file.kind == Kind::output || file.kind == Kind::output_folder;
-    if (path.empty() && file.kind != Kind::optional_input && need == Need::as_described) {
+    if (path.empty() && file.kind != Kind::optional_input && need == Need::as_described)
       throw UsageError("--" + file.name + " is missing: " + file.meaning);
-    }
     if (path.empty()) continue;
     (is_output ? context.outputs_ : context.inputs_)[file.name] = path;
   }
@@ -194,14 +188,13 @@ nlohmann::ordered_json parameters_of(const ParameterList& list) {
     table[p.name] = std::visit(
         [&](const auto& member) -> nlohmann::ordered_json {
           using Member = std::decay_t<decltype(member)>;
-          if constexpr (std::is_same_v<Member, Choice>) {
+          if constexpr (std::is_same_v<Member, Choice>)
             return to_text(p);
-          } else if constexpr (std::is_same_v<Member, std::optional<double>*> ||
-                               std::is_same_v<Member, std::optional<int>*>) {
+          else if constexpr (std::is_same_v<Member, std::optional<double>*> ||
+                             std::is_same_v<Member, std::optional<int>*>)
             return *member ? nlohmann::ordered_json(**member) : nlohmann::ordered_json();
-          } else {
+          else
             return *member;
-          }
         },
         p.member);
   }
@@ -224,9 +217,8 @@ void write_record(const fs::path& file, const StageDescription& description, con
   const fs::path folder = fs::absolute(file).parent_path();
   std::vector<HashedFile> inputs, outputs;
   for (const fs::path& read : context.read_) inputs.push_back({.at = read, .name = read});
-  for (const auto& pending : context.pending_) {
+  for (const auto& pending : context.pending_)
     outputs.push_back({.at = pending.temporary, .name = pending.destination});
-  }
   nlohmann::ordered_json effects = nlohmann::ordered_json::array();
   for (const Effect& e : report.effects) effects.push_back(files::json_of(e));
   nlohmann::ordered_json findings = nlohmann::ordered_json::array();
@@ -258,9 +250,8 @@ void discard(const StageContext& context) {
 }
 
 void expect_all_written(const StageContext& context) {
-  for (const auto& [temporary, destination] : context.pending_) {
+  for (const auto& [temporary, destination] : context.pending_)
     if (!fs::exists(temporary)) throw InternalError(destination.string() + " was announced and not written");
-  }
 }
 
 void commit(const StageContext& context) {

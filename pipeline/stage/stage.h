@@ -1,7 +1,6 @@
 /// The frame of every executable: arguments, parameters, errors to exit codes, atomic outputs, provenance.
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <optional>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/path.h"
 #include "pipeline/contract/stage_report.h"
 #include "pipeline/contract/work.h"
 #include "pipeline/stage/parameters_fwd.h"
@@ -48,36 +48,36 @@ class StageContext {
   void expect_plausible(std::string_view id, double value) { doubt(doubt_about(id, value), std::string(id)); }
 
   /// Path of an input that was given.
-  std::filesystem::path input(const std::string& name);
+  fs::path input(const std::string& name);
   /// An input that is a folder, of which these files are read.
-  std::filesystem::path input(const std::string& name, const std::vector<std::string>& files);
+  fs::path input(const std::string& name, const std::vector<std::string>& files);
   bool has_input(const std::string& name) const { return inputs_.contains(name); }
   /// Temporary path to write an output to.
-  std::filesystem::path output(const std::string& name);
+  fs::path output(const std::string& name);
   /// Temporary path for `file` of an output folder.
-  std::filesystem::path output(const std::string& name, const std::string& file);
+  fs::path output(const std::string& name, const std::string& file);
   /// Temporary path for a file beside the output `name`, called after it: its name with `ending` for its extension.
-  std::filesystem::path output_beside(const std::string& name, const std::string& ending);
+  fs::path output_beside(const std::string& name, const std::string& ending);
 
   // used by run_stage
   std::vector<Finding> findings_;
   std::vector<std::string> allowed_;  ///< quantities whose values are not refused
   /// Temporary path, free to be written to, of what is to be `destination`.
-  std::filesystem::path pending_path(const std::filesystem::path& destination);
-  std::map<std::string, std::filesystem::path> inputs_, outputs_;
-  std::vector<std::filesystem::path> read_, made_;
+  fs::path pending_path(const fs::path& destination);
+  std::map<std::string, fs::path> inputs_, outputs_;
+  std::vector<fs::path> read_, made_;
   struct Pending {
-    std::filesystem::path temporary, destination;
+    fs::path temporary, destination;
   };
   std::vector<Pending> pending_;
 
  private:
   /// Folders that outputs need are made, and unmade where the stage fails.
-  void make_folder(const std::filesystem::path& folder);
+  void make_folder(const fs::path& folder);
 };
 
 /// What a stage reported when it wrote this record. @throws InputError where it is no record of a stage
-StageReport read_report(const std::filesystem::path& record_file);
+StageReport read_report(const fs::path& record_file);
 
 /// Parse the arguments, read the parameters, call `body`, put the outputs in place, write the record, return the exit
 /// code. Flags of every stage: --help --version --threads --quiet --config (or --gel)

@@ -25,9 +25,8 @@ int edit_distance(std::string_view a, std::string_view b) {
 }
 
 void add_words(const DeclaredCommand& command, std::vector<std::string>& words) {
-  for (const DeclaredOption& option : command.options) {
+  for (const DeclaredOption& option : command.options)
     if (!option.flag.empty()) words.push_back(option.flag);
-  }
 }
 
 }  // namespace

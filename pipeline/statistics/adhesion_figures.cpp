@@ -18,6 +18,11 @@ std::string condition_colour(int condition) {
   return charts::kColours[static_cast<std::size_t>(condition) % std::size(charts::kColours)];
 }
 
+double place_in_column(int i) {
+  constexpr double kGolden = 0.61803398874989485;
+  return std::fmod(i * kGolden, 1.0) - 0.5;
+}
+
 double end_below_keys(double largest, std::size_t n_keys) {
   const double used = n_keys == 0 ? 0.05 : 0.07 + 0.077 * static_cast<double>(n_keys);
   return largest > 0 ? largest / (1 - std::min(used, 0.7)) : 1;
@@ -104,8 +109,7 @@ Chart distribution_of(const Sample& sample, const std::string& label) {
     for (int kind = 0; kind < sample.n_kinds(); ++kind) {
       const std::vector<Observation> own = sample.of_group(c, kind);
       if (own.empty()) continue;
-      const std::string name = sample.kinds[kind];
-      all.push_back({.label = fmt::format("{}{}: {}, {}", prefix_of(sample.conditions[c]), name,
+      all.push_back({.label = fmt::format("{}{}: {}, {}", prefix_of(sample.conditions[c]), sample.kinds[kind],
                                           counted(std::ssize(own), "adhesions"), counted(n_cells_of(own), "cells")),
                      .colour = sample.n_conditions() == 1 ? condition_colour(kind) : condition_colour(c),
                      .values = values_of(own),

@@ -26,9 +26,8 @@ std::vector<CellWeights> draw_cells(const std::vector<int>& stratum_of_cell, int
 std::optional<Interval> bootstrap_interval(std::vector<std::optional<double>> values, int n_cells) {
   if (n_cells < 2) return std::nullopt;
   std::vector<double> defined;
-  for (const auto& v : values) {
+  for (const auto& v : values)
     if (v) defined.push_back(*v);
-  }
   if (static_cast<double>(defined.size()) < 0.95 * static_cast<double>(values.size())) return std::nullopt;
   std::ranges::sort(defined);
   const double t = numerics::student_quantile(n_cells - 1, 0.025);

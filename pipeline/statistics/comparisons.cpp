@@ -82,10 +82,9 @@ void add_rank_tests(const Sample& sample, const Family& family, Unit unit, std::
 
 TestResult clustered_test(const std::vector<const Group*>& groups) {
   std::vector<ClusteredValue> values;
-  for (std::size_t g = 0; g < groups.size(); ++g) {
+  for (std::size_t g = 0; g < groups.size(); ++g)
     for (const Observation& o : groups[g]->values)
       values.push_back({.value = o.value, .group = static_cast<int>(g), .cell = o.cell});
-  }
   return clustered_rank_test(values);
 }
 
@@ -165,9 +164,8 @@ void add_corrected(std::vector<Comparison>& list, Add&& add_tests) {
     return;
   }
   std::vector<double> p_values;
-  for (const Comparison& c : tests) {
+  for (const Comparison& c : tests)
     if (!c.group_b.empty()) p_values.push_back(c.p_value);
-  }
   const std::vector<double> corrected = holm(p_values);
   std::size_t next = 0;
   for (Comparison& c : tests) {

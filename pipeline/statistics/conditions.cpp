@@ -1,7 +1,6 @@
 #include "pipeline/statistics/conditions.h"
 
 #include <algorithm>
-#include <map>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
@@ -32,9 +31,8 @@ std::size_t index_of_cell(const std::vector<std::string>& names, const files::Cs
   const auto exact = std::find(names.begin(), names.end(), asked);
   if (exact != names.end()) return static_cast<std::size_t>(exact - names.begin());
   std::vector<std::size_t> matches;
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  for (std::size_t i = 0; i < names.size(); ++i)
     if (Path(names[i]).filename() == asked) matches.push_back(i);
-  }
   if (matches.size() != 1) {
     table.fail(row, "cell", "a cell folder of the study",
                matches.empty() ? "names are relative to the folder of the study, as in " + names.front()
@@ -51,9 +49,8 @@ struct Source {
 
 /// The column of a form that nobody filled in asks for nothing.
 bool says_anything(const files::CsvTable& table, const std::string& column) {
-  for (int row = 0; row < table.n_rows(); ++row) {
+  for (int row = 0; row < table.n_rows(); ++row)
     if (!table.text(row, column).empty()) return true;
-  }
   return false;
 }
 
@@ -68,9 +65,8 @@ Source source_of(const std::string& asked, const char* flag, const std::vector<s
     table->require({asked});
     return {.column = asked};
   }
-  for (const std::string& column : usual) {
+  for (const std::string& column : usual)
     if (table && table->has(column) && says_anything(*table, column)) return {.column = column};
-  }
   return {};
 }
 
@@ -104,9 +100,8 @@ std::vector<CellNote> notes_of(const std::vector<std::string>& names, const std:
     take(condition.column, &CellNote::condition);
     take(replicate.column, &CellNote::replicate);
   }
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  for (std::size_t i = 0; i < names.size(); ++i)
     if (!is_named[i]) notes[i].reason_to_exclude = "not in the table";
-  }
   return notes;
 }
 

@@ -15,9 +15,8 @@ Vec2 initial_direction(Polyline points) {
   double run = 0;
   for (std::size_t i = 1; i < points.size(); ++i) {
     const double step = norm(points[i] - points[i - 1]);
-    if (run + step >= kRun_um) {
+    if (run + step >= kRun_um)
       return points[i - 1] + ((kRun_um - run) / step) * (points[i] - points[i - 1]) - points.front();
-    }
     run += step;
   }
   return points.back() - points.front();
@@ -52,9 +51,8 @@ class NearBeads {
  public:
   explicit NearBeads(const Displacements& d) : d_(d) {
     if (!d.measured || !d.fitted) return;
-    for (const Bead& bead : *d.measured) {
+    for (const Bead& bead : *d.measured)
       if (bead.flag.empty()) measured_[{bead.position_um.x, bead.position_um.y}] = bead.displacement_um;
-    }
   }
   bool has_simple_model() const { return d_.without_fibres && d_.without_fibres->size() == d_.fitted->size(); }
 

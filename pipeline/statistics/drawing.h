@@ -15,6 +15,9 @@ std::string condition_colour(int condition);
 /// @throws InternalError where it is not there
 int index_of(const std::vector<std::string>& list, const std::string& name);
 
+/// Of the i-th of many points: from −1/2 to 1/2, which they fill evenly (golden ratio).
+double place_in_column(int i);
+
 /// The end of a y axis that leaves `largest` below the lines of the key: each takes 18 of the frame's 236 pixels.
 double end_below_keys(double largest, std::size_t n_keys);
 

@@ -18,12 +18,6 @@ using charts::Axis;
 using charts::Chart;
 using charts::readable;
 
-/// Between −0.5 and 0.5, evenly spread whatever the number of points (golden ratio).
-double spread(std::size_t i) {
-  constexpr double kGolden = 0.61803398874989485;
-  return std::fmod(static_cast<double>(i) * kGolden, 1.0) - 0.5;
-}
-
 double largest_of(const Sample& sample) {
   double largest = 0;
   for (const Observation& o : sample.values) largest = std::max(largest, o.value);
@@ -87,13 +81,13 @@ Figure tensions_by_type(const Study& study, const Analysis& analysis) {
               Axis{.label = "tension (nN)", .low = 0, .high = end_below_keys(largest_of(sample), n_keys_of(sample))});
   chart.subtitle(counts_by_kind(sample), "#555");
   const std::vector<MeasuredFibre> fibres = measured_fibres(study);
-  std::map<int, std::size_t> n_of;
+  std::map<int, int> n_of;
   constexpr double kDots = 0.5;  // of a condition's column
   const double width = 0.8 / sample.n_conditions();
   for (std::size_t i = 0; i < fibres.size(); ++i) {
     const Observation& o = sample.values[i];  // in the order of the fibres
     const int condition = o.group / sample.n_kinds();
-    chart.dot({place_of(sample, condition, o.kind) + kDots * width * spread(n_of[o.group]++), o.value}, 2.6,
+    chart.dot({place_of(sample, condition, o.kind) + kDots * width * place_in_column(n_of[o.group]++), o.value}, 2.6,
               "fill:" + colour_of(sample, condition, o.kind) + ";fill-opacity:.5",
               fmt::format("{}, fibre {}: {} nN", fibres[i].cell->name, fibres[i].fibre->fibre_id, readable(o.value)));
   }

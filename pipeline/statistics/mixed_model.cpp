@@ -89,9 +89,8 @@ std::vector<bool> scatter_told(const std::vector<Observation>& rows) {
   for (const Observation& o : rows) n_kinds = std::max(n_kinds, o.kind + 1);
   std::map<std::pair<int, int>, int> n_of;  // group, kind
   std::vector<bool> is_told(static_cast<std::size_t>(n_kinds), false);
-  for (const Observation& o : rows) {
+  for (const Observation& o : rows)
     if (++n_of[{o.group, o.kind}] > 1) is_told[o.kind] = true;
-  }
   return is_told;
 }
 
@@ -127,9 +126,8 @@ Design design_of(std::vector<Observation> observations) {
     design.X(i, design.rows[i].group) = 1;
     design.y[i] = design.rows[i].value;
   }
-  for (int g = 0; g < n_groups; ++g) {
+  for (int g = 0; g < n_groups; ++g)
     if (design.X.col(g).sum() == 0) throw InvalidData("group " + std::to_string(g), "an observation", "none");
-  }
   check_scatter(design);
   // V must stay invertible where a kind does not scatter and its errors are not known
   constexpr double kSmallest = 1e-8;
@@ -227,11 +225,10 @@ MatrixXd derivative_times(const Design& design, const Component& component, cons
     const auto column = [&](Index i) { return component.term == Term::cell ? 0 : block.kind_column[i]; };
     for (Index i = 0; i < block.size; ++i) {
       const Index row = block.first + i;
-      if (component.term != Term::residual) {
+      if (component.term != Term::residual)
         sums.row(column(i)) += m.row(row);
-      } else if (design.rows[row].kind == component.kind) {
+      else if (design.rows[row].kind == component.kind)
         result.row(row) = m.row(row);
-      }
     }
     if (component.term == Term::residual) continue;
     for (Index i = 0; i < block.size; ++i) result.row(block.first + i) = sums.row(column(i));
@@ -293,9 +290,8 @@ Derivatives derivatives_at(const Design& design, const State& s) {
 /// Which variances may move: not those at their lower end whose likelihood falls on leaving it.
 std::vector<Index> free_ones(const VectorXd& v, const VectorXd& lower, const VectorXd& gradient) {
   std::vector<Index> list;
-  for (Index k = 0; k < v.size(); ++k) {
+  for (Index k = 0; k < v.size(); ++k)
     if (v[k] > lower[k] || gradient[k] > 0) list.push_back(k);
-  }
   return list;
 }
 
@@ -333,9 +329,8 @@ VectorXd uphill_step(const Design& design, const State& s, const Derivatives& d)
   for (Index k = 0; k < step.size(); ++k) {
     const Component& c = design.components[k];
     double n_levels = 0;
-    for (const Block& b : design.blocks) {
+    for (const Block& b : design.blocks)
       n_levels += c.term == Term::cell ? 1 : c.term == Term::cell_kind ? b.n_kinds : static_cast<double>(b.size);
-    }
     step[k] = 2 * std::pow(s.v[k] + error, 2) * d.gradient[k] / n_levels;
   }
   return step;

@@ -6,7 +6,6 @@
 #include <png.h>
 #include <zlib.h>
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>

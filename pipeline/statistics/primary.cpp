@@ -28,9 +28,8 @@ struct Mean {
 /// Of one kind, by condition and replicate: the mean of the cells' means.
 std::map<std::pair<int, std::string>, double> means_of_replicates(const Study& study, const Sample& sample, int kind) {
   std::map<int, Mean> by_cell;
-  for (const Observation& o : sample.values) {
+  for (const Observation& o : sample.values)
     if (o.kind == kind) by_cell[o.cell].add(o.value);
-  }
   std::map<std::pair<int, std::string>, Mean> by_replicate;
   for (const auto& [index, mean] : by_cell) {
     const StudyCell& cell = study.cells[index];
@@ -51,9 +50,8 @@ void compare_replicates(const Study& study, const Sample& sample, int kind, Prim
   primary.test = "means of the replicates, compared in pairs (Student’s t)";
   const auto means = means_of_replicates(study, sample, kind);
   Mean reference;
-  for (const auto& [key, mean] : means) {
+  for (const auto& [key, mean] : means)
     if (key.first == 0) reference.add(mean);
-  }
   primary.reference_mean = reference.n > 0 ? reference.value() : 0;
   for (int condition = 1; condition < sample.n_conditions(); ++condition) {
     std::vector<double> differences;
@@ -126,11 +124,10 @@ Primary primary_of(const Study& study, const std::string& name, const Sample& sa
     return primary;
   }
   MBTFM_ASSERT(kind < sample.n_kinds());
-  if (has_replicates(study)) {
+  if (has_replicates(study))
     compare_replicates(study, sample, kind, primary);
-  } else {
+  else
     compare_cells(sample, kind, model, comparisons, primary);
-  }
   std::vector<double> p_values;
   for (const PrimaryDifference& d : primary.differences) p_values.push_back(d.difference.p_value);
   const std::vector<double> corrected = holm(p_values);

@@ -14,12 +14,6 @@ namespace {
 
 using charts::readable;
 
-/// Numbers from −1/2 to 1/2 that fill the place evenly.
-double place_in_column(int i) {
-  constexpr double kGolden = 0.61803398874989485;
-  return std::fmod((i + 1) * kGolden, 1.0) - 0.5;
-}
-
 /// By replicate, in the order of the alphabet; one without a name where none are told.
 std::vector<std::string> replicates_of(const Study& study) {
   std::set<std::string> names;
@@ -51,13 +45,13 @@ void draw_column(charts::Chart& chart, const Study& study, const Sample& sample,
     const StudyCell& cell = study.cells[index];
     if (is_one_a_cell) break;  // its mean says it all
     for (const Observation& o : values)
-      chart.dot({condition + kWidth * place_in_column(n++), o.value}, 2, "fill:" + colour(cell) + ";fill-opacity:.35",
+      chart.dot({condition + kWidth * place_in_column(++n), o.value}, 2, "fill:" + colour(cell) + ";fill-opacity:.35",
                 cell.name + ": " + sample.amount(o.value));
   }
   n = 0;
   for (const auto& [index, values] : by_cell) {
     const StudyCell& cell = study.cells[index];
-    const double mean = describe(values_of(values)).mean, x = condition + kWidth * place_in_column(n++);
+    const double mean = describe(values_of(values)).mean, x = condition + kWidth * place_in_column(++n);
     if (const double half = half_of_95(values.front()); is_one_a_cell && half > 0)
       chart.error({x, mean - half}, {x, mean + half}, "stroke-width:1;stroke:" + colour(cell));
     chart.dot(

@@ -91,9 +91,8 @@ std::vector<Correlation> correlate_forces(const Study& study, const std::vector<
   std::vector<Correlation> list;
   for (const Size& size : kSizes) {
     for (const Force& force : kForces) {
-      for (int condition = 0; condition < static_cast<int>(study.conditions.size()); ++condition) {
+      for (int condition = 0; condition < static_cast<int>(study.conditions.size()); ++condition)
         if (auto c = correlate(study, condition, force, size, draws)) list.push_back(std::move(*c));
-      }
     }
   }
   return list;

@@ -40,9 +40,8 @@ Sample with_typical_errors(Sample sample) {
     sum += o.error_variance;
     n += o.error_variance > 0 ? 1 : 0;
   }
-  for (Observation& o : sample.values) {
+  for (Observation& o : sample.values)
     if (o.error_variance == 0 && n > 0) o.error_variance = sum / n;
-  }
   return sample;
 }
 
@@ -50,9 +49,8 @@ template <class Visit>
 void for_each_adhesion(const Study& study, Visit&& visit) {
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
     std::map<int, double> area;  // of those that were seen: an anchor's or a candidate's size is nobody's measurement
-    for (const Adhesion& a : study.cells[i].cell.adhesions) {
+    for (const Adhesion& a : study.cells[i].cell.adhesions)
       if (!is_assumed(a.origin)) area[a.adhesion_id] = a.area_um2;
-    }
     for (const AdhesionForce& f : study.cells[i].forces) {
       if (!area.contains(f.adhesion_id)) continue;
       visit(study.cells[i], static_cast<int>(i), f, area.at(f.adhesion_id));
@@ -62,10 +60,36 @@ void for_each_adhesion(const Study& study, Visit&& visit) {
 
 std::vector<int> cells_of(const Study& study, CellKind kind) {
   std::vector<int> indices;
-  for (std::size_t i = 0; i < study.cells.size(); ++i) {
+  for (std::size_t i = 0; i < study.cells.size(); ++i)
     if (study.cells[i].kind() == kind) indices.push_back(static_cast<int>(i));
-  }
   return indices;
+}
+
+using Number = std::optional<double>;
+enum class MayBeNegative { no, yes };
+
+/// A number that each cell of a kind has, or lacks.
+struct Measured {
+  const char *column, *name, *unit;
+  std::function<Number(const StudyCell&)> of, sigma = {};  ///< sigma: none where no error is known
+  MayBeNegative may_be_negative = MayBeNegative::no;
+};
+
+/// Of what cells of one kind have. @param figure  a member of it
+template <class Part>
+std::function<Number(const StudyCell&)> figure_of(std::optional<Part> StudyCell::*part, auto figure) {
+  return [=](const StudyCell& c) -> Number { return std::invoke(figure, *(c.*part)); };
+}
+
+/// @param kind  the sample's only one
+Sample sample_of(const Study& study, CellKind of, Observed each, const char* kind, const Measured& m) {
+  Sample sample = empty_sample(study, m.column, m.name, m.unit, each, {kind});
+  sample.is_never_negative = m.may_be_negative == MayBeNegative::no;
+  for (const int i : cells_of(study, of)) {
+    const StudyCell& cell = study.cells[i];
+    if (const Number value = m.of(cell)) add(sample, cell, i, 0, *value, m.sigma ? m.sigma(cell) : Number());
+  }
+  return with_typical_errors(std::move(sample));
 }
 
 bool is_never_negative(SheetQuantity quantity) {
@@ -101,9 +125,8 @@ const std::vector<std::string> kConnection = {"connected", "unconnected"};
 
 std::vector<Observation> Sample::of_group(int condition, int kind) const {
   std::vector<Observation> own;
-  for (const Observation& o : values) {
+  for (const Observation& o : values)
     if (o.group == group_of(condition, kind)) own.push_back(o);
-  }
   return own;
 }
 
@@ -119,9 +142,8 @@ bool Sample::is_one_a_cell() const { return n_cells_of(values) == static_cast<in
 
 Sample sample_tensions(const Study& study) {
   std::vector<std::string> kinds;
-  for (const FibreType type : kFibreTypes) {
+  for (const FibreType type : kFibreTypes)
     if (counted_type(study, type) == type) kinds.emplace_back(name_of(type));
-  }
   Sample sample = empty_sample(study, "tension_nN", "tension", "nN", Observed::fibres, kinds);
   for (const MeasuredFibre& f : measured_fibres(study)) {
     add(sample, *f.cell, static_cast<int>(f.cell - study.cells.data()),
@@ -147,50 +169,36 @@ Sample sample_adhesion_areas(const Study& study) {
 }
 
 std::vector<Sample> sample_cells(const Study& study) {
-  struct Quantity {
-    const char *column, *name, *unit;
-    double FitSummary::*member;
+  const auto of_network = [](double FitSummary::*figure) {
+    return [=](const StudyCell& c) { return is_network_known(c) ? Number(c.fit.*figure) : Number(); };
   };
-  constexpr Quantity kQuantities[] = {{"total_force_nN", "total force", "nN", &FitSummary::total_force_nN},
-                                      {"fibre_force_nN", "force of the fibres", "nN", &FitSummary::fibre_force_nN},
-                                      {"network_force_nN", "force of the network", "nN", &FitSummary::network_force_nN},
-                                      {"network_surface_tension_nN_per_um", "surface tension of the network", "nN/µm",
-                                       &FitSummary::network_surface_tension_nN_per_um}};
+  const Measured figures[] = {
+      {"total_force_nN", "total force", "nN", [](const StudyCell& c) { return c.fit.total_force_nN; }},
+      {"fibre_force_nN", "force of the fibres", "nN", of_network(&FitSummary::fibre_force_nN), {}, MayBeNegative::yes},
+      {"network_force_nN", "force of the network", "nN", of_network(&FitSummary::network_force_nN)},
+      {"network_surface_tension_nN_per_um", "surface tension of the network", "nN/µm",
+       of_network(&FitSummary::network_surface_tension_nN_per_um)}};
   std::vector<Sample> samples;
-  for (const Quantity& q : kQuantities) {
-    Sample sample = empty_sample(study, q.column, q.name, q.unit, Observed::cells, {"cell"});
-    sample.is_never_negative = q.member != &FitSummary::fibre_force_nN;  // a difference: total less network
-    for (const int i : cells_of(study, CellKind::plane)) {
-      const StudyCell& cell = study.cells[i];
-      if (q.member != &FitSummary::total_force_nN && !is_network_known(cell)) continue;
-      add(sample, cell, i, 0, cell.fit.*q.member, 0.0);
-    }
-    samples.push_back(std::move(sample));
-  }
+  for (const Measured& figure : figures)
+    samples.push_back(sample_of(study, CellKind::plane, Observed::cells, "cell", figure));
   return samples;
 }
 
 std::vector<Sample> sample_sheets(const Study& study) {
-  struct Measured {
-    const char *column, *name, *unit;
-    std::function<std::optional<double>(const SheetSummary&)> of;
-    bool is_never_negative = true;
-  };
-  const Measured figures[] = {
-      {"mean_tension_nN_per_um", "mean tension", "nN/µm", &SheetSummary::mean_tension_nN_per_um, false},
-      {"sheet_force_nN", "total force", "nN", &SheetSummary::total_force_nN},
-      {"strain_energy_fJ", "strain energy", "fJ", &SheetSummary::strain_energy_fJ},
-      {"sheet_area_um2", "area", "µm²", &SheetSummary::area_um2}};
+  using S = SheetSummary;
+  constexpr auto kSheet = &StudyCell::sheet;
+  const Measured figures[] = {{"mean_tension_nN_per_um",
+                               "mean tension",
+                               "nN/µm",
+                               figure_of(kSheet, &S::mean_tension_nN_per_um),
+                               {},
+                               MayBeNegative::yes},
+                              {"sheet_force_nN", "total force", "nN", figure_of(kSheet, &S::total_force_nN)},
+                              {"strain_energy_fJ", "strain energy", "fJ", figure_of(kSheet, &S::strain_energy_fJ)},
+                              {"sheet_area_um2", "area", "µm²", figure_of(kSheet, &S::area_um2)}};
   std::vector<Sample> samples = {sample_estimates(study, SheetQuantity::contraction)};
-  for (const Measured& figure : figures) {
-    Sample sample = empty_sample(study, figure.column, figure.name, figure.unit, Observed::sheets, {kWholeSheet});
-    sample.is_never_negative = figure.is_never_negative;
-    for (const int i : cells_of(study, CellKind::sheet)) {
-      const StudyCell& cell = study.cells[i];
-      if (const auto value = figure.of(*cell.sheet)) add(sample, cell, i, 0, *value, 0.0);
-    }
-    samples.push_back(std::move(sample));
-  }
+  for (const Measured& figure : figures)
+    samples.push_back(sample_of(study, CellKind::sheet, Observed::sheets, kWholeSheet, figure));
   for (const SheetQuantity quantity : mbtfm::values_of<SheetQuantity>())
     if (quantity != SheetQuantity::contraction) samples.push_back(sample_estimates(study, quantity));
   std::erase_if(samples, [](const Sample& s) { return s.values.empty(); });
@@ -198,40 +206,24 @@ std::vector<Sample> sample_sheets(const Study& study) {
 }
 
 std::vector<Sample> sample_in_space(const Study& study) {
-  using Number = std::optional<double>;
-  struct Measured {
-    const char *column, *name, *unit;
-    std::function<Number(const SpaceFigures&)> of;
-    Number SpaceFigures::*sigma = nullptr;
-    bool is_never_negative = true;
-  };
+  using S = SpaceFigures;
+  const auto of = [](auto figure) { return figure_of(&StudyCell::space, figure); };
   const Measured figures[] = {
-      {"space_force_nN", "total force", "nN", &SpaceFigures::total_force_nN, &SpaceFigures::total_force_sigma_nN},
-      {"space_strain_energy_fJ", "strain energy", "fJ", &SpaceFigures::strain_energy_fJ},
-      {"space_contractile_moment_nN_um", "contractile moment", "nN µm", &SpaceFigures::contractile_moment_nN_um,
-       &SpaceFigures::contractile_moment_sigma_nN_um, false},
-      {"space_normal_share", "share of the normal force", "", &SpaceFigures::normal_share},
-      {"space_largest_traction_kPa", "largest traction", "kPa", &SpaceFigures::largest_traction_kPa},
-      {kResolution, "resolution", "µm", &SpaceFigures::resolution_um}};
+      {"space_force_nN", "total force", "nN", of(&S::total_force_nN), of(&S::total_force_sigma_nN)},
+      {"space_strain_energy_fJ", "strain energy", "fJ", of(&S::strain_energy_fJ)},
+      {"space_contractile_moment_nN_um", "contractile moment", "nN µm", of(&S::contractile_moment_nN_um),
+       of(&S::contractile_moment_sigma_nN_um), MayBeNegative::yes},
+      {"space_normal_share", "share of the normal force", "", of(&S::normal_share)},
+      {"space_largest_traction_kPa", "largest traction", "kPa", of(&S::largest_traction_kPa)},
+      {kResolution, "resolution", "µm", of(&S::resolution_um)}};
   std::vector<Sample> samples;
-  const std::vector<int> cells = cells_of(study, CellKind::space);
-  const auto figures_in = [&](int i) -> const SpaceFigures& { return *study.cells[i].space; };
-  for (const Measured& figure : figures) {
-    Sample sample = empty_sample(study, figure.column, figure.name, figure.unit, Observed::cells_in_space, {"cell"});
-    sample.is_never_negative = figure.is_never_negative;
-    for (const int i : cells) {
-      const SpaceFigures& s = figures_in(i);
-      if (const Number value = figure.of(s))
-        add(sample, study.cells[i], i, 0, *value, figure.sigma ? s.*figure.sigma : Number());
-    }
-    samples.push_back(with_typical_errors(std::move(sample)));
-  }
+  for (const Measured& figure : figures)
+    samples.push_back(sample_of(study, CellKind::space, Observed::cells_in_space, "cell", figure));
   Sample forces =
       empty_sample(study, "space_adhesion_force_nN", "force", "nN", Observed::adhesions_in_space, {"adhesion"});
-  for (const int i : cells) {
-    for (const SpaceFigures::OfAdhesion& a : figures_in(i).adhesions)
+  for (const int i : cells_of(study, CellKind::space))
+    for (const S::OfAdhesion& a : study.cells[i].space->adhesions)
       add(forces, study.cells[i], i, 0, a.force_nN, a.sigma_nN);
-  }
   samples.push_back(with_typical_errors(std::move(forces)));
   std::erase_if(samples, [](const Sample& s) { return s.values.empty(); });
   return samples;

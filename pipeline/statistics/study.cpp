@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/findings.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -53,12 +53,10 @@ Polygon outline_of_sheet(const Path& folder) {
     return outer;
   }
   const files::CsvTable nodes(folder / "3_sheet/sheet.csv");
-  Vec2 low{INFINITY, INFINITY}, high{-INFINITY, -INFINITY};
-  for (int row = 0; row < nodes.n_rows(); ++row) {
-    const Vec2 at{nodes.number(row, "x_um"), nodes.number(row, "y_um")};
-    low = {std::min(low.x, at.x), std::min(low.y, at.y)};
-    high = {std::max(high.x, at.x), std::max(high.y, at.y)};
-  }
+  std::vector<Vec2> places;
+  for (int row = 0; row < nodes.n_rows(); ++row)
+    places.push_back({nodes.number(row, "x_um"), nodes.number(row, "y_um")});
+  const auto [low, high] = extent_of(places);
   return {low, {high.x, low.y}, high, {low.x, high.y}};
 }
 
@@ -129,9 +127,8 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
 
 /// Why a cell cannot enter, as its folder tells; empty: it can.
 std::string obstacle(const Path& cell, CellKind kind) {
-  for (const std::string& file : files_of_a_cell(kind)) {
+  for (const std::string& file : files_of_a_cell(kind))
     if (!files::is_own_file(cell / file)) return "no fit: " + file + " is not there";
-  }
   return {};
 }
 
@@ -150,13 +147,12 @@ Path field_of(const Path& folder, const StudyCell& cell) {
 /// By half of the smaller one. Two cells of one picture share the field, and lie beside each other.
 bool overlap(const Polygon& a, const Polygon& b) {
   if (a.empty() || b.empty()) return false;
-  const auto [left, right] = std::minmax_element(a.begin(), a.end(), [](Vec2 p, Vec2 q) { return p.x < q.x; });
-  const auto [top, bottom] = std::minmax_element(a.begin(), a.end(), [](Vec2 p, Vec2 q) { return p.y < q.y; });
+  const auto [low, high] = extent_of(a);
   constexpr int kLines = 64;  // of the lattice over a: its area to some percent
-  const Vec2 step{(right->x - left->x) / kLines, (bottom->y - top->y) / kLines};
+  const Vec2 step{(high.x - low.x) / kLines, (high.y - low.y) / kLines};
   double shared_um2 = 0;
   for (int i = 0; i < kLines * kLines; ++i) {
-    const Vec2 p{left->x + (i % kLines + 0.5) * step.x, top->y + (i / kLines + 0.5) * step.y};
+    const Vec2 p{low.x + (i % kLines + 0.5) * step.x, low.y + (i / kLines + 0.5) * step.y};
     if (contains(a, p) && contains(b, p)) shared_um2 += step.x * step.y;
   }
   return shared_um2 > 0.5 * std::min(std::abs(signed_area_um2(a)), std::abs(signed_area_um2(b)));
@@ -219,20 +215,18 @@ void number_conditions(Study& study, const std::vector<std::string>& condition_o
 
 /// Why the findings of a cell keep it out; empty: they do not.
 std::string excluded_by_finding(const StudyCell& cell, const std::vector<std::string>& ids) {
-  for (const Finding& finding : cell.findings) {
+  for (const Finding& finding : cell.findings)
     if (is_open(finding) && std::ranges::find(ids, finding.id) != ids.end())
       return "the finding " + finding.id + " is open (stats.exclude_findings)";
-  }
   return {};
 }
 
 /// @throws UsageError where an id is none
 std::vector<std::string> excluding_findings(const StudyParameters& parameters) {
   const std::vector<std::string> ids = parts_of(parameters.exclude_findings);
-  for (const std::string& id : ids) {
+  for (const std::string& id : ids)
     if (std::ranges::none_of(kinds_of_findings(), [&](const KindOfFinding& kind) { return kind.id == id; }))
       throw UsageError("stats.exclude_findings: there is no finding '" + id + "': docs/findings.md lists them");
-  }
   return ids;
 }
 

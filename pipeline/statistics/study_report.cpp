@@ -143,13 +143,12 @@ std::string estimates_text(const StudyCell& c, SheetQuantity quantity) {
   for (const SheetEstimate& e : c.sheet->estimates) {
     if (e.quantity != quantity) continue;
     text += (text.empty() ? "" : "; ") + (kind_of_part(e) == kWholeSheet ? std::string() : e.part + ": ");
-    if (is_given(e)) {
+    if (is_given(e))
       text += readable(e.value) + " (given)";
-    } else if (e.identifiable) {
+    else if (e.identifiable)
       text += fmt::format("{} ({} to {})", readable(e.value), readable(*e.low), readable(*e.high));
-    } else {
+    else
       text += e.low ? "> " + readable(*e.low) : e.high ? "< " + readable(*e.high) : "not known";
-    }
   }
   return text.empty() ? "–" : text;
 }
@@ -330,12 +329,10 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
     html = "<p>The " + html_escaped(primary.measure) + " cannot be compared: " + html_escaped(primary.obstacle) +
            ".</p>\n";
   }
-  for (const PrimaryDifference& d : primary.differences) {
+  for (const PrimaryDifference& d : primary.differences)
     html += "<p class=\"what\"><b>" + html_escaped(report::capitalised(sentence_of(primary, d))) + ".</b></p>\n";
-  }
-  for (const Figure& figure : figures) {
+  for (const Figure& figure : figures)
     if (figure.name == kPrimaryFigure) html += charts_of(figure);
-  }
   if (!primary.differences.empty())
     html += "<p class=\"sub\">Test: " + html_escaped(primary.test) +
             ", two-sided; p by Holm over the conditions. It was chosen by the parameters <code>primary</code> and "
@@ -405,9 +402,8 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   }
   body += report::section("What was found, exploratory", found);
   std::string pictures;
-  for (const Figure& figure : figures) {
+  for (const Figure& figure : figures)
     if (figure.name != kPrimaryFigure) pictures += embedded(figure);
-  }
   const auto files = tables_of(study, analysis);
   const auto with_file = [&](const Table& table, const std::string& name) {
     const auto file = std::ranges::find_if(files, [&](const auto& f) { return f.first == name; });

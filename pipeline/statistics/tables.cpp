@@ -48,9 +48,8 @@ Columns<InCell<Of>> in_cell(const Columns<Of>& columns) {
 template <class Several>
 auto rows_by_cell(const Study& study, Several of_cell) {
   std::vector<InCell<typename std::remove_cvref_t<std::invoke_result_t<Several, const StudyCell&>>::value_type>> rows;
-  for (const StudyCell& c : study.cells) {
+  for (const StudyCell& c : study.cells)
     for (const auto& of : std::invoke(of_cell, c)) rows.push_back({c.name, condition_of(study, c), of});
-  }
   return rows;
 }
 
@@ -317,10 +316,9 @@ Table<TypeRow> type_table(const std::vector<double>& thresholds_nN) {
 
 std::vector<double> thresholds_of(const Analysis& analysis) {
   std::vector<double> thresholds;
-  for (const ShareAbove& s : analysis.shares) {
+  for (const ShareAbove& s : analysis.shares)
     if (std::find(thresholds.begin(), thresholds.end(), s.threshold_nN) == thresholds.end())
       thresholds.push_back(s.threshold_nN);
-  }
   return thresholds;
 }
 
@@ -328,10 +326,9 @@ std::vector<TypeRow> type_rows(const Study& study, const Analysis& analysis) {
   std::vector<TypeRow> rows;
   for (const Summary& s : analysis.tensions.summaries) {
     TypeRow& row = rows.emplace_back(TypeRow{s, {}});
-    for (const ShareAbove& share : analysis.shares) {
+    for (const ShareAbove& share : analysis.shares)
       if (share.condition == s.condition && share.kind == s.kind)
         row.shares.push_back({share.share.value, share.share.interval, share.without_error});
-    }
   }
   const Sample& sample = analysis.tensions.sample;
   for (const Summary& s : analysis.tensions_by_cell) {
@@ -495,9 +492,8 @@ Table<InCell<Finding>> finding_table() {
 
 std::vector<QuantityRow> summary_rows(const Analysis& analysis) {
   std::vector<QuantityRow> rows;
-  for (const Measure* m : analysis.measures()) {
+  for (const Measure* m : analysis.measures())
     for (const Summary& s : m->summaries) rows.push_back({m->sample.column, s});
-  }
   return rows;
 }
 

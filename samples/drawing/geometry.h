@@ -1,8 +1,6 @@
 /// Plane geometry for drawing.
 #pragma once
 
-#include <vector>
-
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 #include <numbers>
 
 #include "pipeline/numerics/parallel.h"
@@ -101,15 +100,13 @@ PointSpread::PointSpread(const Optics& optics, double deepest_um, double pixel_u
     const Field detected = intensity(optics, optics.emission_um, depth_um, n_r, half_z);
     for (std::size_t k = 0; k < light.values.size(); ++k) light.values[k] *= detected.values[k];
     int brightest = 0;
-    for (int z = -half_z; z <= half_z; ++z) {
+    for (int z = -half_z; z <= half_z; ++z)
       if (light.at(0, z) > light.at(0, brightest)) brightest = z;
-    }
     for (int z = -kHalfAlong; z <= kHalfAlong; ++z) {
       for (int r = 0; r < kAcross; ++r) {
         double sum = 0;
-        for (const auto& p : points) {
+        for (const auto& p : points)
           sum += light.between(std::hypot(kStep_um * r - p[0], p[1]), kStep_um * (z + brightest) - p[2]);
-        }
         table_[(static_cast<std::size_t>(d) * kAlong + static_cast<std::size_t>(z + kHalfAlong)) * kAcross +
                static_cast<std::size_t>(r)] = static_cast<float>(sum / static_cast<double>(points.size()));
       }

@@ -60,9 +60,8 @@ double Random::poisson(double mean) {
     if (k < 0 || (us < 0.013 && v > us)) continue;
     int sign = 0;  // std::lgamma writes that to a variable that all threads share
     if (std::log(v) + std::log(inverse_alpha) - std::log(a / (us * us) + b) <=
-        k * log_mean - mean - lgamma_r(k + 1, &sign)) {
+        k * log_mean - mean - lgamma_r(k + 1, &sign))
       return k;
-    }
   }
 }
 

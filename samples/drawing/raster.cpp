@@ -82,11 +82,9 @@ void add_spot(images::Image& image, const Spot& spot) {
   const double sigma_px = spot.sigma_um / pixel;
   const std::vector<double> across = pixel_integrals(spot.position_um.x / pixel, sigma_px, box.left, box.width());
   const std::vector<double> down = pixel_integrals(spot.position_um.y / pixel, sigma_px, box.top, box.height());
-  for (int row = 0; row < box.height(); ++row) {
-    for (int column = 0; column < box.width(); ++column) {
+  for (int row = 0; row < box.height(); ++row)
+    for (int column = 0; column < box.width(); ++column)
       image.at(box.left + column, box.top + row) += static_cast<float>(spot.total * across[column] * down[row]);
-    }
-  }
 }
 
 void add_ellipse(images::Image& image, const Adhesion& ellipse, double amplitude, double rim_um, double slope) {
@@ -174,15 +172,13 @@ images::Image blurred(const images::Image& image, double sigma_um, int threads) 
   images::Image across = image, result = image;
   numerics::parallel_for(image.height, threads, [&](int row) {
     std::vector<float> padded(image.width + 2 * reach);
-    for (int i = 0; i < static_cast<int>(padded.size()); ++i) {
+    for (int i = 0; i < static_cast<int>(padded.size()); ++i)
       padded[i] = image.at(std::clamp(i - reach, 0, image.width - 1), row);
-    }
     // weight by weight over the whole row: the compiler turns this order into vector instructions
     float* sum = &across.at(0, row);
     std::fill_n(sum, image.width, 0.0f);
-    for (std::size_t k = 0; k < kernel.size(); ++k) {
+    for (std::size_t k = 0; k < kernel.size(); ++k)
       for (int column = 0; column < image.width; ++column) sum[column] += kernel[k] * padded[column + k];
-    }
   });
   numerics::parallel_for(image.height, threads, [&](int row) {
     std::vector<float> sum(image.width, 0.0f);

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <functional>
-#include <vector>
 
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"

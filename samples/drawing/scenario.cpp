@@ -8,8 +8,6 @@
 
 namespace mbtfm::drawing {
 
-namespace fs = std::filesystem;
-
 namespace {
 
 constexpr int kMostBeads = 10'000'000;
@@ -139,9 +137,8 @@ fs::path scenario_folder() {
 std::string known_scenarios() {
   std::vector<std::string> names;
   std::error_code is_missing;
-  for (const auto& entry : fs::directory_iterator(scenario_folder(), is_missing)) {
+  for (const auto& entry : fs::directory_iterator(scenario_folder(), is_missing))
     if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
-  }
   std::ranges::sort(names);
   return listed(names);
 }

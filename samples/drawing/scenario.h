@@ -3,12 +3,11 @@
 
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "pipeline/contract/gel.h"
+#include "pipeline/contract/path.h"
 #include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::drawing {
@@ -148,6 +147,6 @@ int n_beads(const ScenarioParameters& parameters);
 
 /// The file of a scenario: a name of those that come with the program, or a path.
 /// @throws UsageError listing what there is
-std::filesystem::path scenario_file(const std::string& name_or_path);
+fs::path scenario_file(const std::string& name_or_path);
 
 }  // namespace mbtfm::drawing

@@ -1,7 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <string>
 
 #include "pipeline/contract/errors.h"
@@ -78,9 +76,8 @@ Adhesion propose_central(const Sketch& sketch, double area, double aspect, Rando
 
 bool has_room(const Sketch& sketch, const Adhesion& adhesion) {
   const CellParameters& p = sketch.parameters;
-  for (const Adhesion& other : sketch.adhesions) {
+  for (const Adhesion& other : sketch.adhesions)
     if (too_near(adhesion, other, p.adhesion_clearance_um)) return false;
-  }
   for (const Fibre& f : sketch.fibres) {
     const double margin = 0.5 * f.width_um + p.adhesion_clearance_um;
     if (std::ranges::any_of(f.points_um, [&](Vec2 q) { return covers(adhesion, q, margin); })) return false;
@@ -88,9 +85,8 @@ bool has_room(const Sketch& sketch, const Adhesion& adhesion) {
     if (!f.start_adhesion_id && covers(adhesion, f.points_um.front(), end_margin)) return false;
     if (!f.end_adhesion_id && covers(adhesion, f.points_um.back(), end_margin)) return false;
   }
-  for (const Vec2 point : ellipse_corners(adhesion, 24, kRim_um)) {
+  for (const Vec2 point : ellipse_corners(adhesion, 24, kRim_um))
     if (!contains(sketch.outline_um, point)) return false;
-  }
   return true;
 }
 

@@ -41,10 +41,9 @@ bool lie_too_near(const Polyline& a, const Polyline& b, double least_um, const s
   for (std::size_t i = 0; i < a.size(); ++i) {
     const bool is_merging = std::ranges::any_of(shared_um, [&](Vec2 p) { return norm(a[i] - p) < kMerge_um + 1; });
     if (is_merging) continue;
-    for (std::size_t j = 0; j < b.size(); ++j) {
+    for (std::size_t j = 0; j < b.size(); ++j)
       if (norm(a[i] - b[j]) < least_um && std::abs(cross(tangent(a, i), tangent(b, j))) < std::sin(kAlongside_rad))
         return true;
-    }
   }
   return false;
 }
@@ -274,10 +273,9 @@ struct Builder {
   int n_of(FibreType type) const { return static_cast<int>(std::ranges::count(sketch.fibres, type, &Fibre::type)); }
 
   void add_edges() {
-    for (const FreeEdge& edge : sketch.free_edges) {
+    for (const FreeEdge& edge : sketch.free_edges)
       if (!add(FibreType::edge, kTries, [&](double t) { return plan_edge(sketch, edge, t, random); }))
         no_room(sketch, FibreType::edge);
-    }
   }
 
   /// To both sides of the carpet's middle line until it is full, leaves the cell or finds no room.

@@ -67,15 +67,12 @@ bool is_free_end_near(const Sketch& sketch, const Proposal& proposal, const Adhe
 
 bool fits(const Sketch& sketch, const Proposal& proposal, double spacing_um) {
   if (!keeps_inside(sketch, proposal)) return false;
-  for (const Fibre& other : sketch.fibres) {
+  for (const Fibre& other : sketch.fibres)
     if (collide(proposal.points_um, other.points_um, spacing_um)) return false;
-  }
-  for (const Adhesion& other : sketch.adhesions) {
+  for (const Adhesion& other : sketch.adhesions)
     if (lies_on(sketch, proposal.points_um, other) || is_free_end_near(sketch, proposal, other)) return false;
-  }
-  for (const auto& held : {proposal.start, proposal.end}) {
+  for (const auto& held : {proposal.start, proposal.end})
     if (held && !has_room(sketch, *held)) return false;
-  }
   return !proposal.start || !is_free_end_near(sketch, proposal, *proposal.start);
 }
 

@@ -71,9 +71,8 @@ std::function<double(double)> modulation(double strength, double wavelength_um, 
     double number_per_um, phase_rad;
   };
   std::vector<Wave> waves(4);
-  for (Wave& w : waves) {
+  for (Wave& w : waves)
     w = {2 * std::numbers::pi / (wavelength_um * random.uniform(1, 5)), random.uniform(0, 2 * std::numbers::pi)};
-  }
   return [waves, strength](double s) {
     double value = 1;
     for (const Wave& w : waves) value += strength / std::numbers::sqrt2 * std::sin(w.number_per_um * s + w.phase_rad);

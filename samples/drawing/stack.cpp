@@ -18,10 +18,9 @@ void add_bead(images::Image& slice, const GlowingBead& bead, const PointSpread& 
             right = std::min(slice.width - 1, static_cast<int>(x) + reach);
   const int top = std::max(0, static_cast<int>(y) - reach),
             bottom = std::min(slice.height - 1, static_cast<int>(y) + reach);
-  for (int j = top; j <= bottom; ++j) {
+  for (int j = top; j <= bottom; ++j)
     for (int i = left; i <= right; ++i)
       slice.at(i, j) += static_cast<float>(light * spread.at(pixel_um * std::hypot(i - x, j - y), above_um, depth_um));
-  }
 }
 
 }  // namespace

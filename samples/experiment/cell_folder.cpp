@@ -23,9 +23,8 @@ void write_segmentation(const Cell& cell, const std::string& folder, const FileN
 void write_beads(const std::filesystem::path& file, const std::vector<Vec2>& relaxed,
                  const std::vector<Vec2>& stressed) {
   files::CsvText csv({"x_um", "y_um", "stressed_x_um", "stressed_y_um"});
-  for (std::size_t i = 0; i < relaxed.size(); ++i) {
+  for (std::size_t i = 0; i < relaxed.size(); ++i)
     csv.add(relaxed[i].x).add(relaxed[i].y).add(stressed[i].x).add(stressed[i].y).end_row();
-  }
   files::write_text(file, csv.str());
 }
 

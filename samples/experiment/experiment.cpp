@@ -29,9 +29,8 @@ Network span(const Cell& cell, const drawing::ScenarioParameters& p) {
   parameters.edge_length_um = p.mechanics.simulation_edge_length_um;
   parameters.seed = kFirstSimulationSeed + p.seed;
   mesh::GeneratedNetwork generated = mesh::generate_network(cell, parameters);
-  for (Link& link : generated.network.links) {
+  for (Link& link : generated.network.links)
     if (link.fibre_id == 0) link.share *= parameters.edge_length_um / kReferenceEdge_um;
-  }
   return std::move(generated.network);
 }
 
@@ -58,9 +57,8 @@ std::map<int, Vec2> forces_by_adhesion(const Network& network, const std::vector
   if (!equilibrium.report.converged) throw NotSolved(equilibrium.report);
   const VectorXd forces = cables.adhesion_forces_nN(by_group, equilibrium);
   std::map<int, Vec2> result;
-  for (std::size_t i = 0; i < cables.adhesion_ids().size(); ++i) {
+  for (std::size_t i = 0; i < cables.adhesion_ids().size(); ++i)
     result[cables.adhesion_ids()[i]] = {forces[2 * i], forces[2 * i + 1]};
-  }
   return result;
 }
 
@@ -102,9 +100,8 @@ DisplacementField displacement_of(const Experiment& e, const drawing::ScenarioPa
     for (std::size_t i = 0; i < beads.size(); ++i) displacements[i] += change[i];
   }
   DisplacementField field;
-  for (std::size_t i = 0; i < beads.size(); ++i) {
+  for (std::size_t i = 0; i < beads.size(); ++i)
     field.push_back({.position_um = beads[i], .displacement_um = displacements[i], .sigma_um = 0, .flag = {}});
-  }
   return field;
 }
 
@@ -138,9 +135,8 @@ std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
   const auto is_free = [&](Vec2 bead, int column, int row) {
     for (int j = std::max(0, row - reach); j <= std::min(n_cells - 1, row + reach); ++j) {
       for (int i = std::max(0, column - reach); i <= std::min(n_cells - 1, column + reach); ++i) {
-        for (const Vec2 other : grid[static_cast<std::size_t>(j) * n_cells + i]) {
+        for (const Vec2 other : grid[static_cast<std::size_t>(j) * n_cells + i])
           if (norm(other - bead) < p.bead_distance_um) return false;
-        }
       }
     }
     return true;
@@ -180,9 +176,8 @@ Experiment simulate(drawing::DrawnCell drawn, const drawing::ScenarioParameters&
   for (const AdhesionForce& f : e.forces) e.total_force_nN += norm(f.force_nN);
   work.tell(0.4, "deforming the gel");
   e.displacement = displacement_of(e, p, work.threads);
-  for (const Bead& bead : e.displacement) {
+  for (const Bead& bead : e.displacement)
     e.largest_displacement_um = std::max(e.largest_displacement_um, norm(bead.displacement_um));
-  }
   e.noise_um = p.noise_um.value_or(p.noise * e.largest_displacement_um);
   e.measured = with_noise(e.displacement, e.noise_um, p.seed);
   return e;

@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <complex>
-#include <cstddef>
 #include <numbers>
 #include <utility>
 #include <vector>

@@ -365,9 +365,8 @@ void place_beads(GelScene& scene, const Surface& surface, const SpaceParameters&
   });
   for (const BeadInSpace& bead : scene.truth)
     scene.largest_displacement_um = std::max(scene.largest_displacement_um, norm(bead.displacement_um));
-  for (int k = 0; k < p.surface_beads; ++k) {
+  for (int k = 0; k < p.surface_beads; ++k)
     scene.surface_beads_um.push_back(surface.at({random.uniform(0, size.field_um), random.uniform(0, size.field_um)}));
-  }
 }
 
 void add_noise(GelScene& scene, const SpaceParameters& p, const SceneSize& size) {

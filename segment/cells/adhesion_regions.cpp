@@ -1,8 +1,6 @@
 #include "segment/cells/adhesion_regions.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numeric>
 
 namespace mbtfm::cells {
 

@@ -65,9 +65,8 @@ template <class IsPossible>
 std::vector<Adhesion> lattice_candidates(Vec2 low_um, Vec2 high_um, double spacing_um, Placement placement,
                                          const IsPossible& is_possible) {
   std::vector<Adhesion> candidates;
-  for (const Vec2 point : hexagonal_lattice(low_um, high_um, spacing_um, placement)) {
+  for (const Vec2 point : hexagonal_lattice(low_um, high_um, spacing_um, placement))
     if (is_possible(point)) candidates.push_back(disc(point, spacing_um, AdhesionOrigin::candidate));
-  }
   return numbered(std::move(candidates));
 }
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/cells/grid.h"

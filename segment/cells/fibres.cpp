@@ -5,7 +5,6 @@
 #include <functional>
 #include <iterator>
 #include <limits>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 

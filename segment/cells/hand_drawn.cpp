@@ -24,9 +24,8 @@ void require_inside(const std::vector<Vec2>& points_px, const Field& field, cons
   constexpr double kSlack_px = 1;
   for (const Vec2 p : points_px) {
     if (p.x >= -kSlack_px && p.y >= -kSlack_px && p.x <= field.width_px + kSlack_px &&
-        p.y <= field.height_px + kSlack_px) {
+        p.y <= field.height_px + kSlack_px)
       continue;
-    }
     throw InputError(where,
                      "a selection within the image's " + std::to_string(field.width_px) + " x " +
                          std::to_string(field.height_px) + " pixels",
@@ -37,9 +36,8 @@ void require_inside(const std::vector<Vec2>& points_px, const Field& field, cons
 
 std::vector<Vec2> line_um(const std::vector<Vec2>& points_px, double pixel_um) {
   std::vector<Vec2> points_um;
-  for (const Vec2 p : points_px) {
+  for (const Vec2 p : points_px)
     if (points_um.empty() || !(pixel_um * p == points_um.back())) points_um.push_back(pixel_um * p);
-  }
   return points_um;
 }
 
@@ -133,12 +131,11 @@ double height_within(const Polygon& area_um, const Adhesion& adhesion, const ima
 /// The words of a selection's name, in small letters.
 std::vector<std::string> words_of(const std::string& name) {
   std::vector<std::string> words(1);
-  for (const char c : name) {
+  for (const char c : name)
     if (std::isalpha(static_cast<unsigned char>(c)))
       words.back() += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     else if (!words.back().empty())
       words.emplace_back();
-  }
   return words;
 }
 
@@ -355,10 +352,9 @@ HeldFibres hold_fibres(std::vector<DrawnLine> lines, const std::vector<Adhesion>
   std::vector<std::optional<Fibre>> fibres(lines.size());
   // first those whose types ask for anchors, which then hold the others, too
   for (const bool is_stated : {true, false}) {
-    for (std::size_t i = 0; i < lines.size(); ++i) {
+    for (std::size_t i = 0; i < lines.size(); ++i)
       if (lines[i].stated.has_value() == is_stated)
         fibres[i] = held(std::move(lines[i]), all, cell, p, anchor_area_um2, cuts);
-    }
   }
   HeldFibres result;
   for (std::optional<Fibre>& fibre : fibres) result.fibres.push_back(std::move(*fibre));

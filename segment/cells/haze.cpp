@@ -1,6 +1,5 @@
 #include "segment/cells/haze.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>

@@ -1,6 +1,5 @@
 #include "segment/cells/outline.h"
 
-#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -372,9 +371,8 @@ CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um) {
     result.is_cut.push_back(true);
     index.push_back(n);
   }
-  for (std::size_t k = 0; k < index.size(); ++k) {
+  for (std::size_t k = 0; k < index.size(); ++k)
     if (index[k] < n) put_onto(result.points_um[k], onto[index[k]]);
-  }
   return result;
 }
 

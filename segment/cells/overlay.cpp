@@ -163,9 +163,8 @@ void draw_labels(Canvas& canvas, const Cell& cell) {
                  letter_of(f.type) + std::to_string(f.fibre_id), scalar(colour_of(f.type)), kFibreText);
   for (const Adhesion& a : cell.adhesions) canvas.occupy(ellipse_corners(a, 16));
   std::vector<const Adhesion*> large_first;
-  for (const Adhesion& a : cell.adhesions) {
+  for (const Adhesion& a : cell.adhesions)
     if (a.origin != AdhesionOrigin::candidate) large_first.push_back(&a);  // of a lattice numbers would hide the cell
-  }
   std::stable_sort(large_first.begin(), large_first.end(),
                    [](const Adhesion* a, const Adhesion* b) { return a->area_um2 > b->area_um2; });
   for (const Adhesion* a : large_first)
@@ -265,12 +264,11 @@ void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
     else
       canvas.line(ring, true, scalar(kAdhesionColour), thickness);
   }
-  for (const Fibre& f : cell.fibres) {
+  for (const Fibre& f : cell.fibres)
     if (f.type == FibreType::edge)
       canvas.dashed_line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1, kFibreDash_px);
     else
       canvas.line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1);
-  }
 }
 
 }  // namespace

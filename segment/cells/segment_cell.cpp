@@ -1,7 +1,6 @@
 #include "segment/cells/segment_cell.h"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 
 #include "pipeline/contract/counted.h"
@@ -134,9 +133,8 @@ void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& trac
   s.cell.outline_um = outline.outer_um;
   s.cell.holes_um = outline.holes_um;
   for (Polyline& crest : s.unexplained_um) move(crest);
-  for (TracedFibre& t : traced) {
+  for (TracedFibre& t : traced)
     for (Polyline* points : {&t.fibre.points_um, &t.before.points_um, &t.after.points_um}) move(*points);
-  }
 }
 
 /// The images of a field, and where its adhesions come from.

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <fstream>
-#include <string>
 #include <string_view>
 #include <system_error>
 
@@ -194,9 +193,8 @@ Image binned(Image image, int binning) {
   for (int row = 0; row < result.height; ++row) {
     for (int column = 0; column < result.width; ++column) {
       double sum = 0;
-      for (int j = 0; j < binning; ++j) {
+      for (int j = 0; j < binning; ++j)
         for (int i = 0; i < binning; ++i) sum += image.at(column * binning + i, row * binning + j);
-      }
       result.pixels.push_back(static_cast<float>(sum / (binning * binning)));
     }
   }

@@ -1,7 +1,6 @@
 /// Images as microscopes and ImageJ write them.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>

@@ -5,7 +5,6 @@
 #include <jpeglib.h>
 
 #include <cstring>
-#include <memory>
 #include <vector>
 
 #include "pipeline/contract/errors.h"

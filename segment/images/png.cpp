@@ -4,8 +4,6 @@
 
 #include <cstdio>
 #include <cstring>
-#include <memory>
-#include <string>
 
 #include "pipeline/contract/errors.h"
 #include "segment/images/file_handle.h"
@@ -80,9 +78,8 @@ bool write_all(png_structp png, png_infop info, std::string& bytes, const Pictur
   png_set_compression_level(png, 2);
   png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
   png_write_info(png, info);
-  for (int j = 0; j < picture.height; ++j) {
+  for (int j = 0; j < picture.height; ++j)
     png_write_row(png, picture.rgb.data() + static_cast<std::size_t>(j) * picture.width * 3);
-  }
   png_write_end(png, info);
   return true;
 }

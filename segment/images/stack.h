@@ -1,7 +1,6 @@
 /// Which page of a file shows which channel, slice and frame.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>

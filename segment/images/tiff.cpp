@@ -133,11 +133,10 @@ class TiffReader {
 
   Image read() {
     Image image = empty_image();
-    if (layout_.is_planar) {
+    if (layout_.is_planar)
       for (int plane = layout_.first; plane < layout_.first + layout_.colours; ++plane) read_plane(image, plane);
-    } else {
+    else
       read_plane(image, 0);
-    }
     finish(image);
     return image;
   }
@@ -233,9 +232,8 @@ class TiffReader {
   TiffCalibration calibration() const {
     TiffCalibration result;
     const char* description = nullptr;
-    if (TIFFGetField(tiff_.get(), TIFFTAG_IMAGEDESCRIPTION, &description) && description) {
+    if (TIFFGetField(tiff_.get(), TIFFTAG_IMAGEDESCRIPTION, &description) && description)
       result.description = description;
-    }
     float resolution = 0;
     if (TIFFGetField(tiff_.get(), TIFFTAG_XRESOLUTION, &resolution)) result.x_resolution_per_unit = resolution;
     if (TIFFGetField(tiff_.get(), TIFFTAG_YRESOLUTION, &resolution)) result.y_resolution_per_unit = resolution;
@@ -332,9 +330,8 @@ class TiffReader {
     const std::uint64_t samples = layout_.is_planar ? 1 : layout_.samples;
     const std::uint64_t needed = (samples * layout_.bits * block_width + 7) / 8;
     if (row_bytes <= 0 || block_bytes <= 0 || static_cast<std::uint64_t>(row_bytes) < needed ||
-        static_cast<std::uint64_t>(block_bytes) < needed * block_height || samples > 64) {
+        static_cast<std::uint64_t>(block_bytes) < needed * block_height || samples > 64)
       fail("a readable image");
-    }
     require_plausible_bytes(file_, static_cast<std::uint64_t>(block_bytes));
     require_plausible_bytes(file_, samples * block_width * sizeof(float));
     std::vector<unsigned char> block(static_cast<std::size_t>(block_bytes));
@@ -387,9 +384,8 @@ class TiffReader {
       case 64:
         return unpack_as<double>(bytes, row);
       case 24:
-        for (std::size_t i = 0; i < row.size(); ++i, bytes += 3) {
+        for (std::size_t i = 0; i < row.size(); ++i, bytes += 3)
           row[i] = static_cast<float>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
-        }
         return;
       default:
         unpack_bits(bytes, row);
@@ -409,9 +405,8 @@ class TiffReader {
     const std::size_t stride = layout_.is_planar ? 1 : layout_.samples;
     const std::size_t first = layout_.is_planar ? 0 : layout_.first;
     const std::size_t n_summed = layout_.is_planar ? 1 : layout_.colours;
-    for (std::uint32_t i = 0; i < n_columns; ++i) {
+    for (std::uint32_t i = 0; i < n_columns; ++i)
       for (std::size_t c = first; c < first + n_summed; ++c) pixels[i] += row[i * stride + c];
-    }
   }
 
   std::filesystem::path file_;

@@ -43,10 +43,9 @@ void write_tiff(const std::filesystem::path& file, const std::vector<Image>& sli
   MBTFM_ASSERT(!slices.empty() && slices.front().width > 0 && slices.front().height > 0);
   Messages messages;
   const auto require = [&](bool is_done) {
-    if (!is_done) {
+    if (!is_done)
       throw OutputError(file.string() + ": cannot be written" +
                         (messages.first_error.empty() ? "" : ": " + messages.first_error));
-    }
   };
   TiffHandle tiff = open_tiff(file, "w", messages);
   require(tiff != nullptr);
@@ -55,9 +54,8 @@ void write_tiff(const std::filesystem::path& file, const std::vector<Image>& sli
     set_tags(tiff.get(), image, description);
     std::vector<std::uint16_t> row(static_cast<std::size_t>(image.width));
     for (int j = 0; j < image.height; ++j) {
-      for (int i = 0; i < image.width; ++i) {
+      for (int i = 0; i < image.width; ++i)
         row[i] = static_cast<std::uint16_t>(std::clamp(std::round(image.at(i, j)), 0.0f, 65535.0f));
-      }
       require(TIFFWriteScanline(tiff.get(), row.data(), static_cast<std::uint32_t>(j), 0) == 1);
     }
     require(TIFFWriteDirectory(tiff.get()) == 1);

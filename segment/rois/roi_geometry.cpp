@@ -38,9 +38,8 @@ class NaturalSpline {
 
 std::vector<Vec2> without_repetition(const std::vector<Vec2>& points) {
   std::vector<Vec2> different;
-  for (const Vec2 p : points) {
+  for (const Vec2 p : points)
     if (different.empty() || !(p == different.back())) different.push_back(p);
-  }
   return different;
 }
 

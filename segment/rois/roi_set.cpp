@@ -6,12 +6,11 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/path.h"
 #include "segment/rois/roi.h"
 
 namespace mbtfm::rois {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr std::size_t kLargestRoi = 1u << 24;   // bytes: a million points, beyond anything drawn
 constexpr std::size_t kLargestSet = 1u << 28;   // bytes of all ROIs together

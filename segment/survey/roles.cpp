@@ -42,13 +42,11 @@ Roles roles_of(const std::vector<std::string>& names) {
   std::map<std::string, std::vector<std::string>> by_key;
   Roles roles;
   for (const std::string& name : names) by_key[key_of(name)].push_back(name);
-  for (const auto& [key, files] : by_key) {
-    if (!key.empty() && files.size() == 1) {
+  for (const auto& [key, files] : by_key)
+    if (!key.empty() && files.size() == 1)
       roles.files[key] = files.front();
-    } else {
+    else
       roles.unknown.insert(roles.unknown.end(), files.begin(), files.end());
-    }
-  }
   std::ranges::sort(roles.unknown);
   return roles;
 }

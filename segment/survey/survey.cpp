@@ -79,10 +79,9 @@ void look_at_beads(const CellImages& cell, int threads, Survey& survey) {
       images::common_pixel_size_um(*cell.beads_relaxed, *cell.beads_stressed, given_for_beads(cell));
   const images::Image& relaxed = cell.beads_relaxed->image;
   const double size_relaxed = bead_size_px(relaxed), size_stressed = bead_size_px(cell.beads_stressed->image);
-  for (const Channel* channel : {&*cell.beads_relaxed, &*cell.beads_stressed}) {
+  for (const Channel* channel : {&*cell.beads_relaxed, &*cell.beads_stressed})
     if ((channel == &*cell.beads_relaxed ? size_relaxed : size_stressed) == 0)
       survey.doubts.push_back(channel->name + " shows no beads, only noise. Check the channel and the focus.");
-  }
   if (size_relaxed == 0 || size_stressed == 0) return;
   const double ratio = size_stressed / size_relaxed, unlike = std::max(ratio, 1 / ratio);
   if (unlike > kUnlikeSizes)

@@ -220,9 +220,7 @@ TEST(SheetOnGel, large_strains_are_small_ones_in_the_limit_and_in_balance_where_
   for (const double x : {0.005, 0.01, 0.1}) {
     const Solution large = by(Strain::large, x);
     const double off = (large.u - x / 0.01 * linear.u).norm() / (x / 0.01 * linear.u.norm());
-    if (x == 0.01) {
-      EXPECT_NEAR(off / before, 2, 0.1) << "what linear theory leaves out is of second order";
-    }
+    if (x == 0.01) EXPECT_NEAR(off / before, 2, 0.1) << "what linear theory leaves out is of second order";
     before = off;
     const Balance balance = balance_of(large);
     EXPECT_LE(norm(balance.net_force_nN), 1e-7 * balance.total_force_nN);
@@ -283,11 +281,10 @@ TEST(SheetOnGel, springs_stand_for_a_gel_where_beta_says_so_and_only_there) {
     disc.scene.size = with_edge(size_on_gel(disc.scene.region, material, gel, kappa), 1);
     const Solution on_gel = solved(disc), on_springs = solve_on_springs(disc.scene, 1);
     const double off = (on_gel.u - on_springs.u).lpNorm<Eigen::Infinity>() / on_gel.u.lpNorm<Eigen::Infinity>();
-    if (beta < 0.1) {
+    if (beta < 0.1)
       EXPECT_LE(off, 0.025) << beta;
-    } else {
+    else
       EXPECT_GT(off, 0.1) << beta;
-    }
   }
 }
 

@@ -16,17 +16,7 @@ namespace {
 
 using test::ellipse_scene;
 using test::EllipseScene;
-
-TractionParameters half_space(TractionMethod method = TractionMethod::fttc) {
-  TractionParameters parameters;
-  parameters.method = method;
-  parameters.gel_model = GelModel::half_space;
-  return parameters;
-}
-
-TractionInputs inputs_of(const EllipseScene& scene) {
-  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions};
-}
+using test::half_space;
 
 std::vector<Vec2> forces_of(const Reconstruction& r) {
   std::vector<Vec2> forces;
@@ -290,9 +280,7 @@ TEST(FttcMixtures, forces_are_those_of_a_reconstruction_with_as_much_noise) {
       }
       // Of one wave a cubic through points a third of a decade apart errs by 1.6 % at most: the fourth derivative of
       // 1 / (1 + lambda² / c²) by log lambda is 2, its factor (ln 10 / 3)⁴ 9/16 / 24.
-      if (parameters.lambda_um_per_kPa) {
-        EXPECT_LT(std::sqrt(difference2 / all2), 0.016) << share;
-      }
+      if (parameters.lambda_um_per_kPa) EXPECT_LT(std::sqrt(difference2 / all2), 0.016) << share;
       // lambda's criteria see tractions solved to a hundredth in one of the two: what that moves is no error beside
       // theirs
       EXPECT_LT(std::sqrt(difference2), 0.1 * std::sqrt(error2)) << share;

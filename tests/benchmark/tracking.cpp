@@ -20,9 +20,7 @@ const test::BeadPair& pair_of(int width, int n_beads) {
 
 void track(benchmark::State& state, int width, int n_beads) {
   const test::BeadPair& pair = pair_of(width, n_beads);
-  for (auto _ : state) {
-    benchmark::DoNotOptimize(beads::track_beads(pair.relaxed, pair.stressed, 0.1, {}, 2));
-  }
+  for (auto _ : state) benchmark::DoNotOptimize(beads::track_beads(pair.relaxed, pair.stressed, 0.1, {}, 2));
 }
 
 /// The whole: 40 000 beads in 2048² px on two processors.

@@ -63,11 +63,10 @@ TEST(NeoHooke, has_the_stresses_of_the_closed_forms_in_even_states) {
     const Matrix3d written = large_stress(gel, {}).at(F - Matrix3d::Identity(), law.pressure_kPa(J));
     EXPECT_NEAR(written(0, is_shear), at("cauchy_kPa"), rounding) << name << " " << stretch;
     EXPECT_NEAR(P(0, is_shear), at("nominal_kPa"), rounding);
-    if (is_shear) {
+    if (is_shear)
       EXPECT_NEAR(cauchy(0, 0) - cauchy(1, 1), at("other_kPa"), rounding);
-    } else {
+    else
       EXPECT_NEAR(cauchy(1, 1), name == "equibiaxial" ? at("cauchy_kPa") : at("other_kPa"), rounding);
-    }
     ++n[name];
   }
   EXPECT_EQ(n.size(), 4u);
@@ -185,9 +184,8 @@ TEST(NeoHooke, a_manufactured_field_on_a_wave_is_met_with_order_at_any_poisson_r
     const bool is_weak = wavy.c3 != 0;
     if (is_done[is_weak]) continue;
     is_done[is_weak] = true;
-    if (is_weak) {
+    if (is_weak)
       for (double* c : {&wavy.c1, &wavy.c2, &wavy.c3}) *c *= 0.1;
-    }
     std::vector<double> errors;
     for (const int n : {5, 10}) {
       const Block block = block_of(

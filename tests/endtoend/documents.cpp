@@ -101,17 +101,16 @@ std::string slug_of(const std::string& title) {
   std::string slug;
   for (std::size_t i = 0; i < title.size(); ++i) {
     const auto c = static_cast<unsigned char>(title[i]), next = static_cast<unsigned char>(title.c_str()[i + 1]);
-    if (c == ' ' || c == '-') {
+    if (c == ' ' || c == '-')
       slug += '-';
-    } else if (c == '_' || std::isalnum(c) != 0) {
+    else if (c == '_' || std::isalnum(c) != 0)
       slug += static_cast<char>(std::tolower(c));
-    } else if (c == 0xE2) {  // U+2000 to U+2FFF: dashes, quotes, signs, three bytes each
+    else if (c == 0xE2)  // U+2000 to U+2FFF: dashes, quotes, signs, three bytes each
       i += 2;
-    } else if (c == 0xC2 && next != 0xB5) {  // U+0080 to U+00BF: signs, but for the micro sign, which is a letter
+    else if (c == 0xC2 && next != 0xB5)  // U+0080 to U+00BF: signs, but for the micro sign, which is a letter
       i += 1;
-    } else if (c >= 0x80) {
+    else if (c >= 0x80)
       slug += title[i];
-    }
   }
   return slug;
 }

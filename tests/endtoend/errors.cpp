@@ -62,19 +62,15 @@ TEST_F(Errors, a_truncated_image_is_named) {
 }
 
 TEST_F(Errors, images_of_different_sizes_are_named_with_their_sizes) {
-  images::Image small = images::read_image(cell_ / "actin.tif");
-  small.height /= 2;
-  small.pixels.resize(static_cast<std::size_t>(small.width) * small.height);
-  images::write_tiff(cell_ / "actin.tif", small);
-  expect_error(kInput, {"actin.tif", std::to_string(small.height)}, "1_segment");
-}
-
-TEST_F(Errors, bead_images_of_different_sizes_are_named_with_their_sizes) {
-  images::Image small = images::read_image(cell_ / "beads_relaxed.tif");
-  small.height /= 2;
-  small.pixels.resize(static_cast<std::size_t>(small.width) * small.height);
-  images::write_tiff(cell_ / "beads_relaxed.tif", small);
-  expect_error(kInput, {"beads_relaxed.tif", std::to_string(small.height)}, "2_track");
+  for (const auto& [file, folder] : {std::pair("beads_relaxed.tif", "2_track"), std::pair("actin.tif", "1_segment")}) {
+    const images::Image whole = images::read_image(cell_ / file);
+    images::Image small = whole;
+    small.height /= 2;
+    small.pixels.resize(static_cast<std::size_t>(small.width) * small.height);
+    images::write_tiff(cell_ / file, small);
+    expect_error(kInput, {file, std::to_string(small.height)}, folder);
+    images::write_tiff(cell_ / file, whole);
+  }
 }
 
 /// As a camera binds 2 x 2 pixels, and a program keeps half of an image.

@@ -142,9 +142,8 @@ function save(name) { Roi.setName(name); saveAs("Selection", ")"
       ASSERT_EQ(line.size(), m.points_px.size());
       for (std::size_t i = 0; i < line.size(); ++i)
         EXPECT_NEAR(norm(line[i] - m.points_px[i] - Vec2{0.5, 0.5}), 0, 1e-3);
-      if (roi.shape != rois::RoiShape::freehand_line) {  // which ImageJ smooths before it measures
+      if (roi.shape != rois::RoiShape::freehand_line)  // which ImageJ smooths before it measures
         EXPECT_NEAR(length_um(line), m.length, 1e-4 * m.length);
-      }
       continue;
     }
     if (roi.shape == rois::RoiShape::composite) {  // ImageJ counts its pixels

@@ -18,9 +18,8 @@ TEST(Plan, a_question_is_answered_with_a_sentence_tables_a_picture_and_a_page) {
   EXPECT_NE(outcome.find(" to see 1 nN per fibre to 20 %"), std::string::npos) << outcome;
   EXPECT_NE(outcome.find("Checked with 1 simulated experiment"), std::string::npos) << outcome;
   for (const char* file :
-       {"plan.html", "plan.csv", "plan_needed.csv", "plan_cells.csv", "plan_drawn.csv", "plan.svg", "plan.png"}) {
+       {"plan.html", "plan.csv", "plan_needed.csv", "plan_cells.csv", "plan_drawn.csv", "plan.svg", "plan.png"})
     EXPECT_GT(fs::file_size(out / file), 100u) << file;
-  }
   const files::CsvTable table(out / "plan.csv");
   // 2 gels, 2 densities, 2 noises; fibres, ventral fibres, network, total, adhesions three times
   EXPECT_EQ(table.n_rows(), 8 * 7);

@@ -81,9 +81,7 @@ TEST(OthersData, tractions_of_a_monolayer_are_those_of_the_program_that_publishe
                 same.relative_rms, *r.lambda, own.correlation, 1000 * own.mean_one, 1000 * own.mean_other);
     EXPECT_LE(same.relative_rms, 0.02);
     EXPECT_GE(own.correlation, 0.95);
-    if (frame == std::string("1")) {
-      EXPECT_NEAR(1000 * own.mean_one, 225.35, 0.15 * 225.35);
-    }
+    if (frame == std::string("1")) EXPECT_NEAR(1000 * own.mean_one, 225.35, 0.15 * 225.35);
   }
 }
 

@@ -188,9 +188,7 @@ TEST(Simulate, dipoles_pull_inside_of_a_colony_and_add_to_its_sheet) {
       EXPECT_TRUE(contains(rim, at));
       nearest_um = std::min(nearest_um, norm(with[i].position_um - at));
     }
-    if (nearest_um > 60) {
-      EXPECT_LT(norm(added), 0.005) << "a pair of opposite forces is not felt far away";
-    }
+    if (nearest_um > 60) EXPECT_LT(norm(added), 0.005) << "a pair of opposite forces is not felt far away";
   }
   EXPECT_GT(most_um, 0.02);
   EXPECT_LT(norm(mean), 0.05 * most_um);

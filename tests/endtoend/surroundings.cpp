@@ -172,12 +172,8 @@ TEST_F(Surroundings, little_memory_is_an_answer_or_an_error_and_never_a_hang) {
     const Outcome run = run_program("mbtfm run --threads 2 --quiet " + cell_.string(),
                                     "ulimit -v " + std::string(kilobytes) + "; timeout -s KILL 60 ");
     EXPECT_TRUE(run.code == kDone || run.code == kResources || run.code == 127) << run.code << ": " << run.output;
-    if (run.code == kResources) {
-      EXPECT_NE(run.output.find("memory"), std::string::npos) << run.output;
-    }
-    if (run.code == 127) {
-      EXPECT_NE(run.output.find("shared librar"), std::string::npos) << run.output;
-    }
+    if (run.code == kResources) EXPECT_NE(run.output.find("memory"), std::string::npos) << run.output;
+    if (run.code == 127) EXPECT_NE(run.output.find("shared librar"), std::string::npos) << run.output;
     expect_nothing_half_written();
     EXPECT_EQ(fs::exists(cell_ / "4_fit/tensions.csv"), run.code == kDone);
   }

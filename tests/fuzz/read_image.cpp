@@ -65,11 +65,12 @@ std::vector<std::string> samples() {
   files.push_back(
       tiff({.bits = 8, .pages = 6, .description = "ImageJ=1.53t\nimages=6\nchannels=2\nslices=3\nunit=micron\n"}));
   files.push_back(tiff({.bits = 8, .description = "ImageJ=1.53t\nimages=2\nslices=2\n"}));
-  files.push_back(
-      tiff({.bits = 8,
-            .pages = 6,
-            .description = "<OME><Image><Pixels DimensionOrder='XYZCT' SizeC='2' SizeZ='3' SizeT='1' "
-                           "PhysicalSizeX='0.1'><TiffData IFD='0' PlaneCount='6'/></Pixels></Image></OME>"}));
+  files.push_back(tiff(
+      {.bits = 8,
+       .pages = 6,
+       .description = "<OME UUID='urn:uuid:a'><Image><Pixels DimensionOrder='XYZCT' SizeC='2' SizeZ='3' SizeT='1' "
+                      "PhysicalSizeX='0.1'><Channel Name='a'/><Channel Name='b'/><TiffData IFD='0' FirstC='1' "
+                      "PlaneCount='3'><UUID FileName='a.tif'>urn:uuid:a</UUID></TiffData></Pixels></Image></OME>"}));
   return files;
 }
 
@@ -81,7 +82,7 @@ void read(std::string_view bytes) {
   fuzz::answer([&] { images::read_slices(file, {.may_lack_pixels = true}); });
 }
 
-const bool is_added = add({"image", 30000, samples, read});
+const bool is_added = add({"image", 15000, samples, read});
 
 }  // namespace
 }  // namespace mbtfm::fuzz::image_readers

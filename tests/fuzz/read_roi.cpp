@@ -2,6 +2,7 @@
 #include "segment/cells/hand_drawn.h"
 #include "segment/rois/roi.h"
 #include "tests/fuzz/target.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm::fuzz::roi_readers {
 namespace {
@@ -38,6 +39,12 @@ std::vector<std::string> samples() {
   std::filesystem::remove(folder() / "whole.zip");
   rois::write_roi_set(folder() / "whole.zip", {polyline, polygon, ellipse});
   files.push_back(bytes_of(folder() / "whole.zip"));
+  std::set<std::filesystem::path> others;  // of other programs, where they are at hand
+  const auto shared = test::source_folder().parent_path() / "shared/data/roi";
+  if (std::filesystem::exists(shared))
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(shared))
+      if (entry.path().extension() == ".roi") others.insert(entry.path());
+  for (const auto& file : others) files.push_back(bytes_of(file));
   return files;
 }
 

@@ -3,8 +3,6 @@
 /// faults. The same body runs in the suite's own loop (loop.cpp) and under libFuzzer (corpus.cpp).
 #pragma once
 
-#include <cstddef>
-
 #include "pipeline/contract/errors.h"
 #include "tests/support/test.h"
 

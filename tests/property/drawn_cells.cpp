@@ -82,11 +82,10 @@ TEST(DrawnCell, types_fibres_by_the_adhesions_at_their_ends) {
         const auto id = is_start ? f.start_adhesion_id : f.end_adhesion_id;
         const Vec2 end = is_start ? f.points_um.front() : f.points_um.back();
         for (const Adhesion& a : cell.adhesions)
-          if (id == a.adhesion_id) {
+          if (id == a.adhesion_id)
             EXPECT_LT(norm(a.position_um - end), 1e-9) << "fibre " << f.fibre_id;
-          } else if (!id) {
+          else if (!id)
             EXPECT_FALSE(covers(a, end, p.free_end_clearance_um - 1e-9)) << "fibre " << f.fibre_id;
-          }
       }
     }
     EXPECT_EQ(n_of_type[static_cast<int>(FibreType::ventral)], p.n_ventral);

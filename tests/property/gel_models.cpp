@@ -69,9 +69,7 @@ TEST_P(GelModels, three_components_are_those_along_the_surface_and_the_one_into_
 
 TEST_P(GelModels, refuse_what_they_cannot_answer) {
   const SurfaceMesh face{{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, {{0, 1, 2, 3}}};
-  if (!model->capabilities().surface) {
-    EXPECT_THROW(model->response({face}, {points}), UsageError);
-  }
+  if (!model->capabilities().surface) EXPECT_THROW(model->response({face}, {points}), UsageError);
   if (GetParam() == "auto" || model->capabilities().space) return;
   EXPECT_THROW(model->response({ellipses, 3}, {points}), UsageError);
   EXPECT_THROW(model->response({ellipses}, {in_space}), UsageError);
@@ -103,11 +101,10 @@ TEST_P(GelModels, answer_to_forces_in_space_as_along_the_surface) {
 TEST_P(GelModels, have_the_effects_that_they_can) {
   model->compliance_um_per_nN(points, ellipses);
   const Capabilities can = model->capabilities();
-  if (can.inside) {
+  if (can.inside)
     EXPECT_FALSE(model->volume({ellipses.front()}, {{1, 0}}).points_um.empty());
-  } else if (GetParam() != "auto") {
+  else if (GetParam() != "auto")
     EXPECT_THROW(model->volume({ellipses.front()}, {{1, 0}}), UsageError);
-  }
   EXPECT_EQ(model->effects().front().is_on, can.base);
   EXPECT_LT(model->stated_error(), 0.1);
 }

@@ -170,9 +170,7 @@ Pulling pulling(int n_beads, double sigma_um, std::uint64_t seed, const Motion& 
   return p;
 }
 
-Registered registered(const DisplacementField& beads, const Motion& motion) {
-  return {beads, kGel, motion, {-50, -50}, {50, 50}};
-}
+Registered registered(const DisplacementField& beads, const Motion& motion) { return {beads, kGel, motion}; }
 
 tractions::TractionParameters fttc() {
   tractions::TractionParameters parameters;

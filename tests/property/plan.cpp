@@ -1,7 +1,6 @@
 /// Laws of a plan: how its errors scale, and that they are those of the fit.
 #include "mbtfm/plan/cell_numbers.h"
-#include "mbtfm/plan/drawn.h"
-#include "mbtfm/plan/space_drawn.h"
+#include "mbtfm/plan/space_grid.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/errors.h"
@@ -115,19 +114,19 @@ TEST(Plan, at_the_density_that_is_needed_half_of_the_fibres_meet_the_target) {
   const Grid grid = grid_of(scene, asked, computed, kThreads);
   ASSERT_EQ(grid.needed.size(), 2u);
   for (const Needed& n : grid.needed) {
-    ASSERT_TRUE(n.beads_per_um2) << n.youngs_modulus_kPa;
+    ASSERT_TRUE(n.density) << n.youngs_modulus_kPa;
     int n_within = 0;
     const auto n_fibres = static_cast<int>(computed.cell.fibre_ids.size()) - 1;
     for (int i = 1; i <= n_fibres; ++i) {
       // a millionth beyond, where the search for it ends
-      const Point point{n.youngs_modulus_kPa, *n.beads_per_um2 * (1 + 1e-5), n.noise_um};
+      const Point point{n.youngs_modulus_kPa, *n.density * (1 + 1e-5), n.noise_um};
       n_within += standard_error_nN(computed, static_cast<std::size_t>(i), point) <= asked.target_nN;
     }
     EXPECT_GE(2 * n_within, n_fibres);
     EXPECT_LT(2 * (n_within - 1), n_fibres + 1);
   }
   // the model's part is that of every gel: half the modulus needs a quarter of the beads where the law holds
-  EXPECT_LT(*grid.needed[0].beads_per_um2, *grid.needed[1].beads_per_um2);
+  EXPECT_LT(*grid.needed[0].density, *grid.needed[1].density);
 }
 
 TEST(Plan, a_list_that_is_none_is_refused) {
@@ -297,12 +296,7 @@ struct SmallInSpace {
   std::vector<SpacePool> pools = pools_of(scene, asked, kThreads);
   SpaceForeseen foreseen = foresee(scene, asked, pools, kThreads);
   SpaceGrid grid = grid_of(scene, asked, pools, foreseen, pairs_of(scene, asked, {2, 3}, kThreads));
-  const SpaceExpected& of(const SpacePoint& p, SpaceQuantity quantity) const {
-    return *std::ranges::find_if(grid.expected, [&](const SpaceExpected& e) {
-      return e.quantity == quantity && e.point.youngs_modulus_kPa == p.youngs_modulus_kPa &&
-             e.point.beads_per_um3 == p.beads_per_um3 && e.point.noise_um == p.noise_um;
-    });
-  }
+  const SpaceExpected& of(const Point& p, SpaceQuantity quantity) const { return expected_of(grid, p, quantity); }
 };
 const SmallInSpace& in_space() {
   static const SmallInSpace small;
@@ -342,12 +336,12 @@ TEST(PlanInSpace, drawn_experiments_scatter_as_the_part_by_beads_says) {
   const SmallInSpace& s = in_space();
   constexpr int kExperiments = 24;
   for (const double density : {0.01, 0.04}) {
-    const SpacePoint point{10, density, 0.04};
+    const Point point{10, density, 0.04};
     const SpacePool& pool = density < 0.02 ? s.pools.front() : s.pools.back();
-    const SpaceDrawn drawn = draw_experiments(s.scene, pool, s.foreseen, point, kExperiments, kThreads);
-    ASSERT_EQ(drawn.forces.size(), std::size_t{kExperiments} * 6);
+    const Drawn drawn = draw_experiments(s.scene, pool, s.foreseen, point, kExperiments, kThreads);
+    ASSERT_EQ(drawn.numbers.size(), std::size_t{kExperiments} * 6);
     double squares = 0;
-    for (const SpaceDrawnForce& f : drawn.forces) squares += std::pow(f.found_nN - f.true_nN, 2) / kExperiments;
+    for (const DrawnNumber& f : drawn.numbers) squares += std::pow(f.found_nN - f.true_nN, 2) / kExperiments;
     // 144 numbers: their root mean square is known to 6 %; the places of the beads add 5 %, of the thin ones 10 %;
     // three times both
     EXPECT_NEAR(std::sqrt(squares / s.foreseen.of(point).by_noise_nN2.trace()), 1, density < 0.02 ? 0.35 : 0.24)
@@ -358,10 +352,10 @@ TEST(PlanInSpace, drawn_experiments_scatter_as_the_part_by_beads_says) {
 
 TEST(PlanInSpace, at_the_density_that_is_needed_the_error_is_the_target) {
   const SmallInSpace& s = in_space();
-  for (const SpaceNeeded& n : s.grid.needed) {
-    if (!n.beads_per_um3) continue;
+  for (const Needed& n : s.grid.needed) {
+    if (!n.density) continue;
     ASSERT_TRUE(n.of_most);
-    EXPECT_LE(*n.beads_per_um3, *n.of_most);
+    EXPECT_LE(*n.density, *n.of_most);
     const bool is_between = *n.of_most > 0.01 && *n.of_most < 0.04;
     if (!is_between) continue;
     const double thin = s.of({n.youngs_modulus_kPa, 0.01, n.noise_um}, SpaceQuantity::force).standard_error_nN,
@@ -374,10 +368,10 @@ TEST(PlanInSpace, at_the_density_that_is_needed_the_error_is_the_target) {
 TEST(PlanInSpace, what_is_said_of_a_density_does_not_depend_on_the_others) {
   SpaceScene scene = two_patches_in_space();
   scene.traction.spacing_um.reset();  // a reconstruction takes it from its beads
-  const SpacePoint point{10, 0.01, 0.02};
+  const Point point{10, 0.01, 0.02};
   const auto said_beside = [&](std::vector<double> densities) {
     Asked asked = few_points(scene);
-    asked.beads_per_um3 = std::move(densities);
+    asked.densities = std::move(densities);
     return foresee(scene, asked, pools_of(scene, asked, kThreads), kThreads).of(point);
   };
   const spatial::Foreseen alone = said_beside({0.01}), beside = said_beside({0.01, 0.03});
@@ -397,7 +391,7 @@ TEST(PlanInSpace, beads_by_area_or_too_few_or_too_many_are_refused) {
   }
   p = {};
   const Asked asked = asked_in_space(p, scene);
-  EXPECT_EQ(asked.beads_per_um3, (std::vector<double>{0.01, 0.02, 0.04}));
+  EXPECT_EQ(asked.densities, (std::vector<double>{0.01, 0.02, 0.04}));
   EXPECT_NEAR(asked.tension_nN, std::hypot(40, 20), 1e-9);
 }
 

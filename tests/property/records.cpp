@@ -2,7 +2,6 @@
 /// InputError or nothing.
 #include "pipeline/contract/errors.h"
 #include "pipeline/cost/accuracy.h"
-#include "pipeline/report/error_budget.h"
 #include "pipeline/report/provenance.h"
 #include "pipeline/report/report.h"
 #include "pipeline/runner/batch.h"
@@ -72,7 +71,6 @@ class RecordsOfCells : public testing::Test {
     expect([&] { runner::list_cells({cell_}, options_, 1); });
     expect([&] { runner::write_batch_table(folder_ / "batch.csv", folder_.path(), {cell}, {}); });
     expect([&] { report::read_provenance(run_json); });
-    expect([&] { report::error_budget_html(report::read_error_budget(run_json), "cell"); });
     expect([&] { files::read_fit_summary(cell_ / "4_fit/fit.json"); });
     for (const runner::Stage& stage : runner::stages()) {
       expect([&] { stage::read_report(runner::record_file_of(cell_, stage)); });

@@ -3,6 +3,7 @@
 #include <cctype>
 
 #include "mbtfm/plan/cell_numbers.h"
+#include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"

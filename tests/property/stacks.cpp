@@ -27,11 +27,10 @@ Score score_of(const BeadClouds& clouds, const Matching& matching) {
     const Match& m = matching.matches[k];
     if (m.flag != TrackFlag::none) continue;
     ++n_good;
-    if (m.partner == static_cast<int>(k) && k < clouds.displacement.size()) {
+    if (m.partner == static_cast<int>(k) && k < clouds.displacement.size())
       score.followed += 1.0 / static_cast<double>(clouds.displacement.size());
-    } else {
+    else
       score.wrong += 1;
-    }
   }
   score.wrong /= std::max(1, n_good);
   return score;
@@ -430,11 +429,10 @@ TEST(Stacks, beads_whose_light_is_cut_off_are_flagged_and_the_others_are_not) {
     const auto at = near.within(scene.relaxed[k].position_um, 0.8, 1);
     if (at.empty() || beads[at[0]].flag == TrackFlag::edge) continue;
     const bool is_flagged = beads[at[0]].flag == TrackFlag::saturated;
-    if (k < 15) {
+    if (k < 15)
       ++n_inside, n_flagged += is_flagged;
-    } else {
+    else
       EXPECT_FALSE(is_flagged) << "bead " << k;
-    }
   }
   EXPECT_GE(n_inside, 8);
   EXPECT_EQ(n_flagged, n_inside);

@@ -134,9 +134,7 @@ TEST(Layer, tends_to_the_half_space_as_it_grows_thick) {
         greens::make_greens(gel, test::model_named("layer"), 1)->compliance_um_per_nN(points, ellipses);
     const double difference = (layer - limit).norm();
     // the correction is a constant over h to leading order, the next term in (r/h)²: 1/10 to (20/100)² at first
-    if (previous > 0) {
-      EXPECT_NEAR(difference / previous, 0.1, 0.1 * 0.04);
-    }
+    if (previous > 0) EXPECT_NEAR(difference / previous, 0.1, 0.1 * 0.04);
     previous = difference;
   }
 }

@@ -4,10 +4,8 @@
 #include <CGAL/Alpha_shape_vertex_base_2.h>
 #include <CGAL/Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <iostream>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/numbers.h"
 #include "substrate/surface/alpha_slices.h"
 #include "substrate/surface/beads.h"
 #include "tests/support/beads_below.h"
@@ -135,9 +133,7 @@ TEST(SurfaceFromAlphaSlices, turns_with_the_beads_and_their_slices) {
   EXPECT_DOUBLE_EQ(turned.origin_um.x, map.origin_um.y);
   EXPECT_DOUBLE_EQ(turned.spacing_um.y, map.spacing_um.x);
   for (int j = 0; j < map.n_y; ++j)
-    for (int i = 0; i < map.n_x; ++i)
-      EXPECT_DOUBLE_EQ(turned.z_um[i * turned.n_x + j],
-                       map.z_um[j * map.n_x + i]);
+    for (int i = 0; i < map.n_x; ++i) EXPECT_DOUBLE_EQ(turned.z_um[i * turned.n_x + j], map.z_um[j * map.n_x + i]);
 }
 
 TEST(SurfaceFromAlphaSlices, beads_on_a_grid_are_borne) {

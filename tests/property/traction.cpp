@@ -9,17 +9,7 @@ namespace {
 
 using test::ellipse_scene;
 using test::EllipseScene;
-
-TractionParameters half_space(TractionMethod method) {
-  TractionParameters parameters;
-  parameters.method = method;
-  parameters.gel_model = GelModel::half_space;
-  return parameters;
-}
-
-TractionInputs inputs_of(const EllipseScene& scene) {
-  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions};
-}
+using test::half_space;
 
 /// Those of flat surfaces.
 const std::vector<TractionMethod> kMethods = {TractionMethod::fttc, TractionMethod::sparse, TractionMethod::trpf,
@@ -289,12 +279,9 @@ TEST(Tractions, bad_input_is_named) {
   const EllipseScene scene = ellipse_scene(16, 0.05);
   const TractionInputs inputs = full_inputs_of(scene);
   const auto expect_rejected = [](const TractionInputs& bad, TractionMethod method, const std::string& word) {
-    try {
-      reconstruct(bad, parameters_of(method), 1);
-      ADD_FAILURE() << name_of(method) << " took it: " << word;
-    } catch (const InvalidData& error) {
-      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << name_of(method) << ": " << error.what();
-    }
+    const auto error = test::caught<InvalidData>([&] { reconstruct(bad, parameters_of(method), 1); });
+    ASSERT_TRUE(error) << name_of(method) << " took it: " << word;
+    EXPECT_NE(std::string(error->what()).find(word), std::string::npos) << name_of(method) << ": " << error->what();
   };
   for (const TractionMethod method : kMethods) {
     TractionInputs bad = inputs;

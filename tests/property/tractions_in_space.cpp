@@ -164,8 +164,7 @@ TractionMesh split_at_random(const Ground& ground, std::uint64_t seed) {
 MatrixXd prolongation(const TractionMesh& mesh, const TractionMesh& finer) {
   MatrixXd P = MatrixXd::Zero(finer.n_vertices(), mesh.n_vertices());
   for (int v = 0; v < finer.n_vertices(); ++v)
-    for (const auto& [vertex, share] : shares_at(mesh, finer.quads.points_um[v]))
-      P(v, vertex) += share;
+    for (const auto& [vertex, share] : shares_at(mesh, finer.quads.points_um[v])) P(v, vertex) += share;
   return P;
 }
 
@@ -422,9 +421,8 @@ TEST_F(InSpace, the_answer_does_not_depend_on_the_lattice) {
 class SplitFaces : public InSpace {
  protected:
   Problem coarse(double noise_um, bool has_forces) {
-    if (!has_forces) {
+    if (!has_forces)
       for (auto& spot : scene.spots) spot.force_nN = {};
-    }
     scene.spacing_um = 6;
     return scene.problem(scene.beads(noise_um), parameters);
   }
@@ -996,8 +994,7 @@ TEST_F(FindingsInSpace, patches_that_are_all_there_is_have_the_errors_of_least_s
     EXPECT_FALSE(r.lambda);
     double left_nN = 0;  // of the map
     for (int v = 0; v < problem.mesh.n_vertices(); ++v)
-      if (problem.mesh.quads.points_um[v].x < 0)
-        left_nN += problem.mesh.areas_um2[v] * r.traction_kPa[3 * v];
+      if (problem.mesh.quads.points_um[v].x < 0) left_nN += problem.mesh.areas_um2[v] * r.traction_kPa[3 * v];
     EXPECT_NEAR(left_nN, r.forces[0].force_nN.x, 1e-3 * left_nN);
     for (std::size_t s = 0; s < scene.spots.size(); ++s) {
       const Vec3 off = r.forces[s].force_nN - scene.spots[s].force_nN, sigma = r.forces[s].sigma_nN;

@@ -1,5 +1,6 @@
 /// The whole chain on scenes at random: ten in the suite, as many as MBTFM_SCENES says at night
-/// (MBTFM_SCENES=500 MBTFM_FIRST_SCENE=1000 build/tests/stability_scenes). Scenes that failed once are kept below.
+/// (MBTFM_SCENES=500 MBTFM_FIRST_SCENE=1000 build/tests/stability_tests --gtest_filter=RandomScenes.*). Scenes that
+/// failed once are kept below.
 #include <ostream>
 
 #include "pipeline/contract/errors.h"

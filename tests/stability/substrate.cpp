@@ -104,17 +104,15 @@ TEST_P(Model, rejects_what_is_no_gel_no_ellipse_no_point_and_no_force) {
   test::hard_case("nu > 0.5, E <= 0, axes of zero, NaN", "an error for each");
   const SubstrateParameters parameters = test::model_named(GetParam());
   for (const Gel& gel : {Gel{8.4, 0.51, 20}, Gel{8.4, 0.6, 20}, Gel{8.4, -0.1, 20}, Gel{0, 0.4, 20}, Gel{-1, 0.4, 20},
-                         Gel{8.4, 0.4, 0}, Gel{NAN, 0.4, 20}, Gel{8.4, NAN, 20}}) {
+                         Gel{8.4, 0.4, 0}, Gel{NAN, 0.4, 20}, Gel{8.4, NAN, 20}})
     EXPECT_THROW(choice::make_substrate(gel, parameters, 1), InvalidData);
-  }
   const auto model = choice::make_substrate(kGel, parameters, 1);
   const Ellipse good = {{0, 0}, 1, 0.5, 0};
   EXPECT_THROW(model->compliance_um_per_nN({{NAN, 0}}, {good}), InvalidData);
   EXPECT_THROW(model->compliance_um_per_nN({{0, INFINITY}}, {good}), InvalidData);
   for (const Ellipse& bad : {Ellipse{{NAN, 0}, 1, 0.5, 0}, Ellipse{{0, 0}, 1, 0, 0}, Ellipse{{0, 0}, 0.5, 1, 0},
-                             Ellipse{{0, 0}, INFINITY, 1, 0}, Ellipse{{0, 0}, 1, 0.5, NAN}}) {
+                             Ellipse{{0, 0}, INFINITY, 1, 0}, Ellipse{{0, 0}, 1, 0.5, NAN}})
     EXPECT_THROW(model->compliance_um_per_nN({{0, 0}}, {bad}), InvalidData);
-  }
   EXPECT_THROW(model->displacements_um({{0, 0}}, {good}, {{NAN, 0}}), InvalidData);
   EXPECT_THROW(model->displacements_um({{0, 0}}, {good}, {}), InvalidData);
 }

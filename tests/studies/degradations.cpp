@@ -128,9 +128,8 @@ void add_noise(Image& image, double times, unsigned seed) {
   cv::Mat pixels = mat(image), high;
   cv::Laplacian(pixels, high, CV_32F);  // of noise of sd s: s sqrt(20)
   std::vector<float> sizes;
-  for (int j = 0; j < high.rows; ++j) {
+  for (int j = 0; j < high.rows; ++j)
     for (int i = 0; i < high.cols; ++i) sizes.push_back(std::abs(high.at<float>(j, i)));
-  }
   const double sigma = 1.4826 * quantile(sizes, 0.5) / std::sqrt(20.0);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal(0, times * sigma);
@@ -563,9 +562,8 @@ void write(const fs::path& folder, const Set& set) {
     if (!set.as_jpeg) return images::write_tiff(folder / (name + ".tif"), i);
     const float most = *std::ranges::max_element(i.pixels);
     images::Picture picture{.width = i.width, .height = i.height, .rgb = {}};
-    for (const float p : i.pixels) {
+    for (const float p : i.pixels)
       for (int c = 0; c < 3; ++c) picture.rgb.push_back(static_cast<std::uint8_t>(255 * p / most));
-    }
     images::write_jpeg(folder / (name + ".jpg"), picture);
   };
   image("paxillin", set.adhesion);

@@ -4,7 +4,6 @@
 /// names its pair of adhesions among as many rows as were taken out, the tension it states there and its standard
 /// error, and the open findings.
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
@@ -26,9 +25,8 @@ bool run(const std::string& command) {
 
 std::string open_findings(const fs::path& cell) {
   std::string ids;
-  for (const files::JsonRecord& finding : files::JsonRecord(cell / "run.json", "a run").at("findings").list()) {
+  for (const files::JsonRecord& finding : files::JsonRecord(cell / "run.json", "a run").at("findings").list())
     if (finding.at("severity").text() != "note") ids += (ids.empty() ? "" : "; ") + finding.at("id").text();
-  }
   return ids;
 }
 

@@ -400,9 +400,8 @@ void beside_fttc(const Arguments& a) {
 }
 
 Network relabelled(Network network, const std::vector<int>& removed) {
-  for (Link& link : network.links) {
+  for (Link& link : network.links)
     if (std::find(removed.begin(), removed.end(), link.fibre_id) != removed.end()) link.fibre_id = 0;
-  }
   return network;
 }
 

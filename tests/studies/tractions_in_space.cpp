@@ -287,9 +287,8 @@ void meshes(const TractionScene& scene) {
 spatial::Problem on_faces(const spatial::Problem& fine, const spatial::TractionMesh& mesh) {
   Eigen::MatrixXd by_component = Eigen::MatrixXd::Zero(fine.n_unknowns(), 3 * mesh.n_vertices());
   for (Eigen::Index v = 0; v < fine.mesh.n_vertices(); ++v) {
-    for (const auto& [vertex, share] : shares_at(mesh, fine.mesh.quads.points_um[v])) {
+    for (const auto& [vertex, share] : shares_at(mesh, fine.mesh.quads.points_um[v]))
       for (Eigen::Index c = 0; c < 3; ++c) by_component(3 * v + c, 3 * vertex + c) += share;
-    }
   }
   spatial::Problem other = fine;
   other.mesh = mesh;

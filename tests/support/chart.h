@@ -73,9 +73,8 @@ inline std::string chart(const std::vector<Panel>& panels) {
       std::vector<Vec2> points;
       for (std::size_t i = 0; i < s.x.size(); ++i) points.push_back({s.x[i], s.y[i]});
       if (s.is_line) one.curve(points, "stroke:" + colour + ";stroke-width:1.8");
-      if (points.size() <= 60) {
+      if (points.size() <= 60)
         for (const Vec2 p : points) one.dot(p, 2.6, "fill:" + colour);
-      }
       if (panel.series.size() > 1) one.key(s.name, colour);
     }
     all.push_back(std::move(one));

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/beads.h"
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
@@ -21,6 +22,17 @@ struct EllipseScene {
   std::vector<Vec2> tractions_kPa;  ///< mean over each pixel, in the same order
   double largest_um = 0;            ///< displacement, without noise
 };
+
+inline tractions::TractionParameters half_space(tractions::TractionMethod method = tractions::TractionMethod::fttc) {
+  tractions::TractionParameters parameters;
+  parameters.method = method;
+  parameters.gel_model = GelModel::half_space;
+  return parameters;
+}
+
+inline tractions::TractionInputs inputs_of(const EllipseScene& scene) {
+  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions};
+}
 
 inline bool is_in_ellipse(const Adhesion& a, Vec2 point_um, double grown_um = 0) {
   const Vec2 d = point_um - a.position_um;

@@ -8,6 +8,21 @@
 
 namespace mbtfm::test {
 
+/// Squares in a row, shared out to conditions a, b, …; what pulls in them is still to come.
+inline statistics::Study study_of_squares(const std::string& name, int n_cells, int n_conditions) {
+  statistics::Study study;
+  for (int c = 0; c < n_conditions; ++c)
+    study.conditions.push_back(n_conditions == 1 ? "" : std::string(1, static_cast<char>('a' + c)));
+  for (int i = 0; i < n_cells; ++i) {
+    const double x = 50.0 * i;
+    study.cells.push_back({.name = name + std::to_string(i),
+                           .condition = i * n_conditions / n_cells,
+                           .cell = {.outline_um = {{x, 0}, {x + 40, 0}, {x + 40, 40}, {x, 40}}},
+                           .fit = {.converged = true}});
+  }
+  return study;
+}
+
 struct StudySettings {
   int n_cells = 20;
   int n_conditions = 1;
@@ -25,12 +40,9 @@ struct StudySettings {
 inline statistics::Study simulated_study(const StudySettings& s) {
   std::mt19937_64 random(s.seed);
   std::normal_distribution<double> normal;
-  statistics::Study study;
-  for (int c = 0; c < s.n_conditions; ++c)
-    study.conditions.push_back(s.n_conditions == 1 ? "" : std::string(1, static_cast<char>('a' + c)));
-  for (int i = 0; i < s.n_cells; ++i) {
-    statistics::StudyCell cell{
-        .name = "cell_" + std::to_string(i), .condition = i * s.n_conditions / s.n_cells, .cell = round_cell()};
+  statistics::Study study = study_of_squares("cell_", s.n_cells, s.n_conditions);
+  for (statistics::StudyCell& cell : study.cells) {
+    cell.cell = round_cell();
     cell.cell.fibres.clear();
     cell.tensions.push_back({.fibre_id = 0, .tension_nN = 0.06});
     const double of_cell = s.cell_sd_nN * normal(random);
@@ -60,8 +72,6 @@ inline statistics::Study simulated_study(const StudySettings& s) {
     cell.fit.network_force_nN = 0.2 * cell.fit.total_force_nN;
     cell.fit.fibre_force_nN = 0.8 * cell.fit.total_force_nN;
     cell.fit.network_surface_tension_nN_per_um = 0.07 * std::exp(0.1 * normal(random));
-    cell.fit.converged = true;
-    study.cells.push_back(std::move(cell));
   }
   return study;
 }
@@ -77,17 +87,12 @@ struct SheetStudySettings {
   std::uint64_t seed = 1;
 };
 
-/// Square sheets in a row, whose other figures follow the contraction.
+/// Sheets whose other figures follow the contraction.
 inline statistics::Study simulated_sheets(const SheetStudySettings& s) {
   std::mt19937_64 random(s.seed);
   std::normal_distribution<double> normal;
-  statistics::Study study;
-  for (int c = 0; c < s.n_conditions; ++c)
-    study.conditions.push_back(s.n_conditions == 1 ? "" : std::string(1, static_cast<char>('a' + c)));
-  for (int i = 0; i < s.n_sheets; ++i) {
-    statistics::StudyCell cell{.name = "sheet_" + std::to_string(i), .condition = i * s.n_conditions / s.n_sheets};
-    const double x = 50.0 * i;
-    cell.cell.outline_um = {{x, 0}, {x + 40, 0}, {x + 40, 40}, {x, 40}};
+  statistics::Study study = study_of_squares("sheet_", s.n_sheets, s.n_conditions);
+  for (statistics::StudyCell& cell : study.cells) {
     const double value = s.contraction_nN_per_um + cell.condition * s.condition_effect_nN_per_um +
                          s.sheet_sd_nN_per_um * normal(random) + s.error_nN_per_um * normal(random),
                  sigma = std::hypot(s.error_nN_per_um, s.gel_error_nN_per_um);
@@ -118,8 +123,6 @@ inline statistics::Study simulated_sheets(const SheetStudySettings& s) {
                               .expected_relative_l2 = 0.25};
     cell.fit.relative_l2 = 0.3;
     cell.fit.expected_relative_l2 = 0.25;
-    cell.fit.converged = true;
-    study.cells.push_back(std::move(cell));
   }
   return study;
 }
@@ -135,17 +138,12 @@ struct SpaceStudySettings {
   std::uint64_t seed = 1;
 };
 
-/// Round cells in a row on a gel in space, whose other figures follow the force.
+/// Cells on a gel in space whose other figures follow the force.
 inline statistics::Study simulated_cells_in_space(const SpaceStudySettings& s) {
   std::mt19937_64 random(s.seed);
   std::normal_distribution<double> normal;
-  statistics::Study study;
-  for (int c = 0; c < s.n_conditions; ++c)
-    study.conditions.push_back(s.n_conditions == 1 ? "" : std::string(1, static_cast<char>('a' + c)));
-  for (int i = 0; i < s.n_cells; ++i) {
-    statistics::StudyCell cell{.name = "space_" + std::to_string(i), .condition = i * s.n_conditions / s.n_cells};
-    const double x = 50.0 * i;
-    cell.cell.outline_um = {{x, 0}, {x + 40, 0}, {x + 40, 40}, {x, 40}};
+  statistics::Study study = study_of_squares("space_", s.n_cells, s.n_conditions);
+  for (statistics::StudyCell& cell : study.cells) {
     const double force = s.force_nN + cell.condition * s.condition_effect_nN + s.cell_sd_nN * normal(random) +
                          s.error_nN * normal(random);
     cell.space = statistics::SpaceFigures{.method = "group-l1",
@@ -164,8 +162,6 @@ inline statistics::Study simulated_cells_in_space(const SpaceStudySettings& s) {
           {a + 1, force / s.n_adhesions * std::exp(0.3 * normal(random)), s.error_nN / s.n_adhesions});
     cell.fit.relative_l2 = 0.3;
     cell.fit.noise_um = 0.02;
-    cell.fit.converged = true;
-    study.cells.push_back(std::move(cell));
   }
   return study;
 }

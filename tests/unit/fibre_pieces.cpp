@@ -51,7 +51,8 @@ TEST(FibrePieces, need_to_fit_the_less_the_brighter_the_way_between_them_is) {
 
 TEST(FibrePieces, stay_apart_beside_each_other_at_an_angle_and_where_one_is_far_brighter) {
   const Trace left = trace_of(20, 110, level);
-  EXPECT_EQ(n_lines(left, trace_of(150, 280, [](double) { return 156.0; })), 2);  // two of a fibre's radii aside
+  EXPECT_EQ(n_lines(left, trace_of(150, 280, [](double) { return 156.0; })),
+            2);  // two of a fibre's radii aside
   EXPECT_EQ(n_lines(left, trace_of(150, 280, [](double x) { return 150 + 0.36 * (x - 130); })), 2);  // 20°
   EXPECT_EQ(n_lines(left, trace_of(150, 280, level, 8 * 3)), 2);
 }

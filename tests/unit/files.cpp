@@ -289,11 +289,10 @@ TEST(Files, heights_of_a_lattice_come_in_any_order_and_have_holes) {
   for (std::size_t k = 0; k < 16; ++k) {
     const std::size_t i = k % 4, j = k / 4;
     const bool is_hole = (i == 1 && j == 1) || (i == 3 && j == 2);
-    if (is_hole) {
+    if (is_hole)
       EXPECT_TRUE(std::isnan(map.z_um[k]));
-    } else {
+    else
       EXPECT_EQ(map.z_um[k], static_cast<double>(10 * j + i));
-    }
   }
 }
 

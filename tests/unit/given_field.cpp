@@ -75,9 +75,7 @@ TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
     EXPECT_EQ(motion.affine.is_on, growth > 0) << motion.affine.why;
     EXPECT_NEAR(motion.common.growth, growth, 0.05 / 256);  // the noise of one point, at the border
     for (std::size_t k = 0; k < field.size(); ++k) {
-      if (!motion.affine.is_on) {
-        EXPECT_EQ(field[k].displacement_um, before[k].displacement_um);
-      }
+      if (!motion.affine.is_on) EXPECT_EQ(field[k].displacement_um, before[k].displacement_um);
       // six standard deviations of the noise
       EXPECT_LT(norm(field[k].displacement_um - truth[k].displacement_um), 0.3);
     }

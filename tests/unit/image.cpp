@@ -118,13 +118,9 @@ TEST(Image, calibration_is_understood_in_each_dialect) {
 }
 
 std::string error_of(const fs::path& file, int page = 0) {
-  try {
-    read_image(file, page);
-  } catch (const InputError& error) {
-    EXPECT_EQ(error.where, file.string());
-    return error.found;
-  }
-  return "no error";
+  const auto error = test::caught<InputError>([&] { read_image(file, page); });
+  if (error) EXPECT_EQ(error->where, file.string());
+  return error ? error->found : "no error";
 }
 
 TEST(Image, what_is_no_image_is_named_for_what_it_is) {

@@ -37,12 +37,8 @@ float value_of(const fs::path& file, const PlaneChoice& choice) {
 }
 
 std::string refusal(const fs::path& file, const PlaneChoice& choice) {
-  try {
-    read_image(file, choice);
-  } catch (const InputError& error) {
-    return error.expected + ", found " + error.found + "; " + error.hint;
-  }
-  return "no error";
+  const auto error = test::caught<InputError>([&] { read_image(file, choice); });
+  return error ? error->expected + ", found " + error->found + "; " + error->hint : "no error";
 }
 
 TEST(ImagePlanes, imagej_stores_channels_fastest_then_slices_then_frames) {

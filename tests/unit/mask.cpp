@@ -32,12 +32,8 @@ int n_pixels(const LabelMask& m) {
 }
 
 std::string refusal_of(const auto& body) {
-  try {
-    body();
-  } catch (const InputError& error) {
-    return error.where + ": " + error.expected + "; " + error.found;
-  }
-  return "no error";
+  const auto error = test::caught<InputError>(body);
+  return error ? error->where + ": " + error->expected + "; " + error->found : "no error";
 }
 
 std::string hint_of(const auto& body) {

@@ -30,9 +30,8 @@ TEST(Names, characters_of_utf8_have_their_lengths_and_nothing_else_has_one) {
                                                                                      {"\xF0\x8F\xBF\xBF", 0},
                                                                                      {"\xF4\x90\x80\x80", 0},
                                                                                      {"\xF5\x80\x80\x80", 0},
-                                                                                     {"\xFF", 0}}) {
+                                                                                     {"\xFF", 0}})
     EXPECT_EQ(files::utf8_length(text), length) << files::shown_name(text);
-  }
 }
 
 TEST(Names, a_name_of_any_bytes_is_shown_as_utf8_and_shown_again_stays_as_it_is) {

@@ -6,15 +6,6 @@
 namespace mbtfm {
 namespace {
 
-InputError refusal_of(const std::function<void()>& ask) {
-  try {
-    ask();
-  } catch (const InputError& error) {
-    return error;
-  }
-  return {"", "", "nothing was refused"};
-}
-
 std::vector<stage::Doubt> doubts_about_gel(Gel gel, const std::string& allow = "") {
   stage::ParameterList list;
   declare(list, gel);
@@ -47,19 +38,18 @@ TEST(Plausible, what_published_experiments_used_and_found_is_not_doubted) {
                                                                                        {"total_force_nN", 204},
                                                                                        {"total_force_nN", 920},
                                                                                        {"fibre_tension_nN", 103},
-                                                                                       {"traction_kPa", 5.5}}) {
+                                                                                       {"traction_kPa", 5.5}})
     EXPECT_FALSE(stage::doubt_about(id, value)) << id << " = " << value;
-  }
 }
 
 TEST(Plausible, a_modulus_in_pascal_is_refused_and_the_unit_named) {
-  const InputError error = refusal_of([] { doubts_about_gel({.youngs_modulus_kPa = 8400}); });
+  const InputError error = test::thrown<InputError>([] { doubts_about_gel({.youngs_modulus_kPa = 8400}); });
   EXPECT_EQ(error.where, "[gel] youngs_modulus_kPa");
   EXPECT_EQ(error.expected, "a number >= 0.01 and <= 1000 kPa");
   EXPECT_NE(error.hint.find("the unit is kPa: 8400 Pa is 8.4 kPa"), std::string::npos) << error.hint;
   EXPECT_NE(error.hint.find("Discher"), std::string::npos) << "the source: " << error.hint;
   EXPECT_NE(error.hint.find("allow = [\"youngs_modulus_kPa\"]"), std::string::npos) << error.hint;
-  const InputError small = refusal_of([] { doubts_about_gel({.youngs_modulus_kPa = 0.0084}); });
+  const InputError small = test::thrown<InputError>([] { doubts_about_gel({.youngs_modulus_kPa = 0.0084}); });
   EXPECT_NE(small.hint.find("0.0084 MPa is 8.4 kPa"), std::string::npos) << small.hint;
 }
 
@@ -69,7 +59,7 @@ TEST(Plausible, what_is_allowed_is_doubted_and_no_longer_refused) {
   EXPECT_EQ(doubts.front().level, stage::DoubtLevel::refused);
   EXPECT_EQ(doubts.front().value, 8400);
   EXPECT_EQ(doubts.front().limit, 1000);
-  EXPECT_NE(refusal_of([] { doubts_about_gel({.youngs_modulus_kPa = 8400}, "thickness_um"); }).where, "")
+  EXPECT_NE(test::thrown<InputError>([] { doubts_about_gel({.youngs_modulus_kPa = 8400}, "thickness_um"); }).where, "")
       << "what is allowed is one quantity, not all";
   EXPECT_THROW(stage::allowed_quantities({.allow = "youngs_modulus"}), UsageError);
   EXPECT_EQ(stage::allowed_quantities({.allow = "traction_kPa, total_force_nN"}),
@@ -108,7 +98,7 @@ TEST(Plausible, a_pixel_size_is_doubted_from_one_per_cent_off_the_images_own_and
   EXPECT_EQ(halved.level, stage::DoubtLevel::refused);
   EXPECT_NE(halved.remedy.find("binning"), std::string::npos);
   EXPECT_NO_THROW(stage::require_possible(halved, {"pixel_size_um"}, "actin.tif"));
-  const InputError error = refusal_of([&] { stage::require_possible(halved, {}, "actin.tif"); });
+  const InputError error = test::thrown<InputError>([&] { stage::require_possible(halved, {}, "actin.tif"); });
   EXPECT_EQ(error.where, "actin.tif");
   EXPECT_EQ(error.expected, "about 0.2 um, the image's own calibration");
   EXPECT_EQ(error.found, "0.1 um");

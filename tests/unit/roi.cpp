@@ -138,13 +138,9 @@ TEST(Roi, a_spline_longer_than_any_image_is_refused_before_it_is_drawn) {
 }
 
 std::string error_of(const fs::path& file) {
-  try {
-    read_rois(file);
-  } catch (const InputError& error) {
-    EXPECT_EQ(error.where.substr(0, file.string().size()), file.string());
-    return error.found;
-  }
-  return "no error";
+  const auto error = test::caught<InputError>([&] { read_rois(file); });
+  if (error) EXPECT_EQ(error->where.substr(0, file.string().size()), file.string());
+  return error ? error->found : "no error";
 }
 
 TEST(Roi, what_is_no_roi_is_named_for_what_it_is) {

@@ -73,9 +73,8 @@ TEST_F(Stage, outputs_and_the_record_are_in_place_when_it_is_done) {
   EXPECT_EQ(files::read_text(folder_ / "out/deep/b.csv"), "b");
   const std::string record = files::read_text(folder_ / "record.json");
   for (const char* word : {"\"stage\": \"example\"", "\"length_um\": 2.5", "\"in.txt\"", "\"out/deep/b.csv\"",
-                           "\"n\": 2", "\"summary\": \"two files\""}) {
+                           "\"n\": 2", "\"summary\": \"two files\""})
     EXPECT_NE(record.find(word), std::string::npos) << word << " is not in " << record;
-  }
 }
 
 struct OnGel {
@@ -240,9 +239,7 @@ TEST(Console, colours_warnings_on_a_terminal_alone_and_never_against_no_color) {
   EXPECT_EQ(stage::warning("x"), "x");
   unsetenv("NO_COLOR");
   unsetenv("MBTFM_TERMINAL");
-  if (isatty(STDERR_FILENO) == 0) {
-    EXPECT_EQ(stage::warning("x"), "x");
-  }
+  if (isatty(STDERR_FILENO) == 0) EXPECT_EQ(stage::warning("x"), "x");
 }
 
 }  // namespace

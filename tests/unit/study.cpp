@@ -31,10 +31,16 @@ struct FakeStudy {
     files::write_fit_summary(folder / "control/cell_5/4_fit/fit.json", fit);
     test::write_given_stages(folder / "treated/cell_6", test::round_cell());
   }
-  Study read(const StudyParameters& parameters = {}, const std::optional<Path>& table = {}) const {
-    return read_study(folder.path(), parameters, table, 2);
+  /// @param table  text of study.csv; empty: none
+  Study read(const StudyParameters& parameters = {}, const std::string& table = {}) const {
+    if (!table.empty()) files::write_text(folder / "study.csv", table);
+    return read_study(folder.path(), parameters, table.empty() ? std::optional<Path>() : folder / "study.csv", 2);
   }
 };
+
+bool says(const Analysis& analysis, const char* what) {
+  return std::ranges::any_of(analysis.warnings, [&](const std::string& w) { return w.find(what) != w.npos; });
+}
 
 std::string reason_of(const Study& study, const std::string& cell) {
   for (const LeftOutCell& c : study.left_out)
@@ -82,10 +88,9 @@ TEST(Study, conditions_come_from_a_folder_or_a_table) {
   const Study by_folder = fake.read({.condition_from = "folder"});
   EXPECT_EQ(by_folder.conditions, (std::vector<std::string>{"control", "treated"}));
   EXPECT_EQ(by_folder.cells[3].condition, 1);
-  files::write_text(
-      fake.folder / "study.csv",
-      "cell,drug,exclude\ncell_1,none,\ncontrol/cell_3,none,dividing\ncell_2,blebbistatin,\ncell_5,none,\n");
-  const Study by_table = fake.read({.condition_from = "drug"}, fake.folder / "study.csv");
+  const Study by_table =
+      fake.read({.condition_from = "drug"},
+                "cell,drug,exclude\ncell_1,none,\ncontrol/cell_3,none,dividing\ncell_2,blebbistatin,\ncell_5,none,\n");
   EXPECT_EQ(by_table.conditions, (std::vector<std::string>{"blebbistatin", "none"}));
   EXPECT_EQ(reason_of(by_table, "control/cell_3"), "dividing");
   EXPECT_EQ(reason_of(by_table, "treated/cell_4"), "not in the table");
@@ -93,23 +98,21 @@ TEST(Study, conditions_come_from_a_folder_or_a_table) {
 
 TEST(Study, a_column_called_condition_counts_without_being_asked_for) {
   const FakeStudy fake;
-  files::write_text(
-      fake.folder / "study.csv",
-      "cell,condition,day\ncell_1,untreated,mon\ncell_2,drug,mon\ncell_3,untreated,tue\ncell_4,drug,tue\n");
-  const Study study = fake.read({}, fake.folder / "study.csv");
+  const std::string table =
+      "cell,condition,day\ncell_1,untreated,mon\ncell_2,drug,mon\ncell_3,untreated,tue\ncell_4,drug,tue\n";
+  const Study study = fake.read({}, table);
   EXPECT_EQ(study.conditions, (std::vector<std::string>{"drug", "untreated"}));
   EXPECT_EQ(study.cells[0].replicate, "mon");
   EXPECT_EQ(study.cells[1].replicate, "tue");
-  const Study ordered = fake.read({.conditions = "untreated , drug"}, fake.folder / "study.csv");
+  const Study ordered = fake.read({.conditions = "untreated , drug"}, table);
   EXPECT_EQ(ordered.conditions, (std::vector<std::string>{"untreated", "drug"}));
   EXPECT_EQ(ordered.cells[0].condition, 0);
-  EXPECT_THROW(fake.read({.conditions = "control"}, fake.folder / "study.csv"), UsageError);
+  EXPECT_THROW(fake.read({.conditions = "control"}, table), UsageError);
 }
 
 TEST(Study, a_column_called_condition_that_nobody_filled_in_asks_for_nothing) {
   const FakeStudy fake;
-  files::write_text(fake.folder / "study.csv", "cell,condition,day\ncell_1,,\ncell_2,,\n");
-  const Study study = fake.read({}, fake.folder / "study.csv");
+  const Study study = fake.read({}, "cell,condition,day\ncell_1,,\ncell_2,,\n");
   EXPECT_EQ(study.conditions, std::vector<std::string>{""});
   EXPECT_EQ(study.cells.size(), 2u);
 }
@@ -130,14 +133,11 @@ TEST(Study, what_cannot_be_assigned_is_an_error_that_says_so) {
   const FakeStudy fake;
   EXPECT_THROW(fake.read({.condition_from = "drug"}), UsageError);
   EXPECT_THROW(fake.read({.condition_from = "folder2"}), InputError);
-  const auto table = [&](const std::string& text) {
-    files::write_text(fake.folder / "study.csv", text);
-    return std::optional<Path>(fake.folder / "study.csv");
-  };
-  EXPECT_THROW(fake.read({.condition_from = "drug"}, table("cell,dose\ncell_1,2\n")), InputError);
-  EXPECT_THROW(fake.read({}, table("cell\ncell_77\n")), InputError);
-  EXPECT_THROW(fake.read({}, table("cell\ncell_1\ncontrol/cell_1\n")), InputError);
-  EXPECT_THROW(notes_of({"a/x", "b/x"}, "", "", table("cell\nx\n")), InputError);
+  EXPECT_THROW(fake.read({.condition_from = "drug"}, "cell,dose\ncell_1,2\n"), InputError);
+  EXPECT_THROW(fake.read({}, "cell\ncell_77\n"), InputError);
+  EXPECT_THROW(fake.read({}, "cell\ncell_1\ncontrol/cell_1\n"), InputError);
+  files::write_text(fake.folder / "study.csv", "cell\nx\n");
+  EXPECT_THROW(notes_of({"a/x", "b/x"}, "", "", fake.folder / "study.csv"), InputError);
 }
 
 TEST(Study, a_folder_without_a_finished_cell_is_an_error) {
@@ -148,8 +148,8 @@ TEST(Study, a_folder_without_a_finished_cell_is_an_error) {
 
 TEST(Study, where_no_cell_enters_each_reason_is_told) {
   const FakeStudy fake;
-  files::write_text(fake.folder / "study.csv", "cell,exclude\ncell_1,blurred\ncell_2,blurred\ncell_3,dividing\n");
-  const InputError error = test::thrown<InputError>([&] { fake.read({}, fake.folder / "study.csv"); });
+  const InputError error = test::thrown<InputError>(
+      [&] { fake.read({}, "cell,exclude\ncell_1,blurred\ncell_2,blurred\ncell_3,dividing\n"); });
   EXPECT_NE(std::string(error.what()).find("2: blurred, 1: dividing"), std::string::npos) << error.what();
 }
 
@@ -160,9 +160,7 @@ TEST(Study, tensions_that_cannot_be_identified_do_not_enter) {
   for (Tension& t : study.cells[0].tensions)
     if (t.fibre_id == 2) t.identifiable = false;
   EXPECT_EQ(measured_fibres(study).size(), all - 1);
-  const auto warnings = analyse(study, {}).warnings;
-  EXPECT_TRUE(std::any_of(warnings.begin(), warnings.end(),
-                          [](const std::string& w) { return w.find("could not be identified") != w.npos; }));
+  EXPECT_TRUE(says(analyse(study, {}), "could not be identified"));
 }
 
 TEST(Study, edge_fibres_count_as_ventral_ones_or_as_a_type_of_their_own) {
@@ -218,8 +216,7 @@ TEST(Study, forces_of_a_network_that_cannot_be_identified_do_not_enter) {
   const files::CsvTable cells(tables_of(study, analysis)[0].second, "cells.csv");
   EXPECT_FALSE(cells.optional_number(0, "network_force_nN"));
   EXPECT_TRUE(cells.optional_number(1, "network_force_nN"));
-  EXPECT_TRUE(std::any_of(analysis.warnings.begin(), analysis.warnings.end(),
-                          [](const std::string& w) { return w.find("network's tension of 1 of 4 cells") != w.npos; }));
+  EXPECT_TRUE(says(analysis, "network's tension of 1 of 4 cells"));
 }
 
 TEST(Study, four_cells_have_no_line_and_five_have_one) {
@@ -531,6 +528,27 @@ Study read_again(const Study& study, const test::TemporaryFolder& folder, const 
   return read_study(folder.path(), by_folder, {}, 2);
 }
 
+std::string page_of(const Study& study, const Analysis& analysis) {
+  return study_html(study, analysis, figures_of(study, analysis, {}), {}, study.folder);
+}
+
+void expect_no_word_of_fibres(const std::string& page) {
+  for (const char* of_fibres : {"ibre type", "Stress-fibre", "transverse", "No tension", "Not drawn"})
+    EXPECT_EQ(page.find(of_fibres), std::string::npos) << of_fibres;
+}
+
+/// No figure is of cells of two kinds, and each quantity has a column of its own.
+void expect_unmixed(const Study& study, const Analysis& analysis) {
+  std::set<std::string> columns;
+  for (const Measure* m : analysis.measures()) {
+    EXPECT_TRUE(columns.insert(m->sample.column).second) << m->sample.column << " is two quantities";
+    for (const Observation& o : m->sample.values)
+      EXPECT_EQ(study.cells[o.cell].kind(), m->sample.of_cells()) << m->sample.column;
+  }
+  for (const Correlation& c : analysis.correlations)
+    for (const int cell : c.cells) EXPECT_EQ(study.cells[cell].kind(), CellKind::plane) << c.force;
+}
+
 const Sample* sample_named(const Analysis& analysis, const std::string& column) {
   for (const Measure* m : analysis.measures())
     if (m->sample.column == column) return &m->sample;
@@ -559,10 +577,9 @@ TEST(SheetStudy, has_what_the_fit_found_and_compares_the_contraction_first) {
   EXPECT_EQ(sample_named(analysis, "line_tension_nN"), nullptr) << "nobody asked for it";
   EXPECT_EQ(sample_named(analysis, "tension_nN"), nullptr) << "there is no fibre";
   for (const auto& [name, text] : tables_of(study, analysis)) EXPECT_FALSE(text.empty()) << name;
-  const std::string page = study_html(study, analysis, figures_of(study, analysis, {}), {}, folder.path());
+  const std::string page = page_of(study, analysis);
   EXPECT_NE(page.find("<h1>Contraction of 12 sheets</h1>"), std::string::npos);
-  for (const char* of_fibres : {"ibre type", "Stress-fibre", "transverse", "No tension", "Not drawn"})
-    EXPECT_EQ(page.find(of_fibres), std::string::npos) << of_fibres;
+  expect_no_word_of_fibres(page);
 }
 
 TEST(SheetStudy, its_figures_are_those_of_each_sheet_under_their_names_units_and_conditions) {
@@ -594,9 +611,7 @@ TEST(SheetStudy, its_figures_are_those_of_each_sheet_under_their_names_units_and
       EXPECT_EQ(o.group, cell.condition) << e.column;
       const int row = row_with(cells, {{"cell", cell.name}});
       EXPECT_EQ(cells.text(row, "condition"), study.conditions[cell.condition]);
-      if (*e.in_cells) {
-        EXPECT_NEAR(cells.number(row, e.in_cells), value, 1e-5 * value) << e.column << ": six digits";
-      }
+      if (*e.in_cells) EXPECT_NEAR(cells.number(row, e.in_cells), value, 1e-5 * value) << e.column << ": six digits";
     }
   }
 }
@@ -659,13 +674,9 @@ TEST(SheetStudy, beside_cells_with_fibres_no_figure_mixes_the_two) {
   ASSERT_EQ(study.cells.size(), 11u);
   EXPECT_EQ(n_of_kind(study, CellKind::plane), 5);
   const Analysis analysis = analyse(study, {});
-  for (const Measure* m : analysis.measures())
-    for (const Observation& o : m->sample.values)
-      EXPECT_EQ(study.cells[static_cast<std::size_t>(o.cell)].kind(), m->sample.of_cells()) << m->sample.column;
+  expect_unmixed(study, analysis);
   EXPECT_EQ(sample_named(analysis, "total_force_nN")->values.size(), 5u);
   EXPECT_EQ(sample_named(analysis, "sheet_force_nN")->values.size(), 6u);
-  for (const Correlation& c : analysis.correlations)
-    for (const int cell : c.cells) EXPECT_FALSE(study.cells[cell].sheet) << c.force;
   const files::CsvTable cells = table_of(study, "cells.csv");
   int n_of_sheets = 0;
   for (int row = 0; row < cells.n_rows(); ++row) {
@@ -679,7 +690,7 @@ TEST(SheetStudy, beside_cells_with_fibres_no_figure_mixes_the_two) {
     EXPECT_FALSE(cells.text(row, "cell_area_um2").empty());
   }
   EXPECT_EQ(n_of_sheets, 6);
-  const std::string page = study_html(study, analysis, figures_of(study, analysis, {}), {}, folder.path());
+  const std::string page = page_of(study, analysis);
   EXPECT_NE(page.find("Stress-fibre tensions of 5 cells and contraction of 6 sheets"), std::string::npos);
 }
 
@@ -696,9 +707,7 @@ TEST(SheetStudy, takes_no_value_that_was_given_or_that_the_beads_limit_to_one_si
   const Analysis analysis = analyse(study, {});
   EXPECT_EQ(sample_named(analysis, "stiffness_nN_per_um")->values.size(), 4u);
   EXPECT_EQ(sample_named(analysis, "contraction_nN_per_um")->values.size(), 6u);
-  EXPECT_TRUE(std::ranges::any_of(analysis.warnings, [](const std::string& w) {
-    return w.find("limit the stiffness of sheets") != w.npos && w.find("in 1 of 5 fits") != w.npos;
-  }));
+  EXPECT_TRUE(says(analysis, "limit the stiffness of sheets to one side only, or not at all, in 1 of 5 fits"));
   const files::CsvTable sheets = table_of(study, "sheets.csv");
   EXPECT_EQ(sheets.text(row_with(sheets, {{"cell", "a/sheet_0"}, {"quantity", "stiffness_nN_per_um"}}), "enters"),
             "FALSE");
@@ -813,12 +822,11 @@ TEST(SpaceStudy, has_the_figures_of_each_cell_and_compares_the_total_force_first
   for (const char* of_others : {"total_force_nN", "n_fibres", "sheet_force_nN", "strain_energy_fJ", "n_adhesions",
                                 "expected_relative_l2", "n_meshes"})
     EXPECT_TRUE(cells.text(row, of_others).empty()) << of_others;
-  const std::string page = study_html(study, analysis, figures_of(study, analysis, {}), {}, folder.path());
+  const std::string page = page_of(study, analysis);
   for (const char* says : {"<h1>Forces of 12 cells in space</h1>", "Figures of the cells in space",
                            "the mean contractile moment of cells in space is"})
     EXPECT_NE(page.find(says), std::string::npos) << says;
-  for (const char* of_fibres : {"ibre type", "Stress-fibre", "transverse", "No tension", "Not drawn"})
-    EXPECT_EQ(page.find(of_fibres), std::string::npos) << of_fibres;
+  expect_no_word_of_fibres(page);
 }
 
 TEST(SpaceStudy, beside_cells_with_fibres_and_sheets_no_figure_mixes_them) {
@@ -830,15 +838,7 @@ TEST(SpaceStudy, beside_cells_with_fibres_and_sheets_no_figure_mixes_them) {
   const Study study = read_again(made, folder);
   ASSERT_EQ(study.cells.size(), 15u);
   const Analysis analysis = analyse(study, {});
-  for (const Measure* m : analysis.measures())
-    for (const Observation& o : m->sample.values)
-      EXPECT_EQ(study.cells[static_cast<std::size_t>(o.cell)].kind(), m->sample.of_cells()) << m->sample.column;
-  std::set<std::string> columns;
-  for (const Measure* m : analysis.measures())
-    EXPECT_TRUE(columns.insert(m->sample.column).second) << m->sample.column << " is two quantities";
-  for (const Correlation& c : analysis.correlations)
-    for (const int cell : c.cells)
-      EXPECT_EQ(study.cells[static_cast<std::size_t>(cell)].kind(), CellKind::plane) << c.force;
+  expect_unmixed(study, analysis);
   EXPECT_EQ(analysis.primary.measure, "total force of cells in space") << "most cells are of them";
   EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::tension}).primary.measure, "tension of ventral fibres");
   EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::contraction}).primary.measure, "contraction of sheets");
@@ -846,7 +846,7 @@ TEST(SpaceStudy, beside_cells_with_fibres_and_sheets_no_figure_mixes_them) {
             "strain energy of cells in space");
   EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::contractile_moment}).primary.measure,
             "contractile moment of cells in space");
-  const std::string page = study_html(study, analysis, figures_of(study, analysis, {}), {}, folder.path());
+  const std::string page = page_of(study, analysis);
   EXPECT_NE(page.find("Stress-fibre tensions of 5 cells, contraction of 4 sheets and forces of 6 cells in space"),
             std::string::npos);
 }
@@ -891,19 +891,15 @@ TEST(SpaceStudy, leaves_out_a_copy_one_without_its_tractions_and_one_that_did_no
 }
 
 TEST(SpaceStudy, says_where_methods_or_resolutions_make_the_difference) {
-  const auto says = [](const Study& study, const char* what) {
-    return std::ranges::any_of(analyse(study, {}).warnings,
-                               [&](const std::string& w) { return w.find(what) != w.npos; });
-  };
   constexpr const char *kMethods = "different methods", *kCoarser = "are coarser under b than under a";
   Study study = test::simulated_cells_in_space({.condition_effect_nN = 200});
-  EXPECT_FALSE(says(study, kMethods));
-  EXPECT_FALSE(says(study, "coarser"));
+  EXPECT_FALSE(says(analyse(study, {}), kMethods));
+  EXPECT_FALSE(says(analyse(study, {}), "coarser"));
   study.cells[3].space->method = "tikhonov";
-  EXPECT_TRUE(says(study, kMethods));
+  EXPECT_TRUE(says(analyse(study, {}), kMethods));
   for (StudyCell& cell : study.cells)
     if (cell.condition == 1) *cell.space->resolution_um *= 1.3;
-  EXPECT_TRUE(says(study, kCoarser));
+  EXPECT_TRUE(says(analyse(study, {}), kCoarser));
 }
 
 /// As sheets do, with the scatter of cells and the known error of each.

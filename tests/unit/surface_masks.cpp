@@ -62,10 +62,9 @@ TEST(Masks, specks_and_bubbles_do_not_matter) {
 TEST(Masks, an_overhang_is_refused_by_place) {
   test::hard_case("masks of a gel that overhangs", "refused, with the place");
   VoxelStack s = masks_of([](Vec2) { return 20; });
-  for (int k = 8; k < 12; ++k) {
+  for (int k = 8; k < 12; ++k)
     for (int i = 10; i < 20; ++i) voxel(s, i, 7, k) = 1;  // a roof
-  }
-  for (int k = 8; k < 21; ++k) voxel(s, 10, 7, k) = 1;  // on a wall
+  for (int k = 8; k < 21; ++k) voxel(s, 10, 7, k) = 1;    // on a wall
   const InvalidData error = test::thrown<InvalidData>([&] { points_of_masks(s); });
   EXPECT_NE(error.element.find("x, y = 5.75, 3.75"), std::string::npos) << error.what();
 }

@@ -56,13 +56,9 @@ TriangleMesh read_back(const TemporaryFolder& folder, const std::string& name, c
 }
 
 std::string refusal(const TemporaryFolder& folder, const std::string& name, const std::string& bytes) {
-  try {
-    read_back(folder, name, bytes);
-  } catch (const InputError& error) {
-    EXPECT_NE(error.where.find((folder / name).string()), std::string::npos) << error.where;
-    return error.what();
-  }
-  return "read";
+  const auto error = test::caught<InputError>([&] { read_back(folder, name, bytes); });
+  if (error) EXPECT_NE(error->where.find((folder / name).string()), std::string::npos) << error->where;
+  return error ? error->what() : "read";
 }
 
 std::string refusal(const TriangleMesh& mesh) {

@@ -180,9 +180,7 @@ TEST(SurfacePoints, the_surface_lies_nearer_than_they_and_knows_its_error) {
       EXPECT_LT(misfit.rms_um, 0.5 * kError) << "seed " << seed;
       EXPECT_NEAR(misfit.rms_over_sigma, 1, 0.35) << "seed " << seed;
       EXPECT_LE(fit.strays.size(), 1u);  // Student's errors are narrower than the points' own
-      if (!is_known) {
-        EXPECT_NEAR(fit.error_scale, kError, 0.3 * kError);
-      }
+      if (!is_known) EXPECT_NEAR(fit.error_scale, kError, 0.3 * kError);
     }
   }
 }

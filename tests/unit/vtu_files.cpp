@@ -22,12 +22,8 @@ Network read_back(const TemporaryFolder& folder, const std::string& text) {
 }
 
 std::string refusal(const TemporaryFolder& folder, const std::string& text) {
-  try {
-    read_back(folder, text);
-  } catch (const InputError& error) {
-    return error.what() + std::string("; ") + error.hint;
-  }
-  return "read";
+  const auto error = test::caught<InputError>([&] { read_back(folder, text); });
+  return error ? error->what() + std::string("; ") + error->hint : "read";
 }
 
 std::string with(std::string text, const std::string& old, const std::string& now) {
@@ -151,9 +147,8 @@ TEST(VtuFiles, a_cell_is_a_line_between_points_of_the_file) {
                                                                                      {"rest_length_um", "nan"},
                                                                                      {"rest_length_um", "0"},
                                                                                      {"adhesion_id", "-1"},
-                                                                                     {"types", "1e300"}}) {
+                                                                                     {"types", "1e300"}})
     EXPECT_NE(refusal(folder, in_array(array, value)), "read") << array << ": " << value;
-  }
 }
 
 /// Two triangles and a quadrilateral, in two pieces, beside a line.
