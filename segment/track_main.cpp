@@ -140,13 +140,30 @@ std::vector<Finding> findings_of(const Tracking& tracking) {
   return findings;
 }
 
-StageReport report_of(const Tracking& tracking, double pixel_size_um) {
+struct TrackedFrame {
+  Tracking tracking;
+  double pixel_size_um = 0;
+  Vec2 middle_px;           ///< of the images
+  images::Picture picture;  ///< of both images
+};
+
+StageReport report_of(const TrackedFrame& frame, CellWith cell_with) {
+  const auto& [tracking, pixel_size_um, middle_px, picture] = frame;
   StageReport report = report_of(tracking.field);
   const bool has_windows = tracking.windows.is_on;
+  const Vec2 shift_um = pixel_size_um * (tracking.stressed.of(middle_px) - middle_px);
   report.summary = std::to_string(tracking.n_good) + " of " + std::to_string(tracking.field.size()) +
                    (has_windows ? " windows tracked" : " beads tracked") + report.summary;
+  if (norm(shift_um) > pixel_size_um) {
+    report.summary += "; the stage moved by " + brief(norm(shift_um)) + " um, places are those of the " +
+                      (cell_with == CellWith::relaxed ? "relaxed" : "stressed") + " image";
+  }
   for (Finding& finding : findings_of(tracking)) report.findings.push_back(std::move(finding));
-  const Figures more = {{"pixel_size_um", pixel_size_um},
+  const Figures more = {{"cell_with", std::string(name_of(cell_with))},
+                        {"stage_shift_x_um", shift_um.x},
+                        {"stage_shift_y_um", shift_um.y},
+                        {"stage_turn_deg", tracking.stressed.turn_rad() * kRadian_deg},
+                        {"pixel_size_um", pixel_size_um},
                         {"n_beads_stressed", static_cast<std::int64_t>(tracking.n_beads_stressed)},
                         {"bead_sigma_um", tracking.bead_sigma_um},
                         {"far_field_residual_um", tracking.far_field_rms_um},
@@ -233,15 +250,10 @@ auto with_names(const std::string& names, const Body& body) {
   }
 }
 
-struct TrackedFrame {
-  Tracking tracking;
-  double pixel_size_um = 0;
-  images::Picture picture;  ///< of both images
-};
-
+/// @param cell  the relaxed picture in the cell's pictures, if these are with another frame
 TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, const Frame& frame,
-                     const TrackParameters& parameters, int binning, const Progress& progress,
-                     stage::StageContext& context) {
+                     const TrackParameters& parameters, int binning, const std::optional<Placement>& cell,
+                     const Progress& progress, stage::StageContext& context) {
   const images::Channel stressed{frame.name(), images::binned(images::read_image(frame.file, frame.plane), binning)};
   images::require_equal_sizes(relaxed, stressed);
   const double pixel_size_um = images::common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
@@ -253,10 +265,10 @@ TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, 
   if (stressed.image.pixels == relaxed.image.pixels)
     throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both");
   Tracking tracking = with_names(relaxed.name + ", " + stressed.name,
-                                 [&] { return beads.track(stressed.image, pixel_size_um, progress); });
-  images::Picture picture =
-      picture_of_beads(relaxed.image, stressed.image, (1 / pixel_size_um) * tracking.common.drift_um);
-  return {std::move(tracking), pixel_size_um, std::move(picture)};
+                                 [&] { return beads.track(stressed.image, pixel_size_um, progress, cell); });
+  images::Picture picture = picture_of_beads(relaxed.image, stressed.image, tracking.stressed, parameters.cell_with);
+  const Vec2 middle_px{0.5 * (relaxed.image.width - 1), 0.5 * (relaxed.image.height - 1)};
+  return {std::move(tracking), pixel_size_um, middle_px, std::move(picture)};
 }
 
 /// What the page of the cell shows of the images: they lie from (0, 0) on.
@@ -286,11 +298,17 @@ files::FrameRow row_of(int frame, const std::string& image, const Tracking& t) {
           .largest_displacement_um = figures_of(t.field).largest_um};
 }
 
-/// The first frame that could be tracked stands for the series; one that could not does not stop the others.
-StageReport track_series(const std::vector<Frame>& frames, stage::StageContext& context,
-                         const std::function<TrackedFrame(const Frame&, const Progress&)>& tracked_frame) {
+/// @param cell  the relaxed picture in the cell's pictures, if these are with another frame
+using TrackFrame =
+    std::function<TrackedFrame(const Frame&, const std::optional<Placement>& cell, const Progress& progress)>;
+
+/// The first frame that could be tracked stands for the series; one that could not does not stop the others. The cell's
+/// pictures are with it (CellWith::stressed).
+StageReport track_series(const std::vector<Frame>& frames, CellWith cell_with, stage::StageContext& context,
+                         const TrackFrame& tracked_frame) {
   std::vector<files::FrameRow> list;
   std::optional<StageReport> first;
+  std::optional<Placement> cell;
   std::vector<InputError> refused;
   for (std::size_t k = 0; k < frames.size(); ++k) {
     const int number = static_cast<int>(k) + 1;
@@ -299,13 +317,15 @@ StageReport track_series(const std::vector<Frame>& frames, stage::StageContext& 
       context.progress((static_cast<double>(k) + fraction) / n, what);
     };
     try {
-      const auto [tracking, pixel_size_um, picture] = tracked_frame(frames[k], progress);
+      const TrackedFrame frame = tracked_frame(frames[k], cell, progress);
+      const Tracking& tracking = frame.tracking;
+      if (!cell) cell = tracking.stressed;
       const fs::path name = files::displacement_of_frame(number);
       write_field(context, tracking.field, name.stem().string());
       list.push_back(row_of(number, frames[k].name(), tracking));
       if (first) continue;
       write_field(context, tracking.field, "displacement");
-      first = report_of(tracking, pixel_size_um);
+      first = report_of(frame, cell_with);
     } catch (const InputError& error) {
       list.push_back({.frame = number, .image = frames[k].name(), .refused = error.what()});
       refused.push_back(error);
@@ -343,21 +363,26 @@ void keep_field(stage::StageContext& context, const fs::path& folder, const std:
 /// Track the frames whose files are gone once more. All else, list and report included, is what the earlier run found:
 /// from the same images it is the same again.
 StageReport complete_series(const std::vector<Frame>& frames, stage::StageContext& context, const fs::path& earlier,
-                            const std::function<TrackedFrame(const Frame&, const Progress&)>& tracked_frame) {
+                            const TrackFrame& tracked_frame) {
   keep_field(context, earlier, "displacement.csv");
   std::int64_t n_kept = 0;
+  std::optional<Placement> cell;
+  std::optional<std::size_t> first;  // the frame of the cell's pictures
   for (const files::FrameRow& row : files::read(earlier / "frames.csv", files::frame_table())) {
     if (row.frame < 1 || row.frame > static_cast<int>(frames.size()))
       throw InputError((earlier / "frames.csv").string(), "frames from 1 to " + std::to_string(frames.size()),
                        std::to_string(row.frame), "remove the folder: it is of another series");
     if (!row.refused.empty()) continue;
     const std::string name = files::displacement_of_frame(row.frame);
+    const std::size_t k = static_cast<std::size_t>(row.frame) - 1;
+    if (!first) first = k;
     if (fs::is_regular_file(earlier / name)) {
       keep_field(context, earlier, name);
       ++n_kept;
       continue;
     }
-    const TrackedFrame again = tracked_frame(frames.at(static_cast<std::size_t>(row.frame) - 1), context.progress);
+    if (!cell && k != *first) cell = tracked_frame(frames.at(*first), {}, context.progress).tracking.stressed;
+    const TrackedFrame again = tracked_frame(frames.at(k), k == *first ? std::nullopt : cell, context.progress);
     write_field(context, again.tracking.field, fs::path(name).stem().string());
   }
   fs::copy_file(earlier / "frames.csv", context.output("out", "frames.csv"));
@@ -377,21 +402,22 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
   if (parameters.pixel_size_um) context.notice(images::noticed_unchecked({&relaxed}, *parameters.pixel_size_um));
   const RelaxedBeads beads = with_names(
       relaxed.name, [&] { return RelaxedBeads(relaxed.image, parameters, context.threads, model_of_gel(context)); });
-  const auto tracked_frame = [&](const Frame& frame, const Progress& progress) {
-    return tracked(relaxed, beads, frame, parameters, binning, progress, context);
+  const auto tracked_frame = [&](const Frame& frame, const std::optional<Placement>& cell, const Progress& progress) {
+    return tracked(relaxed, beads, frame, parameters, binning, cell, progress, context);
   };
   const std::optional<fs::path> earlier = earlier_run(context);
   if (earlier && files::read(*earlier / "frames.csv", files::frame_table()).size() == frames.size())
     return complete_series(frames, context, *earlier, tracked_frame);
-  if (frames.size() > 1) return track_series(frames, context, tracked_frame);
-  const auto [tracking, pixel_size_um, picture] = tracked_frame(frames.front(), context.progress);
+  if (frames.size() > 1) return track_series(frames, parameters.cell_with, context, tracked_frame);
+  const TrackedFrame frame = tracked_frame(frames.front(), {}, context.progress);
+  const Tracking& tracking = frame.tracking;
   if (!tracking.windows.is_on) {
     context.expect_plausible("beads_per_um2", beads_per_um2(tracking.field));
     context.expect_plausible("bead_sigma_um", tracking.bead_sigma_um);
   }
   write_field(context, tracking.field, "displacement");
-  write_picture(context, picture, relaxed.image, pixel_size_um);
-  return report_of(tracking, pixel_size_um);
+  write_picture(context, frame.picture, relaxed.image, frame.pixel_size_um);
+  return report_of(frame, parameters.cell_with);
 }
 
 struct TrackStageParameters {
@@ -443,11 +469,19 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
     if (has_images) throw UsageError("--displacement and bead images exclude each other");
     DisplacementField field = read_given_field(context.input("displacement"), parameters);
     context.expect_plausible("beads_per_um2", beads_per_um2(field));
-    const GivenMotion motion = take_affine_off(field, parameters);
+    const GivenMotion motion = take_motion_off(field, parameters);
     write_field(context, field, "displacement");
     StageReport report = report_of(field);
     add_figures(report, motion.common);
     report.effects = {motion.affine};
+    if (motion.unplaced_um) {
+      report.findings.push_back(*noticed(
+          FindingKind::assumed_input, 1,
+          "The table holds a drift of " + brief(*motion.unplaced_um) +
+              " um. Its places are read as those of the cell's images; if they are those of the relaxed bead image, "
+              "set track.places = relaxed.",
+          Severity::caution));
+    }
     report.summary = std::to_string(field.size()) + " displacements read" + report.summary;
     return report;
   }

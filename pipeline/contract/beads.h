@@ -1,6 +1,7 @@
 /// Where the gel went.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -8,9 +9,23 @@
 
 namespace mbtfm {
 
+/// The bead picture together with which the cell's pictures were taken, before the stage moved again. Its frame is that
+/// of all places: adhesions, fibres, outline, and beads at rest.
+enum class CellWith {
+  stressed,  ///< of a time series the first
+  relaxed,
+  each  ///< of a time series: the cell's pictures of each frame are with its own beads
+};
+constexpr auto words(CellWith) { return std::array{"stressed", "relaxed", "each"}; }
+
+/// Of images.cell_with, for help and pages.
+inline constexpr const char* kCellWithMeaning =
+    "the bead image together with which the cell's images were taken, before the stage moved again: stressed (of a "
+    "time series the first), relaxed, or each (of a time series: each frame has its own)";
+
 /// Displacement (stressed minus relaxed position) of one bead.
 struct Bead {
-  Vec2 position_um;  ///< in the relaxed state
+  Vec2 position_um;  ///< at rest, in the frame of the cell's pictures
   Vec2 displacement_um;
   double sigma_um = 0;  ///< standard error of each component
   std::string flag;     ///< why it must not be used; empty: good

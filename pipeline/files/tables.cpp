@@ -94,8 +94,8 @@ Table<Bead> displacement_table() {
       .file = "2_track/displacement.csv",
       .row = "each bead",
       .columns = {
-          {"x_um", "its place in the relaxed state", x_of(&Bead::position_um)},
-          {"y_um", "its place in the relaxed state", y_of(&Bead::position_um)},
+          {"x_um", "its place at rest, in the frame of the cell's images", x_of(&Bead::position_um)},
+          {"y_um", "its place at rest, in the frame of the cell's images", y_of(&Bead::position_um)},
           {"ux_um", "its displacement: stressed less relaxed", x_of(&Bead::displacement_um)},
           {"uy_um", "its displacement: stressed less relaxed", y_of(&Bead::displacement_um)},
           {"sigma_um", "standard error of each component", &Bead::sigma_um, {.range = {.low = 0}, .may_lack = true}},

@@ -49,6 +49,7 @@ constexpr ImageKey kImages[] = {
 void declare(stage::ParameterList& list, ImageNames& names) {
   list.table("images");
   for (const ImageKey& image : kImages) list.add(image.key, names.*image.member, image.meaning);
+  list.add("cell_with", names.cell_with, kCellWithMeaning);
 }
 
 bool is_image_key(const std::string& key) {

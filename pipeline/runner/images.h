@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/beads.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/runner/stages.h"
 #include "pipeline/stage/parameters_fwd.h"
@@ -26,6 +27,7 @@ struct ImageNames {
   // masks and label images of other programs, likewise
   std::string outline_mask = "outline_mask.tif|outline_mask.png";
   std::string adhesion_mask = "adhesion_mask.tif|adhesion_mask.png";
+  CellWith cell_with = CellWith::stressed;  ///< the tracking's; here so that it is known in [images]
   std::string cell_labels = "cell_labels.tif|cell_labels.png";  ///< of a colony
 };
 void declare(stage::ParameterList& list, ImageNames& names);

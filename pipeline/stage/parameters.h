@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
@@ -38,12 +39,19 @@ struct Parameter {
   std::string default_value = {};  ///< as printed
   bool is_required = false;
   bool is_set = false;
+  bool is_derived = false;  ///< set from another parameter, which is the one that is given
 };
 
 class ParameterList {
  public:
   /// The following parameters belong to [name] of cell.toml.
   void table(std::string name) { table_ = std::move(name); }
+  /// The same of a table in which another program has keys, too, and checks them.
+  void table_of_several(std::string name) {
+    tables_of_several_.insert(name);
+    table_ = std::move(name);
+  }
+  bool is_of_several(const std::string& table) const { return tables_of_several_.contains(table); }
   /// @param member  a number, or an optional one
   template <class Number>
   void add(std::string name, Number& member, const Range& range, std::string meaning) {
@@ -67,12 +75,20 @@ class ParameterList {
   /// The parameter added last has no default.
   void required() { parameters_.back().is_required = true; }
 
+  /// What is derived once values have been read, whatever they were read from.
+  void derive(std::function<void(ParameterList&)> derivation) { derivations_.push_back(std::move(derivation)); }
+  void derive_all() {
+    for (const auto& derivation : derivations_) derivation(*this);
+  }
+
   std::vector<Parameter>& all() { return parameters_; }
   const std::vector<Parameter>& all() const { return parameters_; }
 
  private:
   void add_member(std::string name, ParameterMember member, const Range& range, std::string meaning);
   std::string table_;
+  std::set<std::string> tables_of_several_;
+  std::vector<std::function<void(ParameterList&)>> derivations_;
   std::vector<Parameter> parameters_;
 };
 

@@ -55,11 +55,30 @@ def _images(cell: Cell) -> List[Layer]:
     import tifffile  # napari brings it
 
     size = cell.pixel_size_um
-    settings: Dict[str, Any] = {"scale": (size, size), "translate": (size / 2, size / 2), "blending": "additive"}
-    return [
-        (tifffile.imread(file), {"name": key, "colormap": _CHANNELS[key], "visible": "beads" not in key, **settings}, "image")
-        for key, file in files.items()
-    ]
+    found: List[Layer] = []
+    for key, file in files.items():
+        image = tifffile.imread(file)
+        settings: Dict[str, Any] = {"scale": (size, size), "translate": (size / 2, size / 2), "blending": "additive"}
+        settings.update(name=key, colormap=_CHANNELS[key], visible="beads" not in key)
+        if "beads" in key:
+            settings["affine"] = _stage_motion(cell, key, size * np.array(image.shape[-2:]))
+        found.append((image, settings, "image"))
+    return found
+
+
+def _stage_motion(cell: Cell, key: str, size_um: Array) -> Array:
+    """From um (y, x, 1) in a bead picture to um in the cell's pictures: the stage moved between the two bead pictures, and one of
+    them lies aside."""
+    figures = cell.run_record["stages"].get("track", {}).get("figures", {})
+    with_relaxed = figures.get("cell_with") == "relaxed"
+    place = np.eye(3)
+    if key != ("beads_stressed" if with_relaxed else "beads_relaxed"):
+        return place
+    angle = np.deg2rad(figures.get("stage_turn_deg", 0.0))  # about the middle, from +x towards +y
+    place[:2, :2] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+    place[:2, 2] = size_um / 2 - place[:2, :2] @ (size_um / 2)
+    place[:2, 2] += [figures.get("stage_shift_y_um", 0.0), figures.get("stage_shift_x_um", 0.0)]
+    return np.linalg.inv(place) if with_relaxed else place
 
 
 def _ellipse(row: Any) -> Array:

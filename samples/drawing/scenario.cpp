@@ -1,6 +1,8 @@
 #include "samples/drawing/scenario.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
@@ -165,8 +167,15 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   list.add("lost_bead_fraction", p.lost_bead_fraction, Range::between(0, 1),
            "share of beads that are in one of the two images only");
   list.add("drift_x_um", p.drift_x_um, Range::between(-1000, 1000),
-           "shift of the stressed bead image to the right (um)");
-  list.add("drift_y_um", p.drift_y_um, Range::between(-1000, 1000), "shift of the stressed bead image down (um)");
+           "shift of the stage to the right, from the relaxed bead image to the pictures with the cell (um)");
+  list.add("drift_y_um", p.drift_y_um, Range::between(-1000, 1000),
+           "shift of the stage downwards between these images (um)");
+  list.add("turn_deg", p.turn_deg, Range::between(-30, 30),
+           "turn of the stage between the relaxed bead image and those with the cell, clockwise as seen (degrees)");
+  list.add("neighbour_x_um", p.neighbour_x_um, Range::between(-1000, 1000),
+           "place of a second cell, from the middle of the field to the right (um); it may lie beyond the border");
+  list.add("neighbour_y_um", p.neighbour_y_um, Range::between(-1000, 1000),
+           "place of a second cell, from the middle of the field downwards (um)");
   declare_cell(list, p.cell);
   declare_actin(list, p.actin);
   declare_tension(list, p.tension);
@@ -175,6 +184,27 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   list.add("simulation_material", p.mechanics.simulation_material,
            "law of the gel in the simulation: linear, or neo-hooke, whatever the strains are");
   declare_microscope(list, p.microscope);
+}
+
+namespace {
+
+/// About the picture's centre; a turn of 0 leaves the bits as they are.
+Vec2 turned(Vec2 place_um, double angle_deg, const MicroscopeParameters& m) {
+  if (angle_deg == 0) return place_um;
+  const Vec2 centre = 0.5 * field_um(m) * Vec2{1, 1};
+  const double angle_rad = angle_deg * std::numbers::pi / 180, c = std::cos(angle_rad), s = std::sin(angle_rad);
+  const Vec2 d = place_um - centre;
+  return centre + Vec2{c * d.x - s * d.y, s * d.x + c * d.y};
+}
+
+}  // namespace
+
+Vec2 moved_by_stage(Vec2 place_um, const ScenarioParameters& p) {
+  return turned(place_um, p.turn_deg, p.microscope) + Vec2{p.drift_x_um, p.drift_y_um};
+}
+
+Vec2 before_stage_moved(Vec2 place_um, const ScenarioParameters& p) {
+  return turned(place_um - Vec2{p.drift_x_um, p.drift_y_um}, -p.turn_deg, p.microscope);
 }
 
 int n_beads(const ScenarioParameters& p) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "pipeline/contract/gel.h"
+#include "pipeline/contract/geometry.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/stage/parameters_fwd.h"
 
@@ -128,8 +129,11 @@ struct ScenarioParameters {
   bool images = false;
   double bead_distance_um = 0.4;      ///< least: the images of nearer ones would melt together
   double lost_bead_fraction = 0.015;  ///< of the beads are in one of the two images only
-  double drift_x_um = 0;              ///< of the stage between the images; none, so that the truth compares directly
+  double drift_x_um = 0;              ///< of the stage, from the relaxed picture to those with the cell
   double drift_y_um = 0;
+  double turn_deg = 0;  ///< the same, about the picture's centre, from +x towards +y
+  /// Centre of another cell from this one's, which is drawn from the next seed and pulls, too. Both unset: none.
+  std::optional<double> neighbour_x_um{}, neighbour_y_um{};
   CellParameters cell;
   ActinParameters actin;
   TensionParameters tension;
@@ -141,6 +145,12 @@ void declare(stage::ParameterList& list, ScenarioParameters& parameters);
 
 /// Side of the square field of view.
 inline double field_um(const MicroscopeParameters& m) { return m.pixel_size_um * m.image_size_px; }
+
+/// Where the stage carried a place of the relaxed picture (um) before the pictures with the cell were taken. The cell
+/// and its truth are in the frame of the latter.
+Vec2 moved_by_stage(Vec2 place_um, const ScenarioParameters& parameters);
+/// Its inverse.
+Vec2 before_stage_moved(Vec2 place_um, const ScenarioParameters& parameters);
 
 /// Beads in the field, however that was asked for.
 int n_beads(const ScenarioParameters& parameters);

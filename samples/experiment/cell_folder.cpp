@@ -36,6 +36,10 @@ void write_image(const FileNamer& file, const std::string& name, const images::I
                      drawing::recorded(photons, drawing::at_quality(p.microscope), p.seed, exposure, work.threads));
 }
 
+void add(images::Image& image, const images::Image& other) {
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] += other.pixels[i];
+}
+
 }  // namespace
 
 void write_cell_folder(const Experiment& e, const drawing::ScenarioParameters& parameters, const FileNamer& file) {
@@ -45,12 +49,15 @@ void write_cell_folder(const Experiment& e, const drawing::ScenarioParameters& p
   files::write_text(file("cell.toml"), stage::to_toml(list, {"", "gel"}));
   files::write_text(file("truth/scenario.toml"), stage::to_toml(list, {"", "gel", "scenario"}));
   write_segmentation(e.cell, "truth", file);
+  if (e.neighbour) files::write_outline(file("truth/" + std::string(files::kNeighboursFile)), e.neighbour->outline_um);
   files::write_tensions(file("truth/tensions.csv"), e.tensions, e.cell.fibres);
   files::write_adhesion_forces(file("truth/adhesion_forces.csv"), e.forces, e.cell.adhesions);
   files::write_displacement(file("truth/displacement.csv"), e.displacement);
   files::write_network(file("truth/network.vtu"), e.network);
   if (parameters.images) return;
   write_segmentation(e.cell, "1_segment", file);
+  if (e.neighbour)
+    files::write_outline(file("1_segment/" + std::string(files::kNeighboursFile)), e.neighbour->outline_um);
   files::write_displacement(file("2_track/displacement.csv"), e.measured);
 }
 
@@ -59,8 +66,8 @@ void write_bead_images(const DisplacementField& measured, const drawing::Scenari
   const drawing::MicroscopeParameters m = drawing::at_quality(p.microscope);
   std::vector<Vec2> relaxed, stressed;
   for (const Bead& bead : measured) {
-    relaxed.push_back(bead.position_um);
-    stressed.push_back(bead.position_um + bead.displacement_um + Vec2{p.drift_x_um, p.drift_y_um});
+    relaxed.push_back(drawing::before_stage_moved(bead.position_um, p));
+    stressed.push_back(bead.position_um + bead.displacement_um);
   }
   const drawing::BeadImages beads = drawing::bead_spots(relaxed, stressed, p.lost_bead_fraction, m, p.seed);
   write_image(file, "beads_relaxed.tif", drawing::photons_of(beads.relaxed, m, work.threads), 2, p, work);
@@ -71,12 +78,17 @@ void write_bead_images(const DisplacementField& measured, const drawing::Scenari
 void write_images(const Experiment& e, const drawing::ScenarioParameters& p, const FileNamer& file, const Work& work) {
   const int threads = work.threads;
   const drawing::MicroscopeParameters m = drawing::at_quality(p.microscope);
-  write_image(file, "paxillin.tif",
-              drawing::photons_of(drawing::paxillin_specimen(e.cell, m, p.seed, threads), m, threads), 0, p, work);
-  write_image(file, "actin.tif",
-              drawing::photons_of(drawing::actin_specimen(e.cell, p.actin, m, p.seed, threads), m, threads), 1, p,
-              work);
-  write_bead_images(e.measured, p, file, work);
+  images::Image paxillin = drawing::paxillin_specimen(e.cell, m, p.seed, threads),
+                actin = drawing::actin_specimen(e.cell, p.actin, m, p.seed, threads);
+  if (e.neighbour) {
+    add(paxillin, drawing::paxillin_specimen(*e.neighbour, m, p.seed + 1, threads));
+    add(actin, drawing::actin_specimen(*e.neighbour, p.actin, m, p.seed + 1, threads));
+  }
+  write_image(file, "paxillin.tif", drawing::photons_of(paxillin, m, threads), 0, p, work);
+  write_image(file, "actin.tif", drawing::photons_of(actin, m, threads), 1, p, work);
+  DisplacementField beads = e.measured;
+  beads.insert(beads.end(), e.beyond.begin(), e.beyond.end());
+  write_bead_images(beads, p, file, work);
 }
 
 }  // namespace mbtfm::experiment

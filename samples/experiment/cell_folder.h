@@ -15,7 +15,8 @@ using FileNamer = std::function<std::filesystem::path(const std::string& file)>;
 void write_cell_folder(const Experiment& experiment, const drawing::ScenarioParameters& parameters,
                        const FileNamer& file);
 
-/// beads_relaxed.tif, beads_stressed.tif and truth/beads.csv; the noise is in the stressed positions.
+/// beads_relaxed.tif, beads_stressed.tif and truth/beads.csv; the noise is in the stressed positions. The measured
+/// field is in the frame of the latter, from which the stage has moved the relaxed picture.
 void write_bead_images(const DisplacementField& measured, const drawing::ScenarioParameters& parameters,
                        const FileNamer& file, const Work& work);
 

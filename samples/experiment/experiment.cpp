@@ -8,6 +8,7 @@
 #include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/numerics/memory.h"
 #include "samples/drawing/random.h"
 #include "substrate/choice/large_strain.h"
@@ -21,6 +22,9 @@ namespace {
 
 /// Far from the small numbers people give a reconstruction, so that the two never share a mesh.
 constexpr std::uint64_t kFirstSimulationSeed = 0x73696d00;
+
+/// So that the noise of beads beyond the field is not that of those in it.
+constexpr std::uint64_t kBeyond = 0x62657900;
 
 /// The simulation's network. The width of material that a cable stands for is counted in cables of the reference mesh:
 /// tension and stiffness by width are then those of the cell, whatever the mesh.
@@ -80,17 +84,53 @@ std::vector<AdhesionForce> force_list(const Cell& cell, const std::map<int, Vec2
   return list;
 }
 
-DisplacementField displacement_of(const Experiment& e, const drawing::ScenarioParameters& p, int threads) {
+/// A drawn cell with what it pulls.
+struct Pulling {
+  Cell cell;
+  Network network;
+  std::vector<Tension> tensions;
+  std::vector<AdhesionForce> forces;
+};
+
+Pulling contracted(drawing::DrawnCell drawn, const drawing::ScenarioParameters& p) {
+  Pulling result;
+  result.tensions = tensions_of(drawn, p.tension);
+  result.cell = std::move(drawn.cell);
+  result.network = span(result.cell, p);
+  result.forces = force_list(result.cell, forces_by_adhesion(result.network, result.tensions));
+  return result;
+}
+
+void move_by(Vec2 shift_um, Cell& cell) {
+  for (Adhesion& a : cell.adhesions) a.position_um += shift_um;
+  for (Fibre& f : cell.fibres)
+    for (Vec2& point : f.points_um) point += shift_um;
+  for (Vec2& point : cell.outline_um) point += shift_um;
+  for (Polygon& hole : cell.holes_um)
+    for (Vec2& point : hole) point += shift_um;
+}
+
+std::optional<Pulling> neighbour_of(const drawing::ScenarioParameters& p) {
+  if (!p.neighbour_x_um && !p.neighbour_y_um) return std::nullopt;
+  drawing::ScenarioParameters other = p;
+  other.seed = p.seed + 1;
+  Pulling result =
+      contracted(drawing::draw_cell(p.cell, p.tension, drawing::field_um(p.microscope), other.seed), other);
+  move_by({p.neighbour_x_um.value_or(0), p.neighbour_y_um.value_or(0)}, result.cell);
+  return result;
+}
+
+DisplacementField displacement_of(const std::vector<const Pulling*>& cells, const std::vector<Vec2>& beads,
+                                  const drawing::ScenarioParameters& p, int threads) {
   substrate::SubstrateParameters substrate_parameters;
   substrate_parameters.model = substrate::ModelKind::layer;
   const auto gel = greens::make_greens(p.gel, substrate_parameters, threads);
   std::vector<substrate::Ellipse> ellipses;
   std::vector<Vec2> forces;
-  for (std::size_t i = 0; i < e.cell.adhesions.size(); ++i) {
-    ellipses.push_back(substrate::ellipse_of(e.cell.adhesions[i]));
-    forces.push_back(e.forces[i].force_nN);
+  for (const Pulling* pulling : cells) {
+    for (const Adhesion& a : pulling->cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+    for (const AdhesionForce& f : pulling->forces) forces.push_back(f.force_nN);
   }
-  const std::vector<Vec2> beads = place_beads(p);
   std::vector<Vec2> displacements = gel->displacements_um(beads, ellipses, forces);
   if (p.mechanics.simulation_material == MaterialLaw::neo_hooke) {
     constexpr double kElementsAcross = 2;  // finer than a fit's, as the network is
@@ -118,39 +158,42 @@ DisplacementField with_noise(DisplacementField field, double noise_um, std::uint
   return field;
 }
 
-std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
+namespace {
+
+/// Random positions in a rectangle, no two nearer than the scenario's bead distance. @param stream  of random numbers
+std::vector<Vec2> beads_in(const Extent& where, int n_beads, const drawing::ScenarioParameters& p,
+                           std::uint64_t stream) {
   constexpr double kBytes = 300;  // of a bead: its place in the grid, its displacement, its spots in two images
-  const int n_beads = drawing::n_beads(p);
   numerics::expect_room_for({.what = "the field of beads",
                              .count = static_cast<double>(n_beads),
                              .parts = "beads",
                              .bytes_each = kBytes,
                              .remedy = "choose fewer beads"});
-  const double field = drawing::field_um(p.microscope);
+  const Vec2 size_um = where.high_um - where.low_um;
   // cells of a grid so small that each holds one bead at most; a bead's neighbours lie within two cells
-  const double cell_um = std::max(p.bead_distance_um / std::sqrt(2.0), 1e-3 * field);
-  const int n_cells = static_cast<int>(field / cell_um) + 1;
-  std::vector<std::vector<Vec2>> grid(static_cast<std::size_t>(n_cells) * n_cells);
+  const double cell_um = std::max(p.bead_distance_um / std::sqrt(2.0), 1e-3 * std::max(size_um.x, size_um.y));
+  const int n_columns = static_cast<int>(size_um.x / cell_um) + 1, n_rows = static_cast<int>(size_um.y / cell_um) + 1;
+  std::vector<std::vector<Vec2>> grid(static_cast<std::size_t>(n_columns) * n_rows);
   const int reach = static_cast<int>(std::ceil(p.bead_distance_um / cell_um));
   const auto is_free = [&](Vec2 bead, int column, int row) {
-    for (int j = std::max(0, row - reach); j <= std::min(n_cells - 1, row + reach); ++j) {
-      for (int i = std::max(0, column - reach); i <= std::min(n_cells - 1, column + reach); ++i) {
-        for (const Vec2 other : grid[static_cast<std::size_t>(j) * n_cells + i])
+    for (int j = std::max(0, row - reach); j <= std::min(n_rows - 1, row + reach); ++j) {
+      for (int i = std::max(0, column - reach); i <= std::min(n_columns - 1, column + reach); ++i) {
+        for (const Vec2 other : grid[static_cast<std::size_t>(j) * n_columns + i])
           if (norm(other - bead) < p.bead_distance_um) return false;
       }
     }
     return true;
   };
-  drawing::Random random(p.seed, drawing::Stream::beads);
+  drawing::Random random(p.seed, drawing::Stream::beads, stream);
   std::vector<Vec2> beads;
   constexpr int kMaxMisses = 10000;  // in a row: beyond that less than 1e-4 of the field is free
   for (int misses = 0; static_cast<int>(beads.size()) < n_beads;) {
-    const double x = random.uniform(0, field);
-    const Vec2 bead{x, random.uniform(0, field)};
+    const double x = random.uniform(0, size_um.x);
+    const Vec2 bead{x, random.uniform(0, size_um.y)};
     const int column = static_cast<int>(bead.x / cell_um), row = static_cast<int>(bead.y / cell_um);
     if (is_free(bead, column, row)) {
-      beads.push_back(bead);
-      grid[static_cast<std::size_t>(row) * n_cells + column].push_back(bead);
+      beads.push_back(where.low_um + bead);
+      grid[static_cast<std::size_t>(row) * n_columns + column].push_back(bead);
       misses = 0;
     } else if (++misses > kMaxMisses) {
       throw UsageError("only " + std::to_string(beads.size()) + " of " + std::to_string(n_beads) + " beads fit at a " +
@@ -160,26 +203,52 @@ std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
   return beads;
 }
 
+}  // namespace
+
+std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
+  const double field = drawing::field_um(p.microscope);
+  return beads_in({{0, 0}, {field, field}}, drawing::n_beads(p), p, 0);
+}
+
+std::vector<Vec2> place_beads_beyond(const drawing::ScenarioParameters& p) {
+  const double field = drawing::field_um(p.microscope);
+  const Extent seen{{0, 0}, {field, field}};
+  const auto carried = [&](Vec2 corner) { return drawing::moved_by_stage(corner, p); };
+  const Extent relaxed = extent_of(std::vector<Vec2>{{0, 0}, {field, 0}, {0, field}, {field, field}}, carried);
+  const double share = relaxed.area_um2() / seen.area_um2();
+  std::vector<Vec2> beads = beads_in(relaxed, static_cast<int>(std::lround(share * drawing::n_beads(p))), p, 1);
+  std::erase_if(beads, [&](Vec2 b) { return b.x > 0 && b.y > 0 && b.x < field && b.y < field; });
+  return beads;
+}
+
 Experiment simulate(const drawing::ScenarioParameters& p, const Work& work) {
   work.tell(0, "drawing the cell");
   return simulate(drawing::draw_cell(p.cell, p.tension, drawing::field_um(p.microscope), p.seed), p, work);
 }
 
 Experiment simulate(drawing::DrawnCell drawn, const drawing::ScenarioParameters& p, const Work& work) {
+  work.tell(0.1, "spanning the network and contracting it");
+  Pulling first = contracted(std::move(drawn), p);
+  std::optional<Pulling> second = neighbour_of(p);
+  std::vector<const Pulling*> cells = {&first};
+  if (second) cells.push_back(&*second);
   Experiment e;
-  e.tensions = tensions_of(drawn, p.tension);
-  e.cell = std::move(drawn.cell);
-  work.tell(0.1, "spanning the network");
-  e.network = span(e.cell, p);
-  work.tell(0.2, "contracting it");
-  e.forces = force_list(e.cell, forces_by_adhesion(e.network, e.tensions));
-  for (const AdhesionForce& f : e.forces) e.total_force_nN += norm(f.force_nN);
+  for (const AdhesionForce& f : first.forces) e.total_force_nN += norm(f.force_nN);
   work.tell(0.4, "deforming the gel");
-  e.displacement = displacement_of(e, p, work.threads);
+  e.displacement = displacement_of(cells, place_beads(p), p, work.threads);
   for (const Bead& bead : e.displacement)
     e.largest_displacement_um = std::max(e.largest_displacement_um, norm(bead.displacement_um));
   e.noise_um = p.noise_um.value_or(p.noise * e.largest_displacement_um);
   e.measured = with_noise(e.displacement, e.noise_um, p.seed);
+  const bool has_moved = p.drift_x_um != 0 || p.drift_y_um != 0 || p.turn_deg != 0;
+  if (p.images && has_moved) {
+    const std::vector<Vec2> beyond = place_beads_beyond(p);
+    if (!beyond.empty())
+      e.beyond = with_noise(displacement_of(cells, beyond, p, work.threads), e.noise_um, p.seed + kBeyond);
+  }
+  e.cell = std::move(first.cell), e.network = std::move(first.network);
+  e.tensions = std::move(first.tensions), e.forces = std::move(first.forces);
+  if (second) e.neighbour = std::move(second->cell);
   return e;
 }
 

@@ -1,6 +1,7 @@
 /// A whole synthetic experiment: a cell, the forces it exerts, how the gel gives way, and what is measured of it.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "pipeline/contract/beads.h"
@@ -16,11 +17,13 @@ namespace mbtfm::experiment {
 
 struct Experiment {
   Cell cell;
+  std::optional<Cell> neighbour;      ///< that pulls at the same gel; what else is here is of the first cell alone
   Network network;                    ///< the simulation's own; its shares refer to a mesh of kReferenceEdge_um
   std::vector<Tension> tensions;      ///< front(): the actin network, for a mesh of kReferenceEdge_um
   std::vector<AdhesionForce> forces;  ///< by adhesion, in rising label
   DisplacementField displacement;     ///< true, at the bead positions
   DisplacementField measured;         ///< with noise
+  DisplacementField beyond;           ///< the same of beads that the relaxed picture alone shows, as the stage moved
   double noise_um = 0;                ///< standard deviation of a component
   double largest_displacement_um = 0;
   double total_force_nN = 0;  ///< sum of the adhesions' force magnitudes
@@ -43,5 +46,8 @@ DisplacementField with_noise(DisplacementField field, double noise_um, std::uint
 /// Random positions on the field, no two nearer than the scenario's bead distance.
 /// @throws UsageError where they do not fit
 std::vector<Vec2> place_beads(const drawing::ScenarioParameters& parameters);
+
+/// The same beyond the field, as far as the relaxed picture reaches.
+std::vector<Vec2> place_beads_beyond(const drawing::ScenarioParameters& parameters);
 
 }  // namespace mbtfm::experiment

@@ -53,12 +53,6 @@ Match match_at(double angle_rad, const cv::Mat& spectrum, const cv::Mat& stresse
 
 }  // namespace
 
-Vec2 Turn::of(Vec2 place) const {
-  const Vec2 d = place - centre;
-  const double c = std::cos(angle_rad), s = std::sin(angle_rad);
-  return centre + shift + Vec2{c * d.x - s * d.y, s * d.x + c * d.y};
-}
-
 std::optional<Turn> turn_between(const Plane& relaxed, const Plane& stressed, double bead_sigma, int threads) {
   const double wanted = static_cast<double>(kMostPixels) / std::max(relaxed.width, relaxed.height);
   const double factor = std::min(1.0, std::max(wanted, 0.8 / bead_sigma));

@@ -3,16 +3,10 @@
 
 #include <optional>
 
+#include "segment/beads/placement.h"
 #include "segment/beads/plane.h"
 
 namespace mbtfm::beads {
-
-/// A turn about the image's centre, then a shift.
-struct Turn {
-  double angle_rad = 0;  ///< from +x towards +y
-  Vec2 shift, centre;
-  Vec2 of(Vec2 place) const;
-};
 
 /// The turn that carries the beads of `relaxed` to those of `stressed`, to half a degree and a few pixels: of turns by
 /// up to 30 degrees, a half apart, the one whose pictures correlate best. Nothing where none stands out.

@@ -167,7 +167,7 @@ double outwardness(const DisplacementField& field) {
   return cosines / total;
 }
 
-GivenMotion take_affine_off(DisplacementField& field, const TrackParameters& parameters) {
+GivenMotion take_motion_off(DisplacementField& field, const TrackParameters& parameters) {
   std::vector<Vec2> positions, displacements;
   for (const Bead& bead : field) {
     if (!bead.flag.empty()) continue;
@@ -177,16 +177,31 @@ GivenMotion take_affine_off(DisplacementField& field, const TrackParameters& par
   const auto [first, last] = extent_of(positions);
   constexpr std::size_t kFewest = 100;  // squares enough that a motion of six numbers is no chance
   if (positions.size() < kFewest || !(last.x > first.x) || !(last.y > first.y)) {
+    if (parameters.places == TablePlaces::relaxed)
+      throw InvalidData("the displacement", std::to_string(kFewest) + " vectors, so that the stage's motion is found",
+                        std::to_string(positions.size()));
     return {
         .common = {},
         .affine = stage::decided(EffectKind::affine_drift, Switch::automatic, false, "too few places would show it")};
   }
   const MotionTaken all = motion_taken(positions, displacements, first, last.x - first.x, last.y - first.y,
                                        parameters.drift_affine, parameters.effect_tolerance, 0);
-  if (all.affine.is_on) {
-    for (Bead& bead : field) bead.displacement_um = bead.displacement_um - all.motion.at(bead.position_um);
+  const bool are_moved = parameters.places == TablePlaces::relaxed;
+  if (all.affine.is_on || are_moved) {
+    for (Bead& bead : field) {
+      const Vec2 motion_um = all.motion.at(bead.position_um);
+      bead.displacement_um = bead.displacement_um - motion_um;
+      if (are_moved) bead.position_um += motion_um;
+    }
   }
-  return {.common = all.common, .affine = all.affine};
+  // a cell that lies aside by 0.3 um, half an adhesion, costs one or two per cent of its force
+  constexpr double kMatters_um = 0.3, kCertain = 4;  // standard errors
+  const double drift_um = norm(all.common.drift_um);
+  const bool matters =
+      drift_um > std::max(kMatters_um, kCertain * all.common.drift_sigma_um) && all.common.has_far_field;
+  GivenMotion result{.common = all.common, .affine = all.affine};
+  if (matters && parameters.places == TablePlaces::automatic) result.unplaced_um = drift_um;
+  return result;
 }
 
 bool points_outward(const DisplacementField& field, const CommonMotion& common, bool is_affine_left) {

@@ -18,11 +18,15 @@ DisplacementField read_given_field(const std::filesystem::path& file, const Trac
 struct GivenMotion {
   CommonMotion common;
   Effect affine;
+  /// Length of the drift that the table holds, if it matters in which picture its places are and nobody said it.
+  std::optional<double> unplaced_um = {};
 };
 
-/// Take turn, growth and shear of the whole, and the shift found with them, off a field, as `drift_affine` says. Where
-/// they are not taken off the field stays as it is: whoever made it has taken its drift off, or wants it.
-GivenMotion take_affine_off(DisplacementField& field, const TrackParameters& parameters);
+/// Take the motion of the whole off a field. If its places are those of the relaxed picture, the motion of the stage is
+/// taken off and added to the places. Otherwise turn, growth and shear, and the shift found with them, are taken off as
+/// `drift_affine` says; if they are not, the field stays as it is: whoever made it has taken its drift off, or wants
+/// it.
+GivenMotion take_motion_off(DisplacementField& field, const TrackParameters& parameters);
 
 /// Mean of the cosine between displacement and direction from the field's centre, weighted with displacement²: about
 /// −0.7 around a contracting cell; positive where stressed and relaxed image are swapped. 0 for less than 20 beads that

@@ -58,14 +58,15 @@ struct Measured {
   double window_px = 0;  ///< Gaussian sigma of the windows; 0: beads
 };
 
-/// What moved the good beads together, px. @param setting  as of TrackParameters::drift_affine
-MotionTaken motion_of_all(const Measured& measured, Switch setting, double tolerance) {
-  const Scene& scene = *measured.scene;
+/// What moved the good beads together, px. @param motion_of  by bead. @param setting  as of drift_affine
+template <class MotionOf>
+MotionTaken motion_of_all(const Scene& scene, const std::vector<Track>& tracks, const MotionOf& motion_of,
+                          Switch setting, double tolerance) {
   std::vector<Vec2> positions, displacements;
   for (int k = 0; k < scene.n_beads(); ++k) {
-    if (!measured.tracks[k].is_good()) continue;
+    if (!tracks[k].is_good()) continue;
     positions.push_back(scene.position(k));
-    displacements.push_back(measured.pooling.beads[k].u);
+    displacements.push_back(motion_of(k));
   }
   const Plane& plane = scene.relaxed->image.plane;
   return motion_taken(positions, displacements, {-0.5, -0.5}, plane.width, plane.height, setting, tolerance, 1);
@@ -89,6 +90,16 @@ void flag_turned_out(const Scene& scene, const Turn& turn, std::vector<Track>& t
   }
 }
 
+/// The beads that the stressed image would not show at rest: what is found in their place, others are.
+void flag_out_of_sight(const Scene& scene, const Placement& stressed, std::vector<Track>& tracks) {
+  const Plane& plane = scene.stressed.image.plane;
+  for (int k = 0; k < scene.n_beads(); ++k) {
+    const Vec2 at_rest = stressed.of(scene.position(k));
+    const bool is_inside = at_rest.x >= 0 && at_rest.y >= 0 && at_rest.x < plane.width && at_rest.y < plane.height;
+    if (!is_inside && tracks[k].is_good()) tracks[k].flag = TrackFlag::edge;
+  }
+}
+
 /// Found from the grid with the wide window, measured in the narrow one, even where beads are loose or not resolved and
 /// single ones scatter: a wider window would hide the scatter and flatten the peaks.
 Followed followed_and_measured(const Scene& scene, const std::optional<Turn>& turn, const TrackParameters& parameters,
@@ -109,34 +120,65 @@ Followed followed_and_measured(const Scene& scene, const std::optional<Turn>& tu
 /// Where a pixel lies, um: positions count from the centre of the first pixel.
 Vec2 place_um(Vec2 position_px, double pixel_size_um) { return pixel_size_um * (position_px + Vec2{0.5, 0.5}); }
 
+/// The relaxed picture in the cell's ones. @param own  the same in this stressed picture
+Placement placement_of_cell(const TrackParameters& parameters, const std::optional<Placement>& cell,
+                            const Placement& own) {
+  switch (parameters.cell_with) {
+    case CellWith::relaxed:
+      return {};
+    case CellWith::stressed:
+      return cell.value_or(own);
+    case CellWith::each:
+      return own;
+  }
+  return own;
+}
+
+/// Of the model of the gel, which is in the frame of the cell's pictures.
+struct PlacedModel {
+  const FieldModel& um;
+  const std::optional<Placement>& cell;  ///< if it is known before the beads are followed
+};
+
 /// Once more, each bead compared with its neighbours in what they do beside the model.
-void follow_beside(const FieldModel& model, const Scene& scene, const TrackParameters& parameters, double pixel_size_um,
-                   std::vector<Track>& tracks) {
+void follow_beside(const PlacedModel& model, const Scene& scene, const std::optional<Turn>& turn,
+                   const TrackParameters& parameters, double pixel_size_um, std::vector<Track>& tracks) {
+  Placement own{.turn = turn};
+  const bool needs_own =
+      parameters.cell_with != CellWith::relaxed && !(model.cell && parameters.cell_with == CellWith::stressed);
+  if (needs_own) {
+    own.motion = motion_of_all(
+                     scene, tracks, [&](int k) { return tracks[k].found.motion.u; }, parameters.drift_affine,
+                     parameters.effect_tolerance)
+                     .motion;
+  }
+  const Placement cell = placement_of_cell(parameters, model.cell, own);
+  const double angle_rad = cell.turn_rad() - own.motion.turn_rad;  // from the picture turned back
   DisplacementField beads;
   for (int k = 0; k < scene.n_beads(); ++k) {
-    beads.push_back({.position_um = place_um(scene.position(k), pixel_size_um),
-                     .displacement_um = pixel_size_um * tracks[k].found.motion.u,
+    beads.push_back({.position_um = place_um(cell.of(scene.position(k)), pixel_size_um),
+                     .displacement_um = pixel_size_um * rotated(tracks[k].found.motion.u, angle_rad),
                      .sigma_um = 0,
                      .flag = name_of(tracks[k].flag)});
   }
-  std::vector<Vec2> expected = model(beads);
+  std::vector<Vec2> expected = model.um(beads);
   if (expected.empty()) return;
-  for (Vec2& u : expected) u = 1 / pixel_size_um * u;
+  for (Vec2& u : expected) u = 1 / pixel_size_um * rotated(u, -angle_rad);
   flag_outliers_beside(expected, scene, parameters.outlier_threshold, tracks);
   recover(scene, parameters.least_similarity, tracks, expected);
 }
 
 Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images::Image& stressed,
                         const std::optional<Turn>& turn, const TrackParameters& parameters, double pixel_size_um,
-                        int threads, const FieldModel& model) {
+                        int threads, const PlacedModel& model) {
   const auto scene = std::make_shared<const Scene>(scene_of(
       relaxed, side_of(stressed, relaxed->bead_sigma, parameters.detection_snr, "stressed", threads), threads));
   auto [tracks, n_by_grid] =
       followed_and_measured(*scene, turn, parameters, search_window(4 * scene->spacing(), parameters, pixel_size_um));
   recover(*scene, parameters.least_similarity, tracks);
   constexpr int kRounds = 2;  // what the first one mends makes the model better
-  for (int round = 0; model && round < kRounds; ++round) {
-    follow_beside(model, *scene, parameters, pixel_size_um, tracks);
+  for (int round = 0; model.um && round < kRounds; ++round) {
+    follow_beside(model, *scene, turn, parameters, pixel_size_um, tracks);
   }
   if (turn) flag_turned_out(*scene, *turn, tracks);  // those found again
   require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
@@ -218,17 +260,19 @@ CommonMotion turned_as_before(CommonMotion common, const Turn& turn, Vec2 centre
   return common;
 }
 
-/// @param motion  of all, px: taken off
-Bead entry_of(const Measured& measured, int k, const AffineMotion& motion, double pixel_size_um) {
+/// At rest in the cell's frame, the motion of all taken off. @param own  the relaxed picture in the stressed one
+Bead entry_of(const Measured& measured, int k, const Placement& own, const Placement& cell, double pixel_size_um) {
   const Pooled& found = measured.pooling.beads[k];
   const Vec2 place = measured.scene->position(k);
-  return {.position_um = place_um(place, pixel_size_um),
-          .displacement_um = pixel_size_um * (found.u - motion.at(place)),
+  const double angle_rad = cell.turn_rad() - own.motion.turn_rad;
+  return {.position_um = place_um(cell.of(place), pixel_size_um),
+          .displacement_um = pixel_size_um * rotated(found.u - own.motion.at(place), angle_rad),
           .sigma_um = pixel_size_um * found.sigma_px,
           .flag = name_of(measured.tracks[k].flag)};
 }
 
-Tracking tracking_of(const Measured& measured, const MotionTaken& all, double pixel_size_um) {
+Tracking tracking_of(const Measured& measured, const MotionTaken& all, const Placement& own, const Placement& cell,
+                     double pixel_size_um) {
   const Scene& scene = *measured.scene;
   const std::vector<Track>& tracks = measured.tracks;
   const Pooling& pooling = measured.pooling;
@@ -241,8 +285,9 @@ Tracking tracking_of(const Measured& measured, const MotionTaken& all, double pi
   result.window_um = pixel_size_um * measured.window_px;
   result.sizes = measured.sizes;
   result.affine = all.affine;
+  result.stressed = own;
   for (int k = 0; k < scene.n_beads(); ++k) {
-    result.field.push_back(entry_of(measured, k, all.motion, pixel_size_um));
+    result.field.push_back(entry_of(measured, k, own, cell, pixel_size_um));
     if (tracks[k].is_good()) ++result.n_good;
   }
   return result;
@@ -254,6 +299,8 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
   list.table("");
   list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
            "side of a pixel in the specimen (um); unset: from the image's own calibration");
+  list.table_of_several("images");
+  list.add("cell_with", p.cell_with, kCellWithMeaning);
   list.table("track");
   declare(list, p.stressed_plane, "stressed", "the stressed bead image");
   declare(list, p.relaxed_plane, "relaxed", "the relaxed bead image");
@@ -287,6 +334,9 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
   list.add(
       "length_unit", p.length_unit,
       "unit of the lengths in --displacement: um, or px (pixels of pixel_size_um; 0 is the centre of the first pixel)");
+  list.add("places", p.places,
+           "frame of the places in --displacement: cell (the cell's images), or relaxed (the relaxed bead image: the "
+           "motion of the stage is found, taken off and added to the places); auto: cell");
 }
 
 RelaxedBeads::RelaxedBeads(const images::Image& relaxed, const TrackParameters& parameters, int threads,
@@ -306,26 +356,27 @@ RelaxedBeads::RelaxedBeads(const images::Image& relaxed, const TrackParameters& 
   }
 }
 
-Tracking RelaxedBeads::track(const images::Image& stressed, double pixel_size_um, const Progress& progress) const {
-  const auto size = [](const images::Image& image) {
-    return std::to_string(image.width) + " x " + std::to_string(image.height);
+Tracking RelaxedBeads::track(const images::Image& image, double pixel_size_um, const Progress& progress,
+                             const std::optional<Placement>& cell) const {
+  const Stressed stressed{image, pixel_size_um, cell, progress};
+  const auto size = [](const images::Image& of) {
+    return std::to_string(of.width) + " x " + std::to_string(of.height);
   };
-  if (size(relaxed_) != size(stressed)) {
-    throw InvalidData("the stressed image", "the relaxed image's " + size(relaxed_) + " pixels", size(stressed));
+  if (size(relaxed_) != size(image)) {
+    throw InvalidData("the stressed image", "the relaxed image's " + size(relaxed_) + " pixels", size(image));
   }
-  require_numbers(stressed, "stressed");
+  require_numbers(image, "stressed");
   try {
-    return track_by_any(stressed, pixel_size_um, progress);
+    return track_by_any(stressed);
   } catch (NotFollowed& error) {
-    error.hint = remedy(stressed, pixel_size_um);
+    error.hint = remedy(stressed);
     throw;
   }
 }
 
 /// Single beads first: where they can be followed, each knows more of its place than a window does.
-Tracking RelaxedBeads::track_by_any(const images::Image& stressed, double pixel_size_um,
-                                    const Progress& progress) const {
-  const auto by = [&](TrackMethod method) { return track_by(method, stressed, pixel_size_um, progress); };
+Tracking RelaxedBeads::track_by_any(const Stressed& stressed) const {
+  const auto by = [&](TrackMethod method) { return track_by(method, stressed); };
   const TrackMethod method = parameters_.method;
   if (method != TrackMethod::automatic) {
     Tracking result = by(method);
@@ -354,9 +405,8 @@ Tracking RelaxedBeads::track_by_any(const images::Image& stressed, double pixel_
   }
 }
 
-Tracking RelaxedBeads::track_by(TrackMethod method, const images::Image& stressed, double pixel_size_um,
-                                const Progress& progress) const {
-  const auto as = [&](Switch setting) { return track_as(method, setting, stressed, pixel_size_um, progress); };
+Tracking RelaxedBeads::track_by(TrackMethod method, const Stressed& stressed) const {
+  const auto as = [&](Switch setting) { return track_as(method, setting, stressed); };
   if (parameters_.drift_affine != Switch::automatic) return as(parameters_.drift_affine);
   std::optional<Tracking> unturned;
   std::exception_ptr refused;
@@ -384,10 +434,10 @@ Tracking RelaxedBeads::track_by(TrackMethod method, const images::Image& stresse
   }
 }
 
-Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const images::Image& stressed, double pixel_size_um,
-                                const Progress& progress) const {
+Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const Stressed& stressed) const {
+  const double pixel_size_um = stressed.pixel_size_um;
   const auto tell = [&](double fraction, const char* what) {
-    if (progress) progress(fraction, what);
+    if (stressed.progress) stressed.progress(fraction, what);
   };
   const bool by_beads = method == TrackMethod::beads;
   const Plane& plane = by_beads ? side_->image.plane : texture_->plane;
@@ -395,27 +445,31 @@ Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const images
   std::optional<Turn> turn;
   if (setting == Switch::on) {
     tell(0, "turning the image back");
-    const Plane light = by_beads ? without_background(stressed, background_sigma(spot_sigma))
-                                 : texture_of(stressed, spot_sigma, "stressed").plane;
+    const Plane light = by_beads ? without_background(stressed.image, background_sigma(spot_sigma))
+                                 : texture_of(stressed.image, spot_sigma, "stressed").plane;
     turn = turn_between(plane, light, spot_sigma, threads_);
     if (!turn && by_beads) require_common_beads(0, 0, static_cast<int>(side_->beads.size()));
     if (!turn)
       throw NotFollowed("the stressed image", "the relaxed image's texture, turned", "no turn that stands out");
   }
-  const images::Image unturned = turn ? turned_back(stressed, *turn, threads_) : stressed;
+  const images::Image unturned = turn ? turned_back(stressed.image, *turn, threads_) : stressed.image;
   tell(0, by_beads ? "following beads" : "following windows");
-  const Measured measured = by_beads
-                                ? measured_beads(side_, unturned, turn, parameters_, pixel_size_um, threads_, model_)
-                                : measured_windows(*texture_, unturned, turn, parameters_, pixel_size_um, threads_);
-  const MotionTaken all = motion_of_all(measured, setting, parameters_.effect_tolerance);
+  Measured measured =
+      by_beads ? measured_beads(side_, unturned, turn, parameters_, pixel_size_um, threads_, {model_, stressed.cell})
+               : measured_windows(*texture_, unturned, turn, parameters_, pixel_size_um, threads_);
+  const MotionTaken all = motion_of_all(
+      *measured.scene, measured.tracks, [&](int k) { return measured.pooling.beads[k].u; }, setting,
+      parameters_.effect_tolerance);
   require_shift_alone(all);
-  Tracking result = tracking_of(measured, all, pixel_size_um);
+  const Placement own{all.motion, turn}, cell = placement_of_cell(parameters_, stressed.cell, own);
+  flag_out_of_sight(*measured.scene, own, measured.tracks);
+  Tracking result = tracking_of(measured, all, own, cell, pixel_size_um);
   if (by_beads && texture_ && !parameters_.is_series) {
     const Gaps gaps(*measured.scene, measured.tracks);
     result.share_of_gaps = gaps.share();
     if (gaps.are_large()) {
       tell(0.9, "following windows where beads fail");
-      fill(gaps, unturned, turn, all.motion, pixel_size_um, result);
+      fill(gaps, unturned, cell, pixel_size_um, result);
     }
   }
   const CommonMotion common = turn ? turned_as_before(all.common, *turn, all.motion.centre) : all.common;
@@ -430,30 +484,32 @@ Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const images
 }
 
 /// Windows in the gaps, beside the beads.
-void RelaxedBeads::fill(const Gaps& gaps, const images::Image& stressed, const std::optional<Turn>& turn,
-                        const AffineMotion& motion, double pixel_size_um, Tracking& tracking) const {
+void RelaxedBeads::fill(const Gaps& gaps, const images::Image& unturned, const Placement& cell, double pixel_size_um,
+                        Tracking& tracking) const {
+  const Placement& own = tracking.stressed;
   std::optional<Measured> windows;
   try {
-    windows = measured_windows(*texture_, stressed, turn, parameters_, pixel_size_um, threads_, &gaps);
+    windows = measured_windows(*texture_, unturned, own.turn, parameters_, pixel_size_um, threads_, &gaps);
   } catch (const NotFollowed&) {
     return;  // there is no texture either
   }
   tracking.window_um = pixel_size_um * windows->window_px;
   for (int k = 0; k < windows->scene->n_beads(); ++k) {
     if (!windows->tracks[k].is_good()) continue;
-    tracking.field.push_back(entry_of(*windows, k, motion, pixel_size_um));
+    tracking.field.push_back(entry_of(*windows, k, own, cell, pixel_size_um));
     ++tracking.n_windows;
     ++tracking.n_good;
   }
 }
 
 /// Tried out one by one: an error has the time, and a hint that does not help costs the reader more.
-std::string RelaxedBeads::remedy(const images::Image& stressed, double pixel_size_um) const {
+std::string RelaxedBeads::remedy(const Stressed& stressed) const {
   const auto helps = [&](const auto& change) {
     TrackParameters changed = parameters_;
     change(changed);
     try {
-      RelaxedBeads(relaxed_, changed, threads_, model_).track_by_any(stressed, pixel_size_um, {});
+      RelaxedBeads(relaxed_, changed, threads_, model_)
+          .track_by_any({stressed.image, stressed.pixel_size_um, stressed.cell, {}});
       return true;
     } catch (const InvalidData&) {
       return false;
@@ -466,7 +522,7 @@ std::string RelaxedBeads::remedy(const images::Image& stressed, double pixel_siz
   if (parameters_.drift_affine == Switch::off && helps([](auto& p) { p.drift_affine = Switch::automatic; })) {
     found.push_back("effects.drift_affine = auto: one image is turned against the other");
   }
-  const double further_um = 0.25 * std::min(stressed.width, stressed.height) * pixel_size_um;
+  const double further_um = 0.25 * std::min(relaxed_.width, relaxed_.height) * stressed.pixel_size_um;
   if (parameters_.largest_displacement_um < further_um &&
       helps([&](auto& p) { p.largest_displacement_um = further_um; })) {
     found.push_back("track.largest_displacement_um = " + brief(further_um) + ": what moved, moved far");

@@ -13,6 +13,7 @@
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/work.h"
 #include "pipeline/stage/parameters_fwd.h"
+#include "segment/beads/placement.h"
 #include "segment/images/image.h"
 
 namespace mbtfm::beads {
@@ -32,12 +33,21 @@ enum class LengthUnit {
 };
 constexpr auto words(LengthUnit) { return std::array{"um", "px"}; }
 
+/// Where a table of another program has its places.
+enum class TablePlaces {
+  automatic,  ///< as `cell`; asked for if the table holds a drift
+  cell,       ///< in the cell's pictures, at rest
+  relaxed     ///< in the relaxed picture, from which the stage moved by the motion that all have in common
+};
+constexpr auto words(TablePlaces) { return std::array{"auto", "cell", "relaxed"}; }
+
 struct TrackParameters {
   std::optional<double> pixel_size_um;        ///< unset: from the images' own calibration
   std::optional<double> beads_pixel_size_um;  ///< of the bead images alone; unset: as all
   images::PlaneChoice stressed_plane;         ///< of a time series the first
   images::PlaneChoice relaxed_plane;
   int stressed_last = 0;                        ///< of a time series the last time or page; 0: a single image
+  CellWith cell_with = CellWith::stressed;      ///< a cell is recorded with the beads that it pulls, then removed
   TrackMethod method = TrackMethod::automatic;  ///< single beads know most where they can be told apart
   double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
@@ -52,6 +62,7 @@ struct TrackParameters {
   std::string x_column = "x_um", y_column = "y_um", ux_column = "ux_um", uy_column = "uy_um";
   std::string sigma_column = "sigma_um";  ///< need not be there
   LengthUnit length_unit = LengthUnit::um;
+  TablePlaces places = TablePlaces::automatic;
 };
 void declare(stage::ParameterList& list, TrackParameters& parameters);
 
@@ -101,6 +112,7 @@ struct BeadSizes {
 
 struct Tracking {
   DisplacementField field;      ///< one entry for each bead found in the relaxed image, good or flagged
+  Placement stressed;           ///< of the relaxed picture in the stressed one, if the gel were at rest
   CommonMotion common;          ///< what all beads do together
   double far_field_rms_um = 0;  ///< of a displacement component at rest, less drift and the cell's tail
   double noise_um = 0;          ///< the same as robust standard deviation
@@ -133,7 +145,6 @@ using FieldModel = std::function<std::vector<Vec2>(const DisplacementField& bead
 
 struct Side;
 struct Texture;
-struct Turn;
 class Gaps;
 
 /// The beads, and the texture, of the relaxed image, found once for any number of stressed ones.
@@ -166,20 +177,28 @@ class RelaxedBeads {
   /// By correlation, steps 1 to 3 are those of windows on a lattice in place of beads (windows.h): the smallest whose
   /// standard error is a tenth of a pixel. Nothing is weighed in. With `auto` such windows fill the gaps between the
   /// beads, too (gaps.h).
+  /// Places at rest are the beads' places in the relaxed picture, moved as the stage moved (`cell_with`).
+  /// @param cell  the relaxed picture in the cell's pictures, if these are with another frame of the series
   /// @throws NotFollowed where the stressed image shows no beads, or others than the relaxed one
   /// @throws InvalidData where the sizes differ, or a turn is found and must not be taken off
   /// @throws ExchangedImages where the gel is pushed outward as if the images were exchanged (given_field.h)
-  Tracking track(const images::Image& stressed, double pixel_size_um, const Progress& progress = {}) const;
+  Tracking track(const images::Image& stressed, double pixel_size_um, const Progress& progress = {},
+                 const std::optional<Placement>& cell = std::nullopt) const;
 
  private:
-  Tracking track_by_any(const images::Image& stressed, double pixel_size_um, const Progress& progress) const;
-  Tracking track_by(TrackMethod method, const images::Image& stressed, double pixel_size_um,
-                    const Progress& progress) const;
-  Tracking track_as(TrackMethod method, Switch setting, const images::Image& stressed, double pixel_size_um,
-                    const Progress& progress) const;
-  void fill(const Gaps& gaps, const images::Image& stressed, const std::optional<Turn>& turn,
-            const AffineMotion& motion, double pixel_size_um, Tracking& tracking) const;
-  std::string remedy(const images::Image& stressed, double pixel_size_um) const;
+  /// A stressed image, and what is known of it beforehand.
+  struct Stressed {
+    const images::Image& image;
+    double pixel_size_um;
+    const std::optional<Placement>& cell;
+    const Progress& progress;
+  };
+  Tracking track_by_any(const Stressed& stressed) const;
+  Tracking track_by(TrackMethod method, const Stressed& stressed) const;
+  Tracking track_as(TrackMethod method, Switch setting, const Stressed& stressed) const;
+  void fill(const Gaps& gaps, const images::Image& unturned, const Placement& cell, double pixel_size_um,
+            Tracking& tracking) const;
+  std::string remedy(const Stressed& stressed) const;
   images::Image relaxed_;
   std::shared_ptr<const Side> side_;        ///< unless windows alone are asked for
   std::shared_ptr<const Texture> texture_;  ///< unless beads alone are

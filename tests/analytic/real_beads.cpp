@@ -36,7 +36,7 @@ TEST(RealBeads, a_layer_of_cells_moves_its_gel_as_image_correlation_says) {
       return images::read_image(folder / "forPIV" / ("000" + std::to_string(k) + ".tif"));
     };
     const images::Image relaxed = image(2 * frame - 2);
-    const Tracking tracking = track_beads(relaxed, image(2 * frame - 1), 1.0, {}, 2);
+    const Tracking tracking = track_beads(relaxed, image(2 * frame - 1), 1.0, test::in_relaxed_frame(), 2);
     test::PivGrid grid;
     std::vector<Vec2> theirs;
     for (const auto& row : rows_of_four(folder / "reference" / ("PIV" + std::to_string(frame) + ".txt"))) {
@@ -57,7 +57,7 @@ TEST(RealBeads, a_layer_of_cells_moves_its_gel_as_image_correlation_says) {
 TEST(RealBeads, a_cell_that_the_border_cuts_moves_nothing_beyond_its_reach) {
   const auto file = kBeads.parent_path() / "real/adhesions_and_beads/bead_a.tif";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not here";
-  TrackParameters parameters;
+  TrackParameters parameters = test::in_relaxed_frame();  // as others state places
   parameters.drift_affine = Switch::automatic;
   const images::Image stressed = images::read_image(file, {.page = 1}), relaxed = images::read_image(file, {.page = 2});
   constexpr double kPixel_um = 0.02025;
@@ -92,7 +92,7 @@ std::vector<Vec2> less_median(std::vector<Vec2> values) {
 TEST(RealBeads, weak_beads_on_a_mottled_ground_are_followed_by_windows_as_image_correlation_says) {
   const auto folder = kBeads / "axon";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
-  TrackParameters parameters;
+  TrackParameters parameters = test::in_relaxed_frame();  // as others state places
   parameters.drift_affine = Switch::automatic;
   const Tracking tracking = track_beads(images::read_image(folder / "beads_relaxed.tif"),
                                         images::read_image(folder / "beads_stressed.tif"), 1.0, parameters, 2);
@@ -133,7 +133,7 @@ TEST(RealBeads, a_growth_cone_moves_its_gel_as_published_tracks_say) {
   const auto folder = kBeads.parent_path() / "real/growth_cone_thin_gel";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
   constexpr double kPixel_um = 0.116;
-  TrackParameters parameters;
+  TrackParameters parameters = test::in_relaxed_frame();  // as others state places
   parameters.drift_affine = Switch::automatic;
   const Tracking tracking = track_beads(images::read_image(folder / "image1.tif"),
                                         images::read_image(folder / "image2.tif"), kPixel_um, parameters, 2);
@@ -205,7 +205,7 @@ TEST_F(TurnedBeads, are_detected) {
 TEST_F(TurnedBeads, are_refused_as_shifted_ones_and_followed_as_turned_ones) {
   EXPECT_THROW(track_beads(images_[0], images_[1], 1.0), InvalidData);
   {
-    TrackParameters parameters;
+    TrackParameters parameters = test::in_relaxed_frame();  // as others state places
     parameters.drift_affine = Switch::on;
     const Tracking tracking = track_beads(images_[0], images_[1], 1.0, parameters, 2);
     EXPECT_NEAR(tracking.common.turn_rad * 180 / std::numbers::pi, 10, 0.01);

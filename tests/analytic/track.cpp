@@ -50,7 +50,8 @@ TEST(Track, steep_peaks_are_followed_and_the_standard_errors_tell_how_well) {
     SCOPED_TRACE(seed);
     const Vec2 drift{1.7, -0.6};
     const auto pair = draw_bead_pair(peaks, {.drift = drift, .seed = seed});
-    const test::TrackingErrors e = test::errors_of(track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2), peaks, drift);
+    const test::TrackingErrors e =
+        test::errors_of(track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(), 2), peaks, drift);
     EXPECT_LE(e.all.root(), 0.12);
     EXPECT_LE(e.small.root(), 0.035);
     EXPECT_LE(e.large.root(), 0.35);
@@ -74,7 +75,8 @@ TEST(Track, standard_errors_hold_for_few_and_many_bright_and_dim_beads) {
                                     << scene.jitter);
     scene.seed = 5;
     const auto pair = draw_bead_pair(peaks, scene);
-    const test::TrackingErrors e = test::errors_of(track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2), peaks);
+    const test::TrackingErrors e =
+        test::errors_of(track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(), 2), peaks);
     EXPECT_GE(e.n_good, 0.95 * e.n_beads);
     EXPECT_GE(e.variance.mean(), 0.7);
     EXPECT_LE(e.variance.mean(), 1.4);
@@ -90,7 +92,7 @@ TEST(Track, a_dish_put_back_turned_is_turned_back) {
         draw_bead_pair(peaks, {.width = 384, .n_beads = 2950, .turn_rad = turn_rad, .drift = {4, -7}, .seed = 3});
     TrackParameters parameters;
     parameters.drift_affine = Switch::on;
-    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, parameters, 2);
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(parameters), 2);
     EXPECT_NEAR(tracking.common.turn_rad, turn_rad, 2e-4);  // 0.04 px at the border
     EXPECT_NEAR(tracking.common.drift_um.x, 4, 0.02);
     EXPECT_NEAR(tracking.common.drift_um.y, -7, 0.02);
@@ -109,7 +111,7 @@ struct Similarity {
 Tracking tracked_similarity(const test::BeadPair& pair) {
   TrackParameters parameters;
   parameters.drift_affine = Switch::on;
-  return track_beads(pair.relaxed, pair.stressed, 1.0, parameters, 2);
+  return track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(parameters), 2);
 }
 
 /// Some 1 300 beads of the frame, each known to 0.02 px, tell turn and growth to 0.02 / (140 sqrt 1300) = 4e-6; the
@@ -161,7 +163,7 @@ TEST(Track, the_noise_is_what_beads_step_by_on_their_own_beside_a_cell_and_where
   for (const bool has_cell : {true, false}) {
     const auto peaks = has_cell ? test::ring_of_adhesions(384, 4) : std::vector<test::Peak>{};
     const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 2500, .jitter = kStep, .seed = 1});
-    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(), 2);
     // the forces in the picture that are fitted to a thousand beads of the frame follow 286 of their 2000 steps'
     // components at most (7 %), and what beads tell of each other takes as much; the beads' own error adds a per cent
     EXPECT_TRUE(tracking.common.has_far_field);

@@ -191,7 +191,8 @@ TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
   // times 1 and 2 pull, 3 is relaxed; channel 1 shows something else
   write_stack(folder / "s.tif", {&other, &one.stressed, &other, &two.stressed, &other, &one.relaxed},
               "channels=2\nslices=1\nframes=3\nhyperstack=true\n");
-  const std::string both = files(folder, "s.tif", "s.tif") + " --pixel_size_um 0.2";
+  // of a series the places are those of its first frame, of a frame alone its own: the relaxed one is the same for both
+  const std::string both = files(folder, "s.tif", "s.tif") + " --pixel_size_um 0.2 --cell_with relaxed";
   const std::string relaxed = " --relaxed_channel 2 --relaxed_time 3", beads = " --stressed_channel 2";
   Outcome ended = run_track(both + relaxed + beads + " --stressed_time 1 --stressed_last 2");
   ASSERT_EQ(ended.code, 0) << ended.output;

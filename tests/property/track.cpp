@@ -133,15 +133,50 @@ std::array<int, 3> colour_at(const images::Picture& picture, int column, int row
   return {picture.rgb[at], picture.rgb[at + 1], picture.rgb[at + 2]};
 }
 
+/// The cell is recorded with the stressed beads: there its places are, and there a bead's place at rest is.
+TEST(PlacesAtRest, are_those_of_the_relaxed_picture_moved_as_the_stage_moved) {
+  const double turn_rad = 0.02;
+  const double side = 384;
+  const Vec2 drift{9.3, -6.4}, middle{0.5 * side, 0.5 * side};
+  const auto pair = test::draw_bead_pair(test::ring_of_adhesions(side, 6),
+                                         {.width = 384, .n_beads = 2950, .turn_rad = turn_rad, .drift = drift});
+  const auto tracked_with = [&](CellWith cell_with) {
+    return track_beads(pair.relaxed, pair.stressed, 1, {.cell_with = cell_with, .drift_affine = Switch::on});
+  };
+  const Tracking relaxed = tracked_with(CellWith::relaxed), stressed = tracked_with(CellWith::stressed);
+  ASSERT_EQ(relaxed.field.size(), stressed.field.size());
+  const auto turned = [&](Vec2 v) {
+    return Vec2{std::cos(turn_rad) * v.x - std::sin(turn_rad) * v.y,
+                std::sin(turn_rad) * v.x + std::cos(turn_rad) * v.y};
+  };
+  int n_in_sight = 0;
+  for (std::size_t k = 0; k < relaxed.field.size(); ++k) {
+    const Bead &before = relaxed.field[k], &after = stressed.field[k];
+    // the motion is known to hundredths of a pixel
+    EXPECT_LT(norm(after.position_um - (middle + drift + turned(before.position_um - middle))), 0.1);
+    EXPECT_LT(norm(after.displacement_um - turned(before.displacement_um)),
+              0.02 * (0.1 + norm(before.displacement_um)));
+    const bool is_in_sight =
+        after.position_um.x > 0 && after.position_um.y > 0 && after.position_um.x < side && after.position_um.y < side;
+    n_in_sight += is_in_sight && after.flag.empty();
+    if (!is_in_sight) EXPECT_FALSE(after.flag.empty()) << "the stressed picture does not show it";
+  }
+  EXPECT_GT(n_in_sight, 0.85 * static_cast<double>(relaxed.field.size()));  // drift and turn take 5 % out of sight
+}
+
 TEST(PictureOfBeads, relaxed_beads_are_green_stressed_ones_purple_and_those_that_only_drifted_white) {
   using Colour = std::array<int, 3>;
-  const images::Picture apart = picture_of_beads(point_at(20, 10), point_at(25, 12), {0, 0});
+  const images::Picture apart = picture_of_beads(point_at(20, 10), point_at(25, 12), {}, CellWith::stressed);
   ASSERT_EQ(apart.width, 60);
   EXPECT_EQ(colour_at(apart, 20, 10), (Colour{0, 255, 0}));
   EXPECT_EQ(colour_at(apart, 25, 12), (Colour{255, 0, 255}));
   EXPECT_EQ(colour_at(apart, 5, 5), (Colour{0, 0, 0}));
-  const images::Picture drifted = picture_of_beads(point_at(20, 10), point_at(25, 12), {5.2, 1.8});
+  const images::Picture drifted =
+      picture_of_beads(point_at(20, 10), point_at(25, 12), {.motion = {.shift = {5, 2}}}, CellWith::relaxed);
   EXPECT_EQ(colour_at(drifted, 20, 10), (Colour{255, 255, 255}));
+  const images::Picture with_stressed =
+      picture_of_beads(point_at(20, 10), point_at(25, 12), {.motion = {.shift = {5, 2}}}, CellWith::stressed);
+  EXPECT_EQ(colour_at(with_stressed, 25, 12), (Colour{255, 255, 255}));
 }
 
 }  // namespace

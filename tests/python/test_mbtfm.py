@@ -178,6 +178,20 @@ class Cells(unittest.TestCase):
         np.testing.assert_allclose((drawn[0].points_px + rois.LINE_ORIGIN_PX) * size, lines_um[0][:, ::-1], atol=1e-4)
         self.assertIn("drawn by hand", next(e for e in told if e.kind == "stage" and e.stage == "segment").content["summary"])
 
+    def test_the_relaxed_beads_lie_where_the_stage_moved_them(self):
+        # by 3 um to the right and 1 um down, turned by 90 degrees about the middle of a field of 20 by 20 um
+        figures = {"cell_with": "stressed", "stage_shift_x_um": 3.0, "stage_shift_y_um": 1.0, "stage_turn_deg": 90.0}
+        for cell_with, moved, still in (("stressed", "beads_relaxed", "beads_stressed"), ("relaxed", "beads_stressed", "beads_relaxed")):
+            record = {"stages": {"track": {"figures": {**figures, "cell_with": cell_with}}}}
+            cell = types.SimpleNamespace(run_record=record)
+            size = np.array([20.0, 20.0])
+            np.testing.assert_array_equal(napari._stage_motion(cell, still, size), np.eye(3))
+            place = napari._stage_motion(cell, moved, size)
+            # +x turns to +y: (x, y) = (15, 10) goes to (10, 15), then to (13, 16)
+            relaxed, stressed = np.array([10.0, 15.0, 1.0]), np.array([16.0, 13.0, 1.0])
+            start, end = (relaxed, stressed) if cell_with == "stressed" else (stressed, relaxed)
+            np.testing.assert_allclose(place @ start, end)
+
     def test_nothing_but_lines_is_written_and_nothing_half(self):
         target = self.first / "fibres.zip"
         meta = {"shape_type": "polygon", "metadata": {}}

@@ -34,7 +34,7 @@ TEST(TrackStability, lost_beads_uneven_light_and_another_exposure_cost_beads_but
   const auto peaks = test::ring_of_adhesions(384, 6);
   const auto pair = test::draw_bead_pair(
       peaks, {.width = 384, .n_beads = 2950, .lost = 0.05, .uneven_light = 0.5, .gain = 0.7, .offset = 200, .seed = 4});
-  const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+  const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(), 2);
   // one bead in ten has lost its partner, and crowded as they are (one in two touches another) its neighbours suffer
   EXPECT_GE(tracking.n_good, 0.8 * static_cast<double>(tracking.field.size()));
   EXPECT_LE(share_wrong(tracking, peaks, 1.0), 0.01);
@@ -51,7 +51,7 @@ TEST(TrackStability, loose_beads_are_followed_and_their_steps_are_in_the_standar
   double squares = 0, n = 0, n_beads = 0, n_wrong = 0;
   for (const std::uint64_t seed : {101u, 102u}) {
     const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 1500, .jitter = kStep, .seed = seed});
-    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(), 2);
     n_beads += static_cast<double>(tracking.field.size());
     const Neighbours truth(pair.positions, 8);
     for (const Bead& bead : tracking.field) {
@@ -202,7 +202,7 @@ TEST(TrackStability, sparse_beads_that_scatter_by_many_widths_are_matched) {
   for (const std::uint64_t seed : {101u, 102u, 103u}) {
     const auto pair = test::draw_bead_pair(
         peaks, {.width = 384, .n_beads = 300, .brightness_spread = 0.25, .jitter = 5, .lost = 0.015, .seed = seed});
-    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(), 2);
     n_good += tracking.n_good;
     n_beads += static_cast<double>(tracking.field.size());
     n_strangers += n_wrong(tracking, pair);
@@ -222,7 +222,7 @@ TEST(TrackStability, a_bead_that_vanished_is_not_matched_with_a_stranger_far_awa
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const auto pair = test::draw_bead_pair(
         peaks, {.width = 256, .n_beads = 150, .brightness_spread = 0.25, .jitter = 0.6, .lost = 0.2, .seed = seed});
-    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(), 2);
     const Neighbours truth(pair.positions, 8);
     for (const Bead& bead : tracking.field) {
       if (!truth.within(bead.position_um - Vec2{0.5, 0.5}, 2, 1).empty()) continue;
@@ -248,7 +248,7 @@ TEST(TrackStability, beads_that_are_lost_stay_in_the_picture) {
                                                  .jitter = 0.4 * kDistance,
                                                  .lost = 0.03,
                                                  .seed = 7});
-  for (const Bead& bead : track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2).field) {
+  for (const Bead& bead : track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(), 2).field) {
     const Vec2 from_middle = bead.position_um + bead.displacement_um - Vec2{0.5 * kSide, 0.5 * kSide};
     EXPECT_LE(std::max(std::abs(from_middle.x), std::abs(from_middle.y)), 0.5 * kSide + 64);
   }

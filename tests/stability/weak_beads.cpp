@@ -8,7 +8,7 @@ namespace mbtfm::beads {
 namespace {
 
 TrackParameters by(TrackMethod method) {
-  TrackParameters parameters;
+  TrackParameters parameters = test::in_relaxed_frame();
   parameters.method = method;
   return parameters;
 }

@@ -10,9 +10,7 @@
 ///   meshes         by the number of meshes, with and without noise: error and processor time
 ///   parts          what the error is made of: the beads' noise, the ensemble's size, the truth's own network
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <map>
 #include <string>
 

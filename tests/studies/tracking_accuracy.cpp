@@ -3,7 +3,6 @@
 /// seed, then the mean.
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 
 #include "tests/support/tracking_accuracy.h"
 
@@ -20,7 +19,8 @@ int main(int argc, char** argv) {
     scene.seed = static_cast<std::uint64_t>(seed);
     const auto pair = test::draw_bead_pair(peaks, scene);
     const auto begin = std::chrono::steady_clock::now();
-    const auto tracking = beads::track_beads(pair.relaxed, pair.stressed, 1.0, {}, static_cast<int>(argument(3, 2)));
+    const auto tracking = beads::track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(),
+                                             static_cast<int>(argument(3, 2)));
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     const test::TrackingErrors e = test::errors_of(tracking, peaks, scene.drift);
     std::printf("%4d   %s  %.2f\n", seed, test::line_of(e).c_str(), seconds.count());

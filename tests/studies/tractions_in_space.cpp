@@ -11,7 +11,6 @@
 ///   fttc      beside the usual method, of the beads just below the surface (level scenes)
 #include <chrono>
 #include <cstdio>
-#include <ctime>
 #include <iostream>
 #include <map>
 #include <numbers>

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "pipeline/contract/geometry.h"
+#include "segment/beads/track.h"
 #include "segment/images/image.h"
 #include "tests/support/test.h"
 
@@ -69,6 +70,12 @@ struct BeadScene {
   Vec2 drift{};
   std::uint64_t seed = 1;
 };
+
+/// With the places of the relaxed picture, where the truth of a drawn pair is.
+inline beads::TrackParameters in_relaxed_frame(beads::TrackParameters parameters = {}) {
+  parameters.cell_with = CellWith::relaxed;
+  return parameters;
+}
 
 struct BeadPair {
   images::Image relaxed, stressed;

@@ -71,7 +71,7 @@ TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
     TrackParameters parameters;
     parameters.drift_affine = Switch::automatic;
     const DisplacementField before = field;
-    const GivenMotion motion = take_affine_off(field, parameters);
+    const GivenMotion motion = take_motion_off(field, parameters);
     EXPECT_EQ(motion.affine.is_on, growth > 0) << motion.affine.why;
     EXPECT_NEAR(motion.common.growth, growth, 0.05 / 256);  // the noise of one point, at the border
     for (std::size_t k = 0; k < field.size(); ++k) {
@@ -79,6 +79,32 @@ TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
       // six standard deviations of the noise
       EXPECT_LT(norm(field[k].displacement_um - truth[k].displacement_um), 0.3);
     }
+  }
+}
+
+TEST(GivenField, places_of_the_relaxed_picture_are_moved_with_the_stage_and_asked_for) {
+  const Vec2 drift{3, -2};
+  DisplacementField truth;
+  for (int j = 0; j < 32; ++j)
+    for (int i = 0; i < 32; ++i) {
+      const Vec2 place{4 * i + 2.0, 4 * j + 2.0};
+      truth.push_back({place, test::displacement(test::ring_of_adhesions(128, 2), place), 0.01, ""});
+    }
+  DisplacementField given = truth;  // the relaxed picture, which the stage has left
+  for (Bead& bead : given) bead.position_um = bead.position_um - drift, bead.displacement_um += drift;
+  DisplacementField as_it_is = given;
+  const GivenMotion asked = take_motion_off(as_it_is, {});
+  ASSERT_TRUE(asked.unplaced_um);
+  EXPECT_NEAR(*asked.unplaced_um, norm(drift), 0.1);
+  TrackParameters said;
+  said.places = TablePlaces::cell;
+  EXPECT_FALSE(take_motion_off(as_it_is, said).unplaced_um);
+  said.places = TablePlaces::relaxed;
+  EXPECT_FALSE(take_motion_off(given, said).unplaced_um);
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    // the tail of the adhesions' pull hides some hundredths of a micrometre of the drift
+    EXPECT_LT(norm(given[k].position_um - truth[k].position_um), 0.1);
+    EXPECT_LT(norm(given[k].displacement_um - truth[k].displacement_um), 0.1);
   }
 }
 
