@@ -68,13 +68,15 @@ MotionTaken motion_taken(const std::vector<Vec2>& positions, const std::vector<V
   const double unit = std::max(largest_about(positions, displacements, affine.drift), 1e-12);
   const double seen =
       std::max(1e-3, 1 - whole.rest.share_of_border_moving);  // of the border; beyond it others may pull
-  const double chance = reach / unit * std::sqrt(kChiSquared / std::max(affine.linear_chi_squared, 1e-12)) / seen;
-  const double threshold = std::max(tolerance, chance);
+  const auto chance = [&](double chi_squared) {
+    return reach / unit * std::sqrt(kChiSquared / std::max(chi_squared, 1e-12)) / seen;
+  };
+  const double threshold = std::max(tolerance, chance(affine.linear_chi_squared));
   constexpr double kCertain = 100;  // ten standard errors: few squares follow any affine motion a little
-  result.is_large = reach > large && affine.linear_chi_squared > kCertain &&
+  result.is_large = reach > large && affine.over_noise > kCertain &&
                     misfit_of(whole.rest, affine.is_at_rest, affine.drift) <
                         0.5 * misfit_of(whole.rest, affine.is_at_rest, shifted.drift);
-  result.is_affine = affine.is_at_rest && reach / unit > threshold;
+  result.is_affine = affine.is_at_rest && reach / unit > std::max(tolerance, chance(affine.over_noise));
   const CommonMotion found = as_found(whole.rest, shifted, affine, true);
   if (setting != Switch::automatic) {
     result.affine = stage::decided(EffectKind::affine_drift, setting, true, "as asked");

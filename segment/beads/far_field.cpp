@@ -25,6 +25,7 @@ int n_of(Drift kind) { return kind == Drift::translation ? 2 : kGlobal; }
 struct Sources {
   std::vector<Vec2> at;
   double softening = 1;
+  double decay = 0;  ///< 1/length: over a gel as thin as this length a tail falls faster; 0: a thick one
 };
 
 /// Patches over the squares that are not at rest.
@@ -55,7 +56,8 @@ void fill_kernels(cv::Mat rows, Vec2 place, const Sources& sources) {
   cv::Matx22d mean;
   for (int k = 0; k < n; ++k) {
     const Vec2 d = place - sources.at[k];
-    const double r = std::sqrt(dot(d, d) + sources.softening * sources.softening), scale = 0.5 * sources.softening / r;
+    const double r = std::sqrt(dot(d, d) + sources.softening * sources.softening),
+                 scale = 0.5 * sources.softening / r * std::exp(-sources.decay * r);
     const double xx = d.x * d.x / (r * r), yy = d.y * d.y / (r * r), xy = d.x * d.y / (r * r);
     const cv::Matx22d kernel(scale * (1 + xx), scale * xy, scale * xy, scale * (1 + yy));
     mean += (1.0 / n) * kernel;
@@ -209,14 +211,17 @@ Solved solved(const Normal& normal, int n, double ridge) {
   return result;
 }
 
-/// The width of the forces' prior that makes the data likeliest.
-double best_ridge(const Normal& normal) {
-  if (normal.A.empty()) return 1;
-  const double unit = cv::trace(normal.A)[0] / normal.A.rows;
-  double best = unit, highest = -1e300;
-  for (double share = 1e-4; share < 100; share *= 30) {  // half a decade off changes little
-    const double evidence = solved(normal, kGlobal, share * unit).log_evidence;
-    if (evidence > highest) highest = evidence, best = share * unit;
+/// A width of the forces' prior, in parts of the normal matrix's mean diagonal.
+double ridge_of(const Normal& normal, double share) {
+  return normal.A.empty() ? 1 : share * cv::trace(normal.A)[0] / normal.A.rows;
+}
+
+/// The width that makes the data likeliest.
+double best_share(const Normal& normal) {
+  double best = 1, highest = -1e300;
+  for (double share = 1e-4; !normal.A.empty() && share < 100; share *= 30) {  // half a decade off changes little
+    const double evidence = solved(normal, kGlobal, ridge_of(normal, share)).log_evidence;
+    if (evidence > highest) highest = evidence, best = share;
   }
   return best;
 }
@@ -243,6 +248,12 @@ AffineMotion motion_of(const Solved& s, Vec2 centre, double scale) {
   return {{value(0), value(1)}, value(2), value(3), value(4), value(5), centre};
 }
 
+double linear_chi_squared(const Solved& s) {
+  const cv::Mat linear = s.global.rowRange(2, kGlobal);
+  const cv::Mat inverse = s.covariance(cv::Range(2, kGlobal), cv::Range(2, kGlobal)).inv(cv::DECOMP_SVD);
+  return linear.dot(inverse * linear);
+}
+
 void take_errors(FarField& far, const Solved& s, double scale) {
   const auto sigma = [&](int k) { return std::sqrt(std::max(0.0, s.covariance.at<double>(k, k))); };
   const auto mean = [](double a, double b) { return std::sqrt(0.5 * (a * a + b * b)); };
@@ -251,9 +262,7 @@ void take_errors(FarField& far, const Solved& s, double scale) {
   far.errors.turn_rad = sigma(2) / scale;
   far.errors.growth = sigma(3) / scale;
   far.errors.shear = mean(sigma(4), sigma(5)) / scale;
-  const cv::Mat linear = s.global.rowRange(2, kGlobal);
-  const cv::Mat inverse = s.covariance(cv::Range(2, kGlobal), cv::Range(2, kGlobal)).inv(cv::DECOMP_SVD);
-  far.linear_chi_squared = linear.dot(inverse * linear);
+  far.linear_chi_squared = linear_chi_squared(s);
 }
 
 /// Beads in the squares at rest, about drift and tail. 1500 tell a standard deviation to a fiftieth.
@@ -305,10 +314,19 @@ struct Fit {
   Sources sources;
   Normal normal;
   double ridge = 1;
+  std::vector<cv::Mat> others;  ///< global motion with tails of other depths
 };
 
+/// With the error of the tail's law, which is not known: what gels of other depths differ by. Of so few any may be it.
+void add_error_of_tail(Solved& s, const std::vector<cv::Mat>& others) {
+  for (const cv::Mat& other : others) {
+    const cv::Mat apart = other.rowRange(0, s.global.rows) - s.global;
+    s.covariance += apart * apart.t();
+  }
+}
+
 Fit fit_of(const RestingField& rest, Vec2 corner, double width, double height, double scale) {
-  Fit fit{.is_at_rest = rest.share_at_rest >= kLeastAtRest, .sources = {}, .normal = {}};
+  Fit fit{.is_at_rest = rest.share_at_rest >= kLeastAtRest, .sources = {}, .normal = {}, .others = {}};
   // the forces in view of a cell that is cut do not balance: a fit of them finds a tail that is not there
   const bool is_whole = !rest.is_cut();
   std::vector<const FieldCell*> used;
@@ -319,7 +337,17 @@ Fit fit_of(const RestingField& rest, Vec2 corner, double width, double height, d
   Design design = design_of(used, fit.sources, rest, scale);
   if (fit.is_at_rest && !is_whole) weigh_by_distance(design, rest);
   fit.normal = normal_of(design);
-  fit.ridge = best_ridge(fit.normal);
+  const double share = best_share(fit.normal);
+  fit.ridge = ridge_of(fit.normal, share);
+  // a tail that falls faster than the fitted one looks like growth, and how fast it falls depends on the gel's depth
+  if (!fit.sources.at.empty()) {
+    for (const double decay : {0.5, 1.0, 2.0}) {  // over half a side of the picture
+      Sources sources = fit.sources;
+      sources.decay = decay / scale;
+      const Normal other = normal_of(design_of(used, sources, rest, scale));
+      fit.others.push_back(solved(other, kGlobal, ridge_of(other, share)).global);
+    }
+  }
   if (!fit.is_at_rest) return fit;
   reweigh(design, solved(fit.normal, kGlobal, fit.ridge));
   fit.normal = normal_of(design);
@@ -352,7 +380,11 @@ WholeMotion whole_motion(const std::vector<Vec2>& positions, const std::vector<V
   const std::vector<char> is_used = beads_at_rest(positions, whole.rest, fit.is_at_rest, corner, width, height);
   for (std::size_t at = 0; at < kinds.size(); ++at) {
     FarField& result = whole.of[at];
-    const Solved s = solved(fit.normal, n_of(kinds[at]), fit.ridge);
+    Solved s = solved(fit.normal, n_of(kinds[at]), fit.ridge);
+    if (kinds[at] == Drift::affine) {
+      result.over_noise = linear_chi_squared(s);
+      add_error_of_tail(s, fit.others);
+    }
     result.is_at_rest = fit.is_at_rest;
     result.drift = motion_of(s, centre, scale);
     take_errors(result, s, scale);

@@ -22,6 +22,7 @@ struct FarField {
   AffineMotion drift;
   MotionErrors errors;
   double linear_chi_squared = 0;  ///< of turn, growth, stretch and skew together, over their covariance: 4 expected
+  double over_noise = 0;          ///< the same over what the beads' noise alone makes of them
   double rms = 0;                 ///< of a bead's component about drift and the cell's tail
   double noise = 0;               ///< the same from the median, which outliers do not move
   bool is_at_rest = false;        ///< some part of the picture is; otherwise the drift is that of all beads
