@@ -135,7 +135,9 @@ Written cell_toml(const fs::path& folder) {
   }
   text +=
       "\n[gel]\n# youngs_modulus_kPa = 8.4    # needed: as measured; all forces are proportional to it\n"
-      "# poisson_ratio = 0.49    # of the gel; 0.49 if not given\n# thickness_um = 60    # of the gel; 60 if not "
+      "# shear_modulus_kPa = 2.8    # in its place, if a "
+      "rheometer gave G: E is about 3 G\n# poisson_ratio = 0.49    # of the gel; 0.49 if not given\n# thickness_um = "
+      "60    # of the gel; 60 if not "
       "given\n"
       "\n[images]\n" +
       images;

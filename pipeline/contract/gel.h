@@ -17,6 +17,7 @@ struct Gel {
   // standard errors, where the user knows them: the error budget then has a part for the gel
   std::optional<double> youngs_modulus_sigma_kPa{}, poisson_ratio_sigma{}, thickness_sigma_um{};
   std::shared_ptr<const HeightMap> surface{};  ///< null: flat, at z = 0
+  std::optional<double> shear_modulus_kPa{};   ///< as given; youngs_modulus_kPa follows from it
 };
 
 /// What is taken for the gel: a layer on a rigid base, or so thick that the base does not matter.

@@ -195,7 +195,7 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
     if (const toml::table* table = node.as_table()) {
       if (keys_of.contains(key_name)) {
         for (const auto& [inner_key, inner] : *table) {
-          if (set(key_name, inner_key.str(), inner)) continue;
+          if (set(key_name, inner_key.str(), inner) || list.is_of_several(key_name)) continue;
           const std::vector<std::string> others = key_name == "effects" ? effect_keys() : std::vector<std::string>();
           const std::vector<std::string>& of_other_stages = key_name == "gel" ? kMoreOfGel : others;
           if (std::ranges::find(of_other_stages, std::string(inner_key.str())) != of_other_stages.end()) continue;
@@ -213,6 +213,7 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
                        unknown_key_hint(list, known, key_name));
     }
   }
+  list.derive_all();
 }
 
 void set_from_text(Parameter& p, const std::string& text) {
@@ -241,7 +242,7 @@ std::string to_toml(const ParameterList& list, const std::vector<std::string>& t
   for (const std::string& table : tables) {
     if (!table.empty()) text += "\n[" + table + "]\n";
     for (const Parameter& p : list.all()) {
-      if (p.table != table || to_text(p).empty()) continue;  // not set
+      if (p.table != table || to_text(p).empty() || p.is_derived) continue;  // not set
       const bool is_text = std::holds_alternative<std::string*>(p.member) || std::holds_alternative<Choice>(p.member);
       text += p.name + " = " + (is_text ? '"' + to_text(p) + '"' : to_text(p)) + "\n";
     }
@@ -279,10 +280,33 @@ std::string to_markdown(const ParameterList& list) {
   return text;
 }
 
+namespace {
+
+/// E = 2 (1 + nu) G of an isotropic gel.
+void derive_youngs_modulus(ParameterList& list, Gel& gel) {
+  const auto of_gel = [&](const char* name) -> Parameter& {
+    return *std::ranges::find_if(list.all(), [&](const Parameter& p) { return p.table == "gel" && p.name == name; });
+  };
+  Parameter& modulus = of_gel("youngs_modulus_kPa");
+  if (!gel.shear_modulus_kPa) return;
+  if (modulus.is_set && !modulus.is_derived)
+    throw UsageError(
+        "[gel] youngs_modulus_kPa and shear_modulus_kPa are given: expected one of them, as E = 2 (1 + nu) G");
+  gel.youngs_modulus_kPa = 2 * (1 + gel.poisson_ratio) * *gel.shear_modulus_kPa;
+  modulus.is_set = modulus.is_derived = true;
+}
+
+}  // namespace
+
 void declare(ParameterList& list, Gel& gel) {
   list.table("gel");
-  list.add("youngs_modulus_kPa", gel.youngs_modulus_kPa, Range::modulus_kPa(), "Young's modulus of the gel (kPa)");
+  list.add("youngs_modulus_kPa", gel.youngs_modulus_kPa, Range::modulus_kPa(),
+           "Young's modulus E of the gel (kPa); required, or shear_modulus_kPa");
   list.required();
+  list.add("shear_modulus_kPa", gel.shear_modulus_kPa, Range::modulus_kPa(),
+           "shear modulus G of the gel, as a rheometer measures it (kPa), in place of youngs_modulus_kPa: E = 2 (1 + "
+           "nu) G, about 3 G");
+  list.derive([&gel](ParameterList& of) { derive_youngs_modulus(of, gel); });
   list.add("poisson_ratio", gel.poisson_ratio, Range::between(0, 0.5),
            "Poisson's ratio of the gel; 0.5, the incompressible limit, only for models without finite elements");
   list.add("thickness_um", gel.thickness_um, Range::thickness_um(), "thickness of the gel on its rigid base (um)");

@@ -89,6 +89,7 @@ void set_parameters(ParameterList& list, const CommandLine& line, const CLI::App
   if (!line.config.empty()) read_toml(list, fs::path(line.config));
   for (Parameter& p : list.all())
     if (app.count("--" + p.flag) > 0) set_from_text(p, line.values.at(p.flag));
+  list.derive_all();
   check_complete(list);
 }
 

@@ -185,6 +185,25 @@ TEST(Parameters, a_gel_needs_its_modulus_and_a_poisson_ratio_below_one_half) {
   EXPECT_NO_THROW(stage::check_complete(list));
 }
 
+TEST(Parameters, a_shear_modulus_gives_youngs_modulus_whatever_the_order_and_not_both_are_taken) {
+  const auto read = [](const std::string& text, const char* flag_of_ratio) {
+    Gel gel;
+    stage::ParameterList list;
+    declare(list, gel);
+    stage::read_toml(list, text, "t");
+    if (*flag_of_ratio != 0) set_from_text(stage::parameter_named(list, "poisson_ratio"), flag_of_ratio);
+    list.derive_all();
+    stage::check_complete(list);
+    EXPECT_EQ(stage::to_toml(list, {"gel"}).find("youngs"), std::string::npos) << "what is derived is not given";
+    return gel.youngs_modulus_kPa;
+  };
+  // E = 2 (1 + nu) G
+  EXPECT_DOUBLE_EQ(read("[gel]\nshear_modulus_kPa = 2.8\npoisson_ratio = 0.5\n", ""), 8.4);
+  EXPECT_DOUBLE_EQ(read("[gel]\npoisson_ratio = 0.25\nshear_modulus_kPa = 4\n", ""), 10);
+  EXPECT_DOUBLE_EQ(read("[gel]\nshear_modulus_kPa = 4\n", "0.25"), 10) << "a flag comes after cell.toml";
+  EXPECT_THROW(read("[gel]\nshear_modulus_kPa = 4\nyoungs_modulus_kPa = 12\n", ""), UsageError);
+}
+
 TEST(Parameters, what_other_programs_and_countries_write_is_answered_with_how_to_write_it) {
   const auto hint = [](const std::string& text) {
     stage::ParameterList list;
