@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/range.h"
 #include "segment/images/image_file.h"
 #include "segment/images/ome.h"
 
@@ -54,14 +55,26 @@ std::optional<PixelSize> ome_pixel_size(const std::string& xml) {
   }
 }
 
+/// Programs that know of no microscope write what a screen or a printer has: 72, 96 or 300 pixels by inch.
+constexpr double kInch_um = 25400;
+
+std::optional<PixelSize> size_by_resolution(const TiffCalibration& calibration, std::optional<double> unit_um) {
+  if (!unit_um || !calibration.x_resolution_per_unit) return std::nullopt;
+  const double x_um = *unit_um / *calibration.x_resolution_per_unit;
+  if (!std::isfinite(x_um) || x_um <= 0) return std::nullopt;
+  return PixelSize{x_um, *unit_um / calibration.y_resolution_per_unit.value_or(*calibration.x_resolution_per_unit)};
+}
+
+std::optional<PixelSize> of_a_microscope(std::optional<PixelSize> size) {
+  const Range range = Range::pixel_um();
+  return size && size->x_um >= range.low && size->x_um <= range.high ? size : std::nullopt;
+}
+
 std::optional<PixelSize> imagej_pixel_size(const TiffCalibration& calibration) {
   const auto name = line_value(calibration.description, "unit");
   const auto unit = name ? unit_um(*name) : std::nullopt;
-  if (!unit || !calibration.x_resolution_per_unit) return std::nullopt;
-  const double x_um = *unit / *calibration.x_resolution_per_unit;
-  if (!std::isfinite(x_um) || x_um <= 0) return std::nullopt;
-  if (!calibration.y_resolution_per_unit) return PixelSize{x_um, x_um};
-  return PixelSize{x_um, *unit / *calibration.y_resolution_per_unit};
+  const std::optional<PixelSize> size = size_by_resolution(calibration, unit);
+  return unit == kInch_um ? of_a_microscope(size) : size;
 }
 
 std::optional<PixelSize> volocity_pixel_size(std::string_view description) {
@@ -111,6 +124,8 @@ std::optional<double> pixel_size_um(const TiffCalibration& calibration) {
   if (is_ome(text)) size = ome_pixel_size(text);
   if (!size && text.starts_with("ImageJ=")) size = imagej_pixel_size(calibration);
   if (!size) size = volocity_pixel_size(text);
+  if (!size && !text.starts_with("ImageJ=") && !is_ome(text))
+    size = of_a_microscope(size_by_resolution(calibration, calibration.unit_um));
   // half a per cent: what two roundings to three digits may differ by
   if (!size || !(std::abs(size->x_um - size->y_um) <= 5e-3 * size->x_um)) return std::nullopt;
   return without_ratio_noise(size->x_um);

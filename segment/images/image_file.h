@@ -63,10 +63,12 @@ struct TiffCalibration {
   std::string description;                      ///< ImageDescription; empty: none
   std::optional<double> x_resolution_per_unit;  ///< XResolution
   std::optional<double> y_resolution_per_unit;  ///< YResolution
+  std::optional<double> unit_um;                ///< ResolutionUnit: of an inch or a centimetre
 };
 
-/// The pixel size: OME-XML's PhysicalSizeX, ImageJ's unit with XResolution, Volocity's XCalibrationMicrons; nothing
-/// where none of them speaks (a resolution without a unit of ImageJ is a printer's) or where pixels are not square.
+/// The pixel size: OME-XML's PhysicalSizeX, ImageJ's unit with XResolution, Volocity's XCalibrationMicrons, or the
+/// file's own resolution by inch or centimetre (SlideBook) if a microscope has such pixels: 72 an inch are a screen's.
+/// Nothing if none of them is there or pixels are not square.
 std::optional<double> pixel_size_um(const TiffCalibration& calibration);
 
 /// The distance of slices: OME-XML's PhysicalSizeZ, ImageJ's spacing in its unit, Volocity's ZCalibrationMicrons.

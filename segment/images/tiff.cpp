@@ -237,6 +237,9 @@ class TiffReader {
     float resolution = 0;
     if (TIFFGetField(tiff_.get(), TIFFTAG_XRESOLUTION, &resolution)) result.x_resolution_per_unit = resolution;
     if (TIFFGetField(tiff_.get(), TIFFTAG_YRESOLUTION, &resolution)) result.y_resolution_per_unit = resolution;
+    const auto unit = tag<std::uint16_t>(TIFFTAG_RESOLUTIONUNIT, RESUNIT_NONE);
+    if (unit == RESUNIT_INCH) result.unit_um = 25400;
+    if (unit == RESUNIT_CENTIMETER) result.unit_um = 1e4;
     return result;
   }
 

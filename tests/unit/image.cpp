@@ -96,9 +96,9 @@ TEST(Image, calibration_is_understood_in_each_dialect) {
       {"ImageJ=1.53t\nunit=nm\n", 0.01, 0.01, 0.1},
       {"ImageJ=1.53t\nunit=mm\n", 10000, 10000, 0.1},
       {"ImageJ=1.53t\nunit=cm\n", 100, 100, 100.0},
-      {"ImageJ=1.53t\nunit=inch\n", 300, 300, 84.6667},
-      {"ImageJ=1.53t\n", 300, 300, {}},  // a printer's resolution
-      {"", 300, 300, {}},                // the same
+      {"ImageJ=1.53t\nunit=inch\n", 300, 300, {}},  // a printer's resolution
+      {"ImageJ=1.53t\n", 300, 300, {}},
+      {"", 300, 300, {}},  // the same
       {"ImageJ=1.53t\nunit=pixel\n", 1, 1, {}},
       {"ImageJ=1.53t\nunit=um\n", {}, {}, {}},
       {"ImageJ=1.53t\nunit=um\n", 0, 0, {}},
@@ -114,7 +114,17 @@ TEST(Image, calibration_is_understood_in_each_dialect) {
        0.16},
   };
   for (const CalibrationCase& c : cases)
-    EXPECT_EQ(pixel_size_um({c.description, c.x_resolution, c.y_resolution}), c.expected_um) << c.description;
+    EXPECT_EQ(pixel_size_um({c.description, c.x_resolution, c.y_resolution, {}}), c.expected_um) << c.description;
+}
+
+TEST(Image, a_resolution_counts_if_a_microscope_has_such_pixels) {
+  constexpr double kInch_um = 25400, kCentimetre_um = 1e4;
+  EXPECT_EQ(pixel_size_um({"SlideBook", 62500, 62500, kCentimetre_um}), 0.16);
+  EXPECT_EQ(pixel_size_um({"", 254000, 254000, kInch_um}), 0.1);
+  for (const double by_inch : {72, 96, 300, 600})
+    EXPECT_EQ(pixel_size_um({"", by_inch, by_inch, kInch_um}), std::nullopt) << by_inch;
+  EXPECT_EQ(pixel_size_um({"", 28.35, 28.35, kCentimetre_um}), std::nullopt) << "72 by inch in centimetres";
+  EXPECT_EQ(pixel_size_um({"ImageJ=1.53t\nunit=inch\n", 72, 72, kInch_um}), std::nullopt);
 }
 
 std::string error_of(const fs::path& file, int page = 0) {
@@ -281,7 +291,7 @@ TEST(Image, real_calibrations_are_found) {
   if (!fs::exists(kShared / "tiff")) GTEST_SKIP() << "the images of other programs are not here";
   const std::pair<const char*, std::optional<double>> cases[] = {
       {"tiff/imagej153t/hyperstack_c2z3t4_16bit_micron.tif", 0.1625},
-      {"tiff/imagej153t/inch300.tif", 84.6667},
+      {"tiff/imagej153t/inch300.tif", std::nullopt},
       {"tiff/imagej153t/lut8_cm.tif", 100.0},
       {"tiff/imagej153t/rgb_nm.tif", 0.0650026},
       {"tiff/imagej153t/stack7_16bit_mu_sign.tif", 0.1},
