@@ -242,6 +242,8 @@ void write_cell(stage::StageContext& context, const std::string& folder, const S
   files::write_adhesions(out("adhesions.csv"), s.cell.adhesions);
   files::write_fibres(out("fibres.csv"), out("fibre_points.csv"), s.cell.fibres);
   files::write_outline(out("outline.csv"), s.cell.outline_um, s.cell.holes_um, s.cell.is_cut);
+  if (const std::vector<Polygon>& others = s.cell.neighbours_um; !others.empty())
+    files::write_outline(out(files::kNeighboursFile), others.front(), {others.begin() + 1, others.end()});
   files::write_cell_vtp(out("cell.vtp"), s.cell);
   images::write_png(out("overlay.png"), pictures.overlay);
   images::write_jpeg(out("images.jpg"), pictures.ground.picture);

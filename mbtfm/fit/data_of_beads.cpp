@@ -40,8 +40,9 @@ substrate::SharedResponse response_of(const GelUnderCell& on, const Displacement
 std::vector<bool> beads_in_region(const DisplacementField& beads, const Cell& cell, const FitParameters& p) {
   std::vector<bool> is_used;
   for (const Bead& b : beads) {
-    is_used.push_back(!p.region_um || contains(cell.outline_um, b.position_um) ||
-                      distance_to_boundary_um(cell.outline_um, b.position_um) <= *p.region_um);
+    const bool is_in_region = !p.region_um || contains(cell.outline_um, b.position_um) ||
+                              distance_to_boundary_um(cell.outline_um, b.position_um) <= *p.region_um;
+    is_used.push_back(is_in_region && !is_beneath_neighbour(cell, b.position_um));
   }
   return is_used;
 }

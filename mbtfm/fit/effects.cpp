@@ -79,9 +79,9 @@ std::optional<Change> with_motion(const FittedCell& c, const Effect& e, int thre
                           threads);
 }
 
-/// None where the image shows the whole cell.
+/// None if the image shows the whole cell, and no other.
 std::optional<Change> with_forces_beyond(const FittedCell& c, const Effect& e, int threads) {
-  if (cuts_of(c.seen).empty()) return {};
+  if (!has_forces_beyond(c.seen)) return {};
   auto [data, beyond] = with_forces_beyond(unweighted(c.fit.data), c.seen, c.parameters.gel);
   return change_with_data(c, e, std::move(data), threads);
 }

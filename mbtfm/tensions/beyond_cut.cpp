@@ -150,11 +150,12 @@ double mean_square_force(const LinearData& data, double variance) {
 
 /// By an even traction along x and along y: out there the cell pulls inwards as a whole, which is no chance, so nothing
 /// is expected of its size.
-Motions by_even_traction(const std::vector<substrate::Ellipse>& places, const MatrixXd& compliance_um_per_nN) {
-  Motions even{.shapes = MatrixXd::Zero(compliance_um_per_nN.rows(), 2)};
-  for (std::size_t i = 0; i < places.size(); ++i) {
+Motions by_even_traction(const std::vector<substrate::Ellipse>& places, Index n_beyond,
+                         const MatrixXd& compliance_um_per_nN) {
+  Motions even{.shapes = MatrixXd::Zero(compliance_um_per_nN.rows(), n_beyond > 0 ? 2 : 0)};
+  for (Index i = 0; i < n_beyond; ++i) {
     const double area_um2 = std::numbers::pi * places[i].semi_major_um * places[i].semi_minor_um;
-    even.shapes += area_um2 * compliance_um_per_nN.middleCols<2>(2 * static_cast<Index>(i));
+    even.shapes += area_um2 * compliance_um_per_nN.middleCols<2>(2 * i);
   }
   return even;
 }
@@ -181,6 +182,46 @@ std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um
 
 namespace {
 
+/// An adhesion at a neighbour's outline reaches beyond it.
+constexpr double kReach_um = 1;
+
+void tile_neighbour(const Polygon& outline_um, const Square& square, double finest_um, double growth,
+                    std::vector<substrate::Ellipse>& places) {
+  const Vec2 centre = square.centre();
+  const double edge_um = distance_to_boundary_um(outline_um, centre);
+  const bool is_inside = contains(outline_um, centre);
+  if (!is_inside && edge_um > std::numbers::sqrt2 / 2 * square.side_um + kReach_um) return;
+  const double largest_um = std::max(finest_um, is_inside ? growth * edge_um : 0);
+  if (square.side_um > largest_um) {
+    for (int i = 0; i < 4; ++i) tile_neighbour(outline_um, square.quarter(i), finest_um, growth, places);
+  } else if (is_inside || edge_um <= kReach_um) {
+    const double radius_um = square.side_um / std::sqrt(std::numbers::pi);
+    places.push_back({.centre_um = centre, .semi_major_um = radius_um, .semi_minor_um = radius_um, .angle_rad = 0});
+  }
+}
+
+}  // namespace
+
+std::vector<substrate::Ellipse> places_beneath_neighbours(const Cell& cell, double finest_um, double growth) {
+  MBTFM_ASSERT(finest_um > 0);
+  std::vector<substrate::Ellipse> places;
+  for (const Polygon& outline : cell.neighbours_um) {
+    const auto [low, high] = extent_of(outline);
+    const double side_um = std::max(high.x - low.x, high.y - low.y) + 2 * kReach_um;
+    tile_neighbour(outline, {low - Vec2{kReach_um, kReach_um}, side_um}, finest_um, growth, places);
+  }
+  return places;
+}
+
+bool is_beneath_neighbour(const Cell& cell, Vec2 place_um) {
+  if (contains(cell.outline_um, place_um)) return false;
+  return std::ranges::any_of(cell.neighbours_um, [&](const Polygon& outline) {
+    return contains(outline, place_um) || distance_to_boundary_um(outline, place_um) <= kReach_um;
+  });
+}
+
+namespace {
+
 /// Of each place the displacement by forces of 1 nN/um times the root of its area.
 MatrixXd by_root_of_area(MatrixXd compliance_um_per_nN, const std::vector<substrate::Ellipse>& places) {
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -202,12 +243,12 @@ MatrixXd motions_that_stand_out(const LinearData& data, const MatrixXd& Z, doubl
 
 }  // namespace
 
-DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::Ellipse>& places,
+DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::Ellipse>& places, Index n_beyond,
                                   const MatrixXd& compliance_um_per_nN, double area_um2) {
   MBTFM_ASSERT(data.motions.precision.size() == 0);
   const MatrixXd Z = by_root_of_area(compliance_um_per_nN, places);
   const Index n_affine = data.motions.shapes.cols();
-  const Motions even = by_even_traction(places, compliance_um_per_nN);
+  const Motions even = by_even_traction(places, n_beyond, compliance_um_per_nN);
   Motions motions = joined(data.motions, even);
   data = with_motions(std::move(data), motions);
   const Spectrum spectrum = spectrum_of(data, Z);
@@ -220,13 +261,15 @@ DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::
   // An even traction is free, so that what these motions have of it may be left to it. Both together would be the same
   // motion twice, whose square no rounding leaves definite.
   const MatrixXd weighted = squared_weights(data).asDiagonal() * even.shapes;
-  random -= numerics::small_product(
-      even.shapes, numerics::shortest_solution(numerics::small_transposed_product(even.shapes, weighted),
-                                               numerics::small_transposed_product(weighted, random)));
+  if (n_beyond > 0)
+    random -= numerics::small_product(
+        even.shapes, numerics::shortest_solution(numerics::small_transposed_product(even.shapes, weighted),
+                                                 numerics::small_transposed_product(weighted, random)));
   motions.precision = VectorXd::Zero(motions.shapes.cols());
   if (n_affine > 0) motions.precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
   motions = joined(std::move(motions), {.shapes = std::move(random), .precision = VectorXd::Ones(n_random)});
-  const ForcesBeyond beyond{.n_places = static_cast<Index>(places.size()),
+  const ForcesBeyond beyond{.n_places = n_beyond,
+                            .n_beneath_neighbours = static_cast<Index>(places.size()) - n_beyond,
                             .n_motions = n_random,
                             .intensity_nN_per_um = std::sqrt(kappa * spectrum.variance)};
   return {with_motions(std::move(data), std::move(motions)), beyond};
@@ -272,30 +315,43 @@ DataWithBeyond with_forces_beyond(LinearData data, const Cell& cell, const Gel& 
   for (const Vec2 p : data.position_um) beads.push_back({.position_um = p, .displacement_um = {}, .flag = {}});
   const double density = beads_per_um2(beads);
   if (density <= 0) return {std::move(data), {}};
-  const auto places = places_beyond(cell, spacing.finest / std::sqrt(density), spacing.growth);
+  const double finest_um = spacing.finest / std::sqrt(density);
+  std::vector<substrate::Ellipse> places;
+  if (!cuts_of(cell).empty()) places = places_beyond(cell, finest_um, spacing.growth);
+  const auto n_beyond = static_cast<Index>(places.size());
+  for (const substrate::Ellipse& place : places_beneath_neighbours(cell, finest_um, spacing.growth))
+    places.push_back(place);
   const MatrixXd compliance = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
                                   ->compliance_um_per_nN(data.position_um, places);
   return with_own_forces(
-      with_forces_beyond(std::move(data), places, compliance, std::abs(signed_area_um2(cell.outline_um))), cell);
+      with_forces_beyond(std::move(data), places, n_beyond, compliance, std::abs(signed_area_um2(cell.outline_um))),
+      cell);
 }
 
+bool has_forces_beyond(const Cell& cell) { return !cuts_of(cell).empty() || !cell.neighbours_um.empty(); }
+
 bool allows_forces_beyond(const stage::EffectSwitches& switches, const Cell& cell) {
-  const bool has_cut = !cuts_of(cell).empty();
-  if (switches.beyond_cut == Switch::on && !has_cut)
-    throw UsageError("effects.beyond_cut = \"on\": the image's border does not cut this cell (outline.csv, is_cut)");
-  return has_cut && switches.beyond_cut != Switch::off;
+  if (switches.beyond_cut == Switch::on && !has_forces_beyond(cell))
+    throw UsageError(
+        "effects.beyond_cut = \"on\": the image's border does not cut this cell (outline.csv, is_cut), and the image "
+        "shows no other (neighbours.csv)");
+  return has_forces_beyond(cell) && switches.beyond_cut != Switch::off;
 }
 
 Effect beyond_cut_effect(Switch setting, const Cell& cell, const std::optional<ForcesBeyond>& found) {
   const double cut_um = length_um(cuts_of(cell));
-  return stage::decided(EffectKind::beyond_cut, setting, cut_um > 0,
-                        cut_um == 0 ? "the image shows the whole cell"
-                        : found     ? "the image cuts the cell along " + brief(cut_um) + " um; forces at " +
-                                      std::to_string(found->n_places) + " places beyond, of " +
-                                      brief(found->intensity_nN_per_um) +
-                                      " nN times the root of their area in um², and at " +
-                                      std::to_string(found->n_own) + " adhesions near the cut"
-                                : "the image cuts the cell along " + brief(cut_um) + " um");
+  const std::size_t n_neighbours = cell.neighbours_um.size();
+  std::string why = cut_um > 0 ? "the image cuts the cell along " + brief(cut_um) + " um" : "";
+  if (n_neighbours > 0)
+    why += (why.empty() ? "" : " and ") +
+           ("the image shows " + std::to_string(n_neighbours) + " other cell" + (n_neighbours > 1 ? "s" : ""));
+  if (found)
+    why += "; forces at " + std::to_string(found->n_places) + " places beyond and " +
+           std::to_string(found->n_beneath_neighbours) + " beneath other cells, of " +
+           brief(found->intensity_nN_per_um) + " nN times the root of their area in um², and at " +
+           std::to_string(found->n_own) + " adhesions near the cut";
+  return stage::decided(EffectKind::beyond_cut, setting, has_forces_beyond(cell),
+                        why.empty() ? "the image shows the whole cell, and no other" : why);
 }
 
 }  // namespace mbtfm::tensions

@@ -1,6 +1,6 @@
-/// Forces beyond the cut of a cell that its image cuts. Adhesions that nobody sees pull on the gel, too, and their
-/// displacement reaches into the image. It is allowed for as motions of the beads: responses of the gel to forces at
-/// places outside of the image, which are not found one by one but expected to be of one size, which the beads tell.
+/// Forces of others: beyond the cut of a cell that its image cuts, and beneath other cells in the image. Their
+/// displacement reaches this cell's beads. It is allowed for as motions of the beads: responses of the gel to forces at
+/// these places, which are not found one by one but expected to be of one size, which the beads tell.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,9 +30,15 @@ struct BeyondSpacing {
 /// @param finest_um  side of the smallest, > 0
 std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um, double growth);
 
+/// Squares that tile the neighbours, as discs of the same area: of `finest_um` along their outlines, and larger within
+/// by the same rule, as no bead beneath them is used.
+std::vector<substrate::Ellipse> places_beneath_neighbours(const Cell& cell, double finest_um, double growth);
+/// Whether a bead tells of a neighbour's forces more than of this cell's.
+bool is_beneath_neighbour(const Cell& cell, Vec2 place_um);
+
 /// What was allowed for.
 struct ForcesBeyond {
-  Index n_places = 0;
+  Index n_places = 0, n_beneath_neighbours = 0;
   Index n_motions = 0;  ///< of the beads, that stand out of their noise
   /// Standard deviation of a component of the forces by square root of the area that they act on (nN/um); forces
   /// independent of each other over an area A have a sum of this times √A.
@@ -54,9 +60,11 @@ struct DataWithBeyond {
 /// outwards or inwards as a growth would: growth and shears are from here on expected to be of usual size
 /// (kUsualGrowth).
 /// @param data  whose motions are affine_motions(), of precision 0, or none
+/// @param n_beyond  of the places: the first ones, beyond a cut; forces beneath a neighbour balance, more or less, and
+/// have no even traction
 /// @param compliance_um_per_nN  2·beads × 2·places
 /// @param area_um2  of the part of the cell that is in view
-DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::Ellipse>& places,
+DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::Ellipse>& places, Index n_beyond,
                                   const MatrixXd& compliance_um_per_nN, double area_um2);
 /// Adhesions near the cut may have forces of their own, beside the network's: a fibre of which less than 3 um is in
 /// view is not segmented (segment.fibre_shortest_um) and may pull on them; and at the cut the network is held where it
@@ -68,7 +76,9 @@ DataWithBeyond with_own_forces(DataWithBeyond given, const Cell& cell);
 /// less than the intensity is known to).
 DataWithBeyond with_forces_beyond(LinearData data, const Cell& cell, const Gel& gel, const BeyondSpacing& spacing = {});
 
-/// @throws UsageError where it is switched on and the cell has no cut
+/// Whether there are forces of others: a cut, or a neighbour.
+bool has_forces_beyond(const Cell& cell);
+/// @throws UsageError where it is switched on and there are none
 bool allows_forces_beyond(const stage::EffectSwitches& switches, const Cell& cell);
 /// @param found  none where it is off
 Effect beyond_cut_effect(Switch setting, const Cell& cell, const std::optional<ForcesBeyond>& found);

@@ -268,6 +268,23 @@ Noticed cell_cut(const FitOutcome& o) {
       o.beyond ? Severity::note : Severity::caution);
 }
 
+Noticed neighbour_pulls(const FitOutcome& o) {
+  if (o.cell.neighbours_um.empty()) return {};
+  double nearest_um = 1e300;
+  Vec2 place_um;
+  for (const Polygon& other : o.cell.neighbours_um) {
+    for (const Vec2 p : other) {
+      const double distance_um = distance_to_boundary_um(o.cell.outline_um, p);
+      if (distance_um < nearest_um) nearest_um = distance_um, place_um = p;
+    }
+  }
+  return noticed(FindingKind::neighbour_pulls, static_cast<double>(o.cell.neighbours_um.size()),
+                 "The image shows another cell, " + brief(nearest_um) + " um from this one at (" + brief(place_um.x) +
+                     ", " + brief(place_um.y) + ") um. Its forces were " +
+                     (o.beyond ? "allowed for." : "not allowed for (effects.beyond_cut = off)."),
+                 o.beyond ? Severity::note : Severity::caution);
+}
+
 Noticed common_motion(const FitOutcome& o) {
   if (!o.motion) return {};
   const AffineMotion& m = o.motion->motion;
@@ -338,6 +355,7 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
   const Imbalance imbalance = imbalance_of(o.fit);
   std::vector<Finding> findings;
   for (Noticed found : {cell_cut(o),
+                        neighbour_pulls(o),
                         common_motion(o),
                         curved_motion(o),
                         channel_shift(o),

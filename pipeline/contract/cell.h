@@ -70,6 +70,7 @@ struct Cell {
   /// By piece of the outline, from its point to the next: it is a cut, along the image's border, and the cell goes on
   /// beyond. Empty: none is.
   std::vector<bool> is_cut{};
+  std::vector<Polygon> neighbours_um{};  ///< outlines of the other cells in the image, which pull at the same gel
 };
 /// Of the outline's pieces that are cuts: their ends.
 using Cuts = std::vector<std::pair<Vec2, Vec2>>;

@@ -52,6 +52,7 @@ enum class FindingKind : int {
   adhesions_without_beads,
   // fit: the cell
   cell_cut,
+  neighbour_pulls,
   missing_fibre,
   missing_adhesion,
   fibre_without_tension,

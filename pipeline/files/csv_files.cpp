@@ -186,6 +186,8 @@ Cell read_cell(const Path& folder) {
             .outline_um = outline.rings_um.front(),
             .holes_um = {outline.rings_um.begin() + 1, outline.rings_um.end()},
             .is_cut = std::move(outline.is_cut)};
+  if (const Path neighbours = folder / kNeighboursFile; std::filesystem::exists(neighbours))
+    cell.neighbours_um = read_outline(neighbours);
   check_read(folder, cell);
   return cell;
 }

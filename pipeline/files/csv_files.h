@@ -30,7 +30,9 @@ void write_outline(const Path& file, const Polygon& outer_um, const std::vector<
 
 /// What a segmented cell consists of.
 inline const std::vector<std::string> kCellFiles = {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv"};
-/// kCellFiles of a folder, checked against each other
+/// Outlines of other cells in the image, a ring each; may not be there.
+inline constexpr const char* kNeighboursFile = "neighbours.csv";
+/// kCellFiles of a folder, checked against each other; with its neighbours if there are any
 Cell read_cell(const Path& folder);
 
 DisplacementField read_displacement(const Path& file);

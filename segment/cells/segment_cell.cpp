@@ -350,6 +350,16 @@ Inputs inputs_of(const std::optional<images::Channel>& adhesion, const std::opti
   return in;
 }
 
+/// The other cells in the image. What lies mostly in this one is a part of it: it may have been drawn by hand.
+std::vector<Polygon> neighbours_of(const CellOutline& cell, const std::vector<CellOutline>& seen) {
+  constexpr double kApart = 0.5;
+  std::vector<Polygon> others;
+  if (cell.is_sheet) return others;
+  for (const CellOutline& other : seen)
+    if (share_beyond(other, {cell}, 0) > kApart) others.push_back(other.outer_um);
+  return others;
+}
+
 Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std::vector<Adhesion>& found,
                          const Outlines& all) {
   const SegmentParameters& p = in.parameters;
@@ -360,6 +370,7 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
                  .is_cut_by_border = outline.is_cut_by_border(),
                  .source = in.source};
   if (!s.is_cut_by_border) s.cell.is_cut.clear();
+  s.cell.neighbours_um = neighbours_of(outline, all.seen.cells);
   const bool is_given = in.drawn.outline || in.drawn.outline_mask;
   constexpr double kGenerous_um = 1;  // an outline drawn by hand is not false for that
   if (is_given && !all.seen.cells.empty()) s.outline_off_actin = share_beyond(outline, all.seen.cells, kGenerous_um);
