@@ -658,7 +658,10 @@ TEST(SheetFit, stray_beads_do_not_move_a_robust_fit) {
   const SheetFit squares = fit_sheet(disc.data(field), *disc.table, tensions::Loss::squares);
   const SheetFit tukey = fit_sheet(disc.data(field), *disc.table, tensions::Loss::tukey);
   EXPECT_NEAR(of(tukey, Quantity::contraction).value, 1, 4 * *of(tukey, Quantity::contraction).sigma);
-  EXPECT_LT(*of(tukey, Quantity::contraction).sigma, 0.2 * *of(squares, Quantity::contraction).sigma);
+  // by squares the same beads tell it five times worse, or not at all
+  ASSERT_TRUE(of(tukey, Quantity::contraction).sigma);
+  const std::optional<double> by_squares = of(squares, Quantity::contraction).sigma;
+  EXPECT_TRUE(!by_squares || *of(tukey, Quantity::contraction).sigma < 0.2 * *by_squares);
   EXPECT_GE(tukey.n_down_weighted, static_cast<int>(field.size() / 40));
 }
 
@@ -742,7 +745,6 @@ TEST(SheetFit, intervals_hold_a_truth_on_another_mesh) {
       }
     }
   }
-  constexpr int kAll = kOutlines * kRuns;
   for (const auto& [E, count] : by_modulus)
     for (const int held : {count.s_held, count.M_held}) {  // as above
       EXPECT_GE(held, 181) << E;
