@@ -392,6 +392,21 @@ StageReport complete_series(const std::vector<Frame>& frames, stage::StageContex
   return report;
 }
 
+/// A pattern is printed on the gel: its mask belongs to the relaxed picture, and lies aside of the cell's by what the
+/// stage moved.
+void doubt_pattern(const TrackedFrame& frame, CellWith cell_with, stage::StageContext& context) {
+  constexpr double kMatters_um = 0.3;  // half an adhesion
+  const double shift_um = frame.pixel_size_um * norm(frame.tracking.stressed.of(frame.middle_px) - frame.middle_px);
+  if (cell_with == CellWith::relaxed || shift_um < kMatters_um || !context.has_input("adhesions")) return;
+  const std::vector<Adhesion> adhesions = files::read_adhesions(context.input("adhesions"));
+  if (std::ranges::find(adhesions, AdhesionOrigin::candidate, &Adhesion::origin) == adhesions.end()) return;
+  context.notice(noticed(FindingKind::assumed_input, 1,
+                         "The stage moved by " + brief(shift_um) +
+                             " um. If the adhesions are those of a pattern whose mask lies on the relaxed beads, set "
+                             "images.cell_with = relaxed.",
+                         Severity::caution));
+}
+
 StageReport track(TrackParameters parameters, int binning, stage::StageContext& context) {
   if (parameters.pixel_size_um) *parameters.pixel_size_um *= binning;
   const std::vector<Frame> frames = frames_of(context, parameters);
@@ -411,6 +426,7 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
   if (frames.size() > 1) return track_series(frames, parameters.cell_with, context, tracked_frame);
   const TrackedFrame frame = tracked_frame(frames.front(), {}, context.progress);
   const Tracking& tracking = frame.tracking;
+  doubt_pattern(frame, parameters.cell_with, context);
   if (!tracking.windows.is_on) {
     context.expect_plausible("beads_per_um2", beads_per_um2(tracking.field));
     context.expect_plausible("bead_sigma_um", tracking.bead_sigma_um);

@@ -103,7 +103,8 @@ Answer run(Fibres fibres, Outline outline, double thickness_um = 60) {
   if (fibres == Fibres::drawn) write_fibres_of_hand(cell / "fibres.zip");
   std::ofstream(cell / "cell.toml") << "pixel_size_um = " << kPixel_um
                                     << "\n[gel]\nyoungs_modulus_kPa = 19.66\npoisson_ratio = 0.5\nthickness_um = "
-                                    << thickness_um << "\n[segment]\nadhesions = \"pattern\"\n";
+                                    << thickness_um << "\n[segment]\nadhesions = \"pattern\"\n"
+                                    << "[images]\ncell_with = \"relaxed\"\n";  // the pattern was found from the beads
   Answer answer;
   answer.outcome = test::run_program("mbtfm run '" + cell.string() + "' --threads 2");
   EXPECT_EQ(answer.outcome.code, 0) << answer.outcome.output;
