@@ -145,23 +145,24 @@ std::string toml_of(const files::JsonRecord& run, const fs::path& inputs, const 
     parameters->expect_object();
     all.merge_patch(parameters->json());
   }
-  if (!all.contains("images")) all["images"] = ordered_json::object();
+  const ordered_json beside_images = all.value("images", ordered_json::object());  // what stages have in [images]
+  all.erase("images");
   std::string text;
   add_values(all, text);
   for (const auto& [table, values] : all.items()) {
     if (!values.is_object()) continue;
     text += "\n[" + table + "]\n";
     add_values(values, text);
-    if (table != "images") continue;
-    for (const auto& [key, file] : images_in(run, inputs))
-      if (files::is_file(file))
-        text += key + " = " + files::json_text(fs::proximate(file, out).generic_string()) + "\n";
   }
   if (const auto of_run = run.find("run")) {
     of_run->expect_object();
     text += "\n[run]\n";
     add_values(of_run->json(), text);
   }
+  text += "\n[images]\n";
+  add_values(beside_images, text);
+  for (const auto& [key, file] : images_in(run, inputs))
+    if (files::is_file(file)) text += key + " = " + files::json_text(fs::proximate(file, out).generic_string()) + "\n";
   return text;
 }
 
