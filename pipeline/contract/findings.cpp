@@ -24,7 +24,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Areas, positions and intensities of what is saturated are wrong. Record with less light or a shorter "
        "exposure."},
       {pixel_size_unchecked, "pixel-size-unchecked", "any stage", note, "1 if no image states its pixel size", 0,
-       "all lengths are proportional to it, and all forces to its square",
+       "all lengths are proportional to it, and all forces to its square; a caution if cell, adhesions and fibres together "
+       "are two standard deviations larger or smaller than those of other cells",
        "Compare it with the microscope's own record, and with the binning of the camera: 10 % of it are 20 % of every "
        "force. Keep the TIFF files that the microscope writes: most state it."},
       {adhesions_left_out, "adhesions-left-out", "segment", note, "adhesions that were found outside of the cell", 0,
