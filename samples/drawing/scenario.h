@@ -10,6 +10,7 @@
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/stage/parameters_fwd.h"
+#include "samples/drawing/faults.h"
 
 namespace mbtfm::drawing {
 
@@ -121,6 +122,7 @@ struct MicroscopeParameters {
 
 struct ScenarioParameters {
   std::string scenario = "u2os";
+  int rough = 0;  ///< the day's number (rough_day.h); 0: nothing goes wrong unasked
   std::uint64_t seed = 1;
   double noise = 0.07;                       ///< thesis 3.2.4: experiments have 5 to 10 %
   std::optional<double> noise_um = {};       ///< a microscope's noise is in um, whatever the gel; unset: by `noise`
@@ -139,6 +141,7 @@ struct ScenarioParameters {
   TensionParameters tension;
   MechanicsParameters mechanics;
   MicroscopeParameters microscope;
+  FaultParameters faults;
   Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};  ///< polyacrylamide of thesis 3.4
 };
 void declare(stage::ParameterList& list, ScenarioParameters& parameters);
