@@ -12,6 +12,7 @@ enum class FindingKind : int {
   lossy_image,
   saturated,
   pixel_size_unchecked,
+  scan_phase,
   // segment
   adhesions_left_out,
   actin_shift,
