@@ -21,6 +21,7 @@
 #include "segment/beads/given_field.h"
 #include "segment/beads/measure.h"
 #include "segment/beads/pool.h"
+#include "segment/beads/pull.h"
 #include "segment/beads/scene.h"
 #include "segment/beads/windows.h"
 
@@ -180,7 +181,8 @@ Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images
   for (int round = 0; model.um && round < kRounds; ++round) {
     follow_beside(model, *scene, turn, parameters, pixel_size_um, tracks);
   }
-  if (turn) flag_turned_out(*scene, *turn, tracks);  // those found again
+  flag_unpulled(*scene, parameters.outlier_threshold, tracks);  // matches, too, which are made without a window
+  if (turn) flag_turned_out(*scene, *turn, tracks);             // those found again
   require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
   Pooling pooling = pooled(*scene, tracks);
   const BeadSizes sizes = sizes_of(*scene, tracks);
