@@ -160,6 +160,14 @@ StageReport report_of(const TrackedFrame& frame, CellWith cell_with) {
                       (cell_with == CellWith::relaxed ? "relaxed" : "stressed") + " image";
   }
   for (Finding& finding : findings_of(tracking)) report.findings.push_back(std::move(finding));
+  if (tracking.period_um > 0) {
+    const double farthest_um = std::max(norm(shift_um), figures_of(tracking.field).largest_um);
+    auto found = noticed(FindingKind::pattern_repeats, farthest_um / tracking.period_um,
+                         "The beads form a pattern that repeats itself every " + brief(tracking.period_um) +
+                             " um, and it moved by " + brief(farthest_um) +
+                             " um: dots may have been taken for their neighbours.");
+    if (found) report.findings.push_back(std::move(*found));
+  }
   const Figures more = {{"cell_with", std::string(name_of(cell_with))},
                         {"stage_shift_x_um", shift_um.x},
                         {"stage_shift_y_um", shift_um.y},
@@ -174,6 +182,7 @@ StageReport report_of(const TrackedFrame& frame, CellWith cell_with) {
                         {"window_sigma_um", tracking.window_um},
                         {"n_windows_in_gaps", static_cast<std::int64_t>(tracking.n_windows)},
                         {"share_of_gaps", tracking.share_of_gaps},
+                        {"pattern_period_um", tracking.period_um},
                         {"bead_size_ratio", tracking.sizes.ratio},
                         {"bead_size_ratio_sigma", tracking.sizes.sigma},
                         {"bead_elongation", tracking.sizes.elongation},

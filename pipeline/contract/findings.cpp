@@ -120,6 +120,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Compare the images' width and height with the camera's: pixels that are not square, as of an image that was "
        "resized by different factors, make tensions wrong. If it is the lens (astigmatism, coma), displacements stay "
        "right."},
+      {pattern_repeats, "pattern-repeats", "track", caution,
+       "largest motion, of the stage or of the gel, over the distance after which the beads repeat themselves", 0.33,
+       "from half of it on the next dot is nearer than a dot's own place; for less, all dots found their partners",
+       "Keep the stage still between the pictures, or use beads at random, or dots further apart."},
       {beads_lost, "beads-lost", "track", caution, "share of the beads in space that were not followed", 0.2,
        "of simulated stacks of 5 000 and 20 000 beads 2 of a hundred and fewer are lost; if many are, those of the "
        "strained parts are lost first",

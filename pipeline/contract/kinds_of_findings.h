@@ -32,6 +32,7 @@ enum class FindingKind : int {
   tracked_by_correlation,
   defocused,
   beads_not_round,
+  pattern_repeats,
   beads_lost,
   little_at_rest,
   slices_moved,
