@@ -16,6 +16,7 @@
 #include "segment/cells/overlay.h"
 #include "segment/cells/segment_cell.h"
 #include "segment/cells/usual_sizes.h"
+#include "segment/images/scan_phase.h"
 
 namespace mbtfm::cells {
 
@@ -25,7 +26,10 @@ std::optional<images::Channel> channel(stage::StageContext& context, const std::
                                        const images::PlaneChoice& plane, int binning) {
   if (!context.has_input(argument)) return std::nullopt;
   const auto file = context.input(argument);
-  return images::Channel{file.string(), binned(images::read_image(file, plane), binning)};
+  images::Channel result{file.string(), images::read_image(file, plane)};
+  context.notice(images::take_scan_phase_off(result));
+  result.image = binned(std::move(result.image), binning);
+  return result;
 }
 
 std::optional<RoiSet> roi_set(stage::StageContext& context, const std::string& argument, int binning) {

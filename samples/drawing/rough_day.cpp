@@ -50,6 +50,7 @@ ScenarioParameters rough_day(ScenarioParameters p, std::uint64_t number) {
   if_happens(0.3, p.microscope.blurred_bead_fraction, random.uniform(0.1, 0.6));
   if_happens(0.3, p.microscope.unevenness, random.uniform(0.25, 0.6));
   if_happens(0.3, p.microscope.haze, between(0.35, 1.5));
+  if_happens(0.2, p.microscope.scan_phase_px, random.uniform(-2, 2));
   return p;
 }
 

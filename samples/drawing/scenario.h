@@ -118,6 +118,7 @@ struct MicroscopeParameters {
   double counts_per_photon = 2;
   double camera_offset = 200;  ///< counts
   double read_noise = 3;       ///< counts
+  double scan_phase_px = 0;    ///< of the rows of the way there against those of the way back, in all images
 };
 
 struct ScenarioParameters {

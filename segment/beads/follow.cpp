@@ -149,7 +149,7 @@ Followed follow(const Scene& scene, const GridField& grid, const TrackParameters
   flag_outliers(surroundings.around, parameters.outlier_threshold, {}, tracks);
   const int n_by_grid = n_good(tracks);
   follow_neighbours(scene, parameters, surroundings, tracks);
-  return {std::move(tracks), n_by_grid};
+  return {std::move(tracks), n_by_grid, grid.period};
 }
 
 std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks,

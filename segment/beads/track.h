@@ -123,6 +123,7 @@ struct Tracking {
   Effect affine{};           ///< whether turn, growth and shear were taken off, and why
   Effect windows{};          ///< whether windows were followed in place of single beads, and why
   double window_um = 0;      ///< Gaussian sigma of the windows; 0: single beads
+  double period_um = 0;      ///< of a pattern that repeats itself, as of dots in a lattice; 0: it does not
   int n_windows = 0;         ///< among the field's entries, the last ones: in gaps between the beads
   double share_of_gaps = 0;  ///< of the picture, where single beads cannot be followed
   int n_beads_stressed = 0;  ///< found in the stressed image
