@@ -23,6 +23,7 @@
 #include "pipeline/report/compare.h"
 #include "pipeline/report/report.h"
 #include "pipeline/report/result_line.h"
+#include "pipeline/runner/all_cells.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/batch_progress.h"
 #include "pipeline/runner/batch_table.h"
@@ -148,8 +149,7 @@ void speak_for_stages(const CommandLine& line) {
   setenv(stage::kRunnerVariable, line.is_json ? stage::kForProgram : stage::kForPerson, 1);
 }
 
-int run(const CommandLine& line) {
-  speak_for_stages(line);
+int run_one(const CommandLine& line) {
   runner::RunOptions options = run_options(line);
   options.finish = [&] {
     if (!report::has_results(line.folder)) return;
@@ -168,6 +168,30 @@ int run(const CommandLine& line) {
   if (outcome.converged()) return kDone;
   std::fprintf(stderr, "mbtfm: error: not converged: %s; the outputs are marked\n", outcome.not_converged().c_str());
   return kNotSolved;
+}
+
+/// All cells of a picture. One that fails does not stop the others; without the first nobody knows how many there are.
+int run_all(const CommandLine& line) {
+  int n = 1, code = kDone;
+  for (int i = 1; i <= n; ++i) {
+    CommandLine one = line;
+    one.folder = runner::make_cell_of_picture(line.folder, i);
+    if (!line.is_json && !line.is_quiet) say(one.folder.string());
+    try {
+      code = std::max(code, run_one(one));
+    } catch (const runner::StageFailed& error) {
+      if (i == 1 && !files::is_file(one.folder / "1_segment/adhesions.csv")) throw;
+      say(one.folder.string() + ": " + error.what());
+      code = std::max(code, error.failure.exit_code);
+    }
+    if (i == 1) n = runner::n_cells_in_picture(one.folder);
+  }
+  return code;
+}
+
+int run(const CommandLine& line) {
+  speak_for_stages(line);
+  return runner::asks_for_all_cells(line.folder) ? run_all(line) : run_one(line);
 }
 
 /// The cells below the folder, made from images first where patterns say so.

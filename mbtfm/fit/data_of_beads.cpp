@@ -42,7 +42,7 @@ std::vector<bool> beads_in_region(const DisplacementField& beads, const Cell& ce
   for (const Bead& b : beads) {
     const bool is_in_region = !p.region_um || contains(cell.outline_um, b.position_um) ||
                               distance_to_boundary_um(cell.outline_um, b.position_um) <= *p.region_um;
-    is_used.push_back(is_in_region && !is_beneath_neighbour(cell, b.position_um));
+    is_used.push_back(is_in_region && !is_nearer_to_neighbour(cell, b.position_um));
   }
   return is_used;
 }

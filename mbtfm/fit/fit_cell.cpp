@@ -118,6 +118,7 @@ ErrorBudget budget_of(const ReadyCell& cell, const EnsembleFit& fit, const Param
 /// The fit of the cell with its candidates for adhesions at other places; beads, gel and cables as in the first.
 EnsembleFit fit_of_second(Cell second, const ReadyCell& first, const Parameters& p, int threads) {
   if (!first.decisions.fibres.is_on) second.fibres.clear();
+  second.neighbours_um = first.scene.cell.neighbours_um;
   const GelUnderCell on{.gel = *first.gel, .cell = second, .parameters = p, .threads = threads};
   const std::vector<cables::CableNetwork> networks =
       of_cables(span_ensemble(second, p, threads), first.networks.front().parameters());

@@ -4,6 +4,7 @@
 
 #include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/fit/networks.h"
+#include "mbtfm/tensions/beyond_border.h"
 #include "mbtfm/tensions/effects.h"
 #include "mbtfm/tensions/second_placement.h"
 #include "network/cables/effects.h"
@@ -76,6 +77,20 @@ std::optional<std::vector<Tension>> tensions_before(const Inputs& inputs, const 
   return time_coupling.is_on ? inputs.before : std::nullopt;
 }
 
+/// With the pieces beyond the border where the beads call for forces as other cells.
+DataOfBeads with_unseen_neighbours(DataOfBeads given, Cell& cell, const GelUnderCell& on,
+                                   const DisplacementField& beads) {
+  if (on.parameters.effects.beyond_cut == Switch::off) return given;
+  const std::vector<Polygon> pieces = neighbours_beyond_border(given.data, cell, on.parameters.gel);
+  if (pieces.empty()) return given;
+  cell.neighbours_um.insert(cell.neighbours_um.end(), pieces.begin(), pieces.end());
+  ReducedData without = std::move(given.data.reduced);
+  given = data_of(on, beads, std::move(given.data.response));
+  given.beyond->borders = borders_of(pieces, given.data.position_um);
+  given.beyond->without = std::move(without);
+  return given;
+}
+
 }  // namespace
 
 ReadyCell with_cables(ReadyCell cell, const LinearData& data, const cables::CableParameters& cables,
@@ -93,7 +108,8 @@ ReadyFit make_ready(const Inputs& inputs, const Parameters& p, const Work& work)
   work.tell(0.05, "compliance of the substrate");
   Responses responses =
       responses_of(inputs.beads, inputs.frames, [&](const DisplacementField& beads) { return response_of(on, beads); });
-  DataOfBeads at_rest = data_of(on, inputs.beads, std::move(responses.of_beads));
+  DataOfBeads at_rest =
+      with_unseen_neighbours(data_of(on, inputs.beads, std::move(responses.of_beads)), cell, on, inputs.beads);
   BeadsOfState state = in_their_state(on, inputs.beads, std::move(at_rest.data), !inputs.frames.empty());
   work.tell(0.3, "spanning networks");
   const Effect coupling = decide_time_coupling(inputs.before || inputs.frames.size() > 1, p.effects.time_coupling);

@@ -41,11 +41,11 @@ std::string summary_line(const FittedCell& cell) {
 }
 
 std::vector<Finding> all_findings(const FittedCell& c) {
-  std::vector<Finding> findings = findings_of(
-      {c.fit, c.fit.data, c.seen, c.found.summary, c.found.tensions, c.checks.missing_fibres,
-       c.checks.missing_adhesions, c.motions.common, c.motions.curved, c.motions.placement, c.ready.beyond,
-       c.ready.decisions.strain,
-       has_far_beads(c.fit.data.position_um, c.ready.scene.cell.outline_um, c.parameters.fit.far_distance_um)});
+  std::vector<Finding> findings =
+      findings_of({c.fit, c.fit.data, c.seen, c.found.summary, c.found.tensions, c.checks.missing_fibres,
+                   c.checks.missing_adhesions, c.motions.common, c.motions.curved, c.motions.placement, c.ready.beyond,
+                   c.ready.decisions.strain,
+                   has_far_beads(c.fit.data, c.ready.scene.cell.outline_um, c.parameters.fit.far_distance_um)});
   for (const auto& [kind, reading] :
        {std::pair(FindingKind::field_smoothed, c.smoothing), std::pair(FindingKind::read_otherwise, c.reading)}) {
     if (!reading) continue;

@@ -5,11 +5,14 @@
 #include <numbers>
 
 #include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/random_forces.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/near.h"
 #include "substrate/greens/models.h"
 
 namespace mbtfm::tensions {
@@ -80,65 +83,6 @@ class Tiling {
   std::vector<Square> squares_;
 };
 
-/// Of data with noise of variance s² and random effects of variance κ s²: those along which they do not mix.
-struct Spectrum {
-  VectorXd information;  ///< d: signal over noise, in squares, at κ = 1
-  VectorXd found;        ///< c² / s²: its mean is d (1 + κ d)
-  double variance = 0;   ///< s²
-};
-
-/// −2 log likelihood of κ, but for a constant.
-double surprise(const Spectrum& s, double kappa) {
-  double sum = 0;
-  for (Index i = 0; i < s.information.size(); ++i) {
-    const double total = 1 + kappa * s.information[i];
-    sum += std::log(total) - kappa * s.found[i] / total;
-  }
-  return sum;
-}
-
-/// Of least surprise, to a quarter: what is allowed for hangs on it weakly.
-double likeliest_kappa(const Spectrum& s) {
-  constexpr double kStep = 1.25, kLeast = 1e-6, kMost = 1e12;  // relative to what stands out of the noise just so
-  const double unit = 1 / std::max(s.information.maxCoeff(), 1e-300);
-  double best = 0, least = 0;
-  for (double kappa = kLeast; kappa < kMost; kappa *= kStep) {
-    const double here = surprise(s, kappa * unit);
-    if (here >= least) continue;
-    least = here;
-    best = kappa * unit;
-  }
-  return best;
-}
-
-/// What the forces inside and the motions leave of the data tells of the random effects Z.
-Spectrum spectrum_of(const LinearData& data, const MatrixXd& Z) {
-  const VectorXd weight = squared_weights(data);
-  const MatrixXd weighted = weight.asDiagonal() * less_motion(data, Z);
-  const MatrixXd pulled = data.response->pull_back(weighted);  // Gᵀ W² P Z
-  const MatrixXd left = numerics::transposed_product(Z, weighted) -
-                        numerics::transposed_product(pulled, solve_normal(data.reduced, pulled));
-  const VectorXd residual = residual_um(data, free_forces_nN(data.reduced));
-  const VectorXd b = numerics::transposed_matvec(Z, weight.cwiseProduct(residual));
-  const auto [values, vectors] = numerics::symmetric_eigen(0.5 * (left + left.transpose()));
-  const double rounding = 1e-10 * std::max(values.maxCoeff(), 1e-300);
-  Spectrum s{values, numerics::transposed_matvec(vectors, b).cwiseAbs2(), 0};
-  double explained = 0;
-  auto n_left = static_cast<double>(data.n_used - data.reduced.n_felt);
-  for (Index i = 0; i < s.information.size(); ++i) {
-    if (s.information[i] <= rounding) {
-      s.information[i] = s.found[i] = 0;
-    } else {
-      explained += s.found[i] / s.information[i];
-      n_left -= 1;
-    }
-  }
-  s.variance = std::max((data.reduced.floor_squared - explained) / std::max(1.0, n_left),
-                        data.has_errors ? 1.0 : 1e-300);  // not below the stated errors'
-  s.found /= s.variance;
-  return s;
-}
-
 /// Of a component of the adhesions' forces, as forces independent of each other have it: less their noise, and each by
 /// what the beads tell of it. @param variance  of the beads' weighted components
 double mean_square_force(const LinearData& data, double variance) {
@@ -185,51 +129,64 @@ namespace {
 /// An adhesion at a neighbour's outline reaches beyond it.
 constexpr double kReach_um = 1;
 
-void tile_neighbour(const Polygon& outline_um, const Square& square, double finest_um, double growth,
-                    std::vector<substrate::Ellipse>& places) {
-  const Vec2 centre = square.centre();
-  const double edge_um = distance_to_boundary_um(outline_um, centre);
-  const bool is_inside = contains(outline_um, centre);
-  if (!is_inside && edge_um > std::numbers::sqrt2 / 2 * square.side_um + kReach_um) return;
-  const double largest_um = std::max(finest_um, is_inside ? growth * edge_um : 0);
-  if (square.side_um > largest_um) {
-    for (int i = 0; i < 4; ++i) tile_neighbour(outline_um, square.quarter(i), finest_um, growth, places);
-  } else if (is_inside || edge_um <= kReach_um) {
-    const double radius_um = square.side_um / std::sqrt(std::numbers::pi);
-    places.push_back({.centre_um = centre, .semi_major_um = radius_um, .semi_minor_um = radius_um, .angle_rad = 0});
+/// Squares on neighbours, each as large as the nearest bead in use is far: what varies within less does not reach it.
+class NeighbourTiling {
+ public:
+  NeighbourTiling(const std::vector<Vec2>& beads_um, const BeyondSpacing& spacing) : growth_(spacing.growth) {
+    const double density = static_cast<double>(beads_um.size()) / std::max(extent_of(beads_um).area_um2(), 1e-300);
+    finest_um_ = spacing.finest / std::sqrt(density);
+    std::vector<Vec3> beads;
+    for (const Vec2 bead : beads_um) beads.push_back({bead.x, bead.y, 0});
+    beads_ = numerics::Near(std::move(beads), finest_um_);
   }
-}
+  void tile(const Polygon& outline_um) {
+    const auto [low, high] = extent_of(outline_um);
+    const double side_um = std::max(high.x - low.x, high.y - low.y) + 2 * kReach_um;
+    divide(outline_um, {low - Vec2{kReach_um, kReach_um}, side_um});
+  }
+  std::vector<substrate::Ellipse> places;
+
+ private:
+  double distance_to_bead_um(Vec2 place) const {
+    const Vec3 at{place.x, place.y, 0};
+    const std::vector<int> nearest = beads_.nearest(at, 1);
+    return nearest.empty() ? 0 : norm(beads_.points()[nearest.front()] - at);
+  }
+  void divide(const Polygon& outline_um, const Square& square) {
+    const Vec2 centre = square.centre();
+    const double edge_um = distance_to_boundary_um(outline_um, centre);
+    const bool is_inside = contains(outline_um, centre);
+    if (!is_inside && edge_um > std::numbers::sqrt2 / 2 * square.side_um + kReach_um) return;
+    if (square.side_um > std::max(finest_um_, growth_ * distance_to_bead_um(centre))) {
+      for (int i = 0; i < 4; ++i) divide(outline_um, square.quarter(i));
+    } else if (is_inside || edge_um <= std::max(kReach_um, square.side_um / 4)) {  // or it covers little of it
+      const double radius_um = square.side_um / std::sqrt(std::numbers::pi);
+      places.push_back({.centre_um = centre, .semi_major_um = radius_um, .semi_minor_um = radius_um, .angle_rad = 0});
+    }
+  }
+  double growth_, finest_um_ = 0;
+  numerics::Near beads_;
+};
 
 }  // namespace
 
-std::vector<substrate::Ellipse> places_beneath_neighbours(const Cell& cell, double finest_um, double growth) {
-  MBTFM_ASSERT(finest_um > 0);
-  std::vector<substrate::Ellipse> places;
-  for (const Polygon& outline : cell.neighbours_um) {
-    const auto [low, high] = extent_of(outline);
-    const double side_um = std::max(high.x - low.x, high.y - low.y) + 2 * kReach_um;
-    tile_neighbour(outline, {low - Vec2{kReach_um, kReach_um}, side_um}, finest_um, growth, places);
-  }
-  return places;
+std::vector<substrate::Ellipse> places_beneath_neighbours(const Cell& cell, const std::vector<Vec2>& beads_um,
+                                                          const BeyondSpacing& spacing) {
+  NeighbourTiling tiling(beads_um, spacing);
+  for (const Polygon& outline : cell.neighbours_um) tiling.tile(outline);
+  return std::move(tiling.places);
 }
 
-bool is_beneath_neighbour(const Cell& cell, Vec2 place_um) {
-  if (contains(cell.outline_um, place_um)) return false;
+bool is_nearer_to_neighbour(const Cell& cell, Vec2 place_um) {
+  if (cell.neighbours_um.empty() || contains(cell.outline_um, place_um)) return false;
+  constexpr double kShare = 0.5;  // equal pulls, whose fields fall with the square of the distance: four times as much
+  const double reach_um = std::max(kReach_um, kShare * distance_to_boundary_um(cell.outline_um, place_um));
   return std::ranges::any_of(cell.neighbours_um, [&](const Polygon& outline) {
-    return contains(outline, place_um) || distance_to_boundary_um(outline, place_um) <= kReach_um;
+    return distance_to_boundary_um(outline, place_um) <= reach_um || contains(outline, place_um);
   });
 }
 
 namespace {
-
-/// Of each place the displacement by forces of 1 nN/um times the root of its area.
-MatrixXd by_root_of_area(MatrixXd compliance_um_per_nN, const std::vector<substrate::Ellipse>& places) {
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const double side_um = std::sqrt(std::numbers::pi) * places[i].semi_major_um;
-    compliance_um_per_nN.middleCols<2>(2 * static_cast<Index>(i)) *= side_um;
-  }
-  return compliance_um_per_nN;
-}
 
 /// The motions by random forces Z that stand out of the noise, of unit variance.
 MatrixXd motions_that_stand_out(const LinearData& data, const MatrixXd& Z, double kappa) {
@@ -251,10 +208,12 @@ DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::
   const Motions even = by_even_traction(places, n_beyond, compliance_um_per_nN);
   Motions motions = joined(data.motions, even);
   data = with_motions(std::move(data), motions);
-  const Spectrum spectrum = spectrum_of(data, Z);
+  Spectrum spectrum = spectrum_of(random_scores(data, Z));
+  const double variance = variance_beside(data, spectrum);
+  spectrum.found /= variance;
   // With few beads at the cut the likelihood is flat down to zero; then what is hidden is as strong as what is seen.
   const double n_adhesions = 0.5 * static_cast<double>(data.response->cols());
-  const double seen = n_adhesions / area_um2 * mean_square_force(data, spectrum.variance) / spectrum.variance;
+  const double seen = n_adhesions / area_um2 * mean_square_force(data, variance) / variance;
   const double kappa = std::max(seen, likeliest_kappa(spectrum));
   MatrixXd random = motions_that_stand_out(data, Z, kappa);
   const Index n_random = random.cols();
@@ -266,12 +225,12 @@ DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::
         even.shapes, numerics::shortest_solution(numerics::small_transposed_product(even.shapes, weighted),
                                                  numerics::small_transposed_product(weighted, random)));
   motions.precision = VectorXd::Zero(motions.shapes.cols());
-  if (n_affine > 0) motions.precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
+  if (n_affine > 0) motions.precision.segment<3>(3).setConstant(variance / (kUsualGrowth * kUsualGrowth));
   motions = joined(std::move(motions), {.shapes = std::move(random), .precision = VectorXd::Ones(n_random)});
   const ForcesBeyond beyond{.n_places = n_beyond,
                             .n_beneath_neighbours = static_cast<Index>(places.size()) - n_beyond,
                             .n_motions = n_random,
-                            .intensity_nN_per_um = std::sqrt(kappa * spectrum.variance)};
+                            .intensity_nN_per_um = std::sqrt(kappa * variance)};
   return {with_motions(std::move(data), std::move(motions)), beyond};
 }
 
@@ -319,13 +278,20 @@ DataWithBeyond with_forces_beyond(LinearData data, const Cell& cell, const Gel& 
   std::vector<substrate::Ellipse> places;
   if (!cuts_of(cell).empty()) places = places_beyond(cell, finest_um, spacing.growth);
   const auto n_beyond = static_cast<Index>(places.size());
-  for (const substrate::Ellipse& place : places_beneath_neighbours(cell, finest_um, spacing.growth))
-    places.push_back(place);
+  if (!cell.neighbours_um.empty()) {
+    std::vector<Vec2> used;
+    for (std::size_t b = 0; b < data.position_um.size(); ++b)
+      if (data.weight_per_um[2 * static_cast<Index>(b)] > 0) used.push_back(data.position_um[b]);
+    for (const substrate::Ellipse& place : places_beneath_neighbours(cell, used, spacing)) places.push_back(place);
+  }
+  ReducedData without = data.reduced;
   const MatrixXd compliance = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
                                   ->compliance_um_per_nN(data.position_um, places);
-  return with_own_forces(
+  DataWithBeyond made = with_own_forces(
       with_forces_beyond(std::move(data), places, n_beyond, compliance, std::abs(signed_area_um2(cell.outline_um))),
       cell);
+  made.beyond.without = std::move(without);
+  return made;
 }
 
 bool has_forces_beyond(const Cell& cell) { return !cuts_of(cell).empty() || !cell.neighbours_um.empty(); }
@@ -341,17 +307,21 @@ bool allows_forces_beyond(const stage::EffectSwitches& switches, const Cell& cel
 Effect beyond_cut_effect(Switch setting, const Cell& cell, const std::optional<ForcesBeyond>& found) {
   const double cut_um = length_um(cuts_of(cell));
   const std::size_t n_neighbours = cell.neighbours_um.size();
+  const std::vector<std::string> borders = found ? found->borders : std::vector<std::string>();
   std::string why = cut_um > 0 ? "the image cuts the cell along " + brief(cut_um) + " um" : "";
   if (n_neighbours > 0)
     why += (why.empty() ? "" : " and ") +
            ("the image shows " + std::to_string(n_neighbours) + " other cell" + (n_neighbours > 1 ? "s" : ""));
+  if (!borders.empty())
+    why += (why.empty() ? "" : " and ") + ("the beads call for forces beyond the border: " + listed(borders));
   if (found)
     why += "; forces at " + std::to_string(found->n_places) + " places beyond and " +
            std::to_string(found->n_beneath_neighbours) + " beneath other cells, of " +
            brief(found->intensity_nN_per_um) + " nN times the root of their area in um², and at " +
            std::to_string(found->n_own) + " adhesions near the cut";
-  return stage::decided(EffectKind::beyond_cut, setting, has_forces_beyond(cell),
-                        why.empty() ? "the image shows the whole cell, and no other" : why);
+  return stage::decided(
+      EffectKind::beyond_cut, setting, has_forces_beyond(cell) || !borders.empty(),
+      why.empty() ? "the image shows the whole cell, and no other, and the beads call for none" : why);
 }
 
 }  // namespace mbtfm::tensions

@@ -30,11 +30,13 @@ struct BeyondSpacing {
 /// @param finest_um  side of the smallest, > 0
 std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um, double growth);
 
-/// Squares that tile the neighbours, as discs of the same area: of `finest_um` along their outlines, and larger within
-/// by the same rule, as no bead beneath them is used.
-std::vector<substrate::Ellipse> places_beneath_neighbours(const Cell& cell, double finest_um, double growth);
-/// Whether a bead tells of a neighbour's forces more than of this cell's.
-bool is_beneath_neighbour(const Cell& cell, Vec2 place_um);
+/// Squares that tile the neighbours, as discs of the same area. A cell far away is seen by the low moments of its
+/// forces only, and has few.
+/// @param beads_um  that are used, none of them beside a neighbour
+std::vector<substrate::Ellipse> places_beneath_neighbours(const Cell& cell, const std::vector<Vec2>& beads_um,
+                                                          const BeyondSpacing& spacing);
+/// Whether a bead tells of a neighbour's forces more than of this cell's: it is no witness of rest, either.
+bool is_nearer_to_neighbour(const Cell& cell, Vec2 place_um);
 
 /// What was allowed for.
 struct ForcesBeyond {
@@ -47,6 +49,8 @@ struct ForcesBeyond {
   /// component of the adhesions' forces in this cell, of which these may have all next to the cut.
   Index n_own = 0;
   double own_nN = 0;
+  std::vector<std::string> borders = {};  ///< of the beads' field, beyond which these call for forces: "upper left"
+  ReducedData without = {};               ///< the data without such forces
 };
 
 struct DataWithBeyond {

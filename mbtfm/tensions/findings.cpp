@@ -8,8 +8,10 @@
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/kinds_of_findings.h"
+#include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::tensions {
 
@@ -268,20 +270,42 @@ Noticed cell_cut(const FitOutcome& o) {
       o.beyond ? Severity::note : Severity::caution);
 }
 
-Noticed neighbour_pulls(const FitOutcome& o) {
-  if (o.cell.neighbours_um.empty()) return {};
+/// Change of the total force if forces of others were not allowed for, to first order.
+double change_without_others_nN(const FitOutcome& o) {
+  const ReducedData& data = o.beyond->without;
+  const MatrixXd& by_tension = o.fit.meshes.front().force_derivatives;
+  const MatrixXd moved = displace(data, by_tension);
+  const VectorXd left = data.target - displace(data, o.fit.forces.nN);
+  const MatrixXd change_nN = numerics::shortest_solution(numerics::small_transposed_product(moved, moved),
+                                                         numerics::transposed_matvec(moved, left));
+  return directions_of(o.fit.forces.nN).dot(numerics::matvec(by_tension, change_nN.col(0)));
+}
+
+/// "Another cell pulls 12 um from this one, at (80, 31) um"; empty: none is in the image.
+std::string nearest_neighbour(const Cell& cell) {
   double nearest_um = 1e300;
   Vec2 place_um;
-  for (const Polygon& other : o.cell.neighbours_um) {
+  for (const Polygon& other : cell.neighbours_um) {
     for (const Vec2 p : other) {
-      const double distance_um = distance_to_boundary_um(o.cell.outline_um, p);
+      const double distance_um = distance_to_boundary_um(cell.outline_um, p);
       if (distance_um < nearest_um) nearest_um = distance_um, place_um = p;
     }
   }
-  return noticed(FindingKind::neighbour_pulls, static_cast<double>(o.cell.neighbours_um.size()),
-                 "The image shows another cell, " + brief(nearest_um) + " um from this one at (" + brief(place_um.x) +
-                     ", " + brief(place_um.y) + ") um. Its forces were " +
-                     (o.beyond ? "allowed for." : "not allowed for (effects.beyond_cut = off)."),
+  if (cell.neighbours_um.empty()) return "";
+  return "Another cell pulls " + brief(nearest_um) + " um from this one, at (" + brief(place_um.x) + ", " +
+         brief(place_um.y) + ") um. ";
+}
+
+Noticed neighbour_pulls(const FitOutcome& o) {
+  const std::size_t n_beyond = o.beyond ? o.beyond->borders.size() : 0;
+  std::string text = nearest_neighbour(o.cell);
+  if (n_beyond > 0) text += "Something pulls beyond the border, at the " + mbtfm::listed(o.beyond->borders) + ". ";
+  if (text.empty()) return {};
+  const double change_nN = o.beyond ? change_without_others_nN(o) : 0;
+  text += o.beyond ? "Allowed for: without it the total force would be " + brief(std::abs(change_nN)) + " nN " +
+                         (change_nN < 0 ? "less." : "more.")
+                   : "Not allowed for (effects.beyond_cut = off).";
+  return noticed(FindingKind::neighbour_pulls, static_cast<double>(o.cell.neighbours_um.size() + n_beyond), text,
                  o.beyond ? Severity::note : Severity::caution);
 }
 

@@ -121,11 +121,13 @@ Figures figures_of(const CutForce& cut, const EnsembleFit& fit, const std::vecto
           {"cut_torque_nN_um", torque_nN_um}};
 }
 
-/// sigma √n / |u less the motion|: the relative L2 that noise alone would leave.
+/// sigma √n / |u less the motion| of the beads in use: the relative L2 that noise alone would leave.
 double expected_relative_l2(const EnsembleFit& fit, double noise_um) {
   const LinearData& data = fit.data;
-  const double measured_um = (residual_um(data, fit.forces.nN) + moved_by(data, fit.forces.nN)).norm();
-  return measured_um > 0 ? noise_um * std::sqrt(static_cast<double>(data.displacement_um.size())) / measured_um : 0;
+  const VectorXd is_used = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1.0 : 0.0; });
+  const VectorXd measured_um = residual_um(data, fit.forces.nN) + moved_by(data, fit.forces.nN);
+  const double measured = is_used.cwiseProduct(measured_um).norm();
+  return measured > 0 ? noise_um * is_used.norm() / measured : 0;
 }
 
 }  // namespace

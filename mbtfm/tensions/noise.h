@@ -7,8 +7,8 @@
 
 namespace mbtfm::tensions {
 
-/// At least 30 lie that far outside the outline: 60 components tell a standard deviation to about 10 %.
-bool has_far_beads(const std::vector<Vec2>& beads_um, const Polygon& outline_um, double far_distance_um);
+/// At least 30 of those in use lie that far outside the outline: 60 components tell a standard deviation to about 10 %.
+bool has_far_beads(const LinearData& data, const Polygon& outline_um, double far_distance_um);
 
 struct NoiseLevel {
   double sigma_um = 0;  ///< standard deviation of a component

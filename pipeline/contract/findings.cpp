@@ -219,11 +219,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the total force is that of the adhesions in view, and what passes through the cut balances it",
        "Record the whole cell if you can. A note if forces beyond the cut are allowed for; a caution if "
        "effects.beyond_cut = off: distrust then the fibres and adhesions near the cut, and the force through it."},
-      {neighbour_pulls, "neighbour-pulls", "fit", note, "other cells in the image", 0,
-       "a cell at twice its own distance moves beads by a tenth of what it moves beneath itself",
-       "Nothing if their forces were allowed for; beads beneath them are left out. If effects.beyond_cut = off, forces "
-       "of "
-       "this cell are wrong: they take over what the other pulls. Choose cells that are alone if you can."},
+      {neighbour_pulls, "neighbour-pulls", "fit", note,
+       "other cells in the image, and sides of its border beyond which the beads call for forces", 0,
+       "a cell at twice its own distance moves beads by a tenth of what it moves beneath itself; a side is named if "
+       "chance would name one in 10 000 cells",
+       "Nothing if their forces were allowed for; beads beside them are left out. If effects.beyond_cut = off, forces "
+       "of this cell are wrong: they take over what the other pulls. Choose cells that are alone if you can."},
       {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for (24 at most)",
        0, "a pair of adhesions is named if chance would name one in one cell of twenty, all pairs tried",
        "Look for the fibre in the actin image between these adhesions (dashed in the map). If it is there, add it: "

@@ -12,6 +12,7 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/runner/all_cells.h"
 #include "pipeline/runner/batch_progress.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
@@ -24,7 +25,9 @@ namespace {
 void collect_cells(const fs::path& folder, FoundCells& found) {
   std::error_code error;
   if (fs::is_regular_file(folder / "cell.toml", error)) {
-    found.cells.push_back(folder);
+    const std::vector<fs::path> of_picture = cells_of_picture(folder);
+    if (of_picture.empty()) found.cells.push_back(folder);
+    found.cells.insert(found.cells.end(), of_picture.begin(), of_picture.end());
     return;
   }
   // That there is none is no error. One that leads round in a circle is: the folder is meant to be a cell.

@@ -52,6 +52,12 @@ void declare(stage::ParameterList& list, ImageNames& names) {
   list.add("cell_with", names.cell_with, kCellWithMeaning);
 }
 
+std::vector<std::string> image_keys() {
+  std::vector<std::string> keys;
+  for (const ImageKey& image : kImages) keys.emplace_back(image.key);
+  return keys;
+}
+
 bool is_image_key(const std::string& key) {
   return std::ranges::find(kImages, key, &ImageKey::key) != std::end(kImages);
 }

@@ -32,6 +32,8 @@ struct ImageNames {
 };
 void declare(stage::ParameterList& list, ImageNames& names);
 
+/// Of files, in [images].
+std::vector<std::string> image_keys();
 bool is_image_key(const std::string& key);
 /// The name or glob of a key of [images]. @throws InternalError for any other key
 const std::string& name_of_image(const ImageNames& names, const std::string& key);

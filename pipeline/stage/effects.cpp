@@ -40,7 +40,7 @@ const std::vector<Key>& switches() {
       {"channel_shift", &S::channel_shift,
        "shift and turn of the cell against the beads, found with the tensions; auto: on, if the beads determine it"},
       {"beyond_cut", &S::beyond_cut,
-       "forces of the part of a cell that lies outside its image; auto: if the outline has a cut"},
+       "forces of the part of a cell that lies outside its image, and of other cells; auto: if there are any"},
       {"cable_elasticity", &S::cable_elasticity,
        "cables resist being stretched beyond their rest length; auto: if any would be longer"},
       {"robust_loss", &S::robust_loss,

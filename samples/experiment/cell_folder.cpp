@@ -1,5 +1,7 @@
 #include "samples/experiment/cell_folder.h"
 
+#include <algorithm>
+
 #include <string>
 
 #include "pipeline/files/csv.h"
@@ -60,7 +62,9 @@ void write_cell_folder(const Experiment& e, const drawing::ScenarioParameters& p
   files::write_network(file("truth/network.vtu"), e.network);
   if (parameters.images) return;
   write_segmentation(e.cell, "1_segment", file);
-  if (e.neighbour)
+  const double field_um = drawing::field_um(parameters.microscope);
+  const auto is_seen = [&](Vec2 p) { return std::min({p.x, p.y, field_um - p.x, field_um - p.y}) > 0; };
+  if (e.neighbour && std::ranges::any_of(e.neighbour->outline_um, is_seen))
     files::write_outline(file("1_segment/" + std::string(files::kNeighboursFile)), e.neighbour->outline_um);
   files::write_displacement(file("2_track/displacement.csv"), e.measured);
 }

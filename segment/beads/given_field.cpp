@@ -1,6 +1,7 @@
 #include "segment/beads/given_field.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -148,7 +149,7 @@ DisplacementField read_given_field(const std::filesystem::path& file, const Trac
 double outwardness(const DisplacementField& field) {
   const auto moves = [](const Bead& b) { return b.flag.empty() && norm(b.displacement_um) > 3 * b.sigma_um; };
   Vec2 centre;
-  double total = 0, cosines = 0;
+  double total = 0;
   int n = 0;
   for (const Bead& bead : field) {
     if (!moves(bead)) continue;
@@ -159,12 +160,20 @@ double outwardness(const DisplacementField& field) {
   }
   if (n < 20) return 0;
   centre = (1 / total) * centre;
+  struct Quarter {
+    double cosines = 0, total = 0;
+  };
+  std::array<Quarter, 4> quarters;
   for (const Bead& bead : field) {
     const Vec2 out = bead.position_um - centre;
     if (!moves(bead) || !(norm(out) > 0)) continue;
-    cosines += norm(bead.displacement_um) * dot(bead.displacement_um, out) / norm(out);
+    Quarter& quarter = quarters[(out.x > 0) + 2 * (out.y > 0)];
+    quarter.cosines += norm(bead.displacement_um) * dot(bead.displacement_um, out) / norm(out);
+    quarter.total += dot(bead.displacement_um, bead.displacement_um);
   }
-  return cosines / total;
+  double sum = 0;  // where nothing moves, nothing moves outward
+  for (const auto& [cosines, of_quarter] : quarters) sum += of_quarter > 0 ? cosines / of_quarter : 0;
+  return sum / 4;
 }
 
 GivenMotion take_motion_off(DisplacementField& field, const TrackParameters& parameters) {

@@ -28,9 +28,10 @@ struct GivenMotion {
 /// it.
 GivenMotion take_motion_off(DisplacementField& field, const TrackParameters& parameters);
 
-/// Mean of the cosine between displacement and direction from the field's centre, weighted with displacement²: about
-/// −0.7 around a contracting cell; positive where stressed and relaxed image are swapped. 0 for less than 20 beads that
-/// move.
+/// Mean of the cosine between displacement and direction from the field's centre, weighted with displacement² in each
+/// quarter about the centre, of all quarters alike: about −0.7 around a contracting cell; positive where stressed and
+/// relaxed image are swapped. What a strong neighbour in a corner pulls outward lies in one quarter. 0 for less than 20
+/// beads that move.
 double outwardness(const DisplacementField& field);
 
 /// The gel moves outward, away from what is pushed, as if stressed and relaxed image were exchanged. Asked only where a

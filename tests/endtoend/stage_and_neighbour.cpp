@@ -1,6 +1,7 @@
 /// What happens beside the cell moves no force of it: the stage between the pictures, another cell in the field.
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/own_files.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
 #include "tests/support/test.h"
@@ -97,6 +98,27 @@ TEST(Neighbour, pulls_and_leaves_the_force_of_this_cell_as_it_is) {
   EXPECT_NEAR(beside.total_force_nN, alone.total_force_nN, 3 * sigma_nN);
   EXPECT_GT(std::abs(taken_over.total_force_nN - alone.total_force_nN),
             std::abs(beside.total_force_nN - alone.total_force_nN));
+}
+
+/// One of the two is the cell whose truth is there; the other's pull is allowed for.
+TEST(AllCells, have_a_folder_each_and_the_force_that_one_alone_has) {
+  const test::TemporaryFolder folder;
+  const std::string cell = (folder / "cell").string();
+  output_of(
+      "mbtfm-simulate --quiet --scenario two-adhesions --seed 3 --noise_um 0.02 --images --neighbour_y_um=14 --out " +
+      cell);
+  files::write_text(cell + "/cell.toml", files::read_text(cell + "/cell.toml") + "\n[segment]\ncell = 0\n");
+  output_of("mbtfm run " + cell);
+  double truth_nN = 0, least = 1e9;
+  for (const AdhesionForce& f : files::read_adhesion_forces(cell + "/truth/adhesion_forces.csv"))
+    truth_nN += norm(f.force_nN);
+  for (const char* one : {"/cell_1", "/cell_2"}) {
+    EXPECT_TRUE(test::fires("neighbour-pulls", files::read_text(cell + one + "/run.json"))) << one;
+    const FitSummary fit = files::read_fit_summary(cell + one + "/4_fit/fit.json");
+    least = std::min(least, std::abs(fit.total_force_nN - truth_nN) / total_force_sigma_nN(fit));
+  }
+  EXPECT_LT(least, 3) << "standard errors of the total force";
+  EXPECT_FALSE(files::is_file(cell + "/cell_3/cell.toml"));
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
@@ -52,6 +54,26 @@ TEST(GivenField, a_grid_of_a_known_field_keeps_its_peaks_and_tells_its_noise) {
     if (!bead.flag.empty()) ++n_flagged;
   EXPECT_LE(n_flagged, 0.01 * static_cast<double>(field.size()));
   EXPECT_LT(outwardness(field), -0.5);
+}
+
+/// A cell that contracts, and in a corner of the picture beads that are pulled out of it as strongly: the field's
+/// centre lies between the two, and all that moves in the corner moves away from it.
+TEST(GivenField, a_strong_neighbour_in_a_corner_is_no_push) {
+  for (const double strength : {0.3, 0.4}) {
+    DisplacementField alone, beside;
+    for (int i = 0; i < 1600; ++i) {
+      const Vec2 place{2.0 * (i % 40) + 1, 2.0 * (i / 40) + 1}, d = place - Vec2{30, 30}, e = place - Vec2{72, 72};
+      const Vec2 own = (-0.1 * std::exp(-std::pow((norm(d) - 15) / 6, 2)) / norm(d)) * d;
+      const double others = strength * std::exp(-dot(e, e) / 50) / std::numbers::sqrt2;
+      alone.push_back({.position_um = place, .displacement_um = own, .sigma_um = 0.003, .flag = {}});
+      beside.push_back(
+          {.position_um = place, .displacement_um = own + Vec2{others, others}, .sigma_um = 0.003, .flag = {}});
+    }
+    EXPECT_LT(outwardness(beside), 0.3);  // finding moves-outward
+    EXPECT_LT(outwardness(alone), -0.9);
+    for (Bead& bead : alone) bead.displacement_um = -1 * bead.displacement_um;
+    EXPECT_GT(outwardness(alone), 0.9) << "exchanged";
+  }
 }
 
 TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {

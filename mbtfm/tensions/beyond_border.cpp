@@ -1,0 +1,128 @@
+#include "mbtfm/tensions/beyond_border.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "mbtfm/tensions/random_forces.h"
+#include "pipeline/contract/extent.h"
+#include "substrate/greens/models.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+constexpr double kDepth_um = 60;  // of a spread cell
+constexpr double kPiece_um = 30;  // half of its breadth
+
+struct Piece {
+  Vec2 low_um, high_um;
+  Polygon ring() const { return {low_um, {high_um.x, low_um.y}, high_um, {low_um.x, high_um.y}}; }
+};
+
+/// Once around the field, from its upper left corner.
+std::vector<Piece> pieces_around(const Extent& field) {
+  const auto& [low, high] = field;
+  const Vec2 size = high - low, deep{kDepth_um, kDepth_um};
+  const int n_across = std::max(1, static_cast<int>(std::lround(size.x / kPiece_um)));
+  const int n_down = std::max(1, static_cast<int>(std::lround(size.y / kPiece_um)));
+  const Vec2 step{size.x / n_across, size.y / n_down};
+  std::vector<Piece> pieces{{low - deep, low}};
+  for (int i = 0; i < n_across; ++i)
+    pieces.push_back({{low.x + i * step.x, low.y - kDepth_um}, {low.x + (i + 1) * step.x, low.y}});
+  pieces.push_back({{high.x, low.y - kDepth_um}, {high.x + kDepth_um, low.y}});
+  for (int i = 0; i < n_down; ++i)
+    pieces.push_back({{high.x, low.y + i * step.y}, {high.x + kDepth_um, low.y + (i + 1) * step.y}});
+  pieces.push_back({high, high + deep});
+  for (int i = n_across; i-- > 0;)
+    pieces.push_back({{low.x + i * step.x, high.y}, {low.x + (i + 1) * step.x, high.y + kDepth_um}});
+  pieces.push_back({{low.x - kDepth_um, high.y}, {low.x, high.y + kDepth_um}});
+  for (int i = n_down; i-- > 0;)
+    pieces.push_back({{low.x - kDepth_um, low.y + i * step.y}, {low.x, low.y + (i + 1) * step.y}});
+  return pieces;
+}
+
+/// Discs on a piece, as large as half of its depth: what a cell out there does in the field is smooth.
+std::vector<substrate::Ellipse> discs_on(const Piece& piece) {
+  const Vec2 size = piece.high_um - piece.low_um;
+  const int nx = std::max(1, static_cast<int>(std::lround(size.x / kPiece_um)));
+  const int ny = std::max(1, static_cast<int>(std::lround(size.y / kPiece_um)));
+  const Vec2 step{size.x / nx, size.y / ny};
+  const double radius_um = std::sqrt(step.x * step.y / std::numbers::pi);
+  std::vector<substrate::Ellipse> discs;
+  for (int j = 0; j < ny; ++j)
+    for (int i = 0; i < nx; ++i)
+      discs.push_back({.centre_um = piece.low_um + Vec2{(i + 0.5) * step.x, (j + 0.5) * step.y},
+                       .semi_major_um = radius_um,
+                       .semi_minor_um = radius_um,
+                       .angle_rad = 0});
+  return discs;
+}
+
+/// The pieces whose forces make the data likelier than chance does, by columns of Z.
+std::set<std::size_t> pieces_called_for(RandomScores scores, const std::vector<std::vector<Index>>& columns) {
+  // a likelihood ratio exceeds x by chance less often than exp(-x/2) (Self & Liang, JASA 82 (1987) 605)
+  const double limit = 2 * std::log(static_cast<double>(columns.size()) / 1e-4);
+  std::set<std::size_t> found;
+  while (found.size() < columns.size()) {
+    std::size_t best = 0;
+    double least = 0, kappa = 0;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      if (found.contains(k)) continue;
+      const Spectrum spectrum = spectrum_of({scores.information(columns[k], columns[k]), scores.scores(columns[k])});
+      const double likeliest = likeliest_kappa(spectrum), here = surprise(spectrum, likeliest);
+      if (here < least) best = k, least = here, kappa = likeliest;
+    }
+    if (-least < limit) break;
+    found.insert(best);
+    scores = beside(scores, columns[best], kappa);
+  }
+  return found;
+}
+
+}  // namespace
+
+std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell& cell, const Gel& gel) {
+  std::vector<Piece> pieces = pieces_around(extent_of(data.position_um));
+  // what lies beyond a cut is allowed for
+  std::erase_if(pieces, [&](const Piece& p) {
+    return !cuts_of(cell).empty() && distance_to_cut_um(cell, 0.5 * (p.low_um + p.high_um)) < kDepth_um;
+  });
+  if (pieces.empty()) return {};
+  std::vector<substrate::Ellipse> discs;
+  std::vector<std::vector<Index>> columns;
+  for (const Piece& piece : pieces) {
+    const std::vector<substrate::Ellipse> own = discs_on(piece);
+    std::vector<Index>& of_piece = columns.emplace_back();
+    for (std::size_t k = 0; k < 2 * own.size(); ++k) of_piece.push_back(2 * std::ssize(discs) + static_cast<Index>(k));
+    discs.insert(discs.end(), own.begin(), own.end());
+  }
+  // a layer's tables would take longer than all the rest, and the field of random forces is as smooth
+  const auto half_space = greens::make_greens(gel, {.model = substrate::ModelKind::half_space}, data.threads);
+  RandomScores scores =
+      random_scores(data, by_root_of_area(half_space->compliance_um_per_nN(data.position_um, discs), discs));
+  scores.scores /= std::sqrt(variance_beside(data, spectrum_of(scores)));
+  std::set<std::size_t> with_next;
+  for (const std::size_t k : pieces_called_for(std::move(scores), columns))
+    for (const std::size_t near : {k, (k + 1) % pieces.size(), (k + pieces.size() - 1) % pieces.size()})
+      with_next.insert(near);
+  std::vector<Polygon> found;
+  for (const std::size_t k : with_next) found.push_back(pieces[k].ring());
+  return found;
+}
+
+std::vector<std::string> borders_of(const std::vector<Polygon>& pieces_um, const std::vector<Vec2>& beads_um) {
+  const auto [low, high] = extent_of(beads_um);
+  std::vector<std::string> names;
+  for (const Polygon& piece : pieces_um) {
+    const Vec2 at = extent_of(piece).middle_um();
+    const std::string down = at.y < low.y ? "upper" : at.y > high.y ? "lower" : "";
+    const std::string across = at.x < low.x ? "left" : at.x > high.x ? "right" : "";
+    const std::string name = down + (down.empty() || across.empty() ? "" : " ") + across;
+    if (std::ranges::find(names, name) == names.end()) names.push_back(name);
+  }
+  return names;
+}
+
+}  // namespace mbtfm::tensions
