@@ -201,11 +201,39 @@ void follow_beside(const PlacedModel& model, const Scene& scene, const std::opti
   recover(scene, parameters.least_similarity, tracks, expected);
 }
 
-Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images::Image& stressed,
-                        const std::optional<Turn>& turn, const TrackParameters& parameters, double pixel_size_um,
-                        int threads, const PlacedModel& model) {
-  const auto scene = std::make_shared<const Scene>(scene_of(
+/// The same beads at the width of another image that is out of focus. The noise stays that of this one's pixels.
+void widen(Side& side, const images::Image& image, double own_px, double wide_px, int threads) {
+  Plane plane = without_background(image, background_sigma(wide_px));
+  if (own_px < wide_px) {
+    plane = blurred(plane, std::sqrt(wide_px * wide_px - own_px * own_px));
+    for (DetectedBead& bead : side.beads) bead.brightness *= std::pow(own_px / wide_px, 2);
+  }
+  side.image = smooth_image(std::move(plane), threads);
+  side.bead_sigma = wide_px;
+}
+
+/// A window of sharp beads does not fit on wide ones. If one image is wider by the factor that `defocused` names, the
+/// sharp one is compared at the width of the other: no narrower window sees more than that one shows.
+std::shared_ptr<const Scene> alike_wide(const std::shared_ptr<const Scene>& scene, const images::Image& relaxed,
+                                        const images::Image& stressed) {
+  constexpr double kOutOfFocus = 1.5;
+  const double here = bead_sigma_of(scene->relaxed->image.plane), there = bead_sigma_of(scene->stressed.image.plane);
+  const double wide = std::max(here, there);
+  if (!(here > 0 && there > 0) || wide < kOutOfFocus * std::min(here, there)) return scene;
+  Side first = *scene->relaxed, second = scene->stressed;
+  widen(first, relaxed, here, wide, scene->threads);
+  widen(second, stressed, there, wide, scene->threads);
+  return std::make_shared<const Scene>(
+      scene_of(std::make_shared<const Side>(std::move(first)), std::move(second), scene->threads));
+}
+
+Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images::Image& image,
+                        const images::Image& stressed, const std::optional<Turn>& turn,
+                        const TrackParameters& parameters, double pixel_size_um, int threads,
+                        const PlacedModel& model) {
+  const auto sharp = std::make_shared<const Scene>(scene_of(
       relaxed, side_of(stressed, relaxed->bead_sigma, parameters.detection_snr, "stressed", threads), threads));
+  const auto scene = alike_wide(sharp, image, stressed);
   auto [tracks, n_by_grid, has_gaps] =
       followed_and_measured(*scene, turn, parameters, search_window(4 * scene->spacing(), parameters, pixel_size_um));
   recover(*scene, parameters.least_similarity, tracks);
@@ -216,7 +244,7 @@ Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images
   if (turn) flag_turned_out(*scene, *turn, tracks);  // those found again
   require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
   Pooling pooling = pooled(*scene, tracks);
-  const BeadSizes sizes = sizes_of(*scene, tracks);
+  const BeadSizes sizes = sizes_of(*sharp, tracks);
   return {.scene = scene, .tracks = std::move(tracks), .pooling = std::move(pooling), .sizes = sizes};
 }
 
@@ -503,9 +531,9 @@ Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const Stress
   }
   const images::Image unturned = turn ? turned_back(stressed.image, *turn, threads_) : stressed.image;
   tell(0, by_beads ? "following beads" : "following windows");
-  Measured measured =
-      by_beads ? measured_beads(side_, unturned, turn, parameters_, pixel_size_um, threads_, {model_, stressed.cell})
-               : measured_windows(*texture_, unturned, turn, parameters_, pixel_size_um, threads_);
+  Measured measured = by_beads ? measured_beads(side_, relaxed_, unturned, turn, parameters_, pixel_size_um, threads_,
+                                                {model_, stressed.cell})
+                               : measured_windows(*texture_, unturned, turn, parameters_, pixel_size_um, threads_);
   const MotionTaken all = motion_of_all(
       *measured.scene, measured.tracks, [&](int k) { return measured.pooling.beads[k].u; }, setting,
       parameters_.effect_tolerance);

@@ -117,13 +117,14 @@ TEST(TrackProperty, beads_that_move_by_a_seventh_of_the_picture_are_followed) {
   for (const Bead& bead : tracking.field) {
     if (!bead.flag.empty()) continue;
     const Vec2 place = bead.position_um - Vec2{0.5, 0.5}, truth = test::displacement(peaks, place);
-    // of two touching beads a window may have the other: a bead's width
+    // a blot of two beads has the motion of either: a bead's width
     if (norm(bead.displacement_um + tracking.stressed.motion.at(place) - truth) > 1.3) continue;
     ++n_right;
     furthest = std::max(furthest, norm(truth));
   }
   EXPECT_GE(furthest, 0.95 * 37);  // beads are 7 px apart: none of them need be at the top
-  EXPECT_GE(n_right, 0.99 * tracking.n_good);
+  // one bead in ten, 1 − exp(−density pi 1.3²), has another within its width, and of such two one may be wrong
+  EXPECT_GE(n_right, 0.95 * tracking.n_good);
   EXPECT_GE(tracking.n_good, 2.0 / 3 * static_cast<double>(tracking.field.size()));
 }
 
