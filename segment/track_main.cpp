@@ -451,8 +451,12 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
     context.expect_plausible("bead_sigma_um", tracking.bead_sigma_um);
   }
   write_field(context, tracking.field, "displacement");
+  if (!tracking.lattice.empty()) files::write_displacement(context.output("out", "windows.csv"), tracking.lattice);
   write_picture(context, frame.picture, relaxed.image, frame.pixel_size_um);
-  return report_of(frame, parameters.cell_with);
+  StageReport report = report_of(frame, parameters.cell_with);
+  if (parameters.windows_spacing_um > 0 && tracking.lattice.empty())
+    report.summary += "; no windows.csv: the images show no texture that windows follow";
+  return report;
 }
 
 struct TrackStageParameters {

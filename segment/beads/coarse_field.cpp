@@ -8,6 +8,7 @@
 
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
+#include "segment/beads/local_motion.h"
 #include "segment/beads/plane.h"
 
 namespace mbtfm::beads {
@@ -50,11 +51,12 @@ std::optional<Vec2> peak_of(const cv::Mat& map, int n, double least_ratio) {
               best.y + parabola_vertex(value(0, -1), value(0, 0), value(0, 1))};
 }
 
-/// Shift, of up to half a window, between a window of the reference and the place in the target where it is expected.
-std::optional<Vec2> window_shift(const Plane& reference, const Plane& target, Vec2 centre, Vec2 expected, int window) {
-  const int side = 2 * window, most = window / 2;
-  const int left = static_cast<int>(std::lround(centre.x)) - most;
-  const int top = static_cast<int>(std::lround(centre.y)) - most;
+/// Shift, of up to `most` px, between a window of the reference and the place in the target where it is expected.
+std::optional<Vec2> window_shift(const Plane& reference, const Plane& target, Vec2 centre, Vec2 expected, int window,
+                                 int most) {
+  const int side = cv::getOptimalDFTSize(window + 2 * most);
+  const int left = static_cast<int>(std::lround(centre.x)) - window / 2;
+  const int top = static_cast<int>(std::lround(centre.y)) - window / 2;
   const int dx = static_cast<int>(std::lround(expected.x)), dy = static_cast<int>(std::lround(expected.y));
   cv::Mat a, b, product;
   cv::dft(cut(reference, left, top, window, side), a, 0, window);
@@ -62,7 +64,7 @@ std::optional<Vec2> window_shift(const Plane& reference, const Plane& target, Ve
   cv::mulSpectrums(b, a, product, 0, true);
   cv::idft(product, product, cv::DFT_REAL_OUTPUT | cv::DFT_SCALE);
   constexpr double kLeastRatio = 1.15;
-  const auto shift = peak_of(product, window + 1, kLeastRatio);  // these shifts do not wrap
+  const auto shift = peak_of(product, 2 * most + 1, kLeastRatio);  // these shifts do not wrap
   if (!shift) return std::nullopt;
   return Vec2{shift->x - most + dx, shift->y - most + dy};
 }
@@ -85,8 +87,8 @@ std::vector<Vec2> around(const GridField& field, const std::vector<std::optional
   return result;
 }
 
-/// Normalised median test (Westerweel & Scarano 2005), then holes take the median of what is known around them.
-void clean(GridField& field, std::vector<std::optional<Vec2>> found, Vec2 otherwise) {
+/// Normalised median test (Westerweel & Scarano 2005).
+void reject_outliers(const GridField& field, std::vector<std::optional<Vec2>>& found) {
   const std::vector<std::optional<Vec2>> before = found;
   for (int j = 0; j < field.ny; ++j) {
     for (int i = 0; i < field.nx; ++i) {
@@ -100,6 +102,11 @@ void clean(GridField& field, std::vector<std::optional<Vec2>> found, Vec2 otherw
       if (norm(*before[k] - median) > 2 * (numerics::quantile(spread, 0.5) + 0.5)) found[k].reset();
     }
   }
+}
+
+/// Holes take the median of what is known around them.
+void clean(GridField& field, std::vector<std::optional<Vec2>> found, Vec2 otherwise) {
+  reject_outliers(field, found);
   for (int j = 0; j < field.ny; ++j) {
     for (int i = 0; i < field.nx; ++i) {
       const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
@@ -248,7 +255,7 @@ GridField coarse_field(const Plane& reference, const Plane& target, int window, 
       for (int i = 0; i < finer.nx; ++i) {
         const Vec2 centre = finer.first + finer.spacing * Vec2{1.0 * i, 1.0 * j};
         const auto shift =
-            window_shift(from, to, (1.0 / scale) * centre, (1.0 / scale) * field.at(centre).u, window / 2);
+            window_shift(from, to, (1.0 / scale) * centre, (1.0 / scale) * field.at(centre).u, window / 2, window / 4);
         if (shift) found[static_cast<std::size_t>(j) * finer.nx + i] = 1.0 * scale * *shift;
       }
     });
@@ -256,6 +263,112 @@ GridField coarse_field(const Plane& reference, const Plane& target, int window, 
     field = std::move(finer);
   }
   field.period = period;
+  return field;
+}
+
+namespace {
+
+/// target(x + u(x)): the reference, as far as the field is right.
+Plane deformed_back(const Plane& target, const GridField& field, int scale, int threads) {
+  Plane result = target;
+  const cv::Mat from(target.height, target.width, CV_32F, const_cast<float*>(target.values.data()));
+  numerics::parallel_for(target.height, threads, [&](int j) {
+    cv::Mat places(1, target.width, CV_32FC2);
+    for (int i = 0; i < target.width; ++i) {
+      const Vec2 place{1.0 * i, 1.0 * j};
+      const Vec2 there = place + (1.0 / scale) * field.at(1.0 * scale * place).u;
+      places.at<cv::Vec2f>(0, i) = {static_cast<float>(there.x), static_cast<float>(there.y)};
+    }
+    cv::Mat row(1, target.width, CV_32F, result.values.data() + static_cast<std::size_t>(j) * target.width);
+    cv::remap(from, row, places, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
+  });
+  return result;
+}
+
+/// Holes take what the nearest known points go on to there: a peak's flanks lead to its top.
+void extrapolate(GridField& field, std::vector<std::optional<Vec2>> found, int threads) {
+  reject_outliers(field, found);
+  std::vector<Vec2> places;
+  std::vector<Motion> motions;
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    if (!found[k]) continue;
+    places.push_back(field.place(k));
+    motions.push_back({.u = *found[k]});
+  }
+  const GridField through = field_through(places, motions, field, threads);
+  for (std::size_t k = 0; k < found.size(); ++k) field.u[k] = found[k].value_or(through.u[k]);
+}
+
+/// Weighed 1 : 2 : 1 with the neighbours along both axes.
+GridField smoothed(const GridField& field) {
+  GridField result = field;
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      Vec2 sum;
+      for (int b = -1; b <= 1; ++b) {
+        for (int a = -1; a <= 1; ++a) {
+          const int x = std::clamp(i + a, 0, field.nx - 1), y = std::clamp(j + b, 0, field.ny - 1);
+          sum += (2.0 - std::abs(a)) * (2.0 - std::abs(b)) / 16 * field.u[static_cast<std::size_t>(y) * field.nx + x];
+        }
+      }
+      result.u[static_cast<std::size_t>(j) * field.nx + i] = sum;
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+GridField field_through(const std::vector<Vec2>& places, const std::vector<Motion>& motions, GridField lattice,
+                        int threads) {
+  if (places.empty()) return lattice;
+  std::vector<Vec3> points;
+  for (const Vec2 place : places) points.push_back({place.x, place.y, 0});
+  const numerics::Near known(std::move(points), lattice.spacing);
+  numerics::parallel_for(lattice.ny, threads, [&](int j) {
+    for (int i = 0; i < lattice.nx; ++i) {
+      constexpr int kNearest = 12;
+      const std::size_t k = static_cast<std::size_t>(j) * lattice.nx + i;
+      const Vec2 place = lattice.place(k);
+      lattice.u[k] = local_motion(place, known.nearest({place.x, place.y, 0}, kNearest), places, motions)->motion.u;
+    }
+  });
+  return lattice;
+}
+
+GridField coarse_to_fine_field(const Plane& reference, const Plane& target, int window, int threads) {
+  const Plane a = compressed(reference), b = compressed(target);
+  struct Pass {
+    int scale = 1, window = 64, reach = 32;
+  };
+  const int third = std::min(reference.width, reference.height) / 3;
+  const Pass passes[] = {{4, 2 * window, third},
+                         {4, 2 * window, window},
+                         {2, window, window / 2},
+                         {2, window, window / 2},
+                         {1, window / 2, window / 4}};
+  GridField field;
+  field.u = {2.0 * drift_of(reduced(a, 2), reduced(b, 2)).shift};
+  field.nx = field.ny = 1;
+  for (const Pass& pass : passes) {
+    const Plane from = reduced(a, pass.scale);
+    const Plane to = deformed_back(reduced(b, pass.scale), field, pass.scale, threads);
+    GridField finer = grid_over(a, 0.25 * pass.window);
+    std::vector<std::optional<Vec2>> found(finer.u.size());
+    numerics::parallel_for(finer.ny, threads, [&](int j) {
+      for (int i = 0; i < finer.nx; ++i) {
+        const std::size_t k = static_cast<std::size_t>(j) * finer.nx + i;
+        const Vec2 centre = finer.place(k);
+        const auto shift =
+            window_shift(from, to, (1.0 / pass.scale) * centre, {}, pass.window / pass.scale, pass.reach / pass.scale);
+        if (!shift) continue;
+        const Vec2 moved = 1.0 * pass.scale * *shift;
+        found[k] = moved + field.at(centre + moved).u;
+      }
+    });
+    extrapolate(finer, std::move(found), threads);
+    field = smoothed(finer);
+  }
   return field;
 }
 

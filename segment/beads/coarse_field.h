@@ -13,6 +13,10 @@ struct GridField {
   Vec2 first;  ///< the first point
   std::vector<Vec2> u;
   double period = 0;  ///< px, of a pattern that repeats itself, as dots in a lattice; 0: it does not
+  Vec2 place(std::size_t k) const {
+    const auto n = static_cast<std::size_t>(nx);
+    return first + spacing * Vec2{static_cast<double>(k % n), static_cast<double>(k / n)};
+  }
   /// Bilinear between the points, constant beyond them.
   Motion at(Vec2 place) const;
 };
@@ -28,5 +32,14 @@ Plane compressed(const Plane& plane);
 /// two) are cross-correlated at that resolution, and windows of half that size at full resolution around what the first
 /// found; points whose peak is ambiguous or differs from their neighbours' take their neighbours' median.
 GridField coarse_field(const Plane& reference, const Plane& target, int window, int threads);
+
+/// The affine motion through the dozen known ones that are nearest, at each point of a lattice.
+GridField field_through(const std::vector<Vec2>& places, const std::vector<Motion>& motions, GridField lattice,
+                        int threads);
+
+/// The same for motions of up to a third of the picture: windows of twice `window` px are searched that far at a
+/// quarter of the resolution, then ever smaller ones in the target deformed back by what was found, so that strains do
+/// not blur their peaks (window deformation: Scarano, Meas Sci Technol 13:R1, 2002). Takes some ten times as long.
+GridField coarse_to_fine_field(const Plane& reference, const Plane& target, int window, int threads);
 
 }  // namespace mbtfm::beads

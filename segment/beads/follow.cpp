@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "segment/beads/gaps.h"
 #include "segment/beads/local_motion.h"
 
 namespace mbtfm::beads {
@@ -148,8 +149,9 @@ Followed follow(const Scene& scene, const GridField& grid, const TrackParameters
   update(scene, tracks, surroundings);
   flag_outliers(surroundings.around, parameters.outlier_threshold, {}, tracks);
   const int n_by_grid = n_good(tracks);
+  const bool has_gaps = Gaps(scene, tracks).are_large();
   follow_neighbours(scene, parameters, surroundings, tracks);
-  return {std::move(tracks), n_by_grid, grid.period};
+  return {std::move(tracks), n_by_grid, has_gaps, grid.period};
 }
 
 std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks,

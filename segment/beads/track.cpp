@@ -102,12 +102,46 @@ void flag_out_of_sight(const Scene& scene, const Placement& stressed, std::vecto
   }
 }
 
+/// What the good tracks go on to everywhere.
+GridField field_of(const Scene& scene, const std::vector<Track>& tracks) {
+  std::vector<Vec2> places;
+  std::vector<Motion> motions;
+  for (int k = 0; k < scene.n_beads(); ++k) {
+    if (!tracks[k].is_good()) continue;
+    places.push_back(scene.position(k));
+    motions.push_back(tracks[k].found.motion);
+  }
+  return field_through(places, motions, grid_over(scene.relaxed->image.plane, scene.spacing()), scene.threads);
+}
+
+/// From the grid. If it finds none of the beads in parts of the picture, as where they moved further than it searches,
+/// or by too different distances, from one that searches further; then, again and again, from what the beads found so
+/// far predict, as long as that finds more. Those bear out each other: what the images' grids find counts as found by
+/// the grid.
+Followed followed_from_grid(const Scene& scene, const TrackParameters& parameters, int window) {
+  const Plane &from = scene.relaxed->image.plane, &to = scene.stressed.image.plane;
+  Followed best = follow(scene, coarse_field(from, to, window, scene.threads), parameters);
+  // of a pattern that repeats itself the least motion counts
+  if (!best.has_gaps || best.period_px > 0) return best;
+  Followed far = follow(scene, coarse_to_fine_field(from, to, window, scene.threads), parameters);
+  if (far.n_by_grid <= best.n_by_grid) return best;
+  best = std::move(far);
+  const int n_by_grid = best.n_by_grid;
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds; ++round) {
+    Followed next = follow(scene, field_of(scene, best.tracks), parameters);
+    if (next.n_by_grid <= best.n_by_grid) break;
+    best = std::move(next);
+  }
+  best.n_by_grid = n_by_grid;
+  return best;
+}
+
 /// Found from the grid with the wide window, measured in the narrow one, even where beads are loose or not resolved and
 /// single ones scatter: a wider window would hide the scatter and flatten the peaks.
 Followed followed_and_measured(const Scene& scene, const std::optional<Turn>& turn, const TrackParameters& parameters,
                                int window, const Gaps* gaps = nullptr) {
-  const GridField grid = coarse_field(scene.relaxed->image.plane, scene.stressed.image.plane, window, scene.threads);
-  Followed followed = follow(scene, grid, parameters);
+  Followed followed = followed_from_grid(scene, parameters, window);
   // beside windows that are far more alike those in gaps would seem to show something else
   for (int k = 0; gaps && k < scene.n_beads(); ++k) {
     if (!gaps->hold(scene.position(k))) followed.tracks[k].flag = TrackFlag::no_partner;
@@ -170,12 +204,40 @@ void follow_beside(const PlacedModel& model, const Scene& scene, const std::opti
   recover(scene, parameters.least_similarity, tracks, expected);
 }
 
-Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images::Image& stressed,
-                        const std::optional<Turn>& turn, const TrackParameters& parameters, double pixel_size_um,
-                        int threads, const PlacedModel& model) {
-  const auto scene = std::make_shared<const Scene>(scene_of(
+/// The same beads at the width of another image that is out of focus. The noise stays that of this one's pixels.
+void widen(Side& side, const images::Image& image, double own_px, double wide_px, int threads) {
+  Plane plane = without_background(image, background_sigma(wide_px));
+  if (own_px < wide_px) {
+    plane = blurred(plane, std::sqrt(wide_px * wide_px - own_px * own_px));
+    for (DetectedBead& bead : side.beads) bead.brightness *= std::pow(own_px / wide_px, 2);
+  }
+  side.image = smooth_image(std::move(plane), threads);
+  side.bead_sigma = wide_px;
+}
+
+/// A window of sharp beads does not fit on wide ones. If one image is wider by the factor that `defocused` names, the
+/// sharp one is compared at the width of the other: no narrower window sees more than that one shows.
+std::shared_ptr<const Scene> alike_wide(const std::shared_ptr<const Scene>& scene, const images::Image& relaxed,
+                                        const images::Image& stressed) {
+  constexpr double kOutOfFocus = 1.5;
+  const double here = bead_sigma_of(scene->relaxed->image.plane), there = bead_sigma_of(scene->stressed.image.plane);
+  const double wide = std::max(here, there);
+  if (!(here > 0 && there > 0) || wide < kOutOfFocus * std::min(here, there)) return scene;
+  Side first = *scene->relaxed, second = scene->stressed;
+  widen(first, relaxed, here, wide, scene->threads);
+  widen(second, stressed, there, wide, scene->threads);
+  return std::make_shared<const Scene>(
+      scene_of(std::make_shared<const Side>(std::move(first)), std::move(second), scene->threads));
+}
+
+Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images::Image& image,
+                        const images::Image& stressed, const std::optional<Turn>& turn,
+                        const TrackParameters& parameters, double pixel_size_um, int threads,
+                        const PlacedModel& model) {
+  const auto sharp = std::make_shared<const Scene>(scene_of(
       relaxed, side_of(stressed, relaxed->bead_sigma, parameters.detection_snr, "stressed", threads), threads));
-  auto [tracks, n_by_grid, period_px] =
+  const auto scene = alike_wide(sharp, image, stressed);
+  auto [tracks, n_by_grid, has_gaps, period_px] =
       followed_and_measured(*scene, turn, parameters, search_window(4 * scene->spacing(), parameters, pixel_size_um));
   recover(*scene, parameters.least_similarity, tracks);
   constexpr int kRounds = 2;  // what the first one mends makes the model better
@@ -186,7 +248,7 @@ Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images
   if (turn) flag_turned_out(*scene, *turn, tracks);             // those found again
   require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
   Pooling pooling = pooled(*scene, tracks);
-  const BeadSizes sizes = sizes_of(*scene, tracks);
+  const BeadSizes sizes = sizes_of(*sharp, tracks);
   return {.scene = scene,
           .tracks = std::move(tracks),
           .pooling = std::move(pooling),
@@ -204,13 +266,15 @@ struct Tried {
 };
 
 /// @param gaps  whose windows alone count; none: all do
+/// @param spacing_px  of the windows; 0: as far as they do not overlap
 Tried tried_windows(const Texture& relaxed, const Texture& stressed, double window_px, const std::optional<Turn>& turn,
-                    TrackParameters parameters, double pixel_size_um, int threads, const Gaps* gaps) {
-  const Windows windows = windows_on(relaxed, stressed, window_px, threads);
+                    TrackParameters parameters, double pixel_size_um, int threads, const Gaps* gaps,
+                    double spacing_px = 0) {
+  const Windows windows = windows_on(relaxed, stressed, window_px, threads, spacing_px);
   const auto scene = std::make_shared<const Scene>(windows.scene);
   parameters.least_similarity = least_similarity(relaxed, window_px);
   // a square of seven Gaussian sigmas is halved on the finer grid, and holds as much as the Gaussian then
-  auto [tracks, n_by_grid, period_px] =
+  auto [tracks, n_by_grid, has_gaps, period_px] =
       followed_and_measured(*scene, turn, parameters, search_window(7 * window_px, parameters, pixel_size_um), gaps);
   Tried result{.measured = {scene, std::move(tracks), {}, {}, window_px, period_px}, .n_by_grid = n_by_grid};
   auto pooling = calibrated(windows, result.measured.tracks);
@@ -301,6 +365,16 @@ Tracking tracking_of(const Measured& measured, const MotionTaken& all, const Pla
   return result;
 }
 
+/// Whether a change made the images fit together, and not a few beads by chance: two in three are followed, as is asked
+/// where the grid bears out nothing, and of a hundred that were compared with their neighbours ten contradict at most.
+/// (Strangers agree with one in twenty of their neighbours.)
+bool is_sound(const Tracking& tracking) {
+  const auto n = static_cast<int>(tracking.field.size());
+  const auto n_against = static_cast<int>(
+      std::ranges::count(tracking.field, std::string(name_of(TrackFlag::neighbours_disagree)), &Bead::flag));
+  return 3 * tracking.n_good >= 2 * n && 9 * n_against <= tracking.n_good;
+}
+
 }  // namespace
 
 void declare(stage::ParameterList& list, TrackParameters& p) {
@@ -323,11 +397,15 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
   list.add("detection_snr", p.detection_snr, Range::factor(),
            "least height of a bead over its background (standard deviations of the noise)");
   list.add("largest_displacement_um", p.largest_displacement_um, Range::between(0, 100),
-           "distance over which a bead is looked for, after the drift (um); 0: 32 pixels, further if beads are sparse");
+           "distance over which a bead is looked for, after the drift (um); 0: 32 pixels, or a third of the image if "
+           "parts of it need more");
   list.add("may_push", p.may_push,
            "accept a cell that pushes its gel outward; false: this is an error, as the two images may be exchanged");
   list.add("least_similarity", p.least_similarity, Range::between(0, 1),
            "least correlation of a bead's surroundings in both images");
+  list.add("windows_spacing_um", p.windows_spacing_um, Range::between(0, 1000),
+           "spacing of a lattice of windows all over the image, written to windows.csv beside the beads (um; not of a "
+           "time series); 0: none");
   list.add("outlier_threshold", p.outlier_threshold, Range::factor(),
            "difference from the neighbours that flags a bead (robust standard deviations)");
   list.add("x_column", p.x_column, "column of --displacement with x of the relaxed position");
@@ -359,7 +437,7 @@ RelaxedBeads::RelaxedBeads(const images::Image& relaxed, const TrackParameters& 
     side.around = beads_around(side, threads);
     side_ = std::make_shared<const Side>(std::move(side));
   }
-  if (method != TrackMethod::beads) {
+  if (method != TrackMethod::beads || parameters.windows_spacing_um > 0) {
     texture_ = std::make_shared<const Texture>(texture_of(relaxed, bead_sigma, "relaxed"));
   }
 }
@@ -462,9 +540,9 @@ Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const Stress
   }
   const images::Image unturned = turn ? turned_back(stressed.image, *turn, threads_) : stressed.image;
   tell(0, by_beads ? "following beads" : "following windows");
-  Measured measured =
-      by_beads ? measured_beads(side_, unturned, turn, parameters_, pixel_size_um, threads_, {model_, stressed.cell})
-               : measured_windows(*texture_, unturned, turn, parameters_, pixel_size_um, threads_);
+  Measured measured = by_beads ? measured_beads(side_, relaxed_, unturned, turn, parameters_, pixel_size_um, threads_,
+                                                {model_, stressed.cell})
+                               : measured_windows(*texture_, unturned, turn, parameters_, pixel_size_um, threads_);
   const MotionTaken all = motion_of_all(
       *measured.scene, measured.tracks, [&](int k) { return measured.pooling.beads[k].u; }, setting,
       parameters_.effect_tolerance);
@@ -472,13 +550,17 @@ Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const Stress
   const Placement own{all.motion, turn}, cell = placement_of_cell(parameters_, stressed.cell, own);
   flag_out_of_sight(*measured.scene, own, measured.tracks);
   Tracking result = tracking_of(measured, all, own, cell, pixel_size_um);
-  if (by_beads && texture_ && !parameters_.is_series) {
+  if (by_beads && parameters_.method == TrackMethod::automatic && !parameters_.is_series) {
     const Gaps gaps(*measured.scene, measured.tracks);
     result.share_of_gaps = gaps.share();
     if (gaps.are_large()) {
       tell(0.9, "following windows where beads fail");
       fill(gaps, unturned, cell, pixel_size_um, result);
     }
+  }
+  if (parameters_.windows_spacing_um > 0) {
+    tell(0.95, "following windows everywhere");
+    result.lattice = lattice_of(unturned, own, cell, pixel_size_um);
   }
   const CommonMotion common = turn ? turned_as_before(all.common, *turn, all.motion.centre) : all.common;
   result.common = in_um(common, pixel_size_um);
@@ -511,15 +593,33 @@ void RelaxedBeads::fill(const Gaps& gaps, const images::Image& unturned, const P
   }
 }
 
-/// Tried out one by one: an error has the time, and a hint that does not help costs the reader more.
+/// Windows of the size that is fine enough, as closely as asked for. Empty where there is no texture to follow.
+DisplacementField RelaxedBeads::lattice_of(const images::Image& unturned, const Placement& own, const Placement& cell,
+                                           double pixel_size_um) const {
+  try {
+    const double window_px =
+        measured_windows(*texture_, unturned, own.turn, parameters_, pixel_size_um, threads_).window_px;
+    const Texture moved = texture_of(unturned, texture_->spot_sigma_px, "stressed");
+    const Tried tried = tried_windows(*texture_, moved, window_px, own.turn, parameters_, pixel_size_um, threads_,
+                                      nullptr, parameters_.windows_spacing_um / pixel_size_um);
+    DisplacementField lattice;
+    for (std::size_t k = 0; k < tried.measured.pooling.beads.size(); ++k)
+      lattice.push_back(entry_of(tried.measured, static_cast<int>(k), own, cell, pixel_size_um));
+    return lattice;
+  } catch (const NotFollowed&) {
+    return {};
+  }
+}
+
+/// Tried out one by one, the whole tracking each: an error has the time, and a hint that does not help costs the reader
+/// more.
 std::string RelaxedBeads::remedy(const Stressed& stressed) const {
   const auto helps = [&](const auto& change) {
     TrackParameters changed = parameters_;
     change(changed);
     try {
-      RelaxedBeads(relaxed_, changed, threads_, model_)
-          .track_by_any({stressed.image, stressed.pixel_size_um, stressed.cell, {}});
-      return true;
+      return is_sound(RelaxedBeads(relaxed_, changed, threads_, model_)
+                          .track_by_any({stressed.image, stressed.pixel_size_um, stressed.cell, {}}));
     } catch (const InvalidData&) {
       return false;
     }

@@ -57,6 +57,7 @@ struct TrackParameters {
   bool may_push = false;           ///< a gel that is pushed outward is no sign of exchanged images
   double effect_tolerance = 0.01;  ///< auto: what displaces the border by less, of the largest displacement, stays
   double least_similarity = 0.6;   ///< correlation of a bead's neighbourhoods below which it is no match
+  double windows_spacing_um = 0;   ///< of a lattice of windows beside the beads; 0: none
   double outlier_threshold = 4;    ///< in robust sd: 4 rejects one good bead in 16 000
   // a displacement field from elsewhere
   std::string x_column = "x_um", y_column = "y_um", ux_column = "ux_um", uy_column = "uy_um";
@@ -120,13 +121,14 @@ struct Tracking {
   double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
   BeadSizes sizes{};
   int n_good = 0;
-  Effect affine{};           ///< whether turn, growth and shear were taken off, and why
-  Effect windows{};          ///< whether windows were followed in place of single beads, and why
-  double window_um = 0;      ///< Gaussian sigma of the windows; 0: single beads
-  double period_um = 0;      ///< of a pattern that repeats itself, as of dots in a lattice; 0: it does not
-  int n_windows = 0;         ///< among the field's entries, the last ones: in gaps between the beads
-  double share_of_gaps = 0;  ///< of the picture, where single beads cannot be followed
-  int n_beads_stressed = 0;  ///< found in the stressed image
+  Effect affine{};            ///< whether turn, growth and shear were taken off, and why
+  Effect windows{};           ///< whether windows were followed in place of single beads, and why
+  double window_um = 0;       ///< Gaussian sigma of the windows; 0: single beads
+  double period_um = 0;       ///< of a pattern that repeats itself, as of dots in a lattice; 0: it does not
+  int n_windows = 0;          ///< among the field's entries, the last ones: in gaps between the beads
+  DisplacementField lattice;  ///< windows all over the picture, beside the field, if asked for
+  double share_of_gaps = 0;   ///< of the picture, where single beads cannot be followed
+  int n_beads_stressed = 0;   ///< found in the stressed image
 };
 
 /// The beads, or the texture, of one image are not met with again in the other.
@@ -199,6 +201,8 @@ class RelaxedBeads {
   Tracking track_as(TrackMethod method, Switch setting, const Stressed& stressed) const;
   void fill(const Gaps& gaps, const images::Image& unturned, const Placement& cell, double pixel_size_um,
             Tracking& tracking) const;
+  DisplacementField lattice_of(const images::Image& unturned, const Placement& own, const Placement& cell,
+                               double pixel_size_um) const;
   std::string remedy(const Stressed& stressed) const;
   images::Image relaxed_;
   std::shared_ptr<const Side> side_;        ///< unless windows alone are asked for

@@ -52,16 +52,19 @@ images::Image without_dead_border(const images::Image& image) {
 /// The displacements of good windows on the lattice.
 class Lattice {
  public:
-  Lattice(const GridField& grid, const std::vector<Track>& tracks) : grid_(grid), tracks_(tracks) {}
+  Lattice(const Windows& windows, const std::vector<Track>& tracks)
+      : grid_(windows.lattice), tracks_(tracks), stride_(windows.stride) {}
   /// Nothing where the window is not good, or beyond the border.
   const Track* at(int i, int j) const {
     if (i < 0 || j < 0 || i >= grid_.nx || j >= grid_.ny) return nullptr;
     const Track& track = tracks_[static_cast<std::size_t>(j) * grid_.nx + i];
     return track.is_good() ? &track : nullptr;
   }
+  /// A neighbour that does not overlap.
+  const Track* beside(int i, int j, int di, int dj) const { return at(i + di * stride_, j + dj * stride_); }
   /// u(k − 1) − 2 u(k) + u(k + 1) along x or y.
   std::optional<Vec2> second_difference(int i, int j, int di, int dj) const {
-    const Track *before = at(i - di, j - dj), *here = at(i, j), *after = at(i + di, j + dj);
+    const Track *before = beside(i, j, -di, -dj), *here = at(i, j), *after = beside(i, j, di, dj);
     if (!before || !here || !after) return std::nullopt;
     return before->found.motion.u - 2 * here->found.motion.u + after->found.motion.u;
   }
@@ -69,6 +72,7 @@ class Lattice {
  private:
   const GridField& grid_;
   const std::vector<Track>& tracks_;
+  int stride_;
 };
 
 /// What the lattice says of the errors around a window.
@@ -78,12 +82,12 @@ struct Check {
                       ///< of each other
 };
 
-std::optional<Check> check_at(const Lattice& lattice, int i, int j) {
+std::optional<Check> check_at(const Lattice& lattice, double apart, int i, int j) {
   Vec2 sum, across, along;
   double variance = 0;
   for (int b = -1; b <= 1; ++b) {
     for (int a = -1; a <= 1; ++a) {
-      const Track* track = lattice.at(i + a, j + b);
+      const Track* track = lattice.beside(i, j, a, b);
       if (!track) return std::nullopt;
       const double weight = (a == 0 ? -2.0 : 1.0) * (b == 0 ? -2.0 : 1.0);
       sum += weight * track->found.motion.u;
@@ -93,18 +97,19 @@ std::optional<Check> check_at(const Lattice& lattice, int i, int j) {
     }
   }
   // Neighbours' errors are correlated by r: along each axis the mask has the variance 6 − 8 r + 2 r⁴, not 6.
-  const double r = std::exp(-kSpacing * kSpacing / 4), less = 1 - (8 * r - 2 * std::pow(r, 4)) / 6;
+  const double r = std::exp(-apart * apart / 4), less = 1 - (8 * r - 2 * std::pow(r, 4)) / 6;
   variance *= less * less;
   if (!(variance > 0)) return std::nullopt;
   return Check{0.5 * dot(sum, sum) / variance, dot(along, along) + dot(across, across)};
 }
 
 /// c of calibrated(), from the half of the lattice where the field changes least: elsewhere the mask sees the field.
-std::optional<double> variance_scale(const GridField& grid, const Lattice& lattice) {
+std::optional<double> variance_scale(const Windows& windows, const Lattice& lattice) {
+  const GridField& grid = windows.lattice;
   std::vector<Check> checks;
   for (int j = 0; j < grid.ny; ++j) {
     for (int i = 0; i < grid.nx; ++i) {
-      if (const auto check = check_at(lattice, i, j)) checks.push_back(*check);
+      if (const auto check = check_at(lattice, windows.apart, i, j)) checks.push_back(*check);
     }
   }
   constexpr std::size_t kFewest = 16;  // the median of half of them is then known to a half
@@ -140,9 +145,12 @@ double least_similarity(const Texture& texture, double window_sigma) {
   return std::min(1.0, kSignificant * width / (std::numbers::sqrt2 * window_sigma));
 }
 
-Windows windows_on(const Texture& relaxed, const Texture& stressed, double window_sigma, int threads) {
-  const double spacing = kSpacing * window_sigma;
+Windows windows_on(const Texture& relaxed, const Texture& stressed, double window_sigma, int threads,
+                   double spacing_px) {
+  const double spacing = spacing_px > 0 ? spacing_px : kSpacing * window_sigma;
   Windows windows{.lattice = grid_over(relaxed.plane, spacing), .scene = {}};
+  windows.stride = std::max(1, static_cast<int>(std::lround(kSpacing * window_sigma / spacing)));
+  windows.apart = windows.stride * spacing / window_sigma;
   const GridField& lattice = windows.lattice;
   std::vector<Vec2> places;
   for (int j = 0; j < lattice.ny; ++j) {
@@ -165,8 +173,8 @@ Windows windows_on(const Texture& relaxed, const Texture& stressed, double windo
 }
 
 std::optional<Pooling> calibrated(const Windows& windows, const std::vector<Track>& tracks) {
-  const Lattice lattice(windows.lattice, tracks);
-  const std::optional<double> scale = variance_scale(windows.lattice, lattice);
+  const Lattice lattice(windows, tracks);
+  const std::optional<double> scale = variance_scale(windows, lattice);
   if (!scale) return std::nullopt;
   Pooling result;
   for (int j = 0; j < windows.lattice.ny; ++j) {
@@ -176,7 +184,7 @@ std::optional<Pooling> calibrated(const Windows& windows, const std::vector<Trac
       if (!track) continue;
       const Vec2 curved = lattice.second_difference(i, j, 1, 0).value_or(Vec2{}) +
                           lattice.second_difference(i, j, 0, 1).value_or(Vec2{});
-      const double bias = norm(curved) / (2 * kSpacing * kSpacing) / std::numbers::sqrt2;  // of a component
+      const double bias = norm(curved) / (2 * windows.apart * windows.apart) / std::numbers::sqrt2;  // of a component
       result.beads.back() = {track->found.motion.u, std::hypot(std::sqrt(*scale) * track->found.sigma_px, bias)};
     }
   }

@@ -36,8 +36,12 @@ double least_similarity(const Texture& texture, double window_sigma);
 struct Windows {
   GridField lattice;
   Scene scene;
+  int stride = 1;    ///< of the lattice, to windows that do not overlap
+  double apart = 3;  ///< so far, in window sigmas
 };
-Windows windows_on(const Texture& relaxed, const Texture& stressed, double window_sigma, int threads);
+/// @param spacing_px  of a lattice whose windows may overlap; 0: three window sigmas
+Windows windows_on(const Texture& relaxed, const Texture& stressed, double window_sigma, int threads,
+                   double spacing_px = 0);
 
 /// Displacement of each good window and its standard error.
 ///

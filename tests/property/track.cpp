@@ -104,6 +104,30 @@ TEST(TrackProperty, swapped_images_give_the_opposite_field) {
   EXPECT_GE(n_same, 0.97 * n);
 }
 
+/// Up to a third of the picture is searched. A pull of a seventh strains the gel by 0.7, so that no window of the usual
+/// search holds beads that move alike.
+TEST(TrackProperty, beads_that_move_by_a_seventh_of_the_picture_are_followed) {
+  const auto peaks = test::ring_of_strain(256, 37, 0.73, 4, 0.7);
+  const auto pair = test::draw_bead_pair(peaks, {.width = 256, .n_beads = 1340, .seed = 11});
+  TrackParameters parameters = test::in_relaxed_frame();
+  parameters.drift_affine = Switch::automatic;
+  const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, parameters, 2);
+  double furthest = 0;
+  int n_right = 0;
+  for (const Bead& bead : tracking.field) {
+    if (!bead.flag.empty()) continue;
+    const Vec2 place = bead.position_um - Vec2{0.5, 0.5}, truth = test::displacement(peaks, place);
+    // a blot of two beads has the motion of either: a bead's width
+    if (norm(bead.displacement_um + tracking.stressed.motion.at(place) - truth) > 1.3) continue;
+    ++n_right;
+    furthest = std::max(furthest, norm(truth));
+  }
+  EXPECT_GE(furthest, 0.95 * 37);  // beads are 7 px apart: none of them need be at the top
+  // one bead in ten, 1 − exp(−density pi 1.3²), has another within its width, and of such two one may be wrong
+  EXPECT_GE(n_right, 0.95 * tracking.n_good);
+  EXPECT_GE(tracking.n_good, 2.0 / 3 * static_cast<double>(tracking.field.size()));
+}
+
 TEST(TrackProperty, any_number_of_threads_gives_the_same_numbers) {
   const auto pair = small_pair();
   const Tracking one = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 1);

@@ -15,38 +15,71 @@ namespace mbtfm::test {
 struct Peak {
   Vec2 centre, pull;
   double radius = 1;
+  double reach = 1e9;  ///< of a gel so thin: beyond it hardly anything moves, as a Gaussian of it
 };
 
-inline Vec2 displacement(const std::vector<Peak>& peaks, Vec2 point) {
+/// @param depth  below the surface, px
+inline Vec2 displacement(const std::vector<Peak>& peaks, Vec2 point, double depth = 0) {
   constexpr double kPoisson = 0.49;
   Vec2 sum;
   for (const Peak& peak : peaks) {
     const Vec2 d = point - peak.centre;
-    const double squared = dot(d, d) + peak.radius * peak.radius;
-    const double scale = peak.radius / std::sqrt(squared) / (1 - kPoisson);
+    const double squared = dot(d, d) + (peak.radius + depth) * (peak.radius + depth);
+    const double scale =
+        peak.radius / std::sqrt(squared) / (1 - kPoisson) * std::exp(-0.5 * dot(d, d) / (peak.reach * peak.reach));
     sum += scale * ((1 - kPoisson) * peak.pull + kPoisson * dot(peak.pull, d) / squared * d);
   }
   return sum;
 }
 
 /// Adhesions on a ring that pull towards its centre, without a net force; one of them moves `largest` px.
-inline std::vector<Peak> ring_of_adhesions(double width, double largest) {
+/// @param size  of the adhesions
+/// @param n  up to ten
+/// @param reach  of the gel, in radii
+inline std::vector<Peak> ring_of_adhesions(double width, double largest, double size = 1, int n = 10,
+                                           double reach = 1e9) {
   const double strengths[] = {1.0, 0.35, 0.6, 0.25, 0.8, 0.45, 0.3, 0.55, 0.4, 0.7};
   const double radii[] = {6.5, 4, 5, 4, 6, 5, 4, 5, 4.5, 6};
   std::vector<Peak> peaks;
   Vec2 net;
-  for (int k = 0; k < 10; ++k) {
-    const double angle = 2 * std::numbers::pi * (k + 0.3 * strengths[k]) / 10;
+  for (int k = 0; k < n; ++k) {
+    const double angle = 2 * std::numbers::pi * (k + 0.3 * strengths[k]) / n;
     const Vec2 out{std::cos(angle), std::sin(angle)};
     const Vec2 centre = Vec2{0.5 * width, 0.5 * width} + (0.2 + 0.12 * radii[k] / 6) * width * out;
-    peaks.push_back({centre, -strengths[k] * largest * out, radii[k]});
-    net += radii[k] * peaks.back().pull;  // force goes with displacement times radius
+    peaks.push_back({centre, -strengths[k] * largest * out, size * radii[k], reach * size * radii[k]});
+    net += peaks.back().radius * peaks.back().pull;  // force goes with displacement times radius
   }
-  for (Peak& peak : peaks) peak.pull = peak.pull - (1.0 / 10 / peak.radius) * net;
+  for (Peak& peak : peaks) peak.pull = peak.pull - (1.0 / n / peak.radius) * net;
   double peak_length = 0;
   for (const Peak& peak : peaks) peak_length = std::max(peak_length, norm(displacement(peaks, peak.centre)));
   for (Peak& peak : peaks) peak.pull = largest / peak_length * peak.pull;
   return peaks;
+}
+
+/// Largest change of the true displacement over a step of half a pixel to either side, per pixel.
+inline double steepness(const std::vector<Peak>& peaks, Vec2 at) {
+  const Vec2 along_x = displacement(peaks, at + Vec2{0.5, 0}) - displacement(peaks, at - Vec2{0.5, 0});
+  const Vec2 along_y = displacement(peaks, at + Vec2{0, 0.5}) - displacement(peaks, at - Vec2{0, 0.5});
+  return std::max(norm(along_x), norm(along_y));
+}
+
+/// The same with adhesions of the size that strains the gel by `strain` at most.
+inline std::vector<Peak> ring_of_strain(double width, double largest, double strain, int n = 10, double reach = 1e9) {
+  const auto of_size = [&](double size) { return ring_of_adhesions(width, largest, size, n, reach); };
+  const auto steepest = [&](const std::vector<Peak>& peaks) {
+    double most = 0;
+    for (const Peak& peak : peaks)
+      for (int j = -8; j <= 8; ++j)
+        for (int i = -8; i <= 8; ++i)
+          most = std::max(most, steepness(peaks, peak.centre + 0.25 * peak.radius * Vec2{1.0 * i, 1.0 * j}));
+    return most;
+  };
+  double small = 0.2, large = 20;  // the larger, the less strain
+  for (int step = 0; step < 20; ++step) {
+    const double middle = std::sqrt(small * large);
+    (steepest(of_size(middle)) > strain ? small : large) = middle;
+  }
+  return of_size(large);
 }
 
 /// How beads and camera look. Lengths in px, light in electrons.
@@ -64,9 +97,11 @@ struct BeadScene {
   double uneven_light = 0;  ///< relative fall of the light towards a corner, another one in each image
   double gain = 1;          ///< of the stressed image over the relaxed one
   double offset = 0;
-  double turn_rad = 0;  ///< of the stressed image about its centre, before the drift
-  double growth = 0;    ///< relative, of the same
-  double defocus = 1;   ///< width of a bead in the stressed image over that in the relaxed one, of the same light
+  double turn_rad = 0;     ///< of the stressed image about its centre, before the drift
+  double growth = 0;       ///< relative, of the same
+  double depth = 0;        ///< beads lie in focus and as far below; what they do there is less
+  double focal_depth = 3;  ///< so far off focus a bead is wider by sqrt 2
+  double defocus = 1;      ///< width of a bead in the stressed image over that in the relaxed one, of the same light
   Vec2 drift{};
   std::uint64_t seed = 1;
 };
@@ -112,18 +147,20 @@ inline BeadPair draw_bead_pair(const std::vector<Peak>& peaks, const BeadScene& 
     const Vec2 at{uniform(random) * side - kMargin - 0.5, uniform(random) * side - kMargin - 0.5};
     const double peak = scene.brightness * std::exp(scene.brightness_spread * normal(random));
     const Vec2 step{scene.jitter * normal(random), scene.jitter * normal(random)};
-    const Vec2 moved = displacement(peaks, at) + step;
+    const double depth = scene.depth > 0 ? scene.depth * uniform(random) : 0;
+    const double wider = std::hypot(1.0, depth / scene.focal_depth);
+    const Vec2 moved = displacement(peaks, at, depth) + step;
     const bool is_in_relaxed = uniform(random) >= scene.lost;
     const bool is_in_stressed = uniform(random) >= scene.lost;
-    if (is_in_relaxed) add_bead(pair.relaxed, at, peak, scene.bead_sigma, scene.bead_aspect);
+    const auto add = [&](images::Image& image, Vec2 place, double by) {
+      add_bead(image, place, peak / (by * by), by * scene.bead_sigma, scene.bead_aspect);
+    };
+    if (is_in_relaxed) add(pair.relaxed, at, wider);
     const Vec2 centre{0.5 * (scene.width - 1), 0.5 * (scene.width - 1)}, d = at + moved - centre;
     const double larger = 1 + scene.growth, c = larger * std::cos(scene.turn_rad),
                  s = larger * std::sin(scene.turn_rad);
     const Vec2 there = centre + scene.drift + Vec2{c * d.x - s * d.y, s * d.x + c * d.y};
-    if (is_in_stressed) {
-      add_bead(pair.stressed, there, peak / (scene.defocus * scene.defocus), scene.defocus * scene.bead_sigma,
-               scene.bead_aspect);
-    }
+    if (is_in_stressed) add(pair.stressed, there, wider * scene.defocus);
     const bool is_inside = at.x >= 0 && at.y >= 0 && at.x <= scene.width - 1 && at.y <= scene.width - 1;
     if (!is_inside || !is_in_relaxed || !is_in_stressed) continue;
     pair.positions.push_back(at);
