@@ -141,6 +141,16 @@ std::vector<Finding> findings_of(const Tracking& tracking) {
   return findings;
 }
 
+/// Both images may be out of focus alike, which their ratio does not show. Diameter d of spheres that are as wide as
+/// the beads in focus: the variance of a sphere's light along an axis is d²/20, and that of the lens's spot is added. A
+/// user knows d, and the images do not: large beads in focus look the same.
+double diameter_in_focus_um(double bead_sigma_um, double pixel_size_um) {
+  // 0.21 wavelengths over an aperture of 0.75; cameras behind lenses of 10 to 100 times have a spot of 0.6 to 1.2
+  // pixels
+  const double lens_um = std::max(0.15, 1.2 * pixel_size_um);
+  return std::sqrt(20 * std::max(0.0, bead_sigma_um * bead_sigma_um - lens_um * lens_um));
+}
+
 struct TrackedFrame {
   Tracking tracking;
   double pixel_size_um = 0;
@@ -160,6 +170,12 @@ StageReport report_of(const TrackedFrame& frame, CellWith cell_with) {
                       (cell_with == CellWith::relaxed ? "relaxed" : "stressed") + " image";
   }
   for (Finding& finding : findings_of(tracking)) report.findings.push_back(std::move(finding));
+  const double diameter_um = diameter_in_focus_um(tracking.bead_sigma_um, pixel_size_um);
+  if (auto found =
+          noticed(FindingKind::beads_wide, diameter_um,
+                  "The beads are " + brief(tracking.bead_sigma_um) + " um wide (standard deviation), as those of " +
+                      brief(diameter_um) + " um are in focus. Smaller ones are out of focus in both images."))
+    report.findings.push_back(std::move(*found));
   if (tracking.period_um > 0) {
     const double farthest_um = std::max(norm(shift_um), figures_of(tracking.field).largest_um);
     auto found = noticed(FindingKind::pattern_repeats, farthest_um / tracking.period_um,

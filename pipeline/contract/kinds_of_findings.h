@@ -31,6 +31,7 @@ enum class FindingKind : int {
   moves_outward,
   tracked_by_correlation,
   defocused,
+  beads_wide,
   beads_not_round,
   pattern_repeats,
   beads_lost,

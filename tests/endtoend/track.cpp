@@ -288,6 +288,10 @@ TEST(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_to
   oblong.bead_aspect = 1.2;
   weak.brightness = 25;
   EXPECT_TRUE(fires("defocused", told(test::draw_bead_pair(peaks, defocused))));
+  test::BeadScene wide = scene;  // 0.4 um, as beads of 1.4 um
+  wide.bead_sigma = 2;
+  EXPECT_TRUE(fires("beads-wide", told(test::draw_bead_pair(peaks, wide))));
+  EXPECT_FALSE(fires("beads-wide", told(test::draw_bead_pair(peaks, scene))));
   const std::string of_oblong = told(test::draw_bead_pair(peaks, oblong));
   EXPECT_TRUE(fires("beads-not-round", of_oblong)) << of_oblong;
   EXPECT_NE(of_oblong.find("caution (beads-not-round)"), std::string::npos) << of_oblong;

@@ -346,7 +346,7 @@ std::vector<Degradation> degradations() {
        }},
       {"defocus", "the stressed bead image is out of focus (blurred by 1.5 px)", "defocused",
        [](Set& s, const Set&) { blur(s.stressed, 1.5); }},
-      {"both-defocused", "both bead images are out of focus (blurred by 2 px)", "",
+      {"both-defocused", "both bead images are out of focus (blurred by 2 px)", "beads-wide",
        [](Set& s, const Set&) { to_beads(s, [](Image& i) { blur(i, 2); }); }},
       {"noisy-beads", "three times more noise in both bead images", "",
        [](Set& s, const Set&) {
