@@ -1,4 +1,5 @@
 /// mbtfm-simulate: a synthetic experiment with known truth.
+#include <charconv>
 #include <string_view>
 
 #include "pipeline/contract/numbers.h"
@@ -6,6 +7,7 @@
 #include "pipeline/stage/stage.h"
 #include "samples/colonies/colony.h"
 #include "samples/colonies/folder.h"
+#include "samples/drawing/rough_day.h"
 #include "samples/experiment/cell_folder.h"
 #include "samples/gels/folder.h"
 
@@ -14,16 +16,26 @@ namespace {
 using namespace mbtfm;
 using namespace mbtfm::experiment;
 
-/// The scenario named on the command line: its file sets the values that all other flags override.
-std::string scenario_named(int argc, char** argv, const std::string& otherwise) {
-  constexpr std::string_view kFlag = "--scenario";
-  std::string name = otherwise;
+/// What the command line says of a flag, before all flags are read: the last one counts.
+std::optional<std::string> value_of(const std::string& flag, int argc, char** argv) {
+  std::optional<std::string> value;
   for (int i = 1; i < argc; ++i) {
     const std::string_view argument = argv[i];
-    if (argument == kFlag && i + 1 < argc) name = argv[i + 1];
-    if (argument.starts_with("--scenario=")) name = argument.substr(kFlag.size() + 1);
+    if (argument == flag && i + 1 < argc) value = argv[i + 1];
+    if (argument.starts_with(flag + "=")) value = argument.substr(flag.size() + 1);
   }
-  return name;
+  return value;
+}
+
+/// The scenario's file, then a rough day's faults set the values that all other flags override.
+void set_scenario(stage::ParameterList& list, drawing::ScenarioParameters& cell, int argc, char** argv) {
+  stage::read_toml(list, drawing::scenario_file(value_of("--scenario", argc, argv).value_or(cell.scenario)));
+  const std::optional<std::string> rough = value_of("--rough", argc, argv);
+  if (!rough) return;
+  int number = 0;
+  const auto [end, error] = std::from_chars(rough->data(), rough->data() + rough->size(), number);
+  if (error == std::errc() && end == rough->data() + rough->size() && number > 0)
+    cell = drawing::rough_day(cell, number);
 }
 
 /// Images beside the true segmentation of an earlier experiment would never be looked at: it would pass for the user's.
@@ -150,7 +162,7 @@ int main(int argc, char** argv) {
       argc, argv,
       [&](stage::ParameterList& list) {
         declare(list, parameters);
-        stage::read_toml(list, drawing::scenario_file(scenario_named(argc, argv, parameters.cell.scenario)));
+        set_scenario(list, parameters.cell, argc, argv);
       },
       [&](stage::StageContext& context) { return run(parameters, context); });
 }

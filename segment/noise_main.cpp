@@ -9,6 +9,7 @@
 #include "pipeline/stage/stage.h"
 #include "segment/beads/unloaded.h"
 #include "segment/images/channels.h"
+#include "segment/images/scan_phase.h"
 
 namespace mbtfm::beads {
 namespace {
@@ -56,6 +57,7 @@ StageReport run(const NoiseParameters& given, stage::StageContext& context) {
   const auto picture = [&](const char* name, const images::PlaneChoice& plane) {
     const std::filesystem::path file = context.input(name);
     images::Channel channel{file.string(), images::read_image(file, plane)};
+    context.notice(images::take_scan_phase_off(channel));
     context.notice(images::noticed_loss(channel));
     context.notice(images::noticed_saturation(channel));
     return channel;

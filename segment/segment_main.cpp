@@ -15,6 +15,8 @@
 #include "segment/cells/contact_sheet.h"
 #include "segment/cells/overlay.h"
 #include "segment/cells/segment_cell.h"
+#include "segment/cells/usual_sizes.h"
+#include "segment/images/scan_phase.h"
 
 namespace mbtfm::cells {
 
@@ -24,7 +26,10 @@ std::optional<images::Channel> channel(stage::StageContext& context, const std::
                                        const images::PlaneChoice& plane, int binning) {
   if (!context.has_input(argument)) return std::nullopt;
   const auto file = context.input(argument);
-  return images::Channel{file.string(), binned(images::read_image(file, plane), binning)};
+  images::Channel result{file.string(), images::read_image(file, plane)};
+  context.notice(images::take_scan_phase_off(result));
+  result.image = binned(std::move(result.image), binning);
+  return result;
 }
 
 std::optional<RoiSet> roi_set(stage::StageContext& context, const std::string& argument, int binning) {
@@ -278,6 +283,24 @@ void expect_plausible(stage::StageContext& context, const Segmentation& s) {
   context.expect_plausible("adhesion_area_um2", numerics::median_in(areas_um2));
 }
 
+/// A pixel size that no image states is doubted if the cell and its parts are not as large with it as cells are.
+std::optional<Finding> noticed_unchecked(std::initializer_list<const std::optional<images::Channel>*> channels,
+                                         double pixel_size_um, const Segmentation& s) {
+  std::vector<const images::Channel*> seen;
+  for (const auto* channel : channels)
+    if (*channel) seen.push_back(&**channel);
+  std::optional<Finding> found = images::noticed_unchecked(seen, pixel_size_um);
+  const SizeRatio size = size_ratio(s);
+  constexpr double kDoubtful = 2;  // sd: cells of other kinds, one in twenty
+  if (!found || std::abs(size.z) < kDoubtful) return found;
+  return noticed(FindingKind::pixel_size_unchecked, 1,
+                 "The given pixel size, " + brief(pixel_size_um) +
+                     " um, is stated by no image. With it the cell, its adhesions and fibres are " +
+                     brief(size.ratio > 1 ? size.ratio : 1 / size.ratio) + " times as " +
+                     (size.ratio > 1 ? "large" : "small") + " as usual.",
+                 Severity::caution);
+}
+
 StageReport run(const SegmentParameters& given, stage::StageContext& context) {
   cv::setNumThreads(context.threads);
   SegmentParameters parameters = given;
@@ -291,10 +314,6 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
     context.notice(images::noticed_loss(*image));
     context.notice(images::noticed_saturation(*image));
   }
-  std::vector<const images::Channel*> seen;
-  for (const auto* image : {&adhesion, &actin})
-    if (*image) seen.push_back(&**image);
-  if (parameters.pixel_size_um) context.notice(images::noticed_unchecked(seen, *parameters.pixel_size_um));
   const bool is_one = adhesion && actin && adhesion->image.pixels == actin->image.pixels;
   if (is_one && adhesion->name != actin->name) {  // one file for both is by intent: no image of the actin is there
     throw InputError(adhesion->name + ", " + actin->name, "images of adhesions and of actin", "the same pixels in both",
@@ -305,6 +324,8 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
                         mask(context, "adhesion-mask", binning)};
   const std::vector<Segmentation> cells = segment_cells(adhesion, actin, parameters, drawn);
   for (const Segmentation& s : cells) expect_plausible(context, s);
+  if (parameters.pixel_size_um)
+    context.notice(noticed_unchecked({&adhesion, &actin}, *parameters.pixel_size_um, cells.front()));
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const std::string folder = parameters.cell == 0 ? "cell_" + std::to_string(i + 1) + "/" : "";
     write_cell(context, folder, cells[i], pictures_of(adhesion, actin, cells[i]), binning);

@@ -22,6 +22,7 @@
 #include "segment/beads/picture.h"
 #include "segment/beads/track.h"
 #include "segment/images/channels.h"
+#include "segment/images/scan_phase.h"
 #include "segment/stacks/run.h"
 
 namespace mbtfm::beads {
@@ -159,6 +160,14 @@ StageReport report_of(const TrackedFrame& frame, CellWith cell_with) {
                       (cell_with == CellWith::relaxed ? "relaxed" : "stressed") + " image";
   }
   for (Finding& finding : findings_of(tracking)) report.findings.push_back(std::move(finding));
+  if (tracking.period_um > 0) {
+    const double farthest_um = std::max(norm(shift_um), figures_of(tracking.field).largest_um);
+    auto found = noticed(FindingKind::pattern_repeats, farthest_um / tracking.period_um,
+                         "The beads form a pattern that repeats itself every " + brief(tracking.period_um) +
+                             " um, and it moved by " + brief(farthest_um) +
+                             " um: dots may have been taken for their neighbours.");
+    if (found) report.findings.push_back(std::move(*found));
+  }
   const Figures more = {{"cell_with", std::string(name_of(cell_with))},
                         {"stage_shift_x_um", shift_um.x},
                         {"stage_shift_y_um", shift_um.y},
@@ -173,6 +182,7 @@ StageReport report_of(const TrackedFrame& frame, CellWith cell_with) {
                         {"window_sigma_um", tracking.window_um},
                         {"n_windows_in_gaps", static_cast<std::int64_t>(tracking.n_windows)},
                         {"share_of_gaps", tracking.share_of_gaps},
+                        {"pattern_period_um", tracking.period_um},
                         {"bead_size_ratio", tracking.sizes.ratio},
                         {"bead_size_ratio_sigma", tracking.sizes.sigma},
                         {"bead_elongation", tracking.sizes.elongation},
@@ -250,11 +260,20 @@ auto with_names(const std::string& names, const Body& body) {
   }
 }
 
+/// As the beads were, each row where it belongs.
+images::Channel channel_of(const std::string& name, const fs::path& file, const images::PlaneChoice& plane, int binning,
+                           stage::StageContext& context) {
+  images::Channel channel{name, images::read_image(file, plane)};
+  context.notice(images::take_scan_phase_off(channel));
+  channel.image = images::binned(std::move(channel.image), binning);
+  return channel;
+}
+
 /// @param cell  the relaxed picture in the cell's pictures, if these are with another frame
 TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, const Frame& frame,
                      const TrackParameters& parameters, int binning, const std::optional<Placement>& cell,
                      const Progress& progress, stage::StageContext& context) {
-  const images::Channel stressed{frame.name(), images::binned(images::read_image(frame.file, frame.plane), binning)};
+  const images::Channel stressed = channel_of(frame.name(), frame.file, frame.plane, binning, context);
   images::require_equal_sizes(relaxed, stressed);
   const double pixel_size_um = images::common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
   for (const images::Channel* image : {&relaxed, &stressed}) {
@@ -412,8 +431,8 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
   const std::vector<Frame> frames = frames_of(context, parameters);
   parameters.is_series = frames.size() > 1;
   const fs::path relaxed_file = context.input("relaxed");
-  const images::Channel relaxed{relaxed_file.string(),
-                                images::binned(images::read_image(relaxed_file, parameters.relaxed_plane), binning)};
+  const images::Channel relaxed =
+      channel_of(relaxed_file.string(), relaxed_file, parameters.relaxed_plane, binning, context);
   if (parameters.pixel_size_um) context.notice(images::noticed_unchecked({&relaxed}, *parameters.pixel_size_um));
   const RelaxedBeads beads = with_names(
       relaxed.name, [&] { return RelaxedBeads(relaxed.image, parameters, context.threads, model_of_gel(context)); });

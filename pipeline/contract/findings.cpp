@@ -24,9 +24,15 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Areas, positions and intensities of what is saturated are wrong. Record with less light or a shorter "
        "exposure."},
       {pixel_size_unchecked, "pixel-size-unchecked", "any stage", note, "1 if no image states its pixel size", 0,
-       "all lengths are proportional to it, and all forces to its square",
+       "all lengths are proportional to it, and all forces to its square; a caution if cell, adhesions and fibres together "
+       "are two standard deviations larger or smaller than those of other cells",
        "Compare it with the microscope's own record, and with the binning of the camera: 10 % of it are 20 % of every "
        "force. Keep the TIFF files that the microscope writes: most state it."},
+      {scan_phase, "scan-phase", "any stage", note, "shift of every second row against the others (pixels)", 0.1,
+       "the error of a force grows with its square: 6 % at 1 pixel, less than 0.1 % at 0.1",
+       "Nothing: it was taken off. Correct the phase of the scanner before the next recording, or scan in one "
+       "direction "
+       "only."},
       {adhesions_left_out, "adhesions-left-out", "segment", note, "adhesions that were found outside of the cell", 0,
        "only what lies in the outline can hold the network", "Check the outline in 1_segment/overlay.png."},
       {adhesions_long, "adhesions-long", "segment", caution, "length over width of the adhesions, mean weighed by area",
@@ -115,6 +121,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Compare the images' width and height with the camera's: pixels that are not square, as of an image that was "
        "resized by different factors, make tensions wrong. If it is the lens (astigmatism, coma), displacements stay "
        "right."},
+      {pattern_repeats, "pattern-repeats", "track", caution,
+       "largest motion, of the stage or of the gel, over the distance after which the beads repeat themselves", 0.33,
+       "from half of it on the next dot is nearer than a dot's own place; for less, all dots found their partners",
+       "Keep the stage still between the pictures, or use beads at random, or dots further apart."},
       {beads_lost, "beads-lost", "track", caution, "share of the beads in space that were not followed", 0.2,
        "of simulated stacks of 5 000 and 20 000 beads 2 of a hundred and fewer are lost; if many are, those of the "
        "strained parts are lost first",

@@ -12,6 +12,7 @@ enum class FindingKind : int {
   lossy_image,
   saturated,
   pixel_size_unchecked,
+  scan_phase,
   // segment
   adhesions_left_out,
   actin_shift,
@@ -31,6 +32,7 @@ enum class FindingKind : int {
   tracked_by_correlation,
   defocused,
   beads_not_round,
+  pattern_repeats,
   beads_lost,
   little_at_rest,
   slices_moved,

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "pipeline/numerics/parallel.h"
+#include "segment/images/scan_phase.h"
 
 namespace mbtfm::drawing {
 
@@ -101,11 +102,13 @@ images::Image photons_of(const std::vector<Spot>& beads, const MicroscopeParamet
 images::Image recorded(const images::Image& photons, const MicroscopeParameters& m, std::uint64_t seed, int exposure,
                        int threads) {
   images::Image counts = photons;
+  if (m.scan_phase_px != 0) counts = images::without_scan_phase(photons, -m.scan_phase_px);
   numerics::parallel_for(photons.height, threads, [&](int row) {
     // each row has its own stream, so that the number of threads does not matter
     Random random(seed, Stream::camera, static_cast<std::uint64_t>(exposure) << 32 | static_cast<unsigned>(row));
     for (int column = 0; column < photons.width; ++column) {
-      const double value = m.camera_offset + m.counts_per_photon * random.poisson(photons.at(column, row)) +
+      const double value = m.camera_offset +
+                           m.counts_per_photon * random.poisson(std::max(0.0f, counts.at(column, row))) +
                            m.read_noise * random.normal();
       counts.at(column, row) = static_cast<float>(std::clamp(std::round(value), 0.0, 65535.0));
     }

@@ -129,6 +129,10 @@ void declare_microscope(stage::ParameterList& list, MicroscopeParameters& p) {
   list.add("camera_offset", p.camera_offset, Range::between(0, 65535), "counts of the camera in the dark");
   list.add("read_noise", p.read_noise, Range::between(0, 65535),
            "standard deviation of the camera's own noise (counts)");
+  list.add("scan_phase_px", p.scan_phase_px, Range::between(-20, 20),
+           "shift of the first, third, fifth row and so on to the right of the others, as of a scanner whose way back "
+           "is out "
+           "of time (pixels)");
 }
 
 /// Beside the folder of the program, in an installation as in a build.
@@ -154,6 +158,9 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   for (stage::Parameter& q : list.all()) q.is_required = false;  // a scenario's gel has defaults, a real one has not
   list.table("scenario");
   list.add("scenario", p.scenario, "name of a scenario, or path of a scenario file");
+  list.add("rough", p.rough, Range::between(0, 1000000),
+           "number of a rough day: an acquisition with faults as laboratories have them, drawn by this number; it sets "
+           "seed and images, too; 0: none");
   list.add("seed", p.seed, "random seed of the whole experiment");
   list.add("noise", p.noise, Range::zero_or_factor(),
            "standard deviation of the bead displacements over the largest displacement");
@@ -184,6 +191,7 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   list.add("simulation_material", p.mechanics.simulation_material,
            "law of the gel in the simulation: linear, or neo-hooke, whatever the strains are");
   declare_microscope(list, p.microscope);
+  declare(list, p.faults);
 }
 
 namespace {

@@ -10,6 +10,7 @@
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/stage/parameters_fwd.h"
+#include "samples/drawing/faults.h"
 
 namespace mbtfm::drawing {
 
@@ -117,10 +118,12 @@ struct MicroscopeParameters {
   double counts_per_photon = 2;
   double camera_offset = 200;  ///< counts
   double read_noise = 3;       ///< counts
+  double scan_phase_px = 0;    ///< of the rows of the way there against those of the way back, in all images
 };
 
 struct ScenarioParameters {
   std::string scenario = "u2os";
+  int rough = 0;  ///< the day's number (rough_day.h); 0: nothing goes wrong unasked
   std::uint64_t seed = 1;
   double noise = 0.07;                       ///< thesis 3.2.4: experiments have 5 to 10 %
   std::optional<double> noise_um = {};       ///< a microscope's noise is in um, whatever the gel; unset: by `noise`
@@ -139,6 +142,7 @@ struct ScenarioParameters {
   TensionParameters tension;
   MechanicsParameters mechanics;
   MicroscopeParameters microscope;
+  FaultParameters faults;
   Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};  ///< polyacrylamide of thesis 3.4
 };
 void declare(stage::ParameterList& list, ScenarioParameters& parameters);

@@ -28,12 +28,16 @@ void write_beads(const std::filesystem::path& file, const std::vector<Vec2>& rel
   files::write_text(file, csv.str());
 }
 
+enum class Shows { cell, beads };
+
 /// As the camera records it. @param exposure  number of the image
-void write_image(const FileNamer& file, const std::string& name, const images::Image& photons, int exposure,
-                 const drawing::ScenarioParameters& p, const Work& work) {
+void write_image(const FileNamer& file, const std::string& name, Shows shows, const images::Image& photons,
+                 int exposure, const drawing::ScenarioParameters& p, const Work& work) {
   work.tell(0.5 + 0.1 * exposure, "rendering " + name);
-  images::write_tiff(file(name),
-                     drawing::recorded(photons, drawing::at_quality(p.microscope), p.seed, exposure, work.threads));
+  images::Image counts = drawing::recorded(photons, drawing::at_quality(p.microscope), p.seed, exposure, work.threads);
+  drawing::add_hot_pixels(p.faults.n_hot_pixels, p.seed, counts);
+  if (shows == Shows::cell) drawing::spoil(p.faults, counts);
+  images::write_tiff(file(name), counts);
 }
 
 void add(images::Image& image, const images::Image& other) {
@@ -69,9 +73,15 @@ void write_bead_images(const DisplacementField& measured, const drawing::Scenari
     relaxed.push_back(drawing::before_stage_moved(bead.position_um, p));
     stressed.push_back(bead.position_um + bead.displacement_um);
   }
-  const drawing::BeadImages beads = drawing::bead_spots(relaxed, stressed, p.lost_bead_fraction, m, p.seed);
-  write_image(file, "beads_relaxed.tif", drawing::photons_of(beads.relaxed, m, work.threads), 2, p, work);
-  write_image(file, "beads_stressed.tif", drawing::photons_of(beads.stressed, m, work.threads), 3, p, work);
+  drawing::BeadImages beads = drawing::bead_spots(relaxed, stressed, p.lost_bead_fraction, m, p.seed);
+  for (drawing::Spot& bead : beads.relaxed) {
+    bead.sigma_um *= p.faults.relaxed_defocus;
+    bead.total *= 1 - p.faults.light_lost;
+  }
+  for (drawing::Spot& bead : beads.stressed) bead.sigma_um *= p.faults.stressed_defocus;
+  write_image(file, "beads_relaxed.tif", Shows::beads, drawing::photons_of(beads.relaxed, m, work.threads), 2, p, work);
+  write_image(file, "beads_stressed.tif", Shows::beads, drawing::photons_of(beads.stressed, m, work.threads), 3, p,
+              work);
   write_beads(file("truth/beads.csv"), relaxed, stressed);
 }
 
@@ -84,8 +94,9 @@ void write_images(const Experiment& e, const drawing::ScenarioParameters& p, con
     add(paxillin, drawing::paxillin_specimen(*e.neighbour, m, p.seed + 1, threads));
     add(actin, drawing::actin_specimen(*e.neighbour, p.actin, m, p.seed + 1, threads));
   }
-  write_image(file, "paxillin.tif", drawing::photons_of(paxillin, m, threads), 0, p, work);
-  write_image(file, "actin.tif", drawing::photons_of(actin, m, threads), 1, p, work);
+  drawing::add_debris(e.cell, p.faults, p.seed, paxillin, actin);
+  write_image(file, "paxillin.tif", Shows::cell, drawing::photons_of(paxillin, m, threads), 0, p, work);
+  write_image(file, "actin.tif", Shows::cell, drawing::photons_of(actin, m, threads), 1, p, work);
   DisplacementField beads = e.measured;
   beads.insert(beads.end(), e.beyond.begin(), e.beyond.end());
   write_bead_images(beads, p, file, work);

@@ -133,15 +133,63 @@ Plane reduced(const Plane& plane, int scale) {
   return result;
 }
 
-/// Shift of the target as a whole: phase correlation.
-Vec2 drift_of(const Plane& reference, const Plane& target) {
-  const auto as_mat = [](const Plane& p) {
-    return cv::Mat(p.height, p.width, CV_32F, const_cast<float*>(p.values.data()));
-  };
+cv::Mat matrix_of(const Plane& p) { return {p.height, p.width, CV_32F, const_cast<float*>(p.values.data())}; }
+
+/// Spectrum of a plane that fades towards its borders.
+cv::Mat spectrum_of(const Plane& plane, const cv::Mat& window) {
+  const cv::Mat values = matrix_of(plane);
+  cv::Mat faded = (values - cv::mean(values)[0]).mul(window), padded, result;
+  const int width = cv::getOptimalDFTSize(plane.width), height = cv::getOptimalDFTSize(plane.height);
+  cv::copyMakeBorder(faded, padded, 0, height - plane.height, 0, width - plane.width, cv::BORDER_CONSTANT, 0);
+  cv::dft(padded, result);
+  return result;
+}
+
+/// Shifts at which the cross-correlation has local maxima of at least this share of its largest value, the least first.
+std::vector<Vec2> likely_shifts(const cv::Mat& from, const cv::Mat& to, double share) {
+  cv::Mat map;
+  cv::mulSpectrums(to, from, map, 0, true);
+  cv::idft(map, map, cv::DFT_REAL_OUTPUT);
+  double highest = 0;
+  cv::minMaxLoc(map, nullptr, &highest);
+  const auto value = [&](int i, int j) { return map.at<float>((j + map.rows) % map.rows, (i + map.cols) % map.cols); };
+  std::vector<Vec2> shifts;
+  for (int j = 0; j < map.rows; ++j) {
+    for (int i = 0; i < map.cols; ++i) {
+      const float here = map.at<float>(j, i);
+      if (!(here >= share * highest)) continue;
+      bool is_peak = true;
+      for (int k = 0; k < 9 && is_peak; ++k) is_peak = k == 4 || value(i + k % 3 - 1, j + k / 3 - 1) < here;
+      if (!is_peak) continue;
+      shifts.push_back(
+          {(2 * i < map.cols ? i : i - map.cols) + parabola_vertex(value(i - 1, j), here, value(i + 1, j)),
+           (2 * j < map.rows ? j : j - map.rows) + parabola_vertex(value(i, j - 1), here, value(i, j + 1))});
+    }
+  }
+  std::ranges::sort(shifts, {}, [](Vec2 shift) { return norm(shift); });
+  return shifts;
+}
+
+struct WholeShift {
+  Vec2 shift;
+  double period = 0;  ///< of a pattern that repeats itself; 0: it does not
+};
+
+/// Shift of the target as a whole: phase correlation. Of a pattern that repeats itself any of its periods fits: the
+/// least one that fits half as well as the best counts, which is at the same time the one that most of it shares.
+WholeShift drift_of(const Plane& reference, const Plane& target) {
   cv::Mat window;
   cv::createHanningWindow(window, {reference.width, reference.height}, CV_32F);
-  const cv::Point2d shift = cv::phaseCorrelate(as_mat(reference), as_mat(target), window);
-  return {shift.x, shift.y};
+  // Spots at random are alike elsewhere as the inverse root of their number: half is never met by eight and more.
+  constexpr double kAlike = 0.5;
+  const cv::Mat from = spectrum_of(reference, window);
+  const std::vector<Vec2> same = likely_shifts(from, from, kAlike);
+  if (same.size() > 1) {
+    const std::vector<Vec2> shifts = likely_shifts(from, spectrum_of(target, window), kAlike);
+    if (!shifts.empty()) return {shifts.front(), norm(same[1])};
+  }
+  const cv::Point2d shift = cv::phaseCorrelate(matrix_of(reference), matrix_of(target), window);
+  return {{shift.x, shift.y}};
 }
 
 }  // namespace
@@ -188,11 +236,14 @@ Motion GridField::at(Vec2 place) const {
 GridField coarse_field(const Plane& reference, const Plane& target, int window, int threads) {
   const Plane a = compressed(reference), b = compressed(target);
   Vec2 drift;
+  double period = 0;
   GridField field;
   for (const int scale : {2, 1}) {
     const Plane from = reduced(a, scale), to = reduced(b, scale);
     if (scale == 2) {
-      drift = 2.0 * drift_of(from, to);
+      const WholeShift found = drift_of(from, to);
+      drift = 2.0 * found.shift;
+      period = 2 * found.period;
       field.u = {drift};
       field.nx = field.ny = 1;
     }
@@ -211,6 +262,7 @@ GridField coarse_field(const Plane& reference, const Plane& target, int window, 
     clean(finer, std::move(found), drift);
     field = std::move(finer);
   }
+  field.period = period;
   return field;
 }
 
@@ -219,7 +271,7 @@ namespace {
 /// target(x + u(x)): the reference, as far as the field is right.
 Plane deformed_back(const Plane& target, const GridField& field, int scale, int threads) {
   Plane result = target;
-  const cv::Mat from(target.height, target.width, CV_32F, const_cast<float*>(target.values.data()));
+  const cv::Mat from = matrix_of(target);
   numerics::parallel_for(target.height, threads, [&](int j) {
     cv::Mat places(1, target.width, CV_32FC2);
     for (int i = 0; i < target.width; ++i) {
@@ -296,7 +348,7 @@ GridField coarse_to_fine_field(const Plane& reference, const Plane& target, int 
                          {2, window, window / 2},
                          {1, window / 2, window / 4}};
   GridField field;
-  field.u = {2.0 * drift_of(reduced(a, 2), reduced(b, 2))};
+  field.u = {2.0 * drift_of(reduced(a, 2), reduced(b, 2)).shift};
   field.nx = field.ny = 1;
   for (const Pass& pass : passes) {
     const Plane from = reduced(a, pass.scale);

@@ -12,6 +12,7 @@ struct GridField {
   double spacing = 1;
   Vec2 first;  ///< the first point
   std::vector<Vec2> u;
+  double period = 0;  ///< px, of a pattern that repeats itself, as dots in a lattice; 0: it does not
   Vec2 place(std::size_t k) const {
     const auto n = static_cast<std::size_t>(nx);
     return first + spacing * Vec2{static_cast<double>(k % n), static_cast<double>(k / n)};
@@ -26,7 +27,8 @@ GridField grid_over(const Plane& plane, double spacing);
 /// Light compressed to −1 … 1, so that a few bright clumps do not decide a window.
 Plane compressed(const Plane& plane);
 
-/// Shift of the target as a whole by phase correlation at half the resolution; then windows of `window` px (a power of
+/// Shift of the target as a whole by phase correlation at half the resolution, of a pattern that repeats itself the
+/// least that fits; then windows of `window` px (a power of
 /// two) are cross-correlated at that resolution, and windows of half that size at full resolution around what the first
 /// found; points whose peak is ambiguous or differs from their neighbours' take their neighbours' median.
 GridField coarse_field(const Plane& reference, const Plane& target, int window, int threads);

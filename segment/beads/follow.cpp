@@ -151,7 +151,7 @@ Followed follow(const Scene& scene, const GridField& grid, const TrackParameters
   const int n_by_grid = n_good(tracks);
   const bool has_gaps = Gaps(scene, tracks).are_large();
   follow_neighbours(scene, parameters, surroundings, tracks);
-  return {std::move(tracks), n_by_grid, has_gaps};
+  return {.tracks = std::move(tracks), .n_by_grid = n_by_grid, .period_px = grid.period, .has_gaps = has_gaps};
 }
 
 std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks,

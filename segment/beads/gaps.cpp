@@ -5,7 +5,7 @@
 
 namespace mbtfm::beads {
 
-Gaps::Gaps(const Scene& scene, const std::vector<Track>& tracks) {
+Gaps::Gaps(const Scene& scene, const std::vector<Track>& tracks) : scene_(scene), tracks_(tracks) {
   constexpr double kUsual = 16;
   constexpr int kFewest = 4;
   const Plane& plane = scene.relaxed->image.plane;
@@ -34,5 +34,20 @@ bool Gaps::are_large() const {
 }
 
 bool Gaps::hold(Vec2 place_px) const { return is_gap_[square_of(place_px)]; }
+
+bool Gaps::allow(Vec2 place_px, Vec2 u_px, double sigma_px) const {
+  constexpr double kStrain = 0.3;  // gels are seldom strained by more between two places
+  constexpr int kMost = 200;
+  const double reach = 2 * std::hypot(side_x_, side_y_);  // the next squares but one
+  bool has_witness = false;
+  for (const int k : scene_.relaxed->neighbours.within(place_px, reach, kMost)) {
+    if (!tracks_[k].is_good()) continue;
+    has_witness = true;
+    const Registered& bead = tracks_[k].found;
+    const double granted = kStrain * norm(scene_.position(k) - place_px) + 4 * std::hypot(sigma_px, bead.sigma_px);
+    if (norm(bead.motion.u - u_px) < granted) return true;
+  }
+  return !has_witness;
+}
 
 }  // namespace mbtfm::beads

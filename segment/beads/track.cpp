@@ -21,6 +21,7 @@
 #include "segment/beads/given_field.h"
 #include "segment/beads/measure.h"
 #include "segment/beads/pool.h"
+#include "segment/beads/pull.h"
 #include "segment/beads/scene.h"
 #include "segment/beads/windows.h"
 
@@ -56,6 +57,7 @@ struct Measured {
   Pooling pooling;
   BeadSizes sizes = {};
   double window_px = 0;  ///< Gaussian sigma of the windows; 0: beads
+  double period_px = 0;  ///< of a pattern that repeats itself; 0: it does not
 };
 
 /// What moved the good beads together, px. @param motion_of  by bead. @param setting  as of drift_affine
@@ -119,7 +121,7 @@ GridField field_of(const Scene& scene, const std::vector<Track>& tracks) {
 Followed followed_from_grid(const Scene& scene, const TrackParameters& parameters, int window) {
   const Plane &from = scene.relaxed->image.plane, &to = scene.stressed.image.plane;
   Followed best = follow(scene, coarse_field(from, to, window, scene.threads), parameters);
-  if (!best.has_gaps) return best;
+  if (!best.has_gaps || best.period_px > 0) return best;  // of a pattern that repeats itself the least shift counts
   Followed far = follow(scene, coarse_to_fine_field(from, to, window, scene.threads), parameters);
   if (far.n_by_grid <= best.n_by_grid) return best;
   best = std::move(far);
@@ -234,18 +236,23 @@ Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images
   const auto sharp = std::make_shared<const Scene>(scene_of(
       relaxed, side_of(stressed, relaxed->bead_sigma, parameters.detection_snr, "stressed", threads), threads));
   const auto scene = alike_wide(sharp, image, stressed);
-  auto [tracks, n_by_grid, has_gaps] =
+  auto [tracks, n_by_grid, period_px, has_gaps] =
       followed_and_measured(*scene, turn, parameters, search_window(4 * scene->spacing(), parameters, pixel_size_um));
   recover(*scene, parameters.least_similarity, tracks);
   constexpr int kRounds = 2;  // what the first one mends makes the model better
   for (int round = 0; model.um && round < kRounds; ++round) {
     follow_beside(model, *scene, turn, parameters, pixel_size_um, tracks);
   }
-  if (turn) flag_turned_out(*scene, *turn, tracks);  // those found again
+  flag_unpulled(*scene, parameters.outlier_threshold, tracks);  // matches, too, which are made without a window
+  if (turn) flag_turned_out(*scene, *turn, tracks);             // those found again
   require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
   Pooling pooling = pooled(*scene, tracks);
   const BeadSizes sizes = sizes_of(*sharp, tracks);
-  return {.scene = scene, .tracks = std::move(tracks), .pooling = std::move(pooling), .sizes = sizes};
+  return {.scene = scene,
+          .tracks = std::move(tracks),
+          .pooling = std::move(pooling),
+          .sizes = sizes,
+          .period_px = period_px};
 }
 
 /// What a size of window gives.
@@ -266,9 +273,9 @@ Tried tried_windows(const Texture& relaxed, const Texture& stressed, double wind
   const auto scene = std::make_shared<const Scene>(windows.scene);
   parameters.least_similarity = least_similarity(relaxed, window_px);
   // a square of seven Gaussian sigmas is halved on the finer grid, and holds as much as the Gaussian then
-  auto [tracks, n_by_grid, has_gaps] =
+  auto [tracks, n_by_grid, period_px, has_gaps] =
       followed_and_measured(*scene, turn, parameters, search_window(7 * window_px, parameters, pixel_size_um), gaps);
-  Tried result{.measured = {scene, std::move(tracks), {}, {}, window_px}, .n_by_grid = n_by_grid};
+  Tried result{.measured = {scene, std::move(tracks), {}, {}, window_px, period_px}, .n_by_grid = n_by_grid};
   auto pooling = calibrated(windows, result.measured.tracks);
   if (!pooling) return result;
   std::vector<double> sigmas;
@@ -346,6 +353,7 @@ Tracking tracking_of(const Measured& measured, const MotionTaken& all, const Pla
   result.bead_sigma_um = pixel_size_um * scene.bead_sigma();
   result.n_beads_stressed = static_cast<int>(scene.stressed.beads.size());
   result.window_um = pixel_size_um * measured.window_px;
+  result.period_um = pixel_size_um * measured.period_px;
   result.sizes = measured.sizes;
   result.affine = all.affine;
   result.stressed = own;
@@ -576,7 +584,8 @@ void RelaxedBeads::fill(const Gaps& gaps, const images::Image& unturned, const P
   }
   tracking.window_um = pixel_size_um * windows->window_px;
   for (int k = 0; k < windows->scene->n_beads(); ++k) {
-    if (!windows->tracks[k].is_good()) continue;
+    const Pooled& found = windows->pooling.beads[k];
+    if (!windows->tracks[k].is_good() || !gaps.allow(windows->scene->position(k), found.u, found.sigma_px)) continue;
     tracking.field.push_back(entry_of(*windows, k, own, cell, pixel_size_um));
     ++tracking.n_windows;
     ++tracking.n_good;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "segment/cells/grid.h"
 
@@ -22,17 +25,49 @@ struct Bright {
   double height = 0, noise = 0;
 };
 
+/// Sums over the bright pixels of one spot.
+struct Spot {
+  double height = 0, square = 0, noise = 0;
+  double mean() const { return square / height; }
+};
+
+/// Specks of dye and hot pixels set no level for adhesions: a spot far brighter than most does not count. No spot has
+/// more than a twentieth of the vote on what most are, however large it is.
 Bright bright_of(const Contrast& c, double seed_noise) {
-  double sum = 0, sum_of_squares = 0, noise = 0;
+  cv::Mat labels;
+  const cv::Mat bright = c.height > 2 * seed_noise * c.noise;
+  std::vector<Spot> spots(static_cast<std::size_t>(cv::connectedComponents(bright, labels)));
   for (int y = 0; y < c.height.rows; ++y)
     for (int x = 0; x < c.height.cols; ++x) {
+      if (!bright.at<uchar>(y, x)) continue;
       const double height = c.height.at<float>(y, x);
-      if (height <= 2 * seed_noise * c.noise.at<float>(y, x)) continue;
-      sum += height;
-      sum_of_squares += height * height;
-      noise += height * c.noise.at<float>(y, x);
+      Spot& spot = spots[static_cast<std::size_t>(labels.at<int>(y, x))];
+      spot.height += height;
+      spot.square += height * height;
+      spot.noise += height * c.noise.at<float>(y, x);
     }
-  return sum > 0 ? Bright{sum_of_squares / sum, noise / sum} : Bright{};
+  std::erase_if(spots, [](const Spot& s) { return s.height <= 0; });  // the background among them
+  std::ranges::sort(spots, {}, &Spot::mean);
+  const auto sum_of = [](const std::vector<Spot>& all, const auto& member) {
+    double sum = 0;
+    for (const Spot& s : all) sum += std::invoke(member, s);
+    return sum;
+  };
+  constexpr double kMostVote = 0.05;
+  constexpr double kFar = 5;  // adhesions differ by a quarter to a half (log sd): three of them and more
+  const double most = kMostVote * sum_of(spots, &Spot::height);
+  const auto vote = [&](const Spot& s) { return std::min(s.height, most); };
+  const double half = sum_of(spots, vote) / 2;
+  double before = 0;
+  for (const Spot& s : spots) {
+    before += vote(s);
+    if (before < half) continue;
+    const double far = kFar * s.mean();
+    std::erase_if(spots, [&](const Spot& other) { return other.mean() > far; });
+    break;
+  }
+  const double height = sum_of(spots, &Spot::height);
+  return height > 0 ? Bright{sum_of(spots, &Spot::square) / height, sum_of(spots, &Spot::noise) / height} : Bright{};
 }
 
 Contrast smoothed_contrast(const cv::Mat& image, double pixel_um, double smoothing_um, const AdhesionParameters& p) {

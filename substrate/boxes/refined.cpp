@@ -55,8 +55,6 @@ std::vector<int> columns_by_place(const std::vector<substrate::Ellipse>& ellipse
 }
 
 constexpr int kOrder = 2;  // with discontinuous linear pressures: stable as nu -> 1/2
-constexpr substrate::Capabilities kRefinedCan{
-    .base = true, .sides = true, .grading = true, .inside = true, .normal_displacement = true};
 
 class Refined final : public substrate::Substrate {
  public:

@@ -40,8 +40,6 @@ greens::PointForceField averaged_field(const Gel& gel, const substrate::Ellipse&
   return sum;
 }
 
-constexpr substrate::Capabilities kSplitCan{.base = true, .sides = true, .normal_displacement = true};
-
 /// With 2 cells of the grid over the thickness (docs/accuracy.md); it falls as the cube of their size.
 constexpr double kErrorOfTwoCells = 1e-3;
 

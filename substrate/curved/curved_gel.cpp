@@ -24,14 +24,6 @@
 namespace mbtfm::curved {
 namespace {
 
-constexpr substrate::Capabilities kCurvedCan{.base = true,
-                                             .sides = true,
-                                             .inside = true,
-                                             .normal_displacement = true,
-                                             .space = true,
-                                             .surface = true,
-                                             .large_strain = true};
-
 /// How fine a mesh is.
 struct Fineness {
   double across;         ///< of targets_of

@@ -9,6 +9,13 @@
 
 namespace mbtfm::curved {
 
+inline constexpr substrate::Capabilities kCurvedCan{.base = true,
+                                                    .sides = true,
+                                                    .inside = true,
+                                                    .normal_displacement = true,
+                                                    .space = true,
+                                                    .surface = true,
+                                                    .large_strain = true};
 substrate::Model curved_gel();
 
 /// What makes the stress of a displacement.

@@ -296,6 +296,43 @@ TEST(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_to
   EXPECT_TRUE(fires("tracked-by-correlation", of_weak)) << of_weak;
 }
 
+/// Dots in a lattice instead of beads: any of its periods fits, so the least shift is the right one.
+TEST(TrackEndToEnd, dots_in_a_lattice_find_their_partners_and_a_choice_is_told) {
+  const test::TemporaryFolder folder;
+  constexpr int kWidth = 256, kPitch = 16;
+  const std::vector<test::Peak> peaks = test::ring_of_adhesions(kWidth, kPitch / 6.0);
+  const auto lattice = [&](Vec2 shift, bool is_pulled, std::uint64_t seed) {
+    images::Image image{.width = kWidth, .height = kWidth, .pixels = {}, .pixel_size_um = {}};
+    image.pixels.assign(kWidth * kWidth, 150);
+    for (int j = -1; j <= kWidth / kPitch; ++j) {
+      for (int i = -1; i <= kWidth / kPitch; ++i) {
+        const Vec2 at{(i + 0.5) * kPitch, (j + 0.5) * kPitch};
+        test::add_bead(image, at + shift + (is_pulled ? test::displacement(peaks, at) : Vec2{}), 1500, 2);
+      }
+    }
+    std::mt19937_64 random(seed);
+    for (float& value : image.pixels) value = static_cast<float>(std::poisson_distribution<int>(value)(random));
+    return image;
+  };
+  write(folder / "r.tif", lattice({}, false, 1), 0.1);
+  for (const std::uint64_t seed : {2, 3}) {
+    write(folder / "s.tif", lattice({0.3, -0.2}, true, seed), 0.1);
+    const std::string told = output_of(run_track(files(folder, "r.tif", "s.tif")));
+    EXPECT_FALSE(fires("pattern-repeats", told)) << told;
+    int n_good = 0;
+    for (const Bead& bead : files::read_displacement(folder / "out/displacement.csv")) {
+      if (!bead.flag.empty()) continue;
+      ++n_good;
+      const Vec2 truth = 0.1 * test::displacement(peaks, 10 * bead.position_um - Vec2{0.5, 0.5});
+      EXPECT_LT(norm(bead.displacement_um - truth), 0.05) << seed;  // a third of what moves; a period is 1.6
+    }
+    EXPECT_GT(n_good, 0.9 * 16 * 16) << seed;
+  }
+  write(folder / "s.tif", lattice({7, 0}, true, 4), 0.1);
+  const std::string told = output_of(run_track(files(folder, "r.tif", "s.tif")));
+  EXPECT_TRUE(fires("pattern-repeats", told)) << told;
+}
+
 TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_told_of) {
   const test::TemporaryFolder folder;
   std::string still = "x_um,y_um,ux_um,uy_um\n", twice = still;

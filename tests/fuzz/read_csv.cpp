@@ -42,7 +42,7 @@ void read(std::string_view bytes) {
   for (const std::string& name : tables) fuzz::answer([&] { files::read_cell(fuzz::folder() / ("damaged-" + name)); });
 }
 
-const bool is_added = add({"csv", 12000, samples, read});
+const bool is_added = add({"csv", 5000, samples, read});
 
 }  // namespace
 }  // namespace mbtfm::fuzz::csv_readers

@@ -25,7 +25,7 @@ void read(std::string_view bytes) {
   fuzz::answer([&] { beads::read_given_field(file, in_pixels); });
 }
 
-const bool is_added = add({"field", 60000, samples, read});
+const bool is_added = add({"field", 20000, samples, read});
 
 }  // namespace
 }  // namespace mbtfm::fuzz::field_readers

@@ -82,7 +82,7 @@ void read(std::string_view bytes) {
   fuzz::answer([&] { images::read_slices(file, {.may_lack_pixels = true}); });
 }
 
-const bool is_added = add({"image", 15000, samples, read});
+const bool is_added = add({"image", 5000, samples, read});
 
 }  // namespace
 }  // namespace mbtfm::fuzz::image_readers

@@ -31,7 +31,7 @@ void read(std::string_view bytes) {
   images::pixel_size_um({.description = description, .x_resolution_per_unit = 10, .y_resolution_per_unit = 1e-300});
 }
 
-const bool is_added = add({"ome", 100000, samples, read});
+const bool is_added = add({"ome", 40000, samples, read});
 
 }  // namespace
 }  // namespace mbtfm::fuzz::ome_readers

@@ -87,7 +87,7 @@ void read(std::string_view bytes) {
   fuzz::answer([&] { runner::write_run_record(fitted, options, untouched()); });
 }
 
-const bool is_added = add({"records", 4000, samples, read});
+const bool is_added = add({"records", 1500, samples, read});
 
 }  // namespace
 }  // namespace mbtfm::fuzz::records_readers

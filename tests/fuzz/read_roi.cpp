@@ -67,7 +67,7 @@ void read(std::string_view bytes) {
   });
 }
 
-const bool is_added = add({"roi", 40000, samples, read});
+const bool is_added = add({"roi", 20000, samples, read});
 
 }  // namespace
 }  // namespace mbtfm::fuzz::roi_readers

@@ -66,7 +66,7 @@ void read(std::string_view bytes) {
   fuzz::answer([&] { runner::read_image_names(fuzz::folder()); });
 }
 
-const bool is_added = add({"settings", 30000, samples, read});
+const bool is_added = add({"settings", 10000, samples, read});
 
 }  // namespace
 }  // namespace mbtfm::fuzz::settings_readers

@@ -68,7 +68,7 @@ void read(std::string_view bytes) {
   });
 }
 
-const bool is_added = add({"surface", 20000, samples, read});
+const bool is_added = add({"surface", 8000, samples, read});
 
 }  // namespace
 }  // namespace mbtfm::fuzz::surface_readers

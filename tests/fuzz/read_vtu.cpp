@@ -26,7 +26,7 @@ void read(std::string_view bytes) {
   fuzz::answer([&] { files::read_contracted_network(file); });
 }
 
-const bool is_added = add({"vtu", 60000, samples, read});
+const bool is_added = add({"vtu", 20000, samples, read});
 
 }  // namespace
 }  // namespace mbtfm::fuzz::vtu_readers

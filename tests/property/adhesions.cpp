@@ -47,6 +47,28 @@ void expect_moved(const Found& a, const Found& b, Move move) {
   EXPECT_GT(intersection_over_union(outline, b.outline_um), 0.99);
 }
 
+/// A speck of dye and hot pixels, far brighter than any adhesion, set no level for them.
+TEST(Adhesions, do_not_depend_on_what_few_pixels_have) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SCOPED_TRACE(seed);
+    const DrawnScene s = drawn_scene(20, seed);
+    Image spoilt = s.adhesion_image;
+    draw_ellipse(spoilt, ellipse(9, {23, 2}, 1.5, 1.5, 0), 30 * 500, 0.13, kPixel_um);
+    for (int k = 0; k < 10; ++k) spoilt.at(20 * k + 30, 250) = 65535;
+    const auto alone = cells::find_adhesions(s.adhesion_image, kPixel_um, {});
+    auto found = cells::find_adhesions(spoilt, kPixel_um, {});
+    std::erase_if(found, [](const Adhesion& a) {
+      return a.position_um.y > 24 || norm(a.position_um - Vec2{23, 2}) < 3;
+    });
+    ASSERT_EQ(found.size(), alone.size());
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      // the camera's noise has no part in it: what is left is the blur that all adhesions share
+      EXPECT_LT(norm(found[i].position_um - alone[i].position_um), 0.01);
+      EXPECT_NEAR(found[i].area_um2, alone[i].area_um2, 0.05 * alone[i].area_um2);
+    }
+  }
+}
+
 TEST(Adhesions, turn_and_mirror_with_the_image) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE(seed);
