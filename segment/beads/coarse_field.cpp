@@ -271,7 +271,7 @@ namespace {
 /// target(x + u(x)): the reference, as far as the field is right.
 Plane deformed_back(const Plane& target, const GridField& field, int scale, int threads) {
   Plane result = target;
-  const cv::Mat from(target.height, target.width, CV_32F, const_cast<float*>(target.values.data()));
+  const cv::Mat from = matrix_of(target);
   numerics::parallel_for(target.height, threads, [&](int j) {
     cv::Mat places(1, target.width, CV_32FC2);
     for (int i = 0; i < target.width; ++i) {

@@ -14,6 +14,7 @@ namespace mbtfm::beads {
 namespace {
 
 constexpr int kAround = 12;
+constexpr double kUnwitnessed = 2.0 / 3;  // of the beads: that many need no other witness than their number
 
 /// What the good tracks around say of each good one, kept while tracks are found and rejected.
 struct Surroundings {
@@ -135,9 +136,9 @@ void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Su
 }  // namespace
 
 void require_common_beads(int n_by_grid, int n_in_the_end, int n_beads) {
-  constexpr double kFewest = 0.2, kMost = 2.0 / 3;
+  constexpr double kFewest = 0.2;
   const int n_found = std::min(n_by_grid, n_in_the_end);
-  if (n_found >= kFewest * n_beads || n_in_the_end >= kMost * n_beads) return;
+  if (n_found >= kFewest * n_beads || n_in_the_end >= kUnwitnessed * n_beads) return;
   throw NotFollowed("the stressed image", "the beads of the relaxed image, displaced",
                     std::to_string(n_found) + " of " + std::to_string(n_beads) + " of them");
 }
@@ -149,9 +150,10 @@ Followed follow(const Scene& scene, const GridField& grid, const TrackParameters
   update(scene, tracks, surroundings);
   flag_outliers(surroundings.around, parameters.outlier_threshold, {}, tracks);
   const int n_by_grid = n_good(tracks);
-  const bool has_gaps = Gaps(scene, tracks).are_large();
+  // squares that hold sixteen of few good beads are too large to be gaps
+  const bool has_gaps = n_by_grid < kUnwitnessed * scene.n_beads() || Gaps(scene, tracks).are_large();
   follow_neighbours(scene, parameters, surroundings, tracks);
-  return {std::move(tracks), n_by_grid, has_gaps, grid.period};
+  return {.tracks = std::move(tracks), .n_by_grid = n_by_grid, .period_px = grid.period, .has_gaps = has_gaps};
 }
 
 std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks,

@@ -13,8 +13,8 @@ namespace mbtfm::beads {
 struct Followed {
   std::vector<Track> tracks;
   int n_by_grid = 0;      ///< found from the grid's prediction, and not contradicted by their neighbours
-  bool has_gaps = false;  ///< parts of the picture have none of those
   double period_px = 0;   ///< of a pattern that repeats itself; 0: it does not
+  bool has_gaps = false;  ///< parts of the picture have no beads that are found so
 };
 
 /// Find the beads with the wide window: from the grid's prediction, then, where that fails, from the motion of the

@@ -121,8 +121,7 @@ GridField field_of(const Scene& scene, const std::vector<Track>& tracks) {
 Followed followed_from_grid(const Scene& scene, const TrackParameters& parameters, int window) {
   const Plane &from = scene.relaxed->image.plane, &to = scene.stressed.image.plane;
   Followed best = follow(scene, coarse_field(from, to, window, scene.threads), parameters);
-  // of a pattern that repeats itself the least motion counts
-  if (!best.has_gaps || best.period_px > 0) return best;
+  if (!best.has_gaps || best.period_px > 0) return best;  // of a pattern that repeats itself the least shift counts
   Followed far = follow(scene, coarse_to_fine_field(from, to, window, scene.threads), parameters);
   if (far.n_by_grid <= best.n_by_grid) return best;
   best = std::move(far);
@@ -237,7 +236,7 @@ Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images
   const auto sharp = std::make_shared<const Scene>(scene_of(
       relaxed, side_of(stressed, relaxed->bead_sigma, parameters.detection_snr, "stressed", threads), threads));
   const auto scene = alike_wide(sharp, image, stressed);
-  auto [tracks, n_by_grid, has_gaps, period_px] =
+  auto [tracks, n_by_grid, period_px, has_gaps] =
       followed_and_measured(*scene, turn, parameters, search_window(4 * scene->spacing(), parameters, pixel_size_um));
   recover(*scene, parameters.least_similarity, tracks);
   constexpr int kRounds = 2;  // what the first one mends makes the model better
@@ -274,7 +273,7 @@ Tried tried_windows(const Texture& relaxed, const Texture& stressed, double wind
   const auto scene = std::make_shared<const Scene>(windows.scene);
   parameters.least_similarity = least_similarity(relaxed, window_px);
   // a square of seven Gaussian sigmas is halved on the finer grid, and holds as much as the Gaussian then
-  auto [tracks, n_by_grid, has_gaps, period_px] =
+  auto [tracks, n_by_grid, period_px, has_gaps] =
       followed_and_measured(*scene, turn, parameters, search_window(7 * window_px, parameters, pixel_size_um), gaps);
   Tried result{.measured = {scene, std::move(tracks), {}, {}, window_px, period_px}, .n_by_grid = n_by_grid};
   auto pooling = calibrated(windows, result.measured.tracks);

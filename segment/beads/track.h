@@ -121,14 +121,14 @@ struct Tracking {
   double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
   BeadSizes sizes{};
   int n_good = 0;
-  Effect affine{};            ///< whether turn, growth and shear were taken off, and why
-  Effect windows{};           ///< whether windows were followed in place of single beads, and why
-  double window_um = 0;       ///< Gaussian sigma of the windows; 0: single beads
-  double period_um = 0;       ///< of a pattern that repeats itself, as of dots in a lattice; 0: it does not
-  int n_windows = 0;          ///< among the field's entries, the last ones: in gaps between the beads
-  DisplacementField lattice;  ///< windows all over the picture, beside the field, if asked for
-  double share_of_gaps = 0;   ///< of the picture, where single beads cannot be followed
-  int n_beads_stressed = 0;   ///< found in the stressed image
+  Effect affine{};              ///< whether turn, growth and shear were taken off, and why
+  Effect windows{};             ///< whether windows were followed in place of single beads, and why
+  double window_um = 0;         ///< Gaussian sigma of the windows; 0: single beads
+  double period_um = 0;         ///< of a pattern that repeats itself, as of dots in a lattice; 0: it does not
+  int n_windows = 0;            ///< among the field's entries, the last ones: in gaps between the beads
+  double share_of_gaps = 0;     ///< of the picture, where single beads cannot be followed
+  int n_beads_stressed = 0;     ///< found in the stressed image
+  DisplacementField lattice{};  ///< windows all over the picture, beside the field, if asked for
 };
 
 /// The beads, or the texture, of one image are not met with again in the other.

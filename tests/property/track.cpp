@@ -128,6 +128,28 @@ TEST(TrackProperty, beads_that_move_by_a_seventh_of_the_picture_are_followed) {
   EXPECT_GE(tracking.n_good, 2.0 / 3 * static_cast<double>(tracking.field.size()));
 }
 
+TEST(TrackProperty, a_lattice_of_windows_lies_beside_the_beads_and_leaves_them_alone) {
+  const auto pair = test::draw_bead_pair({}, {.width = 192, .n_beads = 740, .drift = {1.3, -0.7}});
+  TrackParameters parameters;
+  const Tracking plain = track_beads(pair.relaxed, pair.stressed, 1.0, parameters, 2);
+  parameters.windows_spacing_um = 12;
+  const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, parameters, 2);
+  ASSERT_EQ(plain.field.size(), tracking.field.size());
+  for (std::size_t k = 0; k < plain.field.size(); ++k)
+    EXPECT_EQ(plain.field[k].displacement_um.x, tracking.field[k].displacement_um.x);
+  ASSERT_EQ(tracking.lattice.size(), 16 * 16);
+  double relative = 0;
+  int n = 0;
+  for (const Bead& window : tracking.lattice) {
+    if (!window.flag.empty()) continue;
+    relative += 0.5 * dot(window.displacement_um, window.displacement_um) / (window.sigma_um * window.sigma_um);
+    ++n;
+  }
+  EXPECT_GE(n, 0.8 * 16 * 16);
+  // windows three widths apart are independent: some thirty, whose scale is known to a sixth, as c is by itself
+  EXPECT_NEAR(std::sqrt(relative / n), 1, 4 * std::hypot(1.0 / 6, 1.0 / 6) / 2);
+}
+
 TEST(TrackProperty, any_number_of_threads_gives_the_same_numbers) {
   const auto pair = small_pair();
   const Tracking one = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 1);
