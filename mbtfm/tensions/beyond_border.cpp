@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kDepth_um = 60;  // of a spread cell
 constexpr double kPiece_um = 30;  // half of its breadth
+constexpr double kMost = 10;      // pieces of a side: a field that is wider has room for rest
 
 struct Piece {
   Vec2 low_um, high_um;
@@ -25,8 +26,8 @@ struct Piece {
 std::vector<Piece> pieces_around(const Extent& field) {
   const auto& [low, high] = field;
   const Vec2 size = high - low, deep{kDepth_um, kDepth_um};
-  const int n_across = std::max(1, static_cast<int>(std::lround(size.x / kPiece_um)));
-  const int n_down = std::max(1, static_cast<int>(std::lround(size.y / kPiece_um)));
+  const auto n_along = [](double um) { return static_cast<int>(std::clamp(std::round(um / kPiece_um), 1.0, kMost)); };
+  const int n_across = n_along(size.x), n_down = n_along(size.y);
   const Vec2 step{size.x / n_across, size.y / n_down};
   std::vector<Piece> pieces{{low - deep, low}};
   for (int i = 0; i < n_across; ++i)
@@ -43,11 +44,12 @@ std::vector<Piece> pieces_around(const Extent& field) {
   return pieces;
 }
 
-/// Discs on a piece, as large as half of its depth: what a cell out there does in the field is smooth.
+/// Discs on a piece, as large as it is wide: what a cell out there does in the field is smooth.
 std::vector<substrate::Ellipse> discs_on(const Piece& piece) {
   const Vec2 size = piece.high_um - piece.low_um;
-  const int nx = std::max(1, static_cast<int>(std::lround(size.x / kPiece_um)));
-  const int ny = std::max(1, static_cast<int>(std::lround(size.y / kPiece_um)));
+  const double width_um = std::clamp(std::min(size.x, size.y), kPiece_um / 2, kDepth_um);
+  const int nx = std::max(1, static_cast<int>(std::lround(size.x / width_um)));
+  const int ny = std::max(1, static_cast<int>(std::lround(size.y / width_um)));
   const Vec2 step{size.x / nx, size.y / ny};
   const double radius_um = std::sqrt(step.x * step.y / std::numbers::pi);
   std::vector<substrate::Ellipse> discs;
@@ -84,7 +86,9 @@ std::set<std::size_t> pieces_called_for(RandomScores scores, const std::vector<s
 }  // namespace
 
 std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell& cell, const Gel& gel) {
-  std::vector<Piece> pieces = pieces_around(extent_of(data.position_um));
+  const Extent field = extent_of(data.position_um);
+  if (!(field.area_um2() > 0)) return {};
+  std::vector<Piece> pieces = pieces_around(field);
   // what lies beyond a cut is allowed for
   std::erase_if(pieces, [&](const Piece& p) {
     return !cuts_of(cell).empty() && distance_to_cut_um(cell, 0.5 * (p.low_um + p.high_um)) < kDepth_um;
