@@ -24,7 +24,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Areas, positions and intensities of what is saturated are wrong. Record with less light or a shorter "
        "exposure."},
       {pixel_size_unchecked, "pixel-size-unchecked", "any stage", note, "1 if no image states its pixel size", 0,
-       "all lengths are proportional to it, and all forces to its square; a caution if cell, adhesions and fibres together "
+       "all lengths are proportional to it, and all forces to its square; a caution if cell, adhesions and fibres "
+       "together "
        "are two standard deviations larger or smaller than those of other cells",
        "Compare it with the microscope's own record, and with the binning of the camera: 10 % of it are 20 % of every "
        "force. Keep the TIFF files that the microscope writes: most state it."},
@@ -117,10 +118,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {beads_wide, "beads-wide", "track", note,
        "diameter of beads that look as wide as these if they are in focus (um)", 0.7,
        "beads for this purpose have 0.04 to 0.5 um; a spot of the lens is taken for 0.15 um wide (aperture 0.75), or "
-       "1.2 "
-       "pixels; simulated beads of 0.2 um have 0 in good images, 0.6 in poor ones and 0.9 if blurred by 2 pixels, "
-       "which "
-       "costs 2 to 4 % of the force",
+       "1.2 pixels; a blur of 2 pixels in both images costs 2 to 4 % of the force",
        "Compare it with the diameter of your beads. If they are smaller, focus both images on the plane of the beads."},
       {beads_not_round, "beads-not-round", "track", note, "length over width of the beads' images", 1.08,
        "beads of simulated images have 1.00 to 1.01, of images that are 10 % too low 1.14; of five real pairs 1.06 to "

@@ -39,15 +39,16 @@ bool asks_for_all_cells(const fs::path& folder) {
 fs::path make_cell_of_picture(const fs::path& folder, int n) {
   toml::table toml = files::parse_toml(folder / "cell.toml");
   const ImageNames names = read_image_names(folder);
+  for (const std::string& drawn : {names.outline_roi, names.fibre_rois})
+    if (!match_image(folder, drawn).files.empty())
+      throw UsageError((folder / drawn).string() + ": what is drawn by hand belongs to one cell: choose it " +
+                       "(segment.cell), not all of them (segment.cell = 0)");
   toml::table images;
   if (const auto cell_with = toml["images"]["cell_with"].value<std::string>()) images.insert("cell_with", *cell_with);
   for (const std::string& key : image_keys()) {
     const std::string& name = name_of_image(names, key);
     const bool is_there = !match_image(folder, name).files.empty();
     if (!is_there && !toml["images"][key]) continue;
-    if (is_there && (key == "outline_roi" || key == "fibre_rois"))
-      throw UsageError((folder / name).string() + ": what is drawn by hand belongs to one cell: choose it " +
-                       "(segment.cell), not all of them (segment.cell = 0)");
     images.insert(key, one_up(name));
   }
   toml.insert_or_assign("images", std::move(images));

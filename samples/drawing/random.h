@@ -9,7 +9,18 @@
 namespace mbtfm::drawing {
 
 /// What a stream of random numbers is for. Each has its own, so that more noise or more beads leave the cell as it is.
-enum class Stream : std::uint64_t { outline, tensions, fibres, adhesions, beads, noise, specimen, optics, camera, faults };
+enum class Stream : std::uint64_t {
+  outline,
+  tensions,
+  fibres,
+  adhesions,
+  beads,
+  noise,
+  specimen,
+  optics,
+  camera,
+  faults
+};
 
 class Random {
  public:
