@@ -84,10 +84,8 @@ DataOfBeads with_unseen_neighbours(DataOfBeads given, Cell& cell, const GelUnder
   const std::vector<Polygon> pieces = neighbours_beyond_border(given.data, cell, on.parameters.gel);
   if (pieces.empty()) return given;
   cell.neighbours_um.insert(cell.neighbours_um.end(), pieces.begin(), pieces.end());
-  ReducedData without = std::move(given.data.reduced);
   given = data_of(on, beads, std::move(given.data.response));
   given.beyond->borders = borders_of(pieces, given.data.position_um);
-  given.beyond->without = std::move(without);
   return given;
 }
 

@@ -284,14 +284,11 @@ DataWithBeyond with_forces_beyond(LinearData data, const Cell& cell, const Gel& 
       if (data.weight_per_um[2 * static_cast<Index>(b)] > 0) used.push_back(data.position_um[b]);
     for (const substrate::Ellipse& place : places_beneath_neighbours(cell, used, spacing)) places.push_back(place);
   }
-  ReducedData without = data.reduced;
   const MatrixXd compliance = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
                                   ->compliance_um_per_nN(data.position_um, places);
-  DataWithBeyond made = with_own_forces(
+  return with_own_forces(
       with_forces_beyond(std::move(data), places, n_beyond, compliance, std::abs(signed_area_um2(cell.outline_um))),
       cell);
-  made.beyond.without = std::move(without);
-  return made;
 }
 
 bool has_forces_beyond(const Cell& cell) { return !cuts_of(cell).empty() || !cell.neighbours_um.empty(); }

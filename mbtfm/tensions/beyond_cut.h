@@ -50,7 +50,6 @@ struct ForcesBeyond {
   Index n_own = 0;
   double own_nN = 0;
   std::vector<std::string> borders = {};  ///< of the beads' field, beyond which these call for forces: "upper left"
-  ReducedData without = {};               ///< the data without such forces
 };
 
 struct DataWithBeyond {

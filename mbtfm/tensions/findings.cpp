@@ -11,7 +11,6 @@
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"
-#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::tensions {
 
@@ -270,17 +269,6 @@ Noticed cell_cut(const FitOutcome& o) {
       o.beyond ? Severity::note : Severity::caution);
 }
 
-/// Change of the total force if forces of others were not allowed for, to first order.
-double change_without_others_nN(const FitOutcome& o) {
-  const ReducedData& data = o.beyond->without;
-  const MatrixXd& by_tension = o.fit.meshes.front().force_derivatives;
-  const MatrixXd moved = displace(data, by_tension);
-  const VectorXd left = data.target - displace(data, o.fit.forces.nN);
-  const MatrixXd change_nN = numerics::shortest_solution(numerics::small_transposed_product(moved, moved),
-                                                         numerics::transposed_matvec(moved, left));
-  return directions_of(o.fit.forces.nN).dot(numerics::matvec(by_tension, change_nN.col(0)));
-}
-
 /// "Another cell pulls 12 um from this one, at (80, 31) um"; empty: none is in the image.
 std::string nearest_neighbour(const Cell& cell) {
   double nearest_um = 1e300;
@@ -301,10 +289,7 @@ Noticed neighbour_pulls(const FitOutcome& o) {
   std::string text = nearest_neighbour(o.cell);
   if (n_beyond > 0) text += "Something pulls beyond the border, at the " + mbtfm::listed(o.beyond->borders) + ". ";
   if (text.empty()) return {};
-  const double change_nN = o.beyond ? change_without_others_nN(o) : 0;
-  text += o.beyond ? "Allowed for: without it the total force would be " + brief(std::abs(change_nN)) + " nN " +
-                         (change_nN < 0 ? "less." : "more.")
-                   : "Not allowed for (effects.beyond_cut = off).";
+  text += o.beyond ? "Its forces were allowed for." : "Its forces were not allowed for (effects.beyond_cut = off).";
   return noticed(FindingKind::neighbour_pulls, static_cast<double>(o.cell.neighbours_um.size() + n_beyond), text,
                  o.beyond ? Severity::note : Severity::caution);
 }
