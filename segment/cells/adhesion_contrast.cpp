@@ -27,7 +27,7 @@ struct Bright {
 
 /// Sums over the bright pixels of one spot.
 struct Spot {
-  double height = 0, square = 0, noise = 0;
+  double area_px = 0, height = 0, square = 0, noise = 0;
   double mean() const { return square / height; }
 };
 
@@ -42,6 +42,7 @@ Bright bright_of(const Contrast& c, double seed_noise) {
       if (!bright.at<uchar>(y, x)) continue;
       const double height = c.height.at<float>(y, x);
       Spot& spot = spots[static_cast<std::size_t>(labels.at<int>(y, x))];
+      ++spot.area_px;
       spot.height += height;
       spot.square += height * height;
       spot.noise += height * c.noise.at<float>(y, x);
@@ -55,8 +56,8 @@ Bright bright_of(const Contrast& c, double seed_noise) {
   };
   constexpr double kMostVote = 0.05;
   constexpr double kFar = 5;  // adhesions differ by a quarter to a half (log sd): three of them and more
-  const double most = kMostVote * sum_of(spots, &Spot::height);
-  const auto vote = [&](const Spot& s) { return std::min(s.height, most); };
+  const double most = kMostVote * sum_of(spots, &Spot::area_px);
+  const auto vote = [&](const Spot& s) { return std::min(s.area_px, most); };
   const double half = sum_of(spots, vote) / 2;
   double before = 0;
   for (const Spot& s : spots) {
