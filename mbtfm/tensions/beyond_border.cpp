@@ -106,7 +106,13 @@ std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell
   const auto half_space = greens::make_greens(gel, {.model = substrate::ModelKind::half_space}, data.threads);
   RandomScores scores =
       random_scores(data, by_root_of_area(half_space->compliance_um_per_nN(data.position_um, discs), discs));
-  scores.scores /= std::sqrt(variance_beside(data, spectrum_of(scores)));
+  const double variance = variance_beside(data, spectrum_of(scores));
+  // Simulated beads without noise: what is left is rounding, and has a shape.
+  constexpr double kRounding = 1e-6;  // of the displacement: tables have nine digits, models five and more
+  const double mean_square = squared_weights(data).dot(data.displacement_um.cwiseAbs2()) /
+                             std::max<double>(1, static_cast<double>(data.n_used));
+  if (variance < kRounding * kRounding * mean_square) return {};
+  scores.scores /= std::sqrt(variance);
   std::set<std::size_t> with_next;
   for (const std::size_t k : pieces_called_for(std::move(scores), columns))
     for (const std::size_t near : {k, (k + 1) % pieces.size(), (k + pieces.size() - 1) % pieces.size()})
