@@ -19,7 +19,7 @@ constexpr int kOwnHeadersMedian = 14, kOwnHeadersP90 = 40, kOwnHeadersMost = 93;
 constexpr int kSeeFindings = 30;  // sources of product and tests that a new kind of finding compiles again
 constexpr int kKindsOfFindings = 84;
 constexpr int kParameterRows = 483;  // of docs/parameters.md
-constexpr int kWordsOfDocs = 146400;
+constexpr int kWordsOfDocs = 146550;
 
 const std::vector<std::string> kProduct = {"pipeline", "segment",   "network", "substrate",
                                            "mbtfm",    "continuum", "samples"};
