@@ -15,6 +15,8 @@ namespace mbtfm::runner {
 
 namespace {
 
+constexpr const char* kMade = "# Made by mbtfm run of ../cell.toml, which counts: changes here are lost.\n";
+
 fs::path folder_of(const fs::path& folder, int n) {
   return files::inside(folder, "cell_" + std::to_string(n), folder.string());
 }
@@ -54,11 +56,15 @@ fs::path make_cell_of_picture(const fs::path& folder, int n) {
   toml.insert_or_assign("images", std::move(images));
   toml["segment"].as_table()->insert_or_assign("cell", std::int64_t{n});
   std::ostringstream text;
-  text << "# Made by mbtfm run of ../cell.toml, which counts: changes here are lost.\n"
-       << toml::toml_formatter(toml) << "\n";
+  text << kMade << toml::toml_formatter(toml) << "\n";
   const fs::path cell = folder_of(folder, n), file = cell / "cell.toml";
   fs::create_directories(cell);
-  if (!files::is_file(file) || files::read_text(file) != text.str()) files::write_whole(file, text.str());
+  const std::string before = files::is_file(file) ? files::read_text(file) : kMade;
+  if (!before.starts_with(kMade))
+    throw UsageError(file.string() +
+                     " is not a file that mbtfm made, and segment.cell = 0 would overwrite it: move the "
+                     "folder elsewhere, or choose one cell (segment.cell)");
+  if (before != text.str()) files::write_whole(file, text.str());
   return cell;
 }
 

@@ -121,5 +121,16 @@ TEST(AllCells, have_a_folder_each_and_the_force_that_one_alone_has) {
   EXPECT_FALSE(files::is_file(cell + "/cell_3/cell.toml"));
 }
 
+TEST(AllCells, leave_a_cell_of_the_users_own_as_it_is) {
+  const test::TemporaryFolder folder;
+  const std::string own = "pixel_size_um = 0.2\n";
+  files::write_text(folder / "cell.toml", "pixel_size_um = 0.1\n[segment]\ncell = 0\n");
+  fs::create_directories(folder / "cell_1");
+  files::write_text(folder / "cell_1/cell.toml", own);
+  const std::string said = output_of("mbtfm run " + (folder / "").string(), 2);
+  EXPECT_NE(said.find("would overwrite it"), std::string::npos) << said;
+  EXPECT_EQ(files::read_text(folder / "cell_1/cell.toml"), own);
+}
+
 }  // namespace
 }  // namespace mbtfm
