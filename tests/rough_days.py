@@ -46,7 +46,7 @@ def day(number, folder, bin):
     opened = sorted({f["id"] for f in findings if f["severity"] != "note"})
     found, sigma = fit["total_force_nN"], fit["total_force_sigma_nN"]
     z = (found - truth) / sigma
-    state = "right" if abs(z) <= 3 else "wrong, named" if opened else "wrong, green tick"
+    state = "right" if abs(z) <= 3 else "wrong, with a caution" if opened else "wrong, green tick"
     line = f"{found:.0f} +- {sigma:.1f} nN, truth {truth:.0f} ({100 * (found / truth - 1):+.1f} %, z {z:+.1f})"
     return {"state": state, "line": f"{line}; {', '.join(opened) or 'no caution'}", "cell": cell, "open": bool(opened)}
 
@@ -63,7 +63,7 @@ def main():
         result = day(number, asked.folder, asked.bin)
         days.append(result)
         print(f"{number}: {result['state']}: {result['line']} [{'; '.join(faults_of(result['cell']))}]", flush=True)
-    for state in ("right", "wrong, named", "wrong, green tick", "refused"):
+    for state in ("right", "wrong, with a caution", "wrong, green tick", "refused"):
         print(f"{state}: {sum(d['state'] == state for d in days)} of {len(days)}")
     print(f"right and without a caution: {sum(d['state'] == 'right' and not d['open'] for d in days)} of {len(days)}")
 
