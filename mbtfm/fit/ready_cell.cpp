@@ -77,7 +77,7 @@ std::optional<std::vector<Tension>> tensions_before(const Inputs& inputs, const 
   return time_coupling.is_on ? inputs.before : std::nullopt;
 }
 
-/// With the pieces beyond the border where the beads call for forces as other cells.
+/// The pieces beyond the border where forces act count as other cells.
 DataOfBeads with_unseen_neighbours(DataOfBeads given, Cell& cell, const GelUnderCell& on,
                                    const DisplacementField& beads) {
   if (on.parameters.effects.beyond_cut == Switch::off) return given;

@@ -63,7 +63,7 @@ std::vector<substrate::Ellipse> discs_on(const Piece& piece) {
 }
 
 /// The pieces whose forces make the data likelier than chance does, by columns of Z.
-std::set<std::size_t> pieces_called_for(RandomScores scores, const std::vector<std::vector<Index>>& columns) {
+std::set<std::size_t> likely_pieces(RandomScores scores, const std::vector<std::vector<Index>>& columns) {
   // a likelihood ratio exceeds x by chance less often than exp(-x/2) (Self & Liang, JASA 82 (1987) 605)
   const double limit = 2 * std::log(static_cast<double>(columns.size()) / 1e-4);
   std::set<std::size_t> found;
@@ -114,7 +114,7 @@ std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell
   if (variance < kRounding * kRounding * mean_square) return {};
   scores.scores /= std::sqrt(variance);
   std::set<std::size_t> with_next;
-  for (const std::size_t k : pieces_called_for(std::move(scores), columns))
+  for (const std::size_t k : likely_pieces(std::move(scores), columns))
     for (const std::size_t near : {k, (k + 1) % pieces.size(), (k + pieces.size() - 1) % pieces.size()})
       with_next.insert(near);
   std::vector<Polygon> found;

@@ -11,7 +11,7 @@
 namespace mbtfm::tensions {
 
 /// Pieces of the surface along the border of the beads' field, of half the breadth of a spread cell and its depth,
-/// whose forces the beads call for whatever the forces of this cell are: each by the likelihood of random forces there,
+/// beyond which forces act, whatever the forces of this cell are: each by the likelihood of random forces there,
 /// the likeliest first, the others beside it. With the pieces next to them, as no cell ends where a piece does. None
 /// is named by chance in 10 000 cells.
 /// @param data  with the motions that are allowed for so far

@@ -310,7 +310,7 @@ Effect beyond_cut_effect(Switch setting, const Cell& cell, const std::optional<F
     why += (why.empty() ? "" : " and ") +
            ("the image shows " + std::to_string(n_neighbours) + " other cell" + (n_neighbours > 1 ? "s" : ""));
   if (!borders.empty())
-    why += (why.empty() ? "" : " and ") + ("the beads call for forces beyond the border: " + listed(borders));
+    why += (why.empty() ? "" : " and ") + ("the displacements show forces beyond the border: " + listed(borders));
   if (found)
     why += "; forces at " + std::to_string(found->n_places) + " places beyond and " +
            std::to_string(found->n_beneath_neighbours) + " beneath other cells, of " +
@@ -318,7 +318,9 @@ Effect beyond_cut_effect(Switch setting, const Cell& cell, const std::optional<F
            std::to_string(found->n_own) + " adhesions near the cut";
   return stage::decided(
       EffectKind::beyond_cut, setting, has_forces_beyond(cell) || !borders.empty(),
-      why.empty() ? "the image shows the whole cell, and no other, and the beads call for none" : why);
+      why.empty()
+          ? "the image shows the whole cell, and no other, and the displacements show no forces beyond its border"
+          : why);
 }
 
 }  // namespace mbtfm::tensions

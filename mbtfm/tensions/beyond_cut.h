@@ -49,7 +49,7 @@ struct ForcesBeyond {
   /// component of the adhesions' forces in this cell, of which these may have all next to the cut.
   Index n_own = 0;
   double own_nN = 0;
-  std::vector<std::string> borders = {};  ///< of the beads' field, beyond which these call for forces: "upper left"
+  std::vector<std::string> borders = {};  ///< of the beads' field, beyond which forces act: "upper left"
 };
 
 struct DataWithBeyond {

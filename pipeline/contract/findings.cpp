@@ -25,15 +25,13 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "exposure."},
       {pixel_size_unchecked, "pixel-size-unchecked", "any stage", note, "1 if no image states its pixel size", 0,
        "all lengths are proportional to it, and all forces to its square; a caution if cell, adhesions and fibres "
-       "together "
-       "are two standard deviations larger or smaller than those of other cells",
+       "together are two standard deviations larger or smaller than those of other cells",
        "Compare it with the microscope's own record, and with the binning of the camera: 10 % of it are 20 % of every "
        "force. Keep the TIFF files that the microscope writes: most state it."},
       {scan_phase, "scan-phase", "any stage", note, "shift of every second row against the others (pixels)", 0.1,
        "the error of a force grows with its square: 6 % at 1 pixel, less than 0.1 % at 0.1",
        "Nothing: it was taken off. Correct the phase of the scanner before the next recording, or scan in one "
-       "direction "
-       "only."},
+       "direction only."},
       {adhesions_left_out, "adhesions-left-out", "segment", note, "adhesions that were found outside of the cell", 0,
        "only what lies in the outline can hold the network", "Check the outline in 1_segment/overlay.png."},
       {adhesions_long, "adhesions-long", "segment", caution, "length over width of the adhesions, mean weighed by area",
@@ -226,7 +224,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Record the whole cell if you can. A note if forces beyond the cut are allowed for; a caution if "
        "effects.beyond_cut = off: distrust then the fibres and adhesions near the cut, and the force through it."},
       {neighbour_pulls, "neighbour-pulls", "fit", note,
-       "other cells in the image, and sides of its border beyond which the beads call for forces", 0,
+       "other cells in the image, and sides of its border beyond which forces act", 0,
        "a cell at twice its own distance moves beads by a tenth of what it moves beneath itself; a side is named if "
        "chance would name one in 10 000 cells",
        "Nothing if their forces were allowed for; beads beside them are left out. If effects.beyond_cut = off, forces "

@@ -131,8 +131,7 @@ void declare_microscope(stage::ParameterList& list, MicroscopeParameters& p) {
            "standard deviation of the camera's own noise (counts)");
   list.add("scan_phase_px", p.scan_phase_px, Range::between(-20, 20),
            "shift of the first, third, fifth row and so on to the right of the others, as of a scanner whose way back "
-           "is out "
-           "of time (pixels)");
+           "is out of time (pixels)");
 }
 
 /// Beside the folder of the program, in an installation as in a build.

@@ -1,7 +1,6 @@
 #include "samples/experiment/cell_folder.h"
 
 #include <algorithm>
-
 #include <string>
 
 #include "pipeline/files/csv.h"
