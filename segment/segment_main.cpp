@@ -182,6 +182,11 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
         noticed(FindingKind::outline_off_actin, s.outline_off_actin.value_or(0),
                 "In " + brief(100 * s.outline_off_actin.value_or(0)) +
                     " % of the outline that was given, the actin image shows no cell."),
+        noticed(FindingKind::cells_touch, s.neck ? s.neck->width_um : 0,
+                s.neck ? "The outline is only " + brief(s.neck->width_um) + " um wide at (" + brief(s.neck->at_um.x) +
+                             ", " + brief(s.neck->at_um.y) +
+                             ") um: what lies beyond is taken for another cell, which touches this one."
+                       : std::string()),
         noticed(FindingKind::adhesions_left_out, s.n_adhesions_outside,
                 s.n_adhesions_outside == 1
                     ? "One adhesion outside the cell was left out."
@@ -311,8 +316,7 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
   for (const auto& image : {adhesion, actin}) {
     if (!image) continue;
     context.doubt(images::doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
-    context.notice(images::noticed_loss(*image));
-    context.notice(images::noticed_saturation(*image));
+    for (const std::optional<Finding>& found : images::noticed_in(*image)) context.notice(found);
   }
   const bool is_one = adhesion && actin && adhesion->image.pixels == actin->image.pixels;
   if (is_one && adhesion->name != actin->name) {  // one file for both is by intent: no image of the actin is there

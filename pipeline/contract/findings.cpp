@@ -65,6 +65,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "nine of eleven above this threshold",
        "Look at 1_segment/overlay.png: is it the outline of this cell, at its place and the same way up? If the cell "
        "is too dim there for the program, the outline may still be right."},
+      {cells_touch, "cells-touch", "segment", caution,
+       "width of the neck at which the cell was cut off another one that touches it (um)", 0,
+       "the outline is cut where it is narrower than segment.outline_neck of the narrower part's width",
+       "Look at 1_segment/overlay.png: is the cell cut where it ends? If both parts are one cell, set "
+       "outline_neck = 0 in [segment]. If the cut is at a wrong place, draw outline.roi. What cells pull at each other "
+       "is not in the forces."},
       {actin_shift, "actin-shift", "segment", note, "1 if the actin image is shifted against the adhesion image", 0,
        "twice the gain in log likelihood is above 16.25 near no shift, which chance makes in one cell of 370, and "
        "above 27 elsewhere",

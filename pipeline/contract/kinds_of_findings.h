@@ -21,6 +21,7 @@ enum class FindingKind : int {
   bleed_through,
   adhesions_off_actin,
   outline_off_actin,
+  cells_touch,
   adhesions_assumed,
   pattern_too_fine,
   pattern_as_cell,

@@ -8,6 +8,7 @@
 #include "segment/cells/ellipse.h"
 #include "segment/cells/grid.h"
 #include "segment/cells/haze.h"
+#include "segment/cells/necks.h"
 
 namespace mbtfm::cells {
 
@@ -291,6 +292,39 @@ bool is_inside(const Polygon& hole, const Polygon& outer) {
   return std::all_of(hole.begin(), hole.end(), [&](Vec2 p) { return contains(outer, p); });
 }
 
+/// The cell that a part of the mask shows.
+CellOutline outline_of(const Scene& s, const cv::Mat& part, const cv::Mat& holes,
+                       const std::vector<Adhesion>& adhesions, const cv::Mat& soft) {
+  CellOutline cell;
+  for (const auto& ring : rings_of(part & ~holes)) {
+    const Polygon polygon = polygon_of(s, ring, adhesions, soft);
+    if (cell.outer_um.empty()) {
+      CutRing cut = cut_by_border(polygon, s.field_um(), s.border_um());
+      cell.outer_um = std::move(cut.points_um);
+      cell.is_cut = std::move(cut.is_cut);
+      cell.area_um2 = std::abs(signed_area_um2(cell.outer_um));
+    } else if (is_inside(polygon, cell.outer_um) && std::abs(signed_area_um2(polygon)) > 0) {
+      cell.holes_um.push_back(polygon);
+      cell.area_um2 -= std::abs(signed_area_um2(polygon));
+    }
+  }
+  return cell;
+}
+
+/// Of the necks at which a mask was cut the narrowest at this part of it.
+std::optional<OutlineNeck> narrowest_neck(const std::vector<Neck>& necks, const cv::Mat& part, double pixel_um) {
+  const cv::Rect frame({0, 0}, part.size());
+  std::optional<OutlineNeck> narrowest;
+  for (const Neck& neck : necks) {
+    constexpr int kBeside_px = 2;  // its own pixel was taken out, or is the other part's
+    const cv::Rect near(neck.at - cv::Point(kBeside_px, kBeside_px), cv::Size(2 * kBeside_px + 1, 2 * kBeside_px + 1));
+    const double width_um = neck.width_px * pixel_um;
+    if (cv::countNonZero(part(near & frame)) == 0 || (narrowest && narrowest->width_um <= width_um)) continue;
+    narrowest = {to_um(neck.at, pixel_um), width_um};
+  }
+  return narrowest;
+}
+
 }  // namespace
 
 void declare(stage::ParameterList& list, OutlineParameters& p) {
@@ -301,6 +335,9 @@ void declare(stage::ParameterList& list, OutlineParameters& p) {
   list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2(), "greatest area of a cell (um²)");
   list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2(),
            "least area of a gap in a cell (um²)");
+  list.add("outline_neck", p.outline_neck, Range::between(0.0, 1.0),
+           "cells that touch are cut apart where the outline is narrower than this share of the width of the narrower "
+           "part; 0: never");
 }
 
 CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
@@ -314,23 +351,21 @@ CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>&
   found.beyond_um = add_adhesions(mask, adhesions, s.pixel_um, p.outline_reach_um);
   const Parts parts = parts_of(filled(mask), smallest);
   for (const Parts::Part& each : parts.parts) {
-    CellOutline cell;
     const cv::Mat part = parts.mask(each);
-    cell.is_sheet = each.n_pixels > s.px_of(p.outline_largest_um2);
-    const auto rings = rings_of(cell.is_sheet ? part : part & ~holes);
-    for (const auto& ring : rings) {
-      const Polygon polygon = polygon_of(s, ring, adhesions, soft);
-      if (cell.outer_um.empty()) {
-        CutRing cut = cut_by_border(polygon, s.field_um(), s.border_um());
-        cell.outer_um = std::move(cut.points_um);
-        cell.is_cut = std::move(cut.is_cut);
-        cell.area_um2 = std::abs(signed_area_um2(cell.outer_um));
-      } else if (is_inside(polygon, cell.outer_um) && std::abs(signed_area_um2(polygon)) > 0) {
-        cell.holes_um.push_back(polygon);
-        cell.area_um2 -= std::abs(signed_area_um2(polygon));
-      }
+    if (each.n_pixels > s.px_of(p.outline_largest_um2)) {
+      found.cells.push_back(outline_of(s, part, cv::Mat::zeros(part.size(), CV_8U), adhesions, soft));
+      found.cells.back().is_sheet = true;
+      continue;
     }
-    found.cells.push_back(std::move(cell));
+    const CutMask cut = cut_at_necks(part, p.outline_neck, smallest);
+    cv::Mat unseen;  // the cell's edge is not to be seen where another one touches it
+    cv::dilate(cut.cuts, unseen, disc_of(s.band_px / 2));
+    const Parts apart = parts_of(cut.mask, smallest);
+    for (const Parts::Part& one : apart.parts) {
+      const cv::Mat cell = apart.mask(one);
+      found.cells.push_back(outline_of(s, cell, holes, adhesions, soft | unseen));
+      found.cells.back().neck = narrowest_neck(cut.necks, cell, s.pixel_um);
+    }
   }
   std::ranges::stable_sort(found.cells, std::greater(), &CellOutline::area_um2);
   return found;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 #include "pipeline/contract/cell.h"
@@ -18,17 +19,25 @@ struct OutlineParameters {
   double outline_smallest_um2 = 50;       ///< less is debris, not a spread cell
   double outline_largest_um2 = 30000;     ///< ten spread cells: more is a sheet of cells that touch
   double outline_smallest_hole_um2 = 10;  ///< less is a gap in the actin mesh, over which the membrane spans
+  double outline_neck = 0.6;              ///< pairs that touch have 0.15 to 0.7, real cells that are alone from 0.85 on
 };
 
 void declare(stage::ParameterList& list, OutlineParameters& parameters);
+
+/// Where the outline of a cell was cut off that of another one, which touches it.
+struct OutlineNeck {
+  Vec2 at_um;
+  double width_um = 0;
+};
 
 /// A cell in the image: its outer ring and the gaps in it.
 struct CellOutline {
   Polygon outer_um;
   std::vector<Polygon> holes_um;
-  double area_um2 = 0;         ///< without the holes
-  bool is_sheet = false;       ///< larger than any single cell; its holes are left out
-  std::vector<bool> is_cut{};  ///< by piece of the outer ring: the image ends there before the cell does
+  double area_um2 = 0;                ///< without the holes
+  bool is_sheet = false;              ///< larger than any single cell; its holes are left out
+  std::vector<bool> is_cut{};         ///< by piece of the outer ring: the image ends there before the cell does
+  std::optional<OutlineNeck> neck{};  ///< the narrowest of those where it was cut off another cell
   bool is_cut_by_border() const { return std::ranges::find(is_cut, true) != is_cut.end(); }
 };
 
@@ -49,7 +58,8 @@ struct CellsInImage {
   std::vector<double> beyond_um;
 };
 
-/// The cells of an image. Cells that touch each other count as one.
+/// The cells of an image. Cells that touch are cut apart at the neck between them (necks.h); if there is none, they
+/// count as one.
 ///
 /// A first mask by Otsu's threshold of the smoothed image's logarithm above the darkest region; then each point near
 /// the edge is put to the side, inside or outside, whose mean brightness nearby it resembles more (localised Chan–Vese,

@@ -112,7 +112,7 @@ std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const images::Ch
   if (p.cell == 0) return cells;
   if (p.cell > static_cast<int>(cells.size()))
     throw InputError(channel.name, "cell " + std::to_string(p.cell), std::to_string(cells.size()) + " in all",
-                     "cells that touch count as one");
+                     "cells that touch count as one if there is no neck between them");
   return {std::move(cells[p.cell - 1])};
 }
 
@@ -367,6 +367,7 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
                  .pixel_size_um = in.field.pixel_um,
                  .n_cells = all.n_cells,
                  .area_um2 = outline.area_um2,
+                 .neck = outline.neck,
                  .is_cut_by_border = outline.is_cut_by_border(),
                  .source = in.source};
   if (!s.is_cut_by_border) s.cell.is_cut.clear();
@@ -419,12 +420,17 @@ std::vector<Segmentation> segment_cells(const std::optional<images::Channel>& ad
                                         const std::optional<images::Channel>& actin, const SegmentParameters& p,
                                         const HandDrawn& drawn) {
   const Inputs in = inputs_of(adhesion, actin, p, drawn);
-  const std::vector<Adhesion> found = seen_adhesions(in);
+  const std::vector<Adhesion> seen = seen_adhesions(in), found = drawn.adhesions ? each_once(seen) : seen;
   const Outlines outlines = outlines_in(in, found);
   const bool is_given = drawn.outline || drawn.outline_mask;
   if (actin && is_given && !drawn.fibres) require_content(*actin);  // else the outline has asked for it
   std::vector<Segmentation> result;
   for (const CellOutline& outline : outlines.chosen) result.push_back(segment_one(in, outline, found, outlines));
+  if (found.size() < seen.size()) {
+    for (Segmentation& s : result)
+      s.unused.push_back(name_of_adhesions(in) + " has " + std::to_string(seen.size() - found.size()) +
+                         " of its adhesions twice. Each counts once.");
+  }
   return result;
 }
 

@@ -147,6 +147,67 @@ TEST(Outline, a_dim_middle_is_no_hole) {
   EXPECT_TRUE(cells[0].holes_um.empty());
 }
 
+/// Two discs of 24 and 20 um, 4 um apart, and a bridge of `neck_um` between them.
+struct TouchingDiscs {
+  Adhesion large = ellipse(1, {16, 20}, 24, 24, 0), small = ellipse(2, {42, 20}, 20, 20, 0);
+  Vec2 neck_um{30, 20};
+  images::Image image = even_image(600, 400, 100);
+};
+TouchingDiscs touching_discs(double neck_um) {
+  TouchingDiscs d;
+  for (const Adhesion& part : {d.large, d.small, ellipse(3, d.neck_um, 24, neck_um, 0)}) {
+    images::Image alone = even_image(600, 400, 100);
+    draw_ellipse(alone, part, 200, 0.15, kPixel_um);
+    for (std::size_t k = 0; k < alone.pixels.size(); ++k)
+      d.image.pixels[k] = std::max(d.image.pixels[k], alone.pixels[k]);
+  }
+  add_noise(d.image, 10, 7);
+  return d;
+}
+
+TEST(Outline, cells_that_touch_are_cut_apart_at_the_neck_between_them) {
+  for (const double neck_um : {3.0, 6.0}) {  // of 20 um, the width of the smaller one
+    SCOPED_TRACE(neck_um);
+    const TouchingDiscs d = touching_discs(neck_um);
+    const auto cells = find_cells(d.image, {}, kPixel_um, {}).cells;
+    ASSERT_EQ(cells.size(), 2u);
+    // each has half of the bridge
+    EXPECT_GT(intersection_over_union(cells[0].outer_um, ellipse_corners(d.large, 200)), 0.95);
+    EXPECT_GT(intersection_over_union(cells[1].outer_um, ellipse_corners(d.small, 200)), 0.95);
+    for (const CellOutline& cell : cells) {
+      ASSERT_TRUE(cell.neck);
+      EXPECT_NEAR(cell.neck->width_um, neck_um, 0.8);    // a pixel of the masks' grid on each side
+      EXPECT_LT(norm(cell.neck->at_um - d.neck_um), 2);  // half of the bridge: it is as wide everywhere
+    }
+  }
+}
+
+TEST(Outline, a_wide_waist_and_a_long_cell_are_one_cell) {
+  EXPECT_EQ(find_cells(touching_discs(15).image, {}, kPixel_um, {}).cells.size(), 1u);
+  OutlineParameters never;
+  never.outline_neck = 0;
+  EXPECT_EQ(find_cells(touching_discs(3).image, {}, kPixel_um, never).cells.size(), 1u);
+  images::Image image = even_image(600, 400, 100);
+  draw_ellipse(image, ellipse(1, {30, 20}, 52, 6, 0.1), 200, 0.15, kPixel_um);
+  add_noise(image, 10, 8);
+  const auto cells = find_cells(image, {}, kPixel_um, {}).cells;
+  ASSERT_EQ(cells.size(), 1u);
+  EXPECT_FALSE(cells[0].neck);
+}
+
+TEST(Outline, what_hangs_on_a_cell_by_a_thread_and_is_small_is_a_part_of_it) {
+  images::Image image = even_image(600, 400, 100);
+  draw_ellipse(image, ellipse(1, {20, 20}, 24, 24, 0), 200, 0.15, kPixel_um);
+  draw_ellipse(image, ellipse(2, {40, 20}, 7, 7, 0), 200, 0.15, kPixel_um);  // a twelfth of its area
+  draw_line(image, {{30, 20}, {38, 20}}, 200, 1.5, kPixel_um);
+  add_noise(image, 10, 9);
+  OutlineParameters small;
+  small.outline_smallest_um2 = 20;
+  const auto cells = find_cells(image, {}, kPixel_um, small).cells;
+  ASSERT_EQ(cells.size(), 1u);
+  EXPECT_TRUE(contains(cells[0].outer_um, {40, 20}));
+}
+
 TEST(Outline, several_cells_come_by_area_and_the_border_cuts_one) {
   images::Image image = even_image(600, 400, 100);
   const Adhesion small = ellipse(1, {12, 12}, 14, 10, 0.2), large = ellipse(2, {40, 22}, 24, 20, 1),
