@@ -58,8 +58,7 @@ StageReport run(const NoiseParameters& given, stage::StageContext& context) {
     const std::filesystem::path file = context.input(name);
     images::Channel channel{file.string(), images::read_image(file, plane)};
     context.notice(images::take_scan_phase_off(channel));
-    context.notice(images::noticed_loss(channel));
-    context.notice(images::noticed_saturation(channel));
+    for (const std::optional<Finding>& found : images::noticed_in(channel)) context.notice(found);
     return channel;
   };
   const images::Channel first = picture("first", parameters.relaxed_plane);

@@ -294,8 +294,7 @@ TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, 
   const double pixel_size_um = images::common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
   for (const images::Channel* image : {&relaxed, &stressed}) {
     context.doubt(images::doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
-    context.notice(images::noticed_loss(*image));
-    context.notice(images::noticed_saturation(*image));
+    for (const std::optional<Finding>& found : images::noticed_in(*image)) context.notice(found);
   }
   if (stressed.image.pixels == relaxed.image.pixels)
     throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both");

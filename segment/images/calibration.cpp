@@ -44,15 +44,25 @@ std::optional<double> ome_size_um(const std::string& size, const std::string& un
   return number && in_um ? std::optional(*number * *in_um) : std::nullopt;
 }
 
-std::optional<PixelSize> ome_pixel_size(const std::string& xml) {
+/// Nothing if the text is damaged.
+std::optional<OmeImage> ome_in(const std::string& xml) {
   try {
-    const OmeImage ome = parse_ome(xml);
-    const auto x_um = ome_size_um(ome.size_x, ome.unit_x);
-    if (!x_um) return std::nullopt;
-    return PixelSize{*x_um, ome_size_um(ome.size_y, ome.unit_y).value_or(*x_um)};
+    return parse_ome(xml);
   } catch (const InvalidData&) {
-    return std::nullopt;  // damaged text tells no size: it must be given
+    return std::nullopt;
   }
+}
+
+bool is_of_another_size(const OmeImage& ome, const TiffCalibration& c) {
+  return c.width > 0 && ome.width > 0 && ome.height > 0 && (ome.width != c.width || ome.height != c.height);
+}
+
+std::optional<PixelSize> ome_pixel_size(const TiffCalibration& calibration) {
+  const std::optional<OmeImage> ome = ome_in(calibration.description);
+  if (!ome || is_of_another_size(*ome, calibration)) return std::nullopt;
+  const auto x_um = ome_size_um(ome->size_x, ome->unit_x);
+  if (!x_um) return std::nullopt;
+  return PixelSize{*x_um, ome_size_um(ome->size_y, ome->unit_y).value_or(*x_um)};
 }
 
 /// Programs that know of no microscope write what a screen or a printer has: 72, 96 or 300 pixels by inch.
@@ -84,12 +94,8 @@ std::optional<PixelSize> volocity_pixel_size(std::string_view description) {
 }
 
 std::optional<double> ome_z_step_um(const std::string& xml) {
-  try {
-    const OmeImage ome = parse_ome(xml);
-    return ome_size_um(ome.size_z, ome.unit_z);
-  } catch (const InvalidData&) {
-    return std::nullopt;
-  }
+  const std::optional<OmeImage> ome = ome_in(xml);
+  return ome ? ome_size_um(ome->size_z, ome->unit_z) : std::nullopt;
 }
 
 std::optional<double> imagej_z_step_um(std::string_view description) {
@@ -121,7 +127,7 @@ std::optional<std::string_view> line_value(std::string_view text, std::string_vi
 std::optional<double> pixel_size_um(const TiffCalibration& calibration) {
   const std::string& text = calibration.description;
   std::optional<PixelSize> size;
-  if (is_ome(text)) size = ome_pixel_size(text);
+  if (is_ome(text)) size = ome_pixel_size(calibration);
   if (!size && text.starts_with("ImageJ=")) size = imagej_pixel_size(calibration);
   if (!size) size = volocity_pixel_size(text);
   if (!size && !text.starts_with("ImageJ=") && !is_ome(text))
@@ -129,6 +135,15 @@ std::optional<double> pixel_size_um(const TiffCalibration& calibration) {
   // half a per cent: what two roundings to three digits may differ by
   if (!size || !(std::abs(size->x_um - size->y_um) <= 5e-3 * size->x_um)) return std::nullopt;
   return without_ratio_noise(size->x_um);
+}
+
+std::string stated_of_another_size(const TiffCalibration& calibration) {
+  if (!is_ome(calibration.description)) return "";
+  const std::optional<OmeImage> ome = ome_in(calibration.description);
+  if (!ome || !is_of_another_size(*ome, calibration)) return "";
+  return "one of " + std::to_string(ome->width) + " x " + std::to_string(ome->height) +
+         " pixels, and the picture has " + std::to_string(calibration.width) + " x " +
+         std::to_string(calibration.height);
 }
 
 std::optional<double> z_step_um(const TiffCalibration& calibration) {

@@ -78,8 +78,10 @@ double common_pixel_size_um(const Channel& first, const Channel& second, std::op
   }
   if (a) return *a;
   if (b) return *b;
-  throw InputError(first.name, "a calibration in the file", "none",
-                   "set pixel_size_um, in cell.toml or as --pixel_size_um");
+  const std::string& refused = first.image.no_calibration;
+  throw InputError(first.name, "a calibration in the file", refused.empty() ? "none" : refused,
+                   (refused.empty() ? "" : "it was binned or cropped since: ") +
+                       std::string("set pixel_size_um, in cell.toml or as --pixel_size_um"));
 }
 
 std::optional<Finding> noticed_loss(const Channel& channel) {
@@ -99,6 +101,12 @@ std::optional<Finding> noticed_saturation(const Channel& channel) {
   const double share = share_at_brightest(channel.image);
   return noticed(FindingKind::saturated, share,
                  channel.name + " is saturated: " + brief(100 * share) + " % of its pixels have its largest value.");
+}
+
+std::vector<std::optional<Finding>> noticed_in(const Channel& channel) {
+  return {noticed_loss(channel), noticed_saturation(channel),
+          noticed(FindingKind::assumed_input, channel.image.taken.empty() ? 0 : 1,
+                  channel.name + ": " + channel.image.taken + ".")};
 }
 
 std::optional<Finding> noticed_unchecked(const std::vector<const Channel*>& channels, double pixel_size_um) {

@@ -44,6 +44,9 @@ double share_at_brightest(const Image& image);
 /// A finding where the detector was saturated.
 std::optional<Finding> noticed_saturation(const Channel& channel);
 
+/// Both, and a note of which plane was taken without being chosen.
+std::vector<std::optional<Finding>> noticed_in(const Channel& channel);
+
 /// A note where none of these images states its pixel size: nothing contradicts the one that was given.
 std::optional<Finding> noticed_unchecked(const std::vector<const Channel*>& channels, double pixel_size_um);
 

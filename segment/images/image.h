@@ -19,11 +19,15 @@ struct Image {
   double full_scale = 0;                 ///< the value at which the detector saturates; 0: none (float)
   bool is_lossy = false;                 ///< as a JPEG is: intensities, and with them positions, are not the camera's
   std::optional<double> z_step_um = {};  ///< to the next slice of its stack, from the file's own calibration
+  std::string no_calibration = {};  ///< why the calibration that the file states does not count; empty: it has none
+  std::string taken = {};           ///< which plane, if the file has several and none was chosen
   float at(int column, int row) const { return pixels[static_cast<std::size_t>(row) * width + column]; }
   float& at(int column, int row) { return pixels[static_cast<std::size_t>(row) * width + column]; }
 };
 
 inline const std::string kProjection = "max";
+
+enum class PixelsAre { intensities, labels };
 
 /// Which plane of a file is meant.
 struct PlaneChoice {
@@ -33,6 +37,7 @@ struct PlaneChoice {
   std::optional<int> time = {};  ///< frame from 1; unset: the only one
   std::optional<int> page = {};  ///< from 1, as it lies in the file, whatever it shows; unset: by the other three
   bool may_lack_pixels = false;  ///< NaN is a pixel without a value, and not an error
+  PixelsAre pixels = PixelsAre::intensities;
 };
 /// PREFIX_channel, PREFIX_z, PREFIX_time and PREFIX_page. @param image  "the adhesion image"
 void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image);

@@ -64,12 +64,17 @@ struct TiffCalibration {
   std::optional<double> x_resolution_per_unit;  ///< XResolution
   std::optional<double> y_resolution_per_unit;  ///< YResolution
   std::optional<double> unit_um;                ///< ResolutionUnit: of an inch or a centimetre
+  int width = 0, height = 0;                    ///< of the page; 0: not compared
 };
 
 /// The pixel size: OME-XML's PhysicalSizeX, ImageJ's unit with XResolution, Volocity's XCalibrationMicrons, or the
 /// file's own resolution by inch or centimetre (SlideBook) if a microscope has such pixels: 72 an inch are a screen's.
-/// Nothing if none of them is there or pixels are not square.
+/// Nothing if none of them is there, pixels are not square, or stated_of_another_size().
 std::optional<double> pixel_size_um(const TiffCalibration& calibration);
+
+/// "one of 360 x 360 pixels, and the picture has 180 x 180" if the OME-XML describes a picture of another size: this
+/// one was binned or cropped since, and its pixel size may be another one. Empty if not.
+std::string stated_of_another_size(const TiffCalibration& calibration);
 
 /// The distance of slices: OME-XML's PhysicalSizeZ, ImageJ's spacing in its unit, Volocity's ZCalibrationMicrons.
 std::optional<double> z_step_um(const TiffCalibration& calibration);

@@ -47,6 +47,8 @@ struct OmeReader {
 
   void begin_pixels(const Attributes& a) {
     is_in_pixels = true;
+    image.width = number(a, "SizeX", 0, 1);
+    image.height = number(a, "SizeY", 0, 1);
     image.n_channels = number(a, "SizeC", 1, 1);
     image.n_slices = number(a, "SizeZ", 1, 1);
     image.n_frames = number(a, "SizeT", 1, 1);

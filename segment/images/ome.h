@@ -20,6 +20,7 @@ struct OmePages {
 struct OmeImage {
   std::string uuid;             ///< of this file
   std::string order = "XYCZT";  ///< which dimension runs fastest
+  int width = 0, height = 0;    ///< pixels; 0: not given
   int n_channels = 1, n_slices = 1, n_frames = 1;
   std::vector<std::string> channel_names;                      ///< empty where one has none
   std::vector<OmePages> pages;                                 ///< none: all pages in order

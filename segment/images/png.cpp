@@ -2,6 +2,7 @@
 
 #include <png.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 
@@ -39,14 +40,29 @@ struct PngReading {
   ~PngReading() { png_destroy_read_struct(&png, &info, nullptr); }
 };
 
-bool read_png_header(PngReading& r, std::FILE* stream) {
+bool is_grey(const png_color& colour) { return colour.red == colour.green && colour.green == colour.blue; }
+
+/// Colours that grow brighter from one to the next, as a lookup table of ImageJ's, or are a label each: the index is
+/// the value. Of other colours, as those a picture was reduced to, and of greys, the colours are.
+bool is_index_the_value(const png_color* palette, int n, PixelsAre pixels) {
+  if (std::all_of(palette, palette + n, is_grey)) return false;
+  if (pixels == PixelsAre::labels) return true;
+  const auto brightness = [](const png_color& c) { return int{c.red} + c.green + c.blue; };
+  return std::is_sorted(palette, palette + n,
+                        [&](const png_color& a, const png_color& b) { return brightness(a) < brightness(b); });
+}
+
+bool read_png_header(PngReading& r, std::FILE* stream, PixelsAre pixels) {
   if (setjmp(png_jmpbuf(r.png))) return false;
   png_init_io(r.png, stream);
   png_read_info(r.png, r.info);
   r.width = png_get_image_width(r.png, r.info);
   r.height = png_get_image_height(r.png, r.info);
   r.bits = png_get_bit_depth(r.png, r.info);
-  if (png_get_color_type(r.png, r.info) == PNG_COLOR_TYPE_PALETTE) {
+  png_colorp palette = nullptr;
+  int n_colours = 0;
+  if (png_get_color_type(r.png, r.info) == PNG_COLOR_TYPE_PALETTE &&
+      (png_get_PLTE(r.png, r.info, &palette, &n_colours) == 0 || !is_index_the_value(palette, n_colours, pixels))) {
     png_set_palette_to_rgb(r.png);
     r.bits = 8;
   }
@@ -94,7 +110,7 @@ Image read_png(const std::filesystem::path& file, const PlaneChoice& choice) {
     throw InputError(file.string(), "a whole PNG image", r.message.text[0] ? r.message.text : "damaged data",
                      "the file may be truncated or damaged: copy or export it again");
   };
-  if (!read_png_header(r, stream.get())) fail();
+  if (!read_png_header(r, stream.get(), choice.pixels)) fail();
   require_plausible_size(file, r.width, r.height);
   const std::size_t row_bytes = static_cast<std::size_t>(r.width) * r.channels * (r.bits == 16 ? 2 : 1);
   require_plausible_bytes(file, row_bytes * r.height);

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdlib>
+#include <map>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "segment/images/image_file.h"
 #include "segment/images/ome.h"
@@ -42,7 +45,34 @@ void require_plausible_dimensions(const Stack& s) {
                         std::to_string(s.n_frames) + " frames");
 }
 
-Stack stack_of_ome(const OmeImage& ome, const std::string& file_name) {
+bool is_of_this_file(const OmePages& p, const OmeImage& ome, const std::string& file_name) {
+  return (p.uuid.empty() && p.file_name.empty()) || (!p.uuid.empty() && p.uuid == ome.uuid) || p.file_name == file_name;
+}
+
+/// The TiffData of the planes in this file; nothing: its pages are the planes in the order stored.
+std::vector<OmePages> pages_here(const OmeImage& ome, int n_planes, const FileOfPages& file) {
+  std::vector<OmePages> here;
+  std::map<std::string, std::vector<OmePages>> by_file;
+  for (const OmePages& p : ome.pages) {
+    if (is_of_this_file(p, ome, file.name)) here.push_back(p);
+    by_file[p.file_name.empty() ? p.uuid : p.file_name].push_back(p);
+  }
+  if (!here.empty() || ome.pages.empty()) return here;
+  if (by_file.size() == 1) return by_file.begin()->second;
+  if (file.n_pages >= n_planes) return {};
+  const auto has_as_many = [&](const auto& of_file) {
+    int n = 0;
+    for (const OmePages& p : of_file.second) n += p.n_planes.value_or(n_planes);
+    return n == file.n_pages;
+  };
+  if (std::ranges::count_if(by_file, has_as_many) == 1) return std::ranges::find_if(by_file, has_as_many)->second;
+  std::string names;
+  for (const auto& [name, pages] : by_file)
+    if (names.size() < 100) names += (names.empty() ? "" : ", ") + name;
+  throw InvalidData("OME-XML", "planes of this file", "those of " + names + ", with other names");
+}
+
+Stack stack_of_ome(const OmeImage& ome, const FileOfPages& file) {
   Stack s{.n_channels = ome.n_channels,
           .n_slices = ome.n_slices,
           .n_frames = ome.n_frames,
@@ -56,17 +86,18 @@ Stack stack_of_ome(const OmeImage& ome, const std::string& file_name) {
     throw InvalidData("OME-XML", "DimensionOrder of X, Y and C, Z, T", "'" + ome.order + "'");
   const std::vector<int> planes = stored_order(s, ome.order);
   s.pages.assign(planes.size(), std::nullopt);
-  if (ome.pages.empty()) {
-    for (std::size_t i = 0; i < planes.size(); ++i) s.pages[planes[i]] = static_cast<int>(i);
+  const auto put = [&](int plane, int page) {
+    if (page < file.n_pages) s.pages[plane] = page;
+  };
+  const std::vector<OmePages> here = pages_here(ome, static_cast<int>(planes.size()), file);
+  if (here.empty()) {
+    for (std::size_t i = 0; i < planes.size(); ++i) put(planes[i], static_cast<int>(i));
     return s;
   }
   std::vector<std::size_t> place_of(planes.size());  // of a plane in the order stored
   for (std::size_t i = 0; i < planes.size(); ++i) place_of[planes[i]] = i;
   std::size_t n_assigned = 0;
-  for (const OmePages& p : ome.pages) {
-    const bool is_here =
-        (p.uuid.empty() && p.file_name.empty()) || (!p.uuid.empty() && p.uuid == ome.uuid) || p.file_name == file_name;
-    if (!is_here) continue;
+  for (const OmePages& p : here) {
     if (p.first_channel >= s.n_channels || p.first_slice >= s.n_slices || p.first_frame >= s.n_frames)
       throw InvalidData("OME-XML", "TiffData of a plane that is there", "one beyond the dimensions");
     const int first = (p.first_frame * s.n_slices + p.first_slice) * s.n_channels + p.first_channel;
@@ -76,10 +107,14 @@ Stack stack_of_ome(const OmeImage& ome, const std::string& file_name) {
       // a plane may be told of twice; a damaged file tells of all of them over and over
       if (++n_assigned > 2 * planes.size())
         throw InvalidData("OME-XML", "TiffData that tell of each plane once", "the same planes over and over");
-      s.pages[planes[at++]] = page++;
+      put(planes[at++], page++);
     }
   }
   return s;
+}
+
+bool positive(const std::optional<std::string_view>& number) {
+  return number && !number->empty() && std::atof(std::string(*number).c_str()) > 0;
 }
 
 /// Channels run fastest, then slices (ij.io.FileSaver). Without dimensions a stack's images are slices, as ImageJ takes
@@ -100,7 +135,9 @@ std::optional<Stack> stack_of_imagej(const std::string& description) {
   const int n_images = count("images");
   require_plausible_dimensions(s);
   int n = s.n_channels * s.n_slices * s.n_frames;
-  if (n == 1) n = s.n_slices = n_images;
+  const bool has_times = positive(line_value(description, "finterval")) && !line_value(description, "spacing");
+  if (n == 1) n = (has_times ? s.n_frames : s.n_slices) = n_images;
+  if (n > 1 && has_times && s.n_frames == 1) std::swap(s.n_frames, s.n_slices);
   require_plausible_dimensions(s);
   if (n != n_images) {
     throw InvalidData("ImageJ's description", "images to be channels x slices x frames = " + std::to_string(n),
@@ -129,21 +166,30 @@ std::string lower(std::string text) {
   return text;
 }
 
+/// How many frames are in the file, from the first on: less than it states where the recording was aborted.
+int n_recorded(const Stack& s) {
+  const int n_of_frame = s.n_slices * s.n_channels;
+  const auto last = std::find_if(s.pages.rbegin(), s.pages.rend(), [](const auto& page) { return page.has_value(); });
+  return std::max(1, (static_cast<int>(s.pages.rend() - last) + n_of_frame - 1) / n_of_frame);
+}
+
 int chosen_frame(const Stack& s, const PlaneChoice& choice, const std::string& file) {
-  const std::string hint = "set " + choice.prefix + "_time to a number from 1 to " + std::to_string(s.n_frames);
-  const std::string found = std::to_string(s.n_frames) + " frame" + (s.n_frames == 1 ? "" : "s");
-  if (!choice.time && s.n_frames > 1) throw InputError(file, "the frame to be chosen", found, hint);
+  const int n = n_recorded(s);
+  const std::string hint = "set " + choice.prefix + "_time to a number from 1 to " + std::to_string(n);
+  const std::string found =
+      counted(n, "frames") + (n < s.n_frames ? " of the " + std::to_string(s.n_frames) + " that it states" : "");
+  if (!choice.time && n > 1) throw InputError(file, "the frame to be chosen", found, hint);
   const int frame = choice.time.value_or(1);
-  if (frame > s.n_frames) throw InputError(file, "frame " + std::to_string(frame), found, hint);
+  if (frame > n) throw InputError(file, "frame " + std::to_string(frame), found, hint);
   return frame - 1;
 }
 
 }  // namespace
 
-std::optional<Stack> stack_of(const std::string& description, const std::string& file_name) {
+std::optional<Stack> stack_of(const std::string& description, const FileOfPages& file) {
   if (is_ome(description)) {
     const OmeImage ome = parse_ome(description);
-    if (ome.companion.empty()) return stack_of_ome(ome, file_name);
+    if (ome.companion.empty()) return stack_of_ome(ome, file);
     throw InvalidData("OME-XML", "the dimensions in the file itself", "a reference to " + ome.companion);
   }
   if (description.starts_with("ImageJ=")) return stack_of_imagej(description);
@@ -191,8 +237,10 @@ std::vector<int> chosen_pages(const Stack& s, const PlaneChoice& choice, const s
   for (int slice = low; slice < high; ++slice) {
     const auto page = s.pages[(frame * s.n_slices + slice) * s.n_channels + channel];
     if (!page) {
-      throw InputError(file, "all planes of an OME-TIFF in one file", "this one in another file of the set",
-                       "give the file that holds it, or export the image as one file");
+      throw InputError(file, "all planes of an OME-TIFF in one file", "this one in another file of the set, or nowhere",
+                       "give the file that holds it, or export the image as one file; if the recording was aborted, "
+                       "choose a plane that is there (" +
+                           choice.prefix + "_z, " + choice.prefix + "_time)");
     }
     pages.push_back(*page);
   }

@@ -14,15 +14,24 @@ namespace mbtfm::images {
 struct Stack {
   int n_channels = 1, n_slices = 1, n_frames = 1;
   std::vector<std::string> channel_names;  ///< one a channel; empty where it has none
-  std::vector<std::optional<int>> pages;   ///< by plane; none: it is in another file
+  std::vector<std::optional<int>> pages;   ///< by plane; none: it is in another file, or was never recorded
+};
+
+/// A file as it lies on the disk.
+struct FileOfPages {
+  std::string name;  ///< without its folder, to tell it from the others of an OME set
+  int n_pages = 1;
 };
 
 inline const std::vector<std::string> kRgbNames = {"red", "green", "blue"};
 
 /// What the description says: OME-XML or ImageJ's list. None where it says nothing of dimensions.
-/// @param file_name  without its folder, to tell it from the others of an OME set
+///
+/// Files are renamed, and their OME-XML keeps the old names: a file whose pages are as many as the planes, or as those
+/// of one of the files named and of no other, is meant. Series are aborted: planes beyond the file's last page are not
+/// there. A stack of ImageJ's with an interval between its images and no distance of slices is one of frames.
 /// @throws InvalidData where it contradicts itself
-std::optional<Stack> stack_of(const std::string& description, const std::string& file_name);
+std::optional<Stack> stack_of(const std::string& description, const FileOfPages& file);
 
 /// The number of images that ImageJ says it wrote; 1 where it does not say. It writes more than 4 GB as one page with
 /// the planes one after the other.

@@ -2,9 +2,11 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <numeric>
 #include <string>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "segment/images/image_file.h"
 #include "segment/images/stack.h"
@@ -32,13 +34,15 @@ class TiffReader {
  public:
   explicit TiffReader(const std::filesystem::path& file) : file_(file), tiff_(open_tiff(file, "r", messages_)) {
     if (!tiff_ || !messages_.first_error.empty()) fail("a whole TIFF image");
+    go_to(first_full_page());
     of_first_page_ = calibration();
     calibration_ = pixel_size_um(of_first_page_);
   }
 
   Image read(const PlaneChoice& choice) {
     if (choice.page) return read_page(*choice.page - 1, choice);
-    const Stack stack = dimensions(choice).value_or(Stack{.channel_names = {""}, .pages = {0}});
+    const std::optional<Stack> stated = dimensions(choice);
+    const Stack stack = stated.value_or(Stack{.channel_names = {""}, .pages = {first_full_page()}});
     // channels are pages, or else the samples of each pixel
     PlaneChoice of_stack = choice, of_page = choice;
     (stack.n_channels > 1 ? of_page : of_stack).channel.clear();
@@ -47,6 +51,12 @@ class TiffReader {
     Image image = read_page(pages.front(), of_page);
     require_plausible_bytes(file_, pages.size() * image.pixels.size() * std::max(1, layout_.bits / 8));
     for (std::size_t i = 1; i < pages.size(); ++i) project(image, read_page(pages[i], of_page));
+    if (pages.size() > 1)
+      image.taken =
+          "the maximum of its " + std::to_string(pages.size()) + " slices was taken (" + choice.prefix + "_z = max)";
+    else if (!stated && n_pages() > 1)
+      image.taken = "it does not state what its " + std::to_string(n_pages()) + " pages are, and page " +
+                    std::to_string(pages.front() + 1) + " was taken (" + choice.prefix + "_page)";
     return image;
   }
 
@@ -59,6 +69,7 @@ class TiffReader {
     all.z = kProjection;
     std::vector<int> pages(static_cast<std::size_t>(n_pages()));
     std::iota(pages.begin(), pages.end(), 0);
+    std::erase_if(pages, [&](int page) { return page > 0 && !is_full_page(page); });
     if (const auto stack = dimensions(all)) pages = chosen_pages(*stack, all, file_.string());
     const std::optional<double> z_step = z_step_um(of_first_page_);
     std::vector<Image> slices;
@@ -77,7 +88,7 @@ class TiffReader {
   /// What the description says of channels, slices and frames; nothing of a file of one image.
   std::optional<Stack> dimensions(const PlaneChoice& choice) {
     try {
-      return stack_of(of_first_page_.description, file_.filename().string());
+      return stack_of(of_first_page_.description, {file_.filename().string(), n_pages()});
     } catch (const InvalidData& error) {
       if (n_pages() == 1 && n_imagej_images(of_first_page_.description) == 1) return std::nullopt;
       throw InputError(file_.string() + ": " + error.element, error.expected, error.found,
@@ -92,10 +103,25 @@ class TiffReader {
     return *n_pages_;
   }
 
+  /// Neither a thumbnail of another page nor a mask of it.
+  bool is_full_page(int page) {
+    if (!go_to(page)) return true;  // whoever reads it says what is wrong
+    return (tag<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0) & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == 0;
+  }
+
+  /// The first of a file without dimensions; the very first if all are thumbnails.
+  int first_full_page() {
+    if (is_full_page(0)) return 0;
+    for (int page = 1; page < n_pages(); ++page)
+      if (is_full_page(page)) return page;
+    return 0;
+  }
+
   /// From one to the next without those before.
   bool go_to(int page) {
-    if (page > 0 && static_cast<int>(TIFFCurrentDirectory(tiff_.get())) == page - 1)
-      return TIFFReadDirectory(tiff_.get()) == 1;
+    const int current = static_cast<int>(TIFFCurrentDirectory(tiff_.get()));
+    if (page == current) return true;
+    if (page > 0 && current == page - 1) return TIFFReadDirectory(tiff_.get()) == 1;
     return TIFFSetDirectory(tiff_.get(), static_cast<tdir_t>(page)) == 1;
   }
 
@@ -166,6 +192,7 @@ class TiffReader {
     image.width = static_cast<int>(layout_.width);
     image.height = static_cast<int>(layout_.height);
     image.pixel_size_um = calibration_;
+    image.no_calibration = stated_of_another_size(of_first_page_);
     image.full_scale = full_scale();
     image.is_lossy = compression == COMPRESSION_JPEG || compression == COMPRESSION_OJPEG;
     image.pixels.assign(static_cast<std::size_t>(layout_.width) * layout_.height, 0.0f);
@@ -176,9 +203,24 @@ class TiffReader {
     for (float& value : image.pixels) {
       if (layout_.colours > 1) value /= static_cast<float>(layout_.colours);
       if (layout_.is_inverted) value = static_cast<float>(image.full_scale) - value;
-      if (std::isnan(value) && may_lack_pixels_) continue;
-      if (!std::isfinite(value)) refuse("finite pixel values", "NaN or infinity");
     }
+    require_finite(image);
+  }
+
+  void require_finite(const Image& image) const {
+    const auto lacks_value = [&](float value) {
+      return !std::isfinite(value) && !(std::isnan(value) && may_lack_pixels_);
+    };
+    const auto first = std::ranges::find_if(image.pixels, lacks_value);
+    if (first == image.pixels.end()) return;
+    const auto at = first - image.pixels.begin(), n = std::ranges::count_if(image.pixels, lacks_value);
+    refuse("finite pixel values",
+           counted(n, std::isnan(*first) ? "pixel without a value (NaN)" : "infinite pixel",
+                   std::isnan(*first) ? "pixels without a value (NaN)" : "infinite pixels") +
+               ", the first in column " + std::to_string(at % image.width) + ", row " +
+               std::to_string(at / image.width),
+           "fill them with what is around, in Fiji by Process > Noise > Remove NaNs..., or crop the image to where it "
+           "has values; a registration leaves them at the border");
   }
 
   /// ImageJ's stacks of more than 4 GB: the planes follow the first page's own without pages of theirs.
@@ -240,6 +282,8 @@ class TiffReader {
     const auto unit = tag<std::uint16_t>(TIFFTAG_RESOLUTIONUNIT, RESUNIT_NONE);
     if (unit == RESUNIT_INCH) result.unit_um = 25400;
     if (unit == RESUNIT_CENTIMETER) result.unit_um = 1e4;
+    result.width = static_cast<int>(tag<std::uint32_t>(TIFFTAG_IMAGEWIDTH, 0));
+    result.height = static_cast<int>(tag<std::uint32_t>(TIFFTAG_IMAGELENGTH, 0));
     return result;
   }
 
@@ -261,11 +305,12 @@ class TiffReader {
   void require_known_samples(const Layout& l) const {
     const std::string found = std::to_string(l.bits) + " bits";
     if (l.format == SAMPLEFORMAT_IEEEFP) {
-      if (l.bits != 32 && l.bits != 64) refuse("floating-point samples of 32 or 64 bits", found);
+      if (l.bits != 16 && l.bits != 32 && l.bits != 64) refuse("floating-point samples of 16, 32 or 64 bits", found);
     } else if (l.format == SAMPLEFORMAT_INT) {
-      if (l.bits != 8 && l.bits != 16 && l.bits != 32) refuse("signed samples of 8, 16 or 32 bits", found);
+      if (l.bits != 8 && l.bits != 16 && l.bits != 32 && l.bits != 64)
+        refuse("signed samples of 8, 16, 32 or 64 bits", found);
     } else if (l.format == SAMPLEFORMAT_UINT) {
-      if (l.bits < 1 || l.bits > 32) refuse("samples of 1 to 32 bits", found);
+      if ((l.bits < 1 || l.bits > 32) && l.bits != 64) refuse("samples of 1 to 32 or of 64 bits", found);
     } else {
       refuse("real samples", "complex ones");
     }
@@ -375,23 +420,41 @@ class TiffReader {
   /// Samples to floats. libtiff has put 16-, 24-, 32- and 64-bit samples into this machine's byte order; other widths
   /// are packed from the highest bit on, without gaps.
   void unpack(const unsigned char* bytes, std::vector<float>& row) const {
-    const bool is_signed = layout_.format == SAMPLEFORMAT_INT;
+    const bool is_signed = layout_.format == SAMPLEFORMAT_INT, is_float = layout_.format == SAMPLEFORMAT_IEEEFP;
     switch (layout_.bits) {
       case 8:
         return is_signed ? unpack_as<std::int8_t>(bytes, row) : unpack_as<std::uint8_t>(bytes, row);
       case 16:
+        if (is_float) return unpack_halves(bytes, row);
         return is_signed ? unpack_as<std::int16_t>(bytes, row) : unpack_as<std::uint16_t>(bytes, row);
       case 32:
-        if (layout_.format == SAMPLEFORMAT_IEEEFP) return unpack_as<float>(bytes, row);
+        if (is_float) return unpack_as<float>(bytes, row);
         return is_signed ? unpack_as<std::int32_t>(bytes, row) : unpack_as<std::uint32_t>(bytes, row);
       case 64:
-        return unpack_as<double>(bytes, row);
+        if (is_float) return unpack_as<double>(bytes, row);
+        return is_signed ? unpack_as<std::int64_t>(bytes, row) : unpack_as<std::uint64_t>(bytes, row);
       case 24:
         for (std::size_t i = 0; i < row.size(); ++i, bytes += 3)
           row[i] = static_cast<float>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
         return;
       default:
         unpack_bits(bytes, row);
+    }
+  }
+
+  /// IEEE 754 binary16: a sign, five bits of exponent, ten of fraction.
+  static void unpack_halves(const unsigned char* bytes, std::vector<float>& row) {
+    constexpr int kBias = 15, kFractionBits = 10, kInfinite = 31;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      std::uint16_t half;
+      std::memcpy(&half, bytes + i * sizeof half, sizeof half);
+      const int exponent = half >> kFractionBits & kInfinite, fraction = half & ((1 << kFractionBits) - 1);
+      float value = exponent == 0 ? std::ldexp(static_cast<float>(fraction), 1 - kBias - kFractionBits)
+                                  : std::ldexp(static_cast<float>(fraction + (1 << kFractionBits)),
+                                               exponent - kBias - kFractionBits);
+      if (exponent == kInfinite)
+        value = fraction == 0 ? std::numeric_limits<float>::infinity() : std::numeric_limits<float>::quiet_NaN();
+      row[i] = half >> 15 ? -value : value;
     }
   }
 

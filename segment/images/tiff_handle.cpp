@@ -2,15 +2,52 @@
 
 #include <cstdarg>
 #include <cstdio>
+#include <cstring>
+#include <set>
 
 namespace mbtfm::images {
 namespace {
+
+/// libtiff complains of each tag that is not as it expects; those of other programs (private ones), and names and
+/// dates, are not needed for the pixels.
+bool is_of_a_needed_tag(const std::string& message) {
+  static const std::set<std::string> needed = {"ImageWidth",
+                                               "ImageLength",
+                                               "BitsPerSample",
+                                               "Compression",
+                                               "PhotometricInterpretation",
+                                               "ImageDescription",
+                                               "StripOffsets",
+                                               "SamplesPerPixel",
+                                               "RowsPerStrip",
+                                               "StripByteCounts",
+                                               "XResolution",
+                                               "YResolution",
+                                               "PlanarConfiguration",
+                                               "ResolutionUnit",
+                                               "Predictor",
+                                               "ColorMap",
+                                               "TileWidth",
+                                               "TileLength",
+                                               "TileOffsets",
+                                               "TileByteCounts",
+                                               "ExtraSamples",
+                                               "SampleFormat",
+                                               "JPEGTables",
+                                               "FillOrder",
+                                               "YCbCrSubsampling",
+                                               "ReferenceBlackWhite",
+                                               "SubFileType"};
+  const std::size_t begin = message.find('"'), end = message.find('"', begin + 1);
+  return begin == std::string::npos || end == std::string::npos ||
+         needed.contains(message.substr(begin + 1, end - begin - 1));
+}
 
 int keep_error(TIFF*, void* messages, const char*, const char* format, va_list arguments) {
   char text[512];
   std::vsnprintf(text, sizeof text, format, arguments);
   auto& first = static_cast<Messages*>(messages)->first_error;
-  if (first.empty()) first = text;
+  if (first.empty() && is_of_a_needed_tag(text)) first = text;
   return 1;  // handled: nothing goes to the terminal
 }
 

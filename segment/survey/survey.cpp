@@ -155,6 +155,7 @@ Survey survey(const CellImages& cell, int threads) {
   survey.facts = std::to_string(all[0]->image.width) + " x " + std::to_string(all[0]->image.height) + " pixels of " +
                  images::in_um(pixel_um);
   for (const Channel* image : all) {
+    if (!image->image.taken.empty()) survey.facts += "; " + image->name + ": " + image->image.taken;
     const auto is_it = [&](const std::optional<Channel>& channel) { return channel && image == &*channel; };
     const bool is_of_beads = is_it(cell.beads_relaxed) || is_it(cell.beads_stressed);
     if (const auto doubt =

@@ -22,7 +22,7 @@ std::vector<std::string> samples() {
 void read(std::string_view bytes) {
   const std::string description(bytes);
   try {
-    if (const auto stack = images::stack_of(description, "a.tif"))
+    if (const auto stack = images::stack_of(description, {"a.tif", 100}))
       for (const char* const channel : {"", "1"})
         fuzz::answer([&] { images::chosen_pages(*stack, {.channel = channel, .time = 1}, "a.tif"); });
   } catch (const InvalidData&) {  // its reader makes it an InputError with the file's name

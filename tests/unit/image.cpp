@@ -1,7 +1,9 @@
+#include <png.h>
 #include <sys/stat.h>
 #include <tiffio.h>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/text.h"
 #include "segment/images/channels.h"
 #include "segment/images/image.h"
 #include "segment/images/image_file.h"
@@ -164,6 +166,120 @@ void set_tag(const fs::path& file, std::uint16_t tag, std::uint32_t value) {
     std::memcpy(&bytes[entry + 8], &value, 4);
   }
   std::ofstream(file, std::ios::binary) << bytes;
+}
+
+/// A file of one row of samples.
+template <class Sample>
+void write_samples(const fs::path& file, const std::vector<Sample>& samples, int format,
+                   const std::string& description = {}) {
+  TIFF* tiff = TIFFOpen(file.c_str(), "w");
+  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, static_cast<std::uint32_t>(samples.size()));
+  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, 1);
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, static_cast<int>(8 * sizeof(Sample)));
+  TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, format);
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+  if (!description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
+  std::vector<Sample> row = samples;
+  TIFFWriteScanline(tiff, row.data(), 0, 0);
+  TIFFClose(tiff);
+}
+
+TEST(Image, half_floats_and_long_integers_are_read) {
+  const TemporaryFolder folder;
+  // IEEE 754: 1, -2, the largest one, the smallest normal one, the smallest of all, 1/3 to ten bits, 0
+  write_samples<std::uint16_t>(folder / "half.tif", {0x3C00, 0xC000, 0x7BFF, 0x0400, 0x0001, 0x3555, 0},
+                               SAMPLEFORMAT_IEEEFP);
+  EXPECT_EQ(read_image(folder / "half.tif").pixels,
+            (std::vector<float>{1, -2, 65504, 0x1p-14f, 0x1p-24f, 0x1.554p-2f, 0}));
+  write_samples<std::int64_t>(folder / "int64.tif", {0, 7, -3, 1 << 20}, SAMPLEFORMAT_INT);
+  EXPECT_EQ(read_image(folder / "int64.tif").pixels, (std::vector<float>{0, 7, -3, 1 << 20}));
+  write_samples<std::uint64_t>(folder / "uint64.tif", {0, 7, 1 << 20}, SAMPLEFORMAT_UINT);
+  EXPECT_EQ(read_image(folder / "uint64.tif").pixels, (std::vector<float>{0, 7, 1 << 20}));
+}
+
+TEST(Image, pixels_without_a_value_are_counted_and_placed) {
+  const TemporaryFolder folder;
+  const float nan = std::nanf("");
+  write_samples<float>(folder / "a.tif", {1, 2, nan, 4, nan}, SAMPLEFORMAT_IEEEFP);
+  EXPECT_NE(error_of(folder / "a.tif").find("2 pixels without a value (NaN), the first in column 2, row 0"),
+            std::string::npos)
+      << error_of(folder / "a.tif");
+  write_samples<std::uint16_t>(folder / "half.tif", {0x3C00, 0x7E00}, SAMPLEFORMAT_IEEEFP);
+  EXPECT_NE(error_of(folder / "half.tif").find("1 pixel without a value"), std::string::npos);
+}
+
+TEST(Image, an_empty_tag_of_another_program_is_no_damage) {
+  const TemporaryFolder folder;
+  const std::vector<std::uint16_t> row = {3, 1, 4, 1, 5, 9, 2, 6};
+  write_samples(folder / "a.tif", row, SAMPLEFORMAT_UINT);
+  std::string bytes = files::read_text(folder / "a.tif");
+  // the last tag, which says what is the default, becomes a private one: without a value, or with one beyond the end
+  std::uint32_t at = 0;
+  std::memcpy(&at, &bytes[4], 4);
+  std::uint16_t n_tags = 0;
+  std::memcpy(&n_tags, &bytes[at], 2);
+  const std::uint32_t last = at + 2 + 12u * (n_tags - 1u), kNone = 0, kBeyond = 1u << 30;
+  const std::uint16_t kPrivate = 65000, kByte = 1;
+  std::memcpy(&bytes[last], &kPrivate, 2);
+  std::memcpy(&bytes[last + 2], &kByte, 2);
+  for (const bool is_empty : {true, false}) {
+    const std::uint32_t count = is_empty ? kNone : 1000;
+    std::memcpy(&bytes[last + 4], &count, 4);
+    std::memcpy(&bytes[last + 8], is_empty ? &kNone : &kBeyond, 4);
+    files::write_text(folder / "b.tif", bytes);
+    EXPECT_EQ(read_image(folder / "b.tif").pixels, std::vector<float>(row.begin(), row.end())) << is_empty;
+  }
+}
+
+/// One row of indices into these colours.
+void write_indexed_png(const fs::path& file, const std::vector<png_color>& palette, std::vector<unsigned char> row) {
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  std::FILE* stream = std::fopen(file.c_str(), "wb");
+  png_init_io(png, stream);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(row.size()), 1, 8, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_PLTE(png, info, palette.data(), static_cast<int>(palette.size()));
+  png_write_info(png, info);
+  png_write_row(png, row.data());
+  png_write_end(png, info);
+  png_destroy_write_struct(&png, &info);
+  std::fclose(stream);
+}
+
+TEST(Png, of_indexed_colours_labels_are_the_indices_and_pictures_what_is_seen) {
+  const TemporaryFolder folder;
+  const std::vector<unsigned char> row = {0, 1, 2, 1};
+  const std::vector<png_color> labels = {{0, 0, 0}, {200, 10, 0}, {0, 70, 0}},
+                               greys = {{0, 0, 0}, {9, 9, 9}, {5, 5, 5}},
+                               brighter = {{0, 0, 0}, {90, 0, 0}, {200, 90, 0}};
+  const auto pixels = [&](const std::vector<png_color>& palette, PixelsAre pixels_are) {
+    write_indexed_png(folder / "a.png", palette, row);
+    return read_image(folder / "a.png", {.pixels = pixels_are}).pixels;
+  };
+  const std::vector<float> indices = {0, 1, 2, 1};
+  EXPECT_EQ(pixels(labels, PixelsAre::labels), indices) << "two colours of one mean are two labels";
+  EXPECT_EQ(pixels(labels, PixelsAre::intensities)[1], 70);
+  EXPECT_EQ(pixels(brighter, PixelsAre::intensities), indices) << "a lookup table";
+  for (const PixelsAre pixels_are : {PixelsAre::labels, PixelsAre::intensities})
+    EXPECT_EQ(pixels(greys, pixels_are), (std::vector<float>{0, 9, 5, 9}));
+}
+
+TEST(Image, a_calibration_of_a_picture_of_another_size_does_not_count) {
+  const TemporaryFolder folder;
+  const auto xml = [](int width) {
+    return "<?xml version='1.0'?><OME><Image><Pixels SizeX='" + std::to_string(width) +
+           "' SizeY='1' PhysicalSizeX='0.1' PhysicalSizeY='0.1'/></Image></OME>";
+  };
+  const std::vector<std::uint16_t> row(180, 7);
+  write_samples(folder / "whole.tif", row, SAMPLEFORMAT_UINT, xml(180));
+  write_samples(folder / "binned.tif", row, SAMPLEFORMAT_UINT, xml(360));
+  EXPECT_EQ(read_image(folder / "whole.tif").pixel_size_um, 0.1);
+  const Channel binned{"binned.tif", read_image(folder / "binned.tif")};
+  EXPECT_EQ(binned.image.pixel_size_um, std::nullopt);
+  const auto error = test::thrown<InputError>([&] { common_pixel_size_um(binned, binned, std::nullopt); });
+  EXPECT_EQ(error.found, "one of 360 x 1 pixels, and the picture has 180 x 1");
+  EXPECT_EQ(common_pixel_size_um(binned, binned, 0.2), 0.2);
 }
 
 TEST(Image, a_size_the_file_cannot_fill_takes_no_memory) {

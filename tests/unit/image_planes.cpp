@@ -121,6 +121,82 @@ TEST(ImagePlanes, a_plane_in_another_file_of_an_ome_set_is_an_error) {
   EXPECT_NE(refusal(folder / "a.ome.tif", {.channel = "2"}).find("another file of the set"), std::string::npos);
 }
 
+TEST(ImagePlanes, a_renamed_file_of_ome_is_the_one_whose_planes_it_has) {
+  const TemporaryFolder folder;
+  const auto named = [](const std::string& file, int first, int n) {
+    return "<TiffData FirstT='" + std::to_string(first) + "' IFD='0' PlaneCount='" + std::to_string(n) +
+           "'><UUID FileName='" + file + "'>urn:uuid:" + file + "</UUID></TiffData>";
+  };
+  write_pages(folder / "one.tif", 2, ome("SizeC='1' SizeZ='1' SizeT='2'", named("old.ome.tif", 0, 2)));
+  EXPECT_EQ(value_of(folder / "one.tif", {.time = 2}), 1) << "the only file named";
+  const std::string set = named("a.ome.tif", 0, 1) + named("b.ome.tif", 1, 2);
+  write_pages(folder / "second.tif", 2, ome("SizeC='1' SizeZ='1' SizeT='3'", set));
+  EXPECT_EQ(value_of(folder / "second.tif", {.time = 2}), 0) << "as many pages as b has planes";
+  EXPECT_EQ(value_of(folder / "second.tif", {.time = 3}), 1);
+  EXPECT_NE(refusal(folder / "second.tif", {.time = 1}).find("another file of the set"), std::string::npos);
+  write_pages(folder / "whole.tif", 3, ome("SizeC='1' SizeZ='1' SizeT='3'", set));
+  EXPECT_EQ(value_of(folder / "whole.tif", {.time = 1}), 0) << "put into one file";
+  EXPECT_EQ(value_of(folder / "whole.tif", {.time = 3}), 2);
+  const std::string alike = named("a.ome.tif", 0, 2) + named("b.ome.tif", 2, 2);
+  write_pages(folder / "either.tif", 2, ome("SizeC='1' SizeZ='1' SizeT='4'", alike));
+  EXPECT_NE(refusal(folder / "either.tif", {.time = 1}).find("a.ome.tif, b.ome.tif"), std::string::npos);
+}
+
+TEST(ImagePlanes, an_aborted_recording_has_the_frames_that_are_there) {
+  const TemporaryFolder folder;
+  write_pages(folder / "a.tif", 3, ome("SizeC='1' SizeZ='1' SizeT='100'", "<TiffData IFD='0' PlaneCount='100'/>"));
+  EXPECT_EQ(value_of(folder / "a.tif", {.time = 3}), 2);
+  EXPECT_NE(refusal(folder / "a.tif", {.time = 4}).find("3 frames of the 100 that it states"), std::string::npos)
+      << refusal(folder / "a.tif", {.time = 4});
+  EXPECT_NE(refusal(folder / "a.tif", {}).find("_time to a number from 1 to 3"), std::string::npos);
+  write_pages(folder / "one.tif", 1, ome("SizeC='1' SizeZ='1' SizeT='100'", ""));
+  EXPECT_EQ(value_of(folder / "one.tif", {}), 0) << "the only one";
+}
+
+TEST(ImagePlanes, images_with_an_interval_between_them_are_frames) {
+  const TemporaryFolder folder;
+  write_pages(folder / "a.tif", 5, "ImageJ=1.53t\nimages=5\nslices=5\nfinterval=30.0\n");
+  EXPECT_NE(refusal(folder / "a.tif", {}).find("the frame to be chosen"), std::string::npos) << "not their maximum";
+  EXPECT_EQ(value_of(folder / "a.tif", {.time = 2}), 1);
+  write_pages(folder / "z.tif", 5, "ImageJ=1.53t\nimages=5\nslices=5\nfinterval=30.0\nspacing=0.3\n");
+  EXPECT_EQ(value_of(folder / "z.tif", {}), 4);
+}
+
+TEST(ImagePlanes, what_was_taken_of_several_planes_is_said) {
+  const TemporaryFolder folder;
+  write_pages(folder / "pages.tif", 5, "");
+  write_pages(folder / "slices.tif", 3, "ImageJ=1.53t\nimages=3\nslices=3\n");
+  write_pages(folder / "one.tif", 1, "");
+  EXPECT_NE(read_image(folder / "pages.tif").taken.find("5 pages"), std::string::npos);
+  EXPECT_NE(read_image(folder / "slices.tif").taken.find("maximum of its 3 slices"), std::string::npos);
+  EXPECT_EQ(read_image(folder / "slices.tif", {.z = "2"}).taken, "");
+  EXPECT_EQ(read_image(folder / "one.tif").taken, "");
+}
+
+/// A page of 4 x 3 pixels, and before it one of half of its size.
+void write_with_thumbnail(const fs::path& file) {
+  TIFF* tiff = TIFFOpen(file.c_str(), "w");
+  for (const std::uint32_t side : {2u, 4u}) {
+    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, side);
+    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, side);
+    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 8);
+    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    if (side == 2) TIFFSetField(tiff, TIFFTAG_SUBFILETYPE, FILETYPE_REDUCEDIMAGE);
+    std::vector<unsigned char> row(side, static_cast<unsigned char>(side));
+    for (std::uint32_t j = 0; j < side; ++j) TIFFWriteScanline(tiff, row.data(), j, 0);
+    TIFFWriteDirectory(tiff);
+  }
+  TIFFClose(tiff);
+}
+
+TEST(ImagePlanes, a_thumbnail_is_not_the_picture) {
+  const TemporaryFolder folder;
+  write_with_thumbnail(folder / "a.tif");
+  EXPECT_EQ(value_of(folder / "a.tif", {}), 4);
+  EXPECT_EQ(read_field(folder / "a.tif").width, 4);
+  EXPECT_EQ(value_of(folder / "a.tif", {.page = 1}), 2) << "a page that is asked for";
+}
+
 TEST(ImagePlanes, ome_tells_of_each_plane_once_and_each_slice_has_a_page_of_its_own) {
   const TemporaryFolder folder;
   const std::string one_slice = "SizeC='1' SizeZ='3' SizeT='1'";
