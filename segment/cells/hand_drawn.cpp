@@ -253,6 +253,21 @@ std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optiona
   return adhesions;
 }
 
+std::vector<Adhesion> each_once(const std::vector<Adhesion>& drawn) {
+  constexpr double kSamePlace = 0.1, kSameArea = 0.1;  // of its width, of its area: nobody draws it so again by hand
+  std::vector<Adhesion> once;
+  for (const Adhesion& a : drawn) {
+    const bool is_there = std::ranges::any_of(once, [&](const Adhesion& other) {
+      return norm(a.position_um - other.position_um) < kSamePlace * a.minor_axis_um &&
+             std::abs(a.area_um2 - other.area_um2) < kSameArea * a.area_um2;
+    });
+    if (is_there) continue;
+    once.push_back(a);
+    once.back().adhesion_id = static_cast<int>(once.size());
+  }
+  return once;
+}
+
 std::vector<DrawnLine> drawn_lines(const RoiSet& set, const std::optional<images::Channel>& actin, const Field& field,
                                    const FibreParameters& p) {
   std::vector<DrawnLine> lines;

@@ -38,6 +38,9 @@ struct Field {
 /// of their own. @throws InputError where one lies beside it, is no area, lies outside the field or has no area
 CellOutline hand_drawn_outline(const RoiSet& set, const Field& field);
 
+/// Without those that are there twice, as ImageJ's manager has them after a second click; ids from 1.
+std::vector<Adhesion> each_once(const std::vector<Adhesion>& drawn);
+
 /// Each area as the ellipse of equal second moments, scaled to the area; of polygons by Green's theorem, without a
 /// raster. `mean_intensity` is the mean grey value of the pixels with their centre inside above the median of those
 /// between 0.3 and 1 um around the ellipse; 0 without an image. Ids in the order of the set, from 1.

@@ -184,6 +184,31 @@ void require_size_of_adhesion(const LabelMask& mask, const Adhesion& a) {
                    "outline_mask; of adhesions, check pixel_size_um and that they do not touch each other");
 }
 
+/// Half of the largest value, if all values between 0 and it lie in rims: a mask that was drawn, turned or scaled has
+/// grey pixels between both. None of them is a label.
+std::optional<float> level_of_rims(const images::Image& image) {
+  constexpr int kRim_px = 2;         // as wide as interpolation makes them
+  constexpr std::size_t kGreys = 3;  // less: labels that touch
+  const float largest = image.pixels.empty() ? 0 : std::ranges::max(image.pixels);
+  std::set<float> greys;
+  for (int j = 0; j < image.height; ++j) {
+    for (int i = 0; i < image.width; ++i) {
+      const float value = image.at(i, j);
+      if (!(value > 0 && value < largest)) continue;
+      bool is_near_none = false, is_near_mask = false;
+      for (int y = std::max(0, j - kRim_px); y <= std::min(image.height - 1, j + kRim_px); ++y) {
+        for (int x = std::max(0, i - kRim_px); x <= std::min(image.width - 1, i + kRim_px); ++x) {
+          is_near_none |= image.at(x, y) == 0;
+          is_near_mask |= image.at(x, y) == largest;
+        }
+      }
+      if (!is_near_none || !is_near_mask) return std::nullopt;
+      greys.insert(value);
+    }
+  }
+  return greys.size() >= kGreys ? std::optional(largest / 2) : std::nullopt;
+}
+
 std::string listed(std::vector<int> labels) {
   constexpr std::size_t kMost = 12;
   std::sort(labels.begin(), labels.end());
@@ -201,10 +226,11 @@ LabelMask mask_of(const images::Image& image, const std::string& name) {
                      "save the mask as TIFF or PNG, from the program that made it");
   constexpr float kLargest = 1 << 24;  // whole numbers that a float holds
   LabelMask mask{.name = name, .width = image.width, .height = image.height, .labels = {}};
+  const std::optional<float> rim = level_of_rims(image);
   mask.labels.reserve(image.pixels.size());
   std::set<int> values;
   for (std::size_t k = 0; k < image.pixels.size(); ++k) {
-    const float value = image.pixels[k];
+    const float value = rim ? (image.pixels[k] > *rim ? 1.f : 0.f) : image.pixels[k];
     if (!(value >= 0) || value > kLargest || value != std::floor(value))
       throw InputError(name + ": pixel " + std::to_string(k % static_cast<std::size_t>(image.width)) + ", " +
                            std::to_string(k / static_cast<std::size_t>(image.width)),
@@ -221,7 +247,8 @@ LabelMask mask_of(const images::Image& image, const std::string& name) {
 }
 
 LabelMask read_mask(const std::filesystem::path& file) {
-  return mask_of(images::read_image(file, images::PlaneChoice{.prefix = "mask"}), file.string());
+  return mask_of(images::read_image(file, images::PlaneChoice{.prefix = "mask", .pixels = images::PixelsAre::labels}),
+                 file.string());
 }
 
 void require_size(const LabelMask& mask, const Field& field) {

@@ -57,6 +57,21 @@ TEST(Mask, an_outline_goes_round_its_pixels_without_bias) {
   }
 }
 
+TEST(Mask, grey_rims_of_a_drawn_one_are_rims_and_labels_are_labels) {
+  images::Image image = empty();
+  for (int k = 0; k < 4; ++k) paint_disc(image, static_cast<float>(60 * k + 60), {128, 128}, 60.0 - 0.5 * k);
+  paint_disc(image, 255, {128, 128}, 58);
+  const LabelMask drawn = mask(image);
+  EXPECT_TRUE(drawn.is_binary);
+  EXPECT_NEAR(n_pixels(drawn), std::numbers::pi * 59 * 59, 0.02 * 59 * 59);
+  for (const float largest : {2.f, 255.f}) {
+    images::Image labels = empty();
+    paint_disc(labels, 1, {60, 60}, 20);
+    paint_disc(labels, largest, {160, 160}, 20);
+    EXPECT_FALSE(mask(labels).is_binary) << largest;
+  }
+}
+
 TEST(Mask, a_ring_around_n_pixels_has_an_area_of_half_a_pixel_less) {
   images::Image image = empty();
   paint(image, 1, [](double x, double y) { return (x < 20 && y < 9) || (x > 4 && x < 7 && y < 30); });
