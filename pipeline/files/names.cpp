@@ -1,5 +1,6 @@
 #include "pipeline/files/names.h"
 
+#include <array>
 #include <charconv>
 
 namespace mbtfm::files {
@@ -22,6 +23,33 @@ std::string bytes_told_by(std::string_view text) {
     }
   }
   return bytes;
+}
+
+/// Letters with a mark behind them as one character, as keyboards write them: a Mac's file names have them apart
+/// (Unicode Standard Annex 15, forms D and C; the letters of European languages).
+std::string composed(std::string_view text) {
+  struct Marked {
+    std::string_view mark, letters, composed;  // two bytes a mark and a composed letter
+  };
+  constexpr std::array<Marked, 8> kMarks = {{{"\u0300", "AEIOUaeiou", "ÀÈÌÒÙàèìòù"},
+                                             {"\u0301", "AEIOUYaeiouyCcLlNnRrSsZz", "ÁÉÍÓÚÝáéíóúýĆćĹĺŃńŔŕŚśŹź"},
+                                             {"\u0302", "AEIOUaeiou", "ÂÊÎÔÛâêîôû"},
+                                             {"\u0303", "ANOano", "ÃÑÕãñõ"},
+                                             {"\u0308", "AEIOUaeiouy", "ÄËÏÖÜäëïöüÿ"},
+                                             {"\u030A", "AaUu", "ÅåŮů"},
+                                             {"\u0327", "CcSs", "ÇçŞş"},
+                                             {"\u030C", "CcDdEeNnRrSsTtZz", "ČčĎďĚěŇňŘřŠšŤťŽž"}}};
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    std::string_view letter = text.substr(i, 1);
+    for (const Marked& m : kMarks) {
+      const std::size_t at = text.substr(i + 1).starts_with(m.mark) ? m.letters.find(text[i]) : m.letters.npos;
+      if (at != m.letters.npos) letter = m.composed.substr(2 * at, 2);
+    }
+    result += letter;
+    if (letter.size() == 2) i += 2;
+  }
+  return result;
 }
 
 }  // namespace
@@ -74,7 +102,12 @@ std::string shown_name(std::string_view bytes) {
 std::filesystem::path file_shown_as(const std::filesystem::path& folder, const std::string& name) {
   std::error_code ignored;
   const std::filesystem::path same = folder / name;
-  return std::filesystem::exists(same, ignored) ? same : folder / bytes_told_by(name);
+  if (std::filesystem::exists(same, ignored)) return same;
+  const std::string wanted = composed(same.filename().string());
+  for (std::filesystem::directory_iterator entry(same.parent_path(), ignored), end; !ignored && entry != end;
+       entry.increment(ignored))
+    if (composed(entry->path().filename().string()) == wanted) return entry->path();
+  return folder / bytes_told_by(name);
 }
 
 }  // namespace mbtfm::files

@@ -56,6 +56,15 @@ std::string advice_on(std::string_view text, std::size_t line) {
   if (const auto comma = here.find(','); comma != here.npos && comma > 0 && comma + 1 < here.size() &&
                                          is_digit(here[comma - 1]) && is_digit(here[comma + 1]))
     return "decimals follow a point: 8.4";
+  if (here.find("“") != here.npos || here.find("”") != here.npos || here.find("„") != here.npos)
+    return "texts stand between straight quotes: \"actin.tif\"";
+  if (const auto value = here.find_first_not_of(" \t", std::min(here.find('='), here.size() - 1) + 1);
+      here.find('=') != here.npos && value != here.npos && is_digit(here[value]) &&
+      here.find_first_of("\"'") == here.npos) {
+    const std::string_view number = here.substr(value, here.find_first_not_of("0123456789.+-eE", value) - value);
+    if (number.ends_with('.')) return "a digit follows the point: " + std::string(number) + "0";
+    return "the number alone, without a unit: " + std::string(number);
+  }
   if (here.find('\\') != here.npos)
     return "write folders with /, as in \"D:/images/cell 1\", or the text in single quotes";
   if (here.find('=') != here.npos && here.find('"') == here.npos && here.find('\'') == here.npos)

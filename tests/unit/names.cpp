@@ -57,6 +57,15 @@ TEST(Names, the_file_shown_by_a_name_is_found) {
       << "one of just that name comes first";
 }
 
+TEST(Names, letters_with_marks_are_the_same_as_one_character_or_as_two) {
+  const test::TemporaryFolder folder;
+  files::write_text(folder / "Zellko\u0308rper e\u0301.tif", "");
+  EXPECT_EQ(files::file_shown_as(folder.path(), "Zellk\u00F6rper \u00E9.tif"), folder / "Zellko\u0308rper e\u0301.tif");
+  files::write_text(folder / "Fl\u00E4che.tif", "");
+  EXPECT_EQ(files::file_shown_as(folder.path(), "Fla\u0308che.tif"), folder / "Fl\u00E4che.tif");
+  EXPECT_EQ(files::file_shown_as(folder.path(), "Flache.tif"), folder / "Flache.tif") << "another name";
+}
+
 TEST(Names, no_shown_name_leads_out_of_its_folder) {
   EXPECT_EQ(files::file_shown_as("cell", "\\x2E\\x2E\\x2Fetc"), "cell/\\x2E\\x2E\\x2Fetc");
 }

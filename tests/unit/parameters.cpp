@@ -211,6 +211,10 @@ TEST(Parameters, what_other_programs_and_countries_write_is_answered_with_how_to
     return error ? error->hint : std::string("read");
   };
   EXPECT_EQ(hint("[gel]\nthickness_um = 8,4\n"), "decimals follow a point: 8.4");
+  EXPECT_EQ(hint("[gel]\nthickness_um = 8.\n"), "a digit follows the point: 8.0");
+  EXPECT_EQ(hint("[gel]\nthickness_um = 8.4 kPa\n"), "the number alone, without a unit: 8.4");
+  EXPECT_EQ(hint("[gel]\nthickness_um = 60um\n"), "the number alone, without a unit: 60");
+  EXPECT_NE(hint("[images]\nactin = “actin.tif”\n").find("straight quotes"), std::string::npos);
   EXPECT_NE(hint("[images]\nactin = \"D:\\images\\cell 1\\actin.tif\"\n").find("write folders with /"),
             std::string::npos);
   EXPECT_NE(hint("[images]\nactin = actin.tif\n").find("needs quotes"), std::string::npos);
