@@ -32,6 +32,7 @@
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
+#include "pipeline/runner/settings.h"
 #include "pipeline/runner/stages.h"
 #include "pipeline/runner/verify.h"
 #include "pipeline/stage/console.h"
@@ -51,7 +52,7 @@ struct CommandLine {
   int jobs = 1;
   bool is_quiet = false, is_verbose = false, is_json = false, only_list = false, only_table = false, is_checked = false,
        explain = false;
-  std::vector<std::string> only, redo, patterns;
+  std::vector<std::string> only, redo, patterns, set;
   std::vector<fs::path> more_cells;
   fs::path template_toml, out, inputs;
   std::optional<double> timeout_s;
@@ -89,6 +90,12 @@ std::function<void(const runner::StageTold&)> teller(const CommandLine& line) {
   return [detail](const runner::StageTold& told) { say(text_of(told, detail)); };
 }
 
+std::vector<runner::Setting> settings_of(const CommandLine& line) {
+  std::vector<runner::Setting> settings;
+  for (const std::string& text : line.set) settings.push_back(runner::parse_setting(text));
+  return settings;
+}
+
 runner::RunOptions run_options(const CommandLine& line) {
   return {.stage_folder = line.stage_folder,
           .threads = line.threads,
@@ -102,6 +109,7 @@ runner::RunOptions run_options(const CommandLine& line) {
           .beneath = line.preset.empty() ? std::vector<runner::Setting>() : cost::preset_named(line.preset).settings,
           .beneath_in_space =
               line.preset.empty() ? std::vector<runner::Setting>() : cost::preset_named(line.preset).in_space,
+          .set = settings_of(line),
           .version = kVersion,
           .say = teller(line),
           .sink = line.is_json ? event_sink : std::function<runner::Sink()>(),
@@ -212,6 +220,7 @@ std::vector<std::string> arguments_of_cell(const CommandLine& line) {
   if (!line.accuracy.empty()) arguments.insert(arguments.end(), {"--accuracy", line.accuracy});
   for (const std::string& stage : line.only) arguments.insert(arguments.end(), {"--only", stage});
   for (const std::string& stage : line.redo) arguments.insert(arguments.end(), {"--redo", stage});
+  for (const std::string& text : line.set) arguments.insert(arguments.end(), {"--set", text});
   if (line.timeout_s) arguments.insert(arguments.end(), {"--timeout", std::to_string(*line.timeout_s)});
   if (line.memory_bytes) arguments.insert(arguments.end(), {"--memory", std::to_string(*line.memory_bytes)});
   return arguments;
@@ -363,6 +372,11 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
   CLI::Option* preset = command->add_option("--preset", line.preset, meaning)->check(CLI::IsMember(names));
   command->add_option("--accuracy", line.accuracy, "the cheapest preset that finds the tensions to this error, as 5%")
       ->excludes(preset);
+  command
+      ->add_option(
+          "--set", line.set,
+          "a value in place of that in cell.toml: TABLE.KEY=VALUE, as gel.youngs_modulus_kPa=4; may be repeated")
+      ->allow_extra_args(false);
   // one value a flag: else the folder that follows would be taken for another
   command
       ->add_option("--only", line.only,

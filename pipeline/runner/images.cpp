@@ -76,7 +76,7 @@ std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names) {
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) {
   ImageMatch match{.pattern = name_or_glob};
   const fs::path exact = files::file_shown_as(folder, name_or_glob);
-  if (files::is_file(exact)) {
+  if (files::is_file(exact) || (!name_or_glob.empty() && files::is_folder(exact))) {  // of the frames of a series
     match.files = {exact};
     return match;
   }

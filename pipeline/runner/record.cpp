@@ -190,8 +190,15 @@ std::vector<std::string> files_of(const std::vector<ImageInput>& inputs, const f
   std::vector<std::string> names;
   for (const ImageInput& image : inputs) {
     const ImageMatch match = match_image(cell, name_of_image(images, image.key));
-    for (const fs::path& file : match.files) names.push_back(file.lexically_relative(cell).generic_string());
+    for (const fs::path& file : match.files) {
+      const std::string name = file.lexically_relative(cell).generic_string();
+      if (!files::is_folder(file)) names.push_back(name);
+      if (files::is_folder(file))  // of frames
+        for (const fs::directory_entry& entry : fs::directory_iterator(file))
+          if (files::is_file(entry.path())) names.push_back(name + "/" + entry.path().filename().string());
+    }
   }
+  std::ranges::sort(names);
   return names;
 }
 

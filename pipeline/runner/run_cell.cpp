@@ -111,9 +111,16 @@ class CellRun {
         options_(options),
         images_(read_image_names(cell_)),
         of_(stages_of(cell_, images_)),
-        beneath_(unset_in(cell_ / "cell.toml", beneath(options, of_))),
-        settings_(read_settings(cell_ / "cell.toml", of_.stages, beneath_)),
-        hashes_(cell_) {}
+        given_(with(unset_in(cell_ / "cell.toml", beneath(options, of_)), options.set)),
+        settings_(read_settings(cell_ / "cell.toml", of_.stages, given_)),
+        hashes_(cell_) {
+    for (const Setting& setting : options.set) {
+      if (std::ranges::any_of(of_.stages, [&](const Stage& stage) { return !flags_of(stage, {setting}).empty(); }))
+        continue;
+      throw UsageError("--set " + setting.table + "." + setting.key + ": no stage of this cell reads it (" + of_.why +
+                       ")");
+    }
+  }
 
   CellOutcome look();
   CellOutcome run();
@@ -136,7 +143,7 @@ class CellRun {
   const RunOptions& options_;
   ImageNames images_;
   CellStages of_;
-  std::vector<Setting> beneath_;
+  std::vector<Setting> given_;  // beside cell.toml
   Settings settings_;
   HashCache hashes_;
   std::mutex saying_;
@@ -252,7 +259,7 @@ void CellRun::start(const Stage& stage, const Present& before, int threads, Stag
   command.insert(command.end(), {"--record", record_file.string()});
   if (options_.is_quiet) command.emplace_back("--quiet");
   if (options_.explain && stage.explains) command.emplace_back("--explain");
-  for (const std::string& flag : flags_of(stage, beneath_)) command.push_back(flag);
+  for (const std::string& flag : flags_of(stage, given_)) command.push_back(flag);
   const bool had_record = files::is_own_file(record_file);
   const std::string record_before = had_record ? files::read_text(record_file) : std::string();
   remove_partial_files(record_file.parent_path());
@@ -396,6 +403,7 @@ void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOp
                       const std::vector<std::string>& inputs) {
   std::vector<std::string> command = {executable_of(stage, options.stage_folder), "--check", "--config",
                                       toml_file.string()};
+  for (const std::string& flag : flags_of(stage, options.set)) command.push_back(flag);
   command.insert(command.end(), inputs.begin(), inputs.end());
   const ProcessResult check = run_process(command, options.limits, sink);
   if (check.exit_code == 0 && !check.signal) return;

@@ -24,6 +24,7 @@ struct RunOptions {
   std::string preset = {};                     ///< name of what `beneath` comes from; empty: none
   std::vector<Setting> beneath = {};           ///< in place of defaults, where cell.toml says nothing
   std::vector<Setting> beneath_in_space = {};  ///< the same of a cell in space
+  std::vector<Setting> set = {};               ///< in place of what cell.toml says
   std::string version;
   std::function<void(const StageTold&)> say;          ///< what became of each stage
   std::function<Sink()> sink = {};                    ///< makes one for what a stage prints; empty: our standard error

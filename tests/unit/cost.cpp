@@ -248,6 +248,19 @@ TEST(Settings, reach_the_stages_that_have_them) {
   }
 }
 
+TEST(Settings, that_are_set_have_a_table_a_key_and_a_value) {
+  const runner::Setting gel = runner::parse_setting("gel.youngs_modulus_kPa=4");
+  EXPECT_EQ(gel.table + " " + gel.key + " " + gel.value, "gel youngs_modulus_kPa 4");
+  EXPECT_EQ(runner::parse_setting("pixel_size_um=0.1").table, "");
+  EXPECT_EQ(runner::parse_setting("track.x_column=a=b").value, "a=b");
+  for (const char* text :
+       {"gel.youngs_modulus_kPa", "=4", "gel.=4", "gel.youngs_modulus_kPa=", "jel.youngs_modulus_kPa=4"})
+    EXPECT_THROW(runner::parse_setting(text), UsageError) << text;
+  const auto both = runner::with({{"fit", "n_meshes", "5"}, {"fit", "seed", "1"}}, {{"fit", "n_meshes", "2"}});
+  EXPECT_EQ(both.size(), 2u);
+  EXPECT_EQ(both.back().value, "2");
+}
+
 TEST(Presets, the_standard_one_is_the_defaults) {
   EXPECT_TRUE(preset_named("standard").settings.empty());
   EXPECT_THROW(preset_named("quick"), UsageError);
