@@ -6,6 +6,7 @@
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/stage/plausible.h"
+#include "segment/beads/pair_look.h"
 #include "segment/beads/plane.h"
 #include "segment/beads/track.h"
 #include "segment/cells/adhesions.h"
@@ -98,13 +99,31 @@ void look_at_beads(const CellImages& cell, int threads, Survey& survey) {
                             " um): single fibres will not be told apart. Use more beads, or two colours of them.");
 }
 
-/// From the cell to the nearest side of the image; none where no cell is found.
-std::optional<double> margin_um(const images::Image& image, double pixel_um) {
-  const auto cells = cells::find_cells(image, {}, pixel_um, cells::OutlineParameters{}).cells;
-  if (cells.empty()) return std::nullopt;
-  double margin = std::min(image.width, image.height) * pixel_um;
-  for (const Vec2 p : cells.front().outer_um)
-    margin = std::min({margin, p.x, p.y, image.width * pixel_um - p.x, image.height * pixel_um - p.y});
+/// Do both show the same beads, how far apart, and the same way up?
+void look_at_pair(const CellImages& cell, double pixel_um, Survey& survey) {
+  if (!cell.beads_stressed || !cell.beads_relaxed) return;
+  const beads::PairLook look = beads::look_at_pair(cell.beads_relaxed->image, cell.beads_stressed->image);
+  if (!look.orientation.empty()) {
+    survey.doubts.push_back(cell.beads_stressed->name + " looks " + look.orientation + " against " +
+                            cell.beads_relaxed->name + ". Save both as the microscope recorded them.");
+    return;
+  }
+  const images::Image& image = cell.beads_relaxed->image;
+  const double shared = std::max(0.0, 1 - std::abs(look.shift_px.x) / image.width) *
+                        std::max(0.0, 1 - std::abs(look.shift_px.y) / image.height);
+  survey.facts += "; bead images " + brief(norm(look.shift_px) * pixel_um) + " um apart, " + brief(100 * shared) +
+                  " % of the field in both";
+  constexpr double kLeastShared = 2.0 / 3;  // beads are followed up to a third of the image
+  if (shared < kLeastShared)
+    survey.doubts.push_back("Only " + brief(100 * shared) + " % of the field is in both bead images (limit " +
+                            brief(100 * kLeastShared) +
+                            " %): do they belong to one cell? Put the stage back before the second one is recorded.");
+}
+
+/// From the cell to the nearest side of the image.
+double margin_um(const cells::CellOutline& cell, Vec2 field_um) {
+  double margin = std::min(field_um.x, field_um.y);
+  for (const Vec2 p : cell.outer_um) margin = std::min({margin, p.x, p.y, field_um.x - p.x, field_um.y - p.y});
   return std::max(0.0, margin);
 }
 
@@ -112,15 +131,19 @@ void look_at_cell(const CellImages& cell, double pixel_um, Survey& survey) {
   if (!cell.actin) return;
   constexpr int kCoarse = 4;  // px: the outline to half a micrometre is enough here
   const int binning = std::min({kCoarse, cell.actin->image.width, cell.actin->image.height});
-  const std::optional<double> margin = margin_um(images::binned(cell.actin->image, binning), pixel_um * binning);
-  if (!margin) {
+  const images::Image coarse = images::binned(cell.actin->image, binning);
+  const double coarse_um = pixel_um * binning;
+  const auto found = cells::find_cells(coarse, {}, coarse_um, cells::OutlineParameters{}).cells;
+  if (found.empty()) {
     survey.doubts.push_back(cell.actin->name + " shows no cell. Check the channel.");
     return;
   }
-  survey.facts += "; margin " + brief(*margin) + " um";
-  if (*margin < kLeastMargin_um)
+  const double margin = margin_um(found.front(), {coarse.width * coarse_um, coarse.height * coarse_um});
+  if (found.size() > 1) survey.facts += "; " + std::to_string(found.size()) + " cells, of which the largest counts";
+  survey.facts += "; margin " + brief(margin) + " um";
+  if (margin < kLeastMargin_um)
     survey.doubts.push_back(
-        "The cell comes within " + brief(*margin) + " um of the image's border (limit " + brief(kLeastMargin_um) +
+        "The cell comes within " + brief(margin) + " um of the image's border (limit " + brief(kLeastMargin_um) +
         " um): forces beyond the image are then unknown. Take a larger field, or a cell in its middle.");
 }
 
@@ -165,6 +188,7 @@ Survey survey(const CellImages& cell, int threads) {
   look_at_each(cell, survey);
   look_for_twins(cell, survey);
   look_at_beads(cell, threads, survey);
+  look_at_pair(cell, pixel_um, survey);
   look_at_cell(cell, pixel_um, survey);
   look_at_adhesions(cell, pixel_um, survey);
   return survey;

@@ -231,6 +231,15 @@ TEST_F(Errors, check_knows_channels_that_are_exchanged_blur_few_beads_and_a_cell
   EXPECT_NE(said().find("If one of them shows another channel"), std::string::npos) << said();
   files::write_text(cell_ / "actin.tif", actin);
   files::write_text(cell_ / "beads_relaxed.tif", relaxed);
+  EXPECT_NE(said().find(" % of the field in both"), std::string::npos) << said();
+  const std::string stressed = files::read_text(cell_ / "beads_stressed.tif");
+  images::Image mirrored = images::read_image(cell_ / "beads_stressed.tif");
+  for (int j = 0; j < mirrored.height; ++j)
+    std::ranges::reverse(mirrored.pixels.begin() + static_cast<std::ptrdiff_t>(j) * mirrored.width,
+                         mirrored.pixels.begin() + static_cast<std::ptrdiff_t>(j + 1) * mirrored.width);
+  images::write_tiff(cell_ / "beads_stressed.tif", mirrored);
+  EXPECT_NE(said().find("beads_stressed.tif looks mirrored against beads_relaxed.tif"), std::string::npos) << said();
+  files::write_text(cell_ / "beads_stressed.tif", stressed);
   EXPECT_EQ(said().find("caution"), std::string::npos) << said();
 
   const auto changed = [&](const char* name, const auto& change) {
