@@ -157,6 +157,15 @@ TEST_F(Segment, a_sound_cell_has_no_findings) {
                        "bright-actin", "adhesions-off-actin", "outline-off-actin", "actin-shift", "adhesions-assumed",
                        "fibre-ends-anchored", "input-not-used"},
                       said);
+  EXPECT_FALSE(fires("cells-touch", said)) << said;
+}
+
+TEST_F(Segment, a_second_cell_that_touches_is_cut_off_and_told) {
+  test::draw_ellipse(scene_.actin_image, test::ellipse(1, {23, 23}, 7.4, 7.4, 0), 200, 0.13, scene_.kPixel_um);
+  images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
+  const std::string said = segment("out", both() + " --outline_smallest_um2 20").output;
+  EXPECT_TRUE(fires("cells-touch", said)) << said;
+  EXPECT_FALSE(contains(files::read_cell(folder_ / "out").outline_um, {23, 23}));
 }
 
 TEST_F(Segment, an_adhesion_beside_the_cell_is_left_out_and_told) {
