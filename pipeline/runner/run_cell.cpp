@@ -1,14 +1,17 @@
 #include "pipeline/runner/run_cell.h"
+#include "pipeline/runner/batch.h"
 
 #include <algorithm>
 #include <exception>
 #include <mutex>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/machine.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/runner/batch.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
@@ -417,6 +420,15 @@ void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOp
 
 namespace {
 
+/// 0 where the folder is searched in vain.
+std::size_t n_cells_below(const fs::path& folder) {
+  try {
+    return find_cells(folder).cells.size();
+  } catch (const InputError&) {
+    return 0;
+  }
+}
+
 std::string parent_of(const fs::path& file) {
   const fs::path folder = file.parent_path();
   return folder.empty() ? "." : folder.string();
@@ -429,8 +441,12 @@ ImageNames read_image_names(const fs::path& cell) {
     throw InputError(cell.string(), "a cell folder", "a file", "give the folder that it is in: " + parent_of(cell));
   if (!files::is_folder(cell)) throw InputError(cell.string(), "a cell folder", "none");
   if (!files::is_file(cell / "cell.toml")) {
+    if (const std::size_t n = n_cells_below(cell); n > 0)
+      throw InputError(cell.string(), "a cell folder with cell.toml",
+                       "a folder of " + counted(static_cast<std::int64_t>(n), "cells"),
+                       "to run them all: mbtfm batch " + cell.string());
     throw InputError(cell.string(), "a cell folder with cell.toml", "no cell.toml",
-                     "write one with pixel_size_um and, in [gel], youngs_modulus_kPa");
+                     "to write one from what the images say: mbtfm init " + cell.string());
   }
   ImageNames names;
   stage::ParameterList list;
