@@ -5,6 +5,7 @@
 #include <map>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/own_files.h"
@@ -12,6 +13,8 @@
 
 namespace mbtfm::report {
 namespace {
+
+constexpr const char* kSheetTruth = "truth/sheet.csv";
 
 double sum_of_magnitudes(const std::vector<AdhesionForce>& forces) {
   double sum = 0;
@@ -98,7 +101,27 @@ Comparison compare_with_truth(const fs::path& cell) {
   return comparison;
 }
 
+/// Of a sheet: each quantity of truth/sheet.csv that the fit has.
+std::string sheet_comparison_text(const fs::path& cell) {
+  constexpr const char* kRow = "{:<36} {:>9} {:>9} {:>9} {:>9}\n";
+  const files::CsvTable truth(cell / kSheetTruth), found(cell / "3_sheet/sheet_fit.csv");
+  std::string text = fmt::format(fmt::runtime(kRow), "quantity", "found", "low", "high", "truth");
+  const auto number = [&](int row, const char* column) {
+    const std::optional<double> value = found.optional_number(row, column);
+    return value ? short_number(*value) : std::string("–");
+  };
+  for (int i = 0; i < truth.n_rows(); ++i) {
+    for (int k = 0; k < found.n_rows(); ++k) {
+      if (found.text(k, "quantity") != truth.text(i, "quantity") || !found.text(k, "part").empty()) continue;
+      text += fmt::format(fmt::runtime(kRow), truth.text(i, "quantity"), number(k, "value"), number(k, "low"),
+                          number(k, "high"), short_number(truth.number(i, "value")));
+    }
+  }
+  return text + "\nreport: " + (cell / "report.html").string() + "\n";
+}
+
 std::string comparison_text(const fs::path& cell) {
+  if (files::is_own_file(cell / kSheetTruth)) return sheet_comparison_text(cell);
   const Comparison comparison = compare_with_truth(cell);
   constexpr const char* kRow = "{:>5}  {:>5}  {:<8} {:<8} {:>9} {:>9} {:>9} {:>9}\n";
   std::string text =

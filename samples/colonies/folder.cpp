@@ -70,9 +70,9 @@ void write_folder(const Colony& colony, const sheet::Solution& solution, const W
   declare(list, copy.colony);
   declare(list, copy.sheet);
   const sheet::Material& material = solution.sheet.material;
-  files::write_text(file("cell.toml"), stage::to_toml(list, {"", "gel"}) +
-                                           "\n[sheet]\nthickness_um = " + shortest(material.thickness_um) +
-                                           "\npoisson_ratio = " + shortest(material.poisson_ratio) + "\n");
+  files::write_text(file("cell.toml"),
+                    stage::to_toml(list, {"", "gel"}) + "\n[sheet]\nthickness_um = " + shortest(material.thickness_um) +
+                        "\npoisson_ratio = " + shortest(material.poisson_ratio) + "\n\n[run]\nmodel = \"sheet\"\n");
   files::write_text(file("truth/scenario.toml"), stage::to_toml(list, {"", "gel", "scenario", "colony", "sheet"}));
   files::write_outline(file("1_segment/outline.csv"), colony.outline_um);
   if (!colony.adhesive_um.empty()) files::write_outline(file("adhesive.csv"), colony.adhesive_um.front());

@@ -496,7 +496,6 @@ class SheetsOfImages : public Sheet {
         "mbtfm-simulate --quiet --scenario contracting-disc --images --radius_um 14 --image_size_px 480 --beads 2500 "
         "--mesh_um 0.7 --out " +
         cell_.string());
-    add("[run]\nmodel = \"sheet\"\n");
     std::string toml = files::read_text(cell_ / "cell.toml");
     toml.insert(toml.find("[sheet]\n") + 8, "mesh_um = 0.6\n");
     files::write_text(cell_ / "cell.toml", toml);
@@ -515,6 +514,9 @@ TEST_F(SheetsOfImages, give_contraction_and_stiffness_back_in_one_command_and_in
   const std::string told = done("mbtfm run " + cell_.string());
   EXPECT_NE(told.find("a contracting sheet, as run.model is sheet"), std::string::npos) << told;
   EXPECT_NE(told.find("mbtfm: contraction 2"), std::string::npos) << told;
+  const std::string compared = done("mbtfm compare " + cell_.string());
+  EXPECT_NE(compared.find("contraction_nN_per_um"), std::string::npos) << compared;
+  EXPECT_NE(compared.find(" 2\n"), std::string::npos) << "the truth: " << compared;
   const files::CsvTable truth(cell_ / "truth/sheet.csv"), fitted(cell_ / "3_sheet/sheet_fit.csv");
   for (int row = 0; row < 2; ++row) {
     ASSERT_EQ(truth.text(row, "quantity"), fitted.text(row, "quantity"));
@@ -579,7 +581,7 @@ TEST(SheetStudies, a_known_difference_of_contraction_is_found_and_the_tables_agr
       done("mbtfm-simulate --quiet --scenario contracting-disc --radius_um 14 --beads 1500 --mesh_um 0.7 --seed " +
            std::to_string(seed) + " --contraction_nN_per_um " + std::to_string(contraction) + " --out " +
            cell.string());
-      std::string toml = files::read_text(cell / "cell.toml") + "\n[run]\nmodel = \"sheet\"\n";
+      std::string toml = files::read_text(cell / "cell.toml");
       toml.insert(toml.find("[sheet]\n") + 8, "mesh_um = 2\n");
       files::write_text(cell / "cell.toml", toml);
       truth_of[name] = files::CsvTable(cell / "truth/sheet.csv").number(0, "value");
