@@ -16,6 +16,7 @@
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/provenance.h"
+#include "pipeline/report/result_line.h"
 #include "pipeline/report/results.h"
 #include "pipeline/report/sheet_report.h"
 #include "pipeline/report/space_report.h"
@@ -152,6 +153,17 @@ std::string effects_table(const Provenance& provenance) {
 
 }  // namespace
 
+/// Of a time series; empty for a cell of one frame.
+std::string series_section(const fs::path& cell) {
+  const std::optional<ForceOverTime> series = force_over_time(cell);
+  if (!series) return "";
+  const fs::path picture = cell / "4_fit/tracks.svg";
+  return section("Over time", "<p>" + html_escaped(sentence_of(*series)) +
+                                  " Tables: <code>4_fit/tracks.csv</code> and "
+                                  "<code>4_fit/frames.csv</code>. All else on this page is of the first frame.</p>\n" +
+                                  (files::is_own_text(picture) ? files::read_text(picture) : std::string()));
+}
+
 std::string provenance_section(const Provenance& provenance, const std::string& figures) {
   Table stages{{"stage", "state", "result", number("seconds"), number("memory (MB)"), "version"}, {}, "Stages"};
   for (const StageLine& stage : provenance.stages) {
@@ -230,7 +242,7 @@ std::string report_html(const fs::path& cell) {
       readable(results.gel.thickness_um), kVersion);
   std::string body = findings_section(facts_of(results), provenance);
   if (!results.cell.fibres.empty()) body += tension_section(results);
-  body += map_section(results) + adhesion_section(results);
+  body += series_section(cell) + map_section(results) + adhesion_section(results);
   if (results.fit.error_budget) body += section("Error budget", error_budget_html(results));
   body += section("For your methods section", methods_paragraph(results, provenance)) +
           provenance_section(provenance, folded("Figures of the fit", figure_pairs(results)));

@@ -50,6 +50,11 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
   EXPECT_NEAR(frames.number(1, "total_force_nN"), 2 * frames.number(0, "total_force_nN"),
               4 * frames.number(1, "total_force_sigma_nN"));
   EXPECT_TRUE(fs::exists(cell / "4_fit/tracks.svg"));
+  EXPECT_NE(run.output.find("; over 2 frames from "), std::string::npos) << run.output;
+  const std::string page = files::read_text(cell / "report.html");
+  EXPECT_NE(page.find("Over 2 frames the total force goes from "), std::string::npos);
+  EXPECT_NE(page.find("1 frame could not be fitted"), std::string::npos);
+  EXPECT_NE(page.find(files::read_text(cell / "4_fit/tracks.svg")), std::string::npos);
 
   const std::string before = files::read_text(cell / "4_fit/tracks.csv");
   DisplacementField field = files::read_displacement(cell / "2_track/displacement_0002.csv");
