@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
@@ -79,11 +80,10 @@ VectorXd values_of(const FrameFit& fit) {
   return values_nN;
 }
 
-std::string type_name(const Tension& tension, const std::vector<Fibre>& fibres) {
-  if (tension.fibre_id == 0) return "network";
-  const auto fibre =
-      std::find_if(fibres.begin(), fibres.end(), [&](const Fibre& f) { return f.fibre_id == tension.fibre_id; });
-  return fibre == fibres.end() ? "" : std::string(name_of(fibre->type));
+FibreType type_of(const Tension& tension, const std::vector<Fibre>& fibres) {
+  const auto fibre = std::ranges::find(fibres, tension.fibre_id, &Fibre::fibre_id);
+  MBTFM_ASSERT(fibre != fibres.end());
+  return fibre->type;
 }
 
 std::optional<double> time_s(int frame, std::optional<double> interval_s) {
@@ -113,13 +113,14 @@ charts::Axis time_axis(const std::vector<FrameFit>& fits, std::optional<double> 
 }
 
 charts::Axis from_zero(const std::string& label, double largest) {
-  return {.label = label, .low = 0, .high = largest > 0 ? 1.15 * largest : 1, .scale = charts::Scale::linear};
+  // above the highest curve there is room for the key
+  return {.label = label, .low = 0, .high = largest > 0 ? 1.4 * largest : 1, .scale = charts::Scale::linear};
 }
 
 charts::Chart tension_chart(const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,
                             std::optional<double> interval_s) {
   std::map<int, Track> tracks;
-  std::map<int, std::string> types;
+  std::map<int, FibreType> types;
   double largest = 0;
   for (const FrameFit& f : fits) {
     for (const Tension& t : f.tensions) {
@@ -128,19 +129,16 @@ charts::Chart tension_chart(const std::vector<FrameFit>& fits, const std::vector
       track.points.push_back({time_s(f.frame, interval_s).value_or(f.frame), t.tension_nN});
       track.low.push_back(t.low_nN.value_or(t.tension_nN));
       track.high.push_back(t.high_nN.value_or(t.tension_nN));
-      types[t.fibre_id] = type_name(t, fibres);
+      types[t.fibre_id] = type_of(t, fibres);
       largest = std::max(largest, t.tension_nN);  // a bar of a fibre that no bead tells of may reach beyond
     }
   }
   charts::Chart chart("Tensions of the fibres", time_axis(fits, interval_s), from_zero("tension (nN)", largest));
-  std::map<std::string, std::string> colours;
+  std::set<FibreType> named;
   for (const auto& [id, track] : tracks) {
-    auto& colour = colours[types[id]];
-    if (colour.empty()) {
-      colour = charts::kColours[(colours.size() - 1) % std::size(charts::kColours)];
-      chart.key(types[id], colour);
-    }
-    draw(chart, track, colour, "fibre " + std::to_string(id));
+    const FibreType type = types.at(id);
+    if (named.insert(type).second) chart.key(std::string(name_of(type)), charts::colour_of(type));
+    draw(chart, track, charts::colour_of(type), "fibre " + std::to_string(id));
   }
   return chart;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
 
 namespace mbtfm::charts {
@@ -23,6 +24,12 @@ std::vector<double> ticks(double low, double high);
 /// Colours that differ in lightness and to colour-blind eyes (Okabe & Ito 2008), for curves in turn.
 inline constexpr const char* kColours[] = {"#0072B2", "#D55E00", "#00805C", "#B87A00",
                                            "#8E4A7E", "#333333", "#4A9CC9", "#8A8A00"};
+
+/// Of the fibres' types, in every chart and page.
+constexpr const char* colour_of(FibreType type) {
+  constexpr const char* kOfType[] = {"#0072B2", "#B87A00", "#00805C", "#B5482A"};  // dorsal, arc, ventral, edge
+  return kOfType[static_cast<int>(type)];
+}
 
 /// The colour "#rrggbb" as dark as text on white must be for weak eyes: with a contrast of 4.5 (WCAG 2.1, 1.4.3).
 /// Other ways to write a colour come back as they are.

@@ -40,19 +40,17 @@ void draw_row(Chart& chart, const FibreRow& row, double y, const CellResults& re
 }
 
 struct Look {
-  const char *name, *colour, *bright_colour;
+  const char *name, *bright_colour;
 };
 const Look& look_of(FibreType type) {
-  static constexpr Look kLooks[] = {{"dorsal", "#0072B2", "#56b4ff"},
-                                    {"transverse arc", "#B87A00", "#ffb728"},
-                                    {"ventral", "#00805C", "#00d68f"},
-                                    {"edge", "#B5482A", "#ff7a52"}};
+  static constexpr Look kLooks[] = {
+      {"dorsal", "#56b4ff"}, {"transverse arc", "#ffb728"}, {"ventral", "#00d68f"}, {"edge", "#ff7a52"}};
   return kLooks[static_cast<int>(type)];
 }
 
 }  // namespace
 
-const char* colour_of(FibreType type) { return look_of(type).colour; }
+const char* colour_of(FibreType type) { return charts::colour_of(type); }
 const char* full_name_of(FibreType type) { return look_of(type).name; }
 const char* bright_colour_of(FibreType type) { return look_of(type).bright_colour; }
 const char* dashes_of(FibreType type) { return type == FibreType::edge ? ";stroke-dasharray:9 4 2 4" : ""; }
