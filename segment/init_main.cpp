@@ -1,6 +1,5 @@
 /// mbtfm-init: a cell.toml from what the files of a folder say, with notes on what is to be completed.
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <iterator>
 #include <optional>
@@ -11,6 +10,7 @@
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/own_files.h"
+#include "pipeline/files/names.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
@@ -24,16 +24,13 @@ using namespace mbtfm;
 constexpr std::string_view kImages[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
 
 bool is_image(const fs::path& file) {
-  std::string type = file.extension().string();
-  std::ranges::transform(type, type.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::ranges::find(kImages, type) != std::end(kImages);
+  return std::ranges::find(kImages, files::lower_case(file.extension().string())) != std::end(kImages);
 }
 
 std::vector<std::string> images_in(const fs::path& folder) {
   std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (is_image(entry.path()) && files::is_file(entry.path())) names.push_back(entry.path().filename().string());
-  std::ranges::sort(names);
+  for (const fs::path& file : files::visible_in(folder))
+    if (is_image(file) && files::is_file(file)) names.push_back(file.filename().string());
   return names;
 }
 

@@ -59,6 +59,8 @@ bool is_own_file(const fs::path& file) { return type_of(file) == fs::file_type::
 
 bool is_own_text(const fs::path& file) {
   std::error_code error;
+bool is_own_folder(const fs::path& folder) { return type_of(folder) == fs::file_type::directory; }
+
   return is_own_file(file) && fs::file_size(file, error) <= kLargestText_bytes;
 }
 

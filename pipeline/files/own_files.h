@@ -13,6 +13,8 @@ namespace mbtfm::files {
 bool is_file(const fs::path& file);
 /// A folder, also through links; false where it cannot be looked at.
 bool is_folder(const fs::path& folder);
+/// A folder itself: no link.
+bool is_own_folder(const fs::path& folder);
 /// A regular file itself: no link.
 bool is_own_file(const fs::path& file);
 /// The largest of the texts of ours that are read whole (records, hashes, reports): some ten MB at most in fact. A file

@@ -283,3 +283,4 @@ TEST_F(Errors, a_cell_toml_that_init_wrote_runs_once_the_modulus_is_in_it) {
 
 }  // namespace
 }  // namespace mbtfm
+  files::write_text(cell_ / "._day1_Paxillin.tif", "as a Mac leaves on a stick");
