@@ -51,7 +51,7 @@ struct CommandLine {
   int threads = numerics::available_threads();
   int jobs = 1;
   bool is_quiet = false, is_verbose = false, is_json = false, only_list = false, only_table = false, is_checked = false,
-       explain = false;
+       explain = false, is_forced = false;
   std::vector<std::string> only, redo, patterns, set;
   std::vector<fs::path> more_cells;
   fs::path template_toml, out, inputs;
@@ -408,6 +408,7 @@ int demo(CommandLine line) {
   if (const int code = runner::exit_code_of(simulated); code != kDone) return code;
   const int code = run(line);
   if (code == kDone) compare(line);
+  if (line.is_forced) command.emplace_back("--force");
   return code;
 }
 
@@ -429,6 +430,7 @@ int start(int argc, char** argv) {
       add_command(app, line, "init", "write a cell.toml from what the images of a folder say", kCell);
   CLI::App* check_command = add_command(
       app, line, "check", "what the images below a folder are good for: a second a cell, before a batch", kFolder);
+  demo_command->add_flag("--force", line.is_forced, "write over a cell that an earlier demo or simulation made");
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", kCell);
   add_stage_options(run_command, line);
   run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");

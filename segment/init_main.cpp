@@ -146,9 +146,9 @@ Written cell_toml(const fs::path& folder) {
 StageReport init(stage::StageContext& context) {
   const fs::path folder = context.input("cell", {});
   if (!files::is_folder(folder)) throw InputError(folder.string(), "a folder with the images of a cell", "none");
-  if (fs::symlink_status(folder / "cell.toml").type() != fs::file_type::not_found)
-    throw InputError((folder / "cell.toml").string(), "no cell.toml yet", "one",
-                     "it is yours: edit it, or rename it first");
+  for (const fs::path& file : {folder / "cell.toml", context.outputs_.at("out")})
+    if (fs::symlink_status(file).type() != fs::file_type::not_found)
+      throw InputError(file.string(), "no cell.toml yet", "one", "it is yours: edit it, or rename it first");
   if (images_in(folder).empty())
     throw InputError(folder.string(), "images of a cell: TIFF, PNG or JPEG", "none",
                      "files of a microscope (nd2, czi, lif): in Fiji, File > Import > Bio-Formats, then File > Save As "

@@ -43,7 +43,17 @@ void check_cell_folder(const fs::path& cell);
 /// @throws OutputError where a folder is in the way, or it cannot be removed
 void make_way(const fs::path& file);
 
-/// Give a file that is whole its name; a link of that name is replaced, not followed. @throws OutputError
+/// What a file is, as far as its beginning shows: the first column of a table, the first word or bytes of others.
+std::string kind_of_file(const fs::path& file);
+/// That of an HTML page with our name at the end of its title.
+inline constexpr const char* kOwnPage = "a page of mbtfm";
+
+/// No program writes over what it did not make. @param kind  of what is to take the place of `file`
+/// @throws OutputError if a file of another kind is there; one without content, or with a hidden name, is nobody's
+void expect_own_kind(const fs::path& file, const std::string& kind);
+
+/// Give a file that is whole its name; a link of that name is replaced, not followed.
+/// @throws OutputError, also as expect_own_kind
 void put_in_place(const fs::path& temporary, const fs::path& file);
 
 }  // namespace mbtfm::files
