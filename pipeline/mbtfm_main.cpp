@@ -283,6 +283,10 @@ int repeat(const CommandLine& line) {
   std::vector<std::string> arguments = {
       "--cells",   line.folder.string(),
       "--out",     files::inside(line.folder, "statistics", line.folder.string()).string(),
+  const auto is_config = [](const std::string& argument) { return argument.starts_with("--config"); };
+  if (const fs::path shared = line.folder / "study.toml";
+      files::is_file(shared) && std::ranges::none_of(further, is_config))
+    arguments.insert(arguments.end(), {"--config", shared.string()});
       "--threads", std::to_string(line.threads)};
   if (line.is_quiet) arguments.emplace_back("--quiet");
   for (std::string argument : further) {
