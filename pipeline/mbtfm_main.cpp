@@ -54,7 +54,7 @@ struct CommandLine {
        explain = false, is_forced = false;
   std::vector<std::string> only, redo, patterns, set;
   std::vector<fs::path> more_cells;
-  fs::path template_toml, out, inputs;
+  fs::path template_toml, out, inputs, like;
   std::optional<double> timeout_s;
   std::optional<std::uint64_t> memory_bytes;
   std::string preset, accuracy;
@@ -303,7 +303,9 @@ int repeat(const CommandLine& line) {
 }
 
 [[noreturn]] void init(const CommandLine& line) {
-  become("mbtfm-init", {"--cell", line.folder.string(), "--out", (line.folder / "cell.toml").string()});
+  std::vector<std::string> arguments = {"--cell", line.folder.string(), "--out", (line.folder / "cell.toml").string()};
+  if (!line.like.empty()) arguments.insert(arguments.end(), {"--like", line.like.string()});
+  become("mbtfm-init", arguments);
 }
 
 /// @param arguments  as given, in their order
@@ -431,6 +433,8 @@ int start(int argc, char** argv) {
   CLI::App* demo_command = add_command(
       app, line, "demo", "simulate a cell, run every stage on it, show its tensions beside the truth", kDemo);
   CLI::App* init_command =
+  init_command->add_option("--like", line.like,
+                           "a cell folder: write a cell.toml like its own for each folder below that has none");
       add_command(app, line, "init", "write a cell.toml from what the images of a folder say", kCell);
   CLI::App* check_command = add_command(
       app, line, "check", "what the images below a folder are good for: a second a cell, before a batch", kFolder);
