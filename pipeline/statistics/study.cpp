@@ -189,7 +189,9 @@ void number_conditions(Study& study, const std::vector<std::string>& condition_o
 }
 
 /// Why the findings of a cell keep it out; empty: they do not.
-std::string excluded_by_finding(const StudyCell& cell, const std::vector<std::string>& ids) {
+std::string excluded_by_finding(const StudyCell& cell, const std::vector<std::string>& ids, bool with_bad) {
+  const auto bad = std::ranges::find_if(cell.findings, spoils_cell);
+  if (bad != cell.findings.end() && !with_bad) return "not usable, as " + bad->id + " says (stats.with_bad)";
   for (const Finding& finding : cell.findings)
     if (is_open(finding) && std::ranges::find(ids, finding.id) != ids.end())
       return "the finding " + finding.id + " is open (stats.exclude_findings)";
@@ -248,6 +250,9 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
   list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
   list.add("with_not_converged", parameters.with_not_converged, "include cells whose fit did not converge");
   list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
+  list.add("list", parameters.list,
+           "print each cell, whether it enters and why not (CSV: cell, condition, included, reason); write nothing");
+  list.add("with_bad", parameters.with_bad, "include cells that a bad finding says not to use");
            "a first tension: the share of fibres above it is given (nN)");
   list.add("strong_tension_nN", parameters.strong_tension_nN, Range::force_nN(),
            "a second tension: the share of fibres above it is given (nN)");
@@ -316,7 +321,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
     if (!reasons[i].empty()) return;
     read[i]->replicate = notes[i].replicate;
     if (!read[i]->fit.converged && !parameters.with_not_converged) reasons[i] = "the fit did not converge";
-    if (reasons[i].empty()) reasons[i] = excluded_by_finding(*read[i], excluding);
+    if (reasons[i].empty()) reasons[i] = excluded_by_finding(*read[i], excluding, parameters.with_bad);
   });
   leave_out_copies(folders, names, read, reasons);
   Study study;
