@@ -118,6 +118,7 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
                      "the segmentation changed after the fit: mbtfm run " + folder.string());
   }
   if (const auto run = run_of(folder)) c.findings = findings_of(*run);
+  if (parameters.list) return c;
   c.directions = directions_of(c.cell, {.measured = field_where_there(folder / kDisplacement),
                                         .fitted = field_where_there(folder / kFitted),
                                         .without_fibres = field_where_there(folder / kWithoutFibres),
@@ -154,10 +155,10 @@ void leave_out_copies(const std::vector<Path>& folders, const std::vector<std::s
     const Path field = folders[i] / field_of(*read[i]);
     if (files::is_own_file(field)) cells[i] = {files::sha256_of_file(field), read[i]->cell.outline_um};
   }
-}
   const auto originals = runner::originals_of(cells);
   for (std::size_t i = 0; i < folders.size(); ++i)
     if (originals[i]) reasons[i] = runner::why_a_copy(names[*originals[i]], field_of(*read[i]), cells[i]);
+}
 
 /// The parts between commas, without spaces around them.
 std::vector<std::string> parts_of(const std::string& list) {
@@ -249,10 +250,10 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
            "cells in space, whichever the study has most cells of; total-force and strain-energy go by that, too");
   list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
   list.add("with_not_converged", parameters.with_not_converged, "include cells whose fit did not converge");
-  list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
   list.add("list", parameters.list,
            "print each cell, whether it enters and why not (CSV: cell, condition, included, reason); write nothing");
   list.add("with_bad", parameters.with_bad, "include cells that a bad finding says not to use");
+  list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
            "a first tension: the share of fibres above it is given (nN)");
   list.add("strong_tension_nN", parameters.strong_tension_nN, Range::force_nN(),
            "a second tension: the share of fibres above it is given (nN)");
@@ -294,7 +295,7 @@ const std::vector<std::string>& further_files_of_a_cell(CellKind kind) {
 }
 
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads) {
-  const runner::FoundCells found = runner::find_cells(folder);
+  const runner::FoundCells found = parameters.list ? runner::search_cells(folder) : runner::find_cells(folder);
   const std::vector<Path>& folders = found.cells;
   std::vector<std::string> names;
   for (const Path& cell : folders) {
