@@ -18,6 +18,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/order_statistics.h"
@@ -126,11 +127,15 @@ Path image_in(const Path& folder, const runner::ImageNames& names, const std::st
 /// Folders that hold an outline and a displacement, by name.
 std::vector<Path> folders_of_cells(const Path& top, const Parameters& p) {
   if (!files::is_folder(top)) throw InputError(top.string(), "a folder of cell folders", "none of that name");
-  std::set<Path> found;
+  std::set<Path, decltype(&files::is_before)> found(files::is_before);
   std::error_code error;
   const auto how = fs::directory_options::skip_permission_denied;  // lost+found
   for (fs::recursive_directory_iterator entry(top, how, error), end; !error && entry != end; entry.increment(error)) {
     if (!files::is_folder(entry->path())) continue;  // a link that leads round in a circle is none
+    if (files::is_hidden(entry->path())) {
+      entry.disable_recursion_pending();
+      continue;
+    }
     if (displacement_in(entry->path()).empty()) continue;
     if (outline_in(entry->path(), settings_of(entry->path(), p).images).empty()) continue;
     found.insert(entry->path().lexically_relative(top));

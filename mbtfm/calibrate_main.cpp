@@ -9,6 +9,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/parallel.h"
@@ -36,9 +37,8 @@ struct Cells {
 Cells read_cells(stage::StageContext& context) {
   const Path folder = context.input("cells", {});
   std::vector<Path> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(folder))
-    if (files::is_own_file(entry.path() / "4_fit/fit.json")) paths.push_back(entry.path());
-  std::sort(paths.begin(), paths.end());
+  for (const Path& entry : files::visible_in(folder))
+    if (files::is_own_file(entry / "4_fit/fit.json")) paths.push_back(entry);
   Cells cells;
   for (const Path& path : paths) {
     files::check_cell_folder(path);

@@ -51,10 +51,10 @@ struct CommandLine {
   int threads = numerics::available_threads();
   int jobs = 1;
   bool is_quiet = false, is_verbose = false, is_json = false, only_list = false, only_table = false, is_checked = false,
-       explain = false;
+       explain = false, is_forced = false;
   std::vector<std::string> only, redo, patterns, set;
   std::vector<fs::path> more_cells;
-  fs::path template_toml, out, inputs;
+  fs::path template_toml, out, inputs, like;
   std::optional<double> timeout_s;
   std::optional<std::uint64_t> memory_bytes;
   std::string preset, accuracy;
@@ -203,14 +203,14 @@ int run(const CommandLine& line) {
 }
 
 /// The cells below the folder, made from images first where patterns say so.
-std::vector<fs::path> cells_of(const CommandLine& line) {
+runner::FoundCells cells_of(const CommandLine& line) {
   std::vector<runner::ImagePattern> patterns;
   for (const std::string& text : line.patterns) patterns.push_back(runner::parse_pattern(text));
   if (!patterns.empty()) runner::make_cell_folders(line.folder, patterns, line.template_toml);
   runner::FoundCells found = runner::find_cells(line.folder);
   for (const runner::SkippedFolder& skipped : found.skipped)
-    say("skipped, as it cannot be read: " + skipped.folder.string() + ": " + skipped.why);
-  return std::move(found.cells);
+    say("skipped: " + skipped.folder.string() + ": " + skipped.why);
+  return found;
 }
 
 std::vector<std::string> arguments_of_cell(const CommandLine& line) {
@@ -229,7 +229,7 @@ std::vector<std::string> arguments_of_cell(const CommandLine& line) {
 void tell_of_cell(const runner::BatchCell& cell) { stage::print(event_of(cell)); }
 
 int batch(const CommandLine& line) {
-  const std::vector<fs::path> cells = cells_of(line);
+  const auto [cells, skipped] = cells_of(line);
   if (line.only_list) {
     stage::print(runner::list_cells(cells, run_options(line), line.threads));
     return kDone;
@@ -245,11 +245,9 @@ int batch(const CommandLine& line) {
                                                         .ended = line.is_json ? tell_of_cell : nullptr,
                                                         .show = line.is_quiet || !is_terminal() ? nullptr : show});
   const auto n_failed = std::ranges::count_if(outcomes, [](const auto& cell) { return cell.exit_code != 0; });
-  const fs::path table = line.folder / "batch.csv";
   if (n_failed > 0) say("failed:" + runner::failure_table(line.folder, outcomes));
-  runner::write_batch_table(table, line.folder, outcomes, line.only);
-  say(std::to_string(outcomes.size() - n_failed) + " cells done, " + std::to_string(n_failed) + " failed; " +
-      table.string());
+  const runner::BatchCounts told = runner::write_batch_tables(line.folder, outcomes, skipped, line.only);
+  say(told.counts + "; " + (line.folder / "batch.csv").string() + told.not_to_count);
   return n_failed == 0 ? kDone : kFailed;
 }
 
@@ -285,6 +283,10 @@ int repeat(const CommandLine& line) {
       "--out",     files::inside(line.folder, "statistics", line.folder.string()).string(),
       "--threads", std::to_string(line.threads)};
   if (line.is_quiet) arguments.emplace_back("--quiet");
+  const auto is_config = [](const std::string& argument) { return argument.starts_with("--config"); };
+  if (const fs::path shared = line.folder / "study.toml";
+      files::is_file(shared) && std::ranges::none_of(further, is_config))
+    arguments.insert(arguments.end(), {"--config", shared.string()});
   for (std::string argument : further) {
     // flags are written with dashes, too: --condition-from
     const auto end = argument.begin() + static_cast<std::ptrdiff_t>(std::min(argument.find('='), argument.size()));
@@ -299,7 +301,9 @@ int repeat(const CommandLine& line) {
 }
 
 [[noreturn]] void init(const CommandLine& line) {
-  become("mbtfm-init", {"--cell", line.folder.string(), "--out", (line.folder / "cell.toml").string()});
+  std::vector<std::string> arguments = {"--cell", line.folder.string(), "--out", (line.folder / "cell.toml").string()};
+  if (!line.like.empty()) arguments.insert(arguments.end(), {"--like", line.like.string()});
+  become("mbtfm-init", arguments);
 }
 
 /// @param arguments  as given, in their order
@@ -404,6 +408,7 @@ int demo(CommandLine line) {
   command.insert(command.end(), {"--scenario", "u2os", "--seed", "1", "--noise", "0.07", "--beads", "10000"});
   command.insert(command.end(), {"--images", "--out", line.folder.string(), "--threads", std::to_string(line.threads)});
   if (line.is_quiet) command.emplace_back("--quiet");
+  if (line.is_forced) command.emplace_back("--force");
   const runner::ProcessResult simulated = runner::run_process(command);
   if (const int code = runner::exit_code_of(simulated); code != kDone) return code;
   const int code = run(line);
@@ -425,8 +430,11 @@ int start(int argc, char** argv) {
   app.footer("Exit codes: " + stage::exit_codes());
   CLI::App* demo_command = add_command(
       app, line, "demo", "simulate a cell, run every stage on it, show its tensions beside the truth", kDemo);
+  demo_command->add_flag("--force", line.is_forced, "write over a cell that an earlier demo or simulation made");
   CLI::App* init_command =
       add_command(app, line, "init", "write a cell.toml from what the images of a folder say", kCell);
+  init_command->add_option("--like", line.like,
+                           "a cell folder: write a cell.toml like its own for each folder below that has none");
   CLI::App* check_command = add_command(
       app, line, "check", "what the images below a folder are good for: a second a cell, before a batch", kFolder);
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", kCell);

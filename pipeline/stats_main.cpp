@@ -2,6 +2,7 @@
 #include "pipeline/contract/counted.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/stage/console.h"
 #include "pipeline/stage/stage.h"
 #include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/picture.h"
@@ -38,6 +39,12 @@ double width_mm(const Figure& figure) {
 
 StageReport statistics(const StudyParameters& parameters, stage::StageContext& context) {
   const Study study = read_study(parameters, context);
+  if (parameters.list) {
+    stage::print(list_of_cells(study));
+    StageReport report;
+    report.summary = counted(std::ssize(study.left_out), "cells") + " left out";
+    return report;
+  }
   const Analysis analysis = analyse(study, parameters);
   for (const auto& [name, text] : tables_of(study, analysis)) files::write_text(context.output("out", name), text);
   const std::vector<Figure> figures = figures_of(study, analysis, parameters);

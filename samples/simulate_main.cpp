@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "samples/colonies/colony.h"
@@ -38,6 +39,16 @@ void set_scenario(stage::ParameterList& list, drawing::ScenarioParameters& cell,
     cell = drawing::rough_day(cell, number);
 }
 
+/// @throws UsageError if the folder holds what no simulation made: a cell of the user's own
+void expect_simulated(const std::filesystem::path& cell) {
+  if (files::is_file(cell / "truth/scenario.toml")) return;
+  for (const char* name : {"cell.toml", "paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif",
+                           "surface_beads.tif", "surface.vtp", "1_segment", "2_track", "truth"})
+    if (std::filesystem::exists(std::filesystem::symlink_status(cell / name)))
+      throw UsageError((cell / name).string() +
+                       " is there, and no simulation made it: nothing is written over it; name a new folder");
+}
+
 /// Images beside the true segmentation of an earlier experiment would never be looked at: it would pass for the user's.
 void refuse_given_segmentation(const std::filesystem::path& cell) {
   if (std::filesystem::exists(cell / "1_segment") && !std::filesystem::exists(cell / "run.json"))
@@ -45,6 +56,7 @@ void refuse_given_segmentation(const std::filesystem::path& cell) {
 }
 
 struct SimulateParameters {
+  bool force = false;  ///< what an earlier simulation made is written over
   drawing::ScenarioParameters cell;
   gels::SpaceParameters space;
   colonies::ColonyParameters colony;
@@ -53,6 +65,7 @@ struct SimulateParameters {
 
 void declare(stage::ParameterList& list, SimulateParameters& p) {
   declare(list, p.cell);
+  list.add("force", p.force, "write over what an earlier simulation made in the folder; never over anything else");
   declare(list, p.space);
   declare(list, p.colony);
   declare(list, p.sheet);
@@ -80,17 +93,22 @@ StageReport run_in_space(const SimulateParameters& p, stage::StageContext& conte
   return report;
 }
 
-/// Colonies: one in the folder itself, several in folders colony_001 and so on.
+/// Below the output: the folder itself where there is one colony, else colony_001 and so on.
+std::string folder_of_colony(int k, int n) {
+  std::string number = std::to_string(k + 1);
+  number.insert(0, std::max<std::size_t>(3, number.size()) - number.size(), '0');
+  return n == 1 ? "" : "colony_" + number + "/";
+}
+
 StageReport run_colonies(const SimulateParameters& p, stage::StageContext& context) {
+  const int n = p.colony.n_colonies;
+  for (int k = 0; k < n; ++k) expect_simulated(context.outputs_.at("out") / folder_of_colony(k, n));
   const Work work(context.threads, context.progress);
   const colonies::Contracting contracting(p.colony, p.sheet, p.cell, work.part(0, 0.5));
-  const int n = p.colony.n_colonies;
   double largest_um = 0, noise_um = 0;
   std::size_t n_beads = 0;
   for (int k = 0; k < n; ++k) {
-    std::string number = std::to_string(k + 1);
-    number.insert(0, std::max<std::size_t>(3, number.size()) - number.size(), '0');
-    const std::string folder = n == 1 ? "" : "colony_" + number + "/";
+    const std::string folder = folder_of_colony(k, n);
     const auto file = [&](const std::string& name) { return context.output("out", folder + name); };
     work.tell(0.5 + 0.5 * k / n, "colony " + std::to_string(k + 1) + " of " + std::to_string(n));
     const colonies::Colony colony = contracting.colony(k);
@@ -128,7 +146,9 @@ void refuse_large_strain(const SimulateParameters& p) {
 StageReport run(const SimulateParameters& all, stage::StageContext& context) {
   const drawing::ScenarioParameters& parameters = all.cell;
   refuse_large_strain(all);
+  if (!all.force) context.remedy_to_replace = "--force writes over a simulated cell; else name a new folder";
   if (all.colony.shape != colonies::Shape::none) return run_colonies(all, context);
+  expect_simulated(context.outputs_.at("out"));
   if (parameters.images) refuse_given_segmentation(context.outputs_.at("out"));
   if (all.space.scene != gels::SpaceScene::none) return run_in_space(all, context);
   const Work work(context.threads, context.progress);

@@ -1,9 +1,12 @@
 /// mbtfm-check: what the images below a folder are good for, cell by cell, before a batch is run.
 #include <algorithm>
 #include <filesystem>
+#include <map>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/hash.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/cell_stages.h"
@@ -93,6 +96,8 @@ survey::Survey survey_of(const fs::path& cell) {
 struct Seen {
   std::string text;
   bool is_fine = true;
+  fs::path beads = {};      ///< the picture while the cell pulls
+  std::string sha256 = {};  ///< of it
 };
 
 Seen look_at(const fs::path& cell, const std::string& name) {
@@ -110,6 +115,29 @@ Seen look_at(const fs::path& cell, const std::string& name) {
   }
 }
 
+/// A folder that was copied has the same picture in another file. Cells of one picture share the file.
+void tell_copies(const std::vector<std::string>& names, std::vector<Seen>& seen) {
+  std::map<std::string, std::size_t> first;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (seen[i].sha256.empty()) continue;
+    const auto [at, is_new] = first.emplace(seen[i].sha256, i);
+    if (is_new || seen[at->second].beads == seen[i].beads) continue;
+    seen[i].is_fine = false;
+    seen[i].text +=
+        stage::warning("  caution: " + seen[i].beads.filename().string() + " is the same picture as that of " +
+                       names[at->second] + ": a copy, or another cell of one field. A copy counts once.") +
+        "\n";
+  }
+}
+
+void read_beads(const fs::path& cell, Seen& seen) {
+  try {
+    seen.beads = fs::canonical(runner::resolve_image(cell, runner::read_image_names(cell), "beads_stressed"));
+    if (files::is_file(seen.beads)) seen.sha256 = files::sha256_of_file(seen.beads);
+  } catch (const std::exception&) {  // told of already
+  }
+}
+
 // What a run writes beside each image: its picture, its field, its networks; measured on the demo cell and doubled.
 constexpr double kBytesPerCell = 40e6;
 
@@ -123,13 +151,21 @@ std::string disk_doubt(const fs::path& folder, std::size_t n_cells) {
 }
 
 StageReport check(const fs::path& folder, int threads, bool& is_fine) {
-  const runner::FoundCells found = runner::find_cells(folder);
+  const runner::FoundCells found = runner::search_cells(folder);
   std::vector<Seen> seen(found.cells.size());
+  std::vector<std::string> names;
+  for (const fs::path& cell : found.cells)
+    names.push_back(cell == folder ? fs::weakly_canonical(folder).filename().string()
+                                   : cell.lexically_relative(folder).string());
   numerics::parallel_for(static_cast<int>(seen.size()), threads, [&](int i) {
-    const bool is_folder_itself = found.cells[i] == folder;
-    seen[i] = look_at(found.cells[i], is_folder_itself ? fs::weakly_canonical(folder).filename().string()
-                                                       : found.cells[i].lexically_relative(folder).string());
+    seen[i] = look_at(found.cells[i], names[i]);
+    read_beads(found.cells[i], seen[i]);
   });
+  tell_copies(names, seen);
+  for (const runner::SkippedFolder& skipped : found.skipped)
+    seen.push_back({.text = skipped.folder.lexically_relative(folder).string() + ": " +
+                            stage::warning("error: " + skipped.why) + "\n",
+                    .is_fine = false});
   for (const Seen& cell : seen) stage::print(cell.text);
   stage::print(disk_doubt(folder, seen.size()));
   const auto n_fine = std::ranges::count_if(seen, &Seen::is_fine);

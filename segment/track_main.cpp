@@ -12,6 +12,7 @@
 #include "pipeline/contract/with_error.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/named_array.h"
+#include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
@@ -235,18 +236,15 @@ std::vector<Frame> frames_of_file(const fs::path& file, const TrackParameters& p
 
 constexpr const char* kImageExtensions[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
 
-/// The images of a folder in the order of their names, or those of a file.
+/// The images of a folder in the order of their names, numbers as numbers, or those of a file.
 std::vector<Frame> frames_of(stage::StageContext& context, const TrackParameters& parameters) {
   const fs::path& given = context.inputs_.at("stressed");
   if (!files::is_folder(given)) return frames_of_file(context.input("stressed"), parameters);
   std::vector<std::string> names;
-  for (const fs::directory_entry& entry : fs::directory_iterator(given)) {
-    const std::string extension = entry.path().extension().string();
-    if (std::ranges::find(kImageExtensions, extension) != std::end(kImageExtensions))
-      names.push_back(entry.path().filename().string());
-  }
+  for (const fs::path& file : files::visible_in(given))
+    if (std::ranges::find(kImageExtensions, file.extension()) != std::end(kImageExtensions))
+      names.push_back(file.filename().string());
   if (names.empty()) throw InputError(given.string(), "images (.tif, .tiff, .png, .jpg, .jpeg)", "none");
-  std::sort(names.begin(), names.end());
   context.input("stressed", names);
   std::vector<Frame> frames;
   for (const std::string& name : names) frames.push_back({given / name, parameters.stressed_plane});

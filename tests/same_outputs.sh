@@ -27,7 +27,7 @@ for build in old new; do
   done
   find "$scratch/$build" -name record.json -exec sed -i -E '/"(seconds|peak_memory_MB|version|started|ended|processor|error_budget_s)":/d' {} +
 done
-differ=$(cd "$scratch" && diff -rq old new | grep -vE '(run\.json|report\.html|run\.log|batch\.csv|\.mbtfm\.hashes|profile\.html) ' || true)
+differ=$(cd "$scratch" && diff -rq old new | grep -vE '(run\.json|report\.html|run\.log|batch(_all)?\.csv|\.mbtfm\.hashes|profile\.html) ' || true)
 files=$(find "$scratch/old" -type f | wc -l)
 if [ -n "$differ" ]; then
   echo "$differ"

@@ -1,14 +1,33 @@
 # The study as one tidy frame in R, without packages: source("study.R"); fibres <- mbtfm_study("STUDY")
 #
 # A row for each fibre of each cell: columns of tensions.csv (docs/columns.md) and `cell`, the path below the folder.
-mbtfm_study <- function(folder, table = "4_fit/tensions.csv", conditions = NULL) {
-  tomls <- list.files(folder, pattern = "^cell\\.toml$", recursive = TRUE)
-  cells <- sort(dirname(tomls))
-  files <- file.path(folder, cells, table)
-  there <- file.exists(files)
+# Cells that `mbtfm stats` leaves out are left out, and named; with_left_out = TRUE keeps their rows, with `included` FALSE
+# and the `reason`.
+
+# By cell: is it included, and why not. Without the program, what `mbtfm stats` has last written counts.
+mbtfm_cells <- function(folder, program = "mbtfm") {
+  written <- file.path(folder, "statistics", "cells.csv")
+  if (nzchar(Sys.which(program))) {
+    text <- system2(program, c("stats", shQuote(folder), "--list", "--quiet"), stdout = TRUE)
+    if (!is.null(attr(text, "status"))) stop(folder, ": mbtfm stats failed")
+    return(read.csv(text = text, colClasses = "character"))
+  }
+  if (!file.exists(written)) stop(program, " is not on the PATH: install it, or run mbtfm stats ", folder, " where it is")
+  read.csv(written, colClasses = "character")[c("cell", "condition", "included", "reason")]
+}
+
+mbtfm_study <- function(folder, table = "4_fit/tensions.csv", conditions = NULL, with_left_out = FALSE, program = "mbtfm") {
+  cells <- mbtfm_cells(folder, program)
+  cells$included <- cells$included == "TRUE"
+  paths <- file.path(folder, cells$cell, table)
+  there <- file.exists(paths)
   if (!any(there)) stop(folder, ": no cell has ", table, ": run mbtfm batch")
-  if (!all(there)) message("left out, as they have no ", table, ": ", paste(cells[!there], collapse = ", "))
-  frames <- Map(function(file, cell) cbind(cell = cell, read.csv(file)), files[there], cells[there])
+  cells$reason[cells$included & !there] <- paste(table, "is not there")
+  for (i in which(!cells$included | !there)) message("left out: ", cells$cell[i], ": ", cells$reason[i])
+  chosen <- which(there & (cells$included | with_left_out))
+  frames <- lapply(chosen, function(i) {
+    cbind(cell = cells$cell[i], read.csv(paths[i]), included = cells$included[i], reason = cells$reason[i])
+  })
   columns <- Reduce(union, lapply(frames, names))
   frames <- lapply(frames, function(frame) {
     frame[setdiff(columns, names(frame))] <- NA

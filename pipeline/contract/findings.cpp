@@ -1,6 +1,7 @@
 #include "pipeline/contract/kinds_of_findings.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -420,6 +421,17 @@ const KindOfFinding& properties_of(FindingKind kind) {
 
 bool is_open(const Finding& finding) { return finding.severity != Severity::note; }
 
+bool spoils_cell(const Finding& finding) {
+  constexpr std::array kMarked = {FindingKind::not_identifiable, FindingKind::network_not_identifiable};
+  return finding.severity == Severity::bad &&
+         std::ranges::none_of(kMarked, [&](FindingKind kind) { return finding.id == properties_of(kind).id; });
+}
+
+const Finding* worst_of(const std::vector<Finding>& findings) {
+  const auto at = std::ranges::find_if(findings, spoils_cell), open = std::ranges::find_if(findings, is_open);
+  return at != findings.end() ? &*at : open != findings.end() ? &*open : nullptr;
+}
+
 bool has_open(const std::vector<Finding>& findings) { return std::ranges::any_of(findings, is_open); }
 
 std::optional<Finding> noticed(FindingKind kind, double number, const std::string& text, Severity severity) {
@@ -456,7 +468,7 @@ std::string findings_page() {
   std::string page =
       "# Findings\n\nThe program reports what it notices about the images, the beads and its own answer. Each finding "
       "has an identity, a\nnumber, a threshold and a remedy. A finding appears on the terminal, in the report, in "
-      "`run.json`, in `run.log`, in\nthe column `findings` of `batch.csv` and in `statistics/findings.csv`.\n\n- "
+      "`run.json`, in `run.log`, in\nthe column `findings` of `batch_all.csv` and in `statistics/findings.csv`.\n\n- "
       "**note**: worth knowing; the results hold.\n- **caution**: the results may be off by more than their error bars "
       "say.\n- **bad**: do not use what the finding names.\n\nA caution or a bad finding is *open*. The report shows a "
       "green tick only if no finding is open.\n";

@@ -47,6 +47,10 @@ struct Finding {
 };
 
 bool is_open(const Finding& finding);
+/// Whether none of the cell's results may be used. What is marked by itself, as `identifiable` does, spoils no cell.
+bool spoils_cell(const Finding& finding);
+/// The first one that spoils the cell, else the first open one; null if none is open.
+const Finding* worst_of(const std::vector<Finding>& findings);
 bool has_open(const std::vector<Finding>& findings);
 
 /// A finding where the number is above its kind's threshold, or is not a number.

@@ -2,6 +2,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/results.h"
+#include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/text.h"
@@ -108,6 +109,23 @@ void write_fit_summary(const Path& file, const FitSummary& summary, const std::v
 
 void write_figures(const Path& file, const Figures& figures) {
   write_text(file, json_text(json_of(figures), 2) + "\n");
+}
+
+CellResult read_cell_result(const Path& cell) {
+  CellResult result{.fit = read_fit_summary(cell / "4_fit/fit.json")};
+  if (result.fit.error_budget) result.total_error_nN = total(result.fit.error_budget->total_force_parts_nN);
+  std::map<int, FibreType> types;
+  for (const Fibre& fibre : read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv"))
+    types[fibre.fibre_id] = fibre.type;
+  for (const Tension& tension : read_tensions(cell / "4_fit/tensions.csv")) {
+    const auto type = types.find(tension.fibre_id);
+    if (type == types.end()) continue;  // the network
+    CellResult::OfType& of = result.types[type->second];
+    of.mean_nN += (tension.tension_nN - of.mean_nN) / ++of.n;
+    ++result.n_fibres;
+    result.n_uncertain += is_uncertain(tension);
+  }
+  return result;
 }
 
 }  // namespace mbtfm::files

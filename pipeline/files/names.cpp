@@ -1,5 +1,6 @@
 #include "pipeline/files/names.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 
@@ -52,6 +53,34 @@ std::string composed(std::string_view text) {
   return result;
 }
 
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// The digits that the text begins with go from it; zeros in front do not count.
+std::string_view take_number(std::string_view& text) {
+  const auto end = static_cast<std::size_t>(std::ranges::find_if_not(text, is_digit) - text.begin());
+  std::string_view number = text.substr(0, end);
+  text.remove_prefix(end);
+  number.remove_prefix(std::min(number.find_first_not_of('0'), number.size()));
+  return number;
+}
+
+/// Below, at or above 0, as strcmp; numbers of any length.
+int compare_names(std::string_view a, std::string_view b) {
+  while (!a.empty() && !b.empty()) {
+    if (is_digit(a.front()) && is_digit(b.front())) {
+      const std::string_view one = take_number(a), other = take_number(b);
+      if (one.size() != other.size()) return one.size() < other.size() ? -1 : 1;
+      if (const int order = one.compare(other); order != 0) return order;
+    } else if (a.front() != b.front()) {
+      return static_cast<unsigned char>(a.front()) < static_cast<unsigned char>(b.front()) ? -1 : 1;
+    } else {
+      a.remove_prefix(1);
+      b.remove_prefix(1);
+    }
+  }
+  return static_cast<int>(b.empty()) - static_cast<int>(a.empty());
+}
+
 }  // namespace
 
 std::size_t utf8_length(std::string_view text) {
@@ -99,14 +128,41 @@ std::string shown_name(std::string_view bytes) {
   return text;
 }
 
+std::string lower_case(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+bool is_hidden(const std::filesystem::path& file) { return file.filename().native().starts_with('.'); }
+
+bool is_before(const std::filesystem::path& a, const std::filesystem::path& b) {
+  return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end(), [](const auto& one, const auto& other) {
+    const int order = compare_names(one.native(), other.native());
+    return order == 0 ? one < other : order < 0;  // t1 and t01
+  });
+}
+
+std::vector<std::filesystem::path> visible_in(const std::filesystem::path& folder, std::error_code& error) {
+  std::vector<std::filesystem::path> found;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    if (!is_hidden(entry->path())) found.push_back(entry->path());
+  std::ranges::sort(found, is_before);
+  return found;
+}
+
+std::vector<std::filesystem::path> visible_in(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  return visible_in(folder, ignored);
+}
+
 std::filesystem::path file_shown_as(const std::filesystem::path& folder, const std::string& name) {
   std::error_code ignored;
   const std::filesystem::path same = folder / name;
   if (std::filesystem::exists(same, ignored)) return same;
   const std::string wanted = composed(same.filename().string());
-  for (std::filesystem::directory_iterator entry(same.parent_path(), ignored), end; !ignored && entry != end;
-       entry.increment(ignored))
-    if (composed(entry->path().filename().string()) == wanted) return entry->path();
+  for (const std::filesystem::path& file : visible_in(same.parent_path()))
+    if (composed(file.filename().string()) == wanted) return file;
   return folder / bytes_told_by(name);
 }
 

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <vector>
 
 namespace mbtfm::files {
 
@@ -18,5 +20,19 @@ std::string shown_name(std::string_view bytes);
 /// The file in `folder` whose name is told so: one of just that name, else one of the same letters (ü as one character
 /// or as two), else one with the bytes that it tells.
 std::filesystem::path file_shown_as(const std::filesystem::path& folder, const std::string& name);
+
+/// Letters of ASCII as small ones.
+std::string lower_case(std::string text);
+
+/// Whether the name begins with a point: it is no cell, no frame, no picture and no table, wherever it lies.
+bool is_hidden(const std::filesystem::path& file);
+
+/// Numbers in names count as numbers, as in file managers: t2 is before t10, and day 2/a before day 10/a.
+bool is_before(const std::filesystem::path& a, const std::filesystem::path& b);
+
+/// What is in a folder, as is_before orders it, without what is hidden; what can be read of it, and the error.
+std::vector<std::filesystem::path> visible_in(const std::filesystem::path& folder, std::error_code& error);
+/// The same where a folder that cannot be read has nothing.
+std::vector<std::filesystem::path> visible_in(const std::filesystem::path& folder);
 
 }  // namespace mbtfm::files

@@ -2,7 +2,11 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <fstream>
+
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/names.h"
 
 namespace mbtfm::files {
 namespace {
@@ -54,6 +58,8 @@ bool is_folder(const fs::path& folder) {
   std::error_code ignored;
   return fs::is_directory(folder, ignored);
 }
+
+bool is_own_folder(const fs::path& folder) { return type_of(folder) == fs::file_type::directory; }
 
 bool is_own_file(const fs::path& file) { return type_of(file) == fs::file_type::regular; }
 
@@ -115,9 +121,34 @@ void make_way(const fs::path& file) {
   if (error) throw OutputError("cannot replace " + file.string() + ": " + error.message());
 }
 
+std::string kind_of_file(const fs::path& file) {
+  constexpr std::size_t kBeginning = 4096, kSignature = 4, kWord = 20;  // study.R: "# Repeats the tables"
+  std::string text(kBeginning, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  const std::string line = text.substr(0, text.find_first_of("\r\n"));
+  const bool is_text =
+      is_utf8(line) && std::ranges::none_of(line, [](char c) { return c >= 0 && c < ' ' && c != '\t'; });
+  if (!is_text) return text.substr(0, kSignature);
+  if (line.starts_with("<!DOCTYPE")) return text.find("mbtfm</title>") == text.npos ? "a page" : kOwnPage;
+  const char* const ends = line.starts_with('<') ? " >" : line.starts_with('{') ? "\"" : ",";
+  return line.substr(0, line.find_first_of(ends)).substr(0, kWord);
+}
+
+void expect_own_kind(const fs::path& file, const std::string& kind) {
+  std::error_code error;
+  if (type_of(file) != fs::file_type::regular || is_hidden(file) || fs::file_size(file, error) == 0) return;
+  if (kind_of_file(file) == kind) return;
+  throw OutputError(file.string() +
+                    " is there, and mbtfm did not make it: nothing is written over it; move it to another place, or "
+                    "choose another name for the output");
+}
+
 void put_in_place(const fs::path& temporary, const fs::path& file) {
   const fs::file_type type = type_of(file);  // as root, a rename would take /dev/null away from the whole machine
   if (type == fs::file_type::character || type == fs::file_type::block) refuse_device(file);
+  expect_own_kind(file, kind_of_file(temporary));
   std::error_code error;
   fs::rename(temporary, file, error);
   if (error) throw OutputError("cannot put " + file.string() + " in place: " + error.message());

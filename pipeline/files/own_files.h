@@ -13,6 +13,8 @@ namespace mbtfm::files {
 bool is_file(const fs::path& file);
 /// A folder, also through links; false where it cannot be looked at.
 bool is_folder(const fs::path& folder);
+/// A folder itself: no link.
+bool is_own_folder(const fs::path& folder);
 /// A regular file itself: no link.
 bool is_own_file(const fs::path& file);
 /// The largest of the texts of ours that are read whole (records, hashes, reports): some ten MB at most in fact. A file
@@ -41,7 +43,17 @@ void check_cell_folder(const fs::path& cell);
 /// @throws OutputError where a folder is in the way, or it cannot be removed
 void make_way(const fs::path& file);
 
-/// Give a file that is whole its name; a link of that name is replaced, not followed. @throws OutputError
+/// What a file is, as far as its beginning shows: the first column of a table, the first word or bytes of others.
+std::string kind_of_file(const fs::path& file);
+/// That of an HTML page with our name at the end of its title.
+inline constexpr const char* kOwnPage = "a page of mbtfm";
+
+/// No program writes over what it did not make. @param kind  of what is to take the place of `file`
+/// @throws OutputError if a file of another kind is there; one without content, or with a hidden name, is nobody's
+void expect_own_kind(const fs::path& file, const std::string& kind);
+
+/// Give a file that is whole its name; a link of that name is replaced, not followed.
+/// @throws OutputError, also as expect_own_kind
 void put_in_place(const fs::path& temporary, const fs::path& file);
 
 }  // namespace mbtfm::files

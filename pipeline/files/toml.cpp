@@ -2,9 +2,11 @@
 #include "pipeline/files/toml.h"
 
 #include <algorithm>
+#include <array>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 
 namespace mbtfm::files {
@@ -87,6 +89,65 @@ toml::table parse_toml(std::string_view text, const std::string& name) {
   }
 }
 
-toml::table parse_toml(const std::filesystem::path& file) { return parse_toml(read_text(file), file.string()); }
+namespace {
+
+/// A cell that gives one of them does not take the other: each says the gel's stiffness.
+constexpr std::array kEither = {"youngs_modulus_kPa", "shear_modulus_kPa"};
+
+bool is_said(const toml::table& own, std::string_view key) {
+  if (own.contains(key)) return true;
+  return std::ranges::find(kEither, key) != kEither.end() &&
+         std::ranges::any_of(kEither, [&](const char* other) { return own.contains(other); });
+}
+
+/// Nodes are moved: each still knows the file and the line that it is from.
+/// @returns the keys that came
+std::vector<std::string> complete(toml::table& own, toml::table&& shared, const std::string& of = {}) {
+  std::vector<std::string> keys;
+  for (auto&& [key, node] : shared) {
+    const std::string name = of + std::string(key.str());
+    toml::table *table = node.as_table(), *known = own[key.str()].as_table();
+    if (table && known) {
+      for (std::string& inner : complete(*known, std::move(*table), name + ".")) keys.push_back(std::move(inner));
+    } else if (!is_said(own, key.str())) {
+      if (table)
+        for (const auto& [inner, value] : *table) keys.push_back(name + "." + std::string(inner.str()));
+      else
+        keys.push_back(name);
+      node.visit([&, &at = key](auto& value) { own.insert(at, std::move(value)); });
+    }
+  }
+  return keys;
+}
+
+constexpr const char *kOfCell = "cell.toml", *kOfStudy = "study.toml";
+
+std::filesystem::path study_above(const std::filesystem::path& cell_toml) {
+  if (cell_toml.filename() != kOfCell) return {};
+  std::error_code error;
+  std::filesystem::path folder = std::filesystem::weakly_canonical(cell_toml, error).parent_path();
+  while (!error && folder.has_relative_path()) {
+    folder = folder.parent_path();
+    if (is_file(folder / kOfStudy)) return folder / kOfStudy;
+  }
+  return {};
+}
+
+toml::table parse_file(const std::filesystem::path& file) { return parse_toml(read_text(file), file.string()); }
+
+}  // namespace
+
+toml::table parse_toml(const std::filesystem::path& file) {
+  toml::table own = parse_file(file);
+  if (const auto study = study_above(file); !study.empty()) complete(own, parse_file(study));
+  return own;
+}
+
+SharedSettings shared_settings(const std::filesystem::path& cell_toml) {
+  const std::filesystem::path file = study_above(cell_toml);
+  if (file.empty()) return {};
+  toml::table own = parse_file(cell_toml);
+  return {.file = file, .keys = complete(own, parse_file(file))};
+}
 
 }  // namespace mbtfm::files

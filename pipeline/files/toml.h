@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace mbtfm::files {
 
@@ -51,6 +52,14 @@ namespace mbtfm::files {
 /// @param name  of the text, in messages
 /// @throws InputError with name and line where it is no TOML
 toml::table parse_toml(std::string_view text, const std::string& name);
+/// The same of a file. A cell.toml is completed by what it leaves out and the nearest study.toml above it says.
 toml::table parse_toml(const std::filesystem::path& file);
+
+/// What a cell shares with others.
+struct SharedSettings {
+  std::filesystem::path file = {};  ///< the nearest study.toml above the cell.toml; empty: there is none
+  std::vector<std::string> keys;    ///< that the cell takes from there, as gel.thickness_um
+};
+SharedSettings shared_settings(const std::filesystem::path& cell_toml);
 
 }  // namespace mbtfm::files

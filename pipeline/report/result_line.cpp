@@ -1,12 +1,10 @@
 #include "pipeline/report/result_line.h"
 
 #include <cmath>
-#include <map>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/files/csv.h"
-#include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/own_files.h"
@@ -16,39 +14,6 @@
 #include "pipeline/report/space_report.h"
 
 namespace mbtfm::report {
-
-namespace {
-
-struct OfType {
-  int n = 0;
-  double mean_nN = 0;
-};
-
-struct Result {
-  FitSummary fit;
-  std::optional<double> total_error_nN = {};  ///< of the whole error budget
-  std::map<FibreType, OfType> types = {};
-  int n_fibres = 0, n_uncertain = 0;
-};
-
-Result result_of(const Path& cell) {
-  Result result{.fit = files::read_fit_summary(cell / "4_fit/fit.json")};
-  if (result.fit.error_budget) result.total_error_nN = total(result.fit.error_budget->total_force_parts_nN);
-  std::map<int, FibreType> types;
-  for (const Fibre& fibre : files::read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv"))
-    types[fibre.fibre_id] = fibre.type;
-  for (const Tension& tension : files::read_tensions(cell / "4_fit/tensions.csv")) {
-    const auto type = types.find(tension.fibre_id);
-    if (type == types.end()) continue;  // the network
-    OfType& of = result.types[type->second];
-    of.mean_nN += (tension.tension_nN - of.mean_nN) / ++of.n;
-    ++result.n_fibres;
-    result.n_uncertain += is_uncertain(tension);
-  }
-  return result;
-}
-
-}  // namespace
 
 std::optional<ForceOverTime> force_over_time(const Path& cell) {
   const Path file = cell / "4_fit/frames.csv";
@@ -81,7 +46,7 @@ std::string result_line(const Path& cell) {
   const CellKind kind = kind_of(cell);
   if (kind == CellKind::space) return result_line_in_space(cell);
   if (kind == CellKind::sheet) return result_line_of_sheet(cell);
-  const Result result = result_of(cell);
+  const files::CellResult result = files::read_cell_result(cell);
   std::optional<int> decimals;
   if (result.total_error_nN && *result.total_error_nN > 0) decimals = decimals_for(*result.total_error_nN);
   std::string line = "total force " + rounded(result.fit.total_force_nN, decimals);
@@ -104,7 +69,7 @@ std::string result_event(const Path& cell, const Path& report) {
   const CellKind kind = kind_of(cell);
   if (kind == CellKind::space) return result_event_in_space(cell, report);
   if (kind == CellKind::sheet) return result_event_of_sheet(cell, report);
-  const Result result = result_of(cell);
+  const files::CellResult result = files::read_cell_result(cell);
   nlohmann::ordered_json event = {{"event", "result"},
                                   {"total_force_nN", result.fit.total_force_nN},
                                   {"total_force_error_nN", nullptr},

@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
+#include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/parallel.h"
@@ -20,6 +21,25 @@
 
 namespace mbtfm::runner {
 namespace {
+
+/// What a folder without cell.toml is told of as, if it seems to be a cell all the same. What we write is no TIFF.
+std::optional<SkippedFolder> as_no_cell(const fs::path& folder, const std::vector<fs::path>& entries) {
+  constexpr int kFewest = 2;  // beads are seen twice; one picture may be an overview
+  int n_pictures = 0;
+  for (const fs::path& entry : entries) {
+    const std::string type = files::lower_case(entry.extension().string()),
+                      name = files::lower_case(entry.filename().string());
+    if (name.starts_with("cell") && (name.ends_with(".toml") || name.ends_with(".toml.txt")) && files::is_file(entry))
+      return SkippedFolder{folder,
+                           "its settings are called " + entry.filename().string() + ": rename the file cell.toml"};
+    n_pictures += type.starts_with(".tif") && files::is_file(entry);
+  }
+  if (n_pictures < kFewest) return std::nullopt;
+  return SkippedFolder{folder,
+                       "pictures and no cell.toml: mbtfm init '" + folder.string() +
+                           "', or mbtfm init STUDY --like CELL for all such folders",
+                       true};
+}
 
 /// What cannot be read is skipped: a study may hold lost+found, or a folder of somebody else.
 void collect_cells(const fs::path& folder, FoundCells& found) {
@@ -33,14 +53,22 @@ void collect_cells(const fs::path& folder, FoundCells& found) {
   // That there is none is no error. One that leads round in a circle is: the folder is meant to be a cell.
   const bool is_missing = !error || error == std::errc::no_such_file_or_directory;
   if (!is_missing) {
-    found.skipped.push_back({folder, "cell.toml: " + error.message()});
+    found.skipped.push_back({folder, "its cell.toml cannot be read: " + error.message()});
     return;
   }
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    std::error_code is_gone;  // an entry that is deleted meanwhile
-    if (!entry->is_symlink(is_gone) && entry->is_directory(is_gone)) collect_cells(entry->path(), found);
+  const std::vector<fs::path> entries = files::visible_in(folder, error);
+  FoundCells below;
+  for (const fs::path& entry : entries) {
+    std::error_code unseen;
+    const fs::file_type type = fs::symlink_status(entry, unseen).type();
+    // what is too deep to be looked at is told of
+    if (type == fs::file_type::directory || type == fs::file_type::none) collect_cells(entry, below);
   }
-  if (error) found.skipped.push_back({folder, error.message()});
+  if (below.cells.empty())
+    if (const auto as = as_no_cell(folder, entries)) below.skipped = {*as};  // what is in it is of it: frames, say
+  std::ranges::move(below.cells, std::back_inserter(found.cells));
+  std::ranges::move(below.skipped, std::back_inserter(found.skipped));
+  if (error) found.skipped.push_back({folder, "cannot be read: " + error.message()});
 }
 
 constexpr const char* kRunRecord = "run.json";
@@ -189,10 +217,17 @@ void check_parameters_once(std::vector<Look>& looks, const BatchOptions& options
 
 }  // namespace
 
-FoundCells find_cells(const fs::path& folder) {
+FoundCells search_cells(const fs::path& folder) {
   if (!files::is_folder(folder)) throw InputError(folder.string(), "a folder of cell folders", "none");
   FoundCells found;
   collect_cells(folder, found);
+  std::ranges::sort(found.cells, files::is_before);
+  std::ranges::sort(found.skipped, files::is_before, &SkippedFolder::folder);
+  return found;
+}
+
+FoundCells find_cells(const fs::path& folder) {
+  FoundCells found = search_cells(folder);
   if (found.cells.empty()) {
     const std::string skipped =
         found.skipped.empty() ? ""
@@ -200,8 +235,6 @@ FoundCells find_cells(const fs::path& folder) {
     throw InputError(folder.string(), "cell folders (with a cell.toml) at or below it", "none" + skipped,
                      "write a cell.toml beside each cell's images");
   }
-  std::ranges::sort(found.cells);
-  std::ranges::sort(found.skipped, {}, &SkippedFolder::folder);
   return found;
 }
 
@@ -246,6 +279,7 @@ std::vector<BatchCell> outcomes_so_far(const std::vector<fs::path>& cells, const
     outcomes[i].exit_code = exit_code::kFailed;
     outcomes[i].how = look.finding == Look::Finding::busy ? "being run" : "not run";
     tell_of_failure(outcomes[i]);
+    outcomes[i].is_left_undone = outcomes[i].failed_stage.empty();
   });
   return outcomes;
 }

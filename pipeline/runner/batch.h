@@ -10,10 +10,11 @@
 
 namespace mbtfm::runner {
 
-/// A folder that could not be searched for cells.
+/// A folder that could not be searched for cells, or seems to be one.
 struct SkippedFolder {
   fs::path folder;
-  std::string why;
+  std::string why;              ///< with the remedy
+  bool lacks_settings = false;  ///< it has pictures, and no cell.toml or one of another name
 };
 
 struct FoundCells {
@@ -21,8 +22,10 @@ struct FoundCells {
   std::vector<SkippedFolder> skipped;
 };
 
-/// Folders with a cell.toml at or below `folder`. A cell folder is not searched for more, nor are links followed.
-/// @throws InputError where there is none
+/// Folders with a cell.toml at or below `folder`. A cell folder is not searched for more, nor are links followed, nor
+/// what is hidden looked at. Folders with pictures and no cell at or below them are told of.
+FoundCells search_cells(const fs::path& folder);
+/// The same. @throws InputError where there is no cell
 FoundCells find_cells(const fs::path& folder);
 
 struct BatchCell;
@@ -41,6 +44,7 @@ struct BatchOptions {
 struct BatchCell {
   fs::path cell = {};
   int exit_code = 0;
+  bool is_left_undone = false;  ///< nothing failed: it was not run, or another run is in it
   double seconds = 0;
   std::string message = {};       ///< why it failed: the first error it printed
   std::string failed_stage = {};  ///< empty where it failed outside of one

@@ -39,7 +39,7 @@ void BatchProgress::ended(const BatchCell& cell) {
     line << '[' << n_done_ << '/' << n_to_run_ << "] " << cell.cell.string() << ": " << std::fixed
          << std::setprecision(1) << cell.seconds << " s: ";
     if (cell.exit_code == 0)
-      line << last_summary(cell.cell, options_.run.only);
+      line << verdict_on(cell.cell, options_.run.only) << ": " << last_summary(cell.cell, options_.run.only);
     else
       line << "FAILED" << (cell.failed_stage.empty() ? "" : " in " + cell.failed_stage) << ", " << cell.how;
     line << time_left();

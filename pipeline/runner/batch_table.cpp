@@ -11,11 +11,15 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/files/columns.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/runner/copies.h"
+#include "pipeline/runner/hash_cache.h"
 #include "pipeline/runner/run_cell.h"
 
 namespace mbtfm::runner {
@@ -25,7 +29,7 @@ namespace {
 /// What a stage that has ended says of itself.
 struct StageSays {
   std::string summary;
-  std::vector<std::pair<std::string, std::string>> figures = {};  ///< name, value
+  Figures figures = {};
   std::vector<Finding> findings;
 };
 
@@ -50,7 +54,7 @@ std::optional<StageSays> record_of(const fs::path& cell, const Stage& stage) {
     StageSays says{.summary = record.text_or("summary", ""), .findings = files::findings_of(record)};
     for (const auto& [name, value] : record.at("figures").members()) {
       // null: not a number, in JSON
-      says.figures.emplace_back(name, value.json().is_null() ? std::string() : text_of(value.figure()));
+      says.figures.emplace_back(name, value.json().is_null() ? Value(std::string()) : value.figure());
     }
     return says;
   } catch (const InputError&) {
@@ -59,45 +63,228 @@ std::optional<StageSays> record_of(const fs::path& cell, const Stage& stage) {
 }
 
 /// Those of the cell as it is now; where that cannot be read, of both kinds: records of either may be there.
-std::vector<Stage> stages_told_of(const fs::path& cell) {
+CellStages stages_told_of(const fs::path& cell) {
   try {
-    return stages_of(cell, read_image_names(cell)).stages;
+    return stages_of(cell, read_image_names(cell));
   } catch (const InputError&) {
-    return all_stages();
+    CellStages all;
+    all.stages = all_stages();
+    return all;
   }
 }
 
+/// What became of a cell.
+enum class CellState { fine, cautions, not_usable, copy, failed, not_run, not_seen };
+constexpr auto words(CellState) {
+  return std::array{"fine", "with cautions", "not usable", "copy", "failed", "not run", "skipped"};
+}
+
 struct BatchRow {
+  std::string name = {};  ///< of its folder, below the batch's
   BatchCell cell = {};
+  CellState state = CellState::fine;
+  CellKind kind = CellKind::plane;
+  std::string reason = {};  ///< why it is not fine
   std::vector<Finding> findings = {};
-  std::map<std::string, std::string> figures = {};  ///< by column
+  std::map<std::string, Value> figures = {};     ///< by column
+  std::vector<std::string> columns = {};         ///< of the figures, in their order
+  std::optional<files::CellResult> result = {};  ///< of a cell with fibres
+  std::string last_stage = {};                   ///< that the figures of other cells are of
 };
 
-files::Table<BatchRow> batch_table(const fs::path& folder) {
+const Value* figure_of(const BatchRow& row, const std::string& column) {
+  const auto at = row.figures.find(column);
+  return at == row.figures.end() ? nullptr : &at->second;
+}
+
+std::optional<double> number_of(const BatchRow& row, const char* figure) {
+  const Value* value = figure_of(row, row.last_stage + "." + figure);
+  const auto* number = value ? std::get_if<double>(value) : nullptr;
+  return number ? std::optional(*number) : std::nullopt;
+}
+
+/// The first of the folders above the cell, as `mbtfm stats --condition-from folder` has it; empty: there is none.
+std::string condition_of(const BatchRow& row) {
+  const fs::path name(row.name);
+  return std::distance(name.begin(), name.end()) > 1 ? name.begin()->string() : "";
+}
+
+const FitSummary* fit_of(const BatchRow& row) { return row.result ? &row.result->fit : nullptr; }
+
+files::Columns<BatchRow> tension_column(FibreType type) {
+  return {std::string(name_of(type)) + "_tension_nN", "mean over its fibres of this type",
+          [type](const BatchRow& row) -> std::optional<double> {
+            if (!row.result || !row.result->types.contains(type)) return std::nullopt;
+            return row.result->types.at(type).mean_nN;
+          },
+          files::kResult};
+}
+
+files::Columns<BatchRow> count_column(const char* name, const char* meaning, int files::CellResult::*of) {
+  return {name, meaning, [of](const BatchRow& row) -> std::optional<int> {
+            return row.result ? std::optional((*row.result).*of) : std::nullopt;
+          }};
+}
+
+/// A figure of the fit; of a cell in space or a sheet what its last stage reported.
+files::Columns<BatchRow> result_column(const char* name, const char* meaning, double FitSummary::*of) {
+  return {name, meaning,
+          [name, of](const BatchRow& row) -> std::optional<double> {
+            return row.result ? std::optional(fit_of(row)->*of) : number_of(row, name);
+          },
+          files::kResult};
+}
+
+files::Columns<BatchRow> cell_column() { return {"cell", "its folder, below the batch's", &BatchRow::name}; }
+
+files::Table<BatchRow> batch_table() {
+  using R = files::CellResult;
   return {
       .file = "batch.csv",
-      .row = "each cell of a batch",
-      .columns = {{"cell", "its folder, below the batch's",
-                   [folder](const BatchRow& row) { return row.cell.cell.lexically_relative(folder).generic_string(); }},
-                  {"exit_code", "of `mbtfm run`", files::member(&BatchRow::cell, &BatchCell::exit_code)},
-                  {"seconds", "it took", files::member(&BatchRow::cell, &BatchCell::seconds), files::kResult},
-                  {"message", "why it failed", files::member(&BatchRow::cell, &BatchCell::message)},
-                  {"failed_stage", "where it failed", files::member(&BatchRow::cell, &BatchCell::failed_stage)},
-                  {"findings", "that are open", [](const BatchRow& row) { return open_ids(row.findings); }}}};
+      .row = "each cell of a batch, and each folder that seems to be one",
+      .columns = {
+          cell_column(),
+          {"condition", "the first of the folders above it, if there are any", condition_of},
+          {"state",
+           "fine, with cautions, not usable (a bad finding), copy, failed, not run, or skipped: pictures without a "
+           "cell.toml, or a folder that cannot be read",
+           [](const BatchRow& row) { return std::string(name_of(row.state)); }},
+          {"worst_finding", "that is open",
+           [](const BatchRow& row) {
+             const Finding* worst = worst_of(row.findings);
+             return worst ? worst->id : std::string();
+           }},
+          result_column("total_force_nN", "sum of the force magnitudes", &FitSummary::total_force_nN),
+          {"total_force_sigma_nN", "its standard error, of the whole error budget",
+           [](const BatchRow& row) {
+             return row.result ? row.result->total_error_nN : number_of(row, "total_force_sigma_nN");
+           },
+           files::kResult},
+          tension_column(FibreType::dorsal),
+          tension_column(FibreType::arc),
+          tension_column(FibreType::ventral),
+          tension_column(FibreType::edge),
+          count_column("fibres", "number of its fibres", &R::n_fibres),
+          count_column("uncertain", "of which little more is known than that their tension is small", &R::n_uncertain),
+          result_column("relative_l2", "‖measured − model‖ / ‖measured‖", &FitSummary::relative_l2),
+          result_column("expected_relative_l2", "what the beads' noise alone would leave",
+                        &FitSummary::expected_relative_l2),
+          {"reason", "why it failed, is not usable, or was skipped", &BatchRow::reason}}};
+}
+
+files::Table<BatchRow> whole_table() {
+  return {.file = "batch_all.csv",
+          .row = "each cell of a batch, with every figure of its stages",
+          .columns = {cell_column(),
+                      {"exit_code", "of `mbtfm run`", files::member(&BatchRow::cell, &BatchCell::exit_code)},
+                      {"seconds", "it took", files::member(&BatchRow::cell, &BatchCell::seconds), files::kResult},
+                      {"message", "why it failed", files::member(&BatchRow::cell, &BatchCell::message)},
+                      {"failed_stage", "where it failed", files::member(&BatchRow::cell, &BatchCell::failed_stage)},
+                      {"findings", "that are open", [](const BatchRow& row) { return open_ids(row.findings); }}}};
 }
 
 files::Columns<BatchRow> figure_column(const std::string& name) {
   return {name, "a figure that a stage reported", [name](const BatchRow& row) {
-            const auto figure = row.figures.find(name);
-            return figure == row.figures.end() ? std::string() : figure->second;
+            const Value* figure = figure_of(row, name);
+            return figure ? text_of(*figure) : std::string();
           }};
+}
+
+CellState state_by(const std::vector<Finding>& findings) {
+  if (std::ranges::any_of(findings, spoils_cell)) return CellState::not_usable;
+  return has_open(findings) ? CellState::cautions : CellState::fine;
+}
+
+/// What the stages of the cell say of it.
+BatchRow row_of(const BatchCell& cell, const fs::path& folder, const std::vector<std::string>& only) {
+  BatchRow row{.name = cell.cell.lexically_relative(folder).generic_string(), .cell = cell, .reason = cell.message};
+  if (cell.cell == folder) row.name = fs::weakly_canonical(cell.cell).filename().string();
+  row.state = cell.is_left_undone ? CellState::not_run : CellState::failed;
+  if (cell.exit_code != 0) return row;  // what it has on disk may be of an earlier run
+  const CellStages of = stages_told_of(cell.cell);
+  row.kind = of.kind;
+  for (const Stage& stage : of.stages) {
+    if (!is_asked(stage, only)) continue;
+    row.last_stage = stage.name;
+    const auto record = record_of(cell.cell, stage);
+    if (!record) continue;
+    row.findings.insert(row.findings.end(), record->findings.begin(), record->findings.end());
+    for (const auto& [name, value] : record->figures) {
+      row.columns.push_back(stage.name + "." + name);
+      row.figures[row.columns.back()] = value;
+    }
+  }
+  row.state = state_by(row.findings);
+  if (row.state == CellState::not_usable) row.reason = "not usable, as " + worst_of(row.findings)->id + " says";
+  try {
+    const bool is_fitted = of.kind == CellKind::plane && is_asked(of.stages.back(), only);
+    if (is_fitted && files::is_own_file(cell.cell / "4_fit/fit.json")) row.result = files::read_cell_result(cell.cell);
+  } catch (const InputError& error) {  // changed by hand
+    row.state = CellState::failed;
+    row.reason = error.what();
+  }
+  return row;
+}
+
+/// The field of the beads that the cell was found from, and its outline in it.
+CellInField field_of(const BatchRow& row, const char* field) {
+  CellInField cell;
+  const fs::path outline = row.cell.cell / "1_segment/outline.csv";
+  try {
+    if (files::is_own_file(outline)) cell.outline_um = files::read_outline(outline).front();
+    HashCache hashes(row.cell.cell);
+    const Hashes found = hashes.hash({field});
+    // of a sheet whose outline the stages alone read nobody knows here whether another one lies beside it
+    if (!found.empty() && (row.kind == CellKind::space || !cell.outline_um.empty()))
+      cell.field_sha256 = found.begin()->second;
+  } catch (const InputError&) {  // then it is a copy of nothing
+  }
+  return cell;
+}
+
+void mark_copies(std::vector<BatchRow>& rows) {
+  const auto field_file = [](const BatchRow& row) {
+    return row.kind == CellKind::space ? "2_track/displacement_3d.csv" : "2_track/displacement.csv";
+  };
+  std::vector<CellInField> cells;
+  for (const BatchRow& row : rows)
+    cells.push_back(row.state < CellState::not_usable ? field_of(row, field_file(row)) : CellInField{});
+  const auto originals = originals_of(cells);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (!originals[i]) continue;
+    rows[i].state = CellState::copy;
+    rows[i].reason = why_a_copy(rows[*originals[i]].name, field_file(rows[i]), cells[i]);
+  }
+}
+
+std::string counts_of(const std::vector<BatchRow>& rows) {
+  std::map<CellState, int> n_of;
+  for (const BatchRow& row : rows) ++n_of[row.state];
+  int n_done = 0;
+  std::string done, others;
+  for (const auto& [state, n] : n_of) {
+    std::string& text = state < CellState::failed ? done : others;
+    const char* const between = state < CellState::failed ? ", " : "; ";
+    text += (text.empty() ? "" : between) + std::to_string(n) + " " + name_of(state);
+    if (state < CellState::failed) n_done += n;
+  }
+  return std::to_string(n_done) + " done" + (done.empty() ? "" : ": " + done) + (others.empty() ? "" : "; " + others);
+}
+
+/// A line for each that nobody should count; those that failed have a table of their own.
+std::string not_to_count(const std::vector<BatchRow>& rows) {
+  std::string lines;
+  for (const BatchRow& row : rows)
+    if (row.state == CellState::copy || row.state == CellState::not_usable)
+      lines += "\n  " + row.name + ": " + row.reason;
+  return lines;
 }
 
 }  // namespace
 
 std::string last_summary(const fs::path& cell, const std::vector<std::string>& only) {
   std::string summary;
-  for (const Stage& stage : stages_told_of(cell)) {
+  for (const Stage& stage : stages_told_of(cell).stages) {
     if (!is_asked(stage, only)) continue;
     const auto record = record_of(cell, stage);
     if (record && !record->summary.empty()) summary = record->summary;
@@ -105,27 +292,28 @@ std::string last_summary(const fs::path& cell, const std::vector<std::string>& o
   return summary;
 }
 
-void write_batch_table(const fs::path& file, const fs::path& folder, const std::vector<BatchCell>& cells,
-                       const std::vector<std::string>& only) {
-  files::Table<BatchRow> table = batch_table(folder);
-  std::set<std::string> columns;
+std::string verdict_on(const fs::path& cell, const std::vector<std::string>& only) {
+  const BatchRow row = row_of({.cell = cell}, cell, only);
+  const std::string state = row.state == CellState::not_usable ? "NOT USABLE" : name_of(row.state);
+  return state + (has_open(row.findings) ? " (" + open_ids(row.findings) + ")" : "");
+}
+
+BatchCounts write_batch_tables(const fs::path& folder, const std::vector<BatchCell>& cells,
+                               const std::vector<SkippedFolder>& skipped, const std::vector<std::string>& only) {
+  files::Table<BatchRow> all = whole_table();
   std::vector<BatchRow> rows;
-  for (const BatchCell& cell : cells) {
-    BatchRow& row = rows.emplace_back(BatchRow{.cell = cell});
-    if (cell.exit_code != 0) continue;  // what it has on disk may be of an earlier run
-    for (const Stage& stage : stages_told_of(cell.cell)) {
-      if (!is_asked(stage, only)) continue;
-      const auto record = record_of(cell.cell, stage);
-      if (!record) continue;
-      row.findings.insert(row.findings.end(), record->findings.begin(), record->findings.end());
-      for (const auto& [name, value] : record->figures) {
-        const std::string column = stage.name + "." + name;
-        row.figures[column] = value;
-        if (columns.insert(column).second) table.columns.push_back(figure_column(column));
-      }
-    }
-  }
-  files::write_whole(file, text_of(table, rows));
+  for (const BatchCell& cell : cells) rows.push_back(row_of(cell, folder, only));
+  mark_copies(rows);
+  std::set<std::string> columns;
+  for (const BatchRow& row : rows)
+    for (const std::string& column : row.columns)
+      if (columns.insert(column).second) all.columns.push_back(figure_column(column));
+  files::write_whole(folder / "batch_all.csv", text_of(all, rows));
+  for (const SkippedFolder& s : skipped)
+    rows.push_back(
+        {.name = s.folder.lexically_relative(folder).generic_string(), .state = CellState::not_seen, .reason = s.why});
+  files::write_whole(folder / "batch.csv", text_of(batch_table(), rows));
+  return {.counts = counts_of(rows), .not_to_count = not_to_count(rows)};
 }
 
 std::string failure_table(const fs::path& folder, const std::vector<BatchCell>& cells) {
@@ -147,9 +335,9 @@ std::string failure_table(const fs::path& folder, const std::vector<BatchCell>& 
 }
 
 std::string pages_of_tables() {
-  files::Table<BatchRow> table = batch_table({});
-  table.columns.push_back(figure_column("stage.figure"));
-  return page_of(table);
+  files::Table<BatchRow> all = whole_table();
+  all.columns.push_back(figure_column("stage.figure"));
+  return page_of(batch_table()) + page_of(all);
 }
 
 }  // namespace mbtfm::runner

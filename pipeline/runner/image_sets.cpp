@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/json.h"
+#include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/images.h"
@@ -41,19 +42,17 @@ using ImageSet = std::map<std::string, fs::path>;
 
 /// Folders that cannot be read have no images: the patterns then find none of theirs.
 void collect_files(const fs::path& folder, std::vector<fs::path>& files) {
-  std::error_code error, is_gone;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
-    if (!entry->is_symlink(is_gone) && entry->is_directory(is_gone))
-      collect_files(entry->path(), files);
-    else if (files::is_file(entry->path()))
-      files.push_back(entry->path());
+  for (const fs::path& entry : files::visible_in(folder))
+    if (files::is_own_folder(entry))
+      collect_files(entry, files);
+    else if (files::is_file(entry))
+      files.push_back(entry);
 }
 
 std::vector<fs::path> files_below(const fs::path& folder) {
   std::vector<fs::path> files;
   collect_files(folder, files);
   for (fs::path& file : files) file = file.lexically_relative(folder);
-  std::ranges::sort(files);
   return files;
 }
 

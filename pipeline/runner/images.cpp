@@ -3,7 +3,6 @@
 #include <fnmatch.h>
 
 #include <algorithm>
-#include <cctype>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"
@@ -83,28 +82,18 @@ ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) 
   if (const auto bar = name_or_glob.find('|'); bar != std::string::npos) {
     for (const std::string& part : {name_or_glob.substr(0, bar), name_or_glob.substr(bar + 1)})
       for (fs::path& file : match_image(folder, part).files) match.files.push_back(std::move(file));
-    std::ranges::sort(match.files);
+    std::ranges::sort(match.files, files::is_before);
     match.files.erase(std::unique(match.files.begin(), match.files.end()), match.files.end());
     return match;
   }
   const fs::path parent = exact.parent_path();
   const std::string pattern = exact.filename().string();
-  std::error_code error;  // of a folder that is not there, or cannot be read: no file of it is found
-  for (fs::directory_iterator entry(parent, error), end; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    if (fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0 && files::is_file(entry->path()))
-      match.files.push_back(entry->path());
-  }
-  std::ranges::sort(match.files);
+  for (const fs::path& file : files::visible_in(parent))
+    if (fnmatch(pattern.c_str(), file.filename().c_str(), 0) == 0 && files::is_file(file)) match.files.push_back(file);
   return match;
 }
 
 namespace {
-
-std::string lower(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
 
 constexpr std::string_view kOfMicroscopes[] = {".nd2", ".czi", ".lif", ".oib", ".oif"};
 
@@ -112,20 +101,18 @@ constexpr std::string_view kOfMicroscopes[] = {".nd2", ".czi", ".lif", ".oib", "
 std::string advice_on_missing(const fs::path& folder, const std::string& name, const std::string& key) {
   const std::string place = "'" + key + "' in [images] of cell.toml";
   if (name.find('\\') != name.npos) return "write folders with / in " + place;
-  std::vector<fs::path> there;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
-    there.push_back(entry->path().filename());
-  std::ranges::sort(there);
+  std::vector<fs::path> there = files::visible_in(folder);
+  for (fs::path& file : there) file = file.filename();
   for (const fs::path& file : there)
-    if (lower(file.string()) == lower(name)) return "there is '" + file.string() + "': capitals count";
+    if (files::lower_case(file.string()) == files::lower_case(name))
+      return "there is '" + file.string() + "': capitals count";
   for (const fs::path& file : there) {
-    const std::string type = lower(file.extension().string());
+    const std::string type = files::lower_case(file.extension().string());
     if (std::ranges::find(kOfMicroscopes, type) != std::end(kOfMicroscopes))
       return "there is '" + file.string() + "', a file of a microscope: save it as TIFF in Fiji (File > Import > " +
              "Bio-Formats, then File > Save As > Tiff), or: bfconvert '" + file.string() + "' '" +
              file.stem().string() + ".ome.tif'; then name it as " + place;
-    if (lower(file.stem().string()) == lower(fs::path(name).stem().string()))
+    if (files::lower_case(file.stem().string()) == files::lower_case(fs::path(name).stem().string()))
       return "there is '" + file.string() + "': name it as " + place;
   }
   return "put it there, or name the file or a glob as " + place;

@@ -337,6 +337,7 @@ CellOutcome CellRun::run() {
   const bool has_work = std::ranges::any_of(
       outcome.stages, [](const StageOutcome& stage) { return stage.status.state == StageState::must_run; });
   try {
+    files::expect_own_kind(cell_ / "report.html", files::kOwnPage);
     check_before_start(outcome);
     if (has_work) write_run_record(cell_, options_, outcome);  // unfinished: what a kill leaves
     run_chains(outcome);

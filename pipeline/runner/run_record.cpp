@@ -9,6 +9,7 @@
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/files/toml.h"
 #include "pipeline/numerics/machine.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
@@ -155,6 +156,10 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
     const RunSettings settings = read_run_settings(cell);
     run["run"] = {{"model", name_of(settings.model)}, {"bundles", settings.bundles}};
   }
+  if (const files::SharedSettings shared = files::shared_settings(cell / "cell.toml"); !shared.file.empty())
+    run["study"] = {{"file", fs::proximate(shared.file, fs::weakly_canonical(cell)).generic_string()},
+                    {"sha256", files::sha256_of_file(shared.file)},
+                    {"keys", shared.keys}};
   run["outcome"] = name_of(outcome_of(entries));
   run["started"] = outcome.started;
   if (!outcome.ended.empty()) run["ended"] = outcome.ended;

@@ -117,8 +117,9 @@ std::string advice_on(const Parameter& p, const std::string& text) {
   return slip.empty() ? p.meaning : slip + " (" + p.meaning + ")";
 }
 
+/// In the file that the node is from: of a cell.toml some are from study.toml.
 std::string place(const std::string& name, const toml::node& node) {
-  return name + ":" + std::to_string(node.source().begin.line);
+  return (node.source().path ? *node.source().path : name) + ":" + std::to_string(node.source().begin.line);
 }
 
 /// The texts of an array with commas between them.
@@ -170,12 +171,9 @@ void ParameterList::add_member(std::string name, ParameterMember member, const R
   parameters_.push_back(std::move(parameter));
 }
 
-void read_toml(ParameterList& list, const std::filesystem::path& file) {
-  read_toml(list, files::read_text(file), file.string());
-}
+namespace {
 
-void read_toml(ParameterList& list, std::string_view text, const std::string& name) {
-  const toml::table root = files::parse_toml(text, name);
+void read_table(ParameterList& list, const toml::table& root, const std::string& name) {
   std::map<std::string, std::vector<std::string>> keys_of;  // by table, of this list
   for (const Parameter& p : list.all()) keys_of[p.table].push_back(p.name);
 
@@ -214,6 +212,16 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
     }
   }
   list.derive_all();
+}
+
+}  // namespace
+
+void read_toml(ParameterList& list, const std::filesystem::path& file) {
+  read_table(list, files::parse_toml(file), file.string());
+}
+
+void read_toml(ParameterList& list, std::string_view text, const std::string& name) {
+  read_table(list, files::parse_toml(text, name), name);
 }
 
 void set_from_text(Parameter& p, const std::string& text) {

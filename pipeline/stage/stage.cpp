@@ -104,7 +104,12 @@ void set_files(StageContext& context, const StageDescription& description, const
       throw UsageError("--" + file.name + " is missing: " + file.meaning);
     if (path.empty()) continue;
     (is_output ? context.outputs_ : context.inputs_)[file.name] = path;
+    if (file.kind == Kind::output_folder && files::is_file(path))
+      throw UsageError("--" + file.name + ": expected a folder, found the file " + path + ": give another name");
   }
+  if (!line.config.empty()) context.never_written_["config"] = line.config;
+  context.never_written_.insert(context.inputs_.begin(), context.inputs_.end());
+  for (const auto& [name, output] : context.outputs_) context.expect_no_input(output);
 }
 
 /// " 35 % meshes, about 40 s left": the time at the rate so far, where that is long enough to be asked.
@@ -255,6 +260,16 @@ void expect_all_written(const StageContext& context) {
     if (!fs::exists(temporary)) throw InternalError(destination.string() + " was announced and not written");
 }
 
+/// Before any of them takes its place.
+void expect_all_replaceable(const StageContext& context) {
+  for (const auto& [temporary, destination] : context.pending_) {
+    files::expect_own_kind(destination, files::kind_of_file(temporary));
+    if (context.remedy_to_replace.empty() || !files::is_own_file(destination)) continue;
+    if (files::sha256_of_file(destination) != files::sha256_of_file(temporary))
+      throw UsageError(destination.string() + " is there, with other content; " + context.remedy_to_replace);
+  }
+}
+
 void commit(const StageContext& context) {
   for (const auto& [temporary, destination] : context.pending_) files::put_in_place(temporary, destination);
 }
@@ -292,6 +307,7 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     // The record takes its place last: where it is, all that it speaks of is.
     if (!line.record.empty()) write_record(line.record, description, list, context, report, {started, seconds.count()});
+    expect_all_replaceable(context);
     commit(context);
     tell(description.name, report, seconds.count(), whose);
     return report.converged ? kDone : kNotSolved;
@@ -343,7 +359,16 @@ fs::path StageContext::output_beside(const std::string& name, const std::string&
   return pending_path(output.parent_path() / (output.stem().string() + ending));
 }
 
+void StageContext::expect_no_input(const fs::path& output) const {
+  std::error_code is_new;
+  for (const auto& [name, input] : never_written_)
+    if (files::is_file(input) && fs::equivalent(input, output, is_new))
+      throw UsageError(output.string() + " is the file of --" + name +
+                       ", which would be lost: give the output another name");
+}
+
 fs::path StageContext::pending_path(const fs::path& destination) {
+  expect_no_input(destination);
   make_folder(destination.parent_path());
   const fs::path temporary = files::temporary_name(destination);
   files::make_way(temporary);  // whoever writes it, VTK or a TIFF library, opens it by name

@@ -59,12 +59,17 @@ class StageContext {
   /// Temporary path for a file beside the output `name`, called after it: its name with `ending` for its extension.
   fs::path output_beside(const std::string& name, const std::string& ending);
 
+  /// Empty: a file of the stage's own kind may be replaced. Else only by the same bytes, and this is what to do.
+  std::string remedy_to_replace;
+
   // used by run_stage
   std::vector<Finding> findings_;
   std::vector<std::string> allowed_;  ///< quantities whose values are not refused
   /// Temporary path, free to be written to, of what is to be `destination`.
   fs::path pending_path(const fs::path& destination);
-  std::map<std::string, fs::path> inputs_, outputs_;
+  /// @throws UsageError if it is one of the files that the command line gives as inputs
+  void expect_no_input(const fs::path& output) const;
+  std::map<std::string, fs::path> inputs_, outputs_, never_written_;
   std::vector<fs::path> read_, made_;
   struct Pending {
     fs::path temporary, destination;

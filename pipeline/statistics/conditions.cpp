@@ -27,7 +27,8 @@ std::string folder_of(const std::string& name, int level) {
 
 /// By its whole name, or by that of its own folder where no other cell's is the same.
 std::size_t index_of_cell(const std::vector<std::string>& names, const files::CsvTable& table, int row) {
-  const std::string asked = table.text(row, "cell");
+  std::string asked = table.text(row, "cell");
+  while (asked.ends_with('/')) asked.pop_back();  // as shells complete names
   const auto exact = std::find(names.begin(), names.end(), asked);
   if (exact != names.end()) return static_cast<std::size_t>(exact - names.begin());
   std::vector<std::size_t> matches;

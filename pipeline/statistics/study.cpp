@@ -21,6 +21,7 @@
 #include "pipeline/report/space_results.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/runner/copies.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/statistics/conditions.h"
 #include "pipeline/statistics/descriptive.h"
@@ -117,6 +118,7 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
                      "the segmentation changed after the fit: mbtfm run " + folder.string());
   }
   if (const auto run = run_of(folder)) c.findings = findings_of(*run);
+  if (parameters.list) return c;
   c.directions = directions_of(c.cell, {.measured = field_where_there(folder / kDisplacement),
                                         .fitted = field_where_there(folder / kFitted),
                                         .without_fibres = field_where_there(folder / kWithoutFibres),
@@ -140,48 +142,22 @@ StudyCell read_cell_of_kind(CellKind kind, const Path& folder, const std::string
 }
 
 /// The field of beads that it was found from.
-Path field_of(const Path& folder, const StudyCell& cell) {
-  return folder / (cell.kind() == CellKind::space ? report::kBeadsInSpace : kDisplacement);
-}
-
-/// By half of the smaller one. Two cells of one picture share the field, and lie beside each other.
-bool overlap(const Polygon& a, const Polygon& b) {
-  if (a.empty() || b.empty()) return false;
-  const auto [low, high] = extent_of(a);
-  constexpr int kLines = 64;  // of the lattice over a: its area to some percent
-  const Vec2 step{(high.x - low.x) / kLines, (high.y - low.y) / kLines};
-  double shared_um2 = 0;
-  for (int i = 0; i < kLines * kLines; ++i) {
-    const Vec2 p{low.x + (i % kLines + 0.5) * step.x, low.y + (i / kLines + 0.5) * step.y};
-    if (contains(a, p) && contains(b, p)) shared_um2 += step.x * step.y;
-  }
-  return shared_um2 > 0.5 * std::min(std::abs(signed_area_um2(a)), std::abs(signed_area_um2(b)));
+const char* field_of(const StudyCell& cell) {
+  return cell.kind() == CellKind::space ? report::kBeadsInSpace : kDisplacement;
 }
 
 /// A folder that was copied is no further cell: of those of one field and place the first enters.
 void leave_out_copies(const std::vector<Path>& folders, const std::vector<std::string>& names,
                       const std::vector<std::optional<StudyCell>>& read, std::vector<std::string>& reasons) {
-  std::multimap<std::string, std::size_t> by_field;
+  std::vector<runner::CellInField> cells(folders.size());
   for (std::size_t i = 0; i < folders.size(); ++i) {
     if (!reasons[i].empty()) continue;
-    const Path field = field_of(folders[i], *read[i]);
-    if (!files::is_own_file(field)) continue;
-    const std::string hash = files::sha256_of_file(field);
-    const auto [first, last] = by_field.equal_range(hash);
-    const Polygon& outline = read[i]->cell.outline_um;
-    const auto same = std::find_if(first, last, [&](const auto& other) {
-      const Polygon& of_other = read[other.second]->cell.outline_um;
-      const bool are_whole_fields = read[i]->space && (outline.empty() || of_other.empty());
-      return are_whole_fields || overlap(outline, of_other);
-    });
-    if (same == last) {
-      by_field.emplace(hash, i);
-    } else {
-      reasons[i] = "the same cell as " + names[same->second] + ": their " +
-                   field.lexically_relative(folders[i]).generic_string() + " are the same bytes" +
-                   (outline.empty() ? "" : " and their outlines overlap");
-    }
+    const Path field = folders[i] / field_of(*read[i]);
+    if (files::is_own_file(field)) cells[i] = {files::sha256_of_file(field), read[i]->cell.outline_um};
   }
+  const auto originals = runner::originals_of(cells);
+  for (std::size_t i = 0; i < folders.size(); ++i)
+    if (originals[i]) reasons[i] = runner::why_a_copy(names[*originals[i]], field_of(*read[i]), cells[i]);
 }
 
 /// The parts between commas, without spaces around them.
@@ -214,7 +190,9 @@ void number_conditions(Study& study, const std::vector<std::string>& condition_o
 }
 
 /// Why the findings of a cell keep it out; empty: they do not.
-std::string excluded_by_finding(const StudyCell& cell, const std::vector<std::string>& ids) {
+std::string excluded_by_finding(const StudyCell& cell, const std::vector<std::string>& ids, bool with_bad) {
+  const auto bad = std::ranges::find_if(cell.findings, spoils_cell);
+  if (bad != cell.findings.end() && !with_bad) return "not usable, as " + bad->id + " says (stats.with_bad)";
   for (const Finding& finding : cell.findings)
     if (is_open(finding) && std::ranges::find(ids, finding.id) != ids.end())
       return "the finding " + finding.id + " is open (stats.exclude_findings)";
@@ -272,6 +250,9 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
            "cells in space, whichever the study has most cells of; total-force and strain-energy go by that, too");
   list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
   list.add("with_not_converged", parameters.with_not_converged, "include cells whose fit did not converge");
+  list.add("list", parameters.list,
+           "print each cell, whether it enters and why not (CSV: cell, condition, included, reason); write nothing");
+  list.add("with_bad", parameters.with_bad, "include cells that a bad finding says not to use");
   list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
            "a first tension: the share of fibres above it is given (nN)");
   list.add("strong_tension_nN", parameters.strong_tension_nN, Range::force_nN(),
@@ -314,7 +295,7 @@ const std::vector<std::string>& further_files_of_a_cell(CellKind kind) {
 }
 
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads) {
-  const runner::FoundCells found = runner::find_cells(folder);
+  const runner::FoundCells found = parameters.list ? runner::search_cells(folder) : runner::find_cells(folder);
   const std::vector<Path>& folders = found.cells;
   std::vector<std::string> names;
   for (const Path& cell : folders) {
@@ -341,7 +322,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
     if (!reasons[i].empty()) return;
     read[i]->replicate = notes[i].replicate;
     if (!read[i]->fit.converged && !parameters.with_not_converged) reasons[i] = "the fit did not converge";
-    if (reasons[i].empty()) reasons[i] = excluded_by_finding(*read[i], excluding);
+    if (reasons[i].empty()) reasons[i] = excluded_by_finding(*read[i], excluding, parameters.with_bad);
   });
   leave_out_copies(folders, names, read, reasons);
   Study study;
@@ -357,8 +338,8 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
     condition_of_cell.push_back(notes[i].condition);
   }
   for (const runner::SkippedFolder& s : found.skipped)
-    study.left_out.push_back({s.folder.lexically_relative(folder).generic_string(), "", "cannot be read: " + s.why});
-  if (study.cells.empty()) no_cell_left(folder, study.left_out);
+    study.left_out.push_back({s.folder.lexically_relative(folder).generic_string(), "", s.why});
+  if (study.cells.empty() && !parameters.list) no_cell_left(folder, study.left_out);
   number_conditions(study, condition_of_cell, parameters.conditions);
   return study;
 }

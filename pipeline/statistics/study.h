@@ -39,6 +39,8 @@ struct StudyParameters {
   PrimaryMeasure primary = PrimaryMeasure::automatic;
   FibreType primary_type = FibreType::ventral;  ///< the strongest, and those that most experiments are about
   bool with_not_converged = false;              ///< a fit that did not converge is no measurement
+  bool list = false;                            ///< for other programs: what they leave out is what stats leaves out
+  bool with_bad = false;                        ///< what a finding says not to use is no measurement
   double weak_tension_nN = 1;                   ///< most dorsal fibres of U2OS cells are below it (thesis 3.5)
   double strong_tension_nN = 5;                 ///< a third of the ventral ones are above it
   double near_adhesion_um = 1.5;                ///< beads lie some 1 um apart: about seven of them around an adhesion
@@ -119,7 +121,8 @@ const std::vector<std::string>& further_files_of_a_cell(CellKind kind);
 /// @param table  column `cell` (a cell's folder), any columns of conditions, and `exclude` with the reason why a cell
 ///               must not enter, empty for those that do; or none
 /// A cell whose files are malformed, or lead out of it, is left out, and so is a copy of another cell.
-/// @throws InputError where no cell is left, or the table is malformed or names a cell that is not there
+/// @throws InputError where no cell is left (unless parameters.list), or the table is malformed or names a cell that is
+/// not there
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads);
 
 /// A fibre whose tension could be identified, and is known to within anything that a fibre can carry.

@@ -15,6 +15,9 @@ struct Analysis;
 /// Every table with the name of its file.
 std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, const Analysis& analysis);
 
+/// Which cells enter, and why others do not: the first columns of cells.csv.
+std::string list_of_cells(const Study& study);
+
 /// Their part of docs/columns.md.
 std::string pages_of_tables();
 

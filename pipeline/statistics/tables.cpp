@@ -499,6 +499,11 @@ std::vector<QuantityRow> summary_rows(const Analysis& analysis) {
 
 }  // namespace
 
+std::string list_of_cells(const Study& study) {
+  const auto columns = cell_table().columns.only({"cell", "condition", "included", "reason"});
+  return text_of(Table<InCell<CellRow>>{.columns = columns}, cell_rows(study));
+}
+
 std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, const Analysis& analysis) {
   std::vector<std::pair<std::string, std::string>> tables;
   const auto add = [&](const auto& table, const auto& rows) {

@@ -55,7 +55,7 @@ def programs(name: str = "mbtfm") -> str:
 Value = Union[bool, int, float, str, "os.PathLike[str]"]
 
 
-def _flags(parameters: Mapping[str, Value]) -> List[str]:
+def flags_of(parameters: Mapping[str, Value]) -> List[str]:
     flags = []
     for name, value in parameters.items():
         if isinstance(value, bool):
@@ -135,7 +135,7 @@ def simulate(
     ``simulate("trial", youngs_modulus_kPa=4)``. Without images it holds the true segmentation and the noisy displacement.
     """
     command = [programs("mbtfm-simulate"), "--out", os.fspath(cell), "--json"]
-    command += _flags({"scenario": scenario, "seed": seed, "noise": noise, "beads": beads, **parameters})
+    command += flags_of({"scenario": scenario, "seed": seed, "noise": noise, "beads": beads, **parameters})
     if images:
         command.append("--images")
     _events(command, progress)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import os
+import re
+import subprocess
 from pathlib import Path
-from typing import Any, Dict, Iterable, Iterator, List, Optional
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
 import pandas as pd
 
 from .cell import PathLike, read_table
+from .commands import ProgramFailed, Value, flags_of, programs
 
 #: Tables that `study` knows by a short name.
 TABLES = {
@@ -24,7 +28,13 @@ TABLES = {
 
 def cells_below(folder: PathLike) -> List[Path]:
     """The cell folders at or below a folder, sorted: those that `mbtfm batch` would run."""
-    return sorted(_walk(Path(folder)))
+    return sorted(_walk(Path(folder)), key=lambda cell: [_by_numbers(part) for part in cell.parts])
+
+
+def _by_numbers(name: str) -> List[Tuple[int, str]]:
+    """Numbers in names count as numbers: t2 is before t10."""
+    parts = re.split("([0-9]+)", name)
+    return [(int(part), "") if k % 2 else (-1, part) for k, part in enumerate(parts)]
 
 
 def _walk(folder: Path) -> Iterator[Path]:
@@ -38,27 +48,63 @@ def _walk(folder: Path) -> Iterator[Path]:
             yield from _walk(Path(entry.path))
 
 
-def study(folder: PathLike, table: str = "tensions", conditions: Optional[PathLike] = None) -> pd.DataFrame:
+def _listing(root: Path, parameters: Mapping[str, Value]) -> Dict[str, str]:
+    """By cell, in their order, why it does not enter statistics; empty: it does. As `mbtfm stats` says.
+
+    Without the program, what `mbtfm stats` has last written counts (statistics/cells.csv).
+    """
+    written = root / "statistics/cells.csv"
+    try:
+        program = programs("mbtfm-stats")
+    except FileNotFoundError:
+        if parameters or not written.is_file():
+            raise
+        text = written.read_text(encoding="utf-8")
+    else:
+        command = [program, "--cells", os.fspath(root), "--out", os.fspath(written.parent), "--list", "--quiet"]
+        done = subprocess.run(command + flags_of(parameters), capture_output=True, encoding="utf-8", errors="replace")
+        if done.returncode != 0:
+            raise ProgramFailed("mbtfm-stats", done.returncode, done.stderr.strip())
+        text = done.stdout
+    return {row["cell"]: row["reason"] for row in csv.DictReader(io.StringIO(text, newline=""))}
+
+
+def study(
+    folder: PathLike,
+    table: str = "tensions",
+    conditions: Optional[PathLike] = None,
+    with_left_out: bool = False,
+    **parameters: Value,
+) -> pd.DataFrame:
     """One table of all cells below a folder, with the cell's path (relative to the folder) in the column `cell`.
 
     table:       ``tensions`` (a row for each fibre and network), ``adhesion_forces``, ``adhesions``, ``fibres``,
                  ``displacement``; ``cells`` (a row for each cell: the numbers of fit.json); or a path in the cell folder.
     conditions:  a CSV file with a column `cell` and others, such as `condition` and `replicate`, which are joined.
 
-    Cells without that table (not run, or failed) are left out; their paths are in ``frame.attrs["left_out"]``.
-    Cells whose fit did not converge are in the frame, with `converged` false.
+    Cells that `mbtfm stats` leaves out are left out here, too; ``frame.attrs["left_out"]`` has their paths and reasons.
+    with_left_out:  keep their rows, as far as they have any, with `included` false and the `reason`.
+    parameters:     of `mbtfm stats`, for other rules: ``study("study", with_not_converged=True)``.
     """
     root = Path(folder)
-    cells = cells_below(root)
-    if not cells:
+    if not cells_below(root):
         raise FileNotFoundError(f"{root}: no folder with a cell.toml is in it or below it")
-    left_out: List[str] = []
-    frame = _summaries(root, cells, left_out) if table == "cells" else _rows(root, cells, TABLES.get(table, table), left_out)
+    if conditions is not None:
+        parameters = {"table": os.fspath(conditions), **parameters}
+    reasons = _listing(root, parameters)
+    cells = [root / name if (root / name).is_dir() else root for name in reasons]
+    frame = _summaries(root, cells) if table == "cells" else _rows(root, cells, TABLES.get(table, table))
     if frame is None:
         raise FileNotFoundError(f"{root}: none of its {len(cells)} cells has {TABLES.get(table, table)}: run mbtfm batch")
     if conditions is not None:
         frame = _joined(frame, conditions)
-    frame.attrs["left_out"] = left_out
+    for name in set(reasons).difference(frame["cell"]):  # a table that the statistics do not need
+        reasons[name] = reasons[name] or f"{TABLES.get(table, table)} is not there"
+    frame["reason"] = frame["cell"].map(reasons)
+    frame.insert(len(frame.columns) - 1, "included", frame["reason"] == "")
+    if not with_left_out:
+        frame = frame[frame["included"]].reset_index(drop=True)
+    frame.attrs["left_out"] = {name: reason for name, reason in reasons.items() if reason}
     return frame
 
 
@@ -74,7 +120,7 @@ def _fit(cell: Path) -> Dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def _rows(root: Path, cells: Iterable[Path], file: str, left_out: List[str]) -> Optional[pd.DataFrame]:
+def _rows(root: Path, cells: Iterable[Path], file: str) -> Optional[pd.DataFrame]:
     """The tables are put together as text, by their first lines, and parsed at once: a study has thousands of small files."""
     texts: Dict[str, List[str]] = {}
     names: Dict[str, List[str]] = {}
@@ -83,7 +129,6 @@ def _rows(root: Path, cells: Iterable[Path], file: str, left_out: List[str]) -> 
         try:
             head, _, rows = (cell / file).read_text(encoding="utf-8").partition("\n")
         except FileNotFoundError:
-            left_out.append(_name(root, cell))
             continue
         if rows and not rows.endswith("\n"):
             rows += "\n"
@@ -103,15 +148,15 @@ def _rows(root: Path, cells: Iterable[Path], file: str, left_out: List[str]) -> 
     if not frames:
         return None
     whole = pd.concat(frames, ignore_index=True) if len(frames) > 1 else frames[0]
-    return whole.sort_values("cell", kind="stable", ignore_index=True)
+    order = {_name(root, cell): k for k, cell in enumerate(cells)}
+    return whole.sort_values("cell", key=lambda names: names.map(order), kind="stable", ignore_index=True)
 
 
-def _summaries(root: Path, cells: Iterable[Path], left_out: List[str]) -> Optional[pd.DataFrame]:
+def _summaries(root: Path, cells: Iterable[Path]) -> Optional[pd.DataFrame]:
     rows = []
     for cell in cells:
         fit = _fit(cell)
         if not fit:
-            left_out.append(_name(root, cell))
             continue
         numbers = {key: value for key, value in fit.items() if not isinstance(value, (dict, list))}
         rows.append({"cell": _name(root, cell), **numbers})

@@ -66,7 +66,9 @@ std::vector<Roi> read_zip(const fs::path& file) {
     const char* raw_name = zip_get_name(archive.get(), index, ZIP_FL_ENC_GUESS);
     const fs::path name = raw_name ? raw_name : "";
     // what else is there, macOS' resource files among it, is none of ours
-    if (name.extension() != ".roi" || name.string().starts_with("__MACOSX")) continue;
+    if (name.extension() != ".roi" || name.string().starts_with("__MACOSX") ||
+        name.filename().string().starts_with("._"))
+      continue;
     const std::string where = file.string() + ": " + name.string();
     const std::string bytes = bytes_of(archive.get(), index, where);
     n_bytes += bytes.size();

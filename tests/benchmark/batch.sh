@@ -20,7 +20,7 @@ echo "20 cells, 1 job:  $(seconds "$bin/mbtfm" batch "$work/one" --jobs 1 --thre
 echo "20 cells, 2 jobs: $(seconds "$bin/mbtfm" batch "$work/two" --jobs 2 --threads 2)"
 python3 - "$work/one" <<'PY'
 import csv, glob, json, sys
-wall = [float(row["seconds"]) for row in csv.DictReader(open(sys.argv[1] + "/batch.csv"))]
+wall = [float(row["seconds"]) for row in csv.DictReader(open(sys.argv[1] + "/batch_all.csv"))]
 stages = [sum(s["run"]["seconds"] for s in json.load(open(f))["stages"].values()) for f in glob.glob(sys.argv[1] + "/*/run.json")]
 print(f"beside its stages a cell takes {(sum(wall) - sum(stages)) / len(wall):.3f} s")
 PY

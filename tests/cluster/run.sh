@@ -92,7 +92,7 @@ esac
 
 compare() {
   diff -rq --exclude=record.json --exclude=run.json --exclude='*.log' --exclude=report.html --exclude='.*' \
-    --exclude=batch.csv --exclude=statistics "$work/by_batch" "$work/study" || fail "results differ from those of mbtfm batch"
+    --exclude=batch.csv --exclude=batch_all.csv --exclude=statistics "$work/by_batch" "$work/study" || fail "results differ from those of mbtfm batch"
   n=$(find "$work/study" -name tensions.csv -printf x | wc -c)
   [ "$n" -eq $((n_cells - 1)) ] || fail "$n cells have tensions, expected $((n_cells - 1))"
 }

@@ -218,6 +218,47 @@ TEST_F(Errors, check_finds_what_would_spoil_a_batch_and_nothing_in_a_good_cell) 
   EXPECT_NE(missing.output.find("expected a file 'actin.tif', found none"), std::string::npos) << missing.output;
 }
 
+TEST_F(Errors, check_names_a_copy_and_a_folder_that_lacks_its_settings) {
+  fs::copy(cell_, folder_ / "cell10", fs::copy_options::recursive);
+  fs::copy(cell_, folder_ / "cell2", fs::copy_options::recursive);
+  fs::copy(cell_, folder_ / ".Trash", fs::copy_options::recursive);
+  fs::remove(folder_ / "cell2/cell.toml");
+  const Outcome check = run_program("mbtfm check " + folder_.path().string());
+  EXPECT_EQ(check.code, kFailed);
+  EXPECT_NE(check.output.find("is the same picture as that of cell: a copy"), std::string::npos) << check.output;
+  EXPECT_NE(check.output.find("cell2: error: pictures and no cell.toml: mbtfm init"), std::string::npos)
+      << check.output;
+  EXPECT_EQ(check.output.find("Trash"), std::string::npos) << check.output;
+}
+
+TEST_F(Errors, init_writes_what_is_missing_like_a_cell_and_names_what_it_cannot) {
+  const std::string toml = files::read_text(cell_ / "cell.toml") + "[images]\nactin = \"cell_actin.tif\"\n";
+  fs::rename(cell_ / "actin.tif", cell_ / "cell_actin.tif");
+  files::write_text(cell_ / "cell.toml", toml);
+  const auto add = [&](const std::string& name, const std::string& actin) {
+    fs::create_directories((folder_ / name).parent_path());
+    fs::copy(cell_, folder_ / name, fs::copy_options::recursive);
+    fs::rename(folder_ / name / "cell_actin.tif", folder_ / name / actin);
+    fs::remove(folder_ / name / "cell.toml");
+  };
+  add("day 1/c7", "c7_actin.tif");
+  add("day 1/c8", "cell_actin.tif");
+  add("day 2/c9", "other.tif");
+  add("day 2/c10", "c10_actin.tif");
+  files::write_text(folder_ / "day 2/c10/cell.toml", "# mine\n");
+  const Outcome made = run_program("mbtfm init " + folder_.path().string() + " --like " + cell_.string());
+  EXPECT_EQ(made.code, kFailed);
+  EXPECT_NE(made.output.find("2 cell.toml written"), std::string::npos) << made.output;
+  EXPECT_NE(made.output.find("day 2/c9"), std::string::npos) << made.output;
+  EXPECT_NE(made.output.find("c9_actin.tif"), std::string::npos) << made.output;
+  std::string of_c7 = toml;
+  of_c7.replace(of_c7.find("cell_actin"), 4, "c7");
+  EXPECT_EQ(files::read_text(folder_ / "day 1/c7/cell.toml"), of_c7);
+  EXPECT_EQ(files::read_text(folder_ / "day 1/c8/cell.toml"), toml);
+  EXPECT_EQ(files::read_text(folder_ / "day 2/c10/cell.toml"), "# mine\n");
+  EXPECT_FALSE(fs::exists(folder_ / "day 2/c9/cell.toml"));
+}
+
 TEST_F(Errors, check_knows_channels_that_are_exchanged_blur_few_beads_and_a_cell_at_the_border) {
   const auto said = [&] { return run_program("mbtfm check " + cell_.string()).output; };
   const std::string paxillin = files::read_text(cell_ / "paxillin.tif"), actin = files::read_text(cell_ / "actin.tif"),
@@ -271,6 +312,7 @@ TEST_F(Errors, a_cell_toml_that_init_wrote_runs_once_the_modulus_is_in_it) {
   fs::rename(cell_ / "paxillin.tif", cell_ / "day1_Paxillin.tif");
   fs::rename(cell_ / "beads_relaxed.tif", cell_ / "beads_after_trypsin.tif");
   fs::rename(cell_ / "beads_stressed.tif", cell_ / "beads_with_cell.tif");
+  files::write_text(cell_ / "._day1_Paxillin.tif", "as a Mac leaves on a stick");
   fs::create_symlink("round.tif", cell_ / "round.tif");  // a link that leads round in a circle is no image
   const std::string made = output_of("mbtfm init " + cell_.string());
   EXPECT_NE(made.find("complete in it: youngs_modulus_kPa in [gel]"), std::string::npos) << made;

@@ -535,7 +535,7 @@ TEST_F(SheetsOfImages, give_contraction_and_stiffness_back_in_one_command_and_in
   const std::string study = study_.string();
   EXPECT_NE(done("mbtfm batch " + study + " --list").find("sheet,up to date"), std::string::npos);
   done("mbtfm batch " + study + " --quiet");
-  const files::CsvTable batch(study_ / "batch.csv");
+  const files::CsvTable batch(study_ / "batch_all.csv");
   ASSERT_EQ(batch.n_rows(), 1);
   EXPECT_NEAR(batch.number(0, "sheet.contraction_nN_per_um"), fitted.number(0, "value"), 1e-4);
   done("mbtfm verify " + cell_.string());
@@ -592,7 +592,7 @@ TEST(SheetStudies, a_known_difference_of_contraction_is_found_and_the_tables_agr
   EXPECT_NE(done("mbtfm stats " + study + " --condition-from folder").find("8 sheets; 0 cells left out"),
             std::string::npos);
 
-  const files::CsvTable batch(folder / "batch.csv"), cells(folder / "statistics/cells.csv"),
+  const files::CsvTable batch(folder / "batch_all.csv"), cells(folder / "statistics/cells.csv"),
       sheets(folder / "statistics/sheets.csv"), tests(folder / "statistics/tests.csv");
   const auto row_with = [](const files::CsvTable& table, const std::map<std::string, std::string>& texts) {
     for (int row = 0; row < table.n_rows(); ++row)

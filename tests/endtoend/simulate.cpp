@@ -111,6 +111,37 @@ TEST(Simulate, images_do_not_join_the_segmentation_of_another_experiment) {
   EXPECT_FALSE(fs::exists(folder / "cell" / "actin.tif"));
 }
 
+TEST(Simulate, nothing_of_a_users_cell_is_written_over) {
+  const test::TemporaryFolder folder;
+  const fs::path cell = folder / "mine";
+  fs::create_directories(cell);
+  const std::map<std::string, std::string> files = {{"cell.toml", "pixel_size_um = 0.1\n"}, {"paxillin.tif", "II*"}};
+  for (const auto& [name, text] : files) files::write_text(cell / name, text);
+  for (const std::string& command : std::vector<std::string>{
+           "mbtfm-simulate --images " + kSmall + "--out ", "mbtfm-simulate --force --images " + kSmall + "--out ",
+           "mbtfm-simulate --rough 3 --out ", "mbtfm-simulate --scenario wave --beads 60 --out ",
+           "mbtfm-simulate --scenario colony-disc --beads 300 --out ", "mbtfm demo ", "mbtfm demo --force "}) {
+    const Outcome refused = run_program(command + cell.string());
+    EXPECT_EQ(refused.code, 2) << command;
+    EXPECT_NE(refused.output.find((cell / "cell.toml").string()), std::string::npos) << refused.output;
+  }
+  for (const auto& [name, text] : files) EXPECT_EQ(files::read_text(cell / name), text);
+  EXPECT_EQ(std::distance(fs::directory_iterator(cell), {}), 2);
+}
+
+TEST(Simulate, what_was_simulated_is_written_over_if_it_is_asked_for) {
+  const test::TemporaryFolder folder;
+  const std::string out = " --out " + (folder / "cell").string();
+  output_of(simulate(kSmall + out));
+  const std::string before = files::read_text(folder / "cell/truth/displacement.csv");
+  const Outcome refused = simulate(kSmall + "--seed 2" + out);
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.output.find("--force"), std::string::npos) << refused.output;
+  EXPECT_EQ(files::read_text(folder / "cell/truth/displacement.csv"), before);
+  output_of(simulate(kSmall + "--seed 2 --force" + out));
+  EXPECT_NE(files::read_text(folder / "cell/truth/displacement.csv"), before);
+}
+
 TEST(Simulate, same_seed_same_bytes_for_any_number_of_threads) {
   const test::TemporaryFolder folder;
   ASSERT_EQ(simulate(kSmall + "--images --threads 1 --out " + (folder / "a").string()).code, 0);

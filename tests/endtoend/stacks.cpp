@@ -193,7 +193,7 @@ void expect_a_plan_says_that_it_has_no_robust_loss(const fs::path& folder) {
 void expect_statistics_of(const fs::path& study) {
   const std::string outcome = output_of("mbtfm stats " + study.string());
   EXPECT_NE(outcome.find("1 cell in space"), std::string::npos) << outcome;
-  const files::CsvTable batch(study / "batch.csv"), cells(study / "statistics/cells.csv");
+  const files::CsvTable batch(study / "batch_all.csv"), cells(study / "statistics/cells.csv");
   EXPECT_EQ(cells.text(0, "included"), "TRUE") << cells.text(0, "reason");
   for (const auto& [ours, stage] : {std::pair{"space_force_nN", "traction.total_force_nN"},
                                     {"space_strain_energy_fJ", "traction.strain_energy_fJ"},
@@ -290,7 +290,7 @@ TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
   EXPECT_NE(by_hand.find("2_track/displacement_3d.csv"), std::string::npos) << by_hand;
   const auto batch = run_program("mbtfm batch " + folder.parent_path().string());
   EXPECT_EQ(batch.code, 0) << batch.output;
-  const files::CsvTable table(folder.parent_path() / "batch.csv");
+  const files::CsvTable table(folder.parent_path() / "batch_all.csv");
   EXPECT_GT(table.number(0, "traction.total_force_nN"), 0);
   EXPECT_GT(table.number(0, "traction.strain_energy_fJ"), 0);
   EXPECT_TRUE(table.has("traction.moment_x_nN_um"));

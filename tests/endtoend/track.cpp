@@ -35,8 +35,9 @@ void write_series(const test::TemporaryFolder& folder) {
   const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
   write(folder / "r.tif", one.relaxed, 0.2);
   std::filesystem::create_directory(folder / "frames");
-  write(folder / "frames/a.tif", one.stressed, 0.2);
-  write(folder / "frames/b.tif", two.stressed, 0.2);
+  write(folder / "frames/t2.tif", one.stressed, 0.2);
+  write(folder / "frames/t10.tif", two.stressed, 0.2);
+  files::write_text(folder / "frames/._t2.tif", "as a Mac leaves on a stick");
 }
 
 TEST(TrackEndToEnd, images_become_a_displacement_file_in_um) {
@@ -51,7 +52,7 @@ TEST(TrackEndToEnd, images_become_a_displacement_file_in_um) {
   EXPECT_TRUE(std::filesystem::exists(folder / "out/displacement.vtp"));
 }
 
-TEST(TrackEndToEnd, a_folder_of_frames_is_tracked_against_one_relaxed_image) {
+TEST(TrackEndToEnd, a_folder_of_frames_is_tracked_in_the_order_of_its_numbers_against_one_relaxed_image) {
   const test::TemporaryFolder folder;
   write_series(folder);
   output_of(run_track(files(folder, "r.tif", "frames")));

@@ -82,7 +82,7 @@ void read(std::string_view bytes) {
   fuzz::answer([&] {
     runner::BatchCell cell;
     cell.cell = recorded;
-    runner::write_batch_table(fuzz::folder() / "batch.csv", fuzz::folder(), {cell}, {});
+    runner::write_batch_tables(fuzz::folder(), {cell}, {}, {});
   });
   fuzz::answer([&] { runner::write_run_record(fitted, options, untouched()); });
 }

@@ -69,7 +69,7 @@ class RecordsOfCells : public testing::Test {
     expect([&] { runner::recorded_failure(cell_); });
     expect([&] { runner::last_summary(cell_, {}); });
     expect([&] { runner::list_cells({cell_}, options_, 1); });
-    expect([&] { runner::write_batch_table(folder_ / "batch.csv", folder_.path(), {cell}, {}); });
+    expect([&] { runner::write_batch_tables(folder_.path(), {cell}, {}, {}); });
     expect([&] { report::read_provenance(run_json); });
     expect([&] { files::read_fit_summary(cell_ / "4_fit/fit.json"); });
     for (const runner::Stage& stage : runner::stages()) {

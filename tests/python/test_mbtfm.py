@@ -27,6 +27,15 @@ class Cells(unittest.TestCase):
     """One small cell, simulated and fitted once."""
 
     @classmethod
+    def add(cls, cell):
+        """The same results from beads of its own: one bead less, so that it is no copy."""
+        shutil.copytree(cls.first, cell)
+        field = cell / "2_track/displacement.csv"
+        beads = field.read_text().splitlines(keepends=True)
+        cls.n_left_out = getattr(cls, "n_left_out", 0) + 1
+        field.write_text("".join(beads[: -cls.n_left_out]))
+
+    @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory(prefix="mbtfm-python-")
         cls.study = Path(cls.folder.name) / "study"
@@ -35,7 +44,7 @@ class Cells(unittest.TestCase):
         mbtfm.simulate(cls.first, scenario="ring", seed=3, beads=1500, noise=0.02)
         cls.cell = mbtfm.run(cls.first, preset="fast", progress=cls.events.append)
         for name in ("b/cell 2", "b/cell 3"):
-            shutil.copytree(cls.first, cls.study / name)
+            cls.add(cls.study / name)
 
     @classmethod
     def tearDownClass(cls):
@@ -93,10 +102,11 @@ class Cells(unittest.TestCase):
     def test_a_study_is_the_cells_one_after_the_other(self):
         frame = mbtfm.study(self.study)
         self.assertEqual(list(frame.cell.unique()), ["a/cell 1", "b/cell 2", "b/cell 3"])
-        part = frame[frame.cell == "b/cell 3"].drop(columns=["cell", "converged"]).reset_index(drop=True)
+        part = frame[frame.cell == "b/cell 3"].drop(columns=["cell", "converged", "included", "reason"]).reset_index(drop=True)
         pd.testing.assert_frame_equal(part, self.cell.tensions)
         self.assertEqual(len(mbtfm.study(self.study, "cells")), 3)
-        self.assertEqual(frame.attrs["left_out"], [])
+        self.assertEqual(frame.attrs["left_out"], {})
+        self.assertTrue(frame.included.all())
 
     def test_conditions_are_joined_and_a_missing_one_is_an_error(self):
         table = self.study.parent / "conditions.csv"
@@ -112,12 +122,32 @@ class Cells(unittest.TestCase):
         shutil.copytree(self.first, other / "done")
         (other / "new").mkdir()
         (other / "new/cell.toml").write_text("pixel_size_um = 0.1\n")
-        self.assertEqual(mbtfm.study(other).attrs["left_out"], ["new"])
+        shutil.copytree(self.first, other / "copy")
+        frame = mbtfm.study(other)
+        self.assertEqual(list(frame.cell.unique()), ["copy"])
+        self.assertIn("the same cell as copy", frame.attrs["left_out"]["done"])
+        self.assertIn("no fit", frame.attrs["left_out"]["new"])
+        whole = mbtfm.study(other, with_left_out=True)
+        self.assertEqual(list(whole.cell.unique()), ["copy", "done"])
+        self.assertEqual(set(whole[~whole.included].reason), {frame.attrs["left_out"]["done"]})
+
+    def test_without_the_program_what_it_wrote_last_counts(self):
+        other = self.study.parent / "elsewhere"
+        for name in ("t1", "t2", "t10"):
+            self.add(other / name)
+        with mock.patch.dict(os.environ, {"MBTFM_BIN": str(other)}):
+            with self.assertRaises(FileNotFoundError):
+                mbtfm.study(other)
+            (other / "statistics").mkdir()
+            (other / "statistics/cells.csv").write_text(
+                "cell,condition,included,reason\nt1,,TRUE,\nt10,,TRUE,\nt2,,FALSE,dividing\n")
+            self.assertEqual(list(mbtfm.study(other).cell.unique()), ["t1", "t10"])
+        self.assertEqual(list(mbtfm.study(other).cell.unique()), ["t1", "t2", "t10"])
 
     def test_older_tables_with_fewer_columns_stand_beside_new_ones(self):
         other = self.study.parent / "older"
-        shutil.copytree(self.first, other / "new")
-        shutil.copytree(self.first, other / "old")
+        self.add(other / "new")
+        self.add(other / "old")
         old = mbtfm.read(other / "old").tensions[["fibre_id", "type", "tension_nN"]]
         old.to_csv(other / "old/4_fit/tensions.csv", index=False)
         frame = mbtfm.study(other)

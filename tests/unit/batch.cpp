@@ -92,8 +92,8 @@ TEST(BatchTable, has_a_column_for_every_figure_and_a_row_for_every_cell) {
   EXPECT_EQ(last_summary(cells[0].cell, {"segment"}), "two");
   EXPECT_EQ(last_summary(cells[0].cell, {"track"}), "");
   EXPECT_EQ(last_summary(cells[3].cell, {}), "");
-  write_batch_table(folder / "batch.csv", folder / ".", cells, {});
-  const files::CsvTable table(folder / "batch.csv");
+  EXPECT_EQ(write_batch_tables(folder / ".", cells, {}, {}).counts, "3 done: 3 fine; 1 failed");
+  const files::CsvTable table(folder / "batch_all.csv");
   ASSERT_EQ(table.n_rows(), 4);
   EXPECT_EQ(table.integer(0, "segment.n_adhesions", 0), 2);
   EXPECT_EQ(table.text(1, "segment.why"), "a, b");

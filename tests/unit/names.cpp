@@ -34,6 +34,48 @@ TEST(Names, characters_of_utf8_have_their_lengths_and_nothing_else_has_one) {
     EXPECT_EQ(files::utf8_length(text), length) << files::shown_name(text);
 }
 
+TEST(Names, numbers_count_as_numbers_and_a_point_in_front_hides) {
+  const std::vector<fs::path> ordered = {"a",
+                                         "b 2/z",
+                                         "b 10/a",
+                                         "b10",
+                                         "t1.tif",
+                                         "t01",
+                                         "t2.tif",
+                                         "t10.tif",
+                                         "t12",
+                                         "u1v2",
+                                         "u1v10",
+                                         "u2v1",
+                                         "v9",
+                                         "v0010",
+                                         "v99999999999999999999",
+                                         "v100000000000000000000"};
+  std::vector<fs::path> shuffled = ordered;
+  std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937(1));
+  std::ranges::sort(shuffled, files::is_before);
+  for (std::size_t i = 0; i + 1 < shuffled.size(); ++i) {
+    EXPECT_TRUE(files::is_before(shuffled[i], shuffled[i + 1])) << shuffled[i] << shuffled[i + 1];
+    EXPECT_FALSE(files::is_before(shuffled[i + 1], shuffled[i])) << shuffled[i] << shuffled[i + 1];
+  }
+  const auto place = [&](const char* name) { return std::ranges::find(shuffled, name) - shuffled.begin(); };
+  for (const auto& [first, second] :
+       std::vector<std::pair<const char*, const char*>>{{"t2.tif", "t10.tif"},
+                                                        {"b 2/z", "b 10/a"},
+                                                        {"u1v10", "u2v1"},
+                                                        {"v9", "v0010"},
+                                                        {"v99999999999999999999", "v100000000000000000000"}})
+    EXPECT_LT(place(first), place(second)) << first << " " << second;
+  const TemporaryFolder folder;
+  for (const char* name : {"t10.tif", "t2.tif", "._t2.tif", ".snapshot", "t1.tif"})
+    files::write_text(folder / name, "x");
+  EXPECT_EQ(files::visible_in(folder.path()),
+            (std::vector<fs::path>{folder / "t1.tif", folder / "t2.tif", folder / "t10.tif"}));
+  std::error_code error;
+  EXPECT_TRUE(files::visible_in(folder / "nowhere", error).empty());
+  EXPECT_TRUE(error);
+}
+
 TEST(Names, a_name_of_any_bytes_is_shown_as_utf8_and_shown_again_stays_as_it_is) {
   EXPECT_EQ(files::shown_name("Zelle 3, caf\xC3\xA9"), "Zelle 3, caf\xC3\xA9");
   EXPECT_EQ(files::shown_name("caf\xE9.tif"), "caf\\xE9.tif");

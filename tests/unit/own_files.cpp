@@ -67,9 +67,9 @@ TEST_F(OwnFiles, writing_replaces_a_link_and_a_second_name_and_a_pipe) {
     for (const auto& write : {files::write_text, files::write_whole}) {
       fs::remove(file);
       put();
-      write(file, "ours");
+      write(file, "precious, ours");
       EXPECT_TRUE(files::is_own_file(file));
-      EXPECT_EQ(files::read_text(file), "ours");
+      EXPECT_EQ(files::read_text(file), "precious, ours");
       EXPECT_EQ(files::read_text(folder_ / "outside"), "precious");
       EXPECT_FALSE(fs::exists(folder_ / "new"));
     }
@@ -84,6 +84,38 @@ TEST_F(OwnFiles, a_device_is_not_replaced) {
   EXPECT_THROW(files::put_in_place(folder_ / "new", device), OutputError);
   EXPECT_THROW(files::write_whole(device, "text"), OutputError);
   EXPECT_TRUE(fs::is_character_file(device));
+}
+
+TEST_F(OwnFiles, what_is_replaced_is_of_the_same_kind) {
+  const std::map<std::string, std::string> written = {{"a table", "cell,state\nc1,fine\n"},
+                                                      {"a longer one", "cell,condition,state\n"},
+                                                      {"a page", "<!DOCTYPE html>\n<title>cell 1 – mbtfm</title>"},
+                                                      {"a record", "{\"stage\": 1}"},
+                                                      {"a record on lines", "{\n}\n"},
+                                                      {"a grid", "<?xml version=\"1.0\"?>\n<VTKFile>"},
+                                                      {"a picture", std::string("\x89PNG\r\n\x1A\n", 8)}};
+  const std::map<std::string, std::string> users = {{"another table", "x,y\n1,2\n"},
+                                                    {"a page of theirs", "<!DOCTYPE html>\n<title>mine</title>"},
+                                                    {"settings", "pixel_size_um = 0.1\n"},
+                                                    {"a TIFF", std::string("II*\0\x10", 5)},
+                                                    {"notes", "to do"}};
+  const auto is_replaced = [&](const std::string& before, const std::string& by) {
+    files::write_text(cell_ / "output", before);
+    try {
+      files::write_whole(cell_ / "output", by);
+    } catch (const OutputError& error) {
+      EXPECT_NE(std::string(error.what()).find((cell_ / "output").string()), std::string::npos) << error.what();
+      EXPECT_EQ(files::read_text(cell_ / "output"), before);
+      return false;
+    }
+    return true;
+  };
+  for (const auto& [ours, text] : written) {
+    EXPECT_TRUE(is_replaced(text, text + "\n")) << ours;
+    EXPECT_TRUE(is_replaced("", text)) << ours;
+    for (const auto& [theirs, other] : users) EXPECT_FALSE(is_replaced(other, text)) << theirs << " by " << ours;
+  }
+  EXPECT_TRUE(is_replaced(written.at("a table"), written.at("a longer one"))) << "of an older version";
 }
 
 TEST_F(OwnFiles, a_link_under_the_temporary_name_is_not_followed) {

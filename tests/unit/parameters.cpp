@@ -1,6 +1,9 @@
 #include "pipeline/stage/parameters.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/range.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/toml.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 
 namespace mbtfm {
@@ -202,6 +205,39 @@ TEST(Parameters, a_shear_modulus_gives_youngs_modulus_whatever_the_order_and_not
   EXPECT_DOUBLE_EQ(read("[gel]\npoisson_ratio = 0.25\nshear_modulus_kPa = 4\n", ""), 10);
   EXPECT_DOUBLE_EQ(read("[gel]\nshear_modulus_kPa = 4\n", "0.25"), 10) << "a flag comes after cell.toml";
   EXPECT_THROW(read("[gel]\nshear_modulus_kPa = 4\nyoungs_modulus_kPa = 12\n", ""), UsageError);
+}
+
+TEST(Parameters, a_cell_takes_what_it_leaves_out_from_the_nearest_study_above_it) {
+  const TemporaryFolder folder;
+  const fs::path cell = folder / "study/day 1/cell/cell.toml", study = folder / "study/study.toml";
+  fs::create_directories(cell.parent_path());
+  files::write_text(folder / "study.toml", "pixel_size_um = 9\n[gel]\nthickness_um = 9\n");  // not the nearest
+  const auto read = [&](const std::string& of_cell, const std::string& of_study) {
+    files::write_text(cell, of_cell);
+    files::write_text(study, of_study);
+    Gel gel;
+    double pixel_size_um = 0;
+    stage::ParameterList list;
+    list.table("");
+    list.add("pixel_size_um", pixel_size_um, Range::pixel_um(), "side");
+    declare(list, gel);
+    stage::read_toml(list, cell);
+    return std::pair(gel, pixel_size_um);
+  };
+  const std::string shared =
+      "pixel_size_um = 0.2\n[gel]\nyoungs_modulus_kPa = 8\nthickness_um = 70\n[fit]\nn_meshes = 3\n";
+  const auto [gel, pixel_size_um] = read("[gel]\nthickness_um = 50\n", shared);
+  EXPECT_EQ(pixel_size_um, 0.2);
+  EXPECT_EQ(gel.youngs_modulus_kPa, 8);
+  EXPECT_EQ(gel.thickness_um, 50) << "the cell's own counts";
+  const files::SharedSettings taken = files::shared_settings(cell);
+  EXPECT_TRUE(fs::equivalent(taken.file, study));
+  EXPECT_EQ(taken.keys, (std::vector<std::string>{"fit.n_meshes", "gel.youngs_modulus_kPa", "pixel_size_um"}));
+  EXPECT_NEAR(read("[gel]\nshear_modulus_kPa = 2\n", shared).first.youngs_modulus_kPa, 2 * 1.49 * 2, 1e-12)
+      << "either modulus is the gel's stiffness";
+  const auto error = test::thrown<InputError>([&] { read("", "[gel]\nyoungs_modulus = 8\n"); });
+  EXPECT_EQ(error.where, study.string() + ":2");
+  EXPECT_NE(error.hint.find("youngs_modulus_kPa"), std::string::npos) << error.hint;
 }
 
 TEST(Parameters, what_other_programs_and_countries_write_is_answered_with_how_to_write_it) {

@@ -128,6 +128,25 @@ TEST_F(Stage, a_failure_leaves_no_file_and_no_folder_and_tells_by_its_code) {
   }
 }
 
+TEST_F(Stage, what_the_command_line_gives_as_an_input_is_no_output) {
+  fs::create_directories(folder_ / "out");
+  fs::rename(folder_ / "in.txt", folder_ / "out/a.csv");
+  EXPECT_EQ(run({"--quiet", "--in", (folder_ / "out/a.csv").string(), "--out", (folder_ / "out").string()}, write_two),
+            2);
+  EXPECT_EQ(
+      run({"--quiet", "--in", (folder_ / "out/a.csv").string(), "--out", (folder_ / "out/a.csv").string()}, write_two),
+      2);
+  EXPECT_EQ(files::read_text(folder_ / "out/a.csv"), "in");
+}
+
+TEST_F(Stage, a_file_of_another_kind_is_not_written_over_and_nothing_else_is_written) {
+  fs::create_directories(folder_ / "out/deep");
+  files::write_text(folder_ / "out/deep/b.csv", "a table, of the user's");
+  EXPECT_EQ(run(files(), write_two), 5);
+  EXPECT_EQ(files::read_text(folder_ / "out/deep/b.csv"), "a table, of the user's");
+  EXPECT_FALSE(fs::exists(folder_ / "out/a.csv"));
+}
+
 TEST_F(Stage, links_in_the_place_of_outputs_are_replaced_not_followed) {
   files::write_text(folder_ / "precious", "precious");
   fs::create_directories(folder_ / "out/deep");

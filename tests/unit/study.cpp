@@ -129,6 +129,41 @@ TEST(Study, cells_with_a_finding_that_excludes_are_left_out_with_it_as_the_reaso
   EXPECT_THROW(fake.read({.exclude_findings = "cell-cutt"}), UsageError);
 }
 
+TEST(Study, a_cell_that_a_finding_says_not_to_use_is_left_out_and_one_with_unknown_fibres_is_not) {
+  const FakeStudy fake;
+  const auto find = [&](const char* cell, const char* id) {
+    files::write_text(fake.folder / cell / "run.json",
+                      std::string("{\"findings\": [{\"id\": \"") + id +
+                          "\", \"severity\": \"bad\", \"text\": \"so\", \"remedy\": \"\"}]}");
+  };
+  find("control/cell_1", "explains-little");
+  find("treated/cell_2", "not-identifiable");
+  const Study study = fake.read();
+  EXPECT_EQ(reason_of(study, "control/cell_1"), "not usable, as explains-little says (stats.with_bad)");
+  EXPECT_EQ(study.cells.size(), 3u);
+  EXPECT_EQ(fake.read({.with_bad = true}).cells.size(), 4u);
+}
+
+TEST(Study, the_list_has_every_cell_and_its_reason_also_if_none_enters) {
+  const FakeStudy fake;
+  fs::create_directories(fake.folder / ".Trash/cell_9");
+  files::write_text(fake.folder / ".Trash/cell_9/cell.toml", "");
+  const auto list_of = [&] { return files::CsvTable(list_of_cells(fake.read({.list = true})), "list"); };
+  EXPECT_EQ(list_of().n_rows(), 6);
+  fs::create_directories(fake.folder / "treated/forgotten");
+  for (const char* name : {"a.tif", "b.tif", "frames/t1.tif", "frames/t2.tif"}) {
+    fs::create_directories((fake.folder / "treated/forgotten" / name).parent_path());
+    files::write_text(fake.folder / "treated/forgotten" / name, "x");
+  }
+  for (const int i : {1, 3}) fs::remove(fake.folder / ("control/cell_" + std::to_string(i)) / "4_fit/fit.json");
+  for (const int i : {2, 4}) fs::remove(fake.folder / ("treated/cell_" + std::to_string(i)) / "4_fit/fit.json");
+  const files::CsvTable none = list_of();
+  ASSERT_EQ(none.n_rows(), 7);
+  for (int row = 0; row < 7; ++row) EXPECT_EQ(none.text(row, "included"), "FALSE");
+  EXPECT_EQ(none.text(6, "cell"), "treated/forgotten");
+  EXPECT_NE(none.text(6, "reason").find("mbtfm init"), std::string::npos) << none.text(6, "reason");
+}
+
 TEST(Study, what_cannot_be_assigned_is_an_error_that_says_so) {
   const FakeStudy fake;
   EXPECT_THROW(fake.read({.condition_from = "drug"}), UsageError);
