@@ -6,6 +6,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "mbtfm/tractions/field_of_adhesions.h"
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
@@ -542,8 +543,7 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
           Severity::caution));
     }
     report.summary = std::to_string(field.size()) + " displacements read" + table.how + report.summary;
-    if (table.n_left_out > 0)
-      report.summary += "; " + std::to_string(table.n_left_out) + " rows without a place left out";
+    if (table.n_left_out > 0) report.summary += "; " + counted(table.n_left_out, "rows") + " without a place left out";
     return report;
   }
   for (const char* name : {"stressed", "relaxed"})

@@ -97,7 +97,8 @@ CsvTable::CsvTable(std::string_view text, std::string name) : name_(std::move(na
     Row row{.line = splitter.line(), .fields = splitter.record()};
     if (row.fields.size() != header_.size()) {
       throw InputError(name_ + ":" + std::to_string(row.line),
-                       std::to_string(header_.size()) + " fields, as in the header", std::to_string(row.fields.size()));
+                       std::to_string(header_.size()) + " fields, as in the header", std::to_string(row.fields.size()),
+                       "take rows out that are none; displacements of other programs: mbtfm-track --displacement");
     }
     rows_.push_back(std::move(row));
   }

@@ -198,7 +198,7 @@ std::optional<char> take_separator(std::string_view& text, int& n_lines) {
   return said.size() > 4 ? said[4] : '\t';
 }
 
-constexpr std::array kSeparators = {';', '\t', ',', ' '};
+constexpr std::array kSeparators = {';', '\t', ',', '|', ' '};
 
 /// The one by which most of the first lines are rows of numbers.
 char separator_of_numbers(std::string_view text, std::size_t n_numbers) {
@@ -337,7 +337,7 @@ ForeignTable read_numbers(std::string_view bytes, std::string name, std::size_t 
   Line line;
   const std::optional<char> said = take_separator(text, line.number);
   const char separator = said ? *said : separator_of_numbers(text, n_numbers);
-  ForeignTable table{.name = std::move(name), .above = {}, .lines_above = {}, .rows = {}};
+  ForeignTable table{.name = std::move(name), .separator = separator, .above = {}, .lines_above = {}, .rows = {}};
   table.rows.reserve(static_cast<std::size_t>(std::ranges::count(text, '\n')) + 1);
   for (std::string_view rest = text; next(rest, line);) {
     const bool is_above = table.rows.empty() && !is_row_of_numbers(line, separator, n_numbers);

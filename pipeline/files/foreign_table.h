@@ -21,6 +21,7 @@ bool is_missing(std::string_view cell);
 
 struct ForeignTable {
   std::string name;
+  char separator = ',';                  ///< ' ': any number of blanks
   std::vector<CsvTable::Row> above;      ///< lines before the first row of numbers, without the `#` or `%` before them
   std::vector<std::string> lines_above;  ///< the same as they are
   std::vector<CsvTable::Row> rows;       ///< from there on: all with as many cells; numbers as std::from_chars has them

@@ -24,26 +24,24 @@
 namespace mbtfm::beads {
 namespace {
 
-/// A number of the table in um. Nothing where it is missing.
-std::optional<double> number_in(const GivenTable& table, int row, const std::string& column, double unit_um,
-                                double first = 0) {
-  if (files::is_missing(table.rows.text(row, column))) return std::nullopt;
-  return unit_um * (table.rows.number(row, column) + first);
-}
-
 /// What no field can be displaced by is flagged later on.
 constexpr double kNoDisplacement_um = 2 * kFarthest_um;
 
-/// The same of a displacement, whatever its size: programs write 1e10 where they have none.
-std::optional<double> displacement_in(const GivenTable& table, int row, const std::string& column) {
+/// A number of the table in um, whatever its size: programs write 1e10 where they have none. Nothing where it is
+/// missing.
+std::optional<double> um_in(const GivenTable& table, int row, const std::string& column, double unit_um,
+                            double first = 0) {
   const std::string cell = table.rows.text(row, column);
   if (files::is_missing(cell)) return std::nullopt;
   double value = 0;
   const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
   if (end != cell.data() + cell.size() || (error != std::errc() && error != std::errc::result_out_of_range))
-    table.rows.fail(row, column, "a number");
-  if (error != std::errc()) value = kNoDisplacement_um;
-  return std::clamp(table.displacement_um * value, -kNoDisplacement_um, kNoDisplacement_um);
+    table.rows.fail(row, column, "a number",
+                    "one decimal mark and nothing between thousands; take a row out that is no vector");
+  // too small, or too large, for a number
+  if (error != std::errc())
+    value = cell.find("e-") == cell.npos && cell.find("E-") == cell.npos ? kNoDisplacement_um : 0;
+  return std::clamp(unit_um * (value + first), -kNoDisplacement_um, kNoDisplacement_um);
 }
 
 void flag_duplicates(DisplacementField& field) {
@@ -94,14 +92,28 @@ void move_to_corner(GivenField& given, const GivenTable& table) {
                                     Severity::caution));
 }
 
+/// What one program calls a mask is 1 where it measured, in others where it did not: the smaller part is masked.
+void expect_most_measured(const GivenTable& table) {
+  for (const MarkColumn& column : table.marks) {
+    if (column.mark != RowMark::zero_if_measured) continue;
+    int n_masked = 0;
+    for (int row = 0; row < table.rows.n_rows(); ++row)
+      n_masked += !flag_of(column.mark, table.rows.text(row, column.name)).empty();
+    if (2 * n_masked <= table.rows.n_rows()) continue;
+    table.rows.fail(0, column.name, "0 in most rows, as of vectors that were measured",
+                    "if it has 1 where they were measured, call the column valid; else take the masked rows out");
+  }
+}
+
 GivenField read_rows(const GivenTable& table, std::optional<double> height_um) {
   GivenField given{.form = table.form, .how = table.how, .n_left_out = table.n_left_out};
   given.has_sigma = !table.sigma.empty();
+  expect_most_measured(table);
   const bool has_flags = table.rows.has("flag");
   const Range within = possible_place_um();
   for (int row = 0; row < table.rows.n_rows(); ++row) {
-    const auto x = number_in(table, row, table.x, table.place_um, table.first);
-    const auto y = number_in(table, row, table.y, table.place_um, table.first);
+    const auto x = um_in(table, row, table.x, table.place_um, table.first);
+    const auto y = um_in(table, row, table.y, table.place_um, table.first);
     if (!x || !y) {
       ++given.n_left_out;
       continue;
@@ -114,8 +126,9 @@ GivenField read_rows(const GivenTable& table, std::optional<double> height_um) {
     if (files::numeral_in(bead.flag) != files::Numeral::none) bead.flag = flag_of(RowMark::zero_if_measured, bead.flag);
     for (const MarkColumn& column : table.marks)
       if (bead.flag.empty()) bead.flag = flag_of(column.mark, table.rows.text(row, column.name));
-    const auto ux = displacement_in(table, row, table.ux), uy = displacement_in(table, row, table.uy);
-    const auto sigma = given.has_sigma ? displacement_in(table, row, table.sigma) : 0;
+    const auto ux = um_in(table, row, table.ux, table.displacement_um);
+    const auto uy = um_in(table, row, table.uy, table.displacement_um);
+    const auto sigma = given.has_sigma ? um_in(table, row, table.sigma, table.sigma_um) : 0;
     if (ux && uy && sigma) {
       bead.displacement_um = {*ux, *uy};
       bead.sigma_um = *sigma;
@@ -154,7 +167,8 @@ void flag_masked(GivenField& given) {
   std::vector<std::string> values;
   for (const MaskedValue& value : masked_values(field)) {
     for (const std::size_t k : value.beads) mask(field[k]);
-    values.push_back("(" + brief(value.displacement_um.x) + ", " + brief(value.displacement_um.y) + ")");
+    values.push_back("(" + significant(value.displacement_um.x, 6) + ", " + significant(value.displacement_um.y, 6) +
+                     ")");
   }
   std::size_t n_beyond = 0;
   for (Bead& bead : field) {

@@ -183,19 +183,17 @@ std::optional<Found> found_in(const Header& header, const TrackParameters& param
 
 [[noreturn]] void fail_to_find(const ForeignTable& table, const Header& header, int line,
                                const TrackParameters& parameters) {
+  std::string missing, how;
   const auto asked = asked_for(parameters);
   for (std::size_t k = 0; k < kComponents; ++k) {
     if (!matches_in(header, asked[k], k).empty()) continue;
-    const auto alike = std::ranges::find(header, lower(asked[k].name), lower);
-    const bool has_names = !is_without_names(header);
-    throw InputError(
-        table.name + ":" + std::to_string(line), "a column '" + asked[k].name + "'",
-        has_names ? "the columns " + listed(header) : std::to_string(header.size()) + " columns without names",
-        alike != header.end()
-            ? "write '" + *alike + "' as '" + asked[k].name + "': capitals count"
-            : "name it, or give its number: " + how_to_set(asked[k].parameter, std::to_string(k + 1)));
+    missing += (missing.empty() ? "" : ", ") + asked[k].name;
+    how += " --" + std::string(asked[k].parameter) + " " + std::to_string(k + 1);
   }
-  throw InternalError("columns are there and not found");
+  throw InputError(table.name + ":" + std::to_string(line), "columns " + missing,
+                   is_without_names(header) ? std::to_string(header.size()) + " columns without names"
+                                            : "the columns " + listed(header),
+                   "name them, or give their numbers, as in" + how + " (in cell.toml: track.x_column = \"1\")");
 }
 
 std::string text_of(const CsvTable::Row& row) {
@@ -204,26 +202,24 @@ std::string text_of(const CsvTable::Row& row) {
   return text;
 }
 
+std::string text_above(const ForeignTable& table) {
+  std::string text;
+  for (const std::string& line : table.lines_above) text += line + "\n";
+  return text;
+}
+
 /// The names in quotes or between commas after `VARIABLES =`, over as many lines as they take.
 Header variables_of(const ForeignTable& table) {
-  std::string text;
-  bool is_in = false;
-  for (const std::string& line : table.lines_above) {
-    const std::string key = lower(line);
-    if (key.starts_with("variables")) {
-      is_in = true;
-      text = line.substr(std::min(line.find('=') + 1, line.size()));
-    } else if (key.starts_with("zone") || key.starts_with("title") || key.starts_with("dataset")) {
-      is_in = false;
-    } else if (is_in) {
-      text += " " + line;
-    }
-  }
+  const std::string all = text_above(table), key = lower(all);
+  const std::size_t word = key.find("variables");
+  if (word == key.npos) return {};
+  const std::size_t from = std::min(all.find('=', word), all.size() - 1) + 1;
+  const std::string text = all.substr(from, std::min(key.find("zone", from), key.find("datasetauxdata", from)) - from);
   Header names;
   const bool has_quotes = text.find('"') != text.npos;
   for (std::size_t at = 0; at < text.size();) {
-    const char* separators = has_quotes ? "\"" : ", \t";
-    const std::size_t begin = text.find_first_not_of(has_quotes ? "\", \t" : ", \t", at);
+    const char* separators = has_quotes ? "\"" : ", \t\n";
+    const std::size_t begin = text.find_first_not_of(has_quotes ? "\", \t\n" : ", \t\n", at);
     if (begin == text.npos) break;
     const std::size_t end = std::min(text.find_first_of(separators, begin), text.size());
     names.push_back(without_marks(text.substr(begin, end - begin)));
@@ -239,12 +235,12 @@ void expect_no_numbers(const ForeignTable& table, int line_of_header) {
   for (const CsvTable::Row& row : table.above) {
     const auto n_numbers = static_cast<std::size_t>(std::ranges::count_if(
         row.fields, [](const std::string& cell) { return files::numeral_in(cell) != files::Numeral::none; }));
-    const bool is_row =
-        line_of_header > 0 ? row.line > line_of_header && n_numbers > 0 : row.fields.size() == n && 2 * n_numbers >= n;
+    const bool is_row = line_of_header > 0
+                            ? row.line > line_of_header && n_numbers > 0
+                            : row.fields.size() == n && 2 * n_numbers >= n && !is_without_names(row.fields);
     if (!is_row) continue;
-    throw InputError(table.name + ":" + std::to_string(row.line),
-                     std::to_string(n) + " fields with a number in most of them", "'" + text_of(row) + "'",
-                     "the file may be damaged");
+    throw InputError(table.name + ":" + std::to_string(row.line), std::to_string(n) + " numbers or more, or units",
+                     "'" + text_of(row) + "'", "a number has one decimal mark and nothing between thousands");
   }
 }
 
@@ -314,12 +310,6 @@ void take_numbered_header(ForeignTable& table) {
   table.rows.erase(table.rows.begin());
 }
 
-std::string text_above(const ForeignTable& table) {
-  std::string text;
-  for (const std::string& line : table.lines_above) text += line + "\n";
-  return text;
-}
-
 bool has_columns(const ForeignTable& table, const std::set<std::string>& keys) {
   return std::ranges::any_of(table.above, [&](const CsvTable::Row& row) {
     std::set<std::string> found;
@@ -340,18 +330,21 @@ bool has_names_of_ours(const ForeignTable& table, const TrackParameters& p) {
 TableForm form_of(const ForeignTable& table, const TrackParameters& parameters) {
   if (parameters.table != TableForm::automatic) return parameters.table;
   const std::string text = text_above(table);
+  if (lower(text).find("=block") != text.npos)
+    throw InputError(table.name, "a row for each vector", "blocks of one variable each",
+                     "export it as points (F=POINT)");
   if (has_names_of_ours(table, parameters)) return TableForm::plain;
   if (text.find("DaVis") != text.npos) return TableForm::davis;
   if (!variables_of(table).empty()) return TableForm::tecplot;
   if (text.find("PIVlab") != text.npos || text.find("conversion factor xy") != text.npos ||
       has_columns(table, {"vectortype"}))
     return TableForm::pivlab;
-  if (has_columns(table, {"trackid", "frame", "positionx", "positiony"})) return TableForm::trackmate;
+  if (has_columns(table, {"label", "trackid"})) return TableForm::trackmate;
   if (has_columns(table, {"x", "y", "u", "v", "mask"}) || has_columns(table, {"x", "y", "u", "v", "flags"}))
     return TableForm::openpiv;
-  const std::size_t n = table.rows.front().fields.size();
-  constexpr std::array kOfImagej = {4, 5, 16};
-  if (table.above.empty() && std::ranges::find(kOfImagej, static_cast<int>(n)) != kOfImagej.end() &&
+  constexpr std::array kWidthsOfImagej = {4, 5, 16};
+  const auto n = static_cast<int>(table.rows.front().fields.size());
+  if (table.above.empty() && table.separator == ' ' && std::ranges::find(kWidthsOfImagej, n) != kWidthsOfImagej.end() &&
       std::ranges::all_of(table.rows, [](const CsvTable::Row& row) {
         return files::numeral_in(row.fields[0]) == files::Numeral::whole &&
                files::numeral_in(row.fields[1]) == files::Numeral::whole;
@@ -420,29 +413,68 @@ double pixel_um(const TrackParameters& parameters) {
   throw UsageError("lengths in px need pixel_size_um: give it in cell.toml or as --pixel_size_um");
 }
 
-/// Of a quantity. @throws InputError where nobody says it, or two say differently; UsageError where a factor lacks
-double um_of(const GivenTable& table, const std::string& file, const std::string& column, std::optional<Unit> unit,
+/// A length of a column's unit. @throws InputError where nobody states it; UsageError where the pixel's size lacks
+double um_of(const std::string& file, const std::string& column, const std::optional<Unit>& unit,
              const TrackParameters& parameters) {
-  const std::optional<Unit> asked = unit_of_parameter(parameters.length_unit);
-  const bool is_of_pixels = table.form == TableForm::openpiv || table.form == TableForm::imagej_piv ||
-                            table.form == TableForm::pivlab || table.form == TableForm::pytfm;
-  if (asked && unit && *asked != *unit) {
-    throw InputError(file,
-                     "lengths in " + std::string(name_of(parameters.length_unit)) + ", as track.length_unit has it",
-                     "the column '" + column + "'", "leave track.length_unit out: the table states its unit");
-  }
-  if (!unit) unit = asked;
-  if (!unit && is_of_pixels) unit = Unit{};
-  if (!unit) {
-    throw InputError(file, "a unit of the column '" + column + "'", "none in its name",
-                     how_to_set("length_unit", "px") + " if it is in pixels; um, mm or m are the others");
-  }
-  const double length_um = unit->um > 0 ? unit->um : pixel_um(parameters);
-  if (!(unit->per_s > 0)) return length_um;
-  if (parameters.seconds_between) return length_um * unit->per_s * *parameters.seconds_between;
+  if (unit) return unit->um > 0 ? unit->um : pixel_um(parameters);
+  throw InputError(file, "a unit of the column '" + column + "'", "none in its name",
+                   how_to_set("length_unit", "px") + " if it is in pixels; um, mm or m are the others");
+}
+
+/// Seconds by which the column's numbers are multiplied; 1 for displacements.
+double seconds_of(const std::string& file, const std::string& column, const std::optional<Unit>& stated,
+                  const std::optional<double>& seconds) {
+  const bool is_velocity = stated && stated->per_s > 0;
+  if (stated && !is_velocity && seconds)
+    throw InputError(file, "a velocity in the column '" + column + "'", "a displacement",
+                     "leave track.seconds_between out");
+  if (!is_velocity) return seconds.value_or(1);
+  if (seconds) return stated->per_s * *seconds;
   throw InputError(file, "a displacement in the column '" + column + "'", "a velocity",
                    "set the time (s) between the two images as it was set in that program: track.seconds_between = 1 "
                    "in cell.toml, or --seconds_between 1");
+}
+
+/// The units of places and displacements: of the header, else of the parameter, else of the program.
+void take_units(GivenTable& given, const std::string& file, const Found& found, const TrackParameters& parameters) {
+  const auto& [x, y, ux, uy] = found.columns;
+  const std::optional<Unit>&of_places = found.units[x], &of_displacements = found.units[ux];
+  if (found.units[y] != of_places || found.units[uy] != of_displacements)
+    throw InputError(file, "one unit along x and y", listed(found.header));
+  std::optional<Unit> otherwise = unit_of_parameter(parameters.length_unit);
+  if (otherwise && of_places && of_displacements &&
+      (of_places->um != otherwise->um || of_displacements->um != otherwise->um)) {
+    throw InputError(
+        file, "lengths in " + std::string(name_of(parameters.length_unit)) + ", as track.length_unit has it",
+        "the columns " + given.x + " and " + given.ux, "leave track.length_unit out: the table states its units");
+  }
+  const bool is_of_pixels = given.form == TableForm::openpiv || given.form == TableForm::imagej_piv ||
+                            given.form == TableForm::pivlab || given.form == TableForm::pytfm;
+  if (!otherwise && is_of_pixels) otherwise = Unit{};
+  const std::optional<Unit> place = of_places ? of_places : otherwise;
+  given.place_um = um_of(file, given.x, place, parameters);
+  given.displacement_um = um_of(file, given.ux, of_displacements ? of_displacements : otherwise, parameters) *
+                          seconds_of(file, given.ux, of_displacements, parameters.seconds_between);
+  // a place is the centre of a pixel: PIVlab counts them from 1, others from 0
+  if (place->um == 0)
+    given.first = given.form == TableForm::pivlab ? -0.5 : 0.5;
+  else if (given.form == TableForm::trackmate)
+    given.first = 0.5 * parameters.pixel_size_um.value_or(0) / given.place_um;
+}
+
+/// Of a field that PIVlab calibrated, as the factors above the header have it.
+void take_factors(GivenTable& given, const std::string& file, const PivlabFactors& factors,
+                  const TrackParameters& parameters) {
+  constexpr double kSame = 0.01;
+  const double own_um = 1e6 * factors.m_per_px;
+  if (std::abs(parameters.pixel_size_um.value_or(own_um) / own_um - 1) > kSame) {
+    throw InputError(file, "the pixel size that is set, " + shortest(*parameters.pixel_size_um) + " um",
+                     shortest(own_um) + " um in the line above the header",
+                     "set pixel_size_um = " + shortest(own_um) + ", or calibrate PIVlab's field again");
+  }
+  given.place_um = 1e6;
+  given.displacement_um = own_um / factors.m_per_s_per_px;
+  given.first = -0.5 * factors.m_per_px;
 }
 
 /// Places and displacements of spots in two frames, as a table of vectors.
@@ -492,12 +524,13 @@ void make_vectors_of_spots(ForeignTable& table, const TrackParameters& parameter
         .push_back({spots.number(row, named(x)), spots.number(row, named(y))});
   }
   table.rows.clear();
+  const double scale = unit && unit->um > 0 ? unit->um : 1;  // to um
   for (const auto& [id, t] : tracks) {
     if (t.relaxed.size() != 1 || t.stressed.size() != 1) {
       ++n_left_out;
       continue;
     }
-    const Vec2 place = t.relaxed.front(), u = t.stressed.front() - place;
+    const Vec2 place = scale * t.relaxed.front(), u = scale * t.stressed.front() - place;
     table.rows.push_back({t.line, {shortest(place.x), shortest(place.y), shortest(u.x), shortest(u.y)}});
   }
   if (table.rows.empty()) {
@@ -506,11 +539,7 @@ void make_vectors_of_spots(ForeignTable& table, const TrackParameters& parameter
         "tracks with a spot in frame " + std::to_string(*relaxed) + " and one in frame " + std::to_string(*stressed),
         "none", "track.relaxed_time and track.stressed_time count the frames from 1");
   }
-  const std::string in = !unit             ? ""
-                         : unit->um == 0   ? " [px]"
-                         : unit->um == 1   ? " [um]"
-                         : unit->um == 1e3 ? " [mm]"
-                                           : " [m]";
+  const std::string in = !unit ? "" : unit->um == 0 ? " [px]" : " [um]";
   table.above = {{1, {"x" + in, "y" + in, "u" + in, "v" + in}}};
 }
 
@@ -662,30 +691,14 @@ GivenTable read_given_table(const std::filesystem::path& file, const TrackParame
   constexpr std::size_t kCodeOfImagej = 15;
   if (form == TableForm::imagej_piv && names.size() > kCodeOfImagej)
     given.marks.push_back({names[kCodeOfImagej], RowMark::code_of_imagej});
-  if (factors.are_there && !(factors.m_per_px == 1 && factors.m_per_s_per_px == 1)) {
-    const double own_um = 1e6 * factors.m_per_px, pixel = parameters.pixel_size_um.value_or(own_um);
-    constexpr double kSame = 0.01;
-    if (std::abs(pixel / own_um - 1) > kSame) {
-      throw InputError(name, "the pixel size that is set, " + shortest(pixel) + " um",
-                       shortest(own_um) + " um in the line above the header",
-                       "set pixel_size_um = " + shortest(own_um) + ", or calibrate PIVlab's field again");
-    }
-    given.place_um = 1e6;
-    given.displacement_um = own_um / factors.m_per_s_per_px;
-    given.first = -0.5 * factors.m_per_px;
-  } else {
-    given.place_um = um_of(given, name, names[x], found.units[x], parameters);
-    if (found.units[y] && found.units[y] != found.units[x])
-      throw InputError(name, "one unit of " + names[x] + " and " + names[y], "two");
-    given.displacement_um = um_of(given, name, names[ux], found.units[ux], parameters);
-    if (found.units[uy] != found.units[ux])
-      throw InputError(name, "one unit of " + names[ux] + " and " + names[uy], "two");
-    const std::optional<Unit> unit = found.units[x] ? found.units[x] : unit_of_parameter(parameters.length_unit);
-    // a place is the centre of a pixel: PIVlab counts them from 1, others from 0
-    if (!unit || unit->um == 0) given.first = form == TableForm::pivlab || factors.are_there ? -0.5 : 0.5;
-    if (form == TableForm::trackmate && given.first == 0)
-      given.first = 0.5 * parameters.pixel_size_um.value_or(0) / given.place_um;
-  }
+  if (factors.are_there && !(factors.m_per_px == 1 && factors.m_per_s_per_px == 1))
+    take_factors(given, name, factors, parameters);
+  else
+    take_units(given, name, found, parameters);
+  if (factors.are_there && given.first == 0.5) given.first = -0.5;  // Tecplot's form, written by PIVlab
+  given.sigma_um = given.displacement_um;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    if (names[i] == given.sigma && found.units[i]) given.sigma_um = um_of(name, names[i], found.units[i], parameters);
   given.is_ours = is_ours;
   const bool is_asked = parameters.y_axis == VerticalAxis::up;
   const Order order = is_ours && !is_asked ? Order::none : order_of(table.rows, y);
@@ -697,7 +710,8 @@ GivenTable read_given_table(const std::filesystem::path& file, const TrackParame
     const std::string program = kPrograms[static_cast<std::size_t>(form)];
     given.how = (program.empty() ? "" : " as " + program + " writes them") + " (columns " +
                 listed(std::vector<std::string>{given.x, given.y, given.ux, given.uy}) +
-                (given.is_y_up ? "; y points up" : "") + ")";
+                (given.place_um == parameters.pixel_size_um ? "; px" : "") + (given.is_y_up ? "; y points up" : "") +
+                ")";
   }
   given.rows = CsvTable(std::move(names), std::move(table.rows), name);
   return given;

@@ -32,7 +32,7 @@ struct GivenTable {
   std::string x, y, ux, uy;
   std::string sigma = {};  ///< empty: none
   std::vector<MarkColumn> marks = {};
-  double place_um = 1, displacement_um = 1;  ///< the units that the numbers are in
+  double place_um = 1, displacement_um = 1, sigma_um = 1;  ///< the units that the numbers are in
   double first = 0;      ///< from the picture's corner to where the places count from, in their unit
   bool is_ours = false;  ///< columns by our own names, which mean our axes
   bool is_lattice = false;

@@ -165,6 +165,7 @@ TEST(GivenTable, numbers_that_can_be_read_in_two_ways_are_refused) {
       {"velocities without their time", "x [mm];y [mm];u [m/s];v [m/s]\n1;2;3;4\n"},
       {"two zones",
        "VARIABLES = \"x [px]\", \"y [px]\", \"u [px]\", \"v [px]\"\nZONE I=1\n1 2 3 4\nZONE I=1\n1 2 3 4\n"},
+      {"a mask of most", "x_um,y_um,ux_um,uy_um,mask\n1,2,3,4,1\n2,2,3,4,1\n3,3,3,4,0\n"},
       {"letters", "x_um,y_um,ux_um,uy_um\n1,2,3,4\n1,2,3,o.4\n"},
       {"nothing", ""},
       {"a page", "<html>\n<body>1 2 3 4</body>\n"}};
@@ -275,6 +276,25 @@ TEST(GivenTable, of_each_program_is_found_by_its_head_and_read_as_it_means_it) {
     p.table = form.form;  // and if it is said
     EXPECT_EQ(read(form.text, p, form.name).field.size(), rows.size());
   }
+}
+
+TEST(GivenTable, its_units_may_differ_by_column_and_be_velocities) {
+  const Rows rows = vectors();
+  Rows in_mm = rows;
+  for (auto& row : in_mm) row[0] *= 1e-4, row[1] *= 1e-4;
+  TrackParameters timed = in_pixels();
+  expect_same(read("x [mm],y [mm],u [px],v [px]\n" + lines_of(in_mm, ","), timed), rows, 0.1, 0);
+  expect_same(read("x [mm],y [mm],u,v\n" + lines_of(in_mm, ","), in_pixels(LengthUnit::px)), rows, 0.1, 0);
+  Rows faster = rows;
+  for (auto& row : faster) row[2] *= 4, row[3] *= 4;
+  timed.seconds_between = 0.25;
+  expect_same(read("x [px],y [px],u [px/s],v [px/s]\n" + lines_of(faster, ","), timed), rows);
+  expect_same(read("# x y u v mask\n" + lines_of(faster, " ", shortest, " 0\n"), timed), rows);
+  EXPECT_THROW(read("x [px],y [px],u [px],v [px]\n" + lines_of(rows, ","), timed), InputError);
+  EXPECT_EQ(read("x [px],y [px],u [px],v [px],sigma_um\n" + lines_of(rows, ",", shortest, ",0.02\n"), in_pixels())
+                .field[0]
+                .sigma_um,
+            0.02);
 }
 
 TEST(GivenTable, rows_that_their_program_masked_or_filled_in_are_flagged) {
