@@ -6,6 +6,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "mbtfm/tractions/field_of_adhesions.h"
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
@@ -519,13 +520,18 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
   const bool has_images = context.has_input("stressed") || context.has_input("relaxed");
   if (context.has_input("displacement")) {
     if (has_images) throw UsageError("--displacement and bead images exclude each other");
-    DisplacementField field = read_given_field(context.input("displacement"), parameters);
+    std::optional<images::ImageField> picture;
+    if (context.has_input("cell_image")) picture = images::read_field(context.input("cell_image"));
+    GivenField table = read_given_field(context.input("displacement"), parameters, picture);
+    DisplacementField& field = table.field;
     context.expect_plausible("beads_per_um2", beads_per_um2(field));
     const GivenMotion motion = take_motion_off(field, parameters);
     write_field(context, field, "displacement");
     StageReport report = report_of(field);
     add_figures(report, motion.common);
     report.effects = {motion.affine};
+    report.figures.emplace_back("table", std::string(name_of(table.form)));
+    std::ranges::move(table.findings, std::back_inserter(report.findings));
     if (motion.unplaced_um) {
       report.findings.push_back(*noticed(
           FindingKind::assumed_input, 1,
@@ -534,7 +540,8 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
               "set track.places = relaxed.",
           Severity::caution));
     }
-    report.summary = std::to_string(field.size()) + " displacements read" + report.summary;
+    report.summary = std::to_string(field.size()) + " displacements read" + table.how + report.summary;
+    if (table.n_left_out > 0) report.summary += "; " + counted(table.n_left_out, "rows") + " without a place left out";
     return report;
   }
   for (const char* name : {"stressed", "relaxed"})

@@ -102,6 +102,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {input_not_used, "input-not-used", "segment", note, "inputs that were not used because another one counts more",
        0, "a selection drawn by hand counts more than a mask, and a choice in [segment] counts more than both",
        "Remove the input that you do not want."},
+      {vectors_masked, "vectors-masked", "track", note, "share of the vectors of a table that their program masked", 0,
+       "no measurement repeats both components to the last digit in many places",
+       "None, where that program masked them. They are flagged in displacement.csv and not used."},
       {nothing_moves, "nothing-moves", "track", caution, "share of the beads that do not move by six standard errors",
        0.999,
        "of simulated pairs at rest at most 6 beads in 10 000 move by that much; of cells whose noise is 7 % of the "

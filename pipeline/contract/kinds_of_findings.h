@@ -28,6 +28,7 @@ enum class FindingKind : int {
   fibre_ends_anchored,
   input_not_used,
   // track
+  vectors_masked,
   nothing_moves,
   moves_outward,
   tracked_by_correlation,

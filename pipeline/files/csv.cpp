@@ -92,17 +92,27 @@ CsvTable::CsvTable(std::string_view text, std::string name) : name_(std::move(na
                      "save it as CSV with commas, and with points in the numbers: Excel does so with English number "
                      "formats, R with write.csv(), pandas with to_csv()");
   }
-  std::unordered_set<std::string> seen;
-  for (const std::string& column : header_)
-    if (!seen.insert(column).second) throw InputError(name_ + ":1", "each column once", "'" + column + "' twice");
+  expect_each_column_once();
   while (!splitter.at_end()) {
     Row row{.line = splitter.line(), .fields = splitter.record()};
     if (row.fields.size() != header_.size()) {
       throw InputError(name_ + ":" + std::to_string(row.line),
-                       std::to_string(header_.size()) + " fields, as in the header", std::to_string(row.fields.size()));
+                       std::to_string(header_.size()) + " fields, as in the header", std::to_string(row.fields.size()),
+                       "take rows out that are none; displacements of other programs: mbtfm-track --displacement");
     }
     rows_.push_back(std::move(row));
   }
+}
+
+CsvTable::CsvTable(std::vector<std::string> header, std::vector<Row> rows, std::string name)
+    : name_(std::move(name)), header_(std::move(header)), rows_(std::move(rows)) {
+  expect_each_column_once();
+}
+
+void CsvTable::expect_each_column_once() const {
+  std::unordered_set<std::string> seen;
+  for (const std::string& column : header_)
+    if (!seen.insert(column).second) throw InputError(name_ + ":1", "each column once", "'" + column + "' twice");
 }
 
 bool CsvTable::has(std::string_view column) const {

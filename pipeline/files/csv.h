@@ -14,9 +14,15 @@ namespace mbtfm::files {
 
 class CsvTable {
  public:
+  struct Row {
+    int line = 0;
+    std::vector<std::string> fields;
+  };
   /// @throws InputError with the line where fields are missing or too many, a quote is open or the end is early
   explicit CsvTable(const std::filesystem::path& file);
   CsvTable(std::string_view text, std::string name);
+  /// Of a table that was taken apart elsewhere: each row has as many fields as the header. @throws InputError
+  CsvTable(std::vector<std::string> header, std::vector<Row> rows, std::string name);
 
   int n_rows() const { return static_cast<int>(rows_.size()); }
   bool has(std::string_view column) const;
@@ -35,10 +41,7 @@ class CsvTable {
                          const std::string& hint = {}) const;
 
  private:
-  struct Row {
-    int line = 0;
-    std::vector<std::string> fields;
-  };
+  void expect_each_column_once() const;
   int index_of(const std::string& column) const;
   std::string name_;
   std::vector<std::string> header_;

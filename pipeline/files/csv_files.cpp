@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/tables.h"
 
@@ -192,7 +194,21 @@ Cell read_cell(const Path& folder) {
   return cell;
 }
 
-DisplacementField read_displacement(const Path& file) { return read(file, displacement_table()); }
+DisplacementField read_displacement(const Path& file) {
+  DisplacementField field = read(file, displacement_table());
+  constexpr std::size_t kFewest = 10;  // beads that spread over a field
+  const Extent extent = extent_of(field, &Bead::position_um);
+  const double farthest_um = norm(extent.high_um - extent.low_um);
+  const auto beyond = std::ranges::find_if(
+      field, [&](const Bead& bead) { return bead.flag.empty() && norm(bead.displacement_um) > farthest_um; });
+  if (field.size() >= kFewest && farthest_um > 0 && beyond != field.end()) {
+    throw InputError(file.string(), "displacements shorter than the field is wide, " + brief(farthest_um) + " um",
+                     brief(norm(beyond->displacement_um)) + " um",
+                     "masked vectors of another program: mbtfm-track --displacement '" + file.string() +
+                         "' --out 2_track flags them, take 2_track/displacement.csv then");
+  }
+  return field;
+}
 
 void write_displacement(const Path& file, const DisplacementField& field) {
   check(field);

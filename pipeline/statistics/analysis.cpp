@@ -260,6 +260,7 @@ Analysis analyse(const Study& study, const StudyParameters& parameters) {
   a.correlations = correlate_forces(study, draws);
   a.area_bins = bin_by_area(study, draws);
   a.directions = summarise_directions(study, draws);
+  a.warnings = study.warnings;
   warn_of_few_cells(study, a.warnings);
   if (a.has_fibres) warn_of_tensions(study, a.tensions, a.warnings);
   warn_of_networks(study, a.warnings);

@@ -1,9 +1,13 @@
 #include "pipeline/statistics/conditions.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/csv.h"
+#include "pipeline/contract/listed.h"
+#include "pipeline/files/foreign_table.h"
+#include "pipeline/files/text.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -28,7 +32,9 @@ std::string folder_of(const std::string& name, int level) {
 /// By its whole name, or by that of its own folder where no other cell's is the same.
 std::size_t index_of_cell(const std::vector<std::string>& names, const files::CsvTable& table, int row) {
   std::string asked = table.text(row, "cell");
-  while (asked.ends_with('/')) asked.pop_back();  // as shells complete names
+  std::ranges::replace(asked, '\\', '/');
+  asked = Path(asked).lexically_normal().generic_string();  // "./cell_1/"
+  if (asked.ends_with('/')) asked.pop_back();
   const auto exact = std::find(names.begin(), names.end(), asked);
   if (exact != names.end()) return static_cast<std::size_t>(exact - names.begin());
   std::vector<std::size_t> matches;
@@ -71,27 +77,55 @@ Source source_of(const std::string& asked, const char* flag, const std::vector<s
   return {};
 }
 
+/// What a form says where nobody is to be left out.
+std::string reason_in(const std::string& exclude) {
+  const std::string word = files::lower(exclude);
+  for (const char* nobody : {"no", "n", "0", "false", "f", "-", "none", "nan", "na", "n/a"})
+    if (word == nobody) return {};
+  return exclude;
+}
+
+/// Names that differ in capitals alone become the first of them.
+void join_capitals(std::vector<CellNote>& notes, std::string CellNote::*member, const char* noun,
+                   std::vector<std::string>& warnings) {
+  std::map<std::string, std::string> first;
+  std::map<std::string, std::set<std::string>> others;
+  for (CellNote& note : notes) {
+    const std::string& spelled = first.emplace(files::lower(note.*member), note.*member).first->second;
+    if (note.*member == spelled) continue;
+    others[spelled].insert(note.*member);
+    note.*member = spelled;
+  }
+  for (const auto& [spelled, same] : others) {
+    warnings.push_back("The " + std::string(noun) + " " + spelled + " and " + listed(same) +
+                       " are taken for one: they differ in capitals alone.");
+  }
+}
+
 }  // namespace
 
-std::vector<CellNote> notes_of(const std::vector<std::string>& names, const std::string& condition_from,
-                               const std::string& replicate_from, const std::optional<Path>& table) {
+CellNotes notes_of(const std::vector<std::string>& names, const std::string& condition_from,
+                   const std::string& replicate_from, const std::optional<Path>& table) {
   std::optional<files::CsvTable> rows;
-  if (table) rows.emplace(*table);
-  if (rows) rows->require({"cell"});
+  if (table) {
+    rows = files::read_records(files::read_text(*table), table->string(), "cell",
+                               {"cell", "exclude", "condition", "replicate", "day"});
+  }
   const Source condition = source_of(condition_from, "condition-from", {"condition"}, rows);
   const Source replicate = source_of(replicate_from, "replicate-from", {"replicate", "day"}, rows);
-  std::vector<CellNote> notes(names.size());
+  CellNotes result{.of_cells = std::vector<CellNote>(names.size())};
+  std::vector<CellNote>& notes = result.of_cells;
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (condition.level > 0) notes[i].condition = folder_of(names[i], condition.level);
     if (replicate.level > 0) notes[i].replicate = folder_of(names[i], replicate.level);
   }
-  if (!rows) return notes;
+  if (!rows) return result;
   std::vector<bool> is_named(names.size(), false);
   for (int row = 0; row < rows->n_rows(); ++row) {
     const std::size_t i = index_of_cell(names, *rows, row);
     if (is_named[i]) rows->fail(row, "cell", "each cell once");
     is_named[i] = true;
-    if (rows->has("exclude")) notes[i].reason_to_exclude = rows->text(row, "exclude");
+    if (rows->has("exclude")) notes[i].reason_to_exclude = reason_in(rows->text(row, "exclude"));
     const auto take = [&](const std::string& column, std::string CellNote::*member) {
       if (column.empty()) return;
       notes[i].*member = rows->text(row, column);
@@ -103,7 +137,9 @@ std::vector<CellNote> notes_of(const std::vector<std::string>& names, const std:
   }
   for (std::size_t i = 0; i < names.size(); ++i)
     if (!is_named[i]) notes[i].reason_to_exclude = "not in the table";
-  return notes;
+  join_capitals(notes, &CellNote::condition, "conditions", result.warnings);
+  join_capitals(notes, &CellNote::replicate, "replicates", result.warnings);
+  return result;
 }
 
 }  // namespace mbtfm::statistics

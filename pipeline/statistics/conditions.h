@@ -15,12 +15,18 @@ struct CellNote {
   std::string reason_to_exclude = {};  ///< empty: it enters
 };
 
-/// By cell. A cell that is not in the table does not enter.
+struct CellNotes {
+  std::vector<CellNote> of_cells;
+  std::vector<std::string> warnings = {};  ///< sentences on what was taken for the same
+};
+
+/// A cell that is not in the table does not enter. The table is read as people write it (foreign_table.h). Conditions
+/// and replicates that differ in capitals alone are one, spelled as it is first.
 /// @param names  folders of the cells, relative to the study's
 /// @param condition_from, replicate_from  see StudyParameters; empty: the table's column `condition`; `replicate`, else
 ///                                        `day`, where it has one
 /// @throws InputError where a cell has no such folder above it, the table no such column, or a row no cell
-std::vector<CellNote> notes_of(const std::vector<std::string>& names, const std::string& condition_from,
-                               const std::string& replicate_from, const std::optional<Path>& table);
+CellNotes notes_of(const std::vector<std::string>& names, const std::string& condition_from,
+                   const std::string& replicate_from, const std::optional<Path>& table);
 
 }  // namespace mbtfm::statistics

@@ -12,6 +12,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/foreign_table.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/own_files.h"
@@ -175,12 +176,13 @@ std::vector<std::string> parts_of(const std::string& list) {
 /// @throws UsageError where one is asked for that no cell has
 void number_conditions(Study& study, const std::vector<std::string>& condition_of_cell, const std::string& order) {
   std::set<std::string> names(condition_of_cell.begin(), condition_of_cell.end());
-  for (const std::string& name : parts_of(order)) {
-    if (!names.contains(name))
-      throw UsageError("stats.conditions: no cell that enters is of the condition '" + name + "'; there are " +
+  for (const std::string& asked : parts_of(order)) {
+    const auto name = std::ranges::find(names, files::lower(asked), files::lower);
+    if (name == names.end())
+      throw UsageError("stats.conditions: no cell that enters is of the condition '" + asked + "'; there are " +
                        listed(std::vector<std::string>(names.begin(), names.end())));
+    study.conditions.push_back(*name);
     names.erase(name);
-    study.conditions.push_back(name);
   }
   study.conditions.insert(study.conditions.end(), names.begin(), names.end());
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
@@ -302,7 +304,8 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
     const std::string name = cell.lexically_relative(folder).generic_string();
     names.push_back(name == "." ? fs::weakly_canonical(cell).filename().string() : name);
   }
-  const std::vector<CellNote> notes = notes_of(names, parameters.condition_from, parameters.replicate_from, table);
+  const CellNotes told = notes_of(names, parameters.condition_from, parameters.replicate_from, table);
+  const std::vector<CellNote>& notes = told.of_cells;
   const std::vector<std::string> excluding = excluding_findings(parameters);
   std::vector<std::optional<StudyCell>> read(folders.size());
   std::vector<std::string> reasons(folders.size());
@@ -327,6 +330,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
   leave_out_copies(folders, names, read, reasons);
   Study study;
   study.folder = folder;
+  study.warnings = told.warnings;
   study.n_fibre_types = parameters.fibre_types;
   std::vector<std::string> condition_of_cell;
   for (std::size_t i = 0; i < folders.size(); ++i) {

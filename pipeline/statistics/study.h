@@ -103,8 +103,9 @@ struct Study {
   std::vector<std::string> conditions;
   std::vector<StudyCell> cells = {};  ///< those that enter
   std::vector<LeftOutCell> left_out;
-  Path folder = {};       ///< names are relative to it
-  int n_fibre_types = 3;  ///< 4: edge fibres are a type of their own; 3: they count as ventral
+  Path folder = {};                        ///< names are relative to it
+  int n_fibre_types = 3;                   ///< 4: edge fibres are a type of their own; 3: they count as ventral
+  std::vector<std::string> warnings = {};  ///< of the table of conditions
 };
 /// The name of its condition.
 const std::string& condition_of(const Study& study, const StudyCell& cell);

@@ -80,7 +80,8 @@ def study(
 
     table:       ``tensions`` (a row for each fibre and network), ``adhesion_forces``, ``adhesions``, ``fibres``,
                  ``displacement``; ``cells`` (a row for each cell: the numbers of fit.json); or a path in the cell folder.
-    conditions:  a CSV file with a column `cell` and others, such as `condition` and `replicate`, which are joined.
+    conditions:  a CSV file with a column `cell` and others, such as `condition` and `replicate`, which are joined; or
+                 ``folder`` (the first folder below this one), ``folder2`` (the one below that): the column `condition`.
 
     Cells that `mbtfm stats` leaves out are left out here, too; ``frame.attrs["left_out"]`` has their paths and reasons.
     with_left_out:  keep their rows, as far as they have any, with `included` false and the `reason`.
@@ -89,15 +90,16 @@ def study(
     root = Path(folder)
     if not cells_below(root):
         raise FileNotFoundError(f"{root}: no folder with a cell.toml is in it or below it")
+    level = re.fullmatch("folder([1-9]?)", os.fspath(conditions)) if conditions is not None else None
     if conditions is not None:
-        parameters = {"table": os.fspath(conditions), **parameters}
+        parameters = {"condition_from" if level else "table": os.fspath(conditions), **parameters}
     reasons = _listing(root, parameters)
     cells = [root / name if (root / name).is_dir() else root for name in reasons]
     frame = _summaries(root, cells) if table == "cells" else _rows(root, cells, TABLES.get(table, table))
     if frame is None:
         raise FileNotFoundError(f"{root}: none of its {len(cells)} cells has {TABLES.get(table, table)}: run mbtfm batch")
     if conditions is not None:
-        frame = _joined(frame, conditions)
+        frame = _by_folder(frame, int(level[1] or 1)) if level else _joined(frame, conditions)
     for name in set(reasons).difference(frame["cell"]):  # a table that the statistics do not need
         reasons[name] = reasons[name] or f"{TABLES.get(table, table)} is not there"
     frame["reason"] = frame["cell"].map(reasons)
@@ -163,8 +165,33 @@ def _summaries(root: Path, cells: Iterable[Path]) -> Optional[pd.DataFrame]:
     return pd.DataFrame(rows) if rows else None
 
 
+def _by_folder(frame: pd.DataFrame, level: int) -> pd.DataFrame:
+    parts = frame["cell"].str.split("/")
+    lone = frame["cell"][parts.str.len() <= level]
+    if len(lone):
+        raise ValueError(f"{lone.iloc[0]}: expected a folder of its condition above the cell, at level {level}")
+    return frame.assign(condition=parts.str[level - 1])
+
+
+def _conditions(file: PathLike) -> pd.DataFrame:
+    """The table as people write it: commas, semicolons or tabs, blanks around names, rows without content, UTF-16."""
+    content = Path(file).read_bytes()
+    encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
+    try:
+        text = content.decode(encoding)
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    lines = [line for line in text.splitlines() if line.strip(" \t,;\"") and not line.lower().startswith("sep=")]
+    separator = max(",;\t", key=(lines or [""])[0].count)
+    table = pd.read_csv(io.StringIO("\n".join(lines)), sep=separator, skipinitialspace=True, dtype={"cell": str})
+    table.columns = [str(name).strip() for name in table.columns]
+    for column in table.columns[table.dtypes == object]:
+        table[column] = table[column].str.strip()
+    return table.loc[:, [not name.startswith("Unnamed: ") for name in table.columns]]
+
+
 def _joined(frame: pd.DataFrame, conditions: PathLike) -> pd.DataFrame:
-    table = pd.read_csv(conditions, dtype={"cell": str})
+    table = _conditions(conditions)
     if "cell" not in table:
         raise ValueError(f"{conditions}: expected a column 'cell', found {', '.join(map(str, table.columns))}")
     if table["cell"].duplicated().any():
@@ -174,4 +201,8 @@ def _joined(frame: pd.DataFrame, conditions: PathLike) -> pd.DataFrame:
     missing = sorted(set(frame["cell"]) - set(table["cell"]))
     if missing:
         raise ValueError(f"{conditions}: no row for {missing[0]}" + (f" and {len(missing) - 1} others" if missing[1:] else ""))
-    return frame.merge(table, on="cell", how="left", validate="many_to_one")
+    frame = frame.merge(table, on="cell", how="left", validate="many_to_one")
+    for column in {"condition", "replicate", "day"} & set(frame.columns[frame.dtypes == object]):
+        first = frame[column].groupby(frame[column].str.lower()).first()  # as `mbtfm stats`: capitals alone make no condition
+        frame[column] = frame[column].str.lower().map(first)
+    return frame

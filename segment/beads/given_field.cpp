@@ -2,77 +2,191 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
-#include <set>
+#include <numeric>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/contract/kinds_of_findings.h"
+#include "pipeline/contract/listed.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/contract/place.h"
-#include "pipeline/files/csv.h"
-#include "pipeline/files/text.h"
+#include "pipeline/files/foreign_table.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
 #include "segment/beads/common_motion.h"
+#include "segment/beads/given_table.h"
 #include "segment/beads/local_motion.h"
+#include "segment/beads/masked_values.h"
 
 namespace mbtfm::beads {
 namespace {
 
-/// Commas instead of the separators that spreadsheets and other programs write.
-std::string with_commas(std::string text) {
-  const std::string header = text.substr(0, text.find('\n'));
-  for (const char separator : {';', '\t'}) {
-    if (header.find(',') == std::string::npos && header.find(separator) != std::string::npos) {
-      std::replace(text.begin(), text.end(), separator, ',');
-    }
+/// What no field can be displaced by is flagged later on.
+constexpr double kNoDisplacement_um = 2 * kFarthest_um;
+
+/// A number of the table in um, whatever its size: programs write 1e10 where they have none. Nothing where it is
+/// missing.
+std::optional<double> um_in(const GivenTable& table, int row, const std::string& column, double unit_um,
+                            double first = 0) {
+  const std::string cell = table.rows.text(row, column);
+  if (files::is_missing(cell)) return std::nullopt;
+  double value = 0;
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  if (end != cell.data() + cell.size() || (error != std::errc() && error != std::errc::result_out_of_range))
+    table.rows.fail(row, column, "a number",
+                    "one decimal mark and nothing between thousands; take a row out that is no vector");
+  // too small, or too large, for a number
+  if (error != std::errc())
+    value = cell.find("e-") == cell.npos && cell.find("E-") == cell.npos ? kNoDisplacement_um : 0;
+  return std::clamp(unit_um * (value + first), -kNoDisplacement_um, kNoDisplacement_um);
+}
+
+void flag_duplicates(DisplacementField& field) {
+  std::vector<std::size_t> order(field.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto place = [&](std::size_t k) { return std::pair(field[k].position_um.x, field[k].position_um.y); };
+  std::ranges::sort(order,
+                    [&](std::size_t a, std::size_t b) { return std::pair(place(a), a) < std::pair(place(b), b); });
+  for (std::size_t k = 1; k < order.size(); ++k)
+    if (place(order[k]) == place(order[k - 1])) field[order[k]].flag = "duplicate";
+}
+
+/// y from upwards to downwards. The windows of a lattice begin at the picture's corner: the first row is as far from
+/// the upper border as the first column from the left one. Of single beads the picture's height must be known, or their
+/// middle is its middle.
+void mirror(DisplacementField& field, const GivenTable& table, std::optional<double> height_um) {
+  const Extent extent = extent_of(field, &Bead::position_um);
+  const double sum_um =
+      table.is_lattice ? extent.high_um.y + extent.low_um.x : height_um.value_or(extent.low_um.y + extent.high_um.y);
+  for (Bead& bead : field) {
+    bead.position_um.y = sum_um - bead.position_um.y;
+    bead.displacement_um.y = -bead.displacement_um.y;
   }
-  if (!text.empty() && text.back() != '\n') text += '\n';
-  return text;
 }
 
-bool is_missing(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text.empty() || text == "nan" || text == "-nan" || text == "na" || text == "inf" || text == "-inf";
+/// Half a spacing of a lattice along x.
+double half_step_um(const DisplacementField& field) {
+  std::vector<double> places;
+  for (const Bead& bead : field) places.push_back(bead.position_um.x);
+  std::ranges::sort(places);
+  const double same = 1e-6 * (places.back() - places.front());
+  places.erase(std::unique(places.begin(), places.end(), [&](double a, double b) { return b - a <= same; }),
+               places.end());
+  return places.size() > 1 ? 0.5 * (places.back() - places.front()) / static_cast<double>(places.size() - 1) : 0;
 }
 
-double scale_of(const TrackParameters& parameters) {
-  if (parameters.length_unit == LengthUnit::um) return 1;
-  if (parameters.pixel_size_um) return *parameters.pixel_size_um;
-  throw UsageError("length_unit = px needs pixel_size_um: give it in cell.toml or as --pixel_size_um");
+/// Programs count from a calibrated origin within the picture, too. A lattice of theirs begins at the picture's corner.
+void move_to_corner(GivenField& given, const GivenTable& table) {
+  const Extent extent = extent_of(given.field, &Bead::position_um);
+  if (table.is_ours || !table.is_lattice || (extent.low_um.x >= 0 && (table.is_y_up || extent.low_um.y >= 0))) return;
+  const double half_um = half_step_um(given.field);
+  const Vec2 shift = Vec2{half_um, half_um} - extent.low_um;
+  for (Bead& bead : given.field) bead.position_um += shift;
+  given.findings.push_back(*noticed(FindingKind::assumed_input, 1,
+                                    "The places of the table begin at (" + brief(extent.low_um.x) + ", " +
+                                        brief(extent.low_um.y) +
+                                        ") um. They are moved so that they begin at the picture's corner.",
+                                    Severity::caution));
 }
 
-struct GivenField {
-  DisplacementField field;
-  bool has_sigma = false;
-};
+/// What one program calls a mask is 1 where it measured, in others where it did not: the smaller part is masked.
+void expect_most_measured(const GivenTable& table) {
+  for (const MarkColumn& column : table.marks) {
+    if (column.mark != RowMark::zero_if_measured) continue;
+    int n_masked = 0;
+    for (int row = 0; row < table.rows.n_rows(); ++row)
+      n_masked += !flag_of(column.mark, table.rows.text(row, column.name)).empty();
+    if (2 * n_masked <= table.rows.n_rows()) continue;
+    table.rows.fail(0, column.name, "0 in most rows, as of vectors that were measured",
+                    "if it has 1 where they were measured, call the column valid; else take the masked rows out");
+  }
+}
 
-GivenField read_rows(const std::filesystem::path& file, const TrackParameters& p) {
-  const files::CsvTable table(with_commas(files::read_text(file)), file.string());
-  table.require({p.x_column, p.y_column, p.ux_column, p.uy_column});
-  const double scale = scale_of(p), first = p.length_unit == LengthUnit::px ? 0.5 : 0;
-  const Range within = Range::between(-kFarthest_um / scale, kFarthest_um / scale);
-  GivenField given{.field = {}, .has_sigma = table.has(p.sigma_column)};
-  std::set<std::pair<double, double>> taken;
-  for (int row = 0; row < table.n_rows(); ++row) {
-    Bead bead;
-    bead.position_um = {scale * (table.number(row, p.x_column, within) + first),
-                        scale * (table.number(row, p.y_column, within) + first)};
-    if (table.has("flag")) bead.flag = table.text(row, "flag");
-    const bool lacks = is_missing(table.text(row, p.ux_column)) || is_missing(table.text(row, p.uy_column)) ||
-                       (given.has_sigma && is_missing(table.text(row, p.sigma_column)));
-    if (lacks) {
-      bead.flag = "not a number";
+GivenField read_rows(const GivenTable& table, std::optional<double> height_um) {
+  GivenField given{.form = table.form, .how = table.how, .n_left_out = table.n_left_out};
+  given.has_sigma = !table.sigma.empty();
+  expect_most_measured(table);
+  const bool has_flags = table.rows.has("flag");
+  const Range within = possible_place_um();
+  for (int row = 0; row < table.rows.n_rows(); ++row) {
+    const auto x = um_in(table, row, table.x, table.place_um, table.first);
+    const auto y = um_in(table, row, table.y, table.place_um, table.first);
+    if (!x || !y) {
+      ++given.n_left_out;
+      continue;
+    }
+    for (const auto& [value, column] : {std::pair(*x, table.x), {*y, table.y}})
+      if (!is_inside(within, value)) table.rows.fail(row, column, "a place within a metre");
+    Bead& bead = given.field.emplace_back();
+    bead.position_um = {*x, *y};
+    if (has_flags) bead.flag = table.rows.text(row, "flag");
+    if (files::numeral_in(bead.flag) != files::Numeral::none) bead.flag = flag_of(RowMark::zero_if_measured, bead.flag);
+    for (const MarkColumn& column : table.marks)
+      if (bead.flag.empty()) bead.flag = flag_of(column.mark, table.rows.text(row, column.name));
+    const auto ux = um_in(table, row, table.ux, table.displacement_um);
+    const auto uy = um_in(table, row, table.uy, table.displacement_um);
+    const auto sigma = given.has_sigma ? um_in(table, row, table.sigma, table.sigma_um) : 0;
+    if (ux && uy && sigma) {
+      bead.displacement_um = {*ux, *uy};
+      bead.sigma_um = *sigma;
+      if (*sigma < 0) table.rows.fail(row, table.sigma, "a number >= 0");
     } else {
-      bead.displacement_um = {scale * table.number(row, p.ux_column, within),
-                              scale * table.number(row, p.uy_column, within)};
-      if (given.has_sigma)
-        bead.sigma_um = scale * table.number(row, p.sigma_column, Range::between(0, kFarthest_um / scale));
+      bead.flag = "not a number";
     }
-    if (!taken.emplace(bead.position_um.x, bead.position_um.y).second) bead.flag = "duplicate";
-    given.field.push_back(bead);
   }
+  move_to_corner(given, table);
+  if (table.is_y_up) mirror(given.field, table, height_um);
+  flag_duplicates(given.field);
   return given;
+}
+
+void notice_mirrored(const GivenTable& table, std::vector<Finding>& findings) {
+  if (table.is_y_up_stated) return;
+  findings.push_back(
+      *noticed(FindingKind::assumed_input, 1,
+               "y falls from row to row of the table, so it is read as pointing up. If it points down, set "
+               "track.y_axis = down.",
+               Severity::caution));
+}
+
+/// Rows where their program has no displacement. They get none.
+void flag_masked(GivenField& given) {
+  DisplacementField& field = given.field;
+  constexpr std::size_t kFewest = 10;
+  const Extent extent = extent_of(field, &Bead::position_um);
+  const double farthest_um = norm(extent.high_um - extent.low_um);
+  std::size_t n_masked = 0;
+  const auto mask = [&](Bead& bead) {
+    bead.flag = "masked";
+    bead.displacement_um = {};
+    ++n_masked;
+  };
+  std::vector<std::string> values;
+  for (const MaskedValue& value : masked_values(field)) {
+    for (const std::size_t k : value.beads) mask(field[k]);
+    values.push_back("(" + significant(value.displacement_um.x, 6) + ", " + significant(value.displacement_um.y, 6) +
+                     ")");
+  }
+  std::size_t n_beyond = 0;
+  for (Bead& bead : field) {
+    const double length_um = norm(bead.displacement_um);
+    if (!bead.flag.empty()) {
+      if (length_um > kFarthest_um) bead.displacement_um = {};
+    } else if (length_um > kFarthest_um || (field.size() >= kFewest && farthest_um > 0 && length_um > farthest_um)) {
+      mask(bead);
+      ++n_beyond;
+    }
+  }
+  if (n_masked == 0) return;
+  const std::string of_all = std::to_string(n_masked) + " of " + std::to_string(field.size()) + " vectors ";
+  given.findings.push_back(
+      *noticed(FindingKind::vectors_masked, static_cast<double>(n_masked) / static_cast<double>(field.size()),
+               of_all + (values.empty() ? "are longer than the field is wide."
+                                        : "have the displacement " + listed(values) + " um to the last digit" +
+                                              (n_beyond > 0 ? ", or one longer than the field is wide." : "."))));
 }
 
 /// What a point differs by from the affine motion of its nearest neighbours.
@@ -126,8 +240,15 @@ double scatter_um(const std::vector<Misfit>& misfits) {
 
 }  // namespace
 
-DisplacementField read_given_field(const std::filesystem::path& file, const TrackParameters& parameters) {
-  auto [field, has_sigma] = read_rows(file, parameters);
+GivenField read_given_field(const std::filesystem::path& file, const TrackParameters& parameters,
+                            const std::optional<images::ImageField>& picture) {
+  const GivenTable table = read_given_table(file, parameters, picture);
+  std::optional<double> height_um;
+  if (picture && parameters.pixel_size_um) height_um = *parameters.pixel_size_um * picture->height;
+  GivenField given = read_rows(table, height_um);
+  DisplacementField& field = given.field;
+  notice_mirrored(table, given.findings);
+  flag_masked(given);
   std::vector<double> lengths;
   for (const Bead& bead : field) {
     if (bead.flag.empty()) lengths.push_back(norm(bead.displacement_um));
@@ -136,14 +257,14 @@ DisplacementField read_given_field(const std::filesystem::path& file, const Trac
   const std::vector<Misfit> misfits = misfits_of(field);
   // what a field's curvature between the neighbours may do without being wrong
   const double floor_um = 0.05 * numerics::quantile(lengths, 0.99);
-  const double sigma_um = has_sigma ? 0 : scatter_um(misfits);
+  const double sigma_um = given.has_sigma ? 0 : scatter_um(misfits);
   for (std::size_t k = 0; k < field.size(); ++k) {
     Bead& bead = field[k];
-    if (!has_sigma) bead.sigma_um = sigma_um;
+    if (!given.has_sigma) bead.sigma_um = sigma_um;
     const double allowed = parameters.outlier_threshold * std::hypot(misfits[k].spread, bead.sigma_um) + floor_um;
     if (bead.flag.empty() && misfits[k].distance > allowed) bead.flag = "neighbours disagree";
   }
-  return field;
+  return given;
 }
 
 double outwardness(const DisplacementField& field) {

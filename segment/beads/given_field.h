@@ -4,16 +4,28 @@
 #include <filesystem>
 
 #include "pipeline/contract/effects.h"
+#include "pipeline/contract/findings.h"
 #include "segment/beads/track.h"
 
 namespace mbtfm::beads {
 
-/// Read scattered or gridded displacements, columns and unit as the parameters say; separated by commas, semicolons or
-/// tabs. Nothing is dropped: rows are flagged `not a number`, `duplicate` (of an earlier position) and `neighbours
-/// disagree`. Standard errors that lack are the robust scatter about the neighbours' affine motion where the field
-/// changes least. The field is taken as it is.
+struct GivenField {
+  DisplacementField field = {};
+  TableForm form = TableForm::plain;
+  std::string how = {};  ///< it was read, for people; empty: by our own names
+  bool has_sigma = false;
+  int n_left_out = 0;  ///< rows without a place, spots without a partner
+  std::vector<Finding> findings = {};
+};
+
+/// Read scattered or gridded displacements, as people and other programs write them (foreign_table.h, given_table.h).
+/// Nothing that has a place is dropped: rows are flagged `not a number`, `masked` (by their program, by a value that
+/// many share, longer than the field), `filled in`, `duplicate` (of an earlier position) and `neighbours disagree`.
+/// Missing standard errors are the robust scatter about the neighbours' affine motion where the field changes least.
+/// @param picture  of the same field, if there is one
 /// @throws InputError
-DisplacementField read_given_field(const std::filesystem::path& file, const TrackParameters& parameters);
+GivenField read_given_field(const std::filesystem::path& file, const TrackParameters& parameters,
+                            const std::optional<images::ImageField>& picture = std::nullopt);
 
 struct GivenMotion {
   CommonMotion common;

@@ -407,7 +407,11 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
            "time series); 0: none");
   list.add("outlier_threshold", p.outlier_threshold, Range::factor(),
            "difference from the neighbours that flags a bead (robust standard deviations)");
-  list.add("x_column", p.x_column, "column of --displacement with x of the relaxed position");
+  list.add("table", p.table,
+           "program that wrote the table given by --displacement; auto: as its first lines show; plain: columns as "
+           "named below");
+  list.add("x_column", p.x_column,
+           "column of --displacement with x of the relaxed position: its name, or its number from 1");
   list.add("y_column", p.y_column, "column of --displacement with y of the relaxed position");
   list.add("ux_column", p.ux_column,
            "column of --displacement with x of the displacement: stressed minus relaxed position");
@@ -416,9 +420,14 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
   list.add("sigma_column", p.sigma_column,
            "column of --displacement with the standard error of a component; if there is none, it is estimated from "
            "the neighbours");
-  list.add(
-      "length_unit", p.length_unit,
-      "unit of the lengths in --displacement: um, or px (pixels of pixel_size_um; 0 is the centre of the first pixel)");
+  list.add("length_unit", p.length_unit,
+           "unit of the lengths in --displacement; auto: as its header or program has it; px: pixels of pixel_size_um "
+           "(0 is the centre of the first pixel)");
+  list.add("y_axis", p.y_axis,
+           "direction of y in --displacement; up: the field is mirrored about the middle of its places; auto: up if y "
+           "falls from row to row of a lattice");
+  list.add("seconds_between", p.seconds_between, Range::positive(),
+           "time between the two images (s) by which velocities in --displacement are multiplied");
   list.add("places", p.places,
            "frame of the places in --displacement: cell (the cell's images), or relaxed (the relaxed bead image: the "
            "motion of the stage is found, taken off and added to the places); auto: cell");

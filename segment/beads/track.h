@@ -28,10 +28,27 @@ constexpr auto words(TrackMethod) { return std::array{"auto", "beads", "correlat
 
 /// Of a displacement field from elsewhere.
 enum class LengthUnit {
+  automatic,  ///< as its header, or the program that wrote it, has it
   um,
-  px  ///< 0 at the centre of the first pixel
+  px,  ///< 0 at the centre of the first pixel
+  mm,
+  m
 };
-constexpr auto words(LengthUnit) { return std::array{"um", "px"}; }
+constexpr auto words(LengthUnit) { return std::array{"auto", "um", "px", "mm", "m"}; }
+
+/// The program that wrote it.
+enum class TableForm { automatic, plain, openpiv, pivlab, imagej_piv, davis, tecplot, trackmate, pytfm };
+constexpr auto words(TableForm) {
+  return std::array{"auto", "plain", "openpiv", "pivlab", "imagej-piv", "davis", "tecplot", "trackmate", "pytfm"};
+}
+
+/// Where its y points.
+enum class VerticalAxis {
+  automatic,  ///< up if it falls from row to row of a lattice, which programs write from the top of the picture
+  down,
+  up  ///< about the middle of its places
+};
+constexpr auto words(VerticalAxis) { return std::array{"auto", "down", "up"}; }
 
 /// Where a table of another program has its places.
 enum class TablePlaces {
@@ -62,7 +79,10 @@ struct TrackParameters {
   // a displacement field from elsewhere
   std::string x_column = "x_um", y_column = "y_um", ux_column = "ux_um", uy_column = "uy_um";
   std::string sigma_column = "sigma_um";  ///< need not be there
-  LengthUnit length_unit = LengthUnit::um;
+  TableForm table = TableForm::automatic;
+  LengthUnit length_unit = LengthUnit::automatic;
+  VerticalAxis y_axis = VerticalAxis::automatic;
+  std::optional<double> seconds_between{};  ///< velocities are displacements over this time
   TablePlaces places = TablePlaces::automatic;
 };
 void declare(stage::ParameterList& list, TrackParameters& parameters);

@@ -28,7 +28,7 @@ const std::map<std::string, std::string> kReaders = {
     {"segment/images/ome.cpp", "elements of OME-XML"},
     {"segment/images/stack.cpp", "the order of axes in OME-XML"},
     {"segment/rois/roi_set.cpp", "ImageJ's ROIs and their archives"},
-    {"segment/beads/given_field.cpp", "other programs' words for a missing number in CSV"},
+    {"segment/beads/given_table.cpp", "words of other programs' tables"},
 };
 
 /// Paths, names of files, units of what a user types and the like: what no enumeration would make clearer.

@@ -361,5 +361,36 @@ TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_
   EXPECT_EQ(files::read_displacement(folder / "out/displacement.csv").back().flag, "duplicate");
 }
 
+TEST(TrackEndToEnd, a_table_of_another_program_is_named_and_its_masked_vectors_counted) {
+  const test::TemporaryFolder folder;
+  const auto peaks = test::ring_of_adhesions(320, 3);
+  std::string table =
+      "PIV\r\nconversion factor xy (px -> m): 1, conversion factor uv (px/frame -> m/s): 1\r\n"
+      "x [px],y [px],u [px/frame],v [px/frame],Vector type [-]\r\n";
+  const std::string head = table;
+  std::string sound = head;
+  for (int k = 0; k < 400; ++k) {
+    const Vec2 place{16.0 * (k % 20) + 9, 16.0 * (k / 20) + 9}, u = test::displacement(peaks, place);
+    const std::string at = std::to_string(place.x) + "," + std::to_string(place.y) + ",";
+    const std::string moved = std::to_string(u.x) + "," + std::to_string(u.y) + ",1\r\n";
+    sound += at + moved;
+    table += at + (k % 20 < 7 ? "-9999,-9999,1\r\n" : moved);
+  }
+  files::write_text(folder / "masked.txt", table);
+  files::write_text(folder / "sound.txt", sound);
+  const auto given = [&](const char* file) {
+    return run_track("--pixel_size_um 0.1 --displacement " + (folder / file).string() + " --out " +
+                     (folder / "out").string());
+  };
+  const std::string of_sound = output_of(given("sound.txt"));
+  EXPECT_FALSE(fires("vectors-masked", of_sound)) << of_sound;
+  EXPECT_NE(of_sound.find("400 displacements read as PIVlab writes them"), std::string::npos) << of_sound;
+  const std::string of_masked = output_of(given("masked.txt"));
+  EXPECT_TRUE(fires("vectors-masked", of_masked)) << of_masked;
+  EXPECT_NE(of_masked.find("140 of 400 vectors have the displacement"), std::string::npos) << of_masked;
+  for (const Bead& bead : files::read_displacement(folder / "out/displacement.csv"))
+    EXPECT_LT(norm(bead.displacement_um), 1);
+}
+
 }  // namespace
 }  // namespace mbtfm

@@ -117,6 +117,21 @@ class Cells(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "no row for b/cell 2"):
             mbtfm.study(self.study, conditions=table)
 
+    def test_conditions_are_read_as_people_write_them_or_come_from_folders(self):
+        plain = self.study.parent / "plain.csv"
+        plain.write_text("cell,condition\na/cell 1,ctrl\nb/cell 2,drug\nb/cell 3,drug\n")
+        expected = mbtfm.study(self.study, conditions=plain)
+        written = self.study.parent / "written.csv"
+        for text, encoding in [
+            ("sep=;\r\ncell ;condition;;\r\na/cell 1;ctrl ;;\r\nb/cell 2;drug;;\r\nb/cell 3; Drug;;\r\n;;;\r\n\r\n", "utf-8-sig"),
+            ("cell\tcondition\na/cell 1\tctrl\nb/cell 2\tdrug\nb/cell 3\tDRUG\n", "utf-16"),
+        ]:
+            written.write_bytes(text.encode(encoding))
+            pd.testing.assert_frame_equal(mbtfm.study(self.study, conditions=written), expected)
+        self.assertEqual(set(mbtfm.study(self.study, conditions="folder").condition), {"a", "b"})
+        with self.assertRaisesRegex(ValueError, "a/cell 1: expected a folder"):
+            mbtfm.study(self.study, conditions="folder2")
+
     def test_cells_that_have_not_run_are_left_out_and_named(self):
         other = self.study.parent / "other"
         shutil.copytree(self.first, other / "done")

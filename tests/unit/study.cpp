@@ -110,6 +110,37 @@ TEST(Study, a_column_called_condition_counts_without_being_asked_for) {
   EXPECT_THROW(fake.read({.conditions = "control"}, table), UsageError);
 }
 
+TEST(Study, a_table_of_conditions_is_read_as_people_write_it) {
+  const FakeStudy fake;
+  const auto expected = fake.read({}, "cell,condition\ncell_1,ctrl\ncell_2,drug\ncell_3,ctrl\ncell_4,drug\n");
+  for (const std::string table :
+       {"cell,condition\ncell_1,ctrl\ncell_2,drug\n\ncell_3,ctrl\ncell_4,drug\n\n,\n,\n",
+        "\xEF\xBB\xBFsep=;\r\ncell ;condition;;\r\ncell_1;ctrl ;;\r\ncell_2; "
+        "drug;;\r\ncell_3;ctrl;;\r\ncell_4;drug;;\r\n;;;\r\n",
+        "My study\nCell\tCondition\ncontrol\\cell_1\tctrl\n./treated/cell_2/\tdrug\ncell_3/\tctrl\n\"cell_4\"\tdrug"}) {
+    const Study study = fake.read({}, table);
+    EXPECT_EQ(study.conditions, expected.conditions) << table;
+    ASSERT_EQ(study.cells.size(), 4u) << table;
+    EXPECT_TRUE(study.warnings.empty()) << table;
+  }
+  EXPECT_THROW(fake.read({}, "name,condition\ncell_1,ctrl\n"), InputError);
+  EXPECT_THROW(fake.read({}, "cell,condition\ncell_1,ctrl,more\n"), InputError);
+  EXPECT_THROW(fake.read({}, "cell,condition\n,ctrl\n"), InputError);
+}
+
+TEST(Study, names_that_differ_in_capitals_are_one_condition_and_no_is_no_reason) {
+  const FakeStudy fake;
+  const Study study =
+      fake.read({.conditions = "CTRL"},
+                "cell,condition,exclude\ncell_1,ctrl,no\ncell_2,drug,0\ncell_3,Ctrl,FALSE\ncell_4,drug,yes\n");
+  EXPECT_EQ(study.conditions, (std::vector<std::string>{"ctrl", "drug"}));
+  EXPECT_EQ(study.cells.size(), 3u);
+  EXPECT_EQ(reason_of(study, "treated/cell_4"), "yes");
+  ASSERT_EQ(study.warnings.size(), 1u);
+  EXPECT_NE(study.warnings[0].find("ctrl and Ctrl"), std::string::npos) << study.warnings[0];
+  EXPECT_EQ(analyse(study, {}).warnings.front(), study.warnings.front());
+}
+
 TEST(Study, a_column_called_condition_that_nobody_filled_in_asks_for_nothing) {
   const FakeStudy fake;
   const Study study = fake.read({}, "cell,condition,day\ncell_1,,\ncell_2,,\n");
