@@ -296,8 +296,24 @@ int repeat(const CommandLine& line) {
   become("mbtfm-stats", std::move(arguments));
 }
 
-[[noreturn]] void check(const CommandLine& line) {
-  become("mbtfm-check", {"--cells", line.folder.string(), "--threads", std::to_string(line.threads)});
+/// Of several folders each has its page; the worst exit code counts.
+int check(const CommandLine& line) {
+  const auto arguments_for = [&](const fs::path& folder) {
+    std::vector<std::string> arguments = {"--cells", folder.string(), "--threads", std::to_string(line.threads)};
+    if (line.is_json) arguments.insert(arguments.end(), {"--json", "--quiet"});
+    if (files::is_folder(folder)) arguments.insert(arguments.end(), {"--page", (folder / "check.html").string()});
+    return arguments;
+  };
+  if (line.more_cells.empty()) become("mbtfm-check", arguments_for(line.folder));
+  std::vector<fs::path> folders = line.more_cells;
+  folders.insert(folders.begin(), line.folder);
+  int code = kDone;
+  for (const fs::path& folder : folders) {
+    std::vector<std::string> command = arguments_for(folder);
+    command.insert(command.begin(), (runner::executable_folder() / "mbtfm-check").string());
+    code = std::max(code, runner::exit_code_of(runner::run_process(command, {}, stage::print)));
+  }
+  return code;
 }
 
 [[noreturn]] void init(const CommandLine& line) {
@@ -437,6 +453,7 @@ int start(int argc, char** argv) {
                            "a cell folder: write a cell.toml like its own for each folder below that has none");
   CLI::App* check_command = add_command(
       app, line, "check", "what the images below a folder are good for: a second a cell, before a batch", kFolder);
+  check_command->add_option("MORE", line.more_cells, "further folders");
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", kCell);
   add_stage_options(run_command, line);
   run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
@@ -444,7 +461,7 @@ int start(int argc, char** argv) {
   for (CLI::App* command : {run_command, demo_command})
     command->add_flag("--verbose", line.is_verbose, "print every effect with its number, and why a stage is run");
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", kFolder);
-  for (CLI::App* command : {run_command, batch_command})
+  for (CLI::App* command : {run_command, batch_command, check_command})
     command->add_flag("--json", line.is_json, "print events as JSON, one object a line (docs/formats.md)");
   add_stage_options(batch_command, line);
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
@@ -520,7 +537,7 @@ int start(int argc, char** argv) {
   if (plan_command->parsed()) plan(plan_command->remaining());
   if (noise_command->parsed()) noise(pictures, noise_command->remaining());
   if (stats_command->parsed()) stats(line, stats_command->remaining());
-  if (check_command->parsed()) check(line);
+  if (check_command->parsed()) return check(line);
   if (init_command->parsed()) init(line);
   return compare(line);
 }

@@ -146,6 +146,7 @@ void refuse_large_strain(const SimulateParameters& p) {
 StageReport run(const SimulateParameters& all, stage::StageContext& context) {
   const drawing::ScenarioParameters& parameters = all.cell;
   refuse_large_strain(all);
+  context.assumed.clear();  // of what it chooses itself nothing is assumed
   if (!all.force) context.remedy_to_replace = "--force writes over a simulated cell; else name a new folder";
   if (all.colony.shape != colonies::Shape::none) return run_colonies(all, context);
   expect_simulated(context.outputs_.at("out"));

@@ -2,14 +2,18 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/hash.h"
+#include "pipeline/files/json.h"
 #include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/parameters.h"
@@ -17,6 +21,7 @@
 #include "segment/beads/track.h"
 #include "segment/cells/segment_cell.h"
 #include "segment/stacks/run.h"
+#include "segment/survey/page.h"
 #include "segment/survey/survey.h"
 
 namespace {
@@ -86,33 +91,73 @@ survey::Survey survey_in_space(const fs::path& cell, const runner::ImageNames& n
   return survey;
 }
 
-survey::Survey survey_of(const fs::path& cell) {
+survey::Survey survey_of(const fs::path& cell, survey::CellImages& images) {
   const runner::ImageNames names = runner::read_image_names(cell);
   const CellKind kind = runner::stages_of(cell, names).kind;
   if (kind == CellKind::space) return survey_in_space(cell, names);
-  return survey::survey(images_of(cell, names, kind), 1);
+  images = images_of(cell, names, kind);
+  return survey::survey(images, 1);
 }
 
 struct Seen {
-  std::string text;
-  bool is_fine = true;
-  fs::path beads = {};      ///< the picture while the cell pulls
-  std::string sha256 = {};  ///< of it
+  survey::PageRow row = {};
+  std::string error = {}, hint = {};  ///< why it could not be looked at
+  fs::path beads = {};                ///< the picture while the cell pulls
+  std::string sha256 = {};            ///< of it
+  bool is_fine() const { return error.empty() && row.doubts.empty(); }
 };
 
-Seen look_at(const fs::path& cell, const std::string& name) {
-  try {
-    const survey::Survey survey = survey_of(cell);
-    std::string text = name + ": " + survey.facts + (survey.doubts.empty() ? "; fine" : "");
-    for (const std::string& doubt : survey.doubts) text += "\n" + stage::warning("  caution: " + doubt);
-    return {.text = text + "\n", .is_fine = survey.doubts.empty()};
-  } catch (const InputError& error) {
-    std::string text = name + ": " + stage::warning(std::string("error: ") + error.what()) + "\n";
-    if (!error.hint.empty()) text += "  hint: " + error.hint + "\n";
-    return {.text = text, .is_fine = false};
-  } catch (const std::exception& error) {
-    return {.text = name + ": " + stage::warning(std::string("error: ") + error.what()) + "\n", .is_fine = false};
+/// What a stage of the cell says of cell.toml and, if it looks at them before it runs, of the images.
+void add_refusals(const fs::path& cell, std::vector<std::string>& doubts) {
+  const runner::RunOptions options{.stage_folder = runner::executable_folder()};
+  for (const runner::Stage& stage : runner::stages_of(cell, runner::read_image_names(cell)).stages) {
+    try {
+      runner::check_parameters(stage, cell / "cell.toml", options, [](std::string_view) {});
+    } catch (const runner::StageFailed& refusal) {
+      doubts.push_back(refusal.failure.message);
+    }
   }
+}
+
+Seen look_at(const fs::path& cell, const std::string& name) {
+  Seen seen{.row = {.cell = name, .facts = {}, .doubts = {}, .thumbnails = {}}};
+  try {
+    survey::CellImages images;
+    survey::Survey survey = survey_of(cell, images);
+    seen.row.facts = std::move(survey.facts);
+    seen.row.doubts = std::move(survey.doubts);
+    seen.row.thumbnails = survey::thumbnails_of(images);
+    add_refusals(cell, seen.row.doubts);
+  } catch (const InputError& error) {
+    seen.error = error.what();
+    seen.hint = error.hint;
+  } catch (const std::exception& error) {
+    seen.error = error.what();
+  }
+  return seen;
+}
+
+std::string text_of(const Seen& seen) {
+  std::string text = seen.row.cell + ": ";
+  text +=
+      seen.error.empty() ? seen.row.facts + (seen.is_fine() ? "; fine" : "") : stage::warning("error: " + seen.error);
+  if (!seen.hint.empty()) text += "\n  hint: " + seen.hint;
+  for (const std::string& doubt : seen.row.doubts) text += "\n" + stage::warning("  caution: " + doubt);
+  return text + "\n";
+}
+
+std::string json_of(const Seen& seen) {
+  nlohmann::ordered_json json = {
+      {"cell", seen.row.cell}, {"fine", seen.is_fine()}, {"facts", seen.row.facts}, {"cautions", seen.row.doubts}};
+  if (!seen.error.empty()) json["error"] = seen.error;
+  if (!seen.hint.empty()) json["hint"] = seen.hint;
+  return files::json_text(json) + "\n";
+}
+
+/// On the page what could not be looked at is a row, too.
+survey::PageRow row_of(Seen seen) {
+  if (!seen.error.empty()) seen.row.doubts.insert(seen.row.doubts.begin(), seen.error);
+  return std::move(seen.row);
 }
 
 /// A folder that was copied has the same picture in another file. Cells of one picture share the file.
@@ -122,11 +167,8 @@ void tell_copies(const std::vector<std::string>& names, std::vector<Seen>& seen)
     if (seen[i].sha256.empty()) continue;
     const auto [at, is_new] = first.emplace(seen[i].sha256, i);
     if (is_new || seen[at->second].beads == seen[i].beads) continue;
-    seen[i].is_fine = false;
-    seen[i].text +=
-        stage::warning("  caution: " + seen[i].beads.filename().string() + " is the same picture as that of " +
-                       names[at->second] + ": a copy, or another cell of one field. A copy counts once.") +
-        "\n";
+    seen[i].row.doubts.push_back(seen[i].beads.filename().string() + " is the same picture as that of " +
+                                 names[at->second] + ": a copy, or another cell of one field. A copy counts once.");
   }
 }
 
@@ -150,7 +192,27 @@ std::string disk_doubt(const fs::path& folder, std::size_t n_cells) {
          " cells may take " + brief(needed / 1e9) + " GB.\n";
 }
 
-StageReport check(const fs::path& folder, int threads, bool& is_fine) {
+struct CheckParameters {
+  bool json = false;
+  std::string page;
+};
+void declare(stage::ParameterList& list, CheckParameters& p) {
+  list.add("json", p.json, "print each cell as a JSON object in a line");
+  list.add("page", p.page, "file of a page with a row of thumbnails a cell; empty: none");
+}
+
+/// @throws OutputError where another program made the file
+void write_page(const fs::path& file, const fs::path& folder, const std::vector<Seen>& seen) {
+  const std::string mark = "<!-- made by mbtfm check -->\n";
+  if (files::is_file(file) && !files::read_text(file).ends_with(mark))
+    throw OutputError(file.string() + " is there, and mbtfm check did not make it: nothing is written over it");
+  std::vector<survey::PageRow> rows;
+  for (const Seen& cell : seen) rows.push_back(row_of(cell));
+  files::write_whole(file,
+                     survey::page_of("Images of " + fs::weakly_canonical(folder).filename().string(), rows) + mark);
+}
+
+StageReport check(const fs::path& folder, const CheckParameters& p, int threads, bool& is_fine) {
   const runner::FoundCells found = runner::search_cells(folder);
   std::vector<Seen> seen(found.cells.size());
   std::vector<std::string> names;
@@ -162,14 +224,15 @@ StageReport check(const fs::path& folder, int threads, bool& is_fine) {
     read_beads(found.cells[i], seen[i]);
   });
   tell_copies(names, seen);
-  for (const runner::SkippedFolder& skipped : found.skipped)
-    seen.push_back({.text = skipped.folder.lexically_relative(folder).string() + ": " +
-                            stage::warning("error: " + skipped.why) + "\n",
-                    .is_fine = false});
-  for (const Seen& cell : seen) stage::print(cell.text);
-  stage::print(disk_doubt(folder, seen.size()));
+  for (const runner::SkippedFolder& skipped : found.skipped) {
+    seen.push_back({.error = skipped.why});
+    seen.back().row.cell = skipped.folder.lexically_relative(folder).string();
+  }
+  for (const Seen& cell : seen) stage::print(p.json ? json_of(cell) : text_of(cell));
+  if (!p.json) stage::print(disk_doubt(folder, seen.size()));
   const auto n_fine = std::ranges::count_if(seen, &Seen::is_fine);
   is_fine = n_fine == static_cast<std::ptrdiff_t>(seen.size());
+  if (!p.page.empty()) write_page(p.page, folder, seen);
   StageReport report;
   report.summary = std::to_string(n_fine) + " of " + std::to_string(seen.size()) + " cells are fine";
   report.figures = {{"n_cells", static_cast<std::int64_t>(seen.size())}, {"n_fine", static_cast<std::int64_t>(n_fine)}};
@@ -180,12 +243,13 @@ StageReport check(const fs::path& folder, int threads, bool& is_fine) {
 
 int main(int argc, char** argv) {
   bool is_fine = true;
-  const int code = stage::run_stage(
+  const int code = stage::run_stage<CheckParameters>(
       {.name = "check",
        .purpose = "what the images below a folder are good for, before a batch is run: calibration, sizes, saturation, "
-                  "focus, beads, margin, pictures that are the same, disk",
+                  "focus, beads, margin, pictures that are the same, what the stages refuse, disk",
        .files = {{"cells", stage::FileArgument::Kind::input, "a cell folder, or a folder of cell folders"}}},
-      argc, argv, [](auto&) {},
-      [&](stage::StageContext& context) { return check(context.input("cells", {}), context.threads, is_fine); });
+      argc, argv, [&](const CheckParameters& p, stage::StageContext& context) {
+        return check(context.input("cells", {}), p, context.threads, is_fine);
+      });
   return code == exit_code::kDone && !is_fine ? exit_code::kFailed : code;
 }
