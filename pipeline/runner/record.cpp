@@ -9,6 +9,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/json_record.h"
+#include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
@@ -194,8 +195,8 @@ std::vector<std::string> files_of(const std::vector<ImageInput>& inputs, const f
       const std::string name = file.lexically_relative(cell).generic_string();
       if (!files::is_folder(file)) names.push_back(name);
       if (files::is_folder(file))  // of frames
-        for (const fs::directory_entry& entry : fs::directory_iterator(file))
-          if (files::is_file(entry.path())) names.push_back(name + "/" + entry.path().filename().string());
+        for (const fs::path& frame : files::visible_in(file))
+          if (files::is_file(frame)) names.push_back(name + "/" + frame.filename().string());
     }
   }
   std::ranges::sort(names);
