@@ -109,7 +109,8 @@ struct Seen {
 
 /// What a stage of the cell says of cell.toml and, if it looks at them before it runs, of the images.
 void add_refusals(const fs::path& cell, std::vector<std::string>& doubts) {
-  const runner::RunOptions options{.stage_folder = runner::executable_folder()};
+  runner::RunOptions options;
+  options.stage_folder = runner::executable_folder();
   for (const runner::Stage& stage : runner::stages_of(cell, runner::read_image_names(cell)).stages) {
     try {
       runner::check_parameters(stage, cell / "cell.toml", options, [](std::string_view) {});

@@ -423,9 +423,10 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
   list.add("length_unit", p.length_unit,
            "unit of the lengths in --displacement; auto: as its header or program has it; px: pixels of pixel_size_um "
            "(0 is the centre of the first pixel)");
-  list.add("y_axis", p.y_axis,
-           "direction of y in --displacement; up: the field is mirrored about the middle of its places; auto: up if y "
-           "falls from row to row of a lattice");
+  list.add(
+      "y_axis", p.y_axis,
+      "direction of y in --displacement; up: the field is mirrored, a lattice so that it begins at the corner of the "
+      "image; auto: up if y falls from row to row of a lattice");
   list.add("seconds_between", p.seconds_between, Range::positive(),
            "time between the two images (s) by which velocities in --displacement are multiplied");
   list.add("places", p.places,

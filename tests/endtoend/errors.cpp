@@ -202,6 +202,21 @@ TEST_F(Errors, files_of_a_microscope_are_answered_with_how_to_convert_them) {
 TEST_F(Errors, check_finds_what_would_spoil_a_batch_and_nothing_in_a_good_cell) {
   const Outcome good = run_program("mbtfm check " + cell_.string());
   EXPECT_NE(good.output.find(" beads, "), std::string::npos) << good.output;
+  EXPECT_NE(run_program("mbtfm check " + cell_.string() + " --json").output.find("\"fine\":true"), std::string::npos);
+  const std::string page = files::read_text(cell_ / "check.html");
+  for (const char* part : {"alt=\"actin\"", "beads, relaxed and stressed", "class=\"fine\""})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  files::write_text(cell_ / "check.html", "the user's own");
+  EXPECT_NE(run_program("mbtfm check " + cell_.string()).output.find("did not make it"), std::string::npos);
+  fs::remove(cell_ / "check.html");
+  const std::string toml = files::read_text(cell_ / "cell.toml");
+  files::write_text(cell_ / "cell.toml", toml + "\n[network]\nedge_length_um = -1\n");
+  const Outcome refused = run_program("mbtfm check " + cell_.string());
+  EXPECT_EQ(refused.code, kFailed);
+  EXPECT_NE(refused.output.find("edge_length_um"), std::string::npos) << refused.output;
+  files::write_text(cell_ / "cell.toml", toml);
+  const Outcome both = run_program("mbtfm check " + cell_.string() + " " + cell_.string());
+  EXPECT_NE(both.output.find("1 of 1 cells are fine"), both.output.rfind("1 of 1 cells are fine")) << both.output;
   fs::copy_file(cell_ / "beads_stressed.tif", cell_ / "beads_relaxed.tif", fs::copy_options::overwrite_existing);
   const Outcome twice = run_program("mbtfm check " + cell_.string());
   EXPECT_EQ(twice.code, kFailed);
