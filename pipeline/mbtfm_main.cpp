@@ -300,7 +300,7 @@ int repeat(const CommandLine& line) {
 int check(const CommandLine& line) {
   const auto arguments_for = [&](const fs::path& folder) {
     std::vector<std::string> arguments = {"--cells", folder.string(), "--threads", std::to_string(line.threads)};
-    if (line.is_json) arguments.insert(arguments.end(), {"--json", "--quiet"});
+    if (line.is_json) arguments.insert(arguments.end(), {"--json_lines", "--quiet"});
     if (files::is_folder(folder)) arguments.insert(arguments.end(), {"--page", (folder / "check.html").string()});
     return arguments;
   };

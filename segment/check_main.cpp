@@ -2,12 +2,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/hash.h"
-#include "pipeline/files/json.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/parallel.h"
@@ -15,6 +13,7 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
+#include "pipeline/runner/told.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
@@ -148,11 +147,11 @@ std::string text_of(const Seen& seen) {
 }
 
 std::string json_of(const Seen& seen) {
-  nlohmann::ordered_json json = {
-      {"cell", seen.row.cell}, {"fine", seen.is_fine()}, {"facts", seen.row.facts}, {"cautions", seen.row.doubts}};
-  if (!seen.error.empty()) json["error"] = seen.error;
-  if (!seen.hint.empty()) json["hint"] = seen.hint;
-  return files::json_text(json) + "\n";
+  return runner::event_of_look({.cell = seen.row.cell,
+                                .facts = seen.row.facts,
+                                .cautions = seen.row.doubts,
+                                .error = seen.error,
+                                .hint = seen.hint});
 }
 
 /// On the page what could not be looked at is a row, too.
@@ -198,7 +197,7 @@ struct CheckParameters {
   std::string page;
 };
 void declare(stage::ParameterList& list, CheckParameters& p) {
-  list.add("json", p.json, "print each cell as a JSON object in a line");
+  list.add("json_lines", p.json, "print each cell as a JSON object in a line");
   list.add("page", p.page, "file of a page with a row of thumbnails a cell; empty: none");
 }
 

@@ -75,6 +75,16 @@ std::string events_of(const StageTold& told) {
   return line(event) + stage::events_of(told.stage, *told.report);
 }
 
+std::string event_of_look(const ImageLook& look) {
+  return line({{"event", "look"},
+               {"cell", look.cell},
+               {"fine", look.error.empty() && look.cautions.empty()},
+               {"facts", look.facts},
+               {"cautions", look.cautions},
+               {"error", look.error},
+               {"hint", look.hint}});
+}
+
 std::string event_of_error(const std::string& message, int exit_code) {
   return line({{"event", "error"}, {"message", message}, {"exit_code", exit_code}});
 }

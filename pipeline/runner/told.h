@@ -28,6 +28,13 @@ std::string text_of(const StageTold& told, Detail detail);
 
 /// JSON objects, one a line: the stage, its findings, its effects (docs/formats.md, "Events").
 std::string events_of(const StageTold& told);
+/// What a first look at a cell's images found, as `mbtfm check --json` prints it.
+struct ImageLook {
+  std::string cell, facts;
+  std::vector<std::string> cautions;
+  std::string error, hint;  ///< why it could not be looked at; empty: it was
+};
+std::string event_of_look(const ImageLook& look);
 /// What ended a run.
 std::string event_of_error(const std::string& message, int exit_code);
 
