@@ -16,7 +16,7 @@ namespace mbtfm::files {
 enum class Numeral { none, whole, with_point, with_comma };
 /// A decimal mark at most, an exponent (1.5D-3, too), blanks around it: "1.234,5" and "1 234" are none.
 Numeral numeral_in(std::string_view cell);
-/// Words for a missing number: NaN, NA, #N/A and other errors of spreadsheets, infinite, nothing at all.
+/// Words for a missing number: NaN, NA, \#N/A and other errors of spreadsheets, infinite, nothing at all.
 bool is_missing(std::string_view cell);
 
 struct ForeignTable {

@@ -55,7 +55,7 @@ std::string html_of(const PageRow& row) {
     if (is_of_beads(t))
       beads += html_of(t, beads.empty() ? "beads" : "beads second");
     else
-      html += "<td>" + html_of(t, "still") + "<br>" + t.what + "</td>";
+      html += "<td>" + html_of(t, "still") + t.what + "</td>";
   }
   if (!beads.empty()) html += "<td><div class=\"pair\">" + beads + "</div>beads, relaxed and stressed</td>";
   return html + "</tr>\n";
