@@ -176,7 +176,7 @@ void read_beads(const fs::path& cell, Seen& seen) {
   try {
     seen.beads = fs::canonical(runner::resolve_image(cell, runner::read_image_names(cell), "beads_stressed"));
     if (files::is_file(seen.beads)) seen.sha256 = files::sha256_of_file(seen.beads);
-  } catch (const std::exception&) {  // told of already
+  } catch (const std::exception&) {  // reported already
   }
 }
 

@@ -22,7 +22,7 @@
 namespace mbtfm::runner {
 namespace {
 
-/// What a folder without cell.toml is told of as, if it seems to be a cell all the same. What we write is no TIFF.
+/// The note on a folder without cell.toml that seems to be a cell all the same. What we write is no TIFF.
 std::optional<SkippedFolder> as_no_cell(const fs::path& folder, const std::vector<fs::path>& entries) {
   constexpr int kFewest = 2;  // beads are seen twice; one picture may be an overview
   int n_pictures = 0;
@@ -61,7 +61,7 @@ void collect_cells(const fs::path& folder, FoundCells& found) {
   for (const fs::path& entry : entries) {
     std::error_code unseen;
     const fs::file_type type = fs::symlink_status(entry, unseen).type();
-    // what is too deep to be looked at is told of
+    // what is too deep to be looked at is reported as skipped
     if (type == fs::file_type::directory || type == fs::file_type::none) collect_cells(entry, below);
   }
   if (below.cells.empty())

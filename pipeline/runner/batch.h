@@ -23,7 +23,7 @@ struct FoundCells {
 };
 
 /// Folders with a cell.toml at or below `folder`. A cell folder is not searched for more, nor are links followed, nor
-/// what is hidden looked at. Folders with pictures and no cell at or below them are told of.
+/// what is hidden looked at. Folders with pictures and no cell at or below them are among the skipped ones.
 FoundCells search_cells(const fs::path& folder);
 /// The same. @throws InputError where there is no cell
 FoundCells find_cells(const fs::path& folder);

@@ -1,4 +1,4 @@
-/// Cells that touch, told apart by the neck between them. Internal to segment/ (OpenCV types).
+/// Cells that touch, separated at the neck between them. Internal to segment/ (OpenCV types).
 #pragma once
 
 #include <opencv2/core.hpp>
