@@ -91,8 +91,8 @@ def study(
     if not cells_below(root):
         raise FileNotFoundError(f"{root}: no folder with a cell.toml is in it or below it")
     level = re.fullmatch("folder([1-9]?)", os.fspath(conditions)) if conditions is not None else None
-    if conditions is not None:
-        parameters = {"condition_from" if level else "table": os.fspath(conditions), **parameters}
+    if conditions is not None and not level:
+        parameters = {"table": os.fspath(conditions), **parameters}
     reasons = _listing(root, parameters)
     cells = [root / name if (root / name).is_dir() else root for name in reasons]
     frame = _summaries(root, cells) if table == "cells" else _rows(root, cells, TABLES.get(table, table))
