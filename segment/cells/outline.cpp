@@ -220,7 +220,38 @@ struct Scene {
   double border_um() const { return 1.5 * pixel_um; }
 };
 
-Scene scene_of(const cv::Mat& full, double pixel_size_um) {
+/// With the nearest line in place of the strips of one value that registration leaves along the image's sides: their
+/// edge is none of a cell. A ground of that value, as where dark pixels were set to 0, is left as it is.
+cv::Mat without_padding(const cv::Mat& image) {
+  cv::Rect inner({0, 0}, image.size());
+  const auto share_of = [&](float value, const cv::Rect& line) {
+    return static_cast<double>(cv::countNonZero(image(line) == value)) / line.area();
+  };
+  for (const bool is_row : {true, false}) {
+    for (const bool is_first : {true, false}) {
+      const auto line = [&](int k) {  // the k-th from this side
+        const int n = is_row ? inner.height : inner.width, at = is_first ? k : n - 1 - k;
+        return is_row ? cv::Rect(inner.x, inner.y + at, inner.width, 1)
+                      : cv::Rect(inner.x + at, inner.y, 1, inner.height);
+      };
+      const float value = image.at<float>(line(0).tl());
+      const int most = (is_row ? inner.height : inner.width) / 2;
+      int n = 0;
+      while (n < most && share_of(value, line(n)) == 1) ++n;
+      constexpr double kFew = 0.5;
+      if (n == 0 || n == most || share_of(value, line(n)) > kFew) continue;
+      (is_row ? inner.height : inner.width) -= n;
+      if (is_first) (is_row ? inner.y : inner.x) += n;
+    }
+  }
+  cv::Mat filled;
+  cv::copyMakeBorder(image(inner), filled, inner.y, image.rows - inner.br().y, inner.x, image.cols - inner.br().x,
+                     cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
+  return filled;
+}
+
+Scene scene_of(const cv::Mat& image, double pixel_size_um) {
+  const cv::Mat full = without_padding(image);
   Scene s{full, {}, pixel_size_um, pixel_size_um, 0, 0};
   // the rings' last move is made in the full image, so that three pixels a micrometre do here
   const int factor = std::max(1, static_cast<int>(kGrid_um / pixel_size_um));

@@ -147,6 +147,19 @@ TEST(Outline, a_dim_middle_is_no_hole) {
   EXPECT_TRUE(cells[0].holes_um.empty());
 }
 
+TEST(Outline, strips_that_registration_leaves_are_no_ground) {
+  for (const float value : {0.f, 100.f, 1000.f}) {
+    images::Image image = drawn_disc(10, 6);
+    for (int j = 0; j < image.height; ++j)
+      for (int i = 0; i < image.width; ++i)
+        if (i < 23 || j < 31) image.at(i, j) = value;
+    const auto cells = find_cells(image, {}, kPixel_um, {}).cells;
+    ASSERT_EQ(cells.size(), 1u) << value;
+    EXPECT_GT(intersection_over_union(cells[0].outer_um, ellipse_corners(kDisc, 200)), 0.98) << value;
+    EXPECT_FALSE(cells[0].is_cut_by_border()) << value;
+  }
+}
+
 /// Two discs of 24 and 20 um, 4 um apart, and a bridge of `neck_um` between them.
 struct TouchingDiscs {
   Adhesion large = ellipse(1, {16, 20}, 24, 24, 0), small = ellipse(2, {42, 20}, 20, 20, 0);

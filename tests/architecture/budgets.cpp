@@ -11,7 +11,7 @@
 namespace mbtfm {
 namespace {
 
-constexpr int kLinesOfProduct = 105450;
+constexpr int kLinesOfProduct = 105500;
 constexpr int kLinesOfTests = 46350;
 constexpr int kLongSources = 29;                                                  // .cpp of the product above 400 lines
 constexpr int kLongestSource = 890;                                               // lines
