@@ -1,5 +1,4 @@
 #include "pipeline/runner/run_cell.h"
-#include "pipeline/runner/batch.h"
 
 #include <algorithm>
 #include <exception>
