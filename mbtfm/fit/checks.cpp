@@ -65,8 +65,8 @@ ModelChecks check_model(const ReadyCell& cell, const EnsembleFit& fit, const Par
   ModelChecks checks{.models = compare_models(fit, data, cell.networks.front(), adhesion_ids_of(of)),
                      .influence = influence_of(fit, data),
                      .left_out = {},
-                     .missing_fibres = missing_fibres(fit, of.adhesions, p.segmentation, threads),
-                     .missing_adhesions = missing_adhesions(fit, data, of, p.gel, threads),
+                     .missing_fibres = {},
+                     .missing_adhesions = {},
                      .drawn = cross_validation_of(cell, fit, p.fit.cross_validation, threads)};
   checks.left_out = leave_each_fibre_out(fit, checks.influence);
   if (!is_sheet_asked(p.compare_sheet, checks.models, fit)) return checks;

@@ -27,10 +27,11 @@ struct ModelChecks {
   std::vector<tensions::ModelScore> models;
   tensions::Influence influence;
   std::vector<tensions::FibreLeftOut> left_out;
-  std::vector<MissingFibre> missing_fibres;
-  std::vector<MissingAdhesion> missing_adhesions;
+  std::vector<MissingFibre> missing_fibres;        ///< that the fit has beside those of the network
+  std::vector<MissingAdhesion> missing_adhesions;  ///< likewise
   std::optional<tensions::CrossValidation> drawn;
 };
+/// All but what is missing.
 ModelChecks check_model(const ReadyCell& cell, const tensions::EnsembleFit& fit, const Parameters& parameters,
                         int threads);
 /// Of fit.json.

@@ -51,6 +51,7 @@ DataOfBeads data_of(const GelUnderCell& on, const DisplacementField& beads, subs
   const Parameters& p = on.parameters;
   DataOfBeads result{.data = reduce(beads, std::move(response), beads_in_region(beads, on.cell, p.fit), on.threads,
                                     allows_common_motion(p.effects) ? affine_motions(beads) : MatrixXd())};
+  for (const Adhesion& a : on.cell.adhesions) result.data.load_centre_um.push_back(a.position_um);
   if (!allows_forces_beyond(p.effects, on.cell)) return result;
   auto [data, beyond] = with_forces_beyond(std::move(result.data), on.cell, p.gel);
   return {std::move(data), beyond};

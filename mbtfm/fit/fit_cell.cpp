@@ -9,6 +9,7 @@
 #include "mbtfm/tensions/energy.h"
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/findings.h"
+#include "mbtfm/tensions/missing.h"
 #include "mbtfm/tensions/second_placement.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/stopwatch.h"
@@ -45,6 +46,8 @@ struct ReadyAndFitted {
   ReadyCell ready;
   EnsembleFit fit;
 };
+
+Index n_of_place(const ReadyCell& cell) { return cell.decisions.placement.is_on ? 3 : 0; }
 
 GelUnderCell under(const ReadyCell& cell, const Parameters& p, int threads) {
   return {.gel = *cell.gel, .cell = cell.scene.cell, .parameters = p, .threads = threads};
@@ -111,7 +114,7 @@ ErrorBudget budget_of(const ReadyCell& cell, const EnsembleFit& fit, const Param
                        .substrate_error = substrate_error(cell),
                        .lacks_base = !cell.gel->capabilities().base,
                        .segmentation = p.segmentation,
-                       .n_of_place = cell.decisions.placement.is_on ? 3 : 0},
+                       .n_of_place = n_of_place(cell)},
                       threads);
 }
 
@@ -174,7 +177,7 @@ ModelFields fields_of(const ReadyCell& cell, const EnsembleFit& fit, const Model
   const auto field = [&](const VectorXd& forces_nN) {
     return in_bead_frame(field_of(forces_nN, cell.scene.beads, fit.data), tracked, cell.placement);
   };
-  return {.fitted = field(fit.forces.nN), .without_fibres = field(checks.models.front().forces_nN)};
+  return {.fitted = field(adhesion_forces_nN(fit)), .without_fibres = field(checks.models.front().forces_nN)};
 }
 
 FittedCell with_effects(FittedCell cell, const Work& work) {
@@ -196,10 +199,15 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
   if (!inputs.frames.empty() && p.fit.substrate == TrialDisplacement::per_evaluation)
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   check_place(inputs.beads, inputs.cell);
-  auto [ready, fit] = ready_and_fitted(inputs, p, work);
+  auto [ready, first_fit] = ready_and_fitted(inputs, p, work);
+  auto [fit, missing_fibres, missing_adhesions] =
+      with_missing(std::move(first_fit), ready.networks, ready.scene.cell, p.gel, p.segmentation, p.fit,
+                   n_of_place(ready), work.threads);
   Found found = found_by(ready, fit, inputs.second_placement, p, work);
   FoundMotions motions = motions_found(ready, fit, p.effects);
   ModelChecks checks = check_model(ready, fit, p, work.threads);
+  checks.missing_fibres = std::move(missing_fibres);
+  checks.missing_adhesions = std::move(missing_adhesions);
   append(found.summary.more,
          energy_and_moments(fit, ready.scene.cell, p.gel, p.substrate.modulus_profile.empty(), work.threads));
   append(found.summary.more, figures_of(motions));

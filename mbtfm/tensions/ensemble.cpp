@@ -5,6 +5,7 @@
 #include <functional>
 #include <mutex>
 
+#include "mbtfm/tensions/discrepancy.h"
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
@@ -47,7 +48,7 @@ void add_errors(MeshFit& mesh, const EnsembleFit& all) {
   const MatrixXd J = displace(all.data.reduced, mesh.force_derivatives);
   const MatrixXd by_slope = numerics::transposed_product(J, *all.data.reduced.compliance);
   if (all.model_error)
-    mesh.local.model_variance = numerics::weighted_outer(by_slope, all.model_error->force_variance_nN2);
+    mesh.local.model_variance = numerics::weighted_outer(by_slope, all.model_error->stated_variance_nN2);
   mesh.response = response_of(mesh.local, all.misfit.variance);
   mesh.by_force = numerics::small_product(mesh.response, by_slope);
   mesh.noise_covariance_nN2 = all.misfit.variance * mesh.response;
@@ -79,7 +80,7 @@ void add_bootstrap(EnsembleFit& all, const network::Ensemble& networks, const st
     const TensionProblem problem(networks[m], all.data.reduced, adhesion_ids);
     const MatrixXd of_mesh =
         bootstrap_deviations_nN(problem, parameters, all.meshes[m].fit.trial, all.misfit.variance,
-                                all.model_error ? all.model_error->force_variance_nN2 : VectorXd(), draws, threads);
+                                all.model_error ? all.model_error->stated_variance_nN2 : VectorXd(), draws, threads);
     for (std::size_t i = 0; i < deviations.size(); ++i) {
       const auto row = of_mesh.row(static_cast<Index>(i));
       deviations[i].insert(deviations[i].end(), row.begin(), row.end());
@@ -124,7 +125,7 @@ std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh
     if (model.size() == 0) continue;
     MatrixXd by_force = numerics::transposed_product(mesh.by_force, q.gradients);
     if (along.size() > 0) by_force -= (is_single ? std::sqrt(all.model_error->of_single) : 1.0) * along;
-    model += all.model_error->force_variance_nN2.asDiagonal() * by_force.cwiseAbs2() / n_meshes;
+    model += all.model_error->stated_variance_nN2.asDiagonal() * by_force.cwiseAbs2() / n_meshes;
   }
   if (more_noise.size() > 0) noise += more_noise;
   std::vector<Estimate> estimates;
@@ -241,8 +242,10 @@ Estimate total_force_of(const EnsembleFit& all) {
                magnitude_bias_nN(forces_nN, derivatives, mesh.covariance_nN2));
   };
   Estimate total = with_own_forces(all, along, value_of).front();
+  if (all.forces.own)
+    total.value -= lengthened_nN(forces_nN, all.misfit.variance * across_nN2(forces_nN, all.forces.own->covariance));
   if (!all.model_error) return total;
-  const RoughnessOfTotal roughness = roughness_of_total(forces_nN, *all.model_error);
+  const RoughnessOfTotal roughness = roughness_of_total(all);
   total.value += roughness.lacking_nN - roughness.surplus_nN;
   total.standard_error = std::hypot(total.standard_error, roughness.sigma_nN);
   return total;
@@ -282,6 +285,12 @@ void add_means(EnsembleFit& all) {
   }
 }
 
+void add_force_estimates(EnsembleFit& all, bool is_cut) {
+  all.forces.magnitudes = force_magnitudes_of(all);
+  all.total_force_nN = total_force_of(all);
+  if (is_cut) all.cut = cut_force_of(all);
+}
+
 void add_estimates(EnsembleFit& all, bool is_cut) {
   const auto n_tensions = static_cast<Index>(all.tensions.fibre_ids.size());
   all.tensions.covariance_nN2 = MatrixXd::Zero(n_tensions, n_tensions);
@@ -292,10 +301,24 @@ void add_estimates(EnsembleFit& all, bool is_cut) {
     all.tensions.nN.push_back(sum_of(all, {static_cast<int>(i)}));
     all.tensions.nN.back().sides_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
   }
-  all.forces.magnitudes = force_magnitudes_of(all);
-  all.total_force_nN = total_force_of(all);
   all.network_force_nN = network_force_of(all);
-  if (is_cut) all.cut = cut_force_of(all);
+  add_force_estimates(all, is_cut);
+}
+
+/// R + E a + E' a', the latter beside what the former make of the network's.
+OwnForces one_after_the_other(const OwnForces& first, const OwnForces& then) {
+  return {.left = numerics::small_product(then.left, first.left),
+          .found_nN = numerics::plus_matvec(then.found_nN, then.left, first.found_nN),
+          .covariance = then.covariance + numerics::congruence(then.left, first.covariance)};
+}
+
+/// The tensions at zero are held.
+std::vector<bool> is_free_in(const EnsembleFit& all) {
+  VectorXd sum = VectorXd::Zero(static_cast<Index>(all.tensions.fibre_ids.size()));
+  for (const MeshFit& mesh : all.meshes) sum += mesh.fit.trial.tensions_nN;
+  std::vector<bool> is_free;
+  for (const double tension : sum) is_free.push_back(tension > 0);
+  return is_free;
 }
 
 /// On the first network, with the data as its loss weighs them.
@@ -407,6 +430,11 @@ ScoreTest score_test(const EnsembleFit& fit, const LinearData& data, const Matri
 
 VectorXd adhesion_forces_nN(const EnsembleFit& fit) { return exerted_nN(fit, fit.forces.nN); }
 
+RoughnessOfTotal roughness_of_total(const EnsembleFit& fit) {
+  return roughness_of_total(adhesion_forces_nN(fit), *fit.model_error,
+                            fit.forces.own ? fit.forces.own->left : MatrixXd());
+}
+
 MatrixXd by_network_force(const EnsembleFit& fit, const MatrixXd& sums) {
   return fit.forces.own ? numerics::small_transposed_product(fit.forces.own->left, sums) : sums;
 }
@@ -452,16 +480,44 @@ std::vector<MeshFit> fit_meshes(const network::Ensemble& networks, const Reduced
   return meshes;
 }
 
+/// Of the beads on which the tensions rest, those beside adhesions: they may scatter more than the others.
+void add_telling(EnsembleFit& all) {
+  const MeshFit& mesh = all.meshes.front();
+  const VectorXd leverage = studentized(all.data, mesh.fit.trial, mesh.force_derivatives).leverage;
+  const VectorXd residual = weighted_residual(all.data, adhesion_forces_nN(all));
+  double squares = 0;
+  for (Index b = 0; b < leverage.size(); ++b)
+    squares += leverage[b] * all.data.bead_weight[b] * residual.segment<2>(2 * b).squaredNorm();
+  const double sum = std::max(leverage.sum(), 1e-300);
+  all.misfit.telling_variance = squares / (2 * sum);
+  all.misfit.telling_error = leverage.norm() / sum;
+  all.misfit.variance = std::max(all.misfit.variance, all.misfit.telling_variance);
+}
+
+/// What adhesions exert beside the network, near a cut and where the network is wrong.
+Discrepancy add_discrepancy(EnsembleFit& all, const ModelError& error, bool is_cut) {
+  Discrepancy beside = discrepancy_of(all.data.reduced, mean_of(forces_at_mean(all)), is_free_in(all), error,
+                                      is_cut ? std::vector<Vec2>() : all.data.load_centre_um, all.data.threads);
+  const std::optional<OwnForces> near_cut = own_forces_in(all.data);
+  all.forces.own = near_cut ? one_after_the_other(beside.forces, *near_cut) : beside.forces;
+  return beside;
+}
+
 /// Of the beads, and of the model where two meshes or more tell it.
-void add_variances(EnsembleFit& all) {
+void add_variances(EnsembleFit& all, bool is_cut) {
   const auto n_tensions = static_cast<Index>(all.tensions.fibre_ids.size());
   all.misfit.chi_squared_per_degree = weighted_residual(all.data, all.forces.nN).squaredNorm() /
                                       static_cast<double>(std::max<Index>(1, all.data.n_used - n_tensions));
   all.misfit.variance = misfit_variance(all.data, all.forces.nN, n_tensions, all.misfit.loss);
   if (all.meshes.size() < 2) return;
-  all.model_error = model_error(forces_at_mean(all), all.data.reduced,
+  const std::vector<MeshForces> meshes = forces_at_mean(all);
+  all.model_error = model_error(meshes, all.data.reduced,
                                 variance_beside_model_error(all.data, all.forces.nN, n_tensions, all.misfit.loss));
   all.misfit.variance = all.model_error->noise_variance;
+  if (!all.model_error->is_told) return;
+  const Discrepancy beside = add_discrepancy(all, *all.model_error, is_cut);
+  all.model_error = with_discrepancy(std::move(*all.model_error), beside);
+  add_telling(all);
 }
 
 void check_networks(const network::Ensemble& networks) {
@@ -498,12 +554,22 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
                           std::move(first.fit), tell);
   add_means(all);
   all.forces.own = own_forces_in(all.data);
-  add_variances(all);
+  add_variances(all, networks.front().is_cut());
   numerics::parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[m], all); });
   all.tensions.network_bias =
       network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data.reduced, adhesion_ids), threads);
   add_estimates(all, networks.front().is_cut());
   if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);
+  return all;
+}
+
+EnsembleFit with_forces_by(EnsembleFit all, LinearData data) {
+  all.data = std::move(data);
+  if (!all.model_error || !all.model_error->is_told) return all;
+  const auto n_tensions = static_cast<Index>(all.tensions.fibre_ids.size());
+  const double variance = variance_beside_model_error(all.data, all.forces.nN, n_tensions, all.misfit.loss);
+  add_discrepancy(all, model_error(forces_at_mean(all), all.data.reduced, variance), all.cut.has_value());
+  add_force_estimates(all, all.cut.has_value());
   return all;
 }
 

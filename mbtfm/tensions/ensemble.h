@@ -63,17 +63,21 @@ struct FoundTensions {
 /// What the adhesions carry, fx and fy by adhesion; means over the meshes.
 struct FoundForces {
   VectorXd nN;                       ///< of the network
-  std::optional<OwnForces> own;      ///< that adhesions near a cut have beside these
+  std::optional<OwnForces> own;      ///< that adhesions have beside these, near a cut and where the network is wrong
   VectorXd torques_nN_um;            ///< by adhesion, about the origin
   std::vector<Estimate> magnitudes;  ///< by adhesion
   VectorXd of_network_nN;            ///< with every fibre at the network's tension: the network's part
+  double away_nN2 = 0;               ///< variance of the total by forces away from all adhesions that it holds
 };
 
 /// What the mean over meshes leaves of the beads.
 struct Unexplained {
   double chi_squared_per_degree = 0;  ///< 1 where the model explains all but the noise
   double variance = 0;                ///< of a component of the data: see misfit_variance
-  Loss loss = Loss::squares;          ///< that the first fit called for
+  /// The same of what the adhesions' forces leave, each bead counted as it tells the tensions (its leverage), and its
+  /// error by chance, relative: the tensions' errors follow it (White, Econometrica 48 (1980) 817).
+  double telling_variance = 0, telling_error = 0;
+  Loss loss = Loss::squares;  ///< that the first fit called for
 };
 
 struct EnsembleFit {
@@ -97,6 +101,10 @@ struct EnsembleFit {
 EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, const std::vector<int>& adhesion_ids,
                          const FitParameters& parameters, const Work& work, const SolvedMisfit& solved_misfit = {},
                          const Trial* start = nullptr);
+
+/// The adhesions' forces as these data show them, which allow for more than those that the tensions were fitted to; the
+/// tensions stay.
+EnsembleFit with_forces_by(EnsembleFit fit, LinearData data);
 
 /// Of Student's t at the estimate's degrees of freedom.
 double quantile_975(const Estimate& estimate);
@@ -136,6 +144,8 @@ ScoreTest score_test(const EnsembleFit& fit, const LinearData& data, const Matri
 
 /// What the adhesions exert on the gel: the network's forces and their own.
 VectorXd adhesion_forces_nN(const EnsembleFit& fit);
+/// Of the sum of their magnitudes.
+RoughnessOfTotal roughness_of_total(const EnsembleFit& fit);
 /// How sums of these answer to the network's: weights by force × sums, of the network's.
 MatrixXd by_network_force(const EnsembleFit& fit, const MatrixXd& sums);
 /// Variances of such sums by the beads' noise, the tensions held.

@@ -117,10 +117,10 @@ MeanVariances mean_variances(const BudgetInputs& in) {
     mean.solver += solver_error(in.fit, mesh, gain).cwiseAbs2() / n;
     mean.model += (1 - bead_share(in)) / n * noise;
     if (!in.fit.model_error) continue;
-    const double of_mesh = in.fit.model_error->least_phi_nN / std::max(in.fit.model_error->phi_nN, 1e-300);
-    const VectorXd both = variances(gain.of_model, in.fit.model_error->force_variance_nN2);
-    mean.mesh += of_mesh / n * both;
-    mean.model += (1 - of_mesh) / n * both;
+    const ModelError& error = *in.fit.model_error;
+    const VectorXd of_mesh = variances(gain.of_model, error.least_phi_nN * error.loads_nN);
+    mean.mesh += of_mesh / n;
+    mean.model += (variances(gain.of_model, error.stated_variance_nN2) - of_mesh) / n;
   }
   return mean;
 }
@@ -264,10 +264,19 @@ VectorXd field_of_base_um(const BudgetInputs& in) {
   return field;
 }
 
+/// The tensions and the sums of forces.
+VectorXd values_of_rows(const EnsembleFit& fit) {
+  const VectorXd& tensions_nN = fit.meshes.front().fit.trial.tensions_nN;
+  const VectorXd sums_nN = numerics::transposed_matvec(sums_of(fit), adhesion_forces_nN(fit));
+  VectorXd values(tensions_nN.size() + sums_nN.size());
+  values << tensions_nN, sums_nN;
+  return values;
+}
+
 /// An error of all adhesions' fields alike changes the tensions in proportion; errors by adhesion add up in squares.
 /// Which of the two it is no model tells: both are counted.
 VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers) {
-  const VectorXd values = numerics::matvec(gain.of_tensions, in.fit.meshes.front().fit.trial.tensions_nN);
+  const VectorXd values = values_of_rows(in.fit);
   VectorXd variance = (in.substrate_error * values).cwiseAbs2();
   for (Index a = 0; a < in.fit.forces.nN.size(); a += 2) {
     variance += (in.substrate_error * gain.of_forces.middleCols<2>(a) * in.fit.forces.nN.segment<2>(a)).cwiseAbs2();
@@ -294,11 +303,10 @@ VectorXd change_by_other_gel_um(const BudgetInputs& in, const Gel& other, int th
 /// Of what the user states of the gel; none where nothing is stated. Forces and tensions are proportional to the
 /// modulus (but for the stretch of cables); what another thickness or Poisson's ratio changes of the displacement is
 /// taken for force.
-std::optional<VectorXd> gel_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers,
-                                      int threads) {
+std::optional<VectorXd> gel_variances(const BudgetInputs& in, const BeadAnswers& answers, int threads) {
   const Gel& gel = in.gel;
   if (!gel.youngs_modulus_sigma_kPa && !gel.thickness_sigma_um && !gel.poisson_ratio_sigma) return std::nullopt;
-  const VectorXd values = numerics::matvec(gain.of_tensions, in.fit.meshes.front().fit.trial.tensions_nN);
+  const VectorXd values = values_of_rows(in.fit);
   VectorXd variance = (gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa * values).cwiseAbs2();
   for (const Gel& other : gels_an_error_away(gel)) {
     const VectorXd change = change_by_other_gel_um(in, other, threads);
@@ -363,13 +371,13 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   MeanVariances mean = mean_variances(in);
   const MatrixXd sums = sums_of(in.fit);
   mean.beads.tail(sums.cols()) += own_variances(in.fit, sums);
+  mean.beads[static_cast<Index>(in.fit.tensions.fibre_ids.size())] += in.fit.forces.away_nN2;
   add_room_above(in.fit, mean);
   if (in.fit.model_error)
-    mean.mesh[static_cast<Index>(in.fit.tensions.fibre_ids.size())] +=
-        std::pow(roughness_of_total(adhesion_forces_nN(in.fit), *in.fit.model_error).sigma_nN, 2);
+    mean.mesh[static_cast<Index>(in.fit.tensions.fibre_ids.size())] += std::pow(roughness_of_total(in.fit).sigma_nN, 2);
   const VectorXd segmentation = segmentation_variances(in, gain, answers, threads);
   const VectorXd substrate = substrate_variances(in, gain, answers);
-  const std::optional<VectorXd> gel = gel_variances(in, gain, answers, threads);
+  const std::optional<VectorXd> gel = gel_variances(in, answers, threads);
   const auto parts = [&](Index i) {
     ErrorParts p{.beads = std::sqrt(std::max(0.0, mean.beads[i] - mean.place[i])),
                  .segmentation = std::sqrt(segmentation[i]),

@@ -29,10 +29,6 @@ std::string listed(const std::vector<int>& ids) {
   return ids.size() > kMost ? text + ", ..." : text;
 }
 
-double squared_ratio(const FitSummary& summary) {
-  return summary.expected_relative_l2 > 0 ? std::pow(summary.relative_l2 / summary.expected_relative_l2, 2) : 0;
-}
-
 Noticed explains_little(const FitOutcome& o) {
   const double noise = o.summary.expected_relative_l2 * o.summary.expected_relative_l2;  // of the beads' own squares
   if (noise <= 0 || noise >= 1) return {};
@@ -45,11 +41,12 @@ Noticed explains_little(const FitOutcome& o) {
 }
 
 Noticed unexplained(const FitOutcome& o) {
-  const double ratio = squared_ratio(o.summary);
+  const double all = relative_l2(o.data, adhesion_forces_nN(o.fit));
+  const double ratio = o.summary.expected_relative_l2 > 0 ? std::pow(all / o.summary.expected_relative_l2, 2) : 0;
   return noticed(FindingKind::unexplained_displacement, ratio,
-                 "The model leaves " + brief(ratio) + " times the sum of squares that the noise of the beads (" +
-                     brief(1000 * o.summary.noise_um) +
-                     " nm a component) would leave. The rest is an error of the model: mesh, segmentation or gel.");
+                 "No forces at the adhesions explain what the beads do: " + brief(ratio) +
+                     " times the squares of their noise (" + brief(1000 * o.summary.noise_um) +
+                     " nm a component) are left. Something else moves them, or the gel is another.");
 }
 
 Noticed strain_beyond_linear(const FitOutcome& o) {
@@ -129,31 +126,23 @@ Region worst_region(const LinearData& data, const VectorXd& forces_nN, double no
 }
 
 Noticed beads_disagree(const FitOutcome& o) {
-  const Region worst = worst_region(o.data, o.fit.forces.nN, o.summary.noise_um);
+  const Region worst = worst_region(o.data, adhesion_forces_nN(o.fit), o.summary.noise_um);
   return noticed(FindingKind::beads_disagree_by_region, worst.chi_squared,
                  "In the square of " + brief(worst.side_um) + " um about (" + brief(worst.centre_um.x) + ", " +
-                     brief(worst.centre_um.y) + ") um the model leaves " + brief(worst.chi_squared) +
+                     brief(worst.centre_um.y) + ") um the forces leave " + brief(worst.chi_squared) +
                      " times the squares that the noise of the beads would leave.");
 }
 
-/// The squares that the model leaves of the beads over those of their noise, each bead counted as it tells the tensions
-/// (its leverage): by as much are the tensions' variances larger than the noise of all beads says, summed over the
-/// tensions in units of what is known of each (White, Econometrica 48 (1980) 817).
+/// Of the beads on which the tensions rest.
 Noticed telling_beads_scatter(const FitOutcome& o) {
   const double stated = stated_noise_um(o.data);
   if (stated <= 0 || o.summary.noise_um <= 0) return {};
-  const MeshFit& mesh = o.fit.meshes.front();
-  const Studentized beads = studentized(o.data, mesh.fit.trial, mesh.force_derivatives);
-  const double all = beads.leverage.sum();
-  if (!(all > 0)) return {};
-  const double noise = std::pow(o.summary.noise_um / stated, 2);
-  const Eigen::Map<const Eigen::Matrix2Xd> residual(beads.residual.data(), 2, beads.leverage.size());
-  const double ratio = residual.colwise().squaredNorm().dot(beads.leverage) / (2 * noise * all);
+  const Unexplained& left = o.fit.misfit;
+  const double ratio = left.telling_variance / std::pow(o.summary.noise_um / stated, 2);
   constexpr double kErrors = 3;  // of the ratio by chance
-  return noticed(FindingKind::telling_beads_scatter, ratio - kErrors * beads.leverage.norm() / all,
-                 "The beads on which the tensions rest, those beside adhesions, leave " + brief(ratio) +
-                     " times the squares that their noise would leave: intervals are " + brief(std::sqrt(ratio)) +
-                     " times too narrow.");
+  return noticed(FindingKind::telling_beads_scatter, ratio - kErrors * left.telling_error,
+                 "The beads beside adhesions, on which the tensions rest, scatter " + brief(std::sqrt(ratio)) +
+                     " times as much as their noise would. The intervals allow for it.");
 }
 
 Noticed no_beads_at_adhesions(const FitOutcome& o) {
@@ -163,19 +152,28 @@ Noticed no_beads_at_adhesions(const FitOutcome& o) {
                      " no bead near by: " + listed(ids) + ".");
 }
 
-Noticed missing_fibres_noticed(const FitOutcome& o) {
-  std::string text = "The beads call for " +
-                     counted(static_cast<std::int64_t>(o.missing.size()), "fibre that was", "fibres that were") +
-                     " not segmented: ";
+/// "from adhesion 3 to 12 with 5.1 +- 0.4 nN (fibre 7 ends beside them); ..."
+std::string listed(const std::vector<MissingFibre>& fibres) {
+  std::string text;
   constexpr std::size_t kMost = 4;
-  for (std::size_t i = 0; i < std::min(kMost, o.missing.size()); ++i) {
-    const MissingFibre& f = o.missing[i];
+  for (std::size_t i = 0; i < std::min(kMost, fibres.size()); ++i) {
+    const MissingFibre& f = fibres[i];
     text += (i > 0 ? "; " : "") + std::string("from adhesion ") + std::to_string(f.start_adhesion_id) + " to " +
-            std::to_string(f.end_adhesion_id) + " with " +
-            with_error(f.tension_nN, f.tension_nN / std::sqrt(f.chi_squared_gain)) + " nN";
+            std::to_string(f.end_adhesion_id) + " with " + with_error(f.tension_nN, sigma_nN(f)) + " nN";
+    if (f.beside_fibre_id) text += " (fibre " + std::to_string(*f.beside_fibre_id) + " ends beside them)";
   }
-  if (o.missing.size() > kMost) text += "; ... (missing_fibres.csv)";
-  return noticed(FindingKind::missing_fibre, static_cast<double>(o.missing.size()), text + ".");
+  return fibres.size() > kMost ? text + "; ... (missing_fibres.csv)" : text;
+}
+
+Noticed missing_fibres_noticed(const FitOutcome& o) {
+  const auto n = std::ssize(o.missing);
+  const bool are_all_beside =
+      std::ranges::all_of(o.missing, [](const MissingFibre& f) { return f.beside_fibre_id.has_value(); });
+  return noticed(
+      FindingKind::missing_fibre, static_cast<double>(n),
+      (are_all_beside ? "The beads put the ends of " + counted(n, "fibre", "fibres") + " elsewhere: "
+                      : "The beads call for " + counted(n, "fibre that was", "fibres that were") + " not segmented: ") +
+          listed(o.missing) + ".");
 }
 
 Noticed missing_adhesions_noticed(const FitOutcome& o) {

@@ -135,8 +135,10 @@ double expected_relative_l2(const EnsembleFit& fit, double noise_um) {
 FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double surface_tension_nN_per_um,
                       const FitParameters& parameters) {
   const Polygon& outline_um = scene.cell.outline_um;
-  const NoiseLevel noise = noise_level(scene.beads, fit.data, fit.forces.nN, outline_um, parameters.far_distance_um);
+  const NoiseLevel noise =
+      noise_level(scene.beads, fit.data, adhesion_forces_nN(fit), outline_um, parameters.far_distance_um);
   const Imbalance balance = imbalance_of(fit);
+  const VectorXd exerted_nN = adhesion_forces_nN(fit), beside_nN = exerted_nN - fit.forces.nN;
   FitSummary s;
   s.relative_l2 = relative_l2(fit.data, fit.forces.nN);
   s.noise_um = noise.sigma_um;
@@ -152,6 +154,9 @@ FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double s
             {"chi_squared_per_degree", fit.misfit.chi_squared_per_degree},
             {"total_force_sigma_nN", fit.total_force_nN.standard_error},
             {"network_force_sigma_nN", fit.network_force_nN.standard_error},
+            {"force_beside_network_nN",
+             std::sqrt(2 * beside_nN.squaredNorm() / static_cast<double>(std::max<Index>(1, beside_nN.size())))},
+            {"network_explains", 1 - beside_nN.squaredNorm() / std::max(exerted_nN.squaredNorm(), 1e-300)},
             {"net_force_over_total", balance.force},
             {"net_torque_over_total", balance.torque},
             {"tension_error_from_noise_nN", over_fibres(fit, [](const Estimate& t) { return t.noise; })},

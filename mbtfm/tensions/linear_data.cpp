@@ -147,6 +147,19 @@ Motions joined(Motions those, const Motions& these) {
   return those;
 }
 
+Motions joined_ahead(const Motions& those, Index n_last, const Motions& these) {
+  const auto part = [&](Index first, Index count) {
+    const auto columns = [&](const MatrixXd& of) -> MatrixXd {
+      return of.size() > 0 ? MatrixXd(of.middleCols(first, count)) : of;
+    };
+    return Motions{.shapes = columns(those.shapes),
+                   .precision = columns(those.precision.transpose()).transpose(),
+                   .forces = columns(those.forces)};
+  };
+  const Index n_first = those.shapes.cols() - n_last;
+  return joined(joined(part(0, n_first), these), part(n_first, n_last));
+}
+
 LinearData with_motions(LinearData data, Motions motions) {
   MBTFM_ASSERT(motions.precision.size() == 0 || motions.precision.size() == motions.shapes.cols());
   data.n_used += n_unexpected(data.motions) - n_unexpected(motions);

@@ -41,10 +41,13 @@ struct Motions {
 
 /// These beside those: each stays what it is.
 Motions joined(Motions those, const Motions& these);
+/// The same, ahead of the last of those.
+Motions joined_ahead(const Motions& those, Index n_last, const Motions& these);
 
 struct LinearData {
   std::vector<Vec2> position_um;       ///< of the beads
   substrate::SharedResponse response;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
+  std::vector<Vec2> load_centre_um;    ///< of the adhesions; empty: not known
   VectorXd displacement_um;            ///< u: 2·beads, in the same order, less the offset
   VectorXd offset_um;                  ///< of a gel that is not linear: G F + offset moves its beads; empty: 0
   VectorXd weight_per_um;              ///< W, diagonal, 2·beads: 1/sigma; 0 where the bead is not used

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/extent.h"
@@ -11,6 +12,7 @@
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/half_space.h"
+#include "substrate/greens/models.h"
 
 namespace mbtfm::tensions {
 
@@ -183,6 +185,34 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
   }
   std::ranges::stable_sort(found, std::greater(), &MissingAdhesion::chi_squared_gain);
   return found;
+}
+
+EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& places, const Gel& gel, Index n_last) {
+  std::vector<substrate::Ellipse> discs;
+  for (const MissingAdhesion& place : places)
+    discs.push_back(
+        {.centre_um = place.position_um, .semi_major_um = kDisc_um, .semi_minor_um = kDisc_um, .angle_rad = 0});
+  LinearData data = std::move(fit.data);
+  Motions motions =
+      joined_ahead(data.motions, n_last,
+                   {.shapes = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
+                                  ->compliance_um_per_nN(data.position_um, discs)});
+  fit = with_forces_by(std::move(fit), with_motions(std::move(data), std::move(motions)));
+  const VectorXd errors = motions_beside(fit.data, fit).sigma,
+                 values = motion_in(fit.data,
+                                    fit.data.displacement_um - fit.data.response->displace(adhesion_forces_nN(fit)));
+  const Index first = values.size() - n_last - 2 * std::ssize(places);
+  fit.forces.away_nN2 = 0;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const Eigen::Vector2d force = values.segment<2>(first + 2 * static_cast<Index>(k)),
+                          sigma = errors.segment<2>(first + 2 * static_cast<Index>(k));
+    places[k].force_nN = {force.x(), force.y()};
+    const double along = force.normalized().cwiseProduct(sigma).norm();
+    fit.forces.away_nN2 += along * along;
+    fit.total_force_nN.value += force.norm() - std::min(force.norm(), along * along / (2 * force.norm()));
+  }
+  fit.total_force_nN.standard_error = std::hypot(fit.total_force_nN.standard_error, std::sqrt(fit.forces.away_nN2));
+  return fit;
 }
 
 }  // namespace mbtfm::tensions

@@ -140,6 +140,26 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
   return fibres;
 }
 
+LinearData with_missing_fibres(LinearData data, const std::vector<Adhesion>& adhesions,
+                               const std::vector<MissingFibre>& fibres, Index n_last) {
+  // Ten times what was found bounds nothing, but forces along these pairs are then no direction without any meaning.
+  constexpr double kAnySize = 10;
+  MatrixXd pairs = MatrixXd::Zero(data.response->cols(), std::ssize(fibres));
+  VectorXd precision(pairs.cols());
+  for (std::size_t k = 0; k < fibres.size(); ++k) {
+    const auto start = std::ranges::find(adhesions, fibres[k].start_adhesion_id, &Adhesion::adhesion_id);
+    const auto end = std::ranges::find(adhesions, fibres[k].end_adhesion_id, &Adhesion::adhesion_id);
+    const Vec2 chord = end->position_um - start->position_um, unit = (1 / norm(chord)) * chord;
+    const auto column = static_cast<Index>(k);
+    pairs.col(column).segment<2>(2 * (start - adhesions.begin())) << unit.x, unit.y;
+    pairs.col(column).segment<2>(2 * (end - adhesions.begin())) << -unit.x, -unit.y;
+    precision[column] = 1 / std::pow(kAnySize * fibres[k].tension_nN, 2);
+  }
+  Motions motions = joined_ahead(data.motions, n_last,
+                                 {.shapes = data.response->displace(pairs), .precision = precision, .forces = pairs});
+  return with_motions(std::move(data), std::move(motions));
+}
+
 VectorXd segmentation_variance_nN2(const VectorXd& forces_nN, const std::vector<Adhesion>& adhesions,
                                    const SegmentationErrors& errors) {
   VectorXd variance(forces_nN.size());
@@ -225,7 +245,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
                                          const SegmentationErrors& segmentation, int threads) {
   const double n_pairs = 0.5 * static_cast<double>(adhesions.size()) * (static_cast<double>(adhesions.size()) - 1);
   if (n_pairs < 1) return {};
-  const double limit = numerics::normal_quantile(1 - 0.05 / n_pairs);
+  const double limit = numerics::normal_quantile(1 - 0.01 / n_pairs);
   const MeshFit& mesh = fit.meshes.front();
   ReducedData data = fit.data.reduced;
   if (fit.model_error) {

@@ -48,10 +48,16 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
 constexpr std::size_t kMostMissingFibres = 24;
 
 /// The best ones, no adhesion twice, at most `kMostMissingFibres`, found together: tensions and gains are of each
-/// beside the others. A gain is kept where chance would reach it in one cell of twenty, all pairs tried (Bonferroni),
-/// errors of the model and of the segmentation counted.
+/// beside the others. A gain is kept where chance would reach it in one cell of a hundred, all pairs tried
+/// (Bonferroni), errors of the model and of the segmentation counted.
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
                                          const SegmentationErrors& segmentation = {}, int threads = 1);
+
+/// The data of a cell that has these fibres, too: each a pair of forces of its two adhesions, of any size. What they
+/// pull is no longer taken for the tensions of others.
+/// @param n_last  motions that stay the last ones
+LinearData with_missing_fibres(LinearData data, const std::vector<Adhesion>& adhesions,
+                               const std::vector<MissingFibre>& fibres, Index n_last);
 
 /// Variance of each component of the adhesions' forces, as the beads tell them, by errors of the adhesions' ellipses:
 ///

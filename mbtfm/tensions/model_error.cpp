@@ -8,8 +8,6 @@
 
 namespace mbtfm::tensions {
 
-namespace {
-
 MeshForces mean_of(const std::vector<MeshForces>& meshes) {
   const auto n = static_cast<double>(meshes.size());
   MeshForces mean{VectorXd::Zero(meshes.front().forces_nN.size()), VectorXd::Zero(meshes.front().forces_nN.size()),
@@ -21,6 +19,8 @@ MeshForces mean_of(const std::vector<MeshForces>& meshes) {
   }
   return mean;
 }
+
+namespace {
 
 /// L_a, once for each component.
 VectorXd loads_nN(const MeshForces& mean) {
@@ -86,21 +86,51 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
           .of_single =
               is_told && left_of_squares > 0 ? std::max(1.0, squares / loads.sum() * per_phi / left_of_squares) : 1,
           .force_variance_nN2 = phi * loads,
-          .noise_variance = noise_variance};
+          .stated_variance_nN2 = phi * loads,
+          .cell_variance_nN2 = measured * loads,
+          .noise_variance = noise_variance,
+          .is_told = is_told};
 }
 
-RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError& error) {
-  const auto longer_nN = [&](double phi) {
-    double sum = 0;
-    for (Index row = 0; row < forces_nN.size(); row += 2) {
-      const double force = forces_nN.segment<2>(row).norm();
-      const double across = std::min(std::sqrt(phi * error.loads_nN[row]), force);  // no error turns a force round
-      sum += std::hypot(force, across) - force;
-    }
-    return sum;
+double lengthened_nN(const VectorXd& forces_nN, const VectorXd& across_nN2) {
+  double sum = 0;
+  for (Index a = 0; a < across_nN2.size(); ++a) {
+    const double force = forces_nN.segment<2>(2 * a).norm();
+    sum += std::hypot(force, std::min(std::sqrt(std::max(0.0, across_nN2[a])), force)) - force;  // none turns it round
+  }
+  return sum;
+}
+
+namespace {
+
+/// Of length 1, across the force of adhesion a.
+Eigen::Vector2d across(const VectorXd& forces_nN, Index a) {
+  const Eigen::Vector2d force = forces_nN.segment<2>(2 * a);
+  return Eigen::Vector2d(-force.y(), force.x()) / std::max(force.norm(), 1e-300);
+}
+
+}  // namespace
+
+VectorXd across_nN2(const VectorXd& forces_nN, const MatrixXd& covariance) {
+  VectorXd variance(forces_nN.size() / 2);
+  for (Index a = 0; a < variance.size(); ++a)
+    variance[a] = numerics::quadratic_form(covariance.block<2, 2>(2 * a, 2 * a), across(forces_nN, a));
+  return variance;
+}
+
+RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError& error, const MatrixXd& left) {
+  const auto across_by = [&](const VectorXd& variance) {
+    VectorXd by_adhesion(variance.size() / 2);
+    for (Index a = 0; a < by_adhesion.size(); ++a)
+      by_adhesion[a] = left.size() == 0
+                           ? variance[2 * a]
+                           : (left.middleRows<2>(2 * a).transpose() * across(forces_nN, a)).cwiseAbs2().dot(variance);
+    return by_adhesion;
   };
-  const double of_mean = longer_nN(error.phi_of_mean_nN);
-  const double of_cell = longer_nN(std::max(0.0, error.of_single * error.measured_phi_nN - error.phi_of_mean_nN));
+  const VectorXd across_mean = across_by(error.phi_of_mean_nN * error.loads_nN);
+  const double of_mean = lengthened_nN(forces_nN, across_mean);
+  const double of_cell =
+      lengthened_nN(forces_nN, (error.of_single * across_by(error.cell_variance_nN2) - across_mean).cwiseMax(0));
   // The law of the loads holds to a half (model_error.h), for the cell's network and for the mean's.
   const double of_loads = std::hypot(0.5 * of_cell, 0.5 * of_mean);
   // No one knows the cell's links. Of the same beads, networks of 0.9 um find a total that is 1.1 % below that of 1.5

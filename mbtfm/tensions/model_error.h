@@ -28,7 +28,12 @@ struct ModelError {
   /// and tensions see less of that than of errors independent of each other. So do the meshes, and tell by how much.
   double of_single = 1;
   VectorXd force_variance_nN2;  ///< phi L_a, by component of the forces
-  double noise_variance = 0;    ///< s²: 1 where the beads' errors are as stated
+  /// No less than that, but of adhesions whose forces deviate more what the beads show of them (discrepancy.h): the
+  /// error bars are made of it.
+  VectorXd stated_variance_nN2;
+  VectorXd cell_variance_nN2;  ///< of the cell's own network about the mean, as the beads show it
+  double noise_variance = 0;   ///< s²: 1 where the beads' errors are as stated
+  bool is_told = false;        ///< there are adhesions enough for the misfit to tell phi
 };
 
 /// Of the variance of an adhesion's error: from cell to cell its logarithm scatters about the law's by 1.0 to 1.3, as
@@ -41,13 +46,22 @@ struct MeshForces {
   MatrixXd derivatives;
 };
 
+/// At the tensions and of the meshes that these are of.
+MeshForces mean_of(const std::vector<MeshForces>& meshes);
+
 /// A rough network has larger adhesion forces than a smooth one of the same tensions: an error e across a force R makes
 /// it longer, on average by sqrt(R² + Var e) − R. What the cell's network has of this and the meshes' mean has not is
 /// lacking in the sum of the magnitudes. And what nobody knows of the cell's links makes it larger, or in error.
 struct RoughnessOfTotal {
   double lacking_nN = 0, surplus_nN = 0, sigma_nN = 0;
 };
-RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError& error);
+/// @param left  what of an error of the forces is left in those that are stated; empty: all
+RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError& error, const MatrixXd& left = {});
+
+/// By how much errors across them of this variance (by adhesion) lengthen forces: the sum over all.
+double lengthened_nN(const VectorXd& forces_nN, const VectorXd& across_nN2);
+/// By adhesion the variance across its force. @param covariance  of the forces
+VectorXd across_nN2(const VectorXd& forces_nN, const MatrixXd& covariance);
 
 /// phi by moments: what the meshes' mean leaves of the data, the tensions following, is s² and C Var(e) Cᵀ together.
 /// @param meshes  at least two

@@ -195,10 +195,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Take a displacement field that was not smoothed: smaller windows, no filter. Or give the two bead images, "
        "which this program tracks itself. Tensions of a smoothed field are wrong by more than their error bars."},
       {unexplained_displacement, "unexplained-displacement", "fit", caution,
-       "sum of squares that the model leaves of the displacement, over that of the beads' noise", 1.25,
-       "up to half of the noise's standard deviation, the model's own error adds less than an eighth to what is left",
-       "Look at the map of what is left: arrows in a line want a fibre, arrows at one place an adhesion, arrows "
-       "everywhere another gel or a common motion of the beads."},
+       "squares of the displacement that no forces at the adhesions explain, over those of the beads' noise", 1.25,
+       "more than an eighth beyond the noise is no chance, and the forces at the adhesions are free to follow the "
+       "beads",
+       "Look at the map of what is left: arrows at one place want an adhesion, arrows everywhere another gel or a "
+       "common "
+       "motion of the beads."},
       {strain_beyond_linear, "strain-beyond-linear", "fit", caution,
        "predicted part of the displacement that small-strain elasticity leaves out", 0.05,
        "forces are then off by about as much, which is more than the error of a good fit",
@@ -217,12 +219,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Look at the region in the map of what is left: a bead picture out of focus, another cell, or a fibre or an "
        "adhesion that was not segmented."},
       {telling_beads_scatter, "telling-beads-scatter", "fit", caution,
-       "squares that the model leaves of the beads on which the tensions rest, over those of noise, less three "
+       "squares that the forces leave of the beads on which the tensions rest, over those of noise, less three "
        "standard errors",
-       1.2, "nine sound cells have 0.8 to 1.1; above 1.2 intervals are a tenth too narrow, or more",
+       1.2, "nine sound cells have 0.8 to 1.1; the intervals follow the number whatever it is",
        "Look at the beads beside adhesions in the map of what is left. If their arrows point in all directions, beads "
        "were matched wrongly: smaller pixels or fewer beads help. If they point the same way, the adhesion there is "
-       "not where the force is, or has another shape. Widen the intervals by the factor in the text."},
+       "not where the force is, or has another shape."},
       {adhesions_without_beads, "adhesions-without-beads", "fit", caution,
        "adhesions whose nearest bead is three distances between beads away, or further", 0,
        "of beads scattered at random, one such gap in 10^12 adhesions is chance: the beads do not show this part of "
@@ -240,7 +242,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Nothing if their forces were allowed for; beads beside them are left out. If effects.beyond_cut = off, forces "
        "of this cell are wrong: they take over what the other pulls. Choose cells that are alone if you can."},
       {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for (24 at most)",
-       0, "a pair of adhesions is named if chance would name one in one cell of twenty, all pairs tried",
+       0, "a pair of adhesions is named if chance would name one in one cell of a hundred, all pairs tried",
        "Look for the fibre in the actin image between these adhesions (dashed in the map). If it is there, add it: "
        "mbtfm-add-fibres --rois 1_segment/RoiSet.zip --missing 4_fit/missing_fibres.csv --out fibres.zip in the cell's "
        "folder, then mbtfm run."},

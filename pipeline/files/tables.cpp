@@ -205,7 +205,10 @@ Table<MissingFibre> missing_fibre_table() {
                       {"chi_squared_gain", "how much less misfit it leaves, in units of the noise",
                        &MissingFibre::chi_squared_gain, kResultMayLack},
                       {"sigma_nN", "standard error of the tension", [](const MissingFibre& f) { return sigma_nN(f); },
-                       kResult}}};
+                       kResult},
+                      {"beside_fibre_id",
+                       "the segmented fibre whose ends lie beside these adhesions, where they should be; empty: none",
+                       &MissingFibre::beside_fibre_id, kResultMayLack}}};
 }
 
 Table<MissingAdhesion> missing_adhesion_table() {

@@ -106,6 +106,17 @@ std::string truth(const CellResults& results) {
   return text + ".";
 }
 
+/// Empty for results of a version that did not compute it.
+std::string explained_by_network(const FitSummary& fit) {
+  const auto share = figure_of(fit, "network_explains"), beside_nN = figure_of(fit, "force_beside_network_nN");
+  if (!share || !beside_nN || *beside_nN <= 0) return "";
+  return fmt::format(
+      " The network explains {} of the adhesions' forces (squares). Beside it the beads show {} nN at an adhesion "
+      "(root "
+      "mean square), which the forces in the tables hold.",
+      percent(std::max(0.0, *share)), two_digits(*beside_nN));
+}
+
 /// The displacement that the model explains, against what the noise would allow.
 std::string quality(const FitSummary& fit) {
   if (!(fit.expected_relative_l2 > 0))
@@ -131,7 +142,7 @@ std::string quality(const FitSummary& fit) {
         " These are large because relative L2 counts every bead, also the many far from the cell that move less than "
         "their noise.";
   }
-  return text;
+  return text + explained_by_network(fit);
 }
 
 std::string with_error(double value, double sigma, const char* unit) {

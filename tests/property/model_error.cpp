@@ -1,6 +1,7 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 
+#include "mbtfm/tensions/discrepancy.h"
 #include "mbtfm/tensions/model_checks.h"
 #include "mbtfm/tensions/model_error.h"
 #include "tests/support/tension_scene.h"
@@ -132,7 +133,7 @@ TEST(ModelError, of_the_total_force_is_what_it_misses_where_forces_are_not_the_m
   const EnsembleFit fit = fitted(Eigen::VectorXd::Zero(n));
   const Eigen::VectorXd along = directions_of(fit.forces.nN);
   const auto total = [](const EnsembleFit& f) {  // as fitted: roughness is an error of its own, added to that
-    return f.total_force_nN.value - roughness_of_total(f.forces.nN, *f.model_error).lacking_nN;
+    return f.total_force_nN.value - roughness_of_total(f).lacking_nN;
   };
   double variance = 0;
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -141,7 +142,7 @@ TEST(ModelError, of_the_total_force_is_what_it_misses_where_forces_are_not_the_m
     variance += std::pow(total(other) - total(fit) - deviation * along[k], 2);
   }
   // linear about the fit: forces bend by some per cent over a deviation, and fits stop short by a part of the noise
-  const double of_roughness = roughness_of_total(fit.forces.nN, *fit.model_error).sigma_nN;
+  const double of_roughness = roughness_of_total(fit).sigma_nN;
   const double stated = std::sqrt(std::pow(fit.total_force_nN.from_model(), 2) - of_roughness * of_roughness);
   EXPECT_NEAR(std::sqrt(variance) / stated, 1, 0.15);
 }
@@ -154,8 +155,8 @@ TEST(ModelError, a_rough_network_pulls_more_than_a_smooth_one_of_the_same_mean) 
   double longer_nN = 0;
   for (int i = 0; i < kDraws; ++i) longer_nN += (total_nN(model.forces(1)) - total_nN(mean_nN)) / kDraws;
   ModelError error;
-  error.measured_phi_nN = 0.02;  // that of the draws
-  error.loads_nN = model.deviation.cwiseAbs2() / 0.02;
+  error.cell_variance_nN2 = model.deviation.cwiseAbs2();  // that of the draws
+  error.loads_nN = error.cell_variance_nN2 / 0.02;
   const RoughnessOfTotal roughness = roughness_of_total(mean_nN, error);
   // each force varies by sqrt(.02 |R|) along itself: the mean of the draws' sums is known to .01
   EXPECT_NEAR(longer_nN, roughness.lacking_nN, 0.04 * roughness.lacking_nN + 0.03);
@@ -166,6 +167,7 @@ TEST(ModelError, of_the_total_holds_what_networks_of_other_links_and_edges_find)
   ModelError none;
   const Eigen::VectorXd forces_nN = Eigen::VectorXd::LinSpaced(20, 1, 3);
   none.loads_nN = forces_nN.cwiseAbs();
+  none.cell_variance_nN2 = Eigen::VectorXd::Zero(20);
   const RoughnessOfTotal roughness = roughness_of_total(forces_nN, none);
   EXPECT_EQ(roughness.lacking_nN, 0);
   // `other_network totals`: by the edge from nothing to 1.1 % too much, evenly; by links and anchors 1.0 % either way
@@ -212,6 +214,71 @@ TEST(ModelError, whitened_data_have_errors_of_one_variance) {
   }
   EXPECT_TRUE((root * variance * root.transpose()).isIdentity(1e-9));
   EXPECT_TRUE(whitened(data, error).compliance->isApprox(root * C, 1e-9));
+}
+
+/// Of thirty adhesions: forces that deviate as the law has it, or those of two by far more.
+TEST(Discrepancy, finds_what_adhesions_exert_beside_the_network) {
+  for (const double of_two_nN : {0.0, 8.0}) {
+    double network = 0, found = 0, z_squared = 0;
+    constexpr int kDraws = 50;
+    for (unsigned seed = 1; seed <= kDraws; ++seed) {
+      Model model(seed);
+      const std::vector<MeshForces> meshes = model.meshes(2);
+      ReducedData data = model.data(0);
+      Eigen::VectorXd true_nN = model.forces(2);
+      true_nN.segment<2>(6) += Eigen::Vector2d(of_two_nN, 0);
+      true_nN.segment<2>(40) -= Eigen::Vector2d(of_two_nN, 0);
+      data.target = *data.compliance * true_nN + model.draw(Model::kRows, 1).col(0);
+      const ModelError error = model_error(meshes, data, 1);
+      const MeshForces mean = mean_of(meshes);
+      const Discrepancy beside = discrepancy_of(data, mean, std::vector<bool>(4, true), error, {}, 1);
+      const Eigen::VectorXd forces_nN = beside.forces.left * mean.forces_nN + beside.forces.found_nN;
+      network += (mean.forces_nN - true_nN).norm() / kDraws;
+      found += (forces_nN - true_nN).norm() / kDraws;
+      const Eigen::MatrixXd variance =
+          Eigen::MatrixXd(beside.forces.left * with_discrepancy(error, beside).stated_variance_nN2.asDiagonal() *
+                          beside.forces.left.transpose()) +
+          error.noise_variance * beside.forces.covariance;
+      z_squared += (forces_nN - true_nN).cwiseAbs2().cwiseQuotient(variance.diagonal()).mean() / kDraws;
+      EXPECT_LT((beside.forces.left * model.D).cwiseAbs().maxCoeff(), 1e-6) << "an error of a tension reaches them";
+    }
+    EXPECT_LT(found, (of_two_nN > 0 ? 0.15 : 0.7) * network);
+    // 3 000 components of 50 draws; g is found of the same numbers, and no less than the law's
+    EXPECT_GT(z_squared, 0.4);
+    EXPECT_LT(z_squared, 1.3);
+  }
+}
+
+TEST(Discrepancy, goes_to_nothing_where_the_network_is_right) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    Model model(seed);
+    const std::vector<MeshForces> meshes(2, {model.D * model.tensions, model.D * model.tensions, model.D});
+    ReducedData data = model.data(0);
+    const ModelError error = model_error(meshes, data, 1);
+    const Discrepancy beside = discrepancy_of(data, mean_of(meshes), std::vector<bool>(4, true), error, {}, 1);
+    const Eigen::VectorXd of_network = meshes.front().forces_nN,
+                          forces_nN = beside.forces.left * of_network + beside.forces.found_nN;
+    const Eigen::VectorXd free_nN = free_forces_nN(data);
+    EXPECT_LT((forces_nN - of_network).norm(), 0.5 * (free_nN - of_network).norm()) << seed;
+  }
+}
+
+TEST(Discrepancy, balances_as_a_whole) {
+  Model model(3);
+  std::vector<Vec2> centres_um;
+  for (int a = 0; a < Model::kForces / 2; ++a) centres_um.push_back({10 * std::cos(a), 7 * std::sin(1.7 * a)});
+  // forces of the network that balance, and derivatives that do
+  Eigen::MatrixXd sums(Model::kForces, 3);
+  for (int a = 0; a < Model::kForces / 2; ++a)
+    sums.middleRows<2>(2 * a) << 1, 0, -centres_um[a].y, 0, 1, centres_um[a].x;
+  model.D -= sums * (sums.transpose() * sums).ldlt().solve(sums.transpose() * model.D);
+  const std::vector<MeshForces> meshes(2, {model.D * model.tensions, model.D * model.tensions, model.D});
+  const ReducedData data = model.data(2);
+  const Discrepancy beside =
+      discrepancy_of(data, mean_of(meshes), std::vector<bool>(4, true), model_error(meshes, data, 1), centres_um, 1);
+  const Eigen::VectorXd forces_nN = beside.forces.left * meshes.front().forces_nN + beside.forces.found_nN;
+  EXPECT_GT((forces_nN - meshes.front().forces_nN).norm(), 0.1) << "nothing was found for this to tell anything";
+  EXPECT_LT((sums.transpose() * forces_nN).cwiseAbs().maxCoeff(), 1e-8 * forces_nN.norm() * 100);
 }
 
 Cell cell_with_arcs() {

@@ -7,6 +7,8 @@
 ///   edges          sums of the forces' magnitudes by the mesh's edge, tensions alike
 ///   totals         total forces as fits of several formulations find them of the same beads
 ///   forces         forces of the adhesions on networks of these truths, found and true, and their stated errors
+///   wrong          of cells whose segmentation is wrong: tensions, forces of the adhesions without and with what the
+///                  beads show beside the network, total force
 ///   meshes         by the number of meshes, with and without noise: error and processor time
 ///   parts          what the error is made of: the beads' noise, the ensemble's size, the truth's own network
 #include <cstdio>
@@ -16,6 +18,7 @@
 
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/missing.h"
 #include "samples/experiment/experiment.h"
 #include "tests/support/tension_scene.h"
 
@@ -30,6 +33,7 @@ struct OtherNetwork {
   experiment::Experiment experiment;
   Eigen::VectorXd forces_nN;  ///< true, by adhesion
   std::vector<int> adhesion_ids;
+  DisplacementField beads;            ///< noisy
   tensions::LinearData noisy, exact;  ///< weighted alike
 };
 
@@ -63,8 +67,12 @@ Eigen::VectorXd forces_of(const experiment::Experiment& experiment) {
 OtherNetwork other_network(std::uint64_t seed, const mesh::NetworkParameters* truth = nullptr) {
   drawing::ScenarioParameters p;
   p.seed = seed;
-  OtherNetwork o{
-      .experiment = experiment::simulate(p, 2), .forces_nN = {}, .adhesion_ids = {}, .noisy = {}, .exact = {}};
+  OtherNetwork o{.experiment = experiment::simulate(p, 2),
+                 .forces_nN = {},
+                 .adhesion_ids = {},
+                 .beads = {},
+                 .noisy = {},
+                 .exact = {}};
   o.forces_nN = truth ? forces_on(o.experiment, *truth, seed) : forces_of(o.experiment);
   std::vector<Vec2> points;
   for (const Bead& bead : o.experiment.displacement) points.push_back(bead.position_um);
@@ -92,6 +100,7 @@ OtherNetwork other_network(std::uint64_t seed, const mesh::NetworkParameters* tr
     noisy[i].sigma_um = kNoise_um;
     exact[i].sigma_um = {};  // no error is stated where there is none
   }
+  o.beads = noisy;
   o.noisy = tensions::reduce(noisy, substrate::dense_response(compliance), {}, 2, tensions::affine_motions(noisy));
   o.exact = tensions::reduce(exact, substrate::dense_response(compliance), {}, 2, tensions::affine_motions(exact));
   return o;
@@ -317,6 +326,111 @@ void parts(Cells cells) {
   }
 }
 
+/// Held by the nearest adhesion within 1.5 um; types follow.
+void hold_again(Cell& cell) {
+  constexpr double kReach_um = 1.5;
+  for (Fibre& f : cell.fibres) {
+    const auto holder = [&](const std::optional<int>& was, Vec2 end) -> std::optional<int> {
+      if (!was) return {};
+      std::optional<int> nearest;
+      double distance_um = kReach_um;
+      for (const Adhesion& a : cell.adhesions)
+        if (norm(a.position_um - end) < distance_um) distance_um = norm(a.position_um - end), nearest = a.adhesion_id;
+      return nearest;
+    };
+    f.start_adhesion_id = holder(f.start_adhesion_id, f.points_um.front());
+    f.end_adhesion_id = holder(f.end_adhesion_id, f.points_um.back());
+    if (f.start_adhesion_id && f.start_adhesion_id == f.end_adhesion_id) f.end_adhesion_id.reset();
+    const int n_held = int(f.start_adhesion_id.has_value()) + int(f.end_adhesion_id.has_value());
+    f.type = n_held == 2 ? FibreType::ventral : n_held == 1 ? FibreType::dorsal : FibreType::arc;
+  }
+}
+
+/// What a segmentation has of the cell: without its strongest fibres, without a fifth of the adhesions, with ends that
+/// are off by 0.5 um in each coordinate, or with fibres that bow by 5 % of their length.
+Cell seen_wrongly(const experiment::Experiment& e, const std::string& how, std::uint64_t seed) {
+  Cell cell = e.cell;
+  std::mt19937_64 random(seed + 77);
+  std::normal_distribution<double> normal(0, 1);
+  std::vector<Tension> strongest(e.tensions.begin() + 1, e.tensions.end());
+  std::ranges::sort(strongest, std::greater(), &Tension::tension_nN);
+  const std::size_t n_lost = how == "fibre" ? 1 : how == "two fibres" ? 2 : 0;
+  for (std::size_t i = 0; i < n_lost; ++i)
+    std::erase_if(cell.fibres, [&](const Fibre& f) { return f.fibre_id == strongest[i].fibre_id; });
+  if (how == "adhesions") std::erase_if(cell.adhesions, [&](const Adhesion&) { return random() % 5 == 0; });
+  for (Fibre& f : cell.fibres) {
+    const Vec2 a = f.points_um.front(), along = f.points_um.back() - a;
+    if (how == "ends")
+      for (Vec2* end : {&f.points_um.front(), &f.points_um.back()}) {
+        const double x = normal(random), y = normal(random);
+        *end += 0.5 * Vec2{x, y};
+      }
+    if (how != "bows") continue;
+    const Vec2 sag = 0.05 * normal(random) * Vec2{-along.y, along.x};
+    f.points_um.clear();
+    for (int k = 0; k <= 16; ++k) f.points_um.push_back(a + k / 16.0 * along + 4 * (k / 16.0) * (1 - k / 16.0) * sag);
+  }
+  if (how == "ends" || how == "adhesions") hold_again(cell);
+  return cell;
+}
+
+void wrong(Cells cells) {
+  std::printf(
+      "cell,truth,wrong,relative_error,coverage,rms_error_over_stated,force_error_network,force_error,"
+      "force_coverage,total_over_truth,total_z,n_fibres_named,n_places_named\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    for (const auto& [name, truth] : true_formulations()) {
+      const OtherNetwork o = other_network(c, &truth);
+      for (const std::string how : {"sound", "fibre", "two fibres", "adhesions", "ends", "bows"}) {
+        const Cell seen = seen_wrongly(o.experiment, how, c);
+        const std::vector<int> ids = adhesion_ids_of(seen);
+        Eigen::VectorXd forces_nN(2 * std::ssize(ids));
+        for (std::size_t i = 0; i < ids.size(); ++i)
+          forces_nN.segment<2>(2 * static_cast<Eigen::Index>(i)) =
+              o.forces_nN.segment<2>(2 * (std::ranges::find(o.adhesion_ids, ids[i]) - o.adhesion_ids.begin()));
+        const Gel gel = drawing::ScenarioParameters{}.gel;
+        LinearData data =
+            reduce(o.beads,
+                   substrate::dense_response(
+                       greens::make_greens(gel, {.model = substrate::ModelKind::layer}, 2)
+                           ->compliance_um_per_nN(points_of(o.beads), substrate::ellipses_of(seen.adhesions))),
+                   {}, 2, affine_motions(o.beads));
+        for (const Adhesion& a : seen.adhesions) data.load_centre_um.push_back(a.position_um);
+        const std::vector<cables::CableNetwork> networks = span(seen, FitParameters{}.n_meshes);
+        const WithMissing found =
+            with_missing(fit_ensemble(networks, data, ids, {}, 2), networks, seen, gel, {}, {}, 0, 2);
+        double error = 0, size = 0, z = 0;
+        int n_in = 0, n_forces_in = 0;
+        const auto n = static_cast<int>(found.fit.tensions.fibre_ids.size()) - 1;
+        for (int i = 1; i <= n; ++i) {
+          const Estimate& t = found.fit.tensions.nN[i];
+          const double true_nN =
+              std::ranges::find(o.experiment.tensions, found.fit.tensions.fibre_ids[i], &Tension::fibre_id)->tension_nN;
+          const Interval interval = interval_95(t);
+          error += std::pow(t.value - true_nN, 2), size += true_nN * true_nN;
+          z += std::pow((t.value - true_nN) / std::max(t.standard_error, 1e-9), 2);
+          n_in += interval.low <= true_nN && true_nN <= interval.high;
+        }
+        const Eigen::VectorXd exerted_nN = adhesion_forces_nN(found.fit);
+        for (std::size_t a = 0; a < ids.size(); ++a) {
+          const auto at = 2 * static_cast<Eigen::Index>(a);
+          const Eigen::Vector2d force = exerted_nN.segment<2>(at), off = force - forces_nN.segment<2>(at);
+          const Estimate& magnitude = found.fit.forces.magnitudes[a];
+          n_forces_in += std::abs(off.dot(force.normalized())) <= quantile_975(magnitude) * magnitude.standard_error;
+        }
+        const double total_nN = tensions::total_nN(o.forces_nN);
+        const Estimate& total = found.fit.total_force_nN;
+        std::printf("%d,%s,%s,%.4f,%.3f,%.3f,%.4f,%.4f,%.3f,%.4f,%.3f,%d,%d\n", int(c), name, how.c_str(),
+                    std::sqrt(error / size), double(n_in) / n, std::sqrt(z / n),
+                    (found.fit.forces.nN - forces_nN).norm() / forces_nN.norm(),
+                    (exerted_nN - forces_nN).norm() / forces_nN.norm(), double(n_forces_in) / double(ids.size()),
+                    total.value / total_nN, (total.value - total_nN) / total.standard_error, int(found.fibres.size()),
+                    int(found.adhesions.size()));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -327,12 +441,13 @@ int main(int argc, char** argv) {
   const std::pair<const char*, void (*)(Cells)> studies[] = {{"edges", edges},   {"formulations", formulations},
                                                              {"truths", truths}, {"forces", forces},
                                                              {"totals", totals}, {"meshes", meshes},
-                                                             {"parts", parts}};
+                                                             {"parts", parts},   {"wrong", wrong}};
   for (const auto& [name, study] : studies) {
     if (argc < 2 || std::strcmp(argv[1], name) != 0) continue;
     study(cells);
     return 0;
   }
-  std::fprintf(stderr, "other_network edges|formulations|truths|forces|totals|meshes|parts [cells] [first seed]\n");
+  std::fprintf(stderr,
+               "other_network edges|formulations|truths|forces|totals|meshes|parts|wrong [cells] [first seed]\n");
   return 2;
 }

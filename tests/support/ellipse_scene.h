@@ -31,7 +31,7 @@ inline tractions::TractionParameters half_space(tractions::TractionMethod method
 }
 
 inline tractions::TractionInputs inputs_of(const EllipseScene& scene) {
-  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions};
+  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions, .outline_um = {}};
 }
 
 inline bool is_in_ellipse(const Adhesion& a, Vec2 point_um, double grown_um = 0) {
