@@ -229,6 +229,7 @@ std::vector<std::string> arguments_of_cell(const CommandLine& line) {
 void tell_of_cell(const runner::BatchCell& cell) { stage::print(event_of(cell)); }
 
 int batch(const CommandLine& line) {
+  speak_for_stages(line);
   const auto [cells, skipped] = cells_of(line);
   if (line.only_list) {
     stage::print(runner::list_cells(cells, run_options(line), line.threads));
@@ -508,7 +509,7 @@ int start(int argc, char** argv) {
   fs::path manuals;
   app.add_option("--manuals", manuals, "write manual page and completions below this folder")->group("");
   app.require_subcommand(0, 1);
-  add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", kCell);
+  add_command(app, line, "compare", "print what was found of a simulated cell beside the truth", kCell);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

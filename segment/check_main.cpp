@@ -213,6 +213,7 @@ void write_page(const fs::path& file, const fs::path& folder, const std::vector<
 }
 
 StageReport check(const fs::path& folder, const CheckParameters& p, int threads, bool& is_fine) {
+  setenv(stage::kRunnerVariable, stage::kForPerson, 1);  // of the stages that are asked
   const runner::FoundCells found = runner::search_cells(folder);
   std::vector<Seen> seen(found.cells.size());
   std::vector<std::string> names;

@@ -363,7 +363,8 @@ int main(int argc, char** argv) {
                  {"outline-mask", FileArgument::Kind::optional_input,
                   "mask or label image of the cell, used as its outline (TIFF or PNG)"},
                  {"adhesion-mask", FileArgument::Kind::optional_input,
-                  "mask or label image used as adhesions, or of the adhesive pattern (TIFF or PNG)"},
+                  "mask or label image used as adhesions, or of the adhesive pattern (TIFF or PNG)", false,
+                  "adhesion_mask"},
                  {"out", FileArgument::Kind::output_folder,
                   "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
                   "images.jpg, thumbnail.jpg, images.csv, RoiSet.zip"}}},

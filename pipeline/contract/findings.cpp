@@ -384,9 +384,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {sheet_unexplained, "sheet-unexplained", "sheet", caution,
        "sum of squares that the sheet leaves of the displacement, over that of the beads' noise", 1.25,
        "up to half of the noise's standard deviation, the sheet's own error adds less than an eighth to what is left",
-       "Compare the models in sheet_models.csv. If stress fibres pull, give them (--bundles; for mbtfm run, "
-       "run.bundles). If the edge pulls more than the rest, set fit_line_tension or fit_parts. If the sheet adheres in "
-       "places only, give these (--adhesive; for mbtfm run, images.adhesion_mask). Check the gel and the outline."},
+       "Compare the models in sheet_models.csv. If stress fibres pull, give them (run.bundles, or mbtfm-sheet "
+       "--bundles). If the edge pulls more than the rest, set fit_line_tension or fit_parts. If the sheet adheres in "
+       "places only, give these (images.adhesion_mask, or mbtfm-sheet --adhesive). Check the gel and the outline."},
       {sheet_expands, "sheet-expands", "sheet", caution,
        "share of the sheet's parts whose best contraction is below zero, or whose 95 % interval holds no contraction",
        0,

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/kinds_of_findings.h"
@@ -83,6 +84,15 @@ WordsOfFlags words_of_flags(const ParameterList& list) {
   for (const Parameter& p : list.all())
     if (const auto* choice = std::get_if<Choice>(&p.member)) words["--" + p.name] = choice->words;
   return words;
+}
+
+/// What a text says: of flags by hand, under `mbtfm run` of the keys of cell.toml.
+std::string worded(const ParameterList& list, const StageDescription& description, const std::string& text) {
+  if (std::getenv(kRunnerVariable) == nullptr) return text;
+  std::map<std::string, std::string> images;
+  for (const FileArgument& file : description.files)
+    if (!file.image.empty()) images[file.name] = file.image;
+  return in_keys(list, images, text);
 }
 
 void set_parameters(ParameterList& list, const CommandLine& line, const CLI::App& app) {
@@ -303,6 +313,9 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
   try {
     StageReport report = body(context);
     add_findings(report, context);
+    report.summary = worded(list, description, report.summary);
+    for (Finding& finding : report.findings)
+      for (std::string* text : {&finding.text, &finding.remedy}) *text = worded(list, description, *text);
     expect_all_written(context);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     // The record takes its place last: where it is, all that it speaks of is.
@@ -405,8 +418,8 @@ int run_stage(const StageDescription& description, int argc, char** argv,
   numerics::restart_as_blas_needs(argv);
   watch_signals(SecondSignal::ends_at_once);
   numerics::keep_blas_to_one_thread();
+  ParameterList list;
   try {
-    ParameterList list;
     declare_parameters(list);
     CheckParameters checks;
     if (has_plausible_quantity(list)) declare(list, checks);
@@ -442,7 +455,8 @@ int run_stage(const StageDescription& description, int argc, char** argv,
     numerics::reserve_blas_buffers(line.threads);
     return run(description, list, line, std::move(context), body);
   } catch (...) {
-    return report_current_exception("mbtfm-" + stage);
+    return report_current_exception("mbtfm-" + stage,
+                                    [&](const std::string& text) { return worded(list, description, text); });
   }
 }
 

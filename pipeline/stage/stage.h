@@ -22,6 +22,7 @@ struct FileArgument {
   Kind kind = Kind::input;
   std::string meaning;
   bool is_positional = false;  ///< may be given without its flag
+  std::string image = {};      ///< key of [images] from which `mbtfm run` takes it
 };
 
 struct StageDescription {

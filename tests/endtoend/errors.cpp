@@ -138,6 +138,19 @@ TEST_F(Errors, a_missing_pixel_size_is_asked_for) {
   expect_error(kInput, {"pixel_size_um"}, "1_segment");
 }
 
+TEST_F(Errors, hints_of_a_stage_name_keys_under_a_run_and_flags_alone) {
+  const std::string pattern = " adhesions = \"pattern\"\n";
+  replace_in_toml("[gel]", "[segment]\n" + pattern + "[gel]");
+  EXPECT_NE(output_of("mbtfm run " + cell_.string(), kUsage).find("give it as adhesion_mask in [images]"),
+            std::string::npos);
+  const std::string by_hand = output_of("mbtfm-segment --adhesions pattern --actin-image " +
+                                            (cell_ / "actin.tif").string() + " --out " + (folder_ / "s").string(),
+                                        kUsage);
+  EXPECT_NE(by_hand.find("give it as --adhesion-mask"), std::string::npos) << by_hand;
+  const std::string set = output_of("mbtfm run --set segment.cell=-3 " + cell_.string(), kUsage);
+  EXPECT_NE(set.find("cell in [segment]: expected"), std::string::npos) << set;
+}
+
 TEST_F(Errors, a_negative_modulus_is_refused_before_anything_runs) {
   replace_in_toml("youngs_modulus_kPa", "youngs_modulus_kPa = -8.4");
   expect_error(kInput, {"cell.toml:", "youngs_modulus_kPa", "a number >= 0.001", "-8.4"}, "1_segment");
