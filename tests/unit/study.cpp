@@ -94,6 +94,8 @@ TEST(Study, conditions_come_from_a_folder_or_a_table) {
   EXPECT_EQ(by_table.conditions, (std::vector<std::string>{"blebbistatin", "none"}));
   EXPECT_EQ(reason_of(by_table, "control/cell_3"), "dividing");
   EXPECT_EQ(reason_of(by_table, "treated/cell_4"), "not in the table");
+  const Study by_gel = fake.read({.condition_from = "gel"}, "cell,gel\ncell_1,10 kPa\ncell_2,2 kPa\n");
+  EXPECT_EQ(by_gel.conditions, (std::vector<std::string>{"2 kPa", "10 kPa"}));
 }
 
 TEST(Study, a_column_called_condition_counts_without_being_asked_for) {
