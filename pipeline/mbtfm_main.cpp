@@ -157,10 +157,20 @@ void speak_for_stages(const CommandLine& line) {
   setenv(stage::kRunnerVariable, line.is_json ? stage::kForProgram : stage::kForPerson, 1);
 }
 
+/// Of a time series: 4_fit/series.png, anew after each fit.
+void animate(const CommandLine& line) {
+  const fs::path frames = line.folder / "4_fit/frames.csv", picture = line.folder / "4_fit/series.png",
+                 program = line.stage_folder / "mbtfm-animate";
+  if (!files::is_own_file(frames) || !files::is_file(program)) return;
+  if (files::is_own_file(picture) && fs::last_write_time(picture) > fs::last_write_time(frames)) return;
+  runner::run_process({program.string(), "--cell", line.folder.string(), "--out", picture.string(), "--quiet"});
+}
+
 int run_one(const CommandLine& line) {
   runner::RunOptions options = run_options(line);
   options.finish = [&] {
     if (!report::has_results(line.folder)) return;
+    animate(line);
     report::update_report(line.folder);
     const fs::path page = line.folder / "report.html";
     if (line.is_json) return stage::print(report::result_event(line.folder, page));

@@ -6,6 +6,8 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/version.h"
+#include "pipeline/files/base64.h"
+#include "pipeline/files/fit_summary.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
@@ -155,13 +157,19 @@ std::string effects_table(const Provenance& provenance) {
 
 /// Of a time series; empty for a cell of one frame.
 std::string series_section(const fs::path& cell) {
-  const std::optional<ForceOverTime> series = force_over_time(cell);
+  const std::optional<files::ForceOverTime> series = files::force_over_time(cell);
   if (!series) return "";
-  const fs::path picture = cell / "4_fit/tracks.svg";
+  const fs::path picture = cell / "4_fit/tracks.svg", animation = cell / "4_fit/series.png";
+  constexpr std::uintmax_t kMost_bytes = 20'000'000;  // more would make the page slow
+  std::string moving;
+  if (files::is_own_file(animation) && fs::file_size(animation) < kMost_bytes)
+    moving = "<figure><img alt=\"The frames in turn\" style=\"width:100%\" src=\"data:image/png;base64," +
+             files::base64(files::read_text(animation)) +
+             "\"><figcaption>The frames in turn (<code>4_fit/series.png</code>).</figcaption></figure>\n";
   return section("Over time", "<p>" + html_escaped(sentence_of(*series)) +
                                   " Tables: <code>4_fit/tracks.csv</code> and "
                                   "<code>4_fit/frames.csv</code>. All else on this page is of the first frame.</p>\n" +
-                                  (files::is_own_text(picture) ? files::read_text(picture) : std::string()));
+                                  moving + (files::is_own_text(picture) ? files::read_text(picture) : std::string()));
 }
 
 std::string provenance_section(const Provenance& provenance, const std::string& figures) {

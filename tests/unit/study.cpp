@@ -562,6 +562,13 @@ TEST(Figures, are_drawn_into_pixels) {
   EXPECT_EQ(big_endian(at + 4), std::lround(300 / 0.0254)) << "pixels in a metre";
   EXPECT_GT(bytes.size(), 10000u);  // an empty page of this size has some 4 kB
   EXPECT_THROW(write_png(folder / "nowhere/figure.png", svg_of(figure), 85, 300), OutputError);
+  write_animation(folder / "moving.png", {svg_of(figure), svg_of(figure), svg_of(figure)});
+  const std::string moving = files::read_text(folder / "moving.png");
+  EXPECT_NE(moving.find(std::string("acTL\0\0\0\3", 8)), std::string::npos);
+  int n_frames = 0;
+  for (std::size_t at = moving.find("fcTL"); at != moving.npos; at = moving.find("fcTL", at + 1)) ++n_frames;
+  EXPECT_EQ(n_frames, 3);
+  EXPECT_LT(moving.size(), 1.5 * static_cast<double>(moving.find("fdAT"))) << "frames that are alike take no room";
   write_pdf(folder / "figure.pdf", svg_of(figure), 85);
   write_pdf(folder / "again.pdf", svg_of(figure), 85);
   const std::string pdf = files::read_text(folder / "figure.pdf");
