@@ -33,8 +33,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the error of a force grows with its square: 6 % at 1 pixel, less than 0.1 % at 0.1",
        "Nothing: it was taken off. Correct the phase of the scanner before the next recording, or scan in one "
        "direction only."},
-      {adhesions_left_out, "adhesions-left-out", "segment", note, "adhesions that were found outside of the cell", 0,
-       "only what lies in the outline can hold the network", "Check the outline in 1_segment/overlay.png."},
+      {adhesions_left_out, "adhesions-left-out", "segment", note,
+       "adhesions and small bright things that were found outside of the cell", 0,
+       "only what lies in the outline can hold the network",
+       "Check the outline in 1_segment/overlay.png: grey dashes show what was left out."},
       {adhesions_long, "adhesions-long", "segment", caution, "length over width of the adhesions, mean weighed by area",
        4,
        "adhesion images of five kinds of cell and microscope have 1.7 to 3.1, actin bundles taken for adhesions 6 to 8",
