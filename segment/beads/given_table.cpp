@@ -395,19 +395,6 @@ std::vector<Unit> units_of_davis(const ForeignTable& table) {
   return units;
 }
 
-std::optional<Unit> unit_of_parameter(LengthUnit unit) {
-  switch (unit) {
-    case LengthUnit::automatic:
-      return std::nullopt;
-    case LengthUnit::um:
-    case LengthUnit::px:
-    case LengthUnit::mm:
-    case LengthUnit::m:
-      return unit_named(name_of(unit));
-  }
-  return std::nullopt;
-}
-
 double pixel_um(const TrackParameters& parameters) {
   if (parameters.pixel_size_um) return *parameters.pixel_size_um;
   throw UsageError("lengths in px need pixel_size_um: give it in cell.toml or as --pixel_size_um");
@@ -441,7 +428,8 @@ void take_units(GivenTable& given, const std::string& file, const Found& found, 
   const std::optional<Unit>&of_places = found.units[x], &of_displacements = found.units[ux];
   if (found.units[y] != of_places || found.units[uy] != of_displacements)
     throw InputError(file, "one unit along x and y", listed(found.header));
-  std::optional<Unit> otherwise = unit_of_parameter(parameters.length_unit);
+  std::optional<Unit> otherwise;
+  if (parameters.length_unit != LengthUnit::automatic) otherwise = unit_named(name_of(parameters.length_unit));
   if (otherwise && of_places && of_displacements &&
       (of_places->um != otherwise->um || of_displacements->um != otherwise->um)) {
     throw InputError(
@@ -500,28 +488,23 @@ void make_vectors_of_spots(ForeignTable& table, const TrackParameters& parameter
         "frames count from 1, TrackMate's FRAME 0 is the first");
   }
   const std::string name = table.name;
-  const CsvTable spots(
-      [&] {
-        std::vector<std::string> numbers;
-        for (std::size_t i = 0; i < table.rows.front().fields.size(); ++i) numbers.push_back(std::to_string(i + 1));
-        return numbers;
-      }(),
-      table.rows, name);
-  const auto named = [](std::size_t i) { return std::to_string(i + 1); };
+  std::vector<std::string> numbers;
+  for (std::size_t i = 0; i < table.rows.front().fields.size(); ++i) numbers.push_back(std::to_string(i + 1));
+  const CsvTable spots(numbers, table.rows, name);
   struct Track {
     int line = 0;
     std::vector<Vec2> relaxed, stressed;
   };
   std::map<std::string, Track> tracks;
   for (int row = 0; row < spots.n_rows(); ++row) {
-    const std::string id = spots.text(row, named(track));
+    const std::string id = spots.text(row, numbers[track]);
     if (files::is_missing(id)) continue;
-    const double at = spots.number(row, named(frame), Range::not_negative()) + 1;
+    const double at = spots.number(row, numbers[frame], Range::not_negative()) + 1;
     if (at != *relaxed && at != *stressed) continue;
     Track& found = tracks[id];
     found.line = table.rows[static_cast<std::size_t>(row)].line;
     (at == *relaxed ? found.relaxed : found.stressed)
-        .push_back({spots.number(row, named(x)), spots.number(row, named(y))});
+        .push_back({spots.number(row, numbers[x]), spots.number(row, numbers[y])});
   }
   table.rows.clear();
   const double scale = unit && unit->um > 0 ? unit->um : 1;  // to um
