@@ -9,7 +9,6 @@
 int main(int argc, char** argv) {
   using namespace mbtfm;
   using Kind = stage::FileArgument::Kind;
-  struct None {};
   return stage::run_stage(
       {.name = "animate",
        .purpose = "draw the frames of a time series, as one animated picture",
@@ -21,6 +20,8 @@ int main(int argc, char** argv) {
         const std::vector<std::string> frames = report::drawings_of_series(cell);
         if (frames.empty()) throw InputError(cell.string(), "a time series that was fitted", "none");
         statistics::write_animation(context.output("out"), frames);
-        return StageReport{.summary = counted(std::ssize(frames), "frames")};
+        StageReport report;
+        report.summary = counted(std::ssize(frames), "frames");
+        return report;
       });
 }

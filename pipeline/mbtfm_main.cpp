@@ -343,6 +343,7 @@ int check(const CommandLine& line) {
 
 [[noreturn]] void noise(const std::vector<std::string>& pictures, const std::vector<std::string>& further) {
   std::vector<std::string> arguments;
+  if (pictures.size() == 1) throw UsageError("noise: expected two pictures of a place: mbtfm noise A.tif B.tif");
   if (pictures.size() == 2) arguments = {"--first", pictures[0], "--second", pictures[1]};
   arguments.insert(arguments.end(), further.begin(), further.end());
   become("mbtfm-noise", std::move(arguments));
@@ -421,10 +422,10 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
   const std::map<std::string, double> time_units = {{"s", 1}, {"min", 60}, {"h", 3600}};
   command->add_option("--timeout", line.timeout_s, "kill a stage that takes longer: 90, 10min, 2h")
       ->transform(CLI::AsNumberWithUnit(time_units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"))
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1e-3, 1e15));
   command->add_option("--memory", line.memory_bytes, "kill a stage that takes more memory: 500MB, 4GB")
       ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true))
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1e-3, 1e15));
 }
 
 /// A simulated cell, images and all, every stage on it, and its tensions beside the truth.
@@ -498,7 +499,7 @@ int start(int argc, char** argv) {
   cost_command->add_option("MORE", line.more_cells, "further cells, over all of which the errors are taken");
   cost_command->add_option("--out", line.out, "folder of cost.csv, cost.svg and cost.md; default: CELL/cost");
   cost_command->add_option("--budget", line.budget_min, "no run is begun after this (minutes)")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(1e-3, 1e6))
       ->capture_default_str();
   cost_command->add_option("--repeats", line.repeats, "runs of each choice, at most; the median counts")
       ->check(CLI::Range(1, 100))
@@ -521,7 +522,14 @@ int start(int argc, char** argv) {
   app.require_subcommand(0, 1);
   add_command(app, line, "compare", "print what was found of a simulated cell beside the truth", kCell);
   try {
-    app.parse(argc, argv);
+    std::vector<std::string> arguments(argv + 1, argv + argc);
+    for (const char* word : {"help", "version"}) {  // mbtfm help run
+      if (arguments.empty() || arguments.front() != word) continue;
+      arguments.push_back("--" + arguments.front());
+      arguments.erase(arguments.begin());
+    }
+    std::ranges::reverse(arguments);  // as CLI11 takes them
+    app.parse(std::move(arguments));
   } catch (const CLI::ParseError& error) {
     std::ostringstream help, message;
     const int code = app.exit(error, help, message);

@@ -296,7 +296,8 @@ TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, 
     for (const std::optional<Finding>& found : images::noticed_in(*image)) context.notice(found);
   }
   if (stressed.image.pixels == relaxed.image.pixels)
-    throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both");
+    throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both",
+                     "give the other picture as --stressed or --relaxed");
   Tracking tracking = with_names(relaxed.name + ", " + stressed.name,
                                  [&] { return beads.track(stressed.image, pixel_size_um, progress, cell); });
   images::Picture picture = picture_of_beads(relaxed.image, stressed.image, tracking.stressed, parameters.cell_with);

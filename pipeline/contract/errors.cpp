@@ -12,6 +12,13 @@ namespace mbtfm {
 
 namespace {
 
+int tell(const std::string& program, int code, const std::string& message, const std::string& hint = {}) {
+  const char* kind = code == exit_code::kBug ? "internal error" : "error";
+  std::fprintf(stderr, "%s: %s: %s\n", program.c_str(), kind, message.c_str());
+  if (!hint.empty()) std::fprintf(stderr, "  hint: %s\n", hint.c_str());
+  return code;
+}
+
 constexpr const char* kNeedLess = "fewer threads, a coarser mesh or fewer beads need less";
 
 /// Containers, OpenCV and the threads' library have errors of their own for it.
@@ -32,36 +39,29 @@ NotSolved::NotSolved(Report what)
 
 OutOfMemory::OutOfMemory(std::string reason) : NotSolved(Report{.reason = std::move(reason)}) {}
 
-int report_current_exception(const std::string& program, const std::function<std::string(const std::string&)>& worded) {
+int report_current_exception(const std::string& program) {
   using namespace exit_code;
-  const auto tell = [&](int code, const std::string& message, const std::string& hint = {}) {
-    const auto text = [&](const std::string& of) { return worded ? worded(of) : of; };
-    const char* kind = code == kBug ? "internal error" : "error";
-    std::fprintf(stderr, "%s: %s: %s\n", program.c_str(), kind, text(message).c_str());
-    if (!hint.empty()) std::fprintf(stderr, "  hint: %s\n", text(hint).c_str());
-    return code;
-  };
   try {
     throw;
   } catch (const UsageError& error) {
-    return tell(kUsage, error.what());
+    return tell(program, kUsage, error.what());
   } catch (const InputError& error) {
-    return tell(kInput, error.what(), error.hint);
+    return tell(program, kInput, error.what(), error.hint);
   } catch (const InvalidData& error) {
-    return tell(kInput, error.what());
+    return tell(program, kInput, error.what());
   } catch (const OutOfMemory& error) {
-    return tell(kResources, error.report->reason);
+    return tell(program, kResources, error.report->reason);
   } catch (const NotSolved& error) {
-    return tell(kNoAnswer, "not solved: " + error.report->reason);
+    return tell(program, kNoAnswer, "not solved: " + error.report->reason);
   } catch (const OutputError& error) {
-    return tell(kOutput, error.what());
+    return tell(program, kOutput, error.what());
   } catch (const std::filesystem::filesystem_error& error) {
-    return tell(kOutput, error.what());
+    return tell(program, kOutput, error.what());
   } catch (const Interrupted& error) {
-    return tell(kInterrupted, error.what());
+    return tell(program, kInterrupted, error.what());
   } catch (const std::exception& error) {
-    if (is_want_of_memory(error)) return tell(kResources, "out of memory", kNeedLess);
-    return tell(kBug, error.what(), "please report this with the command and its inputs");
+    if (is_want_of_memory(error)) return tell(program, kResources, "out of memory", kNeedLess);
+    return tell(program, kBug, error.what(), "please report this with the command and its inputs");
   }
 }
 

@@ -1,7 +1,6 @@
 /// What can go wrong, one type for each kind, and how a program ends with it.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -88,9 +87,7 @@ struct InternalError : std::logic_error {
   } while (false)
 
 /// In a catch block: tell what was thrown, with its hint, as an error of `program` on stderr.
-/// @param worded  changes each text before it is printed
 /// @returns its exit code
-int report_current_exception(const std::string& program,
-                             const std::function<std::string(const std::string&)>& worded = {});
+int report_current_exception(const std::string& program);
 
 }  // namespace mbtfm

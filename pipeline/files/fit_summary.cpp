@@ -5,6 +5,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/json.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 
 namespace mbtfm::files {

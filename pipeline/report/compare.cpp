@@ -61,7 +61,10 @@ bool has_truth(const fs::path& cell) { return files::is_own_file(cell / "truth/t
 Comparison compare_with_truth(const fs::path& cell) {
   files::check_cell_folder(cell);
   if (!has_truth(cell))
-    throw InputError((cell / "truth/tensions.csv").string(), "the true tensions of a simulated cell", "none");
+    throw InputError((cell / "truth/tensions.csv").string(), "the true tensions of a simulated cell", "none",
+                     "compare is for cells that mbtfm-simulate or mbtfm demo made");
+  if (!files::is_own_file(cell / "4_fit/tensions.csv"))
+    throw InputError(cell.string(), "a cell that was run", "no 4_fit/tensions.csv", "mbtfm run " + cell.string());
   const std::vector<Fibre> found =
       files::read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv");
   const bool by_place = files::is_own_file(cell / "truth/fibres.csv");

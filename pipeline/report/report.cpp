@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/base64.h"
@@ -18,7 +19,6 @@
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/provenance.h"
-#include "pipeline/report/result_line.h"
 #include "pipeline/report/results.h"
 #include "pipeline/report/sheet_report.h"
 #include "pipeline/report/space_report.h"
@@ -151,6 +151,15 @@ std::string effects_table(const Provenance& provenance) {
     table.rows.push_back(row);
   }
   return html_of(table);
+}
+
+/// "Over 6 frames the total force goes from 6 nN to 71 nN; …"
+std::string sentence_of(const files::ForceOverTime& s) {
+  std::string text = "Over " + counted(s.n_frames, "frames") + " the total force goes from " + readable(s.first_nN) +
+                     " nN to " + readable(s.last_nN) + " nN; its largest change from the first frame is " +
+                     readable(s.largest_change_nN) + " nN.";
+  if (s.n_without_fit > 0) text += " " + counted(s.n_without_fit, "frames") + " could not be fitted.";
+  return text;
 }
 
 }  // namespace

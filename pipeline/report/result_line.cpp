@@ -12,14 +12,6 @@
 
 namespace mbtfm::report {
 
-std::string sentence_of(const files::ForceOverTime& s) {
-  std::string text = "Over " + counted(s.n_frames, "frames") + " the total force goes from " + readable(s.first_nN) +
-                     " nN to " + readable(s.last_nN) + " nN; its largest change from the first frame is " +
-                     readable(s.largest_change_nN) + " nN.";
-  if (s.n_without_fit > 0) text += " " + counted(s.n_without_fit, "frames") + " could not be fitted.";
-  return text;
-}
-
 std::string result_line(const Path& cell) {
   const CellKind kind = kind_of(cell);
   if (kind == CellKind::space) return result_line_in_space(cell);

@@ -5,14 +5,7 @@
 
 #include "pipeline/contract/path.h"
 
-namespace mbtfm::files {
-struct ForceOverTime;
-}
-
 namespace mbtfm::report {
-
-/// "Over 6 frames the total force goes from 6 nN to 71 nN; …"
-std::string sentence_of(const files::ForceOverTime& series);
 
 /// "total force 412 ± 21 nN; tensions: ventral 4.1 (8), dorsal 0.7 (7), arc 2.2 nN (5); 3 of 20 uncertain": means by
 /// type, how many. @throws InputError where a file of the fit is malformed

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "pipeline/contract/extent.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"

@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <regex>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
@@ -266,38 +265,6 @@ Parameter& parameter_named(ParameterList& list, const std::string& name) {
     known.push_back(p.flag);
   }
   throw UsageError("no parameter is called '" + name + "': " + did_you_mean(nearest(known, name)));
-}
-
-std::string in_keys(const ParameterList& list, const std::map<std::string, std::string>& images,
-                    const std::string& text) {
-  static const std::regex beside(R"((cell\.toml),? or (?:as )?--[\w.-]+(?: '[^']*'| [\d.]+)?(?: --[\w.]+ [\d.]+)*)"),
-      flag(R"(--([A-Za-z_][\w.-]*\w)(?: (\w+|\d[\d.]*\d))?)");
-  const std::string given = std::regex_replace(text, beside, "$1");
-  std::string worded;
-  auto rest = given.cbegin();
-  for (std::sregex_iterator at(given.begin(), given.end(), flag), end; at != end; ++at) {
-    const std::string before(given.cbegin(), (*at)[0].first), name = (*at)[1], value = (*at)[2];
-    const std::size_t command = before.rfind("mbtfm"), clause = before.find_last_of(":;,(");
-    if (command != before.npos && (clause == before.npos || clause < command)) continue;
-    std::string key, table;
-    bool is_value = false;
-    if (const auto image = images.find(name); image != images.end()) {
-      key = image->second;
-      table = "images";
-    }
-    for (const Parameter& p : list.all()) {
-      if (p.flag != name) continue;
-      const auto* choice = std::get_if<Choice>(&p.member);
-      const bool is_word = choice != nullptr && std::ranges::find(choice->words, value) != choice->words.end();
-      is_value = is_word || (!value.empty() && value.find_first_not_of("0123456789.") == value.npos);
-      key = p.name + (is_word ? " = \"" + value + '"' : is_value ? " = " + value : "");
-      table = p.table;
-    }
-    if (key.empty()) continue;
-    worded += std::string(rest, (*at)[0].first) + key + " in " + (table.empty() ? "cell.toml" : "[" + table + "]");
-    rest = is_value ? (*at)[0].second : (*at)[1].second;
-  }
-  return worded + std::string(rest, given.cend());
 }
 
 void check_complete(const ParameterList& list) {

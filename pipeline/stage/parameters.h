@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -105,11 +104,6 @@ std::string to_text(const Parameter& parameter);
 std::string to_toml(const ParameterList& list, const std::vector<std::string>& tables);
 /// The parameter of this name. @throws UsageError that names the nearest one there is
 Parameter& parameter_named(ParameterList& list, const std::string& name);
-/// A text for whoever writes cell.toml and no flags: "--loss huber" becomes "loss = "huber" in [fit]", and what a text
-/// offers beside cell.toml goes. Flags of a command that the text names stay.
-/// @param images  flags of files, and the keys of [images] that `mbtfm run` takes them from
-std::string in_keys(const ParameterList& list, const std::map<std::string, std::string>& images,
-                    const std::string& text);
 /// @throws UsageError where a required parameter was never set
 void check_complete(const ParameterList& list);
 /// The parameter page of this list: one table of name, default, range, meaning for each table of cell.toml.

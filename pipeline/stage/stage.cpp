@@ -95,6 +95,18 @@ std::string worded(const ParameterList& list, const StageDescription& descriptio
   return in_keys(list, images, text);
 }
 
+/// In a catch block: what was thrown, in other words.
+template <class Words>
+[[noreturn]] void rethrow_worded(const Words& words) {
+  try {
+    throw;
+  } catch (const UsageError& error) {
+    throw UsageError(words(error.what()));
+  } catch (const InputError& error) {
+    throw InputError(words(error.where), words(error.expected), words(error.found), words(error.hint));
+  }
+}
+
 void set_parameters(ParameterList& list, const CommandLine& line, const CLI::App& app) {
   if (!line.config.empty()) read_toml(list, fs::path(line.config));
   for (Parameter& p : list.all())
@@ -108,7 +120,9 @@ enum class Need { as_described, where_given };
 void set_files(StageContext& context, const StageDescription& description, const CommandLine& line, Need need) {
   using Kind = FileArgument::Kind;
   for (const FileArgument& file : description.files) {
-    const std::string& path = line.files.at(file.name);
+    std::string path = line.files.at(file.name);
+    const std::string& first = line.files.at(description.files.front().name);
+    if (path.empty() && !file.beneath.empty() && !first.empty()) path = fs::path(first) / file.beneath;
     const bool is_output = file.kind == Kind::output || file.kind == Kind::output_folder;
     if (path.empty() && file.kind != Kind::optional_input && need == Need::as_described)
       throw UsageError("--" + file.name + " is missing: " + file.meaning);
@@ -432,7 +446,10 @@ int run_stage(const StageDescription& description, int argc, char** argv,
       print(app.help());
       return kDone;
     } catch (const CLI::ParseError& error) {
-      throw UsageError(error.what() + suggestion(app, error.what()) + " (see mbtfm-" + stage + " --help)");
+      const bool is_run = std::getenv(kRunnerVariable) != nullptr;
+      throw UsageError(
+          error.what() + suggestion(app, error.what()) +
+          (is_run ? " (--set takes the keys of docs/parameters.md)" : " (see mbtfm-" + stage + " --help)"));
     }
     if (line.only_version || line.only_parameters) {
       print(line.only_version ? "mbtfm-" + stage + " " + kVersion + "\n" : to_markdown(list));
@@ -455,8 +472,11 @@ int run_stage(const StageDescription& description, int argc, char** argv,
     numerics::reserve_blas_buffers(line.threads);
     return run(description, list, line, std::move(context), body);
   } catch (...) {
-    return report_current_exception("mbtfm-" + stage,
-                                    [&](const std::string& text) { return worded(list, description, text); });
+    try {
+      rethrow_worded([&](const std::string& text) { return worded(list, description, text); });
+    } catch (...) {
+      return report_current_exception("mbtfm-" + stage);
+    }
   }
 }
 

@@ -82,7 +82,7 @@ void expect_success(cairo_status_t status, const Path& file) {
 
 struct Pixels {
   std::uint32_t width = 0, height = 0;
-  std::vector<std::uint32_t> rgb;  ///< 0x00RRGGBB
+  std::vector<std::uint32_t> rgb = {};  ///< 0x00RRGGBB
 };
 
 Pixels pixels_of(const Drawing& drawing, double width) {

@@ -353,8 +353,8 @@ std::vector<Polygon> debris_in(const Scene& s, const cv::Mat& bright, const cv::
   std::vector<Polygon> debris;
   for (const Parts::Part& part : parts.parts) {
     Polygon& polygon = debris.emplace_back();
-    for (const cv::Point2d& p : rings_of(parts.labels(part.box) == part.label).front())
-      polygon.push_back(to_um(p + cv::Point2d(part.box.tl()), s.pixel_um));
+    const auto rings = rings_of(parts.labels(part.box) == part.label);
+    for (const cv::Point2d& p : rings.front()) polygon.push_back(to_um(p + cv::Point2d(part.box.tl()), s.pixel_um));
   }
   return debris;
 }

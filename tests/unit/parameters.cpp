@@ -3,6 +3,7 @@
 #include "pipeline/contract/range.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
+#include "pipeline/stage/suggest.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 

@@ -276,9 +276,9 @@ TEST_F(Runner, takes_a_displacement_field_instead_of_the_beads_images) {
   EXPECT_EQ(started(), "fit track");
   for (const char* half : {"u.npy", "v.npy"}) files::write_text(cell_ / half, "x");  // of pyTFM
   write_parameters("[images]\ndisplacement = \"u.npy\"\n");
-  EXPECT_EQ(started(), "fit track");
+  EXPECT_EQ(started(), "fit segment track");
   files::write_text(cell_ / "v.npy", "y");
-  EXPECT_EQ(started(), "fit track");
+  EXPECT_EQ(started(), "track");
 }
 
 TEST_F(Runner, rejects_a_half_given_stage) {

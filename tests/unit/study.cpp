@@ -566,7 +566,7 @@ TEST(Figures, are_drawn_into_pixels) {
   const std::string moving = files::read_text(folder / "moving.png");
   EXPECT_NE(moving.find(std::string("acTL\0\0\0\3", 8)), std::string::npos);
   int n_frames = 0;
-  for (std::size_t at = moving.find("fcTL"); at != moving.npos; at = moving.find("fcTL", at + 1)) ++n_frames;
+  for (std::size_t i = moving.find("fcTL"); i != moving.npos; i = moving.find("fcTL", i + 1)) ++n_frames;
   EXPECT_EQ(n_frames, 3);
   EXPECT_LT(moving.size(), 1.5 * static_cast<double>(moving.find("fdAT"))) << "frames that are alike take no room";
   write_pdf(folder / "figure.pdf", svg_of(figure), 85);
