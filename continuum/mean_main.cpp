@@ -97,15 +97,17 @@ struct OwnSettings {
   Gel gel;
   std::optional<double> pixel_size_um;
   runner::ImageNames images;
+  bool has_gel = false;  ///< nothing of it is assumed
 };
 OwnSettings settings_of(const Path& cell, const Parameters& otherwise) {
-  OwnSettings own{otherwise.gel, otherwise.pixel_size_um, {}};
+  OwnSettings own{otherwise.gel, otherwise.pixel_size_um, {}, false};
   if (!files::is_file(cell / "cell.toml")) return own;
   stage::ParameterList list;
   list.add("pixel_size_um", own.pixel_size_um, Range::pixel_um(), "side of a pixel");
   declare(list, own.gel);
   declare(list, own.images);
   read_toml(list, cell / "cell.toml");
+  own.has_gel = stage::assumed_inputs(list).empty();
   return own;
 }
 
@@ -132,7 +134,8 @@ std::vector<Path> folders_of_cells(const Path& top, const Parameters& p) {
   const auto how = fs::directory_options::skip_permission_denied;  // lost+found
   for (fs::recursive_directory_iterator entry(top, how, error), end; !error && entry != end; entry.increment(error)) {
     if (!files::is_folder(entry->path())) continue;  // a link that leads round in a circle is none
-    if (files::is_hidden(entry->path())) {
+    static const Path kTruth = "truth";              // of a simulated cell: the cell is the folder above it
+    if (files::is_hidden(entry->path()) || entry->path().filename() == kTruth) {
       entry.disable_recursion_pending();
       continue;
     }
@@ -158,9 +161,11 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Parameters& p) 
   const Path top = context.input("cells", {});
   std::vector<std::string> read;
   std::vector<Cell> cells;
+  bool have_gels = true;
   for (const Path& name : folders_of_cells(top, p)) {
     const Path folder = top / name;
     const OwnSettings own = settings_of(folder, p);
+    have_gels = have_gels && own.has_gel;
     const Path outline = outline_in(folder, own.images);
     Cell cell{
         .name = name.generic_string(), .outline_file = folder / outline, .outline_um = {}, .beads = {}, .gel = own.gel};
@@ -186,6 +191,7 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Parameters& p) 
                      "selection as of mbtfm run) and displacement.csv (or 2_track/displacement.csv)",
                      std::to_string(cells.size()));
   context.input("cells", read);
+  if (have_gels) context.assumed.clear();
   return cells;
 }
 
@@ -469,15 +475,18 @@ int main(int argc, char** argv) {
   return mbtfm::stage::run_stage<Parameters>(
       {.name = "mean",
        .purpose = "average displacements and tractions over cells of one shape",
-       .files = {{"cells", Kind::input,
-                  "folder of cell folders, each with an outline (outline.csv, or a mask or selection as of mbtfm run) "
-                  "and displacement.csv",
-                  true},
-                 {"pattern", Kind::optional_input,
-                  "outline of the reference shape: outline.csv, a mask or an ImageJ selection"},
-                 {"model", Kind::optional_input,
-                  "traction.csv of a model on a lattice in the frame of the reference: it is blurred as the cells are"},
-                 {"out", Kind::output_folder,
-                  "mean.csv, mean.vtp, mean.json, mean.svg, mean.html, registration.csv, blur.csv, reference.csv"}}},
+       .files =
+           {{"cells", Kind::input,
+             "folder of cell folders, each with an outline (outline.csv, or a mask or selection as of mbtfm run) "
+             "and displacement.csv",
+             true},
+            {"pattern", Kind::optional_input,
+             "outline of the reference shape: outline.csv, a mask or an ImageJ selection"},
+            {"model", Kind::optional_input,
+             "traction.csv of a model on a lattice in the frame of the reference: it is blurred as the cells are"},
+            {"out", Kind::output_folder,
+             "mean.csv, mean.vtp, mean.json, mean.svg, mean.html, registration.csv, blur.csv, reference.csv; unset: "
+             "mean/ in the folder of the cells",
+             false, "", "mean"}}},
       argc, argv, run);
 }

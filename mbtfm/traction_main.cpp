@@ -6,10 +6,13 @@
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
+#include "pipeline/contract/kinds_of_findings.h"
+#include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/numerics/masked_values.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/stage.h"
 
@@ -25,6 +28,21 @@ void expect_plausible(stage::StageContext& context, const TractionInputs& inputs
     context.expect_plausible("traction_kPa", stage::traction_of_half_the_force_kPa(r.forces, inputs.adhesions));
 }
 
+/// @returns how many beads are left out, as they are flagged or as their program masked them
+/// @throws InputError where nothing is left that moves
+std::size_t leave_out(stage::StageContext& context, DisplacementField& beads) {
+  const numerics::Masked masked = numerics::flag_masked(beads);
+  context.notice(noticed(FindingKind::vectors_masked, static_cast<double>(masked.n) / static_cast<double>(beads.size()),
+                         std::to_string(masked.n) + " of " + std::to_string(beads.size()) +
+                             " vectors have the displacement " + listed(masked.values_um) + " um to the last digit."));
+  const std::size_t n = std::erase_if(beads, [](const Bead& bead) { return !bead.flag.empty(); });
+  if (!beads.empty() && std::ranges::none_of(beads, [](const Bead& bead) { return norm(bead.displacement_um) > 0; }))
+    throw InputError(context.input("displacement").string(), "displacements, not all of them zero",
+                     std::to_string(beads.size()) + " zeros",
+                     "was the field exported before its vectors were computed, or are all of them masked?");
+  return n;
+}
+
 /// Of beads in the gel's volume, or of a surface that is not flat.
 bool is_in_space(stage::StageContext& context) {
   return context.has_input("surface") || files::CsvTable(context.input("displacement")).has("uz_um");
@@ -35,7 +53,7 @@ StageReport run(const spatial::StageParameters& p, stage::StageContext& context)
   context.progress(0, "reading");
   TractionInputs inputs{.beads = {}, .gel = p.gel, .adhesions = {}, .outline_um = {}};
   inputs.beads = files::read_displacement(context.input("displacement"));
-  const auto n_flagged = std::erase_if(inputs.beads, [](const Bead& bead) { return !bead.flag.empty(); });
+  const std::size_t n_flagged = leave_out(context, inputs.beads);
   if (context.has_input("adhesions")) inputs.adhesions = files::read_adhesions(context.input("adhesions"));
   if (context.has_input("outline")) inputs.outline_um = files::read_outline(context.input("outline")).front();
   context.expect_plausible("beads_per_um2", beads_per_um2(inputs.beads));
@@ -71,7 +89,7 @@ StageReport run(const spatial::StageParameters& p, stage::StageContext& context)
     report.summary += "; the field states no errors: " + brief(*assumed_um) +
                       " um is assumed for all, estimated from neighbouring beads";
   }
-  if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged beads left out";
+  if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " beads left out";
   report.converged = r.report.converged;
   if (!r.report.converged) report.summary += "; " + r.report.reason;
   if (!r.remark.empty()) report.summary += "; " + r.remark;

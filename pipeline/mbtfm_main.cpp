@@ -157,10 +157,20 @@ void speak_for_stages(const CommandLine& line) {
   setenv(stage::kRunnerVariable, line.is_json ? stage::kForProgram : stage::kForPerson, 1);
 }
 
+/// Of a time series: 4_fit/series.png, anew after each fit.
+void animate(const CommandLine& line) {
+  const fs::path frames = line.folder / "4_fit/frames.csv", picture = line.folder / "4_fit/series.png",
+                 program = line.stage_folder / "mbtfm-animate";
+  if (!files::is_own_file(frames) || !files::is_file(program)) return;
+  if (files::is_own_file(picture) && fs::last_write_time(picture) > fs::last_write_time(frames)) return;
+  runner::run_process({program.string(), "--cell", line.folder.string(), "--out", picture.string(), "--quiet"});
+}
+
 int run_one(const CommandLine& line) {
   runner::RunOptions options = run_options(line);
   options.finish = [&] {
     if (!report::has_results(line.folder)) return;
+    animate(line);
     report::update_report(line.folder);
     const fs::path page = line.folder / "report.html";
     if (line.is_json) return stage::print(report::result_event(line.folder, page));
@@ -229,6 +239,7 @@ std::vector<std::string> arguments_of_cell(const CommandLine& line) {
 void tell_of_cell(const runner::BatchCell& cell) { stage::print(event_of(cell)); }
 
 int batch(const CommandLine& line) {
+  speak_for_stages(line);
   const auto [cells, skipped] = cells_of(line);
   if (line.only_list) {
     stage::print(runner::list_cells(cells, run_options(line), line.threads));
@@ -332,6 +343,7 @@ int check(const CommandLine& line) {
 
 [[noreturn]] void noise(const std::vector<std::string>& pictures, const std::vector<std::string>& further) {
   std::vector<std::string> arguments;
+  if (pictures.size() == 1) throw UsageError("noise: expected two pictures of a place: mbtfm noise A.tif B.tif");
   if (pictures.size() == 2) arguments = {"--first", pictures[0], "--second", pictures[1]};
   arguments.insert(arguments.end(), further.begin(), further.end());
   become("mbtfm-noise", std::move(arguments));
@@ -410,10 +422,10 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
   const std::map<std::string, double> time_units = {{"s", 1}, {"min", 60}, {"h", 3600}};
   command->add_option("--timeout", line.timeout_s, "kill a stage that takes longer: 90, 10min, 2h")
       ->transform(CLI::AsNumberWithUnit(time_units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"))
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1e-3, 1e15));
   command->add_option("--memory", line.memory_bytes, "kill a stage that takes more memory: 500MB, 4GB")
       ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true))
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1e-3, 1e15));
 }
 
 /// A simulated cell, images and all, every stage on it, and its tensions beside the truth.
@@ -487,7 +499,7 @@ int start(int argc, char** argv) {
   cost_command->add_option("MORE", line.more_cells, "further cells, over all of which the errors are taken");
   cost_command->add_option("--out", line.out, "folder of cost.csv, cost.svg and cost.md; default: CELL/cost");
   cost_command->add_option("--budget", line.budget_min, "no run is begun after this (minutes)")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(1e-3, 1e6))
       ->capture_default_str();
   cost_command->add_option("--repeats", line.repeats, "runs of each choice, at most; the median counts")
       ->check(CLI::Range(1, 100))
@@ -508,9 +520,16 @@ int start(int argc, char** argv) {
   fs::path manuals;
   app.add_option("--manuals", manuals, "write manual page and completions below this folder")->group("");
   app.require_subcommand(0, 1);
-  add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", kCell);
+  add_command(app, line, "compare", "print what was found of a simulated cell beside the truth", kCell);
   try {
-    app.parse(argc, argv);
+    std::vector<std::string> arguments(argv + 1, argv + argc);
+    for (const char* word : {"help", "version"}) {  // mbtfm help run
+      if (arguments.empty() || arguments.front() != word) continue;
+      arguments.push_back("--" + arguments.front());
+      arguments.erase(arguments.begin());
+    }
+    std::ranges::reverse(arguments);  // as CLI11 takes them
+    app.parse(std::move(arguments));
   } catch (const CLI::ParseError& error) {
     std::ostringstream help, message;
     const int code = app.exit(error, help, message);

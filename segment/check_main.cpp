@@ -17,6 +17,7 @@
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
+#include "segment/beads/given_field.h"
 #include "segment/beads/track.h"
 #include "segment/cells/segment_cell.h"
 #include "segment/stacks/run.h"
@@ -66,7 +67,14 @@ survey::CellImages images_of(const fs::path& cell, const runner::ImageNames& nam
   const auto actin = kind == CellKind::sheet ? runner::resolve_optional_image(cell, names, "actin")
                                              : runner::resolve_image(cell, names, "actin");
   if (actin) images.actin = channel(*actin, chosen.segment.actin_plane);
-  if (!runner::name_of_image(names, "displacement").empty()) return images;  // of another program
+  if (!runner::name_of_image(names, "displacement").empty()) {  // of another program
+    const auto& picture = images.adhesion ? images.adhesion : images.actin;
+    std::optional<images::ImageField> field;
+    if (picture) field = {picture->image.width, picture->image.height, {}};
+    images.given =
+        beads::read_given_field(runner::resolve_image(cell, names, "displacement"), chosen.track, field).field;
+    return images;
+  }
   images.beads_stressed = channel(runner::resolve_image(cell, names, "beads_stressed"), chosen.track.stressed_plane);
   images.beads_relaxed = channel(runner::resolve_image(cell, names, "beads_relaxed"), chosen.track.relaxed_plane);
   return images;
@@ -213,6 +221,7 @@ void write_page(const fs::path& file, const fs::path& folder, const std::vector<
 }
 
 StageReport check(const fs::path& folder, const CheckParameters& p, int threads, bool& is_fine) {
+  setenv(stage::kRunnerVariable, stage::kForPerson, 1);  // of the stages that are asked
   const runner::FoundCells found = runner::search_cells(folder);
   std::vector<Seen> seen(found.cells.size());
   std::vector<std::string> names;

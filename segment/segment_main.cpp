@@ -2,6 +2,7 @@
 #include <numbers>
 #include <opencv2/core/utility.hpp>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/kinds_of_findings.h"
@@ -109,6 +110,16 @@ double unexplained_um(const Segmentation& s) {
   return sum;
 }
 
+/// "One adhesion outside the cell was left out."
+std::string left_out(const Segmentation& s) {
+  const auto n_others = static_cast<std::int64_t>(s.left_out_um.size()) - s.n_adhesions_outside;
+  std::string text;
+  if (s.n_adhesions_outside > 0) text = counted(s.n_adhesions_outside, "adhesions");
+  if (n_others > 0)
+    text += (text.empty() ? "" : " and ") + counted(n_others, "bright things") + " too small for a cell";
+  return text + " outside the cell " + (s.left_out_um.size() == 1 ? "was" : "were") + " left out.";
+}
+
 StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
   StageReport report;
   const auto n_of = [&](FibreType type) {
@@ -187,10 +198,7 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                              ", " + brief(s.neck->at_um.y) +
                              ") um: what lies beyond is taken for another cell, which touches this one."
                        : std::string()),
-        noticed(FindingKind::adhesions_left_out, s.n_adhesions_outside,
-                s.n_adhesions_outside == 1
-                    ? "One adhesion outside the cell was left out."
-                    : std::to_string(s.n_adhesions_outside) + " adhesions outside the cell were left out."),
+        noticed(FindingKind::adhesions_left_out, static_cast<double>(s.left_out_um.size()), left_out(s)),
         noticed(FindingKind::adhesions_assumed,
                 static_cast<double>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::candidate, &Adhesion::origin)),
                 assumption_of(s, is_assumed_by_itself), severity_of(s)),
@@ -363,7 +371,8 @@ int main(int argc, char** argv) {
                  {"outline-mask", FileArgument::Kind::optional_input,
                   "mask or label image of the cell, used as its outline (TIFF or PNG)"},
                  {"adhesion-mask", FileArgument::Kind::optional_input,
-                  "mask or label image used as adhesions, or of the adhesive pattern (TIFF or PNG)"},
+                  "mask or label image used as adhesions, or of the adhesive pattern (TIFF or PNG)", false,
+                  "adhesion_mask"},
                  {"out", FileArgument::Kind::output_folder,
                   "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
                   "images.jpg, thumbnail.jpg, images.csv, RoiSet.zip"}}},

@@ -258,9 +258,9 @@ auto with_names(const std::string& names, const Body& body) {
   try {
     return body();
   } catch (const ExchangedImages& error) {
-    throw InputError(names + ": " + error.element, error.expected, error.found,
-                     "exchange the files of --stressed and --relaxed (beads_stressed and beads_relaxed in cell.toml); "
-                     "if this cell does push outward, set track.may_push = true");
+    throw InputError(
+        names + ": " + error.element, error.expected, error.found,
+        "exchange the files of --stressed and --relaxed; if this cell does push outward, set track.may_push = true");
   } catch (const NotFollowed& error) {
     throw InputError(names + ": " + error.element, error.expected, error.found,
                      error.hint.empty()
@@ -296,7 +296,8 @@ TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, 
     for (const std::optional<Finding>& found : images::noticed_in(*image)) context.notice(found);
   }
   if (stressed.image.pixels == relaxed.image.pixels)
-    throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both");
+    throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both",
+                     "give the other picture as --stressed or --relaxed");
   Tracking tracking = with_names(relaxed.name + ", " + stressed.name,
                                  [&] { return beads.track(stressed.image, pixel_size_um, progress, cell); });
   images::Picture picture = picture_of_beads(relaxed.image, stressed.image, tracking.stressed, parameters.cell_with);
@@ -563,14 +564,17 @@ int main(int argc, char** argv) {
        .purpose = "measure the displacement of the substrate from images of its beads, stressed and relaxed",
        .files =
            {{"stressed", Kind::optional_input,
-             "beads while the cell pulls (TIFF, PNG or JPEG; a stack: in space); a folder of them: a time series"},
-            {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF, PNG or JPEG)"},
+             "beads while the cell pulls (TIFF, PNG or JPEG; a stack: in space); a folder of them: a time series",
+             false, "beads_stressed"},
+            {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF, PNG or JPEG)", false,
+             "beads_relaxed"},
             {"surface_beads", Kind::optional_input,
              "of stacks: beads of another colour on the gel's surface, relaxed; their places are for mbtfm-surface"},
             {"adhesions", Kind::optional_input,
              "adhesions.csv of the cell: helps to follow single beads where adhesions pull strongly; not used with "
              "stacks, windows or --displacement"},
-            {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
+            {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)", false,
+             "displacement"},
             {"cell_image", Kind::optional_input,
              "image of the cell: it must show the same field as the bead images, which its size tells"},
             {"kept", Kind::optional_input,

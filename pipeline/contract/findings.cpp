@@ -33,8 +33,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the error of a force grows with its square: 6 % at 1 pixel, less than 0.1 % at 0.1",
        "Nothing: it was taken off. Correct the phase of the scanner before the next recording, or scan in one "
        "direction only."},
-      {adhesions_left_out, "adhesions-left-out", "segment", note, "adhesions that were found outside of the cell", 0,
-       "only what lies in the outline can hold the network", "Check the outline in 1_segment/overlay.png."},
+      {adhesions_left_out, "adhesions-left-out", "segment", note,
+       "adhesions and small bright things that were found outside of the cell", 0,
+       "only what lies in the outline can hold the network",
+       "Check the outline in 1_segment/overlay.png: grey dashes show what was left out."},
       {adhesions_long, "adhesions-long", "segment", caution, "length over width of the adhesions, mean weighed by area",
        4,
        "adhesion images of five kinds of cell and microscope have 1.7 to 3.1, actin bundles taken for adhesions 6 to 8",
@@ -386,9 +388,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {sheet_unexplained, "sheet-unexplained", "sheet", caution,
        "sum of squares that the sheet leaves of the displacement, over that of the beads' noise", 1.25,
        "up to half of the noise's standard deviation, the sheet's own error adds less than an eighth to what is left",
-       "Compare the models in sheet_models.csv. If stress fibres pull, give them (--bundles; for mbtfm run, "
-       "run.bundles). If the edge pulls more than the rest, set fit_line_tension or fit_parts. If the sheet adheres in "
-       "places only, give these (--adhesive; for mbtfm run, images.adhesion_mask). Check the gel and the outline."},
+       "Compare the models in sheet_models.csv. If stress fibres pull, give them (run.bundles, or mbtfm-sheet "
+       "--bundles). If the edge pulls more than the rest, set fit_line_tension or fit_parts. If the sheet adheres in "
+       "places only, give these (images.adhesion_mask, or mbtfm-sheet --adhesive). Check the gel and the outline."},
       {sheet_expands, "sheet-expands", "sheet", caution,
        "share of the sheet's parts whose best contraction is below zero, or whose 95 % interval holds no contraction",
        0,

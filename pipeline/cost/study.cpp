@@ -11,13 +11,13 @@
 #include "pipeline/contract/report.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/cost/accuracy.h"
-#include "pipeline/cost/space_map.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/match_fibres.h"
+#include "pipeline/report/space_map.h"
 #include "pipeline/report/space_results.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/process.h"
@@ -50,7 +50,7 @@ struct Answer {
   std::vector<Fibre> fibres = {};
   std::map<int, double> tensions_nN = {};  ///< of the fibres
   double total_force_nN = 0;
-  std::optional<SpaceMap> map = {};  ///< of a cell in space, in place of the fibres
+  std::optional<report::SpaceMap> map = {};  ///< of a cell in space, in place of the fibres
 };
 
 bool is_from_images(const runner::Stage& stage) { return !stage.images.empty(); }
@@ -133,7 +133,7 @@ class Scratch {
   Answer answer() const {
     Answer answer;
     if (kind_ == CellKind::space) {
-      answer.map = read_space_map(folder_);
+      answer.map = report::read_space_map(folder_);
       answer.total_force_nN = answer.map->total_force_nN;
       return answer;
     }
@@ -252,7 +252,7 @@ Rung finest(CellKind kind, double spacing_um) {
 /// True tensions by the segmentation's fibre.
 Answer truth_of(const fs::path& cell, CellKind kind) {
   if (kind == CellKind::space) {
-    const SpaceMap map = true_space_map(cell);
+    const report::SpaceMap map = report::true_space_map(cell);
     return {.tensions_nN = {}, .total_force_nN = map.total_force_nN, .map = map};
   }
   const report::Comparison comparison = report::compare_with_truth(cell);
@@ -304,7 +304,7 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
       study.measurements.push_back({.rung = std::move(rung)});
   std::vector<std::vector<Run>> runs(study.measurements.size());
   std::optional<Answer> finest_answer;
-  if (!(is_in_space ? has_space_truth(cell) : report::has_truth(cell))) {
+  if (!(is_in_space ? report::has_space_truth(cell) : report::has_truth(cell))) {
     const Rung rung = finest(scratch.kind(), spacing_um);
     study.reference = rung.value;
     say("reference: " + study.reference);

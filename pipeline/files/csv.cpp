@@ -84,6 +84,8 @@ CsvTable::CsvTable(const std::filesystem::path& file) : CsvTable(read_text(file)
 
 CsvTable::CsvTable(std::string_view text, std::string name) : name_(std::move(name)) {
   if (text.empty()) throw InputError(name_ + ":1", "a header line", "an empty file");
+  if (text.find('\0') != text.npos)
+    throw InputError(name_, "a table (CSV)", "a picture or another binary file", "is this the right file?");
   Splitter splitter(text, name_);
   header_ = splitter.record();
   if (header_.size() == 1 && header_.front().find_first_of(";\t") != std::string::npos) {

@@ -5,6 +5,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/json.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 
 namespace mbtfm::files {
@@ -111,6 +112,25 @@ void write_figures(const Path& file, const Figures& figures) {
   write_text(file, json_text(json_of(figures), 2) + "\n");
 }
 
+std::optional<ForceOverTime> force_over_time(const Path& cell) {
+  const Path file = cell / "4_fit/frames.csv";
+  if (!is_own_file(file)) return std::nullopt;
+  const CsvTable frames(file);
+  ForceOverTime series;
+  for (int row = 0; row < frames.n_rows(); ++row) {
+    const std::optional<double> force_nN = frames.optional_number(row, "total_force_nN");
+    if (!force_nN) {
+      ++series.n_without_fit;
+      continue;
+    }
+    if (series.n_frames++ == 0) series.first_nN = *force_nN;
+    series.last_nN = *force_nN;
+    const double change_nN = *force_nN - series.first_nN;
+    if (std::abs(change_nN) > std::abs(series.largest_change_nN)) series.largest_change_nN = change_nN;
+  }
+  return series.n_frames > 0 ? std::optional(series) : std::nullopt;
+}
+
 CellResult read_cell_result(const Path& cell) {
   CellResult result{.fit = read_fit_summary(cell / "4_fit/fit.json")};
   if (result.fit.error_budget) result.total_error_nN = total(result.fit.error_budget->total_force_parts_nN);
@@ -125,6 +145,7 @@ CellResult read_cell_result(const Path& cell) {
     ++result.n_fibres;
     result.n_uncertain += is_uncertain(tension);
   }
+  result.over_time = force_over_time(cell);
   return result;
 }
 

@@ -187,7 +187,7 @@ bool is_row_of_numbers(const Line& line, char separator, std::size_t n_numbers) 
 /// `sep=;`, as Excel has it in the first line.
 std::optional<char> take_separator(std::string_view& text, int& n_lines) {
   const std::string_view first = text.substr(0, text.find('\n'));
-  std::string said = lower(std::string(trimmed(first)));
+  std::string said = lower_case(std::string(trimmed(first)));
   std::erase(said, '"');
   if (!said.starts_with("sep=") || said.size() > 5 ||
       (said.size() == 5 && std::string_view(";,|").find(said[4]) == std::string_view::npos))
@@ -209,6 +209,16 @@ char separator_of_numbers(std::string_view text, std::size_t n_numbers) {
     for (std::size_t s = 0; s < kSeparators.size(); ++s)
       n_rows[s] += is_row_of_numbers(line, kSeparators[s], n_numbers);
   return kSeparators[static_cast<std::size_t>(std::ranges::max_element(n_rows) - n_rows.begin())];
+}
+
+/// Of columns whose names differ from ours by capitals alone.
+void take_own_capitals(std::vector<std::string>& header, const std::vector<std::string>& columns) {
+  for (const std::string& own : columns) {
+    if (std::ranges::find(header, own) != header.end()) continue;
+    const auto alike =
+        std::ranges::find_if(header, [&](const std::string& name) { return lower_case(name) == lower_case(own); });
+    if (alike != header.end()) *alike = own;
+  }
 }
 
 std::string at(const std::string& name, int line) { return name + ":" + std::to_string(line); }
@@ -288,11 +298,6 @@ void expect_equal_widths(std::vector<CsvTable::Row>& rows, const std::string& na
 
 }  // namespace
 
-std::string lower(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
 Numeral numeral_in(std::string_view cell) {
   if (cell.starts_with(kMinus))
     cell.remove_prefix(kMinus.size());
@@ -325,7 +330,7 @@ Numeral numeral_in(std::string_view cell) {
 bool is_missing(std::string_view cell) {
   if (cell.empty() || is_error_of_spreadsheet(cell)) return true;
   if (cell.front() == '-' || cell.front() == '+') cell.remove_prefix(1);
-  const std::string word = cell.size() < 10 ? lower(std::string(cell)) : "";
+  const std::string word = cell.size() < 10 ? lower_case(std::string(cell)) : "";
   for (const char* missing : {"nan", "na", "n/a", "inf", "infinity", "none", "null", "nan(ind)", "1.#ind", "1.#qnan"})
     if (word == missing) return true;
   return false;
@@ -357,6 +362,20 @@ ForeignTable read_numbers(std::string_view bytes, std::string name, std::size_t 
   return table;
 }
 
+CsvTable read_columns(std::string_view bytes, std::string name, const std::vector<std::string>& columns) {
+  ForeignTable table = read_numbers(bytes, std::move(name), columns.size());
+  for (std::size_t k = table.above.size(); k-- > 0;) {
+    std::vector<std::string>& header = table.above[k].fields;
+    take_own_capitals(header, columns);
+    const auto is_there = [&](const std::string& own) { return std::ranges::find(header, own) != header.end(); };
+    if (header.size() == table.rows.front().fields.size() && std::ranges::all_of(columns, is_there))
+      return {std::move(header), std::move(table.rows), std::move(table.name)};
+  }
+  throw InputError(table.name + ":1", "the columns " + listed(columns),
+                   table.above.empty() ? "no row of names" : listed(table.above.back().fields),
+                   "name the columns so in the row above the numbers");
+}
+
 CsvTable read_records(std::string_view bytes, std::string name, const std::string& column,
                       const std::vector<std::string>& columns) {
   std::string place;
@@ -372,7 +391,7 @@ CsvTable read_records(std::string_view bytes, std::string name, const std::strin
       for (const char tried : {separator, ';', '\t'}) {
         std::vector<std::string> names = cells_of(without_comment_mark(line.text), said ? *said : tried);
         if (first.size() < names.size()) first = names;
-        if (!header.empty() || std::ranges::find(names, column, lower) == names.end()) continue;
+        if (!header.empty() || std::ranges::find(names, column, lower_case) == names.end()) continue;
         separator = said ? *said : tried;
         header = std::move(names);
       }
@@ -393,11 +412,7 @@ CsvTable read_records(std::string_view bytes, std::string name, const std::strin
   }
   for (std::size_t i = 0; i < header.size(); ++i)
     if (header[i].empty()) header[i] = "column " + std::to_string(i + 1);
-  for (const std::string& own : columns) {
-    if (std::ranges::find(header, own) != header.end()) continue;
-    const auto alike = std::ranges::find(header, own, lower);
-    if (alike != header.end()) *alike = own;
-  }
+  take_own_capitals(header, columns);
   return {std::move(header), std::move(rows), std::move(name)};
 }
 

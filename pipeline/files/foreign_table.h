@@ -31,12 +31,13 @@ struct ForeignTable {
 /// @throws InputError where there are none, a row has more or less cells than the first, or the mark is ambiguous
 ForeignTable read_numbers(std::string_view bytes, std::string name, std::size_t n_numbers);
 
+/// The same with a header: the lowest row above the numbers that has all `columns`, whatever their capitals. There they
+/// get these. @throws InputError
+CsvTable read_columns(std::string_view bytes, std::string name, const std::vector<std::string>& columns);
+
 /// A table with a header: the first row that has `column`, whatever its capitals. `columns` get their own capitals.
 /// @throws InputError
 CsvTable read_records(std::string_view bytes, std::string name, const std::string& column,
                       const std::vector<std::string>& columns);
-
-/// Lower case of ASCII letters.
-std::string lower(std::string text);
 
 }  // namespace mbtfm::files

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 
 #include "pipeline/contract/errors.h"
@@ -10,6 +11,9 @@
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/report/match_fibres.h"
+#include "pipeline/report/page.h"
+#include "pipeline/report/space_map.h"
+#include "pipeline/report/space_results.h"
 
 namespace mbtfm::report {
 namespace {
@@ -57,7 +61,10 @@ bool has_truth(const fs::path& cell) { return files::is_own_file(cell / "truth/t
 Comparison compare_with_truth(const fs::path& cell) {
   files::check_cell_folder(cell);
   if (!has_truth(cell))
-    throw InputError((cell / "truth/tensions.csv").string(), "the true tensions of a simulated cell", "none");
+    throw InputError((cell / "truth/tensions.csv").string(), "the true tensions of a simulated cell", "none",
+                     "compare is for cells that mbtfm-simulate or mbtfm demo made");
+  if (!files::is_own_file(cell / "4_fit/tensions.csv"))
+    throw InputError(cell.string(), "a cell that was run", "no 4_fit/tensions.csv", "mbtfm run " + cell.string());
   const std::vector<Fibre> found =
       files::read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv");
   const bool by_place = files::is_own_file(cell / "truth/fibres.csv");
@@ -101,27 +108,72 @@ Comparison compare_with_truth(const fs::path& cell) {
   return comparison;
 }
 
-/// Of a sheet: each quantity of truth/sheet.csv that the fit has.
-std::string sheet_comparison_text(const fs::path& cell) {
-  constexpr const char* kRow = "{:<36} {:>9} {:>9} {:>9} {:>9}\n";
+namespace {
+
+/// Each quantity of truth/sheet.csv that the fit has.
+ComparedNumbers numbers_of_sheet(const fs::path& cell) {
   const files::CsvTable truth(cell / kSheetTruth), found(cell / "3_sheet/sheet_fit.csv");
-  std::string text = fmt::format(fmt::runtime(kRow), "quantity", "found", "low", "high", "truth");
-  const auto number = [&](int row, const char* column) {
-    const std::optional<double> value = found.optional_number(row, column);
-    return value ? short_number(*value) : std::string("–");
-  };
-  for (int i = 0; i < truth.n_rows(); ++i) {
-    for (int k = 0; k < found.n_rows(); ++k) {
-      if (found.text(k, "quantity") != truth.text(i, "quantity") || !found.text(k, "part").empty()) continue;
-      text += fmt::format(fmt::runtime(kRow), truth.text(i, "quantity"), number(k, "value"), number(k, "low"),
-                          number(k, "high"), short_number(truth.number(i, "value")));
-    }
+  ComparedNumbers all;
+  for (int i = 0; i < truth.n_rows(); ++i)
+    for (int k = 0; k < found.n_rows(); ++k)
+      if (found.text(k, "quantity") == truth.text(i, "quantity") && found.text(k, "part").empty())
+        all.numbers.push_back({truth.text(i, "quantity"), found.optional_number(k, "value"),
+                               found.optional_number(k, "low"), found.optional_number(k, "high"),
+                               truth.number(i, "value")});
+  return all;
+}
+
+ComparedNumbers numbers_in_space(const fs::path& cell) {
+  const SpaceResults results = read_space_results(cell);
+  const SpaceMap map = read_space_map(cell), truth = true_space_map(cell);
+  ComparedNumber force{
+      .quantity = "total_force_nN", .found = map.total_force_nN, .low = {}, .high = {}, .truth = truth.total_force_nN};
+  constexpr double k95 = 1.96;
+  if (const auto sigma = results.find("total_force_sigma_nN")) {
+    force.low = map.total_force_nN - k95 * *sigma;
+    force.high = map.total_force_nN + k95 * *sigma;
   }
-  return text + "\nreport: " + (cell / "report.html").string() + "\n";
+  const auto largest = [](const SpaceMap& of) {
+    double most = 0;
+    for (const Vec3& t : of.traction_kPa) most = std::max(most, norm(t));
+    return most;
+  };
+  return {{force, {"largest_traction_kPa", largest(map), {}, {}, largest(truth)}},
+          fmt::format("tractions over the surface: |t - truth| / |truth| = {:.2f}", difference(map, truth))};
+}
+
+}  // namespace
+
+ComparedNumbers compare_numbers(const fs::path& cell) {
+  if (files::is_own_file(cell / kSheetTruth)) return numbers_of_sheet(cell);
+  return has_space_truth(cell) ? numbers_in_space(cell) : ComparedNumbers{};
+}
+
+std::string truth_section(const fs::path& cell) {
+  const ComparedNumbers compared = compare_numbers(cell);
+  if (compared.numbers.empty()) return {};
+  Table table{{"quantity", number("found"), number("low"), number("high"), number("truth"), number("error (%)")},
+              {},
+              "Beside the truth"};
+  for (const ComparedNumber& n : compared.numbers)
+    table.rows.push_back({n.quantity, short_number(n.found), short_number(n.low), short_number(n.high),
+                          short_number(n.truth),
+                          n.found && n.truth != 0 ? fmt::format("{:+.1f}", 100 * (*n.found / n.truth - 1)) : "–"});
+  return section("Beside the truth",
+                 "<p>This cell was simulated, so the truth is known. Low and high: 95 % interval.</p>\n" +
+                     html_of(table) + "<p>" + html_escaped(capitalised(compared.note)) + "</p>\n");
 }
 
 std::string comparison_text(const fs::path& cell) {
-  if (files::is_own_file(cell / kSheetTruth)) return sheet_comparison_text(cell);
+  const std::string report = "\nreport: " + (cell / "report.html").string() + "\n";
+  if (const ComparedNumbers compared = compare_numbers(cell); !compared.numbers.empty()) {
+    constexpr const char* kNumbers = "{:<36} {:>9} {:>9} {:>9} {:>9}\n";
+    std::string text = fmt::format(fmt::runtime(kNumbers), "quantity", "found", "low", "high", "truth");
+    for (const ComparedNumber& n : compared.numbers)
+      text += fmt::format(fmt::runtime(kNumbers), n.quantity, short_number(n.found), short_number(n.low),
+                          short_number(n.high), short_number(n.truth));
+    return text + (compared.note.empty() ? "" : "\n" + compared.note) + report;
+  }
   const Comparison comparison = compare_with_truth(cell);
   constexpr const char* kRow = "{:>5}  {:>5}  {:<8} {:<8} {:>9} {:>9} {:>9} {:>9}\n";
   std::string text =
@@ -150,7 +202,7 @@ std::string comparison_text(const fs::path& cell) {
     text += fmt::format(", truth {:.1f} nN ({:+.1f} %)", *comparison.true_total_force_nN,
                         100 * (comparison.total_force_nN / *comparison.true_total_force_nN - 1));
   }
-  return text + "\nreport: " + (cell / "report.html").string() + "\n";
+  return text + report;
 }
 
 }  // namespace mbtfm::report

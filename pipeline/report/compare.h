@@ -1,4 +1,4 @@
-/// A simulated cell's fitted tensions beside the truth.
+/// What was found of a simulated cell beside the truth.
 #pragma once
 
 #include <filesystem>
@@ -39,6 +39,21 @@ bool has_truth(const std::filesystem::path& cell);
 /// Fibres are matched by where they lie; without truth/fibres.csv the segmentation is the truth, and ids are the same.
 /// @throws InputError where the cell has no truth or no fit
 Comparison compare_with_truth(const std::filesystem::path& cell);
+
+/// Of a sheet or a cell in space: what was found, its 95 % interval, and the truth.
+struct ComparedNumber {
+  std::string quantity;
+  std::optional<double> found, low, high;
+  double truth = 0;
+};
+struct ComparedNumbers {
+  std::vector<ComparedNumber> numbers = {};  ///< empty: no truth is known
+  std::string note = {};                     ///< of the map of tractions
+};
+/// @throws InputError if the truth is known and the cell has not been run
+ComparedNumbers compare_numbers(const std::filesystem::path& cell);
+/// The same as a section of a page; empty if no truth is known.
+std::string truth_section(const std::filesystem::path& cell);
 
 /// The comparison as a table for a terminal.
 std::string comparison_text(const std::filesystem::path& cell);

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/version.h"
+#include "pipeline/files/base64.h"
+#include "pipeline/files/fit_summary.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
@@ -16,7 +19,6 @@
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/provenance.h"
-#include "pipeline/report/result_line.h"
 #include "pipeline/report/results.h"
 #include "pipeline/report/sheet_report.h"
 #include "pipeline/report/space_report.h"
@@ -151,17 +153,32 @@ std::string effects_table(const Provenance& provenance) {
   return html_of(table);
 }
 
+/// "Over 6 frames the total force goes from 6 nN to 71 nN; …"
+std::string sentence_of(const files::ForceOverTime& s) {
+  std::string text = "Over " + counted(s.n_frames, "frames") + " the total force goes from " + readable(s.first_nN) +
+                     " nN to " + readable(s.last_nN) + " nN; its largest change from the first frame is " +
+                     readable(s.largest_change_nN) + " nN.";
+  if (s.n_without_fit > 0) text += " " + counted(s.n_without_fit, "frames") + " could not be fitted.";
+  return text;
+}
+
 }  // namespace
 
 /// Of a time series; empty for a cell of one frame.
 std::string series_section(const fs::path& cell) {
-  const std::optional<ForceOverTime> series = force_over_time(cell);
+  const std::optional<files::ForceOverTime> series = files::force_over_time(cell);
   if (!series) return "";
-  const fs::path picture = cell / "4_fit/tracks.svg";
+  const fs::path picture = cell / "4_fit/tracks.svg", animation = cell / "4_fit/series.png";
+  constexpr std::uintmax_t kMost_bytes = 20'000'000;  // more would make the page slow
+  std::string moving;
+  if (files::is_own_file(animation) && fs::file_size(animation) < kMost_bytes)
+    moving = "<figure><img alt=\"The frames in turn\" style=\"width:100%\" src=\"data:image/png;base64," +
+             files::base64(files::read_text(animation)) +
+             "\"><figcaption>The frames in turn (<code>4_fit/series.png</code>).</figcaption></figure>\n";
   return section("Over time", "<p>" + html_escaped(sentence_of(*series)) +
                                   " Tables: <code>4_fit/tracks.csv</code> and "
                                   "<code>4_fit/frames.csv</code>. All else on this page is of the first frame.</p>\n" +
-                                  (files::is_own_text(picture) ? files::read_text(picture) : std::string()));
+                                  moving + (files::is_own_text(picture) ? files::read_text(picture) : std::string()));
 }
 
 std::string provenance_section(const Provenance& provenance, const std::string& figures) {

@@ -1,46 +1,16 @@
 #include "pipeline/report/result_line.h"
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/counted.h"
-#include "pipeline/files/csv.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/json.h"
-#include "pipeline/files/own_files.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/report.h"
 #include "pipeline/report/sheet_report.h"
 #include "pipeline/report/space_report.h"
 
 namespace mbtfm::report {
-
-std::optional<ForceOverTime> force_over_time(const Path& cell) {
-  const Path file = cell / "4_fit/frames.csv";
-  if (!files::is_own_file(file)) return std::nullopt;
-  const files::CsvTable frames(file);
-  ForceOverTime series;
-  for (int row = 0; row < frames.n_rows(); ++row) {
-    const std::optional<double> force_nN = frames.optional_number(row, "total_force_nN");
-    if (!force_nN) {
-      ++series.n_without_fit;
-      continue;
-    }
-    if (series.n_frames++ == 0) series.first_nN = *force_nN;
-    series.last_nN = *force_nN;
-    const double change_nN = *force_nN - series.first_nN;
-    if (std::abs(change_nN) > std::abs(series.largest_change_nN)) series.largest_change_nN = change_nN;
-  }
-  return series.n_frames > 0 ? std::optional(series) : std::nullopt;
-}
-
-std::string sentence_of(const ForceOverTime& s) {
-  std::string text = "Over " + counted(s.n_frames, "frames") + " the total force goes from " + readable(s.first_nN) +
-                     " nN to " + readable(s.last_nN) + " nN; its largest change from the first frame is " +
-                     readable(s.largest_change_nN) + " nN.";
-  if (s.n_without_fit > 0) text += " " + counted(s.n_without_fit, "frames") + " could not be fitted.";
-  return text;
-}
 
 std::string result_line(const Path& cell) {
   const CellKind kind = kind_of(cell);
@@ -59,7 +29,7 @@ std::string result_line(const Path& cell) {
   line += tensions;
   if (result.n_fibres > 0)
     line += "; " + std::to_string(result.n_uncertain) + " of " + std::to_string(result.n_fibres) + " uncertain";
-  if (const std::optional<ForceOverTime> series = force_over_time(cell))
+  if (const std::optional<files::ForceOverTime>& series = result.over_time)
     line += "; over " + counted(series->n_frames, "frames") + " from " + readable(series->first_nN) + " to " +
             readable(series->last_nN) + " nN";
   return line;

@@ -1,23 +1,11 @@
 /// A cell's result in one line, for the terminal and for programs.
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "pipeline/contract/path.h"
 
 namespace mbtfm::report {
-
-/// The total force of a time series.
-struct ForceOverTime {
-  int n_frames = 0, n_without_fit = 0;
-  double first_nN = 0, last_nN = 0;
-  double largest_change_nN = 0;  ///< from the first frame, with its sign
-};
-/// Nothing for a cell of one frame. @throws InputError where 4_fit/frames.csv is malformed
-std::optional<ForceOverTime> force_over_time(const Path& cell);
-/// "Over 6 frames the total force goes from 6 nN to 71 nN; …"
-std::string sentence_of(const ForceOverTime& series);
 
 /// "total force 412 ± 21 nN; tensions: ventral 4.1 (8), dorsal 0.7 (7), arc 2.2 nN (5); 3 of 20 uncertain": means by
 /// type, how many. @throws InputError where a file of the fit is malformed

@@ -11,6 +11,7 @@
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/sheet_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/report/compare.h"
 #include "pipeline/report/findings.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
@@ -109,6 +110,7 @@ std::string report_of_sheet(const fs::path& cell) {
   body +=
       section(kTitle, picture_in_page(files::read_text(folder / "sheet.svg"), std::string(kTitle) + ". " + kExplained) +
                           "<p class=\"sub\">" + kExplained + "</p>\n");
+  body += truth_section(cell);
   for (const Listing& table : tables_of_sheet(folder / "sheet_fit.csv", folder / "sheet_models.csv", r.name + "_"))
     body += section_of(table);
   body += section("For your methods section", methods(r, provenance));

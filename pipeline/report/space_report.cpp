@@ -14,6 +14,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/colours.h"
+#include "pipeline/report/compare.h"
 #include "pipeline/report/findings.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
@@ -219,8 +220,8 @@ std::string report_in_space(const fs::path& cell) {
       "modulus {} kPa, Poisson’s ratio {}, {} µm thick below z = 0 · {} · mbtfm {}</p>\n",
       html_escaped(r.name), readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio),
       readable(r.gel.thickness_um), html_escaped(provenance.kind_because), kVersion);
-  const std::string body = findings_section(facts_of(r), provenance) + space_section(r) + map_section(r) +
-                           force_section(r) + data_section(r) + lambda_section(r) +
+  const std::string body = findings_section(facts_of(r), provenance) + truth_section(cell) + space_section(r) +
+                           map_section(r) + force_section(r) + data_section(r) + lambda_section(r) +
                            section("For your methods section", methods(r, provenance)) +
                            provenance_section(provenance, folded("Figures of the tractions", figure_pairs(r)));
   return page(r.name + " – mbtfm", head, body);

@@ -114,9 +114,13 @@ BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
   command.insert(command.end(), options.arguments.begin(), options.arguments.end());
   BatchCell outcome{.cell = cell};
   try {
-    files::write_text(cell / "run.log", "");
+    const fs::path file = cell / "run.log";
+    if (const std::string kind = files::is_own_file(file) ? files::kind_of_file(file) : "";
+        !kind.empty() && !kind.starts_with("mbtfm"))
+      throw OutputError(file.string() + " is there, and no batch made it: give it another name");
+    files::write_text(file, "mbtfm run\n");
     const auto record_before = time_of_record(cell);
-    std::ofstream log(cell / "run.log", std::ios::app);
+    std::ofstream log(file, std::ios::app);
     const ProcessResult result = run_process(command, limits_of_cell(options.run.limits),
                                              [&](std::string_view text) { log << text << std::flush; });
     outcome.seconds = result.seconds;

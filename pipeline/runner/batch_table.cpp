@@ -126,6 +126,14 @@ files::Columns<BatchRow> count_column(const char* name, const char* meaning, int
           }};
 }
 
+files::Columns<BatchRow> series_column(const char* name, const char* meaning, double files::ForceOverTime::*of) {
+  return {name, meaning,
+          [of](const BatchRow& row) -> std::optional<double> {
+            return row.result && row.result->over_time ? std::optional((*row.result->over_time).*of) : std::nullopt;
+          },
+          files::kResult};
+}
+
 /// A figure of the fit; of a cell in space or a sheet what its last stage reported.
 files::Columns<BatchRow> result_column(const char* name, const char* meaning, double FitSummary::*of) {
   return {name, meaning,
@@ -169,6 +177,10 @@ files::Table<BatchRow> batch_table() {
           result_column("relative_l2", "‖measured − model‖ / ‖measured‖", &FitSummary::relative_l2),
           result_column("expected_relative_l2", "what the beads' noise alone would leave",
                         &FitSummary::expected_relative_l2),
+          series_column("first_force_nN", "total force of a time series’ first frame", &files::ForceOverTime::first_nN),
+          series_column("last_force_nN", "of its last frame", &files::ForceOverTime::last_nN),
+          series_column("largest_force_change_nN", "largest change from the first frame, with its sign",
+                        &files::ForceOverTime::largest_change_nN),
           {"reason", "why it failed, is not usable, or was skipped", &BatchRow::reason}}};
 }
 

@@ -120,6 +120,12 @@ std::string advice_on_missing(const fs::path& folder, const std::string& name, c
 
 }  // namespace
 
+fs::path other_half(const fs::path& file) {
+  constexpr std::string_view kHalf = "u.npy";
+  const std::string name = file.string();
+  return name.ends_with(kHalf) ? fs::path(name.substr(0, name.size() - kHalf.size()) + "v.npy") : fs::path();
+}
+
 fs::path resolve_image(const fs::path& folder, const ImageNames& names, const std::string& key) {
   const ImageMatch match = match_image(folder, name_of_image(names, key));
   if (match.files.size() == 1) return match.files.front();

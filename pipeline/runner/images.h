@@ -49,6 +49,9 @@ struct ImageMatch {
 /// them. A file of exactly that name wins over a glob.
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob);
 
+/// Of pyTFM's u.npy, its v.npy; empty for all others.
+fs::path other_half(const fs::path& file);
+
 /// The one file that is meant. @throws InputError where there is none, or several: lists them
 fs::path resolve_image(const fs::path& folder, const ImageNames& names, const std::string& key);
 

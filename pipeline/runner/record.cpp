@@ -194,6 +194,7 @@ std::vector<std::string> files_of(const std::vector<ImageInput>& inputs, const f
     for (const fs::path& file : match.files) {
       const std::string name = file.lexically_relative(cell).generic_string();
       if (!files::is_folder(file)) names.push_back(name);
+      if (const fs::path half = other_half(name); !half.empty()) names.push_back(half.generic_string());
       if (files::is_folder(file))  // of frames
         for (const fs::path& frame : files::visible_in(file))
           if (files::is_file(frame)) names.push_back(name + "/" + frame.filename().string());

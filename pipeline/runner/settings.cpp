@@ -23,6 +23,8 @@ Setting parse_setting(const std::string& text) {
   const std::size_t equals = text.find('='), point = text.substr(0, equals).find('.');
   if (equals == text.npos || equals + 1 == text.size() || equals == (point == text.npos ? 0 : point + 1))
     throw UsageError("--set " + text + ": expected TABLE.KEY=VALUE, as in gel.youngs_modulus_kPa=4");
+  if (point == text.npos && !text.starts_with("pixel_size_um="))  // the one above the first table
+    throw UsageError("--set " + text + ": expected its table, too: TABLE.KEY=VALUE, as in gel.youngs_modulus_kPa=4");
   const std::string table = point == text.npos ? "" : text.substr(0, point);
   const std::size_t begin = point == text.npos ? 0 : point + 1;
   std::set<std::string> tables = {"effects"};

@@ -86,7 +86,9 @@ std::vector<fs::path> named_images(const fs::path& cell) {
 bool may_be_read(const fs::path& name, const fs::path& folder, const std::vector<fs::path>& images) {
   std::error_code error;
   const fs::path file = fs::weakly_canonical(folder / name, error);
-  const auto is_same = [&](const fs::path& image) { return fs::weakly_canonical(image, error) == file; };
+  const auto is_same = [&](const fs::path& image) {
+    return fs::weakly_canonical(image, error) == file || fs::weakly_canonical(other_half(image), error) == file;
+  };
   if (!error && std::ranges::any_of(images, is_same)) return true;
   try {
     files::inside(folder, name, "");

@@ -225,7 +225,7 @@ std::vector<Doubt> doubts_about(const ParameterList& list, const std::vector<std
   std::vector<Doubt> doubts;
   for (const Parameter& p : list.all()) {
     const std::optional<double> value = value_of(p);
-    if (!value || !find(p.flag)) continue;
+    if (!value || !find(p.flag) || (*value == 0 && !p.is_set)) continue;  // left out: each cell may have its own
     const std::optional<Doubt> doubt = doubt_about(p.flag, *value);
     if (!doubt) continue;
     require_possible(*doubt, allowed, (p.table.empty() ? "" : "[" + p.table + "] ") + p.name);

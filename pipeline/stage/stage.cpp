@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/kinds_of_findings.h"
@@ -85,6 +86,27 @@ WordsOfFlags words_of_flags(const ParameterList& list) {
   return words;
 }
 
+/// What a text says: of flags by hand, under `mbtfm run` of the keys of cell.toml.
+std::string worded(const ParameterList& list, const StageDescription& description, const std::string& text) {
+  if (std::getenv(kRunnerVariable) == nullptr) return text;
+  std::map<std::string, std::string> images;
+  for (const FileArgument& file : description.files)
+    if (!file.image.empty()) images[file.name] = file.image;
+  return in_keys(list, images, text);
+}
+
+/// In a catch block: what was thrown, in other words.
+template <class Words>
+[[noreturn]] void rethrow_worded(const Words& words) {
+  try {
+    throw;
+  } catch (const UsageError& error) {
+    throw UsageError(words(error.what()));
+  } catch (const InputError& error) {
+    throw InputError(words(error.where), words(error.expected), words(error.found), words(error.hint));
+  }
+}
+
 void set_parameters(ParameterList& list, const CommandLine& line, const CLI::App& app) {
   if (!line.config.empty()) read_toml(list, fs::path(line.config));
   for (Parameter& p : list.all())
@@ -98,7 +120,9 @@ enum class Need { as_described, where_given };
 void set_files(StageContext& context, const StageDescription& description, const CommandLine& line, Need need) {
   using Kind = FileArgument::Kind;
   for (const FileArgument& file : description.files) {
-    const std::string& path = line.files.at(file.name);
+    std::string path = line.files.at(file.name);
+    const std::string& first = line.files.at(description.files.front().name);
+    if (path.empty() && !file.beneath.empty() && !first.empty()) path = fs::path(first) / file.beneath;
     const bool is_output = file.kind == Kind::output || file.kind == Kind::output_folder;
     if (path.empty() && file.kind != Kind::optional_input && need == Need::as_described)
       throw UsageError("--" + file.name + " is missing: " + file.meaning);
@@ -303,6 +327,9 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
   try {
     StageReport report = body(context);
     add_findings(report, context);
+    report.summary = worded(list, description, report.summary);
+    for (Finding& finding : report.findings)
+      for (std::string* text : {&finding.text, &finding.remedy}) *text = worded(list, description, *text);
     expect_all_written(context);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     // The record takes its place last: where it is, all that it speaks of is.
@@ -405,8 +432,8 @@ int run_stage(const StageDescription& description, int argc, char** argv,
   numerics::restart_as_blas_needs(argv);
   watch_signals(SecondSignal::ends_at_once);
   numerics::keep_blas_to_one_thread();
+  ParameterList list;
   try {
-    ParameterList list;
     declare_parameters(list);
     CheckParameters checks;
     if (has_plausible_quantity(list)) declare(list, checks);
@@ -419,7 +446,10 @@ int run_stage(const StageDescription& description, int argc, char** argv,
       print(app.help());
       return kDone;
     } catch (const CLI::ParseError& error) {
-      throw UsageError(error.what() + suggestion(app, error.what()) + " (see mbtfm-" + stage + " --help)");
+      const bool is_run = std::getenv(kRunnerVariable) != nullptr;
+      throw UsageError(
+          error.what() + suggestion(app, error.what()) +
+          (is_run ? " (--set takes the keys of docs/parameters.md)" : " (see mbtfm-" + stage + " --help)"));
     }
     if (line.only_version || line.only_parameters) {
       print(line.only_version ? "mbtfm-" + stage + " " + kVersion + "\n" : to_markdown(list));
@@ -442,7 +472,11 @@ int run_stage(const StageDescription& description, int argc, char** argv,
     numerics::reserve_blas_buffers(line.threads);
     return run(description, list, line, std::move(context), body);
   } catch (...) {
-    return report_current_exception("mbtfm-" + stage);
+    try {
+      rethrow_worded([&](const std::string& text) { return worded(list, description, text); });
+    } catch (...) {
+      return report_current_exception("mbtfm-" + stage);
+    }
   }
 }
 

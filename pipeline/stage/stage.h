@@ -22,6 +22,8 @@ struct FileArgument {
   Kind kind = Kind::input;
   std::string meaning;
   bool is_positional = false;  ///< may be given without its flag
+  std::string image = {};      ///< key of [images] from which `mbtfm run` takes it
+  std::string beneath = {};    ///< of an output that need not be given: its name in the folder that is the first input
 };
 
 struct StageDescription {

@@ -1,27 +1,35 @@
 #include "pipeline/stage/suggest.h"
 
 #include <algorithm>
-#include <numeric>
+#include <cctype>
+#include <regex>
 #include <sstream>
 
+#include "pipeline/contract/listed.h"
 #include "pipeline/stage/declared.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::stage {
 
 namespace {
 
+/// Letters that are changed, left out, added or exchanged with the next one; capitals are as good as small ones.
 int edit_distance(std::string_view a, std::string_view b) {
-  std::vector<int> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    int diagonal = std::exchange(row[0], static_cast<int>(i) + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const int replaced = diagonal + (a[i] != b[j]);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
+  const auto same = [&](std::size_t i, std::size_t j) {
+    return std::tolower(static_cast<unsigned char>(a[i])) == std::tolower(static_cast<unsigned char>(b[j]));
+  };
+  std::vector<std::vector<int>> d(a.size() + 1, std::vector<int>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i) {
+    for (std::size_t j = 0; j <= b.size(); ++j) {
+      if (i == 0 || j == 0) {
+        d[i][j] = static_cast<int>(i + j);
+        continue;
+      }
+      d[i][j] = std::min({d[i - 1][j - 1] + !same(i - 1, j - 1), d[i - 1][j] + 1, d[i][j - 1] + 1});
+      if (i > 1 && j > 1 && same(i - 1, j - 2) && same(i - 2, j - 1)) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
     }
   }
-  return row.back();
+  return d[a.size()][b.size()];
 }
 
 void add_words(const DeclaredCommand& command, std::vector<std::string>& words) {
@@ -53,6 +61,7 @@ std::string suggestion(const CLI::App& app, const std::string& error) {
     if (app.got_subcommand(command.name)) add_words(command, flags);
   }
   std::istringstream words(error.substr(std::min(error.size(), error.find(": ") + 1)));
+  const bool has_command = std::ranges::any_of(commands, [&](const auto& name) { return app.got_subcommand(name); });
   std::string meant;
   for (std::string word; words >> word;) {
     word = word.substr(0, word.find('='));
@@ -60,7 +69,47 @@ std::string suggestion(const CLI::App& app, const std::string& error) {
     if (known.empty() || !is_alike(known, word)) continue;
     meant += (meant.empty() ? "; " : " ") + did_you_mean(known);
   }
-  return meant;
+  if (!meant.empty() || commands.empty()) return meant;
+  if (!has_command) return "; the commands are " + listed(commands);
+  if (error.find(" -") != error.npos) {
+    const bool takes_keys = std::ranges::find(flags, "--set") != flags.end();
+    return takes_keys ? "; what cell.toml has is set by --set TABLE.KEY=VALUE, as --set gel.youngs_modulus_kPa=4" : "";
+  }
+  return "; one folder at a time: mbtfm batch FOLDER runs all cells below it";
+}
+
+std::string in_keys(const ParameterList& list, const std::map<std::string, std::string>& images,
+                    const std::string& text) {
+  static const std::regex beside(R"((cell\.toml),? or (?:as )?--[\w.-]+(?: '[^']*'| [\d.]+)?(?: --[\w.]+ [\d.]+)*)"),
+      flag(R"(--([A-Za-z_][\w.-]*\w)(?: (\d[\d.]*\d|\w+))?)");
+  constexpr std::size_t kLongest = 10'000;  // beyond, std::regex may run out of stack; no sentence is as long
+  if (text.size() > kLongest) return text;
+  const std::string given = std::regex_replace(text, beside, "$1");
+  std::string worded;
+  auto rest = given.cbegin();
+  for (std::sregex_iterator at(given.begin(), given.end(), flag), end; at != end; ++at) {
+    const std::string before(given.cbegin(), (*at)[0].first), name = (*at)[1], value = (*at)[2];
+    const std::size_t command = before.rfind("mbtfm"), clause = before.find_last_of(":;,(");
+    if (command != before.npos && (clause == before.npos || clause < command)) continue;
+    std::string key, table;
+    bool is_value = false;
+    if (const auto image = images.find(name); image != images.end()) {
+      key = image->second;
+      table = "images";
+    }
+    for (const Parameter& p : list.all()) {
+      if (p.flag != name) continue;
+      const auto* choice = std::get_if<Choice>(&p.member);
+      const bool is_word = choice != nullptr && std::ranges::find(choice->words, value) != choice->words.end();
+      is_value = is_word || (!value.empty() && value.find_first_not_of("0123456789.") == value.npos);
+      key = p.name + (is_word ? " = \"" + value + '"' : is_value ? " = " + value : "");
+      table = p.table;
+    }
+    if (key.empty()) continue;
+    worded += std::string(rest, (*at)[0].first) + key + " in " + (table.empty() ? "cell.toml" : "[" + table + "]");
+    rest = is_value ? (*at)[0].second : (*at)[1].second;
+  }
+  return worded + std::string(rest, given.cend());
 }
 
 }  // namespace mbtfm::stage

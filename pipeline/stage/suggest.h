@@ -1,9 +1,12 @@
-/// What was probably meant by a misspelt word.
+/// What was probably meant by a misspelt word, and how it is called where it is to be written.
 #pragma once
 
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "pipeline/stage/parameters_fwd.h"
 
 namespace CLI {
 class App;
@@ -20,5 +23,11 @@ std::string did_you_mean(const std::string& word);
 
 /// What to say after an error of the command line: the flags or commands that its unknown words look like; empty: none.
 std::string suggestion(const CLI::App& app, const std::string& error);
+
+/// A text for whoever writes cell.toml and no flags: "--loss huber" becomes "loss = "huber" in [fit]", and what a text
+/// offers beside cell.toml goes. Flags of a command that the text names stay.
+/// @param images  flags of files, and the keys of [images] that `mbtfm run` takes them from
+std::string in_keys(const ParameterList& list, const std::map<std::string, std::string>& images,
+                    const std::string& text);
 
 }  // namespace mbtfm::stage

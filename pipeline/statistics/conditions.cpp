@@ -7,6 +7,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/files/foreign_table.h"
+#include "pipeline/files/names.h"
 #include "pipeline/files/text.h"
 
 namespace mbtfm::statistics {
@@ -79,7 +80,7 @@ Source source_of(const std::string& asked, const char* flag, const std::vector<s
 
 /// What a form says where nobody is to be left out.
 std::string reason_in(const std::string& exclude) {
-  const std::string word = files::lower(exclude);
+  const std::string word = files::lower_case(exclude);
   for (const char* nobody : {"no", "n", "0", "false", "f", "-", "none", "nan", "na", "n/a"})
     if (word == nobody) return {};
   return exclude;
@@ -91,7 +92,7 @@ void join_capitals(std::vector<CellNote>& notes, std::string CellNote::*member, 
   std::map<std::string, std::string> first;
   std::map<std::string, std::set<std::string>> others;
   for (CellNote& note : notes) {
-    const std::string& spelled = first.emplace(files::lower(note.*member), note.*member).first->second;
+    const std::string& spelled = first.emplace(files::lower_case(note.*member), note.*member).first->second;
     if (note.*member == spelled) continue;
     others[spelled].insert(note.*member);
     note.*member = spelled;

@@ -60,69 +60,127 @@ std::string big_endian(std::uint32_t number) {
   return bytes;
 }
 
-/// The chunk of a PNG that says how large its pixels are. Source: PNG specification, 11.3.5.3.
-std::string size_chunk(double dots_per_inch) {
-  const std::string per_metre = big_endian(static_cast<std::uint32_t>(std::lround(1000 * dots_per_inch / kInch_mm)));
-  const std::string chunk = "pHYs" + per_metre + per_metre + char(1);
-  const auto sum = crc32(0, reinterpret_cast<const Bytef*>(chunk.data()), static_cast<uInt>(chunk.size()));
-  return big_endian(static_cast<std::uint32_t>(chunk.size() - 4)) + chunk + big_endian(static_cast<std::uint32_t>(sum));
+using Surface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)>;
+
+/// Of a PNG. @param content  with its name of four letters before it. Source: PNG specification, 5.3.
+std::string chunk(const std::string& content) {
+  const auto sum = crc32(0, reinterpret_cast<const Bytef*>(content.data()), static_cast<uInt>(content.size()));
+  return big_endian(static_cast<std::uint32_t>(content.size() - 4)) + content +
+         big_endian(static_cast<std::uint32_t>(sum));
 }
 
-using Surface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)>;
+/// How large its pixels are. Source: 11.3.5.3.
+std::string size_chunk(double dots_per_inch) {
+  const std::string per_metre = big_endian(static_cast<std::uint32_t>(std::lround(1000 * dots_per_inch / kInch_mm)));
+  return chunk("pHYs" + per_metre + per_metre + char(1));
+}
 
 void expect_success(cairo_status_t status, const Path& file) {
   if (status != CAIRO_STATUS_SUCCESS)
     throw OutputError("cannot write " + file.string() + ": " + cairo_status_to_string(status));
 }
 
-/// Red, green and blue of each pixel, in the place of the picture: three bytes where there were four.
-const unsigned char* packed(cairo_surface_t* picture) {
-  cairo_surface_flush(picture);
-  unsigned char* const bytes = cairo_image_surface_get_data(picture);
-  const auto n_pixels = static_cast<std::size_t>(cairo_image_surface_get_height(picture)) *
-                        static_cast<std::size_t>(cairo_image_surface_get_width(picture));
-  MBTFM_ASSERT(cairo_image_surface_get_stride(picture) == 4 * cairo_image_surface_get_width(picture));
-  for (std::size_t i = 0; i < n_pixels; ++i) {
-    std::uint32_t pixel;
-    std::memcpy(&pixel, bytes + 4 * i, 4);
-    for (const int k : {0, 1, 2})
-      bytes[3 * i + static_cast<std::size_t>(k)] = static_cast<unsigned char>(pixel >> (16 - 8 * k));
+struct Pixels {
+  std::uint32_t width = 0, height = 0;
+  std::vector<std::uint32_t> rgb = {};  ///< 0x00RRGGBB
+};
+
+Pixels pixels_of(const Drawing& drawing, double width) {
+  Pixels pixels{.width = static_cast<std::uint32_t>(width),
+                .height = static_cast<std::uint32_t>(std::lround(width * drawing.height_over_width()))};
+  const Surface picture(
+      cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(pixels.width), static_cast<int>(pixels.height)),
+      cairo_surface_destroy);
+  drawing.render(picture.get(), width);
+  cairo_surface_flush(picture.get());
+  MBTFM_ASSERT(cairo_image_surface_get_stride(picture.get()) == 4 * static_cast<int>(pixels.width));
+  pixels.rgb.resize(std::size_t{pixels.width} * pixels.height);
+  std::memcpy(pixels.rgb.data(), cairo_image_surface_get_data(picture.get()), 4 * pixels.rgb.size());
+  for (std::uint32_t& pixel : pixels.rgb) pixel &= 0xFFFFFF;
+  return pixels;
+}
+
+/// Red, green, blue of each pixel; with a fourth byte, which says whether it differs, if there is one before it.
+std::vector<unsigned char> bytes_of(const Pixels& pixels, const Pixels* before) {
+  std::vector<unsigned char> bytes((before ? 4 : 3) * pixels.rgb.size());
+  unsigned char* next = bytes.data();
+  for (std::size_t i = 0; i < pixels.rgb.size(); ++i) {
+    const bool is_same = before && before->rgb[i] == pixels.rgb[i];
+    for (const int shift : {16, 8, 0}) *next++ = static_cast<unsigned char>(is_same ? 0 : pixels.rgb[i] >> shift);
+    if (before) *next++ = is_same ? 0 : 255;
   }
   return bytes;
 }
 
 /// A chart has few colours and long runs of them: without filters it is small by little work. Cairo's own writer tries
 /// all filters on every row, which took most of the time of `mbtfm stats`.
-std::string compressed(cairo_surface_t* picture, const Path& file) {
+std::string compressed(const Pixels& pixels, const Pixels* before, const Path& file) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
-  image.width = static_cast<png_uint_32>(cairo_image_surface_get_width(picture));
-  image.height = static_cast<png_uint_32>(cairo_image_surface_get_height(picture));
-  image.format = PNG_FORMAT_RGB;
+  image.width = pixels.width;
+  image.height = pixels.height;
+  image.format = before ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
   image.flags = PNG_IMAGE_FLAG_FAST;
   char* bytes = nullptr;
   std::size_t n_bytes = 0;
   std::FILE* const memory = open_memstream(&bytes, &n_bytes);
-  const bool is_written = memory && png_image_write_to_stdio(&image, memory, 0, packed(picture), 0, nullptr);
+  const bool is_written =
+      memory && png_image_write_to_stdio(&image, memory, 0, bytes_of(pixels, before).data(), 0, nullptr);
   if (memory) std::fclose(memory);
   const std::unique_ptr<char, decltype(&std::free)> owner(bytes, std::free);
   if (!is_written) throw OutputError("cannot write " + file.string() + ": " + image.message);
   return {bytes, n_bytes};
 }
 
+constexpr std::size_t kHeader = 8 + 25;  // the signature and the first chunk, IHDR
+
+/// What the chunks IDAT of a PNG hold.
+std::vector<std::string> data_of(const std::string& png) {
+  std::vector<std::string> data;
+  for (std::size_t at = kHeader; at + 12 <= png.size();) {
+    std::size_t size = 0;
+    for (int k = 0; k < 4; ++k) size = 256 * size + static_cast<unsigned char>(png[at + static_cast<std::size_t>(k)]);
+    if (png.compare(at + 4, 4, "IDAT") == 0) data.push_back(png.substr(at + 8, size));
+    at += size + 12;
+  }
+  return data;
+}
+
 }  // namespace
 
 void write_png(const Path& file, const std::string& svg, double width_mm, double dots_per_inch) {
-  const Drawing drawing(file, svg);
-  const double width = std::round(width_mm / kInch_mm * dots_per_inch);
-  const Surface picture(cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(width),
-                                                   static_cast<int>(std::lround(width * drawing.height_over_width()))),
-                        cairo_surface_destroy);
-  drawing.render(picture.get(), width);
-  std::string png = compressed(picture.get(), file);
-  constexpr std::size_t kHeader = 8 + 25;  // the signature and the first chunk, IHDR: pHYs stands before the pixels
-  png.insert(kHeader, size_chunk(dots_per_inch));
+  const Pixels pixels = pixels_of(Drawing(file, svg), std::round(width_mm / kInch_mm * dots_per_inch));
+  std::string png = compressed(pixels, nullptr, file);
+  png.insert(kHeader, size_chunk(dots_per_inch));  // before the pixels
   files::write_text(file, png);
+}
+
+/// Source: https://wiki.mozilla.org/APNG_Specification
+void write_animation(const Path& file, const std::vector<std::string>& drawings) {
+  constexpr double kWidth_px = 920;
+  const std::string delay = {0, 45, 0, 100};  // s: a numerator and a denominator
+  std::string png;
+  std::uint32_t n_sequence = 0;
+  Pixels before;
+  for (const std::string& svg : drawings) {
+    const Pixels now = pixels_of(Drawing(file, svg), kWidth_px);
+    const bool is_first = png.empty();
+    if (is_first)
+      before = {.width = now.width, .height = now.height, .rgb = std::vector<std::uint32_t>(now.rgb.size(), ~0u)};
+    MBTFM_ASSERT(now.rgb.size() == before.rgb.size());
+    const std::string frame = compressed(now, &before, file);
+    if (is_first)
+      png = frame.substr(0, kHeader) +
+            chunk("acTL" + big_endian(static_cast<std::uint32_t>(drawings.size())) + big_endian(0));
+    const std::string whole = big_endian(now.width) + big_endian(now.height) + big_endian(0) + big_endian(0);
+    const std::string kept_and_over = {
+        0, static_cast<char>(is_first ? 0 : 1)};  // the frame before stays, changes are laid over it
+    png += chunk("fcTL" + big_endian(n_sequence++) + whole + delay + kept_and_over);
+    for (const std::string& data : data_of(frame))
+      png += is_first ? chunk("IDAT" + data) : chunk("fdAT" + big_endian(n_sequence++) + data);
+    before = now;
+  }
+  files::write_text(file, png + chunk("IEND"));
 }
 
 void write_pdf(const Path& file, const std::string& svg, double width_mm) {

@@ -15,6 +15,7 @@
 #include "pipeline/files/foreign_table.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/json.h"
+#include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/sheet_files.h"
 #include "pipeline/files/tables.h"
@@ -175,9 +176,10 @@ std::vector<std::string> parts_of(const std::string& list) {
 /// Those that are asked for come first, in that order.
 /// @throws UsageError where one is asked for that no cell has
 void number_conditions(Study& study, const std::vector<std::string>& condition_of_cell, const std::string& order) {
-  std::set<std::string> names(condition_of_cell.begin(), condition_of_cell.end());
+  std::set<std::string, decltype(&files::is_before)> names(condition_of_cell.begin(), condition_of_cell.end(),
+                                                           &files::is_before);  // 2 kPa before 10 kPa
   for (const std::string& asked : parts_of(order)) {
-    const auto name = std::ranges::find(names, files::lower(asked), files::lower);
+    const auto name = std::ranges::find(names, files::lower_case(asked), files::lower_case);
     if (name == names.end())
       throw UsageError("stats.conditions: no cell that enters is of the condition '" + asked + "'; there are " +
                        listed(std::vector<std::string>(names.begin(), names.end())));

@@ -14,12 +14,12 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/place.h"
 #include "pipeline/files/foreign_table.h"
+#include "pipeline/numerics/masked_values.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
 #include "segment/beads/common_motion.h"
 #include "segment/beads/given_table.h"
 #include "segment/beads/local_motion.h"
-#include "segment/beads/masked_values.h"
 
 namespace mbtfm::beads {
 namespace {
@@ -158,26 +158,16 @@ void flag_masked(GivenField& given) {
   constexpr std::size_t kFewest = 10;
   const Extent extent = extent_of(field, &Bead::position_um);
   const double farthest_um = norm(extent.high_um - extent.low_um);
-  std::size_t n_masked = 0;
-  const auto mask = [&](Bead& bead) {
-    bead.flag = "masked";
-    bead.displacement_um = {};
-    ++n_masked;
-  };
-  std::vector<std::string> values;
-  for (const MaskedValue& value : masked_values(field)) {
-    for (const std::size_t k : value.beads) mask(field[k]);
-    values.push_back("(" + significant(value.displacement_um.x, 6) + ", " + significant(value.displacement_um.y, 6) +
-                     ")");
-  }
+  auto [n_masked, values] = numerics::flag_masked(field);
   std::size_t n_beyond = 0;
   for (Bead& bead : field) {
     const double length_um = norm(bead.displacement_um);
     if (!bead.flag.empty()) {
       if (length_um > kFarthest_um) bead.displacement_um = {};
     } else if (length_um > kFarthest_um || (field.size() >= kFewest && farthest_um > 0 && length_um > farthest_um)) {
-      mask(bead);
-      ++n_beyond;
+      bead.flag = "masked";
+      bead.displacement_um = {};
+      ++n_masked, ++n_beyond;
     }
   }
   if (n_masked == 0) return;

@@ -20,7 +20,7 @@ namespace {
 
 using files::CsvTable;
 using files::ForeignTable;
-using files::lower;
+using files::lower_case;
 
 constexpr std::size_t kComponents = 4;  // x, y and the displacement along them
 
@@ -45,7 +45,7 @@ std::optional<double> length_named(const std::string& word) {
 }
 
 std::optional<Unit> unit_named(std::string text) {
-  text = lower(std::move(text));
+  text = lower_case(std::move(text));
   std::erase_if(text, [](char c) { return c == ' ' || c == '"'; });
   static const std::map<std::string, double> times_per_s = {{"s", 1}, {"sec", 1}, {"second", 1}, {"ms", 1e3}};
   const std::size_t slash = text.find('/');
@@ -76,7 +76,7 @@ ColumnName parts_of(const std::string& name) {
     parts.unit = unit_named(name.substr(blank + 1));
     if (parts.unit) said = name.substr(0, blank);
   }
-  for (const char c : lower(said))
+  for (const char c : lower_case(said))
     if (std::isalnum(static_cast<unsigned char>(c))) parts.key += c;
   return parts;
 }
@@ -158,7 +158,7 @@ struct Found {
 /// No names: none at all, or those that a program gives to columns without one.
 bool is_without_names(const Header& header) {
   return std::ranges::all_of(header, [](const std::string& name) {
-    const std::string key = lower(name);
+    const std::string key = lower_case(name);
     const std::size_t digits = key.starts_with("var") ? 3 : key.starts_with("column") ? 6 : 0;
     return key.find_first_not_of("0123456789", digits) == key.npos && (digits > 0 || key.size() < 3);
   });
@@ -210,7 +210,7 @@ std::string text_above(const ForeignTable& table) {
 
 /// The names in quotes or between commas after `VARIABLES =`, over as many lines as they take.
 Header variables_of(const ForeignTable& table) {
-  const std::string all = text_above(table), key = lower(all);
+  const std::string all = text_above(table), key = lower_case(all);
   const std::size_t word = key.find("variables");
   if (word == key.npos) return {};
   const std::size_t from = std::min(all.find('=', word), all.size() - 1) + 1;
@@ -330,7 +330,7 @@ bool has_names_of_ours(const ForeignTable& table, const TrackParameters& p) {
 TableForm form_of(const ForeignTable& table, const TrackParameters& parameters) {
   if (parameters.table != TableForm::automatic) return parameters.table;
   const std::string text = text_above(table);
-  if (lower(text).find("=block") != text.npos)
+  if (lower_case(text).find("=block") != text.npos)
     throw InputError(table.name, "a row for each vector", "blocks of one variable each",
                      "export it as points (F=POINT)");
   if (has_names_of_ours(table, parameters)) return TableForm::plain;
@@ -395,19 +395,6 @@ std::vector<Unit> units_of_davis(const ForeignTable& table) {
   return units;
 }
 
-std::optional<Unit> unit_of_parameter(LengthUnit unit) {
-  switch (unit) {
-    case LengthUnit::automatic:
-      return std::nullopt;
-    case LengthUnit::um:
-    case LengthUnit::px:
-    case LengthUnit::mm:
-    case LengthUnit::m:
-      return unit_named(name_of(unit));
-  }
-  return std::nullopt;
-}
-
 double pixel_um(const TrackParameters& parameters) {
   if (parameters.pixel_size_um) return *parameters.pixel_size_um;
   throw UsageError("lengths in px need pixel_size_um: give it in cell.toml or as --pixel_size_um");
@@ -441,7 +428,8 @@ void take_units(GivenTable& given, const std::string& file, const Found& found, 
   const std::optional<Unit>&of_places = found.units[x], &of_displacements = found.units[ux];
   if (found.units[y] != of_places || found.units[uy] != of_displacements)
     throw InputError(file, "one unit along x and y", listed(found.header));
-  std::optional<Unit> otherwise = unit_of_parameter(parameters.length_unit);
+  std::optional<Unit> otherwise;
+  if (parameters.length_unit != LengthUnit::automatic) otherwise = unit_named(name_of(parameters.length_unit));
   if (otherwise && of_places && of_displacements &&
       (of_places->um != otherwise->um || of_displacements->um != otherwise->um)) {
     throw InputError(
@@ -500,28 +488,23 @@ void make_vectors_of_spots(ForeignTable& table, const TrackParameters& parameter
         "frames count from 1, TrackMate's FRAME 0 is the first");
   }
   const std::string name = table.name;
-  const CsvTable spots(
-      [&] {
-        std::vector<std::string> numbers;
-        for (std::size_t i = 0; i < table.rows.front().fields.size(); ++i) numbers.push_back(std::to_string(i + 1));
-        return numbers;
-      }(),
-      table.rows, name);
-  const auto named = [](std::size_t i) { return std::to_string(i + 1); };
+  std::vector<std::string> numbers;
+  for (std::size_t i = 0; i < table.rows.front().fields.size(); ++i) numbers.push_back(std::to_string(i + 1));
+  const CsvTable spots(numbers, table.rows, name);
   struct Track {
     int line = 0;
     std::vector<Vec2> relaxed, stressed;
   };
   std::map<std::string, Track> tracks;
   for (int row = 0; row < spots.n_rows(); ++row) {
-    const std::string id = spots.text(row, named(track));
+    const std::string id = spots.text(row, numbers[track]);
     if (files::is_missing(id)) continue;
-    const double at = spots.number(row, named(frame), Range::not_negative()) + 1;
+    const double at = spots.number(row, numbers[frame], Range::not_negative()) + 1;
     if (at != *relaxed && at != *stressed) continue;
     Track& found = tracks[id];
     found.line = table.rows[static_cast<std::size_t>(row)].line;
     (at == *relaxed ? found.relaxed : found.stressed)
-        .push_back({spots.number(row, named(x)), spots.number(row, named(y))});
+        .push_back({spots.number(row, numbers[x]), spots.number(row, numbers[y])});
   }
   table.rows.clear();
   const double scale = unit && unit->um > 0 ? unit->um : 1;  // to um
@@ -635,7 +618,7 @@ Order order_of(const std::vector<CsvTable::Row>& rows, std::size_t column) {
 std::string flag_of(RowMark mark, const std::string& cell) {
   constexpr const char* kMasked = "masked";
   constexpr const char* kFilled = "filled in";
-  double code = lower(cell) == "true" ? 1 : 0;
+  double code = lower_case(cell) == "true" ? 1 : 0;
   if (files::numeral_in(cell) != files::Numeral::none) std::from_chars(cell.data(), cell.data() + cell.size(), code);
   switch (mark) {
     case RowMark::zero_if_measured:

@@ -32,8 +32,7 @@ AdhesionSource source_of(const CandidateParameters& p, bool shows_adhesions, boo
         "set adhesions = cell");
   if (p.adhesions == AdhesionSource::pattern && !has_mask)
     throw UsageError(
-        "adhesions = pattern: no adhesion mask is given, which says where the pattern is; name it as adhesion_mask in "
-        "[images] or as --adhesion-mask");
+        "adhesions = pattern: no adhesion mask is given, which says where the pattern is; give it as --adhesion-mask");
   return *p.adhesions;
 }
 

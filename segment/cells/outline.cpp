@@ -58,7 +58,7 @@ cv::Mat smoothed(const cv::Mat& mask) {
 }
 
 /// Otsu's threshold of log(1 + brightness): cells are bright by a factor, not by an amount.
-cv::Mat first_mask(const cv::Mat& image, double noise, double smallest) {
+cv::Mat first_mask(const cv::Mat& image, double noise) {
   const double dark = quantile(image, 0.01), bright = quantile(image, 0.99);
   // neither noise (three deviations) nor a twentieth of the range shall spread over the logarithm's steep part
   const double unit = std::max(3 * noise, 0.05 * (bright - dark));
@@ -67,7 +67,7 @@ cv::Mat first_mask(const cv::Mat& image, double noise, double smallest) {
   cv::log(compressed, compressed);
   cv::normalize(compressed, bytes, 0, 255, cv::NORM_MINMAX, CV_8U);
   cv::threshold(bytes, mask, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
-  return without_debris(mask, smallest);
+  return mask;
 }
 
 /// Mean of `values` where `mask` is not 0, weighted by a Gaussian of the distance.
@@ -264,9 +264,9 @@ Scene scene_of(const cv::Mat& image, double pixel_size_um) {
   return s;
 }
 
-/// All cells; holes filled.
-Body cells_in(const Scene& s, double smallest) {
-  cv::Mat mask = first_mask(s.smooth, s.noise, smallest);
+/// All cells; holes filled. @param bright  everything that stands out
+Body cells_in(const Scene& s, const cv::Mat& bright, double smallest) {
+  cv::Mat mask = without_debris(bright, smallest);
   if (cv::countNonZero(mask) == 0 || cv::countNonZero(~mask) == 0) return {};
   // two halves of pure noise differ by 1.6 standard deviations
   if (cv::mean(s.smooth, mask)[0] - cv::mean(s.smooth, ~mask)[0] < 4 * s.noise) return {};
@@ -342,6 +342,23 @@ CellOutline outline_of(const Scene& s, const cv::Mat& part, const cv::Mat& holes
   return cell;
 }
 
+/// Bright things away from all cells that are none themselves, the largest first.
+std::vector<Polygon> debris_in(const Scene& s, const cv::Mat& bright, const cv::Mat& cells) {
+  constexpr double kLeast_um2 = 1;
+  constexpr std::size_t kMost = 100;  // in haze or noise there are any number
+  cv::Mat near;
+  cv::dilate(cells, near, disc_of(s.band_px));
+  Parts parts = parts_of(bright & ~near, s.px_of(kLeast_um2));
+  parts.parts.resize(std::min(parts.parts.size(), kMost));
+  std::vector<Polygon> debris;
+  for (const Parts::Part& part : parts.parts) {
+    Polygon& polygon = debris.emplace_back();
+    const auto rings = rings_of(parts.labels(part.box) == part.label);
+    for (const cv::Point2d& p : rings.front()) polygon.push_back(to_um(p + cv::Point2d(part.box.tl()), s.pixel_um));
+  }
+  return debris;
+}
+
 /// Of the necks at which a mask was cut the narrowest at this part of it.
 std::optional<OutlineNeck> narrowest_neck(const std::vector<Neck>& necks, const cv::Mat& part, double pixel_um) {
   const cv::Rect frame({0, 0}, part.size());
@@ -375,10 +392,12 @@ CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>&
                         const OutlineParameters& p) {
   const Scene s = scene_of(matrix_of(image), pixel_size_um);
   const double smallest = s.px_of(p.outline_smallest_um2);
-  auto [mask, soft] = cells_in(s, smallest);
+  const cv::Mat bright = first_mask(s.smooth, s.noise);
+  auto [mask, soft] = cells_in(s, bright, smallest);
   if (mask.empty() || cv::countNonZero(mask) == 0) return {};
   const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
   CellsInImage found;
+  found.debris_um = debris_in(s, bright, mask);
   found.beyond_um = add_adhesions(mask, adhesions, s.pixel_um, p.outline_reach_um);
   const Parts parts = parts_of(filled(mask), smallest);
   for (const Parts::Part& each : parts.parts) {

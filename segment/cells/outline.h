@@ -56,6 +56,7 @@ struct CellsInImage {
   /// By adhesion that was given: distance of its centre from the nearest cell as the image itself shows it, before any
   /// adhesion is added; 0: in it.
   std::vector<double> beyond_um;
+  std::vector<Polygon> debris_um = {};  ///< bright things beyond all cells that are smaller than one
 };
 
 /// The cells of an image. Cells that touch are cut apart at the neck between them (necks.h); if there is none, they

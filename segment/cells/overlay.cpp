@@ -14,6 +14,8 @@ namespace mbtfm::cells {
 namespace {
 
 const cv::Scalar kInk(15, 15, 15), kPaper(255, 255, 255);  // red, green, blue
+const cv::Scalar kLeftOut(190, 190, 190);
+constexpr double kRingDash_px = 7, kFibreDash_px = 22;
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
 constexpr int kShift = 4;           // OpenCV's drawing takes fixed-point coordinates: sixteenths of a pixel
 constexpr double kLongSide = 1600;  // px: two screens' pixels for each where a page shows it 700 px wide
@@ -208,6 +210,10 @@ std::vector<Entry> entries_of(const Segmentation& s, double pixel_um, int width)
   add_adhesions("anchor", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::anchor; });
   add_adhesions("candidate", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
   if (!s.unexplained_um.empty()) entries.push_back({"bright actin in no fibre", scalar(kUnexplainedColour)});
+  if (const std::size_t n = s.left_out_um.size() + s.cell.neighbours_um.size(); n > 0) {
+    entries.push_back({"not of this cell " + std::to_string(n), kLeftOut, 56, 4});
+    entries.back().is_dashed = true;
+  }
   entries.push_back({"outline", cv::Scalar(150, 150, 150), 56, 4});
   const double bar_um = round_length(0.2 * width * pixel_um);
   char text[32];
@@ -255,7 +261,6 @@ cv::Mat legend(const std::vector<Entry>& entries, int width) {
 void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
   canvas.line(cell.outline_um, true, scalar(kOutlineColour), thickness);
   for (const Polygon& hole : cell.holes_um) canvas.line(hole, true, scalar(kOutlineColour), thickness);
-  constexpr double kRingDash_px = 7, kFibreDash_px = 22;
   for (const Adhesion& a : cell.adhesions) {
     const Polygon ring = ellipse_corners(a, 32);
     if (is_assumed(a.origin))
@@ -290,6 +295,8 @@ images::Picture draw_overlay(const std::optional<images::Channel>& adhesion,
                              const std::optional<images::Channel>& actin, const Segmentation& s) {
   Canvas canvas(adhesion, actin, view_of(s), s.pixel_size_um, kLongSide);
   draw_marks(canvas, s.cell, 2);
+  for (const auto* all : {&s.left_out_um, &s.cell.neighbours_um})
+    for (const Polygon& ring : *all) canvas.dashed_line(ring, true, kLeftOut, 2, kRingDash_px);
   for (const Polyline& crest : s.unexplained_um)
     for (const Vec2 p : crest) canvas.line({p, p}, false, scalar(kUnexplainedColour), 6);
   draw_labels(canvas, s.cell);

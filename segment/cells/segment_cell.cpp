@@ -390,6 +390,8 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
     if (in.adhesion && !is_given) align(s, around, lines.traced, found, p);
     std::vector<Adhesion> own = inside(around, found);
     s.n_adhesions_outside = static_cast<int>(found.size() - own.size());
+    for (const Adhesion& a : found)
+      if (inside(around, {a}).empty()) s.left_out_um.push_back(ellipse_corners(a, 24));
     if (!found.empty() && own.empty() && p.cell != 0)
       throw InputError(name_of_adhesions(in), "adhesions inside the cell's outline",
                        std::to_string(found.size()) + " outside and none inside",
@@ -411,6 +413,7 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
     s.bleed_through = contrast_of_fibres(in.adhesion->image, s.cell, in.field.pixel_um);
   s.n_anchors = static_cast<int>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::anchor, &Adhesion::origin));
   s.unused = unused_in(in);
+  s.left_out_um.insert(s.left_out_um.end(), all.seen.debris_um.begin(), all.seen.debris_um.end());
   return s;
 }
 

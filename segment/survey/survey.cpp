@@ -120,6 +120,21 @@ void look_at_pair(const CellImages& cell, double pixel_um, Survey& survey) {
                             " %): do they belong to one cell? Put the stage back before the second one is recorded.");
 }
 
+/// Does a table lie as the cell's picture does, and point as cells pull?
+void look_at_table(const CellImages& cell, double pixel_um, Survey& survey) {
+  if (cell.given.empty()) return;
+  survey.facts += "; " + std::to_string(cell.given.size()) + " vectors of a table";
+  const auto& picture = cell.adhesion ? cell.adhesion : cell.actin;
+  if (!picture) return;
+  const beads::FieldLook look = beads::look_at_field(cell.given, picture->image, pixel_um);
+  const std::string mend =
+      ". Export the table as the picture lies, or set track.y_axis or the columns (track.x_column, track.ux_column …).";
+  if (!look.places.empty())
+    survey.doubts.push_back("The displacements look " + look.places + " against " + picture->name + mend);
+  else if (!look.vectors.empty())
+    survey.doubts.push_back("The vectors of the table look " + look.vectors + " at their places" + mend);
+}
+
 /// From the cell to the nearest side of the image.
 double margin_um(const cells::CellOutline& cell, Vec2 field_um) {
   double margin = std::min(field_um.x, field_um.y);
@@ -189,6 +204,7 @@ Survey survey(const CellImages& cell, int threads) {
   look_for_twins(cell, survey);
   look_at_beads(cell, threads, survey);
   look_at_pair(cell, pixel_um, survey);
+  look_at_table(cell, pixel_um, survey);
   look_at_cell(cell, pixel_um, survey);
   look_at_adhesions(cell, pixel_um, survey);
   return survey;

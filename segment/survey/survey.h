@@ -5,14 +5,16 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/beads.h"
 #include "segment/images/channels.h"
 
 namespace mbtfm::survey {
 
 struct CellImages {
   std::optional<images::Channel> adhesion, actin, beads_stressed, beads_relaxed;  ///< as far as they are there
-  std::optional<double> given_pixel_size_um;                                      ///< by cell.toml
-  std::optional<double> given_beads_pixel_size_um;                                ///< the same of the bead images alone
+  DisplacementField given = {};                     ///< of another program, in place of the bead images
+  std::optional<double> given_pixel_size_um;        ///< by cell.toml
+  std::optional<double> given_beads_pixel_size_um;  ///< the same of the bead images alone
 };
 
 struct Survey {

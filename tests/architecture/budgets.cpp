@@ -11,8 +11,8 @@
 namespace mbtfm {
 namespace {
 
-constexpr int kLinesOfProduct = 105500;
-constexpr int kLinesOfTests = 46350;
+constexpr int kLinesOfProduct = 106100;
+constexpr int kLinesOfTests = 46510;
 constexpr int kLongSources = 29;                                                  // .cpp of the product above 400 lines
 constexpr int kLongestSource = 890;                                               // lines
 constexpr int kOwnHeadersMedian = 14, kOwnHeadersP90 = 40, kOwnHeadersMost = 93;  // that a source of the product gets

@@ -1,4 +1,6 @@
 /// Bad input: an error that names file, place, expectation and finding; a non-zero exit code; nothing half-written.
+#include <regex>
+
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
@@ -138,6 +140,19 @@ TEST_F(Errors, a_missing_pixel_size_is_asked_for) {
   expect_error(kInput, {"pixel_size_um"}, "1_segment");
 }
 
+TEST_F(Errors, hints_of_a_stage_name_keys_under_a_run_and_flags_alone) {
+  const std::string pattern = " adhesions = \"pattern\"\n";
+  replace_in_toml("[gel]", "[segment]\n" + pattern + "[gel]");
+  EXPECT_NE(output_of("mbtfm run " + cell_.string(), kUsage).find("give it as adhesion_mask in [images]"),
+            std::string::npos);
+  const std::string by_hand = output_of("mbtfm-segment --adhesions pattern --actin-image " +
+                                            (cell_ / "actin.tif").string() + " --out " + (folder_ / "s").string(),
+                                        kUsage);
+  EXPECT_NE(by_hand.find("give it as --adhesion-mask"), std::string::npos) << by_hand;
+  const std::string set = output_of("mbtfm run --set segment.cell=-3 " + cell_.string(), kUsage);
+  EXPECT_NE(set.find("cell in [segment]: expected"), std::string::npos) << set;
+}
+
 TEST_F(Errors, a_negative_modulus_is_refused_before_anything_runs) {
   replace_in_toml("youngs_modulus_kPa", "youngs_modulus_kPa = -8.4");
   expect_error(kInput, {"cell.toml:", "youngs_modulus_kPa", "a number >= 0.001", "-8.4"}, "1_segment");
@@ -191,6 +206,21 @@ TEST_F(Errors, what_was_probably_meant_is_named) {
   EXPECT_NE(said("mbtfm run " + (cell_ / "actin.tif").string(), kInput)
                 .find("give the folder that it is in: " + cell_.string()),
             std::string::npos);
+  for (const auto& [command, remedy] : {std::pair<std::string, const char*>{"rnu CELL", "did you mean 'run'?"},
+                                        {"RUN CELL", "did you mean 'run'?"},
+                                        {"statistics CELL", "the commands are "},
+                                        {"run --loss huber CELL", "--set TABLE.KEY=VALUE"},
+                                        {"run CELL CELL", "mbtfm batch FOLDER"},
+                                        {"run --set youngs_modulus_kPa=4 CELL", "its table, too"},
+                                        {"noise CELL/actin.tif", "mbtfm noise A.tif B.tif"},
+                                        {"cost CELL --budget 0", "not in range 0.001"}})
+    EXPECT_NE(said("mbtfm " + std::regex_replace(command, std::regex("CELL"), cell_.string()), kUsage).find(remedy),
+              std::string::npos)
+        << command;
+  for (const char* word : {"help run", "version"}) said(std::string("mbtfm ") + word, 0);
+  const std::string misspelt = cell_.string() + "s";
+  EXPECT_NE(said("mbtfm run " + misspelt, kInput).find("did you mean 'cell'?"), std::string::npos);
+  EXPECT_NE(said("mbtfm compare " + cell_.string(), kInput).find("mbtfm run"), std::string::npos);
   EXPECT_NE(said("mbtfm", 0).find("check"), std::string::npos) << "alone it prints its help";
 }
 

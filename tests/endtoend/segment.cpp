@@ -176,6 +176,14 @@ TEST_F(Segment, an_adhesion_beside_the_cell_is_left_out_and_told) {
   EXPECT_TRUE(fires("adhesions-off-actin", said)) << said;
 }
 
+TEST_F(Segment, a_speck_beside_the_cell_is_left_out_and_told) {
+  test::draw_ellipse(scene_.actin_image, test::ellipse(1, {24.2, 24.2}, 2, 2, 0), 400, 0.13, scene_.kPixel_um);
+  images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
+  const std::string said = segment("out", both()).output;
+  EXPECT_TRUE(fires("adhesions-left-out", said)) << said;
+  EXPECT_NE(said.find("1 bright thing too small for a cell outside the cell was left out"), said.npos) << said;
+}
+
 TEST_F(Segment, an_end_that_no_adhesion_holds_and_an_input_that_does_not_count_are_told) {
   rois::Roi fibre, outline;
   fibre.name = "ventral 1";

@@ -50,11 +50,21 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
   EXPECT_NEAR(frames.number(1, "total_force_nN"), 2 * frames.number(0, "total_force_nN"),
               4 * frames.number(1, "total_force_sigma_nN"));
   EXPECT_TRUE(fs::exists(cell / "4_fit/tracks.svg"));
+  const std::string moving = files::read_text(cell / "4_fit/series.png");
+  EXPECT_NE(moving.find(std::string("acTL\0\0\0\2", 8)), std::string::npos) << "two frames";
   EXPECT_NE(run.output.find("; over 2 frames from "), std::string::npos) << run.output;
   const std::string page = files::read_text(cell / "report.html");
   EXPECT_NE(page.find("Over 2 frames the total force goes from "), std::string::npos);
   EXPECT_NE(page.find("1 frame could not be fitted"), std::string::npos);
+  EXPECT_NE(page.find("data:image/png"), std::string::npos);
   EXPECT_NE(page.find(files::read_text(cell / "4_fit/tracks.svg")), std::string::npos);
+
+  output_of("mbtfm batch --table " + folder.path().string());
+  const files::CsvTable batch(folder / "batch.csv");
+  EXPECT_NEAR(batch.number(0, "last_force_nN"), 2 * batch.number(0, "first_force_nN"),
+              4 * frames.number(1, "total_force_sigma_nN"));
+  EXPECT_NEAR(batch.number(0, "largest_force_change_nN"), batch.number(0, "first_force_nN"),
+              4 * frames.number(1, "total_force_sigma_nN"));
 
   const std::string before = files::read_text(cell / "4_fit/tracks.csv");
   DisplacementField field = files::read_displacement(cell / "2_track/displacement_0002.csv");

@@ -517,6 +517,7 @@ TEST_F(SheetsOfImages, give_contraction_and_stiffness_back_in_one_command_and_in
   const std::string compared = done("mbtfm compare " + cell_.string());
   EXPECT_NE(compared.find("contraction_nN_per_um"), std::string::npos) << compared;
   EXPECT_NE(compared.find(" 2\n"), std::string::npos) << "the truth: " << compared;
+  EXPECT_NE(files::read_text(cell_ / "report.html").find("Beside the truth"), std::string::npos);
   const files::CsvTable truth(cell_ / "truth/sheet.csv"), fitted(cell_ / "3_sheet/sheet_fit.csv");
   for (int row = 0; row < 2; ++row) {
     ASSERT_EQ(truth.text(row, "quantity"), fitted.text(row, "quantity"));

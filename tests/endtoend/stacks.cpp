@@ -2,12 +2,14 @@
 #include <nlohmann/json.hpp>
 
 #include "mbtfm/plan/space_scene.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/report/space_map.h"
 #include "pipeline/report/space_report.h"
 #include "segment/images/image.h"
 #include "tests/support/program.h"
@@ -204,6 +206,15 @@ void expect_statistics_of(const fs::path& study) {
             files::CsvTable(study / "cell_1/4_traction/traction_adhesion_forces.csv").n_rows());
 }
 
+void expect_the_truth_of(const fs::path& folder) {
+  const std::string text = output_of("mbtfm compare " + folder.string());
+  const double truth = report::true_space_map(folder).total_force_nN;
+  EXPECT_NE(text.find("total_force_nN"), std::string::npos) << text;
+  EXPECT_NE(text.find(" " + brief(truth) + "\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("|t - truth| / |truth| = 0."), std::string::npos) << text;
+  EXPECT_NE(files::read_text(folder / "report.html").find("Beside the truth"), std::string::npos);
+}
+
 /// Beside the truth, in a little time: the cell as it is, and what else there is time for.
 void expect_a_cost_study_of(const fs::path& folder) {
   const std::string before = files::read_text(folder / "4_traction/traction.csv");
@@ -295,6 +306,7 @@ TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
   EXPECT_GT(table.number(0, "traction.strain_energy_fJ"), 0);
   EXPECT_TRUE(table.has("traction.moment_x_nN_um"));
   expect_statistics_of(folder.parent_path());
+  expect_the_truth_of(folder);
   expect_a_cost_study_of(folder);
   expect_that_a_preset_is_taken(folder);
 

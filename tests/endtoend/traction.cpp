@@ -66,11 +66,11 @@ TEST(TractionProgram, refuses_bad_displacements_and_names_them) {
                     "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
   const std::string header = "x_um,y_um,ux_um,uy_um,sigma_um\n", bead = "1,2,0.1,0.1,0.01\n";
   const std::pair<std::string, std::string> cases[] = {
-      {header, "three beads"},                                           // none
-      {header + bead, "three beads"},                                    // one
-      {header + bead + "2,2,nan,0,0.01\n3,5,0,0,0.01\n", "ux_um"},       // not a number
-      {header + bead + "2,4,0,0,0.01\n3,5,0,0,0.01\n" + bead, "bead 3"}  // the same place twice
-  };
+      {header, "three beads"},                                            // none
+      {header + bead, "three beads"},                                     // one
+      {header + bead + "2,2,nan,0,0.01\n3,5,0,0,0.01\n", "ux_um"},        // not a number
+      {header + bead + "2,4,0,0,0.01\n3,5,0,0,0.01\n" + bead, "bead 3"},  // the same place twice
+      {header + "1,2,0,0,0.01\n2,4,0,0,0.01\n3,5,0,0,0.01\n", "3 zeros"}};
   for (const auto& [text, word] : cases) {
     files::write_text(folder / "displacement.csv", text);
     const std::string run =
@@ -80,6 +80,22 @@ TEST(TractionProgram, refuses_bad_displacements_and_names_them) {
     EXPECT_NE(run.find(word), std::string::npos) << run;
     EXPECT_FALSE(fs::exists(folder / "traction.csv"));
   }
+}
+
+TEST(TractionProgram, leaves_out_vectors_that_share_a_value_as_a_mask_writes_it) {
+  const test::TemporaryFolder folder;
+  test::EllipseScene scene = test::ellipse_scene(48, 0.05);
+  const auto total_nN = [&] {
+    files::write_displacement(folder / "displacement.csv", scene.field);
+    const std::string run =
+        test::output_of("mbtfm-traction --youngs_modulus_kPa 8.4 --displacement " +
+                        (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
+    EXPECT_EQ(run.find("vectors-masked") != std::string::npos, scene.field[0].displacement_um.x == -1) << run;
+    return files::JsonRecord(folder / "traction.json", "figures").at("total_force_nN").number();
+  };
+  const double whole_nN = total_nN();
+  for (std::size_t k = 0; k < scene.field.size(); k += 17) scene.field[k].displacement_um = {-1, -1};
+  EXPECT_NEAR(total_nN() / whole_nN, 1, 0.1);  // one bead in 17 less; read as -1 um they make it many times as large
 }
 
 TEST(TractionProgram, takes_a_field_without_errors_and_says_which_it_assumed) {

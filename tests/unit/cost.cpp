@@ -1,10 +1,10 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/cost/accuracy.h"
 #include "pipeline/cost/presets.h"
-#include "pipeline/cost/space_map.h"
 #include "pipeline/cost/study_report.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
+#include "pipeline/report/space_map.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/settings.h"
 #include "tests/support/temporary_folder.h"
@@ -12,6 +12,8 @@
 
 namespace mbtfm::cost {
 namespace {
+
+using report::SpaceMap;
 
 /// Two fibres of 3 and 4 nN; parts of each tension's error in nN.
 ErrorBudget budget(double beads, std::optional<double> mesh) {
@@ -189,10 +191,10 @@ TEST(SpaceMaps, of_the_truth_have_the_area_of_the_surface) {
   for (int k = 0; k < 6; ++k)
     text += std::to_string(2 * (k % 3)) + "," + std::to_string(2 * (k / 3)) + ",0,0.8660254,0,-0.5,0,0,3\n";
   std::filesystem::create_directories(folder / "truth");
-  EXPECT_FALSE(has_space_truth(folder.path()));
+  EXPECT_FALSE(report::has_space_truth(folder.path()));
   files::write_text(folder / "truth/surface_traction.csv", text);
-  ASSERT_TRUE(has_space_truth(folder.path()));
-  EXPECT_NEAR(true_space_map(folder.path()).total_force_nN, 6 * 8 * 3, 1e-9);
+  ASSERT_TRUE(report::has_space_truth(folder.path()));
+  EXPECT_NEAR(report::true_space_map(folder.path()).total_force_nN, 6 * 8 * 3, 1e-9);
 }
 
 TEST(Ladder, in_space_turns_knobs_that_the_stage_has) {

@@ -347,6 +347,26 @@ TEST(Files, numbers_that_no_cell_can_have_are_refused_by_row_and_column) {
       << refusal("0,0,0,0,1e200");
 }
 
+TEST(Files, tractions_are_read_as_people_write_them) {
+  const test::TemporaryFolder folder;
+  const auto read = [&](const std::string& text) {
+    files::write_text(folder / "t.csv", text);
+    return files::read_tractions(folder / "t.csv");
+  };
+  const std::string rows = "0,5;0,5;1,25;0\n2,5;0,5;0;-1,5\n0,5;1,5;0;0\n2,5;1,5;0;0\n";
+  for (const std::string header :
+       {"x_um;y_um;tx_kPa;ty_kPa\n", "sep=;\n# of our program\nX_um;Y_um;tx_kpa; ty_kPa\n"}) {
+    const std::vector<GroundPatch> patches = read(header + rows + ";;;\n");
+    ASSERT_EQ(patches.size(), 4u) << header;
+    EXPECT_EQ(patches[1].position_um, (Vec2{2.5, 0.5}));
+    EXPECT_EQ(patches[1].traction_kPa, (Vec2{0, -1.5}));
+    EXPECT_EQ(patches[1].area_um2, 2);
+  }
+  const auto error = test::caught<InputError>([&] { read("x;y;tx;ty\n" + rows); });
+  ASSERT_TRUE(error);
+  EXPECT_NE(std::string(error->what()).find("tx_kPa"), std::string::npos) << error->what();
+}
+
 TEST(Files, what_has_no_end_is_refused_and_what_is_empty_is_empty) {
   EXPECT_EQ(files::read_text("/dev/null"), "");
   EXPECT_THROW(files::read_text("/dev/zero"), InputError);

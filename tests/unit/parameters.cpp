@@ -3,6 +3,7 @@
 #include "pipeline/contract/range.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
+#include "pipeline/stage/suggest.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 
@@ -238,6 +239,27 @@ TEST(Parameters, a_cell_takes_what_it_leaves_out_from_the_nearest_study_above_it
   const auto error = test::thrown<InputError>([&] { read("", "[gel]\nyoungs_modulus = 8\n"); });
   EXPECT_EQ(error.where, study.string() + ":2");
   EXPECT_NE(error.hint.find("youngs_modulus_kPa"), std::string::npos) << error.hint;
+}
+
+TEST(Parameters, flags_in_a_text_become_keys_where_only_cell_toml_is_written) {
+  Example e;
+  stage::ParameterList list;
+  declare(list, e);
+  const auto worded = [&](const std::string& text) {
+    return stage::in_keys(list, {{"adhesion-mask", "adhesion_mask"}}, text);
+  };
+  EXPECT_EQ(worded("--length_um: expected a number"), "length_um in [network]: expected a number");
+  EXPECT_EQ(worded("try --method exact, or --count 7."),
+            "try method = \"exact\" in [network], or count = 7 in [network].");
+  EXPECT_EQ(worded("(set --method if known)"), "(set method in [network] if known)");
+  EXPECT_EQ(worded("give it in cell.toml or as --pixel_size_um (pixel size)"), "give it in cell.toml (pixel size)");
+  EXPECT_EQ(worded("network.method = \"fast\" in cell.toml, or --method 'fast' for the first"),
+            "network.method = \"fast\" in cell.toml for the first");
+  EXPECT_EQ(worded("count = 1 in cell.toml, or --count 1 --page 2: from 1"), "count = 1 in cell.toml: from 1");
+  EXPECT_EQ(worded("--pixel_size_um is missing; no --adhesion-mask"),
+            "pixel_size_um in cell.toml is missing; no adhesion_mask in [images]");
+  for (const char* text : {"no flag", "mbtfm-network --count 7 --out x does it", "run it with --explain", "a -- b"})
+    EXPECT_EQ(worded(text), text);
 }
 
 TEST(Parameters, what_other_programs_and_countries_write_is_answered_with_how_to_write_it) {

@@ -274,6 +274,11 @@ TEST_F(Runner, takes_a_displacement_field_instead_of_the_beads_images) {
   EXPECT_EQ(started(), "");
   files::write_text(cell_ / "piv.csv", "y");
   EXPECT_EQ(started(), "fit track");
+  for (const char* half : {"u.npy", "v.npy"}) files::write_text(cell_ / half, "x");  // of pyTFM
+  write_parameters("[images]\ndisplacement = \"u.npy\"\n");
+  EXPECT_EQ(started(), "fit segment track");
+  files::write_text(cell_ / "v.npy", "y");
+  EXPECT_EQ(started(), "track");
 }
 
 TEST_F(Runner, rejects_a_half_given_stage) {
@@ -582,6 +587,13 @@ TEST(Batch, a_failed_cell_does_not_stop_the_others) {
   EXPECT_EQ(outcomes[1].exit_code, 3);
   EXPECT_EQ(outcomes[1].message, "mbtfm: error: broken");
   EXPECT_EQ(outcomes[2].exit_code, 128 + 9);
+  files::write_text(folder / "a/run.log", "My notes of Monday\n");  // a person's
+  const auto again = run_batch({cells[0], cells[2]},
+                               {.program = folder / "mbtfm", .run = {.stage_folder = folder / "bin", .version = "1"}});
+  EXPECT_EQ(again[0].exit_code, exit_code::kOutput);
+  EXPECT_NE(again[0].message.find("give it another name"), std::string::npos);
+  EXPECT_EQ(files::read_text(folder / "a/run.log"), "My notes of Monday\n");
+  EXPECT_EQ(again[1].exit_code, 128 + 9) << "a log of ours is replaced";
 }
 
 TEST(Batch, a_folder_without_cells_is_an_error) {

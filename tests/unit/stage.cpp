@@ -224,6 +224,9 @@ TEST(Suggestion, names_the_flag_or_command_that_was_meant_and_nothing_where_none
   EXPECT_EQ(after({"bacth"}), "; did you mean 'batch'?");
   EXPECT_EQ(after({"verfy", "CELL"}), "; did you mean 'verify'?");
   EXPECT_EQ(after({"batch", "--xyz"}), "");
+  EXPECT_EQ(after({"Batch"}), "; did you mean 'batch'?");
+  EXPECT_EQ(after({"btach"}), "; did you mean 'batch'?") << "one slip";
+  EXPECT_EQ(after({"start"}), "; the commands are batch, verify");
 }
 
 TEST(Manual, has_every_option_and_hides_what_help_hides) {

@@ -94,6 +94,8 @@ TEST(Study, conditions_come_from_a_folder_or_a_table) {
   EXPECT_EQ(by_table.conditions, (std::vector<std::string>{"blebbistatin", "none"}));
   EXPECT_EQ(reason_of(by_table, "control/cell_3"), "dividing");
   EXPECT_EQ(reason_of(by_table, "treated/cell_4"), "not in the table");
+  const Study by_gel = fake.read({.condition_from = "gel"}, "cell,gel\ncell_1,10 kPa\ncell_2,2 kPa\n");
+  EXPECT_EQ(by_gel.conditions, (std::vector<std::string>{"2 kPa", "10 kPa"}));
 }
 
 TEST(Study, a_column_called_condition_counts_without_being_asked_for) {
@@ -560,6 +562,13 @@ TEST(Figures, are_drawn_into_pixels) {
   EXPECT_EQ(big_endian(at + 4), std::lround(300 / 0.0254)) << "pixels in a metre";
   EXPECT_GT(bytes.size(), 10000u);  // an empty page of this size has some 4 kB
   EXPECT_THROW(write_png(folder / "nowhere/figure.png", svg_of(figure), 85, 300), OutputError);
+  write_animation(folder / "moving.png", {svg_of(figure), svg_of(figure), svg_of(figure)});
+  const std::string moving = files::read_text(folder / "moving.png");
+  EXPECT_NE(moving.find(std::string("acTL\0\0\0\3", 8)), std::string::npos);
+  int n_frames = 0;
+  for (std::size_t i = moving.find("fcTL"); i != moving.npos; i = moving.find("fcTL", i + 1)) ++n_frames;
+  EXPECT_EQ(n_frames, 3);
+  EXPECT_LT(moving.size(), 1.5 * static_cast<double>(moving.find("fdAT"))) << "frames that are alike take no room";
   write_pdf(folder / "figure.pdf", svg_of(figure), 85);
   write_pdf(folder / "again.pdf", svg_of(figure), 85);
   const std::string pdf = files::read_text(folder / "figure.pdf");

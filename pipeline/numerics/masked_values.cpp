@@ -1,14 +1,15 @@
-#include "segment/beads/masked_values.h"
+#include "pipeline/numerics/masked_values.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "pipeline/contract/extent.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
-#include "segment/beads/plane.h"
 
-namespace mbtfm::beads {
+namespace mbtfm::numerics {
 namespace {
 
 constexpr std::size_t kLeastShared = 10;  // beads: less do no harm that their neighbours do not show
@@ -31,6 +32,8 @@ struct Values {
     return {rank(all_x, u.x), rank(all_y, u.y)};
   }
 };
+
+Vec3 in_plane(Vec2 place) { return {place.x, place.y, 0}; }
 
 bool is_less(Vec2 a, Vec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); }
 
@@ -77,7 +80,7 @@ bool stands_out(const Group& group, const Values& values) {
 }
 
 /// (b), (c) At the rim of the group the field jumps, and does not grow as much again one place further on.
-bool is_cut_out(const Group& group, const Values& values, const DisplacementField& field, const Neighbours& neighbours,
+bool is_cut_out(const Group& group, const Values& values, const DisplacementField& field, const Near& neighbours,
                 double reach_um) {
   constexpr int kAround = 12;
   constexpr double kSteps = 3, kGrowth = 0.4;
@@ -87,7 +90,7 @@ bool is_cut_out(const Group& group, const Values& values, const DisplacementFiel
             is_in.begin() + static_cast<std::ptrdiff_t>(group.end), 1);
   const Vec2 shared = field[values.order[group.begin]].displacement_um;
   const auto around = [&](std::size_t k) {
-    std::vector<int> found = neighbours.within(field[values.order[k]].position_um, reach_um, kAround + 1);
+    std::vector<int> found = neighbours.within(in_plane(field[values.order[k]].position_um), reach_um, kAround + 1);
     std::erase(found, static_cast<int>(k));
     return found;
   };
@@ -110,13 +113,13 @@ bool is_cut_out(const Group& group, const Values& values, const DisplacementFiel
       growths.push_back(dot(further - jump, jump) / dot(jump, jump));
     }
   }
-  if (!(numerics::quantile(std::move(steps), 0.5) > kSteps)) return false;
-  return growths.empty() || numerics::quantile(std::move(growths), 0.5) < kGrowth;
+  if (!(quantile(std::move(steps), 0.5) > kSteps)) return false;
+  return growths.empty() || quantile(std::move(growths), 0.5) < kGrowth;
 }
 
 }  // namespace
 
-std::vector<MaskedValue> masked_values(const DisplacementField& field) {
+Masked flag_masked(DisplacementField& field) {
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < field.size(); ++k)
     if (field[k].flag.empty()) order.push_back(k);
@@ -133,20 +136,27 @@ std::vector<MaskedValue> masked_values(const DisplacementField& field) {
   });
   if (groups.empty()) return {};
   std::vector<Vec2> places;
-  for (const std::size_t k : values.order) places.push_back(field[k].position_um);
+  std::vector<Vec3> in_space;
+  for (const std::size_t k : values.order) {
+    places.push_back(field[k].position_um);
+    in_space.push_back(in_plane(places.back()));
+  }
   const double spacing_um =
       std::sqrt(std::max(1e-12, extent_of(places).area_um2()) / static_cast<double>(places.size()));
   const double reach_um = 1.6 * spacing_um;  // the eight around on a lattice
-  const Neighbours neighbours(places, reach_um);
-  std::vector<MaskedValue> masked;
+  const Near neighbours(in_space, reach_um);
+  std::erase_if(groups, [&](const Group& g) { return !is_cut_out(g, values, field, neighbours, reach_um); });
+  Masked masked;
   for (const Group& group : groups) {
-    if (!is_cut_out(group, values, field, neighbours, reach_um)) continue;
-    MaskedValue& value = masked.emplace_back();
-    value.displacement_um = field[values.order[group.begin]].displacement_um;
-    value.beads.assign(values.order.begin() + static_cast<std::ptrdiff_t>(group.begin),
-                       values.order.begin() + static_cast<std::ptrdiff_t>(group.end));
+    const Vec2 u = field[values.order[group.begin]].displacement_um;
+    masked.values_um.push_back("(" + significant(u.x, 6) + ", " + significant(u.y, 6) + ")");
+    masked.n += group.size();
+    for (std::size_t k = group.begin; k < group.end; ++k) {
+      field[values.order[k]].displacement_um = {};
+      field[values.order[k]].flag = "masked";
+    }
   }
   return masked;
 }
 
-}  // namespace mbtfm::beads
+}  // namespace mbtfm::numerics

@@ -7,7 +7,7 @@
 
 #include "pipeline/contract/geometry.h"
 
-namespace mbtfm::cost {
+namespace mbtfm::report {
 
 /// On an even lattice of x and y, some of whose places may lack.
 struct SpaceMap {
@@ -29,4 +29,4 @@ SpaceMap true_space_map(const std::filesystem::path& cell);
 /// tractions are bilinear; where the map has none they are zero.
 double difference(const SpaceMap& map, const SpaceMap& reference);
 
-}  // namespace mbtfm::cost
+}  // namespace mbtfm::report

@@ -1,4 +1,4 @@
-#include "pipeline/cost/space_map.h"
+#include "pipeline/report/space_map.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/report/space_results.h"
 
-namespace mbtfm::cost {
+namespace mbtfm::report {
 namespace {
 
 constexpr const char* kTruth = "truth/surface_traction.csv";
@@ -72,12 +72,12 @@ class Between {
 }  // namespace
 
 SpaceMap read_space_map(const fs::path& cell) {
-  const report::SpaceResults results = report::read_space_results(cell);
+  const SpaceResults results = read_space_results(cell);
   SpaceMap map;
   map.total_force_nN = results.number("total_force_nN");
   double errors = 0, size = 0;
   bool has_errors = true;
-  for (const report::SurfaceTraction& t : results.tractions) {
+  for (const SurfaceTraction& t : results.tractions) {
     map.at_um.push_back(t.at_um);
     map.traction_kPa.push_back(t.traction_kPa);
     map.area_um2.push_back(t.area_um2);
@@ -122,4 +122,4 @@ double difference(const SpaceMap& map, const SpaceMap& reference) {
   return size > 0 ? std::sqrt(wrong / size) : 0;
 }
 
-}  // namespace mbtfm::cost
+}  // namespace mbtfm::report
