@@ -485,13 +485,13 @@ void add_telling(EnsembleFit& all) {
   const MeshFit& mesh = all.meshes.front();
   const VectorXd leverage = studentized(all.data, mesh.fit.trial, mesh.force_derivatives).leverage;
   const VectorXd residual = weighted_residual(all.data, adhesion_forces_nN(all));
-  double squares = 0;
-  for (Index b = 0; b < leverage.size(); ++b)
-    squares += leverage[b] * all.data.bead_weight[b] * residual.segment<2>(2 * b).squaredNorm();
+  const Eigen::Map<const Eigen::Matrix2Xd> by_bead(residual.data(), 2, leverage.size());
+  const double squares = by_bead.colwise().squaredNorm().dot(leverage);
   const double sum = std::max(leverage.sum(), 1e-300);
   all.misfit.telling_variance = squares / (2 * sum);
   all.misfit.telling_error = leverage.norm() / sum;
-  all.misfit.variance = std::max(all.misfit.variance, all.misfit.telling_variance);
+  if (all.misfit.loss == Loss::squares)  // others weigh such beads down
+    all.misfit.variance = std::max(all.misfit.variance, all.misfit.telling_variance);
 }
 
 /// What adhesions exert beside the network, near a cut and where the network is wrong.

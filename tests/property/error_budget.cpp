@@ -104,8 +104,7 @@ TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
     EXPECT_EQ(parts.substrate, 0);
     EXPECT_LT(parts.solver, 0.2 * parts.beads);  // the fit stops where no bead could tell the difference
   }
-  EXPECT_NEAR(budget.total_force_nN,
-              Eigen::Map<const Eigen::Matrix2Xd>(fit.forces.nN.data(), 2, 16).colwise().norm().sum(), 1e-9);
+  EXPECT_NEAR(budget.total_force_nN, total_nN(adhesion_forces_nN(fit)), 1e-9);
 }
 
 TEST(ErrorBudget, one_mesh_tells_nothing_of_the_mesh) {

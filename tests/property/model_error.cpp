@@ -112,39 +112,36 @@ TEST(ModelError, is_at_least_how_far_one_more_mesh_lies_from_the_mean_of_these) 
   }
 }
 
-/// The error of the total: what the fit makes of forces that are not the model's, less what they are.
+/// Cells whose adhesions exert forces beside the network's, as the law has them.
 TEST(ModelError, of_the_total_force_is_what_it_misses_where_forces_are_not_the_models) {
   Cell cell = test::round_cell(14, 16);
   for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
-  TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.01, 7, {.seed = 5});
-  std::vector<cables::CableNetwork> networks;  // twice the same, and not the cell's: only the misfit tells of errors
-  for (int i = 0; i < 2; ++i) networks.emplace_back(mesh::generate_network(cell, {.seed = 1}).network);
-  const auto fitted = [&](const Eigen::VectorXd& more_nN) {
+  const TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.01, 7, {.seed = 5});
+  std::vector<cables::CableNetwork> networks;
+  for (std::uint64_t seed = 1; seed <= 2; ++seed)
+    networks.emplace_back(mesh::generate_network(cell, {.seed = seed}).network);
+  double z_squared = 0;
+  constexpr unsigned kDraws = 40;
+  for (unsigned seed = 1; seed <= kDraws; ++seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    Eigen::VectorXd forces_nN = scene.forces_nN;
+    for (double& force : forces_nN) force += 0.25 * normal(random);
+    const Eigen::VectorXd moved_um = scene.compliance_um_per_nN * forces_nN;
     DisplacementField beads = scene.beads;
-    const Eigen::VectorXd more_um = scene.compliance_um_per_nN * more_nN;
     for (std::size_t b = 0; b < beads.size(); ++b) {
       const auto row = 2 * static_cast<Eigen::Index>(b);
-      beads[b].displacement_um += Vec2{more_um[row], more_um[row + 1]};
+      const double x = normal(random), y = normal(random);
+      beads[b].displacement_um = Vec2{moved_um[row], moved_um[row + 1]} + beads[b].sigma_um * Vec2{x, y};
     }
-    LinearData data = reduce(beads, scene.compliance_um_per_nN);
-    return fit_ensemble(networks, data, scene.adhesion_ids, {.loss = Loss::squares}, 2);
-  };
-  const Eigen::Index n = scene.compliance_um_per_nN.cols();
-  const EnsembleFit fit = fitted(Eigen::VectorXd::Zero(n));
-  const Eigen::VectorXd along = directions_of(fit.forces.nN);
-  const auto total = [](const EnsembleFit& f) {  // as fitted: roughness is an error of its own, added to that
-    return f.total_force_nN.value - roughness_of_total(f).lacking_nN;
-  };
-  double variance = 0;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const double deviation = std::sqrt(fit.model_error->force_variance_nN2[k]);
-    const EnsembleFit other = fitted(deviation * Eigen::VectorXd::Unit(n, k));
-    variance += std::pow(total(other) - total(fit) - deviation * along[k], 2);
+    const Estimate total = fit_ensemble(networks, reduce(beads, scene.compliance_um_per_nN), scene.adhesion_ids,
+                                        {.loss = Loss::squares}, 2)
+                               .total_force_nN;
+    z_squared += std::pow((total.value - total_nN(forces_nN)) / total.standard_error, 2) / kDraws;
   }
-  // linear about the fit: forces bend by some per cent over a deviation, and fits stop short by a part of the noise
-  const double of_roughness = roughness_of_total(fit).sigma_nN;
-  const double stated = std::sqrt(std::pow(fit.total_force_nN.from_model(), 2) - of_roughness * of_roughness);
-  EXPECT_NEAR(std::sqrt(variance) / stated, 1, 0.15);
+  // forty draws: to 22 %; that of the edge and the links, a tenth of the stated error's square, is not in these
+  EXPECT_LT(z_squared, 1.5);
+  EXPECT_GT(z_squared, 0.2);
 }
 
 /// Forces of which all is scatter but their mean are longer than that by what roughness_of_total() says.
