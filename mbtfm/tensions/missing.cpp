@@ -28,6 +28,16 @@ std::optional<int> fibre_beside(const MissingFibre& missing, const Cell& cell) {
 /// (`other_network wrong`), as fibres of other ends would.
 bool is_sure(const MissingFibre& fibre) { return fibre.chi_squared_gain >= 100; }
 
+/// A fibre that leaves nothing to a segmented one, of which the beads showed a tension, is that fibre seen elsewhere.
+bool takes_over(const EnsembleFit& before, const EnsembleFit& after) {
+  constexpr double kShown = 2;  // standard errors
+  for (std::size_t i = 1; i < before.tensions.nN.size(); ++i) {
+    const Estimate& was = before.tensions.nN[i];
+    if (was.value > kShown * was.standard_error && after.tensions.nN[i].value <= 0) return true;
+  }
+  return false;
+}
+
 /// They lead the list of each.
 bool explains_more(const std::vector<MissingAdhesion>& adhesions, const std::vector<MissingFibre>& fibres) {
   return !adhesions.empty() && (fibres.empty() || adhesions.front().chi_squared_gain > fibres.front().chi_squared_gain);
@@ -54,10 +64,12 @@ WithMissing with_missing(EnsembleFit fit, const network::Ensemble& networks, con
   }
   if (!unseen.empty()) {
     const Trial start = next_start(found.fit);
-    found.fit =
-        fit_ensemble(networks, with_missing_fibres(std::move(found.fit.data), cell.adhesions, unseen, n_of_place),
-                     adhesion_ids_of(cell), parameters, threads, {}, &start);
-    found.adhesions = adhesions_in(found.fit);
+    EnsembleFit with = fit_ensemble(networks, with_missing_fibres(found.fit.data, cell.adhesions, unseen, n_of_place),
+                                    adhesion_ids_of(cell), parameters, threads, {}, &start);
+    if (!takes_over(found.fit, with)) {
+      found.fit = std::move(with);
+      found.adhesions = adhesions_in(found.fit);
+    }
   }
   if (!found.adhesions.empty()) found.fit = with_their_forces(std::move(found.fit), found.adhesions, gel, n_of_place);
   return found;

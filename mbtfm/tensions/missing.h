@@ -13,7 +13,7 @@ namespace mbtfm::tensions {
 
 struct WithMissing {
   EnsembleFit fit;
-  std::vector<MissingFibre> fibres;        ///< only those that are sure and not a segmented one are fitted, too
+  std::vector<MissingFibre> fibres;        ///< those that are sure, and no segmented one, are fitted, too
   std::vector<MissingAdhesion> adhesions;  ///< the total force holds theirs
 };
 
