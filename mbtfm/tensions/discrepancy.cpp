@@ -99,7 +99,8 @@ Discrepancy discrepancy_of(const ReducedData& data, const MeshForces& mean, cons
 
   // The scale converges slowly where one adhesion deviates far more than the others; forces do not change by then.
   const int n_rounds = C.cols() <= 1000 ? 10 : 4;
-  Discrepancy found{.share_nN = {}, .scale_nN = std::max(error.measured_phi_nN, 0.05 * error.least_phi_nN), .forces = {}};
+  Discrepancy found{
+      .share_nN = {}, .scale_nN = std::max(error.measured_phi_nN, 0.05 * error.least_phi_nN), .forces = {}};
   found.share_nN = VectorXd::Constant(n, found.scale_nN);
   const auto posterior = [&] {
     return Posterior(beyond, by_component(found.share_nN).cwiseProduct(loads), sums, threads);

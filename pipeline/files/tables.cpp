@@ -199,16 +199,16 @@ Table<Reaction> reaction_table() {
 Table<MissingFibre> missing_fibre_table() {
   return {.file = "4_fit/missing_fibres.csv",
           .row = "each fibre that was not segmented and that the beads call for (`mbtfm-add-fibres` adds them)",
-          .columns = {{"start_adhesion_id", "adhesion at one end", &MissingFibre::start_adhesion_id, kId},
-                      {"end_adhesion_id", "adhesion at the other end", &MissingFibre::end_adhesion_id, kId},
-                      {"tension_nN", "its tension", &MissingFibre::tension_nN, kResultMayLack},
-                      {"chi_squared_gain", "how much less misfit it leaves, in units of the noise",
-                       &MissingFibre::chi_squared_gain, kResultMayLack},
-                      {"sigma_nN", "standard error of the tension", [](const MissingFibre& f) { return sigma_nN(f); },
-                       kResult},
-                      {"beside_fibre_id",
-                       "the segmented fibre whose ends lie beside these adhesions, where they should be; empty: none",
-                       &MissingFibre::beside_fibre_id, kResultMayLack}}};
+          .columns = {
+              {"start_adhesion_id", "adhesion at one end", &MissingFibre::start_adhesion_id, kId},
+              {"end_adhesion_id", "adhesion at the other end", &MissingFibre::end_adhesion_id, kId},
+              {"tension_nN", "its tension", &MissingFibre::tension_nN, kResultMayLack},
+              {"chi_squared_gain", "how much less misfit it leaves, in units of the noise",
+               &MissingFibre::chi_squared_gain, kResultMayLack},
+              {"sigma_nN", "standard error of the tension", [](const MissingFibre& f) { return sigma_nN(f); }, kResult},
+              {"beside_fibre_id",
+               "the segmented fibre whose ends lie beside these adhesions, where they should be; empty: none",
+               &MissingFibre::beside_fibre_id, kResultMayLack}}};
 }
 
 Table<MissingAdhesion> missing_adhesion_table() {
