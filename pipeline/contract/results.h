@@ -41,7 +41,7 @@ struct GroundPatch {
 struct MissingFibre {
   int start_adhesion_id = 0, end_adhesion_id = 0;
   double tension_nN = 0;
-  double chi_squared_gain = 0;  ///< the other tensions following, in units of the noise
+  double chi_squared_gain = 0;           ///< the other tensions following, in units of the noise
   std::optional<int> beside_fibre_id{};  ///< a segmented fibre that ends beside these adhesions; none: another
 };
 double sigma_nN(const MissingFibre& fibre);
