@@ -28,6 +28,9 @@ std::optional<int> fibre_beside(const MissingFibre& missing, const Cell& cell) {
 /// (`other_network wrong`), as fibres of other ends would.
 bool is_sure(const MissingFibre& fibre) { return fibre.chi_squared_gain >= 100; }
 
+/// Five standard errors, as chance has of a place in one cell of a hundred.
+bool is_sure(const MissingAdhesion& adhesion) { return adhesion.chi_squared_gain >= 25; }
+
 /// A fibre that leaves nothing to a segmented one, of which the beads showed a tension, is that fibre seen elsewhere.
 bool takes_over(const EnsembleFit& before, const EnsembleFit& after) {
   constexpr double kShown = 2;  // standard errors
@@ -71,7 +74,12 @@ WithMissing with_missing(EnsembleFit fit, const network::Ensemble& networks, con
       found.adhesions = adhesions_in(found.fit);
     }
   }
-  if (!found.adhesions.empty()) found.fit = with_their_forces(std::move(found.fit), found.adhesions, gel, n_of_place);
+  // What the adhesions' own forces explain as well is no cause.
+  for (bool has_changed = true; has_changed && !found.adhesions.empty();) {
+    EnsembleFit with = with_their_forces(found.fit, found.adhesions, gel, n_of_place);
+    has_changed = std::erase_if(found.adhesions, [](const MissingAdhesion& a) { return !is_sure(a); }) > 0;
+    if (!has_changed) found.fit = std::move(with);
+  }
   return found;
 }
 

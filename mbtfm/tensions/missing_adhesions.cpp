@@ -207,6 +207,7 @@ EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& pla
     const Eigen::Vector2d force = values.segment<2>(first + 2 * static_cast<Index>(k)),
                           sigma = errors.segment<2>(first + 2 * static_cast<Index>(k));
     places[k].force_nN = {force.x(), force.y()};
+    places[k].chi_squared_gain = force.cwiseQuotient(sigma).squaredNorm();
     const double along = force.normalized().cwiseProduct(sigma).norm();
     fit.forces.away_nN2 += along * along;
     fit.total_force_nN.value += force.norm() - std::min(force.norm(), along * along / (2 * force.norm()));

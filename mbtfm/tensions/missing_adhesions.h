@@ -19,7 +19,7 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
                                                const Gel& gel, int threads);
 
 /// The fit of a cell that pulls at these places, too: the adhesions' forces beside theirs, and the total with them.
-/// @param places  their forces become what the fit finds
+/// @param places  their forces and gains become what the fit finds
 /// @param n_last  motions of the data that stay the last ones
 EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& places, const Gel& gel, Index n_last);
 

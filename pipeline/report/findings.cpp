@@ -111,10 +111,9 @@ std::string explained_by_network(const FitSummary& fit) {
   const auto share = figure_of(fit, "network_explains"), beside_nN = figure_of(fit, "force_beside_network_nN");
   if (!share || !beside_nN || *beside_nN <= 0) return "";
   return fmt::format(
-      " The network explains {} of the adhesions' forces (squares). Beside it the beads show {} nN at an adhesion "
-      "(root "
-      "mean square), which the forces in the tables hold.",
-      percent(std::max(0.0, *share)), two_digits(*beside_nN));
+      " Beside what the network gives, the beads show {} nN at an adhesion (root mean square, {} of the forces). The "
+      "forces in the tables hold it.",
+      two_digits(*beside_nN), percent(std::sqrt(std::clamp(1 - *share, 0.0, 1.0))));
 }
 
 /// The displacement that the model explains, against what the noise would allow.

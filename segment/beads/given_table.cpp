@@ -491,20 +491,21 @@ void make_vectors_of_spots(ForeignTable& table, const TrackParameters& parameter
   std::vector<std::string> numbers;
   for (std::size_t i = 0; i < table.rows.front().fields.size(); ++i) numbers.push_back(std::to_string(i + 1));
   const CsvTable spots(numbers, table.rows, name);
+  const auto named = [](std::size_t i) { return std::to_string(i + 1); };  // which this row may lack
   struct Track {
     int line = 0;
     std::vector<Vec2> relaxed, stressed;
   };
   std::map<std::string, Track> tracks;
   for (int row = 0; row < spots.n_rows(); ++row) {
-    const std::string id = spots.text(row, numbers[track]);
+    const std::string id = spots.text(row, named(track));
     if (files::is_missing(id)) continue;
-    const double at = spots.number(row, numbers[frame], Range::not_negative()) + 1;
+    const double at = spots.number(row, named(frame), Range::not_negative()) + 1;
     if (at != *relaxed && at != *stressed) continue;
     Track& found = tracks[id];
     found.line = table.rows[static_cast<std::size_t>(row)].line;
     (at == *relaxed ? found.relaxed : found.stressed)
-        .push_back({spots.number(row, numbers[x]), spots.number(row, numbers[y])});
+        .push_back({spots.number(row, named(x)), spots.number(row, named(y))});
   }
   table.rows.clear();
   const double scale = unit && unit->um > 0 ? unit->um : 1;  // to um
