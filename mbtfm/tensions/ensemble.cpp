@@ -517,7 +517,6 @@ void add_variances(EnsembleFit& all, bool is_cut) {
   if (!all.model_error->is_told) return;
   const Discrepancy beside = add_discrepancy(all, *all.model_error, is_cut);
   all.model_error = with_discrepancy(std::move(*all.model_error), beside);
-  add_telling(all);
 }
 
 void check_networks(const network::Ensemble& networks) {
@@ -555,6 +554,7 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   add_means(all);
   all.forces.own = own_forces_in(all.data);
   add_variances(all, networks.front().is_cut());
+  add_telling(all);
   numerics::parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[m], all); });
   all.tensions.network_bias =
       network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data.reduced, adhesion_ids), threads);

@@ -247,6 +247,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   if (n_pairs < 1) return {};
   const double limit = numerics::normal_quantile(1 - 0.01 / n_pairs);
   const MeshFit& mesh = fit.meshes.front();
+  const double variance = fit.model_error ? fit.model_error->noise_variance : fit.misfit.variance;
   ReducedData data = fit.data.reduced;
   if (fit.model_error) {
     ModelError error = *fit.model_error;
@@ -281,7 +282,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
         const double slope = e.dot(q.segment<2>(i) - q.segment<2>(j));
         const double curvature = e.dot((own[a] + own[b]) * e) - 2 * e.dot(K.block<2, 2>(i, j - first) * e);
         if (slope <= 0 || curvature <= 0) continue;
-        const double gain = slope * slope / curvature / fit.misfit.variance;
+        const double gain = slope * slope / curvature / variance;
         if (gain < limit * limit) continue;
         found.push_back({.start_adhesion_id = adhesions[a].adhesion_id,
                          .end_adhesion_id = adhesions[b].adhesion_id,
@@ -317,8 +318,8 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   const FibresTogether together(std::move(places_um),
                                 (numerics::small_transposed_product(C_there, C_there) -
                                  numerics::small_transposed_product(explained_there, explained_there)) /
-                                    fit.misfit.variance,
-                                q(components) / fit.misfit.variance);
+                                    variance,
+                                q(components) / variance);
   FibresTogether::Told told = together.with_best_partners(std::move(pairs));
   const auto gains = [&] { return VectorXd(told.tension_nN.cwiseQuotient(told.sigma_nN).cwiseAbs2()); };
   for (Index least = 0; !told.pairs.empty() && gains().minCoeff(&least) < limit * limit;) {

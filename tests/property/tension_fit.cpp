@@ -522,7 +522,7 @@ TEST(ModelChecks, fewer_fibres_are_called_for_at_strong_adhesions_where_errors_o
   const SegmentationErrors stated{.adhesion_shift_error_um = 0.05, .adhesion_area_error = 0.2};  // of poor images
   std::size_t n_told = 0, n_if_exact = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 60, 80, 100), 3000, 0.002, seed);
+    TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 30, 40, 50), 3000, 0.002, seed);
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
     Cell seen = cell;
