@@ -519,9 +519,9 @@ TEST(ModelChecks, missing_fibres_that_cross_have_their_own_ends) {
 TEST(ModelChecks, fewer_fibres_are_called_for_at_strong_adhesions_where_errors_of_the_segmentation_are_counted) {
   Cell cell = test::round_cell(15, 16);
   for (const auto& [a, b] : {std::pair{1, 7}, {3, 12}, {5, 14}}) test::add_ventral(cell, a, b);
-  const SegmentationErrors stated{.adhesion_shift_error_um = 0.05, .adhesion_area_error = 0.2};  // of poor images
+  const SegmentationErrors stated{.adhesion_shift_error_um = 0.05, .adhesion_area_error = 0.3};  // of poor images
   std::size_t n_told = 0, n_if_exact = 0;
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 16; ++seed) {
     TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 30, 40, 50), 3000, 0.002, seed);
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
