@@ -1,5 +1,5 @@
-/// What the beads call for and the segmentation has not: fibres and adhesions compete, the cause that explains most
-/// comes first, and it becomes part of the fit. Others would have its force otherwise.
+/// Fibres and adhesions that the beads show and the segmentation misses. The one that explains most comes first, and
+/// becomes part of the fit: otherwise the others would get its force.
 #pragma once
 
 #include <vector>
