@@ -187,6 +187,9 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   declare_tension(list, p.tension);
   list.add("simulation_edge_length_um", p.mechanics.simulation_edge_length_um, Range::mesh_um(),
            "mean cable length of the simulation's network (um)");
+  list.add("simulation_network", p.mechanics.simulation_network,
+           "links of the simulation's network: to second neighbours as a reconstruction has them, or along edges only, "
+           "with adhesions held all over, at their rims or at their centres");
   list.add("simulation_material", p.mechanics.simulation_material,
            "law of the gel in the simulation: linear, or neo-hooke, whatever the strains are");
   declare_microscope(list, p.microscope);

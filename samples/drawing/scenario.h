@@ -91,9 +91,15 @@ struct TensionParameters {
   double surface_tension_nN_per_um = std::sqrt(3.0) * 0.06 / 1.5;
 };
 
+/// What a simulated cell's network is made of: links to second neighbours, as the reconstruction's, or along the edges
+/// of the triangles alone, adhesions held all over, at their rims or at their centres.
+enum class TrueNetwork { second_neighbours, edges, edges_rims, edges_centres };
+constexpr auto words(TrueNetwork) { return std::array{"second-neighbours", "edges", "edges-rims", "edges-centres"}; }
+
 /// The simulation's own mechanics, finer than what a reconstruction uses.
 struct MechanicsParameters {
   double simulation_edge_length_um = 0.9;  ///< of its network: well below the 1.5 um of a reconstruction
+  TrueNetwork simulation_network = TrueNetwork::second_neighbours;
   MaterialLaw simulation_material = MaterialLaw::linear;
 };
 

@@ -26,10 +26,22 @@ constexpr std::uint64_t kFirstSimulationSeed = 0x73696d00;
 /// So that the noise of beads beyond the field is not that of those in it.
 constexpr std::uint64_t kBeyond = 0x62657900;
 
+mesh::NetworkParameters formulation(drawing::TrueNetwork network) {
+  using enum drawing::TrueNetwork;
+  mesh::NetworkParameters p;
+  if (network != second_neighbours) p.link_reach = mesh::LinkReach::neighbours;
+  if (network == edges_centres) p.adhesion_anchor = mesh::AdhesionAnchor::centre;
+  if (network == edges_rims) {
+    p.adhesion_anchor = mesh::AdhesionAnchor::rim;
+    p.rim_points = 12;
+  }
+  return p;
+}
+
 /// The simulation's network. The width of material that a cable stands for is counted in cables of the reference mesh:
 /// tension and stiffness by width are then those of the cell, whatever the mesh.
 Network span(const Cell& cell, const drawing::ScenarioParameters& p) {
-  mesh::NetworkParameters parameters;
+  mesh::NetworkParameters parameters = formulation(p.mechanics.simulation_network);
   parameters.edge_length_um = p.mechanics.simulation_edge_length_um;
   parameters.seed = kFirstSimulationSeed + p.seed;
   mesh::GeneratedNetwork generated = mesh::generate_network(cell, parameters);
