@@ -1,5 +1,6 @@
 #include "mbtfm/tensions/energy.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -32,6 +33,33 @@ VectorXd mean_displacement_um(const std::vector<substrate::Ellipse>& ellipses, c
       mean.segment<2>(2 * a) += p.weight * at_points.segment<2>(2 * point++);
   }
   return mean;
+}
+
+/// Mean of what the forces make of the beads on an adhesion, or of the four nearest.
+Eigen::Vector2d shown_by_beads_um(const LinearData& data, const VectorXd& moved_um, const Adhesion& adhesion) {
+  constexpr Index kNearest = 4;
+  std::vector<std::pair<double, Index>> by_distance;
+  for (Index i = 0; i < std::ssize(data.position_um); ++i)
+    by_distance.emplace_back(norm(data.position_um[i] - adhesion.position_um), i);
+  std::ranges::sort(by_distance);
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  Index n = 0;
+  for (; n < std::ssize(by_distance); ++n) {
+    if (n >= kNearest && by_distance[n].first > adhesion.major_axis_um / 2) break;
+    sum += moved_um.segment<2>(2 * by_distance[n].second);
+  }
+  return sum / static_cast<double>(n);
+}
+
+VectorXd displacement_under_um(const EnsembleFit& fit, const Cell& cell, const VectorXd& forces_nN, const Gel& gel,
+                               int threads) {
+  VectorXd under = mean_displacement_um(substrate::ellipses_of(cell.adhesions), forces_nN, gel, threads);
+  const auto assumed = [](const Adhesion& a) { return is_assumed(a.origin); };
+  if (std::ranges::none_of(cell.adhesions, assumed) || fit.data.position_um.empty()) return under;
+  const VectorXd moved_um = moved_by(fit.data, forces_nN);
+  for (Index a = 0; a < std::ssize(cell.adhesions); ++a)
+    if (assumed(cell.adhesions[a])) under.segment<2>(2 * a) = shown_by_beads_um(fit.data, moved_um, cell.adhesions[a]);
+  return under;
 }
 
 /// Of a number that changes by `gradient` with the forces.
@@ -74,7 +102,7 @@ Figures energy_and_moments(const EnsembleFit& fit, const Cell& cell, const Gel& 
   const VectorXd forces_nN = adhesion_forces_nN(fit);
   Figures figures;
   if (is_even_gel) {
-    const VectorXd displacement_um = mean_displacement_um(ellipses, forces_nN, gel, threads);
+    const VectorXd displacement_um = displacement_under_um(fit, cell, forces_nN, gel, threads);
     figures = {{"strain_energy_fJ", 0.5 * forces_nN.dot(displacement_um)},
                {"strain_energy_sigma_fJ", standard_error(fit, displacement_um)}};
   }

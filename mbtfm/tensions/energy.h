@@ -11,7 +11,9 @@ struct EnsembleFit;
 
 /// Figures of fit.json, each with its standard error:
 ///
-///   strain_energy_fJ         ½ Σ F · u, u the mean displacement under an adhesion
+///   strain_energy_fJ         ½ Σ F · u, u the mean displacement under an adhesion. Of an adhesion that nobody has seen
+///                            (an anchor, a candidate) the size is assumed, and half of this energy with it: there u is
+///                            that of the beads on it, or of the nearest four. A tighter load has more, unseen
 ///   contractile_moment_nN_um −tr P, P = Σ x Fᵀ symmetrised, about the adhesions' centre: positive where the cell
 ///                            contracts; its two parts along the axes of P, and the angle of the larger one
 ///

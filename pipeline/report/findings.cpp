@@ -150,11 +150,15 @@ std::string with_error(double value, double sigma, const char* unit) {
 }
 
 /// Empty for results of a version that did not compute them.
-std::string energy_and_moment(const FitSummary& fit) {
+std::string energy_and_moment(const CellResults& results) {
+  const FitSummary& fit = results.fit;
   std::string text;
   const auto energy = figure_of(fit, "strain_energy_fJ"), energy_sigma = figure_of(fit, "strain_energy_sigma_fJ");
   if (energy && energy_sigma)
     text += "The forces have put " + with_error(*energy, *energy_sigma, "fJ") + " of strain energy into the gel. ";
+  if (energy && std::ranges::any_of(results.cell.adhesions, [](const Adhesion& a) { return is_assumed(a.origin); }))
+    text +=
+        "At assumed adhesions it is the energy that the nearest beads show; a force on a smaller area stores more. ";
   const auto moment = figure_of(fit, "contractile_moment_nN_um"),
              moment_sigma = figure_of(fit, "contractile_moment_sigma_nN_um"),
              major = figure_of(fit, "contractile_moment_major_nN_um"),
@@ -250,7 +254,7 @@ bool was_asked(const Provenance& provenance) {
 
 std::vector<std::string> facts_of(const CellResults& results) {
   std::vector<std::string> facts = {what(results)};
-  if (const std::string text = energy_and_moment(results.fit); !text.empty()) facts.push_back(text);
+  if (const std::string text = energy_and_moment(results); !text.empty()) facts.push_back(text);
   if (results.comparison) facts.push_back(truth(results));
   facts.push_back(quality(results.fit));
   return facts;

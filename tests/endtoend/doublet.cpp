@@ -6,6 +6,7 @@
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/report/results.h"
 #include "segment/images/image.h"
 #include "segment/rois/roi.h"
 #include "tests/support/folders.h"
@@ -72,27 +73,6 @@ struct Answer {
   test::Outcome outcome;
 };
 
-/// Half the work of the forces along the displacement beneath them: of the beads about a candidate, under load as it
-/// is.
-double strain_energy_pJ(const Cell& cell, const std::vector<AdhesionForce>& forces, const DisplacementField& field) {
-  std::map<int, Vec2> place;
-  for (const Adhesion& a : cell.adhesions) place[a.adhesion_id] = a.position_um;
-  double energy_fJ = 0;  // nN um
-  for (const AdhesionForce& f : forces) {
-    Vec2 sum;
-    double weights = 0;
-    for (const Bead& b : field) {
-      if (!b.flag.empty()) continue;
-      const Vec2 d = b.position_um + b.displacement_um - place[f.adhesion_id];
-      const double weight = std::exp(-dot(d, d) / 2);  // over a micrometre
-      sum += weight * b.displacement_um;
-      weights += weight;
-    }
-    if (weights > 0) energy_fJ += 0.5 / weights * dot(f.force_nN, sum);
-  }
-  return energy_fJ / 1000;
-}
-
 Answer run(Fibres fibres, Outline outline, double thickness_um = 60) {
   const test::TemporaryFolder folder;
   const fs::path cell = folder / "doublet";
@@ -127,7 +107,7 @@ Answer run(Fibres fibres, Outline outline, double thickness_um = 60) {
   for (const Bead& b : field)
     if (b.flag.empty())
       answer.largest_displacement_um = std::max(answer.largest_displacement_um, norm(b.displacement_um));
-  answer.strain_energy_pJ = strain_energy_pJ(answer.cell, forces, field);
+  answer.strain_energy_pJ = report::figure_of(answer.fit, "strain_energy_fJ").value_or(0) / 1000;
   return answer;
 }
 

@@ -103,6 +103,35 @@ TEST(StrainEnergy, of_discs_far_apart_is_that_of_each_by_itself) {
   EXPECT_NEAR(std::remainder(figure(found, "contractile_moment_axis_deg"), 180), 0, 1e-9);
 }
 
+/// Nobody has seen how large an assumed adhesion is: a smaller disc has more energy, of which no bead knows.
+TEST(StrainEnergy, at_assumed_adhesions_is_what_the_beads_show) {
+  Cell cell;
+  DisplacementField beads;
+  std::vector<substrate::Ellipse> discs;
+  for (const double x : {-20.0, 20.0}) {
+    cell.adhesions.push_back({.adhesion_id = static_cast<int>(cell.adhesions.size()) + 1,
+                              .position_um = {x, 0},
+                              .area_um2 = 1,
+                              .major_axis_um = 1.1,
+                              .minor_axis_um = 1.1,
+                              .origin = AdhesionOrigin::candidate});
+    for (const Vec2 d : {Vec2{2, 0}, Vec2{-2, 0}, Vec2{0, 2}, Vec2{0, -2}, Vec2{5, 5}})
+      beads.push_back({.position_um = Vec2{x, 0} + d, .sigma_um = 0.01});
+  }
+  Eigen::MatrixXd compliance = Eigen::MatrixXd::Zero(20, 4);  // each adhesion moves the beads about it, by their order
+  for (int a = 0; a < 2; ++a)
+    for (int i = 0; i < 5; ++i)
+      compliance(10 * a + 2 * i, 2 * a) = compliance(10 * a + 2 * i + 1, 2 * a + 1) = 0.1 * (i + 1);
+  EnsembleFit fit;
+  fit.data = reduce(beads, compliance);
+  fit.forces.nN = Eigen::Vector4d(3, 0, -3, 0);
+  fit.meshes.emplace_back();
+  fit.meshes[0].force_derivatives = Eigen::Vector4d(1, 0, -1, 0);
+  fit.meshes[0].noise_covariance_nN2 = Eigen::MatrixXd::Constant(1, 1, 0.01);
+  const Figures found = energy_and_moments(fit, cell, {.youngs_modulus_kPa = 8.4}, true, 1);
+  EXPECT_NEAR(figure(found, "strain_energy_fJ"), 0.5 * 2 * 3 * 3 * 0.25, 1e-12);  // mean of .1 to .4 um/nN
+}
+
 TEST(ContractileMoment, follows_a_cell_that_is_turned) {
   constexpr double kAngle = 0.4;
   const Eigen::Rotation2Dd turn(kAngle);
