@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "mbtfm/sheets/beside_fibres.h"
+#include "mbtfm/tensions/evidence.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::fit {
@@ -69,20 +70,24 @@ ModelChecks check_model(const ReadyCell& cell, const EnsembleFit& fit, const Par
                      .missing_adhesions = {},
                      .drawn = cross_validation_of(cell, fit, p.fit.cross_validation, threads)};
   checks.left_out = leave_each_fibre_out(fit, checks.influence);
-  if (!is_sheet_asked(p.compare_sheet, checks.models, fit)) return checks;
-  std::vector<Polygon> outline = {of.outline_um};
-  outline.insert(outline.end(), of.holes_um.begin(), of.holes_um.end());
-  if (auto sheet = sheets::score_of_sheet(data, outline, p.gel, *cell.gel, threads))
-    checks.models.push_back(std::move(*sheet));
+  if (is_sheet_asked(p.compare_sheet, checks.models, fit)) {
+    std::vector<Polygon> outline = {of.outline_um};
+    outline.insert(outline.end(), of.holes_um.begin(), of.holes_um.end());
+    if (auto sheet = sheets::score_of_sheet(data, outline, p.gel, *cell.gel, threads))
+      checks.models.push_back(std::move(*sheet));
+  }
+  weigh_with_discrepancy(checks.models, data);
   return checks;
 }
 
 Figures figures_of(const ModelChecks& checks, const EnsembleFit& fit) {
-  const auto best = std::ranges::min_element(checks.models, {}, &ModelScore::bic);
+  const auto best = std::ranges::min_element(checks.models, {}, &ModelScore::bic_with_discrepancy);
   std::vector<std::int64_t> unsupported;
   for (const FibreLeftOut& f : checks.left_out)
     if (f.aic_rise <= 0) unsupported.push_back(f.fibre_id);
+  const auto cables = std::ranges::find(checks.models, "full", &ModelScore::name);
   return {{"best_model_by_bic", best->name},
+          {"bic_of_cables_over_best", cables->bic_with_discrepancy - best->bic_with_discrepancy},
           {"fibres_not_told_apart", names_of_groups(fit)},
           {"fibres_without_support", unsupported},
           {"n_missing_fibres_hinted", std::int64_t(checks.missing_fibres.size())}};

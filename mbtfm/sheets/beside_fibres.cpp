@@ -66,8 +66,10 @@ std::optional<tensions::ModelScore> score_of_sheet(const tensions::LinearData& d
   const double misfit =
       (tensions::displace(of_sheet.reduced, fit.node_amplitudes) - of_sheet.reduced.target).squaredNorm() +
       of_sheet.reduced.floor_squared;
-  return tensions::score_of("sheet", kParameters, misfit / tensions::noise_variance(data),
-                            tensions::relative_l2(of_sheet, fit.node_amplitudes), data);
+  tensions::ModelScore score = tensions::score_of("sheet", kParameters, misfit / tensions::noise_variance(data),
+                                                  tensions::relative_l2(of_sheet, fit.node_amplitudes), data);
+  score.left_um = data.displacement_um - of_sheet.response->displace(fit.node_amplitudes);
+  return score;
 }
 
 }  // namespace mbtfm::sheets

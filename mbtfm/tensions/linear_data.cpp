@@ -76,11 +76,6 @@ MatrixXd explained_by(const LinearData& data, const VectorXd& weight, const Matr
   return data.response->pull_back(weight.asDiagonal() * unit);
 }
 
-struct Explained {
-  VectorXd target;           ///< y = C⁻ᵀ Gᵀ W² P u
-  double floor_squared = 0;  ///< uᵀ W² P u − |y|², Λ included
-};
-
 /// @param root  C
 Explained explained(const LinearData& data, const VectorXd& weight, const MatrixXd& root, const VectorXd& u) {
   const VectorXd weighted = weight.cwiseProduct(less_motion(data, u));
@@ -297,8 +292,8 @@ double total_nN(const VectorXd& forces_nN) {
   return sum;
 }
 
-double floor_squared_of(const LinearData& data, const VectorXd& displacement_um) {
-  return explained(data, squared_weights(data), *data.reduced.compliance, displacement_um).floor_squared;
+Explained explained(const LinearData& data, const VectorXd& displacement_um) {
+  return explained(data, squared_weights(data), *data.reduced.compliance, displacement_um);
 }
 
 double noise_variance(const LinearData& data) {

@@ -136,8 +136,13 @@ double total_nN(const VectorXd& forces_nN);
 /// residual_um, times W: 2·beads
 VectorXd weighted_residual(const LinearData& data, const VectorXd& forces_nN);
 
-/// What no force explains of these displacements (um, 2·beads) in place of the data's: reduced.floor_squared of them.
-double floor_squared_of(const LinearData& data, const VectorXd& displacement_um);
+/// What forces make of these displacements (um, 2·beads) in place of the data's: target and floor_squared of them as
+/// `reduced` has them.
+struct Explained {
+  VectorXd target;           ///< y = C⁻ᵀ Gᵀ W² P u
+  double floor_squared = 0;  ///< uᵀ W² P u − |y|², Λ included
+};
+Explained explained(const LinearData& data, const VectorXd& displacement_um);
 
 /// Variance of a weighted component that is the beads' alone: what even forces independent of each other leave. Not
 /// below the stated errors'.
@@ -149,9 +154,12 @@ struct ModelScore {
   std::string name;
   int n_parameters = 0;
   double chi_squared = 0, relative_l2 = 0;
-  double aic = 0;           ///< chi² + 2 k
-  double bic = 0;           ///< chi² + k ln n
+  double aic = 0;  ///< chi² + 2 k
+  double bic = 0;  ///< chi² + k ln n
+  /// BIC where the model's own error is allowed for, and its size by component of a force: see evidence.h
+  double bic_with_discrepancy = 0, discrepancy_nN = 0;
   VectorXd forces_nN = {};  ///< by adhesion: fx, fy
+  VectorXd left_um = {};    ///< of the beads' displacement; empty: all of it, as each force is an error of its own
 };
 /// @param chi_squared  of the data
 ModelScore score_of(const std::string& name, Index n_parameters, double chi_squared, double relative_l2,

@@ -112,12 +112,16 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
   const VectorXd uniform = best_uniform_nN(TensionProblem(first_network, reduced, adhesion_ids));
   const auto scored = [&](const char* name, Index n_parameters, double left, const VectorXd& forces_nN) {
     ModelScore model = score_of(name, n_parameters, left / variance, relative_l2(data, forces_nN), data);
+    model.left_um = data.displacement_um - data.response->displace(forces_nN);
     model.forces_nN = forces_nN;
     return model;
   };
-  return {scored("no-fibres", 1, misfit(uniform), uniform),
-          scored("full", std::ssize(fit.tensions.fibre_ids), misfit(fit.forces.nN), fit.forces.nN),
-          scored("adhesion-forces", reduced.n_felt, reduced.floor_squared, free_forces_nN(reduced))};
+  std::vector<ModelScore> models = {
+      scored("no-fibres", 1, misfit(uniform), uniform),
+      scored("full", std::ssize(fit.tensions.fibre_ids), misfit(fit.forces.nN), fit.forces.nN),
+      scored("adhesion-forces", reduced.n_felt, reduced.floor_squared, free_forces_nN(reduced))};
+  models.back().left_um.resize(0);
+  return models;
 }
 
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence) {

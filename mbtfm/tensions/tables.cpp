@@ -98,7 +98,11 @@ Table<ModelScore> model_table() {
                       {"chi_squared", "misfit in units of the noise", &Row::chi_squared, kResult},
                       {"relative_l2", "‖measured − model‖ / ‖measured‖", &Row::relative_l2, kResult},
                       {"aic", "Akaike's criterion", &Row::aic, kResult},
-                      {"bic", "the Bayesian criterion", &Row::bic, kResult}}};
+                      {"bic", "the Bayesian criterion", &Row::bic, kResult},
+                      {"discrepancy_nN", "error of the model: standard deviation of a force's component beside it",
+                       &Row::discrepancy_nN, kResult},
+                      {"bic_with_discrepancy", "the Bayesian criterion if that error is allowed for",
+                       &Row::bic_with_discrepancy, kResult}}};
 }
 
 Table<FibreLeftOut> fibre_left_out_table() {

@@ -55,7 +55,7 @@ BeadsOfState take_state(const DisplacementField& at_rest, LinearData data,
   }
   if (setting == Switch::automatic && carried) {  // the exact answer costs as much as all that went before
     const VectorXd there = result.data.displacement_um - carried(result.data);
-    const double estimate = evidence_of(result.data, result.data.reduced, floor_squared_of(result.data, there));
+    const double estimate = evidence_of(result.data, result.data.reduced, explained(result.data, there).floor_squared);
     if (estimate < kHopeless) {
       result.effect = stage::decided(
           kKind, setting, estimate, kHopeless,

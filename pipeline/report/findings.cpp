@@ -116,6 +116,25 @@ std::string explained_by_network(const FitSummary& fit) {
       two_digits(*beside_nN), percent(std::sqrt(std::clamp(1 - *share, 0.0, 1.0))));
 }
 
+/// Empty where the beads call for the cables.
+std::string another_model(const FitSummary& fit) {
+  const auto over = figure_of(fit, "bic_of_cables_over_best");
+  if (!over || *over <= 0) return "";
+  const auto best = std::ranges::find(fit.more, "best_model_by_bic", &Figures::value_type::first);
+  const auto* name = best == fit.more.end() ? nullptr : std::get_if<std::string>(&best->second);
+  if (name == nullptr) return "";
+  const char* model = *name == "no-fibres" ? "a network without fibres"
+                      : *name == "sheet"   ? "a sheet that contracts evenly"
+                                           : "forces of the adhesions that no network joins";
+  return fmt::format(
+      "The beads prefer another model to a network with these fibres: {} (by {:.0f} in BIC, with each model's own "
+      "error "
+      "allowed for). The tensions are those of a model that is less likely. The forces of the adhesions follow the "
+      "beads "
+      "and change little.",
+      model, *over);
+}
+
 /// The displacement that the model explains, against what the noise would allow.
 std::string quality(const FitSummary& fit) {
   if (!(fit.expected_relative_l2 > 0))
@@ -253,7 +272,9 @@ bool was_asked(const Provenance& provenance) {
 }  // namespace
 
 std::vector<std::string> facts_of(const CellResults& results) {
-  std::vector<std::string> facts = {what(results)};
+  std::vector<std::string> facts;
+  if (std::string text = another_model(results.fit); !text.empty()) facts.push_back(std::move(text));
+  facts.push_back(what(results));
   if (const std::string text = energy_and_moment(results); !text.empty()) facts.push_back(text);
   if (results.comparison) facts.push_back(truth(results));
   facts.push_back(quality(results.fit));

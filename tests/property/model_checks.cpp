@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <random>
+
+#include "mbtfm/tensions/evidence.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::tensions {
@@ -74,6 +78,60 @@ TEST(ModelScores, BIC_finds_a_fibre_that_pulls_once_the_beads_are_many) {
     n_found += models[1].bic < models[0].bic && models[1].bic < models[2].bic;
   }
   EXPECT_EQ(n_found, 10);
+}
+
+/// The density of what the models leave, written out: no identity of Woodbury or Sylvester, no reduction.
+double minus_two_log(const test::TensionScene& scene, const Eigen::MatrixXd& G, const Eigen::VectorXd& left_um,
+                     double tau_nN) {
+  const Eigen::VectorXd left = scene.data.weight_per_um.cwiseProduct(left_um);
+  const Eigen::MatrixXd weighted = scene.data.weight_per_um.asDiagonal() * G;
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(left.size(), left.size()),
+                        covariance =
+                            one * noise_variance(scene.data) + tau_nN * tau_nN * weighted * weighted.transpose();
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
+  const double log_noise = std::log(noise_variance(scene.data)) * static_cast<double>(left.size());
+  return left.dot(root.solve(left)) + 2 * root.matrixLLT().diagonal().array().log().sum() - log_noise;
+}
+
+TEST(ModelScores, with_discrepancy_are_the_normal_density_of_what_a_model_leaves) {
+  test::TensionScene scene = one_fibre(2, 60);
+  std::vector<ModelScore> models = scores(scene);
+  weigh_with_discrepancy(models, scene.data);
+  const Eigen::MatrixXd G = scene.data.response->displace(
+      Eigen::MatrixXd::Identity(scene.data.response->cols(), scene.data.response->cols()));
+  for (const ModelScore& m : models) {
+    const bool is_free = m.left_um.size() == 0;
+    const double price = is_free ? 0 : m.n_parameters * std::log(120.0);
+    const Eigen::VectorXd& left_um = is_free ? scene.data.displacement_um : m.left_um;
+    const auto score = [&](double tau_nN) { return minus_two_log(scene, G, left_um, tau_nN) + price; };
+    const double tolerance = 1e-9 * std::abs(m.bic_with_discrepancy);
+    EXPECT_NEAR(m.bic_with_discrepancy, score(m.discrepancy_nN), tolerance) << m.name;
+    for (const double factor : {0.5, 2.0})
+      EXPECT_LE(m.bic_with_discrepancy, score(factor * m.discrepancy_nN) + tolerance);
+  }
+}
+
+TEST(ModelScores, with_discrepancy_prefer_cables_that_are_somewhat_wrong_and_not_those_that_know_nothing) {
+  test::TensionScene scene = one_fibre(2, 2000);
+  const Eigen::VectorXd exact_um = scene.data.displacement_um;
+  const double rms_nN = scene.forces_nN.norm() / std::sqrt(static_cast<double>(scene.forces_nN.size()));
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal(0, 1);
+  int n_wrong_by_bic = 0;
+  for (const double error : {0.0, 0.1, 0.2}) {
+    Eigen::VectorXd beside_nN(scene.forces_nN.size());
+    for (double& f : beside_nN) f = error * rms_nN * normal(random);
+    scene.displacement_um = exact_um + scene.data.response->displace(beside_nN);
+    test::measure(scene, 0.01, 17);
+    std::vector<ModelScore> models = scores(scene);
+    weigh_with_discrepancy(models, scene.data);
+    EXPECT_LT(models[1].bic_with_discrepancy, models[0].bic_with_discrepancy) << error;
+    EXPECT_LT(models[1].bic_with_discrepancy, models[2].bic_with_discrepancy) << error;
+    n_wrong_by_bic += models[2].bic < models[1].bic;
+    // 12 components: their spread is known to a fifth, the grid has factors of two
+    EXPECT_NEAR(std::log2(std::max(models[1].discrepancy_nN, 0.01 * rms_nN) / std::max(error, 0.01) / rms_nN), 0, 1.3);
+  }
+  EXPECT_GE(n_wrong_by_bic, 1) << "else there was nothing to mend";
 }
 
 }  // namespace

@@ -74,7 +74,7 @@ TEST(Neighbours, beyond_the_border_are_named_where_they_are_and_not_where_none_i
           beside.experiment.displacement[b].displacement_um - alone.experiment.displacement[b].displacement_um;
       field.segment<2>(2 * static_cast<Index>(b)) << u.x, u.y;
     }
-    const double stands_out = floor_squared_of(data, field);
+    const double stands_out = explained(data, field).floor_squared;
     n_strong += stands_out > 100;
     const auto borders =
         borders_of(neighbours_beyond_border(data, beside.experiment.cell, beside.gel), data.position_um);
