@@ -471,6 +471,29 @@ std::string open_ids(const std::vector<Finding>& findings) {
   return ids;
 }
 
+namespace {
+
+/// How many of 400 sound simulated cells had it open: tests/alarm_rates.py FOLDER 1001 1400. Segmentation and
+/// displacement were given, so that only the fit was asked.
+std::string on_sound_cells(const KindOfFinding& k) {
+  if (k.stage != std::string_view("fit") || k.severity == Severity::note) return "";
+  switch (k.kind) {
+    case FindingKind::strain_beyond_linear:
+      return "- On 400 sound cells: 84, of which 79 are crowded (`dense`): adhesions there pull with 3 to 8 times the "
+             "shear "
+             "modulus.\n";
+    case FindingKind::missing_fibre:
+      return "- On 400 sound cells: 11.\n";
+    case FindingKind::not_identifiable:
+    case FindingKind::network_not_identifiable:
+      return "- On 400 sound cells: 2.\n";
+    default:
+      return "- On 400 sound cells: 0.\n";
+  }
+}
+
+}  // namespace
+
 std::string findings_page() {
   std::string page =
       "# Findings\n\nThe program reports what it notices about the images, the beads and its own answer. Each finding "
@@ -478,7 +501,8 @@ std::string findings_page() {
       "`run.json`, in `run.log`, in\nthe column `findings` of `batch_all.csv` and in `statistics/findings.csv`.\n\n- "
       "**note**: worth knowing; the results hold.\n- **caution**: the results may be off by more than their error bars "
       "say.\n- **bad**: do not use what the finding names.\n\nA caution or a bad finding is *open*. The report shows a "
-      "green tick only if no finding is open.\n";
+      "green tick only if no finding is open. *On 400 sound cells*: so many simulated cells with a right "
+      "segmentation had it open.\n";
   for (const char* stage : {"any stage", "segment", "track", "network", "fit", "surface", "substrate", "traction",
                             "sheet", "indent", "mean"}) {
     bool has_title = false;
@@ -487,8 +511,8 @@ std::string findings_page() {
       if (!has_title) page += "\n## " + std::string(stage) + "\n";
       has_title = true;
       page += "\n### `" + std::string(k.id) + "` (" + name_of(k.severity) + ")\n\n- Number: " + k.number +
-              "; threshold " + brief(k.threshold) + ".\n- Why this threshold: " + k.reason +
-              ".\n- What to do: " + k.remedy + "\n";
+              "; threshold " + brief(k.threshold) + ".\n- Why this threshold: " + k.reason + ".\n" + on_sound_cells(k) +
+              "- What to do: " + k.remedy + "\n";
     }
   }
   return page;

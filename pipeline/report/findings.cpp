@@ -116,23 +116,27 @@ std::string explained_by_network(const FitSummary& fit) {
       two_digits(*beside_nN), percent(std::sqrt(std::clamp(1 - *share, 0.0, 1.0))));
 }
 
+/// Of models.csv.
+enum class Compared { no_fibres, full, adhesion_forces, sheet };
+constexpr auto words(Compared) { return std::array{"no-fibres", "full", "adhesion-forces", "sheet"}; }
+
 /// Empty where the beads call for the cables.
 std::string another_model(const FitSummary& fit) {
   const auto over = figure_of(fit, "bic_of_cables_over_best");
   if (!over || *over <= 0) return "";
   const auto best = std::ranges::find(fit.more, "best_model_by_bic", &Figures::value_type::first);
   const auto* name = best == fit.more.end() ? nullptr : std::get_if<std::string>(&best->second);
-  if (name == nullptr) return "";
-  const char* model = *name == "no-fibres" ? "a network without fibres"
-                      : *name == "sheet"   ? "a sheet that contracts evenly"
-                                           : "forces of the adhesions that no network joins";
+  const auto which = name == nullptr ? std::nullopt : named<Compared>(*name);
+  if (!which) return "";
+  constexpr std::array kModels = {"a network without fibres", "this one",
+                                  "forces of the adhesions that no network joins", "a sheet that contracts evenly"};
   return fmt::format(
       "The beads prefer another model to a network with these fibres: {} (by {:.0f} in BIC, with each model's own "
       "error "
       "allowed for). The tensions are those of a model that is less likely. The forces of the adhesions follow the "
       "beads "
       "and change little.",
-      model, *over);
+      kModels[static_cast<std::size_t>(*which)], *over);
 }
 
 /// The displacement that the model explains, against what the noise would allow.

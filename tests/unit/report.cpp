@@ -300,6 +300,16 @@ TEST(Report, names_no_part_of_the_network_that_beads_do_not_tell) {
   EXPECT_NE(text_of(results).find("The beads do not show"), std::string::npos);
 }
 
+TEST(Report, says_first_that_the_beads_prefer_another_model) {
+  const FakeCell cell;
+  CellResults results = read_results(cell.folder.path());
+  results.fit.more.emplace_back("best_model_by_bic", std::string("sheet"));
+  results.fit.more.emplace_back("bic_of_cables_over_best", 1690.0);
+  EXPECT_NE(facts_of(results).front().find("a sheet that contracts evenly (by 1690 in BIC"), std::string::npos);
+  results.fit.more.back().second = 0.0;
+  EXPECT_EQ(text_of(results).find("prefer another"), std::string::npos);
+}
+
 TEST(Report, shows_no_more_digits_of_a_tension_than_its_interval_warrants) {
   const FakeCell cell;
   CellResults results = read_results(cell.folder.path());
