@@ -1,5 +1,6 @@
 #include "samples/drawing/rough_day.h"
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -51,6 +52,7 @@ ScenarioParameters rough_day(ScenarioParameters p, std::uint64_t number) {
   if_happens(0.3, p.microscope.unevenness, random.uniform(0.25, 0.6));
   if_happens(0.3, p.microscope.haze, between(0.35, 1.5));
   if_happens(0.2, p.microscope.scan_phase_px, random.uniform(-2, 2));
+  p.mechanics.simulation_network = static_cast<TrueNetwork>(random.uniform(0, std::size(words(TrueNetwork{}))));
   return p;
 }
 
