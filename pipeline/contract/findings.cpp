@@ -220,7 +220,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "noise alone does not reach 2 over the 30 beads that a region has at least",
        "Look at the region in the map of what is left: a bead picture out of focus, another cell, or a fibre or an "
        "adhesion that was not segmented."},
-      {telling_beads_scatter, "telling-beads-scatter", "fit", caution,
+      {telling_beads_scatter, "telling-beads-scatter", "fit", note,
        "squares that the forces leave of the beads on which the tensions rest, over those of noise, less three "
        "standard errors",
        1.2, "nine sound cells have 0.8 to 1.1; the intervals follow the number whatever it is",
