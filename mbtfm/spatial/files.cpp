@@ -90,7 +90,12 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
         for (const VertexShare& b : shares)
           variance += a.share * b.share * r.covariance_kPa2(3 * a.vertex + c, 3 * b.vertex + c);
       }
-      return std::sqrt(std::max(0.0, variance));
+      double shortened = 0;  // group-l1's map, beside the mean of which the covariance is
+      if (r.method == tractions::TractionMethod::group_l1) {
+        for (const auto& [vertex, share] : shares)
+          shortened += share * (summed_tractions_kPa(r) - r.traction_kPa)[3 * vertex + c];
+      }
+      return std::hypot(shortened, std::sqrt(std::max(0.0, variance)));
     };
     row.sigma_x_kPa = sigma(0);
     row.sigma_y_kPa = sigma(1);
@@ -100,22 +105,26 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
 }
 
 files::Table<PartForce> force_table() {
-  return {.file = "traction_3d_adhesion_forces.csv",
-          .row = "each adhesion of `mbtfm-traction` in space",
-          .columns = {{"adhesion_id", "label of the adhesion", &PartForce::adhesion_id},
-                      {"x_um", "middle of its part of the surface", files::x_of(&PartForce::position_um)},
-                      {"y_um", "middle of its part of the surface", files::y_of(&PartForce::position_um)},
-                      {"z_um", "middle of its part of the surface", files::z_of(&PartForce::position_um)},
-                      {"area_um2", "of the curved surface", &PartForce::area_um2, kResult},
-                      {"fx_nN", "force of the cell on the gel", files::x_of(&PartForce::force_nN)},
-                      {"fy_nN", "the same along y", files::y_of(&PartForce::force_nN)},
-                      {"fz_nN", "the same into the gel", files::z_of(&PartForce::force_nN)},
-                      {"sigma_fx_nN", "standard error: the beads' noise, and what they do not resolve",
-                       files::x_of(&PartForce::sigma_nN), kResult},
-                      {"sigma_fy_nN", "the same along y", files::y_of(&PartForce::sigma_nN), kResult},
-                      {"sigma_fz_nN", "the same into the gel", files::z_of(&PartForce::sigma_nN), kResult},
-                      {"force_nN", "its size", [](const PartForce& f) { return norm(f.force_nN); }, kResult},
-                      {"sigma_nN", "standard error along the force", &PartForce::magnitude_sigma_nN, kResult}}};
+  return {
+      .file = "traction_3d_adhesion_forces.csv",
+      .row = "each adhesion of `mbtfm-traction` in space",
+      .columns = {{"adhesion_id", "label of the adhesion", &PartForce::adhesion_id},
+                  {"x_um", "middle of its part of the surface", files::x_of(&PartForce::position_um)},
+                  {"y_um", "middle of its part of the surface", files::y_of(&PartForce::position_um)},
+                  {"z_um", "middle of its part of the surface", files::z_of(&PartForce::position_um)},
+                  {"area_um2", "of the curved surface", &PartForce::area_um2, kResult},
+                  {"fx_nN", "force of the cell on the gel", files::x_of(&PartForce::force_nN)},
+                  {"fy_nN", "the same along y", files::y_of(&PartForce::force_nN)},
+                  {"fz_nN", "the same into the gel", files::z_of(&PartForce::force_nN)},
+                  {"sigma_fx_nN", "standard error: the beads' noise, and what they do not resolve",
+                   files::x_of(&PartForce::sigma_nN), kResult},
+                  {"sigma_fy_nN", "the same along y", files::y_of(&PartForce::sigma_nN), kResult},
+                  {"sigma_fz_nN", "the same into the gel", files::z_of(&PartForce::sigma_nN), kResult},
+                  {"force_nN", "its size", [](const PartForce& f) { return norm(f.force_nN); }, kResult},
+                  {"sigma_nN", "standard error along the force", &PartForce::magnitude_sigma_nN, kResult},
+                  {"angle_deg", "its direction as seen from above, from +x towards +y", &PartForce::angle_deg, kResult},
+                  {"sigma_angle_deg", "standard error of angle_deg; 104: the direction is not known",
+                   &PartForce::angle_sigma_deg, kResult}}};
 }
 
 }  // namespace
@@ -170,6 +179,7 @@ Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const
   if (balance.imbalance) {
     add("imbalance_chi_squared", *balance.imbalance);
   }
+  if (r.flipped_z_chi_squared) add("flipped_z_chi_squared", *r.flipped_z_chi_squared);
   add_vector("centre", "um", balance.centre_um);
   add("strain_energy_fJ", balance.strain_energy_fJ);
   add("contractile_moment_nN_um", balance.contractile_moment_nN_um);

@@ -22,6 +22,9 @@ struct PartForce {
   Vec3 force_nN;
   Vec3 sigma_nN;                  ///< standard error, with what smoothing took away
   double magnitude_sigma_nN = 0;  ///< along the force
+  /// Its direction as seen from above, from +x towards +y, and the standard error of it: that of the force across
+  /// itself over its length, and not more than that of any direction, 180°/√3.
+  double angle_deg = 0, angle_sigma_deg = 0;
 };
 
 /// Tractions whose sums over parts of the surface are better than those of the map, which is smoothed or shortened for
@@ -50,7 +53,8 @@ struct SpatialReconstruction {
   Weighing weighing;
   double variance = 1;       ///< of one datum as weighed, in units of sigma²
   double variance_left = 1;  ///< the same as weighed beads have it at cross-validation's lambda, whatever they state
-  std::vector<PartForce> forces;  ///< by adhesion
+  std::vector<PartForce> forces;                ///< by adhesion
+  std::optional<double> flipped_z_chi_squared;  ///< chi_squared_of_flipped_z()
   std::string remark;
   Figures figures;
   std::vector<std::optional<Finding>> findings;
@@ -146,6 +150,12 @@ SpatialReconstruction reconstruct_green(const Problem& problem, const tractions:
 std::vector<PartForce> forces_beside_background(const Problem& problem, const MatrixXd& background,
                                                 const SpatialReconstruction& reconstruction, int threads);
 
+/// By how much chi-squared of the beads and of the tractions' prior is larger if all displacements along z have the
+/// opposite sign; below zero: that sign explains the beads better. None where no displacement along z counts.
+///
+///   chi² = |S u|²/variance − (Gᵀ S² u)ᵀ C (Gᵀ S² u)/variance²
+std::optional<double> chi_squared_of_flipped_z(const Problem& problem, const SpatialReconstruction& r);
+
 /// What forces, moments and their errors are sums of.
 const VectorXd& summed_tractions_kPa(const SpatialReconstruction& reconstruction);
 const MatrixXd& covariance_of_summed_kPa2(const SpatialReconstruction& reconstruction);
@@ -164,7 +174,7 @@ struct Balance {
   std::optional<double> imbalance;
   Vec3 centre_um;
   double total_force_nN = 0;        ///< ∫ |t| dA
-  double total_force_sigma_nN = 0;  ///< along the tractions found
+  double total_force_sigma_nN = 0;  ///< by noise, and by what smoothing takes and noise adds
   double normal_force_nN = 0;       ///< ∫ |t . n| dA
   double strain_energy_fJ = 0;
   /// −∫ (x − centre) . t dA, above zero where the cell contracts, with its standard error (Butler et al., Am. J.

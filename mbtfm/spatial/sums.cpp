@@ -1,5 +1,6 @@
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <numbers>
 
 #include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/spatial/rows.h"
@@ -64,9 +65,30 @@ void set_force(PartForce& part, const Vector3d& force_nN, const Matrix3d& covari
   part.force_nN = vec(force_nN);
   part.sigma_nN = errors_of(covariance_nN2);
   part.magnitude_sigma_nN = error_along(force_nN, covariance_nN2);
+  constexpr double kOfAny_deg = 180 / std::numbers::sqrt3, kDegrees = 180 / std::numbers::pi;
+  const Vector3d across(-force_nN.y(), force_nN.x(), 0);
+  const double lateral_nN = across.norm();
+  part.angle_deg = kDegrees * std::atan2(force_nN.y(), force_nN.x());
+  part.angle_sigma_deg =
+      lateral_nN > 0 ? std::min(kOfAny_deg, kDegrees * error_along(across, covariance_nN2) / lateral_nN) : kOfAny_deg;
 }
 
 }  // namespace
+
+std::optional<double> chi_squared_of_flipped_z(const Problem& problem, const SpatialReconstruction& r) {
+  const Index n = problem.observed.n_components();
+  if (n < 3 || r.covariance_kPa2.size() == 0 || !(r.variance > 0)) return std::nullopt;
+  const Rows rows(problem, r.weighing.by_row);
+  const auto chi_squared = [&](const VectorXd& displacement_um) {
+    const VectorXd u = rows.of(displacement_um);
+    const VectorXd pulled = numerics::transposed_matvec(problem.response_um_per_kPa, rows.transposed(u));
+    return (u.squaredNorm() - numerics::quadratic_form(r.covariance_kPa2, pulled) / r.variance) / r.variance;
+  };
+  const VectorXd measured = problem.displacement_um();
+  VectorXd flipped = measured;
+  for (Index z = 2; z < flipped.size(); z += n) flipped[z] = -flipped[z];
+  return chi_squared(flipped) - chi_squared(measured);
+}
 
 const VectorXd& summed_tractions_kPa(const SpatialReconstruction& r) {
   return r.summands ? r.summands->traction_kPa : r.traction_kPa;
@@ -115,18 +137,35 @@ std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruc
   return forces;
 }
 
+namespace {
+
+/// Whose sizes add up to the total force: the map's; of group-l1, whose map is shortened for the eye, the mean's.
+const VectorXd& counted_tractions_kPa(const SpatialReconstruction& r) {
+  return r.method == tractions::TractionMethod::group_l1 ? summed_tractions_kPa(r) : r.traction_kPa;
+}
+
+}  // namespace
+
 Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
   const TractionMesh& mesh = problem.mesh;
   const std::vector<Vec3> vertices = problem.vertices_um();
   const Index n = mesh.n_vertices();
   Balance balance;
-  const auto traction = [&](Index v) { return Vector3d(r.traction_kPa.segment<3>(3 * v)); };
+  const VectorXd &summed = summed_tractions_kPa(r), &counted = counted_tractions_kPa(r);
+  const auto traction = [&](Index v) { return Vector3d(counted.segment<3>(3 * v)); };
+  double of_map_nN = 0, of_summed_nN = 0;  // totals
   over_faces(mesh, problem.ground, 3, Places::gauss,
              [&](Vec2 at, std::span<const VertexShare> shares, double area_um2) {
-               Vector3d t = Vector3d::Zero();
-               for (const auto& [vertex, share] : shares) t += share * traction(vertex);
+               Vector3d t = Vector3d::Zero(), m = Vector3d::Zero(), s = Vector3d::Zero();
+               for (const auto& [vertex, share] : shares) {
+                 t += share * traction(vertex);
+                 m += share * r.traction_kPa.segment<3>(3 * vertex);
+                 s += share * summed.segment<3>(3 * vertex);
+               }
                const double size = t.norm() * area_um2;
                balance.total_force_nN += size;
+               of_map_nN += m.norm() * area_um2;
+               of_summed_nN += s.norm() * area_um2;
                balance.normal_force_nN += std::abs(t.dot(vector(problem.ground.normal(at)))) * area_um2;
                balance.centre_um += size * Vec3{at.x, at.y, problem.ground.height_um(at)};
              });
@@ -145,9 +184,10 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
   if (r.covariance_kPa2.size() > 0) {
     VectorXd along(3 * n);
     for (Index v = 0; v < n; ++v) along.segment<3>(3 * v) = mesh.areas_um2[v] * traction(v).stableNormalized();
-    balance.total_force_sigma_nN = std::sqrt(std::max(0.0, numerics::quadratic_form(r.covariance_kPa2, along)));
+    balance.total_force_sigma_nN =
+        std::hypot(std::sqrt(std::max(0.0, numerics::quadratic_form(r.covariance_kPa2, along))),
+                   (of_summed_nN - of_map_nN) / std::sqrt(12.0));
   }
-  const VectorXd& summed = summed_tractions_kPa(r);
   const VectorXd net = numerics::matvec(sums, summed);
   balance.force_nN = vec(net.head<3>());
   balance.moment_nN_um = vec(net.tail<3>());

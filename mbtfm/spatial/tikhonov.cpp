@@ -152,7 +152,9 @@ SpatialReconstruction reconstruct_tikhonov(const Problem& problem, const tractio
   SpatialReconstruction r = reconstruct_in(basis, response, problem, traction, parameters, threads);
   if (r.lambda && problem.patch_response_um_per_nN.size() > 0)
     r.forces = forces_beside_background(problem, response, r, threads);
-  if (r.lambda) r.resolved = resolved_shares(r.covariance_kPa2, *r.lambda * *r.lambda / r.variance * norm);
+  if (!r.lambda) return r;
+  r.flipped_z_chi_squared = chi_squared_of_flipped_z(problem, r);
+  r.resolved = resolved_shares(r.covariance_kPa2, *r.lambda * *r.lambda / r.variance * norm);
   return r;
 }
 

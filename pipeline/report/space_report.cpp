@@ -52,11 +52,6 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   const Sum force = sum_of(r, "net_force", "nN"), moment = sum_of(r, "moment", "nN_um");
   const double total = r.number("total_force_nN");
   std::vector<std::string> facts;
-  facts.push_back(
-      fmt::format("The cell pulls and presses with {} in total, the sum of the sizes of its tractions over {}; {} nN "
-                  "of it are along the surface’s normal. The largest traction is {} kPa.",
-                  with_error(total, r.find("total_force_sigma_nN"), "nN"), r.texts.at("tractions_over"),
-                  readable(r.number("normal_force_nN")), readable(largest_traction_kPa(r))));
   facts.push_back(fmt::format("The strain energy of the gel is {} fJ.", readable(r.number("strain_energy_fJ"))));
   if (const auto moment_found = r.find("contractile_moment_nN_um"))
     facts.back() += fmt::format(
@@ -72,6 +67,18 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
         " In their joint errors chi-squared of the six numbers is {}; chance makes more than {} in one cell of a "
         "thousand.",
         readable(*imbalance), readable(properties_of(FindingKind::tractions_out_of_balance).threshold));
+  }
+  facts.push_back(
+      fmt::format("The cell pulls and presses with {} in total, the sum of the sizes of its tractions over {}; {} nN "
+                  "of it are along the surface’s normal. The largest traction is {} kPa. Smoothing takes from this sum "
+                  "and noise adds to it: the moment is known better.",
+                  with_error(total, r.find("total_force_sigma_nN"), "nN"), r.texts.at("tractions_over"),
+                  readable(r.number("normal_force_nN")), readable(largest_traction_kPa(r))));
+  if (const auto flipped = r.find("flipped_z_chi_squared")) {
+    facts.push_back(fmt::format(
+        "The sign of z: with all displacements along z the other way round, chi-squared of the fit is {} {}.{}",
+        readable(std::abs(*flipped)), *flipped < 0 ? "smaller" : "larger",
+        *flipped < 0 ? " Look at z_points in cell.toml." : ""));
   }
   if (r.find("common_turn_deg")) {
     std::string shifts;

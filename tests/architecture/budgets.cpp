@@ -11,8 +11,8 @@
 namespace mbtfm {
 namespace {
 
-constexpr int kLinesOfProduct = 106650;
-constexpr int kLinesOfTests = 46700;
+constexpr int kLinesOfProduct = 106670;
+constexpr int kLinesOfTests = 46710;
 constexpr int kLongSources = 30;                                                  // .cpp of the product above 400 lines
 constexpr int kLongestSource = 890;                                               // lines
 constexpr int kOwnHeadersMedian = 14, kOwnHeadersP90 = 40, kOwnHeadersMost = 93;  // that a source of the product gets

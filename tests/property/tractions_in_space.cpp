@@ -497,7 +497,7 @@ TEST_F(SplitFaces, displace_beads_as_the_same_tractions_on_an_even_lattice_do) {
 TEST_F(InSpace, forces_lie_within_their_standard_errors) {
   for (const auto method :
        {tractions::TractionMethod::tikhonov, tractions::TractionMethod::group_l1, tractions::TractionMethod::patches}) {
-    double square = 0;
+    double square = 0, turned = 0;
     constexpr int kSeeds = 4;
     for (int seed = 1; seed <= kSeeds; ++seed) {
       scene.seed = static_cast<std::uint64_t>(seed);
@@ -509,8 +509,14 @@ TEST_F(InSpace, forces_lie_within_their_standard_errors) {
       for (std::size_t a = 0; a < scene.spots.size(); ++a) {
         const Vec3 off = r.forces[a].force_nN - scene.spots[a].force_nN, s = r.forces[a].sigma_nN;
         square += (std::pow(off.x / s.x, 2) + std::pow(off.y / s.y, 2) + std::pow(off.z / s.z, 2)) / (9.0 * kSeeds);
+        const Vec3 exact = scene.spots[a].force_nN, found = r.forces[a].force_nN;
+        const double turned_deg =
+            180 / M_PI * std::atan2(exact.x * found.y - exact.y * found.x, exact.x * found.x + exact.y * found.y);
+        turned += std::pow(turned_deg / r.forces[a].angle_sigma_deg, 2) / (3.0 * kSeeds);
       }
     }
+    // 12 angles: chance is a fifth of the root, one way
+    EXPECT_LE(std::sqrt(turned), 1.5) << name_of(method);
     // 36 numbers: chance is 12 % of the root, one way; the errors have the smoothing in them, which may do less
     EXPECT_LE(std::sqrt(square), 1.3) << name_of(method);
     EXPECT_GE(std::sqrt(square), 0.4) << name_of(method);
@@ -978,6 +984,18 @@ TEST_F(FindingsInSpace, the_contractile_moment_is_that_of_the_forces_within_its_
   // of eight normal numbers the root mean square is known to a quarter; the prior's share of the error is not noise
   EXPECT_LT(std::sqrt(squares), 2);
   EXPECT_GT(std::sqrt(squares), 0.25);
+}
+
+TEST_F(InSpace, a_z_that_points_the_other_way_fits_worse) {
+  const SpatialInputs inputs{{}, scene.gel, {}, {}};
+  std::vector<BeadInSpace> beads = scene.beads(0.02);
+  const auto right = reconstruct(scene.problem(beads, parameters), inputs, traction, parameters, 1);
+  for (BeadInSpace& bead : beads) bead.displacement_um.z *= -1;
+  const auto wrong = reconstruct(scene.problem(beads, parameters), inputs, traction, parameters, 1);
+  EXPECT_GT(*right.flipped_z_chi_squared, 10);
+  EXPECT_LT(*wrong.flipped_z_chi_squared, -10);
+  EXPECT_TRUE(right.remark.empty()) << right.remark;
+  EXPECT_NE(wrong.remark.find("z_points"), std::string::npos) << wrong.remark;
 }
 
 /// Nothing is smoothed of a few forces that the beads tell well, so that their errors are those of the noise.
