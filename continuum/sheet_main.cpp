@@ -625,7 +625,8 @@ void check_fit(const Parameters& p) {
   if (!p.sheet.thickness_um) throw UsageError("[sheet] thickness_um is missing: give it in cell.toml");
 }
 
-sheets::Question question_of(const Parameters& p, stage::StageContext& context, const Region& region) {
+sheets::Question question_of(const Parameters& p, stage::StageContext& context, const Region& region,
+                             double usual_outline_error_um) {
   Scene scene;
   scene.adhesive_um = adhesive_area(p, context, region);
   scene.region = with_borders_of(region, scene.adhesive_um);
@@ -641,8 +642,7 @@ sheets::Question question_of(const Parameters& p, stage::StageContext& context, 
                      .bond = p.fit_adhesion_stiffness ? sheets::Bond::fitted : sheets::Bond::known,
                      .loss = p.loss,
                      .has_motion = tensions::allows_common_motion(p.substrate.effects),
-                     .outline_error_um = p.outline_error_um.value_or(
-                         outlines::usual_error_um(context.input("outline"), p.pixel_size_um)),
+                     .outline_error_um = p.outline_error_um.value_or(usual_outline_error_um),
                      .under_load = p.substrate.effects.beads_under_load,
                      .tolerance = p.substrate.effects.effect_tolerance};
   if (p.fit_parts == Parts::field) q.field_points = p.field_points;
@@ -683,7 +683,7 @@ void notice_fit(stage::StageContext& context, const sheets::BeadFit& found, cons
                              brief(found.tried_nN_per_um.high) + "."));
 }
 
-Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region) {
+Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region, double usual_outline_error_um) {
   check_fit(p);
   Gel gel = p.gel;
   gel.youngs_modulus_kPa = *p.gel_modulus_kPa;
@@ -697,7 +697,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
             return choice::make_substrate(of, layer, context.threads);
           }};
   const auto model = models.usual(gel);
-  const sheets::Question question = question_of(p, context, region);
+  const sheets::Question question = question_of(p, context, region, usual_outline_error_um);
   const DisplacementField beads = read_beads(context);
   sheets::BeadFit found = fit_beads(question, beads, gel, *model, models, context.threads,
                                     [&](double share, const char* doing) { context.progress(share, doing); });
@@ -777,7 +777,8 @@ void write_page(stage::StageContext& context, const Run& done, const Balance& ba
 
 StageReport run(const Parameters& p, stage::StageContext& context) {
   context.progress(0, "reading");
-  const Region region = region_of(read_rings(context.input("outline"), p.pixel_size_um));
+  const Path outline = context.input("outline");
+  const Region region = region_of(read_rings(outline, p.pixel_size_um));
   const bool has_tractions = context.has_input("traction");
   if (p.sheet.ground == Ground::none && !has_tractions)
     throw UsageError("ground = none needs the --traction under the sheet: nothing else holds it");
@@ -796,7 +797,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   if (context.has_input("adhesions") && !has_beads)
     throw UsageError("--adhesions are compared with a fit: give --displacement");
   Run done = has_tractions ? run_from_traction(p, context, region)
-             : has_beads   ? run_fit(p, context, region)
+             : has_beads   ? run_fit(p, context, region, outlines::usual_error_um(outline, p.pixel_size_um))
                            : run_forward(p, context, region);
   const Balance balance = done.balance.value_or(balance_of(done.solution));
   const std::size_t n_outside = write_solution(context, done.solution);

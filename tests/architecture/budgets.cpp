@@ -19,7 +19,7 @@ constexpr int kOwnHeadersMedian = 14, kOwnHeadersP90 = 40, kOwnHeadersMost = 94;
 constexpr int kSeeFindings = 30;  // sources of product and tests that a new kind of finding compiles again
 constexpr int kKindsOfFindings = 86;
 constexpr int kParameterRows = 490;  // of docs/parameters.md
-constexpr int kWordsOfDocs = 149640;
+constexpr int kWordsOfDocs = 149720;
 
 const std::vector<std::string> kProduct = {"pipeline", "segment",   "network", "substrate",
                                            "mbtfm",    "continuum", "samples"};
