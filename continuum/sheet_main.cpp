@@ -61,7 +61,7 @@ struct Parameters {
   int field_points = 40;                          ///< of a colony's beads tell fewer numbers
   bool fit_line_tension = false;                  ///< most colonies have none
   bool fit_adhesion_stiffness = false;            ///< few beads tell it beside the sheet's own
-  double outline_error_um = 0.05;                 ///< half a pixel, of outlines that mbtfm-segment finds
+  std::optional<double> outline_error_um;         ///< unset: by its source
   tensions::Loss loss = tensions::Loss::squares;  ///< beads are Gaussian to first order
 };
 
@@ -101,7 +101,8 @@ void declare(stage::ParameterList& list, Parameters& p) {
            "with --displacement: also fit adhesion_stiffness_nN_per_um3, of springs between sheet and gel");
   list.add("outline_error_um", p.outline_error_um, Range::zero_or_size_um(),
            "with --displacement: standard error of the outline's place, outward, along x and along y (um); it is part "
-           "of the intervals");
+           "of the intervals; unset: 0.05 of one that mbtfm-segment finds or of a table, a pixel of a mask, 0.5 of one "
+           "drawn by hand");
   list.add("loss", p.loss,
            "with --displacement: loss function of the beads' residuals; all but squares give less weight to beads that "
            "stray");
@@ -293,6 +294,7 @@ struct Run {
   std::vector<Effect> effects;
   std::optional<Balance> balance = {};       ///< with what holds the sheet at cuts; unset: by the solution alone
   std::string told = {};                     ///< for the last line
+  std::string varied = {};                   ///< what a varying contraction changes
   std::vector<report::Listing> tables = {};  ///< of the page
 };
 
@@ -464,6 +466,10 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
     };
     append(result.figures, tell_cut(context, area, outline, result.solution, *found.cut, with));
   }
+  const double mean = found.balance.mean_tension_nN_per_um;
+  context.notice(noticed(FindingKind::sheet_expands, mean < 0 ? 1 : 0,
+                         "The mean tension is " + brief(mean) +
+                             " nN/µm: these tractions push outward. Are they those of the gel on the cells?"));
   const double worst = std::max(found.unbalanced.net_force_share, found.unbalanced.net_torque_share);
   context.notice(noticed(FindingKind::tractions_off_balance, worst,
                          "Net force and torque of the tractions are " + brief(found.unbalanced.net_force_share) +
@@ -534,16 +540,20 @@ void notice_expansion(stage::StageContext& context, const sheets::SheetFit& fit,
 }
 
 /// What the beads do and the sheet does not.
-void notice_unexplained(stage::StageContext& context, const sheets::SheetFit& fit) {
+void notice_unexplained(stage::StageContext& context, const sheets::SheetFit& fit, const sheets::Misfit& misfit) {
   if (!fit.expected_relative_l2) return;
   constexpr double kLittle = 0.4;  // as the tension fit has it: explains-little
   const double left = fit.relative_l2 * fit.relative_l2, noise = *fit.expected_relative_l2 * *fit.expected_relative_l2;
   const double share = noise < 1 ? std::max(0.0, left - noise) / (1 - noise) : 0;
-  context.notice(noticed(FindingKind::sheet_unexplained, left / noise,
-                         "The sheet explains " + brief(100 * (1 - share)) +
-                             " % of what the beads do beyond their noise: it leaves " + brief(left / noise) +
-                             " times the sum of squares of the noise." +
-                             (share > kLittle ? " It is the wrong model of these beads." : ""),
+  const sheets::Statistic &chi = misfit.chi_squared_per_degree, &alike = misfit.correlation;
+  context.notice(noticed(FindingKind::sheet_unexplained, misfit.excess(),
+                         "Noise alone does not leave this: chi² per degree of freedom is " +
+                             with_error(chi.value, chi.sigma) + " (expected " + brief(chi.expected) +
+                             "), the correlation of near beads' residuals " + with_error(alike.value, alike.sigma) +
+                             " (expected " + brief(alike.expected) + ")." +
+                             (share > kLittle ? " The sheet explains " + brief(100 * (1 - share)) +
+                                                    " % of what the beads do beyond their noise: it is the wrong model."
+                                              : ""),
                          share > kLittle ? Severity::bad : Severity::caution));
 }
 
@@ -615,7 +625,8 @@ void check_fit(const Parameters& p) {
   if (!p.sheet.thickness_um) throw UsageError("[sheet] thickness_um is missing: give it in cell.toml");
 }
 
-sheets::Question question_of(const Parameters& p, stage::StageContext& context, const Region& region) {
+sheets::Question question_of(const Parameters& p, stage::StageContext& context, const Region& region,
+                             double usual_outline_error_um) {
   Scene scene;
   scene.adhesive_um = adhesive_area(p, context, region);
   scene.region = with_borders_of(region, scene.adhesive_um);
@@ -631,7 +642,7 @@ sheets::Question question_of(const Parameters& p, stage::StageContext& context, 
                      .bond = p.fit_adhesion_stiffness ? sheets::Bond::fitted : sheets::Bond::known,
                      .loss = p.loss,
                      .has_motion = tensions::allows_common_motion(p.substrate.effects),
-                     .outline_error_um = p.outline_error_um,
+                     .outline_error_um = p.outline_error_um.value_or(usual_outline_error_um),
                      .under_load = p.substrate.effects.beads_under_load,
                      .tolerance = p.substrate.effects.effect_tolerance};
   if (p.fit_parts == Parts::field) q.field_points = p.field_points;
@@ -664,7 +675,7 @@ void notice_fit(stage::StageContext& context, const sheets::BeadFit& found, cons
   const sheets::SheetFit& fit = found.fit;
   const auto stiffness = std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &SheetEstimate::quantity);
   context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
-  notice_unexplained(context, fit);
+  notice_unexplained(context, fit, found.misfit);
   if (!found.field) notice_expansion(context, fit, found.n_parts);
   context.notice(noticed(FindingKind::sheet_at_bound, fit.is_at_bound ? 1 : 0,
                          "The best stiffness, " + brief(fit.stiffnesses.sheet_nN_per_um) +
@@ -672,7 +683,7 @@ void notice_fit(stage::StageContext& context, const sheets::BeadFit& found, cons
                              brief(found.tried_nN_per_um.high) + "."));
 }
 
-Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region) {
+Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region, double usual_outline_error_um) {
   check_fit(p);
   Gel gel = p.gel;
   gel.youngs_modulus_kPa = *p.gel_modulus_kPa;
@@ -686,7 +697,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
             return choice::make_substrate(of, layer, context.threads);
           }};
   const auto model = models.usual(gel);
-  const sheets::Question question = question_of(p, context, region);
+  const sheets::Question question = question_of(p, context, region, usual_outline_error_um);
   const DisplacementField beads = read_beads(context);
   sheets::BeadFit found = fit_beads(question, beads, gel, *model, models, context.threads,
                                     [&](double share, const char* doing) { context.progress(share, doing); });
@@ -708,6 +719,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   }
   result.told = told_by(fit);
   result.tables = report::tables_of_sheet(estimates_file, models_file);
+  result.varied = found.varied;
   notice_fit(context, found, result.told);
   result.figures = {{"ground", std::string(name_of(Ground::gel))},
                     {"strain", std::string(name_of(Strain::small))},
@@ -718,6 +730,10 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
                     {"correlation", fit.correlation},
                     {"relative_l2", fit.relative_l2},
                     {"expected_relative_l2", fit.expected_relative_l2.value_or(fit.relative_l2)},
+                    {"outline_error_um", question.outline_error_um},
+                    {"chi_squared_per_degree", found.misfit.chi_squared_per_degree.value},
+                    {"residual_correlation", found.misfit.correlation.value},
+                    {"misfit_in_standard_deviations", found.misfit.excess()},
                     {"n_beads", std::int64_t{fit.n_beads}},
                     {"n_down_weighted", std::int64_t{fit.n_down_weighted}},
                     {"aic", fit.models[fit.own_model].aic},
@@ -744,6 +760,7 @@ void write_page(stage::StageContext& context, const Run& done, const Balance& ba
       .title = "Contracting sheet", .facts = {}, .findings = context.findings_, .tables = {}, .figures = done.figures};
   constexpr double kRounding = 1e-6;
   if (!done.told.empty()) page.facts.push_back("Fitted to the beads: " + done.told + ".");
+  if (!done.varied.empty()) page.facts.push_back(done.varied);
   page.facts.push_back("The mean tension is " + charts::readable(balance.mean_tension_nN_per_um) + " nN/µm over " +
                        charts::readable(balance.area_um2) + " µm²; the forces on the ground add up to " +
                        charts::readable(balance.total_force_nN) + " nN in size, " +
@@ -760,7 +777,8 @@ void write_page(stage::StageContext& context, const Run& done, const Balance& ba
 
 StageReport run(const Parameters& p, stage::StageContext& context) {
   context.progress(0, "reading");
-  const Region region = region_of(read_rings(context.input("outline"), p.pixel_size_um));
+  const Path outline = context.input("outline");
+  const Region region = region_of(read_rings(outline, p.pixel_size_um));
   const bool has_tractions = context.has_input("traction");
   if (p.sheet.ground == Ground::none && !has_tractions)
     throw UsageError("ground = none needs the --traction under the sheet: nothing else holds it");
@@ -779,7 +797,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   if (context.has_input("adhesions") && !has_beads)
     throw UsageError("--adhesions are compared with a fit: give --displacement");
   Run done = has_tractions ? run_from_traction(p, context, region)
-             : has_beads   ? run_fit(p, context, region)
+             : has_beads   ? run_fit(p, context, region, outlines::usual_error_um(outline, p.pixel_size_um))
                            : run_forward(p, context, region);
   const Balance balance = done.balance.value_or(balance_of(done.solution));
   const std::size_t n_outside = write_solution(context, done.solution);

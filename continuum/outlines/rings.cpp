@@ -1,11 +1,13 @@
 #include "continuum/outlines/rings.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "continuum/sheet/curve.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/polyline.h"
 #include "pipeline/files/csv_files.h"
+#include "pipeline/files/sheet_files.h"
 #include "pipeline/files/tables.h"
 #include "segment/cells/mask.h"
 #include "segment/rois/roi.h"
@@ -80,6 +82,24 @@ Rings read_rings(const Path& file, const std::optional<double>& pixel_um) {
       throw InputError(file.string(), "an outline around an area", "one around none");
   }
   return rings;
+}
+
+double usual_error_um(const Path& file, const std::optional<double>& pixel_um) {
+  // half a pixel of those that mbtfm-segment finds (docs/developers/sheets.md); hands follow an edge to some pixels
+  constexpr double kFound_um = 0.05, kDrawn_um = 0.5;
+  const bool is_selection = file.extension() == ".roi" || file.extension() == ".zip";
+  const files::OutlineSource source = is_selection                 ? files::OutlineSource::drawn
+                                      : file.extension() != ".csv" ? files::OutlineSource::mask
+                                                                   : files::source_of_outline(file);
+  switch (source) {
+    case files::OutlineSource::drawn:
+      return kDrawn_um;
+    case files::OutlineSource::mask:
+      return std::max(kFound_um, pixel_um.value_or(kFound_um));
+    case files::OutlineSource::found:
+      break;
+  }
+  return kFound_um;
 }
 
 }  // namespace mbtfm::outlines

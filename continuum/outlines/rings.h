@@ -21,4 +21,8 @@ struct Rings {
 /// @throws UsageError where it lacks; InputError where a ring crosses itself or another, or has no area
 Rings read_rings(const Path& file, const std::optional<double>& pixel_um);
 
+/// Standard error of an outline's place (um), by who drew it: mbtfm-segment, another program or a hand.
+/// @throws InputError if the record beside an outline.csv is malformed
+double usual_error_um(const Path& file, const std::optional<double>& pixel_um);
+
 }  // namespace mbtfm::outlines

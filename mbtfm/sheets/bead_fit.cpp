@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "continuum/sheet/mesh_size.h"
+#include "mbtfm/sheets/variation.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/fit_results.h"
@@ -128,9 +129,10 @@ VectorXd differences(const std::vector<FittedEstimate>& others, const std::vecto
 class Errors {
  public:
   explicit Errors(Fitter::Found& found) : found_(found) {}
-  void add(std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um) {
+  /// @returns standard errors by estimate
+  VectorXd add(std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um) {
     if (found_.field) add_error(*found_.field, part, changes_um);
-    add_error(found_.fit, part, changes_um);
+    return add_error(found_.fit, part, changes_um);
   }
   /// Of the estimates alone: of a contraction that varies, its mean.
   void add_sizes(std::optional<double> SheetErrorParts::*part, const VectorXd& sizes) {
@@ -152,6 +154,7 @@ tensions::BeadsOfState state_of(const Question& q, const Fitter& fitter, const D
 }
 
 constexpr double kFiner = 0.7, kFinest = 0.5;  // of the triangles' size
+constexpr double kNear = 0.125;                // of the half width: what a model lacks varies over some of that
 
 }  // namespace
 
@@ -199,9 +202,20 @@ BeadFit fit_beads(const Question& q, const DisplacementField& beads, const Gel& 
   tell(0.8, "asking for the errors");
   scene = scene_of(q, unknowns, found.fit);
   const sheet::Solution solution = solved(scene);
-  if (q.outline_error_um > 0)
-    errors.add(&SheetErrorParts::outline,
-               changes_by_outline_um(scene, solution, model, places, q.outline_error_um, threads));
+  MatrixXd stated_um = by_mesh.left_um;
+  if (q.outline_error_um > 0) {
+    const MatrixXd by_outline_um = changes_by_outline_um(scene, solution, model, places, q.outline_error_um, threads);
+    errors.add(&SheetErrorParts::outline, by_outline_um);
+    stated_um.conservativeResize(Eigen::NoChange, stated_um.cols() + by_outline_um.cols());
+    stated_um.rightCols(by_outline_um.cols()) = by_outline_um;
+  }
+  std::string varied;
+  if (!unknowns.lattice) {
+    const MatrixXd by_variation_um = changes_by_variation_um(fitter.ground(), scene, solution, model, places);
+    const VectorXd moved = errors.add(&SheetErrorParts::variation, by_variation_um);
+    varied = sentence_of_variation(found.fit.estimates, moved);
+  }
+  const Misfit misfit = misfit_of(found.fit.residuals, kNear * narrow_um(q.scene.region), stated_um);
   errors.add_sizes(&SheetErrorParts::substrate, changes_by_modulus(found.fit.estimates, model.stated_error()));
   if (!model.capabilities().base)
     errors.add(&SheetErrorParts::substrate,
@@ -234,6 +248,8 @@ BeadFit fit_beads(const Question& q, const DisplacementField& beads, const Gel& 
           .scene = std::move(scene),
           .solution = std::move(finest),
           .tried_nN_per_um = fitter.table().sheet_nN_per_um(),
+          .varied = std::move(varied),
+          .misfit = misfit,
           .beads = std::move(state.beads),
           .under_load = std::move(state.effect),
           .n_parts = fitter.table().n_contractions()};

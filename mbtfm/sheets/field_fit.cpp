@@ -5,7 +5,9 @@
 #include <map>
 #include <set>
 
+#include "mbtfm/sheets/contraction_prior.h"
 #include "mbtfm/sheets/profile.h"
+#include "mbtfm/sheets/variation.h"
 #include "mbtfm/tensions/intervals.h"
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/errors.h"
@@ -53,19 +55,15 @@ std::vector<double> even_logarithms(double low, double high, int n) {
 class FieldSearch {
  public:
   FieldSearch(const LinearData& data, const StiffnessTable& table, std::optional<double> known,
-              const MatrixXd& roughness, double variance)
-      : data_(data),
-        table_(table),
-        variance_(variance),
-        rank_(static_cast<double>(roughness.rows() - 1)),  // all but an even contraction
-        roughness_(MatrixXd::Zero(table.n_loads(), table.n_loads())) {
-    roughness_.topLeftCorner(roughness.rows(), roughness.cols()) = roughness;
+              const ContractionPrior& prior, double variance)
+      : data_(data), table_(table), prior_(prior), variance_(variance) {
     const StiffnessRange range = table.sheet_nN_per_um();
     look_at(known ? std::vector{*known} : even_logarithms(range.low, range.high, kStiffnesses));
-    const Index n = roughness.rows();
+    const Index n = table.n_contractions();
     const MatrixXd& middle = normals_[normals_.size() / 2].matrix;
-    const double alike = middle.topLeftCorner(n, n).trace() / variance_ / roughness.trace();
+    const double alike = middle.topLeftCorner(n, n).trace() / variance_ / prior.trace();
     smoothings_ = even_logarithms(kRoughest * alike, kSmoothest * alike, kSmoothings);
+    for (const double smoothing : smoothings_) precisions_.push_back(prior.precision(smoothing));
   }
 
   /// Over stiffnesses that are closer than the beads tell them.
@@ -109,29 +107,28 @@ class FieldSearch {
     return mean_of(pairs);
   }
 
-  numerics::SmallCholesky precision(const Normal& normal, double smoothing) const {
-    const numerics::SmallCholesky factor(normal.matrix / variance_ + smoothing * roughness_);
+  numerics::SmallCholesky precision(const Normal& normal, std::size_t smoothing) const {
+    const numerics::SmallCholesky factor(normal.matrix / variance_ + precisions_[smoothing]);
     MBTFM_ASSERT(factor.is_definite());
     return factor;
   }
 
   Pair pair(std::size_t m, std::size_t l) const {
     const Normal& normal = normals_[m];
-    const numerics::SmallCholesky factor = precision(normal, smoothings_[l]);
+    const numerics::SmallCholesky factor = precision(normal, l);
     Pair p{.stiffness = m, .smoothing = l, .loads = factor.solve(normal.right / variance_)};
     const Index n_bundles = std::ssize(table_.bundles());
     if (n_bundles > 0 && p.loads.tail(n_bundles).minCoeff() < 0)
-      p.loads =
-          best_loads(normal.matrix / variance_ + smoothings_[l] * roughness_, normal.right / variance_, n_bundles);
+      p.loads = best_loads(normal.matrix / variance_ + precisions_[l], normal.right / variance_, n_bundles);
     // Q/v but for |y|²/v, the same for all
     const double misfit = p.loads.dot(factor.multiply(p.loads)) - 2 * normal.right.dot(p.loads) / variance_;
-    p.log_evidence = 0.5 * rank_ * std::log(smoothings_[l]) - 0.5 * factor.log_determinant() - 0.5 * misfit;
+    p.log_evidence = 0.5 * prior_.log_determinant(smoothings_[l]) - 0.5 * factor.log_determinant() - 0.5 * misfit;
     p.degrees = factor.solve_matrix(normal.matrix / variance_).trace();
     return p;
   }
 
   Posterior mean_of(const std::vector<Pair>& pairs) const {
-    const Index n = roughness_.rows();
+    const Index n = table_.n_loads();
     Posterior all{.stiffnesses_nN_per_um = {},
                   .smoothings = smoothings_,
                   .by_stiffness = std::vector<double>(normals_.size(), 0),
@@ -154,8 +151,7 @@ class FieldSearch {
       all.loads_over_stiffness += p.share / M * p.loads;
       constexpr double kNone = 1e-9;
       if (p.share < kNone) continue;
-      const MatrixXd second =
-          precision(normals_[p.stiffness], smoothings_[p.smoothing]).inverse() + p.loads * p.loads.transpose();
+      const MatrixXd second = precision(normals_[p.stiffness], p.smoothing).inverse() + p.loads * p.loads.transpose();
       all.covariance += p.share * second;
       all.covariance_over_stiffness += p.share / (M * M) * second;
     }
@@ -167,8 +163,9 @@ class FieldSearch {
 
   const LinearData& data_;
   const StiffnessTable& table_;
-  double variance_, rank_;
-  MatrixXd roughness_;
+  const ContractionPrior& prior_;
+  double variance_;
+  std::vector<MatrixXd> precisions_;  ///< of the prior, by smoothing
   std::vector<Normal> normals_;
   std::vector<double> smoothings_;
 };
@@ -264,6 +261,13 @@ ContractionLattice::ContractionLattice(const sheet::Elements& elements, int n_po
         {{point(column, row), point(column + 1, row), point(column + 1, row + 1), point(column, row + 1)}});
 }
 
+std::vector<Vec2> ContractionLattice::places_um() const {
+  std::vector<Vec2> places;
+  for (const auto& [column, row] : points_)
+    places.push_back(low_um_ + spacing_um_ * Vec2{static_cast<double>(column), static_cast<double>(row)});
+  return places;
+}
+
 double ContractionLattice::share(int point, Vec2 place_um) const {
   const Vec2 at = 1 / spacing_um_ * (place_um - low_um_);
   const auto [column, row] = points_[point];
@@ -324,12 +328,14 @@ void add_error(FieldFit& fit, std::optional<double> SheetErrorParts::*part, cons
 FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss loss, std::optional<double> known,
                    const ContractionLattice& lattice, const VectorXd& mean) {
   MBTFM_ASSERT(table.n_contractions() == lattice.n_points() && !table.adhesion_nN_per_um3());
-  const MatrixXd roughness = lattice.roughness();
+  const double even_nN_per_um = Search(data, table, known, of_even_parts(table)).best().loads(0);
+  const ContractionPrior prior(lattice.roughness(), even_nN_per_um * smooth_patterns(lattice.places_um(), mean),
+                               table.n_loads());
   const auto amplitudes = [&](const Posterior& p) -> VectorXd {
     return numerics::matvec(table.shares(at_mean(p, table)), p.loads);
   };
   const auto found = [&](const LinearData& of, double variance) {
-    return FieldSearch(of, table, known, roughness, variance).posterior();
+    return FieldSearch(of, table, known, prior, variance).posterior();
   };
   data = weighed(std::move(data), loss,
                  [&](const LinearData& of) { return amplitudes(found(of, tensions::noise_variance(of))); });
@@ -351,8 +357,10 @@ FieldFit fit_field(LinearData data, const StiffnessTable& table, tensions::Loss 
   s.stiffnesses = at_mean(p, table);
   s.loads = p.loads;
   s.variance = variance;
-  Linearised about = linearised(data, directions_about(table, s.stiffnesses, p.loads, known.has_value()), variance,
-                                variance * std::exp(p.log_smoothing) * roughness);
+  const Directions directions = directions_about(table, s.stiffnesses, p.loads, known.has_value());
+  const MatrixXd of_prior = variance * prior.precision(std::exp(p.log_smoothing));
+  Linearised about = linearised(data, directions, variance, of_prior);
+  s.residuals = residuals_of(data, amplitudes(p), directions, of_prior);
   split_by_noise(s.estimates, about, variance, data);
   s.answers = std::move(about.answers);
   const double n_numbers = p.degrees + (known ? 0 : 1);

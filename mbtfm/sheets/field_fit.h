@@ -16,6 +16,7 @@ class ContractionLattice {
   /// Over all that the sheet covers, with about so many points.
   ContractionLattice(const sheet::Elements& elements, int n_points);
 
+  std::vector<Vec2> places_um() const;  ///< of the points
   int n_points() const { return static_cast<int>(points_.size()); }
   /// φ_k, which add up to 1 on the sheet.
   double share(int point, Vec2 place_um) const;
@@ -48,12 +49,13 @@ struct FieldFit {
 
 /// Bayes' rule, with a prior that knows how smooth a contraction is and nothing of its mean: exp(−λ/2 ∫ |∇s|² dA). For
 /// each stiffness and λ the contraction is linear in the data; means, errors and 95 % intervals are over the posterior
-/// of all three, log M and log λ equally probable before (MacKay, Neural Comput. 4 (1992) 415).
+/// of all three, log M and log λ equally probable before (MacKay, Neural Comput. 4 (1992) 415). Whatever λ is, the
+/// contraction may vary by the patterns of variation.h: the beads hardly tell these from another stiffness.
 ///
-///   log p(y | M, λ) = ½ r log λ − ½ log |N/v + λL| − Q/(2v),   Q = min |A c − y|² + vλ cᵀLc,   N = AᵀA
+///   log p(y | M, λ) = ½ log |P| − ½ log |N/v + P| − Q/(2v),   Q = min |A c − y|² + v cᵀPc,   N = AᵀA
 ///
-/// r the rank of L, v the variance of a datum: of the noise, or of what the sheet leaves if that is more. Line tension
-/// and bundles are known by nothing before.
+/// P⁻¹ = (λL)⁻¹ + GGᵀ with the patterns G, |P| over all but an even contraction, v the variance of a datum: of the
+/// noise, or of what the sheet leaves if that is more. Line tension and bundles are known by nothing before.
 /// @param table  with the shares of the lattice as its contractions; known adhesions
 /// @param mean  of each φ over the sheet's area
 FieldFit fit_field(tensions::LinearData data, const StiffnessTable& table, tensions::Loss loss,

@@ -182,11 +182,42 @@ MatrixXd padded(const MatrixXd& of_unknown, const Directions& about) {
   return whole;
 }
 
+/// Of all directions; 0 of those that have none.
+MatrixXd whole(const MatrixXd& prior, const Directions& about) {
+  MatrixXd all = MatrixXd::Zero(about.forces.cols(), about.forces.cols());
+  all.topLeftCorner(prior.rows(), prior.cols()) = prior;
+  return all;
+}
+
 }  // namespace
 
+Residuals residuals_of(const LinearData& data, const VectorXd& node_amplitudes, const Directions& about,
+                       const MatrixXd& prior) {
+  const VectorXd weight = tensions::squared_weights(data).cwiseSqrt();
+  const MatrixXd J = weight.asDiagonal() *
+                     tensions::less_motion(data, data.response->displace(about.forces(Eigen::all, about.unknown)));
+  const MatrixXd A = numerics::small_transposed_product(J, J) + whole(prior, about)(about.unknown, about.unknown);
+  const Index n_motions = data.motions.shapes.cols(), n = n_motions + J.cols();
+  Residuals r{.position_um = data.position_um,
+              .weighted = weight.cwiseProduct(tensions::residual_um(data, node_amplitudes)),
+              .weight_per_um = weight,
+              .followed = MatrixXd(J.rows(), n),
+              .inverse = MatrixXd::Zero(n, n),
+              .has_errors = data.has_errors};
+  if (n_motions > 0) {
+    r.followed.leftCols(n_motions) = weight.asDiagonal() * data.motions.shapes;
+    r.inverse.topLeftCorner(n_motions, n_motions) = data.motions.inverse;
+  }
+  r.followed.rightCols(J.cols()) = J;
+  r.inverse.bottomRightCorner(J.cols(), J.cols()) = numerics::inverse_symmetric(A);
+  for (Index b = 0; b < data.bead_weight.size(); ++b)
+    if (data.weight_per_um(2 * b) > 0) r.degrees += 2 * data.bead_weight(b);
+  r.degrees -= r.inverse.cwiseProduct(numerics::small_transposed_product(r.followed, r.followed)).sum();
+  return r;
+}
+
 Linearised linearised(const LinearData& data, const Directions& about, double variance, const MatrixXd& prior) {
-  MatrixXd of_prior = MatrixXd::Zero(about.forces.cols(), about.forces.cols());
-  of_prior.topLeftCorner(prior.rows(), prior.cols()) = prior;
+  const MatrixXd of_prior = whole(prior, about);
   const auto solved = [&](const Directions& of) -> MatrixXd {
     return padded(numerics::inverse_symmetric(of.normal(data) + of_prior(of.unknown, of.unknown)), of);
   };
@@ -237,10 +268,19 @@ void add_misfit(SheetFit& fit, const LinearData& data, VectorXd node_amplitudes,
   fit.relative_l2 = tensions::relative_l2(data, fit.node_amplitudes);
   fit.n_beads = static_cast<int>(data.position_um.size());
   fit.n_down_weighted = static_cast<int>((data.bead_weight.array() < 0.5).count());
-  const VectorXd moved_um = tensions::less_motion(data, MatrixXd(data.displacement_um));
-  const double u_squared = data.weight_per_um.cwiseProduct(moved_um).squaredNorm();
-  if (data.has_errors)
-    fit.expected_relative_l2 = std::sqrt((static_cast<double>(data.n_used) - n_unknowns) / u_squared);
+  if (!data.has_errors) return;
+  // over the same displacements as relative_l2: those less the motion that is found with the sheet
+  const VectorXd u_um =
+      tensions::moved_by(data, fit.node_amplitudes) + tensions::residual_um(data, fit.node_amplitudes);
+  double u_squared = 0, noise_squared = 0, n_components = 0;
+  for (Index k = 0; k < u_um.size(); ++k) {
+    if (!(data.weight_per_um(k) > 0)) continue;
+    u_squared += u_um(k) * u_um(k);
+    noise_squared += 1 / (data.weight_per_um(k) * data.weight_per_um(k));
+    ++n_components;
+  }
+  const double degrees = static_cast<double>(data.n_used) - n_unknowns;
+  if (u_squared > 0) fit.expected_relative_l2 = std::sqrt(noise_squared * degrees / n_components / u_squared);
 }
 
 Models::Models(const LinearData& data, double noise_variance)

@@ -97,6 +97,8 @@ struct Linearised {
   MatrixXd answers;         ///< SheetFit::answers: of a stiffness that is not told none
 };
 /// @param prior  beside the normal equations, by the first of the columns; empty: none
+Residuals residuals_of(const tensions::LinearData& data, const VectorXd& node_amplitudes, const Directions& about,
+                       const MatrixXd& prior = {});
 Linearised linearised(const tensions::LinearData& data, const Directions& about, double variance,
                       const MatrixXd& prior = {});
 /// Splits the standard errors that noise and misfit give. @param variance  the beads' share of the variance

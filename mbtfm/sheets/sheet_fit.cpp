@@ -201,6 +201,26 @@ class Estimates {
   const Allowed& allowed_;
 };
 
+/// What is always positive, and told as a factor.
+bool is_logarithmic(Quantity quantity) {
+  return quantity == Quantity::stiffness || quantity == Quantity::adhesion_stiffness ||
+         quantity == Quantity::penetration;
+}
+
+/// Both ends of an interval. A stiffness that changes much does so neither by a sum nor by a factor: each end is the
+/// farther of both, which is the sum below and the factor above.
+/// @param more  half the width of an interval of the error alone
+void widen(FittedEstimate& e, double more) {
+  if (e.low) {
+    const double wider = e.value - std::hypot(e.value - *e.low, more);
+    e.low = *e.low >= 0 ? std::max(0.0, wider) : wider;  // what cannot be negative stays so
+  }
+  if (!e.high) return;
+  const bool is_factor = is_logarithmic(e.quantity) && e.value > 0;
+  e.high = is_factor ? e.value * std::exp(std::hypot(std::log(*e.high / e.value), more / e.value))
+                     : e.value + std::hypot(*e.high - e.value, more);
+}
+
 }  // namespace
 
 LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
@@ -214,23 +234,26 @@ void add_error(std::vector<FittedEstimate>& estimates, std::optional<double> She
                const VectorXd& sizes) {
   for (std::size_t k = 0; k < estimates.size(); ++k) {
     FittedEstimate& e = estimates[k];
-    const double size = sizes(static_cast<Index>(k)), more = tensions::kNormal95 * size;
-    if (e.low) {
-      const double wider = e.value - std::hypot(e.value - *e.low, more);
-      e.low = *e.low >= 0 ? std::max(0.0, wider) : wider;  // what cannot be negative stays so
+    const double size = sizes(static_cast<Index>(k));
+    if (is_logarithmic(e.quantity) && size > e.value) {
+      e.low = e.high = e.sigma = std::nullopt;
+      e.identifiable = false;
+      e.parts = {};
+      continue;
     }
-    if (e.high) e.high = e.value + std::hypot(*e.high - e.value, more);
+    widen(e, tensions::kNormal95 * size);
     if (!e.sigma) continue;
     e.sigma = std::hypot(*e.sigma, size);
     e.parts.*part = std::hypot((e.parts.*part).value_or(0), size);
   }
 }
 
-void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um) {
+VectorXd add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um) {
   const MatrixXd moved = numerics::small_product(fit.answers, changes_um);
   VectorXd sizes(std::ssize(fit.estimates));
   for (Index k = 0; k < sizes.size(); ++k) sizes(k) = (fit.estimates[k].by_unknown.transpose() * moved).norm();
   add_error(fit.estimates, part, sizes);
+  return sizes;
 }
 
 VectorXd changes_by_modulus(const std::vector<FittedEstimate>& estimates, double share) {
@@ -260,7 +283,9 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   fit.loads = best.loads;
   add_misfit(fit, data, numerics::matvec(table.shares(best.at), best.loads), static_cast<double>(n_unknowns));
   fit.variance = tensions::misfit_variance(data, fit.node_amplitudes, n_unknowns, loss);
-  Linearised about = linearised(data, directions_about(table, best.at, best.loads, known.has_value()), fit.variance);
+  const Directions directions = directions_about(table, best.at, best.loads, known.has_value());
+  fit.residuals = residuals_of(data, fit.node_amplitudes, directions);
+  Linearised about = linearised(data, directions, fit.variance);
   const MatrixXd& covariance = about.covariance;
   const Index at_M = table.n_loads();
   if (!known) fit.correlation = covariance(0, at_M) / std::sqrt(covariance(0, 0) * covariance(at_M, at_M));

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "mbtfm/sheets/residuals.h"
 #include "mbtfm/sheets/stiffness_table.h"
 #include "mbtfm/tensions/linear_data.h"
 #include "mbtfm/tensions/tension_fit.h"
@@ -31,6 +32,7 @@ struct SheetFit {
   bool is_at_bound = false;  ///< the best stiffness of the sheet is the table's first or last
   double correlation = 0;    ///< of the errors of the first contraction and log stiffness
   double variance = 1;       ///< of a weighted component of a bead, that the error bars are made with
+  Residuals residuals;
   double relative_l2 = 0;
   std::optional<double> expected_relative_l2;  ///< by the errors that the beads state
   int n_beads = 0, n_down_weighted = 0;
@@ -53,14 +55,16 @@ void compare_with_adhesions(SheetFit& fit, const tensions::LinearData& adhesions
 tensions::LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
                              const substrate::Substrate& gel, int threads, MatrixXd motions = {});
 
-/// One more error of the estimates, independent of the others: their standard errors and intervals grow by it.
+/// One more error of the estimates, independent of the others: their standard errors and intervals grow by it. A
+/// stiffness that this error alone changes by a factor of e or more has neither from then on.
 /// @param part  the source, whose part grows, too
 /// @param sizes  a standard error each
 void add_error(std::vector<FittedEstimate>& estimates, std::optional<double> SheetErrorParts::*part,
                const VectorXd& sizes);
 /// The same by what they change if the beads moved otherwise.
 /// @param changes_um  2·beads × errors that are independent of each other
-void add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um);
+/// @returns a standard error each
+VectorXd add_error(SheetFit& fit, std::optional<double> SheetErrorParts::*part, const MatrixXd& changes_um);
 /// What they change by if all forces and stiffnesses grow by a share: the beads' displacements are measured, so that is
 /// what another modulus of the gel does, if no stiffness is given.
 VectorXd changes_by_modulus(const std::vector<FittedEstimate>& estimates, double share);

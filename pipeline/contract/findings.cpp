@@ -381,23 +381,31 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the estimate is the difference between the triangles' own tensions and smooth ones; those written are better",
        "Set a smaller sheet.mesh_um."},
       {sheet_not_identifiable, "sheet-not-identifiable", "sheet", caution,
-       "1 if the beads set no limit to a side of the sheet's stiffness", 0,
-       "a sheet much stiffer than its gel moves it by contraction over stiffness alone, a soft one by its contraction",
+       "1 if the beads set no limit to a side of the sheet's stiffness, or a contraction that varies by 20 % moves it "
+       "by a factor of e",
+       0,
+       "a sheet much stiffer than its gel moves it by contraction over stiffness alone, a soft one by its contraction; "
+       "an edge that pulls more than the middle looks like a softer sheet",
        "Read what is limited: contraction_over_stiffness of a stiff sheet, contraction_nN_per_um of a soft one. If the "
-       "stiffness is known, give sheet.youngs_modulus_kPa."},
+       "stiffness is known, give sheet.youngs_modulus_kPa. With fit_parts = field the beads limit the variation, too."},
       {sheet_unexplained, "sheet-unexplained", "sheet", caution,
-       "sum of squares that the sheet leaves of the displacement, over that of the beads' noise", 1.25,
-       "up to half of the noise's standard deviation, the sheet's own error adds less than an eighth to what is left",
+       "standard deviations by which the residuals exceed noise and stated errors: in size (chi² per degree of "
+       "freedom), or in the correlation between near beads, whichever is more",
+       3,
+       "chance exceeds 3 in one of 740 fits for each of the two; what a sheet lacks is smooth, and shows in the "
+       "correlation long before it shows in the size",
        "Compare the models in sheet_models.csv. If stress fibres pull, give them (run.bundles, or mbtfm-sheet "
        "--bundles). If the edge pulls more than the rest, set fit_line_tension or fit_parts. If the sheet adheres in "
        "places only, give these (images.adhesion_mask, or mbtfm-sheet --adhesive). Check the gel and the outline."},
       {sheet_expands, "sheet-expands", "sheet", caution,
-       "share of the sheet's parts whose best contraction is below zero, or whose 95 % interval holds no contraction",
+       "share of the sheet's parts whose best contraction is below zero, or whose 95 % interval holds no contraction; "
+       "1 if given tractions have a negative mean tension",
        0,
        "cells pull their ground inward; one that pushes it outward is exchanged images, another cell or a wrong "
        "outline",
-       "Check which image is stressed and which relaxed, the outline, and what pulls beside it. If the interval holds "
-       "zero, the beads tell no contraction: use its upper end."},
+       "Check which image is stressed and which relaxed, the sign of given tractions (they are those on the gel), the "
+       "outline, and what pulls beside it. If the interval holds zero, the beads tell no contraction: use its upper "
+       "end."},
       {sheet_at_bound, "sheet-at-bound", "sheet", caution,
        "1 if the best stiffness is the softest or the stiffest that is looked at", 0,
        "the misfit falls up to the end of the range: the value is the range's end, not what the beads tell",

@@ -35,6 +35,7 @@ struct SheetErrorParts {
   std::optional<double> beads = {};      ///< noise of the displacements
   std::optional<double> motion = {};     ///< that all beads share: how much less they tell beside it
   std::optional<double> model = {};      ///< what the misfit calls for beyond the beads' noise
+  std::optional<double> variation = {};  ///< of the contraction over the sheet, which is taken for even
   std::optional<double> mesh = {};       ///< what is left of it once a finer one has corrected the fit
   std::optional<double> outline = {};    ///< its place
   std::optional<double> gel = {};        ///< modulus, thickness and Poisson's ratio, where their errors are stated
@@ -46,6 +47,7 @@ void for_each_part(const SheetErrorParts& p, const Visit& visit) {
   visit("beads", p.beads);
   visit("motion", p.motion);
   visit("model", p.model);
+  visit("variation", p.variation);
   visit("mesh", p.mesh);
   visit("outline", p.outline);
   visit("gel", p.gel);

@@ -1,6 +1,7 @@
 #include "pipeline/files/sheet_files.h"
 
 #include "pipeline/files/json_record.h"
+#include "pipeline/files/own_files.h"
 
 namespace mbtfm::files {
 namespace {
@@ -33,6 +34,9 @@ Table<SheetEstimate> sheet_estimate_table() {
           part("by_motion", "part by the motion that all beads share; empty: none was allowed for",
                &SheetErrorParts::motion),
           part("by_model", "part by what the sheet leaves of the beads beyond their noise", &SheetErrorParts::model),
+          part("by_variation",
+               "part by a contraction that varies by 20 % over the sheet, slowly; empty: its variation is fitted",
+               &SheetErrorParts::variation),
           part("by_mesh", "part by the sheet's triangles", &SheetErrorParts::mesh),
           part("by_outline", "part by the place of the outline (`outline_error_um`)", &SheetErrorParts::outline),
           part("by_gel",
@@ -51,6 +55,16 @@ SheetSummary read_sheet_summary(const Path& folder) {
                  .expected_relative_l2 = figures.at("expected_relative_l2").number()};
   if (const auto energy = figures.find("strain_energy_fJ")) s.strain_energy_fJ = energy->number();
   return s;
+}
+
+OutlineSource source_of_outline(const Path& table) {
+  const Path beside = table.parent_path() / "record.json";
+  if (!is_own_file(beside)) return OutlineSource::found;
+  const JsonRecord record(beside, "a record of mbtfm-segment");
+  const std::optional<JsonRecord> figures = record.find("figures");
+  if (!figures) return OutlineSource::found;
+  if (figures->is_true_or("outline_drawn_by_hand", false)) return OutlineSource::drawn;
+  return figures->is_true_or("outline_from_mask", false) ? OutlineSource::mask : OutlineSource::found;
 }
 
 }  // namespace mbtfm::files

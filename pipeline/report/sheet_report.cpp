@@ -90,8 +90,8 @@ std::vector<Listing> tables_of_sheet(const fs::path& estimates, const fs::path& 
            "Their squares add up to that of sigma; a part that is not there was not asked for.",
            of + "sheet_fit.csv",
            files::read_text(estimates),
-           {"quantity", "part", "sigma", "by_beads", "by_motion", "by_model", "by_mesh", "by_outline", "by_gel",
-            "by_substrate"}}};
+           {"quantity", "part", "sigma", "by_beads", "by_motion", "by_model", "by_variation", "by_mesh", "by_outline",
+            "by_gel", "by_substrate"}}};
 }
 
 std::string report_of_sheet(const fs::path& cell) {

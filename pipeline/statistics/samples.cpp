@@ -233,7 +233,8 @@ bool enters(const SheetEstimate& e) { return e.identifiable && !is_given(e); }
 
 std::optional<double> own_error(const SheetEstimate& e) {
   if (!e.sigma) return std::nullopt;
-  const double shared = std::hypot(e.parts.gel.value_or(0), e.parts.substrate.value_or(0));
+  const SheetErrorParts& p = e.parts;
+  const double shared = std::hypot(p.gel.value_or(0), p.substrate.value_or(0), p.variation.value_or(0));
   return std::sqrt(std::max(0.0, *e.sigma * *e.sigma - shared * shared));
 }
 

@@ -67,7 +67,8 @@ inline constexpr const char* kResolution = "space_resolution_um";
 /// Whether it is a measurement: not given by the user, and limited to both sides by the beads.
 bool enters(const SheetEstimate& estimate);
 /// The standard error without what all sheets on gels of one kind share: errors of the gel's numbers and of its model
-/// are no scatter of sheets.
+/// are no scatter of sheets. That of a contraction which varies is shared if all vary alike, and scatter, which the
+/// statistics see, if not.
 std::optional<double> own_error(const SheetEstimate& estimate);
 
 /// What a cell's force may depend on.

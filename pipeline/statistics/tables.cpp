@@ -242,18 +242,19 @@ Table<SpaceForceRow> space_force_table() {
 
 using EstimateRow = InCell<SheetEstimate>;
 Table<EstimateRow> estimate_table() {
-  return {.file = "statistics/sheets.csv",
-          .row = "each number of a sheet that its beads were asked for",
-          .columns = in_cell<SheetEstimate>(
-              {files::sheet_estimate_table().columns.only({"quantity", "part", "value", "low", "high", "identifiable"}),
-               {"kind", "as which it counts: the sheet, or the kind of part, without its label",
-                [](const SheetEstimate& e) { return kind_of_part(e); }},
-               {"enters", "the statistics: the beads limit it to both sides, and it was not given",
-                [](const SheetEstimate& e) { return enters(e); }},
-               {"sigma",
-                "standard error that the statistics take: that of the fit without what the gel's numbers and its model "
-                "add, which sheets share",
-                [](const SheetEstimate& e) { return own_error(e); }, kResult}})};
+  return {
+      .file = "statistics/sheets.csv",
+      .row = "each number of a sheet that its beads were asked for",
+      .columns = in_cell<SheetEstimate>(
+          {files::sheet_estimate_table().columns.only({"quantity", "part", "value", "low", "high", "identifiable"}),
+           {"kind", "as which it counts: the sheet, or the kind of part, without its label",
+            [](const SheetEstimate& e) { return kind_of_part(e); }},
+           {"enters", "the statistics: the beads limit it to both sides, and it was not given",
+            [](const SheetEstimate& e) { return enters(e); }},
+           {"sigma",
+            "standard error that the statistics take: that of the fit without what the gel's numbers, its model and "
+            "a contraction that varies add, which sheets share",
+            [](const SheetEstimate& e) { return own_error(e); }, kResult}})};
 }
 
 /// @param unit  begins with an underscore or is empty
