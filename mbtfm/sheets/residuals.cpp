@@ -62,7 +62,10 @@ Statistic over(Statistic s, double divisor) { return {s.value / divisor, s.expec
 
 }  // namespace
 
-double Misfit::excess() const { return std::max(chi_squared_per_degree.excess(), correlation.excess()); }
+double Misfit::excess() const {
+  constexpr double kSizeKnown = 0.2, kShared = 0.05;
+  return std::max(chi_squared_per_degree.excess(kSizeKnown), correlation.excess(kShared));
+}
 
 Misfit misfit_of(const Residuals& r, double near_um, const MatrixXd& errors_um) {
   Misfit misfit;

@@ -390,7 +390,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "stiffness is known, give sheet.youngs_modulus_kPa. With fit_parts = field the beads limit the variation, too."},
       {sheet_unexplained, "sheet-unexplained", "sheet", caution,
        "standard deviations by which the residuals exceed noise and stated errors: in size (chi² per degree of "
-       "freedom), or in the correlation between near beads, whichever is more",
+       "freedom, 0.2 aside), or in the correlation between near beads (0.05 aside), whichever is more",
        3,
        "chance exceeds 3 in one of 740 fits for each of the two; what a sheet lacks is smooth, and shows in the "
        "correlation long before it shows in the size",
