@@ -392,7 +392,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "standard deviations by which the residuals exceed noise and stated errors: in size (chi² per degree of "
        "freedom, 0.2 aside), or in the correlation between near beads (0.05 aside), whichever is more",
        3,
-       "chance exceeds 3 in one of 740 fits for each of the two; what a sheet lacks is smooth, and shows in the "
+       "chance exceeds 3 in one of 740 fits for each of the two; what a sheet leaves out is smooth, and shows in the "
        "correlation long before it shows in the size",
        "Compare the models in sheet_models.csv. If stress fibres pull, give them (run.bundles, or mbtfm-sheet "
        "--bundles). If the edge pulls more than the rest, set fit_line_tension or fit_parts. If the sheet adheres in "

@@ -285,7 +285,7 @@ TEST(SheetFit, residuals_of_a_right_sheet_are_as_large_and_as_alike_as_stated) {
 
 /// What the outline's error makes of the residuals is counted if it is stated, and named if it is not.
 TEST(SheetFit, an_outline_that_lies_elsewhere_is_named_unless_its_error_is_stated) {
-  constexpr double kFurther_um = 2;
+  constexpr double kFurther_um = 3;
   const FittedDisc truth(25), taken(25 + kFurther_um);
   std::mt19937_64 random(32);
   const DisplacementField beads = with_noise(truth.exact(3, 1), random);
