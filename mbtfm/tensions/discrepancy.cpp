@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "mbtfm/tensions/robust.h"
 #include "pipeline/numerics/dense.h"
 
 namespace mbtfm::tensions {
@@ -69,24 +70,17 @@ VectorXd by_component(const VectorXd& by_adhesion) {
   return twice;
 }
 
-/// The derivatives by tensions that are free.
-MatrixXd of_free(const MatrixXd& derivatives, const std::vector<bool>& is_free) {
-  std::vector<Index> columns;
-  for (std::size_t i = 0; i < is_free.size(); ++i)
-    if (is_free[i]) columns.push_back(static_cast<Index>(i));
-  return derivatives(Eigen::all, columns);
-}
-
 /// An adhesion that nothing pulls at by this model may still bear something.
 VectorXd not_without(const VectorXd& loads_nN) { return loads_nN.cwiseMax(1e-3 * loads_nN.mean()).cwiseMax(1e-300); }
 
 }  // namespace
 
-Discrepancy discrepancy_of(const ReducedData& data, const MeshForces& mean, const std::vector<bool>& is_free,
+Discrepancy discrepancy_of(const ReducedData& data, const MeshForces& mean, const VectorXd& tensions_nN,
                            const ModelError& error, const std::vector<Vec2>& centres_um, int threads) {
   const double variance = error.noise_variance;
   const MatrixXd C = displace(data, MatrixXd::Identity(data.compliance->cols(), data.compliance->cols()), threads);
-  const MatrixXd J = of_free(mean.derivatives, is_free), A = displace(data, J), Q = numerics::orthonormal_basis(A);
+  const MatrixXd J = of_free_tensions(mean.derivatives, tensions_nN), A = displace(data, J),
+                 Q = numerics::orthonormal_basis(A);
   Beyond beyond{
       .compliance = C - numerics::product(Q, numerics::transposed_product(Q, C, threads), threads), .H = {}, .q = {}};
   beyond.H = numerics::gram(beyond.compliance, threads) / variance;

@@ -23,9 +23,9 @@ struct Discrepancy {
 };
 
 /// @param mean  of the meshes, at tensions common to all
-/// @param is_free  by tension: it may follow; the others are held at zero
+/// @param tensions_nN  those above zero may follow, the others are held there
 /// @param centres_um  of the adhesions; empty: their forces need not balance
-Discrepancy discrepancy_of(const ReducedData& data, const MeshForces& mean, const std::vector<bool>& is_free,
+Discrepancy discrepancy_of(const ReducedData& data, const MeshForces& mean, const VectorXd& tensions_nN,
                            const ModelError& error, const std::vector<Vec2>& centres_um, int threads);
 
 /// With the variances of single adhesions that the beads show.

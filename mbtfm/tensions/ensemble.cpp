@@ -312,13 +312,11 @@ OwnForces one_after_the_other(const OwnForces& first, const OwnForces& then) {
           .covariance = then.covariance + numerics::congruence(then.left, first.covariance)};
 }
 
-/// The tensions at zero are held.
-std::vector<bool> is_free_in(const EnsembleFit& all) {
+/// Of each tension: zero where every mesh holds it there.
+VectorXd sum_over_meshes_nN(const EnsembleFit& all) {
   VectorXd sum = VectorXd::Zero(static_cast<Index>(all.tensions.fibre_ids.size()));
   for (const MeshFit& mesh : all.meshes) sum += mesh.fit.trial.tensions_nN;
-  std::vector<bool> is_free;
-  for (const double tension : sum) is_free.push_back(tension > 0);
-  return is_free;
+  return sum;
 }
 
 /// On the first network, with the data as its loss weighs them.
@@ -496,7 +494,7 @@ void add_telling(EnsembleFit& all) {
 
 /// What adhesions exert beside the network, near a cut and where the network is wrong.
 Discrepancy add_discrepancy(EnsembleFit& all, const ModelError& error, bool is_cut) {
-  Discrepancy beside = discrepancy_of(all.data.reduced, mean_of(forces_at_mean(all)), is_free_in(all), error,
+  Discrepancy beside = discrepancy_of(all.data.reduced, mean_of(forces_at_mean(all)), sum_over_meshes_nN(all), error,
                                       is_cut ? std::vector<Vec2>() : all.data.load_centre_um, all.data.threads);
   const std::optional<OwnForces> near_cut = own_forces_in(all.data);
   all.forces.own = near_cut ? one_after_the_other(beside.forces, *near_cut) : beside.forces;

@@ -70,7 +70,7 @@ struct Step {
 };
 
 Step step_of(const LinearData& data, const Trial& trial, const MatrixXd& derivatives, const MatrixXd& placement) {
-  const MatrixXd of_free = of_free_tensions(derivatives, trial);
+  const MatrixXd of_free = of_free_tensions(derivatives, trial.tensions_nN);
   // all by way of the forces: beads × tensions are too many numbers
   MatrixXd weighted(placement.rows(), 4);
   weighted << less_motion(data, placement), residual_um(data, trial.forces_nN);

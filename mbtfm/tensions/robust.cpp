@@ -174,16 +174,15 @@ bool stands_alone(const LinearData& data, const VectorXd& residual, Index row) {
 
 }  // namespace
 
-MatrixXd of_free_tensions(const MatrixXd& force_derivatives, const Trial& trial) {
+MatrixXd of_free_tensions(const MatrixXd& force_derivatives, const VectorXd& tensions_nN) {
   std::vector<Index> free;
-  for (Index i = 0; i < force_derivatives.cols(); ++i) {
-    if (trial.tensions_nN[i] > 0) free.push_back(i);
-  }
+  for (Index i = 0; i < tensions_nN.size(); ++i)
+    if (tensions_nN[i] > 0) free.push_back(i);
   return force_derivatives(Eigen::all, free);
 }
 
 Studentized studentized(const LinearData& data, const Trial& trial, const MatrixXd& force_derivatives) {
-  const MatrixXd of_free = of_free_tensions(force_derivatives, trial);
+  const MatrixXd of_free = of_free_tensions(force_derivatives, trial.tensions_nN);
   const VectorXd weight = squared_weights(data).cwiseSqrt();
   Eigen::Matrix3Xd hat = Eigen::Matrix3Xd::Zero(3, weight.size() / 2);  // its blocks: xx, xy, yy
   const auto add = [&](const MatrixXd& independent) {                   // columns Z of a part Z Zᵀ

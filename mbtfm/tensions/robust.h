@@ -11,7 +11,7 @@
 namespace mbtfm::tensions {
 
 /// Columns of dR/dt (2·adhesions × tensions) of the tensions that are not at their bound, zero.
-MatrixXd of_free_tensions(const MatrixXd& force_derivatives, const Trial& trial);
+MatrixXd of_free_tensions(const MatrixXd& force_derivatives, const VectorXd& tensions_nN);
 
 /// The weighted residuals of a trial, each made as large as if the fit did not follow its bead: (1 − H)^(−1/2) r, H the
 /// bead's 2 × 2 block of the hat matrix of motions and tensions, those at zero held there (Cook & Weisberg, Residuals

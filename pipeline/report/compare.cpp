@@ -11,6 +11,7 @@
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/report/match_fibres.h"
+#include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/space_map.h"
 #include "pipeline/report/space_results.h"
@@ -51,7 +52,7 @@ void add_figures(Comparison& comparison) {
   comparison.relative_error = truth2 > 0 ? std::sqrt(error2 / truth2) : 0;
 }
 
-std::string short_number(const std::optional<double>& value) { return value ? fmt::format("{:.3g}", *value) : "–"; }
+std::string short_number(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
 std::string label(const std::optional<Fibre>& fibre) { return fibre ? std::to_string(fibre->fibre_id) : "–"; }
 
 }  // namespace
@@ -126,12 +127,15 @@ ComparedNumbers numbers_of_sheet(const fs::path& cell) {
 ComparedNumbers numbers_in_space(const fs::path& cell) {
   const SpaceResults results = read_space_results(cell);
   const SpaceMap map = read_space_map(cell), truth = true_space_map(cell);
-  ComparedNumber force{
-      .quantity = "total_force_nN", .found = map.total_force_nN, .low = {}, .high = {}, .truth = truth.total_force_nN};
+  ComparedNumber force{.quantity = "total_force_nN",
+                       .found = results.number("total_force_nN"),
+                       .low = {},
+                       .high = {},
+                       .truth = truth.total_force_nN};
   constexpr double k95 = 1.96;
   if (const auto sigma = results.find("total_force_sigma_nN")) {
-    force.low = map.total_force_nN - k95 * *sigma;
-    force.high = map.total_force_nN + k95 * *sigma;
+    force.low = *force.found - k95 * *sigma;
+    force.high = *force.found + k95 * *sigma;
   }
   const auto largest = [](const SpaceMap& of) {
     double most = 0;

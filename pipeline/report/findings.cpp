@@ -73,16 +73,27 @@ std::string parts_of_total(const CellResults& results) {
                      readable(results.fit.network_force_nN));
 }
 
+std::string with_error(double value, double sigma, const char* unit) {
+  const auto decimals = sigma > 0 ? std::optional(decimals_for(sigma)) : std::nullopt;
+  return fmt::format("{} ± {} {}", rounded(value, decimals), rounded(sigma, decimals), unit);
+}
+
+/// With its standard error, where the fit states one.
+std::string total_in_words(const FitSummary& fit) {
+  if (!fit.error_budget) return readable(fit.total_force_nN) + " nN";
+  return with_error(fit.total_force_nN, total(fit.error_budget->total_force_parts_nN), "nN");
+}
+
 std::string what(const CellResults& results) {
   int n_by_type[std::size(kFibreTypes)] = {};
   for (const Fibre& fibre : results.cell.fibres) ++n_by_type[static_cast<int>(fibre.type)];
   const int n_edge = n_by_type[static_cast<int>(FibreType::edge)];
   return fmt::format(
-             "{} ({} dorsal, {}, {} ventral{}) and {}. The cell pulls with {} nN in total, summed over its adhesions{}",
+             "{} ({} dorsal, {}, {} ventral{}) and {}. The cell pulls with {} in total, summed over its adhesions{}",
              counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
              counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
              n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell),
-             readable(results.fit.total_force_nN), parts_of_total(results)) +
+             total_in_words(results.fit), parts_of_total(results)) +
          of_candidates(results.cell) + of_cut(results.fit);
 }
 
@@ -165,11 +176,6 @@ std::string quality(const FitSummary& fit) {
         "their noise.";
   }
   return text + explained_by_network(fit);
-}
-
-std::string with_error(double value, double sigma, const char* unit) {
-  const auto decimals = sigma > 0 ? std::optional(decimals_for(sigma)) : std::nullopt;
-  return fmt::format("{} ± {} {}", rounded(value, decimals), rounded(sigma, decimals), unit);
 }
 
 /// Empty for results of a version that did not compute them.

@@ -228,7 +228,7 @@ TEST(Discrepancy, finds_what_adhesions_exert_beside_the_network) {
       data.target = *data.compliance * true_nN + model.draw(Model::kRows, 1).col(0);
       const ModelError error = model_error(meshes, data, 1);
       const MeshForces mean = mean_of(meshes);
-      const Discrepancy beside = discrepancy_of(data, mean, std::vector<bool>(4, true), error, {}, 1);
+      const Discrepancy beside = discrepancy_of(data, mean, Eigen::VectorXd::Ones(4), error, {}, 1);
       const Eigen::VectorXd forces_nN = beside.forces.left * mean.forces_nN + beside.forces.found_nN;
       network += (mean.forces_nN - true_nN).norm() / kDraws;
       found += (forces_nN - true_nN).norm() / kDraws;
@@ -252,7 +252,7 @@ TEST(Discrepancy, goes_to_nothing_where_the_network_is_right) {
     const std::vector<MeshForces> meshes(2, {model.D * model.tensions, model.D * model.tensions, model.D});
     ReducedData data = model.data(0);
     const ModelError error = model_error(meshes, data, 1);
-    const Discrepancy beside = discrepancy_of(data, mean_of(meshes), std::vector<bool>(4, true), error, {}, 1);
+    const Discrepancy beside = discrepancy_of(data, mean_of(meshes), Eigen::VectorXd::Ones(4), error, {}, 1);
     const Eigen::VectorXd of_network = meshes.front().forces_nN,
                           forces_nN = beside.forces.left * of_network + beside.forces.found_nN;
     const Eigen::VectorXd free_nN = free_forces_nN(data);
@@ -272,7 +272,7 @@ TEST(Discrepancy, balances_as_a_whole) {
   const std::vector<MeshForces> meshes(2, {model.D * model.tensions, model.D * model.tensions, model.D});
   const ReducedData data = model.data(2);
   const Discrepancy beside =
-      discrepancy_of(data, mean_of(meshes), std::vector<bool>(4, true), model_error(meshes, data, 1), centres_um, 1);
+      discrepancy_of(data, mean_of(meshes), Eigen::VectorXd::Ones(4), model_error(meshes, data, 1), centres_um, 1);
   const Eigen::VectorXd forces_nN = beside.forces.left * meshes.front().forces_nN + beside.forces.found_nN;
   EXPECT_GT((forces_nN - meshes.front().forces_nN).norm(), 0.1) << "nothing was found for this to tell anything";
   EXPECT_LT((sums.transpose() * forces_nN).cwiseAbs().maxCoeff(), 1e-8 * forces_nN.norm() * 100);
