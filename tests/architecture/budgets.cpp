@@ -17,9 +17,9 @@ constexpr int kLongSources = 30;                                                
 constexpr int kLongestSource = 890;                                               // lines
 constexpr int kOwnHeadersMedian = 14, kOwnHeadersP90 = 40, kOwnHeadersMost = 94;  // that a source of the product gets
 constexpr int kSeeFindings = 30;  // sources of product and tests that a new kind of finding compiles again
-constexpr int kKindsOfFindings = 86;
+constexpr int kKindsOfFindings = 87;
 constexpr int kParameterRows = 491;  // of docs/parameters.md
-constexpr int kWordsOfDocs = 150150;
+constexpr int kWordsOfDocs = 150220;
 
 const std::vector<std::string> kProduct = {"pipeline", "segment",   "network", "substrate",
                                            "mbtfm",    "continuum", "samples"};
