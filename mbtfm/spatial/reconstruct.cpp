@@ -163,9 +163,14 @@ SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& i
     const SpatialReconstruction by_squares = by_method(method, problem, by_the_same, squares, threads);
     r.findings.push_back(notice_loss(parameters.loss, balance_of(problem, r), balance_of(problem, by_squares)));
   }
-  constexpr double kSure = 10;  // of a likelihood ratio of e^5, 150
-  if (r.flipped_z_chi_squared.value_or(0) < -kSure)
+  const double falls_by = -r.flipped_z_chi_squared.value_or(0);
+  if (auto reversed = noticed(FindingKind::z_reversed, falls_by,
+                              "The beads fit better if all displacements along z have the opposite sign: chi-squared "
+                              "falls by " +
+                                  brief(falls_by) + ".")) {
+    r.findings.push_back(std::move(reversed));
     r.remark = "the beads fit better with the opposite sign of uz_um: look at z_points";
+  }
   return r;
 }
 

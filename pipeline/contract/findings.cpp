@@ -330,6 +330,11 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "errors contain the error of the gel's model",
        "Check that the whole cell lies above the beads: forces beyond them are missing in the sum. Look for a cell "
        "beside it, or for a support that holds the cell."},
+      {z_reversed, "z-reversed", "traction", caution,
+       "by how much chi-squared of the fit falls if all displacements along z have the opposite sign", 10,
+       "ten are odds of 150 to one; with the right sign it rises by some hundreds",
+       "Check z_points in cell.toml, and "
+       "the sign of uz_um in displacement_3d.csv: it is positive out of the gel."},
       {beads_stray, "beads-stray", "traction", caution,
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
@@ -488,8 +493,7 @@ std::string on_sound_cells(const KindOfFinding& k) {
   switch (k.kind) {
     case FindingKind::strain_beyond_linear:
       return "- On 400 sound cells: 84, of which 79 are crowded (`dense`): adhesions there pull with 3 to 8 times the "
-             "shear "
-             "modulus.\n";
+             "shear modulus.\n";
     case FindingKind::missing_fibre:
       return "- On 400 sound cells: 11.\n";
     case FindingKind::not_identifiable:

@@ -81,6 +81,7 @@ enum class FindingKind : int {
   misfit_in_space,
   patches_do_not_fit,
   tractions_out_of_balance,
+  z_reversed,
   beads_stray,
   loss_decides,
   lambda_runs_away,

@@ -996,6 +996,8 @@ TEST_F(InSpace, a_z_that_points_the_other_way_fits_worse) {
   EXPECT_LT(*wrong.flipped_z_chi_squared, -10);
   EXPECT_TRUE(right.remark.empty()) << right.remark;
   EXPECT_NE(wrong.remark.find("z_points"), std::string::npos) << wrong.remark;
+  EXPECT_FALSE(fires("z-reversed", right.findings));
+  EXPECT_TRUE(fires("z-reversed", wrong.findings));
 }
 
 /// Nothing is smoothed of a few forces that the beads tell well, so that their errors are those of the noise.
