@@ -16,6 +16,8 @@ import pathlib
 import random
 import subprocess
 
+from rough_days import true_force_nN
+
 NETWORKS = ["second-neighbours", "edges", "edges-rims", "edges-centres"]
 
 
@@ -65,12 +67,10 @@ def results(seed, asked):
         if asked.without:
             take_away(cell, asked.without, seed)
         subprocess.run([asked.bin / "mbtfm", "run", cell, "--quiet", "--threads", "1"], capture_output=True)
-    with open(cell / "truth/adhesion_forces.csv", newline="") as file:
-        truth = sum(math.hypot(float(row["fx_nN"]), float(row["fy_nN"])) for row in csv.DictReader(file))
     fit = json.loads((cell / "4_fit/fit.json").read_text())
     findings = json.loads((cell / "run.json").read_text()).get("findings", [])
     return chosen, list(dict.fromkeys(f["id"] for f in findings if f["severity"] != "note")), \
-        (fit["total_force_nN"] - truth) / fit["total_force_sigma_nN"]
+        (fit["total_force_nN"] - true_force_nN(cell)) / fit["total_force_sigma_nN"]
 
 
 def main():

@@ -96,6 +96,7 @@ struct Linearised {
   MatrixXd without_motion;  ///< the same if the beads shared no motion
   MatrixXd answers;         ///< SheetFit::answers: of a stiffness that is not told none
 };
+/// What these amplitudes leave of the beads, and how the fit follows their noise.
 /// @param prior  beside the normal equations, by the first of the columns; empty: none
 Residuals residuals_of(const tensions::LinearData& data, const VectorXd& node_amplitudes, const Directions& about,
                        const MatrixXd& prior = {});

@@ -87,7 +87,6 @@ Misfit misfit_of(const Residuals& r, double near_um, const MatrixXd& errors_um) 
   misfit.correlation = quadratic(r, l, summed(near, r.followed), summed(near, l), 0, n_pairs, v);
   misfit.correlation.value = r.weighted.dot(summed(near, r.weighted).col(0));
   misfit.correlation = over(misfit.correlation, v * n_pairs);
-  misfit.n_beads_near = static_cast<int>(std::lround(n_pairs / n));
   return misfit;
 }
 

@@ -32,7 +32,6 @@ struct Statistic {
 /// model lacks, as that is smooth.
 struct Misfit {
   Statistic chi_squared_per_degree, correlation;
-  int n_beads_near = 0;  ///< pairs of near beads per bead, rounded
   /// The larger of both. Errors of tracked beads are known to a tenth, and near beads share up to a twentieth of
   /// theirs, as their pictures overlap: three sound sheets from pictures have χ² of 1.06 to 1.18 and correlations of
   /// .01 to .04.

@@ -201,7 +201,7 @@ class Estimates {
   const Allowed& allowed_;
 };
 
-/// What is always positive, and told as a factor.
+/// Always positive: its error is a factor.
 bool is_logarithmic(Quantity quantity) {
   return quantity == Quantity::stiffness || quantity == Quantity::adhesion_stiffness ||
          quantity == Quantity::penetration;

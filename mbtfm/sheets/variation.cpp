@@ -49,15 +49,15 @@ MatrixXd changes_by_variation_um(const sheet::OnGel& ground, const sheet::Scene&
 }
 
 std::string sentence_of_variation(const std::vector<FittedEstimate>& estimates, const VectorXd& moved) {
-  std::string told;
+  std::string changes;
   for (Index k = 0; k < moved.size(); ++k) {
     const FittedEstimate& e = estimates[static_cast<std::size_t>(k)];
     if (is_given(e) || e.quantity == Quantity::contraction_over_stiffness || !(e.value > 0)) continue;
-    told += (told.empty() ? "" : ", ") + std::string(for_people(e.quantity).name) +
-            (e.part.empty() ? "" : " of " + e.part) + " by " + brief(100 * moved(k) / e.value) + " %";
+    changes += (changes.empty() ? "" : ", ") + std::string(for_people(e.quantity).name) +
+               (e.part.empty() ? "" : " of " + e.part) + " by " + brief(100 * moved(k) / e.value) + " %";
   }
-  if (told.empty()) return told;
-  return "A contraction that varies by " + brief(100 * kVariation) + " % over the sheet would move: " + told +
+  if (changes.empty()) return changes;
+  return "A contraction that varies by " + brief(100 * kVariation) + " % over the sheet would move: " + changes +
          ". The intervals contain this.";
 }
 

@@ -92,8 +92,9 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
       }
       double shortened = 0;  // group-l1's map, beside the mean of which the covariance is
       if (r.method == tractions::TractionMethod::group_l1) {
+        const VectorXd& mean = summed_tractions_kPa(r);
         for (const auto& [vertex, share] : shares)
-          shortened += share * (summed_tractions_kPa(r) - r.traction_kPa)[3 * vertex + c];
+          shortened += share * (mean[3 * vertex + c] - r.traction_kPa[3 * vertex + c]);
       }
       return std::hypot(shortened, std::sqrt(std::max(0.0, variance)));
     };

@@ -137,35 +137,30 @@ std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruc
   return forces;
 }
 
-namespace {
-
-/// Whose sizes add up to the total force: the map's; of group-l1, whose map is shortened for the eye, the mean's.
-const VectorXd& counted_tractions_kPa(const SpatialReconstruction& r) {
-  return r.method == tractions::TractionMethod::group_l1 ? summed_tractions_kPa(r) : r.traction_kPa;
-}
-
-}  // namespace
-
 Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
   const TractionMesh& mesh = problem.mesh;
   const std::vector<Vec3> vertices = problem.vertices_um();
   const Index n = mesh.n_vertices();
   Balance balance;
-  const VectorXd &summed = summed_tractions_kPa(r), &counted = counted_tractions_kPa(r);
-  const auto traction = [&](Index v) { return Vector3d(counted.segment<3>(3 * v)); };
+  const VectorXd& summed = summed_tractions_kPa(r);
+  // The total is that of the map; of group-l1, whose map the penalty shortens, that of the mean.
+  const bool is_mean_counted = r.method == tractions::TractionMethod::group_l1;
+  const auto traction = [&](Index v) {
+    return Vector3d((is_mean_counted ? summed : r.traction_kPa).segment<3>(3 * v));
+  };
   double of_map_nN = 0, of_summed_nN = 0;  // totals
   over_faces(mesh, problem.ground, 3, Places::gauss,
              [&](Vec2 at, std::span<const VertexShare> shares, double area_um2) {
-               Vector3d t = Vector3d::Zero(), m = Vector3d::Zero(), s = Vector3d::Zero();
+               Vector3d of_map = Vector3d::Zero(), of_sums = Vector3d::Zero();
                for (const auto& [vertex, share] : shares) {
-                 t += share * traction(vertex);
-                 m += share * r.traction_kPa.segment<3>(3 * vertex);
-                 s += share * summed.segment<3>(3 * vertex);
+                 of_map += share * r.traction_kPa.segment<3>(3 * vertex);
+                 of_sums += share * summed.segment<3>(3 * vertex);
                }
+               const Vector3d& t = is_mean_counted ? of_sums : of_map;
                const double size = t.norm() * area_um2;
                balance.total_force_nN += size;
-               of_map_nN += m.norm() * area_um2;
-               of_summed_nN += s.norm() * area_um2;
+               of_map_nN += of_map.norm() * area_um2;
+               of_summed_nN += of_sums.norm() * area_um2;
                balance.normal_force_nN += std::abs(t.dot(vector(problem.ground.normal(at)))) * area_um2;
                balance.centre_um += size * Vec3{at.x, at.y, problem.ground.height_um(at)};
              });

@@ -7,6 +7,7 @@
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/near.h"
 #include "substrate/greens/models.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"
@@ -36,19 +37,14 @@ VectorXd mean_displacement_um(const std::vector<substrate::Ellipse>& ellipses, c
 }
 
 /// Mean of what the forces make of the beads on an adhesion, or of the four nearest.
-Eigen::Vector2d shown_by_beads_um(const LinearData& data, const VectorXd& moved_um, const Adhesion& adhesion) {
-  constexpr Index kNearest = 4;
-  std::vector<std::pair<double, Index>> by_distance;
-  for (Index i = 0; i < std::ssize(data.position_um); ++i)
-    by_distance.emplace_back(norm(data.position_um[i] - adhesion.position_um), i);
-  std::ranges::sort(by_distance);
+Eigen::Vector2d shown_by_beads_um(const numerics::Near& beads, const VectorXd& moved_um, const Adhesion& adhesion) {
+  constexpr std::size_t kNearest = 4;
+  const Vec3 place{adhesion.position_um.x, adhesion.position_um.y, 0};
+  std::vector<int> shown = beads.within(place, adhesion.major_axis_um / 2, static_cast<int>(beads.points().size()));
+  if (shown.size() < kNearest) shown = beads.nearest(place, kNearest);
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  Index n = 0;
-  for (; n < std::ssize(by_distance); ++n) {
-    if (n >= kNearest && by_distance[n].first > adhesion.major_axis_um / 2) break;
-    sum += moved_um.segment<2>(2 * by_distance[n].second);
-  }
-  return sum / static_cast<double>(n);
+  for (const int bead : shown) sum += moved_um.segment<2>(2 * Index{bead});
+  return sum / static_cast<double>(shown.size());
 }
 
 VectorXd displacement_under_um(const EnsembleFit& fit, const Cell& cell, const VectorXd& forces_nN, const Gel& gel,
@@ -56,9 +52,13 @@ VectorXd displacement_under_um(const EnsembleFit& fit, const Cell& cell, const V
   VectorXd under = mean_displacement_um(substrate::ellipses_of(cell.adhesions), forces_nN, gel, threads);
   const auto assumed = [](const Adhesion& a) { return is_assumed(a.origin); };
   if (std::ranges::none_of(cell.adhesions, assumed) || fit.data.position_um.empty()) return under;
+  std::vector<Vec3> places_um;
+  for (const Vec2 p : fit.data.position_um) places_um.push_back({p.x, p.y, 0});
+  constexpr double kCell_um = 1;
+  const numerics::Near beads(std::move(places_um), kCell_um);
   const VectorXd moved_um = moved_by(fit.data, forces_nN);
   for (Index a = 0; a < std::ssize(cell.adhesions); ++a)
-    if (assumed(cell.adhesions[a])) under.segment<2>(2 * a) = shown_by_beads_um(fit.data, moved_um, cell.adhesions[a]);
+    if (assumed(cell.adhesions[a])) under.segment<2>(2 * a) = shown_by_beads_um(beads, moved_um, cell.adhesions[a]);
   return under;
 }
 

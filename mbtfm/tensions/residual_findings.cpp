@@ -68,12 +68,9 @@ struct Region {
   double side_um = 0, chi_squared = 0;  ///< by degree of freedom
 };
 
-/// The one whose beads the model explains worst.
-/// @param beads  that are asked
-Region worst_region(const LinearData& data, const VectorXd& forces_nN, double noise_um,
-                    const std::vector<bool>& beads) {
+/// The one whose beads the model explains worst. @param residual  um, 2·beads  @param beads  those to look at
+Region worst_region(const LinearData& data, const VectorXd& residual, double noise_um, const std::vector<bool>& beads) {
   constexpr double kBeads = 60, kFewest = 30;
-  const VectorXd residual = residual_um(data, forces_nN);
   const Extent field = extent_of(data.position_um);
   const Vec2 low = field.low_um;
   const double n = static_cast<double>(data.position_um.size());
@@ -130,8 +127,9 @@ std::optional<Finding> noise_disagrees(const FitOutcome& o) {
 }
 
 std::optional<Finding> beads_disagree(const FitOutcome& o) {
+  const VectorXd residual = residual_um(o.data, adhesion_forces_nN(o.fit));
   const auto worst_among = [&](const std::vector<Vec2>& places) {
-    return worst_region(o.data, adhesion_forces_nN(o.fit), o.summary.noise_um, elsewhere(o.data, places));
+    return worst_region(o.data, residual, o.summary.noise_um, elsewhere(o.data, places));
   };
   const double beside = worst_among(named_places(o)).chi_squared;
   const Region worst = worst_among({});

@@ -73,11 +73,6 @@ std::string parts_of_total(const CellResults& results) {
                      readable(results.fit.network_force_nN));
 }
 
-std::string with_error(double value, double sigma, const char* unit) {
-  const auto decimals = sigma > 0 ? std::optional(decimals_for(sigma)) : std::nullopt;
-  return fmt::format("{} ± {} {}", rounded(value, decimals), rounded(sigma, decimals), unit);
-}
-
 /// With its standard error, where the fit states one.
 std::string total_in_words(const FitSummary& fit) {
   if (!fit.error_budget) return readable(fit.total_force_nN) + " nN";
@@ -131,7 +126,7 @@ std::string explained_by_network(const FitSummary& fit) {
 enum class Compared { no_fibres, full, adhesion_forces, sheet };
 constexpr auto words(Compared) { return std::array{"no-fibres", "full", "adhesion-forces", "sheet"}; }
 
-/// Empty where the beads call for the cables.
+/// Empty if the network with its fibres fits best.
 std::string another_model(const FitSummary& fit) {
   const auto over = figure_of(fit, "bic_of_cables_over_best");
   if (!over || *over <= 0) return "";
@@ -143,10 +138,8 @@ std::string another_model(const FitSummary& fit) {
                                   "forces of the adhesions that no network joins", "a sheet that contracts evenly"};
   return fmt::format(
       "The beads prefer another model to a network with these fibres: {} (by {:.0f} in BIC, with each model's own "
-      "error "
-      "allowed for). The tensions are those of a model that is less likely. The forces of the adhesions follow the "
-      "beads "
-      "and change little.",
+      "error allowed for). The tensions are those of a model that is less likely. The forces of the adhesions follow "
+      "the beads and change little.",
       kModels[static_cast<std::size_t>(*which)], *over);
 }
 

@@ -32,6 +32,12 @@ std::string rounded(const std::optional<double>& value, std::optional<int> decim
   return value ? rounded(*value, decimals) : "–";
 }
 
+std::string with_error(double value, std::optional<double> error, const char* unit) {
+  if (!error || !(*error > 0)) return readable(value) + " " + unit;
+  const int decimals = decimals_for(*error);
+  return fmt::format("{} ± {} {}", rounded(value, decimals), rounded(*error, decimals), unit);
+}
+
 std::string text_of_figure(const Value& value) {
   return std::visit(
       [](const auto& v) -> std::string {

@@ -19,6 +19,9 @@ std::string rounded(double value, std::optional<int> decimals);
 /// "–" for none.
 std::string rounded(const std::optional<double>& value, std::optional<int> decimals);
 
+/// "412 ± 21 nN"; without an error above 0 "412 nN".
+std::string with_error(double value, std::optional<double> error, const char* unit);
+
 /// Of a figure: a number as above, a list with commas.
 std::string text_of_figure(const Value& value);
 

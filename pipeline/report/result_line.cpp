@@ -17,11 +17,7 @@ std::string result_line(const Path& cell) {
   if (kind == CellKind::space) return result_line_in_space(cell);
   if (kind == CellKind::sheet) return result_line_of_sheet(cell);
   const files::CellResult result = files::read_cell_result(cell);
-  std::optional<int> decimals;
-  if (result.total_error_nN && *result.total_error_nN > 0) decimals = decimals_for(*result.total_error_nN);
-  std::string line = "total force " + rounded(result.fit.total_force_nN, decimals);
-  if (result.total_error_nN) line += " ± " + rounded(*result.total_error_nN, decimals);
-  line += " nN";
+  std::string line = "total force " + with_error(result.fit.total_force_nN, result.total_error_nN, "nN");
   std::string tensions;
   for (const auto& [type, of] : result.types)
     tensions += (tensions.empty() ? "; mean tension: " : ", ") + std::string(name_of(type)) + " " +

@@ -24,12 +24,6 @@
 namespace mbtfm::report {
 namespace {
 
-std::string with_error(double value, std::optional<double> sigma, const char* unit) {
-  if (!sigma || !(*sigma > 0)) return readable(value) + " " + unit;
-  const int decimals = decimals_for(*sigma);
-  return fmt::format("{} ± {} {}", rounded(value, decimals), rounded(*sigma, decimals), unit);
-}
-
 /// Net force or moment, with its standard error where there is one.
 struct Sum {
   double size = 0;

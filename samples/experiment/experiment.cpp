@@ -26,18 +26,6 @@ constexpr std::uint64_t kFirstSimulationSeed = 0x73696d00;
 /// So that the noise of beads beyond the field is not that of those in it.
 constexpr std::uint64_t kBeyond = 0x62657900;
 
-mesh::NetworkParameters formulation(drawing::TrueNetwork network) {
-  using enum drawing::TrueNetwork;
-  mesh::NetworkParameters p;
-  if (network != second_neighbours) p.link_reach = mesh::LinkReach::neighbours;
-  if (network == edges_centres) p.adhesion_anchor = mesh::AdhesionAnchor::centre;
-  if (network == edges_rims) {
-    p.adhesion_anchor = mesh::AdhesionAnchor::rim;
-    p.rim_points = 12;
-  }
-  return p;
-}
-
 /// The simulation's network. The width of material that a cable stands for is counted in cables of the reference mesh:
 /// tension and stiffness by width are then those of the cell, whatever the mesh.
 Network span(const Cell& cell, const drawing::ScenarioParameters& p) {
@@ -231,6 +219,18 @@ std::vector<Vec2> place_beads_beyond(const drawing::ScenarioParameters& p) {
   std::vector<Vec2> beads = beads_in(relaxed, static_cast<int>(std::lround(share * drawing::n_beads(p))), p, 1);
   std::erase_if(beads, [&](Vec2 b) { return b.x > 0 && b.y > 0 && b.x < field && b.y < field; });
   return beads;
+}
+
+mesh::NetworkParameters formulation(drawing::TrueNetwork network) {
+  using enum drawing::TrueNetwork;
+  mesh::NetworkParameters p;
+  if (network != second_neighbours) p.link_reach = mesh::LinkReach::neighbours;
+  if (network == edges_centres) p.adhesion_anchor = mesh::AdhesionAnchor::centre;
+  if (network == edges_rims) {
+    p.adhesion_anchor = mesh::AdhesionAnchor::rim;
+    p.rim_points = 12;
+  }
+  return p;
 }
 
 Experiment simulate(const drawing::ScenarioParameters& p, const Work& work) {

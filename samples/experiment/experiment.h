@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "network/mesh/mesh.h"
 #include "pipeline/contract/beads.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
@@ -39,6 +40,9 @@ Experiment simulate(const drawing::ScenarioParameters& parameters, const Work& w
 
 /// The same of a cell that is given, with its tensions.
 Experiment simulate(drawing::DrawnCell drawn, const drawing::ScenarioParameters& parameters, const Work& work = {});
+
+/// How a network of this kind is made: all but its mesh.
+mesh::NetworkParameters formulation(drawing::TrueNetwork network);
 
 /// Gaussian noise on each component, of the seed's own stream.
 DisplacementField with_noise(DisplacementField field, double noise_um, std::uint64_t seed);

@@ -163,12 +163,11 @@ void formulations(Cells cells) {
 using Formulations = std::vector<std::pair<const char*, mesh::NetworkParameters>>;
 
 Formulations true_formulations() {
-  return {{"second neighbours", {}},
-          {"edges", {.link_reach = mesh::LinkReach::neighbours}},
-          {"edges and rims",
-           {.link_reach = mesh::LinkReach::neighbours, .adhesion_anchor = mesh::AdhesionAnchor::rim, .rim_points = 12}},
-          {"edges and centres",
-           {.link_reach = mesh::LinkReach::neighbours, .adhesion_anchor = mesh::AdhesionAnchor::centre}}};
+  using enum drawing::TrueNetwork;
+  return {{"second neighbours", experiment::formulation(second_neighbours)},
+          {"edges", experiment::formulation(edges)},
+          {"edges and rims", experiment::formulation(edges_rims)},
+          {"edges and centres", experiment::formulation(edges_centres)}};
 }
 
 /// Of every adhesion: true force, found force, stated error; and of the cell's total.
