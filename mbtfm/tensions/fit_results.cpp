@@ -12,7 +12,7 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/dense.h"
-#include "pipeline/numerics/magnitude_interval.h"
+#include "pipeline/numerics/distributions.h"
 #include "substrate/compliance.h"
 
 namespace mbtfm::tensions {

@@ -5,7 +5,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
-#include "pipeline/numerics/magnitude_interval.h"
+#include "pipeline/numerics/distributions.h"
 #include "pipeline/numerics/memory.h"
 #include "pipeline/stage/parameters.h"
 #include "substrate/compliance.h"

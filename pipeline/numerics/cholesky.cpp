@@ -1,15 +1,21 @@
 #include "pipeline/numerics/cholesky.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
 #include <variant>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/report.h"
+#include "pipeline/files/hash.h"
 #include "pipeline/numerics/dense_panel.h"
-#include "pipeline/numerics/factor_file.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::numerics {
@@ -49,6 +55,65 @@ void fill(Factor<Real>& factor, const BlockMatrix<3>& matrix, const FactorOption
                                      "Poisson ratio is too near 1/2"});
   }
 }
+
+template <class T>
+std::string hash_of(const std::vector<T>& values) {
+  return files::sha256({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)});
+}
+
+/// The file of one matrix' factor. Written under a name of its own and renamed, so that many may write at a time and
+/// no one reads half a file; checked by a hash of its content when read.
+class FactorFile {
+ public:
+  FactorFile(const std::filesystem::path& folder, const BlockMatrix<3>& matrix, const Elimination& elimination)
+      : n_bytes_(9 * sizeof(double) * elimination.n_blocks()) {
+    // the order of elimination, too: another version of METIS has another
+    std::vector<int> first;
+    for (const EliminationPanel& panel : elimination.panels) first.push_back(panel.first);
+    const std::string key = hash_of(matrix.start) + hash_of(matrix.row) + hash_of(matrix.value) +
+                            hash_of(elimination.place) + hash_of(first);
+    file_ = folder / ("factor-" + files::sha256(key) + ".bin");
+  }
+
+  /// The factor, empty where there is none. @return a note for the record: used, absent or damaged
+  std::string read(Eigen::VectorXd& factor) const {
+    std::ifstream stream(file_, std::ios::binary);
+    if (!stream) return "absent";
+    std::ostringstream text;
+    text << stream.rdbuf();
+    const std::string bytes = std::move(text).str();
+    constexpr std::size_t kHashLength = 64;  // of SHA-256, in hexadecimal
+    const bool is_whole =
+        bytes.size() == n_bytes_ + kHashLength &&
+        std::string_view(bytes).substr(n_bytes_) == files::sha256(std::string_view(bytes).substr(0, n_bytes_));
+    if (!is_whole) return "damaged, ignored: " + file_.string();
+    factor.resize(static_cast<Eigen::Index>(n_bytes_ / sizeof(double)));
+    std::memcpy(factor.data(), bytes.data(), n_bytes_);
+    return "used";
+  }
+
+  /// @return a note: written, or why not; a factor that cannot be kept is no error
+  std::string write(const Eigen::VectorXd& factor) const {
+    const std::string_view numbers(reinterpret_cast<const char*>(factor.data()), n_bytes_);
+    std::error_code error;
+    std::filesystem::create_directories(file_.parent_path(), error);
+    std::string temporary = file_.string() + ".XXXXXX";
+    const int descriptor = mkstemp(temporary.data());
+    if (descriptor < 0) return "; not written: " + file_.string();
+    close(descriptor);
+    std::ofstream stream(temporary, std::ios::binary);
+    stream << numbers << files::sha256(numbers);
+    stream.close();
+    if (stream) std::filesystem::rename(temporary, file_, error);
+    if (stream && !error) return "; written";
+    std::filesystem::remove(temporary, error);
+    return "; not written: " + file_.string();
+  }
+
+ private:
+  std::filesystem::path file_;
+  std::size_t n_bytes_;
+};
 
 void solve_block(const Factor<double>& factor, const std::vector<char>& is_needed, int width,
                  std::vector<double>& values) {

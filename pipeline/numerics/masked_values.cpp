@@ -37,16 +37,6 @@ Vec3 in_plane(Vec2 place) { return {place.x, place.y, 0}; }
 
 bool is_less(Vec2 a, Vec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); }
 
-/// Runs of equal displacements of kLeastShared beads and more.
-std::vector<Group> large_groups(const DisplacementField& field, const std::vector<std::size_t>& order) {
-  std::vector<Group> groups;
-  for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
-    while (end < order.size() && field[order[end]].displacement_um == field[order[begin]].displacement_um) ++end;
-    if (end - begin >= kLeastShared) groups.push_back({.begin = begin, .end = end});
-  }
-  return groups;
-}
-
 Values values_of(const DisplacementField& field, std::vector<std::size_t> order) {
   Values values{.order = std::move(order), .all_x = {}, .all_y = {}, .groups = {}};
   for (const std::size_t k : values.order) {
@@ -127,14 +117,11 @@ Masked flag_masked(DisplacementField& field) {
     const Vec2 u = field[a].displacement_um, v = field[b].displacement_um;
     return is_less(u, v) || (u == v && a < b);
   });
-  std::vector<Group> groups = large_groups(field, order);
-  if (groups.empty() || groups.front().size() == order.size()) return {};
   const Values values = values_of(field, std::move(order));
-  std::erase_if(groups, [&](Group& group) {
-    group = values.groups.at(values.ranks(field[values.order[group.begin]].displacement_um));
-    return !stands_out(group, values);
-  });
-  if (groups.empty()) return {};
+  std::vector<Group> groups;
+  for (const auto& [ranks, group] : values.groups)
+    if (group.size() >= kLeastShared && stands_out(group, values)) groups.push_back(group);
+  if (groups.empty() || groups.front().size() == values.order.size()) return {};
   std::vector<Vec2> places;
   std::vector<Vec3> in_space;
   for (const std::size_t k : values.order) {

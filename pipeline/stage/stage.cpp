@@ -17,7 +17,6 @@
 #include "pipeline/files/json.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
-#include "pipeline/numerics/blas.h"
 #include "pipeline/numerics/machine.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/console.h"

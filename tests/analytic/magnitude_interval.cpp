@@ -1,5 +1,5 @@
 /// The interval of a force's magnitude holds the true one as often as it says.
-#include "pipeline/numerics/magnitude_interval.h"
+#include "pipeline/numerics/distributions.h"
 #include "tests/support/test.h"
 
 namespace mbtfm::numerics {
