@@ -1,9 +1,7 @@
 #include "pipeline/contract/beads.h"
 
-#include <cmath>
+#include <algorithm>
 
-#include "pipeline/contract/beads_in_space.h"
-#include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
 
 namespace mbtfm {
@@ -21,15 +19,6 @@ bool state_errors(const DisplacementField& beads) {
 double beads_per_um2(const DisplacementField& beads) {
   const double area_um2 = extent_of(beads, &Bead::position_um).area_um2();
   return area_um2 > 0 ? static_cast<double>(beads.size()) / area_um2 : 0;
-}
-
-void check(const std::vector<BeadInSpace>& beads) {
-  for (std::size_t i = 0; i < beads.size(); ++i) {
-    const BeadInSpace& b = beads[i];
-    const bool has_errors = b.sigma_um >= 0 && b.sigma_z_um >= 0 && std::isfinite(b.sigma_um + b.sigma_z_um);
-    if (is_finite(b.position_um) && is_finite(b.displacement_um) && has_errors) continue;
-    throw InvalidData("bead " + std::to_string(i), "finite numbers, standard errors not below 0", "others");
-  }
 }
 
 }  // namespace mbtfm

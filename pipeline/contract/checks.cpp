@@ -4,10 +4,13 @@
 #include <string>
 
 #include "pipeline/contract/beads.h"
+#include "pipeline/contract/beads_in_space.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/network.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/contract/place.h"
 #include "pipeline/contract/surface.h"
 
 namespace mbtfm {
@@ -113,6 +116,15 @@ void check(const DisplacementField& field) {
   }
 }
 
+void check(const std::vector<BeadInSpace>& beads) {
+  for (std::size_t i = 0; i < beads.size(); ++i) {
+    const BeadInSpace& b = beads[i];
+    const bool has_errors = b.sigma_um >= 0 && b.sigma_z_um >= 0 && std::isfinite(b.sigma_um + b.sigma_z_um);
+    if (is_finite(b.position_um) && is_finite(b.displacement_um) && has_errors) continue;
+    throw InvalidData("bead " + std::to_string(i), "finite numbers, standard errors not below 0", "others");
+  }
+}
+
 void check(const Gel& gel) {
   require_positive(gel.youngs_modulus_kPa, "youngs_modulus_kPa", "the gel");
   require_positive(gel.thickness_um, "thickness_um", "the gel");
@@ -153,6 +165,53 @@ void check(const Network& network) {
     require_positive(link.rest_length_um, "rest_length_um", element);
     require_positive(link.share, "share", element);
   }
+}
+
+namespace {
+
+const std::string kWithin = "within a metre";
+
+bool is_within(double place_um) { return is_inside(possible_place_um(), place_um); }  // NaN is not
+std::string told(double place_um) { return std::isfinite(place_um) ? brief(place_um) + " um" : "NaN or infinity"; }
+
+}  // namespace
+
+void check(const HeightMap& map) {
+  constexpr int kFewest = 4;  // a cubic spline's
+  const std::string lattice = std::to_string(map.n_x) + " x " + std::to_string(map.n_y) + " vertices";
+  require(map.n_x >= kFewest && map.n_y >= kFewest, "height map", "a lattice of at least 4 x 4 vertices", lattice);
+  const auto n = static_cast<std::size_t>(map.n_x) * static_cast<std::size_t>(map.n_y);
+  require(map.z_um.size() == n, "height map", lattice, std::to_string(map.z_um.size()) + " heights");
+  require(map.sigma_um.empty() || map.sigma_um.size() == n, "height map", lattice,
+          std::to_string(map.sigma_um.size()) + " standard errors");
+  require(is_within(map.origin_um.x) && is_within(map.origin_um.y), "height map", "an origin " + kWithin,
+          told(map.origin_um.x) + ", " + told(map.origin_um.y));
+  require(map.spacing_um.x > 0 && map.spacing_um.y > 0 && is_within(map.n_x * map.spacing_um.x) &&
+              is_within(map.n_y * map.spacing_um.y),
+          "height map", "positive spacings of a lattice " + kWithin,
+          brief(map.spacing_um.x) + ", " + brief(map.spacing_um.y));
+  for (std::size_t k = 0; k < n; ++k) {
+    const bool has_sigma = map.sigma_um.empty() || (map.sigma_um[k] >= 0 && is_within(map.sigma_um[k]));
+    if (is_within(map.z_um[k]) && has_sigma) continue;
+    const std::string vertex = "height map, vertex " + std::to_string(k);
+    require(is_within(map.z_um[k]), vertex, "a height " + kWithin, told(map.z_um[k]));
+    require(false, vertex, "a standard error of at least 0", brief(map.sigma_um[k]));
+  }
+}
+
+void check(const TriangleMesh& mesh) {
+  for (std::size_t k = 0; k < mesh.points_um.size(); ++k) {
+    const Vec3 p = mesh.points_um[k];
+    for (const double place : {p.x, p.y, p.z})
+      if (!is_within(place))
+        throw InvalidData("mesh, point " + std::to_string(k), "coordinates " + kWithin, told(place));
+  }
+  const auto n = static_cast<int>(mesh.points_um.size());
+  for (std::size_t k = 0; k < mesh.triangles.size(); ++k)
+    for (const int corner : mesh.triangles[k])
+      if (corner < 0 || corner >= n)
+        throw InvalidData("mesh, triangle " + std::to_string(k), "points below " + std::to_string(n),
+                          std::to_string(corner));
 }
 
 }  // namespace mbtfm

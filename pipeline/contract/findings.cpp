@@ -71,9 +71,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {cells_touch, "cells-touch", "segment", caution,
        "width of the neck at which the cell was cut off another one that touches it (um)", 0,
        "the outline is cut where it is narrower than segment.outline_neck of the narrower part's width",
-       "Look at 1_segment/overlay.png: is the cell cut where it ends? If both parts are one cell, set "
-       "outline_neck = 0 in [segment]. If the cut is at a wrong place, draw outline.roi. What cells pull at each other "
-       "is not in the forces."},
+       "Look at 1_segment/overlay.png: is the cell cut where it ends? If both parts are one cell, set outline_neck = 0 "
+       "in [segment]. If the cut is at a wrong place, draw outline.roi. What cells pull at each other is not in the "
+       "forces."},
       {actin_shift, "actin-shift", "segment", note, "1 if the actin image is shifted against the adhesion image", 0,
        "twice the gain in log likelihood is above 16.25 near no shift, which chance makes in one cell of 370, and "
        "above 27 elsewhere",
@@ -201,8 +201,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "more than an eighth beyond the noise is no chance, and the forces at the adhesions are free to follow the "
        "beads",
        "Look at the map of what is left: arrows at one place want an adhesion, arrows everywhere another gel or a "
-       "common "
-       "motion of the beads."},
+       "common motion of the beads."},
       {strain_beyond_linear, "strain-beyond-linear", "fit", caution,
        "predicted part of the displacement that small-strain elasticity leaves out", 0.05,
        "forces are then off by about as much, which is more than the error of a good fit",
@@ -333,8 +332,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {z_reversed, "z-reversed", "traction", caution,
        "by how much chi-squared of the fit falls if all displacements along z have the opposite sign", 10,
        "ten are odds of 150 to one; with the right sign it rises by some hundreds",
-       "Check z_points in cell.toml, and "
-       "the sign of uz_um in displacement_3d.csv: it is positive out of the gel."},
+       "Check z_points in cell.toml, and the sign of uz_um in displacement_3d.csv: it is positive out of the gel."},
       {beads_stray, "beads-stray", "traction", caution,
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
@@ -513,8 +511,8 @@ std::string findings_page() {
       "`run.json`, in `run.log`, in\nthe column `findings` of `batch_all.csv` and in `statistics/findings.csv`.\n\n- "
       "**note**: worth knowing; the results hold.\n- **caution**: the results may be off by more than their error bars "
       "say.\n- **bad**: do not use what the finding names.\n\nA caution or a bad finding is *open*. The report shows a "
-      "green tick only if no finding is open. *On 400 sound cells*: so many simulated cells with a right "
-      "segmentation had it open.\n";
+      "green tick only if no finding is open. *On 400 sound cells*: so many simulated cells with a right segmentation "
+      "had it open.\n";
   for (const char* stage : {"any stage", "segment", "track", "network", "fit", "surface", "substrate", "traction",
                             "sheet", "indent", "mean"}) {
     bool has_title = false;

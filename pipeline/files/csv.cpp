@@ -1,7 +1,6 @@
 #include "pipeline/files/csv.h"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -128,11 +127,7 @@ void CsvTable::require(const std::vector<std::string>& columns) const {
 int CsvTable::index_of(const std::string& column) const {
   const auto at = std::find(header_.begin(), header_.end(), column);
   if (at != header_.end()) return static_cast<int>(at - header_.begin());
-  const auto lower = [](std::string text) {
-    std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
-    return text;
-  };
-  const auto alike = std::ranges::find(header_, lower(column), lower);
+  const auto alike = std::ranges::find(header_, lower_case(column), lower_case);
   throw InputError(name_ + ":1", "a column '" + column + "'", "the columns " + listed(header_),
                    alike == header_.end() ? "" : "write '" + *alike + "' as '" + column + "': capitals count");
 }

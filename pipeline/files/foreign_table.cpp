@@ -16,32 +16,21 @@ constexpr std::string_view kBlanks = " \t\r\v\f";
 constexpr std::string_view kByteOrder = "\xEF\xBB\xBF", kHardBlank = "\xC2\xA0", kMinus = "\xE2\x88\x92";
 
 std::string_view trimmed(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t before = text.size();
+  for (std::size_t before = 0; text.size() != before;) {
+    before = text.size();
     text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
     text.remove_suffix(text.size() - (text.find_last_not_of(kBlanks) + 1));
     if (text.starts_with(kHardBlank)) text.remove_prefix(kHardBlank.size());
     if (text.ends_with(kHardBlank)) text.remove_suffix(kHardBlank.size());
-    if (text.size() == before) break;
   }
   return text;
 }
 
 void append_utf8(std::string& text, std::uint32_t c) {
-  const auto add = [&](std::uint32_t byte) { text += static_cast<char>(byte); };
-  if (c < 0x80) return add(c);
-  if (c < 0x800) {
-    add(0xC0 | c >> 6);
-  } else {
-    if (c < 0x10000) {
-      add(0xE0 | c >> 12);
-    } else {
-      add(0xF0 | c >> 18);
-      add(0x80 | (c >> 12 & 0x3F));
-    }
-    add(0x80 | (c >> 6 & 0x3F));
-  }
-  add(0x80 | (c & 0x3F));
+  constexpr std::uint32_t kFirst[] = {0, 0xC0, 0xE0, 0xF0};
+  const int n_more = c < 0x80 ? 0 : c < 0x800 ? 1 : c < 0x10000 ? 2 : 3;
+  text += static_cast<char>(kFirst[n_more] | c >> 6 * n_more);
+  for (int k = n_more; k-- > 0;) text += static_cast<char>(0x80 | (c >> 6 * k & 0x3F));
 }
 
 std::string from_utf16(std::string_view bytes, bool is_big_endian) {
@@ -81,10 +70,8 @@ std::string_view as_text(std::string_view bytes, std::string& place) {
   if (bytes.starts_with(kByteOrder)) bytes.remove_prefix(kByteOrder.size());
   if (!is_ascii(bytes) && !is_utf8(bytes)) bytes = place = from_latin1(bytes);
   if (bytes.find('\n') == bytes.npos && bytes.find('\r') != bytes.npos) {
-    std::string text(bytes);
-    std::ranges::replace(text, '\r', '\n');
-    place = std::move(text);
-    return place;
+    bytes = place = std::string(bytes);
+    std::ranges::replace(place, '\r', '\n');
   }
   return bytes;
 }
@@ -174,14 +161,12 @@ std::string_view without_comment_mark(std::string_view line) {
   return line.substr(std::min(line.find_first_not_of("#%\"", line.find_first_of("#%")), line.size()));
 }
 
-std::size_t n_numbers_in(const std::vector<std::string>& cells) {
-  return static_cast<std::size_t>(std::ranges::count_if(cells, [](const std::string& cell) {
-    return !cell.empty() && (numeral_in(cell) != Numeral::none || is_missing(cell));
-  }));
-}
-
 bool is_row_of_numbers(const Line& line, char separator, std::size_t n_numbers) {
-  return !is_comment(line.text) && n_numbers_in(cells_of(line.text, separator)) >= n_numbers;
+  const auto is_number = [](const std::string& cell) {
+    return !cell.empty() && (numeral_in(cell) != Numeral::none || is_missing(cell));
+  };
+  if (is_comment(line.text)) return false;
+  return static_cast<std::size_t>(std::ranges::count_if(cells_of(line.text, separator), is_number)) >= n_numbers;
 }
 
 /// `sep=;`, as Excel has it in the first line.
@@ -276,14 +261,6 @@ void make_plain(std::string& cell) {
   if (exponent != cell.npos) cell[exponent] = 'e';
 }
 
-void make_plain(std::vector<CsvTable::Row>& rows, std::string_view text, char separator, const std::string& name) {
-  const bool may_have_commas = text.find(',') != text.npos && (separator != ',' || text.find('"') != text.npos);
-  if (may_have_commas) make_points(rows, name);
-  if (text.find_first_of("+dD\xE2") == text.npos) return;
-  for (CsvTable::Row& row : rows)
-    for (std::string& cell : row.fields) make_plain(cell);
-}
-
 /// @throws InputError where a row has more or less cells than the first. One that is empty may end all of them.
 void expect_equal_widths(std::vector<CsvTable::Row>& rows, const std::string& name, char separator) {
   const std::size_t n = rows.front().fields.size();
@@ -358,7 +335,10 @@ ForeignTable read_numbers(std::string_view bytes, std::string name, std::size_t 
                      "a row for each vector, its numbers between commas, semicolons, tabs or blanks");
   }
   expect_equal_widths(table.rows, table.name, separator);
-  make_plain(table.rows, text, separator, table.name);
+  const bool may_have_commas = text.find(',') != text.npos && (separator != ',' || text.find('"') != text.npos);
+  if (may_have_commas) make_points(table.rows, table.name);
+  if (text.find_first_of("+dD\xE2") == text.npos) return table;
+  for (CsvTable::Row& row : table.rows) std::ranges::for_each(row.fields, make_plain);
   return table;
 }
 

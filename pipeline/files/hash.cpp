@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/base64.h"
 #include "pipeline/files/own_files.h"
 
 namespace mbtfm::files {
@@ -57,6 +58,15 @@ std::string sha256_of_file(const std::filesystem::path& file) {
   }
   if (stream.bad()) throw InputError(file.string(), "a readable file", "a read error");
   return hash.hexadecimal();
+}
+
+std::string base64(std::string_view bytes) {
+  std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');  // one more for the zero at the end
+  const int length =
+      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
+                      reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
+  text.resize(static_cast<std::size_t>(length));
+  return text;
 }
 
 }  // namespace mbtfm::files

@@ -103,4 +103,16 @@ nlohmann::ordered_json in_utf8(const nlohmann::ordered_json& json) {
 
 std::string json_text(const nlohmann::ordered_json& json, int indent) { return in_utf8(json).dump(indent); }
 
+std::string events_of(const std::string& stage, const StageReport& report) {
+  std::string lines;
+  const auto add = [&](const char* kind, const nlohmann::ordered_json& content) {
+    nlohmann::ordered_json event = {{"event", kind}, {"stage", stage}};
+    event.update(content);
+    lines += json_text(event) + "\n";
+  };
+  for (const Finding& finding : report.findings) add("finding", json_of(finding));
+  for (const Effect& effect : report.effects) add("effect", json_of(effect));
+  return lines;
+}
+
 }  // namespace mbtfm::files

@@ -4,9 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "pipeline/contract/effects.h"
-#include "pipeline/contract/figures.h"
-#include "pipeline/contract/findings.h"
+#include "pipeline/contract/stage_report.h"
 #include "pipeline/files/json_record.h"
 
 namespace mbtfm::files {
@@ -24,5 +22,8 @@ std::vector<Finding> findings_of(const JsonRecord& record);
 /// As text, in lines where indent >= 0. JSON is UTF-8: texts that are not, as names of files may be, tell their
 /// bytes (names.h), keys too.
 std::string json_text(const nlohmann::ordered_json& json, int indent = -1);
+
+/// What a stage found as JSON objects, one a line: its findings, then its effects (docs/formats.md, "Events").
+std::string events_of(const std::string& stage, const StageReport& report);
 
 }  // namespace mbtfm::files

@@ -40,7 +40,4 @@ int index_of(double value, const std::string& where);
 /// Cut into triangles. @throws InputError where there are fewer than three corners
 void add_polygon(const std::vector<int>& corners, const std::string& where, TriangleMesh& mesh);
 
-/// The text of a PLY file, in any of its three formats. @throws InputError
-TriangleMesh parse_ply(std::string_view text, const std::string& name);
-
 }  // namespace mbtfm::files

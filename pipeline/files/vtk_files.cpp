@@ -5,9 +5,12 @@
 #include <vtkDoubleArray.h>
 #include <vtkIntArray.h>
 #include <vtkNew.h>
+#include <vtkObjectFactory.h>
+#include <vtkOutputWindow.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
+#include <vtkSmartPointer.h>
 #include <vtkUnstructuredGrid.h>
 #include <vtkXMLPolyDataWriter.h>
 #include <vtkXMLUnstructuredGridWriter.h>
@@ -15,17 +18,41 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/text.h"
-#include "pipeline/files/vtk_errors.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/files/vtu_file.h"
 
 namespace mbtfm::files {
 
 namespace {
+
+/// VTK prints its errors and goes on: this takes the place of its output window while it lives and keeps what it says.
+class VtkErrors {
+ public:
+  VtkErrors() : before_(vtkOutputWindow::GetInstance()) { vtkOutputWindow::SetInstance(window_); }
+  ~VtkErrors() { vtkOutputWindow::SetInstance(before_); }
+  VtkErrors(const VtkErrors&) = delete;
+  VtkErrors& operator=(const VtkErrors&) = delete;
+  std::string text() const { return window_->text; }
+
+ private:
+  class Window : public vtkOutputWindow {
+   public:
+    static Window* New();
+    vtkTypeMacro(Window, vtkOutputWindow);
+    void DisplayText(const char* message) override { text += message; }
+    void DisplayWarningText(const char*) override {}
+    std::string text = {};
+  };
+  vtkNew<Window> window_;
+  vtkSmartPointer<vtkOutputWindow> before_;
+};
+
+VtkErrors::Window* VtkErrors::Window::New() { VTK_STANDARD_NEW_BODY(VtkErrors::Window); }
 
 template <class Writer, class Data>
 void write_xml(const Path& file, Data* data) {
@@ -53,9 +80,11 @@ vtkNew<vtkPoints> points_of(const std::vector<Vec3>& positions_um) {
   return points;
 }
 
-vtkNew<vtkIntArray> int_array(const char* name) {
+template <class Things, class Value = std::identity>
+vtkNew<vtkIntArray> int_array(const char* name, const Things& things, Value value = {}) {
   vtkNew<vtkIntArray> array;
   array->SetName(name);
+  for (const auto& thing : things) array->InsertNextValue(static_cast<int>(std::invoke(value, thing)));
   return array;
 }
 
@@ -108,22 +137,14 @@ vtkNew<vtkUnstructuredGrid> grid_of(const Network& network, const std::vector<Ve
   vtkNew<vtkUnstructuredGrid> grid;
   const vtkNew<vtkPoints> points = points_of(in_space(positions_um));
   grid->SetPoints(points);
-  const auto adhesion = int_array("adhesion_id");
-  for (const int id : network.adhesion_id) adhesion->InsertNextValue(id);
-  grid->GetPointData()->AddArray(adhesion);
-  if (!network.held_by_cut.empty()) {
-    const auto by_cut = int_array("held_by_cut");
-    for (const bool is_held : network.held_by_cut) by_cut->InsertNextValue(is_held ? 1 : 0);
-    grid->GetPointData()->AddArray(by_cut);
-  }
+  grid->GetPointData()->AddArray(int_array("adhesion_id", network.adhesion_id));
+  if (!network.held_by_cut.empty()) grid->GetPointData()->AddArray(int_array("held_by_cut", network.held_by_cut));
   grid->Allocate(static_cast<vtkIdType>(network.links.size()));
-  const auto fibre = int_array("fibre_id");
   for (const Link& link : network.links) {
     const vtkIdType ends[2] = {link.vertex_a, link.vertex_b};
     grid->InsertNextCell(VTK_LINE, 2, ends);
-    fibre->InsertNextValue(link.fibre_id);
   }
-  grid->GetCellData()->AddArray(fibre);
+  grid->GetCellData()->AddArray(int_array("fibre_id", network.links, &Link::fibre_id));
   add({array_of("rest_length_um", network.links, &Link::rest_length_um),
        array_of("share", network.links, &Link::share)},
       network.links.size(), grid->GetCellData());
@@ -247,9 +268,7 @@ void write_contracted_network(const Path& file, const Network& network, const st
                link_states.size() == network.links.size());
   const auto grid = grid_of(network, positions_um);
   grid->GetCellData()->AddArray(double_array(array_of("force_nN", link_force_nN)));
-  const auto state = int_array("state");  // 0 slack, 1 taut, 2 collapsed
-  for (const CableState s : link_states) state->InsertNextValue(static_cast<int>(s));
-  grid->GetCellData()->AddArray(state);
+  grid->GetCellData()->AddArray(int_array("state", link_states));  // 0 slack, 1 taut, 2 collapsed
   std::vector<Vec2> moves_um;
   for (std::size_t v = 0; v < positions_um.size(); ++v) moves_um.push_back(positions_um[v] - network.vertices_um[v]);
   grid->GetPointData()->AddArray(double_array(array_of("contraction_um", moves_um)));
@@ -259,34 +278,33 @@ void write_contracted_network(const Path& file, const Network& network, const st
 void write_cell_vtp(const Path& file, const Cell& cell) {
   check(cell);
   Shapes shapes;
-  const auto fibre = int_array("fibre_id");
-  const auto type = int_array("fibre_type");  // 1 dorsal, 2 arc, 3 ventral, 4 edge; 0: no fibre
-  const auto adhesion = int_array("adhesion_id");
-  const auto origin = int_array("adhesion_origin");  // 1 image, 2 drawn, 3 anchor, 4 candidate; 0: no adhesion
-  const auto label = [&](int fibre_id, int fibre_type, int adhesion_id, int adhesion_origin = 0) {
-    fibre->InsertNextValue(fibre_id);
-    type->InsertNextValue(fibre_type);
-    adhesion->InsertNextValue(adhesion_id);
-    origin->InsertNextValue(adhesion_origin);
+  struct Label {
+    int fibre_id = 0;
+    int fibre_type = 0;  // 1 dorsal, 2 arc, 3 ventral, 4 edge; 0: no fibre
+    int adhesion_id = 0;
+    int adhesion_origin = 0;  // 1 image, 2 drawn, 3 anchor, 4 candidate; 0: no adhesion
   };
+  std::vector<Label> labels;
   std::vector<Polygon> rings = cell.holes_um;
   rings.insert(rings.begin(), cell.outline_um);
   for (Polyline& ring : rings) {
     ring.push_back(ring.front());
     shapes.add_line(ring);
-    label(0, 0, 0);
+    labels.push_back({});
   }
   for (const Fibre& f : cell.fibres) {
     shapes.add_line(f.points_um);
-    label(f.fibre_id, 1 + static_cast<int>(f.type), 0);
+    labels.push_back({.fibre_id = f.fibre_id, .fibre_type = 1 + static_cast<int>(f.type)});
   }
   for (const Adhesion& a : cell.adhesions) {
     shapes.add_polygon(ellipse_corners(a, kEllipseCorners));
-    label(0, 0, a.adhesion_id, 1 + static_cast<int>(a.origin));
+    labels.push_back({.adhesion_id = a.adhesion_id, .adhesion_origin = 1 + static_cast<int>(a.origin)});
   }
   const auto poly = shapes.data();
-  for (vtkIntArray* array : {fibre.Get(), type.Get(), adhesion.Get(), origin.Get()})
-    poly->GetCellData()->AddArray(array);
+  poly->GetCellData()->AddArray(int_array("fibre_id", labels, &Label::fibre_id));
+  poly->GetCellData()->AddArray(int_array("fibre_type", labels, &Label::fibre_type));
+  poly->GetCellData()->AddArray(int_array("adhesion_id", labels, &Label::adhesion_id));
+  poly->GetCellData()->AddArray(int_array("adhesion_origin", labels, &Label::adhesion_origin));
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }
 
@@ -309,13 +327,9 @@ void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions
                         const std::vector<NamedArray>& arrays) {
   check(adhesions);
   Shapes shapes;
-  const auto label = int_array("adhesion_id");
-  for (const Adhesion& a : adhesions) {
-    shapes.add_polygon(ellipse_corners(a, kEllipseCorners));
-    label->InsertNextValue(a.adhesion_id);
-  }
+  for (const Adhesion& a : adhesions) shapes.add_polygon(ellipse_corners(a, kEllipseCorners));
   const auto poly = shapes.data();
-  poly->GetCellData()->AddArray(label);
+  poly->GetCellData()->AddArray(int_array("adhesion_id", adhesions, &Adhesion::adhesion_id));
   add(arrays, adhesions.size(), poly->GetCellData());
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }

@@ -175,6 +175,13 @@ void require_plausible_counts(const std::vector<VtuFile::Piece>& pieces, std::si
   }
 }
 
+void require_points(const std::vector<double>& points, std::uint64_t n, const std::string& name) {
+  for (const double point : points)
+    if (!(point >= 0 && point < static_cast<double>(n)) || point != std::floor(point))
+      throw InputError(name + ": array 'connectivity'", "a point below " + std::to_string(n), shortest(point),
+                       kDamaged);
+}
+
 }  // namespace
 
 VtuFile::VtuFile(std::string text, std::string name, VtuKind kind) : text_(std::move(text)), name_(std::move(name)) {
@@ -271,13 +278,9 @@ std::vector<double> VtuFile::line_ends() const {
       throw InputError(name_ + ": cell " + std::to_string(static_cast<std::size_t>(n_cells_before) + k),
                        "a line of two points", "cell type " + shortest(types[k]));
     }
-    for (const double end : numbers(piece, VtuSection::cells, "connectivity", 1, 2 * piece.n_cells)) {
-      if (!(end >= 0 && end < static_cast<double>(piece.n_points)) || end != std::floor(end)) {
-        throw InputError(name_ + ": array 'connectivity'", "a point below " + std::to_string(piece.n_points),
-                         shortest(end), kDamaged);
-      }
-      all.push_back(end + n_points_before);
-    }
+    const auto ends = numbers(piece, VtuSection::cells, "connectivity", 1, 2 * piece.n_cells);
+    require_points(ends, piece.n_points, name_);
+    for (const double end : ends) all.push_back(end + n_points_before);
     n_points_before += static_cast<double>(piece.n_points);
     n_cells_before += static_cast<double>(piece.n_cells);
   }
@@ -297,11 +300,7 @@ void VtuFile::add_polygons(const Piece& piece, int n_points_before, std::vector<
     begin = end;
   }
   const auto corners = numbers(piece, VtuSection::polygons, "connectivity", 1, static_cast<std::uint64_t>(ends.back()));
-  for (const double corner : corners) {
-    if (corner >= 0 && corner < static_cast<double>(piece.n_points) && corner == std::floor(corner)) continue;
-    throw InputError(name_ + ": array 'connectivity'", "a point below " + std::to_string(piece.n_points),
-                     shortest(corner), kDamaged);
-  }
+  require_points(corners, piece.n_points, name_);
   auto corner = corners.begin();
   for (const double end : ends) {
     auto& polygon = all.emplace_back();

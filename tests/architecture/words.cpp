@@ -14,8 +14,7 @@ const fs::path kRoot = test::source_folder();
 const std::map<std::string, std::string> kReaders = {
     {"pipeline/files/vtu_file.cpp", "elements and attributes of VTU"},
     {"pipeline/files/vtu_data.cpp", "VTU's names of compressors"},
-    {"pipeline/files/triangle_mesh.cpp", "extensions and words of STL and OBJ"},
-    {"pipeline/files/ply.cpp", "words of PLY's header"},
+    {"pipeline/files/triangle_mesh.cpp", "extensions and words of STL, PLY and OBJ"},
     {"mbtfm/plan/study_scatter.cpp", "rows of a study's tables"},
     {"substrate/surface_main.cpp", "the extension of a height map"},
     {"continuum/outlines/rings.cpp", "extensions of outlines"},
