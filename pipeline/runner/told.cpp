@@ -8,7 +8,6 @@
 #include "pipeline/files/json.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/effects.h"
-#include "pipeline/stage/events.h"
 
 namespace mbtfm::runner {
 
@@ -72,7 +71,7 @@ std::string events_of(const StageTold& told) {
   if (!told.report) return line(event);
   event["summary"] = told.report->summary;
   event["figures"] = files::json_of(told.report->figures);
-  return line(event) + stage::events_of(told.stage, *told.report);
+  return line(event) + files::events_of(told.stage, *told.report);
 }
 
 std::string event_of_look(const ImageLook& look) {

@@ -8,6 +8,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/columns.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
 #include "pipeline/stage/effects.h"
@@ -41,19 +42,26 @@ struct Overloaded : F... {
 template <class... F>
 Overloaded(F...) -> Overloaded<F...>;
 
+template <class T>
+T number_in(const std::optional<T>&);
+template <class T>
+T number_in(const T&);
+/// The type of a number that may be optional.
+template <class Member>
+using NumberIn = decltype(number_in(std::declval<Member>()));
+
 std::string in_table(const Parameter& p) { return (p.table.empty() ? "" : "[" + p.table + "] ") + p.name; }
 
 /// What a value must be: "a number > 0", "true or false", "one of a, b".
 std::string expectation(const Parameter& p) {
-  return std::visit(Overloaded{[&](double*) { return describe("a number", p.range); },
-                               [&](std::optional<double>*) { return describe("a number", p.range); },
-                               [&](int*) { return describe("an integer", p.range); },
-                               [&](std::optional<int>*) { return describe("an integer", p.range); },
-                               [&](std::uint64_t*) { return std::string("an integer >= 0"); },
-                               [&](bool*) { return std::string("true or false"); },
-                               [&](std::string*) { return std::string("a text"); },
-                               [&](const Choice& choice) { return "one of " + listed(choice.words); }},
-                    p.member);
+  return std::visit(
+      Overloaded{[&](auto* number) {
+                   constexpr bool kIsReal = std::is_floating_point_v<NumberIn<decltype(*number)>>;
+                   return describe(kIsReal ? "a number" : "an integer", p.range);
+                 },
+                 [](bool*) { return std::string("true or false"); }, [](std::string*) { return std::string("a text"); },
+                 [](const Choice& choice) { return "one of " + listed(choice.words); }},
+      p.member);
 }
 
 template <class T>
@@ -64,27 +72,16 @@ bool read_number(const std::string& text, T& value) {
 
 /// Set the member; false where the text is not what it must be.
 bool try_set(Parameter& p, const std::string& text) {
-  const auto set_real = [&](auto* member) {
-    double value = 0;
-    if (!read_number(text, value) || !std::isfinite(value) || !is_inside(p.range, value)) return false;
-    *member = value;
-    return true;
-  };
-  const auto set_whole = [&](auto* member) {
-    int value = 0;
-    if (!read_number(text, value) || !is_inside(p.range, value)) return false;
-    *member = value;
-    return true;
-  };
-  return std::visit(Overloaded{[&](double* member) { return set_real(member); },
-                               [&](std::optional<double>* member) { return set_real(member); },
-                               [&](int* member) { return set_whole(member); },
-                               [&](std::optional<int>* member) { return set_whole(member); },
-                               [&](std::uint64_t* member) { return read_number(text, *member); },
-                               [&](bool* member) {
-                                 if (text != "true" && text != "false") return false;
-                                 *member = text == "true";
+  return std::visit(Overloaded{[&](auto* number) {
+                                 NumberIn<decltype(*number)> value{};
+                                 const bool is_one = read_number(text, value) && std::isfinite(value);
+                                 if (!is_one || !is_inside(p.range, static_cast<double>(value))) return false;
+                                 *number = value;
                                  return true;
+                               },
+                               [&](bool* member) {
+                                 *member = text == "true";
+                                 return *member || text == "false";
                                },
                                [&](std::string* member) {
                                  *member = text;
@@ -234,15 +231,10 @@ void set_from_text(Parameter& p, const std::string& text) {
 }
 
 std::string to_text(const Parameter& p) {
-  return std::visit(
-      Overloaded{[](double* m) { return shortest(*m); },
-                 [](std::optional<double>* m) { return *m ? shortest(**m) : std::string(); },
-                 [](int* m) { return std::to_string(*m); },
-                 [](std::optional<int>* m) { return *m ? std::to_string(**m) : std::string(); },
-                 [](std::uint64_t* m) { return std::to_string(*m); },
-                 [](bool* m) { return std::string(*m ? "true" : "false"); }, [](std::string* m) { return *m; },
-                 [](const Choice& choice) { return choice.words.at(choice.get()); }},
-      p.member);
+  return std::visit(Overloaded{[](auto* number) { return files::field_of(*number, 0); },
+                               [](bool* member) { return std::string(*member ? "true" : "false"); },
+                               [](const Choice& choice) { return choice.words.at(choice.get()); }},
+                    p.member);
 }
 
 std::string to_toml(const ParameterList& list, const std::vector<std::string>& tables) {

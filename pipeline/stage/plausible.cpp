@@ -59,96 +59,59 @@ std::string range_text(const Range& range) { return describe("", range); }
 
 const std::vector<PlausibleQuantity>& plausible_quantities() {
   static const std::vector<PlausibleQuantity> table = {
-      {.id = "youngs_modulus_kPa",
-       .quantity = "Young's modulus of the gel",
-       .usual = Range::between(0.1, 100),
-       .possible = Range::between(0.01, 1000),
-       .source = "Tissues and the gels that stand for them have 0.1 kPa (brain) to 40 kPa (bone before it "
-                 "mineralises): Discher, Janmey & Wang, Science 310 (2005) 1139; gels for traction are made up to 100 "
-                 "kPa. Above 1000 kPa the strongest adhesions known, 10 kPa over a radius of 1 um, move beads by 20 nm "
-                 "(2.25 t a / E), which images do not show; below 0.01 kPa a gel does not keep its shape",
-       .remedy = "check the modulus and its unit, kPa"},
-      {.id = "poisson_ratio",
-       .quantity = "Poisson's ratio of the gel",
-       .usual = Range::between(0.3, 0.5),
-       .possible = Range::between(0, 0.5),
-       .source = "Water in a gel has no time to leave it: 0.45 to 0.5 for polyacrylamide and silicone (Takigawa et "
-                 "al., Polym. Gels Netw. 4 (1996) 1: 0.457). 0.5 is the limit of an elastic body, and no gel gets "
-                 "thicker where it is pulled",
-       .remedy = "take 0.49 for polyacrylamide, 0.5 or 0.499 for silicone"},
-      {.id = "thickness_um",
-       .quantity = "thickness of the gel",
-       .usual = Range::between(10, 1000),
-       .possible = Range::between(1, 1e5),
-       .source = "Gels for traction force microscopy are cast 20 to 100 um thick. Below some 10 um the displacements "
-                 "are set by the glass below (Merkel et al., Biophys. J. 93 (2007) 3314); beyond 1000 um no objective "
-                 "with the resolution for beads looks through",
-       .remedy = "measure the thickness by focusing on the glass and on the surface; for a half-space set gel_model or "
-                 "the effect finite_thickness"},
-      {.id = kPixelSize,
-       .quantity = "pixel size",
-       .usual = Range::between(0.02, 1.3),
-       .possible = Range::between(0.005, 7),
-       .source = "Camera pixels of 2 to 16 um behind lenses of 10 to 100 times: 0.02 to 1.3 um; 7 um is a camera "
-                 "without a lens",
-       .remedy = "check the pixel size and its unit, um: the camera's pixel over the magnification, times the camera's "
-                 "binning"},
-      {.id = "beads_per_um2",
-       .quantity = "density of the beads",
-       .usual = Range::between(0.02, 10),
-       .possible = Range::not_negative(),
-       .source =
-           "Adhesions are some um apart: at less than one bead in 7 x 7 um no force can be told from its neighbours' "
-           "(Sabass et al., Biophys. J. 94 (2008) 207: the resolution is the beads' distance). At more than 10 a um² "
-           "beads are nearer than the 0.3 um that a lens resolves: then neighbours share their errors",
-       .remedy = "check the pixel size; use more beads, or thin out a field that was interpolated"},
-      {.id = "bead_sigma_um",
-       .quantity = "width (standard deviation) of the beads in the images",
-       .usual = Range::between(0.075, 1),
-       .possible = Range::between(0.01, 20),
-       .source = "No lens shows a point smaller than 0.21 wavelengths over its aperture: 0.075 um at the 515 nm of "
-                 "yellow-green beads and an aperture of 1.45 (Zhang, Zerubia & Olivo-Marin, Appl. Opt. 46 (2007) "
-                 "1819). 1 um is a bead of 4 um across. Below 0.01 and above 20 um no microscope shows single beads",
-       .remedy = "check the pixel size: were the images binned or reduced after it was measured? Forces go with its "
-                 "square. Beads of super-resolved images may be smaller"},
-      {.id = "adhesion_area_um2",
-       .quantity = "median area of the adhesions",
-       .usual = Range::between(0.1, 10),
-       .possible = Range::between(0.01, 100),
-       .source = "Focal adhesions have 0.1 to 10 um² (mean 0.46 um² in U2OS cells: Soine et al., PLoS Comput. Biol. 11 "
-                 "(2015) e1004076). A spot of 0.01 um² is a sixth of what a lens resolves; 100 um² is a small cell",
-       .remedy = "check the pixel size, the channel and the thresholds of [segment]"},
-      {.id = "cell_area_um2",
-       .quantity = "area of the cell",
-       .usual = Range::between(200, 20000),
-       .possible = Range::between(10, 1e6),
-       .source =
-           "Adherent cells spread over 500 to 10 000 um², platelets over 30; 1 mm² is a colony of hundreds of cells",
-       .remedy = "check the pixel size, and whether the outline holds one cell"},
-      {.id = "total_force_nN",
-       .quantity = "total force of the cell",
-       .usual = Range::between(1, 5000),
-       .possible = Range::between(0, 1e5),
-       .source = "U2OS cells exert about 200 nN (3612 adhesions in 21 cells, 1.19 nN each: Soine et al. 2015). 5.5 kPa "
-                 "(Balaban et al. 2001) on a tenth of a large cell, 10 000 um², are 5500 nN; 100 000 nN are that on "
-                 "twenty such cells",
-       .remedy = "check the modulus (kPa) and the pixel size (um) first: the force goes with the product of modulus, "
-                 "displacement and length. Of several cells the forces add up"},
-      {.id = "fibre_tension_nN",
-       .quantity = "tension of a stress fibre",
-       .usual = Range::between(0, 150),
-       .possible = Range::between(0, 400),
-       .source = "An isolated stress fibre breaks at 380 nN and carried about 10 nN in the cell (Deguchi, Ohashi & "
-                 "Sato, J. Biomech. 39 (2006) 2603)",
-       .remedy = "check the modulus (kPa) and the pixel size (um), and whether a fibre is missing beside it"},
-      {.id = "traction_kPa",
-       .quantity = "traction of the adhesions that bear half of the force",
-       .usual = Range::between(0, 15),
-       .possible = Range::between(0, 100),
-       .source = "Adhesions carry 5.5 kPa (Balaban et al., Nat. Cell Biol. 3 (2001) 466), supermature ones 12 kPa "
-                 "(Goffin et al., J. Cell Biol. 172 (2006) 259). 100 kPa are 2500 bonds of 40 pN on each um²",
-       .remedy = "check the modulus (kPa) and the pixel size (um), and the adhesion's ellipse: a force on too small an "
-                 "area is a large traction"},
+      {"youngs_modulus_kPa", "Young's modulus of the gel", Range::between(0.1, 100), Range::between(0.01, 1000),
+       "Tissues and the gels that stand for them have 0.1 kPa (brain) to 40 kPa (bone before it mineralises): Discher, "
+       "Janmey & Wang, Science 310 (2005) 1139; gels for traction are made up to 100 kPa. Above 1000 kPa the strongest "
+       "adhesions known, 10 kPa over a radius of 1 um, move beads by 20 nm (2.25 t a / E), which images do not show; "
+       "below 0.01 kPa a gel does not keep its shape",
+       "check the modulus and its unit, kPa"},
+      {"poisson_ratio", "Poisson's ratio of the gel", Range::between(0.3, 0.5), Range::between(0, 0.5),
+       "Water in a gel has no time to leave it: 0.45 to 0.5 for polyacrylamide and silicone (Takigawa et al., Polym. "
+       "Gels Netw. 4 (1996) 1: 0.457). 0.5 is the limit of an elastic body, and no gel gets thicker where it is pulled",
+       "take 0.49 for polyacrylamide, 0.5 or 0.499 for silicone"},
+      {"thickness_um", "thickness of the gel", Range::between(10, 1000), Range::between(1, 1e5),
+       "Gels for traction force microscopy are cast 20 to 100 um thick. Below some 10 um the displacements are set by "
+       "the glass below (Merkel et al., Biophys. J. 93 (2007) 3314); beyond 1000 um no objective with the resolution "
+       "for beads looks through",
+       "measure the thickness by focusing on the glass and on the surface; for a half-space set gel_model or the "
+       "effect finite_thickness"},
+      {kPixelSize, "pixel size", Range::between(0.02, 1.3), Range::between(0.005, 7),
+       "Camera pixels of 2 to 16 um behind lenses of 10 to 100 times: 0.02 to 1.3 um; 7 um is a camera without a lens",
+       "check the pixel size and its unit, um: the camera's pixel over the magnification, times the camera's binning"},
+      {"beads_per_um2", "density of the beads", Range::between(0.02, 10), Range::not_negative(),
+       "Adhesions are some um apart: at less than one bead in 7 x 7 um no force can be told from its neighbours' "
+       "(Sabass et al., Biophys. J. 94 (2008) 207: the resolution is the beads' distance). At more than 10 a um² beads "
+       "are nearer than the 0.3 um that a lens resolves: then neighbours share their errors",
+       "check the pixel size; use more beads, or thin out a field that was interpolated"},
+      {"bead_sigma_um", "width (standard deviation) of the beads in the images", Range::between(0.075, 1),
+       Range::between(0.01, 20),
+       "No lens shows a point smaller than 0.21 wavelengths over its aperture: 0.075 um at the 515 nm of yellow-green "
+       "beads and an aperture of 1.45 (Zhang, Zerubia & Olivo-Marin, Appl. Opt. 46 (2007) 1819). 1 um is a bead of 4 "
+       "um across. Below 0.01 and above 20 um no microscope shows single beads",
+       "check the pixel size: were the images binned or reduced after it was measured? Forces go with its square. "
+       "Beads of super-resolved images may be smaller"},
+      {"adhesion_area_um2", "median area of the adhesions", Range::between(0.1, 10), Range::between(0.01, 100),
+       "Focal adhesions have 0.1 to 10 um² (mean 0.46 um² in U2OS cells: Soine et al., PLoS Comput. Biol. 11 (2015) "
+       "e1004076). A spot of 0.01 um² is a sixth of what a lens resolves; 100 um² is a small cell",
+       "check the pixel size, the channel and the thresholds of [segment]"},
+      {"cell_area_um2", "area of the cell", Range::between(200, 20000), Range::between(10, 1e6),
+       "Adherent cells spread over 500 to 10 000 um², platelets over 30; 1 mm² is a colony of hundreds of cells",
+       "check the pixel size, and whether the outline holds one cell"},
+      {"total_force_nN", "total force of the cell", Range::between(1, 5000), Range::between(0, 1e5),
+       "U2OS cells exert about 200 nN (3612 adhesions in 21 cells, 1.19 nN each: Soine et al. 2015). 5.5 kPa (Balaban "
+       "et al. 2001) on a tenth of a large cell, 10 000 um², are 5500 nN; 100 000 nN are that on twenty such cells",
+       "check the modulus (kPa) and the pixel size (um) first: the force goes with the product of modulus, "
+       "displacement and length. Of several cells the forces add up"},
+      {"fibre_tension_nN", "tension of a stress fibre", Range::between(0, 150), Range::between(0, 400),
+       "An isolated stress fibre breaks at 380 nN and carried about 10 nN in the cell (Deguchi, Ohashi & Sato, J. "
+       "Biomech. 39 (2006) 2603)",
+       "check the modulus (kPa) and the pixel size (um), and whether a fibre is missing beside it"},
+      {"traction_kPa", "traction of the adhesions that bear half of the force", Range::between(0, 15),
+       Range::between(0, 100),
+       "Adhesions carry 5.5 kPa (Balaban et al., Nat. Cell Biol. 3 (2001) 466), supermature ones 12 kPa (Goffin et "
+       "al., J. Cell Biol. 172 (2006) 259). 100 kPa are 2500 bonds of 40 pN on each um²",
+       "check the modulus (kPa) and the pixel size (um), and the adhesion's ellipse: a force on too small an area is a "
+       "large traction"},
   };
   return table;
 }

@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -21,7 +20,6 @@
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/effects.h"
-#include "pipeline/stage/events.h"
 #include "pipeline/stage/manual.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/suggest.h"
@@ -39,13 +37,6 @@ struct CommandLine {
   int threads = numerics::available_threads();
   bool is_quiet = false, is_json = false, only_check = false, only_parameters = false, only_version = false;
 };
-
-/// " (one of a, b, c)"; empty where the parameter is no choice.
-std::string words_in(const Parameter& p) {
-  const auto* choice = std::get_if<Choice>(&p.member);
-  if (choice == nullptr) return {};
-  return " (one of " + listed(choice->words) + ")";
-}
 
 void add_options(CLI::App& app, CommandLine& line, const StageDescription& description, const ParameterList& list) {
   for (const FileArgument& file : description.files) {
@@ -68,7 +59,8 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
   app.add_flag("--version", line.only_version, "print the version");
   app.add_option("--manuals", line.manuals, "write manual page and completions below this folder")->group("");
   for (const Parameter& p : list.all()) {
-    std::string meaning = p.meaning + words_in(p);
+    std::string meaning = p.meaning;
+    if (const auto* choice = std::get_if<Choice>(&p.member)) meaning += " (one of " + listed(choice->words) + ")";
     if (!p.default_value.empty() && !p.is_required) meaning += " [" + p.default_value + "]";
     const std::string group = p.table.empty() ? "Parameters of the image" : "Parameters [" + p.table + "]";
     if (std::holds_alternative<bool*>(p.member))
@@ -182,7 +174,7 @@ void tell(const std::string& stage, const StageReport& report, double seconds, R
                  {"summary", report.summary},
                  {"figures", files::json_of(report.figures)}},
                 reader);
-    print(events_of(stage, report));
+    print(files::events_of(stage, report));
   }
   if (!report.converged)
     std::fprintf(stderr, "mbtfm-%s: error: not converged: %s\n", stage.c_str(), report.summary.c_str());
@@ -195,18 +187,19 @@ void tell(const std::string& stage, const StageReport& report, double seconds, R
   }
 }
 
-/// Content hashes of files that lie at `at` now and are called `name` when all is in place.
-struct HashedFile {
-  fs::path at, name;
-};
-
-nlohmann::ordered_json hashes_of(const std::vector<HashedFile>& files, const fs::path& folder) {
+/// Content hashes, called as they are when all is in place.
+nlohmann::ordered_json hashes_of(const std::vector<StageContext::Pending>& files, const fs::path& folder) {
   auto list = nlohmann::ordered_json::array();
-  for (const HashedFile& file : files) {
-    if (!fs::is_regular_file(file.at)) continue;
-    list.push_back(
-        {{"file", fs::proximate(file.name, folder).generic_string()}, {"sha256", files::sha256_of_file(file.at)}});
-  }
+  for (const auto& [at, name] : files)
+    if (fs::is_regular_file(at))
+      list.push_back({{"file", fs::proximate(name, folder).generic_string()}, {"sha256", files::sha256_of_file(at)}});
+  return list;
+}
+
+template <class Things>
+nlohmann::ordered_json list_of(const Things& things) {
+  auto list = nlohmann::ordered_json::array();
+  for (const auto& thing : things) list.push_back(files::json_of(thing));
   return list;
 }
 
@@ -236,38 +229,27 @@ double peak_memory_MB() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-struct Took {
-  std::string started;  ///< as utc_now tells
-  double seconds = 0;
-};
-
 void write_record(const fs::path& file, const StageDescription& description, const ParameterList& list,
-                  StageContext& context, const StageReport& report, const Took& took) {
+                  StageContext& context, const StageReport& report, const std::string& started, double seconds) {
   const fs::path folder = fs::absolute(file).parent_path();
-  std::vector<HashedFile> inputs, outputs;
-  for (const fs::path& read : context.read_) inputs.push_back({.at = read, .name = read});
-  for (const auto& pending : context.pending_)
-    outputs.push_back({.at = pending.temporary, .name = pending.destination});
-  nlohmann::ordered_json effects = nlohmann::ordered_json::array();
-  for (const Effect& e : report.effects) effects.push_back(files::json_of(e));
-  nlohmann::ordered_json findings = nlohmann::ordered_json::array();
-  for (const Finding& f : report.findings) findings.push_back(files::json_of(f));
+  std::vector<StageContext::Pending> inputs;
+  for (const fs::path& read : context.read_) inputs.push_back({.temporary = read, .destination = read});
   const nlohmann::ordered_json record = {{"stage", description.name},
                                          {"version", kVersion},
                                          {"parameters", parameters_of(list)},
                                          {"inputs", hashes_of(inputs, folder)},
-                                         {"outputs", hashes_of(outputs, folder)},
-                                         {"started", took.started},
+                                         {"outputs", hashes_of(context.pending_, folder)},
+                                         {"started", started},
                                          {"ended", numerics::utc_now()},
                                          {"processor", numerics::processor_name()},
                                          {"threads", context.threads},
-                                         {"seconds", took.seconds},
+                                         {"seconds", seconds},
                                          {"peak_memory_MB", peak_memory_MB()},
                                          {"converged", report.converged},
                                          {"summary", report.summary},
                                          {"figures", files::json_of(report.figures)},
-                                         {"effects", effects},
-                                         {"findings", findings}};
+                                         {"effects", list_of(report.effects)},
+                                         {"findings", list_of(report.findings)}};
   files::write_text(context.pending_path(file), files::json_text(record, 2) + "\n");
 }
 
@@ -301,13 +283,15 @@ void commit(const StageContext& context) {
 void add_findings(StageReport& report, const StageContext& context) {
   std::vector<Finding> findings;
   for (const Doubt& doubt : context.doubts) {
-    Finding finding = *noticed(FindingKind::unusual_value, 1, sentence_of(doubt) + ".");
-    finding.number = doubt.value;
-    finding.threshold = doubt.limit;
-    finding.number_is = doubt.quantity;
-    finding.reason = doubt.source;
-    finding.remedy = doubt.remedy;
-    findings.push_back(std::move(finding));
+    const Finding kind = *noticed(FindingKind::unusual_value, 1, sentence_of(doubt) + ".");
+    findings.push_back({.id = kind.id,
+                        .severity = kind.severity,
+                        .text = kind.text,
+                        .number = doubt.value,
+                        .threshold = doubt.limit,
+                        .number_is = doubt.quantity,
+                        .reason = doubt.source,
+                        .remedy = doubt.remedy});
   }
   findings.insert(findings.end(), context.findings_.begin(), context.findings_.end());
   report.findings.insert(report.findings.begin(), findings.begin(), findings.end());
@@ -317,7 +301,7 @@ void add_findings(StageReport& report, const StageContext& context) {
 
 int run(const StageDescription& description, ParameterList& list, const CommandLine& line, StageContext context,
         const std::function<StageReport(StageContext&)>& body) {
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const std::string started = numerics::utc_now();
   set_files(context, description, line, Need::as_described);
   context.threads = line.threads;
@@ -330,12 +314,12 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
     for (Finding& finding : report.findings)
       for (std::string* text : {&finding.text, &finding.remedy}) *text = worded(list, description, *text);
     expect_all_written(context);
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    const double seconds = watch.seconds();
     // The record takes its place last: where it is, all that it speaks of is.
-    if (!line.record.empty()) write_record(line.record, description, list, context, report, {started, seconds.count()});
+    if (!line.record.empty()) write_record(line.record, description, list, context, report, started, seconds);
     expect_all_replaceable(context);
     commit(context);
-    tell(description.name, report, seconds.count(), whose);
+    tell(description.name, report, seconds, whose);
     return report.converged ? kDone : kNotSolved;
   } catch (...) {
     discard(context);
@@ -347,12 +331,13 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
 
 StageReport read_report(const fs::path& record_file) {
   const files::JsonRecord record(record_file, "a stage's record");
-  StageReport report{.converged = record.at("converged").is_true(),
-                     .summary = record.at("summary").text(),
+  StageReport report{.converged = record.is_true_or("converged", true),
+                     .summary = record.text_or("summary", ""),
                      .findings = files::findings_of(record)};
-  for (const auto& [name, value] : record.at("figures").members()) report.figures.emplace_back(name, value.figure());
-  for (const files::JsonRecord& effect : record.at("effects").list())
-    report.effects.push_back(files::effect_of(effect));
+  for (const auto& [name, value] : record.at("figures").members())  // null: not a number, in JSON
+    report.figures.emplace_back(name, value.json().is_null() ? Value(std::string()) : value.figure());
+  if (const auto effects = record.find("effects"))
+    for (const files::JsonRecord& effect : effects->list()) report.effects.push_back(files::effect_of(effect));
   return report;
 }
 

@@ -1,12 +1,13 @@
 #include "pipeline/stage/suggest.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
 #include <regex>
 #include <sstream>
 
 #include "pipeline/contract/listed.h"
-#include "pipeline/stage/declared.h"
+#include "pipeline/stage/manual.h"
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::stage {
