@@ -23,16 +23,13 @@
 #include "pipeline/report/compare.h"
 #include "pipeline/report/report.h"
 #include "pipeline/report/result_line.h"
-#include "pipeline/runner/all_cells.h"
 #include "pipeline/runner/batch.h"
-#include "pipeline/runner/batch_progress.h"
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/image_sets.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
-#include "pipeline/runner/settings.h"
 #include "pipeline/runner/stages.h"
 #include "pipeline/runner/verify.h"
 #include "pipeline/stage/console.h"
@@ -90,13 +87,10 @@ std::function<void(const runner::StageTold&)> teller(const CommandLine& line) {
   return [detail](const runner::StageTold& told) { say(text_of(told, detail)); };
 }
 
-std::vector<runner::Setting> settings_of(const CommandLine& line) {
+runner::RunOptions run_options(const CommandLine& line) {
   std::vector<runner::Setting> settings;
   for (const std::string& text : line.set) settings.push_back(runner::parse_setting(text));
-  return settings;
-}
-
-runner::RunOptions run_options(const CommandLine& line) {
+  const cost::Preset preset = line.preset.empty() ? cost::Preset() : cost::preset_named(line.preset);
   return {.stage_folder = line.stage_folder,
           .threads = line.threads,
           .is_quiet = line.is_quiet,
@@ -106,10 +100,9 @@ runner::RunOptions run_options(const CommandLine& line) {
           .explain = line.explain,
           .limits = {.seconds = line.timeout_s, .memory_bytes = line.memory_bytes},
           .preset = line.preset,
-          .beneath = line.preset.empty() ? std::vector<runner::Setting>() : cost::preset_named(line.preset).settings,
-          .beneath_in_space =
-              line.preset.empty() ? std::vector<runner::Setting>() : cost::preset_named(line.preset).in_space,
-          .set = settings_of(line),
+          .beneath = preset.settings,
+          .beneath_in_space = preset.in_space,
+          .set = std::move(settings),
           .version = kVersion,
           .say = teller(line),
           .sink = line.is_json ? event_sink : std::function<runner::Sink()>(),
@@ -228,15 +221,12 @@ std::vector<std::string> arguments_of_cell(const CommandLine& line) {
                                         "--stages-dir", line.stage_folder.string(), "--checked"};
   if (!line.preset.empty()) arguments.insert(arguments.end(), {"--preset", line.preset});
   if (!line.accuracy.empty()) arguments.insert(arguments.end(), {"--accuracy", line.accuracy});
-  for (const std::string& stage : line.only) arguments.insert(arguments.end(), {"--only", stage});
-  for (const std::string& stage : line.redo) arguments.insert(arguments.end(), {"--redo", stage});
-  for (const std::string& text : line.set) arguments.insert(arguments.end(), {"--set", text});
+  for (const auto& [flag, values] : {std::pair("--only", &line.only), {"--redo", &line.redo}, {"--set", &line.set}})
+    for (const std::string& value : *values) arguments.insert(arguments.end(), {flag, value});
   if (line.timeout_s) arguments.insert(arguments.end(), {"--timeout", std::to_string(*line.timeout_s)});
   if (line.memory_bytes) arguments.insert(arguments.end(), {"--memory", std::to_string(*line.memory_bytes)});
   return arguments;
 }
-
-void tell_of_cell(const runner::BatchCell& cell) { stage::print(event_of(cell)); }
 
 int batch(const CommandLine& line) {
   speak_for_stages(line);
@@ -245,16 +235,19 @@ int batch(const CommandLine& line) {
     stage::print(runner::list_cells(cells, run_options(line), line.threads));
     return kDone;
   }
-  const auto outcomes = line.only_table
-                            ? runner::outcomes_so_far(cells, run_options(line), line.threads)
-                            : runner::run_batch(cells, {.program = fs::read_symlink("/proc/self/exe"),
-                                                        .arguments = arguments_of_cell(line),
-                                                        .jobs = line.jobs,
-                                                        .threads = line.threads,
-                                                        .run = run_options(line),
-                                                        .say = line.is_quiet || line.is_json ? nullptr : say,
-                                                        .ended = line.is_json ? tell_of_cell : nullptr,
-                                                        .show = line.is_quiet || !is_terminal() ? nullptr : show});
+  const auto outcomes =
+      line.only_table
+          ? runner::outcomes_so_far(cells, run_options(line), line.threads)
+          : runner::run_batch(
+                cells, {.program = fs::read_symlink("/proc/self/exe"),
+                        .arguments = arguments_of_cell(line),
+                        .jobs = line.jobs,
+                        .threads = line.threads,
+                        .run = run_options(line),
+                        .say = line.is_quiet || line.is_json ? nullptr : say,
+                        .ended = line.is_json ? [](const runner::BatchCell& cell) { stage::print(event_of(cell)); }
+                                              : std::function<void(const runner::BatchCell&)>(),
+                        .show = line.is_quiet || !is_terminal() ? nullptr : show});
   const auto n_failed = std::ranges::count_if(outcomes, [](const auto& cell) { return cell.exit_code != 0; });
   if (n_failed > 0) say("failed:" + runner::failure_table(line.folder, outcomes));
   const runner::BatchCounts told = runner::write_batch_tables(line.folder, outcomes, skipped, line.only);
@@ -268,8 +261,6 @@ int tell(const runner::Verification& found, const std::string& what) {
     stage::print(what + ": " + std::to_string(found.n_files) + " files, all as recorded in run.json\n");
   return found.differences.empty() ? kDone : kFailed;
 }
-
-int verify(const CommandLine& line) { return tell(runner::verify_cell(line.folder), line.folder.string()); }
 
 int repeat(const CommandLine& line) {
   speak_for_stages(line);
@@ -307,6 +298,12 @@ int repeat(const CommandLine& line) {
   become("mbtfm-stats", std::move(arguments));
 }
 
+std::vector<fs::path> all_folders(const CommandLine& line) {
+  std::vector<fs::path> folders = line.more_cells;
+  folders.insert(folders.begin(), line.folder);
+  return folders;
+}
+
 /// Of several folders each has its page; the worst exit code counts.
 int check(const CommandLine& line) {
   const auto arguments_for = [&](const fs::path& folder) {
@@ -316,10 +313,8 @@ int check(const CommandLine& line) {
     return arguments;
   };
   if (line.more_cells.empty()) become("mbtfm-check", arguments_for(line.folder));
-  std::vector<fs::path> folders = line.more_cells;
-  folders.insert(folders.begin(), line.folder);
   int code = kDone;
-  for (const fs::path& folder : folders) {
+  for (const fs::path& folder : all_folders(line)) {
     std::vector<std::string> command = arguments_for(folder);
     command.insert(command.begin(), (runner::executable_folder() / "mbtfm-check").string());
     code = std::max(code, runner::exit_code_of(runner::run_process(command, {}, stage::print)));
@@ -352,8 +347,7 @@ int check(const CommandLine& line) {
 int cost_study(const CommandLine& line) {
   if (!line.more_cells.empty() && line.out.empty())
     throw UsageError("--out: is needed for the study of several cells: a folder of its own");
-  std::vector<fs::path> cells = line.more_cells;
-  cells.insert(cells.begin(), line.folder);
+  const std::vector<fs::path> cells = all_folders(line);
   std::vector<cost::Study> studies;
   std::string names;
   for (const fs::path& cell : cells) {
@@ -368,11 +362,6 @@ int cost_study(const CommandLine& line) {
   const fs::path folder = line.out.empty() ? files::inside(line.folder, "cost", line.folder.string()) : line.out;
   cost::write_study(folder, cost::combined(studies), names);
   if (!line.is_quiet) say("cost.csv, cost.svg and cost.md in " + folder.string());
-  return kDone;
-}
-
-int compare(const CommandLine& line) {
-  stage::print(report::comparison_text(line.folder));
   return kDone;
 }
 
@@ -392,6 +381,10 @@ CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name,
       ->capture_default_str();
   command->add_flag("--quiet", line.is_quiet, "print errors only");
   return command;
+}
+
+void add_stage_folder(CLI::App* command, CommandLine& line) {
+  command->add_option("--stages-dir", line.stage_folder, "folder of the stages' executables")->capture_default_str();
 }
 
 void add_stage_options(CLI::App* command, CommandLine& line) {
@@ -418,7 +411,7 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
   command->add_option("--redo", line.redo, "run this stage even if up to date or changed by hand; several with commas")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--stages-dir", line.stage_folder, "folder of the stages' executables")->capture_default_str();
+  add_stage_folder(command, line);
   const std::map<std::string, double> time_units = {{"s", 1}, {"min", 60}, {"h", 3600}};
   command->add_option("--timeout", line.timeout_s, "kill a stage that takes longer: 90, 10min, 2h")
       ->transform(CLI::AsNumberWithUnit(time_units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"))
@@ -440,7 +433,7 @@ int demo(CommandLine line) {
   const runner::ProcessResult simulated = runner::run_process(command);
   if (const int code = runner::exit_code_of(simulated); code != kDone) return code;
   const int code = run(line);
-  if (code == kDone) compare(line);
+  if (code == kDone) stage::print(report::comparison_text(line.folder));
   return code;
 }
 
@@ -491,8 +484,7 @@ int start(int argc, char** argv) {
       add_command(app, line, "repeat", "repeat the run of a run.json in a new folder and compare the outputs", kCell);
   repeat_command->add_option("--out", line.out, "the new cell folder")->required();
   repeat_command->add_option("--inputs", line.inputs, "folder of the inputs; default: beside run.json");
-  repeat_command->add_option("--stages-dir", line.stage_folder, "folder of the stages' executables")
-      ->capture_default_str();
+  add_stage_folder(repeat_command, line);
   CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", kFolder);
   stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
   CLI::App* cost_command = add_command(app, line, "cost", "what accuracy costs in time, for this cell", kCell);
@@ -505,8 +497,7 @@ int start(int argc, char** argv) {
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
   cost_command->add_flag("--all", line.is_whole, "the choices that take minutes, too");
-  cost_command->add_option("--stages-dir", line.stage_folder, "folder of the stages' executables")
-      ->capture_default_str();
+  add_stage_folder(cost_command, line);
   // what follows is for the program that they become, --help included
   CLI::App* plan_command = app.add_subcommand(
       "plan", "how many beads, which gel, how little noise and how many cells a question takes: mbtfm plan --help");
@@ -551,14 +542,15 @@ int start(int argc, char** argv) {
   if (run_command->parsed()) return run(line);
   if (batch_command->parsed()) return batch(line);
   if (cost_command->parsed()) return cost_study(line);
-  if (verify_command->parsed()) return verify(line);
+  if (verify_command->parsed()) return tell(runner::verify_cell(line.folder), line.folder.string());
   if (repeat_command->parsed()) return repeat(line);
   if (plan_command->parsed()) plan(plan_command->remaining());
   if (noise_command->parsed()) noise(pictures, noise_command->remaining());
   if (stats_command->parsed()) stats(line, stats_command->remaining());
   if (check_command->parsed()) return check(line);
   if (init_command->parsed()) init(line);
-  return compare(line);
+  stage::print(report::comparison_text(line.folder));
+  return kDone;
 }
 
 }  // namespace

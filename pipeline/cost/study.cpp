@@ -22,7 +22,6 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
-#include "pipeline/runner/settings.h"
 
 namespace mbtfm::cost {
 namespace {

@@ -3,21 +3,28 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <iomanip>
 #include <map>
 #include <mutex>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
 #include <thread>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/stopwatch.h"
 #include "pipeline/files/csv.h"
+#include "pipeline/files/json.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/parallel.h"
-#include "pipeline/runner/all_cells.h"
-#include "pipeline/runner/batch_progress.h"
+#include "pipeline/runner/batch_table.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/runner/image_sets.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
+#include "pipeline/stage/console.h"
 
 namespace mbtfm::runner {
 namespace {
@@ -219,7 +226,73 @@ void check_parameters_once(std::vector<Look>& looks, const BatchOptions& options
   }
 }
 
+/// How far a batch is, and how long it will take. Threads may share one.
+class BatchProgress {
+ public:
+  BatchProgress(int n_to_run, const BatchOptions& options) : n_to_run_(n_to_run), options_(options) {}
+
+  void starts(const fs::path& cell) {
+    const std::lock_guard guard(mutex_);
+    running_.insert(cell.filename().string());
+    show();
+  }
+
+  /// It was not started after all.
+  void put_off(const fs::path& cell) {
+    const std::lock_guard guard(mutex_);
+    running_.erase(cell.filename().string());
+  }
+
+  void ended(const BatchCell& cell) {
+    const std::lock_guard guard(mutex_);
+    running_.erase(cell.cell.filename().string());
+    ++n_done_;
+    n_failed_ += cell.exit_code != 0;
+    if (options_.ended) options_.ended(cell);
+    if (options_.say) {
+      std::ostringstream line;
+      line << '[' << n_done_ << '/' << n_to_run_ << "] " << cell.cell.string() << ": " << std::fixed
+           << std::setprecision(1) << cell.seconds << " s: ";
+      if (cell.exit_code == 0)
+        line << verdict_on(cell.cell, options_.run.only) << ": " << last_summary(cell.cell, options_.run.only);
+      else
+        line << "FAILED" << (cell.failed_stage.empty() ? "" : " in " + cell.failed_stage) << ", " << cell.how;
+      options_.say(line.str() + time_left());
+    }
+    show();
+  }
+
+ private:
+  /// At the rate so far, jobs that run at the same time included.
+  std::string time_left() const {
+    if (n_done_ == 0 || n_done_ >= n_to_run_) return {};
+    return "; about " + stage::readable_duration(watch_.seconds() / n_done_ * (n_to_run_ - n_done_)) + " left";
+  }
+
+  void show() const {
+    if (!options_.show) return;
+    std::string line = std::to_string(n_done_) + " of " + std::to_string(n_to_run_) + " done";
+    if (n_failed_ > 0) line += ", " + std::to_string(n_failed_) + " failed";
+    line += time_left();
+    for (const std::string& name : running_) line += (name == *running_.begin() ? "; running " : ", ") + name;
+    options_.show(n_done_ < n_to_run_ ? line : std::string());
+  }
+
+  int n_to_run_, n_done_ = 0, n_failed_ = 0;
+  const BatchOptions& options_;
+  std::set<std::string> running_;
+  Stopwatch watch_;
+  std::mutex mutex_;  ///< of all, and of the lines on the terminal
+};
+
 }  // namespace
+
+std::string event_of(const BatchCell& cell) {
+  const nlohmann::ordered_json event = {
+      {"event", "cell"},         {"cell", cell.cell.string()},        {"exit_code", cell.exit_code},
+      {"seconds", cell.seconds}, {"failed_stage", cell.failed_stage}, {"message", cell.message}};
+  return files::json_text(event) + "\n";
+}
 
 FoundCells search_cells(const fs::path& folder) {
   if (!files::is_folder(folder)) throw InputError(folder.string(), "a folder of cell folders", "none");

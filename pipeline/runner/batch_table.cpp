@@ -4,7 +4,6 @@
 #include <array>
 #include <iomanip>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
@@ -13,8 +12,6 @@
 #include "pipeline/files/columns.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
-#include "pipeline/files/json.h"
-#include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/cell_stages.h"
@@ -26,13 +23,6 @@ namespace mbtfm::runner {
 
 namespace {
 
-/// What a stage that has ended says of itself.
-struct StageSays {
-  std::string summary;
-  Figures figures = {};
-  std::vector<Finding> findings;
-};
-
 std::string text_of(const Value& value) {
   return std::visit(
       [](const auto& v) {
@@ -43,23 +33,6 @@ std::string text_of(const Value& value) {
           return listed(v);
       },
       value);
-}
-
-/// None where there is no record, or a damaged one: the run itself tells.
-std::optional<StageSays> record_of(const fs::path& cell, const Stage& stage) {
-  const fs::path file = record_file_of(cell, stage);
-  if (!files::is_own_file(file)) return std::nullopt;
-  try {
-    const files::JsonRecord record(file, "a stage's record");
-    StageSays says{.summary = record.text_or("summary", ""), .findings = files::findings_of(record)};
-    for (const auto& [name, value] : record.at("figures").members()) {
-      // null: not a number, in JSON
-      says.figures.emplace_back(name, value.json().is_null() ? Value(std::string()) : value.figure());
-    }
-    return says;
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
 }
 
 /// Those of the cell as it is now; where that cannot be read, of both kinds: records of either may be there.
@@ -109,8 +82,6 @@ std::string condition_of(const BatchRow& row) {
   return std::distance(name.begin(), name.end()) > 1 ? name.begin()->string() : "";
 }
 
-const FitSummary* fit_of(const BatchRow& row) { return row.result ? &row.result->fit : nullptr; }
-
 files::Columns<BatchRow> tension_column(FibreType type) {
   return {std::string(name_of(type)) + "_tension_nN", "mean over its fibres of this type",
           [type](const BatchRow& row) -> std::optional<double> {
@@ -120,25 +91,11 @@ files::Columns<BatchRow> tension_column(FibreType type) {
           files::kResult};
 }
 
-files::Columns<BatchRow> count_column(const char* name, const char* meaning, int files::CellResult::*of) {
-  return {name, meaning, [of](const BatchRow& row) -> std::optional<int> {
-            return row.result ? std::optional((*row.result).*of) : std::nullopt;
-          }};
-}
-
-files::Columns<BatchRow> series_column(const char* name, const char* meaning, double files::ForceOverTime::*of) {
-  return {name, meaning,
-          [of](const BatchRow& row) -> std::optional<double> {
-            return row.result && row.result->over_time ? std::optional((*row.result->over_time).*of) : std::nullopt;
-          },
-          files::kResult};
-}
-
 /// A figure of the fit; of a cell in space or a sheet what its last stage reported.
 files::Columns<BatchRow> result_column(const char* name, const char* meaning, double FitSummary::*of) {
   return {name, meaning,
           [name, of](const BatchRow& row) -> std::optional<double> {
-            return row.result ? std::optional(fit_of(row)->*of) : number_of(row, name);
+            return row.result ? std::optional(row.result->fit.*of) : number_of(row, name);
           },
           files::kResult};
 }
@@ -172,15 +129,18 @@ files::Table<BatchRow> batch_table() {
           tension_column(FibreType::arc),
           tension_column(FibreType::ventral),
           tension_column(FibreType::edge),
-          count_column("fibres", "number of its fibres", &R::n_fibres),
-          count_column("uncertain", "of which little more is known than that their tension is small", &R::n_uncertain),
+          {"fibres", "number of its fibres", files::member(&BatchRow::result, &R::n_fibres)},
+          {"uncertain", "of which little more is known than that their tension is small",
+           files::member(&BatchRow::result, &R::n_uncertain)},
           result_column("relative_l2", "‖measured − model‖ / ‖measured‖", &FitSummary::relative_l2),
           result_column("expected_relative_l2", "what the beads' noise alone would leave",
                         &FitSummary::expected_relative_l2),
-          series_column("first_force_nN", "total force of a time series’ first frame", &files::ForceOverTime::first_nN),
-          series_column("last_force_nN", "of its last frame", &files::ForceOverTime::last_nN),
-          series_column("largest_force_change_nN", "largest change from the first frame, with its sign",
-                        &files::ForceOverTime::largest_change_nN),
+          {"first_force_nN", "total force of a time series’ first frame",
+           files::member(&BatchRow::result, &R::over_time, &files::ForceOverTime::first_nN), files::kResult},
+          {"last_force_nN", "of its last frame",
+           files::member(&BatchRow::result, &R::over_time, &files::ForceOverTime::last_nN), files::kResult},
+          {"largest_force_change_nN", "largest change from the first frame, with its sign",
+           files::member(&BatchRow::result, &R::over_time, &files::ForceOverTime::largest_change_nN), files::kResult},
           {"reason", "why it failed, is not usable, or was skipped", &BatchRow::reason}}};
 }
 
@@ -218,7 +178,7 @@ BatchRow row_of(const BatchCell& cell, const fs::path& folder, const std::vector
   for (const Stage& stage : of.stages) {
     if (!is_asked(stage, only)) continue;
     row.last_stage = stage.name;
-    const auto record = record_of(cell.cell, stage);
+    const auto record = report_of(cell.cell, stage);
     if (!record) continue;
     row.findings.insert(row.findings.end(), record->findings.begin(), record->findings.end());
     for (const auto& [name, value] : record->figures) {
@@ -298,7 +258,7 @@ std::string last_summary(const fs::path& cell, const std::vector<std::string>& o
   std::string summary;
   for (const Stage& stage : stages_told_of(cell).stages) {
     if (!is_asked(stage, only)) continue;
-    const auto record = record_of(cell, stage);
+    const auto record = report_of(cell, stage);
     if (record && !record->summary.empty()) summary = record->summary;
   }
   return summary;

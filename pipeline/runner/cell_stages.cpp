@@ -251,4 +251,46 @@ CellStages stages_of(const fs::path& cell, const ImageNames& images) {
   return of;
 }
 
+std::string executable_of(const Stage& stage, const fs::path& stage_folder) {
+  return (stage_folder / ("mbtfm-" + stage.name)).string();
+}
+
+std::vector<std::string> command_of(const Stage& stage, const fs::path& stage_folder, const fs::path& cell,
+                                    const fs::path& folder, const ImageNames& images, int threads) {
+  std::vector<std::string> command = {executable_of(stage, stage_folder)};
+  const auto add = [&](const std::string& flag, const std::string& value) {
+    command.push_back("--" + flag);
+    command.push_back(value);
+  };
+  for (const ImageInput& image : images_of(stage, images))
+    if (const auto file = resolve_image(cell, images, image)) add(image.flag, file->string());
+  for (const ImageInput& image : stage.optional_images)
+    if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
+  for (const PathArgument& argument : stage.arguments) {
+    const auto condition = argument.condition();
+    if (!condition || files::is_own_file(folder / *condition)) add(argument.flag, (folder / argument.path).string());
+  }
+  add("config", (folder / "cell.toml").string());
+  for (const Setting& setting : stage.settings) add(setting.key, setting.value);
+  add(stage.output.flag, (folder / stage.output.path).string());
+  add("threads", std::to_string(threads));
+  return command;
+}
+
+std::vector<std::string> to_look_at(const Stage& stage, const fs::path& cell, const ImageNames& images) {
+  std::vector<std::string> flags;
+  for (const ImageInput& other : stage.beside) {
+    const auto file = resolve_optional_image(cell, images, other.key);
+    if (file && flags.empty()) flags = {"--" + other.flag, file->string()};  // they are of one size
+  }
+  if (flags.empty()) return {};
+  for (const ImageInput& image : images_of(stage, images)) {
+    if (const auto file = resolve_image(cell, images, image)) {
+      flags.push_back("--" + image.flag);
+      flags.push_back(file->string());
+    }
+  }
+  return flags;
+}
+
 }  // namespace mbtfm::runner

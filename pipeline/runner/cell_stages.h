@@ -51,4 +51,12 @@ const std::vector<Stage>& all_stages();
 /// "segment, track, network, fit, surface, traction or sheet"
 std::string stage_names();
 
+std::string executable_of(const Stage& stage, const fs::path& stage_folder);
+/// The program of a stage and its flags. @param cell  that its images lie in  @param folder  of cell.toml and of what
+/// the stages write: the cell's own, or a copy of it
+std::vector<std::string> command_of(const Stage& stage, const fs::path& stage_folder, const fs::path& cell,
+                                    const fs::path& folder, const ImageNames& images, int threads);
+/// Flags and files of the images that a stage compares with those of others; none where it looks at no others.
+std::vector<std::string> to_look_at(const Stage& stage, const fs::path& cell, const ImageNames& images);
+
 }  // namespace mbtfm::runner

@@ -4,14 +4,18 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <sstream>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/files/toml.h"
 #include "pipeline/runner/images.h"
+#include "pipeline/runner/run_cell.h"
 #include "pipeline/stage/parameters.h"
+#include "pipeline/stage/stage.h"
 
 namespace mbtfm::runner {
 namespace {
@@ -49,16 +53,11 @@ void collect_files(const fs::path& folder, std::vector<fs::path>& files) {
       files.push_back(entry);
 }
 
-std::vector<fs::path> files_below(const fs::path& folder) {
+std::map<std::string, ImageSet> group_images(const fs::path& folder, const std::vector<ImagePattern>& patterns) {
+  std::map<std::string, ImageSet> sets;
   std::vector<fs::path> files;
   collect_files(folder, files);
   for (fs::path& file : files) file = file.lexically_relative(folder);
-  return files;
-}
-
-std::map<std::string, ImageSet> group_images(const fs::path& folder, const std::vector<ImagePattern>& patterns) {
-  std::map<std::string, ImageSet> sets;
-  const std::vector<fs::path> files = files_below(folder);
   for (const ImagePattern& p : patterns) {
     const std::regex regex = regex_of(p.pattern);
     const std::size_t n_before = sets.size();
@@ -128,6 +127,77 @@ std::vector<std::string> make_cell_folders(const fs::path& folder, const std::ve
     fs::create_directories(cell);
     files::write_whole(toml, toml_of(settings, images, folder, cell));
   }
+  return cells;
+}
+
+namespace {
+
+constexpr const char* kMade = "# Made by mbtfm run of ../cell.toml, which counts: changes here are lost.\n";
+
+fs::path folder_of(const fs::path& folder, int n) {
+  return files::inside(folder, "cell_" + std::to_string(n), folder.string());
+}
+
+/// The names or globs between the bars, one folder up.
+std::string one_up(const std::string& names) {
+  std::string up;
+  std::istringstream parts(names);
+  for (std::string name; std::getline(parts, name, '|');)
+    up += (up.empty() ? "" : "|") + (fs::path(name).is_absolute() ? name : "../" + name);
+  return up;
+}
+
+}  // namespace
+
+bool asks_for_all_cells(const fs::path& folder) {
+  if (!files::is_file(folder / "cell.toml")) return false;
+  const toml::table toml = files::parse_toml(folder / "cell.toml");
+  return toml["segment"]["cell"].value_or(std::int64_t{1}) == 0;
+}
+
+fs::path make_cell_of_picture(const fs::path& folder, int n) {
+  toml::table toml = files::parse_toml(folder / "cell.toml");
+  const ImageNames names = read_image_names(folder);
+  for (const std::string& drawn : {names.outline_roi, names.fibre_rois})
+    if (!match_image(folder, drawn).files.empty())
+      throw UsageError((folder / drawn).string() + ": what is drawn by hand belongs to one cell: choose it " +
+                       "(segment.cell), not all of them (segment.cell = 0)");
+  toml::table images;
+  if (const auto cell_with = toml["images"]["cell_with"].value<std::string>()) images.insert("cell_with", *cell_with);
+  for (const std::string& key : image_keys()) {
+    const std::string& name = name_of_image(names, key);
+    const bool is_there = !match_image(folder, name).files.empty();
+    if (!is_there && !toml["images"][key]) continue;
+    images.insert(key, one_up(name));
+  }
+  toml.insert_or_assign("images", std::move(images));
+  toml["segment"].as_table()->insert_or_assign("cell", std::int64_t{n});
+  std::ostringstream text;
+  text << kMade << toml::toml_formatter(toml) << "\n";
+  const fs::path cell = folder_of(folder, n), file = cell / "cell.toml";
+  fs::create_directories(cell);
+  const std::string before = files::is_file(file) ? files::read_text(file) : kMade;
+  if (!before.starts_with(kMade))
+    throw UsageError(file.string() +
+                     " is not a file that mbtfm made, and segment.cell = 0 would overwrite it: move the "
+                     "folder elsewhere, or choose one cell (segment.cell)");
+  if (before != text.str()) files::write_whole(file, text.str());
+  return cell;
+}
+
+int n_cells_in_picture(const fs::path& cell) {
+  const StageReport report = stage::read_report(cell / "1_segment/record.json");
+  const auto n = std::ranges::find(report.figures, "n_cells_in_image", [](const auto& f) { return f.first; });
+  return n == report.figures.end() ? 1 : static_cast<int>(std::get<std::int64_t>(n->second));
+}
+
+std::vector<fs::path> cells_of_picture(const fs::path& folder) {
+  const fs::path first = folder_of(folder, 1);
+  if (!files::is_file(first / "cell.toml") || !asks_for_all_cells(folder)) return {};
+  std::vector<fs::path> cells = {first};
+  const int n = files::is_file(first / "1_segment/record.json") ? n_cells_in_picture(first) : 1;
+  for (int i = 2; i <= n && files::is_file(folder_of(folder, i) / "cell.toml"); ++i)
+    cells.push_back(folder_of(folder, i));
   return cells;
 }
 

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
+#include "pipeline/runner/batch.h"
 #include "pipeline/stage/parameters.h"
+#include "pipeline/stage/suggest.h"
 
 namespace mbtfm::runner {
 
@@ -154,6 +157,52 @@ std::optional<fs::path> resolve_optional_image(const fs::path& folder, const Ima
   const bool is_there = fs::exists(fs::symlink_status(files::file_shown_as(folder, name), error));
   if (is_default && !is_there && match_image(folder, name).files.empty()) return std::nullopt;
   return resolve_image(folder, names, key);
+}
+
+namespace {
+
+/// 0 where the folder is searched in vain.
+std::size_t n_cells_below(const fs::path& folder) {
+  try {
+    return find_cells(folder).cells.size();
+  } catch (const InputError&) {
+    return 0;
+  }
+}
+
+std::string parent_of(const fs::path& file) {
+  const fs::path folder = file.parent_path();
+  return folder.empty() ? "." : folder.string();
+}
+
+}  // namespace
+
+ImageNames read_image_names(const fs::path& cell) {
+  if (files::is_file(cell))
+    throw InputError(cell.string(), "a cell folder", "a file", "give the folder that it is in: " + parent_of(cell));
+  if (!files::is_folder(cell)) {
+    std::vector<std::string> names;
+    for (const fs::path& other : files::visible_in(parent_of(cell))) names.push_back(other.filename().string());
+    const std::string near = stage::nearest(names, cell.filename().string());
+    const bool is_slip = !near.empty() && stage::is_alike(near, cell.filename().string());
+    throw InputError(cell.string(), "a cell folder", "none",
+                     is_slip ? stage::did_you_mean(near) : "give the folder of the cell's images and cell.toml");
+  }
+  if (!files::is_file(cell / "cell.toml")) {
+    if (const std::size_t n = n_cells_below(cell); n > 0)
+      throw InputError(cell.string(), "a cell folder with cell.toml",
+                       "a folder of " + counted(static_cast<std::int64_t>(n), "cells"),
+                       "to run them all: mbtfm batch " + cell.string());
+    throw InputError(cell.string(), "a cell folder with cell.toml", "no cell.toml",
+                     files::is_file(cell / "cell.toml.txt")
+                         ? "rename cell.toml.txt to cell.toml"
+                         : "to write one from what the images say: mbtfm init " + cell.string());
+  }
+  ImageNames names;
+  stage::ParameterList list;
+  declare(list, names);
+  stage::read_toml(list, cell / "cell.toml");
+  return names;
 }
 
 }  // namespace mbtfm::runner

@@ -31,6 +31,8 @@ struct ImageNames {
   std::string cell_labels = "cell_labels.tif|cell_labels.png";  ///< of a colony
 };
 void declare(stage::ParameterList& list, ImageNames& names);
+/// Names of [images] from cell.toml. @throws InputError where there is no cell.toml, or for an unknown table or key
+ImageNames read_image_names(const fs::path& cell);
 
 /// Of files, in [images].
 std::vector<std::string> image_keys();

@@ -51,21 +51,89 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 /// A program that runs: its process group and what it prints.
 class Child {
  public:
-  Child(const std::vector<std::string>& command, const Sink& sink);
+  Child(const std::vector<std::string>& command, const Sink& sink) : sink_(sink) {
+    std::vector<char*> arguments;
+    for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
+    arguments.push_back(nullptr);
+    const auto fail = [&] { throw OutputError("cannot start " + command[0] + ": " + std::strerror(errno)); };
+    if (access(arguments[0], X_OK) != 0) fail();
+    std::array<int, 2> ends{};
+    if (pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) != 0) fail();
+    fcntl(ends[1], F_SETFL, 0);  // the program's end is an ordinary one
+    output_ = ends[0];
+    const pid_t parent = getpid();
+    pid_ = fork();
+    if (pid_ == 0) become(arguments.data(), ends[1], parent);
+    const int fork_error = errno;
+    close(ends[1]);
+    if (pid_ < 0) {
+      close(output_);
+      errno = fork_error;
+      fail();
+    }
+    setpgid(pid_, pid_);  // here, too: whoever comes first
+  }
   ~Child() { close(output_); }
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
   /// Wait for output or a tick of the clock, and pass on what there is.
-  void listen();
-  bool has_ended() const;
-  std::uint64_t memory_bytes() const;  ///< that it holds
+  void listen() {
+    pollfd place{.fd = is_output_open_ ? output_ : -1, .events = POLLIN, .revents = 0};
+    // Where the output is closed, the program ends in this moment as a rule.
+    const int wait_ms = is_output_open_ ? kTick_ms : 1;
+    if (poll(&place, 1, wait_ms) > 0) read_once();
+  }
+
+  bool has_ended() const {
+    siginfo_t info{};
+    return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == pid_;
+  }
+
+  /// That it holds.
+  std::uint64_t memory_bytes() const {
+    std::ifstream statm("/proc/" + std::to_string(pid_) + "/statm");
+    std::uint64_t all_pages = 0, resident_pages = 0;
+    statm >> all_pages >> resident_pages;
+    return resident_pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+  }
+
   void signal_group(int signal) const { kill(-pid_, signal); }
+
   /// End what is left of its group, and take its result. After has_ended only.
-  ProcessResult result();
+  ProcessResult result() {
+    signal_group(SIGKILL);  // not reaped yet: its number cannot be another's
+    while (read_once()) {
+    }
+    int status = 0;
+    rusage usage{};
+    while (wait4(pid_, &status, 0, &usage) < 0 && errno == EINTR) {
+    }
+    ProcessResult result;
+    const auto seconds_of = [](const timeval& t) {
+      return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    };
+    result.cpu_seconds = seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime);
+    constexpr double kMegabytePerKibibyte = 1024e-6;  // ru_maxrss is in KiB
+    result.peak_memory_MB = static_cast<double>(usage.ru_maxrss) * kMegabytePerKibibyte;
+    if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
+    result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
+    result.last_output = std::move(tail_);
+    return result;
+  }
 
  private:
-  bool read_once();
+  bool read_once() {
+    std::array<char, 4096> block;
+    const ssize_t n = read(output_, block.data(), block.size());
+    if (n == 0) is_output_open_ = false;
+    if (n <= 0) return false;
+    const std::string_view text(block.data(), static_cast<std::size_t>(n));
+    sink_(text);
+    tail_ += text;
+    if (tail_.size() > kTailBytes) tail_.erase(0, tail_.size() - kTailBytes);
+    return true;
+  }
 
   pid_t pid_ = -1;
   int output_ = -1;
@@ -73,81 +141,6 @@ class Child {
   const Sink& sink_;
   std::string tail_;
 };
-
-Child::Child(const std::vector<std::string>& command, const Sink& sink) : sink_(sink) {
-  std::vector<char*> arguments;
-  for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
-  arguments.push_back(nullptr);
-  const auto fail = [&] { throw OutputError("cannot start " + command[0] + ": " + std::strerror(errno)); };
-  if (access(arguments[0], X_OK) != 0) fail();
-  std::array<int, 2> ends{};
-  if (pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) != 0) fail();
-  fcntl(ends[1], F_SETFL, 0);  // the program's end is an ordinary one
-  output_ = ends[0];
-  const pid_t parent = getpid();
-  pid_ = fork();
-  if (pid_ == 0) become(arguments.data(), ends[1], parent);
-  const int fork_error = errno;
-  close(ends[1]);
-  if (pid_ < 0) {
-    close(output_);
-    errno = fork_error;
-    fail();
-  }
-  setpgid(pid_, pid_);  // here, too: whoever comes first
-}
-
-bool Child::read_once() {
-  std::array<char, 4096> block;
-  const ssize_t n = read(output_, block.data(), block.size());
-  if (n == 0) is_output_open_ = false;
-  if (n <= 0) return false;
-  const std::string_view text(block.data(), static_cast<std::size_t>(n));
-  sink_(text);
-  tail_ += text;
-  if (tail_.size() > kTailBytes) tail_.erase(0, tail_.size() - kTailBytes);
-  return true;
-}
-
-void Child::listen() {
-  pollfd place{.fd = is_output_open_ ? output_ : -1, .events = POLLIN, .revents = 0};
-  // Where the output is closed, the program ends in this moment as a rule.
-  const int wait_ms = is_output_open_ ? kTick_ms : 1;
-  if (poll(&place, 1, wait_ms) > 0) read_once();
-}
-
-bool Child::has_ended() const {
-  siginfo_t info{};
-  return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == pid_;
-}
-
-std::uint64_t Child::memory_bytes() const {
-  std::ifstream statm("/proc/" + std::to_string(pid_) + "/statm");
-  std::uint64_t all_pages = 0, resident_pages = 0;
-  statm >> all_pages >> resident_pages;
-  return resident_pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
-}
-
-ProcessResult Child::result() {
-  signal_group(SIGKILL);  // not reaped yet: its number cannot be another's
-  while (read_once()) {
-  }
-  int status = 0;
-  rusage usage{};
-  while (wait4(pid_, &status, 0, &usage) < 0 && errno == EINTR) {
-  }
-  ProcessResult result;
-  const auto seconds_of = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  result.cpu_seconds = seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime);
-  constexpr double kMegabytePerKibibyte = 1024e-6;  // ru_maxrss is in KiB
-  result.peak_memory_MB = static_cast<double>(usage.ru_maxrss) * kMegabytePerKibibyte;
-  if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
-  result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
-  result.last_output = std::move(tail_);
-  return result;
-}
 
 }  // namespace
 

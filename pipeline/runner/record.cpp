@@ -15,6 +15,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/stage/stage.h"
 
 namespace mbtfm::runner {
 using nlohmann::json;
@@ -102,6 +103,16 @@ std::optional<StageRecord> read_record(const fs::path& cell, const Stage& stage)
   record.outputs = hashes_of(*run, "outputs");
   for (const auto& [name, hash] : record.outputs) output_file(cell, stage, name, file.string());
   return record;
+}
+
+std::optional<StageReport> report_of(const fs::path& cell, const Stage& stage) {
+  const fs::path file = record_file_of(cell, stage);
+  if (!files::is_own_file(file)) return std::nullopt;
+  try {
+    return stage::read_report(file);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 void write_begun(const fs::path& record_file, const Stage& stage, const std::string& record_before) {

@@ -4,48 +4,21 @@
 #include <exception>
 #include <mutex>
 
-#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/machine.h"
 #include "pipeline/numerics/parallel.h"
-#include "pipeline/runner/batch.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
-#include "pipeline/runner/settings.h"
-#include "pipeline/stage/parameters.h"
-#include "pipeline/stage/stage.h"
-#include "pipeline/stage/suggest.h"
 
 namespace mbtfm::runner {
 namespace {
 
 bool contains_name(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-std::string executable_of(const Stage& stage, const fs::path& stage_folder) {
-  return (stage_folder / ("mbtfm-" + stage.name)).string();
-}
-
-/// Flags and files of the images that a stage compares with those of others; none where it looks at no others.
-std::vector<std::string> to_look_at(const Stage& stage, const fs::path& cell, const ImageNames& images) {
-  std::vector<std::string> flags;
-  for (const ImageInput& other : stage.beside) {
-    const auto file = resolve_optional_image(cell, images, other.key);
-    if (file && flags.empty()) flags = {"--" + other.flag, file->string()};  // they are of one size
-  }
-  if (flags.empty()) return {};
-  for (const ImageInput& image : images_of(stage, images)) {
-    if (const auto file = resolve_image(cell, images, image)) {
-      flags.push_back("--" + image.flag);
-      flags.push_back(file->string());
-    }
-  }
-  return flags;
 }
 
 /// The command as run.json tells it: paths relative to the cell folder, the program by its name.
@@ -63,8 +36,7 @@ void remove_partial_files(const fs::path& folder) {
   std::vector<fs::path> partial;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
     if (entry->path().filename().string().starts_with(files::kPartialPrefix)) partial.push_back(entry->path());
-  for (const fs::path& file : partial)
-    fs::remove(file, error);  // a link, not what it points to; no folder that is full
+  for (const fs::path& file : partial) fs::remove(file, error);  // a link, not what it points to; no full folder
 }
 
 StageFailure failure_of(const ProcessResult& result) {
@@ -126,8 +98,50 @@ class CellRun {
     }
   }
 
-  CellOutcome look();
-  CellOutcome run();
+  CellOutcome look() {
+    CellOutcome outcome;
+    for (const Stage& stage : of_.stages) {
+      const Present now = present(stage);
+      outcome.stages.push_back(
+          {.stage = stage.name,
+           .status = now.status,
+           .converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged});
+    }
+    hashes_.save();
+    return outcome;
+  }
+
+  CellOutcome run() {
+    const bool is_whole = options_.only.empty();  // and no other run is in the cell
+    if (is_whole) remove_partial_files(cell_);
+    CellOutcome outcome = look();
+    outcome.started = numerics::utc_now();
+    if (of_.kind == CellKind::space && options_.note) options_.note("beads in space, as " + of_.why);
+    if (of_.kind == CellKind::sheet && options_.note) options_.note("a contracting sheet, as " + of_.why);
+    const bool has_work = std::ranges::any_of(
+        outcome.stages, [](const StageOutcome& stage) { return stage.status.state == StageState::must_run; });
+    try {
+      files::expect_own_kind(cell_ / "report.html", files::kOwnPage);
+      check_before_start(outcome);
+      if (has_work) write_run_record(cell_, options_, outcome);  // unfinished: what a kill leaves
+      run_chains(outcome);
+    } catch (const std::exception&) {
+      outcome.ended = numerics::utc_now();
+      try {
+        write_run_record(cell_, options_, outcome);
+      } catch (const std::exception&) {
+        // the disk is full, as a rule: the error that is on its way says so
+      }
+      throw;
+    }
+    // A report of what is no more must not outlive a kill between here and the next one.
+    std::error_code is_folder;  // then writing the report tells
+    if (has_work) fs::remove(cell_ / "report.html", is_folder);
+    outcome.ended = numerics::utc_now();
+    write_run_record(cell_, options_, outcome);
+    hashes_.save();
+    return outcome;
+  }
 
  private:
   struct Present {
@@ -135,13 +149,163 @@ class CellRun {
     StageSurroundings surroundings;
     StageStatus status;
   };
-  Present present(const Stage& stage);
-  void check_before_start(CellOutcome& now) const;
-  void run_chains(CellOutcome& outcome);
-  void bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome);
-  void start(const Stage& stage, const Present& now, int threads, StageOutcome& outcome);
-  Hashes outputs_of(const Stage& stage, const Present& before);
-  void say(const StageTold& told);
+
+  Present present(const Stage& stage) {
+    Present now;
+    now.record = read_record(cell_, stage);
+    if (!is_asked(stage, options_.only)) {
+      now.status = {StageState::not_asked, "left out by --only"};
+      return now;
+    }
+    now.surroundings = surroundings_of(
+        stage,
+        {.cell = cell_, .images = images_, .settings = settings_, .hashes = hashes_, .version = options_.version},
+        now.record);
+    const bool is_explained = options_.explain && stage.explains;
+    now.status = is_explained || contains_name(options_.redo, stage.name)
+                     ? StageStatus{StageState::must_run, "asked for"}
+                     : status_of(stage, now.record, now.surroundings);
+    return now;
+  }
+
+  /// Before anything runs: the inputs are there, and every stage that will run accepts its parameters.
+  void check_before_start(CellOutcome& now) const {
+    std::vector<std::string> changed;  // folders whose stage will run
+    for (std::size_t i = 0; i < of_.stages.size(); ++i) {
+      const Stage& stage = of_.stages[i];
+      const StageState state = now.stages[i].status.state;
+      const auto is_changed = [&](const std::string& file) {
+        return contains_name(changed, fs::path(file).begin()->string());
+      };
+      const bool follows =
+          std::ranges::any_of(stage.reads, is_changed) || std::ranges::any_of(stage.reads_where_there, is_changed);
+      if (state != StageState::must_run && !(follows && state == StageState::up_to_date)) continue;
+      changed.push_back(stage.folder);
+      note_failure(now.stages[i], [&] {
+        for (const ImageInput& image : images_of(stage, images_)) resolve_image(cell_, images_, image);
+        for (const ImageInput& image : stage.optional_images) resolve_optional_image(cell_, images_, image.key);
+        const std::vector<std::string> inputs = to_look_at(stage, cell_, images_);
+        if (!options_.is_checked || !inputs.empty())
+          check_parameters(stage, cell_ / "cell.toml", options_, print_on, inputs);
+      });
+    }
+  }
+
+  void say(const StageTold& told) {
+    if (!options_.say) return;
+    const std::lock_guard guard(saying_);
+    options_.say(told);
+  }
+
+  void bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome) {
+    note_failure(outcome, [&] {
+      const Present now = present(stage);
+      outcome.status = now.status;
+      if (now.status.state == StageState::must_run) return start(stage, now, threads, outcome);
+      outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
+      say({.stage = stage.name, .status = now.status, .converged = outcome.converged});
+    });
+  }
+
+  /// Of what the stage has just written. Files of a series that it does not write any more go.
+  Hashes outputs_of(const Stage& stage, const Present& before) {
+    std::vector<std::string> names = stage.writes;
+    for (std::string& name : series_outputs(cell_, stage)) names.push_back(std::move(name));
+    Hashes outputs = hashes_.hash(names);
+    for (const std::string& file : stage.writes) {
+      if (outputs.contains(file)) continue;
+      throw StageFailed(stage.name, {.exit_code = exit_code::kBug, .how = "did not write " + file});
+    }
+    if (!before.record) return outputs;
+    for (const auto& [name, hash] : before.record->outputs) {
+      const auto found = before.surroundings.outputs.find(name);
+      const bool is_by_hand = found != before.surroundings.outputs.end() && found->second != hash;
+      if (!outputs.contains(name) && is_of_series(stage, name)) fs::remove(cell_ / name);
+      if (before.status.keeps_frames && is_by_hand) outputs[name] = hash;  // still the user's
+    }
+    return outputs;
+  }
+
+  void start(const Stage& stage, const Present& before, int threads, StageOutcome& outcome) {
+    const StageSurroundings& now = before.surroundings;
+    for (const std::string& file : stage.reads) {
+      if (!files::is_own_file(cell_ / file)) {
+        throw InputError((cell_ / file).string(), "a file that an earlier stage makes", "none",
+                         "run all stages: mbtfm run without --only");
+      }
+    }
+    const fs::path record_file = record_file_of(cell_, stage);
+    std::vector<std::string> command = command_of(stage, options_.stage_folder, cell_, cell_, images_, threads);
+    command.insert(command.end(), {"--record", record_file.string()});
+    if (options_.is_quiet) command.emplace_back("--quiet");
+    if (options_.explain && stage.explains) command.emplace_back("--explain");
+    for (const std::string& flag : flags_of(stage, given_)) command.push_back(flag);
+    const bool had_record = files::is_own_file(record_file);
+    const std::string record_before = had_record ? files::read_text(record_file) : std::string();
+    remove_partial_files(record_file.parent_path());
+    if (before.status.keeps_frames) {
+      command.push_back("--kept");
+      command.push_back((cell_ / stage.folder).string());
+    }
+    write_begun(record_file, stage, before.status.keeps_frames ? record_before : "");
+    const ProcessResult result =
+        run_process(command, options_.limits, options_.sink ? options_.sink() : Sink(print_on));
+    // A stage that did not converge and yet wrote its outputs has written a record, too.
+    outcome.converged = result.exit_code != exit_code::kNotSolved;
+    outcome.seconds = result.seconds;
+    const bool has_outputs =
+        !result.signal && (result.exit_code == 0 || (!outcome.converged && !is_begun(record_file)));
+    if (!has_outputs) {
+      // A stage that ends by itself has left its outputs as they were: so must be the record.
+      if (!result.signal && had_record) files::write_whole(record_file, record_before);
+      if (!result.signal && !had_record) forget_begun(record_file);
+      throw StageFailed(stage.name, failure_of(result));
+    }
+    const Hashes outputs = outputs_of(stage, before);
+    complete_record(record_file,
+                    {.finished = true,
+                     .converged = outcome.converged,
+                     .version = now.version,
+                     .settings = now.settings,
+                     .inputs = now.inputs,
+                     .outputs = outputs},
+                    {.command = command_to_tell(command, cell_),
+                     .seconds = result.seconds,
+                     .peak_memory_MB = result.peak_memory_MB});
+    outcome.was_run = true;
+    say({.stage = stage.name,
+         .status = outcome.status,
+         .was_run = true,
+         .converged = outcome.converged,
+         .seconds = result.seconds,
+         .peak_memory_MB = result.peak_memory_MB,
+         .report = report_of(cell_, stage)});
+  }
+
+  /// Tracking runs beside the network, in space beside segmentation. The last stage needs both.
+  void run_chains(CellOutcome& outcome) {
+    const std::vector<Stage>& all = of_.stages;
+    for (const int i : of_.first) bring_up_to_date(all[i], options_.threads, outcome.stages[i]);
+    const std::vector<std::vector<int>>& chains = of_.chains;
+    const auto is_wanted = [&](const std::vector<int>& chain) {
+      return std::ranges::any_of(chain, [&](int i) { return is_asked(all[i], options_.only); });
+    };
+    const int workers = std::ranges::count_if(chains, is_wanted) > 1 ? std::min(options_.threads, 2) : 1;
+    // Two at least: one chain ends before the other, which then has the processors to itself.
+    const int threads = workers == 1 ? options_.threads : std::max(2, options_.threads / 2);
+    // A chain that fails does not stop the other: what is done does not depend on the number of threads.
+    std::vector<std::exception_ptr> errors(chains.size());
+    numerics::parallel_for(static_cast<int>(chains.size()), workers, [&](int chain) {
+      try {
+        for (const int i : chains[chain]) bring_up_to_date(all[i], threads, outcome.stages[i]);
+      } catch (...) {
+        errors[chain] = std::current_exception();
+      }
+    });
+    for (const std::exception_ptr& error : errors)
+      if (error) std::rethrow_exception(error);
+    bring_up_to_date(all.back(), options_.threads, outcome.stages.back());
+  }
 
   fs::path cell_;
   const RunOptions& options_;
@@ -152,213 +316,6 @@ class CellRun {
   HashCache hashes_;
   std::mutex saying_;
 };
-
-CellRun::Present CellRun::present(const Stage& stage) {
-  Present now;
-  now.record = read_record(cell_, stage);
-  if (!is_asked(stage, options_.only)) {
-    now.status = {StageState::not_asked, "left out by --only"};
-    return now;
-  }
-  now.surroundings = surroundings_of(
-      stage, {.cell = cell_, .images = images_, .settings = settings_, .hashes = hashes_, .version = options_.version},
-      now.record);
-  const bool is_explained = options_.explain && stage.explains;
-  now.status = is_explained || contains_name(options_.redo, stage.name)
-                   ? StageStatus{StageState::must_run, "asked for"}
-                   : status_of(stage, now.record, now.surroundings);
-  return now;
-}
-
-CellOutcome CellRun::look() {
-  CellOutcome outcome;
-  for (const Stage& stage : of_.stages) {
-    const Present now = present(stage);
-    outcome.stages.push_back(
-        {.stage = stage.name,
-         .status = now.status,
-         .converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged});
-  }
-  hashes_.save();
-  return outcome;
-}
-
-/// Before anything runs: the inputs are there, and every stage that will run accepts its parameters.
-void CellRun::check_before_start(CellOutcome& now) const {
-  std::vector<std::string> changed;  // folders whose stage will run
-  for (std::size_t i = 0; i < of_.stages.size(); ++i) {
-    const Stage& stage = of_.stages[i];
-    const StageState state = now.stages[i].status.state;
-    const auto is_changed = [&](const std::string& file) {
-      return contains_name(changed, fs::path(file).begin()->string());
-    };
-    const bool follows =
-        std::ranges::any_of(stage.reads, is_changed) || std::ranges::any_of(stage.reads_where_there, is_changed);
-    if (state != StageState::must_run && !(follows && state == StageState::up_to_date)) continue;
-    changed.push_back(stage.folder);
-    note_failure(now.stages[i], [&] {
-      for (const ImageInput& image : images_of(stage, images_)) resolve_image(cell_, images_, image);
-      for (const ImageInput& image : stage.optional_images) resolve_optional_image(cell_, images_, image.key);
-      const std::vector<std::string> inputs = to_look_at(stage, cell_, images_);
-      if (!options_.is_checked || !inputs.empty())
-        check_parameters(stage, cell_ / "cell.toml", options_, print_on, inputs);
-    });
-  }
-}
-
-void CellRun::say(const StageTold& told) {
-  if (!options_.say) return;
-  const std::lock_guard guard(saying_);
-  options_.say(told);
-}
-
-/// None where the record of a stage that has just run is not as ours are.
-std::optional<StageReport> report_in(const fs::path& record_file) {
-  try {
-    return stage::read_report(record_file);
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
-}
-
-void CellRun::bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome) {
-  note_failure(outcome, [&] {
-    const Present now = present(stage);
-    outcome.status = now.status;
-    if (now.status.state == StageState::must_run) return start(stage, now, threads, outcome);
-    outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
-    say({.stage = stage.name, .status = now.status, .converged = outcome.converged});
-  });
-}
-
-/// Of what the stage has just written. Files of a series that it does not write any more go.
-Hashes CellRun::outputs_of(const Stage& stage, const Present& before) {
-  std::vector<std::string> names = stage.writes;
-  for (std::string& name : series_outputs(cell_, stage)) names.push_back(std::move(name));
-  Hashes outputs = hashes_.hash(names);
-  for (const std::string& file : stage.writes) {
-    if (outputs.contains(file)) continue;
-    throw StageFailed(stage.name, {.exit_code = exit_code::kBug, .how = "did not write " + file});
-  }
-  if (!before.record) return outputs;
-  for (const auto& [name, hash] : before.record->outputs) {
-    const auto found = before.surroundings.outputs.find(name);
-    const bool is_by_hand = found != before.surroundings.outputs.end() && found->second != hash;
-    if (!outputs.contains(name) && is_of_series(stage, name)) fs::remove(cell_ / name);
-    if (before.status.keeps_frames && is_by_hand) outputs[name] = hash;  // still the user's
-  }
-  return outputs;
-}
-
-void CellRun::start(const Stage& stage, const Present& before, int threads, StageOutcome& outcome) {
-  const StageSurroundings& now = before.surroundings;
-  for (const std::string& file : stage.reads) {
-    if (!files::is_own_file(cell_ / file)) {
-      throw InputError((cell_ / file).string(), "a file that an earlier stage makes", "none",
-                       "run all stages: mbtfm run without --only");
-    }
-  }
-  const fs::path record_file = record_file_of(cell_, stage);
-  std::vector<std::string> command = command_of(stage, options_.stage_folder, cell_, cell_, images_, threads);
-  command.insert(command.end(), {"--record", record_file.string()});
-  if (options_.is_quiet) command.emplace_back("--quiet");
-  if (options_.explain && stage.explains) command.emplace_back("--explain");
-  for (const std::string& flag : flags_of(stage, given_)) command.push_back(flag);
-  const bool had_record = files::is_own_file(record_file);
-  const std::string record_before = had_record ? files::read_text(record_file) : std::string();
-  remove_partial_files(record_file.parent_path());
-  if (before.status.keeps_frames) {
-    command.push_back("--kept");
-    command.push_back((cell_ / stage.folder).string());
-  }
-  write_begun(record_file, stage, before.status.keeps_frames ? record_before : "");
-  const ProcessResult result = run_process(command, options_.limits, options_.sink ? options_.sink() : Sink(print_on));
-  // A stage that did not converge and yet wrote its outputs has written a record, too.
-  outcome.converged = result.exit_code != exit_code::kNotSolved;
-  outcome.seconds = result.seconds;
-  const bool has_outputs = !result.signal && (result.exit_code == 0 || (!outcome.converged && !is_begun(record_file)));
-  if (!has_outputs) {
-    // A stage that ends by itself has left its outputs as they were: so must be the record.
-    if (!result.signal && had_record) files::write_whole(record_file, record_before);
-    if (!result.signal && !had_record) forget_begun(record_file);
-    throw StageFailed(stage.name, failure_of(result));
-  }
-  const Hashes outputs = outputs_of(stage, before);
-  complete_record(
-      record_file,
-      {.finished = true,
-       .converged = outcome.converged,
-       .version = now.version,
-       .settings = now.settings,
-       .inputs = now.inputs,
-       .outputs = outputs},
-      {.command = command_to_tell(command, cell_), .seconds = result.seconds, .peak_memory_MB = result.peak_memory_MB});
-  outcome.was_run = true;
-  say({.stage = stage.name,
-       .status = outcome.status,
-       .was_run = true,
-       .converged = outcome.converged,
-       .seconds = result.seconds,
-       .peak_memory_MB = result.peak_memory_MB,
-       .report = report_in(record_file)});
-}
-
-/// Tracking runs beside the network, in space beside segmentation. The last stage needs both.
-void CellRun::run_chains(CellOutcome& outcome) {
-  const std::vector<Stage>& all = of_.stages;
-  for (const int i : of_.first) bring_up_to_date(all[i], options_.threads, outcome.stages[i]);
-  const std::vector<std::vector<int>>& chains = of_.chains;
-  const auto is_wanted = [&](const std::vector<int>& chain) {
-    return std::ranges::any_of(chain, [&](int i) { return is_asked(all[i], options_.only); });
-  };
-  const int workers = std::ranges::count_if(chains, is_wanted) > 1 ? std::min(options_.threads, 2) : 1;
-  // Two at least: one chain ends before the other, which then has the processors to itself.
-  const int threads = workers == 1 ? options_.threads : std::max(2, options_.threads / 2);
-  // A chain that fails does not stop the other: what is done does not depend on the number of threads.
-  std::vector<std::exception_ptr> errors(chains.size());
-  numerics::parallel_for(static_cast<int>(chains.size()), workers, [&](int chain) {
-    try {
-      for (const int i : chains[chain]) bring_up_to_date(all[i], threads, outcome.stages[i]);
-    } catch (...) {
-      errors[chain] = std::current_exception();
-    }
-  });
-  for (const std::exception_ptr& error : errors)
-    if (error) std::rethrow_exception(error);
-  bring_up_to_date(all.back(), options_.threads, outcome.stages.back());
-}
-
-CellOutcome CellRun::run() {
-  const bool is_whole = options_.only.empty();  // and no other run is in the cell
-  if (is_whole) remove_partial_files(cell_);
-  CellOutcome outcome = look();
-  outcome.started = numerics::utc_now();
-  if (of_.kind == CellKind::space && options_.note) options_.note("beads in space, as " + of_.why);
-  if (of_.kind == CellKind::sheet && options_.note) options_.note("a contracting sheet, as " + of_.why);
-  const bool has_work = std::ranges::any_of(
-      outcome.stages, [](const StageOutcome& stage) { return stage.status.state == StageState::must_run; });
-  try {
-    files::expect_own_kind(cell_ / "report.html", files::kOwnPage);
-    check_before_start(outcome);
-    if (has_work) write_run_record(cell_, options_, outcome);  // unfinished: what a kill leaves
-    run_chains(outcome);
-  } catch (const std::exception&) {
-    outcome.ended = numerics::utc_now();
-    try {
-      write_run_record(cell_, options_, outcome);
-    } catch (const std::exception&) {
-      // the disk is full, as a rule: the error that is on its way says so
-    }
-    throw;
-  }
-  // A report of what is no more must not outlive a kill between here and the next one.
-  std::error_code is_folder;  // then writing the report tells
-  if (has_work) fs::remove(cell_ / "report.html", is_folder);
-  outcome.ended = numerics::utc_now();
-  write_run_record(cell_, options_, outcome);
-  hashes_.save();
-  return outcome;
-}
 
 void expect_known(const RunOptions& options) {
   for (const auto& names : {options.only, options.redo}) {
@@ -382,28 +339,6 @@ std::string CellOutcome::not_converged() const {
   return names;
 }
 
-std::vector<std::string> command_of(const Stage& stage, const fs::path& stage_folder, const fs::path& cell,
-                                    const fs::path& folder, const ImageNames& images, int threads) {
-  std::vector<std::string> command = {executable_of(stage, stage_folder)};
-  const auto add = [&](const std::string& flag, const std::string& value) {
-    command.push_back("--" + flag);
-    command.push_back(value);
-  };
-  for (const ImageInput& image : images_of(stage, images))
-    if (const auto file = resolve_image(cell, images, image)) add(image.flag, file->string());
-  for (const ImageInput& image : stage.optional_images)
-    if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
-  for (const PathArgument& argument : stage.arguments) {
-    const auto condition = argument.condition();
-    if (!condition || files::is_own_file(folder / *condition)) add(argument.flag, (folder / argument.path).string());
-  }
-  add("config", (folder / "cell.toml").string());
-  for (const Setting& setting : stage.settings) add(setting.key, setting.value);
-  add(stage.output.flag, (folder / stage.output.path).string());
-  add("threads", std::to_string(threads));
-  return command;
-}
-
 void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOptions& options, const Sink& sink,
                       const std::vector<std::string>& inputs) {
   std::vector<std::string> command = {executable_of(stage, options.stage_folder), "--check", "--config",
@@ -418,52 +353,6 @@ void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOp
   const std::string looked_at = inputs.empty() ? "cell.toml" : "cell.toml and the images";
   failure.how = is_refusal ? "does not accept " + looked_at : failure.how + " while it read " + looked_at;
   throw StageFailed(stage.name, std::move(failure));
-}
-
-namespace {
-
-/// 0 where the folder is searched in vain.
-std::size_t n_cells_below(const fs::path& folder) {
-  try {
-    return find_cells(folder).cells.size();
-  } catch (const InputError&) {
-    return 0;
-  }
-}
-
-std::string parent_of(const fs::path& file) {
-  const fs::path folder = file.parent_path();
-  return folder.empty() ? "." : folder.string();
-}
-
-}  // namespace
-
-ImageNames read_image_names(const fs::path& cell) {
-  if (files::is_file(cell))
-    throw InputError(cell.string(), "a cell folder", "a file", "give the folder that it is in: " + parent_of(cell));
-  if (!files::is_folder(cell)) {
-    std::vector<std::string> names;
-    for (const fs::path& other : files::visible_in(parent_of(cell))) names.push_back(other.filename().string());
-    const std::string near = stage::nearest(names, cell.filename().string());
-    const bool is_slip = !near.empty() && stage::is_alike(near, cell.filename().string());
-    throw InputError(cell.string(), "a cell folder", "none",
-                     is_slip ? stage::did_you_mean(near) : "give the folder of the cell's images and cell.toml");
-  }
-  if (!files::is_file(cell / "cell.toml")) {
-    if (const std::size_t n = n_cells_below(cell); n > 0)
-      throw InputError(cell.string(), "a cell folder with cell.toml",
-                       "a folder of " + counted(static_cast<std::int64_t>(n), "cells"),
-                       "to run them all: mbtfm batch " + cell.string());
-    throw InputError(cell.string(), "a cell folder with cell.toml", "no cell.toml",
-                     files::is_file(cell / "cell.toml.txt")
-                         ? "rename cell.toml.txt to cell.toml"
-                         : "to write one from what the images say: mbtfm init " + cell.string());
-  }
-  ImageNames names;
-  stage::ParameterList list;
-  declare(list, names);
-  stage::read_toml(list, cell / "cell.toml");
-  return names;
 }
 
 CellOutcome run_cell(const fs::path& cell, const RunOptions& options) {

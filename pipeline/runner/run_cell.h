@@ -75,17 +75,9 @@ CellOutcome look_at_cell(const fs::path& cell, const RunOptions& options);
 /// Of look_at_cell: there is nothing left to do for the stages asked for, and run.json and the report tell of it.
 bool is_done(const fs::path& cell, const RunOptions& options, const CellOutcome& now);
 
-/// The program of a stage and its flags. @param cell  that its images lie in  @param folder  of cell.toml and of what
-/// the stages write: the cell's own, or a copy of it
-std::vector<std::string> command_of(const Stage& stage, const fs::path& stage_folder, const fs::path& cell,
-                                    const fs::path& folder, const ImageNames& images, int threads);
-
 /// Does the stage accept this cell.toml? It prints why not. @throws StageFailed where it does not
 /// @param inputs  flags and files that it looks at, too
 void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOptions& options,
                       const Sink& sink = print_on, const std::vector<std::string>& inputs = {});
-
-/// Names of [images] from cell.toml. @throws InputError where there is no cell.toml, or for an unknown table or key
-ImageNames read_image_names(const fs::path& cell);
 
 }  // namespace mbtfm::runner

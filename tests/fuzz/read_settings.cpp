@@ -5,7 +5,6 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/record.h"
 #include "pipeline/runner/run_cell.h"
-#include "pipeline/runner/settings.h"
 #include "pipeline/stage/parameters.h"
 #include "tests/fuzz/target.h"
 

@@ -6,7 +6,6 @@
 #include "pipeline/files/text.h"
 #include "pipeline/report/space_map.h"
 #include "pipeline/runner/cell_stages.h"
-#include "pipeline/runner/settings.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 
