@@ -44,17 +44,13 @@ using namespace exit_code;
 
 struct CommandLine {
   fs::path folder;
-  fs::path stage_folder = runner::executable_folder();
-  int threads = numerics::available_threads();
+  runner::RunOptions run;  ///< what of it flags say
   int jobs = 1;
-  bool is_quiet = false, is_verbose = false, is_json = false, only_list = false, only_table = false, is_checked = false,
-       explain = false, is_forced = false;
-  std::vector<std::string> only, redo, patterns, set;
+  bool is_verbose = false, is_json = false, only_list = false, only_table = false, is_forced = false;
+  std::vector<std::string> patterns, set;
   std::vector<fs::path> more_cells;
   fs::path template_toml, out, inputs, like;
-  std::optional<double> timeout_s;
-  std::optional<std::uint64_t> memory_bytes;
-  std::string preset, accuracy;
+  std::string accuracy;
   double budget_min = 10;  // a study that one waits for
   int repeats = 3;         // whose median one busy moment does not move
   bool is_whole = false;
@@ -82,32 +78,23 @@ void show(const std::string& line) { std::fprintf(stderr, "\r\033[K%s", line.c_s
 
 std::function<void(const runner::StageTold&)> teller(const CommandLine& line) {
   if (line.is_json) return [](const runner::StageTold& told) { stage::print(events_of(told)); };
-  if (line.is_quiet) return nullptr;
+  if (line.run.is_quiet) return nullptr;
   const auto detail = line.is_verbose ? runner::Detail::all : runner::Detail::brief;
   return [detail](const runner::StageTold& told) { say(text_of(told, detail)); };
 }
 
 runner::RunOptions run_options(const CommandLine& line) {
-  std::vector<runner::Setting> settings;
-  for (const std::string& text : line.set) settings.push_back(runner::parse_setting(text));
-  const cost::Preset preset = line.preset.empty() ? cost::Preset() : cost::preset_named(line.preset);
-  return {.stage_folder = line.stage_folder,
-          .threads = line.threads,
-          .is_quiet = line.is_quiet,
-          .is_checked = line.is_checked,
-          .only = line.only,
-          .redo = line.redo,
-          .explain = line.explain,
-          .limits = {.seconds = line.timeout_s, .memory_bytes = line.memory_bytes},
-          .preset = line.preset,
-          .beneath = preset.settings,
-          .beneath_in_space = preset.in_space,
-          .set = std::move(settings),
-          .version = kVersion,
-          .say = teller(line),
-          .sink = line.is_json ? event_sink : std::function<runner::Sink()>(),
-          .note = line.is_json || line.is_quiet ? nullptr : std::function<void(const std::string&)>(say),
-          .finish = nullptr};
+  runner::RunOptions options = line.run;
+  if (!options.preset.empty()) {
+    options.beneath = cost::preset_named(options.preset).settings;
+    options.beneath_in_space = cost::preset_named(options.preset).in_space;
+  }
+  for (const std::string& text : line.set) options.set.push_back(runner::parse_setting(text));
+  options.version = kVersion;
+  options.say = teller(line);
+  if (line.is_json) options.sink = event_sink;
+  if (!line.is_json && !options.is_quiet) options.note = say;
+  return options;
 }
 
 /// @throws UsageError where no error budget of tensions will tell what was reached
@@ -124,7 +111,7 @@ void expect_tensions(const fs::path& cell) {
 runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions options) {
   const double wanted = cost::parse_accuracy(line.accuracy);
   const std::function<void()> write_report = std::exchange(options.finish, nullptr);
-  if (!line.only.empty()) throw UsageError("--accuracy: is reached by all stages together: leave out --only");
+  if (!line.run.only.empty()) throw UsageError("--accuracy: is reached by all stages together: leave out --only");
   expect_tensions(line.folder);
   const cost::AccuracyOutcome reached = cost::reach_accuracy(wanted, [&](const std::string& preset) {
     options.preset = preset;
@@ -153,7 +140,7 @@ void speak_for_stages(const CommandLine& line) {
 /// Of a time series: 4_fit/series.png, anew after each fit.
 void animate(const CommandLine& line) {
   const fs::path frames = line.folder / "4_fit/frames.csv", picture = line.folder / "4_fit/series.png",
-                 program = line.stage_folder / "mbtfm-animate";
+                 program = line.run.stage_folder / "mbtfm-animate";
   if (!files::is_own_file(frames) || !files::is_file(program)) return;
   if (files::is_own_file(picture) && fs::last_write_time(picture) > fs::last_write_time(frames)) return;
   runner::run_process({program.string(), "--cell", line.folder.string(), "--out", picture.string(), "--quiet"});
@@ -167,7 +154,7 @@ int run_one(const CommandLine& line) {
     report::update_report(line.folder);
     const fs::path page = line.folder / "report.html";
     if (line.is_json) return stage::print(report::result_event(line.folder, page));
-    if (!line.is_quiet) say(report::result_line(line.folder) + "; " + page.string());
+    if (!line.run.is_quiet) say(report::result_line(line.folder) + "; " + page.string());
   };
   runner::CellOutcome outcome;
   try {
@@ -187,7 +174,7 @@ int run_all(const CommandLine& line) {
   for (int i = 1; i <= n; ++i) {
     CommandLine one = line;
     one.folder = runner::make_cell_of_picture(line.folder, i);
-    if (!line.is_json && !line.is_quiet) say(one.folder.string());
+    if (!line.is_json && !line.run.is_quiet) say(one.folder.string());
     try {
       code = std::max(code, run_one(one));
     } catch (const runner::StageFailed& error) {
@@ -217,14 +204,17 @@ runner::FoundCells cells_of(const CommandLine& line) {
 }
 
 std::vector<std::string> arguments_of_cell(const CommandLine& line) {
-  std::vector<std::string> arguments = {"--threads", std::to_string(std::max(1, line.threads / line.jobs)),
-                                        "--stages-dir", line.stage_folder.string(), "--checked"};
-  if (!line.preset.empty()) arguments.insert(arguments.end(), {"--preset", line.preset});
+  std::vector<std::string> arguments = {"--threads", std::to_string(std::max(1, line.run.threads / line.jobs)),
+                                        "--stages-dir", line.run.stage_folder.string(), "--checked"};
+  if (!line.run.preset.empty()) arguments.insert(arguments.end(), {"--preset", line.run.preset});
   if (!line.accuracy.empty()) arguments.insert(arguments.end(), {"--accuracy", line.accuracy});
-  for (const auto& [flag, values] : {std::pair("--only", &line.only), {"--redo", &line.redo}, {"--set", &line.set}})
-    for (const std::string& value : *values) arguments.insert(arguments.end(), {flag, value});
-  if (line.timeout_s) arguments.insert(arguments.end(), {"--timeout", std::to_string(*line.timeout_s)});
-  if (line.memory_bytes) arguments.insert(arguments.end(), {"--memory", std::to_string(*line.memory_bytes)});
+  for (const std::string& stage : line.run.only) arguments.insert(arguments.end(), {"--only", stage});
+  for (const std::string& stage : line.run.redo) arguments.insert(arguments.end(), {"--redo", stage});
+  for (const std::string& text : line.set) arguments.insert(arguments.end(), {"--set", text});
+  if (line.run.limits.seconds)
+    arguments.insert(arguments.end(), {"--timeout", std::to_string(*line.run.limits.seconds)});
+  if (line.run.limits.memory_bytes)
+    arguments.insert(arguments.end(), {"--memory", std::to_string(*line.run.limits.memory_bytes)});
   return arguments;
 }
 
@@ -232,25 +222,25 @@ int batch(const CommandLine& line) {
   speak_for_stages(line);
   const auto [cells, skipped] = cells_of(line);
   if (line.only_list) {
-    stage::print(runner::list_cells(cells, run_options(line), line.threads));
+    stage::print(runner::list_cells(cells, run_options(line), line.run.threads));
     return kDone;
   }
   const auto outcomes =
       line.only_table
-          ? runner::outcomes_so_far(cells, run_options(line), line.threads)
+          ? runner::outcomes_so_far(cells, run_options(line), line.run.threads)
           : runner::run_batch(
                 cells, {.program = fs::read_symlink("/proc/self/exe"),
                         .arguments = arguments_of_cell(line),
                         .jobs = line.jobs,
-                        .threads = line.threads,
+                        .threads = line.run.threads,
                         .run = run_options(line),
-                        .say = line.is_quiet || line.is_json ? nullptr : say,
+                        .say = line.run.is_quiet || line.is_json ? nullptr : say,
                         .ended = line.is_json ? [](const runner::BatchCell& cell) { stage::print(event_of(cell)); }
                                               : std::function<void(const runner::BatchCell&)>(),
-                        .show = line.is_quiet || !is_terminal() ? nullptr : show});
+                        .show = line.run.is_quiet || !is_terminal() ? nullptr : show});
   const auto n_failed = std::ranges::count_if(outcomes, [](const auto& cell) { return cell.exit_code != 0; });
   if (n_failed > 0) say("failed:" + runner::failure_table(line.folder, outcomes));
-  const runner::BatchCounts told = runner::write_batch_tables(line.folder, outcomes, skipped, line.only);
+  const runner::BatchCounts told = runner::write_batch_tables(line.folder, outcomes, skipped, line.run.only);
   say(told.counts + "; " + (line.folder / "batch.csv").string() + told.not_to_count);
   return n_failed == 0 ? kDone : kFailed;
 }
@@ -283,8 +273,8 @@ int repeat(const CommandLine& line) {
   std::vector<std::string> arguments = {
       "--cells",   line.folder.string(),
       "--out",     files::inside(line.folder, "statistics", line.folder.string()).string(),
-      "--threads", std::to_string(line.threads)};
-  if (line.is_quiet) arguments.emplace_back("--quiet");
+      "--threads", std::to_string(line.run.threads)};
+  if (line.run.is_quiet) arguments.emplace_back("--quiet");
   const auto is_config = [](const std::string& argument) { return argument.starts_with("--config"); };
   if (const fs::path shared = line.folder / "study.toml";
       files::is_file(shared) && std::ranges::none_of(further, is_config))
@@ -307,7 +297,7 @@ std::vector<fs::path> all_folders(const CommandLine& line) {
 /// Of several folders each has its page; the worst exit code counts.
 int check(const CommandLine& line) {
   const auto arguments_for = [&](const fs::path& folder) {
-    std::vector<std::string> arguments = {"--cells", folder.string(), "--threads", std::to_string(line.threads)};
+    std::vector<std::string> arguments = {"--cells", folder.string(), "--threads", std::to_string(line.run.threads)};
     if (line.is_json) arguments.insert(arguments.end(), {"--json_lines", "--quiet"});
     if (files::is_folder(folder)) arguments.insert(arguments.end(), {"--page", (folder / "check.html").string()});
     return arguments;
@@ -352,16 +342,16 @@ int cost_study(const CommandLine& line) {
   std::string names;
   for (const fs::path& cell : cells) {
     names += (names.empty() ? "" : ", ") + fs::weakly_canonical(cell).filename().string();
-    studies.push_back(cost::measure(cell, {.stage_folder = line.stage_folder,
-                                           .threads = line.threads,
+    studies.push_back(cost::measure(cell, {.stage_folder = line.run.stage_folder,
+                                           .threads = line.run.threads,
                                            .budget_s = 60 * line.budget_min / static_cast<double>(cells.size()),
                                            .repeats = line.repeats,
                                            .extent = line.is_whole ? cost::Extent::whole : cost::Extent::quick,
-                                           .say = line.is_quiet ? nullptr : say}));
+                                           .say = line.run.is_quiet ? nullptr : say}));
   }
   const fs::path folder = line.out.empty() ? files::inside(line.folder, "cost", line.folder.string()) : line.out;
   cost::write_study(folder, cost::combined(studies), names);
-  if (!line.is_quiet) say("cost.csv, cost.svg and cost.md in " + folder.string());
+  if (!line.run.is_quiet) say("cost.csv, cost.svg and cost.md in " + folder.string());
   return kDone;
 }
 
@@ -376,15 +366,16 @@ CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name,
                       const FolderArgument& folder) {
   CLI::App* command = app.add_subcommand(name, purpose);
   command->add_option(folder.name, line.folder, folder.meaning)->required(folder.is_required);
-  command->add_option("--threads", line.threads, "processors to use")
+  command->add_option("--threads", line.run.threads, "processors to use")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
-  command->add_flag("--quiet", line.is_quiet, "print errors only");
+  command->add_flag("--quiet", line.run.is_quiet, "print errors only");
   return command;
 }
 
 void add_stage_folder(CLI::App* command, CommandLine& line) {
-  command->add_option("--stages-dir", line.stage_folder, "folder of the stages' executables")->capture_default_str();
+  command->add_option("--stages-dir", line.run.stage_folder, "folder of the stages' executables")
+      ->capture_default_str();
 }
 
 void add_stage_options(CLI::App* command, CommandLine& line) {
@@ -394,7 +385,7 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
     names.push_back(preset.name);
     meaning += (names.size() == 1 ? ": " : ", ") + preset.name + " (" + preset.purpose + ")";
   }
-  CLI::Option* preset = command->add_option("--preset", line.preset, meaning)->check(CLI::IsMember(names));
+  CLI::Option* preset = command->add_option("--preset", line.run.preset, meaning)->check(CLI::IsMember(names));
   command->add_option("--accuracy", line.accuracy, "the cheapest preset that finds the tensions to this error, as 5%")
       ->excludes(preset);
   command
@@ -404,19 +395,20 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
       ->allow_extra_args(false);
   // one value a flag: else the folder that follows would be taken for another
   command
-      ->add_option("--only", line.only,
+      ->add_option("--only", line.run.only,
                    "run this stage only: " + runner::stage_names() + "; several with commas: segment,track")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--redo", line.redo, "run this stage even if up to date or changed by hand; several with commas")
+  command
+      ->add_option("--redo", line.run.redo, "run this stage even if up to date or changed by hand; several with commas")
       ->delimiter(',')
       ->allow_extra_args(false);
   add_stage_folder(command, line);
   const std::map<std::string, double> time_units = {{"s", 1}, {"min", 60}, {"h", 3600}};
-  command->add_option("--timeout", line.timeout_s, "kill a stage that takes longer: 90, 10min, 2h")
+  command->add_option("--timeout", line.run.limits.seconds, "kill a stage that takes longer: 90, 10min, 2h")
       ->transform(CLI::AsNumberWithUnit(time_units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"))
       ->check(CLI::Range(1e-3, 1e15));
-  command->add_option("--memory", line.memory_bytes, "kill a stage that takes more memory: 500MB, 4GB")
+  command->add_option("--memory", line.run.limits.memory_bytes, "kill a stage that takes more memory: 500MB, 4GB")
       ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true))
       ->check(CLI::Range(1e-3, 1e15));
 }
@@ -424,11 +416,12 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
 /// A simulated cell, images and all, every stage on it, and its tensions beside the truth.
 int demo(CommandLine line) {
   if (line.folder.empty()) line.folder = "mbtfm-demo";
-  if (!line.is_quiet) say("simulating a cell in " + line.folder.string());
-  std::vector<std::string> command = {(line.stage_folder / "mbtfm-simulate").string()};
+  if (!line.run.is_quiet) say("simulating a cell in " + line.folder.string());
+  std::vector<std::string> command = {(line.run.stage_folder / "mbtfm-simulate").string()};
   command.insert(command.end(), {"--scenario", "u2os", "--seed", "1", "--noise", "0.07", "--beads", "10000"});
-  command.insert(command.end(), {"--images", "--out", line.folder.string(), "--threads", std::to_string(line.threads)});
-  if (line.is_quiet) command.emplace_back("--quiet");
+  command.insert(command.end(),
+                 {"--images", "--out", line.folder.string(), "--threads", std::to_string(line.run.threads)});
+  if (line.run.is_quiet) command.emplace_back("--quiet");
   if (line.is_forced) command.emplace_back("--force");
   const runner::ProcessResult simulated = runner::run_process(command);
   if (const int code = runner::exit_code_of(simulated); code != kDone) return code;
@@ -446,6 +439,8 @@ stage::WordsOfFlags words_of_flags() {
 
 int start(int argc, char** argv) {
   CommandLine line;
+  line.run.stage_folder = runner::executable_folder();
+  line.run.threads = numerics::available_threads();
   CLI::App app("model-based traction force microscopy: from images to stress-fibre tensions", "mbtfm");
   app.set_version_flag("--version", std::string("mbtfm ") + kVersion);
   app.footer("Exit codes: " + stage::exit_codes());
@@ -461,8 +456,8 @@ int start(int argc, char** argv) {
   check_command->add_option("MORE", line.more_cells, "further folders");
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", kCell);
   add_stage_options(run_command, line);
-  run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
-  run_command->add_flag("--explain", line.explain, "fit again and say what each effect that is off would change");
+  run_command->add_flag("--checked", line.run.is_checked, "the stages are known to accept the parameters")->group("");
+  run_command->add_flag("--explain", line.run.explain, "fit again and say what each effect that is off would change");
   for (CLI::App* command : {run_command, demo_command})
     command->add_flag("--verbose", line.is_verbose, "print every effect with its number, and why a stage is run");
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", kFolder);
