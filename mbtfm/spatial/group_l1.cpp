@@ -6,6 +6,7 @@
 #include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/spatial/rows.h"
+#include "mbtfm/tractions/group_lasso.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
@@ -16,90 +17,48 @@ using Eigen::ArrayXd;
 
 namespace {
 
-/// By place: the length of its three components, which lie n apart.
-ArrayXd lengths_of(const VectorXd& x) {
-  const Index n = x.size() / 3;
-  return (x.head(n).array().square() + x.segment(n, n).array().square() + x.tail(n).array().square()).sqrt();
-}
+using tractions::GroupLasso;
+
+ArrayXd lengths_of(const VectorXd& x) { return tractions::lengths_of(x, x.size() / 3); }
 
 VectorXd for_each_component(const VectorXd& by_place) { return by_place.replicate(3, 1); }
 
-/// Minimises ½ |A x − u|² + mu Σ w |x_i| over vectors x_i, for several mu in turn, by alternating directions (Boyd et
-/// al., Found. Trends Mach. Learn. 3 (2011) 1, section 6.4), in the frame of AᵀA, so that no step factorises anything.
-class GroupLasso {
- public:
-  /// @param largest  about the largest |x_i|: tells the size of a good step, no more
-  GroupLasso(const MatrixXd& normal, VectorXd pulled, double data_squared, ArrayXd weights, double largest)
-      : normal_(normal),
-        pulled_(std::move(pulled)),
-        data_squared_(data_squared),
-        weights_(std::move(weights)),
-        largest_(largest) {
-    auto [values, vectors] = numerics::symmetric_eigen(normal);
-    values_ = values.array().max(0);
-    vectors_ = std::move(vectors);
-    projected_ = numerics::transposed_matvec(vectors_, pulled_);
-    z_ = VectorXd::Zero(pulled_.size());
-    dual_ = z_;
+/// ½ |A x − u|² without A.
+struct Squares {
+  MatrixXd normal;  ///< AᵀA
+  VectorXd pulled;  ///< Aᵀu
+  double data_squared = 0;
+  double misfit(const VectorXd& x) const {
+    return data_squared - 2 * x.dot(pulled) + numerics::quadratic_form(normal, x);
   }
-
-  /// From which on nothing is left.
-  double largest_mu() const { return (lengths_of(pulled_) / weights_).maxCoeff(); }
-
-  void minimise(double mu) {
-    constexpr double kSettled = 1e-3;  // of x: below what the noise makes of it
-    constexpr int kMost = 600;
-    // about where shortening is a tenth of the largest vectors, as mbtfm/tractions/sparse.cpp has it
-    constexpr double kShortening = 0.1;
-    const double rho = mu * weights_.mean() / (kShortening * largest_);
-    VectorXd x;
-    for (int k = 0; k < kMost; ++k) {
-      const VectorXd right = projected_ + numerics::transposed_matvec(vectors_, rho * z_ - dual_);
-      x = numerics::matvec(vectors_, (right.array() / (values_ + rho)).matrix());
-      const VectorXd v = x + dual_ / rho;
-      const ArrayXd shares = (1 - mu / rho * weights_ / lengths_of(v).max(1e-300)).max(0);
-      const VectorXd next = v.cwiseProduct(for_each_component(shares.matrix()));
-      const double size = std::max(next.norm(), 1e-300);
-      const double change = (next - z_).norm() / size, gap = (x - next).norm() / size;
-      z_ = next;
-      dual_ += rho * (x - z_);
-      ++steps_;
-      if (std::max(change, gap) < kSettled) return;
-    }
-  }
-
-  const VectorXd& x() const { return z_; }
-  double misfit() const { return data_squared_ - 2 * z_.dot(pulled_) + numerics::quadratic_form(normal_, z_); }
-  int steps() const { return steps_; }
-  const VectorXd& pulled() const { return pulled_; }
-  const ArrayXd& weights() const { return weights_; }
-
- private:
-  const MatrixXd& normal_;
-  VectorXd pulled_;
-  double data_squared_;
-  ArrayXd weights_, values_;
-  MatrixXd vectors_;
-  VectorXd projected_, z_, dual_;
-  double largest_;
-  int steps_ = 0;
 };
 
+/// In the frame of AᵀA, so that no step factorises anything.
+GroupLasso::Solve solver_of(const Squares& squares) {
+  auto [values, vectors] = numerics::symmetric_eigen(squares.normal);
+  VectorXd projected = numerics::transposed_matvec(vectors, squares.pulled);
+  return [values = ArrayXd(values.array().max(0)), vectors = std::move(vectors), projected = std::move(projected)](
+             const VectorXd& added, double rho) -> VectorXd {
+    const VectorXd right = projected + numerics::transposed_matvec(vectors, added);
+    return numerics::matvec(vectors, (right.array() / (values + rho)).matrix());
+  };
+}
+
 /// The penalty at which the misfit is what noise leaves (Morozov's discrepancy): from where nothing is left, down.
-/// @param target  the misfit aimed at
-double choose_mu(GroupLasso& lasso, double target) {
+/// @param largest  from which on nothing is left
+/// @param target   the misfit aimed at
+double choose_mu(GroupLasso& lasso, const Squares& squares, double largest, double target) {
   constexpr double kStep = 0.63, kSmallest = 1e-4;
-  const double largest = lasso.largest_mu();
   double mu = 0.25 * largest, misfit_before = 0, mu_before = 0;
   for (; mu > kSmallest * largest; mu *= kStep) {
     lasso.minimise(mu);
-    const double misfit = lasso.misfit();
+    const double misfit = squares.misfit(lasso.x());
     if (misfit <= target) break;
     misfit_before = misfit;
     mu_before = mu;
   }
   if (mu_before > 0 && mu > kSmallest * largest) {  // between the two, where it is met
-    const double share = std::clamp((misfit_before - target) / (misfit_before - lasso.misfit()), 0.0, 1.0);
+    const double share = std::clamp((misfit_before - target) / (misfit_before - squares.misfit(lasso.x())), 0.0, 1.0);
     mu = mu_before * std::pow(mu / mu_before, share);
     lasso.minimise(mu);
   }
@@ -123,16 +82,17 @@ struct Posterior {
   MatrixXd covariance;
 };
 
-Posterior posterior_of(const GroupLasso& lasso, const MatrixXd& normal, double mu, double variance, int threads) {
+Posterior posterior_of(const VectorXd& at_minimum, const Squares& squares, const ArrayXd& penalty, double variance,
+                       int threads) {
   constexpr int kRounds = 4;
-  const Index n = lasso.weights().size();
-  Posterior posterior{lasso.x(), {}, {}};
-  ArrayXd spread = ArrayXd::Constant(n, lengths_of(lasso.x()).square().mean());
+  const Index n = penalty.size();
+  Posterior posterior{at_minimum, {}, {}};
+  ArrayXd spread = ArrayXd::Constant(n, lengths_of(at_minimum).square().mean());
   for (int round = 0; round < kRounds; ++round) {
     const ArrayXd size = (lengths_of(posterior.mean).square() + spread).sqrt();
-    posterior.precision_before = for_each_component((mu * lasso.weights() / size).matrix());
-    posterior.covariance = inverse_of(normal, posterior.precision_before, threads);
-    posterior.mean = numerics::matvec(posterior.covariance, lasso.pulled());
+    posterior.precision_before = for_each_component((penalty / size).matrix());
+    posterior.covariance = inverse_of(squares.normal, posterior.precision_before, threads);
+    posterior.mean = numerics::matvec(posterior.covariance, squares.pulled);
     const VectorXd diagonal = variance * posterior.covariance.diagonal();
     spread = diagonal.head(n) + diagonal.segment(n, n) + diagonal.tail(n);
   }
@@ -163,17 +123,20 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   const Rows rows(problem, r.weighing.by_row);  // Tikhonov's weights
   const MatrixXd weighed = rows.of(response);
   const VectorXd data = rows.of(problem.displacement_um());
-  const MatrixXd normal = numerics::gram(weighed, threads);
-  GroupLasso lasso(normal, numerics::transposed_matvec(weighed, data), data.squaredNorm(), weights, largest);
+  const Squares squares{numerics::gram(weighed, threads), numerics::transposed_matvec(weighed, data),
+                        data.squaredNorm()};
+  constexpr tractions::Settled kSettled{.change = 1e-3, .gap = 1e-3, .most_steps = 600};  // below what noise makes of x
+  GroupLasso lasso(solver_of(squares), 3 * n, weights, largest, kSettled);
   // The sum of n squares of the noise varies by sqrt(2/n), 2 % for 1 500 beads, and that is half of what the penalty
   // moves: the misfit aimed at is the one of the noise that these beads have, not of the one they state, and of what
   // their weights leave of it.
   const double aimed = std::max(r.variance_left, problem.variance_of_model());
-  const double mu = choose_mu(lasso, aimed * r.weighing.n_data);
-  const VectorXd at_minimum = lasso.x();
+  const double mu =
+      choose_mu(lasso, squares, (lengths_of(squares.pulled) / weights).maxCoeff(), aimed * r.weighing.n_data);
+  const VectorXd& at_minimum = lasso.x();
   r.traction_kPa = basis.tractions(at_minimum);
-  r.relative_l2 = std::sqrt(std::max(0.0, lasso.misfit()) / std::max(data.squaredNorm(), 1e-300));
-  const Posterior posterior = posterior_of(lasso, normal, mu, variance, threads);
+  r.relative_l2 = std::sqrt(std::max(0.0, squares.misfit(lasso.x())) / std::max(data.squaredNorm(), 1e-300));
+  const Posterior posterior = posterior_of(at_minimum, squares, mu * weights, variance, threads);
   r.covariance_kPa2 = basis.covariance(posterior.covariance, threads);
   r.summands = Summands{basis.tractions(posterior.mean), r.covariance_kPa2, {}};
   const VectorXd seen =
@@ -188,7 +151,7 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   r.figures = {{"penalty_per_nN", mu},
                {"spot_width_um", width_um},
                {"n_active_spots", static_cast<std::int64_t>((lengths_of(at_minimum) > 0).count())},
-               {"n_steps", std::int64_t{lasso.steps()}}};
+               {"n_steps", std::int64_t{lasso.n_steps()}}};
   return r;
 }
 
