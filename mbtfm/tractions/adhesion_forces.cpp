@@ -52,10 +52,7 @@ void check_solvable(const VectorXd& values) {
   constexpr double kRounding = 1e-13;  // of the normal matrix
   const auto n_lost = (values.array() <= kRounding * values.maxCoeff()).count();
   if (n_lost == 0) return;
-  throw NotSolved({.converged = false,
-                   .iterations = 0,
-                   .last_change = 0,
-                   .reason = std::to_string(n_lost) + " of " + std::to_string(values.size()) +
+  throw NotSolved({.reason = std::to_string(n_lost) + " of " + std::to_string(values.size()) +
                              " force components are not felt by any bead or not told apart: adhesions that lie on each "
                              "other, or far from all beads"});
 }
@@ -139,8 +136,9 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
   for (std::size_t a = 0; a < ellipses.size(); ++a) {
     const auto at = 2 * static_cast<Index>(a);
     const Eigen::Vector2d f = forces.segment<2>(at);
-    const Eigen::Vector2d e = f.norm() > 0 ? Eigen::Vector2d(f / f.norm()) : Eigen::Vector2d(1, 0);
     forces_nN.push_back({f.x(), f.y()});
+    const Vec2 along = direction_of(forces_nN.back());
+    const Eigen::Vector2d e(along.x, along.y);
     r.forces.push_back({.adhesion_id = inputs.adhesions[a].adhesion_id,
                         .force_nN = forces_nN.back(),
                         .sigma_nN = std::sqrt(e.dot(covariance.block<2, 2>(at, at) * e)),

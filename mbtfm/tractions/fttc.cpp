@@ -3,17 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "mbtfm/tractions/lattice_forces.h"
-
 namespace mbtfm::tractions {
-
-namespace {
-
-using std::numbers::pi;
-
-double sinc(double x) { return x == 0 ? 1 : std::sin(x) / x; }
-
-}  // namespace
 
 std::vector<double> lambdas_of(const LatticeProblem& problem) {
   // From tractions that only the longest waves of the field tell of, to those that its shortest waves tell of: beyond
@@ -67,16 +57,13 @@ LatticeOptions lattice_options(const TractionParameters& p, int threads) {
 std::vector<GroundPatch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions,
                                     const NodeField& displacements) {
   const Lattice& field = problem.field();
+  const std::vector<Vec2> displacements_um = on_field(problem, displacements);
   std::vector<GroundPatch> patches;
-  for (int j = 0; j < field.n_rows; ++j) {
-    for (int i = 0; i < field.n_columns; ++i) {
-      const Eigen::Index at = i + static_cast<Eigen::Index>(problem.box().n_columns) * j;
-      patches.push_back({.position_um = field.position_um(i, j),
-                         .area_um2 = field.spacing_um * field.spacing_um,
-                         .traction_kPa = tractions[patches.size()],
-                         .displacement_um = {displacements.x[at], displacements.y[at]}});
-    }
-  }
+  for (int k = 0; k < static_cast<int>(field.n_nodes()); ++k)
+    patches.push_back({.position_um = field.position_um(k % field.n_columns, k / field.n_columns),
+                       .area_um2 = field.spacing_um * field.spacing_um,
+                       .traction_kPa = tractions[k],
+                       .displacement_um = displacements_um[k]});
   return patches;
 }
 
@@ -117,12 +104,7 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   double misfit = 0;
   for (const double d : problem.residuals(displacements)) misfit += d * d;
   r.relative_l2 = std::sqrt(misfit / problem.data_squared());
-  if (!inputs.adhesions.empty()) {
-    r.forces = forces_on({.problem = problem,
-                          .scan = *r.scan,
-                          .compliance = even_forces_um_per_nN(inputs, parameters.gel_model, threads)},
-                         forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um), threads);
-  }
+  r.forces = forces_beside(problem, *r.scan, r.patches, inputs, parameters, threads);
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"lattice_columns", std::int64_t(problem.field().n_columns)},
                {"lattice_rows", std::int64_t(problem.field().n_rows)}};
@@ -135,7 +117,8 @@ std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& 
   const auto factors = [&](int n_waves, int n_nodes) {  // along one axis: both smoothings are products over the two
     Eigen::ArrayXd f(n_waves);
     for (int i = 0; i < n_waves; ++i) {
-      const double turn = pi * (2 * i <= n_nodes ? i : i - n_nodes) / n_nodes;  // half the phase to the next node
+      const double turn =
+          std::numbers::pi * (2 * i <= n_nodes ? i : i - n_nodes) / n_nodes;  // half the phase to the next node
       f[i] = (read_out == ReadOut::cells ? sinc(turn) : 1) *
              std::exp(-2 * std::pow(turn / box.spacing_um * gaussian_um, 2));
     }

@@ -19,12 +19,30 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver);
 
 LatticeOptions lattice_options(const TractionParameters& parameters, int threads);
 
-/// The nodes of the field, rows first. @param displacements  of the box
+/// Vectors at the nodes of the field, rows first.
+std::vector<Vec2> on_field(const LatticeProblem& problem, const NodeField& nodes);
+/// @param tractions_kPa  at these  @param displacements  of the box
 std::vector<GroundPatch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions_kPa,
                                     const NodeField& displacements);
 
-/// Vectors at the nodes of the field, rows first.
-std::vector<Vec2> on_field(const LatticeProblem& problem, const NodeField& nodes);
+/// Forces by adhesion beside the tractions of a lattice: docs/theory/reconstructions.md (16).
+/// The beads' displacements (times the roots of their weights) come from forces F on the adhesions, from tractions
+/// without a pattern everywhere, and from noise:
+///
+///   u = D F + P G t + noise,   noise ~ sigma²,   t ~ sigma² / m²,   F ~ s²
+///
+/// the first two variances being those that make (9) with lambda = m the best guess of t. With
+/// W = D − P G (A + m²)⁻¹ G Pᵀ D, A = G PᵀP G, what is known of F has the covariance and the mean
+///
+///   C = (Wᵀ D / sigma² + 1 / s²)⁻¹,   F = C Wᵀ u / sigma²
+///
+/// (Lindley & Smith, J. R. Stat. Soc. B 34 (1972) 1). m and s are the most likely ones for u: where forces on the
+/// adhesions explain all, there is no background, and where the adhesions do not explain the beads, it is strong.
+/// @param scan     of the same problem
+/// @param patches  of the map, whose moments stay
+std::vector<AdhesionForce> forces_beside(const LatticeProblem& problem, const LambdaScan& scan,
+                                         const std::vector<GroundPatch>& patches, const TractionInputs& inputs,
+                                         const TractionParameters& parameters, int threads);
 
 /// Where all displacements are zero: no tractions, and a remark that says so.
 Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const TractionInputs& inputs);

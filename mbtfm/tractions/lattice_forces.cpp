@@ -1,17 +1,13 @@
-#include "mbtfm/tractions/lattice_forces.h"
-
 #include <cmath>
 #include <limits>
 
-#include "mbtfm/tractions/traction.h"
+#include "mbtfm/tractions/fttc.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::tractions {
 
 namespace {
-
-constexpr double kTolerance = 1e-3;  // in energy: a thirtieth of a standard error
 
 /// Wᵀ D and Wᵀ u for one m.
 struct Normal {
@@ -23,7 +19,7 @@ Normal normal_for(const LatticeProblem& problem, const MatrixXd& D, double m, in
   Normal normal{MatrixXd(D.cols(), D.cols()), VectorXd(D.cols())};
   numerics::parallel_for(static_cast<int>(D.cols()), threads, [&](int a) {
     TikhonovSolver solver(problem, problem.pulled_back(problem.spread_of(D.col(a))), 1);
-    solver.solve(m, kTolerance);
+    solver.solve(m, kTolerance);  // a thirtieth of a standard error
     const VectorXd w = D.col(a) - problem.at_beads(problem.displaced(solver.solution()));
     normal.matrix.row(a) = (D.transpose() * w).transpose();
     normal.right[a] = w.dot(problem.data());
@@ -75,14 +71,14 @@ std::vector<double> log_likelihoods_of(const LambdaScan& scan) {
 
 /// From next to no background, which is quickly solved, to that of (9) by cross-validation, which explains the data
 /// without any adhesion: until it gets less likely.
-Known most_likely(const ForceData& data, const MatrixXd& D, int threads) {
-  const std::vector<double> without = log_likelihoods_of(data.scan);
+Known most_likely(const LatticeProblem& problem, const LambdaScan& scan, const MatrixXd& D, int threads) {
+  const std::vector<double> without = log_likelihoods_of(scan);
   Known best;
   double likeliest = -std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < data.scan.points.size(); ++i) {
-    const double m = data.scan.points[i].lambda;
-    if (m < data.scan.by_gcv && i > 0) break;
-    Known known = known_from(normal_for(data.problem, D, m, threads), data.scan.variance);
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const double m = scan.points[i].lambda;
+    if (m < scan.by_gcv && i > 0) break;
+    Known known = known_from(normal_for(problem, D, m, threads), scan.variance);
     const double value = without[i] + known.log_likelihood;
     if (value < likeliest) break;
     likeliest = value;
@@ -93,8 +89,13 @@ Known most_likely(const ForceData& data, const MatrixXd& D, int threads) {
 
 }  // namespace
 
-std::vector<AdhesionForce> forces_on(const ForceData& data, std::vector<AdhesionForce> forces, int threads) {
-  const Known known = most_likely(data, data.problem.weighted(data.compliance), threads);
+std::vector<AdhesionForce> forces_beside(const LatticeProblem& problem, const LambdaScan& scan,
+                                         const std::vector<GroundPatch>& patches, const TractionInputs& inputs,
+                                         const TractionParameters& parameters, int threads) {
+  std::vector<AdhesionForce> forces = forces_by_adhesion(patches, inputs.adhesions, parameters.grow_um);
+  if (forces.empty()) return forces;
+  const MatrixXd D = problem.weighted(even_forces_um_per_nN(inputs, parameters.gel_model, threads));
+  const Known known = most_likely(problem, scan, D, threads);
   for (std::size_t a = 0; a < forces.size(); ++a) {
     const auto row = 2 * static_cast<Index>(a);
     forces[a].force_nN = {known.mean[row], known.mean[row + 1]};

@@ -49,10 +49,11 @@ double lambda_at(const std::vector<ScanPoint>& points, double at) {
   return std::exp(first + (last - first) * at / (static_cast<double>(points.size()) - 1));
 }
 
-std::vector<double> over_points(const std::vector<ScanPoint>& points,
-                                const std::function<double(const ScanPoint&)>& f) {
+/// By point, or by a value of each.
+template <class From, class Function>
+std::vector<double> each(const std::vector<From>& all, const Function& f) {
   std::vector<double> values;
-  for (const ScanPoint& p : points) values.push_back(f(p));
+  for (const From& one : all) values.push_back(f(one));
   return values;
 }
 
@@ -105,7 +106,7 @@ double unbiased_risk(const ScanPoint& point, double misfit, double n_data, doubl
 
 Risks unbiased_risks(double n_data) {
   return [n_data](const std::vector<ScanPoint>& points, double variance) {
-    return over_points(points, [&](const ScanPoint& p) { return unbiased_risk(p, p.misfit, n_data, variance); });
+    return each(points, [&](const ScanPoint& p) { return unbiased_risk(p, p.misfit, n_data, variance); });
   };
 }
 
@@ -115,17 +116,16 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
   LambdaScan scan;
   scan.points = std::move(points);
   // (12) Golub, Heath & Wahba 1979
-  scan.gcv = over_points(scan.points, [&](const ScanPoint& p) {
+  scan.gcv = each(scan.points, [&](const ScanPoint& p) {
     return n_data * p.misfit / std::pow(std::max(n_data - p.degrees, 1e-6 * n_data), 2);
   });
   std::vector<double> log_gcv;
   for (const double g : scan.gcv) log_gcv.push_back(log_of(g));
-  const double gcv_at = smallest_at(log_gcv);
-  scan.by_gcv = lambda_at(scan.points, gcv_at);
+  scan.by_gcv = lambda_at(scan.points, smallest_at(log_gcv));
 
   // (13) Hansen & O'Leary 1993. As lambda falls the L-curve runs left, then up: its corner turns clockwise.
-  const auto x = spline_of(over_points(scan.points, [](const ScanPoint& p) { return log_of(p.misfit); }));
-  const auto y = spline_of(over_points(scan.points, [](const ScanPoint& p) { return log_of(p.norm); }));
+  const auto x = spline_of(each(scan.points, [](const ScanPoint& p) { return log_of(p.misfit); }));
+  const auto y = spline_of(each(scan.points, [](const ScanPoint& p) { return log_of(p.norm); }));
   const auto curvature_at = [&](double at) {
     const double dx = x.prime(at), dy = y.prime(at);
     const double turn = dy * x.double_prime(at) - dx * y.double_prime(at);
@@ -149,9 +149,7 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
   }
   const double highest = *std::max_element(scan.evidence.begin(), scan.evidence.end());
   for (double& e : scan.evidence) e -= highest;
-  std::vector<double> against;
-  for (const double e : scan.evidence) against.push_back(-e);
-  scan.by_evidence = lambda_at(scan.points, smallest_at(against));
+  scan.by_evidence = lambda_at(scan.points, smallest_at(each(scan.evidence, [](double e) { return -e; })));
 
   // With the errors that the data state, or with the misfit's where it tells of larger ones.
   const double left = variance_left_at(scan.by_gcv);
@@ -159,14 +157,12 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
   scan.variance_source = scan.variance > left ? "the errors that the data state" : "the misfit";
   scan.risk = risks(scan.points, scan.variance);
   // (25b) Mallows 1973: what the tractions displace wants less smoothing than they do
-  std::vector<double> prediction;
-  for (const ScanPoint& p : scan.points) prediction.push_back(log_of(p.misfit + 2 * scan.variance * p.degrees));
-  scan.by_prediction = lambda_at(scan.points, smallest_at(prediction));
+  scan.by_prediction = lambda_at(scan.points, smallest_at(each(scan.points, [&](const ScanPoint& p) {
+                                   return log_of(p.misfit + 2 * scan.variance * p.degrees);
+                                 })));
   if (stated_variance) scan.by_discrepancy = lambda_of_misfit(scan.points, n_data * *stated_variance);
   const RiskScale scale(scan.risk);
-  std::vector<double> tamed;
-  for (const double r : scan.risk) tamed.push_back(scale.to(r));
-  scan.by_risk = lambda_at(scan.points, smallest_at(tamed));
+  scan.by_risk = lambda_at(scan.points, smallest_at(each(scan.risk, [&](double r) { return scale.to(r); })));
   return scan;
 }
 
@@ -180,9 +176,8 @@ Refinement::Refinement(const std::vector<ScanPoint>& points) {
 
 std::vector<double> Refinement::of(const std::vector<double>& values, const std::function<double(double)>& to,
                                    const std::function<double(double)>& from) const {
-  std::vector<double> scaled, fine;
-  for (const double v : values) scaled.push_back(to(v));
-  const auto spline = spline_of(scaled);
+  std::vector<double> fine;
+  const auto spline = spline_of(each(values, to));
   for (std::size_t i = 0; i < lambdas.size(); ++i) {
     fine.push_back(from(spline(std::min(static_cast<double>(i) / kFine, static_cast<double>(values.size()) - 1))));
   }
@@ -194,15 +189,6 @@ RiskScale::RiskScale(const std::vector<double>& risk)
 double RiskScale::to(double risk) const { return std::asinh((risk - least) / depth); }
 double RiskScale::from(double tamed) const { return least + depth * std::sinh(tamed); }
 
-namespace {
-
-/// But for the ends, where a spline knows no curvature.
-double largest_curvature(const LambdaScan& scan) {
-  return *std::max_element(scan.curvature.begin() + 2, scan.curvature.end() - 2);
-}
-
-}  // namespace
-
 double chosen_lambda(const LambdaScan& scan, LambdaCriterion criterion) {
   switch (criterion) {
     case LambdaCriterion::risk:
@@ -213,21 +199,17 @@ double chosen_lambda(const LambdaScan& scan, LambdaCriterion criterion) {
       return scan.by_evidence;
     case LambdaCriterion::discrepancy:
       if (scan.by_discrepancy) return *scan.by_discrepancy;
-      throw NotSolved({.converged = false,
-                       .iterations = 0,
-                       .last_change = 0,
-                       .reason = "no lambda brings the misfit down to what the stated errors leave, or none are "
+      throw NotSolved({.reason = "no lambda brings the misfit down to what the stated errors leave, or none are "
                                  "stated: set lambda_by = risk, which takes lambda " +
                                  brief(scan.by_risk) + " here"});
     case LambdaCriterion::l_curve:
       break;
   }
   if (scan.by_l_curve) return *scan.by_l_curve;
-  throw NotSolved({.converged = false,
-                   .iterations = 0,
-                   .last_change = 0,
-                   .reason = "the L-curve of these data has no corner (its largest curvature is " +
-                             brief(largest_curvature(scan)) + ", a corner has " + brief(kLeastCurvature) +
+  // but for the ends, where a spline knows no curvature
+  const double largest = *std::max_element(scan.curvature.begin() + 2, scan.curvature.end() - 2);
+  throw NotSolved({.reason = "the L-curve of these data has no corner (its largest curvature is " + brief(largest) +
+                             ", a corner has " + brief(kLeastCurvature) +
                              " at least): set lambda_by = risk, which takes lambda " + brief(scan.by_risk) +
                              " here; it aims at the tractions, and needs no corner"});
 }

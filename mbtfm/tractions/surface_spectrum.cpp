@@ -12,9 +12,9 @@ namespace mbtfm::tractions {
 
 using std::numbers::pi;
 
-namespace {
-
 double sinc(double x) { return x == 0 ? 1 : std::sin(x) / x; }
+
+namespace {
 
 /// The mean of the compliance over the rectangle of wave numbers around zero that has no wave but the zero one. The
 /// half-space's 1/k is integrable there: k dk dphi cancels it. By symmetry only the mean of along and across is left.

@@ -23,6 +23,8 @@ enum class Basis {
   cells   ///< traction even over the cell around each node: its waves are weaker by sinc(kx a/2) sinc(ky a/2)
 };
 
+double sinc(double x);
+
 /// The compliance of every stored wave of a lattice, in the frame of its wave vector.
 class SurfaceSpectrum {
  public:
