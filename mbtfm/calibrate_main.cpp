@@ -89,20 +89,11 @@ struct Line {
   double slope = 0, correlation = 0;
 };
 
-Line line_of(const std::vector<double>& x, const std::vector<double>& y) {
-  double xx = 0, xy = 0, mean_x = 0, mean_y = 0, vx = 0, vy = 0, cov = 0;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    xx += x[i] * x[i];
-    xy += x[i] * y[i];
-    mean_x += x[i] / static_cast<double>(x.size());
-    mean_y += y[i] / static_cast<double>(x.size());
-  }
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    vx += (x[i] - mean_x) * (x[i] - mean_x);
-    vy += (y[i] - mean_y) * (y[i] - mean_y);
-    cov += (x[i] - mean_x) * (y[i] - mean_y);
-  }
-  return {.slope = xx > 0 ? xy / xx : 0, .correlation = vx * vy > 0 ? cov / std::sqrt(vx * vy) : 0};
+Line line_of(const Eigen::VectorXd& x, const Eigen::VectorXd& y) {
+  const Eigen::VectorXd dx = x.array() - x.mean(), dy = y.array() - y.mean();
+  const double variances = dx.squaredNorm() * dy.squaredNorm();
+  return {.slope = x.squaredNorm() > 0 ? x.dot(y) / x.squaredNorm() : 0,
+          .correlation = variances > 0 ? dx.dot(dy) / std::sqrt(variances) : 0};
 }
 
 /// The comparison over all cells, for one lambda.
@@ -199,13 +190,12 @@ StageReport calibrate(const TractionParameters& p, stage::StageContext& context)
     const auto i = static_cast<std::size_t>(c);
     totals[i] = total_forces_nN(cells[i], lengths_um, p);
   });
-  std::vector<double> fitted;
-  for (const FittedCell& cell : cells) fitted.push_back(cell.fitted_force_nN);
+  Eigen::VectorXd fitted(std::ssize(cells)), fttc(std::ssize(cells));
+  for (Eigen::Index c = 0; c < fitted.size(); ++c) fitted[c] = cells[c].fitted_force_nN;
   std::vector<Comparison> series;
   for (std::size_t l = 0; l < lengths_um.size(); ++l) {
-    std::vector<double> fttc;
-    for (const auto& of_cell : totals) fttc.push_back(of_cell[l]);
-    series.push_back({lengths_um[l], fttc, line_of(fitted, fttc)});
+    for (Eigen::Index c = 0; c < fttc.size(); ++c) fttc[c] = totals[c][l];
+    series.push_back({lengths_um[l], {fttc.begin(), fttc.end()}, line_of(fitted, fttc)});
   }
   write_tables(context, cells, series);
   const std::optional<double> slope_one_um = length_of_slope_one_um(series);
