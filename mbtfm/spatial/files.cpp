@@ -1,9 +1,7 @@
-#include "mbtfm/spatial/files.h"
-
 #include <algorithm>
 #include <cmath>
 
-#include "mbtfm/spatial/reconstruction.h"
+#include "mbtfm/spatial/stage.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
@@ -15,7 +13,7 @@ using files::kResult;
 
 struct Row {
   Vec3 position_um, traction_kPa;
-  std::optional<double> sigma_x_kPa, sigma_y_kPa, sigma_z_kPa;
+  std::optional<Vec3> sigma_kPa;
   double area_um2 = 0;
   std::optional<double> resolution_um;
   double normal_kPa = 0, tangential_kPa = 0;
@@ -35,10 +33,10 @@ files::Table<Row> traction_table() {
                files::x_of(&Row::traction_kPa)},
               {"ty_kPa", "the same along y", files::y_of(&Row::traction_kPa)},
               {"tz_kPa", "the same into the gel", files::z_of(&Row::traction_kPa)},
-              {"sigma_tx_kPa", "standard error: the beads' noise, and what they do not resolve", &Row::sigma_x_kPa,
-               kResult},
-              {"sigma_ty_kPa", "the same along y", &Row::sigma_y_kPa, kResult},
-              {"sigma_tz_kPa", "the same into the gel", &Row::sigma_z_kPa, kResult},
+              {"sigma_tx_kPa", "standard error: the beads' noise, and what they do not resolve",
+               files::member(&Row::sigma_kPa, &Vec3::x), kResult},
+              {"sigma_ty_kPa", "the same along y", files::member(&Row::sigma_kPa, &Vec3::y), kResult},
+              {"sigma_tz_kPa", "the same into the gel", files::member(&Row::sigma_kPa, &Vec3::z), kResult},
               {"resolution_um",
                "forces closer together than this look like one; from about twice that on they are mostly seen as two",
                &Row::resolution_um, kResult},
@@ -98,9 +96,7 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
       }
       return std::hypot(shortened, std::sqrt(std::max(0.0, variance)));
     };
-    row.sigma_x_kPa = sigma(0);
-    row.sigma_y_kPa = sigma(1);
-    row.sigma_z_kPa = sigma(2);
+    row.sigma_kPa = {sigma(0), sigma(1), sigma(2)};
   }
   return all;
 }
@@ -145,10 +141,9 @@ void write_tractions(const Path& csv, const Path& vtp, const Problem& problem,
                        files::array_of("normal_kPa", all.rows, &Row::normal_kPa),
                        files::array_of("tangential_kPa", all.rows, &Row::tangential_kPa),
                        files::array_of("displacement_um", all.rows, &Row::displacement_um)};
-  if (reconstruction.covariance_kPa2.size() > 0) {
-    const auto sigma_kPa = [](const Row& row) { return Vec3{*row.sigma_x_kPa, *row.sigma_y_kPa, *row.sigma_z_kPa}; };
-    grid.point_arrays.push_back(files::array_of("sigma_traction_kPa", all.rows, sigma_kPa));
-  }
+  if (reconstruction.covariance_kPa2.size() > 0)
+    grid.point_arrays.push_back(
+        files::array_of("sigma_traction_kPa", all.rows, [](const Row& row) { return *row.sigma_kPa; }));
   if (reconstruction.resolved.size() > 0)
     grid.point_arrays.push_back(
         files::array_of("resolution_um", all.rows, [](const Row& row) { return *row.resolution_um; }));
@@ -177,9 +172,7 @@ Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const
     add("net_force_sigma_along_nN", balance.net_force_sigma_nN);
     add("moment_sigma_along_nN_um", balance.net_moment_sigma_nN_um);
   }
-  if (balance.imbalance) {
-    add("imbalance_chi_squared", *balance.imbalance);
-  }
+  if (balance.imbalance) add("imbalance_chi_squared", *balance.imbalance);
   if (r.flipped_z_chi_squared) add("flipped_z_chi_squared", *r.flipped_z_chi_squared);
   add_vector("centre", "um", balance.centre_um);
   add("strain_energy_fJ", balance.strain_energy_fJ);

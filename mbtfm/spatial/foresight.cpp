@@ -50,7 +50,7 @@ Foresight::Foresight(const Problem& problem, const tractions::TractionParameters
   MBTFM_ASSERT(problem.patch_response_um_per_nN.size() > 0);
   const VectorXd displacement_um = problem.displacement_um();
   if (displacement_um.isZero(0)) throw UsageError("the known tractions move no bead");
-  const MatrixXd norm = norm_of(problem.mesh, problem.ground, [&](Vec2 p) { return problem.expected.amplitude(p); });
+  const MatrixXd norm = problem.norm_um2();
   const Basis basis = orthonormal_basis(norm);
   const Rows rows(problem, VectorXd::Ones(displacement_um.size()));
   const MatrixXd A = rows.of(basis.response(problem.response_um_per_kPa, threads)),

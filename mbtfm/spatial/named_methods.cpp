@@ -1,7 +1,5 @@
 /// Methods of others, on the same gel and the same beads, to be compared with.
 #include <algorithm>
-#include <array>
-#include <chrono>
 #include <cmath>
 
 #include "mbtfm/spatial/basis.h"
@@ -21,9 +19,6 @@ struct Functional {
   VectorXd data;      ///< W u
   double lambda2 = 0;
 
-  double value(const VectorXd& x) const {
-    return (data - numerics::matvec(response, x)).squaredNorm() + lambda2 * x.squaredNorm();
-  }
   VectorXd half_slope(const VectorXd& x) const {
     return lambda2 * x - numerics::transposed_matvec(response, numerics::minus_matvec(data, response, x));
   }
@@ -33,11 +28,6 @@ Functional functional_of(const Problem& problem, const Basis& basis, const Spati
   const Rows rows(problem, r.weighing.by_row);
   return {rows.of(basis.response(problem.response_um_per_kPa, threads)), rows.of(problem.displacement_um()),
           *r.lambda * *r.lambda};
-}
-
-Basis basis_of(const Problem& problem) {
-  return orthonormal_basis(
-      norm_of(problem.mesh, problem.ground, [&](Vec2 p) { return problem.expected.amplitude(p); }));
 }
 
 /// The displacement of the beads around a vertex, by the inverse of their distance.
@@ -59,7 +49,7 @@ SpatialReconstruction reconstruct_adjoint(const Problem& problem, const traction
                                           const SpatialParameters& parameters, int threads) {
   SpatialReconstruction r = reconstruct_tikhonov(problem, traction, parameters, threads);
   if (!r.lambda) return r;
-  const Basis basis = basis_of(problem);
+  const Basis basis = orthonormal_basis(problem.norm_um2());
   const Functional f = functional_of(problem, basis, r, threads);
   constexpr double kSettled = 1e-12;
   constexpr int kMost = 20000;
@@ -88,7 +78,7 @@ SpatialReconstruction reconstruct_thesis_cg(const Problem& problem, const tracti
                                             const SpatialParameters& parameters, int threads) {
   SpatialReconstruction r = reconstruct_tikhonov(problem, traction, parameters, threads);
   if (!r.lambda) return r;
-  const Basis basis = basis_of(problem);
+  const Basis basis = orthonormal_basis(problem.norm_um2());
   const Functional f = functional_of(problem, basis, r, threads);
   constexpr double kSettled = 1e-6;                // of the slope
   constexpr int kMost = 5000, kSolvesOfLine = 10;  // Numerical Recipes' bracket and parabolas take about so many

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/rows.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -137,6 +138,10 @@ std::vector<Vec3> Problem::vertices_um() const {
     places.push_back({p.x, p.y, ground.height_um(p)});
   }
   return places;
+}
+
+MatrixXd Problem::norm_um2() const {
+  return norm_of(mesh, ground, [this](Vec2 at) { return expected.amplitude(at); });
 }
 
 substrate::LazyResponse response_of_vertices(const substrate::Substrate& model, const Problem& problem) {

@@ -5,7 +5,6 @@
 #include <memory>
 
 #include "mbtfm/spatial/observed.h"
-#include "mbtfm/spatial/region.h"
 #include "mbtfm/tractions/spectrum.h"
 #include "substrate/compliance.h"
 #include "substrate/response.h"
@@ -38,6 +37,8 @@ struct Problem {
 
   Index n_unknowns() const { return 3 * Index{mesh.n_vertices()}; }
   std::vector<Vec3> vertices_um() const;
+  /// Of tractions, each over the amplitude that is expected where it is: see norm_of().
+  MatrixXd norm_um2() const;
   /// What the gel answers to: the beads, then the vertices.
   substrate::Observations all_observed() const;
   /// The rows of `observed`, of those of all_observed().

@@ -16,24 +16,15 @@ using tractions::TractionMethod;
 SpatialReconstruction by_method(TractionMethod method, const Problem& problem,
                                 const tractions::TractionParameters& traction, const SpatialParameters& parameters,
                                 int threads) {
-  switch (method) {
-    case TractionMethod::tikhonov:
-      return reconstruct_tikhonov(problem, traction, parameters, threads);
-    case TractionMethod::group_l1:
-      return reconstruct_group_l1(problem, traction, parameters, threads);
-    case TractionMethod::patches:
-      return reconstruct_patches(problem, traction, parameters, threads);
-    case TractionMethod::adjoint:
-      return reconstruct_adjoint(problem, traction, parameters, threads);
-    case TractionMethod::direct:
-      return reconstruct_direct(problem, threads);
-    case TractionMethod::green:
-      return reconstruct_green(problem, traction, parameters, threads);
-    case TractionMethod::thesis_cg:
-      return reconstruct_thesis_cg(problem, traction, parameters, threads);
-    default:
-      throw InternalError("a method of flat surfaces");
-  }
+  using By = decltype(&reconstruct_tikhonov);
+  constexpr std::pair<TractionMethod, By> kMethods[] = {
+      {TractionMethod::tikhonov, reconstruct_tikhonov}, {TractionMethod::group_l1, reconstruct_group_l1},
+      {TractionMethod::patches, reconstruct_patches},   {TractionMethod::adjoint, reconstruct_adjoint},
+      {TractionMethod::green, reconstruct_green},       {TractionMethod::thesis_cg, reconstruct_thesis_cg}};
+  if (method == TractionMethod::direct) return reconstruct_direct(problem, threads);
+  const auto by = std::ranges::find(kMethods, method, &std::pair<TractionMethod, By>::first);
+  if (by == std::end(kMethods)) throw InternalError("a method of flat surfaces");
+  return by->second(problem, traction, parameters, threads);
 }
 
 /// From the middle of what may carry tractions to the nearest bead.

@@ -107,10 +107,7 @@ enum class RiskIs {
 ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
                            const tractions::TractionParameters& traction, RiskIs risk_is);
 
-/// The same as tikhonov where the problem has no matrix. No standard errors.
-SpatialReconstruction reconstruct_large(const Problem& problem, const tractions::TractionParameters& traction,
-                                        const SpatialParameters& parameters);
-
+/// With so many tractions that the problem has no matrix: without standard errors.
 SpatialReconstruction reconstruct_tikhonov(const Problem& problem, const tractions::TractionParameters& traction,
                                            const SpatialParameters& parameters, int threads);
 

@@ -1,11 +1,11 @@
-/// mbtfm-traction where the displacements are in space.
+/// mbtfm-traction where the displacements are in space, and its files.
 #pragma once
 
-#include "mbtfm/spatial/parameters.h"
+#include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/path.h"
 #include "pipeline/contract/stage_report.h"
 #include "pipeline/stage/stage.h"
-#include "substrate/compliance.h"
 
 namespace mbtfm::spatial {
 
@@ -19,5 +19,16 @@ struct StageParameters {
 void declare(stage::ParameterList& list, StageParameters& parameters);
 
 StageReport run_in_space(const StageParameters& parameters, stage::StageContext& context);
+
+/// A table with a row for each vertex, and the surface with the same.
+void write_tractions(const Path& csv, const Path& vtp, const Problem& problem,
+                     const SpatialReconstruction& reconstruction);
+void write_part_forces(const Path& file, const std::vector<PartForce>& forces);
+/// Their part of docs/columns.md.
+std::string pages_of_tables();
+
+/// The criterion that chose lambda, or "given".
+const char* how_lambda(const SpatialReconstruction& reconstruction);
+Figures summary_of(const Problem& problem, const SpatialReconstruction& reconstruction, const Balance& balance);
 
 }  // namespace mbtfm::spatial

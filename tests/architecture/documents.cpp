@@ -7,7 +7,7 @@
 #include "continuum/solids/outputs.h"
 #include "mbtfm/plan/tables.h"
 #include "mbtfm/sheets/tables.h"
-#include "mbtfm/spatial/files.h"
+#include "mbtfm/spatial/stage.h"
 #include "mbtfm/tensions/tables.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/findings.h"

@@ -1,5 +1,5 @@
 /// Tractions that strain the gel beyond linear elasticity.
-#include "mbtfm/spatial/strained.h"
+#include "mbtfm/spatial/repeated.h"
 #include "pipeline/contract/numbers.h"
 #include "substrate/choice/factory.h"
 #include "substrate/material.h"

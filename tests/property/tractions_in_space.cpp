@@ -3,8 +3,8 @@
 
 #include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/foresight.h"
-#include "mbtfm/spatial/neighbours.h"
-#include "mbtfm/spatial/refine.h"
+#include "mbtfm/spatial/loss.h"
+#include "mbtfm/spatial/repeated.h"
 #include "mbtfm/spatial/rows.h"
 #include "mbtfm/tractions/recurrences.h"
 #include "pipeline/contract/errors.h"

@@ -18,7 +18,7 @@
 
 #include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/reconstruction.h"
-#include "mbtfm/spatial/refine.h"
+#include "mbtfm/spatial/repeated.h"
 #include "mbtfm/tractions/traction.h"
 #include "substrate/choice/factory.h"
 #include "substrate/surface/beads.h"
