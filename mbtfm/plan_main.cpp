@@ -1,6 +1,5 @@
 /// mbtfm-plan: how many beads, which gel, how little noise and how many cells a question takes.
 #include "mbtfm/plan/answer.h"
-#include "mbtfm/plan/page.h"
 #include "mbtfm/plan/tables.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/files/text.h"

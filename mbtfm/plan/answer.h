@@ -1,4 +1,4 @@
-/// A plan as a whole, and what it says in words.
+/// A plan as a whole, what it says in words, and as pictures and a page that stands alone.
 #pragma once
 
 #include "mbtfm/plan/cell_numbers.h"
@@ -43,5 +43,12 @@ std::string answer_sentence(const SpacePlan& plan);
 /// What follows it: the adhesions, the cells, how well the drawn experiments bore it out.
 std::vector<std::string> further_sentences(const Plan& plan);
 std::vector<std::string> further_sentences(const SpacePlan& plan);
+
+/// A chart for each noise: standard error of the middle fibre or patch over density, a curve for each gel, the target
+/// as a line.
+template <class Quantity>
+std::string svg_of(const PlanOf<Quantity>& plan);
+template <class Quantity>
+std::string html_of(const PlanOf<Quantity>& plan);
 
 }  // namespace mbtfm::plan

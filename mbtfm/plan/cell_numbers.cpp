@@ -4,6 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
 #include "pipeline/numerics/distributions.h"
 
 namespace mbtfm::plan {
@@ -23,27 +25,32 @@ Moments moments_of(const std::vector<double>& values) {
   return m;
 }
 
+std::optional<double> variance_named(const files::CsvTable& table, const std::string& component) {
+  for (int row = 0; row < table.n_rows(); ++row) {
+    if (table.text(row, "quantity") != "tension_nN" || table.text(row, "component") != component) continue;
+    const auto sd = table.optional_number(row, "standard_deviation");
+    return sd ? std::optional(*sd * *sd) : std::nullopt;
+  }
+  return std::nullopt;
+}
+
+constexpr const char* kOfStudy = "the study's mixed model";
+
 }  // namespace
 
 std::vector<Scatter> scatter_of(const Scene& scene, const Computed& c, const Point& point, double between_cells) {
   std::vector<Scatter> all;
-  const std::pair<FibreType, Quantity> types[] = {{FibreType::dorsal, Quantity::dorsal},
-                                                  {FibreType::arc, Quantity::arc},
-                                                  {FibreType::ventral, Quantity::ventral},
-                                                  {FibreType::edge, Quantity::edge}};
-  for (const auto& [type, quantity] : types) {
+  for (std::size_t k = 0; k < std::size(kFibreTypes); ++k) {
     std::vector<double> tensions_nN;
     double squares = 0;
-    for (std::size_t i = 1; i < c.cell.fibre_ids.size(); ++i) {
-      const auto fibre = std::ranges::find(scene.cell.cell.fibres, c.cell.fibre_ids[i], &Fibre::fibre_id);
-      if (fibre->type != type) continue;
+    for (const std::size_t i : labels_of(scene, c.cell, kFibreTypes[k])) {
       tensions_nN.push_back(c.cell.tensions_nN[static_cast<Eigen::Index>(i)]);
       squares += std::pow(standard_error_nN(c, i, point), 2);
     }
     if (tensions_nN.empty()) continue;
     const Moments m = moments_of(tensions_nN);
     const auto n = static_cast<double>(tensions_nN.size());
-    all.push_back({.type = quantity,
+    all.push_back({.type = kOfTypes[k],
                    .mean_nN = m.mean,
                    .between_cells_nN = between_cells * m.mean,
                    .within_nN = m.sd,
@@ -52,6 +59,33 @@ std::vector<Scatter> scatter_of(const Scene& scene, const Computed& c, const Poi
                    .source = "this cell's fibres; between cells as given"});
   }
   return all;
+}
+
+std::vector<Scatter> scatter_of_study(const std::filesystem::path& statistics, std::vector<Scatter> scatter) {
+  const files::CsvTable types(statistics / "types.csv"), variances(statistics / "variances.csv");
+  types.require({"cell", "type", "mean_nN", "n_cells", "n_fibres"});
+  variances.require({"quantity", "component", "standard_deviation"});
+  const double cell = variance_named(variances, "cell").value_or(0),
+               kind_in_cell = variance_named(variances, "kind in a cell").value_or(0);
+  for (Scatter& s : scatter) {
+    const std::string word = name_of(kFibreTypes[std::ranges::find(kOfTypes, s.type) - std::begin(kOfTypes)]);
+    for (int row = 0; row < types.n_rows(); ++row) {
+      if (types.text(row, "cell") != "all" || types.text(row, "type") != word) continue;
+      const auto within = variance_named(variances, "within: " + word);
+      if (!within) continue;
+      s.mean_nN = types.number(row, "mean_nN");
+      s.between_cells_nN = std::sqrt(cell + kind_in_cell);
+      s.within_nN = std::sqrt(*within);
+      s.fibres_per_cell = types.number(row, "n_fibres") / std::max(1.0, types.number(row, "n_cells"));
+      s.source = kOfStudy;
+      break;  // the first condition
+    }
+  }
+  if (std::ranges::all_of(scatter, [](const Scatter& s) { return s.source != kOfStudy; }))
+    throw InputError((statistics / "variances.csv").string(),
+                     "the scatter of tension_nN within a cell (component 'within: TYPE') of a type of types.csv",
+                     "none", "make the tables with mbtfm stats, of two cells or more");
+  return scatter;
 }
 
 double power_of(const Scatter& s, double difference_nN, double fibres_per_cell, int cells) {

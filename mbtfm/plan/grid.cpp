@@ -5,21 +5,14 @@
 #include <limits>
 
 #include "mbtfm/plan/adhesion_pair.h"
-#include "mbtfm/tensions/linear_data.h"
-#include "mbtfm/tractions/fttc_mixtures.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/order_statistics.h"
-#include "pipeline/numerics/parallel.h"
 #include "substrate/choice/large_strain.h"
 
 namespace mbtfm::plan {
 
-using namespace tensions;
-
 namespace {
-
-constexpr std::uint64_t kDrawOfFttc = 50;  // between those of the bound and those of whole experiments
 
 /// Of one estimate: what the beads make, and what the rest makes.
 struct Errors {
@@ -45,29 +38,6 @@ std::vector<Errors> errors_of_forces(const Eigen::VectorXd& unit, double scale, 
   return errors;
 }
 
-std::vector<std::size_t> labels_of(const Scene& scene, const KnownCell& cell, std::optional<FibreType> type) {
-  std::vector<std::size_t> labels;
-  for (std::size_t i = 1; i < cell.fibre_ids.size(); ++i) {
-    const auto fibre = std::ranges::find(scene.cell.cell.fibres, cell.fibre_ids[i], &Fibre::fibre_id);
-    if (!type || fibre->type == *type) labels.push_back(i);
-  }
-  return labels;
-}
-
-Quantity quantity_of(FibreType type) {
-  switch (type) {
-    case FibreType::dorsal:
-      return Quantity::dorsal;
-    case FibreType::arc:
-      return Quantity::arc;
-    case FibreType::ventral:
-      return Quantity::ventral;
-    case FibreType::edge:
-      break;
-  }
-  return Quantity::edge;
-}
-
 template <class Of>
 double median_of(const std::vector<Errors>& errors, const Of& of) {
   std::vector<double> values;
@@ -91,12 +61,6 @@ Expected expected_of(const Point& point, Quantity quantity, const std::vector<Er
           .smallest_seen_nN = kSeen * median_of(errors, [](const Errors& e) { return e.total_nN(); })};
 }
 
-double median_area_um2(const Scene& scene) {
-  std::vector<double> areas;
-  for (const Adhesion& a : scene.cell.cell.adhesions) areas.push_back(a.area_um2);
-  return numerics::median_in(areas);
-}
-
 /// Of the cell on its own gel; it falls with the modulus.
 struct OnOwnGel {
   double largest_displacement_um = 0, traction_kPa = 0;
@@ -107,11 +71,6 @@ OnOwnGel on_own_gel(const Computed& c) {
   for (Eigen::Index row = 0; row < u_um.size(); row += 2)
     own.largest_displacement_um = std::max(own.largest_displacement_um, u_um.segment<2>(row).norm());
   return own;
-}
-
-Gel of_modulus(Gel gel, double youngs_modulus_kPa) {
-  gel.youngs_modulus_kPa = youngs_modulus_kPa;
-  return gel;
 }
 
 /// All quantities at a point.
@@ -125,7 +84,7 @@ std::vector<Expected> at_point(const Scene& scene, const Asked& asked, const Com
       all.push_back(expected_of(point, quantity, errors_of_tensions(c, unit, scale, labels), asked.target_nN));
   };
   add_fibres(Quantity::fibres, {});
-  for (const FibreType type : kFibreTypes) add_fibres(quantity_of(type), type);
+  for (std::size_t k = 0; k < std::size(kFibreTypes); ++k) add_fibres(kOfTypes[k], kFibreTypes[k]);
   const double network_nN = scale * unit.tensions[0] * c.model.network_force_nN / c.cell.tensions_nN[0];
   all.push_back(expected_of(point, Quantity::network_force, {{network_nN, c.model.network_force}},
                             asked.within * c.model.network_force_nN));
@@ -139,36 +98,6 @@ std::vector<Expected> at_point(const Scene& scene, const Asked& asked, const Com
   return all;
 }
 
-/// One experiment with this density, on a part of the densest beads, for FTTC.
-struct FttcExperiment {
-  tractions::FttcMixtures mixtures;
-  double modulus_kPa = 0;
-};
-FttcExperiment fttc_experiment(const Scene& scene, const Computed& c, double share_of_beads) {
-  drawing::Random places(scene.experiment.seed, drawing::Stream::beads, kDrawOfFttc),
-      random(scene.experiment.seed, drawing::Stream::noise, kDrawOfFttc),
-      segmentation(scene.experiment.seed, drawing::Stream::specimen, kDrawOfFttc);
-  const BeadsOnGel beads = some_of(c.densest, share_of_beads, places);
-  const DisplacementField exact = exact_beads(beads.places_um, *beads.response, c.cell.forces_nN, 1);
-  DisplacementField noise = exact;
-  for (Bead& b : noise) {
-    const double x = random.normal(), y = random.normal();
-    b.displacement_um = {x, y};
-  }
-  Gel gel = scene.fit.gel;
-  gel.youngs_modulus_kPa = beads.modulus_kPa;
-  return {tractions::FttcMixtures(exact, noise, gel,
-                                  as_segmented(scene.cell.cell, scene.fit.segmentation, segmentation).adhesions, {}, 1),
-          beads.modulus_kPa};
-}
-
-/// Magnitudes of FTTC's errors. On another gel displacements fall with its modulus, and noise counts the more.
-std::vector<double> errors_of_fttc(const FttcExperiment& e, const Computed& c, const Point& point) {
-  std::vector<double> errors_nN;
-  add_errors_along(errors_nN, e.mixtures.forces_nN(scale_of(point) / e.modulus_kPa), c.cell.forces_nN);
-  return errors_nN;
-}
-
 Expected expected_of_fttc(const Point& point, const std::vector<double>& errors_nN, double target_nN) {
   const double error_nN = robust_error(errors_nN);
   return {.point = point,
@@ -178,15 +107,6 @@ Expected expected_of_fttc(const Point& point, const std::vector<double>& errors_
           .target_nN = target_nN,
           .share_within = share_within(errors_nN, target_nN),
           .smallest_seen_nN = kSeen * error_nN};
-}
-
-/// By gel, density, noise.
-std::vector<Point> points_of(const Asked& asked) {
-  std::vector<Point> points;
-  for (const double E : asked.youngs_modulus_kPa)
-    for (const double density : asked.densities)
-      for (const double noise_um : asked.noise_um) points.push_back({E, density, noise_um});
-  return points;
 }
 
 /// Density at which a tension's standard error is the target; infinite where what is left without noise is more, or
@@ -220,13 +140,53 @@ std::vector<std::string> warnings_of(const Asked& asked, const Computed& c, cons
     const double largest_um = own.largest_displacement_um * c.densest.modulus_kPa / E;
     for (const double noise_um : asked.noise_um)
       if (largest_um < kOfNoise * noise_um) warnings.push_back(sentence_of_noise(E, largest_um, noise_um));
-    const double left_out = choice::left_out_at_beads(of_modulus(scene.fit.gel, E), own.traction_kPa);
+    const double left_out = choice::left_out_at_beads(with_modulus(scene.fit.gel, E), own.traction_kPa);
     if (left_out > kBeyondLinear) warnings.push_back(sentence_of_strain(E, left_out));
   }
   return warnings;
 }
 
+void check_densities(const Scene& scene, const std::vector<double>& beads_per_um2) {
+  const double area_um2 = scene.field.area_um2(), most = most_beads_per_um2(scene);
+  constexpr double kFewest = 20;
+  if (beads_per_um2.front() * area_um2 < kFewest)
+    throw UsageError("beads_per_um2: " + brief(beads_per_um2.front()) + " are fewer than 20 beads in the " +
+                     brief(area_um2) + " um² of the scene");
+  if (beads_per_um2.back() > most)
+    throw UsageError("beads_per_um2: " + brief(beads_per_um2.back()) + " are more than the " + brief(most) +
+                     " that can be told apart: beads nearer than " + brief(scene.experiment.bead_distance_um) +
+                     " um to each other melt together in an image");
+}
+
 }  // namespace
+
+std::vector<Point> points_of(const Asked& asked) {
+  std::vector<Point> points;
+  for (const double E : asked.youngs_modulus_kPa)
+    for (const double density : asked.densities)
+      for (const double noise_um : asked.noise_um) points.push_back({E, density, noise_um});
+  return points;
+}
+
+Gel with_modulus(Gel gel, double youngs_modulus_kPa) {
+  gel.youngs_modulus_kPa = youngs_modulus_kPa;
+  return gel;
+}
+
+double median_area_um2(const std::vector<Adhesion>& adhesions) {
+  std::vector<double> areas;
+  for (const Adhesion& a : adhesions) areas.push_back(a.area_um2);
+  return numerics::median_in(areas);
+}
+
+std::vector<std::size_t> labels_of(const Scene& scene, const KnownCell& cell, std::optional<FibreType> type) {
+  std::vector<std::size_t> labels;
+  for (std::size_t i = 1; i < cell.fibre_ids.size(); ++i) {
+    const auto fibre = std::ranges::find(scene.cell.cell.fibres, cell.fibre_ids[i], &Fibre::fibre_id);
+    if (!type || fibre->type == *type) labels.push_back(i);
+  }
+  return labels;
+}
 
 double share_within(const std::vector<double>& errors_nN, double target_nN) {
   const auto n_within = std::ranges::count_if(errors_nN, [&](double e) { return e <= target_nN; });
@@ -276,18 +236,6 @@ double standard_error_nN(const Computed& c, std::size_t label, const Point& poin
                     c.model.tensions[label].total_nN());
 }
 
-void check_densities(const Scene& scene, const std::vector<double>& beads_per_um2) {
-  const double area_um2 = scene.field.area_um2(), most = most_beads_per_um2(scene);
-  constexpr double kFewest = 20;
-  if (beads_per_um2.front() * area_um2 < kFewest)
-    throw UsageError("beads_per_um2: " + brief(beads_per_um2.front()) + " are fewer than 20 beads in the " +
-                     brief(area_um2) + " um² of the scene");
-  if (beads_per_um2.back() > most)
-    throw UsageError("beads_per_um2: " + brief(beads_per_um2.back()) + " are more than the " + brief(most) +
-                     " that can be told apart: beads nearer than " + brief(scene.experiment.bead_distance_um) +
-                     " um to each other melt together in an image");
-}
-
 Computed compute(const Scene& scene, const Asked& asked, const Work& work) {
   check_densities(scene, asked.densities);
   Computed c{.cell = known_cell(scene, work.part(0, 0.2)), .densest = {}, .densities = {}, .model = {}};
@@ -303,19 +251,11 @@ Computed compute(const Scene& scene, const Asked& asked, const Work& work) {
 Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c, int threads) {
   Grid grid;
   const OnOwnGel own = on_own_gel(c);
-  const PairResolution pairs(scene.fit.gel, median_area_um2(scene), asked.densities, threads);
+  const PairResolution pairs(scene.fit.gel, median_area_um2(scene.cell.cell.adhesions), asked.densities, threads);
   grid.touching_um = pairs.touching_um();
   const double force_nN = asked.target_nN / asked.within;
   const std::vector<Point> points = points_of(asked);
-  std::vector<std::vector<double>> of_fttc(points.size());
-  const auto n_densities = static_cast<int>(asked.densities.size());
-  numerics::parallel_for(n_densities, threads, [&](int i) {
-    // the densest, which takes longest, first
-    const double density = asked.densities[n_densities - 1 - i];
-    const FttcExperiment experiment = fttc_experiment(scene, c, density / asked.densities.back());
-    for (std::size_t k = 0; k < points.size(); ++k)
-      if (points[k].density == density) of_fttc[k] = errors_of_fttc(experiment, c, points[k]);
-  });
+  const std::vector<std::vector<double>> of_fttc = errors_of_fttc_nN(scene, asked, c, threads);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point& point = points[i];
     const double E = point.youngs_modulus_kPa;
@@ -325,7 +265,7 @@ Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c, int thre
     all.push_back(expected_of_fttc(point, of_fttc[i], asked.target_nN));
     for (Expected& e : all) {
       e.largest_displacement_um = own.largest_displacement_um * c.densest.modulus_kPa / E;
-      e.left_out = choice::left_out_at_beads(of_modulus(scene.fit.gel, E), own.traction_kPa);
+      e.left_out = choice::left_out_at_beads(with_modulus(scene.fit.gel, E), own.traction_kPa);
       if (e.quantity == Quantity::free_force)
         e.least_distance_um = pairs.least_distance_um(force_nN, E, density, point.noise_um);
       grid.expected.push_back(e);

@@ -1,13 +1,16 @@
-#include "mbtfm/plan/page.h"
-
+#include <algorithm>
 #include <cmath>
 
 #include "mbtfm/plan/answer.h"
-#include "mbtfm/plan/page_parts.h"
 #include "mbtfm/plan/tables.h"
+#include "pipeline/charts/chart.h"
+#include "pipeline/contract/version.h"
+#include "pipeline/report/page.h"
 
 namespace mbtfm::plan {
 namespace {
+
+using report::number;
 
 /// What is said of flat cells and of cells in space in other words.
 struct Texts {
@@ -57,27 +60,44 @@ std::string further_of(const Expected& e) {
 }
 std::string further_of(const SpaceExpected&) { return {}; }
 
+std::string colour(std::size_t k) { return charts::kColours[k % std::size(charts::kColours)]; }
+
+std::string dashed(const Asked& asked) { return "Dashed: the target of " + brief(asked.target_nN) + " nN."; }
+
+/// Standard error over density at one noise, a curve for each gel, the target as a line.
 template <class Quantity>
-charts::Chart chart_of(const PlanOf<Quantity>& plan, double noise_um) {
+charts::Chart error_chart(const PlanOf<Quantity>& plan, double noise_um) {
   const Quantity quantity = drawn_quantity(plan);
   const Texts& texts = texts_of(plan);
-  std::vector<double> errors;
+  const Asked& asked = plan.asked;
+  std::vector<double> errors = {asked.target_nN};  // of all noises, so that the axes are alike
   for (const auto& e : plan.grid.expected)
     if (e.quantity == quantity) errors.push_back(e.standard_error_nN);
-  return error_chart(plan.asked, noise_um, texts.beads, plan.asked.densities, texts.middle, std::move(errors),
-                     [&](double E) {
-                       std::vector<ErrorDot> dots;
-                       for (const auto& e : plan.grid.expected)
-                         if (e.quantity == quantity && e.point.youngs_modulus_kPa == E && e.point.noise_um == noise_um)
-                           dots.push_back({e.point.density, e.standard_error_nN, e.from_beads_nN, further_of(e)});
-                       return dots;
-                     });
+  charts::Chart chart(
+      "Noise " + brief(noise_um) + " µm", charts::axis_over(texts.beads, asked.densities, charts::Scale::logarithmic),
+      charts::axis_over("standard error of the " + texts.middle + " (nN)", errors, charts::Scale::logarithmic));
+  for (std::size_t k = 0; k < asked.youngs_modulus_kPa.size(); ++k) {
+    const std::string gel = brief(asked.youngs_modulus_kPa[k]) + " kPa";
+    std::vector<Vec2> points;
+    for (const auto& e : plan.grid.expected) {
+      if (e.quantity != quantity || e.point.youngs_modulus_kPa != asked.youngs_modulus_kPa[k]) continue;
+      if (e.point.noise_um != noise_um) continue;
+      points.push_back({e.point.density, e.standard_error_nN});
+      chart.dot(points.back(), 3.5, "fill:" + colour(k) + ";stroke:#fff",
+                gel + ", " + brief(e.point.density) + " " + texts.beads + ": " + brief(e.standard_error_nN) +
+                    " nN, of which " + brief(e.from_beads_nN) + " by the beads" + further_of(e));
+    }
+    chart.curve(points, "fill:none;stroke-width:2;stroke:" + colour(k));
+    chart.key(gel, colour(k));
+  }
+  chart.level(asked.target_nN, "stroke:#333;stroke-width:1.5;stroke-dasharray:6 4");
+  return chart;
 }
 
 template <class Quantity>
 std::vector<charts::Chart> charts_of(const PlanOf<Quantity>& plan) {
   std::vector<charts::Chart> charts;
-  for (const double noise_um : plan.asked.noise_um) charts.push_back(chart_of(plan, noise_um));
+  for (const double noise_um : plan.asked.noise_um) charts.push_back(error_chart(plan, noise_um));
   return charts;
 }
 
@@ -148,12 +168,47 @@ std::string name_of_number(const SpacePlan&, const DrawnNumber& d) {
   return "patch " + std::to_string(d.id) + ", " + name_of(d.component);
 }
 
+/// Numbers as drawn experiments found them.
 template <class Quantity>
 charts::Chart drawn_chart(const PlanOf<Quantity>& plan) {
-  std::vector<DrawnDot> dots;
-  for (const DrawnNumber& d : plan.drawn->numbers)
-    dots.push_back({d.true_nN, d.found_nN, d.predicted_error_nN, d.experiment, name_of_number(plan, d)});
-  return drawn_chart(texts_of(plan).drawn, dots);
+  const std::vector<DrawnNumber>& numbers = plan.drawn->numbers;
+  std::vector<double> both;
+  for (const DrawnNumber& d : numbers) both.insert(both.end(), {d.true_nN, d.found_nN});
+  charts::Chart chart("Drawn experiments",
+                      charts::axis_over("true " + texts_of(plan).drawn + " (nN)", both, charts::Scale::linear),
+                      charts::axis_over("found, ± predicted standard error (nN)", both, charts::Scale::linear));
+  const auto [least, most] = std::ranges::minmax(both);
+  const double from = std::min(0.0, least);
+  chart.curve({{from, from}, {most, most}}, "fill:none;stroke:#999;stroke-width:1");
+  for (const DrawnNumber& d : numbers) {
+    const std::string of = colour(static_cast<std::size_t>(d.experiment));
+    chart.error({d.true_nN, d.found_nN - d.predicted_error_nN}, {d.true_nN, d.found_nN + d.predicted_error_nN},
+                "stroke-width:1;stroke:" + of);
+    chart.dot({d.true_nN, d.found_nN}, 3, "fill:" + of + ";stroke:#fff",
+              name_of_number(plan, d) + ": true " + brief(d.true_nN) + " nN, found " + brief(d.found_nN) + " ± " +
+                  brief(d.predicted_error_nN) + " nN");
+  }
+  return chart;
+}
+
+/// By gel and noise.
+template <class Quantity>
+report::Table needed_rows(const PlanOf<Quantity>& plan) {
+  report::Table table{.columns = {number("gel (kPa)")}};
+  for (const double noise_um : plan.asked.noise_um) table.columns.push_back(number("noise " + brief(noise_um) + " µm"));
+  for (const double E : plan.asked.youngs_modulus_kPa) {
+    std::vector<std::string> row = {brief(E)};
+    for (const Needed& n : plan.grid.needed)
+      if (n.youngs_modulus_kPa == E) row.push_back(needed_text(plan, n));
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+std::string paragraphs(const std::vector<std::string>& texts) {
+  std::string html;
+  for (const std::string& text : texts) html += "<p>" + report::html_escaped(text) + "</p>\n";
+  return html;
 }
 
 }  // namespace
@@ -161,23 +216,27 @@ charts::Chart drawn_chart(const PlanOf<Quantity>& plan) {
 template <class Quantity>
 std::string svg_of(const PlanOf<Quantity>& plan) {
   const Texts& texts = texts_of(plan);
-  return svg_of(charts_of(plan), plan.name + ": standard error of the " + texts.middle + "'s " + texts.of_middle + ".",
-                plan.asked);
+  const std::vector<charts::Chart> charts = charts_of(plan);
+  return charts::svg_file(
+      charts, std::min<int>(2, static_cast<int>(charts.size())),
+      {plan.name + ": standard error of the " + texts.middle + "'s " + texts.of_middle + ".", dashed(plan.asked)});
 }
 
 template <class Quantity>
 std::string html_of(const PlanOf<Quantity>& plan) {
   const Texts& texts = texts_of(plan);
-  const std::string head = head_of(plan.name, answer_sentence(plan), further_sentences(plan));
-  std::string body;
+  const std::string head = "<h1>Plan: " + report::html_escaped(plan.name) + "</h1><p class=\"sub\">mbtfm " +
+                           std::string(kVersion) + "</p>\n<p><b>" + report::html_escaped(answer_sentence(plan)) +
+                           "</b></p>\n" + paragraphs(further_sentences(plan));
+  std::string body, figures;
   if (!plan.grid.warnings.empty()) body += report::section("What to mind", paragraphs(plan.grid.warnings));
-  body += report::section("Standard error over density", figures_of(charts_of(plan), plan.asked) + texts.how);
+  for (const charts::Chart& chart : charts_of(plan)) figures += report::figure(chart, dashed(plan.asked));
+  body += report::section("Standard error over density", figures + texts.how);
   if (!plan.grid.needed.empty())
     body += report::section(
         report::capitalised(texts.beads) + " that are needed",
-        report::html_of(
-            needed_rows(plan.asked, plan.grid.needed, [&](const Needed& n) { return needed_text(plan, n); }),
-            {"plan_needed.csv", files::text_of(needed_table(Quantity{}), plan.grid.needed)}) +
+        report::html_of(needed_rows(plan),
+                        {"plan_needed.csv", files::text_of(needed_table(Quantity{}), plan.grid.needed)}) +
             below_needed(plan));
   if (plan.drawn && !plan.drawn->numbers.empty())
     body += report::section("How well it held", report::figure(drawn_chart(plan), texts.drawn_explained));

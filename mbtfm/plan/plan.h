@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/gel.h"
 #include "pipeline/contract/words.h"
 
 namespace mbtfm::plan {
@@ -35,6 +37,8 @@ constexpr auto words(Quantity) {
       "fibre",         "dorsal fibre", "transverse arc", "ventral fibre",        "edge fibre",
       "network force", "total force",  "adhesion force", "adhesion force alone", "adhesion force by FTTC"};
 }
+inline constexpr Quantity kOfTypes[] = {Quantity::dorsal, Quantity::arc, Quantity::ventral,
+                                        Quantity::edge};  ///< in the order of kFibreTypes
 /// What is estimated in space. Of patches the plan gives the middle one.
 enum class SpaceQuantity { force, tangential_force, normal_force, total_force, net_force };
 constexpr auto words(SpaceQuantity) {
@@ -124,6 +128,12 @@ struct Drawn {
 };
 /// Set the last two.
 void sum_up(Drawn& drawn);
+
+struct Asked;
+/// By gel, density, noise.
+std::vector<Point> points_of(const Asked& asked);
+Gel with_modulus(Gel gel, double youngs_modulus_kPa);
+double median_area_um2(const std::vector<Adhesion>& adhesions);
 
 /// Three standard errors are the smallest force seen: chance passes it once in 700 times.
 constexpr double kSeen = 3;

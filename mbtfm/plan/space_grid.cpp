@@ -25,12 +25,6 @@ constexpr int kDraws = 2;  // of beads: errors of a patch then differ by some pe
 
 Vector3d vector(const Vec3& v) { return {v.x, v.y, v.z}; }
 
-std::vector<Adhesion> adhesions_of(const SpaceScene& scene) {
-  std::vector<Adhesion> adhesions;
-  for (const SpacePatch& patch : scene.patches) adhesions.push_back(patch.adhesion);
-  return adhesions;
-}
-
 VectorXd forces_of(const SpaceScene& scene) {
   VectorXd forces_nN(3 * std::ssize(scene.patches));
   for (std::size_t a = 0; a < scene.patches.size(); ++a)
@@ -85,28 +79,20 @@ std::vector<Index> run_of(std::size_t first, std::size_t n) {
   return chosen;
 }
 
-spatial::Foreseen sum(spatial::Foreseen a, const spatial::Foreseen& b) {
-  a.lambda += b.lambda;
-  a.degrees += b.degrees;
-  a.covariance_nN2 += b.covariance_nN2;
-  a.by_noise_nN2 += b.by_noise_nN2;
-  a.mean_nN += b.mean_nN;
-  a.net_force_nN2 += b.net_force_nN2;
-  a.net_by_noise_nN2 += b.net_by_noise_nN2;
-  for (std::size_t v = 0; v < a.resolution_um.size(); ++v) a.resolution_um[v] += b.resolution_um[v];
-  return a;
-}
-
-spatial::Foreseen scaled(spatial::Foreseen f, double factor) {
-  f.lambda *= factor;
-  f.degrees *= factor;
-  f.covariance_nN2 *= factor;
-  f.by_noise_nN2 *= factor;
-  f.mean_nN *= factor;
-  f.net_force_nN2 *= factor;
-  f.net_by_noise_nN2 *= factor;
-  for (double& r : f.resolution_um) r *= factor;
-  return f;
+/// sum += factor · f
+void add(spatial::Foreseen& sum, const spatial::Foreseen& f, double factor) {
+  if (sum.resolution_um.empty()) {  // the first: f + (factor − 1) f
+    sum = f;
+    factor -= 1;
+  }
+  sum.lambda += factor * f.lambda;
+  sum.degrees += factor * f.degrees;
+  sum.covariance_nN2 += factor * f.covariance_nN2;
+  sum.by_noise_nN2 += factor * f.by_noise_nN2;
+  sum.mean_nN += factor * f.mean_nN;
+  sum.net_force_nN2 += factor * f.net_force_nN2;
+  sum.net_by_noise_nN2 += factor * f.net_by_noise_nN2;
+  for (std::size_t v = 0; v < sum.resolution_um.size(); ++v) sum.resolution_um[v] += factor * f.resolution_um[v];
 }
 
 std::size_t index_of(const std::vector<double>& list, double value) {
@@ -177,11 +163,6 @@ OnOwnGel on_own_gel(const SpaceScene& scene, const SpacePool& pool) {
   }
   own.traction_kPa = square > 0 ? std::sqrt(fourth / square) : 0;
   return own;
-}
-
-double left_out(Gel gel, double youngs_modulus_kPa, double traction_kPa) {
-  gel.youngs_modulus_kPa = youngs_modulus_kPa;
-  return choice::left_out_in_gel(gel, traction_kPa);
 }
 
 /// Density at which a patch's standard error is the target: on the line of logarithms between the densities, above
@@ -302,19 +283,15 @@ SpaceForeseen foresee(const SpaceScene& scene, const Asked& asked, const std::ve
   foreseen.at.resize(n_densities);
   for (std::size_t k = 0; k < n_densities; ++k) {
     for (std::size_t s = 0; s < foreseen.noise_kPa_um.size(); ++s) {
-      spatial::Foreseen all = by_job[kDraws * k][s];
-      for (int draw = 1; draw < kDraws; ++draw)
-        all = sum(std::move(all), by_job[kDraws * k + static_cast<std::size_t>(draw)][s]);
-      foreseen.at[k].push_back(scaled(std::move(all), 1.0 / kDraws));
+      spatial::Foreseen& mean = foreseen.at[k].emplace_back();
+      for (std::size_t draw = 0; draw < kDraws; ++draw) add(mean, by_job[kDraws * k + draw][s], 1.0 / kDraws);
     }
   }
   return foreseen;
 }
 
 PairResolution pairs_of(const SpaceScene& scene, const Asked& asked, const PairDraws& draws, int threads) {
-  std::vector<double> areas_um2;
-  for (const SpacePatch& patch : scene.patches) areas_um2.push_back(patch.adhesion.area_um2);
-  return {scene.gel,       numerics::median_in(areas_um2),
+  return {scene.gel,       median_area_um2(adhesions_of(scene)),
           asked.densities, {.depth_um = scene.bead_depth_um, .axial_noise = scene.spatial.axial_sigma_ratio},
           draws,           threads};
 }
@@ -326,39 +303,36 @@ SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector
   std::vector<OnOwnGel> own;
   for (const SpacePool& pool : pools) own.push_back(on_own_gel(scene, pool));
   const double total_nN = total_of(scene);
-  for (const double E : asked.youngs_modulus_kPa) {
-    for (std::size_t k = 0; k < pools.size(); ++k) {
-      const double density = asked.densities[k];
-      for (const double noise_um : asked.noise_um) {
-        const Point point{E, density, noise_um};
-        const spatial::Foreseen& f = foreseen.of(point);
-        for (const SpaceQuantity quantity : {force, tangential_force, normal_force, total_force, net_force}) {
-          Errors errors = errors_of(scene, f, quantity);
-          const bool is_of_cell = quantity == total_force || quantity == net_force;
-          const double target_nN = is_of_cell ? asked.within * total_nN : asked.target_nN;
-          const double error_nN = numerics::median_in(errors.all_nN), beads_nN = numerics::median_in(errors.beads_nN);
-          grid.expected.push_back(
-              {.point = point,
-               .quantity = quantity,
-               .n = static_cast<int>(errors.all_nN.size()),
-               .standard_error_nN = error_nN,
-               .from_beads_nN = beads_nN,
-               .from_background_nN = std::sqrt(std::max(0.0, error_nN * error_nN - beads_nN * beads_nN)),
-               .target_nN = target_nN,
-               .share_within = share_within(errors.all_nN, target_nN),
-               .smallest_seen_nN = kSeen * error_nN,
-               .resolution_um =
-                   quantity == force ? std::optional(resolution_at_patches(scene, pools[k].problem, f)) : std::nullopt,
-               .least_distance_um =
-                   quantity == force ? pairs.least_distance_um(asked.tension_nN, E, k, noise_um) : std::nullopt,
-               .degrees = f.degrees,
-               .largest_displacement_um = own[k].largest_um * scene.gel.youngs_modulus_kPa / E,
-               .left_out = left_out(scene.gel, E, own[k].traction_kPa)});
-        }
-      }
+  for (const Point& point : points_of(asked)) {
+    const auto& [E, density, noise_um] = point;
+    const auto k = foreseen.index_of_density(density);
+    const spatial::Foreseen& f = foreseen.of(point);
+    for (const SpaceQuantity quantity : {force, tangential_force, normal_force, total_force, net_force}) {
+      Errors errors = errors_of(scene, f, quantity);
+      const bool is_of_cell = quantity == total_force || quantity == net_force;
+      const double target_nN = is_of_cell ? asked.within * total_nN : asked.target_nN;
+      const double error_nN = numerics::median_in(errors.all_nN), beads_nN = numerics::median_in(errors.beads_nN);
+      grid.expected.push_back(
+          {.point = point,
+           .quantity = quantity,
+           .n = static_cast<int>(errors.all_nN.size()),
+           .standard_error_nN = error_nN,
+           .from_beads_nN = beads_nN,
+           .from_background_nN = std::sqrt(std::max(0.0, error_nN * error_nN - beads_nN * beads_nN)),
+           .target_nN = target_nN,
+           .share_within = share_within(errors.all_nN, target_nN),
+           .smallest_seen_nN = kSeen * error_nN,
+           .resolution_um =
+               quantity == force ? std::optional(resolution_at_patches(scene, pools[k].problem, f)) : std::nullopt,
+           .least_distance_um =
+               quantity == force ? pairs.least_distance_um(asked.tension_nN, E, k, noise_um) : std::nullopt,
+           .degrees = f.degrees,
+           .largest_displacement_um = own[k].largest_um * scene.gel.youngs_modulus_kPa / E,
+           .left_out = choice::left_out_in_gel(with_modulus(scene.gel, E), own[k].traction_kPa)});
     }
-    for (const double noise_um : asked.noise_um) grid.needed.push_back(needed_of(scene, asked, foreseen, E, noise_um));
   }
+  for (const double E : asked.youngs_modulus_kPa)
+    for (const double noise_um : asked.noise_um) grid.needed.push_back(needed_of(scene, asked, foreseen, E, noise_um));
   grid.warnings = warnings_of(scene, asked, grid);
   return grid;
 }

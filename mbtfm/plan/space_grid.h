@@ -5,7 +5,7 @@
 
 #include "mbtfm/plan/adhesion_pair.h"
 #include "mbtfm/plan/plan.h"
-#include "mbtfm/plan/space_scene.h"
+#include "mbtfm/plan/scene.h"
 #include "mbtfm/spatial/foresight.h"
 #include "pipeline/contract/work.h"
 

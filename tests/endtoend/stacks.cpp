@@ -1,7 +1,7 @@
 /// From two stacks of beads to displacements in space, as a person runs it.
 #include <nlohmann/json.hpp>
 
-#include "mbtfm/plan/space_scene.h"
+#include "mbtfm/plan/scene.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
