@@ -100,69 +100,11 @@ Chart::Chart(std::string title, Axis x, Axis y)
       y_(drawable(std::move(y))),
       frame_height_px_(kFrameHeight_px) {}
 
-void Chart::subtitle(std::string text, std::string colour) {
-  subtitle_ = std::move(text);
-  subtitle_colour_ = std::move(colour);
-}
-
-void Chart::second_x_axis(std::string label, double factor) {
-  second_label_ = std::move(label);
-  second_factor_ = factor;
-}
-
-void Chart::frame_height(double height_px) { frame_height_px_ = height_px; }
-void Chart::same_scales() { are_scales_same_ = true; }
-
-void Chart::curve(const std::vector<Vec2>& points, const std::string& style, const std::string& hover) {
-  marks_.push_back({.kind = Mark::Kind::curve, .points = points, .style = style, .hover = hover});
-}
-
-void Chart::polygon(const std::vector<Vec2>& corners, const std::string& style, const std::string& hover) {
-  marks_.push_back({.kind = Mark::Kind::polygon, .points = corners, .style = style, .hover = hover});
-}
-
 void Chart::pieces(const std::vector<std::pair<Vec2, Vec2>>& pieces, const std::string& style,
                    const std::string& hover) {
   std::vector<Vec2> ends;
   for (const auto& [a, b] : pieces) ends.insert(ends.end(), {a, b});
-  marks_.push_back({.kind = Mark::Kind::pieces, .points = std::move(ends), .style = style, .hover = hover});
-}
-
-void Chart::bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover) {
-  marks_.push_back({.kind = Mark::Kind::bar, .points = {corner, opposite}, .style = style, .hover = hover});
-}
-
-void Chart::error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover) {
-  marks_.push_back({.kind = Mark::Kind::error, .points = {from, to}, .style = style, .hover = hover});
-}
-
-void Chart::dot(Vec2 at, double radius_px, const std::string& style, const std::string& hover) {
-  marks_.push_back({.kind = Mark::Kind::dot, .points = {at}, .style = style, .hover = hover, .radius_px = radius_px});
-}
-
-void Chart::diamond(Vec2 at, double radius_px, const std::string& style, const std::string& hover) {
-  dot(at, radius_px, style, hover);
-  marks_.back().kind = Mark::Kind::diamond;
-}
-
-void Chart::arrow(Vec2 from, Vec2 shift_px, const std::string& style) {
-  marks_.push_back({.kind = Mark::Kind::arrow, .points = {from}, .style = style, .shift_px = shift_px});
-}
-
-void Chart::upright(double x, const std::string& style) {
-  marks_.push_back({.kind = Mark::Kind::upright, .points = {{x, y_.low}}, .style = style});
-}
-
-void Chart::level(double y, const std::string& style) {
-  marks_.push_back({.kind = Mark::Kind::level, .points = {{x_.low, y}}, .style = style});
-}
-
-void Chart::label(Vec2 at, const std::string& text) {
-  marks_.push_back({.kind = Mark::Kind::label, .points = {at}, .text = text});
-}
-
-void Chart::picture(Vec2 corner, Vec2 opposite, const std::string& address) {
-  marks_.push_back({.kind = Mark::Kind::picture, .points = {corner, opposite}, .text = address});
+  marks_.push_back({Mark::Kind::pieces, std::move(ends), style, hover});
 }
 
 namespace {
@@ -204,8 +146,6 @@ std::string readable_on_white(const std::string& colour) {
                        percent * (*rgb)[2] / 100);
   return dark;
 }
-
-void Chart::key(const std::string& text, const std::string& colour) { keys_.emplace_back(text, colour); }
 
 std::string arrow_path(Vec2 shift_px) {
   const double length = norm(shift_px);

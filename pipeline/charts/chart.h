@@ -84,34 +84,56 @@ class Chart {
   Chart(std::string title, Axis x, Axis y);
 
   /// A line below the title.
-  void subtitle(std::string text, std::string colour);
+  void subtitle(std::string text, std::string colour) {
+    subtitle_ = std::move(text);
+    subtitle_colour_ = std::move(colour);
+  }
   /// The x axis in another unit, along the upper side: its value is `factor` times that of the lower.
-  void second_x_axis(std::string label, double factor);
+  void second_x_axis(std::string label, double factor) {
+    second_label_ = std::move(label);
+    second_factor_ = factor;
+  }
   /// Height of the frame, where the usual one does not suit.
-  void frame_height(double height_px);
+  void frame_height(double height_px) { frame_height_px_ = height_px; }
   /// A unit of x is as long as one of y: a map.
-  void same_scales();
+  void same_scales() { are_scales_same_ = true; }
 
-  void curve(const std::vector<Vec2>& points, const std::string& style, const std::string& hover = {});
-  void polygon(const std::vector<Vec2>& corners, const std::string& style, const std::string& hover = {});
+  void curve(const std::vector<Vec2>& points, const std::string& style, const std::string& hover = {}) {
+    marks_.push_back({Mark::Kind::curve, points, style, hover});
+  }
+  void polygon(const std::vector<Vec2>& corners, const std::string& style, const std::string& hover = {}) {
+    marks_.push_back({Mark::Kind::polygon, corners, style, hover});
+  }
   /// Separate pieces of line, as one thing.
   void pieces(const std::vector<std::pair<Vec2, Vec2>>& pieces, const std::string& style,
               const std::string& hover = {});
   /// A filled rectangle between two opposite corners.
-  void bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover = {});
+  void bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover = {}) {
+    marks_.push_back({Mark::Kind::bar, {corner, opposite}, style, hover});
+  }
   /// An error bar, along x or y.
-  void error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover = {});
-  void dot(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {});
-  void diamond(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {});
-  void arrow(Vec2 from, Vec2 shift_px, const std::string& style);
+  void error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover = {}) {
+    marks_.push_back({Mark::Kind::error, {from, to}, style, hover});
+  }
+  void dot(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {}) {
+    marks_.push_back({Mark::Kind::dot, {at}, style, hover, {}, radius_px});
+  }
+  void diamond(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {}) {
+    marks_.push_back({Mark::Kind::diamond, {at}, style, hover, {}, radius_px});
+  }
+  void arrow(Vec2 from, Vec2 shift_px, const std::string& style) {
+    marks_.push_back({.kind = Mark::Kind::arrow, .points = {from}, .style = style, .shift_px = shift_px});
+  }
   /// A line across the frame at x, or at y.
-  void upright(double x, const std::string& style);
-  void level(double y, const std::string& style);
-  void label(Vec2 at, const std::string& text);
+  void upright(double x, const std::string& style) { marks_.push_back({Mark::Kind::upright, {{x, y_.low}}, style}); }
+  void level(double y, const std::string& style) { marks_.push_back({Mark::Kind::level, {{x_.low, y}}, style}); }
+  void label(Vec2 at, const std::string& text) { marks_.push_back({Mark::Kind::label, {at}, {}, {}, text}); }
   /// @param address  "data:image/…" where a page must stand alone
-  void picture(Vec2 corner, Vec2 opposite, const std::string& address);
+  void picture(Vec2 corner, Vec2 opposite, const std::string& address) {
+    marks_.push_back({Mark::Kind::picture, {corner, opposite}, {}, {}, address});
+  }
   /// A line of the key, in the frame's upper corner on the given side.
-  void key(const std::string& text, const std::string& colour);
+  void key(const std::string& text, const std::string& colour) { keys_.emplace_back(text, colour); }
   enum class KeySide { left, right, above };  ///< above: in a row over the frame, off what a map shows
   void put_key(KeySide side) { key_side_ = side; }
 

@@ -87,30 +87,9 @@ std::string path_of(const Mark& mark, const Axes& axes) {
   return mark.kind == Kind::polygon ? path + "Z" : path;
 }
 
-/// The kind of mark that Vega has for it.
-std::string vega_kind(Kind kind) {
-  switch (kind) {
-    case Kind::curve:
-    case Kind::polygon:
-    case Kind::pieces:
-    case Kind::arrow:
-      return "path";
-    case Kind::bar:
-      return "rect";
-    case Kind::error:
-    case Kind::upright:
-    case Kind::level:
-      return "rule";
-    case Kind::dot:
-    case Kind::diamond:
-      return "symbol";
-    case Kind::label:
-      return "text";
-    case Kind::picture:
-      return "image";
-  }
-  return {};
-}
+/// The kind of mark that Vega has for each of ours, in their order.
+constexpr std::array kVegaKinds = {"path",   "path", "path", "rect", "rule", "symbol",
+                                   "symbol", "path", "rule", "rule", "text", "image"};
 
 bool is_path(Kind kind) { return kind == Kind::curve || kind == Kind::polygon || kind == Kind::pieces; }
 
@@ -222,7 +201,7 @@ ordered_json mark_of(Kind kind, const std::string& data, ordered_json& rows) {
     if (!is_shared) continue;
     for (ordered_json& row : rows) row.erase(name);
   }
-  return {{"type", vega_kind(kind)},
+  return {{"type", kVegaKinds.at(static_cast<std::size_t>(kind))},
           {"from", {{"data", data}}},
           {"clip", true},
           {"aria", false},  // read aloud is the chart's name; a table beside it has the numbers
