@@ -31,7 +31,6 @@
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
-#include "pipeline/report/sheet_report.h"
 #include "pipeline/report/stage_page.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/parameters.h"

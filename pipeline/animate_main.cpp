@@ -1,7 +1,7 @@
 /// mbtfm-animate: a time series as one picture that moves.
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/report/series.h"
+#include "pipeline/report/report.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "pipeline/statistics/picture.h"

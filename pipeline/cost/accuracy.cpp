@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/cost/presets.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/text.h"

@@ -5,10 +5,26 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "pipeline/contract/results.h"
+#include "pipeline/runner/stages.h"
 
 namespace mbtfm::cost {
+
+/// Parameters that trade accuracy for time together.
+struct Preset {
+  std::string name;
+  std::string purpose;
+  std::vector<runner::Setting> settings;  ///< where they differ from the defaults, of cells with fibres
+  std::vector<runner::Setting> in_space;  ///< the same of cells in space
+};
+
+/// The cheapest first.
+const std::vector<Preset>& presets();
+
+/// @throws UsageError for an unknown name
+const Preset& preset_named(const std::string& name);
 
 /// Root mean squares over a cell's fibres, relative to that of their tensions.
 struct RelativeError {

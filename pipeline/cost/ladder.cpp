@@ -1,11 +1,11 @@
-#include "pipeline/cost/ladder.h"
-
+/// The knobs that trade accuracy for time, and the rungs of each.
 #include <algorithm>
 #include <map>
 #include <set>
 
 #include "pipeline/contract/numbers.h"
-#include "pipeline/cost/presets.h"
+#include "pipeline/cost/accuracy.h"
+#include "pipeline/cost/study.h"
 
 namespace mbtfm::cost {
 

@@ -1,6 +1,6 @@
-#include "pipeline/cost/presets.h"
-
+/// Sets of parameters that trade accuracy for time together.
 #include "pipeline/contract/errors.h"
+#include "pipeline/cost/accuracy.h"
 
 namespace mbtfm::cost {
 

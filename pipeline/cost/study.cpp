@@ -16,8 +16,6 @@
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/report/compare.h"
-#include "pipeline/report/match_fibres.h"
-#include "pipeline/report/space_map.h"
 #include "pipeline/report/space_results.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/process.h"
@@ -132,7 +130,7 @@ class Scratch {
   Answer answer() const {
     Answer answer;
     if (kind_ == CellKind::space) {
-      answer.map = report::read_space_map(folder_);
+      answer.map = report::map_of(report::read_space_results(folder_));
       answer.total_force_nN = answer.map->total_force_nN;
       return answer;
     }

@@ -3,13 +3,42 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "pipeline/contract/cell_kind.h"
-#include "pipeline/cost/ladder.h"
+#include "pipeline/runner/stages.h"
 
 namespace mbtfm::cost {
+
+// The knobs that trade accuracy for time, and the rungs of each.
+
+/// One choice of one knob; everything else is as the cell has it.
+struct Rung {
+  std::string knob, value;
+  std::vector<runner::Setting> settings = {};
+  double bead_share = 1;            ///< of the beads that are used
+  std::optional<int> threads = {};  ///< or as many as the study has
+};
+
+/// Whether it needs the cell's images: it turns a knob of segmentation or tracking.
+bool needs_images(const Rung& rung);
+
+enum class Extent { quick, whole };  ///< whole: those that take minutes, too
+
+inline constexpr const char* kAsItIs = "as it is";
+inline constexpr const char* kPreset = "preset";
+
+/// The cell as it is comes first, then knob by knob, rungs from coarse to fine.
+std::vector<Rung> ladder(Extent extent);
+/// The same of a cell in space. @param spacing_um  of its lattice of tractions, which the rungs widen and narrow
+std::vector<Rung> ladder_in_space(Extent extent, double spacing_um);
+
+/// The groups of knobs that are drawn together, of one kind of cells.
+std::vector<std::string> groups_of(CellKind kind);
+/// The one of a knob.
+std::string group_of(const std::string& knob, CellKind kind);
 
 struct StudyOptions {
   std::filesystem::path stage_folder;  ///< where the stages' executables are
@@ -49,5 +78,21 @@ Study measure(const std::filesystem::path& cell, const StudyOptions& options);
 /// the luckiest, too; over several luck levels out. A rung counts where it was measured in all of them.
 /// @throws UsageError where they are of two kinds
 Study combined(const std::vector<Study>& studies);
+
+// The study as a table, a picture and a page.
+
+/// Indices of the measurements that no other one beats in both processor time and error, the quickest
+/// first. Failed ones and ones that were not run are left out.
+std::vector<int> front_of(const std::vector<Measurement>& measurements);
+
+/// By how much another measurement beats this one: the largest share s such that one takes no more time and errs by s
+/// less, or errs no more and takes s less. 0 on the front.
+double distance_to_front(const std::vector<Measurement>& measurements, int index);
+
+/// cost.csv, cost.svg and cost.md in this folder. @throws OutputError
+void write_study(const std::filesystem::path& folder, const Study& study, const std::string& cell_name);
+
+/// The part of docs/columns.md.
+std::string pages_of_tables();
 
 }  // namespace mbtfm::cost

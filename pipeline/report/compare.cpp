@@ -3,17 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <tuple>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/polyline.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/own_files.h"
-#include "pipeline/report/match_fibres.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
-#include "pipeline/report/space_map.h"
 #include "pipeline/report/space_results.h"
 
 namespace mbtfm::report {
@@ -52,10 +53,47 @@ void add_figures(Comparison& comparison) {
   comparison.relative_error = truth2 > 0 ? std::sqrt(error2 / truth2) : 0;
 }
 
-std::string short_number(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
 std::string label(const std::optional<Fibre>& fibre) { return fibre ? std::to_string(fibre->fibre_id) : "–"; }
 
+/// Mean over a's length of the distance from b: midpoints of pieces no longer than step_um, weighted by length.
+double directed_distance_um(const Polyline& a, const Polyline& b, double step_um) {
+  double sum = 0, length = 0;
+  for (std::size_t i = 1; i < a.size(); ++i) {
+    const double piece = norm(a[i] - a[i - 1]);
+    const int n = std::max(1, static_cast<int>(std::ceil(piece / step_um)));
+    for (int k = 0; k < n; ++k) sum += piece / n * distance_to_line_um(b, a[i - 1] + (k + 0.5) / n * (a[i] - a[i - 1]));
+    length += piece;
+  }
+  return sum / length;
+}
+
 }  // namespace
+
+double line_distance_um(const Polyline& a, const Polyline& b, double step_um) {
+  return std::max(directed_distance_um(a, b, step_um), directed_distance_um(b, a, step_um));
+}
+
+std::vector<FibreMatch> match_fibres(const std::vector<Fibre>& found, const std::vector<Fibre>& truth,
+                                     const FibreMatchParameters& parameters) {
+  std::vector<FibreMatch> candidates;
+  for (int i = 0; i < static_cast<int>(found.size()); ++i) {
+    for (int k = 0; k < static_cast<int>(truth.size()); ++k) {
+      const double distance = line_distance_um(found[i].points_um, truth[k].points_um, parameters.step_um);
+      if (distance <= parameters.largest_distance_um) candidates.push_back({i, k, distance});
+    }
+  }
+  std::ranges::sort(candidates, [](const FibreMatch& a, const FibreMatch& b) {
+    return std::tie(a.distance_um, a.found_index, a.true_index) < std::tie(b.distance_um, b.found_index, b.true_index);
+  });
+  std::vector<bool> is_found_taken(found.size()), is_true_taken(truth.size());
+  std::vector<FibreMatch> matches;
+  for (const FibreMatch& candidate : candidates) {
+    if (is_found_taken[candidate.found_index] || is_true_taken[candidate.true_index]) continue;
+    is_found_taken[candidate.found_index] = is_true_taken[candidate.true_index] = true;
+    matches.push_back(candidate);
+  }
+  return matches;
+}
 
 bool has_truth(const fs::path& cell) { return files::is_own_file(cell / "truth/tensions.csv"); }
 
@@ -76,32 +114,25 @@ Comparison compare_with_truth(const fs::path& cell) {
   for (const Tension& t : files::read_tensions(cell / "4_fit/tensions.csv")) tension[t.fibre_id] = t;
   std::map<int, double> true_tension_nN;
   for (const Tension& t : files::read_tensions(cell / "truth/tensions.csv")) true_tension_nN[t.fibre_id] = t.tension_nN;
-
-  Comparison comparison;
-  comparison.network = tension[0];
-  if (true_tension_nN.contains(0)) comparison.true_network_nN = true_tension_nN[0];
+  const auto truth_of = [&](int fibre_id) {
+    const auto t = true_tension_nN.find(fibre_id);
+    return t == true_tension_nN.end() ? std::nullopt : std::optional(t->second);
+  };
+  Comparison comparison{.network = tension[0], .true_network_nN = truth_of(0)};
   const std::map<int, int> partner = partners(found, truth, by_place);
   std::vector<bool> is_true_found(truth.size());
   for (int i = 0; i < static_cast<int>(found.size()); ++i) {
-    ComparedFibre fibre;
-    fibre.found = found[i];
+    ComparedFibre& fibre = comparison.fibres.emplace_back(ComparedFibre{.found = found[i]});
     if (const auto t = tension.find(found[i].fibre_id); t != tension.end()) fibre.tension = t->second;
     if (const auto p = partner.find(i); p != partner.end()) {
       is_true_found[p->second] = true;
       fibre.truth = truth[p->second];
-      if (const auto t = true_tension_nN.find(fibre.truth->fibre_id); t != true_tension_nN.end())
-        fibre.true_tension_nN = t->second;
+      fibre.true_tension_nN = truth_of(fibre.truth->fibre_id);
     }
-    comparison.fibres.push_back(std::move(fibre));
   }
-  for (std::size_t k = 0; k < truth.size(); ++k) {
-    if (is_true_found[k]) continue;
-    ComparedFibre missed;
-    missed.truth = truth[k];
-    if (const auto t = true_tension_nN.find(truth[k].fibre_id); t != true_tension_nN.end())
-      missed.true_tension_nN = t->second;
-    comparison.fibres.push_back(std::move(missed));
-  }
+  for (std::size_t k = 0; k < truth.size(); ++k)
+    if (!is_true_found[k])
+      comparison.fibres.push_back({.truth = truth[k], .true_tension_nN = truth_of(truth[k].fibre_id)});
   add_figures(comparison);
   comparison.total_force_nN = files::read_fit_summary(cell / "4_fit/fit.json").total_force_nN;
   if (files::is_own_file(cell / "truth/adhesion_forces.csv"))
@@ -126,7 +157,7 @@ ComparedNumbers numbers_of_sheet(const fs::path& cell) {
 
 ComparedNumbers numbers_in_space(const fs::path& cell) {
   const SpaceResults results = read_space_results(cell);
-  const SpaceMap map = read_space_map(cell), truth = true_space_map(cell);
+  const SpaceMap map = map_of(results), truth = true_space_map(cell);
   ComparedNumber force{.quantity = "total_force_nN",
                        .found = results.number("total_force_nN"),
                        .low = {},
@@ -156,12 +187,11 @@ ComparedNumbers compare_numbers(const fs::path& cell) {
 std::string truth_section(const fs::path& cell) {
   const ComparedNumbers compared = compare_numbers(cell);
   if (compared.numbers.empty()) return {};
-  Table table{{"quantity", number("found"), number("low"), number("high"), number("truth"), number("error (%)")},
-              {},
-              "Beside the truth"};
+  Table table{"Beside the truth",
+              {"quantity", number("found"), number("low"), number("high"), number("truth"), number("error (%)")}};
   for (const ComparedNumber& n : compared.numbers)
-    table.rows.push_back({n.quantity, short_number(n.found), short_number(n.low), short_number(n.high),
-                          short_number(n.truth),
+    table.rows.push_back({n.quantity, rounded(n.found, {}), rounded(n.low, {}), rounded(n.high, {}),
+                          rounded(n.truth, {}),
                           n.found && n.truth != 0 ? fmt::format("{:+.1f}", 100 * (*n.found / n.truth - 1)) : "–"});
   return section("Beside the truth",
                  "<p>This cell was simulated, so the truth is known. Low and high: 95 % interval.</p>\n" +
@@ -174,8 +204,8 @@ std::string comparison_text(const fs::path& cell) {
     constexpr const char* kNumbers = "{:<36} {:>9} {:>9} {:>9} {:>9}\n";
     std::string text = fmt::format(fmt::runtime(kNumbers), "quantity", "found", "low", "high", "truth");
     for (const ComparedNumber& n : compared.numbers)
-      text += fmt::format(fmt::runtime(kNumbers), n.quantity, short_number(n.found), short_number(n.low),
-                          short_number(n.high), short_number(n.truth));
+      text += fmt::format(fmt::runtime(kNumbers), n.quantity, rounded(n.found, {}), rounded(n.low, {}),
+                          rounded(n.high, {}), rounded(n.truth, {}));
     return text + (compared.note.empty() ? "" : "\n" + compared.note) + report;
   }
   const Comparison comparison = compare_with_truth(cell);
@@ -183,16 +213,15 @@ std::string comparison_text(const fs::path& cell) {
   std::string text =
       fmt::format(fmt::runtime(kRow), "fibre", "true", "type", "true", "tension", "low", "high", "truth");
   text += fmt::format(fmt::runtime(kRow), "id", "id", "", "type", "nN", "nN", "nN", "nN");
-  text += fmt::format(fmt::runtime(kRow), 0, 0, "network", "network", short_number(comparison.network.tension_nN),
-                      short_number(comparison.network.low_nN), short_number(comparison.network.high_nN),
-                      short_number(comparison.true_network_nN));
+  text += fmt::format(fmt::runtime(kRow), 0, 0, "network", "network", rounded(comparison.network.tension_nN, {}),
+                      rounded(comparison.network.low_nN, {}), rounded(comparison.network.high_nN, {}),
+                      rounded(comparison.true_network_nN, {}));
   for (const ComparedFibre& fibre : comparison.fibres) {
-    const Tension none;
-    const Tension& t = fibre.tension ? *fibre.tension : none;
+    const Tension t = fibre.tension.value_or(Tension{});
     text += fmt::format(fmt::runtime(kRow), label(fibre.found), label(fibre.truth),
                         fibre.found ? name_of(fibre.found->type) : "–", fibre.truth ? name_of(fibre.truth->type) : "–",
-                        fibre.tension ? short_number(t.tension_nN) : "–", short_number(t.low_nN),
-                        short_number(t.high_nN), short_number(fibre.true_tension_nN));
+                        fibre.tension ? rounded(t.tension_nN, {}) : "–", rounded(t.low_nN, {}), rounded(t.high_nN, {}),
+                        rounded(fibre.true_tension_nN, {}));
   }
   text += fmt::format("\ntensions of the {} fibres found: |t - truth| / |truth| = {:.3f}\n", comparison.n_matched,
                       comparison.relative_error);

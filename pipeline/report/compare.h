@@ -11,24 +11,45 @@
 
 namespace mbtfm::report {
 
+struct FibreMatchParameters {
+  /// Two lines further apart on average are different fibres: about the spacing of bundles that one can resolve, and
+  /// it admits a fibre that was followed over 60 % of its length or more (a 10 um long one that lacks 4 um at an end
+  /// is 0.4 · 2 um = 0.8 um away).
+  double largest_distance_um = 1.5;
+  double step_um = 0.25;  ///< between the points at which the distance is taken: fine against largest_distance_um
+};
+
+/// Mean distance of the points of each line from the other line; of the two directions, the larger.
+double line_distance_um(const Polyline& a, const Polyline& b, double step_um);
+
+struct FibreMatch {
+  int found_index = 0;
+  int true_index = 0;
+  double distance_um = 0;
+};
+
+/// Pairs of one found and one true fibre each, the closest first; fibres without a partner are left out.
+std::vector<FibreMatch> match_fibres(const std::vector<Fibre>& found, const std::vector<Fibre>& truth,
+                                     const FibreMatchParameters& parameters = {});
+
 /// A found fibre, a true one, or both.
 struct ComparedFibre {
-  std::optional<Fibre> found;
-  std::optional<Tension> tension;  ///< of the found one
-  std::optional<Fibre> truth;
-  std::optional<double> true_tension_nN;
+  std::optional<Fibre> found = {};
+  std::optional<Tension> tension = {};  ///< of the found one
+  std::optional<Fibre> truth = {};
+  std::optional<double> true_tension_nN = {};
 };
 
 struct Comparison {
   std::vector<ComparedFibre> fibres = {};  ///< the found ones in order of id, then the missed ones
-  Tension network;
-  std::optional<double> true_network_nN;
+  Tension network = {};
+  std::optional<double> true_network_nN = {};
   double relative_error = 0;  ///< |t − truth| / |truth| over the fibres that are found
   int n_matched = 0;
   int n_long = 0;                  ///< true fibres longer than kLongFibre_um
   int n_long_found_and_typed = 0;  ///< of those, found, and of the right type
   double total_force_nN = 0;
-  std::optional<double> true_total_force_nN;
+  std::optional<double> true_total_force_nN = {};
 };
 
 /// Shorter fibres hold less than three links of a network of the default edge length: not asked for.

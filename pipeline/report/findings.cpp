@@ -1,5 +1,4 @@
-#include "pipeline/report/findings.h"
-
+/// What a reader should know first: what was found, how good it is, what to distrust.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,11 +9,12 @@
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/stage_state.h"
 #include "pipeline/report/compare.h"
+#include "pipeline/report/kinds.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/results.h"
-#include "pipeline/report/tension_plot.h"
-#include "pipeline/report/tension_table.h"
+#include "pipeline/report/stage_page.h"
+#include "pipeline/report/tensions.h"
 
 namespace mbtfm::report {
 namespace {
@@ -57,8 +57,7 @@ std::string adhesions_in_words(const Cell& cell) {
 }
 
 std::string of_candidates(const Cell& cell) {
-  const auto is_one = [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; };
-  if (std::ranges::none_of(cell.adhesions, is_one)) return {};
+  if (!has_origin(cell, AdhesionOrigin::candidate)) return {};
   return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return is_assumed(a.origin); })
              ? " No adhesion was seen: forces are placed where adhesions may be, on the candidates."
              : " Forces act on the candidates, too, where nobody saw an adhesion.";
@@ -178,7 +177,7 @@ std::string energy_and_moment(const CellResults& results) {
   const auto energy = figure_of(fit, "strain_energy_fJ"), energy_sigma = figure_of(fit, "strain_energy_sigma_fJ");
   if (energy && energy_sigma)
     text += "The forces have put " + with_error(*energy, *energy_sigma, "fJ") + " of strain energy into the gel. ";
-  if (energy && std::ranges::any_of(results.cell.adhesions, [](const Adhesion& a) { return is_assumed(a.origin); }))
+  if (energy && has_assumed(results.cell))
     text +=
         "At assumed adhesions it is the energy that the nearest beads show; a force on a smaller area stores more. ";
   const auto moment = figure_of(fit, "contractile_moment_nN_um"),

@@ -7,19 +7,14 @@
 #include <map>
 
 #include "pipeline/contract/beads.h"
-#include "pipeline/contract/extent.h"
 #include "pipeline/contract/network.h"
 #include "pipeline/contract/polyline.h"
 #include "pipeline/files/base64.h"
-#include "pipeline/files/text.h"
 #include "pipeline/numerics/order_statistics.h"
-#include "pipeline/report/arrows.h"
-#include "pipeline/report/colours.h"
-#include "pipeline/report/hover.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/results.h"
-#include "pipeline/report/tension_plot.h"
+#include "pipeline/report/tensions.h"
 
 namespace mbtfm::report {
 namespace {
@@ -28,21 +23,12 @@ using charts::Chart;
 
 constexpr int kEllipseCorners = 16;  // an ellipse is a few px long
 
-constexpr const char* kOutlineStyle = "fill:none;stroke:#888;stroke-width:1;stroke-dasharray:5 3";
-// Around the cell: the displacement reaches beyond it.
-constexpr double kMargin_um = 5;
-Box map_box(const CellResults& results) {
+Extent map_box(const CellResults& results) {
   std::vector<Vec2> points = results.cell.outline_um;
   for (const Adhesion& adhesion : results.cell.adhesions) points.push_back(adhesion.position_um);
   const auto [low, high] = extent_of(points);
-  const Vec2 margin{kMargin_um, kMargin_um};
+  constexpr Vec2 margin{5, 5};  // the displacement reaches beyond the cell
   return {low - margin, high + margin};
-}
-
-Chart empty_map(const Box& box, const std::string& title) {
-  Chart map(title, {"x (µm)", box.low.x, box.high.x}, {"y (µm)", box.high.y, box.low.y});
-  map.same_scales();
-  return map;
 }
 
 constexpr const char* kCutStyle = "fill:none;stroke:#777;stroke-width:2.6;stroke-dasharray:9 5";
@@ -68,7 +54,7 @@ std::string caption_of_cut(const Cell& cell) {
 
 Chart new_map(const CellResults& results, const std::string& title) {
   Chart map = empty_map(map_box(results), title);
-  draw_outline(map, results.cell, kOutlineStyle);
+  draw_outline(map, results.cell, "fill:none;stroke:#888;stroke-width:1;stroke-dasharray:5 3");
   return map;
 }
 
@@ -108,17 +94,16 @@ std::map<int, std::string> fibre_texts(const CellResults& results) {
 }
 
 void draw_fibre_ids(Chart& map, const CellResults& results) {
-  const Box box = map_box(results);
-  const double clear_um = 15 * (box.high.x - box.low.x) / Chart::kFrameWidth_px;  // about a label's width
+  const Extent box = map_box(results);
+  const double clear_um = 15 * (box.high_um.x - box.low_um.x) / Chart::kFrameWidth_px;  // about a label's width
   for (const Fibre& fibre : results.cell.fibres) {
     map.label(label_places_um(fibre, results.cell.fibres, clear_um).front(),
               letter_of(fibre.type) + std::to_string(fibre.fibre_id));
   }
 }
 
-ColourScale tension_scale(const CellResults& results, NetworkForm form) {
-  ColourScale scale{
-      .low = 0, .high = 0, .label = form == NetworkForm::original ? "fitted tension (nN)" : "force carried (nN)"};
+ColourScale tension_scale(const CellResults& results, const char* label) {
+  ColourScale scale{.low = 0, .high = 0, .label = label};
   for (const auto& [id, tension] : results.tensions)
     if (id != 0) scale.high = std::max(scale.high, tension.tension_nN);
   scale.high = round_end(scale.high);
@@ -134,61 +119,6 @@ void draw_web(Chart& map, const CellResults& results, const Pieces& web, Hover h
 constexpr const char* kHalo = "stroke:#fff;stroke-width:7;stroke-linecap:round";
 constexpr const char* kThick = "stroke-width:3;stroke-linecap:round;stroke:";
 
-bool has_edge_fibres(const Cell& cell) {
-  return std::ranges::any_of(cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; });
-}
-
-bool has_origin(const Cell& cell, AdhesionOrigin origin) {
-  return std::ranges::any_of(cell.adhesions, [&](const Adhesion& a) { return a.origin == origin; });
-}
-
-bool are_all_candidates(const Cell& cell) {
-  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
-}
-
-Figure original_network(const CellResults& results) {
-  Chart map = new_map(results, "Where the fibres are");
-  const ColourScale scale = tension_scale(results, NetworkForm::original);
-  const SortedLinks links = sorted_links(results.network, {});
-  const std::map<int, std::string> texts = fibre_texts(results);
-  draw_web(map, results, links.web, Hover::whole);
-  for (const auto& [id, pieces] : links.fibres) {
-    const auto tension = results.tensions.find(id);
-    map.pieces(pieces, kHalo, texts.at(id));
-    map.pieces(pieces, kThick + (tension == results.tensions.end() ? "#555" : scale.colour(tension->second.tension_nN)),
-               texts.at(id));
-  }
-  draw_fibre_ids(map, results);
-  return {map,
-          fmt::format("Stress fibres (dorsal d, arc a, ventral v, edge e) with their numbers, coloured by their fitted "
-                      "tension, in the network of the first mesh before it contracts: {} vertices, {} links (grey: "
-                      "actin network). Blue: {}, which hold the vertices inside them.",
-                      results.network.vertices_um.size(), results.network.links.size(),
-                      has_origin(results.cell, AdhesionOrigin::candidate) ? "candidates for adhesions" : "adhesions") +
-              caption_of_cut(results.cell),
-          legend(colour_bar(scale))};
-}
-
-Figure contracted_network(const CellResults& results) {
-  Chart map = new_map(results, "Network in equilibrium");
-  const ColourScale scale = tension_scale(results, NetworkForm::contracted);
-  const SortedLinks links = sorted_links(results.contracted.network, results.contracted.link_force_nN);
-  const std::map<int, std::string> texts = fibre_texts(results);
-  draw_web(map, results, links.web, Hover::none);
-  for (const auto& [id, pieces] : links.fibres) {
-    const std::vector<double>& carried_nN = links.carried_nN.at(id);
-    map.pieces(pieces, kHalo, texts.at(id));
-    for (std::size_t k = 0; k < pieces.size(); ++k) {
-      map.pieces({pieces[k]}, kThick + scale.colour(carried_nN[k]),
-                 fmt::format("{}\nthis link carries {} nN", texts.at(id), readable(carried_nN[k])));
-    }
-  }
-  return {map,
-          "The same network where its tensions have drawn it; each link of a fibre is coloured by the force that it "
-          "carries.",
-          legend(colour_bar(scale))};
-}
-
 /// Of the model's tractions.
 ColourScale traction_scale(const CellResults& results) {
   const auto by_id = adhesions_by_id(results.cell);
@@ -199,7 +129,7 @@ ColourScale traction_scale(const CellResults& results) {
 }
 
 /// Squares in a picture of a few dozen colours: some ten thousand marks of their own would make the page slow.
-std::string picture_of_squares(const UsualMethod& usual, const Box& box, const ColourScale& colours) {
+std::string picture_of_squares(const UsualMethod& usual, const Extent& box, const ColourScale& colours) {
   constexpr int kColours = 48;  // neighbours are hardly told apart
   const double side_um = usual.spacing_um;
   // by colour, as paths in a frame whose unit is a hundredth of a side; neighbours of one colour along x are one piece
@@ -213,12 +143,12 @@ std::string picture_of_squares(const UsualMethod& usual, const Box& box, const C
     const int colour = colour_at(i);
     const double y_um = usual.positions_um[i].y;
     for (next = i + 1; next < n && usual.positions_um[next].y == y_um && colour_at(next) == colour;) ++next;
-    const Vec2 corner = 100 / side_um * (usual.positions_um[i] - box.low) - Vec2{50, 50};
+    const Vec2 corner = 100 / side_um * (usual.positions_um[i] - box.low_um) - Vec2{50, 50};
     // a hundredth more than its sides: no gaps by rounding
     const auto width = 100 * (next - i) + 1;
     pieces[colour] += fmt::format("M{:.0f} {:.0f}h{}v101h-{}", corner.x, corner.y, width, width);
   }
-  const Vec2 size = 100 / side_um * (box.high - box.low);
+  const Vec2 size = 100 / side_um * (box.high_um - box.low_um);
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
       "preserveAspectRatio=\"none\" shape-rendering=\"crispEdges\">",
@@ -247,11 +177,11 @@ std::string html_of(const Figure& map) { return figure(map.chart, map.caption, m
 
 Figure segmentation_map(const CellResults& results) {
   const bool is_dark = results.images.has_value();
-  Chart map =
-      empty_map(is_dark ? Box{results.images->low_um, results.images->high_um} : map_box(results), "Segmentation");
+  const std::string of_missing = is_dark ? "#ffe14d" : "#b00020";
+  Chart map = empty_map(is_dark ? results.images->place : map_box(results), "Segmentation");
   if (is_dark) {
-    map.picture(results.images->low_um, results.images->high_um,
-                "data:image/jpeg;base64," + files::base64(files::read_text(results.images->file)));
+    map.picture(results.images->place.low_um, results.images->place.high_um,
+                data_address(results.images->file, "image/jpeg"));
   }
   draw_outline(map, results.cell, std::string("fill:none;stroke-width:1.3;stroke:") + (is_dark ? "#ddd" : "#888"));
   // nearly invisible fill: the mouse finds the whole ellipse
@@ -262,8 +192,10 @@ Figure segmentation_map(const CellResults& results) {
                 hover_of(adhesion, results));
   }
   std::string types;
+  const bool has_edge_fibres =
+      std::ranges::find(results.cell.fibres, FibreType::edge, &Fibre::type) != results.cell.fibres.end();
   for (const FibreType type : kFibreTypes) {
-    if (type == FibreType::edge && !has_edge_fibres(results.cell)) continue;
+    if (type == FibreType::edge && !has_edge_fibres) continue;
     types += fmt::format("<span>{}{} ({})</span>", swatch_of(type, is_dark ? bright_colour_of(type) : colour_of(type)),
                          full_name_of(type), letter_of(type));
   }
@@ -278,22 +210,21 @@ Figure segmentation_map(const CellResults& results) {
   const auto by_id = adhesions_by_id(results.cell);
   for (const MissingFibre& f : results.missing_fibres) {
     map.curve({by_id.at(f.start_adhesion_id)->position_um, by_id.at(f.end_adhesion_id)->position_um},
-              std::string("stroke-width:2.2;stroke-dasharray:7 5;stroke:") + (is_dark ? "#ffe14d" : "#b00020"),
+              "stroke-width:2.2;stroke-dasharray:7 5;stroke:" + of_missing,
               fmt::format("called for by the beads, not segmented\nfrom adhesion {} to {}\n{} ± {} nN",
                           f.start_adhesion_id, f.end_adhesion_id, readable(f.tension_nN), readable(sigma_nN(f))));
   }
   for (const MissingAdhesion& a : results.missing_adhesions) {
     const Adhesion circle{.adhesion_id = 0, .position_um = a.position_um, .major_axis_um = 2, .minor_axis_um = 2};
     map.polygon(ellipse_corners(circle, 24),
-                std::string("fill:#fff;fill-opacity:0.01;stroke-width:2.2;stroke-dasharray:4 3;stroke:") +
-                    (is_dark ? "#ffe14d" : "#b00020"),
+                "fill:#fff;fill-opacity:0.01;stroke-width:2.2;stroke-dasharray:4 3;stroke:" + of_missing,
                 fmt::format("a force that the beads call for, no adhesion found\n{} nN", readable(norm(a.force_nN))));
   }
   const std::string missing =
       results.missing_fibres.empty() && results.missing_adhesions.empty()
           ? ""
           : fmt::format("<span><span class=\"type\" style=\"background:{}\"></span>missing (dashed)</span>",
-                        is_dark ? "#ffe14d" : "#b00020");
+                        of_missing);
   return {map,
           (is_dark ? "Adhesions, fibres and outline over the images they were found in: actin grey, adhesions purple. "
                      "Full size: 1_segment/overlay.png."
@@ -304,8 +235,8 @@ Figure segmentation_map(const CellResults& results) {
 
 Figure bead_map(const CellResults& results) {
   const Images& images = results.bead_images.value();
-  Chart map = empty_map({images.low_um, images.high_um}, "Beads");
-  map.picture(images.low_um, images.high_um, "data:image/jpeg;base64," + files::base64(files::read_text(images.file)));
+  Chart map = empty_map(images.place, "Beads");
+  map.picture(images.place.low_um, images.place.high_um, data_address(images.file, "image/jpeg"));
   draw_outline(map, results.cell, "fill:none;stroke-width:1.3;stroke:#ddd");
   int n_flagged = 0;
   for (const Bead& bead : results.displacement) {
@@ -345,7 +276,8 @@ Figure adhesion_map(const CellResults& results) {
                                           "traction density (force over the area of a lattice cell)."
                                         : "";
   return {map,
-          std::string(are_all_candidates(results.cell)
+          std::string(std::ranges::all_of(results.cell.adhesions,
+                                          [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; })
                           ? "Each candidate is coloured by the traction at its place; the arrow is the force"
                           : "Each adhesion’s ellipse is coloured by its mean traction; the arrow is the force") +
               " of the cell on the substrate. Dashed: the cell’s outline. The few highest tractions share the colour "
@@ -356,13 +288,13 @@ Figure adhesion_map(const CellResults& results) {
 
 Figure usual_method_map(const CellResults& results) {
   const UsualMethod& usual = results.usual_method.value();
-  const Box box = map_box(results);
+  const Extent box = map_box(results);
   Chart map = empty_map(box, "What the usual method says");
   double largest_kPa = 0;
   for (const Vec2 t : usual.tractions_kPa) largest_kPa = std::max(largest_kPa, norm(t));
   // its own: smoothed, they are so much smaller that the model's colours show nothing
   const ColourScale colours{.low = 0, .high = round_end(largest_kPa), .label = "traction (kPa)"};
-  map.picture(box.low, box.high, picture_of_squares(usual, box, colours));
+  map.picture(box.low_um, box.high_um, picture_of_squares(usual, box, colours));
   draw_outline(map, results.cell, "fill:none;stroke-width:1.3;stroke:#fff;stroke-dasharray:5 3");
   draw_adhesions(map, results, "fill:none;stroke:#fff;stroke-width:0.7", Hover::none);
   const std::string lambda = usual.lambda_um_per_kPa ? fmt::format(", λ = {} µm/kPa (criterion: {})",
@@ -381,6 +313,49 @@ Figure usual_method_map(const CellResults& results) {
       legend(colour_bar(colours))};
 }
 
+Figure network_map(const CellResults& results) {
+  Chart map = new_map(results, "Where the fibres are");
+  const ColourScale scale = tension_scale(results, "fitted tension (nN)");
+  const SortedLinks links = sorted_links(results.network, {});
+  const std::map<int, std::string> texts = fibre_texts(results);
+  draw_web(map, results, links.web, Hover::whole);
+  for (const auto& [id, pieces] : links.fibres) {
+    const auto tension = results.tensions.find(id);
+    map.pieces(pieces, kHalo, texts.at(id));
+    map.pieces(pieces, kThick + (tension == results.tensions.end() ? "#555" : scale.colour(tension->second.tension_nN)),
+               texts.at(id));
+  }
+  draw_fibre_ids(map, results);
+  return {map,
+          fmt::format("Stress fibres (dorsal d, arc a, ventral v, edge e) with their numbers, coloured by their fitted "
+                      "tension, in the network of the first mesh before it contracts: {} vertices, {} links (grey: "
+                      "actin network). Blue: {}, which hold the vertices inside them.",
+                      results.network.vertices_um.size(), results.network.links.size(),
+                      has_origin(results.cell, AdhesionOrigin::candidate) ? "candidates for adhesions" : "adhesions") +
+              caption_of_cut(results.cell),
+          legend(colour_bar(scale))};
+}
+
+Figure contracted_network_map(const CellResults& results) {
+  Chart map = new_map(results, "Network in equilibrium");
+  const ColourScale scale = tension_scale(results, "force carried (nN)");
+  const SortedLinks links = sorted_links(results.contracted.network, results.contracted.link_force_nN);
+  const std::map<int, std::string> texts = fibre_texts(results);
+  draw_web(map, results, links.web, Hover::none);
+  for (const auto& [id, pieces] : links.fibres) {
+    const std::vector<double>& carried_nN = links.carried_nN.at(id);
+    map.pieces(pieces, kHalo, texts.at(id));
+    for (std::size_t k = 0; k < pieces.size(); ++k) {
+      map.pieces({pieces[k]}, kThick + scale.colour(carried_nN[k]),
+                 fmt::format("{}\nthis link carries {} nN", texts.at(id), readable(carried_nN[k])));
+    }
+  }
+  return {map,
+          "The same network where its tensions have drawn it; each link of a fibre is coloured by the force that it "
+          "carries.",
+          legend(colour_bar(scale))};
+}
+
 std::vector<Figure> displacement_maps(const CellResults& results) {
   VectorField measured, fitted, residual;
   for (const Bead& bead : results.displacement) {
@@ -388,7 +363,7 @@ std::vector<Figure> displacement_maps(const CellResults& results) {
     measured.positions_um.push_back(bead.position_um);
     measured.vectors.push_back(bead.displacement_um);
   }
-  const Box box = map_box(results);
+  const Extent box = map_box(results);
   const double side_um = averaging_side_um(measured, box);
   const AveragedField means = averaged(measured, box, side_um);
   const ArrowScale scale = arrow_scale(means.means.vectors);
@@ -415,10 +390,6 @@ std::vector<Figure> displacement_maps(const CellResults& results) {
                           "Same squares, same scale. Bead noise points anywhere; arrows that point the same way over a "
                           "region are the model’s error."));
   return figures;
-}
-
-Figure network_map(const CellResults& results, NetworkForm form) {
-  return form == NetworkForm::original ? original_network(results) : contracted_network(results);
 }
 
 }  // namespace mbtfm::report

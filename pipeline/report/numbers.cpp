@@ -22,6 +22,10 @@ std::string with_minus(const std::string& text) {
 
 int decimals_for(double error) { return std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 9); }
 
+std::optional<int> decimals_for(const std::optional<double>& error) {
+  return error && *error > 0 ? std::optional(decimals_for(*error)) : std::nullopt;
+}
+
 std::string rounded(double value, std::optional<int> decimals) {
   if (!decimals) return readable(value);
   const int exponent = value != 0 ? static_cast<int>(std::floor(std::log10(std::abs(value)))) : 0;
@@ -32,10 +36,13 @@ std::string rounded(const std::optional<double>& value, std::optional<int> decim
   return value ? rounded(*value, decimals) : "–";
 }
 
+std::string with_error(double value, std::optional<double> error) {
+  const std::optional<int> decimals = decimals_for(error);
+  return decimals ? rounded(value, decimals) + " ± " + rounded(*error, decimals) : readable(value);
+}
+
 std::string with_error(double value, std::optional<double> error, const char* unit) {
-  if (!error || !(*error > 0)) return readable(value) + " " + unit;
-  const int decimals = decimals_for(*error);
-  return fmt::format("{} ± {} {}", rounded(value, decimals), rounded(*error, decimals), unit);
+  return with_error(value, error) + " " + unit;
 }
 
 std::string text_of_figure(const Value& value) {

@@ -13,6 +13,8 @@ using charts::readable;
 
 /// Decimals that show two digits of an error. @param error  > 0
 int decimals_for(double error);
+/// None without an error above 0: as many as each number needs.
+std::optional<int> decimals_for(const std::optional<double>& error);
 
 /// No more than three significant digits and no more than so many decimals; without these, three significant digits.
 std::string rounded(double value, std::optional<int> decimals);
@@ -21,6 +23,8 @@ std::string rounded(const std::optional<double>& value, std::optional<int> decim
 
 /// "412 ± 21 nN"; without an error above 0 "412 nN".
 std::string with_error(double value, std::optional<double> error, const char* unit);
+/// The same without a unit.
+std::string with_error(double value, std::optional<double> error);
 
 /// Of a figure: a number as above, a list with commas.
 std::string text_of_figure(const Value& value);

@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "pipeline/files/base64.h"
+#include "pipeline/files/text.h"
 
 namespace mbtfm::report {
 
@@ -80,6 +81,10 @@ std::string html_of_pairs(const std::string& caption, const std::vector<std::pai
             "</td></tr>\n";
   }
   return html + "</tbody></table></div>\n";
+}
+
+std::string data_address(const Path& picture, const char* type) {
+  return fmt::format("data:{};base64,{}", type, files::base64(files::read_text(picture)));
 }
 
 std::string capitalised(std::string text) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/path.h"
 
 namespace mbtfm::report {
 
@@ -19,9 +20,9 @@ struct Table {
     std::string title;
     bool is_number = false;  ///< aligned to the right and sorted as numbers
   };
+  std::string caption = {};  ///< what it lists, for those who hear the page
   std::vector<Column> columns = {};
   std::vector<std::vector<std::string>> rows = {};
-  std::string caption = {};  ///< what it lists, for those who hear the page
 };
 
 inline Table::Column number(std::string title) { return {std::move(title), true}; }
@@ -37,6 +38,9 @@ std::string html_of(const Table& table);
 std::string html_of(const Table& table, const Download& csv);
 /// Two columns: name, value.
 std::string html_of_pairs(const std::string& caption, const std::vector<std::pair<std::string, std::string>>& pairs);
+
+/// The bytes of a picture as an address, for a page that must stand alone. @param type  "image/jpeg"
+std::string data_address(const Path& picture, const char* type);
 
 /// A sentence begins so: "Control: ventral fibres".
 std::string capitalised(std::string text);

@@ -72,6 +72,10 @@ EffectLine effect_line_of(const files::JsonRecord& record) {
 
 }  // namespace
 
+std::string program_of(const Provenance& provenance) {
+  return "mbtfm" + (provenance.version.empty() ? "" : " " + provenance.version);
+}
+
 Provenance read_provenance(const std::filesystem::path& run_file) {
   Provenance provenance;
   if (!files::is_own_file(run_file)) return provenance;

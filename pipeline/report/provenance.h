@@ -44,6 +44,9 @@ struct Provenance {
   std::vector<Finding> findings;
 };
 
+/// "mbtfm 1.2"; "mbtfm" where no version is known.
+std::string program_of(const Provenance& provenance);
+
 /// Of run.json; empty where there is none. @throws InputError where it is malformed
 Provenance read_provenance(const std::filesystem::path& run_file);
 

@@ -1,5 +1,6 @@
 #include "pipeline/report/results.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
@@ -38,7 +39,7 @@ std::optional<Images> images_of(const Path& file, const Path& place) {
   if (!files::is_own_file(file) || !files::is_own_file(place)) return {};
   const std::vector<files::ImagePlace> rows = files::read(place, files::image_place_table());
   if (rows.size() != 1) throw InputError(place.string(), "one row", std::to_string(rows.size()));
-  return Images{file, rows[0].low_um, rows[0].low_um + rows[0].size_um};
+  return Images{file, {rows[0].low_um, rows[0].low_um + rows[0].size_um}};
 }
 
 /// Of a file that a fit of this version writes; none where it is not there.
@@ -108,6 +109,12 @@ CellResults read_results(const Path& cell) {
   results.missing_adhesions = rows_in(cell / "4_fit/missing_adhesions.csv", files::missing_adhesion_table());
   return results;
 }
+
+bool has_origin(const Cell& cell, AdhesionOrigin origin) {
+  return std::ranges::find(cell.adhesions, origin, &Adhesion::origin) != cell.adhesions.end();
+}
+
+bool has_assumed(const Cell& cell) { return std::ranges::any_of(cell.adhesions, is_assumed, &Adhesion::origin); }
 
 std::map<int, const Adhesion*> adhesions_by_id(const Cell& cell) {
   std::map<int, const Adhesion*> by_id;

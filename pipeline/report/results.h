@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/contract/beads.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/contract/fit_summary.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/network.h"
@@ -24,7 +25,7 @@ struct Residual {
 /// The images behind a segmentation, as one picture, and where it lies.
 struct Images {
   Path file;  ///< JPEG
-  Vec2 low_um, high_um;
+  Extent place;
 };
 
 /// What the usual method (FTTC) says of the same beads: tractions at the middles of squares.
@@ -60,6 +61,9 @@ struct CellResults {
 /// @throws InputError where a file that the stages write lacks or is malformed
 CellResults read_results(const Path& cell);
 
+bool has_origin(const Cell& cell, AdhesionOrigin origin);
+/// Some were put where nobody saw one.
+bool has_assumed(const Cell& cell);
 /// Adhesion by id.
 std::map<int, const Adhesion*> adhesions_by_id(const Cell& cell);
 

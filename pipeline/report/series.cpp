@@ -1,18 +1,15 @@
-#include "pipeline/report/series.h"
-
+/// A time series, picture by picture.
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "pipeline/contract/extent.h"
-#include "pipeline/files/base64.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/own_files.h"
-#include "pipeline/files/text.h"
-#include "pipeline/report/arrows.h"
-#include "pipeline/report/colours.h"
+#include "pipeline/report/map_parts.h"
 #include "pipeline/report/numbers.h"
+#include "pipeline/report/page.h"
+#include "pipeline/report/report.h"
 #include "pipeline/report/results.h"
 
 namespace mbtfm::report {
@@ -28,7 +25,7 @@ struct Frame {
   VectorField displacement = {};           ///< means over squares
 };
 
-std::vector<Frame> frames_of(const Path& cell, const Box& box) {
+std::vector<Frame> frames_of(const Path& cell, const Extent& box) {
   const files::CsvTable table(cell / "4_fit/frames.csv"), tracks(cell / "4_fit/tracks.csv");
   std::vector<Frame> frames;
   double side_um = 0;
@@ -57,13 +54,10 @@ std::vector<Frame> frames_of(const Path& cell, const Box& box) {
   return frames;
 }
 
-Chart map_of(const Frame& frame, const CellResults& results, const Box& box, const ColourScale& colours,
+Chart map_of(const Frame& frame, const CellResults& results, const Extent& box, const ColourScale& colours,
              const ArrowScale& arrows) {
-  Chart map("Tensions and displacement", {"x (µm)", box.low.x, box.high.x}, {"y (µm)", box.high.y, box.low.y});
-  map.same_scales();
-  if (results.images)
-    map.picture(results.images->low_um, results.images->high_um,
-                "data:image/jpeg;base64," + files::base64(files::read_text(results.images->file)));
+  Chart map = empty_map(box, "Tensions and displacement");
+  if (results.images) map.picture(box.low_um, box.high_um, data_address(results.images->file, "image/jpeg"));
   map.polygon(results.cell.outline_um, "fill:none;stroke-width:1.3;stroke:#aaa");
   for (const Fibre& fibre : results.cell.fibres) {
     const auto tension = frame.tensions_nN.find(fibre.fibre_id);
@@ -115,8 +109,8 @@ std::vector<std::string> drawings_of_series(const Path& cell) {
   const CellResults results = read_results(cell);
   const auto [low, high] = extent_of(results.cell.outline_um);
   constexpr double kMargin_um = 3;
-  const Box box = results.images ? Box{results.images->low_um, results.images->high_um}
-                                 : Box{low - Vec2{kMargin_um, kMargin_um}, high + Vec2{kMargin_um, kMargin_um}};
+  const Extent box = results.images ? results.images->place
+                                    : Extent{low - Vec2{kMargin_um, kMargin_um}, high + Vec2{kMargin_um, kMargin_um}};
   const std::vector<Frame> frames = frames_of(cell, box);
   ColourScale colours{.low = 0, .high = 0, .label = "fitted tension (nN)"};
   std::vector<Vec2> vectors;

@@ -1,22 +1,18 @@
-#include "pipeline/report/sheet_report.h"
-
+/// The page of a cell or colony that is fitted as a contracting sheet.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <utility>
 
-#include "pipeline/contract/version.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/sheet_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/compare.h"
-#include "pipeline/report/findings.h"
+#include "pipeline/report/kinds.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
-#include "pipeline/report/provenance.h"
-#include "pipeline/report/space_report.h"
+#include "pipeline/report/stage_page.h"
 
 namespace mbtfm::report {
 namespace {
@@ -57,18 +53,17 @@ std::string parameter(const Provenance& provenance, const std::string& name) {
 
 std::string methods(const SheetResults& r, const Provenance& provenance) {
   const bool has_motion = parameter(provenance, "effects.common_motion") != "off";
-  const std::string text = fmt::format(
-      "The contraction was found with the program mbtfm{}. The cell was taken as an even elastic sheet in plane stress "
+  return fmt::format(
+      "The contraction was found with the program {}. The cell was taken as an even elastic sheet in plane stress "
       "({} µm thick, Poisson’s ratio {}) that contracts on the gel (Young’s modulus {} kPa, Poisson’s ratio {}, "
       "thickness {} µm) and was solved by finite elements ({} quadratic triangles). Fitted to the displacements of {} "
       "beads{}: {}. The fit left {} of the displacement (relative L2; the noise alone would leave {}). Intervals are "
       "95 % intervals.",
-      provenance.version.empty() ? "" : " " + provenance.version, parameter(provenance, "sheet.thickness_um"),
-      parameter(provenance, "sheet.poisson_ratio"), parameter(provenance, "gel.youngs_modulus_kPa"),
-      parameter(provenance, "gel.poisson_ratio"), parameter(provenance, "gel.thickness_um"), r.number("n_triangles"),
-      r.number("n_beads"), has_motion ? ", beside a common motion of all beads (shift, turn, growth, shear)" : "",
+      program_of(provenance), parameter(provenance, "sheet.thickness_um"), parameter(provenance, "sheet.poisson_ratio"),
+      parameter(provenance, "gel.youngs_modulus_kPa"), parameter(provenance, "gel.poisson_ratio"),
+      parameter(provenance, "gel.thickness_um"), r.number("n_triangles"), r.number("n_beads"),
+      has_motion ? ", beside a common motion of all beads (shift, turn, growth, shear)" : "",
       r.figures.at("fitted").text(), readable(r.number("relative_l2")), readable(r.number("expected_relative_l2")));
-  return "<p class=\"cite\">" + html_escaped(text) + "</p>\n";
 }
 
 }  // namespace
@@ -94,55 +89,53 @@ std::vector<Listing> tables_of_sheet(const fs::path& estimates, const fs::path& 
             "by_gel", "by_substrate"}}};
 }
 
-std::string report_of_sheet(const fs::path& cell) {
+CellPage page_of_sheet(const Path& cell, const Provenance& provenance) {
   const SheetResults r = read_sheet(cell);
-  const Provenance provenance = read_provenance(cell / "run.json");
-  const fs::path folder = cell / "3_sheet";
-  const std::string head = fmt::format(
-      "<h1>{}</h1><p class=\"what\">Contraction and tensions of one cell or colony, taken as a contracting "
-      "sheet</p>\n<p class=\"sub\">{} · mbtfm {}</p>\n",
-      html_escaped(r.name), html_escaped(provenance.kind_because), kVersion);
-  constexpr const char* kTitle = "Tension and traction";
-  constexpr const char* kExplained =
-      "Left: mean of the two principal tensions. Right: traction on the gel; arrows are means over squares. x to the "
-      "right, y down.";
-  std::string body = findings_section(facts_of(r), provenance);
-  body +=
-      section(kTitle, picture_in_page(files::read_text(folder / "sheet.svg"), std::string(kTitle) + ". " + kExplained) +
-                          "<p class=\"sub\">" + kExplained + "</p>\n");
-  body += truth_section(cell);
+  const Path folder = cell / "3_sheet";
+  std::string body =
+      section_of_picture("Tension and traction", files::read_text(folder / "sheet.svg"),
+                         "Left: mean of the two principal tensions. Right: traction on the gel; arrows are means over "
+                         "squares. x to the right, y down.") +
+      truth_section(cell);
   for (const Listing& table : tables_of_sheet(folder / "sheet_fit.csv", folder / "sheet_models.csv", r.name + "_"))
     body += section_of(table);
-  body += section("For your methods section", methods(r, provenance));
-  body += provenance_section(provenance, "");
-  return page(r.name + " – mbtfm", head, body);
+  return {.name = r.name,
+          .what = "Contraction and tensions of one cell or colony, taken as a contracting sheet",
+          .sub = html_escaped(provenance.kind_because),
+          .facts = facts_of(r),
+          .body = body,
+          .methods = methods(r, provenance),
+          .figures = {}};
 }
 
-std::string result_line_of_sheet(const fs::path& cell) {
+Result result_of_sheet(const Path& cell, const Path& report) {
   const SheetResults r = read_sheet(cell);
-  return r.figures.at("fitted").text() + "; mean tension " + readable(r.number("mean_tension_nN_per_um")) +
-         " nN/µm; total force " + readable(r.number("total_force_nN")) + " nN";
-}
-
-std::string result_event_of_sheet(const fs::path& cell, const fs::path& report) {
-  const SheetResults r = read_sheet(cell);
+  const double tension = r.number("mean_tension_nN_per_um"), force_nN = r.number("total_force_nN");
   nlohmann::ordered_json event = {{"event", "result"},
-                                  {"total_force_nN", r.number("total_force_nN")},
-                                  {"mean_tension_nN_per_um", r.number("mean_tension_nN_per_um")},
+                                  {"total_force_nN", force_nN},
+                                  {"mean_tension_nN_per_um", tension},
                                   {"estimates", nlohmann::ordered_json::array()},
                                   {"report", report.string()}};
+  const auto or_null = [](const std::optional<double>& value) -> nlohmann::ordered_json {
+    if (value) return *value;
+    return nullptr;
+  };
   for (const SheetEstimate& e : r.estimates) {
-    nlohmann::ordered_json one = {{"quantity", name_of(e.quantity)}, {"part", e.part}, {"value", e.value}};
-    one["sigma"] = e.sigma ? nlohmann::ordered_json(*e.sigma) : nullptr;
-    one["low"] = e.low ? nlohmann::ordered_json(*e.low) : nullptr;
-    one["high"] = e.high ? nlohmann::ordered_json(*e.high) : nullptr;
-    one["sigma_parts"] = nlohmann::ordered_json::object();
+    nlohmann::ordered_json parts = nlohmann::ordered_json::object();
     for_each_part(e.parts, [&](const char* name, const std::optional<double>& size) {
-      if (size) one["sigma_parts"][name] = *size;
+      if (size) parts[name] = *size;
     });
-    event["estimates"].push_back(std::move(one));
+    event["estimates"].push_back({{"quantity", name_of(e.quantity)},
+                                  {"part", e.part},
+                                  {"value", e.value},
+                                  {"sigma", or_null(e.sigma)},
+                                  {"low", or_null(e.low)},
+                                  {"high", or_null(e.high)},
+                                  {"sigma_parts", parts}});
   }
-  return files::json_text(event) + "\n";
+  return {r.figures.at("fitted").text() + "; mean tension " + readable(tension) + " nN/µm; total force " +
+              readable(force_nN) + " nN",
+          files::json_text(event) + "\n"};
 }
 
 }  // namespace mbtfm::report

@@ -1,5 +1,4 @@
-#include "pipeline/report/space_report.h"
-
+/// The page of a cell whose beads are in space.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,19 +6,16 @@
 
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/results.h"
-#include "pipeline/contract/version.h"
-#include "pipeline/files/base64.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/order_statistics.h"
-#include "pipeline/report/colours.h"
 #include "pipeline/report/compare.h"
-#include "pipeline/report/findings.h"
+#include "pipeline/report/kinds.h"
+#include "pipeline/report/maps.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
-#include "pipeline/report/space_maps.h"
-#include "pipeline/report/space_scene.h"
+#include "pipeline/report/space_results.h"
 
 namespace mbtfm::report {
 namespace {
@@ -113,9 +109,8 @@ std::string how_lambda(const SpaceResults& r) {
 std::string svg_of(const Path& file, const std::string& title, const std::string& caption) {
   if (!files::is_own_file(file)) return {};
   return fmt::format(
-      "<figure><h3>{0}</h3><img alt=\"{0}\" style=\"width:100%\" "
-      "src=\"data:image/svg+xml;base64,{1}\"><figcaption>{2}</figcaption></figure>\n",
-      html_escaped(title), files::base64(files::read_text(file)), html_escaped(caption));
+      "<figure><h3>{0}</h3><img alt=\"{0}\" style=\"width:100%\" src=\"{1}\"><figcaption>{2}</figcaption></figure>\n",
+      html_escaped(title), data_address(file, "image/svg+xml"), html_escaped(caption));
 }
 
 std::string space_section(const SpaceResults& r) {
@@ -157,12 +152,11 @@ std::string force_section(const SpaceResults& r) {
   std::vector<ForceInSpace> forces = r.forces;
   std::ranges::stable_sort(forces, std::greater{}, [](const ForceInSpace& f) { return norm(f.force_nN); });
   Table table{
+      "Forces of the adhesions",
       {number("adhesion"), number("force (nN)"), number("std. error (nN)"), number("Fx (nN)"), number("Fy (nN)"),
-       number("Fz (nN), into the gel"), number("area (µm²)"), number("x (µm)"), number("y (µm)"), number("z (µm)")},
-      {},
-      "Forces of the adhesions"};
+       number("Fz (nN), into the gel"), number("area (µm²)"), number("x (µm)"), number("y (µm)"), number("z (µm)")}};
   for (const ForceInSpace& f : forces) {
-    const auto decimals = f.sigma_nN && *f.sigma_nN > 0 ? std::optional(decimals_for(*f.sigma_nN)) : std::nullopt;
+    const std::optional<int> decimals = decimals_for(f.sigma_nN);
     table.rows.push_back({std::to_string(f.adhesion_id), rounded(norm(f.force_nN), decimals),
                           rounded(f.sigma_nN, decimals), rounded(f.force_nN.x, decimals),
                           rounded(f.force_nN.y, decimals), rounded(f.force_nN.z, decimals), rounded(f.area_um2, 2),
@@ -186,22 +180,24 @@ std::string methods(const SpaceResults& r, const Provenance& provenance) {
     sigma_z.push_back(bead.sigma_z_um);
   }
   std::string text = fmt::format(
-      "Tractions in space were found with the program mbtfm{}. {} beads were followed in the volume of the gel between "
+      "Tractions in space were found with the program {}. {} beads were followed in the volume of the gel between "
       "two confocal stacks",
-      provenance.version.empty() ? "" : " " + provenance.version, n_good);
+      program_of(provenance), n_good);
   if (!sigma.empty() && numerics::median(sigma) > 0)
     text += fmt::format(", with a standard error of {} nm across and {} nm along the optical axis (medians)",
                         readable(1000 * numerics::median(sigma)), readable(1000 * numerics::median(sigma_z)));
-  text += fmt::format(
-      ". The surface of the gel was found from data, too. The gel was taken as linear elastic on a rigid base (Young’s "
-      "modulus {} kPa, Poisson’s ratio {}, thickness {} µm) and its answer to tractions computed by finite elements "
-      "that follow the surface. Tractions at the vertices of a lattice of {} × {} µm ({} unknowns) were fitted to the "
-      "displacements by the method {} over {}. {} {}.",
-      readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio), readable(r.gel.thickness_um),
-      readable(r.number("spacing_x_um")), readable(r.number("spacing_y_um")), r.number("n_unknowns"),
-      r.texts.at("method"), r.texts.at("tractions_over"), how_lambda(r),
-      fmt::format("The tractions leave {} of the displacement (relative L2)", readable(r.number("relative_l2"))));
-  return "<p class=\"cite\">" + html_escaped(text) + "</p>\n";
+  return text +
+         fmt::format(
+             ". The surface of the gel was found from data, too. The gel was taken as linear elastic on a rigid base "
+             "(Young’s "
+             "modulus {} kPa, Poisson’s ratio {}, thickness {} µm) and its answer to tractions computed by finite "
+             "elements "
+             "that follow the surface. Tractions at the vertices of a lattice of {} × {} µm ({} unknowns) were fitted "
+             "to the "
+             "displacements by the method {} over {}. {} The tractions leave {} of the displacement (relative L2).",
+             readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio), readable(r.gel.thickness_um),
+             readable(r.number("spacing_x_um")), readable(r.number("spacing_y_um")), r.number("n_unknowns"),
+             r.texts.at("method"), r.texts.at("tractions_over"), how_lambda(r), readable(r.number("relative_l2")));
 }
 
 std::string figure_pairs(const SpaceResults& r) {
@@ -213,42 +209,39 @@ std::string figure_pairs(const SpaceResults& r) {
 
 }  // namespace
 
-std::string report_in_space(const fs::path& cell) {
+CellPage page_in_space(const Path& cell, const Provenance& provenance) {
   const SpaceResults r = read_space_results(cell);
-  const Provenance provenance = read_provenance(cell / "run.json");
-  const std::string head = fmt::format(
-      "<h1>{}</h1><p class=\"what\">Forces in space of one cell on a curved gel</p>\n<p class=\"sub\">Gel: Young’s "
-      "modulus {} kPa, Poisson’s ratio {}, {} µm thick below z = 0 · {} · mbtfm {}</p>\n",
-      html_escaped(r.name), readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio),
-      readable(r.gel.thickness_um), html_escaped(provenance.kind_because), kVersion);
-  const std::string body = findings_section(facts_of(r), provenance) + truth_section(cell) + space_section(r) +
-                           map_section(r) + force_section(r) + data_section(r) + lambda_section(r) +
-                           section("For your methods section", methods(r, provenance)) +
-                           provenance_section(provenance, folded("Figures of the tractions", figure_pairs(r)));
-  return page(r.name + " – mbtfm", head, body);
+  return {.name = r.name,
+          .what = "Forces in space of one cell on a curved gel",
+          .sub = fmt::format("Gel: Young’s modulus {} kPa, Poisson’s ratio {}, {} µm thick below z = 0 · {}",
+                             readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio),
+                             readable(r.gel.thickness_um), html_escaped(provenance.kind_because)),
+          .facts = facts_of(r),
+          .body = truth_section(cell) + space_section(r) + map_section(r) + force_section(r) + data_section(r) +
+                  lambda_section(r),
+          .methods = methods(r, provenance),
+          .figures = folded("Figures of the tractions", figure_pairs(r))};
 }
 
-std::string result_line_in_space(const fs::path& cell) {
+Result result_in_space(const Path& cell, const Path& report) {
   const SpaceResults r = read_space_results(cell);
   const Sum force = sum_of(r, "net_force", "nN");
-  return "total force " + with_error(r.number("total_force_nN"), r.find("total_force_sigma_nN"), "nN") +
-         "; net force " + with_error(force.size, force.sigma, "nN") + "; strain energy " +
-         readable(r.number("strain_energy_fJ")) + " fJ";
-}
-
-std::string result_event_in_space(const fs::path& cell, const fs::path& report) {
-  const SpaceResults r = read_space_results(cell);
-  const Sum force = sum_of(r, "net_force", "nN");
-  nlohmann::ordered_json event = {{"event", "result"},
-                                  {"total_force_nN", r.number("total_force_nN")},
-                                  {"total_force_error_nN", nullptr},
-                                  {"net_force_nN", force.size},
-                                  {"net_force_error_nN", nullptr},
-                                  {"strain_energy_fJ", r.number("strain_energy_fJ")},
-                                  {"report", report.string()}};
-  if (force.sigma) event["net_force_error_nN"] = *force.sigma;
-  if (const auto sigma = r.find("total_force_sigma_nN")) event["total_force_error_nN"] = *sigma;
-  return files::json_text(event) + "\n";
+  const std::optional<double> total_sigma_nN = r.find("total_force_sigma_nN");
+  const std::string line = "total force " + with_error(r.number("total_force_nN"), total_sigma_nN, "nN") +
+                           "; net force " + with_error(force.size, force.sigma, "nN") + "; strain energy " +
+                           readable(r.number("strain_energy_fJ")) + " fJ";
+  const auto or_null = [](const std::optional<double>& value) -> nlohmann::ordered_json {
+    if (value) return *value;
+    return nullptr;
+  };
+  const nlohmann::ordered_json event = {{"event", "result"},
+                                        {"total_force_nN", r.number("total_force_nN")},
+                                        {"total_force_error_nN", or_null(total_sigma_nN)},
+                                        {"net_force_nN", force.size},
+                                        {"net_force_error_nN", or_null(force.sigma)},
+                                        {"strain_energy_fJ", r.number("strain_energy_fJ")},
+                                        {"report", report.string()}};
+  return {line, files::json_text(event) + "\n"};
 }
 
 }  // namespace mbtfm::report

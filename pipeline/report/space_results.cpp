@@ -1,8 +1,11 @@
 #include "pipeline/report/space_results.h"
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/extent.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json_record.h"
@@ -12,6 +15,14 @@
 
 namespace mbtfm::report {
 namespace {
+
+constexpr const char* kTruth = "truth/surface_traction.csv";
+
+std::vector<Vec2> from_above(const std::vector<Vec3>& places) {
+  std::vector<Vec2> seen;
+  for (const Vec3& at : places) seen.push_back({at.x, at.y});
+  return seen;
+}
 
 Vec3 vector_in(const files::CsvTable& table, int row, const char* x, const char* y, const char* z) {
   return {table.number(row, x), table.number(row, y), table.number(row, z)};
@@ -96,6 +107,89 @@ SpaceResults read_space_results(const Path& cell) {
     results.outline_um = files::read_outline(cell / "1_segment/outline.csv").front();
   read_figures(cell / "4_traction/traction.json", results);
   return results;
+}
+
+SpaceMap map_of(const SpaceResults& results) {
+  SpaceMap map;
+  map.total_force_nN = results.number("total_force_nN");
+  double errors = 0, size = 0;
+  bool has_errors = true;
+  for (const SurfaceTraction& t : results.tractions) {
+    map.at_um.push_back(t.at_um);
+    map.traction_kPa.push_back(t.traction_kPa);
+    map.area_um2.push_back(t.area_um2);
+    size += t.area_um2 * dot(t.traction_kPa, t.traction_kPa);
+    has_errors = has_errors && t.sigma_kPa;
+    if (t.sigma_kPa) errors += t.area_um2 * dot(*t.sigma_kPa, *t.sigma_kPa);
+  }
+  if (has_errors && size > 0) map.stated_error = std::sqrt(errors / size);
+  return map;
+}
+
+bool has_space_truth(const Path& cell) { return files::is_own_file(cell / kTruth); }
+
+SpaceMap true_space_map(const Path& cell) {
+  const files::CsvTable table(cell / kTruth);
+  table.require({"x_um", "y_um", "z_um", "nz", "tx_kPa", "ty_kPa", "tz_kPa"});
+  SpaceMap map;
+  for (int row = 0; row < table.n_rows(); ++row) {
+    map.at_um.push_back(vector_in(table, row, "x_um", "y_um", "z_um"));
+    map.traction_kPa.push_back(vector_in(table, row, "tx_kPa", "ty_kPa", "tz_kPa"));
+    map.area_um2.push_back(1 / std::abs(table.number(row, "nz")));
+  }
+  const Vec2 step_um = files::lattice_spacing_um(from_above(map.at_um), cell / kTruth);
+  for (std::size_t k = 0; k < map.at_um.size(); ++k) {
+    map.area_um2[k] *= step_um.x * step_um.y;
+    map.total_force_nN += map.area_um2[k] * norm(map.traction_kPa[k]);
+  }
+  return map;
+}
+
+TractionsBetween::TractionsBetween(const SpaceMap& map) {
+  const std::vector<Vec2> places = from_above(map.at_um);
+  const Vec2 gap = files::lattice_spacing_um(places, "map of tractions");
+  const auto [low, high] = extent_of(places);
+  origin_um_ = low;
+  last_ = {std::round((high.x - low.x) / gap.x), std::round((high.y - low.y) / gap.y)};
+  spacing_um_ = {(high.x - low.x) / last_.x, (high.y - low.y) / last_.y};
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const Vec2 p = in_steps(places[k]);
+    traction_kPa_[{std::lround(p.x), std::lround(p.y)}] = map.traction_kPa[k];
+  }
+}
+
+Vec2 TractionsBetween::in_steps(Vec2 place_um) const {
+  return {(place_um.x - origin_um_.x) / spacing_um_.x, (place_um.y - origin_um_.y) / spacing_um_.y};
+}
+
+TractionsBetween::Found TractionsBetween::at(Vec2 place_um) const {
+  constexpr double kRounding = 1e-6;  // files have nine digits
+  const Vec2 p = in_steps(place_um);
+  if (std::min(p.x, p.y) < -kRounding || p.x > last_.x + kRounding || p.y > last_.y + kRounding) return {};
+  const double i = std::clamp(std::floor(p.x), 0.0, last_.x - 1), j = std::clamp(std::floor(p.y), 0.0, last_.y - 1);
+  Found found{.is_whole = true};
+  for (const int right : {0, 1}) {
+    for (const int down : {0, 1}) {
+      const auto corner = traction_kPa_.find({std::lround(i) + right, std::lround(j) + down});
+      const double share = (right == 1 ? p.x - i : 1 - p.x + i) * (down == 1 ? p.y - j : 1 - p.y + j);
+      if (corner == traction_kPa_.end())
+        found.is_whole = false;
+      else
+        found.traction_kPa += share * corner->second;
+    }
+  }
+  return found;
+}
+
+double difference(const SpaceMap& map, const SpaceMap& reference) {
+  const TractionsBetween found(map);
+  double wrong = 0, size = 0;
+  for (std::size_t k = 0; k < reference.at_um.size(); ++k) {
+    const Vec3 off = found.at({reference.at_um[k].x, reference.at_um[k].y}).traction_kPa - reference.traction_kPa[k];
+    wrong += reference.area_um2[k] * dot(off, off);
+    size += reference.area_um2[k] * dot(reference.traction_kPa[k], reference.traction_kPa[k]);
+  }
+  return size > 0 ? std::sqrt(wrong / size) : 0;
 }
 
 }  // namespace mbtfm::report

@@ -9,7 +9,6 @@
 #include "pipeline/contract/version.h"
 #include "pipeline/contract/words.h"
 #include "pipeline/files/csv.h"
-#include "pipeline/report/findings.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 
@@ -35,7 +34,7 @@ std::string shown(const std::string& text) {
 
 std::string section_of(const Listing& listing) {
   const files::CsvTable csv(listing.csv, listing.name);
-  Table table{.rows = {}, .caption = listing.title};
+  Table table{.caption = listing.title};
   table.rows.resize(static_cast<std::size_t>(csv.n_rows()));
   for (const std::string& column : listing.columns) {
     std::vector<std::string> texts;
@@ -50,17 +49,17 @@ std::string section_of(const Listing& listing) {
                                     html_of(table, Download{listing.name, listing.csv}));
 }
 
-std::string picture_in_page(const std::string& svg_file, const std::string& name) {
-  return "<svg role=\"img\" aria-label=\"" + html_escaped(name) + "\" style=\"max-width:100%;height:auto\"" +
-         svg_file.substr(svg_file.find("<svg") + 4);
+std::string section_of_picture(const std::string& title, const std::string& svg_file, const std::string& explained) {
+  return section(title, "<svg role=\"img\" aria-label=\"" + html_escaped(title + ". " + explained) +
+                            "\" style=\"max-width:100%;height:auto\"" + svg_file.substr(svg_file.find("<svg") + 4) +
+                            "<p class=\"sub\">" + html_escaped(explained) + "</p>\n");
 }
 
 std::string html_of(const StagePage& of) {
   const std::string head =
       "<h1>" + html_escaped(of.title) + "</h1><p class=\"sub\">mbtfm " + std::string(kVersion) + "</p>\n";
   std::string body = section("In short", list_of(of.facts, of.findings));
-  body += section(of.picture_title, picture_in_page(of.picture_svg, of.picture_title + ". " + of.picture_explained) +
-                                        "<p class=\"sub\">" + html_escaped(of.picture_explained) + "</p>\n");
+  body += section_of_picture(of.picture_title, of.picture_svg, of.picture_explained);
   for (const Listing& listing : of.tables) body += section_of(listing);
   std::vector<std::pair<std::string, std::string>> pairs;
   for (const auto& [name, value] : of.figures) pairs.emplace_back(name, text_of_figure(value));

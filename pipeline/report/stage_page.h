@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/figures.h"
 #include "pipeline/contract/findings.h"
+#include "pipeline/contract/path.h"
 
 namespace mbtfm::report {
 
@@ -18,8 +19,14 @@ struct Listing {
 
 /// A section with the table.
 std::string section_of(const Listing& listing);
-/// A drawing of the program's own as a picture with a name, no wider than the page.
-std::string picture_in_page(const std::string& svg_file, const std::string& name);
+/// A section with a drawing of the program's own, no wider than the page.
+std::string section_of_picture(const std::string& title, const std::string& svg_file, const std::string& explained);
+
+/// Those of the fit of a cell or colony as a contracting sheet. @param of  put before the names of the downloads
+std::vector<Listing> tables_of_sheet(const Path& estimates, const Path& models, const std::string& of = {});
+
+/// What one program found: these sentences, its open findings with their remedies or a tick, its notes.
+std::string list_of(const std::vector<std::string>& facts, const std::vector<Finding>& findings);
 
 struct StagePage {
   std::string title = {};

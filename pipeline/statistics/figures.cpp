@@ -7,7 +7,6 @@
 #include <set>
 
 #include "pipeline/contract/counted.h"
-#include "pipeline/report/tension_plot.h"
 #include "pipeline/statistics/drawing.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -35,7 +34,7 @@ double place_of(const Sample& sample, int condition, int kind) {
 }
 
 std::string colour_of(const Sample& sample, int condition, int kind) {
-  return sample.n_conditions() == 1 ? report::colour_of(kFibreTypes[kind]) : condition_colour(condition);
+  return sample.n_conditions() == 1 ? charts::colour_of(kFibreTypes[kind]) : condition_colour(condition);
 }
 
 /// The kinds side by side.

@@ -5,9 +5,7 @@
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/version.h"
-#include "pipeline/files/base64.h"
 #include "pipeline/files/own_files.h"
-#include "pipeline/files/text.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/statistics/analysis.h"
@@ -23,10 +21,19 @@ using report::Table;
 
 std::string p_cell(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : readable(p); }
 
-std::string number_text(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
+std::string number_text(const std::optional<double>& value) { return report::rounded(value, {}); }
 
 std::string interval_text(const std::optional<Interval>& interval) {
   return interval ? readable(interval->low) + " to " + readable(interval->high) : "–";
+}
+
+/// Between what names the summary and its scatter: mean and 95 % of the mixed model, plain mean and its 95 %.
+void add_row(Table& table, std::vector<std::string> row, const Summary& s, const std::vector<std::string>& scatter) {
+  const auto interval = s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt;
+  row.insert(row.end(), {s.model ? readable(s.model->estimate) : "–", interval_text(interval), readable(s.plain.mean),
+                         interval_text(s.mean_interval)});
+  row.insert(row.end(), scatter.begin(), scatter.end());
+  table.rows.push_back(std::move(row));
 }
 
 bool has_conditions(const Study& study) { return study.conditions.size() > 1 || !study.conditions.front().empty(); }
@@ -52,19 +59,15 @@ void without_column(Table& table, std::ptrdiff_t column) {
 }
 
 Table types_table(const Study& study, const Analysis& analysis) {
-  Table table{{"condition", "type", number("cells"), number("fibres"), number("mean, mixed model (nN)"), number("95 %"),
+  Table table{"Tension by fibre type",
+              {"condition", "type", number("cells"), number("fibres"), number("mean, mixed model (nN)"), number("95 %"),
                number("plain mean (nN)"), number("95 %, cells resampled"), number("median (nN)"), number("SD (nN)"),
-               number("SD without error (nN)")},
-              {},
-              "Tension by fibre type"};
+               number("SD without error (nN)")}};
   for (const Summary& s : analysis.tensions.summaries) {
-    table.rows.push_back(
-        {html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n),
-         s.model ? readable(s.model->estimate) : "–",
-         interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
-         readable(s.plain.mean), interval_text(s.mean_interval), readable(s.plain.median),
-         number_text(s.plain.standard_deviation),
-         number_text(s.without_error ? std::optional(s.without_error->standard_deviation) : std::nullopt)});
+    add_row(table, {html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n)},
+            s,
+            {readable(s.plain.median), number_text(s.plain.standard_deviation),
+             s.without_error ? readable(s.without_error->standard_deviation) : "–"});
   }
   if (!has_conditions(study)) without_column(table, 0);
   return table;
@@ -80,18 +83,18 @@ std::string figure_name(const Sample& sample) {
 /// @param cells  what they are called
 Table figures_table(const Study& study, const std::vector<Measure>& measures, const std::string& title,
                     const std::string& cells) {
-  Table table{{"figure", "condition", "of", number(cells), number("mean, mixed model"), number("95 %"),
-               number("plain mean"), number("95 %, " + cells + " resampled"), number("SD"), number("SD without error")},
-              {},
-              title};
+  Table table{
+      title,
+      {"figure", "condition", "of", number(cells), number("mean, mixed model"), number("95 %"), number("plain mean"),
+       number("95 %, " + cells + " resampled"), number("SD"), number("SD without error")}};
   for (const Measure& m : measures) {
     for (const Summary& s : m.summaries) {
-      table.rows.push_back(
-          {html_escaped(figure_name(m.sample)), html_escaped(s.condition), html_escaped(s.kind),
-           std::to_string(s.n_cells), s.model ? readable(s.model->estimate) : "–",
-           interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
-           readable(s.plain.mean), interval_text(s.mean_interval), number_text(s.plain.standard_deviation),
-           s.typical_error && s.without_error ? readable(s.without_error->standard_deviation) : "–"});
+      add_row(table,
+              {html_escaped(figure_name(m.sample)), html_escaped(s.condition), html_escaped(s.kind),
+               std::to_string(s.n_cells)},
+              s,
+              {number_text(s.plain.standard_deviation),
+               s.typical_error && s.without_error ? readable(s.without_error->standard_deviation) : "–"});
     }
   }
   const auto has_parts = [](const Measure& m) { return m.sample.n_kinds() > 1; };
@@ -101,10 +104,9 @@ Table figures_table(const Study& study, const std::vector<Measure>& measures, co
 }
 
 Table tests_table(const Measure& m) {
-  Table table{{"within", "test", "unit", "groups", "observations", "cells", number("statistic"), number("d.f."),
-               number("p"), number("p (Holm)"), number("effect"), "95 %", "effect is"},
-              {},
-              "Tests of the " + m.sample.name};
+  Table table{"Tests of the " + m.sample.name,
+              {"within", "test", "unit", "groups", "observations", "cells", number("statistic"), number("d.f."),
+               number("p"), number("p (Holm)"), number("effect"), "95 %", "effect is"}};
   for (const Comparison& t : m.comparisons) {
     const bool is_pair = !t.group_b.empty();
     table.rows.push_back({html_escaped(t.within), name_of(t.test), name_of(t.unit),
@@ -122,10 +124,9 @@ std::string enters_text(const StudyCell& c) { return c.fit.converged ? "yes" : "
 
 Table cells_table(const Study& study) {
   Table table{
+      "Cells with fibres",
       {"cell", "condition", number("fibres"), number("adhesions"), number("total force (nN)"), number("of fibres (nN)"),
-       number("of network (nN)"), number("relative L2"), number("expected"), "enters"},
-      {},
-      "Cells with fibres"};
+       number("of network (nN)"), number("relative L2"), number("expected"), "enters"}};
   for (const StudyCell& c : study.cells) {
     if (c.kind() != CellKind::plane) continue;
     table.rows.push_back({html_escaped(c.name), html_escaped(condition_of(study, c)),
@@ -154,11 +155,10 @@ std::string estimates_text(const StudyCell& c, SheetQuantity quantity) {
 }
 
 Table sheets_table(const Study& study) {
-  Table table{{"sheet", "condition", number("contraction (nN/µm)"), number("stiffness (nN/µm)"),
+  Table table{"Sheets",
+              {"sheet", "condition", number("contraction (nN/µm)"), number("stiffness (nN/µm)"),
                number("mean tension (nN/µm)"), number("total force (nN)"), number("strain energy (fJ)"),
-               number("area (µm²)"), number("relative L2"), number("expected"), "enters"},
-              {},
-              "Sheets"};
+               number("area (µm²)"), number("relative L2"), number("expected"), "enters"}};
   for (const StudyCell& c : study.cells) {
     if (!c.sheet) continue;
     table.rows.push_back({html_escaped(c.name), html_escaped(condition_of(study, c)),
@@ -171,26 +171,20 @@ Table sheets_table(const Study& study) {
   return table;
 }
 
-std::string with_error(double value, const std::optional<double>& sigma) {
-  if (!sigma || !(*sigma > 0)) return readable(value);
-  const int decimals = report::decimals_for(*sigma);
-  return report::rounded(value, decimals) + " ± " + report::rounded(*sigma, decimals);
-}
-
 Table cells_in_space_table(const Study& study) {
-  Table table{{"cell", "condition", "method", number("total force (nN)"), number("strain energy (fJ)"),
+  Table table{"Cells in space",
+              {"cell", "condition", "method", number("total force (nN)"), number("strain energy (fJ)"),
                number("contractile moment (nN µm)"), number("normal share"), number("largest traction (kPa)"),
                number("net force (nN)"), number("net moment (nN µm)"), number("resolution (µm)"), number("adhesions"),
-               number("relative L2"), "enters"},
-              {},
-              "Cells in space"};
+               number("relative L2"), "enters"}};
   for (const StudyCell& c : study.cells) {
     if (!c.space) continue;
     const SpaceFigures& s = *c.space;
     table.rows.push_back(
         {html_escaped(c.name), html_escaped(condition_of(study, c)), html_escaped(s.method),
-         with_error(s.total_force_nN, s.total_force_sigma_nN), readable(s.strain_energy_fJ),
-         s.contractile_moment_nN_um ? with_error(*s.contractile_moment_nN_um, s.contractile_moment_sigma_nN_um) : "–",
+         report::with_error(s.total_force_nN, s.total_force_sigma_nN), readable(s.strain_energy_fJ),
+         s.contractile_moment_nN_um ? report::with_error(*s.contractile_moment_nN_um, s.contractile_moment_sigma_nN_um)
+                                    : "–",
          readable(s.normal_share()), readable(s.largest_traction_kPa), readable(s.net_force_nN),
          readable(s.net_moment_nN_um), number_text(s.resolution_um),
          s.adhesions.empty() ? "–" : std::to_string(s.adhesions.size()), readable(c.fit.relative_l2), enters_text(c)});
@@ -199,7 +193,7 @@ Table cells_in_space_table(const Study& study) {
 }
 
 Table left_out_table(const Study& study) {
-  Table table{{"cell", "condition", "why"}, {}, "Left out"};
+  Table table{"Left out", {"cell", "condition", "why"}};
   for (const LeftOutCell& c : study.left_out)
     table.rows.push_back({html_escaped(c.name), html_escaped(c.condition), html_escaped(c.reason)});
   return table;
@@ -215,7 +209,7 @@ std::string first_of(const std::vector<std::string>& names) {
 
 /// Open findings, each with the cells that have it.
 Table findings_table(const Study& study) {
-  Table table{{"finding", "severity", number("cells"), "of them", "what to do"}, {}, "Open findings"};
+  Table table{"Open findings", {"finding", "severity", number("cells"), "of them", "what to do"}};
   std::map<std::string, std::pair<const Finding*, std::vector<std::string>>> by_id;
   for (const StudyCell& c : study.cells) {
     for (const Finding& f : c.findings) {
@@ -258,11 +252,10 @@ std::string gallery(const Study& study, const Path& page_folder) {
                                          : c.space ? "in space, "
                                                    : "",
                                          readable(force_nN));
-    html += fmt::format("<a href=\"{}\">{}<span>{}{}</span></a>\n", html_escaped(link),
-                        files::is_own_file(picture) ? fmt::format("<img alt=\"\" src=\"data:image/jpeg;base64,{}\">",
-                                                                  files::base64(files::read_text(picture)))
-                                                    : "",
-                        html_escaped(text), has_open(c.findings) ? " <b>!</b>" : "");
+    html += fmt::format(
+        "<a href=\"{}\">{}<span>{}{}</span></a>\n", html_escaped(link),
+        files::is_own_file(picture) ? "<img alt=\"\" src=\"" + report::data_address(picture, "image/jpeg") + "\">" : "",
+        html_escaped(text), has_open(c.findings) ? " <b>!</b>" : "");
   }
   return html +
          "</div>\n<p class=\"sub\">Total force of each cell; a click opens its page. <b>!</b>: findings are open. To "

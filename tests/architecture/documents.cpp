@@ -11,7 +11,7 @@
 #include "mbtfm/tensions/tables.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/findings.h"
-#include "pipeline/cost/study_report.h"
+#include "pipeline/cost/study.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/runner/batch_table.h"

@@ -9,8 +9,8 @@
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
-#include "pipeline/report/space_map.h"
-#include "pipeline/report/space_report.h"
+#include "pipeline/report/report.h"
+#include "pipeline/report/space_results.h"
 #include "segment/images/image.h"
 #include "tests/support/program.h"
 #include "tests/support/test.h"
@@ -280,7 +280,7 @@ TEST_F(Stacks, a_folder_of_stacks_is_run_to_its_report_and_only_once) {
     const std::string key = "\"lambda_by\": \"risk\"";
     files::write_text(folder / "4_traction/traction.json",
                       std::string(figures).replace(figures.find(key), key.size(), std::string("\"lambda_by\": ") + by));
-    return report::report_in_space(folder);
+    return report::report_html(folder);
   };
   const std::string by_evidence = told("\"evidence\"");
   EXPECT_NE(by_evidence.find("(criterion: evidence)"), std::string::npos);

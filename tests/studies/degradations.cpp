@@ -23,7 +23,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json_record.h"
-#include "pipeline/report/match_fibres.h"
+#include "pipeline/report/compare.h"
 #include "segment/cells/cell_rois.h"
 #include "segment/images/image.h"
 #include "segment/images/png.h"

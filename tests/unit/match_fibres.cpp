@@ -1,4 +1,4 @@
-#include "pipeline/report/match_fibres.h"
+#include "pipeline/report/compare.h"
 
 #include <gtest/gtest.h>
 

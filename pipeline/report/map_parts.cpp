@@ -1,4 +1,4 @@
-#include "pipeline/report/arrows.h"
+#include "pipeline/report/map_parts.h"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "pipeline/charts/colour_map.h"
 #include "pipeline/numerics/order_statistics.h"
-#include "pipeline/report/colours.h"
 
 namespace mbtfm::report {
 namespace {
@@ -19,32 +19,65 @@ constexpr double kMembers = 9;
 // Squares cut by the map's rim hold fewer; the mean of two would show their noise.
 constexpr std::size_t kFewest = 3;
 
-bool is_inside(const Box& box, Vec2 p) {
-  return p.x >= box.low.x && p.x <= box.high.x && p.y >= box.low.y && p.y <= box.high.y;
+bool is_inside(const Extent& box, Vec2 p) {
+  return p.x >= box.low_um.x && p.x <= box.high_um.x && p.y >= box.low_um.y && p.y <= box.high_um.y;
 }
 
 }  // namespace
 
-double averaging_side_um(const VectorField& field, const Box& box) {
-  const Vec2 size = box.high - box.low;
+charts::Chart empty_map(const Extent& box, const std::string& title) {
+  charts::Chart map(title, {"x (µm)", box.low_um.x, box.high_um.x}, {"y (µm)", box.high_um.y, box.low_um.y});
+  map.same_scales();
+  return map;
+}
+
+std::string ColourScale::colour(double value) const {
+  return charts::hex(charts::colour_at(charts::ColourMap::plasma, high > low ? (value - low) / (high - low) : 0));
+}
+
+double round_end(double value) {
+  if (!(value > 0)) return 0;
+  const std::vector<double> list = charts::ticks(0, value);
+  return list.back() >= value ? value : list.back() + list[1];
+}
+
+std::string colour_bar(const ColourScale& scale) {
+  if (!(scale.high > scale.low)) return {};
+  std::string stops, numbers;
+  for (const double share : charts::stops_of(charts::ColourMap::plasma))
+    stops += "," + scale.colour(scale.low + share * (scale.high - scale.low));
+  for (const double tick : charts::ticks(scale.low, scale.high)) {
+    numbers += fmt::format("<span style=\"left:{:.1f}%\">{}</span>",
+                           100 * (tick - scale.low) / (scale.high - scale.low), charts::readable(tick));
+  }
+  return fmt::format(
+      "<span class=\"bar\"><span class=\"ink\"><i style=\"background:linear-gradient(90deg{})\"></i>{}</span>{}</span>",
+      stops, numbers, charts::html_escaped(scale.label));
+}
+
+std::string legend(const std::string& items) {
+  return items.empty() ? items : "<div class=\"legend\">" + items + "</div>\n";
+}
+
+double averaging_side_um(const VectorField& field, const Extent& box) {
+  const Vec2 size = box.high_um - box.low_um;
   const auto n_inside = std::ranges::count_if(field.positions_um, [&](Vec2 p) { return is_inside(box, p); });
-  const double area_um2 = size.x * size.y;
-  const double needed_um = n_inside > 0 ? std::sqrt(kMembers * area_um2 / static_cast<double>(n_inside)) : size.x;
+  const double needed_um = n_inside > 0 ? std::sqrt(kMembers * box.area_um2() / static_cast<double>(n_inside)) : size.x;
   // a whole number of squares across
   return size.x / std::clamp(std::floor(size.x / needed_um), 1.0, kArrowsAcross);
 }
 
-AveragedField averaged(const VectorField& field, const Box& box, double side_um) {
+AveragedField averaged(const VectorField& field, const Extent& box, double side_um) {
   std::map<std::pair<int, int>, std::vector<std::size_t>> squares;
   std::size_t n_inside = 0;
   for (std::size_t i = 0; i < field.positions_um.size(); ++i) {
     const Vec2 p = field.positions_um[i];
     if (!is_inside(box, p)) continue;
     ++n_inside;
-    squares[{static_cast<int>((p.y - box.low.y) / side_um), static_cast<int>((p.x - box.low.x) / side_um)}].push_back(
-        i);
+    squares[{static_cast<int>((p.y - box.low_um.y) / side_um), static_cast<int>((p.x - box.low_um.x) / side_um)}]
+        .push_back(i);
   }
-  AveragedField result{.side_um = side_um, .mean_members = 0};
+  AveragedField result;
   for (const auto& [place, members] : squares) {
     if (members.size() < kFewest) continue;
     Vec2 position, vector;

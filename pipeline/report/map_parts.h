@@ -1,17 +1,31 @@
-/// Fields of arrows on the report's maps.
+/// What the report's maps share: frames, colours that stand for numbers, fields of arrows.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/extent.h"
 
 namespace mbtfm::report {
 
-/// A part of the plane.
-struct Box {
-  Vec2 low, high;
+/// x to the right, y down, both in um.
+charts::Chart empty_map(const Extent& box, const std::string& title);
+
+/// A map from numbers to colours that differ in lightness, so that colour-blind eyes and grey printers tell them apart.
+struct ColourScale {
+  double low = 0, high = 1;
+  std::string label;  ///< with the unit
+  std::string colour(double value) const;
 };
+
+/// End of a colour bar from zero that shows `value`: the next of the bar's ticks. 0 where nothing is positive.
+double round_end(double value);
+
+/// The scale as HTML; nothing where it has no width.
+std::string colour_bar(const ColourScale& scale);
+/// What goes below a chart to explain it, as HTML.
+std::string legend(const std::string& items);
 
 /// Vectors at points, to be drawn as arrows.
 struct VectorField {
@@ -21,15 +35,14 @@ struct VectorField {
 /// Means over square cells that hold at least three points.
 struct AveragedField {
   VectorField means = {};
-  double side_um = 0;       ///< of the squares
   double mean_members = 0;  ///< points a square
 };
 
 /// Side of the squares over which to average: as small as arrows can be told apart, larger where they would hold too
 /// few points for noise to fade.
-double averaging_side_um(const VectorField& field, const Box& box);
+double averaging_side_um(const VectorField& field, const Extent& box);
 
-AveragedField averaged(const VectorField& field, const Box& box, double side_um);
+AveragedField averaged(const VectorField& field, const Extent& box, double side_um);
 
 /// How long an arrow is; shared by maps that are to be compared.
 struct ArrowScale {
