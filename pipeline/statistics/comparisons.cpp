@@ -1,9 +1,9 @@
-#include "pipeline/statistics/comparisons.h"
-
+/// Tests between kinds (fibre types; connected adhesions or not) and between conditions.
 #include <algorithm>
 #include <map>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/rank_tests.h"
 
 namespace mbtfm::statistics {
@@ -53,125 +53,116 @@ Group all_of(const std::vector<Group>& groups) {
   return all;
 }
 
-/// Kruskal–Wallis, Mann–Whitney.
-void add_rank_tests(const Sample& sample, const Family& family, Unit unit, std::vector<Comparison>& list) {
-  std::vector<std::vector<double>> values;
-  for (const Group& g : family.groups) values.push_back(values_of(g.values));
-  if (family.groups.size() > 2) {
-    Comparison all = blank(sample, family, Test::kruskal_wallis, unit, all_of(family.groups), nullptr);
-    const TestResult h = kruskal_wallis(values);
-    all.statistic = h.statistic;
-    all.degrees = static_cast<double>(values.size()) - 1;
-    all.p_value = h.p_value;
-    all.effect = h.statistic / (all.n_a - 1);
-    all.effect_name = "epsilon squared";
-    list.push_back(std::move(all));
-  }
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    for (std::size_t k = i + 1; k < values.size(); ++k) {
-      Comparison pair = blank(sample, family, Test::mann_whitney, unit, family.groups[i], &family.groups[k]);
-      const TestResult u = mann_whitney(values[i], values[k]);
-      pair.statistic = u.statistic;
-      pair.p_value = u.p_value;
-      pair.effect = 2 * u.statistic / (static_cast<double>(pair.n_a) * pair.n_b) - 1;
-      pair.effect_name = "rank-biserial correlation";
-      list.push_back(std::move(pair));
-    }
-  }
-}
-
-TestResult clustered_test(const std::vector<const Group*>& groups) {
-  std::vector<ClusteredValue> values;
-  for (std::size_t g = 0; g < groups.size(); ++g)
-    for (const Observation& o : groups[g]->values)
-      values.push_back({.value = o.value, .group = static_cast<int>(g), .cell = o.cell});
-  return clustered_rank_test(values);
-}
-
-/// Datta & Satten's.
-void add_clustered_tests(const Sample& sample, const Family& family, std::vector<Comparison>& list) {
-  const auto add = [&](Comparison c, const std::vector<const Group*>& groups) {
-    const TestResult f = clustered_test(groups);
-    c.statistic = f.statistic;
-    c.p_value = f.p_value;
-    list.push_back(std::move(c));
-  };
-  const Group all = all_of(family.groups);
-  std::vector<const Group*> pointers;
-  for (const Group& g : family.groups) pointers.push_back(&g);
-  if (pointers.size() > 2) {
-    const double cells = n_cells_of(all.values), q = static_cast<double>(pointers.size()) - 1;
-    Comparison c = blank(sample, family, Test::clustered_rank_sum, Unit::cell, all, nullptr);
-    c.degrees = cells - q;
-    add(std::move(c), pointers);
-  }
-  for (std::size_t i = 0; i < pointers.size(); ++i) {
-    for (std::size_t k = i + 1; k < pointers.size(); ++k) {
-      Comparison c = blank(sample, family, Test::clustered_rank_sum, Unit::cell, *pointers[i], pointers[k]);
-      c.degrees = n_cells_of(all_of({*pointers[i], *pointers[k]}).values) - 1;
-      const double n_pairs = static_cast<double>(c.n_a) * c.n_b;
-      c.effect =
-          2 * mann_whitney(values_of(pointers[i]->values), values_of(pointers[k]->values)).statistic / n_pairs - 1;
-      c.effect_name = "rank-biserial correlation";
-      add(std::move(c), {pointers[i], pointers[k]});
-    }
-  }
-}
-
-/// F of all groups, t of each difference.
-void add_model_tests(const Sample& sample, const Family& family, const SampleModel& model,
-                     std::vector<Comparison>& list) {
-  const auto n_groups = static_cast<Eigen::Index>(family.groups.size());
-  const auto difference = [&](Eigen::Index a, Eigen::Index b) {
-    Eigen::VectorXd weights = Eigen::VectorXd::Zero(model.fit.mean.size());
-    const auto index = [&](Eigen::Index g) { return model.index[family.groups[g].index]; };
-    weights[index(a)] += 1;
-    weights[index(b)] -= 1;
-    return weights;
-  };
-  if (n_groups > 2) {
-    Eigen::MatrixXd contrasts(n_groups - 1, model.fit.mean.size());
-    for (Eigen::Index g = 1; g < n_groups; ++g) contrasts.row(g - 1) = difference(g, 0);
-    const FTest f = test_all_zero(model.fit, contrasts);
-    Comparison all = blank(sample, family, Test::mixed_model, Unit::cell, all_of(family.groups), nullptr);
-    all.statistic = f.f;
-    all.degrees = f.denominator_degrees;
-    all.p_value = f.p_value;
-    list.push_back(std::move(all));
-  }
-  for (Eigen::Index i = 0; i < n_groups; ++i) {
-    for (Eigen::Index k = i + 1; k < n_groups; ++k) {
-      Comparison pair = blank(sample, family, Test::mixed_model, Unit::cell, family.groups[i], &family.groups[k]);
-      const Contrast c = contrast_of(model.fit, difference(i, k));
-      pair.statistic = c.t;
-      pair.degrees = c.degrees;
-      pair.p_value = c.p_value;
-      pair.effect = c.estimate;
-      pair.effect_name = "difference of means" + (sample.unit.empty() ? "" : " (" + sample.unit + ")");
-      pair.interval = Interval{c.low, c.high};
-      list.push_back(std::move(pair));
-    }
-  }
-}
-
-/// Run one kind of test and correct its pairs. What cannot be tested (all values equal, too few cells) is left out.
-template <class Add>
-void add_corrected(std::vector<Comparison>& list, Add&& add_tests) {
+/// Run one kind of test, of all groups together if they are three or more and of each pair, and correct the pairs. What
+/// cannot be tested (all values equal, too few cells) is left out.
+/// @param of_all, of_pair  tests of all groups, of two by their places: statistic, p, effect of a comparison
+template <class OfAll, class OfPair>
+void add_tests(std::vector<Comparison>& list, const Sample& sample, const Family& family, std::pair<Test, Test> test,
+               Unit unit, const OfAll& of_all, const OfPair& of_pair) {
+  const std::vector<Group>& groups = family.groups;
   std::vector<Comparison> tests;
+  std::vector<double> p_values;
   try {
-    add_tests(tests);
+    if (groups.size() > 2) {
+      tests.push_back(blank(sample, family, test.first, unit, all_of(groups), nullptr));
+      of_all(tests.back());
+    }
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      for (std::size_t k = i + 1; k < groups.size(); ++k) {
+        tests.push_back(blank(sample, family, test.second, unit, groups[i], &groups[k]));
+        of_pair(tests.back(), i, k);
+        p_values.push_back(tests.back().p_value);
+      }
+    }
   } catch (const InvalidData&) {
     return;
   }
-  std::vector<double> p_values;
-  for (const Comparison& c : tests)
-    if (!c.group_b.empty()) p_values.push_back(c.p_value);
   const std::vector<double> corrected = holm(p_values);
   std::size_t next = 0;
   for (Comparison& c : tests) {
     if (!c.group_b.empty()) c.p_holm = corrected[next++];
     list.push_back(std::move(c));
   }
+}
+
+void take(Comparison& c, const TestResult& result) {
+  c.statistic = result.statistic;
+  c.p_value = result.p_value;
+}
+
+/// @param u  Mann–Whitney's, of the pair
+void take_rank_biserial(Comparison& pair, double u) {
+  pair.effect = 2 * u / (static_cast<double>(pair.n_a) * pair.n_b) - 1;
+  pair.effect_name = "rank-biserial correlation";
+}
+
+/// Kruskal–Wallis, Mann–Whitney.
+void add_rank_tests(const Sample& sample, const Family& family, Unit unit, std::vector<Comparison>& list) {
+  std::vector<std::vector<double>> values;
+  for (const Group& g : family.groups) values.push_back(values_of(g.values));
+  const auto of_all = [&](Comparison& all) {
+    take(all, kruskal_wallis(values));
+    all.degrees = static_cast<double>(values.size()) - 1;
+    all.effect = all.statistic / (all.n_a - 1);
+    all.effect_name = "epsilon squared";
+  };
+  const auto of_pair = [&](Comparison& pair, std::size_t i, std::size_t k) {
+    take(pair, mann_whitney(values[i], values[k]));
+    take_rank_biserial(pair, pair.statistic);
+  };
+  add_tests(list, sample, family, {Test::kruskal_wallis, Test::mann_whitney}, unit, of_all, of_pair);
+}
+
+TestResult clustered_test(const std::vector<Group>& groups) {
+  std::vector<ClusteredValue> values;
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    for (const Observation& o : groups[g].values)
+      values.push_back({.value = o.value, .group = static_cast<int>(g), .cell = o.cell});
+  return clustered_rank_test(values);
+}
+
+/// Datta & Satten's.
+void add_clustered_tests(const Sample& sample, const Family& family, std::vector<Comparison>& list) {
+  const std::vector<Group>& groups = family.groups;
+  const auto of_all = [&](Comparison& all) {
+    all.degrees = static_cast<double>(all.cells_a) - (static_cast<double>(groups.size()) - 1);
+    take(all, clustered_test(groups));
+  };
+  const auto of_pair = [&](Comparison& pair, std::size_t i, std::size_t k) {
+    const std::vector<Group> both = {groups[i], groups[k]};
+    pair.degrees = n_cells_of(all_of(both).values) - 1;
+    take_rank_biserial(pair, mann_whitney(values_of(both[0].values), values_of(both[1].values)).statistic);
+    take(pair, clustered_test(both));
+  };
+  add_tests(list, sample, family, {Test::clustered_rank_sum, Test::clustered_rank_sum}, Unit::cell, of_all, of_pair);
+}
+
+/// F of all groups, t of each difference.
+void add_model_tests(const Sample& sample, const Family& family, const SampleModel& model,
+                     std::vector<Comparison>& list) {
+  const auto difference = [&](std::size_t a, std::size_t b) {
+    Eigen::VectorXd weights = Eigen::VectorXd::Zero(model.fit.mean.size());
+    weights[model.index[family.groups[a].index]] += 1;
+    weights[model.index[family.groups[b].index]] -= 1;
+    return weights;
+  };
+  const auto of_all = [&](Comparison& all) {
+    const auto n = static_cast<Eigen::Index>(family.groups.size());
+    Eigen::MatrixXd contrasts(n - 1, model.fit.mean.size());
+    for (Eigen::Index g = 1; g < n; ++g) contrasts.row(g - 1) = difference(static_cast<std::size_t>(g), 0);
+    const FTest f = test_all_zero(model.fit, contrasts);
+    take(all, {.statistic = f.f, .p_value = f.p_value});
+    all.degrees = f.denominator_degrees;
+  };
+  const auto of_pair = [&](Comparison& pair, std::size_t i, std::size_t k) {
+    const Contrast c = contrast_of(model.fit, difference(i, k));
+    take(pair, {.statistic = c.t, .p_value = c.p_value});
+    pair.degrees = c.degrees;
+    pair.effect = c.estimate;
+    pair.effect_name = "difference of means" + (sample.unit.empty() ? "" : " (" + sample.unit + ")");
+    pair.interval = Interval{c.low, c.high};
+  };
+  add_tests(list, sample, family, {Test::mixed_model, Test::mixed_model}, Unit::cell, of_all, of_pair);
 }
 
 Family with_medians(Family family) {
@@ -205,17 +196,13 @@ std::vector<Comparison> compare(const Sample& sample, const std::optional<Sample
   const bool is_one_a_cell = sample.is_one_a_cell();
   std::vector<Comparison> list;
   for (const Family& family : families_of(sample)) {
-    add_corrected(list, [&](auto& tests) {
-      add_rank_tests(sample, family, is_one_a_cell ? Unit::cell : Unit::observation, tests);
-    });
+    add_rank_tests(sample, family, is_one_a_cell ? Unit::cell : Unit::observation, list);
     if (!is_one_a_cell) {
-      const Family medians = with_medians(family);
-      if (medians.groups.size() > 1)
-        add_corrected(list, [&](auto& tests) { add_rank_tests(sample, medians, Unit::cell_median, tests); });
-      add_corrected(list, [&](auto& tests) { add_clustered_tests(sample, family, tests); });
+      add_rank_tests(sample, with_medians(family), Unit::cell_median, list);
+      add_clustered_tests(sample, family, list);
     }
     const bool has_cells = std::ranges::all_of(family.groups, [](const Group& g) { return n_cells_of(g.values) > 1; });
-    if (model && has_cells) add_corrected(list, [&](auto& tests) { add_model_tests(sample, family, *model, tests); });
+    if (model && has_cells) add_model_tests(sample, family, *model, list);
   }
   return list;
 }

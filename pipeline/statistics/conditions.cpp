@@ -1,5 +1,4 @@
-#include "pipeline/statistics/conditions.h"
-
+/// What a user says of the cells of a study: their condition, and which must not enter.
 #include <algorithm>
 #include <map>
 #include <set>
@@ -9,6 +8,7 @@
 #include "pipeline/files/foreign_table.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/text.h"
+#include "pipeline/statistics/study.h"
 
 namespace mbtfm::statistics {
 namespace {

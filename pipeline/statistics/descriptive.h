@@ -1,7 +1,11 @@
-/// Figures that describe a sample, and what a line or a share says with its error.
+/// Figures that describe a sample, what a line or a share says with its error, and intervals that take the cell for the
+/// unit: whole cells are resampled, with all that was measured in them.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace mbtfm::statistics {
@@ -65,5 +69,46 @@ Deconvolved deconvolved_moments(const std::vector<double>& values, const std::ve
 /// @param values  not negative
 double deconvolved_fraction_above(const std::vector<double>& values, const std::vector<double>& error_variances,
                                   double threshold);
+
+/// How often each cell is drawn.
+using CellWeights = std::vector<double>;
+
+/// Draws of as many cells as there are, with replacement, within each stratum: conditions keep their numbers of cells.
+/// The same for the same seed on any machine.
+std::vector<CellWeights> draw_cells(const std::vector<int>& stratum_of_cell, int n_draws, std::uint64_t seed);
+
+/// 95 % interval of a statistic from its values at the draws, at the percentiles that make up for few cells:
+/// Phi(t √(n/(n−1))) with t of n − 1 degrees instead of 2.5 %. A resample of the means of fibres as well would count
+/// their scatter twice, which the cells' means carry already.
+/// Source: Hesterberg, Am. Stat. 69, 371 (2015), "expanded percentile"; Davison & Hinkley, Bootstrap Methods
+/// (1997), 3.8.
+/// @param n_cells  independent cells behind the statistic, 2 at least
+/// @returns none where the statistic is undefined in more than one of twenty draws
+std::optional<Interval> bootstrap_interval(std::vector<std::optional<double>> values, int n_cells);
+/// Interval of Σ a / Σ b over cells: of a mean (b the numbers), of a slope through the origin (x y and x²).
+std::optional<Interval> ratio_interval(const std::map<int, std::pair<double, double>>& by_cell,
+                                       const std::vector<CellWeights>& draws);
+
+/// Values by cell: their mean, with the interval that takes the cell for the unit.
+class CellMean {
+ public:
+  void add(int cell, double value) {
+    sum_ += value;
+    ++n_;
+    by_cell_[cell].first += value;
+    by_cell_[cell].second += 1;
+  }
+  int n() const { return n_; }
+  int n_cells() const { return static_cast<int>(by_cell_.size()); }
+  double mean() const { return sum_ / n_; }
+  std::optional<Interval> interval(const std::vector<CellWeights>& draws) const {
+    return ratio_interval(by_cell_, draws);
+  }
+
+ private:
+  double sum_ = 0;
+  int n_ = 0;
+  std::map<int, std::pair<double, double>> by_cell_;  ///< sum, number
+};
 
 }  // namespace mbtfm::statistics

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <sstream>
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/statistics/drawing.h"
@@ -203,17 +204,6 @@ Figure forces_by_cell(const Study& study) {
           .charts = {chart}};
 }
 
-const std::map<std::string, std::string>& labels() {
-  static const std::map<std::string, std::string> list = {{"total_force_nN", "total force (nN)"},
-                                                          {"fibre_force_nN", "force of the fibres (nN)"},
-                                                          {"network_force_nN", "force of the network (nN)"},
-                                                          {"n_adhesions", "number of adhesions"},
-                                                          {"adhesion_area_um2", "area of all adhesions (µm²)"},
-                                                          {"cell_area_um2", "area of the cell (µm²)"},
-                                                          {"n_fibres", "number of fibres"}};
-  return list;
-}
-
 /// "force (nN)" without what stands in brackets.
 std::string without_unit(const std::string& label) { return label.substr(0, label.find(" (")); }
 
@@ -237,9 +227,10 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
       for (const double x : c->x) x_end = std::max(x_end, x);
       for (const double y : c->y) y_end = std::max(y_end, y);
     }
-    Chart chart(without_unit(labels().at(key.second)) + " by " + without_unit(labels().at(key.first)),
-                Axis{.label = labels().at(key.first), .low = 0, .high = 1.05 * x_end},
-                Axis{.label = labels().at(key.second), .low = 0, .high = end_below_keys(y_end, panels[key].size())});
+    const std::string of_force = panels[key].front()->force_label, of_size = panels[key].front()->size_label;
+    Chart chart(without_unit(of_force) + " by " + without_unit(of_size),
+                Axis{.label = of_size, .low = 0, .high = 1.05 * x_end},
+                Axis{.label = of_force, .low = 0, .high = end_below_keys(y_end, panels[key].size())});
     chart.put_key(Chart::KeySide::left);
     for (const Correlation* c : panels[key]) {
       const std::string colour = condition_colour(index_of(study.conditions, c->condition));
@@ -283,22 +274,16 @@ std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, con
 }
 
 std::string svg_of(const Figure& figure) {
+  const int n_columns = std::min<int>(figure.n_columns, static_cast<int>(figure.charts.size()));
   // a line holds about 50 characters for each column of charts
+  const std::size_t width = 50 * static_cast<std::size_t>(n_columns);
   std::vector<std::string> lines(1);
-  const std::size_t width =
-      50 * static_cast<std::size_t>(std::min<int>(figure.n_columns, static_cast<int>(figure.charts.size())));
-  std::string word;
-  for (const char c : figure.caption + " ") {
-    if (c != ' ') {
-      word += c;
-      continue;
-    }
+  std::istringstream words(figure.caption);
+  for (std::string word; words >> word;) {
     if (!lines.back().empty() && lines.back().size() + word.size() > width) lines.emplace_back();
     lines.back() += (lines.back().empty() ? "" : " ") + word;
-    word.clear();
   }
-  return charts::svg_file(figure.charts, std::min<int>(figure.n_columns, static_cast<int>(figure.charts.size())),
-                          lines);
+  return charts::svg_file(figure.charts, n_columns, lines);
 }
 
 }  // namespace mbtfm::statistics

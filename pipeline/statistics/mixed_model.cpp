@@ -1,9 +1,11 @@
 #include "pipeline/statistics/mixed_model.h"
 
 #include <Eigen/Dense>
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <set>
 
 #include "pipeline/contract/errors.h"
@@ -11,6 +13,8 @@
 
 namespace mbtfm::statistics {
 namespace {
+
+using SparseMatrix = Eigen::SparseMatrix<double>;
 
 /// A variance component: a random effect shared by the observations of a cell (and of one kind), or the scatter of a
 /// kind.
@@ -20,17 +24,16 @@ struct Component {
   int kind = 0;  ///< of a residual
 };
 
-/// Of a cell's block of the covariance of the data, V = D + Z L Zᵀ: which columns of Z its rows have.
+/// Which columns of Z a cell has, those of its kinds. The covariance of the data is V = D + Z L Zᵀ.
 struct Block {
   Index first = 0, size = 0;
-  int n_kinds = 0;                 ///< that it has
-  std::vector<int> kind_column{};  ///< by row
 };
 
 struct Design {
   std::vector<Observation> rows = {};  ///< by cell
-  std::vector<Block> blocks;
-  MatrixXd X;  ///< 1 where the row is of the group
+  std::vector<Block> blocks = {};      ///< by cell
+  MatrixXd X;                          ///< 1 where the row is of the group
+  SparseMatrix of_cell, Z;             ///< 1 where the row is of the cell; where it is of the cell and kind
   VectorXd y = {};
   std::vector<Component> components;
   std::vector<bool> is_scatter_told;  ///< by kind: a group has two observations of it
@@ -61,21 +64,26 @@ void check_scatter(const Design& design) {
   throw InvalidData("the sample", "values that differ within a group, or errors", "neither");
 }
 
-std::vector<Block> blocks_of(const std::vector<Observation>& rows) {
-  std::vector<Block> blocks;
-  std::map<int, int> column_of;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (i == 0 || rows[i].cell != rows[i - 1].cell) {
-      blocks.push_back({.first = static_cast<Index>(i)});
+/// Blocks and their columns.
+void add_blocks(Design& design) {
+  std::vector<Eigen::Triplet<double>> of_cell, of_kind;
+  std::map<int, Index> column_of;  // by kind, of one cell
+  for (Index i = 0; i < static_cast<Index>(design.rows.size()); ++i) {
+    const Observation& o = design.rows[i];
+    if (i == 0 || o.cell != design.rows[i - 1].cell) {
+      design.blocks.push_back({.first = i == 0 ? 0 : design.blocks.back().first + design.blocks.back().size});
       column_of.clear();
     }
-    Block& block = blocks.back();
-    ++block.size;
-    const auto [at, is_new] = column_of.try_emplace(rows[i].kind, static_cast<int>(column_of.size()));
-    block.kind_column.push_back(at->second);
-    block.n_kinds = static_cast<int>(column_of.size());
+    Block& block = design.blocks.back();
+    const auto [at, is_new] = column_of.try_emplace(o.kind, block.first + block.size);
+    if (is_new) ++block.size;
+    of_cell.emplace_back(i, std::ssize(design.blocks) - 1, 1);
+    of_kind.emplace_back(i, at->second, 1);
   }
-  return blocks;
+  design.of_cell.resize(std::ssize(design.rows), std::ssize(design.blocks));
+  design.of_cell.setFromTriplets(of_cell.begin(), of_cell.end());
+  design.Z.resize(std::ssize(design.rows), design.blocks.back().first + design.blocks.back().size);
+  design.Z.setFromTriplets(of_kind.begin(), of_kind.end());
 }
 
 bool has_group_of_two_cells(const std::vector<Observation>& rows) {
@@ -95,14 +103,13 @@ std::vector<bool> scatter_told(const std::vector<Observation>& rows) {
 }
 
 /// The random effects that the design can tell from the scatter and from each other.
-std::vector<Component> components_of(const std::vector<Observation>& rows, const std::vector<Block>& blocks) {
-  const bool has_two_cells = has_group_of_two_cells(rows);
-  const bool has_two_in_a_cell = std::ranges::any_of(blocks, [](const Block& b) { return b.size > 1; });
-  const bool has_two_kinds = std::ranges::any_of(blocks, [](const Block& b) { return b.n_kinds > 1; });
-  const bool has_two_of_a_kind = std::ranges::any_of(blocks, [](const Block& b) { return b.size > b.n_kinds; });
+std::vector<Component> components_of(const Design& design) {
+  const std::vector<Observation>& rows = design.rows;
+  const Index n = design.Z.rows(), n_of_kind = design.Z.cols(), n_cells = design.of_cell.cols();
   std::vector<Component> components;
-  if (has_two_cells && has_two_in_a_cell) components.push_back({.term = Term::cell});
-  if (has_two_cells && has_two_kinds && has_two_of_a_kind) components.push_back({.term = Term::cell_kind});
+  if (has_group_of_two_cells(rows) && n > n_cells) components.push_back({.term = Term::cell});
+  if (has_group_of_two_cells(rows) && n_of_kind > n_cells && n > n_of_kind)
+    components.push_back({.term = Term::cell_kind});
   std::set<int> kinds;
   for (const Observation& o : rows) kinds.insert(o.kind);
   for (const int kind : kinds) components.push_back({.term = Term::residual, .kind = kind});
@@ -114,8 +121,8 @@ Design design_of(std::vector<Observation> observations) {
   Design design;
   design.rows = std::move(observations);
   std::ranges::stable_sort(design.rows, [](const Observation& a, const Observation& b) { return a.cell < b.cell; });
-  design.blocks = blocks_of(design.rows);
-  design.components = components_of(design.rows, design.blocks);
+  add_blocks(design);
+  design.components = components_of(design);
   design.is_scatter_told = scatter_told(design.rows);
   const Index n = static_cast<Index>(design.rows.size());
   int n_groups = 0;
@@ -158,82 +165,63 @@ class Covariance {
       weight_[i] = 1 / (residual[o.kind] + o.error_variance);
       log_determinant_ -= std::log(weight_[i]);
     }
-    for (const Block& block : design.blocks) {
-      VectorXd A = VectorXd::Zero(block.n_kinds);
-      for (Index i = 0; i < block.size; ++i) A[column(block, i)] += weight_[block.first + i];
-      MatrixXd of_means = MatrixXd::Constant(block.n_kinds, block.n_kinds, of_cell);
-      of_means.diagonal() += A.cwiseInverse() + VectorXd::Constant(block.n_kinds, of_cell_kind);
+    const VectorXd A = design.Z.transpose() * weight_;
+    share_ = weight_.cwiseQuotient(design.Z * A);
+    for (const auto& [first, size] : design.blocks) {
+      const VectorXd own = A.segment(first, size);
+      MatrixXd of_means = MatrixXd::Constant(size, size, of_cell);
+      of_means.diagonal() += own.cwiseInverse() + VectorXd::Constant(size, of_cell_kind);
       const Eigen::LLT<MatrixXd> llt(of_means);
-      log_determinant_ += A.array().log().sum() + 2 * llt.matrixLLT().diagonal().array().log().sum();
-      M_.push_back(llt.solve(MatrixXd::Identity(block.n_kinds, block.n_kinds)));
-      A_.push_back(std::move(A));
+      log_determinant_ += own.array().log().sum() + 2 * llt.matrixLLT().diagonal().array().log().sum();
+      M_.push_back(llt.solve(MatrixXd::Identity(size, size)));
     }
   }
   double log_determinant() const { return log_determinant_; }
 
   MatrixXd solve(const MatrixXd& m) const {
-    MatrixXd result(m.rows(), m.cols());
-    for (std::size_t b = 0; b < design_->blocks.size(); ++b) {
-      const Block& block = design_->blocks[b];
-      MatrixXd means = MatrixXd::Zero(block.n_kinds, m.cols());
-      for (Index i = 0; i < block.size; ++i) means.row(column(block, i)) += share(b, i) * m.row(block.first + i);
-      const MatrixXd solved = M_[b] * means;
-      for (Index i = 0; i < block.size; ++i) {
-        const Index row = block.first + i, k = column(block, i);
-        result.row(row) = weight_[row] * (m.row(row) - means.row(k)) + share(b, i) * solved.row(k);
-      }
+    const MatrixXd means = design_->Z.transpose() * MatrixXd(share_.asDiagonal() * m);
+    MatrixXd solved(means.rows(), means.cols());
+    for (std::size_t b = 0; b < M_.size(); ++b) {
+      const auto& [first, size] = design_->blocks[b];
+      solved.middleRows(first, size) = M_[b] * means.middleRows(first, size);
     }
-    return result;
+    return weight_.asDiagonal() * (m - design_->Z * means) + share_.asDiagonal() * (design_->Z * solved);
   }
 
   /// tr(V⁻¹ V_k), V_k the derivative of V by the component's variance.
   double trace(const Component& component) const {
     double sum = 0;
-    for (std::size_t b = 0; b < design_->blocks.size(); ++b) {
-      const Block& block = design_->blocks[b];
+    VectorXd diagonal(design_->Z.cols());  // of M
+    for (std::size_t b = 0; b < M_.size(); ++b) {
       if (component.term == Term::cell) sum += M_[b].sum();
       if (component.term == Term::cell_kind) sum += M_[b].trace();
-      for (Index i = 0; i < block.size && component.term == Term::residual; ++i) {
-        const Index row = block.first + i, k = column(block, i);
-        if (design_->rows[row].kind != component.kind) continue;
-        sum += weight_[row] * (1 - share(b, i)) + share(b, i) * share(b, i) * M_[b](k, k);
-      }
+      diagonal.segment(design_->blocks[b].first, design_->blocks[b].size) = M_[b].diagonal();
     }
+    if (component.term != Term::residual) return sum;
+    const VectorXd by_row = design_->Z * diagonal;
+    for (Index i = 0; i < by_row.size(); ++i)
+      if (design_->rows[i].kind == component.kind)
+        sum += weight_[i] * (1 - share_[i]) + share_[i] * share_[i] * by_row[i];
     return sum;
   }
 
  private:
-  static Index column(const Block& block, Index i) { return block.kind_column[i]; }
-  /// Of a row in the mean of its cell and kind.
-  double share(std::size_t b, Index i) const {
-    const Block& block = design_->blocks[b];
-    return weight_[block.first + i] / A_[b][column(block, i)];
-  }
-
   const Design* design_;
   VectorXd weight_;          ///< D⁻¹
-  std::vector<VectorXd> A_;  ///< by block
+  VectorXd share_;           ///< of a row in the mean of its cell and kind
   std::vector<MatrixXd> M_;  ///< by block
   double log_determinant_ = 0;
 };
 
 /// V_k m.
 MatrixXd derivative_times(const Design& design, const Component& component, const MatrixXd& m) {
-  MatrixXd result = MatrixXd::Zero(m.rows(), m.cols());
-  for (const Block& block : design.blocks) {
-    MatrixXd sums = MatrixXd::Zero(std::max(1, block.n_kinds), m.cols());
-    const auto column = [&](Index i) { return component.term == Term::cell ? 0 : block.kind_column[i]; };
-    for (Index i = 0; i < block.size; ++i) {
-      const Index row = block.first + i;
-      if (component.term != Term::residual)
-        sums.row(column(i)) += m.row(row);
-      else if (design.rows[row].kind == component.kind)
-        result.row(row) = m.row(row);
-    }
-    if (component.term == Term::residual) continue;
-    for (Index i = 0; i < block.size; ++i) result.row(block.first + i) = sums.row(column(i));
+  if (component.term == Term::residual) {
+    VectorXd is_of_kind(m.rows());
+    for (Index i = 0; i < m.rows(); ++i) is_of_kind[i] = design.rows[i].kind == component.kind ? 1 : 0;
+    return is_of_kind.asDiagonal() * m;
   }
-  return result;
+  const SparseMatrix& of = component.term == Term::cell ? design.of_cell : design.Z;
+  return of * MatrixXd(of.transpose() * m);
 }
 
 /// The likelihood at given variances, with all that its derivatives need.
@@ -259,7 +247,7 @@ State state_at(const Design& design, const VectorXd& v) {
   const double log_det_information = 2 * llt.matrixLLT().diagonal().array().log().sum();
   const double n = static_cast<double>(design.y.size() - p);
   s.log_likelihood = -0.5 * (s.inverse.log_determinant() + log_det_information + residual.dot(s.r) +
-                             n * std::log(2 * 3.14159265358979323846));
+                             n * std::log(2 * std::numbers::pi));
   return s;
 }
 
@@ -328,10 +316,10 @@ VectorXd uphill_step(const Design& design, const State& s, const Derivatives& d)
   VectorXd step(d.gradient.size());
   for (Index k = 0; k < step.size(); ++k) {
     const Component& c = design.components[k];
-    double n_levels = 0;
-    for (const Block& b : design.blocks)
-      n_levels += c.term == Term::cell ? 1 : c.term == Term::cell_kind ? b.n_kinds : static_cast<double>(b.size);
-    step[k] = 2 * std::pow(s.v[k] + error, 2) * d.gradient[k] / n_levels;
+    const Index n_levels = c.term == Term::cell        ? design.of_cell.cols()
+                           : c.term == Term::cell_kind ? design.Z.cols()
+                                                       : design.Z.rows();
+    step[k] = 2 * std::pow(s.v[k] + error, 2) * d.gradient[k] / static_cast<double>(n_levels);
   }
   return step;
 }

@@ -8,8 +8,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <memory>
 
@@ -121,15 +119,12 @@ std::string compressed(const Pixels& pixels, const Pixels* before, const Path& f
   image.height = pixels.height;
   image.format = before ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
   image.flags = PNG_IMAGE_FLAG_FAST;
-  char* bytes = nullptr;
-  std::size_t n_bytes = 0;
-  std::FILE* const memory = open_memstream(&bytes, &n_bytes);
-  const bool is_written =
-      memory && png_image_write_to_stdio(&image, memory, 0, bytes_of(pixels, before).data(), 0, nullptr);
-  if (memory) std::fclose(memory);
-  const std::unique_ptr<char, decltype(&std::free)> owner(bytes, std::free);
-  if (!is_written) throw OutputError("cannot write " + file.string() + ": " + image.message);
-  return {bytes, n_bytes};
+  png_alloc_size_t n_bytes = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::string png(n_bytes, '\0');
+  if (!png_image_write_to_memory(&image, png.data(), &n_bytes, 0, bytes_of(pixels, before).data(), 0, nullptr))
+    throw OutputError("cannot write " + file.string() + ": " + image.message);
+  png.resize(n_bytes);
+  return png;
 }
 
 constexpr std::size_t kHeader = 8 + 25;  // the signature and the first chunk, IHDR

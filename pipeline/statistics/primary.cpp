@@ -1,5 +1,4 @@
-#include "pipeline/statistics/primary.h"
-
+/// The one comparison that a study was made for.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,25 +17,18 @@ using charts::readable;
 
 namespace {
 
-struct Mean {
-  double sum = 0;
-  int n = 0;
-  void add(double value) { sum += value, ++n; }
-  double value() const { return sum / n; }
-};
-
 /// Of one kind, by condition and replicate: the mean of the cells' means.
 std::map<std::pair<int, std::string>, double> means_of_replicates(const Study& study, const Sample& sample, int kind) {
-  std::map<int, Mean> by_cell;
+  std::map<int, CellMean> by_cell;
   for (const Observation& o : sample.values)
-    if (o.kind == kind) by_cell[o.cell].add(o.value);
-  std::map<std::pair<int, std::string>, Mean> by_replicate;
+    if (o.kind == kind) by_cell[o.cell].add(o.cell, o.value);
+  std::map<std::pair<int, std::string>, CellMean> by_replicate;
   for (const auto& [index, mean] : by_cell) {
     const StudyCell& cell = study.cells[index];
-    by_replicate[{cell.condition, cell.replicate}].add(mean.value());
+    by_replicate[{cell.condition, cell.replicate}].add(index, mean.mean());
   }
   std::map<std::pair<int, std::string>, double> means;
-  for (const auto& [key, mean] : by_replicate) means[key] = mean.value();
+  for (const auto& [key, mean] : by_replicate) means[key] = mean.mean();
   return means;
 }
 
@@ -49,10 +41,10 @@ bool has_replicates(const Study& study) {
 void compare_replicates(const Study& study, const Sample& sample, int kind, Primary& primary) {
   primary.test = "means of the replicates, compared in pairs (Student’s t)";
   const auto means = means_of_replicates(study, sample, kind);
-  Mean reference;
+  std::vector<double> reference;
   for (const auto& [key, mean] : means)
-    if (key.first == 0) reference.add(mean);
-  primary.reference_mean = reference.n > 0 ? reference.value() : 0;
+    if (key.first == 0) reference.push_back(mean);
+  primary.reference_mean = reference.empty() ? 0 : describe(reference).mean;
   for (int condition = 1; condition < sample.n_conditions(); ++condition) {
     std::vector<double> differences;
     for (const auto& [key, mean] : means) {
@@ -97,6 +89,8 @@ void compare_cells(const Sample& sample, int kind, const std::optional<SampleMod
 
 }  // namespace
 
+std::string p_text(double p) { return p < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", p); }
+
 std::string sentence_of(const Primary& primary, const PrimaryDifference& d) {
   const Contrast& c = d.difference;
   const double sign = c.estimate < 0 ? -1 : 1;
@@ -106,8 +100,7 @@ std::string sentence_of(const Primary& primary, const PrimaryDifference& d) {
                   primary.unit, sign > 0 ? "more" : "less", primary.reference);
   if (primary.reference_mean > 0)
     text += fmt::format(" ({:.0f} %)", 100 * std::abs(c.estimate) / primary.reference_mean);
-  text += fmt::format(" [95 % CI {} to {} {}], {}; ", readable(low), readable(high), primary.unit,
-                      d.p_holm < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", d.p_holm));
+  text += fmt::format(" [95 % CI {} to {} {}], {}; ", readable(low), readable(high), primary.unit, p_text(d.p_holm));
   if (d.replicates > 0) text += counted(d.replicates, "replicates") + ", ";
   return text + fmt::format("{} and {} {}", d.cells, d.cells_before, primary.cells);
 }

@@ -1,5 +1,4 @@
-#include "pipeline/statistics/relations.h"
-
+/// What goes with what: forces of cells with their size, force of adhesions with their area, directions.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -7,32 +6,35 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/statistics/samples.h"
+#include "pipeline/statistics/analysis.h"
 
 namespace mbtfm::statistics {
 namespace {
 
 struct Force {
-  const char* column;
+  const char *column, *label;
   double FitSummary::*member;
 };
-constexpr Force kForces[] = {{"total_force_nN", &FitSummary::total_force_nN},
-                             {"fibre_force_nN", &FitSummary::fibre_force_nN},
-                             {"network_force_nN", &FitSummary::network_force_nN}};
+constexpr Force kForces[] = {{"total_force_nN", "total force (nN)", &FitSummary::total_force_nN},
+                             {"fibre_force_nN", "force of the fibres (nN)", &FitSummary::fibre_force_nN},
+                             {"network_force_nN", "force of the network (nN)", &FitSummary::network_force_nN}};
 struct Size {
-  const char *column, *unit;
+  const char *column, *label, *unit;
   double CellFigures::*member;
 };
-constexpr Size kSizes[] = {{"n_adhesions", "adhesion", &CellFigures::n_adhesions},
-                           {"adhesion_area_um2", "µm² of adhesion", &CellFigures::adhesion_area_um2},
-                           {"cell_area_um2", "µm² of cell", &CellFigures::cell_area_um2},
-                           {"n_fibres", "fibre", &CellFigures::n_fibres}};
+constexpr Size kSizes[] = {
+    {"n_adhesions", "number of adhesions", "adhesion", &CellFigures::n_adhesions},
+    {"adhesion_area_um2", "area of all adhesions (µm²)", "µm² of adhesion", &CellFigures::adhesion_area_um2},
+    {"cell_area_um2", "area of the cell (µm²)", "µm² of cell", &CellFigures::cell_area_um2},
+    {"n_fibres", "number of fibres", "fibre", &CellFigures::n_fibres}};
 
 std::optional<Correlation> correlate(const Study& study, int condition, const Force& force, const Size& size,
                                      const std::vector<CellWeights>& draws) {
   const bool is_of_total = force.member == &FitSummary::total_force_nN;
   Correlation c{.force = force.column,
                 .size = size.column,
+                .force_label = force.label,
+                .size_label = size.label,
                 .size_unit = size.unit,
                 .is_of_total = is_of_total,
                 .condition = study.conditions[condition]};
@@ -53,28 +55,12 @@ std::optional<Correlation> correlate(const Study& study, int condition, const Fo
   return c;
 }
 
-struct SizedForce {
-  int cell = 0, condition = 0;
-  bool is_connected = false;
-  double area_um2 = 0, force_nN = 0;
-};
-
-std::vector<SizedForce> sized_forces(const Study& study) {
-  const Sample forces = sample_adhesion_forces(study), areas = sample_adhesion_areas(study);
-  std::vector<SizedForce> list;
-  for (std::size_t i = 0; i < forces.values.size(); ++i) {
-    const Observation& o = forces.values[i];
-    list.push_back({o.cell, study.cells[o.cell].condition, o.kind == 0, areas.values[i].value, o.value});
-  }
-  return list;
-}
-
 /// Inner edges that cut the sorted areas into parts of as many adhesions; equal ones once.
-std::vector<double> bin_edges(const std::vector<SizedForce>& adhesions) {
+std::vector<double> bin_edges(const std::vector<SeenAdhesion>& adhesions) {
   constexpr int kBins = 8;           // enough to see a bend
   constexpr int kFewestInABin = 20;  // five connected ones, where a quarter are: else fewer bins
   std::vector<double> areas;
-  for (const SizedForce& a : adhesions) areas.push_back(a.area_um2);
+  for (const SeenAdhesion& a : adhesions) areas.push_back(a.area_um2);
   std::ranges::sort(areas);
   const int n_bins = std::clamp(static_cast<int>(areas.size()) / kFewestInABin, 1, kBins);
   std::set<double> edges = {areas.front(), areas.back()};
@@ -99,7 +85,7 @@ std::vector<Correlation> correlate_forces(const Study& study, const std::vector<
 }
 
 std::vector<AreaBin> bin_by_area(const Study& study, const std::vector<CellWeights>& draws) {
-  const std::vector<SizedForce> adhesions = sized_forces(study);
+  const std::vector<SeenAdhesion> adhesions = seen_adhesions(study);
   if (adhesions.empty()) return {};
   const std::vector<double> edges = bin_edges(adhesions);
   std::vector<AreaBin> bins;
@@ -110,22 +96,22 @@ std::vector<AreaBin> bin_by_area(const Study& study, const std::vector<CellWeigh
                     .is_connected = is_connected,
                     .low_um2 = edges[b],
                     .high_um2 = edges[b + 1]};
-        std::map<int, std::pair<double, double>> by_cell;
+        CellMean area, force;
         const bool is_last = b + 2 == edges.size();
-        for (const SizedForce& a : adhesions) {
+        for (const SeenAdhesion& a : adhesions) {
           const bool is_inside = a.area_um2 >= bin.low_um2 && (a.area_um2 < bin.high_um2 || is_last);
-          if (a.condition != static_cast<int>(condition) || a.is_connected != is_connected || !is_inside) continue;
-          ++bin.n_adhesions;
-          bin.mean_area_um2 += a.area_um2;
-          bin.mean_force_nN += a.force_nN;
-          by_cell[a.cell].first += a.force_nN;
-          by_cell[a.cell].second += 1;
+          if (study.cells[a.cell].condition != static_cast<int>(condition) || a.is_connected != is_connected ||
+              !is_inside)
+            continue;
+          area.add(a.cell, a.area_um2);
+          force.add(a.cell, a.force_nN);
         }
-        if (bin.n_adhesions == 0) continue;
-        bin.n_cells = static_cast<int>(by_cell.size());
-        bin.mean_area_um2 /= bin.n_adhesions;
-        bin.mean_force_nN /= bin.n_adhesions;
-        bin.interval_nN = ratio_interval(by_cell, draws);
+        if (force.n() == 0) continue;
+        bin.n_cells = force.n_cells();
+        bin.n_adhesions = force.n();
+        bin.mean_area_um2 = area.mean();
+        bin.mean_force_nN = force.mean();
+        bin.interval_nN = force.interval(draws);
         bins.push_back(bin);
       }
     }
@@ -138,28 +124,23 @@ std::vector<DirectionSummary> summarise_directions(const Study& study, const std
   for (const Relation relation : kRelations) {
     for (std::size_t condition = 0; condition < study.conditions.size(); ++condition) {
       DirectionSummary s{.relation = relation, .condition = study.conditions[condition]};
-      std::map<int, std::pair<double, double>> angles, cosines;
+      CellMean angle, cosine;
       for (std::size_t i = 0; i < study.cells.size(); ++i) {
         if (study.cells[i].condition != static_cast<int>(condition)) continue;
         for (const Direction& d : study.cells[i].directions) {
           if (d.relation != relation) continue;
-          const double cosine = std::cos(d.angle_deg * std::numbers::pi / 180);
           s.angles_deg.push_back(d.angle_deg);
-          s.mean_angle_deg += d.angle_deg;
-          s.mean_cosine += cosine;
-          angles[static_cast<int>(i)].first += d.angle_deg;
-          angles[static_cast<int>(i)].second += 1;
-          cosines[static_cast<int>(i)].first += cosine;
-          cosines[static_cast<int>(i)].second += 1;
+          angle.add(static_cast<int>(i), d.angle_deg);
+          cosine.add(static_cast<int>(i), std::cos(d.angle_deg * std::numbers::pi / 180));
         }
       }
-      s.n = static_cast<int>(s.angles_deg.size());
-      if (s.n == 0) continue;
-      s.n_cells = static_cast<int>(angles.size());
-      s.mean_angle_deg /= s.n;
-      s.mean_cosine /= s.n;
-      s.angle_interval_deg = ratio_interval(angles, draws);
-      s.cosine_interval = ratio_interval(cosines, draws);
+      if (angle.n() == 0) continue;
+      s.n = angle.n();
+      s.n_cells = angle.n_cells();
+      s.mean_angle_deg = angle.mean();
+      s.mean_cosine = cosine.mean();
+      s.angle_interval_deg = angle.interval(draws);
+      s.cosine_interval = cosine.interval(draws);
       list.push_back(std::move(s));
     }
   }

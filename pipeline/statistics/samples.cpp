@@ -45,17 +45,14 @@ Sample with_typical_errors(Sample sample) {
   return sample;
 }
 
-template <class Visit>
-void for_each_adhesion(const Study& study, Visit&& visit) {
-  for (std::size_t i = 0; i < study.cells.size(); ++i) {
-    std::map<int, double> area;  // of those that were seen: an anchor's or a candidate's size is nobody's measurement
-    for (const Adhesion& a : study.cells[i].cell.adhesions)
-      if (!is_assumed(a.origin)) area[a.adhesion_id] = a.area_um2;
-    for (const AdhesionForce& f : study.cells[i].forces) {
-      if (!area.contains(f.adhesion_id)) continue;
-      visit(study.cells[i], static_cast<int>(i), f, area.at(f.adhesion_id));
-    }
-  }
+/// Forces, or areas, of the adhesions.
+Sample sample_adhesions(const Study& study, const char* column, const char* name, const char* unit,
+                        double SeenAdhesion::*value) {
+  Sample sample = empty_sample(study, column, name, unit, Observed::adhesions, {"connected", "unconnected"});
+  for (const SeenAdhesion& a : seen_adhesions(study))
+    add(sample, study.cells[a.cell], a.cell, a.is_connected ? 0 : 1, a.*value,
+        value == &SeenAdhesion::force_nN ? a.sigma_nN : 0.0);
+  return with_typical_errors(std::move(sample));
 }
 
 std::vector<int> cells_of(const Study& study, CellKind kind) {
@@ -119,8 +116,6 @@ Sample sample_estimates(const Study& study, SheetQuantity quantity) {
   return with_typical_errors(std::move(sample));
 }
 
-const std::vector<std::string> kConnection = {"connected", "unconnected"};
-
 }  // namespace
 
 std::vector<Observation> Sample::of_group(int condition, int kind) const {
@@ -152,20 +147,25 @@ Sample sample_tensions(const Study& study) {
   return with_typical_errors(std::move(sample));
 }
 
+std::vector<SeenAdhesion> seen_adhesions(const Study& study) {
+  std::vector<SeenAdhesion> list;
+  for (std::size_t i = 0; i < study.cells.size(); ++i) {
+    std::map<int, double> area;  // of those that were seen: an anchor's or a candidate's size is nobody's measurement
+    for (const Adhesion& a : study.cells[i].cell.adhesions)
+      if (!is_assumed(a.origin)) area[a.adhesion_id] = a.area_um2;
+    for (const AdhesionForce& f : study.cells[i].forces)
+      if (area.contains(f.adhesion_id))
+        list.push_back({static_cast<int>(i), f.connected, area.at(f.adhesion_id), norm(f.force_nN), f.sigma_nN});
+  }
+  return list;
+}
+
 Sample sample_adhesion_forces(const Study& study) {
-  Sample sample = empty_sample(study, "adhesion_force_nN", "force", "nN", Observed::adhesions, kConnection);
-  for_each_adhesion(study, [&](const StudyCell& cell, int i, const AdhesionForce& f, double) {
-    add(sample, cell, i, f.connected ? 0 : 1, norm(f.force_nN), f.sigma_nN);
-  });
-  return with_typical_errors(std::move(sample));
+  return sample_adhesions(study, "adhesion_force_nN", "force", "nN", &SeenAdhesion::force_nN);
 }
 
 Sample sample_adhesion_areas(const Study& study) {
-  Sample sample = empty_sample(study, "adhesion_area_um2", "area", "µm²", Observed::adhesions, kConnection);
-  for_each_adhesion(study, [&](const StudyCell& cell, int i, const AdhesionForce& f, double area_um2) {
-    add(sample, cell, i, f.connected ? 0 : 1, area_um2, 0.0);
-  });
-  return sample;
+  return sample_adhesions(study, "adhesion_area_um2", "area", "µm²", &SeenAdhesion::area_um2);
 }
 
 std::vector<Sample> sample_cells(const Study& study) {

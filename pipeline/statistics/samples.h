@@ -49,6 +49,15 @@ struct Sample {
   std::string label() const { return unit.empty() ? name : name + " (" + unit + ")"; }
 };
 
+/// An adhesion that was seen, and has a force.
+struct SeenAdhesion {
+  int cell = 0;  ///< index into Study::cells
+  bool is_connected = false;
+  double area_um2 = 0, force_nN = 0;
+  std::optional<double> sigma_nN = {};  ///< of the force
+};
+std::vector<SeenAdhesion> seen_adhesions(const Study& study);
+
 Sample sample_tensions(const Study& study);
 Sample sample_adhesion_forces(const Study& study);
 Sample sample_adhesion_areas(const Study& study);

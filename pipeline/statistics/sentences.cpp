@@ -15,8 +15,6 @@ namespace {
 
 using charts::readable;
 
-std::string p_text(double p) { return p < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", p); }
-
 std::string plural_of(const Sample& sample, const std::string& kind) {
   if (sample.each == Observed::cells || sample.each == Observed::bundles || sample.of_cells() == CellKind::space)
     return name_of(sample.each);

@@ -1,7 +1,6 @@
 #include "pipeline/statistics/study.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <set>
 #include <sstream>
@@ -12,7 +11,6 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
-#include "pipeline/files/foreign_table.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/names.h"
@@ -25,7 +23,6 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/copies.h"
 #include "pipeline/stage/parameters.h"
-#include "pipeline/statistics/conditions.h"
 #include "pipeline/statistics/descriptive.h"
 
 namespace mbtfm::statistics {
@@ -356,21 +353,25 @@ FibreType counted_type(const Study& study, FibreType type) {
   return study.n_fibre_types < 4 && type == FibreType::edge ? FibreType::ventral : type;
 }
 
+const Tension* tension_of(const StudyCell& cell, int fibre_id) {
+  const auto found = std::ranges::find(cell.tensions, fibre_id, &Tension::fibre_id);
+  return found == cell.tensions.end() ? nullptr : &*found;
+}
+
 std::vector<MeasuredFibre> measured_fibres(const Study& study) {
   std::vector<MeasuredFibre> fibres;
   for (const StudyCell& cell : study.cells) {
-    std::map<int, const Tension*> tension;
-    for (const Tension& t : cell.tensions) tension[t.fibre_id] = &t;
     for (const Fibre& fibre : cell.cell.fibres) {
-      const auto found = tension.find(fibre.fibre_id);
-      if (found != tension.end() && is_measured(*found->second)) fibres.push_back({&cell, &fibre, found->second});
+      const Tension* tension = tension_of(cell, fibre.fibre_id);
+      if (tension && is_measured(*tension)) fibres.push_back({&cell, &fibre, tension});
     }
   }
   return fibres;
 }
 
 bool is_network_known(const StudyCell& cell) {
-  return std::ranges::none_of(cell.tensions, [](const Tension& t) { return t.fibre_id == 0 && !t.identifiable; });
+  const Tension* network = tension_of(cell, 0);
+  return !network || network->identifiable;
 }
 
 std::optional<double> standard_error_nN(const Tension& t) {

@@ -126,6 +126,29 @@ const std::vector<std::string>& further_files_of_a_cell(CellKind kind);
 /// not there
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads);
 
+struct CellNote {
+  std::string condition = {};          ///< empty where none are asked for
+  std::string replicate = {};          ///< day, dish or animal; empty where none are told
+  std::string reason_to_exclude = {};  ///< empty: it enters
+};
+
+struct CellNotes {
+  std::vector<CellNote> of_cells;
+  std::vector<std::string> warnings = {};  ///< sentences on what was taken for the same
+};
+
+/// A cell that is not in the table does not enter. The table is read as people write it (foreign_table.h). Conditions
+/// and replicates that differ in capitals alone are one, spelled as it is first.
+/// @param names  folders of the cells, relative to the study's
+/// @param condition_from, replicate_from  see StudyParameters; empty: the table's column `condition`; `replicate`, else
+///                                        `day`, where it has one
+/// @throws InputError where a cell has no such folder above it, the table no such column, or a row no cell
+CellNotes notes_of(const std::vector<std::string>& names, const std::string& condition_from,
+                   const std::string& replicate_from, const std::optional<Path>& table);
+
+/// Null where it has none. @param fibre_id  0: the network
+const Tension* tension_of(const StudyCell& cell, int fibre_id);
+
 /// A fibre whose tension could be identified, and is known to within anything that a fibre can carry.
 struct MeasuredFibre {
   const StudyCell* cell = nullptr;

@@ -29,15 +29,6 @@ Summary plain_summary(const std::string& condition, const std::string& kind, con
           .model = {}};
 }
 
-std::optional<Interval> mean_interval(const std::vector<Observation>& own, const std::vector<CellWeights>& draws) {
-  std::map<int, std::pair<double, double>> by_cell;  // sum, number
-  for (const Observation& o : own) {
-    by_cell[o.cell].first += o.value;
-    by_cell[o.cell].second += 1;
-  }
-  return ratio_interval(by_cell, draws);
-}
-
 std::optional<Interval> median_interval(std::vector<Observation> own, const std::vector<CellWeights>& draws) {
   std::ranges::sort(own, [](const Observation& a, const Observation& b) { return a.value < b.value; });
   std::vector<std::optional<double>> medians;
@@ -91,7 +82,9 @@ std::vector<Summary> summarise(const Sample& sample, const std::optional<SampleM
       const std::vector<Observation> own = sample.of_group(condition, kind);
       if (own.empty()) continue;
       Summary s = plain_summary(sample.conditions[condition], sample.kinds[kind], own);
-      s.mean_interval = mean_interval(own, draws);
+      CellMean mean;
+      for (const Observation& o : own) mean.add(o.cell, o.value);
+      s.mean_interval = mean.interval(draws);
       s.median_interval = median_interval(own, draws);
       if (model && s.n_cells > 1) {
         const int g = model->index[sample.group_of(condition, kind)];

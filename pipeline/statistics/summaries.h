@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/statistics/bootstrap.h"
+#include "pipeline/statistics/descriptive.h"
 #include "pipeline/statistics/samples.h"
 
 namespace mbtfm::statistics {

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <functional>
-#include <map>
 
 #include "pipeline/files/sheet_files.h"
 #include "pipeline/files/tables.h"
@@ -75,8 +74,8 @@ auto n_fibres(std::optional<FibreType> type) {
 }
 
 Number network_tension_of(const StudyCell& c) {
-  const auto found = std::ranges::find(c.tensions, 0, &Tension::fibre_id);
-  return found == c.tensions.end() ? Number() : Number(found->tension_nN);
+  const Tension* network = tension_of(c, 0);
+  return network ? Number(network->tension_nN) : Number();
 }
 
 /// None where no image shows the cell's outline.
@@ -206,13 +205,9 @@ struct MeasuredTension {
 };
 const Fibre& fibre_of(const MeasuredTension& row) { return *row.fibre; }
 std::vector<MeasuredTension> measured_tensions_of(const StudyCell& c) {
-  std::map<int, const Tension*> tension;
-  for (const Tension& t : c.tensions) tension[t.fibre_id] = &t;
   std::vector<MeasuredTension> rows;
-  for (const Fibre& fibre : c.cell.fibres) {
-    const auto t = tension.find(fibre.fibre_id);
-    if (t != tension.end()) rows.push_back({&fibre, {*t->second, fibre.type}});
-  }
+  for (const Fibre& fibre : c.cell.fibres)
+    if (const Tension* t = tension_of(c, fibre.fibre_id)) rows.push_back({&fibre, {*t, fibre.type}});
   return rows;
 }
 using FibreRow = InCell<MeasuredTension>;
@@ -498,6 +493,28 @@ std::vector<QuantityRow> summary_rows(const Analysis& analysis) {
   return rows;
 }
 
+/// @param visit  of a table and its rows
+template <class Visit>
+void for_each_table(const Study& study, const Analysis& analysis, const Visit& visit) {
+  visit(cell_table(), cell_rows(study));
+  visit(finding_table(), rows_by_cell(study, &StudyCell::findings));
+  visit(adhesion_table(),
+        rows_by_cell(study, [](const StudyCell& c) { return files::forces_on(c.cell.adhesions, c.forces); }));
+  visit(fibre_table(), rows_by_cell(study, measured_tensions_of));
+  visit(estimate_table(),
+        rows_by_cell(study, [](const StudyCell& c) { return c.sheet.value_or(SheetSummary{}).estimates; }));
+  visit(space_force_table(),
+        rows_by_cell(study, [](const StudyCell& c) { return c.space.value_or(SpaceFigures{}).adhesions; }));
+  visit(type_table(thresholds_of(analysis)), type_rows(study, analysis));
+  visit(test_table(), test_rows(analysis));
+  visit(summary_table(), summary_rows(analysis));
+  visit(variance_table(), variance_rows(analysis));
+  visit(correlation_table(), analysis.correlations);
+  visit(area_bin_table(), analysis.area_bins);
+  visit(direction_table(), rows_by_cell(study, &StudyCell::directions));
+  visit(direction_mean_table(), analysis.directions);
+}
+
 }  // namespace
 
 std::string list_of_cells(const Study& study) {
@@ -507,35 +524,18 @@ std::string list_of_cells(const Study& study) {
 
 std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, const Analysis& analysis) {
   std::vector<std::pair<std::string, std::string>> tables;
-  const auto add = [&](const auto& table, const auto& rows) {
+  for_each_table(study, analysis, [&](const auto& table, const auto& rows) {
     tables.emplace_back(Path(table.file).filename().string(), text_of(table, rows));
-  };
-  add(cell_table(), cell_rows(study));
-  add(finding_table(), rows_by_cell(study, &StudyCell::findings));
-  add(adhesion_table(),
-      rows_by_cell(study, [](const StudyCell& c) { return files::forces_on(c.cell.adhesions, c.forces); }));
-  add(fibre_table(), rows_by_cell(study, measured_tensions_of));
-  add(estimate_table(),
-      rows_by_cell(study, [](const StudyCell& c) { return c.sheet.value_or(SheetSummary{}).estimates; }));
-  add(space_force_table(),
-      rows_by_cell(study, [](const StudyCell& c) { return c.space.value_or(SpaceFigures{}).adhesions; }));
-  add(type_table(thresholds_of(analysis)), type_rows(study, analysis));
-  add(test_table(), test_rows(analysis));
-  add(summary_table(), summary_rows(analysis));
-  add(variance_table(), variance_rows(analysis));
-  add(correlation_table(), analysis.correlations);
-  add(area_bin_table(), analysis.area_bins);
-  add(direction_table(), rows_by_cell(study, &StudyCell::directions));
-  add(direction_mean_table(), analysis.directions);
+  });
   return tables;
 }
 
 std::string pages_of_tables() {
-  return page_of(cell_table()) + page_of(finding_table()) + page_of(adhesion_table()) + page_of(fibre_table()) +
-         page_of(estimate_table()) + page_of(space_force_table()) +
-         page_of(type_table({StudyParameters{}.weak_tension_nN})) + page_of(test_table()) + page_of(summary_table()) +
-         page_of(variance_table()) + page_of(correlation_table()) + page_of(area_bin_table()) +
-         page_of(direction_table()) + page_of(direction_mean_table());
+  std::string pages;
+  Analysis of_one_threshold;
+  of_one_threshold.shares.emplace_back().threshold_nN = StudyParameters{}.weak_tension_nN;
+  for_each_table({}, of_one_threshold, [&](const auto& table, const auto&) { pages += page_of(table); });
+  return pages;
 }
 
 }  // namespace mbtfm::statistics

@@ -1,7 +1,6 @@
 /// The statistics beside R's own functions on the same tables: tests/data/statistics/expected.R makes both.
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
-#include "pipeline/statistics/bootstrap.h"
 #include "pipeline/statistics/descriptive.h"
 #include "pipeline/statistics/mixed_model.h"
 #include "pipeline/statistics/rank_tests.h"
