@@ -20,7 +20,6 @@
 #include "segment/images/scan_phase.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 std::optional<images::Channel> channel(stage::StageContext& context, const std::string& argument,

@@ -9,7 +9,6 @@
 #include "segment/beads/given_field.h"
 
 namespace mbtfm::beads {
-
 namespace {
 
 cv::Mat small_picture(const images::Image& image, int binning) {

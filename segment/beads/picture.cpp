@@ -8,7 +8,6 @@
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::beads {
-
 namespace {
 
 constexpr double kLongSide_px = 1000;  // a page shows it 700 px wide

@@ -7,7 +7,6 @@
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::beads {
-
 namespace {
 
 constexpr double kNormalOfMedian = 1.4826;  // standard deviation of a normal variable over its median magnitude

@@ -7,7 +7,6 @@
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr int kGround = EllipseValue::kParameters, kBlur = kGround - 1, kDome = kBlur - 1, kBrightness = 5,

@@ -1,12 +1,44 @@
-/// The pixels of each adhesion. Internal to segment/ (OpenCV types).
+/// How far each pixel of an adhesion image stands out, and the pixels of each adhesion. Internal to segment/ (OpenCV
+/// types).
 #pragma once
 
+#include <opencv2/core.hpp>
 #include <vector>
 
-#include "segment/cells/adhesion_contrast.h"
+#include "segment/cells/adhesions.h"
 #include "segment/cells/ellipse.h"
 
 namespace mbtfm::cells {
+
+constexpr double kUsualBlur_um = 0.15;       ///< 0.21 · 560 nm / NA 1.2 … 0.9, a little out of focus
+constexpr double kWidestBlur_um = 0.2;       ///< a rim that is softer than any optics in focus is the adhesion's own
+constexpr double kLeastSmoothing_um = 0.05;  ///< a third of the microscope's blur, which it widens by 6 %
+/// The filter matched to the image of the smallest adhesion is as wide as the blur.
+constexpr double kMostSmoothing_um = kWidestBlur_um;
+
+/// What an adhesion's pixels are compared to.
+struct Contrast {
+  double smoothing_um;  ///< standard deviation of the Gaussian
+  double coarseness;    ///< blur of the smoothed image over that of one that noise does not trouble
+  cv::Mat sharp;        ///< image above the local background
+  cv::Mat sharp_noise;  ///< standard deviation of a pixel
+  cv::Mat height;       ///< `sharp`, smoothed
+  cv::Mat noise;        ///< standard deviation of `height` where there is no adhesion
+  double floor;         ///< heights below are texture or rounding
+  cv::Mat least_seed;   ///< heights below may be a step of the background, as at the edge of a bright cell
+};
+
+/// The smoothing is the least, from `kLeastSmoothing_um` to `kMostSmoothing_um`, at which the faintest adhesion that
+/// the floor lets through can have a seed:
+///
+///   adhesion_seed_noise · noise(s) <= adhesion_faintest · typical height(s)
+///
+/// The noise falls with s and the height hardly, as long as adhesions are wider. Gaps and fringes are wider in a
+/// smoothed image, so the background's disc grows as the blur does.
+Contrast contrast_of(const cv::Mat& image, double pixel_size_um, const AdhesionParameters& parameters);
+
+/// 255 where the height is that many standard deviations of the noise, and above the floor.
+cv::Mat above(const Contrast& contrast, double n_sigma);
 
 /// Everything above its rim that reaches a seed: hysteresis, split where adhesions touch, the rim of each at a share of
 /// its own height.

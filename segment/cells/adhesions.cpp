@@ -11,7 +11,6 @@
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr double kUsualDome = 0.2;  ///< adhesions fade towards their rim

@@ -8,7 +8,6 @@
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr double kBeside_um = 0.5;  // beyond what the microscope blurs

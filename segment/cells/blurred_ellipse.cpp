@@ -5,7 +5,6 @@
 #include <numbers>
 
 namespace mbtfm::cells {
-
 namespace {
 
 /// Density and integral of the standard normal distribution, tabulated: linear interpolation in steps of 1/128 is right

@@ -7,7 +7,6 @@
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 /// Of the fibres the middle one's middle height.

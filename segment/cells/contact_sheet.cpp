@@ -9,7 +9,6 @@
 #include "segment/cells/overlay.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr int kTile_px = 640;    // three beside each other fill a screen

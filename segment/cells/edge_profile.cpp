@@ -9,7 +9,6 @@
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr double kInward_um = 0.8;      ///< how far the edge may lie inside the ring: a blurred mask bulges

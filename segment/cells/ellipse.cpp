@@ -5,7 +5,6 @@
 #include <numbers>
 
 namespace mbtfm::cells {
-
 namespace {
 
 struct Moments {

@@ -11,7 +11,6 @@
 #include "segment/cells/ellipse.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();

@@ -4,7 +4,6 @@
 #include <cmath>
 
 namespace mbtfm::cells {
-
 namespace {
 
 /// Between first and last, both kept.

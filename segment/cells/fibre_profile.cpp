@@ -7,7 +7,6 @@
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr double kColumnStep = 0.5;  // px: bilinear samples carry no more

@@ -5,7 +5,6 @@
 #include <numbers>
 
 namespace mbtfm::cells {
-
 namespace {
 
 double filter_sigma_um(const FibreParameters& p) {

@@ -22,7 +22,6 @@
 #include "segment/cells/without_lines.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr double kSideRatio = 0.1;  // a step (the cell's edge) falls on one side only, a fibre on both

@@ -10,7 +10,6 @@
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 /// The grid on which slow local statistics are evaluated: a disc's radius is four of its cells (49 cells in the disc,

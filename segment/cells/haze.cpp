@@ -7,7 +7,6 @@
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr double kFar_bands = 3;      // from the mask: haze has fallen to a tenth, a twentieth of the half that matters

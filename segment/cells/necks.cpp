@@ -9,7 +9,6 @@
 #include <utility>
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr double kLeastShare = 0.15;  // of the area of both: cells of one kind differ in area by less than six times

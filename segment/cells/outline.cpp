@@ -11,7 +11,6 @@
 #include "segment/cells/necks.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr double kSigma_px = 1.5;      // of the smoothing of masks

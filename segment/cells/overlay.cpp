@@ -10,7 +10,6 @@
 #include "segment/cells/palette.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 const cv::Scalar kInk(15, 15, 15), kPaper(255, 255, 255);  // red, green, blue

@@ -10,7 +10,6 @@
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 using std::numbers::pi;

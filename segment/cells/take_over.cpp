@@ -12,7 +12,6 @@
 #include "segment/cells/squares.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 using Points = std::vector<cv::Point2d>;

@@ -15,7 +15,6 @@
 #include "segment/cells/ways.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 using std::numbers::pi;

@@ -11,7 +11,6 @@
 #include "segment/cells/squares.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 /// An end of a piece: 2 · piece for its first point, 2 · piece + 1 for its last.

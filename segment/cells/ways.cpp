@@ -6,7 +6,6 @@
 #include <numbers>
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr float kUnit = 4, kMost = 255;  // of a standard deviation: a byte holds 64 of them

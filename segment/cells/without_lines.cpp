@@ -8,7 +8,6 @@
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
-
 namespace {
 
 constexpr double kReach = 2.5;  // standard deviations of the profile: beyond it little is left

@@ -8,7 +8,6 @@
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::survey {
-
 namespace {
 
 constexpr int kSide_px = 200;

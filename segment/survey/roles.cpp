@@ -6,7 +6,6 @@
 #include <string_view>
 
 namespace mbtfm::survey {
-
 namespace {
 
 constexpr std::array kBeads = {"bead", "fluosphere", "tfm", "gel"};

@@ -13,7 +13,6 @@
 #include "segment/cells/outline.h"
 
 namespace mbtfm::survey {
-
 namespace {
 
 using images::Channel;
