@@ -1,4 +1,4 @@
-/// Focal adhesions of a fluorescence image.
+/// Focal adhesions of a fluorescence image, or why it shows none.
 #pragma once
 
 #include <optional>
@@ -59,5 +59,16 @@ double aspect_ratio(const std::vector<Adhesion>& adhesions);
 
 /// Why there is no adhesion in an image in which none is found: what stands out of the noise least short of one.
 std::string why_no_adhesions(const images::Image& image, double pixel_size_um, const AdhesionParameters& parameters);
+
+/// Why nothing in the image can be measured: "every pixel is 100", "42 % of the pixels at 255, the brightest value: the
+/// detector was saturated". Empty where there may be something.
+///
+/// More than a tenth at one brightest value is no structure: adhesions cover a few per cent of a field, and an image
+/// that is not cut off has few pixels at its very maximum.
+std::string emptiness_of(const images::Image& image);
+
+/// The negative of an image that looks like one: its darkest pixels differ more from the middle one than its brightest.
+/// Beads, adhesions, fibres and a cell of less than half of the field are bright on dark.
+std::optional<images::Image> negative_of_dark_on_bright(images::Image image);
 
 }  // namespace mbtfm::cells

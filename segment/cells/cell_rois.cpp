@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "segment/cells/palette.h"
+#include "segment/cells/overlay.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -10,8 +10,6 @@
 
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/parameters.h"
-#include "segment/cells/bright_actin.h"
-#include "segment/cells/fibre_line.h"
 #include "segment/cells/fibre_profile.h"
 #include "segment/cells/fibre_scales.h"
 #include "segment/cells/fibre_significance.h"

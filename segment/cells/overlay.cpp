@@ -7,7 +7,6 @@
 
 #include "pipeline/contract/polyline.h"
 #include "segment/cells/grid.h"
-#include "segment/cells/palette.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -1,14 +1,33 @@
 /// Pictures of a segmentation on its images, to judge it by eye. Internal to segment/ (OpenCV).
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "pipeline/contract/cell.h"
 #include "pipeline/contract/extent.h"
 #include "segment/cells/segment_cell.h"
 #include "segment/images/png.h"
 
 namespace mbtfm::cells {
+
+struct Colour {
+  std::uint8_t red, green, blue;
+};
+
+// Those of the report's plots (Okabe & Ito's palette, which colour-blind people can tell apart), lighter for the dark
+// ground.
+inline constexpr Colour kVentralColour{0, 214, 143}, kDorsalColour{86, 180, 255}, kArcColour{255, 183, 40},
+    kEdgeColour{255, 122, 82}, kAdhesionColour{255, 170, 235}, kOutlineColour{225, 225, 225},
+    kUnexplainedColour{90, 60, 255};
+
+constexpr Colour colour_of(FibreType type) {
+  return type == FibreType::ventral  ? kVentralColour
+         : type == FibreType::dorsal ? kDorsalColour
+         : type == FibreType::edge   ? kEdgeColour
+                                     : kArcColour;
+}
 
 /// The part of the images that holds the cell: actin in grey, adhesions in purple, both stretched to their own
 /// contrast; over them the outline, the adhesions' ellipses and the fibres in the colours that their types have in the

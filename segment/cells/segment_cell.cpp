@@ -8,8 +8,8 @@
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/stage/parameters.h"
-#include "segment/cells/bleed_through.h"
-#include "segment/cells/emptiness.h"
+#include "segment/cells/adhesions.h"
+#include "segment/cells/channel_alignment.h"
 #include "segment/cells/fibre_ends.h"
 
 namespace mbtfm::cells {

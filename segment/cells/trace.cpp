@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "pipeline/numerics/order_statistics.h"
-#include "segment/cells/claims.h"
 #include "segment/cells/grid.h"
 #include "segment/cells/trace_join.h"
 #include "segment/cells/ways.h"

@@ -1,14 +1,30 @@
-/// The best way on of a line, in position, direction and curvature together. Internal to segment/ (OpenCV types).
-/// Lengths in pixels.
+/// Where lines run already, and the best way on of one, in position, direction and curvature together. Internal to
+/// segment/ (OpenCV types). Lengths in pixels.
 #pragma once
 
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "segment/cells/claims.h"
 #include "segment/cells/ridge.h"
 
 namespace mbtfm::cells {
+
+/// Which directions of lines already pass through each pixel, a bit each.
+class Claims {
+ public:
+  Claims(cv::Size size, int n_directions) : bits_(size, CV_32S, cv::Scalar(0)), n_(n_directions) {}
+
+  bool has(cv::Point2d point, double angle_rad) const;
+  /// Lines within one of the filter's directions.
+  void add(cv::Point2d point, double angle_rad, double radius_px);
+  void add_all_directions(cv::Point2d point, double radius_px) { mark(point, (1 << n_) - 1, radius_px); }
+
+ private:
+  void mark(cv::Point2d point, int mask, double radius_px);
+  int index(double angle_rad) const;
+  cv::Mat bits_;
+  int n_;
+};
 
 /// A place on a line, and how it runs there.
 struct Course {

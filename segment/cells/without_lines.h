@@ -1,8 +1,10 @@
-/// An image without its lines. Internal to segment/ (OpenCV types).
+/// What an image shows beside its lines. Internal to segment/ (OpenCV types).
 #pragma once
 
 #include <opencv2/core.hpp>
 #include <vector>
+
+#include "segment/cells/ridge.h"
 
 namespace mbtfm::cells {
 
@@ -17,5 +19,16 @@ struct SeenLine {
 /// turns, so that lines that touch share what is there. Shows fainter lines beside bright ones.
 /// @param averaging_px  standard deviation along the line
 cv::Mat without_lines(const cv::Mat& image, const std::vector<SeenLine>& lines, double averaging_px);
+
+/// The crests of ridges as high as the middle one of these fibres, away from all of them: what the tracing, or the
+/// judgement of a line, has missed.
+/// @param is_inside    CV_8U, not 0 where fibres may be
+/// @param fibres       points about a pixel apart
+/// @param aside_px     crests nearer to a fibre are its own
+/// @param shortest_px  of a crest; shorter ones are specks
+/// @returns by crest its points, in no order; nothing of fewer than five fibres, which do not tell what bright is
+std::vector<std::vector<cv::Point2d>> bright_crests_beside(const Ridges& ridges, const cv::Mat& is_inside,
+                                                           const std::vector<std::vector<cv::Point2d>>& fibres,
+                                                           double aside_px, double shortest_px);
 
 }  // namespace mbtfm::cells

@@ -1,6 +1,6 @@
 /// Images that show no adhesion give none, and say why.
+#include "segment/cells/adhesions.h"
 #include "pipeline/contract/errors.h"
-#include "segment/cells/emptiness.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/hard_case.h"

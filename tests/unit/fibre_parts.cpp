@@ -1,9 +1,9 @@
 /// The parts of the fibre finder: what lies beside fibres, what a faint end leads to, what counts as texture.
-#include "segment/cells/bright_actin.h"
 #include "segment/cells/fibre_ends.h"
 #include "segment/cells/fibre_significance.h"
 #include "segment/cells/fibres.h"
 #include "segment/cells/ridge.h"
+#include "segment/cells/without_lines.h"
 #include "tests/support/test.h"
 
 namespace mbtfm::cells {
