@@ -21,7 +21,7 @@
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "segment/beads/given_field.h"
-#include "segment/beads/picture.h"
+#include "segment/beads/pair_look.h"
 #include "segment/beads/track.h"
 #include "segment/images/channels.h"
 #include "segment/images/scan_phase.h"

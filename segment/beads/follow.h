@@ -1,4 +1,5 @@
-/// Inside of the bead tracker: where each bead has gone.
+/// Inside of the bead tracker: where each bead has gone, and parts of the picture in which single beads cannot be
+/// followed, as where it is out of focus, or mottled, or crowded.
 #pragma once
 
 #include <optional>
@@ -9,6 +10,30 @@
 #include "segment/beads/scene.h"
 
 namespace mbtfm::beads {
+
+/// Squares of the picture in which sixteen beads are good elsewhere. A square is a gap if fewer than four are: of
+/// sixteen at random that is chance in one of ten thousand.
+class Gaps {
+ public:
+  /// Both must outlive this.
+  Gaps(const Scene& scene, const std::vector<Track>& tracks);
+  /// Of the picture.
+  double share() const { return share_; }
+  /// A fiftieth of the picture, and two squares at least: less is noticed by nobody, and takes the time of windows.
+  bool are_large() const;
+  bool hold(Vec2 place_px) const;
+  /// Whether the gel could have a motion (px) there beside what some bead nearby does: what contradicts all of them is
+  /// another part of a pattern that repeats itself, or chance.
+  bool allow(Vec2 place_px, Vec2 u_px, double sigma_px) const;
+
+ private:
+  int square_of(Vec2 place_px) const;
+  const Scene& scene_;
+  const std::vector<Track>& tracks_;
+  double side_x_ = 1, side_y_ = 1, share_ = 0;
+  int nx_ = 1, ny_ = 1;
+  std::vector<bool> is_gap_;
+};
 
 struct Followed {
   std::vector<Track> tracks;
@@ -49,5 +74,20 @@ std::vector<double> missed_around(const Scene& scene, const std::vector<Track>& 
 /// may be wrong.
 int flag_outliers_beside(const std::vector<Vec2>& expected, const Scene& scene, double threshold,
                          std::vector<Track>& tracks);
+
+/// Flag "neighbours disagree" what moves by itself: a gel cannot do that.
+///
+/// What pulls a bead pulls those around it, too. About a patch of force of radius a that moves its middle by U beside
+/// what the surroundings do, they move as the surface of an incompressible half-space does (Cerruti),
+///
+///   u(d) = c + G d + (a/|d|) (U + (U·e) e),   U = u_bead − c,   e = d/|d|,
+///
+/// of which c, G and a are fitted to the good beads around, softened within two bead sigmas. A right bead at an
+/// adhesion has an a of some pixels; a false partner has a = 0, or less if it stays behind where the others are pulled.
+/// Asked are beads that contradict their neighbours as outliers do, and beads of groups that no way of small steps
+/// connects with most of the picture: those agree with one another, and so only the beads beyond the group are
+/// witnesses. A bead is flagged if a is below the radius of what a lens shows, a bead's own, by two standard errors.
+/// @return how many
+int flag_unpulled(const Scene& scene, double threshold, std::vector<Track>& tracks);
 
 }  // namespace mbtfm::beads

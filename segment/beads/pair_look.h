@@ -1,11 +1,13 @@
-/// A first look at a pair of bead images.
+/// A pair of bead images: a first look, and a picture of both for the eye.
 #pragma once
 
 #include <string>
 
 #include "pipeline/contract/beads.h"
 #include "pipeline/contract/geometry.h"
+#include "segment/beads/placement.h"
 #include "segment/images/image.h"
+#include "segment/images/png.h"
 
 namespace mbtfm::beads {
 
@@ -41,5 +43,13 @@ struct FieldLook {
 /// The beads that move most lie beneath the cell, at its bright parts; all move towards its middle. Another orientation
 /// counts if it shows that and the given one does not; a cell that is alike in both is no witness.
 FieldLook look_at_field(const DisplacementField& field, const images::Image& cell, double pixel_um);
+
+/// Relaxed green, stressed purple, white where both are bright, in the frame of the cell's pictures; each stretched
+/// from its median to the brightest beads, and reduced to 1000 pixels at most along its longer side. Black where one of
+/// them shows nothing.
+/// @param placement  of the relaxed picture in the stressed one
+/// @throws InvalidData where the sizes differ
+images::Picture picture_of_beads(const images::Image& relaxed, const images::Image& stressed,
+                                 const Placement& placement, CellWith cell_with);
 
 }  // namespace mbtfm::beads

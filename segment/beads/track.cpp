@@ -17,11 +17,9 @@
 #include "segment/beads/common_motion.h"
 #include "segment/beads/focus.h"
 #include "segment/beads/follow.h"
-#include "segment/beads/gaps.h"
 #include "segment/beads/given_field.h"
 #include "segment/beads/measure.h"
 #include "segment/beads/pool.h"
-#include "segment/beads/pull.h"
 #include "segment/beads/scene.h"
 #include "segment/beads/windows.h"
 

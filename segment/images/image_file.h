@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -81,5 +83,10 @@ std::optional<double> z_step_um(const TiffCalibration& calibration);
 
 /// The value of `key=value` at the start of a line; lines end as Unix, DOS or the old Macintosh (Volocity) ends them.
 std::optional<std::string_view> line_value(std::string_view text, std::string_view key);
+
+struct FileCloser {
+  void operator()(std::FILE* stream) const { std::fclose(stream); }
+};
+using FileHandle = std::unique_ptr<std::FILE, FileCloser>;
 
 }  // namespace mbtfm::images

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "pipeline/contract/errors.h"
-#include "segment/images/file_handle.h"
 #include "segment/images/image_file.h"
 #include "segment/images/png.h"
 

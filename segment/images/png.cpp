@@ -7,7 +7,6 @@
 #include <cstring>
 
 #include "pipeline/contract/errors.h"
-#include "segment/images/file_handle.h"
 #include "segment/images/image_file.h"
 
 namespace mbtfm::images {

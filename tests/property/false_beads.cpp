@@ -1,5 +1,5 @@
 /// Beads that were given another one's partner, without pictures: tracks on a surface that is pulled.
-#include "segment/beads/pull.h"
+#include "segment/beads/follow.h"
 #include "tests/support/bead_pair.h"
 
 namespace mbtfm::beads {

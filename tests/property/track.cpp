@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "segment/beads/picture.h"
+#include "segment/beads/pair_look.h"
 #include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 
