@@ -21,7 +21,6 @@
 #include "segment/beads/track.h"
 #include "segment/cells/segment_cell.h"
 #include "segment/stacks/run.h"
-#include "segment/survey/page.h"
 #include "segment/survey/survey.h"
 
 namespace {

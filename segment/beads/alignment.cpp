@@ -1,4 +1,4 @@
-#include "segment/beads/alignment.h"
+#include "segment/beads/coarse_field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pipeline/numerics/parallel.h"
-#include "segment/beads/coarse_field.h"
 #include "segment/beads/registration.h"
 
 namespace mbtfm::beads {

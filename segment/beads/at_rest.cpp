@@ -1,4 +1,4 @@
-#include "segment/beads/at_rest.h"
+#include "segment/beads/far_field.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,21 @@
-/// Inside of the bead tracker: a first displacement field on a grid.
+/// Inside of the bead tracker: one image turned against the other, as after a dish was put back on the stage, and a
+/// first displacement field on a grid.
 #pragma once
 
+#include <optional>
+
+#include "segment/beads/placement.h"
 #include "segment/beads/plane.h"
 #include "segment/beads/registration.h"
 
 namespace mbtfm::beads {
+
+/// The turn that carries the beads of `relaxed` to those of `stressed`, to half a degree and a few pixels: of turns by
+/// up to 30 degrees, a half apart, the one whose pictures correlate best. Nothing where none stands out.
+std::optional<Turn> turn_between(const Plane& relaxed, const Plane& stressed, double bead_sigma, int threads);
+
+/// The image as it would be without that turn: result(x) = image(turn(x)).
+images::Image turned_back(const images::Image& image, const Turn& turn, int threads);
 
 /// A displacement field on a square grid of points, in px.
 struct GridField {

@@ -9,7 +9,6 @@
 #include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
-#include "segment/beads/at_rest.h"
 #include "segment/beads/far_field.h"
 #include "segment/beads/plane.h"
 

@@ -1,4 +1,4 @@
-#include "segment/beads/match.h"
+#include "segment/beads/measure.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,6 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/beads.h"
 #include "segment/beads/follow.h"
-#include "segment/beads/match.h"
 
 namespace mbtfm::beads {
 namespace {

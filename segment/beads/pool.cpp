@@ -1,4 +1,4 @@
-#include "segment/beads/pool.h"
+#include "segment/beads/measure.h"
 
 #include <algorithm>
 #include <cmath>

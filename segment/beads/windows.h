@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "segment/beads/coarse_field.h"
-#include "segment/beads/pool.h"
+#include "segment/beads/measure.h"
 #include "segment/beads/scene.h"
 
 namespace mbtfm::beads {

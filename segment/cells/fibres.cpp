@@ -14,7 +14,6 @@
 #include "segment/cells/fibre_scales.h"
 #include "segment/cells/fibre_significance.h"
 #include "segment/cells/grid.h"
-#include "segment/cells/take_over.h"
 #include "segment/cells/trace.h"
 #include "segment/cells/trace_join.h"
 #include "segment/cells/without_lines.h"

@@ -1,4 +1,4 @@
-#include "segment/cells/take_over.h"
+#include "segment/cells/trace_join.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,6 @@
 #include <tuple>
 #include <utility>
 
-#include "segment/cells/parabola.h"
 #include "segment/cells/squares.h"
 
 namespace mbtfm::cells {

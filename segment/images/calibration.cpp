@@ -8,7 +8,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/range.h"
 #include "segment/images/image_file.h"
-#include "segment/images/ome.h"
+#include "segment/images/stack.h"
 
 namespace mbtfm::images {
 namespace {

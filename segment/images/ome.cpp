@@ -1,4 +1,4 @@
-#include "segment/images/ome.h"
+#include "segment/images/stack.h"
 
 #include <expat.h>
 

@@ -8,7 +8,6 @@
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "segment/images/image_file.h"
-#include "segment/images/ome.h"
 
 namespace mbtfm::images {
 namespace {

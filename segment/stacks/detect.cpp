@@ -14,7 +14,6 @@
 #include "segment/beads/plane.h"
 #include "segment/beads/track.h"
 #include "segment/stacks/spots.h"
-#include "segment/stacks/volume.h"
 
 namespace mbtfm::stacks {
 namespace {

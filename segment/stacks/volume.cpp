@@ -1,4 +1,4 @@
-#include "segment/stacks/volume.h"
+#include "segment/stacks/spots.h"
 
 #include <algorithm>
 #include <cmath>

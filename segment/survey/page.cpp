@@ -1,4 +1,4 @@
-#include "segment/survey/page.h"
+#include "segment/survey/survey.h"
 
 #include <algorithm>
 #include <cmath>

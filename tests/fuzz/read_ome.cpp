@@ -1,6 +1,5 @@
 /// What a TIFF says of its dimensions and its pixel size.
 #include "segment/images/image_file.h"
-#include "segment/images/ome.h"
 #include "segment/images/stack.h"
 #include "tests/fuzz/target.h"
 

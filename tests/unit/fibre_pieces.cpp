@@ -1,6 +1,5 @@
 /// Fibres in pieces, and parts of them that another line took over. On responses that are made by hand: a pixel is a
 /// unit of length, and the texture has a deviation of 1.
-#include "segment/cells/take_over.h"
 #include "segment/cells/trace_join.h"
 #include "tests/support/test.h"
 
