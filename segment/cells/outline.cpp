@@ -4,92 +4,16 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pipeline/stage/parameters.h"
+#include "segment/cells/cell_mask.h"
 #include "segment/cells/edge_profile.h"
 #include "segment/cells/ellipse.h"
 #include "segment/cells/grid.h"
-#include "segment/cells/haze.h"
-#include "segment/cells/necks.h"
 
 namespace mbtfm::cells {
 namespace {
 
-constexpr double kSigma_px = 1.5;      // of the smoothing of masks
 constexpr double kSmoothing_um = 0.3;  // just above the resolution of light: more would round the cell's corners
-constexpr double kBand_um = 3;         // brightness inside and outside is compared within this distance
 constexpr double kGrid_um = 0.4;       // pitch of the masks: a little more than the smoothing
-
-/// Parts of a mask by label, from 1, of at least `smallest` pixels each, the largest first.
-struct Parts {
-  struct Part {
-    int label, n_pixels;
-    cv::Rect box;
-  };
-  cv::Mat labels;
-  std::vector<Part> parts;
-  cv::Mat mask(const Part& part) const { return labels == part.label; }
-};
-
-Parts parts_of(const cv::Mat& mask, double smallest) {
-  Parts result;
-  cv::Mat stats, centroids;
-  const int n = cv::connectedComponentsWithStats(mask, result.labels, stats, centroids, 4, CV_32S);
-  for (int i = 1; i < n; ++i) {
-    const auto of = [&](int column) { return stats.at<int>(i, column); };
-    const cv::Rect box(of(cv::CC_STAT_LEFT), of(cv::CC_STAT_TOP), of(cv::CC_STAT_WIDTH), of(cv::CC_STAT_HEIGHT));
-    if (of(cv::CC_STAT_AREA) >= smallest) result.parts.push_back({i, of(cv::CC_STAT_AREA), box});
-  }
-  std::stable_sort(result.parts.begin(), result.parts.end(),
-                   [](const Parts::Part& a, const Parts::Part& b) { return a.n_pixels > b.n_pixels; });
-  return result;
-}
-
-cv::Mat without_debris(const cv::Mat& mask, double smallest) {
-  const Parts parts = parts_of(filled(mask), smallest);
-  cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U);
-  for (const Parts::Part& part : parts.parts) result(part.box) |= parts.labels(part.box) == part.label;
-  return result;
-}
-
-cv::Mat smoothed(const cv::Mat& mask) {
-  cv::Mat smooth;
-  cv::GaussianBlur(mask, smooth, cv::Size(0, 0), kSigma_px);
-  return smooth > 127;
-}
-
-/// Otsu's threshold of log(1 + brightness): cells are bright by a factor, not by an amount.
-cv::Mat first_mask(const cv::Mat& image, double noise) {
-  const double dark = quantile(image, 0.01), bright = quantile(image, 0.99);
-  // neither noise (three deviations) nor a twentieth of the range shall spread over the logarithm's steep part
-  const double unit = std::max(3 * noise, 0.05 * (bright - dark));
-  if (unit <= 0) return cv::Mat::zeros(image.size(), CV_8U);
-  cv::Mat compressed = cv::max((image - dark) / unit, 0.0) + 1.0, bytes, mask;
-  cv::log(compressed, compressed);
-  cv::normalize(compressed, bytes, 0, 255, cv::NORM_MINMAX, CV_8U);
-  cv::threshold(bytes, mask, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
-  return mask;
-}
-
-/// Mean of `values` where `mask` is not 0, weighted by a Gaussian of the distance.
-cv::Mat mean_nearby(const cv::Mat& values, const cv::Mat& mask, double sigma_px) {
-  cv::Mat weight, weighted;
-  mask.convertTo(weight, CV_32F, 1.0 / 255);
-  cv::multiply(values, weight, weighted);
-  // 1e-6: far from the mask both are nothing, and the quotient must stay finite
-  return wide_gaussian(weighted, sigma_px) / (wide_gaussian(weight, sigma_px) + 1e-6);
-}
-
-/// One round of comparing points near the edge with both sides. "Inside" is what the cell looks like along its edge:
-/// brighter things, its thick middle, fibres and adhesions, count no more than that.
-cv::Mat moved_edge(const cv::Mat& values, const cv::Mat& mask, double band_px, double smallest) {
-  cv::Mat grown, core, result = mask.clone();
-  cv::dilate(mask, grown, disc_of(band_px));
-  cv::erode(mask, core, disc_of(band_px), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(255));
-  const cv::Mat clipped = cv::min(values, median_within(values, mask & ~core));
-  const cv::Mat middle = (mean_nearby(clipped, mask, band_px) + mean_nearby(clipped, ~mask, band_px)) / 2;
-  const cv::Mat brighter = clipped > middle, band = grown & ~core;
-  brighter.copyTo(result, band);
-  return without_debris(smoothed(result), smallest);
-}
 
 /// @returns how far each adhesion's centre lies beyond the mask, before any is added (um)
 std::vector<double> add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& adhesions, double pixel_um,
@@ -173,7 +97,7 @@ std::vector<std::vector<cv::Point2d>> rings_of(const cv::Mat& mask) {
   std::stable_sort(contours.begin(), contours.end(),
                    [](const auto& a, const auto& b) { return cv::contourArea(a) > cv::contourArea(b); });
   framed.convertTo(level, CV_32F, 1.0 / 255);
-  level = gaussian(level, kSigma_px);
+  level = gaussian(level, kMaskSigma_px);
   std::vector<std::vector<cv::Point2d>> rings;
   for (const auto& contour : contours) {
     rings.push_back(smoothed_ring(on_level(contour, level), 2));
@@ -181,43 +105,6 @@ std::vector<std::vector<cv::Point2d>> rings_of(const cv::Mat& mask) {
   }
   return rings;
 }
-
-/// Gaps in the cells where it is as dark as outside: less than half of the way up to the cells' edges, and in parts
-/// within a quarter.
-cv::Mat holes_in(const cv::Mat& values, const cv::Mat& mask, double band_px, double noise, double smallest) {
-  cv::Mat core;
-  cv::erode(mask, core, disc_of(band_px), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(255));
-  // from far away: the holes are in the middle
-  const cv::Mat outside = mean_nearby(values, ~mask, 4 * band_px),
-                edge = mean_nearby(values, mask & ~core, 4 * band_px);
-  const cv::Mat rise = edge - outside, height = values - outside;
-  cv::Mat quarter;
-  cv::min(cv::Mat(rise * 0.25), cv::Mat(rise - 4 * noise), quarter);
-  const cv::Mat dark = (height < rise * 0.5) & mask, darkest = (height < quarter) & mask;
-  cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U);
-  const Parts gaps = parts_of(dark, smallest);
-  const cv::Rect frame(cv::Point(0, 0), mask.size());
-  for (const Parts::Part& gap : gaps.parts) {
-    const cv::Rect box = cv::Rect(gap.box.tl() - cv::Point(1, 1), gap.box.br() + cv::Point(1, 1)) & frame;
-    const cv::Mat hole = gaps.labels(box) == gap.label;
-    cv::Mat rim;
-    cv::dilate(hole, rim, disc_of(1));
-    // a gap that reaches the edge is no hole
-    if (cv::countNonZero(rim & ~mask(box)) == 0 && 2 * cv::countNonZero(hole & darkest(box)) > gap.n_pixels)
-      result(box) |= hole;
-  }
-  return result;
-}
-
-/// The image at the resolution of the masks, and how it is scaled.
-struct Scene {
-  cv::Mat full, smooth;
-  double pixel_um, full_pixel_um, band_px, noise;
-  double px_of(double area_um2) const { return area_um2 / (pixel_um * pixel_um); }
-  Vec2 field_um() const { return {full.cols * full_pixel_um, full.rows * full_pixel_um}; }
-  /// A ring as near as this to the image's border is one that the border has made: rings go through pixels' centres.
-  double border_um() const { return 1.5 * pixel_um; }
-};
 
 /// With the nearest line in place of the strips of one value that registration leaves along the image's sides: their
 /// edge is none of a cell. A ground of that value, as where dark pixels were set to 0, is left as it is.
@@ -261,24 +148,6 @@ Scene scene_of(const cv::Mat& image, double pixel_size_um) {
   s.smooth = gaussian(small, sigma_px);
   s.noise = overall_noise(small) * noise_gain(sigma_px);
   return s;
-}
-
-/// All cells; holes filled. @param bright  everything that stands out
-Body cells_in(const Scene& s, const cv::Mat& bright, double smallest) {
-  cv::Mat mask = without_debris(bright, smallest);
-  if (cv::countNonZero(mask) == 0 || cv::countNonZero(~mask) == 0) return {};
-  // two halves of pure noise differ by 1.6 standard deviations
-  if (cv::mean(s.smooth, mask)[0] - cv::mean(s.smooth, ~mask)[0] < 4 * s.noise) return {};
-  constexpr int kRounds = 6;  // the edge moves by up to a band in the first few and then stays
-  for (int round = 0; round < kRounds && cv::countNonZero(mask) > 0; ++round) {
-    const cv::Mat before = mask;
-    mask = moved_edge(s.smooth, mask, s.band_px, smallest);
-    // less than a pixel in a thousand of the cell: what still changes is noise
-    if (cv::countNonZero(before ^ mask) * 1000 < cv::countNonZero(mask)) break;
-  }
-  Body body = without_haze(s.smooth, mask, s.pixel_um, kBand_um);
-  if (cv::countNonZero(body.mask ^ mask) > 0) mask = without_debris(smoothed(body.mask), smallest);
-  return {mask, body.soft};
 }
 
 /// Points at the image's border and at adhesions stay: there the ring is not an edge of this channel. So do those in

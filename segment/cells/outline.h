@@ -59,7 +59,7 @@ struct CellsInImage {
   std::vector<Polygon> debris_um = {};  ///< bright things beyond all cells that are smaller than one
 };
 
-/// The cells of an image. Cells that touch are cut apart at the neck between them (necks.h); if there is none, they
+/// The cells of an image. Cells that touch are cut apart at the neck between them (cell_mask.h); if there is none, they
 /// count as one.
 ///
 /// A first mask by Otsu's threshold of the smoothed image's logarithm above the darkest region; then each point near
