@@ -1,8 +1,9 @@
 #include "segment/cells/ellipse.h"
 
-#include <algorithm>
-#include <cmath>
 #include <numbers>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::cells {
 namespace {
@@ -59,6 +60,36 @@ Adhesion measure_ellipse(const std::vector<CoveredPixel>& pixels, double pixel_s
   return adhesion;
 }
 
+Adhesion ellipse_of_polygon(const Polygon& polygon) {
+  const Vec2 origin = polygon.front();  // near, so that no digits are lost
+  double area = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vec2 a = polygon[i] - origin, b = polygon[(i + 1) % polygon.size()] - origin;
+    const double c = cross(a, b);
+    area += c / 2;
+    x += c * (a.x + b.x) / 6;
+    y += c * (a.y + b.y) / 6;
+    xx += c * (a.x * a.x + a.x * b.x + b.x * b.x) / 12;
+    yy += c * (a.y * a.y + a.y * b.y + b.y * b.y) / 12;
+    xy += c * (a.x * b.y + 2 * a.x * a.y + 2 * b.x * b.y + b.x * a.y) / 24;
+  }
+  MBTFM_ASSERT(area != 0);
+  const Vec2 centre{x / area, y / area};
+  const double m_xx = xx / area - centre.x * centre.x, m_yy = yy / area - centre.y * centre.y,
+               m_xy = xy / area - centre.x * centre.y;
+  const double mean = (m_xx + m_yy) / 2, half_difference = std::hypot((m_xx - m_yy) / 2, m_xy);
+  const double ratio = std::sqrt((mean - half_difference) / (mean + half_difference));
+  if (!(ratio > 0)) throw InvalidData("polygon", "a line that does not cross itself", "negative second moments");
+  Adhesion adhesion;
+  adhesion.position_um = origin + centre;
+  adhesion.area_um2 = std::abs(area);
+  adhesion.major_axis_um = std::sqrt(adhesion.area_um2 / ratio * 4 / std::numbers::pi);
+  adhesion.minor_axis_um = ratio * adhesion.major_axis_um;
+  adhesion.angle_rad = std::atan2(2 * m_xy, m_xx - m_yy) / 2;
+  adhesion.eccentricity = std::sqrt(std::max(0.0, 1 - ratio * ratio));
+  return adhesion;
+}
+
 double distance_to_ellipse_um(const Adhesion& adhesion, Vec2 point_um) {
   const Vec2 p = along_axes(adhesion, point_um);
   const double a = adhesion.major_axis_um / 2, b = adhesion.minor_axis_um / 2;
@@ -66,6 +97,25 @@ double distance_to_ellipse_um(const Adhesion& adhesion, Vec2 point_um) {
   if (q < 1e-9) return -b;
   // q is 1 on the rim; |grad q| turns its excess into a distance
   return (q - 1) * q / std::hypot(p.x / (a * a), p.y / (b * b));
+}
+
+std::optional<double> level_around(const Adhesion& adhesion, const images::Image& image, double pixel_um,
+                                   const std::function<bool(int, int, Vec2)>& is_background) {
+  constexpr double kBlur_um = 0.3, kRing_um = 1;  // the ring begins where the resolution of light has faded
+  const double reach_um = adhesion.major_axis_um / 2 + kRing_um;
+  const Vec2 low = adhesion.position_um - Vec2{reach_um, reach_um},
+             high = adhesion.position_um + Vec2{reach_um, reach_um};
+  std::vector<float> around;
+  for (int j = pixel_at(low.y, pixel_um, image.height); j <= pixel_at(high.y, pixel_um, image.height); ++j) {
+    for (int i = pixel_at(low.x, pixel_um, image.width); i <= pixel_at(high.x, pixel_um, image.width); ++i) {
+      const Vec2 centre_um{(i + 0.5) * pixel_um, (j + 0.5) * pixel_um};
+      if (!is_background(i, j, centre_um)) continue;
+      const double distance_um = distance_to_ellipse_um(adhesion, centre_um);
+      if (distance_um >= kBlur_um && distance_um <= kRing_um) around.push_back(image.at(i, j));
+    }
+  }
+  if (around.empty()) return std::nullopt;
+  return numerics::median_in(around);
 }
 
 }  // namespace mbtfm::cells

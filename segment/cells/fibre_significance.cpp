@@ -74,7 +74,6 @@ TextureLines texture_lines(std::vector<double> significances) {
 
 namespace {
 
-constexpr double kBeside_um = 3;  // bundles of one carpet lie nearer
 constexpr std::size_t kEach = 3;  // point
 
 Vec2 direction_at(const Polyline& line, std::size_t i) {
@@ -82,29 +81,21 @@ Vec2 direction_at(const Polyline& line, std::size_t i) {
   return (1 / std::max(norm(d), 1e-12)) * d;
 }
 
-std::pair<int, int> square_of(Vec2 p, int dx = 0, int dy = 0) {
-  return {static_cast<int>(std::floor(p.x / kBeside_um)) + dx, static_cast<int>(std::floor(p.y / kBeside_um)) + dy};
-}
-
 }  // namespace
 
 void Bundles::add(const Polyline& line_um) {
   for (std::size_t i = 0; i < line_um.size(); i += kEach)
-    squares_[square_of(line_um[i])].push_back({line_um[i], direction_at(line_um, i)});
+    squares_.add({line_um[i].x, line_um[i].y}, {line_um[i], direction_at(line_um, i)});
 }
 
 bool Bundles::has_beside(const Place& place) const {
   constexpr double kParallel = 0.9659;  // cosine of 15°
-  for (int dy = -1; dy <= 1; ++dy)
-    for (int dx = -1; dx <= 1; ++dx) {
-      const auto found = squares_.find(square_of(place.position_um, dx, dy));
-      if (found == squares_.end()) continue;
-      for (const Place& other : found->second)
-        if (norm(other.position_um - place.position_um) < kBeside_um &&
-            std::abs(dot(other.along, place.along)) > kParallel)
-          return true;
-    }
-  return false;
+  bool is_found = false;
+  squares_.each_near({place.position_um.x, place.position_um.y}, [&](const Place& other) {
+    is_found = is_found || (norm(other.position_um - place.position_um) < kBeside_um &&
+                            std::abs(dot(other.along, place.along)) > kParallel);
+  });
+  return is_found;
 }
 
 double Bundles::share_beside(const Polyline& line_um) const {

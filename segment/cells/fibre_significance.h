@@ -1,13 +1,12 @@
 /// What tells a bundle from the meshwork of the cortex. Internal to segment/ (OpenCV types).
 #pragma once
 
-#include <map>
 #include <opencv2/core.hpp>
-#include <utility>
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
 #include "segment/cells/ridge.h"
+#include "segment/cells/squares.h"
 
 namespace mbtfm::cells {
 
@@ -55,7 +54,8 @@ class Bundles {
     Vec2 position_um, along;
   };
   bool has_beside(const Place& place) const;
-  std::map<std::pair<int, int>, std::vector<Place>> squares_;
+  static constexpr double kBeside_um = 3;  ///< bundles of one carpet lie nearer
+  Squares<Place> squares_{kBeside_um};
 };
 
 /// Does the line wind to and fro, as a fold of the membrane does and a bundle under tension does not? Turning beyond

@@ -101,31 +101,19 @@ Adhesion ellipse_of(const rois::Roi& roi, const Polygon& polygon_um, const Field
 
 /// See `hand_drawn_adhesions`. An area without a pixel's centre is as bright as the pixel at its own.
 double height_within(const Polygon& area_um, const Adhesion& adhesion, const images::Image& image, double pixel_um) {
-  constexpr double kBlur_um = 0.3, kRing_um = 1;  // the ring begins where the resolution of light has faded
-  const double reach_um = adhesion.major_axis_um / 2 + kRing_um;
-  const auto pixel_at = [&](double at_um, int n) {
-    return std::clamp(static_cast<int>(std::floor(at_um / pixel_um)), 0, n - 1);
-  };
-  const Vec2 c = adhesion.position_um;
   double sum = 0;
   int n_inside = 0;
-  std::vector<float> around;
-  for (int j = pixel_at(c.y - reach_um, image.height); j <= pixel_at(c.y + reach_um, image.height); ++j) {
-    for (int i = pixel_at(c.x - reach_um, image.width); i <= pixel_at(c.x + reach_um, image.width); ++i) {
-      const Vec2 centre_um{(i + 0.5) * pixel_um, (j + 0.5) * pixel_um};
-      const double distance_um = distance_to_ellipse_um(adhesion, centre_um);
-      if (contains(area_um, centre_um)) {
-        sum += image.at(i, j);
-        ++n_inside;
-      } else if (distance_um >= kBlur_um && distance_um <= kRing_um) {
-        around.push_back(image.at(i, j));
-      }
-    }
-  }
-  const double inside =
-      n_inside > 0 ? sum / n_inside : image.at(pixel_at(c.x, image.width), pixel_at(c.y, image.height));
-  if (around.empty()) return inside;
-  return inside - numerics::median_in(around);
+  const std::optional<double> around = level_around(adhesion, image, pixel_um, [&](int i, int j, Vec2 centre_um) {
+    if (!contains(area_um, centre_um)) return true;
+    sum += image.at(i, j);
+    ++n_inside;
+    return false;
+  });
+  const Vec2 c = adhesion.position_um;
+  const double inside = n_inside > 0
+                            ? sum / n_inside
+                            : image.at(pixel_at(c.x, pixel_um, image.width), pixel_at(c.y, pixel_um, image.height));
+  return inside - around.value_or(0);
 }
 
 /// The words of a selection's name, in small letters.
@@ -375,36 +363,6 @@ HeldFibres hold_fibres(std::vector<DrawnLine> lines, const std::vector<Adhesion>
   for (std::optional<Fibre>& fibre : fibres) result.fibres.push_back(std::move(*fibre));
   result.anchors.assign(all.begin() + static_cast<std::ptrdiff_t>(adhesions.size()), all.end());
   return result;
-}
-
-Adhesion ellipse_of_polygon(const Polygon& polygon) {
-  const Vec2 origin = polygon.front();  // near, so that no digits are lost
-  double area = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vec2 a = polygon[i] - origin, b = polygon[(i + 1) % polygon.size()] - origin;
-    const double c = cross(a, b);
-    area += c / 2;
-    x += c * (a.x + b.x) / 6;
-    y += c * (a.y + b.y) / 6;
-    xx += c * (a.x * a.x + a.x * b.x + b.x * b.x) / 12;
-    yy += c * (a.y * a.y + a.y * b.y + b.y * b.y) / 12;
-    xy += c * (a.x * b.y + 2 * a.x * a.y + 2 * b.x * b.y + b.x * a.y) / 24;
-  }
-  MBTFM_ASSERT(area != 0);
-  const Vec2 centre{x / area, y / area};
-  const double m_xx = xx / area - centre.x * centre.x, m_yy = yy / area - centre.y * centre.y,
-               m_xy = xy / area - centre.x * centre.y;
-  const double mean = (m_xx + m_yy) / 2, half_difference = std::hypot((m_xx - m_yy) / 2, m_xy);
-  const double ratio = std::sqrt((mean - half_difference) / (mean + half_difference));
-  if (!(ratio > 0)) throw InvalidData("polygon", "a line that does not cross itself", "negative second moments");
-  Adhesion adhesion;
-  adhesion.position_um = origin + centre;
-  adhesion.area_um2 = std::abs(area);
-  adhesion.major_axis_um = std::sqrt(adhesion.area_um2 / ratio * 4 / std::numbers::pi);
-  adhesion.minor_axis_um = ratio * adhesion.major_axis_um;
-  adhesion.angle_rad = std::atan2(2 * m_xy, m_xx - m_yy) / 2;
-  adhesion.eccentricity = std::sqrt(std::max(0.0, 1 - ratio * ratio));
-  return adhesion;
 }
 
 }  // namespace mbtfm::cells

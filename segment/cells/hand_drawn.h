@@ -75,14 +75,4 @@ struct HeldFibres {
 HeldFibres hold_fibres(std::vector<DrawnLine> lines, const std::vector<Adhesion>& adhesions, const CellOutline& cell,
                        const FibreParameters& parameters, double anchor_area_um2, const Cuts& cuts = {});
 
-/// Area, centroid and the ellipse of equal second moments of a polygon, scaled to its area.
-///
-///   A = ½ Σ c_i,  ∫x² = 1/12 Σ c_i (x_i² + x_i x_j + x_j²),  ∫xy = 1/24 Σ c_i (x_i y_j + 2 x_i y_i + 2 x_j y_j + x_j
-///   y_i)
-///
-/// with j = i + 1 and c_i = x_i y_j − x_j y_i (Green's theorem).
-/// @param polygon  of an area other than 0
-/// @throws InvalidData where it crosses itself so that it has no such ellipse
-Adhesion ellipse_of_polygon(const Polygon& polygon);
-
 }  // namespace mbtfm::cells

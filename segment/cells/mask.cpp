@@ -139,29 +139,6 @@ std::map<int, std::vector<CoveredPixel>> pixels_by_label(const LabelMask& mask) 
   return pixels;
 }
 
-/// Median of the image's pixels of no adhesion between 0.3 and 1 um around the ellipse, as of adhesions drawn by hand.
-std::optional<double> level_around(const LabelMask& mask, const Adhesion& a, const images::Image& image,
-                                   double pixel_um) {
-  constexpr double kBlur_um = 0.3, kRing_um = 1;
-  const double reach_um = a.major_axis_um / 2 + kRing_um;
-  const auto pixel_at = [&](double at_um, int n) {
-    return std::clamp(static_cast<int>(std::floor(at_um / pixel_um)), 0, n - 1);
-  };
-  std::vector<float> around;
-  for (int j = pixel_at(a.position_um.y - reach_um, image.height);
-       j <= pixel_at(a.position_um.y + reach_um, image.height); ++j) {
-    for (int i = pixel_at(a.position_um.x - reach_um, image.width);
-         i <= pixel_at(a.position_um.x + reach_um, image.width); ++i) {
-      const double distance_um = distance_to_ellipse_um(a, {(i + 0.5) * pixel_um, (j + 0.5) * pixel_um});
-      const bool is_free =
-          mask.at_or_zero(i * mask.binning + mask.binning / 2, j * mask.binning + mask.binning / 2) == 0;
-      if (is_free && distance_um >= kBlur_um && distance_um <= kRing_um) around.push_back(image.at(i, j));
-    }
-  }
-  if (around.empty()) return std::nullopt;
-  return numerics::median_in(around);
-}
-
 /// Labels of the parts that are large enough for a cell, the largest first; of a label image those that are there.
 std::vector<int> cells_in(const LabelMask& parts, const Field& field, const OutlineParameters& p) {
   std::map<int, int> n_pixels;
@@ -289,10 +266,6 @@ PatternAtCell pattern_at(const LabelMask& pattern, const CellOutline& cell, cons
     bool is_cut = false;
   };
   std::map<int, Part> by_label;
-  const auto is_in_cell = [&](Vec2 point) {
-    const auto is_in = [&](const Polygon& ring) { return contains(ring, point); };
-    return is_in(cell.outer_um) && std::ranges::none_of(cell.holes_um, is_in);
-  };
   for (int j = 0; j < parts.height; j += step)
     for (int i = 0; i < parts.width; i += step) {
       const int label = parts.at(i, j);
@@ -300,7 +273,7 @@ PatternAtCell pattern_at(const LabelMask& pattern, const CellOutline& cell, cons
       const double area_um2 = std::pow(step * pixel_um, 2);
       Part& part = by_label[label];
       part.area_um2 += area_um2;
-      if (is_in_cell({(i + 0.5) * pixel_um, (j + 0.5) * pixel_um})) part.beneath_um2 += area_um2;
+      if (is_in_cell(cell, {(i + 0.5) * pixel_um, (j + 0.5) * pixel_um})) part.beneath_um2 += area_um2;
       part.is_cut = part.is_cut || i < step || j < step || i + step >= parts.width || j + step >= parts.height;
     }
   double area_um2 = 0, beneath_um2 = 0, on_um2 = 0;
@@ -403,7 +376,11 @@ std::vector<Adhesion> mask_adhesions(const LabelMask& mask, const std::optional<
     Adhesion a = measure_ellipse(pixels, pixel_of(mask, field));
     require_size_of_adhesion(mask, a);
     a.adhesion_id = static_cast<int>(adhesions.size()) + 1;
-    if (adhesion) a.mean_intensity -= level_around(parts, a, adhesion->image, field.pixel_um).value_or(0);
+    const auto is_free = [&](int i, int j, Vec2) {
+      const int middle = mask.binning / 2;
+      return parts.at_or_zero(i * mask.binning + middle, j * mask.binning + middle) == 0;
+    };
+    if (adhesion) a.mean_intensity -= level_around(a, adhesion->image, field.pixel_um, is_free).value_or(0);
     adhesions.push_back(a);
   }
   return adhesions;

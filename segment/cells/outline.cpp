@@ -335,20 +335,21 @@ Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& ad
   return cells.empty() ? Polygon{} : cells.front().outer_um;
 }
 
+bool is_in_cell(const CellOutline& cell, Vec2 point_um) {
+  const auto is_in = [&](const Polygon& ring) { return contains(ring, point_um); };
+  return is_in(cell.outer_um) && std::ranges::none_of(cell.holes_um, is_in);
+}
+
 double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& others, double far_um) {
   constexpr double kLines = 100;  // across the cell: its area to a per cent
   const auto [left, right] = std::ranges::minmax(cell.outer_um, {}, &Vec2::x);
   const auto [top, bottom] = std::ranges::minmax(cell.outer_um, {}, &Vec2::y);
   const double step = std::max(right.x - left.x, bottom.y - top.y) / kLines;
-  const auto is_in = [](const CellOutline& of, Vec2 p) {
-    return contains(of.outer_um, p) &&
-           std::ranges::none_of(of.holes_um, [&](const Polygon& hole) { return contains(hole, p); });
-  };
   int n = 0, n_beyond = 0;
   for (double y = top.y + step / 2; y < bottom.y; y += step) {
     for (double x = left.x + step / 2; x < right.x; x += step) {
       const Vec2 p{x, y};
-      if (!is_in(cell, p)) continue;
+      if (!is_in_cell(cell, p)) continue;
       ++n;
       n_beyond += std::ranges::none_of(others, [&](const CellOutline& other) {
         return contains(other.outer_um, p) || distance_to_boundary_um(other.outer_um, p) <= far_um;
@@ -361,8 +362,7 @@ double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& oth
 std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions) {
   std::vector<Adhesion> kept;
   for (const Adhesion& adhesion : adhesions) {
-    const auto is_in = [&](const Polygon& ring) { return contains(ring, adhesion.position_um); };
-    if (!is_in(cell.outer_um) || std::any_of(cell.holes_um.begin(), cell.holes_um.end(), is_in)) continue;
+    if (!is_in_cell(cell, adhesion.position_um)) continue;
     kept.push_back(adhesion);
     kept.back().adhesion_id = static_cast<int>(kept.size());
   }

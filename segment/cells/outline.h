@@ -50,6 +50,9 @@ struct CutRing {
 /// image's corner is put in where the ring goes round it that closely.
 CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um);
 
+/// In the outer ring and in none of the holes.
+bool is_in_cell(const CellOutline& cell, Vec2 point_um);
+
 /// The cells that an image shows, the largest first.
 struct CellsInImage {
   std::vector<CellOutline> cells;

@@ -246,10 +246,7 @@ std::vector<Adhesion> candidates_in(const Inputs& in, const CellOutline& cell, c
       return distance_to_edge_um(whole, point) <= p.candidate_band_um;
     };
     const auto [low, high] = extent_of(cell.outer_um);
-    const auto in_cell = [&](Vec2 point) {
-      const auto is_in = [&](const Polygon& ring) { return contains(ring, point); };
-      return is_in(cell.outer_um) && std::ranges::none_of(cell.holes_um, is_in) && is_possible(point);
-    };
+    const auto in_cell = [&](Vec2 point) { return is_in_cell(cell, point) && is_possible(point); };
     for (Adhesion& a : lattice_candidates(low, high, p.candidate_spacing_um, placement, in_cell))
       candidates.push_back(std::move(a));
   }
