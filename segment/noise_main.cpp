@@ -9,7 +9,6 @@
 #include "pipeline/stage/stage.h"
 #include "segment/beads/unloaded.h"
 #include "segment/images/channels.h"
-#include "segment/images/scan_phase.h"
 
 namespace mbtfm::beads {
 namespace {

@@ -17,7 +17,7 @@
 #include "segment/cells/overlay.h"
 #include "segment/cells/segment_cell.h"
 #include "segment/cells/usual_sizes.h"
-#include "segment/images/scan_phase.h"
+#include "segment/images/channels.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -24,7 +24,6 @@
 #include "segment/beads/pair_look.h"
 #include "segment/beads/track.h"
 #include "segment/images/channels.h"
-#include "segment/images/scan_phase.h"
 #include "segment/stacks/run.h"
 
 namespace mbtfm::beads {

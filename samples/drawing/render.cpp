@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "pipeline/numerics/parallel.h"
-#include "segment/images/scan_phase.h"
+#include "segment/images/channels.h"
 
 namespace mbtfm::drawing {
 

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "pipeline/numerics/order_statistics.h"
-#include "segment/beads/beads.h"
 #include "segment/beads/follow.h"
+#include "segment/beads/scene.h"
 
 namespace mbtfm::beads {
 namespace {

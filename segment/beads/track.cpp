@@ -11,7 +11,6 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/parameters.h"
-#include "segment/beads/beads.h"
 #include "segment/beads/coarse_field.h"
 #include "segment/beads/common_motion.h"
 #include "segment/beads/follow.h"

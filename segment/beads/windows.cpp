@@ -7,7 +7,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/order_statistics.h"
-#include "segment/beads/beads.h"
+#include "segment/beads/scene.h"
 
 namespace mbtfm::beads {
 namespace {

@@ -1,4 +1,4 @@
-#include "segment/cells/adhesion_fit.h"
+#include "segment/cells/adhesion_parts.h"
 
 #include <algorithm>
 #include <cmath>

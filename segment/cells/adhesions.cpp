@@ -6,7 +6,6 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/parameters.h"
-#include "segment/cells/adhesion_fit.h"
 #include "segment/cells/adhesion_parts.h"
 #include "segment/cells/grid.h"
 #include "segment/images/channels.h"

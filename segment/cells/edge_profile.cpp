@@ -1,4 +1,4 @@
-#include "segment/cells/edge_profile.h"
+#include "segment/cells/cell_mask.h"
 
 #include <algorithm>
 #include <array>

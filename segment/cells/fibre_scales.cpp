@@ -1,4 +1,4 @@
-#include "segment/cells/fibre_scales.h"
+#include "segment/cells/fibre_significance.h"
 
 #include <algorithm>
 #include <cmath>

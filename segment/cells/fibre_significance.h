@@ -1,12 +1,15 @@
-/// What tells a bundle from the meshwork of the cortex. Internal to segment/ (OpenCV types).
+/// What tells a bundle from the meshwork of the cortex, and the lengths by which it is looked for. Internal to segment/
+/// (OpenCV types).
 #pragma once
 
 #include <opencv2/core.hpp>
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
+#include "segment/cells/fibres.h"
 #include "segment/cells/ridge.h"
 #include "segment/cells/squares.h"
+#include "segment/cells/trace.h"
 
 namespace mbtfm::cells {
 
@@ -61,5 +64,15 @@ class Bundles {
 /// Does the line wind to and fro, as a fold of the membrane does and a bundle under tension does not? Turning beyond
 /// its net turning, by length.
 bool winds(const Polyline& line_um);
+
+/// How many pixels of the image become one of the grid: the narrow filter's deviation spans 1.2 of them, so that the
+/// grid carries all but 1e-3 of its spectrum.
+int grid_factor(const FibreParameters& parameters, double pixel_um);
+/// The filter is narrower than a fibre: it tells neighbours of a bundle apart, and still answers at the crest of a wide
+/// one.
+RidgeScales scales_of(const FibreParameters& parameters, double pixel_um);
+TraceRule rule_of(const FibreParameters& parameters, double pixel_um);
+/// Over this length of a line its responses are one independent piece.
+double independent_px(const FibreParameters& parameters, double pixel_um);
 
 }  // namespace mbtfm::cells

@@ -11,7 +11,6 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/parameters.h"
 #include "segment/cells/fibre_profile.h"
-#include "segment/cells/fibre_scales.h"
 #include "segment/cells/fibre_significance.h"
 #include "segment/cells/grid.h"
 #include "segment/cells/trace.h"

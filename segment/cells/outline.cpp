@@ -5,7 +5,6 @@
 
 #include "pipeline/stage/parameters.h"
 #include "segment/cells/cell_mask.h"
-#include "segment/cells/edge_profile.h"
 #include "segment/cells/ellipse.h"
 #include "segment/cells/grid.h"
 

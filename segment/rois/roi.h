@@ -73,9 +73,6 @@ void write_roi_set(const std::filesystem::path& file, const std::vector<Roi>& ro
 /// The same selection in the pixels of an image that was reduced by this factor.
 Roi binned(Roi roi, int binning);
 
-/// The same selection in the pixels of an image whose pixels are `binning` of these wide.
-Roi binned(Roi roi, int binning);
-
 /// The line of a line selection, origin at the outer corner of the top-left pixel; a spline as ImageJ draws it.
 /// @throws InternalError for another selection
 Polyline line_px(const Roi& roi);

@@ -1,4 +1,4 @@
-#include "segment/stacks/detect.h"
+#include "segment/stacks/spots.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,9 @@
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
-#include "segment/beads/beads.h"
 #include "segment/beads/plane.h"
+#include "segment/beads/scene.h"
 #include "segment/beads/track.h"
-#include "segment/stacks/spots.h"
 
 namespace mbtfm::stacks {
 namespace {

@@ -1,4 +1,4 @@
-#include "segment/stacks/match.h"
+#include "segment/stacks/track.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>

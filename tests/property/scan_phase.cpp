@@ -1,4 +1,4 @@
-#include "segment/images/scan_phase.h"
+#include "segment/images/channels.h"
 
 #include "pipeline/numerics/order_statistics.h"
 #include "tests/support/bead_pair.h"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "samples/drawing/stack.h"
-#include "segment/stacks/match.h"
+#include "segment/stacks/track.h"
 #include "tests/support/test.h"
 
 namespace mbtfm::test {
