@@ -22,6 +22,20 @@ struct Plane {
 /// The image less its Gaussian average over `sigma` px: light that varies slowly is gone.
 Plane without_background(const images::Image& image, double sigma);
 
+/// The cubic spline through an image's values.
+struct Spline {
+  Plane coefficients;  ///< with a margin of one before and two after, mirrored
+  float last_x = 0, last_y = 0;
+};
+
+Spline spline_through(const Plane& plane, int threads);
+/// An image as a smooth function: its values and slopes at the pixels, and the spline between them.
+struct SmoothImage {
+  Plane plane, slope_x, slope_y;
+  Spline spline;
+};
+SmoothImage smooth_image(Plane plane, int threads);
+
 /// Gaussian average.
 Plane blurred(const Plane& plane, double sigma);
 

@@ -45,29 +45,6 @@ float interpolated(const Spline& spline, float x, float y) {
   return cv::v_reduce_sum(column * wx);
 }
 
-/// Turns a line of values into the coefficients of the cubic spline through them, mirrored at its ends
-/// (Unser's recursion; the pole's 16th power is below single precision). `step` apart, `n` long, `lanes` side by side.
-void to_coefficients(float* values, std::ptrdiff_t step, int n, int lanes) {
-  const float pole = std::sqrt(3.0f) - 2;
-  const auto line = [&](int k) { return values + k * step; };
-  std::vector<float> start(static_cast<std::size_t>(lanes), 0.0f);
-  for (int k = std::min(16, n - 1); k >= 0; --k) {
-    for (int l = 0; l < lanes; ++l) start[l] = pole * start[l] + line(k)[l];
-  }
-  for (int l = 0; l < lanes; ++l) line(0)[l] = start[l];
-  for (int k = 1; k < n; ++k) {
-    for (int l = 0; l < lanes; ++l) line(k)[l] += pole * line(k - 1)[l];
-  }
-  const float end = pole / (pole * pole - 1);
-  for (int l = 0; l < lanes; ++l) line(n - 1)[l] = end * (line(n - 1)[l] + pole * line(n - 2)[l]);
-  for (int k = n - 2; k >= 0; --k) {
-    for (int l = 0; l < lanes; ++l) line(k)[l] = pole * (line(k + 1)[l] - line(k)[l]);
-  }
-  for (int k = 0; k < n; ++k) {
-    for (int l = 0; l < lanes; ++l) line(k)[l] *= 6;
-  }
-}
-
 /// Of the value at a pixel by u and G; the two places left, up to what the processor adds at once, take the value and
 /// one where sums with them are needed, too.
 using Slope = std::array<float, 8>;
@@ -316,52 +293,8 @@ Vec6 gradient_difference(const Motion& a, const Motion& b) {
 
 }  // namespace
 
-Spline spline_through(const Plane& plane, int threads) {
-  const int width = plane.width, height = plane.height;
-  Plane inner = plane;
-  float* values = inner.values.data();
-  in_strips(width, threads, [&](int from, int to) { to_coefficients(values + from, width, height, to - from); });
-  in_strips(height, threads, [&](int from, int to) {
-    for (int j = from; j < to; ++j) to_coefficients(values + static_cast<std::size_t>(j) * width, 1, width, 1);
-  });
-  const auto mirrored = [](int k, int n) { return k < 0 ? -k : k >= n ? 2 * n - 2 - k : k; };
-  Spline result{.coefficients = {width + 3, height + 3, {}},
-                .last_x = static_cast<float>(width - 1),
-                .last_y = static_cast<float>(height - 1)};
-  std::vector<float>& padded = result.coefficients.values;
-  padded.resize(static_cast<std::size_t>(width + 3) * (height + 3));
-  for (int j = 0; j < height + 3; ++j) {
-    const float* from = inner.row(mirrored(j - 1, height));
-    float* to = padded.data() + static_cast<std::size_t>(j) * (width + 3);
-    std::copy(from, from + width, to + 1);
-    to[0] = from[1], to[width + 1] = from[width - 2], to[width + 2] = from[width - 3];
-  }
-  return result;
-}
-
 float value_at(const Spline& spline, Vec2 place) {
   return interpolated(spline, static_cast<float>(place.x), static_cast<float>(place.y));
-}
-
-SmoothImage smooth_image(Plane plane, int threads) {
-  SmoothImage result;
-  result.spline = spline_through(plane, threads);
-  const Plane& c = result.spline.coefficients;
-  result.slope_x = result.slope_y = {plane.width, plane.height, std::vector<float>(plane.values.size())};
-  in_strips(plane.height, threads, [&](int from, int to) {
-    for (int j = from; j < to; ++j) {
-      const float *above = c.row(j), *here = c.row(j + 1), *below = c.row(j + 2);
-      const std::size_t first = static_cast<std::size_t>(j) * plane.width;
-      for (int i = 0; i < plane.width; ++i) {
-        const auto along = [&](const float* row) { return row[i + 2] - row[i]; };
-        const auto across = [&](int k) { return below[i + k] - above[i + k]; };
-        result.slope_x.values[first + i] = (along(above) + 4 * along(here) + along(below)) / 12;
-        result.slope_y.values[first + i] = (across(0) + 4 * across(1) + across(2)) / 12;
-      }
-    }
-  });
-  result.plane = std::move(plane);
-  return result;
 }
 
 Registered registered(const SmoothImage& reference, const Spline& target, Vec2 place, const Motion& guess,

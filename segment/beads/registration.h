@@ -14,22 +14,8 @@ struct Motion {
   }
 };
 
-/// The cubic spline through an image's values.
-struct Spline {
-  Plane coefficients;  ///< with a margin of one before and two after, mirrored
-  float last_x = 0, last_y = 0;
-};
-
-Spline spline_through(const Plane& plane, int threads);
 /// Beyond the border the last pixel goes on.
 float value_at(const Spline& spline, Vec2 place);
-
-/// An image as a smooth function: its values and slopes at the pixels, and the spline between them.
-struct SmoothImage {
-  Plane plane, slope_x, slope_y;
-  Spline spline;
-};
-SmoothImage smooth_image(Plane plane, int threads);
 
 struct Window {
   double sigma = 4;          ///< px, of its Gaussian weight

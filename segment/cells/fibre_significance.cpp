@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/stage/parameters.h"
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
@@ -127,6 +128,88 @@ bool winds(const Polyline& line_um) {
     length += norm(d);
   }
   return turning - std::abs(net) > kWinding_per_um * length;
+}
+
+namespace {
+
+double filter_sigma_um(const FibreParameters& p) {
+  constexpr double kFwhm = 2.3548;  // full width at half maximum of a Gaussian in standard deviations
+  constexpr double kNarrower = 0.6;
+  return kNarrower * p.fibre_width_um / kFwhm;
+}
+
+}  // namespace
+
+int grid_factor(const FibreParameters& p, double pixel_um) {
+  constexpr double kSigma_px = 1.2;
+  return std::max(1, static_cast<int>(filter_sigma_um(p) / pixel_um / kSigma_px));
+}
+
+RidgeScales scales_of(const FibreParameters& p, double pixel_um) {
+  constexpr double kNarrowest_px = 0.7;  // pixels carry no more
+  return {.width_sigma_px = std::max(kNarrowest_px, filter_sigma_um(p) / pixel_um),
+          .length_sigma_px = p.fibre_averaging_um / pixel_um,
+          .noise_radius_px = std::max(6.0, 8 * p.fibre_width_um / pixel_um)};
+}
+
+TraceRule rule_of(const FibreParameters& p, double pixel_um) {
+  constexpr double kHidden = 3;      // widths: so long a line that crosses at 20° hides this one
+  constexpr double kStraight = 0.2;  // noise and waves of a fibre, of its radius
+  constexpr double kGentle = 8;      // long fibres bend less than the smallest radius by so much
+  TraceRule rule;
+  rule.start_noise = p.fibre_start_noise;
+  rule.follow_noise = p.fibre_follow_noise;
+  const double gap_and_beyond_um = 2 * p.fibre_gap_um;
+  rule.start_gain_px = gap_and_beyond_um / pixel_um;
+  rule.reach_px = std::max(gap_and_beyond_um, kHidden * p.fibre_width_um) / pixel_um;
+  rule.step_px = 0.5 * p.fibre_width_um / pixel_um;
+  rule.through_px = 3 * p.fibre_gap_um / pixel_um;
+  rule.smallest_radius_px = p.fibre_smallest_radius_um / pixel_um;
+  rule.line_radius_px = 0.6 * p.fibre_width_um / pixel_um;
+  rule.shortest_px = p.fibre_shortest_um / pixel_um;
+  rule.end_window_px = 4 * p.fibre_averaging_um / pixel_um;
+  rule.course_px = 3.4 * p.fibre_averaging_um / pixel_um;
+  rule.join_gap_px = 3 * p.fibre_gap_um / pixel_um;
+  rule.overlap_px = 1.92 * p.fibre_gap_um / pixel_um;
+  rule.bridge_px = 6 * p.fibre_gap_um / pixel_um;
+  rule.bridge_course_px = 2 * p.fibre_shortest_um / pixel_um;
+  rule.bridge_misfit_px = kStraight * rule.line_radius_px;
+  rule.bridge_radius_px = kGentle * rule.smallest_radius_px;
+  rule.faint_px = p.fibre_faint_um / pixel_um;
+  return rule;
+}
+
+double independent_px(const FibreParameters& p, double pixel_um) {
+  // noise through a Gaussian of deviation s correlates over 2 sqrt(pi) s
+  return 2 * std::sqrt(std::numbers::pi) * p.fibre_averaging_um / pixel_um;
+}
+
+void declare(stage::ParameterList& list, FibreParameters& p) {
+  list.table("segment");
+  list.add("fibre_width_um", p.fibre_width_um, Range::between(1e-3, 100),
+           "typical width of a fibre; half to twice of it is found (um)");
+  list.add("fibre_averaging_um", p.fibre_averaging_um, Range::between(1e-3, 10),
+           "averaging along the fibre (standard deviation, um)");
+  list.add("fibre_start_noise", p.fibre_start_noise, Range::factor(),
+           "height that a fibre must reach somewhere (standard deviations of the filtered noise)");
+  list.add("fibre_follow_noise", p.fibre_follow_noise, Range::factor(),
+           "height that a fibre must keep along its length (standard deviations of the filtered noise)");
+  list.add("fibre_false_per_cell", p.fibre_false_per_cell, Range::factor(),
+           "expected number of lines in a cell that are taken for fibres but belong to the actin meshwork");
+  list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::size_um(),
+           "smallest radius of curvature of a fibre (um)");
+  list.add("fibre_faintest", p.fibre_faintest, Range::between(0, 1),
+           "least height of a fibre, as a share of the median height of the cell's fibres");
+  list.add("fibre_edge_um", p.fibre_edge_um, Range::zero_or_size_um(),
+           "a line along the outline this near to it is the cell's edge, not a fibre (um)");
+  list.add("fibre_lamellipodium_um", p.fibre_lamellipodium_um, Range::zero_or_size_um(),
+           "a line that winds this near to the outline is a ruffle, not a fibre (um)");
+  list.add("fibre_gap_um", p.fibre_gap_um, Range::zero_or_size_um(), "length over which a fibre may be invisible (um)");
+  list.add("fibre_shortest_um", p.fibre_shortest_um, Range::size_um(), "shortest fibre (um)");
+  list.add("fibre_reach_um", p.fibre_reach_um, Range::size_um(),
+           "a fibre's end this near to an adhesion is held by it (um)");
+  list.add("fibre_faint_um", p.fibre_faint_um, Range::zero_or_size_um(),
+           "distance over which a fibre's end is followed to an adhesion, while it is brighter than the texture (um)");
 }
 
 }  // namespace mbtfm::cells

@@ -23,6 +23,13 @@ struct Peak {
   double height = 0;  ///< of a spot that answers so
 };
 
+/// Where a coordinate lies that is mirrored in the first and last voxel.
+int mirrored(int at, int n) {
+  if (n == 1) return 0;
+  const int period = 2 * (n - 1), m = ((at % period) + period) % period;
+  return m < n ? m : period - m;
+}
+
 /// Weights of a Gaussian average at 0, 1, … voxels from the middle.
 std::vector<float> weights_of(double sigma) {
   const int reach = std::max(1, static_cast<int>(std::ceil(3.5 * sigma)));  // beyond lies 5e-4 of the weight

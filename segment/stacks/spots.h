@@ -32,13 +32,6 @@ struct Volume {
 /// detector's limit are marked: that of its numbers, or one below them that many voxels share.
 Volume volume_of(std::vector<images::Image> slices);
 
-/// Where a coordinate lies that is mirrored in the first and last voxel.
-inline int mirrored(int at, int n) {
-  if (n == 1) return 0;
-  const int period = 2 * (n - 1), m = ((at % period) + period) % period;
-  return m < n ? m : period - m;
-}
-
 /// Of a bead's picture, which is near to a Gaussian: its standard deviations, in pixels across and in slices along z.
 struct Widths {
   double xy = 0, z = 0;
