@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/counted.h"
+#include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/parameters.h"
 #include "segment/cells/adhesion_parts.h"
 #include "segment/cells/grid.h"
-#include "segment/images/channels.h"
 
 namespace mbtfm::cells {
 namespace {
@@ -130,6 +131,31 @@ double aspect_ratio(const std::vector<Adhesion>& adhesions) {
     area_um2 += a.area_um2;
   }
   return area_um2 > 0 ? sum / area_um2 : 0;
+}
+
+void require_content(const images::Channel& channel) {
+  const std::string reason = emptiness_of(channel.image);
+  if (!reason.empty())
+    throw InputError(channel.name, "a picture of a cell", reason,
+                     "is this the right file, channel and page? Was it overexposed?");
+}
+
+std::vector<Adhesion> require_adhesions(const images::Channel& channel, double pixel_um, const AdhesionParameters& p) {
+  require_content(channel);
+  const auto found = find_adhesions(channel.image, pixel_um, p);
+  if (!found.empty()) return found;
+  const std::string expected =
+      "bright spots of " + shortest(p.adhesion_smallest_um2) + " um² or more that stand out of the noise";
+  if (const auto negative = negative_of_dark_on_bright(channel.image)) {
+    const auto dark = find_adhesions(*negative, pixel_um, p);
+    constexpr std::size_t kSome = 5;  // fewer are gaps between bright things
+    if (dark.size() >= kSome)
+      throw InputError(channel.name, expected, counted(std::ssize(dark), "dark spots") + " on a brighter ground",
+                       kInvert);
+  }
+  throw InputError(channel.name, expected, "no adhesion: " + why_no_adhesions(channel.image, pixel_um, p),
+                   "is this the adhesion channel, in focus? Check pixel_size_um (" + images::in_um(pixel_um) +
+                       "), adhesion_channel, and adhesion_seed_noise for a faint image");
 }
 
 std::string why_no_adhesions(const images::Image& image, double pixel_size_um, const AdhesionParameters& p) {

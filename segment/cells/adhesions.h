@@ -8,7 +8,7 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/stage/parameters_fwd.h"
 #include "segment/cells/ellipse.h"
-#include "segment/images/image.h"
+#include "segment/images/channels.h"
 
 namespace mbtfm::cells {
 
@@ -56,6 +56,15 @@ std::vector<Adhesion> find_adhesions(const images::Image& image, double pixel_si
 
 /// Length over width, mean weighed by area; 0 of none.
 double aspect_ratio(const std::vector<Adhesion>& adhesions);
+
+/// @throws InputError where the image shows nothing: see emptiness_of()
+void require_content(const images::Channel& channel);
+
+inline const std::string kInvert = "the image seems inverted: in ImageJ, Edit > Invert; fluorescence is bright on dark";
+
+/// @throws InputError where the image shows none, with why
+std::vector<Adhesion> require_adhesions(const images::Channel& channel, double pixel_um,
+                                        const AdhesionParameters& parameters);
 
 /// Why there is no adhesion in an image in which none is found: what stands out of the noise least short of one.
 std::string why_no_adhesions(const images::Image& image, double pixel_size_um, const AdhesionParameters& parameters);

@@ -67,6 +67,21 @@ Adhesion anchor(Vec2 position_um, double area_um2) {
   return disc(position_um, std::sqrt(4 / std::numbers::pi * area_um2), AdhesionOrigin::anchor);
 }
 
+int next_id(const std::vector<Adhesion>& adhesions) {
+  int largest_id = 0;
+  for (const Adhesion& a : adhesions) largest_id = std::max(largest_id, a.adhesion_id);
+  return largest_id + 1;
+}
+
+Adhesion Anchors::at(Vec2 end) {
+  Adhesion made = anchor(end, area_um2_);
+  for (std::size_t i = n_seen_; i < adhesions_.size(); ++i)
+    if (norm(adhesions_[i].position_um - end) < made.major_axis_um / 2) return adhesions_[i];
+  made.adhesion_id = next_id(adhesions_);
+  adhesions_.push_back(made);
+  return made;
+}
+
 std::vector<Adhesion> candidates_at(const std::vector<Vec2>& ends_um, double spacing_um) {
   std::vector<Adhesion> candidates;
   for (const Vec2 end : ends_um) {

@@ -51,6 +51,23 @@ Adhesion disc(Vec2 position_um, double diameter_um, AdhesionOrigin origin);
 /// The disc that holds an end of a drawn fibre where no adhesion is.
 Adhesion anchor(Vec2 position_um, double area_um2);
 
+/// An id that none of them has: after the largest.
+int next_id(const std::vector<Adhesion>& adhesions);
+
+/// Adds anchors; ends that meet share one.
+class Anchors {
+ public:
+  /// @param adhesions  must outlive this
+  Anchors(std::vector<Adhesion>& adhesions, double area_um2)
+      : adhesions_(adhesions), n_seen_(adhesions.size()), area_um2_(area_um2) {}
+  Adhesion at(Vec2 end);
+
+ private:
+  std::vector<Adhesion>& adhesions_;
+  std::size_t n_seen_;
+  double area_um2_;
+};
+
 /// Candidates at these ends of fibres, one for ends that are less than a spacing apart.
 std::vector<Adhesion> candidates_at(const std::vector<Vec2>& ends_um, double spacing_um);
 

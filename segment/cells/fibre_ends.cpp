@@ -315,14 +315,13 @@ bool is_on_cut(Vec2 end, const Cuts& cuts) {
 
 void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um) {
   if (cuts.empty()) return;
-  constexpr double kCourse_um = 1;   // of the line's end tells where it points
-  constexpr double kOnIt_um = 1e-6;  // ends there already
+  constexpr double kCourse_um = 1;  // of the line's end tells where it points
   const auto leads = [&](Polyline& line) {
     const Polyline last = last_part(line, kCourse_um);
     const Vec2 from = last.front(), ahead = direction_of_end(last);
+    if (is_on_cut(from, cuts)) return true;
     double way_um = kInfinite;
     for (const auto& [a, b] : cuts) {
-      if (distance_to_segment_um(from, a, b) < kOnIt_um) return true;
       const double across = cross(ahead, b - a);
       if (across == 0) continue;
       const double way = cross(a - from, b - a) / across, along = cross(a - from, ahead) / across;
@@ -353,29 +352,6 @@ bool is_held_at_both(const Fibre& fibre, const Polygon& outline_um, double lamel
   const Polyline points = last_part(line, length_um(line));
   return is_straight(points, outline_um) || !has_shape_of_arc(points, outline_um, lamellipodium_um);
 }
-
-/// Adds anchors; ends that meet share one.
-class Anchors {
- public:
-  Anchors(std::vector<Adhesion>& adhesions, double area_um2)
-      : adhesions_(adhesions), n_seen_(adhesions.size()), area_um2_(area_um2) {
-    for (const Adhesion& a : adhesions) largest_id_ = std::max(largest_id_, a.adhesion_id);
-  }
-  Adhesion at(Vec2 end) {
-    const Adhesion made = anchor(end, area_um2_);
-    for (std::size_t i = n_seen_; i < adhesions_.size(); ++i)
-      if (norm(adhesions_[i].position_um - end) < made.major_axis_um / 2) return adhesions_[i];
-    adhesions_.push_back(made);
-    adhesions_.back().adhesion_id = ++largest_id_;
-    return adhesions_.back();
-  }
-
- private:
-  std::vector<Adhesion>& adhesions_;
-  std::size_t n_seen_;
-  double area_um2_;
-  int largest_id_ = 0;
-};
 
 }  // namespace
 

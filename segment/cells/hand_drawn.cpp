@@ -311,10 +311,8 @@ Vec2 place_of_anchor(Vec2 end_um, const CellOutline& cell, const std::string& wh
 /// Tie a line's free end that must be held, its last point, to an anchor of its own.
 int add_anchor(Polyline& line, std::vector<Adhesion>& all, const CellOutline& cell, double area_um2,
                const std::string& where) {
-  int largest_id = 0;
-  for (const Adhesion& a : all) largest_id = std::max(largest_id, a.adhesion_id);
   Adhesion made = anchor(place_of_anchor(line.back(), cell, where), area_um2);
-  made.adhesion_id = largest_id + 1;
+  made.adhesion_id = next_id(all);
   if (!(made.position_um == line.back())) {
     line.back() = made.position_um;
     if (line.size() > 1 && line[line.size() - 2] == line.back()) line.pop_back();

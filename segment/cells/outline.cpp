@@ -358,6 +358,19 @@ double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& oth
   return n == 0 ? 0 : static_cast<double>(n_beyond) / n;
 }
 
+std::optional<double> share_off_actin(const CellsInImage& seen, const std::vector<Adhesion>& adhesions) {
+  constexpr double kBeyond_um = 1;  // channels are shifted by less
+  constexpr double kOwn_um = 8;     // what is farther is another cell's, which may show no actin
+  if (seen.cells.empty()) return std::nullopt;
+  double near_um2 = 0, beyond_um2 = 0;
+  for (std::size_t i = 0; i < adhesions.size(); ++i) {
+    if (seen.beyond_um[i] > kOwn_um) continue;
+    near_um2 += adhesions[i].area_um2;
+    if (seen.beyond_um[i] > kBeyond_um) beyond_um2 += adhesions[i].area_um2;
+  }
+  return near_um2 > 0 ? std::optional(beyond_um2 / near_um2) : std::nullopt;
+}
+
 std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions) {
   std::vector<Adhesion> kept;
   for (const Adhesion& adhesion : adhesions) {

@@ -81,6 +81,10 @@ Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& ad
 /// Share of a cell's area that lies more than `far_um` beyond all of the others.
 double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& others, double far_um);
 
+/// Of what the adhesion image shows in or near the cells of the actin image, the share by area that lies beyond them.
+/// Nothing where the actin image shows no cell.
+std::optional<double> share_off_actin(const CellsInImage& seen, const std::vector<Adhesion>& adhesions);
+
 /// The adhesions whose centre lies in the cell, with their ids renewed.
 std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions);
 std::vector<Adhesion> inside(const Polygon& outline_um, const std::vector<Adhesion>& adhesions);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <functional>
 
-#include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
@@ -39,33 +38,6 @@ void declare(stage::ParameterList& list, SegmentParameters& p) {
 }
 
 namespace {
-
-void require_content(const images::Channel& channel) {
-  const std::string reason = emptiness_of(channel.image);
-  if (!reason.empty())
-    throw InputError(channel.name, "a picture of a cell", reason,
-                     "is this the right file, channel and page? Was it overexposed?");
-}
-
-const std::string kInvert = "the image seems inverted: in ImageJ, Edit > Invert; fluorescence is bright on dark";
-
-std::vector<Adhesion> adhesions_of(const images::Channel& channel, double pixel_um, const SegmentParameters& p) {
-  require_content(channel);
-  const auto found = find_adhesions(channel.image, pixel_um, p.adhesions);
-  if (!found.empty()) return found;
-  const std::string expected =
-      "bright spots of " + shortest(p.adhesions.adhesion_smallest_um2) + " um² or more that stand out of the noise";
-  if (const auto negative = negative_of_dark_on_bright(channel.image)) {
-    const auto dark = find_adhesions(*negative, pixel_um, p.adhesions);
-    constexpr std::size_t kSome = 5;  // fewer are gaps between bright things
-    if (dark.size() >= kSome)
-      throw InputError(channel.name, expected, counted(std::ssize(dark), "dark spots") + " on a brighter ground",
-                       kInvert);
-  }
-  throw InputError(channel.name, expected, "no adhesion: " + why_no_adhesions(channel.image, pixel_um, p.adhesions),
-                   "is this the adhesion channel, in focus? Check pixel_size_um (" + images::in_um(pixel_um) +
-                       "), adhesion_channel, and adhesion_seed_noise for a faint image");
-}
 
 /// Nothing bright, or something that is too small for a cell.
 [[noreturn]] void no_cell(const images::Channel& channel, const std::vector<Adhesion>& adhesions, double pixel_um,
@@ -151,7 +123,7 @@ std::vector<Adhesion> seen_adhesions(const Inputs& in) {
   if (in.source != AdhesionSource::image) return {};
   if (in.drawn.adhesions) return hand_drawn_adhesions(*in.drawn.adhesions, in.adhesion, in.field);
   if (in.drawn.adhesion_mask) return mask_adhesions(*in.drawn.adhesion_mask, in.adhesion, in.field);
-  return adhesions_of(*in.adhesion, in.field.pixel_um, in.parameters);
+  return require_adhesions(*in.adhesion, in.field.pixel_um, in.parameters.adhesions);
 }
 
 const std::string& name_of_adhesions(const Inputs& in) {
@@ -165,21 +137,6 @@ struct Outlines {
   CellsInImage seen =
       {};  ///< by the actin image, whatever outline is given; no cells where there is none, or it shows none
 };
-
-/// Of what the adhesion image shows in or near the cells of the actin image, the share by area that lies beyond them.
-/// Nothing where the actin image shows no cell.
-std::optional<double> share_off_actin(const CellsInImage& seen, const std::vector<Adhesion>& adhesions) {
-  constexpr double kBeyond_um = 1;  // channels are shifted by less
-  constexpr double kOwn_um = 8;     // what is farther is another cell's, which may show no actin
-  if (seen.cells.empty()) return std::nullopt;
-  double near_um2 = 0, beyond_um2 = 0;
-  for (std::size_t i = 0; i < adhesions.size(); ++i) {
-    if (seen.beyond_um[i] > kOwn_um) continue;
-    near_um2 += adhesions[i].area_um2;
-    if (seen.beyond_um[i] > kBeyond_um) beyond_um2 += adhesions[i].area_um2;
-  }
-  return near_um2 > 0 ? std::optional(beyond_um2 / near_um2) : std::nullopt;
-}
 
 Outlines outlines_in(const Inputs& in, const std::vector<Adhesion>& found) {
   const SegmentParameters& p = in.parameters;

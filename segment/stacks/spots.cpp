@@ -54,12 +54,26 @@ struct Profile {
   }
 };
 
+/// A voxel of a volume, and the same in a box.
+struct Voxel {
+  int i, j, k, di, dj, dk;
+};
+
+template <class Use>
+void for_each_voxel(const Box& box, const Use& use) {
+  for (int k = box.low[2]; k <= box.high[2]; ++k)
+    for (int j = box.low[1]; j <= box.high[1]; ++j)
+      for (int i = box.low[0]; i <= box.high[0]; ++i)
+        use(Voxel{i, j, k, i - box.low[0], j - box.low[1], k - box.low[2]});
+}
+
 struct Profiles {
   Profile x, y, z;
   Profiles(Vec3 place, const Box& box, Widths w)
       : x(place.x, box.low[0], box.high[0], w.xy),
         y(place.y, box.low[1], box.high[1], w.xy),
         z(place.z, box.low[2], box.high[2], w.z) {}
+  float at(const Voxel& v) const { return x.value[v.di] * y.value[v.dj] * z.value[v.dk]; }
 };
 
 double distance_in_widths(Vec3 a, Vec3 b, Widths w) {
