@@ -69,6 +69,19 @@ std::optional<Vec2> window_shift(const Plane& reference, const Plane& target, Ve
   return Vec2{shift->x - most + dx, shift->y - most + dy};
 }
 
+/// What search(place) finds, by point of a grid.
+template <class Search>
+std::vector<std::optional<Vec2>> found_on(const GridField& grid, int threads, const Search& search) {
+  std::vector<std::optional<Vec2>> found(grid.u.size());
+  numerics::parallel_for(grid.ny, threads, [&](int j) {
+    for (int i = 0; i < grid.nx; ++i) {
+      const std::size_t k = static_cast<std::size_t>(j) * grid.nx + i;
+      found[k] = search(grid.place(k));
+    }
+  });
+  return found;
+}
+
 Vec2 median_of(const std::vector<Vec2>& values) {
   std::vector<double> x, y;
   for (const Vec2 v : values) x.push_back(v.x), y.push_back(v.y);
@@ -250,14 +263,11 @@ GridField coarse_field(const Plane& reference, const Plane& target, int window, 
     // the second pass, at half the size, looks around what the first has found
     const double spacing = scale == 2 ? 0.75 * window : 0.375 * window;
     GridField finer = grid_over(a, spacing);
-    std::vector<std::optional<Vec2>> found(finer.u.size());
-    numerics::parallel_for(finer.ny, threads, [&](int j) {
-      for (int i = 0; i < finer.nx; ++i) {
-        const Vec2 centre = finer.first + finer.spacing * Vec2{1.0 * i, 1.0 * j};
-        const auto shift =
-            window_shift(from, to, (1.0 / scale) * centre, (1.0 / scale) * field.at(centre).u, window / 2, window / 4);
-        if (shift) found[static_cast<std::size_t>(j) * finer.nx + i] = 1.0 * scale * *shift;
-      }
+    auto found = found_on(finer, threads, [&](Vec2 centre) {
+      auto shift =
+          window_shift(from, to, (1.0 / scale) * centre, (1.0 / scale) * field.at(centre).u, window / 2, window / 4);
+      if (shift) shift = 1.0 * scale * *shift;
+      return shift;
     });
     clean(finer, std::move(found), drift);
     field = std::move(finer);
@@ -325,14 +335,11 @@ GridField field_through(const std::vector<Vec2>& places, const std::vector<Motio
   std::vector<Vec3> points;
   for (const Vec2 place : places) points.push_back({place.x, place.y, 0});
   const numerics::Near known(std::move(points), lattice.spacing);
-  numerics::parallel_for(lattice.ny, threads, [&](int j) {
-    for (int i = 0; i < lattice.nx; ++i) {
-      constexpr int kNearest = 12;
-      const std::size_t k = static_cast<std::size_t>(j) * lattice.nx + i;
-      const Vec2 place = lattice.place(k);
-      lattice.u[k] = local_motion(place, known.nearest({place.x, place.y, 0}, kNearest), places, motions)->motion.u;
-    }
+  const auto u = found_on(lattice, threads, [&](Vec2 place) -> std::optional<Vec2> {
+    constexpr int kNearest = 12;
+    return local_motion(place, known.nearest({place.x, place.y, 0}, kNearest), places, motions)->motion.u;
   });
+  for (std::size_t k = 0; k < u.size(); ++k) lattice.u[k] = *u[k];
   return lattice;
 }
 
@@ -354,17 +361,13 @@ GridField coarse_to_fine_field(const Plane& reference, const Plane& target, int 
     const Plane from = reduced(a, pass.scale);
     const Plane to = deformed_back(reduced(b, pass.scale), field, pass.scale, threads);
     GridField finer = grid_over(a, 0.25 * pass.window);
-    std::vector<std::optional<Vec2>> found(finer.u.size());
-    numerics::parallel_for(finer.ny, threads, [&](int j) {
-      for (int i = 0; i < finer.nx; ++i) {
-        const std::size_t k = static_cast<std::size_t>(j) * finer.nx + i;
-        const Vec2 centre = finer.place(k);
-        const auto shift =
-            window_shift(from, to, (1.0 / pass.scale) * centre, {}, pass.window / pass.scale, pass.reach / pass.scale);
-        if (!shift) continue;
-        const Vec2 moved = 1.0 * pass.scale * *shift;
-        found[k] = moved + field.at(centre + moved).u;
-      }
+    auto found = found_on(finer, threads, [&](Vec2 centre) {
+      auto shift =
+          window_shift(from, to, (1.0 / pass.scale) * centre, {}, pass.window / pass.scale, pass.reach / pass.scale);
+      if (!shift) return shift;
+      const Vec2 moved = 1.0 * pass.scale * *shift;
+      shift = moved + field.at(centre + moved).u;
+      return shift;
     });
     extrapolate(finer, std::move(found), threads);
     field = smoothed(finer);

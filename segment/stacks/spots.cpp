@@ -7,7 +7,6 @@
 #include <functional>
 #include <numeric>
 
-#include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
@@ -81,8 +80,6 @@ double distance_in_widths(Vec3 a, Vec3 b, Widths w) {
 }
 
 }  // namespace
-
-// --- the fit
 
 SpotFit::SpotFit(Volume& volume, SpotShape shape, Noise noise, int threads)
     : volume_(volume), shape_(shape), noise_(std::move(noise)), threads_(threads) {}
@@ -158,45 +155,37 @@ SpotFit::Step SpotFit::step_of(int number, bool with_errors) const {
   std::array<double, kMost * kMost> normal{}, spread{};
   std::array<double, kMost> right{}, row{};
   double sum_weight = 0, sum_squares = 0, light = 0, light_saturated = 0;
-  for (int k = box.low[2]; k <= box.high[2]; ++k) {
-    const int dk = k - box.low[2];
-    for (int j = box.low[1]; j <= box.high[1]; ++j) {
-      const int dj = j - box.low[1];
-      const float* values = volume_.row(j, k) + box.low[0];
-      for (int i = box.low[0]; i <= box.high[0]; ++i) {
-        const int di = i - box.low[0];
-        row[0] = 1;
-        double all_light = 0;
-        for (int s = 0; s < n_spots; ++s) {
-          const Profiles& p = profiles[s];
-          const double g = p.x.value[di] * p.y.value[dj] * p.z.value[dk];
-          double* r = &row[1 + 4 * s];
-          r[0] = g, r[1] = g * p.x.offset[di], r[2] = g * p.y.offset[dj], r[3] = g * p.z.offset[dk];
-          all_light += heights[s] * g;
-        }
-        const double own = spot.height * row[1];
-        light += own;
-        if (!volume_.is_saturated.empty() && volume_.is_saturated[volume_.index(i, j, k)]) {
-          light_saturated += own;
-          continue;
-        }
-        const double variance = noise_.variance(k, all_light), value = values[di];
-        const double in_window = weight.x.value[di] * weight.y.value[dj] * weight.z.value[dk];
-        const double v = in_window / variance;
-        for (int a = 0; a < n; ++a) {
-          const double va = v * row[a];
-          right[a] += va * value;
-          for (int b = 0; b <= a; ++b) normal[a * kMost + b] += va * row[b];
-        }
-        if (!with_errors) continue;
-        sum_weight += in_window, sum_squares += in_window * value * value / variance;
-        for (int a = 0; a < n; ++a) {
-          const double va = v * v * variance * row[a];
-          for (int b = 0; b <= a; ++b) spread[a * kMost + b] += va * row[b];
-        }
-      }
+  for_each_voxel(box, [&](const Voxel& at) {
+    row[0] = 1;
+    double all_light = 0;
+    for (int s = 0; s < n_spots; ++s) {
+      const Profiles& p = profiles[s];
+      const double g = p.at(at);
+      double* r = &row[1 + 4 * s];
+      r[0] = g, r[1] = g * p.x.offset[at.di], r[2] = g * p.y.offset[at.dj], r[3] = g * p.z.offset[at.dk];
+      all_light += heights[s] * g;
     }
-  }
+    const double own = spot.height * row[1];
+    light += own;
+    if (!volume_.is_saturated.empty() && volume_.is_saturated[volume_.index(at.i, at.j, at.k)]) {
+      light_saturated += own;
+      return;
+    }
+    const double variance = noise_.variance(at.k, all_light), value = volume_.at(at.i, at.j, at.k);
+    const double in_window = weight.at(at);
+    const double v = in_window / variance;
+    for (int a = 0; a < n; ++a) {
+      const double va = v * row[a];
+      right[a] += va * value;
+      for (int b = 0; b <= a; ++b) normal[a * kMost + b] += va * row[b];
+    }
+    if (!with_errors) return;
+    sum_weight += in_window, sum_squares += in_window * value * value / variance;
+    for (int a = 0; a < n; ++a) {
+      const double va = v * v * variance * row[a];
+      for (int b = 0; b <= a; ++b) spread[a * kMost + b] += va * row[b];
+    }
+  });
   result.spot.share_saturated = light > 0 ? light_saturated / light : 0;
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMost, kMost>;
   Matrix a(n, n), m(n, n);
@@ -287,8 +276,6 @@ void SpotFit::drop_doubles(double share) {
   drop(is_double);
 }
 
-// --- what is measured of many spots
-
 Widths SpotFit::fitted_widths(const Spot& spot) const {
   Spot now = spot;
   const Widths begin = shape_.at(spot.place);
@@ -300,25 +287,16 @@ Widths SpotFit::fitted_widths(const Spot& spot) const {
     const Profiles p(now.place, box, w);
     Eigen::Matrix<double, 7, 7> normal = Eigen::Matrix<double, 7, 7>::Zero();
     Eigen::Matrix<double, 7, 1> right = Eigen::Matrix<double, 7, 1>::Zero();
-    for (int k = box.low[2]; k <= box.high[2]; ++k) {
-      const int dk = k - box.low[2];
-      for (int j = box.low[1]; j <= box.high[1]; ++j) {
-        const int dj = j - box.low[1];
-        const float* values = volume_.row(j, k) + box.low[0];
-        for (int i = box.low[0]; i <= box.high[0]; ++i) {
-          const int di = i - box.low[0];
-          const double x = p.x.offset[di], y = p.y.offset[dj], z = p.z.offset[dk];
-          const double g = p.x.value[di] * p.y.value[dj] * p.z.value[dk];
-          const double taken = spot.height * first.x.value[di] * first.y.value[dj] * first.z.value[dk];
-          Eigen::Matrix<double, 7, 1> row;
-          row << 1, g, g * x, g * y, g * z, g * (x * x + y * y), g * z * z;
-          const double left = values[di] + taken - now.height * g;
-          const double weight = 1 / noise_.variance(k, now.height * g);
-          normal += weight * row * row.transpose();
-          right += weight * left * row;
-        }
-      }
-    }
+    for_each_voxel(box, [&](const Voxel& at) {
+      const double x = p.x.offset[at.di], y = p.y.offset[at.dj], z = p.z.offset[at.dk], g = p.at(at);
+      const double taken = spot.height * first.x.value[at.di] * first.y.value[at.dj] * first.z.value[at.dk];
+      Eigen::Matrix<double, 7, 1> row;
+      row << 1, g, g * x, g * y, g * z, g * (x * x + y * y), g * z * z;
+      const double left = volume_.at(at.i, at.j, at.k) + taken - now.height * g;
+      const double weight = 1 / noise_.variance(at.k, now.height * g);
+      normal += weight * row * row.transpose();
+      right += weight * left * row;
+    });
     const Eigen::Matrix<double, 7, 1> change = numerics::solve_symmetric(normal, right) / now.height;
     if (!change.allFinite()) return {};
     const auto held = [](double by) { return std::clamp(by, -0.3, 0.3); };
@@ -398,19 +376,14 @@ void SpotFit::measure_noise() {
     const Widths w = shape_.at(spot.place);
     const Box box = box_around(volume_, spot.place, w, 1.5);
     const Profiles p(spot.place, box, w);
-    for (int k = box.low[2]; k <= box.high[2]; ++k) {
-      for (int j = box.low[1]; j <= box.high[1]; ++j) {
-        for (int i = box.low[0]; i <= box.high[0]; ++i) {
-          const double light =
-              spot.height * p.x.value[i - box.low[0]] * p.y.value[j - box.low[1]] * p.z.value[k - box.low[2]];
-          const int bin = bin_of(light);
-          if (bin < 0 || bin >= kBins) continue;
-          const double left = volume_.at(i, j, k), dark = noise_.variance(k, 0);
-          bins[bin].squares.push_back(static_cast<float>(left * left - dark));
-          bins[bin].light += light;
-        }
-      }
-    }
+    for_each_voxel(box, [&](const Voxel& at) {
+      const double light = spot.height * p.x.value[at.di] * p.y.value[at.dj] * p.z.value[at.dk];
+      const int bin = bin_of(light);
+      if (bin < 0 || bin >= kBins) return;
+      const double left = volume_.at(at.i, at.j, at.k), dark = noise_.variance(at.k, 0);
+      bins[bin].squares.push_back(static_cast<float>(left * left - dark));
+      bins[bin].light += light;
+    });
   }
   // y = b x + c x² with weights 1/x²: relative errors are alike
   double xx = 0, xxx = 0, xxxx = 0, xy = 0, xxy = 0;
