@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "segment/cells/basins.h"
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
@@ -122,88 +123,41 @@ struct SplitRule {
   double smallest_px = 1;  ///< a region with fewer pixels joins its neighbour
 };
 
-/// Regions that grow from their maxima and may be joined: a union-find whose root is the region with the higher peak.
-class Regions {
- public:
-  int add(float peak) {
-    parent_.push_back(static_cast<int>(parent_.size()));
-    peak_.push_back(peak);
-    size_.push_back(1);
-    return parent_.back();
-  }
-  int root(int i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(int into, int from) {
-    parent_[from] = into;
-    size_[into] += size_[from];
-  }
-  void grow(int i) { ++size_[i]; }
-  float peak(int i) const { return peak_[i]; }
-  int size(int i) const { return size_[i]; }
-
- private:
-  std::vector<int> parent_, size_;
-  std::vector<float> peak_;
-};
-
-std::vector<int> masked_pixels_from_the_highest(const cv::Mat& height, const cv::Mat& mask) {
-  std::vector<int> pixels;
-  for (int i = 0; i < height.rows * height.cols; ++i)
-    if (mask.at<uchar>(i / height.cols, i % height.cols)) pixels.push_back(i);
-  const float* value = height.ptr<float>();
-  std::sort(pixels.begin(), pixels.end(),
-            [&](int a, int b) { return value[a] > value[b] || (value[a] == value[b] && a < b); });
-  return pixels;
-}
-
 /// Connected pixels (4-neighbours) where `mask` is not 0, split by flooding from the highest pixel down: where two
 /// regions meet they stay apart if the dip between them is deeper than the rule's share of the lower maximum and than
 /// three standard deviations of the noise there, and both are large enough.
 /// @returns labels from 1 (CV_32S), 0 outside
 cv::Mat split_regions(const cv::Mat& height, const cv::Mat& noise, const cv::Mat& mask, const SplitRule& rule) {
-  const cv::Mat value = height.isContinuous() ? height : height.clone();
-  cv::Mat labels(height.size(), CV_32S, cv::Scalar(-1));
-  Regions regions;
-  const int columns = height.cols;
-  for (const int pixel : masked_pixels_from_the_highest(value, mask)) {
-    const int x = pixel % columns, y = pixel / columns;
-    const float level = value.at<float>(y, x);
+  Basins basins(height.total());
+  for (const int pixel : pixels_from_the_highest(height, mask)) {
+    const int x = pixel % height.cols, y = pixel / height.cols;
+    const float level = height.at<float>(y, x);
     int own = -1;
     for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
       const int u = x + dx, v = y + dy;
-      if (u < 0 || v < 0 || u >= columns || v >= height.rows || labels.at<int>(v, u) < 0) continue;
-      int other = regions.root(labels.at<int>(v, u));
+      if (u < 0 || v < 0 || u >= height.cols || v >= height.rows || !basins.has(v * height.cols + u)) continue;
+      int other = basins.of(v * height.cols + u);
       if (own < 0 || own == other) {
         own = other;
         continue;
       }
-      if (regions.peak(other) > regions.peak(own)) std::swap(own, other);
-      const double dip = regions.peak(other) - level;
-      const double needed = std::max<double>(rule.depth * regions.peak(other), 3 * noise.at<float>(y, x));
-      if (dip < needed || regions.size(other) < rule.smallest_px) regions.join(own, other);
+      if (basins.peak(other) > basins.peak(own)) std::swap(own, other);
+      const double dip = basins.peak(other) - level;
+      const double needed = std::max<double>(rule.depth * basins.peak(other), 3 * noise.at<float>(y, x));
+      if (dip < needed || basins.n_pixels(other) < rule.smallest_px) basins.join(own, other);
     }
-    if (own < 0)
-      own = regions.add(level);
-    else
-      regions.grow(own);
-    labels.at<int>(y, x) = own;
+    basins.add(pixel, level);
+    if (own >= 0) basins.join(own, pixel);
   }
-  std::vector<int> name;  // roots renamed 1, 2, … in raster order
+  cv::Mat labels(height.size(), CV_32S, cv::Scalar(0));
+  std::vector<int> name(height.total(), 0);  // roots renamed 1, 2, … in raster order
   int n_names = 0;
-  for (int y = 0; y < labels.rows; ++y)
-    for (int x = 0; x < columns; ++x) {
-      int& label = labels.at<int>(y, x);
-      if (label < 0) {
-        label = 0;
-        continue;
-      }
-      const int root = regions.root(label);
-      if (root >= static_cast<int>(name.size())) name.resize(static_cast<std::size_t>(root) + 1, 0);
-      if (!name[root]) name[root] = ++n_names;
-      label = name[root];
-    }
+  for (int i = 0; i < static_cast<int>(height.total()); ++i) {
+    if (!basins.has(i)) continue;
+    int& own = name[basins.of(i)];
+    if (own == 0) own = ++n_names;
+    labels.at<int>(i / height.cols, i % height.cols) = own;
+  }
   return labels;
 }
 
