@@ -1,8 +1,6 @@
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <fstream>
-#include <limits>
 #include <numeric>
 #include <string>
 
@@ -14,21 +12,6 @@
 
 namespace mbtfm::images {
 namespace {
-
-/// How the samples of a page are laid out.
-struct Layout {
-  std::uint32_t width = 0;
-  std::uint32_t height = 0;
-  std::uint16_t bits = 1;
-  std::uint16_t format = SAMPLEFORMAT_UINT;
-  std::uint16_t samples = 1;     ///< by pixel, alpha included
-  std::uint16_t n_channels = 1;  ///< of them: alpha is none, red, green and blue are three
-  std::uint16_t first = 0;       ///< of those whose mean is the grey value
-  std::uint16_t colours = 1;     ///< how many: 1, or 3 for RGB
-  bool is_rgb = false;
-  bool is_planar = false;
-  bool is_inverted = false;  ///< 0 is white
-};
 
 class TiffReader {
  public:
@@ -61,7 +44,7 @@ class TiffReader {
   }
 
   ImageField field() {
-    const Layout first = layout();
+    const Layout first = layout_of(tiff_.get(), file_);
     return {static_cast<int>(first.width), static_cast<int>(first.height), calibration_};
   }
 
@@ -140,7 +123,7 @@ class TiffReader {
     if (page > 0) {
       if (const auto own = pixel_size_um(calibration())) calibration_ = own;
     }
-    layout_ = layout();
+    layout_ = layout_of(tiff_.get(), file_);
     choose_samples(choice);
     may_lack_pixels_ = choice.may_lack_pixels;
     return is_raw ? read_raw(page) : read();
@@ -245,7 +228,7 @@ class TiffReader {
       stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
       if (!stream) fail("a whole image");
       if (TIFFIsByteSwapped(tiff_.get())) swap_samples(bytes);
-      unpack(bytes.data(), row);
+      unpack(bytes.data(), layout_, row);
       add_row(row, &image.at(0, j), layout_.width);
     }
     finish(image);
@@ -267,8 +250,7 @@ class TiffReader {
 
   template <class T>
   T tag(ttag_t name, T otherwise) const {
-    T value{};
-    return TIFFGetFieldDefaulted(tiff_.get(), name, &value) ? value : otherwise;
+    return tag_of(tiff_.get(), name, otherwise);
   }
 
   TiffCalibration calibration() const {
@@ -285,77 +267,6 @@ class TiffReader {
     result.width = static_cast<int>(tag<std::uint32_t>(TIFFTAG_IMAGEWIDTH, 0));
     result.height = static_cast<int>(tag<std::uint32_t>(TIFFTAG_IMAGELENGTH, 0));
     return result;
-  }
-
-  Layout layout() {
-    Layout result;
-    TIFFGetField(tiff_.get(), TIFFTAG_IMAGEWIDTH, &result.width);
-    TIFFGetField(tiff_.get(), TIFFTAG_IMAGELENGTH, &result.height);
-    require_plausible_size(file_, result.width, result.height);
-    result.bits = tag<std::uint16_t>(TIFFTAG_BITSPERSAMPLE, 1);
-    result.format = tag<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
-    if (result.format == SAMPLEFORMAT_VOID) result.format = SAMPLEFORMAT_UINT;
-    result.samples = tag<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1);
-    result.is_planar = tag<std::uint16_t>(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) == PLANARCONFIG_SEPARATE;
-    require_known_samples(result);
-    set_colours(result);
-    return result;
-  }
-
-  void require_known_samples(const Layout& l) const {
-    const std::string found = std::to_string(l.bits) + " bits";
-    if (l.format == SAMPLEFORMAT_IEEEFP) {
-      if (l.bits != 16 && l.bits != 32 && l.bits != 64) refuse("floating-point samples of 16, 32 or 64 bits", found);
-    } else if (l.format == SAMPLEFORMAT_INT) {
-      if (l.bits != 8 && l.bits != 16 && l.bits != 32 && l.bits != 64)
-        refuse("signed samples of 8, 16, 32 or 64 bits", found);
-    } else if (l.format == SAMPLEFORMAT_UINT) {
-      if ((l.bits < 1 || l.bits > 32) && l.bits != 64) refuse("samples of 1 to 32 or of 64 bits", found);
-    } else {
-      refuse("real samples", "complex ones");
-    }
-  }
-
-  void set_colours(Layout& l) {
-    const auto compression = tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE);
-    if (!TIFFIsCODECConfigured(compression)) {
-      refuse("a compression that libtiff knows here", "compression " + std::to_string(compression),
-             "save the image uncompressed or with deflate");
-    }
-    std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
-    TIFFGetField(tiff_.get(), TIFFTAG_PHOTOMETRIC, &photometric);
-    if (photometric == PHOTOMETRIC_YCBCR && compression == COMPRESSION_JPEG && !l.is_planar) {
-      TIFFSetField(tiff_.get(), TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);  // libjpeg converts
-      photometric = PHOTOMETRIC_RGB;
-    }
-    const bool is_grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE ||
-                         photometric == PHOTOMETRIC_PALETTE;
-    if (!is_grey && photometric != PHOTOMETRIC_RGB) {
-      refuse("a grey or RGB image", "photometric interpretation " + std::to_string(photometric),
-             "convert it to grey: the original of the microscope is best");
-    }
-    l.is_rgb = !is_grey;
-    l.colours = l.n_channels = l.is_rgb ? 3 : 1;
-    l.is_inverted = photometric == PHOTOMETRIC_MINISWHITE;
-    if (l.is_inverted && l.format != SAMPLEFORMAT_UINT) refuse("0 to be black", "0 to be white in signed samples");
-    if (l.samples > l.colours) count_channels(l);
-    if (l.samples < l.colours) refuse("three colour channels", std::to_string(l.samples) + " channels");
-  }
-
-  /// Further samples are channels of their own where they are not transparency.
-  void count_channels(Layout& l) const {
-    std::uint16_t n_extra = 0;
-    std::uint16_t* kinds = nullptr;
-    TIFFGetFieldDefaulted(tiff_.get(), TIFFTAG_EXTRASAMPLES, &n_extra, &kinds);
-    const bool is_alpha = l.samples == l.colours + n_extra && std::all_of(kinds, kinds + n_extra, [](auto kind) {
-                            return kind != EXTRASAMPLE_UNSPECIFIED;
-                          });
-    if (is_alpha) return;
-    if (l.is_rgb) {
-      refuse("three colour channels", std::to_string(l.samples) + " channels",
-             "save each channel as a page of its own");
-    }
-    l.n_channels = l.samples;
   }
 
   double full_scale() const {
@@ -390,7 +301,7 @@ class TiffReader {
         read_block(is_tiled, left, top, plane, block, is_tiled ? block_bytes : row_bytes * n_rows);
         const std::uint32_t n_columns = std::min(block_width, layout_.width - left);
         for (std::uint32_t j = 0; j < n_rows; ++j) {
-          unpack(block.data() + static_cast<std::size_t>(j) * row_bytes, row);
+          unpack(block.data() + static_cast<std::size_t>(j) * row_bytes, layout_, row);
           add_row(row, &image.at(static_cast<int>(left), static_cast<int>(top + j)), n_columns);
         }
       }
@@ -406,65 +317,6 @@ class TiffReader {
                                   : TIFFReadEncodedStrip(tiff_.get(), TIFFComputeStrip(tiff_.get(), top, sample),
                                                          block.data(), static_cast<tmsize_t>(block.size()));
     if (got < n_bytes) fail("a whole image of " + std::to_string(layout_.height) + " rows");
-  }
-
-  template <class T>
-  static void unpack_as(const unsigned char* bytes, std::vector<float>& row) {
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      T value;
-      std::memcpy(&value, bytes + i * sizeof(T), sizeof(T));
-      row[i] = static_cast<float>(value);
-    }
-  }
-
-  /// Samples to floats. libtiff has put 16-, 24-, 32- and 64-bit samples into this machine's byte order; other widths
-  /// are packed from the highest bit on, without gaps.
-  void unpack(const unsigned char* bytes, std::vector<float>& row) const {
-    const bool is_signed = layout_.format == SAMPLEFORMAT_INT, is_float = layout_.format == SAMPLEFORMAT_IEEEFP;
-    switch (layout_.bits) {
-      case 8:
-        return is_signed ? unpack_as<std::int8_t>(bytes, row) : unpack_as<std::uint8_t>(bytes, row);
-      case 16:
-        if (is_float) return unpack_halves(bytes, row);
-        return is_signed ? unpack_as<std::int16_t>(bytes, row) : unpack_as<std::uint16_t>(bytes, row);
-      case 32:
-        if (is_float) return unpack_as<float>(bytes, row);
-        return is_signed ? unpack_as<std::int32_t>(bytes, row) : unpack_as<std::uint32_t>(bytes, row);
-      case 64:
-        if (is_float) return unpack_as<double>(bytes, row);
-        return is_signed ? unpack_as<std::int64_t>(bytes, row) : unpack_as<std::uint64_t>(bytes, row);
-      case 24:
-        for (std::size_t i = 0; i < row.size(); ++i, bytes += 3)
-          row[i] = static_cast<float>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
-        return;
-      default:
-        unpack_bits(bytes, row);
-    }
-  }
-
-  /// IEEE 754 binary16: a sign, five bits of exponent, ten of fraction.
-  static void unpack_halves(const unsigned char* bytes, std::vector<float>& row) {
-    constexpr int kBias = 15, kFractionBits = 10, kInfinite = 31;
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      std::uint16_t half;
-      std::memcpy(&half, bytes + i * sizeof half, sizeof half);
-      const int exponent = half >> kFractionBits & kInfinite, fraction = half & ((1 << kFractionBits) - 1);
-      float value = exponent == 0 ? std::ldexp(static_cast<float>(fraction), 1 - kBias - kFractionBits)
-                                  : std::ldexp(static_cast<float>(fraction + (1 << kFractionBits)),
-                                               exponent - kBias - kFractionBits);
-      if (exponent == kInfinite)
-        value = fraction == 0 ? std::numeric_limits<float>::infinity() : std::numeric_limits<float>::quiet_NaN();
-      row[i] = half >> 15 ? -value : value;
-    }
-  }
-
-  void unpack_bits(const unsigned char* bytes, std::vector<float>& row) const {
-    std::size_t at = 0;
-    for (float& value : row) {
-      std::uint32_t sample = 0;
-      for (int bit = 0; bit < layout_.bits; ++bit, ++at) sample = sample << 1 | (bytes[at / 8] >> (7 - at % 8) & 1u);
-      value = static_cast<float>(sample);
-    }
   }
 
   void add_row(const std::vector<float>& row, float* pixels, std::uint32_t n_columns) const {

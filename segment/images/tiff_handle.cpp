@@ -5,11 +5,13 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 #include <set>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "segment/images/image.h"
+#include "segment/images/image_file.h"
 
 namespace mbtfm::images {
 namespace {
@@ -66,6 +68,101 @@ int keep_warning_of_early_end(TIFF* tiff, void* messages, const char* module, co
   va_end(copy);
   if (std::strstr(text, "IO error during reading")) return keep_error(tiff, messages, module, format, arguments);
   return 1;
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& expected, const std::string& found,
+                         const std::string& hint = {}) {
+  throw InputError(file.string(), expected, found, hint);
+}
+
+void require_known_samples(const Layout& l, const std::filesystem::path& file) {
+  const std::string found = std::to_string(l.bits) + " bits";
+  if (l.format == SAMPLEFORMAT_IEEEFP) {
+    if (l.bits != 16 && l.bits != 32 && l.bits != 64)
+      refuse(file, "floating-point samples of 16, 32 or 64 bits", found);
+  } else if (l.format == SAMPLEFORMAT_INT) {
+    if (l.bits != 8 && l.bits != 16 && l.bits != 32 && l.bits != 64)
+      refuse(file, "signed samples of 8, 16, 32 or 64 bits", found);
+  } else if (l.format == SAMPLEFORMAT_UINT) {
+    if ((l.bits < 1 || l.bits > 32) && l.bits != 64) refuse(file, "samples of 1 to 32 or of 64 bits", found);
+  } else {
+    refuse(file, "real samples", "complex ones");
+  }
+}
+
+/// Further samples are channels of their own where they are not transparency.
+void count_channels(Layout& l, TIFF* tiff, const std::filesystem::path& file) {
+  std::uint16_t n_extra = 0;
+  std::uint16_t* kinds = nullptr;
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_EXTRASAMPLES, &n_extra, &kinds);
+  const bool is_alpha = l.samples == l.colours + n_extra &&
+                        std::all_of(kinds, kinds + n_extra, [](auto kind) { return kind != EXTRASAMPLE_UNSPECIFIED; });
+  if (is_alpha) return;
+  if (l.is_rgb) {
+    refuse(file, "three colour channels", std::to_string(l.samples) + " channels",
+           "save each channel as a page of its own");
+  }
+  l.n_channels = l.samples;
+}
+
+void set_colours(Layout& l, TIFF* tiff, const std::filesystem::path& file) {
+  const auto compression = tag_of<std::uint16_t>(tiff, TIFFTAG_COMPRESSION, COMPRESSION_NONE);
+  if (!TIFFIsCODECConfigured(compression)) {
+    refuse(file, "a compression that libtiff knows here", "compression " + std::to_string(compression),
+           "save the image uncompressed or with deflate");
+  }
+  std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
+  TIFFGetField(tiff, TIFFTAG_PHOTOMETRIC, &photometric);
+  if (photometric == PHOTOMETRIC_YCBCR && compression == COMPRESSION_JPEG && !l.is_planar) {
+    TIFFSetField(tiff, TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);  // libjpeg converts
+    photometric = PHOTOMETRIC_RGB;
+  }
+  const bool is_grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE ||
+                       photometric == PHOTOMETRIC_PALETTE;
+  if (!is_grey && photometric != PHOTOMETRIC_RGB) {
+    refuse(file, "a grey or RGB image", "photometric interpretation " + std::to_string(photometric),
+           "convert it to grey: the original of the microscope is best");
+  }
+  l.is_rgb = !is_grey;
+  l.colours = l.n_channels = l.is_rgb ? 3 : 1;
+  l.is_inverted = photometric == PHOTOMETRIC_MINISWHITE;
+  if (l.is_inverted && l.format != SAMPLEFORMAT_UINT) refuse(file, "0 to be black", "0 to be white in signed samples");
+  if (l.samples > l.colours) count_channels(l, tiff, file);
+  if (l.samples < l.colours) refuse(file, "three colour channels", std::to_string(l.samples) + " channels");
+}
+
+template <class T>
+void unpack_as(const unsigned char* bytes, std::vector<float>& row) {
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    T value;
+    std::memcpy(&value, bytes + i * sizeof(T), sizeof(T));
+    row[i] = static_cast<float>(value);
+  }
+}
+
+/// IEEE 754 binary16: a sign, five bits of exponent, ten of fraction.
+void unpack_halves(const unsigned char* bytes, std::vector<float>& row) {
+  constexpr int kBias = 15, kFractionBits = 10, kInfinite = 31;
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    std::uint16_t half;
+    std::memcpy(&half, bytes + i * sizeof half, sizeof half);
+    const int exponent = half >> kFractionBits & kInfinite, fraction = half & ((1 << kFractionBits) - 1);
+    float value = exponent == 0 ? std::ldexp(static_cast<float>(fraction), 1 - kBias - kFractionBits)
+                                : std::ldexp(static_cast<float>(fraction + (1 << kFractionBits)),
+                                             exponent - kBias - kFractionBits);
+    if (exponent == kInfinite)
+      value = fraction == 0 ? std::numeric_limits<float>::infinity() : std::numeric_limits<float>::quiet_NaN();
+    row[i] = half >> 15 ? -value : value;
+  }
+}
+
+void unpack_bits(const unsigned char* bytes, int n_bits, std::vector<float>& row) {
+  std::size_t at = 0;
+  for (float& value : row) {
+    std::uint32_t sample = 0;
+    for (int bit = 0; bit < n_bits; ++bit, ++at) sample = sample << 1 | (bytes[at / 8] >> (7 - at % 8) & 1u);
+    value = static_cast<float>(sample);
+  }
 }
 
 }  // namespace
@@ -133,6 +230,44 @@ void write_tiff(const std::filesystem::path& file, const std::vector<Image>& sli
   }
   tiff.reset();
   require(messages.first_error.empty());
+}
+
+Layout layout_of(TIFF* tiff, const std::filesystem::path& file) {
+  Layout result;
+  TIFFGetField(tiff, TIFFTAG_IMAGEWIDTH, &result.width);
+  TIFFGetField(tiff, TIFFTAG_IMAGELENGTH, &result.height);
+  require_plausible_size(file, result.width, result.height);
+  result.bits = tag_of<std::uint16_t>(tiff, TIFFTAG_BITSPERSAMPLE, 1);
+  result.format = tag_of<std::uint16_t>(tiff, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
+  if (result.format == SAMPLEFORMAT_VOID) result.format = SAMPLEFORMAT_UINT;
+  result.samples = tag_of<std::uint16_t>(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
+  result.is_planar = tag_of<std::uint16_t>(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) == PLANARCONFIG_SEPARATE;
+  require_known_samples(result, file);
+  set_colours(result, tiff, file);
+  return result;
+}
+
+void unpack(const unsigned char* bytes, const Layout& layout, std::vector<float>& row) {
+  const bool is_signed = layout.format == SAMPLEFORMAT_INT, is_float = layout.format == SAMPLEFORMAT_IEEEFP;
+  switch (layout.bits) {
+    case 8:
+      return is_signed ? unpack_as<std::int8_t>(bytes, row) : unpack_as<std::uint8_t>(bytes, row);
+    case 16:
+      if (is_float) return unpack_halves(bytes, row);
+      return is_signed ? unpack_as<std::int16_t>(bytes, row) : unpack_as<std::uint16_t>(bytes, row);
+    case 32:
+      if (is_float) return unpack_as<float>(bytes, row);
+      return is_signed ? unpack_as<std::int32_t>(bytes, row) : unpack_as<std::uint32_t>(bytes, row);
+    case 64:
+      if (is_float) return unpack_as<double>(bytes, row);
+      return is_signed ? unpack_as<std::int64_t>(bytes, row) : unpack_as<std::uint64_t>(bytes, row);
+    case 24:
+      for (std::size_t i = 0; i < row.size(); ++i, bytes += 3)
+        row[i] = static_cast<float>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
+      return;
+    default:
+      unpack_bits(bytes, layout.bits, row);
+  }
 }
 
 }  // namespace mbtfm::images
