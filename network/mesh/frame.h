@@ -1,16 +1,29 @@
 /// What the mesh must contain: adhesions, fibres and outline as vertices and segments.
 #pragma once
 
+#include <cstdint>
+#include <random>
 #include <vector>
 
 #include "network/mesh/mesh.h"
 #include "network/mesh/outline.h"
-#include "network/mesh/random.h"
 #include "network/mesh/size_field.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
 
 namespace mbtfm::mesh {
+
+/// Random numbers that are the same on every platform (the standard's distributions are not).
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  /// Evenly spread over [0, 1), from the upper 53 bits.
+  double uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+  double uniform(double low, double high) { return low + (high - low) * uniform(); }
+
+ private:
+  std::mt19937_64 engine_;
+};
 
 struct FrameSegment {
   int vertex_a = 0;
