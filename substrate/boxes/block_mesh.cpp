@@ -45,22 +45,18 @@ MakeMesh* load_mesh_maker() {
       "install the program again, with lib/ beside bin/; the models 'half-space' and 'layer' do without it");
 }
 
-/// Index of the interval of `line` that holds x; the last one holds its upper end.
-int interval_of(const std::vector<double>& line, double x) {
-  const auto above = std::upper_bound(line.begin() + 1, line.end() - 1, x);
-  return static_cast<int>(above - line.begin()) - 1;
-}
-
-/// Level, and position among the level's cells across the block.
-std::uint64_t surface_key(const GridLines& lines, int level, Vec2 point) {
-  const auto index = [level](const std::vector<double>& line, double x) {
-    const int coarse = interval_of(line, x);
-    const double fraction = (x - line[coarse]) / (line[coarse + 1] - line[coarse]);
-    const std::uint64_t n = std::uint64_t{1} << level;
-    const auto fine = static_cast<std::uint64_t>(std::max(0.0, fraction * static_cast<double>(n)));
-    return coarse * n + std::min(fine, n - 1);
-  };
-  return static_cast<std::uint64_t>(level) << 58 | index(lines.x_um, point.x) << 29 | index(lines.y_um, point.y);
+/// Of the box of a level that holds a point.
+BoxKey key_of(const GridLines& lines, int level, const std::array<double, 3>& point) {
+  BoxKey key = {static_cast<std::uint32_t>(level)};
+  const std::array line_of = {&lines.x_um, &lines.y_um, &lines.z_um};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<double>& line = *line_of[axis];
+    const auto above = std::upper_bound(line.begin() + 1, line.end() - 1, point[axis]);
+    const double low = *(above - 1), n = std::ldexp(1, level);
+    const double within = std::clamp(std::floor((point[axis] - low) / (*above - low) * n), 0.0, n - 1);
+    key[axis + 1] = static_cast<std::uint32_t>(static_cast<double>(above - line.begin() - 1) * n + within);
+  }
+  return key;
 }
 
 }  // namespace
@@ -85,11 +81,10 @@ BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function
     }
   }
   for (std::size_t cell = 0; cell < mesh.cells.size(); ++cell) {
-    const Box& box = mesh.cells[cell];
+    const auto& [low, size] = mesh.cells[cell];
     MBTFM_ASSERT(mesh.cell_levels[cell] < kMostLevels);
-    if (box.low_um[2] > 0) continue;
-    const Vec2 centre = {box.low_um[0] + 0.5 * box.size_um[0], box.low_um[1] + 0.5 * box.size_um[1]};
-    mesh.cell_at_surface[surface_key(lines, mesh.cell_levels[cell], centre)] = static_cast<int>(cell);
+    const std::array middle = {low[0] + 0.5 * size[0], low[1] + 0.5 * size[1], low[2] + 0.5 * size[2]};
+    mesh.cell_at[key_of(lines, mesh.cell_levels[cell], middle)] = static_cast<int>(cell);
   }
   return mesh;
 }
@@ -102,16 +97,16 @@ std::vector<double> even_lines(double low, double high, double margin_um, double
   return values;
 }
 
-int surface_cell(const BlockMesh& mesh, Vec2 point_um) {
+int cell_holding(const BlockMesh& mesh, const std::array<double, 3>& point_um) {
   const auto is_within = [](const std::vector<double>& line, double x) {
     return x >= line.front() && x <= line.back();
   };
-  if (!is_within(mesh.lines.x_um, point_um.x) || !is_within(mesh.lines.y_um, point_um.y)) return -1;
+  if (!is_within(mesh.lines.x_um, point_um[0]) || !is_within(mesh.lines.y_um, point_um[1])) return -1;
   for (int level = 0; level < kMostLevels; ++level) {
-    const auto found = mesh.cell_at_surface.find(surface_key(mesh.lines, level, point_um));
-    if (found != mesh.cell_at_surface.end()) return found->second;
+    const auto found = mesh.cell_at.find(key_of(mesh.lines, level, point_um));
+    if (found != mesh.cell_at.end()) return found->second;
   }
-  throw InternalError("no cell of the surface holds a point of the block");
+  throw InternalError("no cell of the block holds a point of it");
 }
 
 std::array<double, 3> shape_values(int order, double t) {

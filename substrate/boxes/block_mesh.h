@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <unordered_map>
+#include <map>
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
@@ -21,7 +21,10 @@ struct GridLines {
   std::vector<double> x_um, y_um, z_um;
 };
 
-constexpr int kMostLevels = 20;  ///< of halving: keys have 29 bits and more for a position
+constexpr int kMostLevels = 20;  ///< of halving
+
+/// Of a box: its level of halving, and its place among the boxes of that level.
+using BoxKey = std::array<std::uint32_t, 4>;
 
 /// Evenly from low - margin to high + margin, so many that no step is longer than `step_um`.
 std::vector<double> even_lines(double low, double high, double margin_um, double step_um);
@@ -36,11 +39,11 @@ struct BlockMesh {
   int order = 2;
   GridLines lines;
   std::vector<Box> cells;
-  std::vector<int> cell_levels;                            ///< by cell: how often one of the grid was halved
-  std::vector<int> cell_nodes;                             ///< by cell, x fastest, then y, then z
-  std::vector<std::array<double, 3>> position_um;          ///< by node
-  std::vector<std::vector<NodeWeight>> hanging;            ///< by node: what it hangs on; empty: a node of its own
-  std::unordered_map<std::uint64_t, int> cell_at_surface;  ///< by key of level, i, j: see `surface_cell`
+  std::vector<int> cell_levels;                    ///< by cell: how often one of the grid was halved
+  std::vector<int> cell_nodes;                     ///< by cell, x fastest, then y, then z
+  std::vector<std::array<double, 3>> position_um;  ///< by node
+  std::vector<std::vector<NodeWeight>> hanging;    ///< by node: what it hangs on; empty: a node of its own
+  std::map<BoxKey, int> cell_at;
 
   int nodes_per_cell() const { return (order + 1) * (order + 1) * (order + 1); }
   const int* nodes_of(int cell) const { return &cell_nodes[static_cast<std::size_t>(cell) * nodes_per_cell()]; }
@@ -53,8 +56,12 @@ struct BlockMesh {
 BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function<bool(const Box&)>& is_too_large,
                           std::int64_t most_cells, int threads);
 
-/// The cell of the surface that holds a point; -1 outside the block.
-int surface_cell(const BlockMesh& mesh, Vec2 point_um);
+/// The cell that holds a point of a depth within the block; -1 beside the block.
+int cell_holding(const BlockMesh& mesh, const std::array<double, 3>& point_um);
+/// That of the surface.
+inline int surface_cell(const BlockMesh& mesh, Vec2 point_um) {
+  return cell_holding(mesh, {point_um.x, point_um.y, 0});
+}
 
 /// Shape functions of order 1 or 2 on [0, 1] and their slopes.
 std::array<double, 3> shape_values(int order, double t);

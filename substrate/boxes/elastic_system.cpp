@@ -1,6 +1,5 @@
 #include "substrate/boxes/elastic_system.h"
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
@@ -124,16 +123,16 @@ std::vector<NodeWeight> ElasticSystem::surface_weights(Vec2 point_um) const {
 std::vector<int> ElasticSystem::touched_cells(const substrate::Ellipse& ellipse) const {
   std::vector<int> touched;
   const Vec2 extent = substrate::half_extent_um(ellipse);
-  for (const auto& [key, cell] : mesh_.cell_at_surface) {
+  for (std::size_t cell = 0; cell < mesh_.cells.size(); ++cell) {
     const Box& box = mesh_.cells[cell];
+    if (box.low_um[2] > 0) continue;
     const Vec2 low = {box.low_um[0], box.low_um[1]};
     const Vec2 high = {low.x + box.size_um[0], low.y + box.size_um[1]};
     const Vec2 c = ellipse.centre_um;
     if (low.x > c.x + extent.x || high.x < c.x - extent.x || low.y > c.y + extent.y || high.y < c.y - extent.y)
       continue;
-    if (!clipped_ellipse_rule(ellipse, {low, high}).empty()) touched.push_back(cell);
+    if (!clipped_ellipse_rule(ellipse, {low, high}).empty()) touched.push_back(static_cast<int>(cell));
   }
-  std::sort(touched.begin(), touched.end());  // the table's order is not ours
   return touched;
 }
 

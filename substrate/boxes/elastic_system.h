@@ -12,6 +12,7 @@
 #include "pipeline/numerics/cholesky.h"
 #include "substrate/boxes/block_mesh.h"
 #include "substrate/boxes/free_nodes.h"
+#include "substrate/compliance.h"
 #include "substrate/ellipse.h"
 #include "substrate/material.h"
 
@@ -54,6 +55,10 @@ class ElasticSystem {
 
 /// Stiffness of one box of order 1 or 2, (3 nodes)² by columns; unknown 3 k + i is axis i of node k, x fastest.
 MatrixXd box_stiffness(const substrate::Material& material, int order, const Box& box);
+
+/// A solution inside the gel, as boxes with values. @param with_stress  mean over each box
+substrate::VolumeField volume_field(const ElasticSystem& system, const substrate::Material& material,
+                                    const numerics::NodalColumn& u, bool with_stress);
 
 /// What `memory_limit_GB` stands for: 0 is four fifths of the machine's memory.
 double allowed_GB(double memory_limit_GB);

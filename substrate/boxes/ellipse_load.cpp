@@ -15,25 +15,22 @@ namespace {
 
 // With y = Y sin t the ellipse spans x = P sin t -+ W cos t, about its centre: smooth in t, up to its very tips.
 struct Span {
-  double y_extent, p, w, x_extent;
+  Vec2 extent;
+  double p, w;
 };
 
 Span span_of(const substrate::Ellipse& ellipse) {
-  const double c = std::cos(ellipse.angle_rad);
-  const double s = std::sin(ellipse.angle_rad);
-  const double a2 = ellipse.semi_major_um * ellipse.semi_major_um;
-  const double b2 = ellipse.semi_minor_um * ellipse.semi_minor_um;
-  const double y_extent = std::sqrt(a2 * s * s + b2 * c * c);
-  return {.y_extent = y_extent,
-          .p = (a2 - b2) * c * s / y_extent,
-          .w = ellipse.semi_major_um * ellipse.semi_minor_um / y_extent,
-          .x_extent = std::sqrt(a2 * c * c + b2 * s * s)};
+  const double a = ellipse.semi_major_um, b = ellipse.semi_minor_um;
+  const Vec2 extent = substrate::half_extent_um(ellipse);
+  return {.extent = extent,
+          .p = (a * a - b * b) * std::cos(ellipse.angle_rad) * std::sin(ellipse.angle_rad) / extent.y,
+          .w = a * b / extent.y};
 }
 
 /// Add the t in (low, high) where either flank of the ellipse crosses x.
 void add_crossings(std::vector<double>& breaks, const Span& span, double x, double low, double high) {
-  if (std::abs(x) >= span.x_extent) return;
-  const double angle = std::asin(x / span.x_extent);
+  if (std::abs(x) >= span.extent.x) return;
+  const double angle = std::asin(x / span.extent.x);
   const double phase = std::atan2(span.w, span.p);
   for (const double flank : {phase, -phase}) {  // P sin t + W cos t = X sin(t + phase), and with -W
     for (const double turned : {angle - flank, pi - angle - flank}) {
@@ -56,9 +53,9 @@ std::vector<substrate::DiscPoint> clipped_ellipse_rule(const substrate::Ellipse&
   const Vec2 low = rectangle.low_um - ellipse.centre_um;
   const Vec2 high = rectangle.high_um - ellipse.centre_um;
   std::vector<substrate::DiscPoint> rule;
-  if (low.x >= span.x_extent || high.x <= -span.x_extent) return rule;
-  const double t_low = std::asin(std::clamp(low.y / span.y_extent, -1.0, 1.0));
-  const double t_high = std::asin(std::clamp(high.y / span.y_extent, -1.0, 1.0));
+  if (low.x >= span.extent.x || high.x <= -span.extent.x) return rule;
+  const double t_low = std::asin(std::clamp(low.y / span.extent.y, -1.0, 1.0));
+  const double t_high = std::asin(std::clamp(high.y / span.extent.y, -1.0, 1.0));
   std::vector<double> breaks = {t_low, t_high};
   add_crossings(breaks, span, low.x, t_low, t_high);
   add_crossings(breaks, span, high.x, t_low, t_high);
@@ -74,10 +71,10 @@ std::vector<substrate::DiscPoint> clipped_ellipse_rule(const substrate::Ellipse&
       const double left = std::max(low.x, span.p * sin - span.w * cos);
       const double right = std::min(high.x, span.p * sin + span.w * cos);
       if (right <= left) continue;
-      const double weight = half * outer.weights[i] * span.y_extent * cos * 0.5 * (right - left) / area;
+      const double weight = half * outer.weights[i] * span.extent.y * cos * 0.5 * (right - left) / area;
       for (int k = 0; k < kInner; ++k) {
         const double x = 0.5 * (left + right) + 0.5 * (right - left) * inner.nodes[k];
-        rule.push_back({ellipse.centre_um + Vec2{x, span.y_extent * sin}, weight * inner.weights[k]});
+        rule.push_back({ellipse.centre_um + Vec2{x, span.extent.y * sin}, weight * inner.weights[k]});
       }
     }
   }

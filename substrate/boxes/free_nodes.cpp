@@ -112,4 +112,22 @@ void merge(std::vector<NodeWeight>& weights) {
   if (!weights.empty()) weights.resize(last + 1);
 }
 
+std::vector<int> nodes_of(const WeightedNodes& points) {
+  std::vector<int> nodes;
+  for (const auto& point : points)
+    for (const NodeWeight& w : point) nodes.push_back(w.node);
+  return nodes;
+}
+
+MatrixXd solve_between(const numerics::SparseCholesky& factor, const WeightedNodes& from, Axes from_axes,
+                       const MatrixXd& values, const WeightedNodes& to, Axes to_axes, const std::vector<int>& order) {
+  MatrixXd answers = MatrixXd::Zero(to_axes.n * static_cast<Index>(to.size()), values.cols());
+  const auto column_of = [&](int k) -> Index { return order.empty() ? k : order[k]; };
+  factor.solve(
+      static_cast<int>(values.cols()), nodes_of(to),
+      [&](int k, const numerics::NodalColumn& b) { add_loads(from, from_axes, values.col(column_of(k)).data(), b); },
+      [&](int k, const numerics::NodalColumn& u) { add_samples(to, to_axes, u, answers.col(column_of(k)).data()); });
+  return answers;
+}
+
 }  // namespace mbtfm::boxes

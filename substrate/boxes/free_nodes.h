@@ -5,7 +5,7 @@
 #include <functional>
 #include <span>
 
-#include "pipeline/numerics/block_cholesky.h"
+#include "pipeline/numerics/cholesky.h"
 #include "substrate/boxes/block_mesh.h"
 
 namespace mbtfm::boxes {
@@ -52,5 +52,42 @@ class FreeNodes {
 
 /// Merge weights of equal nodes, by rising node.
 void merge(std::vector<NodeWeight>& weights);
+
+/// By load or point: its share of each free node.
+using WeightedNodes = std::vector<std::vector<NodeWeight>>;
+
+/// The rows of a column that hold the axes of each load or point.
+struct Axes {
+  Index first = 0, n = 3;  ///< the first axis, and how many
+};
+
+/// at(node, axis) += the loads' shares of a column's values.
+template <class At>
+void add_loads(const WeightedNodes& loads, Axes axes, const double* column, const At& at) {
+  for (const auto& load : loads) {
+    for (Index axis = axes.first; axis < axes.first + axes.n; ++axis, ++column) {
+      if (*column == 0) continue;
+      for (const auto& [node, weight] : load) at(node, static_cast<int>(axis)) += weight * *column;
+    }
+  }
+}
+
+/// column += at(node, axis), as each of the points has it.
+template <class At>
+void add_samples(const WeightedNodes& points, Axes axes, const At& at, double* column) {
+  for (const auto& point : points) {
+    for (Index axis = axes.first; axis < axes.first + axes.n; ++axis, ++column)
+      for (const auto& [node, weight] : point) *column += weight * at(node, static_cast<int>(axis));
+  }
+}
+
+/// Nodes that any of the points is a mean of.
+std::vector<int> nodes_of(const WeightedNodes& points);
+
+/// K⁻¹ between two lists of weighted nodes: symmetric, so that exchanging them transposes it exactly.
+/// @param order  in which columns are solved for; empty: as they come
+MatrixXd solve_between(const numerics::SparseCholesky& factor, const WeightedNodes& from, Axes from_axes,
+                       const MatrixXd& values, const WeightedNodes& to, Axes to_axes,
+                       const std::vector<int>& order = {});
 
 }  // namespace mbtfm::boxes

@@ -7,7 +7,7 @@ namespace mbtfm::boxes {
 
 constexpr const char* kMeshMakerFile = "libmbtfm_mesh_maker.so";
 
-/// Fill in a mesh whose order and lines are given: all but cell_at_surface.
+/// Fill in a mesh whose order and lines are given: all but cell_at.
 /// @throws std::length_error for more than `most_cells`
 using MakeMesh = void(BlockMesh& mesh, const std::function<bool(const Box&)>& is_too_large, std::int64_t most_cells,
                       int threads);

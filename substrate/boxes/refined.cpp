@@ -1,9 +1,9 @@
 /// Locally refined finite elements: no closed form anywhere, so what the others are checked against, at a price.
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <mutex>
+#include <numbers>
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
@@ -12,34 +12,23 @@
 #include "pipeline/contract/stopwatch.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/boxes/elastic_system.h"
-#include "substrate/boxes/load_cases.h"
+#include "substrate/boxes/ellipse_load.h"
 #include "substrate/boxes/models.h"
-#include "substrate/boxes/refined_mesh.h"
-#include "substrate/boxes/volume.h"
 #include "substrate/loads.h"
-#include "substrate/models.h"
 #include "substrate/response.h"
+#include "substrate/scene.h"
 
 namespace mbtfm::boxes {
 namespace {
 
+constexpr int kOrder = 2;               // with discontinuous linear pressures: stable as nu -> 1/2
 const double kFall = std::pow(2, 1.5);  // of the error at a load's rim when the elements there halve
 constexpr double kAim = 0.9;  // of the tolerance: a second try costs more than what is spared by just reaching it
 constexpr int kMostRefinements = 8;  // of refinement: 2^8 times finer than asked for no memory holds
 
-void add_loads(const std::vector<std::vector<NodeWeight>>& loads, const LoadCase& forces,
-               const numerics::NodalColumn& b) {
-  for (const auto& [j, force] : forces) {
-    for (const auto& [node, weight] : loads[j]) {
-      b(node, 0) += weight * force.x;
-      b(node, 1) += weight * force.y;
-    }
-  }
-}
-
 /// Columns of the matrix, those of neighbouring ellipses side by side: along a Z-shaped (Morton) curve of 1024 x 1024.
 std::vector<int> columns_by_place(const std::vector<substrate::Ellipse>& ellipses) {
-  const substrate::Extent extent = substrate::extent_of({}, ellipses);
+  const Extent extent = substrate::extent_of({}, ellipses);
   const Vec2 size = extent.high_um - extent.low_um;
   const auto key = [&](int column) {
     const Vec2 at = ellipses[column / 2].centre_um - extent.low_um;
@@ -54,7 +43,112 @@ std::vector<int> columns_by_place(const std::vector<substrate::Ellipse>& ellipse
   return columns;
 }
 
-constexpr int kOrder = 2;  // with discontinuous linear pressures: stable as nu -> 1/2
+struct Fineness {
+  double across = 1.4;        ///< square root of an ellipse's area over the largest side of an element on it
+  int fewest_elements = 4;    ///< that touch an ellipse: the thesis' rule
+  double growth = 4;          ///< of a side over its distance to the nearest ellipse, at most
+  std::vector<int> halvings;  ///< by ellipse: of the side that follows; below 0: doublings
+};
+
+// of an element's sides: stiffness and ordering take it, and steps of the modulus near the surface ask for it
+constexpr double kMostFlat = 4;
+
+/// From the surface to the base, with a line at each step of the modulus.
+std::vector<double> depths_of(const substrate::Material& material, double side_um) {
+  std::vector<double> ends = substrate::steps_um(material);
+  ends.push_back(material.gel.thickness_um);
+  std::vector<double> depths = {0};
+  for (const double end : ends) {
+    const double begin = depths.back();
+    const int n = std::max(1, static_cast<int>(std::lround((end - begin) / side_um)));
+    for (int k = 1; k <= n; ++k) depths.push_back(k == n ? end : begin + (end - begin) * k / n);
+  }
+  return depths;
+}
+
+/// Sides of the coarsest elements along the surface: the gel's thickness, or less over thin layers.
+double coarsest_side_um(const substrate::Material& material) {
+  double side = material.gel.thickness_um;
+  double before = 0;
+  for (const double step : substrate::steps_um(material)) {
+    side = std::min(side, kMostFlat * (step - before));
+    before = step;
+  }
+  return std::min(side, kMostFlat * (material.gel.thickness_um - before));
+}
+
+/// Elements of a uniform grid that an ellipse touches.
+int n_touched(const substrate::Ellipse& ellipse, Vec2 origin, double side) {
+  const Vec2 half = substrate::half_extent_um(ellipse);
+  const auto index = [side](double x) { return std::floor(x / side); };
+  const Vec2 low = ellipse.centre_um - half - origin;
+  const Vec2 high = ellipse.centre_um + half - origin;
+  int n = 0;
+  for (double j = index(low.y); j <= index(high.y); ++j) {
+    for (double i = index(low.x); i <= index(high.x); ++i) {
+      const Vec2 corner = origin + Vec2{i * side, j * side};
+      if (!clipped_ellipse_rule(ellipse, {corner, corner + Vec2{side, side}}).empty()) ++n;
+    }
+  }
+  return n;
+}
+
+/// An ellipse with the side of element it asks for, covered by discs of its semi-minor axis along its major one.
+struct Target {
+  double side_um, radius_um;
+  std::vector<Vec2> centres_um;
+};
+
+Target target_of(const substrate::Ellipse& ellipse, const GridLines& lines, const Fineness& fineness, int halvings) {
+  const double wanted = std::sqrt(std::numbers::pi * ellipse.semi_major_um * ellipse.semi_minor_um) / fineness.across;
+  double side = std::max(lines.x_um[1] - lines.x_um[0], lines.y_um[1] - lines.y_um[0]);
+  const Vec2 origin = {lines.x_um.front(), lines.y_um.front()};
+  while (side > wanted || n_touched(ellipse, origin, side) < fineness.fewest_elements) side /= 2;
+  side = std::ldexp(side, -halvings);
+
+  const double b = ellipse.semi_minor_um;
+  const double reach = std::max(0.0, ellipse.semi_major_um - b);
+  const int n = static_cast<int>(std::ceil(reach / b));
+  const Vec2 along = {std::cos(ellipse.angle_rad), std::sin(ellipse.angle_rad)};
+  Target target{.side_um = side, .radius_um = b, .centres_um = {}};
+  for (int k = -n; k <= n; ++k) target.centres_um.push_back(ellipse.centre_um + (n == 0 ? 0 : reach * k / n) * along);
+  return target;
+}
+
+double distance(const Box& box, Vec2 point) {
+  const auto outside = [](double low, double size, double x) { return std::max({0.0, low - x, x - low - size}); };
+  const double dx = outside(box.low_um[0], box.size_um[0], point.x);
+  const double dy = outside(box.low_um[1], box.size_um[1], point.y);
+  return std::sqrt(dx * dx + dy * dy + box.low_um[2] * box.low_um[2]);
+}
+
+/// @throws NotSolved where it would have more than `most_cells`
+BlockMesh refined_mesh(const substrate::Material& material, const Extent& scene,
+                       const std::vector<substrate::Ellipse>& ellipses, const Fineness& fineness, double margin_um,
+                       std::int64_t most_cells, int threads) {
+  const double coarsest = coarsest_side_um(material);
+  substrate::check_size(scene, coarsest, most_cells);
+  // boxes that are nearly cubes; flatter over thin layers
+  const GridLines lines = {even_lines(scene.low_um.x, scene.high_um.x, margin_um, coarsest),
+                           even_lines(scene.low_um.y, scene.high_um.y, margin_um, coarsest),
+                           depths_of(material, coarsest)};
+  std::vector<Target> targets;
+  for (std::size_t j = 0; j < ellipses.size(); ++j) {
+    targets.push_back(target_of(ellipses[j], lines, fineness, fineness.halvings[j]));
+  }
+  const auto is_too_large = [&](const Box& box) {
+    const double side = std::max(box.size_um[0], box.size_um[1]);
+    for (const Target& target : targets) {
+      // the side grows with the distance: the field's own scale
+      if (side <= target.side_um * (1 + 1e-9)) continue;
+      for (const Vec2 centre : target.centres_um) {
+        if (side > fineness.growth * (distance(box, centre) - target.radius_um)) return true;
+      }
+    }
+    return false;
+  };
+  return make_block_mesh(lines, kOrder, is_too_large, most_cells, threads);
+}
 
 class Refined final : public substrate::Substrate {
  public:
@@ -69,8 +163,7 @@ class Refined final : public substrate::Substrate {
     const std::vector<substrate::Ellipse> ellipses = ellipses_of(loads);
     const substrate::Components components = observations.components;
     // all axes for one, too: the error is a share of the whole displacement, and this part vanishes with 1 - 2 nu
-    const std::vector<int> axes =
-        components == substrate::Components::along ? std::vector<int>{0, 1} : std::vector<int>{0, 1, 2};
+    const Index n_axes = components == substrate::Components::along ? 2 : 3, n_forces = 2 * loads.size();
     const Index n_rows = observations.n_components() * observations.size();
     const auto asked = [=](const MatrixXd& field) -> MatrixXd {
       if (components != substrate::Components::normal) return field;
@@ -78,18 +171,16 @@ class Refined final : public substrate::Substrate {
     };
     return substrate::lazy_response(
         {.rows = n_rows,
-         .cols = 2 * loads.size(),
+         .cols = n_forces,
          .matrix =
              [=, this] {
-               return asked(solve({points_um, ellipses, 2 * static_cast<int>(ellipses.size()), unit_case, axes}));
+               return asked(solve({points_um, ellipses, MatrixXd::Identity(n_forces, n_forces), n_axes}));
              },
          .displace =
              [=, this](const MatrixXd& forces_nN) {
                MatrixXd field(n_rows, forces_nN.cols());
-               for (Index column = 0; column < field.cols(); ++column) {
-                 const LoadCase all = case_of(substrate::vectors_of(forces_nN.col(column)));
-                 field.col(column) = asked(solve({points_um, ellipses, 1, [&all](int) { return all; }, axes}));
-               }
+               for (Index column = 0; column < field.cols(); ++column)
+                 field.col(column) = asked(solve({points_um, ellipses, forces_nN.col(column), n_axes}));
                return field;
              }});
   }
@@ -109,13 +200,17 @@ class Refined final : public substrate::Substrate {
     check(ellipses);
     substrate::check_forces(ellipses, forces_nN);
     const ElasticSystem system = system_for(first_fineness(ellipses.size()), {}, ellipses);
-    std::vector<std::vector<NodeWeight>> loads;
+    WeightedNodes loads;
     for (const substrate::Ellipse& ellipse : ellipses) loads.push_back(system.load_weights(ellipse));
+    const VectorXd forces = substrate::column_of(forces_nN);
     std::vector<int> all_nodes(system.n_unknowns() / 3);
     std::iota(all_nodes.begin(), all_nodes.end(), 0);
     substrate::VolumeField field;
     system.factor().solve(
-        1, all_nodes, [&](int, const numerics::NodalColumn& b) { add_loads(loads, case_of(forces_nN), b); },
+        1, all_nodes,
+        [&](int, const numerics::NodalColumn& b) {
+          add_loads(loads, {0, 2}, forces.data(), b);
+        },
         [&](int, const numerics::NodalColumn& u) { field = volume_field(system, material_, u, parameters_.stress); });
     return field;
   }
@@ -126,21 +221,20 @@ class Refined final : public substrate::Substrate {
   }
 
  private:
-  /// Columns wanted at points: what loads each, and along which axes the points are asked.
+  /// Columns wanted at points: the forces of each, and along how many axes the points are asked.
   struct Request {
     const std::vector<Vec2>& points_um;
     const std::vector<substrate::Ellipse>& ellipses;
-    int n_columns;
-    std::function<LoadCase(int)> case_of_column;
-    std::vector<int> axes = {0, 1};
+    MatrixXd forces_nN;
+    Index n_axes;
   };
 
   /// One mesh, or finer and finer ones until the estimated error is below the tolerance.
   MatrixXd solve(const Request& request) const {
     substrate::check_points(request.points_um);
     check(request.ellipses);
-    const auto n_rows = static_cast<Index>(request.axes.size() * request.points_um.size());
-    if (n_rows == 0 || request.ellipses.empty()) return MatrixXd::Zero(n_rows, request.n_columns);
+    const Index n_rows = request.n_axes * std::ssize(request.points_um);
+    if (n_rows == 0 || request.ellipses.empty()) return MatrixXd::Zero(n_rows, request.forces_nN.cols());
     const Stopwatch watch;
     Fineness fineness = first_fineness(request.ellipses.size());
     MatrixXd columns;
@@ -159,7 +253,6 @@ class Refined final : public substrate::Substrate {
 
   Fineness first_fineness(std::size_t n_ellipses) const {
     return {.across = parameters_.elements_across_adhesion,
-            .fewest_elements = 4,  // that touch each adhesion: the thesis' rule
             .growth = parameters_.growth,
             .halvings = std::vector<int>(n_ellipses, 0)};
   }
@@ -234,19 +327,14 @@ class Refined final : public substrate::Substrate {
     const Stopwatch watch;
     const ElasticSystem system = system_for(fineness, request.points_um, request.ellipses);
     const double setup_s = watch.seconds();
-    std::vector<std::vector<NodeWeight>> samples(request.points_um.size()), loads(request.ellipses.size());
+    WeightedNodes samples(request.points_um.size()), loads(request.ellipses.size());
     numerics::parallel_for(static_cast<int>(samples.size()), threads_,
                            [&](int i) { samples[i] = system.surface_weights(request.points_um[i]); });
     numerics::parallel_for(static_cast<int>(loads.size()), threads_,
                            [&](int j) { loads[j] = system.load_weights(request.ellipses[j]); });
-    const std::vector<int> order = request.n_columns == 1 ? std::vector<int>{0} : columns_by_place(request.ellipses);
-    MatrixXd columns = MatrixXd::Zero(static_cast<Index>(request.axes.size() * samples.size()), request.n_columns);
-    system.factor().solve(
-        request.n_columns, nodes_of(samples),
-        [&](int k, const numerics::NodalColumn& b) { add_loads(loads, request.case_of_column(order[k]), b); },
-        [&](int k, const numerics::NodalColumn& u) {
-          add_samples(samples, request.axes, u, columns.col(order[k]).data());
-        });
+    const bool is_one = request.forces_nN.cols() == 1;
+    MatrixXd columns = solve_between(system.factor(), loads, {0, 2}, request.forces_nN, samples, {0, request.n_axes},
+                                     is_one ? std::vector<int>() : columns_by_place(request.ellipses));
     note(system, request.ellipses, setup_s);
     return columns;
   }
@@ -257,7 +345,7 @@ class Refined final : public substrate::Substrate {
     constexpr double kBytes = 1e5;
     const auto most = static_cast<std::int64_t>(1e9 * allowed_GB(parameters_.memory_limit_GB) / kBytes);
     BlockMesh mesh = refined_mesh(material_, substrate::extent_of(points_um, ellipses), ellipses, fineness,
-                                  substrate::margin_um(material_.gel, parameters_), kOrder, most, threads_);
+                                  substrate::margin_um(material_.gel, parameters_), most, threads_);
     return {material_,
             std::move(mesh),
             {.threads = threads_,

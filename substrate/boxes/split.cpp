@@ -5,21 +5,149 @@
 /// grid does, and it knows nothing of the adhesions: one factorisation for all scenes that cover the same squares.
 /// Valid for a homogeneous gel with a flat surface; sides about a thickness away from the adhesions at least.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <mutex>
 
 #include "pipeline/contract/stopwatch.h"
-#include "substrate/boxes/load_cases.h"
+#include "pipeline/numerics/quadrature.h"
+#include "substrate/boxes/elastic_system.h"
 #include "substrate/boxes/models.h"
-#include "substrate/boxes/split_block.h"
 #include "substrate/greens/columns.h"
 #include "substrate/loads.h"
 #include "substrate/models.h"
 #include "substrate/response.h"
+#include "substrate/scene.h"
 
 namespace mbtfm::boxes {
 namespace {
+
+/// Indices of the squares, of side thickness / cells_per_thickness, that the scene covers.
+using Squares = std::array<int, 4>;
+
+/// A quadrature point of a side of the block.
+struct SidePoint {
+  std::array<double, 3> position_um;
+  int normal_axis;
+  double area_um2;  ///< with the sign of the outward normal
+  std::vector<NodeWeight> weights;
+};
+
+/// Where a grid lies: the squares that are cut alike, and the sides.
+struct Footprint {
+  Squares squares;
+  Extent outer;
+};
+struct SplitBlock {
+  Footprint footprint;
+  ElasticSystem system;
+  std::vector<SidePoint> side_points;
+};
+
+/// Steps that grow from `step` until they fill `reach`: their ends.
+std::vector<double> growing_steps(double step, double reach) {
+  constexpr double kGrowth = 1.5;  // the correction fades over distances that grow with the distance itself
+  std::vector<double> ends;
+  double end = 0;
+  for (double size = step; end < reach * (1 - 1e-9); size *= kGrowth) ends.push_back(end += size);
+  for (double& e : ends) e *= reach / end;
+  return ends;
+}
+
+/// Lines at index_low … index_high times `step`, then towards either side growing steps.
+std::vector<double> lines_of(int index_low, int index_high, double step, double low, double high) {
+  // near sides may cut squares: no slivers
+  while (index_low * step - low < 0.25 * step && index_low < index_high) ++index_low;
+  while (high - index_high * step < 0.25 * step && index_high > index_low) --index_high;
+  std::vector<double> lines;
+  const std::vector<double> before = growing_steps(step, index_low * step - low);
+  for (auto d = before.rbegin(); d != before.rend(); ++d) lines.push_back(index_low * step - *d);
+  for (int index = index_low; index <= index_high; ++index) lines.push_back(index * step);
+  for (const double d : growing_steps(step, high - index_high * step)) lines.push_back(index_high * step + d);
+  return lines;
+}
+
+GridLines grid_of(const Footprint& footprint, const Gel& gel, const substrate::SubstrateParameters& parameters) {
+  const double step = gel.thickness_um / parameters.cells_per_thickness;
+  const auto& [squares, outer] = footprint;
+  GridLines lines;
+  lines.x_um = lines_of(squares[0], squares[1], step, outer.low_um.x, outer.high_um.x);
+  lines.y_um = lines_of(squares[2], squares[3], step, outer.low_um.y, outer.high_um.y);
+  for (int k = 0; k <= parameters.cells_per_thickness; ++k) lines.z_um.push_back(k * step);
+  lines.z_um.back() = gel.thickness_um;
+  return lines;
+}
+
+/// Memory before anything is built: 45 kB an element are too few for any grid of Q2 (measured: 90 to 300).
+std::int64_t most_cells(const substrate::SubstrateParameters& parameters) {
+  return static_cast<std::int64_t>(allowed_GB(parameters.memory_limit_GB) / 45e-6);
+}
+
+std::vector<SidePoint> side_points_of(const ElasticSystem& system) {
+  const BlockMesh& mesh = system.mesh();
+  const numerics::GaussRule gauss = numerics::gauss_legendre(3);
+  std::vector<SidePoint> points;
+  for (std::size_t cell = 0; cell < mesh.cells.size(); ++cell) {
+    const Box& box = mesh.cells[cell];
+    for (int axis = 0; axis < 2; ++axis) {
+      const std::vector<double>& lines = axis == 0 ? mesh.lines.x_um : mesh.lines.y_um;
+      const double tiny = 1e-6 * box.size_um[axis];
+      for (int end = 0; end < 2; ++end) {
+        const double face = box.low_um[axis] + end * box.size_um[axis];
+        if (std::abs(face - (end == 0 ? lines.front() : lines.back())) > tiny) continue;
+        const double area = (end == 0 ? -1 : 1) * box.size_um[1 - axis] * box.size_um[2];
+        for (int g = 0; g < 9; ++g) {
+          std::array<double, 3> unit;
+          unit[axis] = end;
+          unit[1 - axis] = 0.5 * (1 + gauss.nodes[g % 3]);
+          unit[2] = 0.5 * (1 + gauss.nodes[g / 3]);
+          SidePoint point{.position_um = {},
+                          .normal_axis = axis,
+                          .area_um2 = 0.25 * gauss.weights[g % 3] * gauss.weights[g / 3] * area,
+                          .weights = system.cell_weights(static_cast<int>(cell), unit)};
+          for (int k = 0; k < 3; ++k) point.position_um[k] = box.low_um[k] + unit[k] * box.size_um[k];
+          points.push_back(std::move(point));
+        }
+      }
+    }
+  }
+  return points;
+}
+
+bool operator==(const Footprint& a, const Footprint& b) {
+  const auto numbers = [](const Extent& e) { return std::array{e.low_um.x, e.low_um.y, e.high_um.x, e.high_um.y}; };
+  return a.squares == b.squares && numbers(a.outer) == numbers(b.outer);
+}
+
+/// @throws NotSolved where the gel is so thin beside the scene that no grid of it fits
+Footprint footprint_of(const Extent& scene, const Gel& gel, const substrate::SubstrateParameters& parameters) {
+  const double step = gel.thickness_um / parameters.cells_per_thickness;
+  substrate::check_size(scene, step, most_cells(parameters));
+  const auto below = [step](double x) { return static_cast<int>(std::floor(x / step)); };
+  const Squares s = {below(scene.low_um.x), below(scene.high_um.x) + 1, below(scene.low_um.y),
+                     below(scene.high_um.y) + 1};
+  const double margin = substrate::margin_um(gel, parameters);
+  // the gel's own sides stand where they do; far ones may stand at whole squares, alike for many scenes
+  const Extent from =
+      parameters.side_distance_um ? scene : Extent{{s[0] * step, s[2] * step}, {s[1] * step, s[3] * step}};
+  return {s, {from.low_um - Vec2{margin, margin}, from.high_um + Vec2{margin, margin}}};
+}
+
+/// @throws NotSolved where memory would not suffice
+std::unique_ptr<SplitBlock> make_split_block(const Footprint& footprint, const Gel& gel,
+                                             const substrate::SubstrateParameters& parameters, int threads) {
+  const GridLines lines = grid_of(footprint, gel, parameters);
+  BlockMesh mesh = make_block_mesh(
+      lines, 2, [](const Box&) { return false; }, most_cells(parameters), threads);
+  const numerics::FactorOptions options = {.threads = threads,
+                                           .memory_limit_GB = allowed_GB(parameters.memory_limit_GB),
+                                           .cache_folder = parameters.cache_folder};
+  auto block =
+      std::unique_ptr<SplitBlock>(new SplitBlock{footprint, ElasticSystem({gel, {}}, std::move(mesh), options), {}});
+  block->side_points = side_points_of(block->system);
+  return block;
+}
 
 /// Averages the half-space's inner field over an ellipse, a force along x and y at once.
 greens::PointForceField averaged_field(const Gel& gel, const substrate::Ellipse& ellipse,
@@ -62,23 +190,23 @@ class Split final : public substrate::Substrate {
   substrate::LazyResponse response(const substrate::Loads& loads,
                                    const substrate::Observations& observations) const override {
     const Scene scene{surface_points_of(observations), ellipses_of(loads)};
-    const auto of = [=, this](const std::vector<int>& axes) {
-      const auto rows = static_cast<Index>(axes.size() * scene.points_um.size());
+    const auto of = [=, this](Axes axes) {
+      const Index rows = axes.n * std::ssize(scene.points_um);
       return substrate::lazy_response(
           {.rows = rows,
            .cols = 2 * static_cast<Index>(scene.ellipses.size()),
-           .matrix = axes.size() == 2 ? std::function([=, this] { return matrix(scene); }) : nullptr,
+           .matrix = axes.n == 2 ? std::function([=, this] { return matrix(scene); }) : nullptr,
            .displace = [=, this](const MatrixXd& forces_nN) { return displaced(scene, axes, forces_nN); }});
     };
     switch (observations.components) {
       case substrate::Components::along:
-        return of({0, 1});
+        return of({0, 2});
       case substrate::Components::normal:
-        return of({2});
+        return of({2, 1});
       case substrate::Components::all:
         break;
     }
-    return joined(of({0, 1}), of({2}));
+    return joined(of({0, 2}), of({2, 1}));
   }
 
   double stated_error() const override { return kErrorOfTwoCells * std::pow(2.0 / parameters_.cells_per_thickness, 3); }
@@ -111,23 +239,20 @@ class Split final : public substrate::Substrate {
     MatrixXd matrix =
         greens::compliance_by_columns(scene.points_um, scene.ellipses, threads_,
                                       [this](const auto& ellipse) { return greens::HalfSpaceEllipse(gel_, ellipse); });
-    if (matrix.size() > 0) add_correction(scene.points_um, scene.ellipses, unit_case, {0, 1}, matrix);
+    if (matrix.size() > 0) add_correction(scene, MatrixXd::Identity(matrix.cols(), matrix.cols()), {0, 2}, matrix);
     return matrix;
   }
 
   /// By each column of forces: the near field, then the correction.
-  MatrixXd displaced(const Scene& scene, const std::vector<int>& axes, const MatrixXd& forces_nN) const {
-    MatrixXd field = MatrixXd::Zero(static_cast<Index>(axes.size() * scene.points_um.size()), forces_nN.cols());
+  MatrixXd displaced(const Scene& scene, Axes axes, const MatrixXd& forces_nN) const {
+    MatrixXd field = MatrixXd::Zero(axes.n * std::ssize(scene.points_um), forces_nN.cols());
     if (field.size() == 0 || scene.ellipses.empty()) return field;
     const std::lock_guard lock(mutex_);
-    std::vector<LoadCase> cases;
     for (Index column = 0; column < forces_nN.cols(); ++column) {
       const std::vector<Vec2> forces = substrate::vectors_of(forces_nN.col(column));
-      field.col(column) = axes.size() == 2 ? near_field(scene, forces) : near_normal(scene, forces);
-      cases.push_back(case_of(forces));
+      field.col(column) = axes.n == 2 ? near_field(scene, forces) : near_normal(scene, forces);
     }
-    add_correction(
-        scene.points_um, scene.ellipses, [&](int column) { return cases[column]; }, axes, field);
+    add_correction(scene, forces_nN, axes, field);
     return field;
   }
 
@@ -151,7 +276,7 @@ class Split final : public substrate::Substrate {
     return Eigen::Map<const VectorXd>(near.data(), static_cast<Index>(near.size()));
   }
 
-  const SplitBlock& block_around(const substrate::Extent& scene) const {
+  const SplitBlock& block_around(const Extent& scene) const {
     const Footprint footprint = footprint_of(scene, gel_, parameters_);
     if (block_ && block_->footprint == footprint) return *block_;
     block_.reset();  // not two at a time in memory
@@ -161,19 +286,20 @@ class Split final : public substrate::Substrate {
     return *block_;
   }
 
-  /// Add w at the points, along these axes, to each column, whose forces on ellipses are given by `case_of_column`.
-  template <class CaseOf>
-  void add_correction(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
-                      const CaseOf& case_of_column, const std::vector<int>& axes, MatrixXd& columns) const {
-    const SplitBlock& block = block_around(substrate::extent_of(points_um, ellipses));
+  /// Add w at the points, along these axes, to the column of each column of forces.
+  void add_correction(const Scene& scene, const MatrixXd& forces_nN, Axes axes, MatrixXd& columns) const {
+    const SplitBlock& block = block_around(substrate::extent_of(scene.points_um, scene.ellipses));
     const Stopwatch watch;
-    std::vector<std::vector<NodeWeight>> samples(points_um.size());
+    WeightedNodes samples(scene.points_um.size());
     numerics::parallel_for(static_cast<int>(samples.size()), threads_,
-                           [&](int i) { samples[i] = block.system.surface_weights(points_um[i]); });
+                           [&](int i) { samples[i] = block.system.surface_weights(scene.points_um[i]); });
     block.system.factor().solve(
         static_cast<int>(columns.cols()), nodes_of(samples),
         [&](int column, const numerics::NodalColumn& b) {
-          for (const auto& [j, force] : case_of_column(column)) add_data(block, ellipses[j], force, b);
+          for (Index j = 0; j < std::ssize(scene.ellipses); ++j) {
+            const Vec2 force{forces_nN(2 * j, column), forces_nN(2 * j + 1, column)};
+            if (!(force == Vec2{})) add_data(block, scene.ellipses[j], force, b);
+          }
         },
         [&](int column, const numerics::NodalColumn& w) { add_samples(samples, axes, w, columns.col(column).data()); });
     solve_s_ = watch.seconds();

@@ -1,4 +1,4 @@
-#include "substrate/boxes/volume.h"
+#include "substrate/boxes/elastic_system.h"
 
 #include "substrate/material.h"
 

@@ -39,18 +39,14 @@ struct Fineness {
   static constexpr double kFarStep = std::numbers::sqrt2;
 };
 
-/// Rows of a vector that hold a load's or a point's axes.
-struct Axes {
-  Index first = 0, n = 3;  ///< the first axis, and how many
-  Index row(std::size_t at, Index axis) const { return n * static_cast<Index>(at) + axis - first; }
-};
+using boxes::Axes;
 
 /// A mesh with its factor, its loads and its points.
 struct System {
   Block block;
   Space space;
   std::shared_ptr<const numerics::SparseCholesky> factor;  ///< of small strains; null where nobody asks for them
-  std::vector<std::vector<boxes::NodeWeight>> loads, points;
+  boxes::WeightedNodes loads, points;
 
   System(Block made, const Gel& gel, const substrate::Loads& of, const substrate::Observations& at, bool is_factorised,
          const numerics::FactorOptions& options)
@@ -66,39 +62,6 @@ struct System {
   }
 };
 
-/// K⁻¹ between two lists of weighted nodes: symmetric, so that exchanging them transposes it exactly.
-MatrixXd solve_between(const numerics::SparseCholesky& factor, const std::vector<std::vector<boxes::NodeWeight>>& from,
-                       Axes from_axes, const MatrixXd& values, const std::vector<std::vector<boxes::NodeWeight>>& to,
-                       Axes to_axes) {
-  std::vector<int> needed;
-  for (const auto& weights : to) {
-    for (const auto& w : weights) needed.push_back(w.node);
-  }
-  std::sort(needed.begin(), needed.end());
-  needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
-  MatrixXd answers = MatrixXd::Zero(to_axes.n * static_cast<Index>(to.size()), values.cols());
-  factor.solve(
-      static_cast<int>(values.cols()), needed,
-      [&](int column, const numerics::NodalColumn& b) {
-        for (std::size_t j = 0; j < from.size(); ++j) {
-          for (Index axis = from_axes.first; axis < from_axes.first + from_axes.n; ++axis) {
-            const double value = values(from_axes.row(j, axis), column);
-            if (value == 0) continue;
-            for (const auto& [node, weight] : from[j]) b(node, static_cast<int>(axis)) += weight * value;
-          }
-        }
-      },
-      [&](int column, const numerics::NodalColumn& u) {
-        for (std::size_t i = 0; i < to.size(); ++i) {
-          for (Index axis = to_axes.first; axis < to_axes.first + to_axes.n; ++axis) {
-            double& sum = answers(to_axes.row(i, axis), column);
-            for (const auto& [node, weight] : to[i]) sum += weight * u(node, static_cast<int>(axis));
-          }
-        }
-      });
-  return answers;
-}
-
 /// By the factor of a tangent, on a mesh.
 class FactoredResponse final : public substrate::Response {
  public:
@@ -109,10 +72,10 @@ class FactoredResponse final : public substrate::Response {
   Index rows() const override { return point_axes_.n * std::ssize(system_->points); }
   Index cols() const override { return load_axes_.n * std::ssize(system_->loads); }
   MatrixXd displace(const MatrixXd& forces) const override {
-    return solve_between(*factor_, system_->loads, load_axes_, forces, system_->points, point_axes_);
+    return boxes::solve_between(*factor_, system_->loads, load_axes_, forces, system_->points, point_axes_);
   }
   MatrixXd pull_back(const MatrixXd& displacements) const override {
-    return solve_between(*factor_, system_->points, point_axes_, displacements, system_->loads, load_axes_);
+    return boxes::solve_between(*factor_, system_->points, point_axes_, displacements, system_->loads, load_axes_);
   }
   MatrixXd matrix() const override {
     if (cols() <= rows()) return displace(MatrixXd::Identity(cols(), cols()));
@@ -237,7 +200,7 @@ class CurvedGel final : public substrate::Substrate {
     const double tolerance = parameters_.displacement_tolerance;
     const MatrixXd probes = probes_of(loads);
     const auto displaced = [&](const System& s) {
-      return solve_between(*s.factor, s.loads, load_axes, probes, s.points, point_axes);
+      return boxes::solve_between(*s.factor, s.loads, load_axes, probes, s.points, point_axes);
     };
     MatrixXd before;  // two factors at a time are too many: of the coarser mesh these are kept
     if (tolerance > 0) before = displaced(*make_system(fineness.coarser(), loads, observations));
@@ -272,11 +235,8 @@ class CurvedGel final : public substrate::Substrate {
     const substrate::Loads loads{ellipses};
     const auto system = make_system(first_fineness(), loads, {}, !is_large());
     Vectors forces(system->space.nodes().size(), Eigen::Vector3d::Zero());
-    for (std::size_t j = 0; j < ellipses.size(); ++j) {
-      for (const auto& [node, weight] : system->loads[j]) {
-        forces[node] += weight * Eigen::Vector3d(forces_nN[j].x, forces_nN[j].y, 0);
-      }
-    }
+    boxes::add_loads(system->loads, {0, 2}, substrate::column_of(forces_nN).data(),
+                     [&](int node, int axis) -> double& { return forces[node][axis]; });
     const bool with_stress = parameters_.stress;
     if (is_large()) {
       const LargeSolution solution = solve_large(*system, forces);
@@ -376,7 +336,7 @@ class CurvedGel final : public substrate::Substrate {
     std::vector<Vec2> places;
     for (const Target& t : targets) places.insert(places.end(), {t.low_um, t.high_um});
     for (const Vec3& p : substrate::points_in_space(observations)) places.push_back({p.x, p.y});
-    const substrate::Extent scene = substrate::extent_of(places, {});
+    const Extent scene = substrate::extent_of(places, {});
     const double margin = substrate::margin_um(gel_, parameters_);
     const double depth = mean_depth_um(scene);
     const double coarsest = depth / fineness.layers;
@@ -402,7 +362,7 @@ class CurvedGel final : public substrate::Substrate {
                                     observations, is_factorised, factor_options());
   }
 
-  double mean_depth_um(const substrate::Extent& scene) const {
+  double mean_depth_um(const Extent& scene) const {
     constexpr int kSamples = 16;
     const Vec2 size = scene.high_um - scene.low_um;
     double sum = 0;
@@ -481,24 +441,16 @@ MatrixXd CurvedResponse::displace(const MatrixXd& forces) const {
 }
 
 Vectors CurvedResponse::forces_on_nodes(const System& s, const VectorXd& forces) const {
-  const Axes axes = load_axes();
   Vectors at_nodes(s.space.nodes().size(), Eigen::Vector3d::Zero());
-  for (std::size_t j = 0; j < s.loads.size(); ++j) {
-    for (Index axis = axes.first; axis < axes.first + axes.n; ++axis) {
-      for (const auto& [node, weight] : s.loads[j]) at_nodes[node][axis] += weight * forces[axes.row(j, axis)];
-    }
-  }
+  boxes::add_loads(s.loads, load_axes(), forces.data(),
+                   [&](int node, int axis) -> double& { return at_nodes[node][axis]; });
   return at_nodes;
 }
 
 VectorXd CurvedResponse::at_points(const System& s, const Vectors& free_um) const {
-  const Axes axes = point_axes();
   VectorXd values = VectorXd::Zero(rows());
-  for (std::size_t i = 0; i < s.points.size(); ++i) {
-    for (Index axis = axes.first; axis < axes.first + axes.n; ++axis) {
-      for (const auto& [node, weight] : s.points[i]) values[axes.row(i, axis)] += weight * free_um[node][axis];
-    }
-  }
+  boxes::add_samples(
+      s.points, point_axes(), [&](int node, int axis) { return free_um[node][axis]; }, values.data());
   return values;
 }
 

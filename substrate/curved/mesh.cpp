@@ -1,7 +1,6 @@
 #include "substrate/curved/mesh.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
@@ -12,26 +11,6 @@ namespace {
 
 std::string shown(const Eigen::Vector3d& p) {
   return "(" + brief(p.x()) + ", " + brief(p.y()) + ", " + brief(p.z()) + ") um";
-}
-
-/// Of the box of a level that holds a point.
-BoxKey key_of(const boxes::GridLines& lines, int level, const std::array<double, 3>& point) {
-  BoxKey key = {static_cast<std::uint32_t>(level)};
-  const std::array line_of = {&lines.x_um, &lines.y_um, &lines.z_um};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::vector<double>& line = *line_of[axis];
-    const auto above = std::upper_bound(line.begin() + 1, line.end() - 1, point[axis]);
-    const double low = *(above - 1), n = std::ldexp(1, level);
-    const double within = std::clamp(std::floor((point[axis] - low) / (*above - low) * n), 0.0, n - 1);
-    key[axis + 1] = static_cast<std::uint32_t>(static_cast<double>(above - line.begin() - 1) * n + within);
-  }
-  return key;
-}
-
-std::array<double, 3> middle_of(const boxes::Box& box) {
-  std::array<double, 3> middle;
-  for (int axis = 0; axis < 3; ++axis) middle[axis] = box.low_um[axis] + 0.5 * box.size_um[axis];
-  return middle;
 }
 
 }  // namespace
@@ -73,9 +52,7 @@ Block::Block(Shape shape, const boxes::GridLines& lines, const std::function<boo
     mesh_.position_um[node] = position;
   }
   for (int cell = 0; cell < mesh_.n_cells(); ++cell) {
-    const boxes::Box& box = boxes_.cells[cell];
-    cell_at_[key_of(lines, boxes_.cell_levels[cell], middle_of(box))] = cell;
-    if (box.low_um[2] == 0) mesh_.surface_cells.push_back(cell);
+    if (boxes_.cells[cell].low_um[2] == 0) mesh_.surface_cells.push_back(cell);
     const NodePositions nodes = mesh_.positions_of(cell);
     const double jacobian = least_scaled_jacobian(nodes);
     if (jacobian >= kLeastScaledJacobian) continue;
@@ -98,24 +75,13 @@ Location Block::on_surface(Vec2 point_um) const {
 
 Location Block::locate(const Vec3& point_um) const {
   check_inside(shape_, point_um);
-  const boxes::GridLines& lines = boxes_.lines;
   const Eigen::Vector3d point(point_um.x, point_um.y, point_um.z);
-  const auto is_within = [](const std::vector<double>& line, double x) {
-    return x >= line.front() && x <= line.back();
-  };
-  if (!is_within(lines.x_um, point.x()) || !is_within(lines.y_um, point.y())) {
-    throw InvalidData("point " + shown(point), "one in the gel's block", "it outside");
-  }
-  const double surface = shape_.height_um({point.x(), point.y()}), depth = lines.z_um.back();
+  const double surface = shape_.height_um({point.x(), point.y()}), depth = boxes_.thickness_um();
   constexpr double kRounding = 1e-9;
   double z = std::clamp(depth * (point.z() - surface) / (shape_.base_um - surface), 0.0, depth);
   for (int step = 0; step < 8; ++step) {  // the pulled lines of hanging cells differ a little from the shape's own
-    int cell = -1;
-    for (int level = 0; level < boxes::kMostLevels && cell < 0; ++level) {
-      const auto found = cell_at_.find(key_of(lines, level, {point.x(), point.y(), z}));
-      if (found != cell_at_.end()) cell = found->second;
-    }
-    MBTFM_ASSERT(cell >= 0);
+    const int cell = boxes::cell_holding(boxes_, {point.x(), point.y(), z});
+    if (cell < 0) throw InvalidData("point " + shown(point), "one in the gel's block", "it outside");
     const boxes::Box& box = boxes_.cells[cell];
     Eigen::Vector3d unit((point.x() - box.low_um[0]) / box.size_um[0], (point.y() - box.low_um[1]) / box.size_um[1],
                          (z - box.low_um[2]) / box.size_um[2]);

@@ -2,18 +2,13 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <functional>
-#include <map>
 #include <vector>
 
 #include "substrate/boxes/block_mesh.h"
 #include "substrate/curved/element.h"
 
 namespace mbtfm::curved {
-
-/// Of a box: its level of halving, and its place among the boxes of that level.
-using BoxKey = std::array<std::uint32_t, 4>;
 
 struct Mesh {
   std::vector<int> cell_nodes;                          ///< kNodes a cell; the face z = 0 of a cell is its outer one
@@ -72,7 +67,6 @@ class Block {
   Shape shape_;
   boxes::BlockMesh boxes_;
   Mesh mesh_;
-  std::map<BoxKey, int> cell_at_;
 };
 
 }  // namespace mbtfm::curved
