@@ -9,7 +9,6 @@
 #include "substrate/greens/layer.h"
 #include "substrate/greens/layer_vertical.h"
 #include "substrate/greens/models.h"
-#include "substrate/greens/square.h"
 #include "substrate/greens/wave.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"

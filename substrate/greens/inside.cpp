@@ -23,24 +23,6 @@ using std::numbers::pi;
 constexpr int kPiecesOfR = 2, kNodesOfR = 12, kNodesOfZ = 24;
 constexpr int kPiecesInReach = kPiecesOfR * static_cast<int>(BaseTable::kReach);
 
-/// Barycentric weights of the values at the n Chebyshev nodes of the first kind for the place t in [-1, 1].
-template <int n>
-std::array<double, n> interpolation_weights(double t) {
-  std::array<double, n> weights{};
-  double sum = 0;
-  for (int k = 0; k < n; ++k) {
-    const double gap = t - chebyshev_node(n, k);
-    if (gap == 0) {
-      weights.fill(0);
-      weights[k] = 1;
-      return weights;
-    }
-    sum += weights[k] = (k % 2 == 0 ? 1 : -1) * std::sin(pi * (k + 0.5) / n) / gap;
-  }
-  for (double& w : weights) w /= sum;
-  return weights;
-}
-
 /// Displacements of a wave of wave number 1: U along it as its cosine, W into the gel as its sine.
 struct Wave {
   double u = 0, w = 0;
@@ -108,6 +90,8 @@ Eigen::Matrix3d half_space_inside_um_per_nN(const Gel& gel, Vec2 offset, double 
       x * down, y * down, z * z * a * a * a + (1 + q) * a;
   return 1 / (4 * pi * substrate::shear_modulus_kPa(gel)) * g;
 }
+
+double base_down_by_along(double nu, double x) { return sum_of(base_part(nu, x)[0], 3 - 4 * nu, x, 0).w; }
 
 BaseTable::BaseTable(double nu) {
   constexpr int kPanels = 100;  // of 1/2 with 20 Gauss points: the factors fall as x² exp(-x), or faster

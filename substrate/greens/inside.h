@@ -31,6 +31,9 @@ namespace mbtfm::greens {
 /// x, y, z (into the gel), columns forces along them. Not at the origin itself.
 Eigen::Matrix3d half_space_inside_um_per_nN(const Gel& gel, Vec2 offset_um, double z_um);
 
+/// What the base adds to W_t at the surface, x = kh > 0.
+double base_down_by_along(double poisson_ratio, double x);
+
 /// What a rigid base adds, times 2 pi mu h, as functions of r/h and z/h.
 class BaseTable {
  public:

@@ -2,15 +2,16 @@
 
 #include <math.h>  // j1: POSIX
 
-#include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/numerics/quadrature.h"
+#include "substrate/greens/inside.h"
 #include "substrate/greens/layer.h"
+#include "substrate/greens/transforms.h"
 #include "substrate/material.h"
 
 namespace mbtfm::greens {
@@ -22,29 +23,9 @@ using std::numbers::pi;
 constexpr int kPiecesPerUnit = 2, kNodes = 10;
 constexpr int kPieces = kPiecesPerUnit * static_cast<int>(LayerTable::kReach);
 
-double node(int k) { return std::cos(pi * (k + 0.5) / kNodes); }
-
 }  // namespace
 
-double layer_vertical_factor(double nu, double x) {
-  // Four solutions e^(sz) of wave number 1: displacements U cos, W sin; s = -1 decays from the surface, s = 1 from the
-  // base at z = x. Rows: U(x), W(x), and sigma_xz, sigma_zz over mu at z = 0.
-  const double kappa = 3 - 4 * nu;
-  Eigen::Matrix4d rows;
-  Eigen::Vector4d w_at_surface;
-  for (int i = 0; i < 4; ++i) {
-    const double s = i % 2 == 0 ? -1 : 1;
-    const double top = s < 0 ? 1 : std::exp(-x), base = s < 0 ? std::exp(-x) : 1;
-    if (i < 2) {  // grad phi
-      rows.col(i) << base, s * base, 2 * s * top, 2 * top;
-      w_at_surface[i] = s * top;
-    } else {  // kappa psi - z grad psi
-      rows.col(i) << -x * base, (kappa - x * s) * base, (kappa - 1) * top, 4 * (1 - nu) * s * top;
-      w_at_surface[i] = kappa * top;
-    }
-  }
-  return w_at_surface.dot(rows.fullPivLu().solve(Eigen::Vector4d(0, 0, -1, 0)));
-}
+double layer_vertical_factor(double nu, double x) { return 0.5 * (1 - 2 * nu) + base_down_by_along(nu, x); }
 
 LayerVertical::LayerVertical(const Gel& gel) : gel_(gel), values_(kPieces * kNodes) {
   constexpr int kPanels = 48;  // of 1/2 with 20 Gauss points, as the layer's other transforms
@@ -53,12 +34,11 @@ LayerVertical::LayerVertical(const Gel& gel) : gel_(gel), values_(kPieces * kNod
   for (int panel = 0; panel < kPanels; ++panel) {
     for (std::size_t g = 0; g < gauss.nodes.size(); ++g) {
       at.push_back(0.5 * (panel + 0.5 * (1 + gauss.nodes[g])));
-      weight.push_back(0.25 * gauss.weights[g] *
-                       (layer_vertical_factor(gel.poisson_ratio, at.back()) - 0.5 * (1 - 2 * gel.poisson_ratio)));
+      weight.push_back(0.25 * gauss.weights[g] * base_down_by_along(gel.poisson_ratio, at.back()));
     }
   }
   for (int k = 0; k < kPieces * kNodes; ++k) {
-    const double r = (k / kNodes + 0.5 * (1 + node(k % kNodes))) / kPiecesPerUnit;
+    const double r = (k / kNodes + 0.5 * (1 + chebyshev_node(kNodes, k % kNodes))) / kPiecesPerUnit;
     for (std::size_t i = 0; i < at.size(); ++i) values_[k] += weight[i] * ::j1(at[i] * r);
     values_[k] /= r;  // smooth and even in r
   }
@@ -69,16 +49,8 @@ double LayerVertical::correction(double r) const {
     return r > 0 ? -0.5 * (1 - 2 * gel_.poisson_ratio) / r : 0;  // what cancels the half-space's
   const double scaled = kPiecesPerUnit * r;
   const int piece = static_cast<int>(scaled);
-  const double t = 2 * (scaled - piece) - 1;
-  double above = 0, below = 0;  // barycentric, Chebyshev nodes of the first kind
-  for (int k = 0; k < kNodes; ++k) {
-    const double value = values_[piece * kNodes + k], gap = t - node(k);
-    if (gap == 0) return r * value;
-    const double weight = (k % 2 == 0 ? 1 : -1) * std::sin(pi * (k + 0.5) / kNodes) / gap;
-    above += weight * value;
-    below += weight;
-  }
-  return r * above / below;
+  const auto weights = interpolation_weights<kNodes>(2 * (scaled - piece) - 1);
+  return r * std::inner_product(weights.begin(), weights.end(), values_.begin() + piece * kNodes, 0.0);
 }
 
 std::vector<double> LayerVertical::vertical_um(const std::vector<Vec2>& points_um,

@@ -5,9 +5,7 @@
 ///
 ///   u_z(r) = (F . e) / (2 pi mu) ∫ w(kh) J1(kr) dk,   e = r/|r|
 ///
-/// w - (1-2nu)/2, less the half-space's, falls as (kh)² exp(-2kh), so that this part is smooth. w(kh) is solved for in
-/// the layer's own solutions at each k: plane strain, with the base at rest and the surface loaded along itself alone.
-/// Source: Papkovich's general solution, u = 4 (1-nu) psi - grad(z psi + phi) over 2 mu (Barber, Elasticity, ch. 21).
+/// w - (1-2nu)/2, less the half-space's, falls as (kh)² exp(-2kh), so that this part is smooth. w is W_t of inside.h.
 #pragma once
 
 #include <vector>

@@ -5,7 +5,6 @@
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "pipeline/contract/errors.h"
 #include "substrate/greens/layer.h"
-#include "substrate/greens/square.h"
 #include "substrate/greens/wave.h"
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/substrate_scene.h"
