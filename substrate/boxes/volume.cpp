@@ -1,5 +1,6 @@
 #include "substrate/boxes/elastic_system.h"
 
+#include "substrate/compliance.h"
 #include "substrate/material.h"
 
 namespace mbtfm::boxes {
