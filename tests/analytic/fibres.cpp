@@ -114,8 +114,7 @@ TEST(Fibres, tell_why_they_have_their_type) {
   const auto fibres = fibres_of(drawn({line}), {ellipse(3, {4.9, 12}, 1.6, 0.6, 0), ellipse(8, {12, 12}, 1, 0.6, 0)});
   ASSERT_EQ(fibres.size(), 1u);
   EXPECT_EQ(fibres[0].type, FibreType::dorsal);
-  EXPECT_NE(fibres[0].type_reason.find("held 0.0 um from adhesion 3"), std::string::npos) << fibres[0].type_reason;
-  EXPECT_NE(fibres[0].type_reason.find("; over adhesion 8"), std::string::npos) << fibres[0].type_reason;
+  EXPECT_TRUE(has_words(fibres[0].type_reason, "held 0.0 um from adhesion 3", "; over adhesion 8"));
   EXPECT_GT(fibres[0].type_confidence, 0.95);
 }
 

@@ -158,7 +158,7 @@ TEST(Revolved, the_volume_is_the_round_sections_of_the_same_area_and_height) {
 
 void expect_refused(const std::function<void()>& work, const std::string& words) {
   const InvalidData error = test::thrown<InvalidData>(work);
-  EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+  EXPECT_TRUE(has_words(error.what(), words));
 }
 
 TEST(Revolved, outlines_that_it_cannot_follow_are_refused_with_the_place) {

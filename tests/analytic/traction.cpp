@@ -200,7 +200,7 @@ TEST(LCurve, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_th
       EXPECT_NEAR(std::log(*scan.by_l_curve / kCorner), 0, std::log(1.2));  // a tenth of the scan's step
     } else {
       const NotSolved error = test::thrown<NotSolved>([&] { chosen_lambda(scan, LambdaCriterion::l_curve); });
-      EXPECT_NE(error.report->reason.find("set lambda_by = risk"), std::string::npos) << error.report->reason;
+      EXPECT_TRUE(has_words(error.report->reason, "set lambda_by = risk"));
     }
   }
 }

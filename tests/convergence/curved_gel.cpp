@@ -233,7 +233,7 @@ TEST(SteepWalls, of_eighty_degrees_are_solved_steeper_ones_refused_by_place) {
   for (const Eigen::Vector3d& u : field.at_nodes_um) EXPECT_TRUE(u.allFinite());
   EXPECT_GT(field.displacement_um(field.block->on_surface({0, 0})).x(), 0);
   const InvalidData error = test::thrown<InvalidData>([&] { block_of(88); });
-  EXPECT_NE(std::string(error.what()).find("surface at ("), std::string::npos) << error.what();
+  EXPECT_TRUE(has_words(error.what(), "surface at ("));
 }
 
 std::unique_ptr<substrate::Substrate> gel_of(const Gel& gel, const char* model, double tolerance = 0) {

@@ -161,7 +161,7 @@ TEST(Chain, one_two_and_four_threads_give_the_same_bytes) {
   std::istringstream lines(first_of_usual_method);
   int n_lines = 0;
   for (std::string line; std::getline(lines, line); ++n_lines)
-    EXPECT_NE(whole.find(line + "\n"), whole.npos) << "not mbtfm-traction's: " << line;
+    EXPECT_TRUE(has_words(whole, line + "\n")) << "not mbtfm-traction's: " << line;
   EXPECT_GT(n_lines, 100);
 }
 
@@ -201,8 +201,8 @@ TEST(Chain, tensions_of_the_oracle_cells_come_back_from_the_displacement_of_thei
     for (const auto& entry : fs::recursive_directory_iterator(cell))
       fs::permissions(entry, fs::perms::owner_write, fs::perm_options::add);
     recompute_displacement(cell);
-    const std::string run = output_of("mbtfm run " + cell.string());
-    EXPECT_NE(run.find("given"), std::string::npos) << "segmentation and tracking are skipped: " << run;
+    EXPECT_TRUE(has_words(output_of("mbtfm run " + cell.string()), "given"))
+        << "segmentation and tracking are skipped";
     EXPECT_LE(report::compare_with_truth(cell).relative_error, 0.30) << name;
   }
 }

@@ -55,7 +55,7 @@ TEST_F(Continuum, a_sweep_finds_the_height_that_presses_deepest) {
     EXPECT_NEAR(optima.number(row, "height_um"), heights[row], 0.1) << row;
     EXPECT_LT(optima.number(row, "height_error_um"), 0.1);
   }
-  EXPECT_NE(files::read_text(file("out/indent.svg")).find("<svg"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(file("out/indent.svg")), "<svg"));
 }
 
 /// On a soft gel Newton's method finds no equilibrium of large strains for cells above 9 um.
@@ -84,8 +84,8 @@ TEST_F(Continuum, cases_of_a_sweep_that_are_not_solved_say_so_in_their_row) {
 
 TEST_F(Continuum, what_is_no_cell_or_no_gel_for_it_is_refused) {
   const auto refused = [&](const std::string& cell, const std::string& words) {
-    const std::string outcome = test::output_of("mbtfm-indent --config " + settings(cell) + " --out " + file("out"), 2);
-    EXPECT_NE(outcome.find(words), std::string::npos) << outcome;
+    EXPECT_TRUE(
+        has_words(test::output_of("mbtfm-indent --config " + settings(cell) + " --out " + file("out"), 2), words));
     EXPECT_FALSE(std::filesystem::exists(file("out/indent.csv")));
   };
   refused("height_um = 22\n", "whole sphere");
@@ -111,7 +111,7 @@ TEST_F(Continuum, a_contact_that_is_an_outline_is_solved_in_space) {
   EXPECT_LT(table.number(0, "depth_5_um"), 0.2654);
   EXPECT_GT(table.number(0, "depth_5_um"), 0.9 * 0.2654);
   EXPECT_GT(table.number(0, "error_um"), 0);
-  EXPECT_NE(files::read_text(file("out/indent.json")).find("\"n_sectors\": 16"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(file("out/indent.json")), "\"n_sectors\": 16"));
   EXPECT_FALSE(files::read_text(file("out/indent.vtu")).empty());
 }
 
@@ -122,7 +122,7 @@ TEST_F(Continuum, outlines_that_are_no_contact_are_refused_with_the_file_and_the
     const std::string outcome = test::output_of("mbtfm-indent --config " + settings(kOnOutline) + " --outline " +
                                                     file("outline.csv") + " --out " + file("out") + flags,
                                                 code);
-    EXPECT_NE(outcome.find(words), std::string::npos) << outcome;
+    EXPECT_TRUE(has_words(outcome, words));
     EXPECT_EQ(outcome.find("outline.csv") != std::string::npos, code == 3) << outcome;
     EXPECT_FALSE(std::filesystem::exists(file("out/indent.csv")));
   };
@@ -181,8 +181,7 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
   }
   const files::CsvTable table(file("mean/mean.csv"));
   table.require({"x_um", "y_um", "ux_um", "uy_um", "tx_kPa", "ty_kPa", "tx_sigma_kPa", "ty_sigma_kPa", "n_cells"});
-  const std::string page = files::read_text(file("mean/mean.html"));
-  for (const char* words : {"In short", "5 cells", "<svg"}) EXPECT_NE(page.find(words), std::string::npos) << words;
+  EXPECT_TRUE(has_words(files::read_text(file("mean/mean.html")), "In short", "5 cells", "<svg"));
   for (const char* name : {"mean.vtp", "mean.json", "mean.svg", "blur.csv", "reference.csv"})
     EXPECT_FALSE(files::read_text(file("mean/") + name).empty()) << name;
   // the same cells, of which two have their outline as a mask alone
@@ -197,8 +196,7 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
     images::write_tiff(cell / "outline_mask.tif", mask);
     std::filesystem::rename(cell / "outline.csv", cell / "was_outline.csv");
   }
-  const std::string unknown = test::output_of(mean + " --out " + file("unknown"), 2);
-  EXPECT_NE(unknown.find("pixel_size_um is missing"), std::string::npos) << unknown;
+  EXPECT_TRUE(has_words(test::output_of(mean + " --out " + file("unknown"), 2), "pixel_size_um is missing"));
   const auto by_mask = test::run_program(mean + " --pixel_size_um 0.25 --out " + file("by_mask"));
   ASSERT_EQ(by_mask.code, 0) << by_mask.output;
   const files::CsvTable of_masks(file("by_mask/registration.csv"));
@@ -214,8 +212,7 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
 
   std::filesystem::remove(folder_ / "cells/round");
   write_cell(folder_ / "cells/round", 0, 9, 0);
-  const std::string refused = test::output_of(pattern + " --out " + file("no"), 3);
-  EXPECT_NE(refused.find("cell 'round'"), std::string::npos) << refused;
+  EXPECT_TRUE(has_words(test::output_of(pattern + " --out " + file("no"), 3), "cell 'round'"));
   EXPECT_FALSE(std::filesystem::exists(file("no/mean.csv")));
   const auto left = test::run_program(pattern + " --others left-out --out " + file("left"));
   EXPECT_EQ(left.code, 0) << left.output;

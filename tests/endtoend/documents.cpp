@@ -194,7 +194,7 @@ TEST(DocumentPages, the_index_names_every_page) {
   for (const fs::path& page : pages()) {
     const std::string name = page.lexically_relative(kDocs).generic_string();
     if (name.starts_with("..") || name == "README.md") continue;
-    EXPECT_NE(index.find("(" + name + ")"), index.npos) << name << " is not in docs/README.md";
+    EXPECT_TRUE(has_words(index, "(" + name + ")")) << name << " is not in docs/README.md";
   }
 }
 
@@ -205,19 +205,19 @@ TEST(DocumentPages, every_command_and_exit_code_is_on_its_page) {
   const std::regex added(R"re(add_(command\(\s*app,\s*line,|subcommand\()\s*"([a-z]+)")re");
   int n_commands = 0;
   for (std::sregex_iterator at(source.begin(), source.end(), added), end; at != end; ++at, ++n_commands)
-    EXPECT_NE(commands.find("| `mbtfm " + (*at)[2].str()), commands.npos) << (*at)[2];
+    EXPECT_TRUE(has_words(commands, "| `mbtfm " + (*at)[2].str())) << (*at)[2];
   EXPECT_GE(n_commands, 12);
   for (const fs::directory_entry& entry : fs::directory_iterator(test::build_folder() / "bin")) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with("mbtfm-")) continue;
-    EXPECT_NE(commands.find("`" + name + "`"), commands.npos) << name;
+    EXPECT_TRUE(has_words(commands, "`" + name + "`")) << name;
   }
   const std::string errors = files::read_text(kProject / "pipeline/contract/errors.h");
   const std::regex code(R"(inline constexpr int k\w+ = (\d+);)");
   for (const char* name : {"commands.md", "troubleshooting.md", "formats.md"}) {
     const std::string page = files::read_text(kDocs / name);
     for (std::sregex_iterator at(errors.begin(), errors.end(), code), end; at != end; ++at)
-      EXPECT_NE(page.find("\n| " + (*at)[1].str() + " |"), page.npos) << name << ": " << (*at)[1];
+      EXPECT_TRUE(has_words(page, "\n| " + (*at)[1].str() + " |")) << name << ": " << (*at)[1];
   }
 }
 

@@ -414,17 +414,16 @@ TEST_F(HostileCells, touch_nothing_outside_and_stop_no_other_cell) {
     if (!way.is_said.empty()) {
       const Outcome table = mbtfm("batch --table " + study);
       EXPECT_EQ(table.code, way.codes.batch) << table.output;
-      for (const Outcome* outcome : {&batch, &list, &table})
-        EXPECT_NE(outcome->output.find(way.is_said), std::string::npos) << outcome->output;
+      for (const Outcome* outcome : {&batch, &list, &table}) EXPECT_TRUE(has_words(outcome->output, way.is_said));
       const std::string left_out = fs::path(way.is_said).filename().string();
-      EXPECT_NE(files::read_text(scene.study() / "statistics/cells.csv").find(left_out), std::string::npos);
+      EXPECT_TRUE(has_words(files::read_text(scene.study() / "statistics/cells.csv"), left_out));
     }
     if (way.run_record == Way::RunRecord::removed) run_further();
     expect_untouched(scene.outside(), before, are_reads_noted);
     EXPECT_FALSE(holds_the_secret(scene.study()));
     EXPECT_FALSE(fs::exists(scene.root / "cell.toml"));
     EXPECT_TRUE(fs::exists(fs::symlink_status(scene.cell() / "paxillin.tif")));
-    EXPECT_NE(files::read_text(scene.study() / "sound/run.json").find("\"outcome\": \"done\""), std::string::npos);
+    EXPECT_TRUE(has_words(files::read_text(scene.study() / "sound/run.json"), "\"outcome\": \"done\""));
   }
 }
 
@@ -448,10 +447,9 @@ TEST_F(HostileCells, a_folder_that_may_not_be_read_is_skipped_and_named) {
                                      "batch --table " + study.string() + stages, "stats " + study.string()}) {
     const Outcome outcome = test::run_program("mbtfm " + command, as_owner_alone());
     EXPECT_EQ(outcome.code, 0) << command << ": " << outcome.output;
-    if (!command.starts_with("stats"))
-      EXPECT_NE(outcome.output.find("lost+found"), std::string::npos) << command << ": " << outcome.output;
+    if (!command.starts_with("stats")) EXPECT_TRUE(has_words(outcome.output, "lost+found")) << command;
   }
-  EXPECT_NE(files::read_text(study / "statistics/cells.csv").find("lost+found"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(study / "statistics/cells.csv"), "lost+found"));
   fs::permissions(closed, fs::perms::owner_all);
 }
 

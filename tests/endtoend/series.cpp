@@ -50,14 +50,10 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
   EXPECT_NEAR(frames.number(1, "total_force_nN"), 2 * frames.number(0, "total_force_nN"),
               4 * frames.number(1, "total_force_sigma_nN"));
   EXPECT_TRUE(fs::exists(cell / "4_fit/tracks.svg"));
-  const std::string moving = files::read_text(cell / "4_fit/series.png");
-  EXPECT_NE(moving.find(std::string("acTL\0\0\0\2", 8)), std::string::npos) << "two frames";
-  EXPECT_NE(run.output.find("; over 2 frames from "), std::string::npos) << run.output;
-  const std::string page = files::read_text(cell / "report.html");
-  EXPECT_NE(page.find("Over 2 frames the total force goes from "), std::string::npos);
-  EXPECT_NE(page.find("1 frame could not be fitted"), std::string::npos);
-  EXPECT_NE(page.find("data:image/png"), std::string::npos);
-  EXPECT_NE(page.find(files::read_text(cell / "4_fit/tracks.svg")), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(cell / "4_fit/series.png"), std::string("acTL\0\0\0\2", 8))) << "two frames";
+  EXPECT_TRUE(has_words(run.output, "; over 2 frames from "));
+  EXPECT_TRUE(has_words(files::read_text(cell / "report.html"), "Over 2 frames the total force goes from ",
+                        "1 frame could not be fitted", "data:image/png", files::read_text(cell / "4_fit/tracks.svg")));
 
   output_of("mbtfm batch --table " + folder.path().string());
   const files::CsvTable batch(folder / "batch.csv");
@@ -71,12 +67,12 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
   for (Bead& bead : field) bead.displacement_um = 1.5 * bead.displacement_um;
   files::write_displacement(cell / "2_track/displacement_0002.csv", field);
   output_of("mbtfm run " + cell.string());
-  EXPECT_NE(files::read_text(cell / "4_fit/record.json").find("--kept"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(cell / "4_fit/record.json"), "--kept"));
   const std::string after = files::read_text(cell / "4_fit/tracks.csv");
   EXPECT_EQ(after.substr(0, after.find("\n2,")), before.substr(0, before.find("\n2,")));  // the first frame's rows
   EXPECT_NEAR(files::CsvTable(cell / "4_fit/frames.csv").number(1, "total_force_nN"),
               3 * frames.number(0, "total_force_nN"), 4 * frames.number(1, "total_force_sigma_nN"));
-  EXPECT_NE(run_program("mbtfm run " + cell.string()).output.find("up to date"), std::string::npos);
+  EXPECT_TRUE(has_words(run_program("mbtfm run " + cell.string()).output, "up to date"));
   fs::remove(cell / "2_track/displacement_0002.csv");  // nothing is there to make it from
   EXPECT_EQ(run_program("mbtfm run " + cell.string()).code, 3);
   files::write_displacement(cell / "2_track/displacement_0002.csv", field);

@@ -96,7 +96,7 @@ TEST_F(Sheet, one_that_the_image_cuts_is_held_at_the_cut_and_said_to_be) {
   test::output_of(run("[sheet]\npoisson_ratio = 0.3\n", record() + "--traction " + (folder_ / "traction.csv").string(),
                       "half.csv"));
   EXPECT_TRUE(fires("sheet-cut"));
-  EXPECT_NE(files::read_text(folder_ / "out" / "sheet.html").find("The image cuts the sheet"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(folder_ / "out" / "sheet.html"), "The image cuts the sheet"));
   // triangles of the whole lie across the cut: some of the forces are on the other side of it
   EXPECT_NEAR(figure("inside_mean_tension_nN_per_um"), mean, 0.05 * mean);
   EXPECT_LT(figure("inside_mean_tension_cut_free_nN_per_um"), 0.8 * mean);
@@ -145,7 +145,7 @@ TEST_F(Sheet, tractions_in_pascals_are_refused) {
   file.close();
   const std::string outcome =
       test::output_of(run("[sheet]\npoisson_ratio = 0.3\n", "--traction " + (folder_ / "traction.csv").string()), 3);
-  EXPECT_NE(outcome.find("200 Pa are 0.2 kPa"), std::string::npos) << outcome;
+  EXPECT_TRUE(has_words(outcome, "200 Pa are 0.2 kPa"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
@@ -236,14 +236,14 @@ TEST_F(FittedSheet, contraction_and_stiffness_come_back_from_beads) {
     EXPECT_NEAR(std::sqrt(squares) / found.number(row, "sigma"), 1, 1e-4) << "six digits each";
     EXPECT_FALSE(found.optional_number(row, "by_gel")) << "nothing is said of its errors";
   }
-  EXPECT_NE(files::read_text(folder_ / "out" / "sheet.html").find("Where the errors come from"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(folder_ / "out" / "sheet.html"), "Where the errors come from"));
   EXPECT_EQ(found.text(0, "quantity"), "contraction_nN_per_um");
   EXPECT_NEAR(found.number(0, "value"), 0.5, 4 * found.number(0, "sigma"));
   EXPECT_EQ(found.text(1, "quantity"), "stiffness_nN_per_um");
   EXPECT_TRUE(fires("sheet-not-identifiable"));
   EXPECT_NEAR(found.number(1, "value") / (30 * 0.4 / (1 - 0.09)), 1, 0.5) << "the contraction is even, here";
   EXPECT_LT(figure("aic"), figure("aic_of_nothing") - 1000);
-  EXPECT_EQ(outcome.output.find("explains"), std::string::npos) << "the sheet explains the beads: " << outcome.output;
+  EXPECT_FALSE(has_words(outcome.output, "explains")) << "the sheet explains the beads";
   // a gel whose modulus is known to 10 %, and whose thickness to a third
   const double sigma = found.number(0, "sigma");
   test::output_of(run(gel_ + "youngs_modulus_sigma_kPa = 0.1\nthickness_sigma_um = 20\n" + sheet_ + mesh_,
@@ -262,7 +262,7 @@ TEST_F(FittedSheet, contraction_and_stiffness_come_back_from_beads) {
   for (int row = 0; row < places.n_rows(); ++row)
     EXPECT_NEAR(places.number(row, "contraction_nN_per_um"), 0.5, 4 * places.number(row, "sigma_nN_per_um"));
   EXPECT_EQ(files::CsvTable(folder_ / "out" / "sheet_fit.csv").text(0, "part"), "mean");
-  EXPECT_NE(files::read_text(folder_ / "out" / "sheet.svg").find(">Contraction<"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(folder_ / "out" / "sheet.svg"), ">Contraction<"));
   test::output_of(run(gel_ + sheet_ + mesh_ + "fit_parts = \"field\"\nfit_adhesion_stiffness = true\n",
                       "--displacement " + (folder_ / "displacement.csv").string()),
                   2);
@@ -300,7 +300,7 @@ TEST_F(Sheet, one_that_expands_or_has_the_stiffness_of_a_bound_is_doubted) {
   const auto radial = [](double r) { return 0.8 * r / 25 * std::exp(-std::pow(r / 25, 4)); };
   const std::string outward = fitted(radial);
   EXPECT_TRUE(test::fires("sheet-expands", outward)) << outward;
-  EXPECT_NE(outward.find("\"bad\""), std::string::npos) << "ten and more standard errors";
+  EXPECT_TRUE(has_words(outward, "\"bad\"")) << "ten and more standard errors";
   const std::string inward = fitted([&](double r) { return -radial(r); });
   EXPECT_FALSE(test::fires("sheet-expands", inward)) << inward;
   EXPECT_TRUE(test::fires("sheet-unexplained", inward)) << "an even contraction has not this profile";
@@ -435,8 +435,7 @@ TEST_F(Sheet, tractions_of_a_larger_area_tell_both_means_their_errors_and_what_i
   }
   files::write_text(folder_ / "traction.csv", one_side);
   std::filesystem::remove_all(folder_ / "out");
-  const std::string refused = test::output_of(run("[sheet]\npoisson_ratio = 0.3\n", traction), 3);
-  EXPECT_NE(refused.find("most_unbalanced"), std::string::npos) << refused;
+  EXPECT_TRUE(has_words(test::output_of(run("[sheet]\npoisson_ratio = 0.3\n", traction), 3), "most_unbalanced"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
   test::output_of(run("[sheet]\npoisson_ratio = 0.3\nmost_unbalanced = 1\n", record() + traction));
   EXPECT_TRUE(fires("tractions-off-balance"));
@@ -490,21 +489,21 @@ TEST_F(Sheet, what_cannot_be_is_refused_by_name) {
   for (const Refused& refused : cases) {
     const auto outcome = run(refused.settings);
     EXPECT_EQ(outcome.code, refused.code) << refused.name << ": " << outcome.output;
-    EXPECT_NE(outcome.output.find(refused.says), std::string::npos) << refused.name << ": " << outcome.output;
+    EXPECT_TRUE(has_words(outcome.output, refused.says)) << refused.name;
     EXPECT_FALSE(std::filesystem::exists(folder_ / "out")) << refused.name << ": something was written";
   }
   files::write_outline(folder_ / "beside.csv", {{40, 0}, {60, 0}, {60, 20}, {40, 20}});
   const auto beside = run(std::string(kSheet) + springs, "--adhesive " + (folder_ / "beside.csv").string());
   EXPECT_EQ(beside.code, 3) << beside.output;
-  EXPECT_NE(beside.output.find("beside.csv: expected an area beneath the sheet"), std::string::npos) << beside.output;
+  EXPECT_TRUE(has_words(beside.output, "beside.csv: expected an area beneath the sheet"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
   files::write_outline(folder_ / "eight.csv", {{0, 0}, {40, 40}, {40, 0}, {0, 40}});
   files::write_text(folder_ / "line.csv", "x_um,y_um\n0,1e-300\n20,2e-300\n40,1e-300\n20,0\n");
   const auto line = run(std::string(kSheet) + springs, "", "line.csv");
   EXPECT_EQ(line.code, 3) << line.output;
-  EXPECT_NE(line.output.find("line.csv: expected an outline"), std::string::npos) << line.output;
-  const std::string outcome = test::output_of(run(std::string(kSheet) + springs, "", "eight.csv"), 3);
-  EXPECT_NE(outcome.find("piece 1 of ring 0 and piece 3 of ring 0 cross"), std::string::npos) << outcome;
+  EXPECT_TRUE(has_words(line.output, "line.csv: expected an outline"));
+  EXPECT_TRUE(has_words(test::output_of(run(std::string(kSheet) + springs, "", "eight.csv"), 3),
+                        "piece 1 of ring 0 and piece 3 of ring 0 cross"));
 }
 
 /// The folder of a cell whose images were simulated, to be run as a sheet.
@@ -530,13 +529,12 @@ class SheetsOfImages : public Sheet {
 };
 
 TEST_F(SheetsOfImages, give_contraction_and_stiffness_back_in_one_command_and_in_a_batch) {
-  const std::string told = done("mbtfm run " + cell_.string());
-  EXPECT_NE(told.find("a contracting sheet, as run.model is sheet"), std::string::npos) << told;
-  EXPECT_NE(told.find("mbtfm: contraction 2"), std::string::npos) << told;
+  EXPECT_TRUE(has_words(done("mbtfm run " + cell_.string()), "a contracting sheet, as run.model is sheet",
+                        "mbtfm: contraction 2"));
   const std::string compared = done("mbtfm compare " + cell_.string());
-  EXPECT_NE(compared.find("contraction_nN_per_um"), std::string::npos) << compared;
-  EXPECT_NE(compared.find(" 2\n"), std::string::npos) << "the truth: " << compared;
-  EXPECT_NE(files::read_text(cell_ / "report.html").find("Beside the truth"), std::string::npos);
+  EXPECT_TRUE(has_words(compared, "contraction_nN_per_um"));
+  EXPECT_TRUE(has_words(compared, " 2\n")) << "the truth";
+  EXPECT_TRUE(has_words(files::read_text(cell_ / "report.html"), "Beside the truth"));
   const files::CsvTable truth(cell_ / "truth/sheet.csv"), fitted(cell_ / "3_sheet/sheet_fit.csv");
   for (int row = 0; row < 2; ++row) {
     ASSERT_EQ(truth.text(row, "quantity"), fitted.text(row, "quantity"));
@@ -556,35 +554,31 @@ TEST_F(SheetsOfImages, give_contraction_and_stiffness_back_in_one_command_and_in
   }
   for (const char* page : {"report.html", "3_sheet/sheet.html"})
     for (const char* words : {"In short", "Caution:", "What the beads tell", "stiffness_nN_per_um", "<svg"})
-      EXPECT_NE(files::read_text(cell_ / page).find(words), std::string::npos) << page << ": " << words;
+      EXPECT_TRUE(has_words(files::read_text(cell_ / page), words)) << page << ": " << words;
 
   const std::string study = study_.string();
-  EXPECT_NE(done("mbtfm batch " + study + " --list").find("sheet,up to date"), std::string::npos);
+  EXPECT_TRUE(has_words(done("mbtfm batch " + study + " --list"), "sheet,up to date"));
   done("mbtfm batch " + study + " --quiet");
   const files::CsvTable batch(study_ / "batch_all.csv");
   ASSERT_EQ(batch.n_rows(), 1);
   EXPECT_NEAR(batch.number(0, "sheet.contraction_nN_per_um"), fitted.number(0, "value"), 1e-4);
   done("mbtfm verify " + cell_.string());
   done("mbtfm repeat " + cell_.string() + " --quiet --out " + (folder_ / "again").string());
-  EXPECT_NE(done("mbtfm stats " + study).find("1 sheet; 0 cells left out"), std::string::npos);
+  EXPECT_TRUE(has_words(done("mbtfm stats " + study), "1 sheet; 0 cells left out"));
   add("[effects]\ncommon_motion = \"off\"\n");
-  EXPECT_NE(done("mbtfm batch " + study + " --list").find("track,up to date"), std::string::npos);
-  EXPECT_NE(done("mbtfm batch " + study + " --list").find("sheet,run"), std::string::npos);
+  EXPECT_TRUE(has_words(done("mbtfm batch " + study + " --list"), "track,up to date", "sheet,run"));
 }
 
 TEST_F(SheetsOfImages, take_a_mask_for_the_outline_and_say_what_lacks) {
   std::filesystem::remove(cell_ / "1_segment/outline.csv");
   std::filesystem::remove(cell_ / "1_segment");
-  const auto nothing = test::run_program("mbtfm run " + cell_.string());
-  EXPECT_EQ(nothing.code, 3);
-  EXPECT_NE(nothing.output.find("actin.tif"), std::string::npos) << nothing.output;
+  EXPECT_TRUE(has_words(output_of("mbtfm run " + cell_.string(), 3), "actin.tif"));
   images::Image mask{.width = 480, .height = 480, .pixels = std::vector<float>(480 * 480, 0)};
   for (int j = 0; j < 480; ++j)
     for (int i = 0; i < 480; ++i)
       if (std::hypot(i + 0.5 - 240, j + 0.5 - 240) < 140) mask.at(i, j) = 255;
   images::write_tiff(cell_ / "outline_mask.tif", mask);
-  const std::string told = done("mbtfm run " + cell_.string());
-  EXPECT_NE(told.find("its outline is outline_mask"), std::string::npos) << told;
+  EXPECT_TRUE(has_words(done("mbtfm run " + cell_.string()), "its outline is outline_mask"));
   const files::CsvTable truth(cell_ / "truth/sheet.csv"), fitted(cell_ / "3_sheet/sheet_fit.csv");
   EXPECT_NEAR(fitted.number(0, "value"), truth.number(0, "value"), 0.1 * truth.number(0, "value"));
   const files::JsonRecord figures(cell_ / "3_sheet/sheet.json", "figures of a sheet");
@@ -617,8 +611,7 @@ TEST(SheetStudies, a_known_difference_of_contraction_is_found_and_the_tables_agr
     }
   const std::string study = folder.path().string();
   done("mbtfm batch " + study + " --quiet --jobs 2 --threads 2");
-  EXPECT_NE(done("mbtfm stats " + study + " --condition-from folder").find("8 sheets; 0 cells left out"),
-            std::string::npos);
+  EXPECT_TRUE(has_words(done("mbtfm stats " + study + " --condition-from folder"), "8 sheets; 0 cells left out"));
 
   const files::CsvTable batch(folder / "batch_all.csv"), cells(folder / "statistics/cells.csv"),
       sheets(folder / "statistics/sheets.csv"), tests(folder / "statistics/tests.csv");
@@ -664,9 +657,8 @@ TEST(SheetStudies, a_known_difference_of_contraction_is_found_and_the_tables_agr
     EXPECT_NEAR(summaries.number(at, "mean"), mean, 1e-5 * mean);
     EXPECT_EQ(summaries.number(at, "n_cells"), 4);
   }
-  const std::string page = files::read_text(folder / "statistics/report.html");
-  EXPECT_NE(page.find("Contraction of sheets under drug: "), std::string::npos);
-  EXPECT_NE(page.find("less than under control"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(folder / "statistics/report.html"),
+                        "Contraction of sheets under drug: ", "less than under control"));
   EXPECT_TRUE(std::filesystem::exists(folder / "statistics/figures/primary.svg"));
   EXPECT_TRUE(std::filesystem::exists(folder / "statistics/figures/sheets.svg"));
 }
@@ -711,7 +703,7 @@ TEST_F(Sheet, cells_of_a_label_image_contract_each_by_its_own) {
   files::write_text(folder_ / "contractions.csv", "cell,contraction_nN_per_um\n2,0.02\n");
   outcome = run(settings, cells + " --contractions " + (folder_ / "contractions.csv").string(), "moved.csv");
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_NE(outcome.output.find("none of cell 1"), std::string::npos) << outcome.output;
+  EXPECT_TRUE(has_words(outcome.output, "none of cell 1"));
 }
 
 }  // namespace

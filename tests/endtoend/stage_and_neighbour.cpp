@@ -69,7 +69,7 @@ TEST(CellWithRelaxedBeads, are_asked_for_in_the_images_table) {
   files::write_text(moved.folder / "cell/cell.toml",
                     files::read_text(moved.folder / "cell/cell.toml") + "\n[images]\ncell_with = \"relaxed\"\n");
   output_of("mbtfm run " + (moved.folder / "cell").string());
-  EXPECT_NE(files::read_text(moved.folder / "cell/run.json").find("\"cell_with\": \"relaxed\""), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(moved.folder / "cell/run.json"), "\"cell_with\": \"relaxed\""));
 }
 
 /// A cell whose segmentation and beads are given.
@@ -127,8 +127,7 @@ TEST(AllCells, leave_a_cell_of_the_users_own_as_it_is) {
   files::write_text(folder / "cell.toml", "pixel_size_um = 0.1\n[segment]\ncell = 0\n");
   fs::create_directories(folder / "cell_1");
   files::write_text(folder / "cell_1/cell.toml", own);
-  const std::string said = output_of("mbtfm run " + (folder / "").string(), 2);
-  EXPECT_NE(said.find("would overwrite it"), std::string::npos) << said;
+  EXPECT_TRUE(has_words(output_of("mbtfm run " + (folder / "").string(), 2), "would overwrite it"));
   EXPECT_EQ(files::read_text(folder / "cell_1/cell.toml"), own);
 }
 

@@ -123,7 +123,7 @@ TEST_F(Surroundings, what_cannot_be_printed_is_an_output_error) {
     const int messages = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     const int full = open("/dev/full", O_WRONLY | O_CLOEXEC);
     EXPECT_EQ(code_of(start(words, full, messages)), kOutput);
-    EXPECT_NE(files::read_text(log).find("standard output"), std::string::npos) << files::read_text(log);
+    EXPECT_TRUE(has_words(files::read_text(log), "standard output"));
     close(full);
     close(messages);
   }
@@ -172,8 +172,8 @@ TEST_F(Surroundings, little_memory_is_an_answer_or_an_error_and_never_a_hang) {
     const Outcome run = run_program("mbtfm run --threads 2 --quiet " + cell_.string(),
                                     "ulimit -v " + std::string(kilobytes) + "; timeout -s KILL 60 ");
     EXPECT_TRUE(run.code == kDone || run.code == kResources || run.code == 127) << run.code << ": " << run.output;
-    if (run.code == kResources) EXPECT_NE(run.output.find("memory"), std::string::npos) << run.output;
-    if (run.code == 127) EXPECT_NE(run.output.find("shared librar"), std::string::npos) << run.output;
+    if (run.code == kResources) EXPECT_TRUE(has_words(run.output, "memory"));
+    if (run.code == 127) EXPECT_TRUE(has_words(run.output, "shared librar"));
     expect_nothing_half_written();
     EXPECT_EQ(fs::exists(cell_ / "4_fit/tensions.csv"), run.code == kDone);
   }
@@ -198,31 +198,28 @@ TEST_F(Surroundings, a_name_that_is_not_utf8_is_a_name) {
   EXPECT_EQ(run["images"]["actin"], "actin_\\xFF.tif");
   for (const fs::path& file : {odd / "report.html", odd / "run.json", study_ / "batch.csv"})
     EXPECT_TRUE(files::is_utf8(files::read_text(file))) << file;
-  EXPECT_NE(files::read_text(odd / "report.html").find("caf\\xE9"), std::string::npos);
-  EXPECT_NE(files::read_text(study_ / "batch.csv").find("caf\\xE9,,"), std::string::npos);
-  EXPECT_NE(files::read_text(study_ / "batch_all.csv").find("caf\\xE9,0"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(odd / "report.html"), "caf\\xE9"));
+  EXPECT_TRUE(has_words(files::read_text(study_ / "batch.csv"), "caf\\xE9,,"));
+  EXPECT_TRUE(has_words(files::read_text(study_ / "batch_all.csv"), "caf\\xE9,0"));
   output_of("mbtfm verify '" + odd.string() + "'", kDone);
   output_of("mbtfm repeat --quiet --out " + (folder_ / "again").string() + " '" + odd.string() + "'", kDone);
   const Outcome list = run_program("mbtfm batch --list " + study_.string());
-  EXPECT_EQ(list.output.find("run,"), std::string::npos) << "all is up to date: " << list.output;
+  EXPECT_FALSE(has_words(list.output, "run,")) << "all is up to date";
 }
 
 TEST_F(Surroundings, a_mesh_that_memory_cannot_hold_is_refused_with_its_count) {
   set("edge_length_um = 0.01");  // 1.3 million vertices, of a kilobyte each at the least
-  const std::string run = output_of("mbtfm run " + cell_.string(), kResources, "ulimit -v 1000000; ");
-  EXPECT_NE(run.find(" vertices, which take "), std::string::npos) << run;
-  EXPECT_NE(run.find("edge_length_um"), std::string::npos) << run;
+  EXPECT_TRUE(has_words(output_of("mbtfm run " + cell_.string(), kResources, "ulimit -v 1000000; "),
+                        " vertices, which take ", "edge_length_um"));
   EXPECT_FALSE(fs::exists(cell_ / "3_network"));
 }
 
 TEST_F(Surroundings, an_edge_length_that_is_no_length_is_refused_before_anything_runs) {
   set("edge_length_um = 1e-300");
-  const std::string run = output_of("mbtfm run " + cell_.string(), kInput);
-  EXPECT_NE(run.find("expected a number >= 0.01 and <= 100, found '1e-300'"), std::string::npos) << run;
+  EXPECT_TRUE(has_words(output_of("mbtfm run " + cell_.string(), kInput),
+                        "expected a number >= 0.01 and <= 100, found '1e-300'"));
   EXPECT_FALSE(fs::exists(cell_ / "1_segment"));
-  const Outcome flag = run_program("mbtfm-network --edge_length_um 1500 --check");
-  EXPECT_EQ(flag.code, kUsage);
-  EXPECT_NE(flag.output.find("1500 nm is 1.5 um"), std::string::npos) << flag.output;
+  EXPECT_TRUE(has_words(output_of("mbtfm-network --edge_length_um 1500 --check", kUsage), "1500 nm is 1.5 um"));
 }
 
 TEST_F(Surroundings, stages_are_chosen_one_by_one_or_with_commas) {

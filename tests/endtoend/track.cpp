@@ -79,7 +79,7 @@ TEST(TrackEndToEnd, a_frame_that_is_lost_is_tracked_again_and_the_others_are_not
   EXPECT_EQ(files::read_text(folder / "out/displacement_0002.csv"), lost);
   EXPECT_EQ(files::read_text(folder / "out/displacement_0001.csv"), other);
   EXPECT_EQ(files::read_text(folder / "out/frames.csv"), list);
-  EXPECT_NE(files::read_text(folder / "out/record.json").find("\"n_frames_kept\": 1"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(folder / "out/record.json"), "\"n_frames_kept\": 1"));
 }
 
 TEST(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
@@ -88,8 +88,7 @@ TEST(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
   const std::string out = " --out " + (folder / "out").string();
   const std::string given = "--displacement " + (folder / "piv.csv").string() + out;
   const std::string columns = " --x_column x --y_column y --ux_column u --uy_column v";
-  const std::string ended = output_of(run_track(given + columns + " --length_unit px --pixel_size_um 0.5"));
-  EXPECT_NE(ended.find("1 flagged"), std::string::npos) << ended;
+  EXPECT_TRUE(has_words(output_of(run_track(given + columns + " --length_unit px --pixel_size_um 0.5")), "1 flagged"));
   const DisplacementField field = files::read_displacement(folder / "out/displacement.csv");
   ASSERT_EQ(field.size(), 4u);
   EXPECT_EQ(field[1].position_um, (Vec2{5.25, 0.25}));
@@ -124,7 +123,7 @@ TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
                {"no_scale.tif", "no_scale.tif", {"no_scale.tif", "calibration", "pixel_size_um"}}};
   for (const auto& c : cases) {
     const std::string ended = output_of(run_track(files(folder, c.relaxed, c.stressed)), 3);
-    for (const std::string& word : c.said) EXPECT_NE(ended.find(word), std::string::npos) << word << ": " << ended;
+    for (const std::string& word : c.said) EXPECT_TRUE(has_words(ended, word));
     EXPECT_FALSE(std::filesystem::exists(folder / "out/displacement.csv")) << c.stressed;
   }
 }
@@ -140,14 +139,13 @@ TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
   write(folder / "frames/b.tif", one.stressed, 0.2);
   files::write_text(folder / "frames/c.tif", "no image");
   write(folder / "frames/d.tif", two.stressed, 0.2);
-  const std::string ended = output_of(run_track(files(folder, "r.tif", "frames")), 4);
-  EXPECT_NE(ended.find("2 of 4 frames"), std::string::npos) << ended;
+  EXPECT_TRUE(has_words(output_of(run_track(files(folder, "r.tif", "frames")), 4), "2 of 4 frames"));
   const files::CsvTable frames(folder / "out/frames.csv");
   ASSERT_EQ(frames.n_rows(), 4);
-  EXPECT_NE(frames.text(0, "refused").find("bright beads"), std::string::npos);
+  EXPECT_TRUE(has_words(frames.text(0, "refused"), "bright beads"));
   EXPECT_EQ(frames.text(0, "n_tracked"), "");
   EXPECT_EQ(frames.text(1, "refused"), "");
-  EXPECT_NE(frames.text(2, "refused").find("c.tif"), std::string::npos);
+  EXPECT_TRUE(has_words(frames.text(2, "refused"), "c.tif"));
   EXPECT_NEAR(frames.number(3, "drift_x_um"), -0.6, 0.005);
   for (const char* missing : {"1", "3"})
     EXPECT_FALSE(std::filesystem::exists(folder / ("out/displacement_000" + std::string(missing) + ".csv")));
@@ -221,9 +219,8 @@ TEST(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
   test::expect_silent({"nothing-moves", "moves-outward", "tracked-by-correlation", "defocused", "beads-not-round",
                        "saturated", "lossy-image", "unusual-value"},
                       sound.output);
-  const Outcome swapped = run_track(files(folder, "s.tif", "r.tif"));
-  EXPECT_EQ(swapped.code, 3);
-  EXPECT_NE(swapped.output.find("exchange the files of --stressed and --relaxed"), std::string::npos) << swapped.output;
+  EXPECT_TRUE(has_words(output_of(run_track(files(folder, "s.tif", "r.tif")), 3),
+                        "exchange the files of --stressed and --relaxed"));
   const Outcome pushed = run_track(files(folder, "s.tif", "r.tif") + " --may_push");
   EXPECT_EQ(pushed.code, 0);
   EXPECT_TRUE(fires("moves-outward", pushed.output)) << pushed.output;
@@ -256,8 +253,7 @@ TEST(TrackEndToEnd, images_that_cannot_be_a_pair_are_refused_with_the_reason) {
   for (const auto& c : cases) {
     const Outcome ended = run_track(files(folder, c.relaxed, c.stressed));
     EXPECT_EQ(ended.code, 3) << c.relaxed << ' ' << c.stressed << ended.output;
-    for (const std::string& word : c.said)
-      EXPECT_NE(ended.output.find(word), std::string::npos) << word << ended.output;
+    for (const std::string& word : c.said) EXPECT_TRUE(has_words(ended.output, word)) << word;
     EXPECT_FALSE(std::filesystem::exists(folder / "out"));
   }
 }
@@ -295,7 +291,7 @@ TEST(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_to
   EXPECT_FALSE(fires("beads-wide", told(test::draw_bead_pair(peaks, scene))));
   const std::string of_oblong = told(test::draw_bead_pair(peaks, oblong));
   EXPECT_TRUE(fires("beads-not-round", of_oblong)) << of_oblong;
-  EXPECT_NE(of_oblong.find("caution (beads-not-round)"), std::string::npos) << of_oblong;
+  EXPECT_TRUE(has_words(of_oblong, "caution (beads-not-round)"));
   for (test::Peak& peak : peaks) peak.radius *= 4;  // narrower ones no window shows
   const std::string of_weak = told(test::weakened(test::draw_bead_pair(peaks, weak), {.levels = 40}, 1));
   EXPECT_TRUE(fires("tracked-by-correlation", of_weak)) << of_weak;
@@ -354,10 +350,8 @@ TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_
   const Outcome of_still = given("still.csv");
   EXPECT_EQ(of_still.code, 0);
   EXPECT_TRUE(fires("nothing-moves", of_still.output)) << of_still.output;
-  EXPECT_NE(of_still.output.find("Nothing moves: 0 of 64 beads"), std::string::npos) << of_still.output;
-  const Outcome of_twice = given("twice.csv");
-  EXPECT_EQ(of_twice.code, 0);
-  EXPECT_NE(of_twice.output.find("1 flagged"), std::string::npos) << of_twice.output;
+  EXPECT_TRUE(has_words(of_still.output, "Nothing moves: 0 of 64 beads"));
+  EXPECT_TRUE(has_words(output_of(given("twice.csv")), "1 flagged"));
   EXPECT_EQ(files::read_displacement(folder / "out/displacement.csv").back().flag, "duplicate");
 }
 
@@ -384,10 +378,10 @@ TEST(TrackEndToEnd, a_table_of_another_program_is_named_and_its_masked_vectors_c
   };
   const std::string of_sound = output_of(given("sound.txt"));
   EXPECT_FALSE(fires("vectors-masked", of_sound)) << of_sound;
-  EXPECT_NE(of_sound.find("400 displacements read as PIVlab writes them"), std::string::npos) << of_sound;
+  EXPECT_TRUE(has_words(of_sound, "400 displacements read as PIVlab writes them"));
   const std::string of_masked = output_of(given("masked.txt"));
   EXPECT_TRUE(fires("vectors-masked", of_masked)) << of_masked;
-  EXPECT_NE(of_masked.find("140 of 400 vectors have the displacement"), std::string::npos) << of_masked;
+  EXPECT_TRUE(has_words(of_masked, "140 of 400 vectors have the displacement"));
   for (const Bead& bead : files::read_displacement(folder / "out/displacement.csv"))
     EXPECT_LT(norm(bead.displacement_um), 1);
 }

@@ -77,7 +77,7 @@ TEST(TractionProgram, refuses_bad_displacements_and_names_them) {
         test::output_of("mbtfm-traction --gel " + (folder / "cell.toml").string() + " --displacement " +
                             (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string(),
                         3);
-    EXPECT_NE(run.find(word), std::string::npos) << run;
+    EXPECT_TRUE(has_words(run, word));
     EXPECT_FALSE(fs::exists(folder / "traction.csv"));
   }
 }
@@ -111,8 +111,7 @@ TEST(TractionProgram, takes_a_field_without_errors_and_says_which_it_assumed) {
                              (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string() +
                              more);
   };
-  const std::string told = test::output_of(run(""));
-  EXPECT_NE(told.find("the field states no errors"), std::string::npos) << told;
+  EXPECT_TRUE(has_words(test::output_of(run("")), "the field states no errors"));
   // 2304 beads: half of them tell the noise to 2.5 %
   const double assumed_um = files::JsonRecord(folder / "traction.json", "figures").at("assumed_sigma_um").number();
   EXPECT_NEAR(assumed_um / (kNoise * scene.largest_um), 1, 0.075);
@@ -127,8 +126,7 @@ TEST(TractionProgram, refuses_a_modulus_in_pascal_unless_told_to_and_takes_an_in
     return test::run_program("mbtfm-traction --gel " + (folder / "cell.toml").string() + " --displacement " +
                              (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
   };
-  const std::string refused = test::output_of(run("[gel]\nyoungs_modulus_kPa = 8400\n"), 3);
-  EXPECT_NE(refused.find("8400 Pa is 8.4 kPa"), std::string::npos) << refused;
+  EXPECT_TRUE(has_words(test::output_of(run("[gel]\nyoungs_modulus_kPa = 8400\n"), 3), "8400 Pa is 8.4 kPa"));
   EXPECT_FALSE(fs::exists(folder / "traction.csv"));
   EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8400\n[checks]\nallow = [\"youngs_modulus_kPa\"]\n").code, 0);
   EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.5\n").code, 0);
@@ -234,9 +232,8 @@ TEST_F(TractionInSpace, splits_faces_by_each_rule_and_writes_an_even_lattice) {
       EXPECT_EQ(number("largest_spacing_um") > 1.5 * spacing, is_split) << rule;
     }
   }
-  const auto refused = run("--spacing_um 4 --method direct --refine resolved");
-  EXPECT_EQ(refused.code, exit_code::kUsage) << refused.output;
-  EXPECT_NE(refused.output.find("direct states no resolution"), std::string::npos) << refused.output;
+  EXPECT_TRUE(has_words(output_of(run("--spacing_um 4 --method direct --refine resolved"), exit_code::kUsage),
+                        "direct states no resolution"));
 }
 
 TEST_F(TractionInSpace, lambda_that_it_tells_is_the_one_to_be_given) {
@@ -279,11 +276,10 @@ TEST_F(TractionInSpace, says_which_criterion_chose_lambda_in_the_end) {
   const auto text = [&](const char* name) { return files::read_text(folder_ / name); };
   const auto expect_chosen = [&](const Outcome& outcome, const std::string& by, const char* file_says) {
     ASSERT_EQ(outcome.code, 0) << outcome.output;
-    EXPECT_NE(outcome.output.find("um (" + by + ")"), std::string::npos) << outcome.output;
+    EXPECT_TRUE(has_words(outcome.output, "um (" + by + ")"));
     EXPECT_FALSE(test::fires("lambda-runs-away", outcome.output)) << outcome.output;
-    EXPECT_NE(text("traction_3d.json").find(std::string("\"lambda_by\": \"") + file_says + '"'), std::string::npos);
-    EXPECT_NE(text("traction_3d_lambda.svg").find("Chosen, " + (by == "given" ? "as given" : by) + ":"),
-              std::string::npos);
+    EXPECT_TRUE(has_words(text("traction_3d.json"), std::string("\"lambda_by\": \"") + file_says + '"'));
+    EXPECT_TRUE(has_words(text("traction_3d_lambda.svg"), "Chosen, " + (by == "given" ? "as given" : by) + ":"));
   };
   const auto of_astray = run(dense, "astray.csv");
   expect_chosen(of_astray, "by risk", "risk");
@@ -298,22 +294,20 @@ TEST_F(TractionInSpace, says_which_criterion_chose_lambda_in_the_end) {
 
 TEST_F(TractionInSpace, says_whether_a_common_motion_was_looked_for) {
   const std::string dense = "--spacing_um 4 --method ";
-  EXPECT_NE(run(dense + "tikhonov").output.find("common motion: on (auto): found with the tractions: shift x"),
-            std::string::npos);
-  EXPECT_NE(run(dense + "tikhonov --common_motion off").output.find("common motion: off (as switched): switched off"),
-            std::string::npos);
-  EXPECT_NE(run(dense + "direct").output.find("common motion: off (auto): the displacement is imposed"),
-            std::string::npos);
-  const std::string refused = test::output_of(run(dense + "direct --common_motion on"), 2);
-  EXPECT_NE(refused.find("direct imposes the displacement as it was measured"), std::string::npos);
+  EXPECT_TRUE(has_words(run(dense + "tikhonov").output, "common motion: on (auto): found with the tractions: shift x"));
+  EXPECT_TRUE(
+      has_words(run(dense + "tikhonov --common_motion off").output, "common motion: off (as switched): switched off"));
+  EXPECT_TRUE(has_words(run(dense + "direct").output, "common motion: off (auto): the displacement is imposed"));
+  EXPECT_TRUE(has_words(test::output_of(run(dense + "direct --common_motion on"), 2),
+                        "direct imposes the displacement as it was measured"));
 }
 
 TEST_F(TractionInSpace, doubts_a_total_force_that_no_cell_has) {
   const std::string cell = "--spacing_um 4 --grow_um 3 --adhesions " + at("adhesions.csv");
-  EXPECT_EQ(run(cell).output.find("total force of the cell"), std::string::npos);
+  EXPECT_FALSE(has_words(run(cell).output, "total force of the cell"));
   const auto outcome = run(cell + " --youngs_modulus_kPa 900");  // 90 times the gel's own: 125 nN become 11 000 nN
   ASSERT_EQ(outcome.code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find("the total force of the cell is"), std::string::npos) << outcome.output;
+  EXPECT_TRUE(has_words(outcome.output, "the total force of the cell is"));
 }
 
 TEST_F(TractionInSpace, refuses_what_tells_nothing_and_leaves_no_file) {
@@ -322,7 +316,7 @@ TEST_F(TractionInSpace, refuses_what_tells_nothing_and_leaves_no_file) {
   files::write_text(folder_ / "outline.csv", "x_um,y_um\n100,100\n120,100\n120,120\n");
   const auto refused = [&](const Outcome& outcome, int code, const char* says) {
     EXPECT_EQ(outcome.code, code) << outcome.output;
-    EXPECT_NE(outcome.output.find(says), std::string::npos) << outcome.output;
+    EXPECT_TRUE(has_words(outcome.output, says));
     EXPECT_FALSE(fs::exists(folder_ / "traction_3d.csv"));
   };
   refused(run("", "flat.csv"), exit_code::kInput, "z_um");
@@ -349,10 +343,9 @@ TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_forc
     fit.total_force_nN = fit.converged ? 89.8 * strength : 1;
     files::write_fit_summary(cell / "4_fit/fit.json", fit);
   }
-  const std::string run = test::output_of("mbtfm-calibrate --cells " + folder.path().string() + " --out " +
-                                          (folder / "calibration.csv").string());
-  EXPECT_NE(run.find("FTTC gives the forces of the fit at lambda E"), std::string::npos) << run;
-  EXPECT_NE(run.find("1 left out, whose fit has not converged"), std::string::npos) << run;
+  EXPECT_TRUE(has_words(test::output_of("mbtfm-calibrate --cells " + folder.path().string() + " --out " +
+                                        (folder / "calibration.csv").string()),
+                        "FTTC gives the forces of the fit at lambda E", "1 left out, whose fit has not converged"));
   const files::CsvTable table(folder / "calibration.csv");
   // forces in proportion, and the same noise: nearly one line at any lambda; the less smoothing the steeper
   for (int row = 1; row < table.n_rows(); ++row) {
@@ -360,9 +353,8 @@ TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_forc
     EXPECT_GT(table.number(row, "correlation"), 0.9);
   }
   EXPECT_EQ(files::CsvTable(folder / "calibration_cells.csv").n_rows(), 3 * table.n_rows());
-  EXPECT_EQ(files::read_text(folder / "calibration_cells.csv").find("cell_4"), std::string::npos);
-  const std::string picture = files::read_text(folder / "calibration.svg");
-  EXPECT_NE(picture.find("slope one at ℓ = "), std::string::npos);
+  EXPECT_FALSE(has_words(files::read_text(folder / "calibration_cells.csv"), "cell_4"));
+  EXPECT_TRUE(has_words(files::read_text(folder / "calibration.svg"), "slope one at ℓ = "));
 }
 
 }  // namespace

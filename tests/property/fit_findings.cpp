@@ -215,7 +215,7 @@ TEST_F(FitFindings, a_network_with_a_fibre_that_is_none_of_the_cells_is_refused)
   inputs_.cell.fibres.pop_back();
   const InputError error = test::thrown<InputError>([&] { found(); });
   EXPECT_EQ(error.where, "network.vtu");
-  EXPECT_NE(error.found.find("fibre 3"), std::string::npos) << error.found;
+  EXPECT_TRUE(has_words(error.found, "fibre 3"));
 }
 
 TEST_F(FitFindings, a_fibre_that_was_drawn_twice_is_told_apart_from_itself_by_no_beads) {

@@ -134,7 +134,7 @@ TEST(Mean, a_disc_is_no_spiked_cell) {
   const Alignment alignment{.reference_um = spiked(40, 25, 0, 360), .motions = {Motion{}}};
   const CellRow row = aligned({cell_of(spiked(45, 0, 0, 360))}, alignment, 1).front();
   EXPECT_FALSE(row.is_kept);
-  EXPECT_NE(row.reason.find("from the reference"), std::string::npos);
+  EXPECT_TRUE(has_words(row.reason, "from the reference"));
 }
 
 const Gel kGel{.youngs_modulus_kPa = 8};

@@ -150,7 +150,7 @@ TEST(Plan, a_percentage_without_its_sign_is_refused_and_named) {
   Parameters p;
   p.within = "20";
   const UsageError e = test::thrown<UsageError>([&] { asked_by(p, 8); });
-  EXPECT_NE(std::string(e.what()).find("Did you mean 20%?"), std::string::npos) << e.what();
+  EXPECT_TRUE(has_words(e.what(), "Did you mean 20%?"));
 }
 
 // --- pairs

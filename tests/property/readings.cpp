@@ -102,7 +102,7 @@ TEST(Readings, name_the_way_in_which_images_or_tables_lie_wrong) {
   };
   for (const Case& c : cases) {
     const Reading reading = best_reading(scene.on(), changed(scene.beads, c.wrong), scene.forces_nN, scene.noise_um);
-    EXPECT_NE(reading.what.find(c.says), std::string::npos) << c.says << ", but: " << reading.what;
+    EXPECT_TRUE(has_words(reading.what, c.says)) << c.says << ", but";
     EXPECT_TRUE(test::fires("read-otherwise", noticed_reading(FindingKind::read_otherwise, reading))) << c.says;
   }
 }
@@ -140,7 +140,7 @@ TEST(Readings, name_a_field_that_was_smoothed) {
     return best_smoothing(data_of(scene.on(), beads), scene.forces_nN, scene.noise_um);
   };
   const Reading reading = of(smooth);
-  EXPECT_NE(reading.what.find("over 4 um"), std::string::npos) << reading.what;
+  EXPECT_TRUE(has_words(reading.what, "over 4 um"));
   EXPECT_TRUE(test::fires("field-smoothed", noticed_reading(FindingKind::field_smoothed, reading)));
   const Reading of_sharp = of(scene.beads);
   EXPECT_FALSE(test::fires("field-smoothed", noticed_reading(FindingKind::field_smoothed, of_sharp))) << of_sharp.what;

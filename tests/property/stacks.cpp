@@ -106,7 +106,7 @@ TEST(Stacks, too_few_beads_are_refused_with_the_number_that_would_do) {
   const BeadClouds clouds = bead_clouds(25, 0.03, 0, 5, pull);
   const beads::NotFollowed error =
       test::thrown<beads::NotFollowed>([&] { follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 1); });
-  EXPECT_NE(error.expected.find("40"), std::string::npos) << error.expected;
+  EXPECT_TRUE(has_words(error.expected, "40"));
   EXPECT_EQ(error.found, "25");
 }
 

@@ -130,7 +130,7 @@ TEST(TensionFitHard, fewer_beads_than_unknowns_are_refused_with_the_count_that_w
   TensionScene scene = tension_scene("case_21", 4, 0.05, 3);
   const InvalidData error = test::thrown<InvalidData>([&] { fit_own_network(scene); });
   const std::string enough = "at least " + std::to_string((scene.tensions_nN.size() + 1) / 2) + " good beads";
-  EXPECT_NE(std::string(error.what()).find(enough), std::string::npos) << error.what();
+  EXPECT_TRUE(has_words(error.what(), enough));
   test::came_out(error.what());
 }
 

@@ -39,6 +39,15 @@ namespace fs = std::filesystem;
 
 namespace mbtfm::test {
 
+/// Whether a text has all of these words; if not, the first that it lacks, and the text.
+template <class... Words>
+testing::AssertionResult has_words(const std::string& text, const Words&... words) {
+  for (const std::string& word : {std::string(words)...})
+    if (text.find(word) == text.npos)
+      return testing::AssertionFailure() << "'" << word << "' is not in: " << text << '\n';
+  return testing::AssertionSuccess() << "all words are in: " << text << '\n';
+}
+
 /// The exception of this type that the call ends with.
 template <class Error>
 std::optional<Error> caught(const auto& call) {
@@ -58,3 +67,9 @@ Error thrown(const auto& call) {
 }
 
 }  // namespace mbtfm::test
+
+namespace mbtfm {
+
+using test::has_words;
+
+}  // namespace mbtfm

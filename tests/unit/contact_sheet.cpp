@@ -50,7 +50,7 @@ TEST(ContactSheet, shows_values_with_which_nothing_is_found) {
 TEST(ContactSheet, names_the_parameter_that_was_meant) {
   const Sheet sheet;
   const UsageError error = test::thrown<UsageError>([&] { sheet.draw("adhesion_smalest_um2=3"); });
-  EXPECT_NE(std::string(error.what()).find("adhesion_smallest_um2"), std::string::npos);
+  EXPECT_TRUE(has_words(error.what(), "adhesion_smallest_um2"));
   EXPECT_THROW(sheet.draw("adhesion_smallest_um2=-1"), UsageError);
 }
 

@@ -69,9 +69,9 @@ TEST(Accuracy, stops_where_noise_makes_it_unreachable_and_computing_is_in_vain) 
   const AccuracyOutcome outcome = reach_accuracy(0.01, run);
   EXPECT_FALSE(outcome.is_met);
   EXPECT_EQ(tried.size(), 2u);
-  EXPECT_NE(outcome.verdict.find("no computing reaches that"), std::string::npos) << outcome.verdict;
+  EXPECT_TRUE(has_words(outcome.verdict, "no computing reaches that"));
   // 0.5 nN of noise in each of two tensions, of 3 and 4 nN
-  EXPECT_NE(outcome.verdict.find("the beads' noise alone makes 14 %"), std::string::npos) << outcome.verdict;
+  EXPECT_TRUE(has_words(outcome.verdict, "the beads' noise alone makes 14 %"));
 }
 
 TEST(Accuracy, does_not_take_the_misfit_of_a_coarse_model_for_unavoidable) {
@@ -141,10 +141,10 @@ TEST(CostStudy, of_a_cell_in_space_tells_of_tractions_and_not_of_tensions) {
   EXPECT_EQ(flat.number(1, "tension_error"), 0.5);
   EXPECT_TRUE(flat.text(1, "traction_error").empty());
   const std::string page = files::read_text(folder / "cost.md"), svg = files::read_text(folder / "cost.svg");
-  EXPECT_NE(page.find("error of tractions"), std::string::npos);
-  EXPECT_EQ(page.find("fibres"), std::string::npos);
-  EXPECT_EQ(page.find("tensions"), std::string::npos);
-  EXPECT_NE(svg.find("error of the tractions, relative"), std::string::npos);
+  EXPECT_TRUE(has_words(page, "error of tractions"));
+  EXPECT_FALSE(has_words(page, "fibres"));
+  EXPECT_FALSE(has_words(page, "tensions"));
+  EXPECT_TRUE(has_words(svg, "error of the tractions, relative"));
 }
 
 /// Tractions of one kPa along x on a square lattice of `n` places a side.

@@ -31,7 +31,7 @@ TEST(Effects, a_stage_reads_its_own_switches_and_leaves_the_others_to_their_stag
 
 TEST(Effects, a_misspelt_switch_is_refused_by_every_stage) {
   const InputError error = test::thrown<InputError>([&] { read("[effects]\nfinite_side = 'on'\n", {"drift_affine"}); });
-  EXPECT_NE(error.hint.find("'finite_sides'"), std::string::npos) << error.hint;
+  EXPECT_TRUE(has_words(error.hint, "'finite_sides'"));
   EXPECT_THROW(read("[effects]\nfinite_sides = 'yes'\n", {"finite_sides"}), InputError);
 }
 

@@ -174,7 +174,7 @@ TEST(GivenTable, numbers_that_can_be_read_in_two_ways_are_refused) {
     if (what == "a unit against the header") p = in_pixels(LengthUnit::px);
     const auto error = test::caught<InputError>([&] { read(text, p); });
     EXPECT_TRUE(error) << what;
-    EXPECT_NE(error.value_or(InputError("", "", "")).where.find("field.csv"), std::string::npos) << what;
+    EXPECT_TRUE(has_words(error.value_or(InputError("", "", "")).where, "field.csv")) << what;
   }
   // one comma that is no thousands' decides for all
   EXPECT_EQ(read(header + "1,234;5,678;0,111;2,222\n").field[0].position_um, (Vec2{1.234, 5.678}));
@@ -261,7 +261,7 @@ TEST(GivenTable, of_each_program_is_found_by_its_head_and_read_as_it_means_it) {
     TrackParameters p = in_pixels();
     if (form.seconds > 0) p.seconds_between = form.seconds;
     if (form.form == TableForm::trackmate) {
-      EXPECT_NE(test::thrown<InputError>([&] { read(form.text, p); }).hint.find("relaxed_time = 1"), std::string::npos);
+      EXPECT_TRUE(has_words(test::thrown<InputError>([&] { read(form.text, p); }).hint, "relaxed_time = 1"));
       p.relaxed_plane.time = 1, p.stressed_plane.time = 2;
     }
     Rows expected = rows;
@@ -323,7 +323,7 @@ TEST(GivenTable, y_that_falls_from_row_to_row_points_up_and_the_user_is_asked) {
   const GivenField given = read(text, in_pixels());
   expect_same(given, rows);
   ASSERT_EQ(given.findings.size(), 1u);
-  EXPECT_NE(given.findings[0].text.find("track.y_axis = down"), std::string::npos);
+  EXPECT_TRUE(has_words(given.findings[0].text, "track.y_axis = down"));
   TrackParameters said = in_pixels();
   said.y_axis = VerticalAxis::down;
   EXPECT_TRUE(read(text, said).findings.empty());
@@ -378,7 +378,7 @@ TEST(GivenTable, is_what_the_other_stages_point_to_where_theirs_is_masked) {
     text += std::to_string(k) + "," + std::to_string(k % 5) + "," + (k == 7 ? "-9999" : "0.1") + ",0\n";
   files::write_text(folder / "d.csv", text);
   const auto error = test::thrown<InputError>([&] { files::read_displacement(folder / "d.csv"); });
-  EXPECT_NE(error.hint.find("mbtfm-track --displacement"), std::string::npos);
+  EXPECT_TRUE(has_words(error.hint, "mbtfm-track --displacement"));
   EXPECT_EQ(read_given_field(folder / "d.csv", {}).field[7].flag, "masked");
 }
 

@@ -104,7 +104,7 @@ TEST_F(OwnFiles, what_is_replaced_is_of_the_same_kind) {
     try {
       files::write_whole(cell_ / "output", by);
     } catch (const OutputError& error) {
-      EXPECT_NE(std::string(error.what()).find((cell_ / "output").string()), std::string::npos) << error.what();
+      EXPECT_TRUE(has_words(error.what(), (cell_ / "output").string()));
       EXPECT_EQ(files::read_text(cell_ / "output"), before);
       return false;
     }

@@ -34,9 +34,9 @@ TEST(Report, names_every_fibre_and_adhesion) {
   const FakeCell cell;
   const std::string html = report_html(cell.folder.path());
   for (int fibre = 1; fibre <= 4; ++fibre)
-    EXPECT_NE(html.find("fibre " + std::to_string(fibre) + " ("), std::string::npos) << fibre;
+    EXPECT_TRUE(has_words(html, "fibre " + std::to_string(fibre) + " (")) << fibre;
   for (int adhesion = 1; adhesion <= 12; ++adhesion)
-    EXPECT_NE(html.find("adhesion " + std::to_string(adhesion) + "\\n"), std::string::npos) << adhesion;
+    EXPECT_TRUE(has_words(html, "adhesion " + std::to_string(adhesion) + "\\n")) << adhesion;
 }
 
 TEST(Charts, keys_are_dark_enough_to_read_on_white) {
@@ -61,9 +61,9 @@ TEST(StagePage, its_picture_has_a_name_and_keeps_to_the_page_and_its_tables_have
                         .picture_title = "Tension",
                         .picture_explained = "Left: a \"map\".",
                         .figures = {{"n", std::int64_t(1)}}});
-  EXPECT_NE(html.find("<svg role=\"img\" aria-label=\"Tension. Left: a &quot;map&quot;.\" "
-                      "style=\"max-width:100%;height:auto\" width=\"920\""),
-            std::string::npos);
+  EXPECT_TRUE(has_words(html,
+                        "<svg role=\"img\" aria-label=\"Tension. Left: a &quot;map&quot;.\" "
+                        "style=\"max-width:100%;height:auto\" width=\"920\""));
   std::size_t n_tables = 0, n_captions = 0;
   for (std::size_t at = 0; (at = html.find("<table>", at)) != std::string::npos; ++at) ++n_tables;
   for (std::size_t at = 0; (at = html.find("<table><caption", at)) != std::string::npos; ++at) ++n_captions;
@@ -99,8 +99,8 @@ TEST(Report, asks_for_nothing_from_anywhere) {
   // what comes before the scripts; what these ask for shows in a browser (tests/endtoend/pages.cpp)
   const std::string html = whole.substr(0, whole.find("</main>"));
   EXPECT_FALSE(std::regex_search(html, std::regex(R"((src|href)="(?!data:|#))")));
-  EXPECT_EQ(html.find("url("), std::string::npos);
-  EXPECT_EQ(html.find("@import"), std::string::npos);
+  EXPECT_FALSE(has_words(html, "url("));
+  EXPECT_FALSE(has_words(html, "@import"));
 }
 
 TEST(Report, is_well_formed_where_names_hold_markup) {
@@ -149,18 +149,16 @@ TEST(Report, the_methods_paragraph_has_the_numbers_of_this_cell) {
 
 TEST(Report, shows_the_bead_images_where_tracking_has_left_them) {
   const FakeCell cell;
-  EXPECT_EQ(report_html(cell.folder.path()).find("<h3>Beads</h3>"), std::string::npos);
+  EXPECT_FALSE(has_words(report_html(cell.folder.path()), "<h3>Beads</h3>"));
   files::write_text(cell.folder / "2_track/beads.jpg", "a picture");
   files::write_text(cell.folder / "2_track/beads_picture.csv", "x_um,y_um,width_um,height_um\n0,0,80,80\n");
-  const std::string html = report_html(cell.folder.path());
-  EXPECT_NE(html.find("<h3>Beads</h3>"), std::string::npos);
-  EXPECT_NE(html.find(files::base64("a picture")), std::string::npos);
+  EXPECT_TRUE(has_words(report_html(cell.folder.path()), "<h3>Beads</h3>", files::base64("a picture")));
 }
 
 TEST(Report, shows_what_the_usual_method_says_where_it_was_asked) {
   const FakeCell cell;
   const std::string title = "What the usual method says";
-  EXPECT_EQ(report_html(cell.folder.path()).find(title), std::string::npos) << "results of an older version";
+  EXPECT_FALSE(has_words(report_html(cell.folder.path()), title)) << "results of an older version";
   files::write_text(cell.folder / "4_fit/fttc.csv",
                     "x_um,y_um,tx_kPa,ty_kPa,area_um2,ux_um,uy_um\n30,30,0.3,0.4,4,0,0\n32,30,0,0,4,0,0\n");
   const auto figures = cell.folder / "4_fit/fttc.json";
@@ -168,15 +166,13 @@ TEST(Report, shows_what_the_usual_method_says_where_it_was_asked) {
   const std::string html = report_html(cell.folder.path());
   const std::size_t at = html.find("<h3>" + title);
   ASSERT_NE(at, html.npos);
-  const std::string figure = html.substr(at, html.find("</figure>", at) - at);
-  for (const char* part :
-       {"λ = 0.056 µm/kPa (criterion: risk)", "squares of 2 µm", "123 nN", "data:image/svg+xml;base64,"})
-    EXPECT_NE(figure.find(part), std::string::npos) << part;
+  EXPECT_TRUE(has_words(html.substr(at, html.find("</figure>", at) - at), "λ = 0.056 µm/kPa (criterion: risk)",
+                        "squares of 2 µm", "123 nN", "data:image/svg+xml;base64,"));
 
   files::write_text(figures, R"({"obstacle": "all beads on one line"})");
   const std::string without = report_html(cell.folder.path());
-  EXPECT_EQ(without.find("<h3>" + title), std::string::npos);
-  EXPECT_NE(without.find("has no answer for these beads: all beads on one line."), std::string::npos);
+  EXPECT_FALSE(has_words(without, "<h3>" + title));
+  EXPECT_TRUE(has_words(without, "has no answer for these beads: all beads on one line."));
   files::write_text(figures, R"({"total_force_nN": 1})");
   files::write_text(cell.folder / "4_fit/fttc.csv", "x_um,y_um\n1,2\n");
   EXPECT_THROW(report_html(cell.folder.path()), InputError);
@@ -257,10 +253,9 @@ TEST(Report, a_tick_stands_only_where_no_finding_is_open) {
 TEST(Report, an_open_finding_shows_its_text_number_threshold_and_remedy) {
   const FakeCell cell;
   const Finding finding = *noticed(FindingKind::missing_fibre, 3, "three <fibres>");
-  const std::string html = findings_section(facts_of(read_results(cell.folder.path())), fitted_here({finding}));
-  for (const std::string& part : {std::string("three &lt;fibres&gt;"), charts::html_escaped(finding.remedy),
-                                  charts::html_escaped(finding.reason), std::string(": 3. Threshold: 0;")})
-    EXPECT_NE(html.find(part), std::string::npos) << part;
+  EXPECT_TRUE(has_words(findings_section(facts_of(read_results(cell.folder.path())), fitted_here({finding})),
+                        std::string("three &lt;fibres&gt;"), charts::html_escaped(finding.remedy),
+                        charts::html_escaped(finding.reason), std::string(": 3. Threshold: 0;")));
 }
 
 TEST(Report, shows_the_gravest_finding_first_and_prints_units_as_papers_do) {
@@ -282,20 +277,19 @@ TEST(Report, tells_the_noise_from_the_models_error) {
   CellResults results = read_results(cell.folder.path());
   results.fit.relative_l2 = 0.5;
   results.fit.expected_relative_l2 = 0.4;  // 0.4² / 0.5² = 64 %
-  EXPECT_NE(text_of(results).find("64 % is the noise of the beads"), std::string::npos);
-  EXPECT_NE(text_of(results).find("36 % the error of the model"), std::string::npos);
+  EXPECT_TRUE(has_words(text_of(results), "64 % is the noise of the beads", "36 % the error of the model"));
   results.fit.relative_l2 = 0.39;
-  EXPECT_NE(text_of(results).find("All that the model leaves"), std::string::npos);
+  EXPECT_TRUE(has_words(text_of(results), "All that the model leaves"));
 }
 
 TEST(Report, names_no_part_of_the_network_that_beads_do_not_tell) {
   const FakeCell cell;
   CellResults results = read_results(cell.folder.path());
   results.tensions.at(0).identifiable = true;
-  EXPECT_NE(text_of(results).find("nN by the actin network"), std::string::npos);
+  EXPECT_TRUE(has_words(text_of(results), "nN by the actin network"));
   results.tensions.at(0).identifiable = false;
-  EXPECT_EQ(text_of(results).find("nN by the actin network"), std::string::npos);
-  EXPECT_NE(text_of(results).find("The beads do not show"), std::string::npos);
+  EXPECT_FALSE(has_words(text_of(results), "nN by the actin network"));
+  EXPECT_TRUE(has_words(text_of(results), "The beads do not show"));
 }
 
 TEST(Report, says_first_that_the_beads_prefer_another_model) {
@@ -303,9 +297,9 @@ TEST(Report, says_first_that_the_beads_prefer_another_model) {
   CellResults results = read_results(cell.folder.path());
   results.fit.more.emplace_back("best_model_by_bic", std::string("sheet"));
   results.fit.more.emplace_back("bic_of_cables_over_best", 1690.0);
-  EXPECT_NE(facts_of(results).front().find("a sheet that contracts evenly (by 1690 in BIC"), std::string::npos);
+  EXPECT_TRUE(has_words(facts_of(results).front(), "a sheet that contracts evenly (by 1690 in BIC"));
   results.fit.more.back().second = 0.0;
-  EXPECT_EQ(text_of(results).find("prefer another"), std::string::npos);
+  EXPECT_FALSE(has_words(text_of(results), "prefer another"));
 }
 
 TEST(Report, shows_no_more_digits_of_a_tension_than_its_interval_warrants) {
@@ -345,8 +339,8 @@ TEST(StagePage, a_table_shows_three_digits_words_for_truth_and_no_empty_columns)
                                        .columns = {"cell", "part", "angle_deg", "misfit_um", "bic", "n", "kept"}});
   const std::string table = html.substr(0, html.find("download"));
   for (const char* shown : {">122<", ">-16.9<", ">0.0123<", ">3008<", ">2996<", ">24629<", ">yes<", ">no<"})
-    EXPECT_NE(table.find(shown), std::string::npos) << shown << html;
-  EXPECT_EQ(table.find("part"), std::string::npos);
+    EXPECT_TRUE(has_words(table, shown)) << shown << html;
+  EXPECT_FALSE(has_words(table, "part"));
 }
 
 TEST(Compare, without_true_fibres_ids_are_the_same) {
@@ -390,8 +384,7 @@ TEST(Compare, counts_a_missed_and_a_mistyped_fibre) {
   EXPECT_EQ(comparison.n_long_found_and_typed, 3);
   EXPECT_EQ(comparison.fibres.size(), 5u);
   EXPECT_FALSE(comparison.fibres.back().found);
-  const std::string text = comparison_text(cell.folder.path());
-  EXPECT_NE(text.find("3 of 5 found and typed right"), std::string::npos);
+  EXPECT_TRUE(has_words(comparison_text(cell.folder.path()), "3 of 5 found and typed right"));
 }
 
 }  // namespace

@@ -232,7 +232,7 @@ TEST_F(Runner, keeps_an_output_that_was_changed_by_hand) {
   EXPECT_EQ(started(), "fit network");
   EXPECT_EQ(state_of("segment"), StageState::replaced);
   EXPECT_EQ(files::read_text(cell_ / "1_segment/fibres.csv"), "drawn by hand");
-  EXPECT_NE(files::read_text(cell_ / "run.json").find("\"replaced\""), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(cell_ / "run.json"), "\"replaced\""));
   EXPECT_EQ(started(), "");
   options_.redo = {"segment"};
   EXPECT_EQ(started(), "fit network segment");
@@ -291,7 +291,7 @@ TEST_F(Runner, rejects_a_half_given_stage) {
 TEST_F(Runner, starts_nothing_where_an_image_lacks) {
   fs::remove(cell_ / "beads_relaxed.tif");
   const InputError error = test::thrown<InputError>([&] { started(); });
-  EXPECT_NE(std::string(error.what()).find("beads_relaxed.tif"), std::string::npos);
+  EXPECT_TRUE(has_words(error.what(), "beads_relaxed.tif"));
   EXPECT_EQ(calls(), "");
 }
 
@@ -417,7 +417,7 @@ TEST_F(Runner, kills_a_stage_and_what_it_started_when_its_time_is_over) {
   options_.limits.seconds = 0.2;
   const StageFailed error = test::thrown<StageFailed>([&] { started(); });
   EXPECT_EQ(error.failure.exit_code, 6);
-  EXPECT_NE(error.failure.how.find("timed out"), std::string::npos);
+  EXPECT_TRUE(has_words(error.failure.how, "timed out"));
   EXPECT_EQ(run_process({"/bin/sh", "-c", "sleep 4"}).exit_code, 0);
   EXPECT_FALSE(fs::exists(folder_ / "survived"));
 }
@@ -429,7 +429,7 @@ TEST_F(Runner, kills_a_stage_that_takes_too_much_memory) {
   options_.limits.memory_bytes = 100'000'000;
   const StageFailed error = test::thrown<StageFailed>([&] { started(); });
   EXPECT_EQ(error.failure.exit_code, 6);
-  EXPECT_NE(error.failure.how.find("took too much memory"), std::string::npos) << error.failure.how;
+  EXPECT_TRUE(has_words(error.failure.how, "took too much memory"));
 }
 
 TEST_F(Runner, limits_hold_while_a_stage_reads_its_parameters) {
@@ -502,7 +502,7 @@ TEST_F(Runner, names_of_images_are_globs_that_fit_one_file) {
   EXPECT_EQ(resolve_image(cell_, names, "adhesion"), cell_ / "c1_pax.tif");
   names.adhesion = "*_pax.tif";
   const InputError error = test::thrown<InputError>([&] { resolve_image(cell_, names, "adhesion"); });
-  EXPECT_NE(std::string(error.what()).find("c1_pax.tif, c2_pax.tif"), std::string::npos);
+  EXPECT_TRUE(has_words(error.what(), "c1_pax.tif, c2_pax.tif"));
 }
 
 TEST_F(Runner, a_file_whose_name_looks_like_a_glob_is_found) {
@@ -544,15 +544,14 @@ TEST_F(Runner, hand_drawn_rois_that_are_asked_for_by_name_must_be_there) {
 TEST_F(Runner, a_cell_without_an_adhesion_image_is_run_and_one_that_names_its_image_must_have_it) {
   fs::remove(cell_ / "paxillin.tif");
   EXPECT_EQ(started(), "fit network segment track");
-  EXPECT_EQ(files::read_text(cell_ / "1_segment/record.json").find("--adhesion-image"), std::string::npos);
+  EXPECT_FALSE(has_words(files::read_text(cell_ / "1_segment/record.json"), "--adhesion-image"));
   files::write_text(cell_ / "adhesion_mask.png", "mask");
   files::write_text(cell_ / "outline_mask.tif", "mask");
   EXPECT_EQ(started(), "segment");
-  for (const char* flag : {"--adhesion-mask", "--outline-mask"})
-    EXPECT_NE(files::read_text(cell_ / "1_segment/record.json").find(flag), std::string::npos) << flag;
+  EXPECT_TRUE(has_words(files::read_text(cell_ / "1_segment/record.json"), "--adhesion-mask", "--outline-mask"));
   files::write_text(cell_ / "paxillin.tif", "it was elsewhere");
   EXPECT_EQ(started(), "segment");
-  EXPECT_NE(files::read_text(cell_ / "1_segment/record.json").find("--adhesion-image"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(cell_ / "1_segment/record.json"), "--adhesion-image"));
   write_parameters("[images]\nadhesion = \"vinculin.tif\"\n");
   EXPECT_THROW(run_cell(cell_, options_), InputError);
 }
@@ -591,7 +590,7 @@ TEST(Batch, a_failed_cell_does_not_stop_the_others) {
   const auto again = run_batch({cells[0], cells[2]},
                                {.program = folder / "mbtfm", .run = {.stage_folder = folder / "bin", .version = "1"}});
   EXPECT_EQ(again[0].exit_code, exit_code::kOutput);
-  EXPECT_NE(again[0].message.find("give it another name"), std::string::npos);
+  EXPECT_TRUE(has_words(again[0].message, "give it another name"));
   EXPECT_EQ(files::read_text(folder / "a/run.log"), "My notes of Monday\n");
   EXPECT_EQ(again[1].exit_code, 128 + 9) << "a log of ours is replaced";
 }
@@ -616,9 +615,7 @@ TEST(Told, is_one_line_for_the_stage_and_names_effects_that_are_on_unasked) {
                           effect(EffectKind::large_strain, Switch::automatic, false)};
   EXPECT_EQ(text_of(told, Detail::brief),
             "fit      20 tensions (2.3 s)\n  on as your data call for it: finite thickness");
-  const std::string all = text_of(told, Detail::all);
-  for (const char* name : {"finite thickness", "robust loss", "large strain"})
-    EXPECT_NE(all.find(name), all.npos) << all;
+  EXPECT_TRUE(has_words(text_of(told, Detail::all), "finite thickness", "robust loss", "large strain"));
   told.report->effects.clear();
   told.status.why = "its parameters have changed";
   EXPECT_EQ(text_of(told, Detail::brief), "fit      20 tensions (2.3 s; its parameters have changed)");
@@ -650,10 +647,10 @@ TEST_F(Runner, an_image_that_is_missing_is_answered_with_the_one_that_was_probab
     return error ? error->hint : std::string("found");
   };
   EXPECT_EQ(hint("actin.tif"), "found");
-  EXPECT_NE(hint("Actin.TIF").find("there is 'Actin.TIF': capitals count"), std::string::npos);
-  EXPECT_NE(hint("actin.png").find("there is 'actin.png': name it as"), std::string::npos);
-  EXPECT_NE(hint("day1.nd2").find("bfconvert 'day1.nd2' 'day1.ome.tif'"), std::string::npos);
-  EXPECT_NE(hint("notes.txt").find("put it there"), std::string::npos);
+  EXPECT_TRUE(has_words(hint("Actin.TIF"), "there is 'Actin.TIF': capitals count"));
+  EXPECT_TRUE(has_words(hint("actin.png"), "there is 'actin.png': name it as"));
+  EXPECT_TRUE(has_words(hint("day1.nd2"), "bfconvert 'day1.nd2' 'day1.ome.tif'"));
+  EXPECT_TRUE(has_words(hint("notes.txt"), "put it there"));
 }
 
 }  // namespace

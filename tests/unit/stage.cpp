@@ -71,10 +71,8 @@ TEST_F(Stage, outputs_and_the_record_are_in_place_when_it_is_done) {
             0);
   EXPECT_EQ(files::read_text(folder_ / "out/a.csv"), "a");
   EXPECT_EQ(files::read_text(folder_ / "out/deep/b.csv"), "b");
-  const std::string record = files::read_text(folder_ / "record.json");
-  for (const char* word : {"\"stage\": \"example\"", "\"length_um\": 2.5", "\"in.txt\"", "\"out/deep/b.csv\"",
-                           "\"n\": 2", "\"summary\": \"two files\""})
-    EXPECT_NE(record.find(word), std::string::npos) << word << " is not in " << record;
+  EXPECT_TRUE(has_words(files::read_text(folder_ / "record.json"), "\"stage\": \"example\"", "\"length_um\": 2.5",
+                        "\"in.txt\"", "\"out/deep/b.csv\"", "\"n\": 2", "\"summary\": \"two files\""));
 }
 
 struct OnGel {
@@ -184,7 +182,7 @@ TEST_F(Stage, what_has_not_converged_is_written_and_marked) {
                 }),
             4);
   EXPECT_TRUE(fs::exists(folder_ / "out/a.csv"));
-  EXPECT_NE(files::read_text(folder_ / "record.json").find("\"converged\": false"), std::string::npos);
+  EXPECT_TRUE(has_words(files::read_text(folder_ / "record.json"), "\"converged\": false"));
 }
 
 TEST_F(Stage, flags_win_over_the_file_and_the_file_over_the_default) {
@@ -235,21 +233,20 @@ TEST(Manual, has_every_option_and_hides_what_help_hides) {
   bool is_secret = false;
   app.add_flag("--secret", is_secret, "nobody's")->group("");
   const std::string page = stage::manual_page(app);
-  EXPECT_NE(page.find("\\-\\-length_um"), std::string::npos) << page;
-  EXPECT_NE(page.find("\n\\&.that begins"), std::string::npos) << "troff takes a leading point for a command: " << page;
+  EXPECT_TRUE(has_words(page, "\\-\\-length_um"));
+  EXPECT_TRUE(has_words(page, "\n\\&.that begins")) << "troff takes a leading point for a command";
   for (const std::string& text :
        {page, stage::bash_completion(app, {}), stage::zsh_completion(app, {}), stage::fish_completion(app, {})})
-    EXPECT_EQ(text.find("secret"), std::string::npos) << text;
+    EXPECT_FALSE(has_words(text, "secret"));
 }
 
 TEST(Completion, offers_the_words_of_a_choice) {
   CLI::App app("what it does", "mbtfm-example");
   app.add_option("--model", "which");
   const stage::WordsOfFlags words = {{"--model", {"layer", "half-space"}}};
-  EXPECT_NE(stage::bash_completion(app, words).find("--model) COMPREPLY=($(compgen -W 'layer half-space'"),
-            std::string::npos);
-  EXPECT_NE(stage::zsh_completion(app, words).find(":(layer half-space)"), std::string::npos);
-  EXPECT_NE(stage::fish_completion(app, words).find("-l model -d 'which' -x -a 'layer half-space'"), std::string::npos);
+  EXPECT_TRUE(has_words(stage::bash_completion(app, words), "--model) COMPREPLY=($(compgen -W 'layer half-space'"));
+  EXPECT_TRUE(has_words(stage::zsh_completion(app, words), ":(layer half-space)"));
+  EXPECT_TRUE(has_words(stage::fish_completion(app, words), "-l model -d 'which' -x -a 'layer half-space'"));
 }
 
 TEST(Console, colours_warnings_on_a_terminal_alone_and_never_against_no_color) {

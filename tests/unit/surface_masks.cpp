@@ -66,7 +66,7 @@ TEST(Masks, an_overhang_is_refused_by_place) {
     for (int i = 10; i < 20; ++i) voxel(s, i, 7, k) = 1;  // a roof
   for (int k = 8; k < 21; ++k) voxel(s, 10, 7, k) = 1;    // on a wall
   const InvalidData error = test::thrown<InvalidData>([&] { points_of_masks(s); });
-  EXPECT_NE(error.element.find("x, y = 5.75, 3.75"), std::string::npos) << error.what();
+  EXPECT_TRUE(has_words(error.element, "x, y = 5.75, 3.75")) << error.what();
 }
 
 TEST(Masks, with_the_gel_black_or_without_a_surface_are_refused) {
