@@ -1,19 +1,11 @@
 /// other_network STUDY [cells] [first seed]: how well tensions are found on other networks than the truth's, 20 nm of
 /// noise. A table (CSV) on stdout.
 ///   formulations   the default ensemble beside one mesh in the thesis' formulation
-///   truths         truths of several formulations, beads with and without noise; and, beside the fit as it is, one
-///   that
-///                  weighs the data by what the meshes tell of each adhesion's error
-///   edges          sums of the forces' magnitudes by the mesh's edge, tensions alike
-///   totals         total forces as fits of several formulations find them of the same beads
 ///   forces         forces of the adhesions on networks of these truths, found and true, and their stated errors
 ///   wrong          of cells whose segmentation is wrong: tensions, forces of the adhesions without and with what the
 ///                  beads show beside the network, total force
-///   meshes         by the number of meshes, with and without noise: error and processor time
-///   parts          what the error is made of: the beads' noise, the ensemble's size, the truth's own network
 #include <cstdio>
 #include <cstring>
-#include <map>
 #include <string>
 
 #include "mbtfm/tensions/common_motion.h"
@@ -33,8 +25,8 @@ struct OtherNetwork {
   experiment::Experiment experiment;
   Eigen::VectorXd forces_nN;  ///< true, by adhesion
   std::vector<int> adhesion_ids;
-  DisplacementField beads;            ///< noisy
-  tensions::LinearData noisy, exact;  ///< weighted alike
+  DisplacementField beads;  ///< noisy
+  tensions::LinearData noisy;
 };
 
 struct Cells {
@@ -67,12 +59,8 @@ Eigen::VectorXd forces_of(const experiment::Experiment& experiment) {
 OtherNetwork other_network(std::uint64_t seed, const mesh::NetworkParameters* truth = nullptr) {
   drawing::ScenarioParameters p;
   p.seed = seed;
-  OtherNetwork o{.experiment = experiment::simulate(p, 2),
-                 .forces_nN = {},
-                 .adhesion_ids = {},
-                 .beads = {},
-                 .noisy = {},
-                 .exact = {}};
+  OtherNetwork o{
+      .experiment = experiment::simulate(p, 2), .forces_nN = {}, .adhesion_ids = {}, .beads = {}, .noisy = {}};
   o.forces_nN = truth ? forces_on(o.experiment, *truth, seed) : forces_of(o.experiment);
   std::vector<Vec2> points;
   for (const Bead& bead : o.experiment.displacement) points.push_back(bead.position_um);
@@ -98,11 +86,9 @@ OtherNetwork other_network(std::uint64_t seed, const mesh::NetworkParameters* tr
     const double x = normal(random), y = normal(random);
     noisy[i].displacement_um += Vec2{x, y};
     noisy[i].sigma_um = kNoise_um;
-    exact[i].sigma_um = {};  // no error is stated where there is none
   }
   o.beads = noisy;
   o.noisy = tensions::reduce(noisy, substrate::dense_response(compliance), {}, 2, tensions::affine_motions(noisy));
-  o.exact = tensions::reduce(exact, substrate::dense_response(compliance), {}, 2, tensions::affine_motions(exact));
   return o;
 }
 
@@ -142,8 +128,6 @@ Score score(const tensions::EnsembleFit& fit, const OtherNetwork& o) {
   }
   return {std::sqrt(error / size), std::sqrt(over_stated / n), double(n_covered) / n};
 }
-
-double relative_error(const tensions::EnsembleFit& fit, const OtherNetwork& o) { return score(fit, o).relative_error; }
 
 void formulations(Cells cells) {
   const mesh::NetworkParameters thesis = test::thesis_network();
@@ -191,137 +175,6 @@ void forces(Cells cells) {
                     distance_to_boundary_um(o.experiment.cell.outline_um, o.experiment.cell.adhesions[a].position_um));
       }
     }
-  }
-}
-
-/// The cell's total force as fits of several formulations find it, over the true one; and its stated error.
-void totals(Cells cells) {
-  const std::pair<const char*, mesh::NetworkParameters> fits[] = {
-      {"default", {}},
-      {"edges", {.link_reach = mesh::LinkReach::neighbours}},
-      {"edges and rims",
-       {.link_reach = mesh::LinkReach::neighbours, .adhesion_anchor = mesh::AdhesionAnchor::rim, .rim_points = 12}},
-      {"1.2 um", {.edge_length_um = 1.2}},
-      {"0.9 um", {.edge_length_um = 0.9}}};
-  std::printf("cell,truth,fit,true_nN,found_nN,sigma_nN\n");
-  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
-    for (const auto& [name, truth] : true_formulations()) {
-      OtherNetwork o = other_network(c, &truth);
-      for (const auto& [fit_name, formulation] : fits) {
-        const tensions::Estimate total =
-            fit(span(o.experiment.cell, tensions::FitParameters{}.n_meshes, formulation), o.noisy, o).total_force_nN;
-        std::printf("%d,%s,%s,%.5g,%.5g,%.5g\n", int(c), name, fit_name, tensions::total_nN(o.forces_nN), total.value,
-                    total.standard_error);
-      }
-    }
-  }
-}
-
-/// Sums of the forces' magnitudes by the mesh's edge, of the same tensions: of single meshes, and of their mean over
-/// meshes (what of its roughness is left taken off), in all and by kind of adhesion.
-void edges(Cells cells) {
-  constexpr int kMeshes = 8;
-  std::printf("cell,edge_um,kind,adhesions,of_single_nN,of_mean_nN\n");
-  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
-    drawing::ScenarioParameters scenario;
-    scenario.seed = c;
-    const experiment::Experiment experiment = experiment::simulate(scenario, 2);
-    std::vector<double> tensions_nN;
-    for (const Tension& t : experiment.tensions) tensions_nN.push_back(t.tension_nN);
-    for (const double edge_um : {1.5, 1.2, 0.9, 0.6}) {
-      std::vector<Eigen::VectorXd> forces_nN;
-      for (int m = 0; m < kMeshes; ++m) {
-        mesh::NetworkParameters p;
-        p.edge_length_um = edge_um;
-        p.seed = 100 + static_cast<std::uint64_t>(m);
-        Network network = mesh::generate_network(experiment.cell, p).network;
-        for (Link& link : network.links)
-          if (link.fibre_id == 0) link.share *= edge_um / experiment::kReferenceEdge_um;
-        const cables::CableNetwork cables(std::move(network));
-        forces_nN.push_back(cables.adhesion_forces_nN(tensions_nN, cables.equilibrium(tensions_nN)));
-      }
-      struct Sum {
-        int n = 0;
-        double single = 0, mean = 0;
-      };
-      std::map<std::string, Sum> sums;
-      for (std::size_t a = 0; a < experiment.cell.adhesions.size(); ++a) {
-        const auto row = 2 * static_cast<Eigen::Index>(a);
-        Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-        double single = 0, squares = 0;
-        for (const Eigen::VectorXd& f : forces_nN) mean += f.segment<2>(row) / kMeshes;
-        for (const Eigen::VectorXd& f : forces_nN) single += f.segment<2>(row).norm() / kMeshes;
-        const Eigen::Vector2d along = mean.normalized(), across(-along[1], along[0]);
-        for (const Eigen::VectorXd& f : forces_nN) squares += std::pow(across.dot(f.segment<2>(row)), 2);
-        const double variance = squares / (kMeshes - 1.0) / kMeshes;
-        const int id = experiment.cell.adhesions[a].adhesion_id;
-        bool holds_fibre = false;
-        for (const Fibre& f : experiment.cell.fibres)
-          holds_fibre |= f.start_adhesion_id == id || f.end_adhesion_id == id;
-        const double from_edge_um =
-            distance_to_boundary_um(experiment.cell.outline_um, experiment.cell.adhesions[a].position_um);
-        for (const std::string& kind : {std::string("all"), std::string(holds_fibre        ? "fibre"
-                                                                        : from_edge_um < 2 ? "edge"
-                                                                                           : "inside")}) {
-          Sum& sum = sums[kind];
-          ++sum.n;
-          sum.single += single;
-          sum.mean += mean.norm() - variance / (2 * mean.norm());
-        }
-      }
-      for (const auto& [kind, sum] : sums)
-        std::printf("%d,%g,%s,%d,%.5g,%.5g\n", int(c), edge_um, kind.c_str(), sum.n, sum.single, sum.mean);
-    }
-  }
-}
-
-void truths(Cells cells) {
-  std::printf("cell,truth,noise_nm,relative_error,rms_error_over_stated,coverage,relative_error_if_weighed\n");
-  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
-    for (const auto& [name, truth] : true_formulations()) {
-      OtherNetwork o = other_network(c, &truth);
-      const std::vector<cables::CableNetwork> networks = span(o.experiment.cell, tensions::FitParameters{}.n_meshes);
-      for (tensions::LinearData* data : {&o.noisy, &o.exact}) {
-        const tensions::EnsembleFit found = fit(networks, *data, o);
-        const Score s = score(found, o);
-        tensions::LinearData weighed = found.data;
-        weighed.reduced = tensions::whitened(found.data.reduced, *found.model_error);
-        std::printf("%d,%s,%g,%.4f,%.3f,%.3f,%.4f\n", int(c), name, data == &o.noisy ? 1e3 * kNoise_um : 0,
-                    s.relative_error, s.over_stated, s.coverage, relative_error(fit(networks, weighed, o), o));
-      }
-    }
-  }
-}
-
-void meshes(Cells cells) {
-  std::printf("cell,noise_nm,meshes,relative_error,rms_error_over_stated,coverage,processor_s\n");
-  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
-    OtherNetwork o = other_network(c);
-    for (const int n_meshes : {1, 2, 4, 8, 16}) {
-      for (tensions::LinearData* data : {&o.noisy, &o.exact}) {
-        const std::clock_t begin = std::clock();
-        const Score s = score(fit(span(o.experiment.cell, n_meshes), *data, o, 1), o);
-        std::printf("%d,%g,%d,%.4f,%.3f,%.3f,%.2f\n", int(c), data == &o.noisy ? 1e3 * kNoise_um : 0, n_meshes,
-                    s.relative_error, s.over_stated, s.coverage, double(std::clock() - begin) / CLOCKS_PER_SEC);
-      }
-    }
-  }
-}
-
-void parts(Cells cells) {
-  mesh::NetworkParameters fine;
-  fine.edge_length_um = drawing::MechanicsParameters{}.simulation_edge_length_um;
-  std::printf("cell,own_network,meshes_8,meshes_32,exact_meshes_8,exact_meshes_32,exact_meshes_8_of_its_edge\n");
-  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
-    OtherNetwork o = other_network(c);
-    const Cell& cell = o.experiment.cell;
-    std::vector<cables::CableNetwork> own;
-    own.emplace_back(o.experiment.network);
-    const std::vector<cables::CableNetwork> eight = span(cell, 8), many = span(cell, 32);
-    std::printf("%d,%.4f,%.4f,%.4f,", int(c), relative_error(fit(own, o.noisy, o), o),
-                relative_error(fit(eight, o.noisy, o), o), relative_error(fit(many, o.noisy, o), o));
-    std::printf("%.4f,%.4f,%.4f\n", relative_error(fit(eight, o.exact, o), o), relative_error(fit(many, o.exact, o), o),
-                relative_error(fit(span(cell, 8, fine), o.exact, o), o));
   }
 }
 
@@ -437,16 +290,13 @@ int main(int argc, char** argv) {
   Cells cells;
   if (argc > 3) cells.first = static_cast<std::uint64_t>(std::atoi(argv[3]));
   cells.last = cells.first + static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 20) - 1;
-  const std::pair<const char*, void (*)(Cells)> studies[] = {{"edges", edges},   {"formulations", formulations},
-                                                             {"truths", truths}, {"forces", forces},
-                                                             {"totals", totals}, {"meshes", meshes},
-                                                             {"parts", parts},   {"wrong", wrong}};
+  const std::pair<const char*, void (*)(Cells)> studies[] = {
+      {"formulations", formulations}, {"forces", forces}, {"wrong", wrong}};
   for (const auto& [name, study] : studies) {
     if (argc < 2 || std::strcmp(argv[1], name) != 0) continue;
     study(cells);
     return 0;
   }
-  std::fprintf(stderr,
-               "other_network edges|formulations|truths|forces|totals|meshes|parts|wrong [cells] [first seed]\n");
+  std::fprintf(stderr, "other_network formulations|forces|wrong [cells] [first seed]\n");
   return 2;
 }
