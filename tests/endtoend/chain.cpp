@@ -201,8 +201,7 @@ TEST(Chain, tensions_of_the_oracle_cells_come_back_from_the_displacement_of_thei
     for (const auto& entry : fs::recursive_directory_iterator(cell))
       fs::permissions(entry, fs::perms::owner_write, fs::perm_options::add);
     recompute_displacement(cell);
-    EXPECT_TRUE(has_words(output_of("mbtfm run " + cell.string()), "given"))
-        << "segmentation and tracking are skipped";
+    EXPECT_TRUE(has_words(output_of("mbtfm run " + cell.string()), "given")) << "segmentation and tracking are skipped";
     EXPECT_LE(report::compare_with_truth(cell).relative_error, 0.30) << name;
   }
 }

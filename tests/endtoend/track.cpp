@@ -17,14 +17,16 @@ namespace {
 
 using test::fires;
 
-Outcome run_track(const std::string& arguments) { return run_program("mbtfm-track " + arguments); }
-
-std::string files(const test::TemporaryFolder& folder, const std::string& relaxed, const std::string& stressed) {
-  return "--relaxed " + (folder / relaxed).string() + " --stressed " + (folder / stressed).string() + " --out " +
-         (folder / "out").string();
+/// In its folder, to `out`.
+Outcome run_track(const test::TemporaryFolder& folder, const std::string& arguments) {
+  return run_in(folder, "mbtfm-track --out out " + arguments);
 }
 
-void write(const std::filesystem::path& file, images::Image image, std::optional<double> pixel_size_um) {
+std::string files(const std::string& relaxed, const std::string& stressed) {
+  return "--relaxed " + relaxed + " --stressed " + stressed;
+}
+
+void write(const fs::path& file, images::Image image, std::optional<double> pixel_size_um) {
   image.pixel_size_um = pixel_size_um;
   images::write_tiff(file, image);
 }
@@ -34,48 +36,29 @@ void write_series(const test::TemporaryFolder& folder) {
   const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
   const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
   write(folder / "r.tif", one.relaxed, 0.2);
-  std::filesystem::create_directory(folder / "frames");
+  fs::create_directory(folder / "frames");
   write(folder / "frames/t2.tif", one.stressed, 0.2);
   write(folder / "frames/t10.tif", two.stressed, 0.2);
   files::write_text(folder / "frames/._t2.tif", "as a Mac leaves on a stick");
 }
 
-TEST(TrackEndToEnd, images_become_a_displacement_file_in_um) {
-  const test::TemporaryFolder folder;
-  const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
-  write(folder / "r.tif", pair.relaxed, 0.2);
-  write(folder / "s.tif", pair.stressed, 0.2);
-  output_of(run_track(files(folder, "r.tif", "s.tif")));
-  const DisplacementField field = files::read_displacement(folder / "out/displacement.csv");
-  EXPECT_GT(field.size(), 150u);
-  for (const Bead& bead : field) EXPECT_LE(std::max(bead.position_um.x, bead.position_um.y), 128 * 0.2);
-  EXPECT_TRUE(std::filesystem::exists(folder / "out/displacement.vtp"));
-}
-
-TEST(TrackEndToEnd, a_folder_of_frames_is_tracked_in_the_order_of_its_numbers_against_one_relaxed_image) {
+TEST(TrackEndToEnd, frames_are_tracked_in_the_order_of_their_numbers_and_one_that_is_lost_again) {
   const test::TemporaryFolder folder;
   write_series(folder);
-  output_of(run_track(files(folder, "r.tif", "frames")));
+  const std::string arguments = files("r.tif", "frames") + " --record out/record.json";
+  output_of(run_track(folder, arguments));
   const files::CsvTable frames(folder / "out/frames.csv");
   ASSERT_EQ(frames.n_rows(), 2);
   EXPECT_NEAR(frames.number(0, "drift_x_um"), 0.4, 0.005);
   EXPECT_NEAR(frames.number(1, "drift_x_um"), -0.6, 0.005);
-  const auto first = files::read_displacement(folder / "out/displacement_0001.csv");
-  EXPECT_EQ(first.size(), files::read_displacement(folder / "out/displacement_0002.csv").size());
-  EXPECT_EQ(files::read_text(folder / "out/displacement.csv"), files::read_text(folder / "out/displacement_0001.csv"));
-}
-
-TEST(TrackEndToEnd, a_frame_that_is_lost_is_tracked_again_and_the_others_are_not) {
-  const test::TemporaryFolder folder;
-  write_series(folder);
-  const std::string arguments = files(folder, "r.tif", "frames") + " --record " + (folder / "out/record.json").string();
-  ASSERT_EQ(run_track(arguments).code, 0);
+  const std::string first = files::read_text(folder / "out/displacement_0001.csv");
+  EXPECT_EQ(files::read_text(folder / "out/displacement.csv"), first);
   const std::string list = files::read_text(folder / "out/frames.csv"),
                     lost = files::read_text(folder / "out/displacement_0002.csv");
   const std::string other = files::read_text(folder / "out/displacement.csv") + "1,1,0,0,0.1,by hand\n";
   files::write_text(folder / "out/displacement_0001.csv", other);  // no tracking would give it
-  std::filesystem::remove(folder / "out/displacement_0002.csv");
-  output_of(run_track(arguments + " --kept " + (folder / "out").string()));
+  fs::remove(folder / "out/displacement_0002.csv");
+  output_of(run_track(folder, arguments + " --kept out"));
   EXPECT_EQ(files::read_text(folder / "out/displacement_0002.csv"), lost);
   EXPECT_EQ(files::read_text(folder / "out/displacement_0001.csv"), other);
   EXPECT_EQ(files::read_text(folder / "out/frames.csv"), list);
@@ -85,83 +68,23 @@ TEST(TrackEndToEnd, a_frame_that_is_lost_is_tracked_again_and_the_others_are_not
 TEST(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
   const test::TemporaryFolder folder;
   files::write_text(folder / "piv.csv", "x,y,u,v\n0,0,1,0\n10,0,1,0\n0,10,1,0\n10,10,NaN,0\n");
-  const std::string out = " --out " + (folder / "out").string();
-  const std::string given = "--displacement " + (folder / "piv.csv").string() + out;
+  const std::string given = "--displacement piv.csv";
   const std::string columns = " --x_column x --y_column y --ux_column u --uy_column v";
-  EXPECT_TRUE(has_words(output_of(run_track(given + columns + " --length_unit px --pixel_size_um 0.5")), "1 flagged"));
+  EXPECT_TRUE(
+      has_words(output_of(run_track(folder, given + columns + " --length_unit px --pixel_size_um 0.5")), "1 flagged"));
   const DisplacementField field = files::read_displacement(folder / "out/displacement.csv");
   ASSERT_EQ(field.size(), 4u);
   EXPECT_EQ(field[1].position_um, (Vec2{5.25, 0.25}));
   EXPECT_EQ(field[1].displacement_um, (Vec2{0.5, 0}));
   EXPECT_EQ(field[3].flag, "not a number");
-  EXPECT_EQ(run_track(given).code, 3);                                                  // other columns
-  EXPECT_EQ(run_track(given + columns + " --length_unit px").code, 2);                  // of which size?
-  EXPECT_EQ(run_track(given + " --relaxed " + (folder / "piv.csv").string()).code, 2);  // which of them?
-  EXPECT_EQ(run_track(out).code, 2);
-}
-
-TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
-  const test::TemporaryFolder folder;
-  const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330});
-  const auto small = test::draw_bead_pair({}, {.width = 96, .n_beads = 200});
-  const auto dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0});
-  write(folder / "r.tif", pair.relaxed, 0.2);
-  write(folder / "small.tif", small.stressed, 0.2);
-  write(folder / "dark.tif", dark.stressed, 0.2);
-  write(folder / "other_scale.tif", pair.stressed, 0.25);
-  write(folder / "no_scale.tif", pair.stressed, std::nullopt);
-  std::filesystem::copy_file(folder / "r.tif", folder / "cut.tif");
-  std::filesystem::resize_file(folder / "cut.tif", 3000);
-  const struct {
-    const char *relaxed, *stressed;
-    std::vector<std::string> said;
-  } cases[] = {{"r.tif", "none.tif", {"none.tif"}},
-               {"r.tif", "cut.tif", {"cut.tif"}},
-               {"r.tif", "small.tif", {"small.tif", "r.tif", "128 x 128", "96 x 96"}},
-               {"r.tif", "dark.tif", {"dark.tif", "beads", "none"}},
-               {"r.tif", "other_scale.tif", {"other_scale.tif", "r.tif", "0.25"}},
-               {"no_scale.tif", "no_scale.tif", {"no_scale.tif", "calibration", "pixel_size_um"}}};
-  for (const auto& c : cases) {
-    const std::string ended = output_of(run_track(files(folder, c.relaxed, c.stressed)), 3);
-    for (const std::string& word : c.said) EXPECT_TRUE(has_words(ended, word));
-    EXPECT_FALSE(std::filesystem::exists(folder / "out/displacement.csv")) << c.stressed;
-  }
-}
-
-TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
-  const test::TemporaryFolder folder;
-  const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
-  const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
-  const auto dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0});
-  write(folder / "r.tif", one.relaxed, 0.2);
-  std::filesystem::create_directory(folder / "frames");
-  write(folder / "frames/a.tif", dark.stressed, 0.2);
-  write(folder / "frames/b.tif", one.stressed, 0.2);
-  files::write_text(folder / "frames/c.tif", "no image");
-  write(folder / "frames/d.tif", two.stressed, 0.2);
-  EXPECT_TRUE(has_words(output_of(run_track(files(folder, "r.tif", "frames")), 4), "2 of 4 frames"));
-  const files::CsvTable frames(folder / "out/frames.csv");
-  ASSERT_EQ(frames.n_rows(), 4);
-  EXPECT_TRUE(has_words(frames.text(0, "refused"), "bright beads"));
-  EXPECT_EQ(frames.text(0, "n_tracked"), "");
-  EXPECT_EQ(frames.text(1, "refused"), "");
-  EXPECT_TRUE(has_words(frames.text(2, "refused"), "c.tif"));
-  EXPECT_NEAR(frames.number(3, "drift_x_um"), -0.6, 0.005);
-  for (const char* missing : {"1", "3"})
-    EXPECT_FALSE(std::filesystem::exists(folder / ("out/displacement_000" + std::string(missing) + ".csv")));
-  EXPECT_EQ(files::read_text(folder / "out/displacement.csv"), files::read_text(folder / "out/displacement_0002.csv"));
-  EXPECT_EQ(files::read_displacement(folder / "out/displacement_0004.csv").size(),
-            files::read_displacement(folder / "out/displacement.csv").size());
-  std::filesystem::remove(folder / "frames/b.tif");
-  std::filesystem::remove(folder / "frames/d.tif");
-  std::filesystem::remove_all(folder / "out");
-  EXPECT_EQ(run_track(files(folder, "r.tif", "frames")).code, 3);  // of no frame is there a field
-  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  EXPECT_EQ(run_track(folder, given).code, 3);                                  // other columns
+  EXPECT_EQ(run_track(folder, given + columns + " --length_unit px").code, 2);  // of which size?
+  EXPECT_EQ(run_track(folder, given + " --relaxed piv.csv").code, 2);           // which of them?
+  EXPECT_EQ(run_track(folder, "").code, 2);
 }
 
 /// A float TIFF of these images, as ImageJ writes a hyperstack.
-void write_stack(const std::filesystem::path& file, const std::vector<const images::Image*>& images,
-                 const std::string& dimensions) {
+void write_stack(const fs::path& file, const std::vector<const images::Image*>& images, const std::string& dimensions) {
   TIFF* tiff = TIFFOpen(file.c_str(), "w");
   const std::string description = "ImageJ=1.53t\nimages=" + std::to_string(images.size()) + "\n" + dimensions;
   for (const images::Image* image : images) {
@@ -182,6 +105,78 @@ void write_stack(const std::filesystem::path& file, const std::vector<const imag
   TIFFClose(tiff);
 }
 
+TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
+  const test::TemporaryFolder folder;
+  const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330});
+  const images::Image dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
+  images::Image one = dark, broken = pair.stressed;
+  test::add_bead(one, {60.3, 50.8}, 3000, 1.3);
+  broken.at(6, 11) = std::numeric_limits<float>::quiet_NaN();
+  write(folder / "r.tif", pair.relaxed, 0.2);
+  write(folder / "s.tif", pair.stressed, 0.2);
+  write(folder / "small.tif", test::draw_bead_pair({}, {.width = 96, .n_beads = 200}).stressed, 0.2);
+  write(folder / "dark.tif", dark, 0.2);
+  write(folder / "one.tif", one, 0.2);
+  write(folder / "other_scale.tif", pair.stressed, 0.25);
+  write(folder / "no_scale.tif", pair.stressed, std::nullopt);
+  write_stack(folder / "nan.tif", {&broken}, "");
+  fs::copy_file(folder / "r.tif", folder / "cut.tif");
+  fs::resize_file(folder / "cut.tif", 3000);
+  const struct {
+    const char *relaxed, *stressed;
+    std::vector<std::string> said;
+  } cases[] = {{"r.tif", "none.tif", {"none.tif"}},
+               {"r.tif", "cut.tif", {"cut.tif"}},
+               {"r.tif", "small.tif", {"small.tif", "r.tif", "128 x 128", "96 x 96"}},
+               {"dark.tif", "s.tif", {"dark.tif", "the relaxed image", "beads", "none"}},
+               {"r.tif", "dark.tif", {"dark.tif", "the stressed image", "beads", "none"}},
+               {"dark.tif", "dark.tif", {"beads", "none"}},
+               {"one.tif", "s.tif", {"one.tif", "8 beads at least", "found 1"}},
+               {"r.tif", "one.tif", {"one.tif", "8 beads at least", "found 1"}},
+               {"r.tif", "nan.tif", {"nan.tif", "finite pixel values", "NaN"}},
+               {"nan.tif", "s.tif", {"nan.tif", "finite pixel values", "NaN"}},
+               {"r.tif", "r.tif", {"two images", "the same pixels in both"}},
+               {"r.tif", "other_scale.tif", {"other_scale.tif", "r.tif", "0.25"}},
+               {"no_scale.tif", "no_scale.tif", {"no_scale.tif", "calibration", "pixel_size_um"}}};
+  for (const auto& c : cases) {
+    const Outcome ended = run_track(folder, files(c.relaxed, c.stressed));
+    EXPECT_EQ(ended.code, 3) << c.relaxed << ' ' << c.stressed << ended.output;
+    for (const std::string& word : c.said) EXPECT_TRUE(has_words(ended.output, word));
+    EXPECT_FALSE(fs::exists(folder / "out")) << c.relaxed << ' ' << c.stressed;
+  }
+}
+
+TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
+  const test::TemporaryFolder folder;
+  const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
+  const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
+  const auto dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0});
+  write(folder / "r.tif", one.relaxed, 0.2);
+  fs::create_directory(folder / "frames");
+  write(folder / "frames/a.tif", dark.stressed, 0.2);
+  write(folder / "frames/b.tif", one.stressed, 0.2);
+  files::write_text(folder / "frames/c.tif", "no image");
+  write(folder / "frames/d.tif", two.stressed, 0.2);
+  EXPECT_TRUE(has_words(output_of(run_track(folder, files("r.tif", "frames")), 4), "2 of 4 frames"));
+  const files::CsvTable frames(folder / "out/frames.csv");
+  ASSERT_EQ(frames.n_rows(), 4);
+  EXPECT_TRUE(has_words(frames.text(0, "refused"), "bright beads"));
+  EXPECT_EQ(frames.text(0, "n_tracked"), "");
+  EXPECT_EQ(frames.text(1, "refused"), "");
+  EXPECT_TRUE(has_words(frames.text(2, "refused"), "c.tif"));
+  EXPECT_NEAR(frames.number(3, "drift_x_um"), -0.6, 0.005);
+  for (const char* missing : {"1", "3"})
+    EXPECT_FALSE(fs::exists(folder / ("out/displacement_000" + std::string(missing) + ".csv")));
+  EXPECT_EQ(files::read_text(folder / "out/displacement.csv"), files::read_text(folder / "out/displacement_0002.csv"));
+  EXPECT_EQ(files::read_displacement(folder / "out/displacement_0004.csv").size(),
+            files::read_displacement(folder / "out/displacement.csv").size());
+  fs::remove(folder / "frames/b.tif");
+  fs::remove(folder / "frames/d.tif");
+  fs::remove_all(folder / "out");
+  EXPECT_EQ(run_track(folder, files("r.tif", "frames")).code, 3);  // of no frame is there a field
+  EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
 TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
   const test::TemporaryFolder folder;
   const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
@@ -191,22 +186,22 @@ TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
   write_stack(folder / "s.tif", {&other, &one.stressed, &other, &two.stressed, &other, &one.relaxed},
               "channels=2\nslices=1\nframes=3\nhyperstack=true\n");
   // of a series the places are those of its first frame, of a frame alone its own: the relaxed one is the same for both
-  const std::string both = files(folder, "s.tif", "s.tif") + " --pixel_size_um 0.2 --cell_with relaxed";
+  const std::string both = files("s.tif", "s.tif") + " --pixel_size_um 0.2 --cell_with relaxed";
   const std::string relaxed = " --relaxed_channel 2 --relaxed_time 3", beads = " --stressed_channel 2";
-  Outcome ended = run_track(both + relaxed + beads + " --stressed_time 1 --stressed_last 2");
+  Outcome ended = run_track(folder, both + relaxed + beads + " --stressed_time 1 --stressed_last 2");
   ASSERT_EQ(ended.code, 0) << ended.output;
   const files::CsvTable frames(folder / "out/frames.csv");
   ASSERT_EQ(frames.n_rows(), 2);
   EXPECT_NEAR(frames.number(0, "drift_x_um"), 0.4, 0.005);
   EXPECT_NEAR(frames.number(1, "drift_x_um"), -0.6, 0.005);
   const std::string of_time = files::read_text(folder / "out/displacement_0002.csv");
-  ended = run_track(both + " --relaxed_page 6 --stressed_page 4");
+  ended = run_track(folder, both + " --relaxed_page 6 --stressed_page 4");
   ASSERT_EQ(ended.code, 0) << ended.output;
   EXPECT_EQ(files::read_text(folder / "out/displacement.csv"), of_time);
-  EXPECT_EQ(run_track(both).code, 3);                                           // which of them?
-  EXPECT_EQ(run_track(both + relaxed + beads).code, 3);                         // of which time?
-  EXPECT_EQ(run_track(both + relaxed + beads + " --stressed_last 2").code, 2);  // from where?
-  EXPECT_EQ(run_track(both + relaxed + beads + " --stressed_time 3 --stressed_last 2").code, 2);
+  EXPECT_EQ(run_track(folder, both).code, 3);                                           // which of them?
+  EXPECT_EQ(run_track(folder, both + relaxed + beads).code, 3);                         // of which time?
+  EXPECT_EQ(run_track(folder, both + relaxed + beads + " --stressed_last 2").code, 2);  // from where?
+  EXPECT_EQ(run_track(folder, both + relaxed + beads + " --stressed_time 3 --stressed_last 2").code, 2);
 }
 
 TEST(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
@@ -214,48 +209,20 @@ TEST(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
   const auto pair = test::draw_bead_pair(test::ring_of_adhesions(384, 6), {.width = 384, .n_beads = 2950});
   write(folder / "r.tif", pair.relaxed, 0.2);
   write(folder / "s.tif", pair.stressed, 0.2);
-  const Outcome sound = run_track(files(folder, "r.tif", "s.tif"));
+  const Outcome sound = run_track(folder, files("r.tif", "s.tif"));
   EXPECT_EQ(sound.code, 0);
+  const DisplacementField field = files::read_displacement(folder / "out/displacement.csv");
+  EXPECT_GT(field.size(), 1500u);
+  for (const Bead& bead : field) EXPECT_LE(std::max(bead.position_um.x, bead.position_um.y), 384 * 0.2);
+  EXPECT_TRUE(fs::exists(folder / "out/displacement.vtp"));
   test::expect_silent({"nothing-moves", "moves-outward", "tracked-by-correlation", "defocused", "beads-not-round",
                        "saturated", "lossy-image", "unusual-value"},
                       sound.output);
-  EXPECT_TRUE(has_words(output_of(run_track(files(folder, "s.tif", "r.tif")), 3),
+  EXPECT_TRUE(has_words(output_of(run_track(folder, files("s.tif", "r.tif")), 3),
                         "exchange the files of --stressed and --relaxed"));
-  const Outcome pushed = run_track(files(folder, "s.tif", "r.tif") + " --may_push");
+  const Outcome pushed = run_track(folder, files("s.tif", "r.tif") + " --may_push");
   EXPECT_EQ(pushed.code, 0);
   EXPECT_TRUE(fires("moves-outward", pushed.output)) << pushed.output;
-}
-
-TEST(TrackEndToEnd, images_that_cannot_be_a_pair_are_refused_with_the_reason) {
-  const test::TemporaryFolder folder;
-  const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330});
-  images::Image dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
-  images::Image one = dark;
-  test::add_bead(one, {60.3, 50.8}, 3000, 1.3);
-  images::Image broken = pair.stressed;
-  broken.at(6, 11) = std::numeric_limits<float>::quiet_NaN();
-  write(folder / "r.tif", pair.relaxed, 0.2);
-  write(folder / "s.tif", pair.stressed, 0.2);
-  write(folder / "dark.tif", dark, 0.2);
-  write(folder / "one.tif", one, 0.2);
-  write_stack(folder / "nan.tif", {&broken}, "");
-  const struct {
-    const char *relaxed, *stressed;
-    std::vector<std::string> said;
-  } cases[] = {{"dark.tif", "s.tif", {"dark.tif", "the relaxed image", "beads", "none"}},
-               {"r.tif", "dark.tif", {"dark.tif", "the stressed image", "beads", "none"}},
-               {"dark.tif", "dark.tif", {"beads", "none"}},
-               {"one.tif", "s.tif", {"one.tif", "8 beads at least", "found 1"}},
-               {"r.tif", "one.tif", {"one.tif", "8 beads at least", "found 1"}},
-               {"r.tif", "nan.tif", {"nan.tif", "finite pixel values", "NaN"}},
-               {"nan.tif", "s.tif", {"nan.tif", "finite pixel values", "NaN"}},
-               {"r.tif", "r.tif", {"two images", "the same pixels in both"}}};
-  for (const auto& c : cases) {
-    const Outcome ended = run_track(files(folder, c.relaxed, c.stressed));
-    EXPECT_EQ(ended.code, 3) << c.relaxed << ' ' << c.stressed << ended.output;
-    for (const std::string& word : c.said) EXPECT_TRUE(has_words(ended.output, word)) << word;
-    EXPECT_FALSE(std::filesystem::exists(folder / "out"));
-  }
 }
 
 TEST(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_told_of) {
@@ -264,7 +231,7 @@ TEST(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_told_of) {
   for (const double pixel_um : {0.2, 0.05}) {
     write(folder / "r.tif", pair.relaxed, pixel_um);
     write(folder / "s.tif", pair.stressed, pixel_um);
-    const std::string ended = output_of(run_track(files(folder, "r.tif", "s.tif")));
+    const std::string ended = output_of(run_track(folder, files("r.tif", "s.tif")));
     EXPECT_EQ(ended.find("of the beads in the images is 0.0") != std::string::npos, pixel_um < 0.1) << ended;
     EXPECT_EQ(fires("unusual-value", ended), pixel_um < 0.1) << ended;
   }
@@ -275,7 +242,7 @@ TEST(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_to
   const auto told = [&](const test::BeadPair& pair) {
     write(folder / "r.tif", pair.relaxed, 0.2);
     write(folder / "s.tif", pair.stressed, 0.2);
-    const std::string ended = output_of(run_track(files(folder, "r.tif", "s.tif")));
+    const std::string ended = output_of(run_track(folder, files("r.tif", "s.tif")));
     return ended;
   };
   test::BeadScene scene{.width = 256, .n_beads = 1300, .drift = {2, 1}};
@@ -318,7 +285,7 @@ TEST(TrackEndToEnd, dots_in_a_lattice_find_their_partners_and_a_choice_is_told) 
   write(folder / "r.tif", lattice({}, false, 1), 0.1);
   for (const std::uint64_t seed : {2, 3}) {
     write(folder / "s.tif", lattice({0.3, -0.2}, true, seed), 0.1);
-    const std::string told = output_of(run_track(files(folder, "r.tif", "s.tif")));
+    const std::string told = output_of(run_track(folder, files("r.tif", "s.tif")));
     EXPECT_FALSE(fires("pattern-repeats", told)) << told;
     int n_good = 0;
     for (const Bead& bead : files::read_displacement(folder / "out/displacement.csv")) {
@@ -330,7 +297,7 @@ TEST(TrackEndToEnd, dots_in_a_lattice_find_their_partners_and_a_choice_is_told) 
     EXPECT_GT(n_good, 0.9 * 16 * 16) << seed;
   }
   write(folder / "s.tif", lattice({7, 0}, true, 4), 0.1);
-  const std::string told = output_of(run_track(files(folder, "r.tif", "s.tif")));
+  const std::string told = output_of(run_track(folder, files("r.tif", "s.tif")));
   EXPECT_TRUE(fires("pattern-repeats", told)) << told;
 }
 
@@ -344,9 +311,7 @@ TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_
   }
   files::write_text(folder / "still.csv", still);
   files::write_text(folder / "twice.csv", twice + "3,3,0.03,0\n");
-  const auto given = [&](const char* file) {
-    return run_track("--displacement " + (folder / file).string() + " --out " + (folder / "out").string());
-  };
+  const auto given = [&](const std::string& file) { return run_track(folder, "--displacement " + file); };
   const Outcome of_still = given("still.csv");
   EXPECT_EQ(of_still.code, 0);
   EXPECT_TRUE(fires("nothing-moves", of_still.output)) << of_still.output;
@@ -372,9 +337,8 @@ TEST(TrackEndToEnd, a_table_of_another_program_is_named_and_its_masked_vectors_c
   }
   files::write_text(folder / "masked.txt", table);
   files::write_text(folder / "sound.txt", sound);
-  const auto given = [&](const char* file) {
-    return run_track("--pixel_size_um 0.1 --displacement " + (folder / file).string() + " --out " +
-                     (folder / "out").string());
+  const auto given = [&](const std::string& file) {
+    return run_track(folder, "--pixel_size_um 0.1 --displacement " + file);
   };
   const std::string of_sound = output_of(given("sound.txt"));
   EXPECT_FALSE(fires("vectors-masked", of_sound)) << of_sound;

@@ -17,53 +17,49 @@
 namespace mbtfm::tractions {
 namespace {
 
-TEST(TractionProgram, writes_what_it_says_for_every_method) {
-  const test::TemporaryFolder folder;
+class TractionProgram : public testing::Test {
+ protected:
+  void SetUp() override {
+    files::write_text(folder / "cell.toml",
+                      "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
+  }
+  Outcome run(const std::string& more = {}) const {
+    return run_in(folder, "mbtfm-traction --gel cell.toml --displacement displacement.csv --out traction.csv " + more);
+  }
+  test::TemporaryFolder folder;
+};
+
+TEST_F(TractionProgram, writes_what_it_says_for_every_method) {
   const test::EllipseScene scene = test::ellipse_scene(48, 0.03);
   files::write_displacement(folder / "displacement.csv", scene.field);
   files::write_adhesions(folder / "adhesions.csv", scene.adhesions);
   files::write_outline(folder / "outline.csv", {{8, 8}, {57, 8}, {57, 57}, {8, 57}});
-  files::write_text(
-      folder / "cell.toml",
-      "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n[traction]\nelement_um = 6\n");
-  const auto at = [&](const std::string& name) { return (folder / name).string(); };
   for (const std::string method : {"fttc", "sparse", "trpf", "bem", "adhesion-forces"}) {
-    test::output_of("mbtfm-traction --method " + method + " --gel " + at("cell.toml") + " --displacement " +
-                    at("displacement.csv") + " --adhesions " + at("adhesions.csv") + " --outline " + at("outline.csv") +
-                    " --out " + at(method + ".csv"));
-    const files::CsvTable map(folder / (method + ".csv"));
+    for (const auto& entry : fs::directory_iterator(folder.path()))
+      if (entry.path().filename().string().starts_with("traction")) fs::remove(entry);
+    output_of(run("--element_um 6 --adhesions adhesions.csv --outline outline.csv --method " + method));
+    const files::CsvTable map(folder / "traction.csv");
     map.require({"x_um", "y_um", "tx_kPa", "ty_kPa"});
     EXPECT_GT(map.n_rows(), 0);
-    EXPECT_EQ(files::read_adhesion_forces(folder / (method + "_adhesion_forces.csv")).size(), 8u);
-    for (const char* ending : {".vtp", ".json"})
-      EXPECT_TRUE(fs::exists(folder / (method + ending))) << method << ending;
+    EXPECT_EQ(files::read_adhesion_forces(folder / "traction_adhesion_forces.csv").size(), 8u);
     const bool has_scan = method != "sparse" && method != "adhesion-forces";
-    for (const char* ending : {"_lambda.csv", "_lambda.svg"})
-      EXPECT_EQ(fs::exists(folder / (method + ending)), has_scan) << method << ending;
+    for (const auto& [ending, is_there] :
+         {std::pair{".vtp", true}, {".json", true}, {"_lambda.csv", has_scan}, {"_lambda.svg", has_scan}})
+      EXPECT_EQ(fs::exists(folder / (std::string("traction") + ending)), is_there) << method << ending;
   }
 }
 
-TEST(TractionProgram, warns_where_tractions_push_outward_as_after_a_swap_of_the_images) {
-  const test::TemporaryFolder folder;
+TEST_F(TractionProgram, warns_where_tractions_push_outward_as_after_a_swap_of_the_images) {
   test::EllipseScene scene = test::ellipse_scene(48, 0.1);
-  files::write_text(folder / "cell.toml",
-                    "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
   for (const bool is_swapped : {false, true}) {
     for (Bead& b : scene.field) b.displacement_um = (is_swapped ? -1.0 : 1.0) * b.displacement_um;
     files::write_displacement(folder / "displacement.csv", scene.field);
-    for (const std::string method : {"fttc", "sparse"}) {
-      const std::string run = test::output_of(
-          "mbtfm-traction --method " + method + " --gel " + (folder / "cell.toml").string() + " --displacement " +
-          (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
-      EXPECT_EQ(run.find("swapped") != std::string::npos, is_swapped) << method << ": " << run;
-    }
+    for (const std::string method : {"fttc", "sparse"})
+      EXPECT_EQ(has_words(output_of(run("--method " + method)), "swapped"), is_swapped) << method;
   }
 }
 
-TEST(TractionProgram, refuses_bad_displacements_and_names_them) {
-  const test::TemporaryFolder folder;
-  files::write_text(folder / "cell.toml",
-                    "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
+TEST_F(TractionProgram, refuses_bad_displacements_and_names_them) {
   const std::string header = "x_um,y_um,ux_um,uy_um,sigma_um\n", bead = "1,2,0.1,0.1,0.01\n";
   const std::pair<std::string, std::string> cases[] = {
       {header, "three beads"},                                            // none
@@ -73,24 +69,16 @@ TEST(TractionProgram, refuses_bad_displacements_and_names_them) {
       {header + "1,2,0,0,0.01\n2,4,0,0,0.01\n3,5,0,0,0.01\n", "3 zeros"}};
   for (const auto& [text, word] : cases) {
     files::write_text(folder / "displacement.csv", text);
-    const std::string run =
-        test::output_of("mbtfm-traction --gel " + (folder / "cell.toml").string() + " --displacement " +
-                            (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string(),
-                        3);
-    EXPECT_TRUE(has_words(run, word));
+    EXPECT_TRUE(has_words(output_of(run(), 3), word));
     EXPECT_FALSE(fs::exists(folder / "traction.csv"));
   }
 }
 
-TEST(TractionProgram, leaves_out_vectors_that_share_a_value_as_a_mask_writes_it) {
-  const test::TemporaryFolder folder;
+TEST_F(TractionProgram, leaves_out_vectors_that_share_a_value_as_a_mask_writes_it) {
   test::EllipseScene scene = test::ellipse_scene(48, 0.05);
   const auto total_nN = [&] {
     files::write_displacement(folder / "displacement.csv", scene.field);
-    const std::string run =
-        test::output_of("mbtfm-traction --youngs_modulus_kPa 8.4 --displacement " +
-                        (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
-    EXPECT_EQ(run.find("vectors-masked") != std::string::npos, scene.field[0].displacement_um.x == -1) << run;
+    EXPECT_EQ(has_words(output_of(run()), "vectors-masked"), scene.field[0].displacement_um.x == -1);
     return files::JsonRecord(folder / "traction.json", "figures").at("total_force_nN").number();
   };
   const double whole_nN = total_nN();
@@ -98,39 +86,30 @@ TEST(TractionProgram, leaves_out_vectors_that_share_a_value_as_a_mask_writes_it)
   EXPECT_NEAR(total_nN() / whole_nN, 1, 0.1);  // one bead in 17 less; read as -1 um they make it many times as large
 }
 
-TEST(TractionProgram, takes_a_field_without_errors_and_says_which_it_assumed) {
-  const test::TemporaryFolder folder;
+TEST_F(TractionProgram, takes_a_field_without_errors_and_says_which_it_assumed) {
   constexpr double kNoise = 0.05;
   const test::EllipseScene scene = test::ellipse_scene(48, kNoise);
   files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
   for (const Bead& b : scene.field)
     csv.add(b.position_um.x).add(b.position_um.y).add(b.displacement_um.x).add(b.displacement_um.y).end_row();
   files::write_text(folder / "displacement.csv", csv.str());
-  const auto run = [&](const std::string& more) {
-    return test::run_program("mbtfm-traction --youngs_modulus_kPa 8.4 --displacement " +
-                             (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string() +
-                             more);
-  };
-  EXPECT_TRUE(has_words(test::output_of(run("")), "the field states no errors"));
+  EXPECT_TRUE(has_words(output_of(run()), "the field states no errors"));
   // 2304 beads: half of them tell the noise to 2.5 %
   const double assumed_um = files::JsonRecord(folder / "traction.json", "figures").at("assumed_sigma_um").number();
   EXPECT_NEAR(assumed_um / (kNoise * scene.largest_um), 1, 0.075);
 }
 
-TEST(TractionProgram, refuses_a_modulus_in_pascal_unless_told_to_and_takes_an_incompressible_gel) {
-  const test::TemporaryFolder folder;
-  const test::EllipseScene scene = test::ellipse_scene(32, 0.05);
-  files::write_displacement(folder / "displacement.csv", scene.field);
-  const auto run = [&](const std::string& toml) {
-    files::write_text(folder / "cell.toml", toml);
-    return test::run_program("mbtfm-traction --gel " + (folder / "cell.toml").string() + " --displacement " +
-                             (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
+TEST_F(TractionProgram, refuses_a_modulus_in_pascal_unless_told_to_and_takes_an_incompressible_gel) {
+  files::write_displacement(folder / "displacement.csv", test::ellipse_scene(32, 0.05).field);
+  const auto run_on = [&](const std::string& toml) {
+    files::write_text(folder / "cell.toml", "[gel]\nyoungs_modulus_kPa = " + toml);
+    return run();
   };
-  EXPECT_TRUE(has_words(test::output_of(run("[gel]\nyoungs_modulus_kPa = 8400\n"), 3), "8400 Pa is 8.4 kPa"));
+  EXPECT_TRUE(has_words(output_of(run_on("8400\n"), 3), "8400 Pa is 8.4 kPa"));
   EXPECT_FALSE(fs::exists(folder / "traction.csv"));
-  EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8400\n[checks]\nallow = [\"youngs_modulus_kPa\"]\n").code, 0);
-  EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.5\n").code, 0);
-  EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.501\n").code, 3);
+  EXPECT_EQ(run_on("8400\n[checks]\nallow = [\"youngs_modulus_kPa\"]\n").code, 0);
+  EXPECT_EQ(run_on("8.4\npoisson_ratio = 0.5\n").code, 0);
+  EXPECT_EQ(run_on("8.4\npoisson_ratio = 0.501\n").code, 3);
 }
 
 /// Two adhesions on a wave that pull at each other and at the gel, and beads below.
@@ -140,11 +119,9 @@ class TractionInSpace : public testing::Test {
     files::write_text(folder_ / "cell.toml",
                       "[gel]\nyoungs_modulus_kPa = 10\npoisson_ratio = 0.45\nthickness_um = 30\n[substrate]\n"
                       "displacement_tolerance = 0\n");
-    const auto surface = test::run_program(
-        "mbtfm-surface --formula 'wave amplitude_um=3 period_um=40' --low_x_um -24 --low_y_um -24 --high_x_um 24 "
-        "--high_y_um 24 --out " +
-        at("surface.vtp"));
-    ASSERT_EQ(surface.code, 0) << surface.output;
+    output_of(run_in(folder_,
+                     "mbtfm-surface --formula 'wave amplitude_um=3 period_um=40' --low_x_um -24 --low_y_um -24 "
+                     "--high_x_um 24 --high_y_um 24 --out surface.vtp"));
     files::write_text(
         folder_ / "adhesions.csv",
         "adhesion_id,x_um,y_um,area_um2,major_axis_um,minor_axis_um,angle_deg,eccentricity,mean_intensity\n"
@@ -156,11 +133,9 @@ class TractionInSpace : public testing::Test {
     for (int b = 0; b < 350; ++b)
       points += brief(across(random)) + "," + brief(across(random)) + "," + brief(down(random)) + "\n";
     files::write_text(folder_ / "points.csv", points);
-    const auto gel =
-        test::run_program("mbtfm-substrate --gel " + at("cell.toml") + " --surface " + at("surface.vtp") +
-                          " --adhesions " + at("adhesions.csv") + " --forces " + at("adhesion_forces.csv") +
-                          " --points " + at("points.csv") + " --out " + at("exact.csv"));
-    ASSERT_EQ(gel.code, 0) << gel.output;
+    output_of(run_in(folder_,
+                     "mbtfm-substrate --gel cell.toml --surface surface.vtp --adhesions adhesions.csv --forces "
+                     "adhesion_forces.csv --points points.csv --out exact.csv"));
     std::vector<BeadInSpace> beads = files::read_displacement_in_space(folder_ / "exact.csv");
     std::normal_distribution<double> noise(0, 0.01);
     for (BeadInSpace& b : beads) {
@@ -171,17 +146,16 @@ class TractionInSpace : public testing::Test {
     }
     files::write_displacement_in_space(folder_ / "displacement_3d.csv", beads);
   }
-  std::string at(const std::string& name) const { return (folder_ / name).string(); }
-  test::Outcome run(const std::string& more, const std::string& displacement = "displacement_3d.csv") const {
-    return test::run_program("mbtfm-traction --gel " + at("cell.toml") + " --surface " + at("surface.vtp") +
-                             " --displacement " + at(displacement) + " --out " + at("traction_3d.csv") + " " + more);
+  Outcome run(const std::string& more, const std::string& displacement = "displacement_3d.csv") const {
+    return run_in(folder_, "mbtfm-traction --gel cell.toml --surface surface.vtp --displacement " + displacement +
+                               " --out traction_3d.csv " + more);
   }
   test::TemporaryFolder folder_;
 };
 
 TEST_F(TractionInSpace, finds_forces_of_adhesions_on_a_wave_with_their_errors) {
   for (const std::string method : {"auto", "patches"}) {
-    test::output_of(run("--spacing_um 4 --grow_um 3 --adhesions " + at("adhesions.csv") + " --method " + method));
+    output_of(run("--spacing_um 4 --grow_um 3 --adhesions adhesions.csv --method " + method));
     const files::CsvTable forces(folder_ / "traction_3d_adhesion_forces.csv");
     ASSERT_EQ(forces.n_rows(), 2);
     for (int row = 0; row < 2; ++row) {
@@ -209,7 +183,7 @@ TEST_F(TractionInSpace, splits_faces_by_each_rule_and_writes_an_even_lattice) {
     return nlohmann::json::parse(files::read_text(folder_ / "traction_3d.json")).at(name).get<double>();
   };
   for (const std::string rule : {"none", "region", "resolved", "threshold"}) {
-    test::output_of(run("--spacing_um 3 --method tikhonov --outline " + at("outline.csv") + " --refine " + rule));
+    output_of(run("--spacing_um 3 --method tikhonov --outline outline.csv --refine " + rule));
     const files::CsvTable map(folder_ / "traction_3d.csv");
     Vec3 sum;
     for (int row = 0; row < map.n_rows(); ++row)
@@ -298,12 +272,12 @@ TEST_F(TractionInSpace, says_whether_a_common_motion_was_looked_for) {
   EXPECT_TRUE(
       has_words(run(dense + "tikhonov --common_motion off").output, "common motion: off (as switched): switched off"));
   EXPECT_TRUE(has_words(run(dense + "direct").output, "common motion: off (auto): the displacement is imposed"));
-  EXPECT_TRUE(has_words(test::output_of(run(dense + "direct --common_motion on"), 2),
+  EXPECT_TRUE(has_words(output_of(run(dense + "direct --common_motion on"), 2),
                         "direct imposes the displacement as it was measured"));
 }
 
 TEST_F(TractionInSpace, doubts_a_total_force_that_no_cell_has) {
-  const std::string cell = "--spacing_um 4 --grow_um 3 --adhesions " + at("adhesions.csv");
+  const std::string cell = "--spacing_um 4 --grow_um 3 --adhesions adhesions.csv";
   EXPECT_FALSE(has_words(run(cell).output, "total force of the cell"));
   const auto outcome = run(cell + " --youngs_modulus_kPa 900");  // 90 times the gel's own: 125 nN become 11 000 nN
   ASSERT_EQ(outcome.code, 0) << outcome.output;
@@ -321,7 +295,7 @@ TEST_F(TractionInSpace, refuses_what_tells_nothing_and_leaves_no_file) {
   };
   refused(run("", "flat.csv"), exit_code::kInput, "z_um");
   refused(run("", "few.csv"), exit_code::kInput, "at least 4 beads");
-  refused(run("--outline " + at("outline.csv")), exit_code::kInput, "the outline above the beads");
+  refused(run("--outline outline.csv"), exit_code::kInput, "the outline above the beads");
   refused(run("--method fttc"), exit_code::kUsage, "group-l1");
   refused(run("--method patches"), exit_code::kUsage, "--adhesions");
 }
@@ -343,8 +317,7 @@ TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_forc
     fit.total_force_nN = fit.converged ? 89.8 * strength : 1;
     files::write_fit_summary(cell / "4_fit/fit.json", fit);
   }
-  EXPECT_TRUE(has_words(test::output_of("mbtfm-calibrate --cells " + folder.path().string() + " --out " +
-                                        (folder / "calibration.csv").string()),
+  EXPECT_TRUE(has_words(output_of(run_in(folder, "mbtfm-calibrate --cells . --out calibration.csv")),
                         "FTTC gives the forces of the fit at lambda E", "1 left out, whose fit has not converged"));
   const files::CsvTable table(folder / "calibration.csv");
   // forces in proportion, and the same noise: nearly one line at any lambda; the less smoothing the steeper

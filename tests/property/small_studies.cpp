@@ -126,6 +126,7 @@ void expect_whole(const Study& study, Page page) {
 }
 
 TEST(SmallStudies, whatever_lacks_every_number_is_finite_or_its_field_empty) {
+  expect_whole(test::simulated_study({.n_cells = 1}), Page::made);
   for (int seed = 1; seed <= kStudies; ++seed) {
     const test::Lack lack = test::drawn_lack(static_cast<std::uint64_t>(seed));
     SCOPED_TRACE("seed " + std::to_string(seed) + ": " + lack.str());

@@ -15,29 +15,14 @@ namespace mbtfm::surface {
 namespace {
 
 using test::beads_below;
-using Height = std::function<double(Vec2)>;
+using test::Misfit;
+using test::misfit_of;
+using Height = test::HeightOf;
 constexpr double kHalf = test::kBeadField_um, kSigma = test::kBeadSigma_um, kDensity = 0.0062;
 
 double flat(Vec2) { return 0; }
 /// Crests along x.
 double wave(Vec2 p) { return -12 * std::cos(2 * std::numbers::pi * (p.y - 35) / 70); }
-
-struct Misfit {
-  double mean_um = 0, rms_um = 0;
-};
-/// Over the field without 15 um at its edges. `surface`: of a place.
-Misfit misfit_of(const Height& surface, const Height& height) {
-  Misfit sum;
-  int n = 0;
-  for (double y = -45; y <= 45; y += 1.5)
-    for (double x = -45; x <= 45; x += 1.5) {
-      const double error = surface({x, y}) - height({x, y});
-      sum.mean_um += error;
-      sum.rms_um += error * error;
-      ++n;
-    }
-  return {sum.mean_um / n, std::sqrt(sum.rms_um / n)};
-}
 
 Height nearest_in(const HeightMap& map) {
   return [map](Vec2 at) {

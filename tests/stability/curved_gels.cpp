@@ -6,8 +6,6 @@
 #include "substrate/response.h"
 #include "substrate/surface/beads.h"
 #include "substrate/surface/formula.h"
-#include "substrate/surface/mesh.h"
-#include "substrate/surface/missing.h"
 #include "tests/support/beads_below.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/test.h"
@@ -133,92 +131,6 @@ TEST(SurfaceOfBeads, of_a_few_beads_has_honest_errors_or_is_refused) {
                 " beads: " + (refused.empty() ? two_digits(worst) + " standard errors" : "refused");
   }
   came_out(measured);
-}
-
-TEST(SurfaceOfBeads, is_not_lifted_by_beads_above_it) {
-  test::hard_case("eight stray beads up to 15 um above the surface", "named, the height as without them");
-  std::vector<Vec3> beads = test::beads_below(wave, 0.0062, 2);
-  const surface::SurfaceFit without = fitted(beads);
-  const std::size_t n = beads.size();
-  std::vector<Vec2> below;
-  for (int k = 0; k < 8; ++k) {
-    below.push_back({-40.0 + 10 * k, 35.0 - 9 * k});
-    beads.push_back({below.back().x, below.back().y, wave(below.back()) - 8 - k});
-  }
-  const surface::SurfaceFit with = fitted(beads);
-  std::size_t named = 0;
-  for (const int k : with.above_surface) named += static_cast<std::size_t>(k) >= n;
-  double lifted = 0;
-  for (const Vec2 at : below) lifted = std::max(lifted, std::abs(with.height_um(at) - without.height_um(at)));
-  came_out(std::to_string(named) + " named, lifted by " + two_digits(lifted) + " um");
-  EXPECT_EQ(named, 8u);
-  EXPECT_LE(lifted, 1);
-}
-
-TEST(SurfaceOfBeads, that_lie_in_two_sheets_is_refused) {
-  test::hard_case("6 000 beads in two sheets, 30 um apart", "refused: beads lie on both faces of a thin gel");
-  std::vector<Vec3> sheets;
-  std::mt19937_64 random(3);
-  std::uniform_real_distribution<double> across(-60, 60), thick(0, 1);
-  for (int k = 0; k < 6000; ++k) sheets.push_back({across(random), across(random), thick(random) + 30 * (k % 2)});
-  const std::string refused = refusal_of([&] { fitted(sheets); });
-  came_out(refused.empty() ? "not refused" : "refused");
-  EXPECT_TRUE(has_words(refused, "sheets"));
-}
-
-TEST(SurfaceOfAMap, has_small_holes_filled_and_wide_ones_refused) {
-  test::hard_case("a height map with NaN in a disc of 4 um and in one of 20 um",
-                  "the small one filled within 0.1 um, the wide one refused by place");
-  const auto holed = [](double radius_um) {
-    HeightMap map = surface::sampled(wave, {-30, -30}, {30, 30}, 0.5);
-    for (std::size_t k = 0; k < map.z_um.size(); ++k)
-      if (norm(map.vertex_um(k)) < radius_um) map.z_um[k] = std::numeric_limits<double>::quiet_NaN();
-    return map;
-  };
-  const HeightMap filled = surface::filled(holed(2), 5).map;
-  double worst = 0;
-  for (std::size_t k = 0; k < filled.z_um.size(); ++k)
-    worst = std::max(worst, std::abs(filled.z_um[k] - wave(filled.vertex_um(k))));
-  const std::string refused = refusal_of([&] { surface::filled(holed(10), 5); });
-  came_out("filled within " + two_digits(worst) + " um; " + (refused.empty() ? "not refused" : "refused"));
-  EXPECT_LE(worst, 0.1);
-  EXPECT_TRUE(has_words(refused, "x, y = "));
-}
-
-/// Two triangles for each square of 2 um, some of them the other way round, some missing.
-TriangleMesh mesh_of(bool has_flipped, double hole_um) {
-  constexpr int kSide = 21;
-  TriangleMesh mesh;
-  for (int j = 0; j < kSide; ++j)
-    for (int i = 0; i < kSide; ++i) {
-      const Vec2 p = {2.0 * i - 20, 2.0 * j - 20};
-      mesh.points_um.push_back({p.x, p.y, wave(p)});
-    }
-  for (int j = 0; j + 1 < kSide; ++j)
-    for (int i = 0; i + 1 < kSide; ++i) {
-      if (std::hypot(2.0 * i - 19, 2.0 * j - 19) < hole_um) continue;
-      const int a = kSide * j + i, b = a + 1, c = a + kSide, d = c + 1;
-      const bool flips = has_flipped && (i + j) % 7 == 0;
-      mesh.triangles.push_back(flips ? std::array{a, c, b} : std::array{a, b, c});
-      mesh.triangles.push_back(flips ? std::array{b, c, d} : std::array{b, d, c});
-    }
-  return mesh;
-}
-
-TEST(SurfaceOfAMesh, bears_flipped_normals_and_small_holes_and_refuses_wide_ones) {
-  test::hard_case("a triangle mesh with a seventh of its normals flipped and a hole of 4 um; a hole of 20 um",
-                  "flipped ones counted, the height within 0.3 um (half of what edges of 2 um miss); refused by place");
-  const surface::MeshSurface flipped = surface::sample_mesh(mesh_of(true, 2), 1);
-  const HeightMap map = surface::filled(flipped.map, 6).map;
-  double worst = 0;
-  for (std::size_t k = 0; k < map.z_um.size(); ++k)
-    worst = std::max(worst, std::abs(map.z_um[k] - wave(map.vertex_um(k))));
-  const std::string refused = refusal_of([] { surface::filled(surface::sample_mesh(mesh_of(false, 10), 1).map, 6); });
-  came_out(std::to_string(flipped.n_flipped) + " flipped, within " + two_digits(worst) + " um; " +
-           (refused.empty() ? "not refused" : "refused"));
-  EXPECT_GT(flipped.n_flipped, 0);
-  EXPECT_LE(worst, 0.3);
-  EXPECT_TRUE(has_words(refused, "x, y = "));
 }
 
 }  // namespace

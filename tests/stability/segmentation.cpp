@@ -12,10 +12,10 @@ namespace {
 
 using namespace mbtfm::test;
 
-void expect_nothing(const images::Image& image) {
-  EXPECT_TRUE(find_adhesions(image, 0.1, AdhesionParameters{}).empty());
-  EXPECT_TRUE(find_fibres(image, {}, {}, 0.1, FibreParameters{}).empty());
-  EXPECT_TRUE(find_outline(image, {}, 0.1, OutlineParameters{}).empty());
+void expect_nothing(const images::Image& image, double pixel_um = 0.1) {
+  EXPECT_TRUE(find_adhesions(image, pixel_um, AdhesionParameters{}).empty());
+  EXPECT_TRUE(find_fibres(image, {}, {}, pixel_um, FibreParameters{}).empty());
+  EXPECT_TRUE(find_outline(image, {}, pixel_um, OutlineParameters{}).empty());
 }
 
 TEST(Segmentation, finds_nothing_in_a_constant_image) {
@@ -24,18 +24,20 @@ TEST(Segmentation, finds_nothing_in_a_constant_image) {
 }
 
 TEST(Segmentation, finds_nothing_in_noise_alone) {
-  test::hard_case("noise without a cell", "no adhesion, fibre or outline");
-  for (const std::uint64_t seed : {1, 2, 3}) {
-    SCOPED_TRACE(seed);
-    images::Image image = even_image(512, 512, 200);
-    add_noise(image, 15, seed);
-    expect_nothing(image);
-  }
+  test::hard_case("noise at three pixel sizes", "no adhesion, fibre or outline");
+  for (const std::uint64_t seed : {1, 2, 3})
+    for (const double pixel_um : {0.05, 0.1, 0.2}) {
+      SCOPED_TRACE(std::to_string(seed) + " " + std::to_string(pixel_um));
+      images::Image image = even_image(512, 384, 200);
+      add_noise(image, 15, seed);
+      expect_nothing(image, pixel_um);
+    }
 }
 
 TEST(Segmentation, takes_images_of_few_pixels) {
   test::hard_case("images of 1 to 17 pixels", "nothing, no error");
-  for (const int side : {1, 2, 5, 17}) expect_nothing(even_image(side, side, 3));
+  for (const int side : {1, 2, 5, 17})
+    for (const int length : {side, 700}) expect_nothing(even_image(side, length, 3));
 }
 
 TEST(Segmentation, says_how_small_a_thing_is_that_is_too_small_for_a_cell) {

@@ -24,4 +24,22 @@ inline std::vector<Vec3> beads_below(const std::function<double(Vec2)>& height, 
   return beads;
 }
 
+using HeightOf = std::function<double(Vec2)>;
+
+struct Misfit {
+  double mean_um = 0, rms_um = 0;
+};
+/// Over the field without 15 um at its edges.
+inline Misfit misfit_of(const HeightOf& surface, const HeightOf& height) {
+  Misfit sum;
+  int n = 0;
+  for (double y = -45; y <= 45; y += 1.5)
+    for (double x = -45; x <= 45; x += 1.5, ++n) {
+      const double error = surface({x, y}) - height({x, y});
+      sum.mean_um += error;
+      sum.rms_um += error * error;
+    }
+  return {sum.mean_um / n, std::sqrt(sum.rms_um / n)};
+}
+
 }  // namespace mbtfm::test

@@ -26,6 +26,11 @@ inline Outcome run_program(const std::string& command, const std::string& before
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), files::read_text(log)};
 }
 
+/// The same in a folder: names of files are of it.
+inline Outcome run_in(const TemporaryFolder& folder, const std::string& command) {
+  return run_program(command, "cd '" + folder.path().string() + "' && ");
+}
+
 /// What a program said that ended with this exit code; with another one, the test ends.
 inline std::string output_of(const Outcome& outcome, int code = 0) {
   if (outcome.code == code) return outcome.output;
@@ -42,6 +47,7 @@ namespace mbtfm {
 
 using test::Outcome;
 using test::output_of;
+using test::run_in;
 using test::run_program;
 
 }  // namespace mbtfm
