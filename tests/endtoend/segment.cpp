@@ -1,7 +1,6 @@
 // mbtfm-segment on images of several channels and on selections drawn by hand.
 
 #include <gtest/gtest.h>
-#include <tiffio.h>
 
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
@@ -11,6 +10,7 @@
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
 #include "tests/support/segmentation_accuracy.h"
+#include "tests/support/tiff_pages.h"
 
 namespace mbtfm {
 namespace {
@@ -18,25 +18,6 @@ namespace {
 using rois::Roi;
 using rois::RoiShape;
 using test::fires;
-
-/// A 16-bit TIFF of one page an image.
-void write_pages(const fs::path& file, const std::vector<images::Image>& pages, const std::string& description) {
-  TIFF* tiff = TIFFOpen(file.c_str(), "w");
-  for (const images::Image& page : pages) {
-    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, page.width);
-    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, page.height);
-    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 16);
-    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
-    if (&page == &pages.front()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
-    std::vector<std::uint16_t> row(static_cast<std::size_t>(page.width));
-    for (int j = 0; j < page.height; ++j) {
-      for (int i = 0; i < page.width; ++i) row[i] = static_cast<std::uint16_t>(std::lround(page.at(i, j)));
-      TIFFWriteScanline(tiff, row.data(), static_cast<std::uint32_t>(j), 0);
-    }
-    TIFFWriteDirectory(tiff);
-  }
-  TIFFClose(tiff);
-}
 
 class Segment : public testing::Test {
  protected:
@@ -48,23 +29,20 @@ class Segment : public testing::Test {
     images::write_tiff(folder_ / "paxillin.tif", scene_.adhesion_image);
     images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
   }
-  std::string path(const std::string& name) const { return "'" + (folder_ / name).string() + "'"; }
-  test::Outcome segment(const std::string& out, const std::string& arguments) const {
-    return test::run_program("mbtfm-segment --out " + path(out) + " " + arguments);
+  Outcome segment(const std::string& out, const std::string& arguments) const {
+    return run_in(folder_, "mbtfm-segment --out " + out + " " + arguments);
   }
-  std::string both() const {
-    return "--adhesion-image " + path("paxillin.tif") + " --actin-image " + path("actin.tif");
-  }
+  static inline const std::string kBoth = "--adhesion-image paxillin.tif --actin-image actin.tif";
 };
 
 /// 0.2 um pixels still show what is 0.5 um wide; where it lies does not depend on the pixels.
 TEST_F(Segment, binned_images_show_the_same_cell_at_the_same_place) {
-  ASSERT_EQ(segment("whole", both()).code, 0);
-  const Outcome binned = segment("binned", both() + " --binning 2 --outline-roi " + path("outline.roi"));
+  ASSERT_EQ(segment("whole", kBoth).code, 0);
+  const Outcome binned = segment("binned", kBoth + " --binning 2 --outline-roi outline.roi");
   EXPECT_EQ(binned.code, 3) << binned.output;  // there is none yet
   const std::vector<rois::Roi> rois = rois::read_rois(folder_ / "whole/RoiSet.zip");
   files::write_text(folder_ / "outline.roi", rois::encode_roi(rois.front()));
-  ASSERT_EQ(segment("binned", both() + " --binning 2 --outline-roi " + path("outline.roi")).code, 0);
+  ASSERT_EQ(segment("binned", kBoth + " --binning 2 --outline-roi outline.roi").code, 0);
   const Cell fine = files::read_cell(folder_ / "whole"), coarse = files::read_cell(folder_ / "binned");
   const double step_um = scene_.kPixel_um;  // the outline's corners are stored in pixels, with fractions
   ASSERT_EQ(coarse.outline_um.size(), fine.outline_um.size());
@@ -83,12 +61,13 @@ TEST_F(Segment, one_file_of_two_channels_is_segmented_as_two_files_of_one) {
       "<OME><Image><Pixels DimensionOrder='XYZCT' SizeC='2' SizeZ='2' SizeT='1' PhysicalSizeX='100' "
       "PhysicalSizeXUnit='nm'><Channel Name='paxillin'/><Channel Name='actin'/></Pixels></Image></OME>";
   const images::Image dark = test::even_image(256, 256, 0);  // a slice that adds nothing to the projection
-  write_pages(folder_ / "both.ome.tif", {dark, scene_.adhesion_image, dark, scene_.actin_image}, ome);
-  const std::string file = path("both.ome.tif");
+  test::write_pages<std::uint16_t>(folder_ / "both.ome.tif", {dark, scene_.adhesion_image, dark, scene_.actin_image},
+                                   ome);
+  const std::string file = "both.ome.tif";
   const Outcome one = segment(
       "one", "--adhesion-image " + file + " --actin-image " + file + " --adhesion_channel paxillin --actin_channel 2");
   ASSERT_EQ(one.code, 0) << one.output;
-  ASSERT_EQ(segment("two", both()).code, 0);
+  ASSERT_EQ(segment("two", kBoth).code, 0);
   for (const char* name : {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv", "RoiSet.zip"})
     EXPECT_EQ(files::read_text(folder_ / "one" / name), files::read_text(folder_ / "two" / name)) << name;
 
@@ -100,8 +79,8 @@ TEST_F(Segment, one_file_of_two_channels_is_segmented_as_two_files_of_one) {
 TEST_F(Segment, channels_of_different_pixel_sizes_are_an_error) {
   scene_.actin_image.pixel_size_um = 0.11;
   images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
-  EXPECT_TRUE(has_words(output_of(segment("out", both()), 3), "0.11 um"));
-  EXPECT_EQ(segment("out", both() + " --pixel_size_um 0.1").code, 0);
+  EXPECT_TRUE(has_words(output_of(segment("out", kBoth), 3), "0.11 um"));
+  EXPECT_EQ(segment("out", kBoth + " --pixel_size_um 0.1").code, 0);
 }
 
 TEST_F(Segment, what_is_drawn_by_hand_takes_the_place_of_what_would_be_found) {
@@ -116,9 +95,8 @@ TEST_F(Segment, what_is_drawn_by_hand_takes_the_place_of_what_would_be_found) {
   rois::write_roi_set(folder_ / "fibres.zip", {fibre});
   rois::write_roi_set(folder_ / "adhesions.zip", {adhesion});
   rois::write_roi_set(folder_ / "outline.zip", {outline});
-  const std::string outcome =
-      test::output_of(segment("out", both() + " --fibre-rois " + path("fibres.zip") + " --adhesion-rois " +
-                                         path("adhesions.zip") + " --outline-roi " + path("outline.zip")));
+  const std::string outcome = output_of(
+      segment("out", kBoth + " --fibre-rois fibres.zip --adhesion-rois adhesions.zip --outline-roi outline.zip"));
   EXPECT_TRUE(has_words(outcome, "fibres drawn by hand"));
   const Cell cell = files::read_cell(folder_ / "out");
   ASSERT_EQ(cell.fibres.size(), 1u);
@@ -130,8 +108,8 @@ TEST_F(Segment, what_is_drawn_by_hand_takes_the_place_of_what_would_be_found) {
   EXPECT_NEAR(signed_area_um2(cell.outline_um), 21.6 * 21.6, 1e-9);
   EXPECT_TRUE(fires("outline-off-actin", outcome)) << "a square about a disc: " << outcome;
 
-  EXPECT_TRUE(has_words(output_of(segment("swapped", both() + " --fibre-rois " + path("adhesions.zip")), 3),
-                        "'mine': expected a line"));
+  EXPECT_TRUE(
+      has_words(output_of(segment("swapped", kBoth + " --fibre-rois adhesions.zip"), 3), "'mine': expected a line"));
 }
 
 /// Of 255 where `is_in` has a place, in um.
@@ -147,7 +125,7 @@ images::Image mask_of(const IsIn& is_in) {
 double radius_um(Vec2 place) { return norm(place - Vec2{12.8, 12.8}); }
 
 TEST_F(Segment, a_sound_cell_has_no_findings) {
-  const std::string said = segment("out", both()).output;
+  const std::string said = segment("out", kBoth).output;
   test::expect_silent({"lossy-image", "saturated", "unusual-value", "adhesions-left-out", "adhesions-long",
                        "bright-actin", "adhesions-off-actin", "outline-off-actin", "actin-shift", "adhesions-assumed",
                        "fibre-ends-anchored", "input-not-used"},
@@ -158,7 +136,7 @@ TEST_F(Segment, a_sound_cell_has_no_findings) {
 TEST_F(Segment, a_second_cell_that_touches_is_cut_off_and_told) {
   test::draw_ellipse(scene_.actin_image, test::ellipse(1, {23, 23}, 7.4, 7.4, 0), 200, 0.13, scene_.kPixel_um);
   images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
-  const std::string said = segment("out", both() + " --outline_smallest_um2 20").output;
+  const std::string said = segment("out", kBoth + " --outline_smallest_um2 20").output;
   EXPECT_TRUE(fires("cells-touch", said)) << said;
   EXPECT_FALSE(contains(files::read_cell(folder_ / "out").outline_um, {23, 23}));
 }
@@ -166,7 +144,7 @@ TEST_F(Segment, a_second_cell_that_touches_is_cut_off_and_told) {
 TEST_F(Segment, an_adhesion_beside_the_cell_is_left_out_and_told) {
   test::draw_ellipse(scene_.adhesion_image, test::ellipse(6, {23, 23}, 1.6, 0.6, 0.6), 500, 0.13, scene_.kPixel_um);
   images::write_tiff(folder_ / "paxillin.tif", scene_.adhesion_image);
-  const std::string said = segment("out", both()).output;
+  const std::string said = segment("out", kBoth).output;
   EXPECT_TRUE(fires("adhesions-left-out", said)) << said;
   EXPECT_TRUE(fires("adhesions-off-actin", said)) << said;
 }
@@ -174,7 +152,7 @@ TEST_F(Segment, an_adhesion_beside_the_cell_is_left_out_and_told) {
 TEST_F(Segment, a_speck_beside_the_cell_is_left_out_and_told) {
   test::draw_ellipse(scene_.actin_image, test::ellipse(1, {24.2, 24.2}, 2, 2, 0), 400, 0.13, scene_.kPixel_um);
   images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
-  const std::string said = segment("out", both()).output;
+  const std::string said = segment("out", kBoth).output;
   EXPECT_TRUE(fires("adhesions-left-out", said)) << said;
   EXPECT_TRUE(has_words(said, "1 bright thing too small for a cell outside the cell was left out"));
 }
@@ -189,9 +167,8 @@ TEST_F(Segment, an_end_that_no_adhesion_holds_and_an_input_that_does_not_count_a
   rois::write_roi_set(folder_ / "fibres.zip", {fibre});
   rois::write_roi_set(folder_ / "outline.zip", {outline});
   images::write_tiff(folder_ / "mask.tif", mask_of([](Vec2 p) { return radius_um(p) < 10; }));
-  const std::string said = segment("out", both() + " --fibre-rois " + path("fibres.zip") + " --outline-roi " +
-                                              path("outline.zip") + " --outline-mask " + path("mask.tif"))
-                               .output;
+  const std::string said =
+      segment("out", kBoth + " --fibre-rois fibres.zip --outline-roi outline.zip --outline-mask mask.tif").output;
   EXPECT_TRUE(fires("fibre-ends-anchored", said)) << said;
   EXPECT_TRUE(fires("input-not-used", said)) << said;
   EXPECT_FALSE(fires("outline-off-actin", said)) << said;
@@ -201,9 +178,7 @@ TEST_F(Segment, an_end_that_no_adhesion_holds_and_an_input_that_does_not_count_a
 TEST_F(Segment, a_mask_that_is_no_pattern_is_told) {
   const auto with = [&](const images::Image& mask) {
     images::write_tiff(folder_ / "mask.tif", mask);
-    return segment("out",
-                   "--actin-image " + path("actin.tif") + " --adhesions pattern --adhesion-mask " + path("mask.tif"))
-        .output;
+    return segment("out", "--actin-image actin.tif --adhesions pattern --adhesion-mask mask.tif").output;
   };
   const std::string ring = with(mask_of([](Vec2 p) { return std::abs(radius_um(p) - 7.5) < 2; }));
   test::expect_silent({"pattern-too-fine", "pattern-as-cell"}, ring);
@@ -228,7 +203,7 @@ TEST_F(Segment, images_that_are_shifted_or_exchanged_and_actin_that_is_no_fibre_
   const auto found = [&](const images::Image& adhesion, const images::Image& actin) {
     images::write_tiff(folder_ / "paxillin.tif", adhesion);
     images::write_tiff(folder_ / "actin.tif", actin);
-    return segment("out", both()).output;
+    return segment("out", kBoth).output;
   };
   const images::Image &adhesion = cell.adhesion.image, &actin = cell.actin.image;
   test::expect_silent({"actin-shift", "adhesions-long", "bright-actin", "bleed-through"}, found(adhesion, actin));

@@ -31,18 +31,16 @@ class SubstrateProgram : public testing::Test {
   void write(const std::string& name, const std::string& text) { files::write_text(folder_ / name, text); }
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
   test::Outcome run(const std::string& arguments) {
-    return test::run_program("mbtfm-substrate --quiet --gel " + file("gel.toml") + " " + arguments);
+    return run_in(folder_, "mbtfm-substrate --quiet --gel gel.toml " + arguments);
   }
-  std::string forces() const {
-    return "--adhesions " + file("adhesions.csv") + " --forces " + file("forces.csv") + " ";
-  }
+  std::string forces() const { return "--adhesions adhesions.csv --forces forces.csv "; }
 
   test::TemporaryFolder folder_;
 };
 
 TEST_F(SubstrateProgram, displaces_points_by_forces_and_by_the_same_force_as_tractions) {
-  const std::string at_points = "--model layer --points " + file("points.csv") + " --out ";
-  ASSERT_EQ(run(forces() + at_points + file("a.csv")).code, 0);
+  const std::string at_points = "--model layer --points points.csv --out ";
+  ASSERT_EQ(run(forces() + at_points + "a.csv").code, 0);
   // the disc as squares of 0.1 um: those whose centres it holds
   std::string rows = "x_um,y_um,tx_kPa,ty_kPa\n";
   int n = 0;
@@ -55,7 +53,7 @@ TEST_F(SubstrateProgram, displaces_points_by_forces_and_by_the_same_force_as_tra
           shortest(20 + x) + "," + shortest(20 + y) + (is_inside ? ",0.954929658551372,0.318309886183791\n" : ",0,0\n");
     }
   write("traction.csv", rows);
-  ASSERT_EQ(run("--traction " + file("traction.csv") + " " + at_points + file("b.csv")).code, 0);
+  ASSERT_EQ(run("--traction traction.csv " + at_points + "b.csv").code, 0);
   const DisplacementField a = files::read_displacement(file("a.csv")), b = files::read_displacement(file("b.csv"));
   ASSERT_EQ(a.size(), 4u);
   const double share = 0.01 * n / 3.141592653589793;  // of the disc that the squares cover
@@ -66,15 +64,12 @@ TEST_F(SubstrateProgram, displaces_points_by_forces_and_by_the_same_force_as_tra
 }
 
 TEST_F(SubstrateProgram, writes_the_vertical_part_where_asked_for) {
-  ASSERT_EQ(run(forces() + "--model split --vertical_displacement on --points " + file("points.csv") + " --out " +
-                file("u.csv"))
-                .code,
-            0);
+  ASSERT_EQ(run(forces() + "--model split --vertical_displacement on --points points.csv --out u.csv").code, 0);
   const files::CsvTable table{fs::path(file("u.csv"))};
   // a point ahead of the force is pressed into the gel, and one above it keeps still but for its other component
   EXPECT_GT(table.number(1, "uz_um"), 0);
   EXPECT_NEAR(table.number(0, "uz_um"), 0, 1e-3 * table.number(0, "ux_um"));
-  ASSERT_EQ(run(forces() + "--model split --points " + file("points.csv") + " --out " + file("v.csv")).code, 0);
+  ASSERT_EQ(run(forces() + "--model split --points points.csv --out v.csv").code, 0);
   EXPECT_FALSE(files::CsvTable{fs::path(file("v.csv"))}.has("uz_um"));
 }
 
@@ -102,27 +97,25 @@ double largest(vtkDataSetAttributes* attributes, const char* name, vtkIdType n, 
 TEST_F(SubstrateProgram, moves_its_inside_and_answers_to_forces_into_it) {
   write("points_3d.csv", "x_um,y_um,z_um\n20,20,0\n23,20,5\n20,26,20\n");
   write("lifted.csv", "adhesion_id,x_um,y_um,area_um2,fx_nN,fy_nN,fz_nN\n1,20,20,3.141592653589793,3,1,-2\n");
-  const std::string inside = " --points " + file("points_3d.csv") + " --out ";
-  ASSERT_EQ(run(forces() + inside + file("along.csv")).code, 0);
-  ASSERT_EQ(
-      run("--adhesions " + file("adhesions.csv") + " --forces " + file("lifted.csv") + inside + file("up.csv")).code,
-      0);
-  ASSERT_EQ(run(forces() + "--points " + file("points.csv") + " --out " + file("flat.csv")).code, 0);
+  const std::string inside = " --points points_3d.csv --out ";
+  ASSERT_EQ(run(forces() + inside + "along.csv").code, 0);
+  ASSERT_EQ(run("--adhesions adhesions.csv --forces lifted.csv" + inside + "up.csv").code, 0);
+  ASSERT_EQ(run(forces() + "--points points.csv --out flat.csv").code, 0);
   const files::CsvTable along(folder_ / "along.csv"), up(folder_ / "up.csv"), flat(folder_ / "flat.csv");
   EXPECT_NEAR(along.number(0, "ux_um"), flat.number(0, "ux_um"), 1e-6 * flat.number(0, "ux_um"));
   EXPECT_LT(up.number(0, "uz_um"), along.number(0, "uz_um"));  // lifted where it is pulled up
   for (const char* u : {"ux_um", "uy_um", "uz_um"}) EXPECT_NEAR(up.number(2, u), 0, 1e-9);  // the base
   write("deep.csv", "x_um,y_um,z_um\n20,20,21\n");
-  const Outcome deep = run(forces() + "--points " + file("deep.csv") + " --out " + file("no.csv"));
+  const Outcome deep = run(forces() + "--points deep.csv --out no.csv");
   EXPECT_NE(deep.code, 0);
   EXPECT_TRUE(has_words(deep.output, "thickness"));
   EXPECT_FALSE(fs::exists(folder_ / "no.csv"));
-  const Outcome split = run(forces() + "--model split" + inside + file("no.csv"));
+  const Outcome split = run(forces() + "--model split" + inside + "no.csv");
   EXPECT_NE(split.code, 0);
 }
 
 TEST_F(SubstrateProgram, writes_a_surface_that_vtk_opens) {
-  ASSERT_EQ(run(forces() + "--model layer --out " + file("surface.vtu")).code, 0);
+  ASSERT_EQ(run(forces() + "--model layer --out surface.vtu").code, 0);
   const auto grid = opened(file("surface.vtu"));
   const vtkIdType n_points = grid->GetNumberOfPoints(), n_cells = grid->GetNumberOfCells();
   ASSERT_GT(n_cells, 160 * 160);  // the adhesion's rectangle alone
@@ -130,7 +123,7 @@ TEST_F(SubstrateProgram, writes_a_surface_that_vtk_opens) {
   EXPECT_GT(largest(grid->GetPointData(), "displacement_um", n_points, 3, 0), 0);
   // a surface in space has three components, but where the third is switched off
   EXPECT_GT(largest(grid->GetPointData(), "displacement_um", n_points, 3, 2), 0);
-  ASSERT_EQ(run(forces() + "--model layer --vertical_displacement off --out " + file("flat.vtu")).code, 0);
+  ASSERT_EQ(run(forces() + "--model layer --vertical_displacement off --out flat.vtu").code, 0);
   EXPECT_EQ(largest(opened(file("flat.vtu"))->GetPointData(), "displacement_um", n_points, 3, 2), 0);
   // 3 and 1 nN over pi um²
   EXPECT_NEAR(largest(grid->GetCellData(), "traction_kPa", n_cells, 3, 0), 3 / std::numbers::pi, 1e-9);
@@ -139,7 +132,7 @@ TEST_F(SubstrateProgram, writes_a_surface_that_vtk_opens) {
 }
 
 TEST_F(SubstrateProgram, writes_an_inside_that_vtk_opens) {
-  ASSERT_EQ(run(forces() + "--model refined --stress --out " + file("volume.vtu")).code, 0);
+  ASSERT_EQ(run(forces() + "--model refined --stress --out volume.vtu").code, 0);
   const auto grid = opened(file("volume.vtu"));
   const vtkIdType n_points = grid->GetNumberOfPoints(), n_cells = grid->GetNumberOfCells();
   double volume = 0;
@@ -164,24 +157,21 @@ TEST_F(SubstrateProgram, writes_an_inside_that_vtk_opens) {
     EXPECT_GT(stress, 0);
     EXPECT_LT(stress, 10);  // the traction is 1 kPa
   }
-  ASSERT_EQ(run(forces() + "--model refined --out " + file("plain_volume.vtu")).code, 0);
+  ASSERT_EQ(run(forces() + "--model refined --out plain_volume.vtu").code, 0);
   EXPECT_EQ(opened(file("plain_volume.vtu"))->GetCellData()->GetNumberOfArrays(), 0);
 }
 
 TEST_F(SubstrateProgram, says_what_it_lacks) {
-  const std::string out = "--out " + file("u.csv");
+  const std::string out = "--out u.csv";
   EXPECT_EQ(run(out).code, 2);
   EXPECT_EQ(run(forces() + out).code, 2);  // a table, and no points
-  EXPECT_EQ(run(forces() + "--model layer --out " + file("volume.vtu")).code, 2);
+  EXPECT_EQ(run(forces() + "--model layer --out volume.vtu").code, 2);
   for (const std::string model : {"split", "refined"})  // their bulk modulus would be infinite
-    EXPECT_EQ(
-        run(forces() + "--poisson_ratio 0.5 --model " + model + " --points " + file("points.csv") + " " + out).code, 2);
-  EXPECT_EQ(run(forces() + "--poisson_ratio 0.51 --points " + file("points.csv") + " " + out).code, 2);
-  EXPECT_EQ(run(forces() + "--youngs_modulus_kPa -1 --points " + file("points.csv") + " " + out).code, 2);
+    EXPECT_EQ(run(forces() + "--poisson_ratio 0.5 --model " + model + " --points points.csv " + out).code, 2);
+  EXPECT_EQ(run(forces() + "--poisson_ratio 0.51 --points points.csv " + out).code, 2);
+  EXPECT_EQ(run(forces() + "--youngs_modulus_kPa -1 --points points.csv " + out).code, 2);
   write("traction.csv", "x_um,y_um,tx_kPa,ty_kPa\n1,1,1,0\n");
-  EXPECT_TRUE(
-      has_words(output_of(run("--traction " + file("traction.csv") + " --points " + file("points.csv") + " " + out), 3),
-                "area_um2"));
+  EXPECT_TRUE(has_words(output_of(run("--traction traction.csv --points points.csv " + out), 3), "area_um2"));
   EXPECT_FALSE(fs::exists(file("u.csv")));
 }
 
@@ -196,8 +186,8 @@ TEST(Programs, load_no_finite_elements_before_they_need_them) {
 
 TEST_F(SubstrateProgram, takes_large_strains_where_the_material_and_the_tractions_call_for_them) {
   write("points.csv", "x_um,y_um,z_um\n22,20,0\n20,23,2\n16,20,0\n");
-  const std::string rest = "--displacement_tolerance 0 --elements_across_adhesion 0.7 --growth 10 --points " +
-                           file("points.csv") + " --out ";
+  const std::string rest =
+      "--displacement_tolerance 0 --elements_across_adhesion 0.7 --growth 10 --points points.csv --out ";
   const auto displaced = [&](const std::string& name) {
     std::vector<double> numbers;
     const files::CsvTable table(file(name));
@@ -215,29 +205,28 @@ TEST_F(SubstrateProgram, takes_large_strains_where_the_material_and_the_traction
     return std::sqrt(difference / size);
   };
   // 1 kPa, a third of the shear modulus
-  ASSERT_EQ(run(forces() + "--model curved " + rest + file("small.csv")).code, 0);
-  ASSERT_EQ(run(forces() + "--material neo-hooke " + rest + file("large.csv")).code, 0);
-  ASSERT_EQ(run(forces() + "--model curved --material neo-hooke --large_strain off " + rest + file("off.csv")).code, 0);
+  ASSERT_EQ(run(forces() + "--model curved " + rest + "small.csv").code, 0);
+  ASSERT_EQ(run(forces() + "--material neo-hooke " + rest + "large.csv").code, 0);
+  ASSERT_EQ(run(forces() + "--model curved --material neo-hooke --large_strain off " + rest + "off.csv").code, 0);
   EXPECT_EQ(apart("off.csv", 1, "small.csv"), 0);
   // a hundredth of the force: linear theory holds, up to what the elements of each make of so coarse a mesh
   write("forces.csv", "adhesion_id,x_um,y_um,area_um2,fx_nN,fy_nN\n1,20,20,3.141592653589793,0.03,0.01\n");
-  ASSERT_EQ(run(forces() + "--material neo-hooke --large_strain on " + rest + file("weak.csv")).code, 0);
-  ASSERT_EQ(run(forces() + "--model curved --material neo-hooke " + rest + file("linear.csv")).code, 0);
+  ASSERT_EQ(run(forces() + "--material neo-hooke --large_strain on " + rest + "weak.csv").code, 0);
+  ASSERT_EQ(run(forces() + "--model curved --material neo-hooke " + rest + "linear.csv").code, 0);
   EXPECT_LT(apart("linear.csv", 100, "small.csv"), 1e-12);
   EXPECT_LT(apart("weak.csv", 1, "linear.csv"), 0.1);
   EXPECT_GT(apart("weak.csv", 100, "large.csv"), 0.005);
   EXPECT_LT(apart("weak.csv", 100, "large.csv"), 0.1);
   // what cannot be
-  EXPECT_TRUE(has_words(output_of(run(forces() + "--large_strain on " + rest + file("x.csv")), 2), "neo-hooke"));
-  const Outcome layer = run(forces() + "--model layer --material neo-hooke --large_strain on " + rest + file("x.csv"));
+  EXPECT_TRUE(has_words(output_of(run(forces() + "--large_strain on " + rest + "x.csv"), 2), "neo-hooke"));
+  const Outcome layer = run(forces() + "--model layer --material neo-hooke --large_strain on " + rest + "x.csv");
   EXPECT_EQ(layer.code, 2);
-  const Outcome by_name =
-      run(forces() + "--model layer --material neo-hooke --large_strain auto " + rest + file("x.csv"));
+  const Outcome by_name = run(forces() + "--model layer --material neo-hooke --large_strain auto " + rest + "x.csv");
   EXPECT_EQ(by_name.code, 0) << "0.03 nN need none";
   // a load that turns the gel inside out
   write("forces.csv", "adhesion_id,x_um,y_um,area_um2,fx_nN,fy_nN\n1,20,20,3.141592653589793,900,0\n");
-  const Outcome torn = run(forces() + "--material neo-hooke " + rest + file("torn.csv"));
-  EXPECT_TRUE(has_words(output_of(run(forces() + "--model layer --material neo-hooke " + rest + file("torn.csv")), 2),
+  const Outcome torn = run(forces() + "--material neo-hooke " + rest + "torn.csv");
+  EXPECT_TRUE(has_words(output_of(run(forces() + "--model layer --material neo-hooke " + rest + "torn.csv"), 2),
                         "take the model curved or auto"));
   EXPECT_NE(torn.code, 0);
   EXPECT_TRUE(has_words(torn.output, "no state at rest beyond"));

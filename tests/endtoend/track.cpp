@@ -1,5 +1,3 @@
-#include <tiffio.h>
-
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
@@ -10,6 +8,7 @@
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
+#include "tests/support/tiff_pages.h"
 #include "tests/support/weak_beads.h"
 
 namespace mbtfm {
@@ -83,28 +82,6 @@ TEST(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
   EXPECT_EQ(run_track(folder, "").code, 2);
 }
 
-/// A float TIFF of these images, as ImageJ writes a hyperstack.
-void write_stack(const fs::path& file, const std::vector<const images::Image*>& images, const std::string& dimensions) {
-  TIFF* tiff = TIFFOpen(file.c_str(), "w");
-  const std::string description = "ImageJ=1.53t\nimages=" + std::to_string(images.size()) + "\n" + dimensions;
-  for (const images::Image* image : images) {
-    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, image->width);
-    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, image->height);
-    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 32);
-    TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP);
-    TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
-    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
-    if (image == images.front()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
-    for (int j = 0; j < image->height; ++j) {
-      std::vector<float> row(image->pixels.begin() + static_cast<std::ptrdiff_t>(j) * image->width,
-                             image->pixels.begin() + static_cast<std::ptrdiff_t>(j + 1) * image->width);
-      TIFFWriteScanline(tiff, row.data(), static_cast<std::uint32_t>(j), 0);
-    }
-    TIFFWriteDirectory(tiff);
-  }
-  TIFFClose(tiff);
-}
-
 TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
   const test::TemporaryFolder folder;
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330});
@@ -119,7 +96,7 @@ TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
   write(folder / "one.tif", one, 0.2);
   write(folder / "other_scale.tif", pair.stressed, 0.25);
   write(folder / "no_scale.tif", pair.stressed, std::nullopt);
-  write_stack(folder / "nan.tif", {&broken}, "");
+  test::write_pages<float>(folder / "nan.tif", {broken}, "ImageJ=1.53t\nimages=1\n");
   fs::copy_file(folder / "r.tif", folder / "cut.tif");
   fs::resize_file(folder / "cut.tif", 3000);
   const struct {
@@ -183,8 +160,8 @@ TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
   const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
   const images::Image other = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
   // times 1 and 2 pull, 3 is relaxed; channel 1 shows something else
-  write_stack(folder / "s.tif", {&other, &one.stressed, &other, &two.stressed, &other, &one.relaxed},
-              "channels=2\nslices=1\nframes=3\nhyperstack=true\n");
+  test::write_pages<float>(folder / "s.tif", {other, one.stressed, other, two.stressed, other, one.relaxed},
+                           "ImageJ=1.53t\nimages=6\nchannels=2\nslices=1\nframes=3\nhyperstack=true\n");
   // of a series the places are those of its first frame, of a frame alone its own: the relaxed one is the same for both
   const std::string both = files("s.tif", "s.tif") + " --pixel_size_um 0.2 --cell_with relaxed";
   const std::string relaxed = " --relaxed_channel 2 --relaxed_time 3", beads = " --stressed_channel 2";
