@@ -1,7 +1,4 @@
 /// Adhesions are measured as they were drawn, and as others measured them.
-#include <gtest/gtest.h>
-
-#include "segment/cells/adhesions.h"
 #include "segment/cells/blurred_ellipse.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/real_adhesions.h"

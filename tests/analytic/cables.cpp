@@ -1,9 +1,7 @@
 #include <Eigen/Dense>
 
-#include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
 #include "tests/support/equilibrium.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

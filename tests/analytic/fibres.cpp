@@ -1,6 +1,4 @@
 /// Drawn fibres are found where they were drawn, each as one, of the right width and type.
-#include <gtest/gtest.h>
-
 #include "segment/cells/fibres.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/segmentation_accuracy.h"

@@ -1,10 +1,8 @@
-#include "network/mesh/mesh.h"
 #include "network/mesh/adhesions.h"
 #include "network/mesh/links.h"
 #include "network/mesh/polyline.h"
 #include "network/mesh/triangulation.h"
 #include "pipeline/contract/polyline.h"
-#include "tests/support/test.h"
 #include "tests/support/valid_network.h"
 
 namespace mbtfm::mesh {

@@ -1,9 +1,6 @@
 /// Outlines lie on the edges of drawn cells.
-#include <gtest/gtest.h>
-
 #include "pipeline/contract/errors.h"
 #include "segment/cells/ellipse.h"
-#include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/real_adhesions.h"
 

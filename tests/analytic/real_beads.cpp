@@ -3,11 +3,9 @@
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/plane.h"
-#include "segment/beads/track.h"
 #include "tests/support/folders.h"
 #include "tests/support/mat_tracks.h"
 #include "tests/support/piv.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::beads {
 namespace {

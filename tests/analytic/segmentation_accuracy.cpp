@@ -1,6 +1,4 @@
 /// What the segmentation must reach on simulated cells whose truth is known. The seeds served no tuning.
-#include <gtest/gtest.h>
-
 #include "tests/support/segmentation_accuracy.h"
 
 namespace mbtfm::test {

@@ -4,7 +4,6 @@
 #include "continuum/sheet/tables.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/sheets.h"
-#include "tests/support/test.h"
 
 namespace {
 

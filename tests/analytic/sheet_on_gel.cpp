@@ -7,7 +7,6 @@
 #include "pipeline/contract/errors.h"
 #include "substrate/greens/models.h"
 #include "tests/support/sheets.h"
-#include "tests/support/test.h"
 
 namespace {
 

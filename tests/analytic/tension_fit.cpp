@@ -1,9 +1,7 @@
 #include "mbtfm/tensions/tension_fit.h"
-#include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/noise.h"
 #include "mbtfm/tensions/robust.h"
 #include "tests/support/tension_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {

@@ -1,6 +1,3 @@
-#include "segment/beads/track.h"
-
-#include <gtest/gtest.h>
 
 #include "pipeline/contract/errors.h"
 #include "segment/beads/far_field.h"

@@ -8,7 +8,6 @@
 #include "substrate/greens/wave.h"
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/substrate_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::tractions {
 namespace {

@@ -17,10 +17,8 @@
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/stage/plausible.h"
 #include "pipeline/statistics/study_files.h"
-#include "tests/support/folders.h"
 #include "tests/support/plain_words.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

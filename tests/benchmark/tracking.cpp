@@ -2,7 +2,6 @@
 
 #include <map>
 
-#include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 
 namespace {

@@ -8,7 +8,6 @@
 #include "substrate/response.h"
 #include "tests/support/cubed_sphere.h"
 #include "tests/support/field_under_a_surface.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::curved {
 namespace {

@@ -9,7 +9,6 @@
 #include "substrate/curved/surface_loads.h"
 #include "tests/support/cubed_sphere.h"
 #include "tests/support/field_under_a_surface.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::curved {
 namespace {

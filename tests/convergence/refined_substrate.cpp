@@ -1,6 +1,4 @@
 /// What `refined` promises beyond convergence: the error it reports, layered gels, symmetries, the gel's inside.
-#include <gtest/gtest.h>
-
 #include "substrate/choice/factory.h"
 #include "substrate/greens/layer.h"
 #include "substrate/greens/layer_vertical.h"

@@ -6,7 +6,6 @@
 #include "substrate/greens/half_space.h"
 #include "substrate/material.h"
 #include "tests/support/substrate_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::substrate {
 namespace {

@@ -1,9 +1,7 @@
 /// "Add it and run again": fibres that the beads call for, put beside the segmented ones.
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

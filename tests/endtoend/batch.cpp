@@ -5,10 +5,7 @@
 #include <unistd.h>
 #include <thread>
 
-#include "pipeline/files/text.h"
-#include "tests/support/folders.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

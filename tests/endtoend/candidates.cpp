@@ -5,7 +5,6 @@
 #include "segment/images/image.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -2,14 +2,11 @@
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
 #include "pipeline/report/compare.h"
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
-#include "tests/support/folders.h"
 #include "tests/support/json_schema.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

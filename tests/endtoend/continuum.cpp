@@ -2,11 +2,9 @@
 #include "pipeline/contract/beads.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
 #include "segment/images/image.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,6 +1,5 @@
 /// Presets, wanted accuracy and the cost study, as a person runs them on a small cell.
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -2,12 +2,9 @@
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
-#include "pipeline/files/text.h"
 #include "segment/images/image.h"
 #include "tests/support/findings.h"
-#include "tests/support/folders.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -2,10 +2,8 @@
 #include <cctype>
 #include <regex>
 
-#include "tests/support/folders.h"
 #include "tests/support/plain_words.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -9,9 +9,7 @@
 #include "pipeline/report/results.h"
 #include "segment/images/image.h"
 #include "segment/rois/roi.h"
-#include "tests/support/folders.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -2,9 +2,7 @@
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

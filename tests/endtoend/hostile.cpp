@@ -6,11 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "pipeline/files/text.h"
-#include "tests/support/folders.h"
 #include "tests/support/program.h"
 #include "tests/support/script_stages.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -4,9 +4,7 @@
 #include "segment/cells/ellipse.h"
 #include "segment/rois/roi.h"
 #include "tests/support/drawn_image.h"
-#include "tests/support/folders.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

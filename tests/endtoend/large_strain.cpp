@@ -1,10 +1,8 @@
 /// A cell that strains its gel beyond linear elasticity, simulated and fitted.
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

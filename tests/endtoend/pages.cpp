@@ -6,7 +6,6 @@
 #include "tests/support/browser.h"
 #include "tests/support/fake_cell.h"
 #include "tests/support/folders.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,9 +1,7 @@
 /// mbtfm plan and mbtfm noise as a person runs them.
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
-#include "tests/support/folders.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

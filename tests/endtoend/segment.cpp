@@ -1,10 +1,6 @@
 // mbtfm-segment on images of several channels and on selections drawn by hand.
 
-#include <gtest/gtest.h>
-
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
-#include "segment/images/image.h"
 #include "segment/rois/roi.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/findings.h"

@@ -1,9 +1,6 @@
 /// A cell followed over time, through the programs.
-#include <gtest/gtest.h>
-
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {

@@ -1,5 +1,4 @@
 /// mbtfm-sheet as a person runs it.
-#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json_record.h"
 #include "segment/images/image.h"
@@ -8,7 +7,6 @@
 #include "tests/support/program.h"
 #include "tests/support/sheets.h"
 #include "tests/support/tables.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

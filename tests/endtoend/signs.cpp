@@ -2,10 +2,8 @@
 #include <regex>
 
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
 #include "segment/images/image.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

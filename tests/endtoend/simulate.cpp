@@ -1,14 +1,10 @@
 /// mbtfm-simulate as a person runs it.
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "samples/drawing/scenario.h"
 #include "segment/images/image.h"
-#include "tests/support/folders.h"
 #include "tests/support/program.h"
-#include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace {
 

@@ -5,7 +5,6 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
@@ -13,7 +12,6 @@
 #include "pipeline/report/space_results.h"
 #include "segment/images/image.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -4,7 +4,6 @@
 #include "pipeline/files/own_files.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -12,7 +12,6 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,13 +1,10 @@
 /// mbtfm-surface on files, and mbtfm-substrate on a gel with such a surface.
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
-#include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "segment/images/image.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
-#include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -9,10 +9,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"
-#include "pipeline/files/text.h"
-#include "tests/support/folders.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,13 +1,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
-#include "segment/images/image.h"
-#include "tests/support/bead_pair.h"
 #include "tests/support/findings.h"
-#include "tests/support/folders.h"
 #include "tests/support/program.h"
-#include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 #include "tests/support/tiff_pages.h"
 #include "tests/support/weak_beads.h"
 

@@ -1,18 +1,15 @@
 /// The executables that reconstruct tractions and compare them with the fit.
 #include <nlohmann/json.hpp>
 
-#include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/json_record.h"
-#include "pipeline/files/text.h"
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/findings.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::tractions {
 namespace {

@@ -8,7 +8,6 @@
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv_files.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -3,7 +3,6 @@
 
 #include "tests/fuzz/target.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::fuzz {
 

@@ -7,7 +7,6 @@
 #include "tests/fuzz/target.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::images {
 namespace {

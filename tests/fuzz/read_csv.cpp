@@ -1,6 +1,4 @@
 /// The tables between stages.
-#include "pipeline/files/csv.h"
-#include "pipeline/files/csv_files.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/fake_tables.h"
 

@@ -1,6 +1,5 @@
 /// Displacement fields of other programs, and tables of conditions.
 #include "pipeline/contract/numbers.h"
-#include "pipeline/files/csv_files.h"
 #include "pipeline/files/foreign_table.h"
 #include "segment/beads/given_field.h"
 #include "tests/fuzz/target.h"

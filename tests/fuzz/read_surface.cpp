@@ -6,7 +6,6 @@
 #include "substrate/surface/missing.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/mesh_files.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::fuzz::surface_readers {
 namespace {

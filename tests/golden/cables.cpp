@@ -1,10 +1,6 @@
 // The independent reference: its own lengths are smoothed by 1e-5 um, its forces good to 1e-4 nN.
-#include <gtest/gtest.h>
 
-#include "network/cables/cables.h"
-#include "pipeline/files/csv.h"
 #include "tests/support/equilibrium.h"
-#include "tests/support/folders.h"
 #include "tests/support/reference_network.h"
 
 namespace mbtfm {

@@ -1,6 +1,4 @@
 /// What must not change the adhesions and the outline, or change them in a known way.
-#include <gtest/gtest.h>
-
 #include <opencv2/core/utility.hpp>
 
 #include "segment/cells/adhesions.h"

@@ -1,7 +1,5 @@
 /// Whether the tracker takes turn, growth and shear off is decided by the pictures.
-#include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::beads {
 namespace {

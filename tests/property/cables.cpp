@@ -1,8 +1,6 @@
-#include "network/cables/cables.h"
 #include "pipeline/numerics/parallel.h"
 #include "tests/support/equilibrium.h"
 #include "tests/support/lattice.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,7 +1,5 @@
 #include "segment/cells/channel_alignment.h"
-#include "segment/cells/segment_cell.h"
 #include "tests/support/segmentation_accuracy.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

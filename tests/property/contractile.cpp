@@ -1,8 +1,6 @@
 /// Tensions of a cell that is not of cables: what the fit asks of a model is all that it needs.
 #include "network/contractile.h"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Dense>
 
 #include "tests/support/tension_scene.h"

@@ -8,7 +8,6 @@
 #include "samples/drawing/scenario.h"
 #include "samples/experiment/experiment.h"
 #include "tests/support/cut_cell.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

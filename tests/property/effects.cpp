@@ -2,8 +2,6 @@
 /// out, against a fit that has them.
 #include "mbtfm/tensions/effects.h"
 
-#include <gtest/gtest.h>
-
 #include "mbtfm/tensions/explain.h"
 #include "network/cables/effects.h"
 #include "pipeline/contract/errors.h"

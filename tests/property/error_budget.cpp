@@ -1,4 +1,3 @@
-#include <gtest/gtest.h>
 
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/second_placement.h"

@@ -1,6 +1,4 @@
 /// What must not change the fibres of an image, or change them in a known way.
-#include <gtest/gtest.h>
-
 #include "segment/cells/fibres.h"
 #include "tests/support/drawn_image.h"
 

@@ -5,7 +5,6 @@
 #include "pipeline/contract/errors.h"
 #include "tests/support/findings.h"
 #include "tests/support/tension_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::fit {
 namespace {

@@ -6,7 +6,6 @@
 #include "mbtfm/tensions/fit_results.h"
 #include "tests/support/substrate_scene.h"
 #include "tests/support/tension_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {

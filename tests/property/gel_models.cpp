@@ -1,6 +1,4 @@
 /// What holds of every model of the gel in the table.
-#include <gtest/gtest.h>
-
 #include "pipeline/contract/errors.h"
 #include "substrate/choice/factory.h"
 #include "substrate/loads.h"

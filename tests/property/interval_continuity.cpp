@@ -1,9 +1,7 @@
 /// Other processors, other libraries and other numbers of beads to a block round differently. What a fit reports must
 /// not depend on that: tensions and the ends of their intervals are continuous in the data.
 /// MBTFM_CASES=N takes as many seeds; MBTFM_PRINT=1 prints how far each case moves, in standard errors.
-#include "mbtfm/tensions/ensemble.h"
 #include "tests/support/tension_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {

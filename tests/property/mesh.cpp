@@ -1,6 +1,5 @@
 #include "tests/support/hard_cells.h"
 #include "tests/support/random_cell.h"
-#include "tests/support/test.h"
 #include "tests/support/valid_network.h"
 
 namespace mbtfm::mesh {

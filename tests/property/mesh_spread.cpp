@@ -1,6 +1,4 @@
 /// How far the forces that one cell's tensions exert differ from mesh to mesh.
-#include <gtest/gtest.h>
-
 #include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
 #include "tests/support/random_cell.h"

@@ -1,7 +1,5 @@
 #include "mbtfm/tensions/missing_adhesions.h"
 
-#include <gtest/gtest.h>
-
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "tests/support/tension_scene.h"

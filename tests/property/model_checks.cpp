@@ -1,8 +1,6 @@
 /// Which model the criteria prefer, over many draws of the beads' noise.
 #include "mbtfm/tensions/model_checks.h"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Cholesky>
 #include <random>
 

@@ -5,7 +5,6 @@
 #include "mbtfm/tensions/model_checks.h"
 #include "mbtfm/tensions/model_error.h"
 #include "tests/support/tension_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {

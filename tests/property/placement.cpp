@@ -1,12 +1,10 @@
 #include <Eigen/Geometry>
 
 #include "mbtfm/tensions/error_budget.h"
-#include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/placement.h"
 #include "mbtfm/tensions/series.h"
 #include "tests/support/layer_data.h"
 #include "tests/support/tension_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {

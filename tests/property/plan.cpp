@@ -7,7 +7,6 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 #include "tests/support/drawn_pair.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::plan {
 namespace {

@@ -4,7 +4,6 @@
 #include "substrate/choice/factory.h"
 #include "tests/support/findings.h"
 #include "tests/support/tension_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::fit {
 namespace {

@@ -11,7 +11,6 @@
 #include "pipeline/stage/stage.h"
 #include "tests/support/script_stages.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

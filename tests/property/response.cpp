@@ -3,7 +3,6 @@
 #include "substrate/greens/models.h"
 #include "substrate/loads.h"
 #include "tests/support/substrate_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::substrate {
 namespace {

@@ -2,12 +2,10 @@
 #include "mbtfm/tensions/series.h"
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tension_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::tensions {
 namespace {

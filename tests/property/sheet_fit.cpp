@@ -8,7 +8,6 @@
 #include "mbtfm/tensions/common_motion.h"
 #include "substrate/greens/models.h"
 #include "tests/support/sheets.h"
-#include "tests/support/test.h"
 
 namespace {
 

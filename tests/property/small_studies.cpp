@@ -9,7 +9,6 @@
 #include "pipeline/statistics/study_files.h"
 #include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::statistics {
 namespace {

@@ -8,7 +8,6 @@
 #include "segment/stacks/track.h"
 #include "tests/support/findings.h"
 #include "tests/support/stack_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::stacks {
 namespace {

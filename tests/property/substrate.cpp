@@ -1,6 +1,4 @@
 /// Symmetries of the half-space and the layer.
-#include <gtest/gtest.h>
-
 #include "substrate/greens/layer.h"
 #include "substrate/greens/models.h"
 #include "tests/support/substrate_scene.h"

@@ -9,7 +9,6 @@
 #include "substrate/surface/alpha_slices.h"
 #include "substrate/surface/beads.h"
 #include "tests/support/beads_below.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {

@@ -2,7 +2,6 @@
 #include "pipeline/contract/errors.h"
 #include "substrate/surface/beads.h"
 #include "tests/support/beads_below.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {

@@ -1,8 +1,6 @@
 /// What the tension fit must do over many repeats: its errors are as small as the data allow and as large as it says.
 #include "mbtfm/tensions/tension_fit.h"
 
-#include <gtest/gtest.h>
-
 #include "mbtfm/tensions/cross_validation.h"
 #include "mbtfm/tensions/model_checks.h"
 #include "mbtfm/tensions/robust.h"

@@ -1,7 +1,5 @@
-#include <gtest/gtest.h>
 
 #include "segment/beads/pair_look.h"
-#include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 
 namespace mbtfm::beads {

@@ -2,7 +2,6 @@
 #include "mbtfm/tractions/fttc.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/ellipse_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::tractions {
 namespace {

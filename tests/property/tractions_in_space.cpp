@@ -10,7 +10,6 @@
 #include "pipeline/contract/errors.h"
 #include "tests/support/findings.h"
 #include "tests/support/half_space_problem.h"
-#include "tests/support/test.h"
 
 namespace {
 

@@ -1,9 +1,5 @@
 #include "mbtfm/tensions/under_load.h"
 
-#include <gtest/gtest.h>
-
-#include "mbtfm/tensions/common_motion.h"
-#include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/placement.h"
 #include "pipeline/stage/effects.h"
 #include "tests/support/layer_data.h"

@@ -4,7 +4,6 @@
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/hard_case.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -1,6 +1,4 @@
-#include <gtest/gtest.h>
 
-#include "network/cables/cables.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/equilibrium.h"
 #include "tests/support/hard_cables.h"

@@ -8,7 +8,6 @@
 #include "substrate/surface/formula.h"
 #include "tests/support/beads_below.h"
 #include "tests/support/hard_case.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -1,6 +1,4 @@
 /// Actin images without fibres give none; what looks like fibres but is not is left out.
-#include <gtest/gtest.h>
-
 #include <opencv2/core.hpp>
 
 #include "segment/cells/fibres.h"

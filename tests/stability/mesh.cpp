@@ -4,7 +4,6 @@
 #include "tests/support/hard_case.h"
 #include "tests/support/hard_cells.h"
 #include "tests/support/random_cell.h"
-#include "tests/support/test.h"
 #include "tests/support/valid_network.h"
 
 namespace mbtfm::mesh {

@@ -3,7 +3,6 @@
 #include "tests/support/folders.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/segmentation_score.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::images {
 namespace {

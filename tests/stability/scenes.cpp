@@ -3,10 +3,8 @@
 /// failed once are kept below.
 #include <ostream>
 
-#include "pipeline/contract/errors.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/random_scene.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

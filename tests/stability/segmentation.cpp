@@ -1,11 +1,9 @@
 /// Images without a cell give none, and say why.
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
-#include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/segmentation_accuracy.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -15,7 +15,6 @@
 #include "tests/support/hard_case.h"
 #include "tests/support/substrate_scene.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::substrate {
 namespace {

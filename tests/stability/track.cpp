@@ -1,12 +1,8 @@
-#include "segment/beads/track.h"
 #include "mbtfm/tractions/field_of_adhesions.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/stage/parameters.h"
 #include "segment/beads/given_field.h"
-#include "segment/beads/plane.h"
-#include "tests/support/bead_pair.h"
 #include "tests/support/hard_case.h"
-#include "tests/support/test.h"
 #include "tests/support/tracked_cell.h"
 
 namespace mbtfm::beads {

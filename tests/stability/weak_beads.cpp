@@ -1,8 +1,6 @@
 /// Bead images that single beads cannot be followed in, and two of unequal focus.
 #include "tests/support/weak_beads.h"
-#include "segment/beads/track.h"
 #include "tests/support/hard_case.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::beads {
 namespace {

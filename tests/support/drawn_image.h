@@ -6,7 +6,6 @@
 #include "pipeline/contract/polyline.h"
 #include "segment/images/image.h"
 #include "tests/support/segmentation_score.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -3,7 +3,6 @@
 
 #include "pipeline/contract/polyline.h"
 #include "tests/support/segmentation_accuracy.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -4,7 +4,6 @@
 #include "pipeline/files/text.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

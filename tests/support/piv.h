@@ -4,7 +4,6 @@
 #include "segment/beads/coarse_field.h"
 #include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -8,7 +8,6 @@
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/report/compare.h"
 #include "tests/support/program.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

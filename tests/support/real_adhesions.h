@@ -8,7 +8,6 @@
 #include "segment/cells/segment_cell.h"
 #include "tests/support/folders.h"
 #include "tests/support/segmentation_score.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -7,7 +7,6 @@
 #include "samples/drawing/scenario.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/segmentation_score.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -4,7 +4,6 @@
 
 #include "pipeline/files/sheet_files.h"
 #include "tests/support/simulated_study.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

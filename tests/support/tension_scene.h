@@ -9,7 +9,6 @@
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
 #include "tests/support/reference_network.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

@@ -4,7 +4,6 @@
 #include "samples/drawing/render.h"
 #include "samples/experiment/experiment.h"
 #include "segment/beads/plane.h"
-#include "tests/support/test.h"
 #include "tests/support/tracking_accuracy.h"
 
 namespace mbtfm::test {

@@ -3,7 +3,6 @@
 
 #include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::test {
 

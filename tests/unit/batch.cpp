@@ -1,6 +1,4 @@
 /// Images by file-name patterns, and the table of a batch.
-#include <gtest/gtest.h>
-
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"

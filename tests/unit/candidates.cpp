@@ -4,7 +4,6 @@
 #include "segment/cells/mask.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

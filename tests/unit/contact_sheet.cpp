@@ -2,7 +2,6 @@
 
 #include "pipeline/contract/errors.h"
 #include "tests/support/drawn_image.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::images {
 namespace {

@@ -6,7 +6,6 @@
 #include "pipeline/report/space_results.h"
 #include "pipeline/runner/cell_stages.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::cost {
 namespace {

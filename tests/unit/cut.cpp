@@ -7,7 +7,6 @@
 #include "segment/cells/fibre_ends.h"
 #include "segment/cells/outline.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

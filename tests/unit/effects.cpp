@@ -7,7 +7,6 @@
 #include "pipeline/runner/record.h"
 #include "pipeline/stage/parameters.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

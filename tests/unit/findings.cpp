@@ -7,7 +7,6 @@
 #include "pipeline/files/json.h"
 #include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

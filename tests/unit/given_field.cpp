@@ -1,7 +1,5 @@
 #include "segment/beads/given_field.h"
 
-#include <gtest/gtest.h>
-
 #include <numbers>
 
 #include "pipeline/contract/errors.h"

@@ -10,7 +10,6 @@
 #include "tests/support/bead_pair.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::beads {
 namespace {

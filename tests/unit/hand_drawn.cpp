@@ -3,7 +3,6 @@
 #include "segment/cells/cell_rois.h"
 #include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -11,7 +11,6 @@
 #include "tests/support/findings.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::images {
 namespace {

@@ -8,7 +8,6 @@
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/memory.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -6,7 +6,6 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

@@ -5,7 +5,6 @@
 #include "pipeline/files/toml.h"
 #include "pipeline/stage/suggest.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

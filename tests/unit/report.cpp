@@ -1,14 +1,11 @@
 #include "pipeline/report/report.h"
 
-#include <gtest/gtest.h>
-
 #include <regex>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/base64.h"
-#include "pipeline/files/text.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/kinds.h"
 #include "pipeline/report/map_parts.h"

@@ -5,7 +5,6 @@
 #include "segment/rois/roi.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::rois {
 namespace {

@@ -16,7 +16,6 @@
 #include "pipeline/stage/effects.h"
 #include "tests/support/folders.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::runner {
 namespace {

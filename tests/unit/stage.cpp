@@ -12,7 +12,6 @@
 #include "pipeline/stage/suggest.h"
 #include "tests/support/findings.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm {
 namespace {

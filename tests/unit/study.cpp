@@ -1,17 +1,12 @@
-#include "pipeline/statistics/study.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/csv.h"
-#include "pipeline/files/text.h"
 #include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/picture.h"
 #include "pipeline/statistics/samples.h"
 #include "pipeline/statistics/study_files.h"
 #include "pipeline/statistics/summaries.h"
-#include "tests/support/fake_cell.h"
 #include "tests/support/small_study.h"
 #include "tests/support/tables.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::statistics {
 namespace {

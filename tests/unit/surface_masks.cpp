@@ -3,7 +3,6 @@
 #include "substrate/surface/points.h"
 #include "substrate/surface/voxels.h"
 #include "tests/support/hard_case.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {

@@ -5,7 +5,6 @@
 #include "substrate/surface/mesh.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {

@@ -5,7 +5,6 @@
 #include "substrate/surface/missing.h"
 #include "substrate/surface/points.h"
 #include "tests/support/hard_case.h"
-#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {

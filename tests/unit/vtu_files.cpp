@@ -1,11 +1,9 @@
 /// network.vtu as others write it, and damaged.
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/files/vtu_file.h"
 #include "tests/support/fake_tables.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test.h"
 #include "tests/support/vtu_variants.h"
 
 namespace mbtfm {
