@@ -58,8 +58,9 @@ void expect_schemas_refuse_spoilt_files(const fs::path& cell, const fs::path& sp
   }
 }
 
-TEST(Chain, tensions_come_back_from_the_true_segmentation_and_noisy_beads) {
-  const TemporaryFolder folder;
+using Chain = test::InFolder;
+
+TEST_F(Chain, tensions_come_back_from_the_true_segmentation_and_noisy_beads) {
   const fs::path cell = folder / "cell";
   const report::Comparison comparison = simulate_and_run(cell, "--scenario u2os --seed 1 --noise 0.07 --beads 10000");
   EXPECT_LE(comparison.relative_error, 0.25);
@@ -68,8 +69,7 @@ TEST(Chain, tensions_come_back_from_the_true_segmentation_and_noisy_beads) {
   expect_schemas_refuse_spoilt_files(cell, folder / "spoilt.json");
 }
 
-TEST(Chain, tensions_come_back_from_images_alone) {
-  const TemporaryFolder folder;
+TEST_F(Chain, tensions_come_back_from_images_alone) {
   const fs::path cell = folder / "cell";
   const report::Comparison comparison =
       simulate_and_run(cell, "--scenario u2os --seed 1 --noise 0.07 --beads 10000 --images");
@@ -82,15 +82,13 @@ TEST(Chain, tensions_come_back_from_images_alone) {
 
 /// Without a floor under the beads' noise, the error of the model would put all weight on the few modes of the forces
 /// that no mesh disagrees upon: 0.14.
-TEST(Chain, beads_without_any_noise_are_fitted_no_worse_than_noisy_ones) {
-  const TemporaryFolder folder;
+TEST_F(Chain, beads_without_any_noise_are_fitted_no_worse_than_noisy_ones) {
   const report::Comparison comparison =
       simulate_and_run(folder / "cell", "--scenario u2os --seed 1 --noise 0 --beads 5000");
   EXPECT_LE(comparison.relative_error, 0.1);
 }
 
-TEST(Chain, noise_free_tensions_on_the_simulations_own_network_come_back) {
-  const TemporaryFolder folder;
+TEST_F(Chain, noise_free_tensions_on_the_simulations_own_network_come_back) {
   const fs::path cell = folder / "cell";
   output_of("mbtfm-simulate --scenario u2os --seed 2 --noise 0 --beads 3000 --quiet --out " + cell.string());
   output_of("mbtfm-fit --model layer --n_meshes 1 --tolerance 1e-9 --compare_sheet on --cell " +
@@ -119,8 +117,7 @@ TEST(Chain, noise_free_tensions_on_the_simulations_own_network_come_back) {
   EXPECT_LT(of_sheet, 1);
 }
 
-TEST(Chain, a_second_run_does_nothing_and_a_changed_input_runs_what_depends_on_it) {
-  const TemporaryFolder folder;
+TEST_F(Chain, a_second_run_does_nothing_and_a_changed_input_runs_what_depends_on_it) {
   const fs::path cell = folder / "cell";
   simulate_and_run(cell, "--scenario two-adhesions --seed 1 --noise 0.07 --beads 800");
   const auto before = fs::last_write_time(cell / "4_fit/tensions.csv");
@@ -135,8 +132,7 @@ TEST(Chain, a_second_run_does_nothing_and_a_changed_input_runs_what_depends_on_i
   EXPECT_GT(files::read_tensions(cell / "4_fit/tensions.csv")[1].tension_nN, 1.5 * tension);
 }
 
-TEST(Chain, one_two_and_four_threads_give_the_same_bytes) {
-  const TemporaryFolder folder;
+TEST_F(Chain, one_two_and_four_threads_give_the_same_bytes) {
   const fs::path cell = folder / "cell";
   ASSERT_EQ(run_program("mbtfm-simulate --scenario ring --seed 1 --beads 1500 --quiet --out " + cell.string()).code, 0);
   std::string first, first_of_usual_method;
@@ -187,7 +183,7 @@ void recompute_displacement(const fs::path& cell) {
   files::write_displacement(cell / "2_track/displacement.csv", beads);
 }
 
-TEST(Chain, tensions_of_the_oracle_cells_come_back_from_the_displacement_of_their_forces) {
+TEST_F(Chain, tensions_of_the_oracle_cells_come_back_from_the_displacement_of_their_forces) {
   const fs::path reference = test::source_folder() / "../shared/reference";
   if (!fs::exists(reference)) GTEST_SKIP() << "no ../shared/reference here";
   for (const char* name : {"oracle_cell_21", "oracle_cell_22"}) {

@@ -58,9 +58,10 @@ std::map<std::string, Measured> measured_in(const fs::path& table) {
 /// wide.
 std::string report_function() { return files::read_text(test::source_folder() / "tests/data/report.ijm"); }
 
-TEST(ImageJ, it_measures_the_areas_and_lengths_of_the_set_that_the_segmentation_writes) {
+using ImageJ = test::InFolder;
+
+TEST_F(ImageJ, it_measures_the_areas_and_lengths_of_the_set_that_the_segmentation_writes) {
   if (!has_imagej()) GTEST_SKIP() << "imagej and xvfb-run are not installed";
-  const TemporaryFolder folder;
   const test::DrawnScene scene = test::drawn_scene(10, 1);
   const double pixel_um = scene.kPixel_um;
   images::write_tiff(folder / "paxillin.tif", scene.adhesion_image);
@@ -102,9 +103,8 @@ TEST(ImageJ, it_measures_the_areas_and_lengths_of_the_set_that_the_segmentation_
   }
 }
 
-TEST(ImageJ, a_line_it_profiles_lies_where_mbtfm_reads_it) {
+TEST_F(ImageJ, a_line_it_profiles_lies_where_mbtfm_reads_it) {
   if (!has_imagej()) GTEST_SKIP() << "imagej and xvfb-run are not installed";
-  const TemporaryFolder folder;
   // the grey value of a pixel is its column: a profile's first value tells where the line begins
   const std::string output = run_macro(folder.path(), R"(
 newImage("ramp", "32-bit", 100, 80, 1);
@@ -117,9 +117,8 @@ saveAs("Selection", ")" + (folder / "a.roi").string() + R"("); print("begins", p
   EXPECT_NEAR(rois::line_px(rois::read_rois(folder / "a.roi").front()).front().x, centre_of_column, 1e-3);
 }
 
-TEST(ImageJ, selections_it_saves_are_read_as_it_draws_them) {
+TEST_F(ImageJ, selections_it_saves_are_read_as_it_draws_them) {
   if (!has_imagej()) GTEST_SKIP() << "imagej and xvfb-run are not installed";
-  const TemporaryFolder folder;
   const fs::path table = folder / "drawn";
   const std::string save = "save('";
   std::ostringstream macro;
@@ -162,9 +161,8 @@ function save(name) { Roi.setName(name); saveAs("Selection", ")"
   }
 }
 
-TEST(ImageJ, a_hyperstack_it_saves_is_read_by_channel_slice_and_frame) {
+TEST_F(ImageJ, a_hyperstack_it_saves_is_read_by_channel_slice_and_frame) {
   if (!has_imagej()) GTEST_SKIP() << "imagej and xvfb-run are not installed";
-  const TemporaryFolder folder;
   for (const char* bits : {"8", "16", "32"}) {
     const fs::path file = folder / (std::string(bits) + ".tif");
     run_macro(folder.path(), "newImage('h', '" + std::string(bits) + R"(-bit grayscale-mode', 20, 10, 2, 3, 4);

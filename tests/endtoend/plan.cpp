@@ -9,8 +9,9 @@ namespace {
 const std::string kSmall =
     "mbtfm plan --scenario two-adhesions --noise_um 0.02,0.05 --beads_per_um2 0.5,1 --youngs_modulus_kPa 4,8 ";
 
-TEST(Plan, a_question_is_answered_with_a_sentence_tables_a_picture_and_a_page) {
-  const test::TemporaryFolder folder;
+using Plan = test::InFolder;
+
+TEST_F(Plan, a_question_is_answered_with_a_sentence_tables_a_picture_and_a_page) {
   const fs::path out = folder / "plan";
   EXPECT_TRUE(has_words(output_of(kSmall + "--drawn 1 --out " + out.string()), " to see 1 nN per fibre to 20 %",
                         "Checked with 1 simulated experiment"));
@@ -25,16 +26,14 @@ TEST(Plan, a_question_is_answered_with_a_sentence_tables_a_picture_and_a_page) {
   EXPECT_TRUE(has_words(page, "How many cells"));
 }
 
-TEST(Plan, the_same_question_has_the_same_answer_for_any_number_of_threads) {
-  const test::TemporaryFolder folder;
+TEST_F(Plan, the_same_question_has_the_same_answer_for_any_number_of_threads) {
   for (const char* threads : {"1", "2"})
     output_of(kSmall + "--drawn 1 --threads " + threads + " --out " + (folder / threads).string());
   for (const char* file : {"plan.csv", "plan_drawn.csv", "plan.html"})
     EXPECT_EQ(files::read_text(folder / "1" / file), files::read_text(folder / "2" / file)) << file;
 }
 
-TEST(Plan, a_finished_cell_is_planned_with_by_its_own_tensions_beads_and_gel) {
-  const test::TemporaryFolder folder;
+TEST_F(Plan, a_finished_cell_is_planned_with_by_its_own_tensions_beads_and_gel) {
   const fs::path cell = folder / "cell", out = folder / "plan";
   ASSERT_EQ(
       run_program("mbtfm-simulate --quiet --scenario two-adhesions --beads 2500 --noise_um 0.02 --out " + cell.string())
@@ -47,8 +46,7 @@ TEST(Plan, a_finished_cell_is_planned_with_by_its_own_tensions_beads_and_gel) {
   EXPECT_TRUE(has_words(output_of(ask), "your gel of 8.4 kPa"));
 }
 
-TEST(Plan, a_gel_that_hardly_moves_or_moves_too_far_is_warned_of) {
-  const test::TemporaryFolder folder;
+TEST_F(Plan, a_gel_that_hardly_moves_or_moves_too_far_is_warned_of) {
   const std::string said = run_program(
                                "mbtfm plan --scenario two-adhesions --noise_um 0.02 --beads_per_um2 0.5 "
                                "--youngs_modulus_kPa 0.05,8.4,1000 --drawn 0 --out " +
@@ -59,8 +57,7 @@ TEST(Plan, a_gel_that_hardly_moves_or_moves_too_far_is_warned_of) {
   EXPECT_FALSE(has_words(said, "Mind: On 8.4 kPa"));
 }
 
-TEST(Plan, what_is_no_plan_is_refused_and_leaves_nothing_behind) {
-  const test::TemporaryFolder folder;
+TEST_F(Plan, what_is_no_plan_is_refused_and_leaves_nothing_behind) {
   const std::string out = " --out " + (folder / "plan").string();
   for (const char* bad :
        {"--noise_um 0", "--noise_um a,b", "--beads_per_um2 1,-2", "--youngs_modulus_kPa 8400000000", "--within never",
@@ -73,8 +70,7 @@ TEST(Plan, what_is_no_plan_is_refused_and_leaves_nothing_behind) {
   EXPECT_FALSE(fs::exists(folder / "plan"));
 }
 
-TEST(Plan, a_modulus_in_pascals_is_refused_and_no_end_of_a_search_is_an_answer) {
-  const test::TemporaryFolder folder;
+TEST_F(Plan, a_modulus_in_pascals_is_refused_and_no_end_of_a_search_is_an_answer) {
   const std::string ask = "mbtfm plan --scenario two-adhesions --drawn 0 --beads_per_um2 0.5 --noise_um 0.05 --out " +
                           (folder / "plan").string() + " --youngs_modulus_kPa ";
   EXPECT_TRUE(has_words(output_of(ask + "8400", 3), "8400 Pa is 8.4 kPa"));

@@ -15,7 +15,9 @@ Outcome simulate(const std::string& arguments) { return run_program("mbtfm-simul
 /// A small experiment: what does not need a whole cell is tested on this.
 const std::string kSmall = "--scenario two-adhesions --beads 300 ";
 
-TEST(Simulate, every_scenario_makes_a_cell_that_reads_back) {
+using Simulate = test::InFolder;
+
+TEST_F(Simulate, every_scenario_makes_a_cell_that_reads_back) {
   for (const auto& entry : fs::directory_iterator(test::source_folder() / "samples" / "scenarios")) {
     const std::string name = entry.path().stem().string();
     SCOPED_TRACE(name);
@@ -45,8 +47,7 @@ TEST(Simulate, every_scenario_makes_a_cell_that_reads_back) {
   }
 }
 
-TEST(Simulate, images_stand_in_for_segmentation_and_displacement) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, images_stand_in_for_segmentation_and_displacement) {
   const fs::path cell = folder / "cell";
   output_of(simulate(kSmall + "--images --out " + cell.string()));
   for (const char* name : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"}) {
@@ -66,8 +67,7 @@ TEST(Simulate, images_stand_in_for_segmentation_and_displacement) {
   EXPECT_FALSE(fs::exists(cell / "2_track"));
 }
 
-TEST(Simulate, colonies_have_images_of_their_beads_and_of_themselves) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, colonies_have_images_of_their_beads_and_of_themselves) {
   output_of(simulate(
       "--scenario colony-disc --images --radius_um 12 --image_size_px 400 --beads 800 --n_colonies 2 --n_dipoles 0 "
       "--mesh_um 3 --out " +
@@ -98,8 +98,7 @@ TEST(Simulate, colonies_have_images_of_their_beads_and_of_themselves) {
                files::read_text(folder / "all/colony_002/beads_stressed.tif"));
 }
 
-TEST(Simulate, images_do_not_join_the_segmentation_of_another_experiment) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, images_do_not_join_the_segmentation_of_another_experiment) {
   const std::string out = "--out " + (folder / "cell").string();
   ASSERT_EQ(simulate(kSmall + out).code, 0);
   EXPECT_EQ(simulate(kSmall + out).code, 0) << "the same again is no matter";
@@ -107,8 +106,7 @@ TEST(Simulate, images_do_not_join_the_segmentation_of_another_experiment) {
   EXPECT_FALSE(fs::exists(folder / "cell" / "actin.tif"));
 }
 
-TEST(Simulate, nothing_of_a_users_cell_is_written_over) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, nothing_of_a_users_cell_is_written_over) {
   const fs::path cell = folder / "mine";
   fs::create_directories(cell);
   const std::map<std::string, std::string> files = {{"cell.toml", "pixel_size_um = 0.1\n"}, {"paxillin.tif", "II*"}};
@@ -125,8 +123,7 @@ TEST(Simulate, nothing_of_a_users_cell_is_written_over) {
   EXPECT_EQ(std::distance(fs::directory_iterator(cell), {}), 2);
 }
 
-TEST(Simulate, what_was_simulated_is_written_over_if_it_is_asked_for) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, what_was_simulated_is_written_over_if_it_is_asked_for) {
   const std::string out = " --out " + (folder / "cell").string();
   output_of(simulate(kSmall + out));
   const std::string before = files::read_text(folder / "cell/truth/displacement.csv");
@@ -136,8 +133,7 @@ TEST(Simulate, what_was_simulated_is_written_over_if_it_is_asked_for) {
   EXPECT_NE(files::read_text(folder / "cell/truth/displacement.csv"), before);
 }
 
-TEST(Simulate, same_seed_same_bytes_for_any_number_of_threads) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, same_seed_same_bytes_for_any_number_of_threads) {
   ASSERT_EQ(simulate(kSmall + "--images --threads 1 --out " + (folder / "a").string()).code, 0);
   ASSERT_EQ(simulate(kSmall + "--images --threads 3 --out " + (folder / "b").string()).code, 0);
   int n_files = 0;
@@ -150,8 +146,7 @@ TEST(Simulate, same_seed_same_bytes_for_any_number_of_threads) {
   EXPECT_GE(n_files, 12);
 }
 
-TEST(Simulate, flags_override_the_scenario_and_its_record_repeats_it) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, flags_override_the_scenario_and_its_record_repeats_it) {
   const fs::path first = folder / "first", again = folder / "again";
   ASSERT_EQ(simulate(kSmall + "--youngs_modulus_kPa 3 --noise 0.1 --out " + first.string()).code, 0);
   EXPECT_TRUE(has_words(files::read_text(first / "cell.toml"), "youngs_modulus_kPa = 3"));
@@ -160,8 +155,7 @@ TEST(Simulate, flags_override_the_scenario_and_its_record_repeats_it) {
             files::read_text(again / "2_track" / "displacement.csv"));
 }
 
-TEST(Simulate, colonies_differ_by_place_beads_and_dipoles_alone) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, colonies_differ_by_place_beads_and_dipoles_alone) {
   output_of(simulate(
       "--scenario colony-spikes --beads 2000 --noise_um 0 --n_colonies 2 --scatter_um 8 --n_dipoles 0 --mesh_um 8 "
       "--out " +
@@ -188,8 +182,7 @@ TEST(Simulate, colonies_differ_by_place_beads_and_dipoles_alone) {
   }
 }
 
-TEST(Simulate, dipoles_pull_inside_of_a_colony_and_add_to_its_sheet) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, dipoles_pull_inside_of_a_colony_and_add_to_its_sheet) {
   const auto field = [&](int n_dipoles) {
     const fs::path out = folder / std::to_string(n_dipoles);
     output_of(simulate("--scenario colony-disc --beads 2000 --noise_um 0 --n_dipoles " + std::to_string(n_dipoles) +
@@ -219,8 +212,7 @@ TEST(Simulate, dipoles_pull_inside_of_a_colony_and_add_to_its_sheet) {
   EXPECT_LT(norm(mean), 0.05 * most_um);
 }
 
-TEST(Simulate, on_springs_what_lies_under_the_sheet_moves_and_nothing_else) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, on_springs_what_lies_under_the_sheet_moves_and_nothing_else) {
   const fs::path cell = folder / "cell";
   const std::string disc = "--scenario contracting-disc --beads 2000 --mesh_um 4 --ground springs ";
   ASSERT_EQ(simulate(disc + "--adhesion_stiffness_nN_per_um3 0.1 --out " + cell.string()).code, 0);
@@ -235,8 +227,7 @@ TEST(Simulate, on_springs_what_lies_under_the_sheet_moves_and_nothing_else) {
       "n_dipoles"));
 }
 
-TEST(Simulate, wrong_arguments_are_explained_and_leave_nothing_behind) {
-  const test::TemporaryFolder folder;
+TEST_F(Simulate, wrong_arguments_are_explained_and_leave_nothing_behind) {
   const std::string out = " --out " + (folder / "cell").string();
   EXPECT_TRUE(has_words(output_of(simulate("--scenario no-such" + out), 2), "two-adhesions"));
   EXPECT_EQ(simulate("--scenario ./nowhere.toml" + out).code, 2);

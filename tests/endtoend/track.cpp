@@ -35,8 +35,9 @@ void write_series(const test::TemporaryFolder& folder) {
   files::write_text(folder / "frames/._t2.tif", "as a Mac leaves on a stick");
 }
 
-TEST(TrackEndToEnd, frames_are_tracked_in_the_order_of_their_numbers_and_one_that_is_lost_again) {
-  const test::TemporaryFolder folder;
+using TrackEndToEnd = test::InFolder;
+
+TEST_F(TrackEndToEnd, frames_are_tracked_in_the_order_of_their_numbers_and_one_that_is_lost_again) {
   write_series(folder);
   const std::string arguments = files("r.tif", "frames") + " --record out/record.json";
   output_of(run_track(folder, arguments));
@@ -58,8 +59,7 @@ TEST(TrackEndToEnd, frames_are_tracked_in_the_order_of_their_numbers_and_one_tha
   EXPECT_TRUE(has_words(files::read_text(folder / "out/record.json"), "\"n_frames_kept\": 1"));
 }
 
-TEST(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
-  const test::TemporaryFolder folder;
+TEST_F(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
   files::write_text(folder / "piv.csv", "x,y,u,v\n0,0,1,0\n10,0,1,0\n0,10,1,0\n10,10,NaN,0\n");
   const std::string given = "--displacement piv.csv";
   const std::string columns = " --x_column x --y_column y --ux_column u --uy_column v";
@@ -76,8 +76,7 @@ TEST(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
   EXPECT_EQ(run_track(folder, "").code, 2);
 }
 
-TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
-  const test::TemporaryFolder folder;
+TEST_F(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330});
   const images::Image dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
   images::Image one = dark, broken = pair.stressed;
@@ -117,8 +116,7 @@ TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
   }
 }
 
-TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
-  const test::TemporaryFolder folder;
+TEST_F(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
   const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
   const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
   const auto dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0});
@@ -148,8 +146,7 @@ TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
   EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
-TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
-  const test::TemporaryFolder folder;
+TEST_F(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
   const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
   const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
   const images::Image other = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
@@ -175,8 +172,7 @@ TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
   EXPECT_EQ(run_track(folder, both + relaxed + beads + " --stressed_time 3 --stressed_last 2").code, 2);
 }
 
-TEST(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
-  const test::TemporaryFolder folder;
+TEST_F(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
   const auto pair = test::draw_bead_pair(test::ring_of_adhesions(384, 6), {.width = 384, .n_beads = 2950});
   write(folder / "r.tif", pair.relaxed, 0.2);
   write(folder / "s.tif", pair.stressed, 0.2);
@@ -196,8 +192,7 @@ TEST(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
   EXPECT_TRUE(fires("moves-outward", pushed.output)) << pushed.output;
 }
 
-TEST(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_told_of) {
-  const test::TemporaryFolder folder;
+TEST_F(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_told_of) {
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330});  // 1.3 px: 0.26 and 0.065 um
   for (const double pixel_um : {0.2, 0.05}) {
     write(folder / "r.tif", pair.relaxed, pixel_um);
@@ -208,8 +203,7 @@ TEST(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_told_of) {
   }
 }
 
-TEST(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_told) {
-  const test::TemporaryFolder folder;
+TEST_F(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_told) {
   const auto told = [&](const test::BeadPair& pair) {
     write(folder / "r.tif", pair.relaxed, 0.2);
     write(folder / "s.tif", pair.stressed, 0.2);
@@ -236,8 +230,7 @@ TEST(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_to
 }
 
 /// Dots in a lattice instead of beads: any of its periods fits, so the least shift is the right one.
-TEST(TrackEndToEnd, dots_in_a_lattice_find_their_partners_and_a_choice_is_told) {
-  const test::TemporaryFolder folder;
+TEST_F(TrackEndToEnd, dots_in_a_lattice_find_their_partners_and_a_choice_is_told) {
   constexpr int kWidth = 256, kPitch = 16;
   const std::vector<test::Peak> peaks = test::ring_of_adhesions(kWidth, kPitch / 6.0);
   const auto lattice = [&](Vec2 shift, bool is_pulled, std::uint64_t seed) {
@@ -272,8 +265,7 @@ TEST(TrackEndToEnd, dots_in_a_lattice_find_their_partners_and_a_choice_is_told) 
   EXPECT_TRUE(fires("pattern-repeats", told)) << told;
 }
 
-TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_told_of) {
-  const test::TemporaryFolder folder;
+TEST_F(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_told_of) {
   std::string still = "x_um,y_um,ux_um,uy_um\n", twice = still;
   for (int k = 0; k < 64; ++k) {
     const std::string place = std::to_string(k % 8) + "," + std::to_string(k / 8) + ",";
@@ -291,8 +283,7 @@ TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_
   EXPECT_EQ(files::read_displacement(folder / "out/displacement.csv").back().flag, "duplicate");
 }
 
-TEST(TrackEndToEnd, a_table_of_another_program_is_named_and_its_masked_vectors_counted) {
-  const test::TemporaryFolder folder;
+TEST_F(TrackEndToEnd, a_table_of_another_program_is_named_and_its_masked_vectors_counted) {
   const auto peaks = test::ring_of_adhesions(320, 3);
   std::string table =
       "PIV\r\nconversion factor xy (px -> m): 1, conversion factor uv (px/frame -> m/s): 1\r\n"

@@ -50,7 +50,9 @@ std::vector<FrameFit> fit(const Series& series, const std::vector<FrameFit>& kep
                     series.scene.adhesion_ids, parameters, true, true, 2, start, kept);
 }
 
-TEST(Series, tensions_and_total_force_that_change_are_followed_within_their_standard_errors) {
+using Series = test::InFolder;
+
+TEST_F(Series, tensions_and_total_force_that_change_are_followed_within_their_standard_errors) {
   const Series series = make_series(12);
   const std::vector<FrameFit> fits = fit(series);
   ASSERT_EQ(fits.size(), series.frames.size());
@@ -74,7 +76,7 @@ TEST(Series, tensions_and_total_force_that_change_are_followed_within_their_stan
   EXPECT_NEAR(std::sqrt(total_squares / n_frames), 1, 4 / std::sqrt(2 * n_frames));
 }
 
-TEST(Series, a_frame_without_displacements_or_with_too_few_beads_does_not_stop_the_others) {
+TEST_F(Series, a_frame_without_displacements_or_with_too_few_beads_does_not_stop_the_others) {
   Series series = make_series(4);
   series.frames[1] = {.frame = 2, .refused = "out of focus"};
   for (std::size_t i = 2; i < series.frames[2].beads.size(); ++i) series.frames[2].beads[i].flag = "lost";
@@ -85,7 +87,7 @@ TEST(Series, a_frame_without_displacements_or_with_too_few_beads_does_not_stop_t
   EXPECT_TRUE(fits[3].converged);
 }
 
-TEST(Series, flagged_beads_do_not_count) {
+TEST_F(Series, flagged_beads_do_not_count) {
   Series series = make_series(1);
   const std::vector<FrameFit> before = fit(series);
   for (std::size_t i = 0; i < series.frames[0].beads.size(); i += 10) series.frames[0].beads[i].flag = "ambiguous";
@@ -99,7 +101,7 @@ TEST(Series, flagged_beads_do_not_count) {
   }
 }
 
-TEST(Series, the_response_of_beads_that_the_frames_share_is_found_once) {
+TEST_F(Series, the_response_of_beads_that_the_frames_share_is_found_once) {
   const Series series = make_series(2);
   int n_calls = 0;
   const auto response = [&](const DisplacementField& beads) {
@@ -127,11 +129,10 @@ TEST(Series, the_response_of_beads_that_the_frames_share_is_found_once) {
   EXPECT_EQ(n_calls, 4);
 }
 
-TEST(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
+TEST_F(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
   Series series = make_series(3);
   for (SeriesFrame& frame : series.frames) frame.sha256 = "file " + std::to_string(frame.frame);
   std::vector<FrameFit> whole = fit(series);
-  const test::TemporaryFolder folder;
   whole[0].tensions[0].tension_nN = 42;  // no fit gives it
   write_tracks(folder / "tracks.csv", whole, {}, 30);
   write_frames(folder / "frames.csv", whole, 30);
@@ -152,12 +153,11 @@ TEST(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
   EXPECT_EQ(written(known), written(whole));  // the same bytes
 }
 
-TEST(Series, time_begins_with_the_first_frame) {
+TEST_F(Series, time_begins_with_the_first_frame) {
   std::vector<FrameFit> fits(2);
   for (FrameFit& fit : fits) fit.tensions.resize(1);
   fits[0].frame = 1;
   fits[1].frame = 4;
-  const test::TemporaryFolder folder;
   write_frames(folder / "frames.csv", fits, 30);
   write_tracks(folder / "tracks.csv", fits, {}, 30);
   for (const char* name : {"frames.csv", "tracks.csv"}) {
@@ -167,8 +167,7 @@ TEST(Series, time_begins_with_the_first_frame) {
   }
 }
 
-TEST(Series, frames_of_other_beads_are_an_error_that_names_the_file) {
-  const test::TemporaryFolder folder;
+TEST_F(Series, frames_of_other_beads_are_an_error_that_names_the_file) {
   Series series = make_series(2);
   files::write_text(folder / "frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
   files::write_displacement(folder / "displacement_0001.csv", series.frames[0].beads);

@@ -33,6 +33,12 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
+/// For cases that write files: each has a folder of its own. `using Suite = test::InFolder;`
+class InFolder : public testing::Test {
+ protected:
+  const TemporaryFolder folder;
+};
+
 }  // namespace mbtfm::test
 
 namespace mbtfm {

@@ -43,8 +43,9 @@ std::string message_of(const std::function<void()>& action) {
   return error ? error->what() : "no InputError";
 }
 
-TEST(Files, adhesions_and_fibres_come_back_as_they_were_written) {
-  const TemporaryFolder folder;
+using Files = test::InFolder;
+
+TEST_F(Files, adhesions_and_fibres_come_back_as_they_were_written) {
   files::write_adhesions(folder / "adhesions.csv", {adhesion(7), adhesion(9)});
   const auto adhesions = files::read_adhesions(folder / "adhesions.csv");
   ASSERT_EQ(adhesions.size(), 2u);
@@ -63,8 +64,7 @@ TEST(Files, adhesions_and_fibres_come_back_as_they_were_written) {
   EXPECT_EQ(fibres[1].type_reason, fibre(4).type_reason);
 }
 
-TEST(Files, fibres_drawn_elsewhere_need_no_reasons) {
-  const TemporaryFolder folder;
+TEST_F(Files, fibres_drawn_elsewhere_need_no_reasons) {
   files::write_text(folder / "fibres.csv",
                     "fibre_id,type,length_um,width_um,start_adhesion_id,end_adhesion_id,mean_intensity,confidence\n"
                     "1,arc,5,0.6,,,3,1\n");
@@ -74,8 +74,7 @@ TEST(Files, fibres_drawn_elsewhere_need_no_reasons) {
   EXPECT_TRUE(fibres[0].type_reason.empty());
 }
 
-TEST(Files, an_outline_comes_back_with_its_holes_and_without_the_column_is_one_ring) {
-  const TemporaryFolder folder;
+TEST_F(Files, an_outline_comes_back_with_its_holes_and_without_the_column_is_one_ring) {
   const Polygon outer = {{0, 0}, {10, 0}, {10, 10}, {0, 10}}, hole = {{4, 4}, {6, 4}, {5, 6}};
   files::write_outline(folder / "outline.csv", outer, {hole});
   EXPECT_EQ(files::read_outline(folder / "outline.csv"), (std::vector<Polygon>{outer, hole}));
@@ -85,7 +84,7 @@ TEST(Files, an_outline_comes_back_with_its_holes_and_without_the_column_is_one_r
   EXPECT_TRUE(has_words(message_of([&] { files::read_outline(folder / "gap.csv"); }), "rings in order"));
 }
 
-TEST(Files, a_hole_lies_inside_its_outline) {
+TEST_F(Files, a_hole_lies_inside_its_outline) {
   Cell cell{{}, {}, {{0, 0}, {10, 0}, {10, 10}, {0, 10}}, {{{4, 4}, {6, 4}, {5, 6}}}};
   EXPECT_NO_THROW(check(cell));
   cell.holes_um[0][1].x = 11;
@@ -94,8 +93,7 @@ TEST(Files, a_hole_lies_inside_its_outline) {
   EXPECT_THROW(check(cell), InvalidData);
 }
 
-TEST(Files, a_network_comes_back_as_it_was_written) {
-  const TemporaryFolder folder;
+TEST_F(Files, a_network_comes_back_as_it_was_written) {
   files::write_network(folder / "network.vtu", network());
   const Network read = files::read_network(folder / "network.vtu");
   EXPECT_TRUE(read.vertices_um == network().vertices_um);
@@ -112,8 +110,7 @@ TEST(Files, a_network_comes_back_as_it_was_written) {
   EXPECT_EQ(contracted.link_force_nN[1], 2);
 }
 
-TEST(Files, a_vtk_file_cut_anywhere_is_an_input_error) {
-  const TemporaryFolder folder;
+TEST_F(Files, a_vtk_file_cut_anywhere_is_an_input_error) {
   files::write_network(folder / "network.vtu", network());
   const std::string whole = files::read_text(folder / "network.vtu");
   for (std::size_t n = 0; n < whole.size() - 1; n += 7) {
@@ -122,8 +119,7 @@ TEST(Files, a_vtk_file_cut_anywhere_is_an_input_error) {
   }
 }
 
-TEST(Files, an_error_names_file_line_column_label_expectation_and_finding) {
-  const TemporaryFolder folder;
+TEST_F(Files, an_error_names_file_line_column_label_expectation_and_finding) {
   files::write_adhesions(folder / "adhesions.csv", {adhesion(7), adhesion(11)});
   std::string text = files::read_text(folder / "adhesions.csv");
   text.replace(text.rfind(",0.5,1.2"), 4, ",-3.2");
@@ -133,8 +129,7 @@ TEST(Files, an_error_names_file_line_column_label_expectation_and_finding) {
                 ":3: column 'area_um2' of adhesion 11: expected a number > 0, found '-3.2'");
 }
 
-TEST(Files, not_a_number_is_refused_where_a_number_is_due) {
-  const TemporaryFolder folder;
+TEST_F(Files, not_a_number_is_refused_where_a_number_is_due) {
   for (const char* bad : {"nan", "inf", "", "1e", "1.5x", " 1"}) {
     files::write_text(folder / "displacement.csv",
                       std::string("x_um,y_um,ux_um,uy_um,sigma_um\n1,2,") + bad + ",0,0.02\n");
@@ -143,7 +138,7 @@ TEST(Files, not_a_number_is_refused_where_a_number_is_due) {
   }
 }
 
-TEST(Files, missing_columns_extra_fields_open_quotes_and_early_ends_are_refused) {
+TEST_F(Files, missing_columns_extra_fields_open_quotes_and_early_ends_are_refused) {
   EXPECT_THROW(files::CsvTable("a,b\n1,2,3\n", "t"), InputError);
   EXPECT_THROW(files::CsvTable("a,b\n1\n", "t"), InputError);
   EXPECT_THROW(files::CsvTable("a,b\n1,2", "t"), InputError);
@@ -153,7 +148,7 @@ TEST(Files, missing_columns_extra_fields_open_quotes_and_early_ends_are_refused)
   EXPECT_THROW(files::CsvTable("a\n1\n", "t").require({"b"}), InputError);
 }
 
-TEST(Files, semicolons_and_capitals_in_a_table_are_answered_with_how_to_write_it) {
+TEST_F(Files, semicolons_and_capitals_in_a_table_are_answered_with_how_to_write_it) {
   const auto error_of = [](const std::string& text) {
     const auto error = test::caught<InputError>([&] { files::CsvTable(text, "points.csv").require({"x_um"}); });
     return error ? error->found + " | " + error->hint : std::string("read");
@@ -163,7 +158,7 @@ TEST(Files, semicolons_and_capitals_in_a_table_are_answered_with_how_to_write_it
   EXPECT_TRUE(has_words(error_of("X_um,y_um\n1,2\n"), "write 'X_um' as 'x_um'"));
 }
 
-TEST(Files, quoted_fields_and_carriage_returns_are_read) {
+TEST_F(Files, quoted_fields_and_carriage_returns_are_read) {
   const files::CsvTable table(
       "\xEF\xBB\xBF"
       "a,b\r\n\"x, \"\"y\"\"\",2\r\n",
@@ -175,14 +170,13 @@ TEST(Files, quoted_fields_and_carriage_returns_are_read) {
   EXPECT_EQ(files::CsvTable(text.str(), "t").text(0, "a"), "x, \"y\"");
 }
 
-TEST(Files, a_full_disk_is_an_output_error) {
+TEST_F(Files, a_full_disk_is_an_output_error) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
   EXPECT_THROW(files::write_text("/dev/full", std::string(100000, 'x')), OutputError);
   EXPECT_THROW(files::write_network("/dev/full", network()), OutputError);
 }
 
-TEST(Files, writers_check_what_they_write) {
-  const TemporaryFolder folder;
+TEST_F(Files, writers_check_what_they_write) {
   Adhesion bad = adhesion(1);
   bad.area_um2 = -1;
   EXPECT_THROW(files::write_adhesions(folder / "a.csv", {bad}), InvalidData);
@@ -191,8 +185,7 @@ TEST(Files, writers_check_what_they_write) {
   EXPECT_THROW(files::write_network(folder / "n.vtu", torn), InvalidData);
 }
 
-TEST(Files, an_adhesions_origin_and_its_distance_from_the_edge_are_kept) {
-  const test::TemporaryFolder folder;
+TEST_F(Files, an_adhesions_origin_and_its_distance_from_the_edge_are_kept) {
   std::vector<Adhesion> adhesions;
   for (const AdhesionOrigin origin : values_of<AdhesionOrigin>())
     adhesions.push_back({.adhesion_id = static_cast<int>(adhesions.size()) + 1,
@@ -210,8 +203,7 @@ TEST(Files, an_adhesions_origin_and_its_distance_from_the_edge_are_kept) {
   EXPECT_EQ(read[1].edge_distance_um, 0.25);
 }
 
-TEST(Files, adhesions_of_an_older_version_are_read_as_seen_in_the_image) {
-  const test::TemporaryFolder folder;
+TEST_F(Files, adhesions_of_an_older_version_are_read_as_seen_in_the_image) {
   const std::string columns =
       "adhesion_id,x_um,y_um,area_um2,major_axis_um,minor_axis_um,angle_deg,eccentricity,mean_intensity";
   files::write_text(folder / "adhesions.csv", columns + "\n1,1,2,1,1.2,1.1,0,0.4,100\n");
@@ -222,14 +214,15 @@ TEST(Files, adhesions_of_an_older_version_are_read_as_seen_in_the_image) {
   EXPECT_THROW(files::read_adhesions(folder / "adhesions.csv"), InputError);
 }
 
-TEST(Files, a_candidate_stands_for_the_cell_of_its_lattice) {
+TEST_F(Files, a_candidate_stands_for_the_cell_of_its_lattice) {
   const Adhesion disc{.area_um2 = 3.14159265, .origin = AdhesionOrigin::candidate};  // of 2 um, on a lattice of 2 um
   EXPECT_NEAR(area_stood_for_um2(disc), std::sqrt(3.0) / 2 * 4, 1e-6);
   EXPECT_EQ(area_stood_for_um2({.area_um2 = 1.5}), 1.5);
 }
 
-TEST(Columns, a_truth_value_is_written_for_r_and_pandas_and_read_as_any_program_writes_it) {
-  const TemporaryFolder folder;
+using Columns = test::InFolder;
+
+TEST_F(Columns, a_truth_value_is_written_for_r_and_pandas_and_read_as_any_program_writes_it) {
   files::write_tensions(folder / "tensions.csv", {{.fibre_id = 0, .tension_nN = 1}}, {});
   EXPECT_TRUE(has_words(files::read_text(folder / "tensions.csv"), ",TRUE\n"));
   const auto is_identifiable = [&](const std::string& word) {
@@ -241,8 +234,7 @@ TEST(Columns, a_truth_value_is_written_for_r_and_pandas_and_read_as_any_program_
   for (const char* word : {"1", "yes", ""}) EXPECT_THROW(is_identifiable(word), InputError);
 }
 
-TEST(Columns, a_table_of_an_older_version_is_read_and_its_later_columns_are_unset) {
-  const TemporaryFolder folder;
+TEST_F(Columns, a_table_of_an_older_version_is_read_and_its_later_columns_are_unset) {
   files::write_text(folder / "tensions.csv",
                     "fibre_id,type,tension_nN,low_nN,high_nN,identifiable\n1,ventral,4.17,3.37,4.98,true\n");
   const Tension tension = files::read_tensions(folder / "tensions.csv").at(0);
@@ -254,8 +246,7 @@ TEST(Columns, a_table_of_an_older_version_is_read_and_its_later_columns_are_unse
   EXPECT_FALSE(force.low_nN.has_value());
 }
 
-TEST(Files, displacements_in_space_come_back_and_are_checked) {
-  const TemporaryFolder folder;
+TEST_F(Files, displacements_in_space_come_back_and_are_checked) {
   const std::vector<BeadInSpace> beads = {{{1, 2, 3.25}, {0.1, -0.2, 1.0 / 3}, 0.01, 0.03, ""},
                                           {{4, 5, 6}, {}, 0, 0, "defocused"}};
   files::write_displacement_in_space(folder / "d.csv", beads);
@@ -272,8 +263,7 @@ TEST(Files, displacements_in_space_come_back_and_are_checked) {
   EXPECT_THROW(files::read_displacement_in_space(folder / "flat.csv"), InputError);
 }
 
-TEST(Files, heights_of_a_lattice_come_in_any_order_and_have_holes) {
-  const TemporaryFolder folder;
+TEST_F(Files, heights_of_a_lattice_come_in_any_order_and_have_holes) {
   std::string text = "z_um,y_um,x_um\n";
   for (const int i : {2, 0, 3, 1})
     for (const int j : {1, 3, 0, 2})
@@ -294,8 +284,7 @@ TEST(Files, heights_of_a_lattice_come_in_any_order_and_have_holes) {
 }
 
 /// Of a lattice from its lines: n rows may claim n x n vertices.
-TEST(Files, heights_along_a_diagonal_are_refused_before_memory_is_taken) {
-  const TemporaryFolder folder;
+TEST_F(Files, heights_along_a_diagonal_are_refused_before_memory_is_taken) {
   std::string text = "x_um,y_um,z_um\n";
   for (int k = 0; k < 100'000; ++k) text += std::to_string(k) + "," + std::to_string(k) + ",1\n";
   files::write_text(folder / "diagonal.csv", text);
@@ -303,8 +292,7 @@ TEST(Files, heights_along_a_diagonal_are_refused_before_memory_is_taken) {
   EXPECT_TRUE(has_words(error.expected, "100000 x 100000 vertices")) << error.what();
 }
 
-TEST(Files, two_heights_for_one_place_are_refused_by_line) {
-  const TemporaryFolder folder;
+TEST_F(Files, two_heights_for_one_place_are_refused_by_line) {
   std::string text = "x_um,y_um,z_um\n";
   for (int k = 0; k < 16; ++k) text += std::to_string(k % 4) + "," + std::to_string(k / 4) + ",1\n";
   files::write_text(folder / "twice.csv", text + "2,1,5\n");
@@ -313,8 +301,7 @@ TEST(Files, two_heights_for_one_place_are_refused_by_line) {
 }
 
 /// What a later stage computes with comes back as it was; a result has the digits that mean something.
-TEST(Columns, results_have_six_digits_and_what_is_computed_with_has_all) {
-  const TemporaryFolder folder;
+TEST_F(Columns, results_have_six_digits_and_what_is_computed_with_has_all) {
   const double third = 1.0 / 3;
   files::write_tensions(folder / "tensions.csv",
                         {{.fibre_id = 0, .tension_nN = third, .low_nN = third, .sigma_nN = third}}, {});
@@ -327,8 +314,7 @@ TEST(Columns, results_have_six_digits_and_what_is_computed_with_has_all) {
   EXPECT_EQ(files::read_displacement(folder / "displacement.csv").at(0).sigma_um, third);
 }
 
-TEST(Files, numbers_that_no_cell_can_have_are_refused_by_row_and_column) {
-  const TemporaryFolder folder;
+TEST_F(Files, numbers_that_no_cell_can_have_are_refused_by_row_and_column) {
   const auto refusal = [&](const std::string& row) {
     files::write_text(folder / "a.csv", "x_um,y_um,ux_um,uy_um,traction_kPa\n1,2,0,0,3\n" + row + "\n");
     const files::CsvTable table(folder / "a.csv");
@@ -343,8 +329,7 @@ TEST(Files, numbers_that_no_cell_can_have_are_refused_by_row_and_column) {
   EXPECT_TRUE(has_words(refusal("0,0,0,0,1e200"), "a.csv:3: column 'traction_kPa'"));
 }
 
-TEST(Files, tractions_are_read_as_people_write_them) {
-  const test::TemporaryFolder folder;
+TEST_F(Files, tractions_are_read_as_people_write_them) {
   const auto read = [&](const std::string& text) {
     files::write_text(folder / "t.csv", text);
     return files::read_tractions(folder / "t.csv");
@@ -363,12 +348,12 @@ TEST(Files, tractions_are_read_as_people_write_them) {
   EXPECT_TRUE(has_words(error->what(), "tx_kPa")) << error->what();
 }
 
-TEST(Files, what_has_no_end_is_refused_and_what_is_empty_is_empty) {
+TEST_F(Files, what_has_no_end_is_refused_and_what_is_empty_is_empty) {
   EXPECT_EQ(files::read_text("/dev/null"), "");
   EXPECT_THROW(files::read_text("/dev/zero"), InputError);
 }
 
-TEST(Files, a_surface_beyond_a_metre_is_none) {
+TEST_F(Files, a_surface_beyond_a_metre_is_none) {
   HeightMap map{.origin_um = {0, 0}, .spacing_um = {1, 1}, .n_x = 4, .n_y = 4};
   map.z_um.assign(16, -2);
   EXPECT_NO_THROW(check(map));

@@ -40,8 +40,9 @@ std::string refusal(const fs::path& file, const PlaneChoice& choice) {
   return error ? error->expected + ", found " + error->found + "; " + error->hint : "no error";
 }
 
-TEST(ImagePlanes, imagej_stores_channels_fastest_then_slices_then_frames) {
-  const TemporaryFolder folder;
+using ImagePlanes = test::InFolder;
+
+TEST_F(ImagePlanes, imagej_stores_channels_fastest_then_slices_then_frames) {
   const fs::path file = folder / "a.tif";
   write_pages(file, 24, "ImageJ=1.53t\nimages=24\nchannels=2\nslices=3\nframes=4\nhyperstack=true\n");
   for (int t = 0; t < 4; ++t)
@@ -53,15 +54,13 @@ TEST(ImagePlanes, imagej_stores_channels_fastest_then_slices_then_frames) {
   EXPECT_EQ(value_of(file, {.page = 8}), 7);
 }
 
-TEST(ImagePlanes, an_imagej_stack_without_dimensions_is_one_of_slices) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, an_imagej_stack_without_dimensions_is_one_of_slices) {
   write_pages(folder / "a.tif", 5, "ImageJ=1.53t\nimages=5\n");
   EXPECT_EQ(value_of(folder / "a.tif", {}), 4);
   EXPECT_EQ(value_of(folder / "a.tif", {.z = "2"}), 1);
 }
 
-TEST(ImagePlanes, a_file_that_states_no_dimensions_is_read_by_pages) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, a_file_that_states_no_dimensions_is_read_by_pages) {
   write_pages(folder / "a.tif", 5, "");
   EXPECT_EQ(value_of(folder / "a.tif", {}), 0);
   EXPECT_EQ(value_of(folder / "a.tif", {.page = 4}), 3);
@@ -75,8 +74,7 @@ std::string ome(const std::string& pixels, const std::string& inside) {
          "</Pixels></Image><Image ID=\"Image:1\"><Pixels SizeC=\"1\" SizeZ=\"1\" SizeT=\"1\"/></Image></OME>";
 }
 
-TEST(ImagePlanes, ome_states_which_dimension_runs_fastest) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, ome_states_which_dimension_runs_fastest) {
   const fs::path file = folder / "a.ome.tif";
   const int sizes[3] = {2, 3, 2};  // C, Z, T
   for (const std::string order : {"XYCZT", "XYCTZ", "XYZCT", "XYZTC", "XYTCZ", "XYTZC"}) {
@@ -97,8 +95,7 @@ TEST(ImagePlanes, ome_states_which_dimension_runs_fastest) {
   }
 }
 
-TEST(ImagePlanes, ome_pages_may_lie_in_any_order) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, ome_pages_may_lie_in_any_order) {
   const fs::path file = folder / "a.ome.tif";
   write_pages(file, 4,
               ome("DimensionOrder='XYCZT' SizeC='2' SizeZ='2' SizeT='1'",
@@ -110,8 +107,7 @@ TEST(ImagePlanes, ome_pages_may_lie_in_any_order) {
   EXPECT_EQ(value_of(file, {.channel = "2"}), 2);
 }
 
-TEST(ImagePlanes, a_plane_in_another_file_of_an_ome_set_is_an_error) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, a_plane_in_another_file_of_an_ome_set_is_an_error) {
   write_pages(folder / "a.ome.tif", 1,
               ome("SizeC='2' SizeZ='1' SizeT='1'",
                   "<TiffData IFD='0'><UUID FileName='a.ome.tif'>urn:uuid:a</UUID></TiffData><TiffData FirstC='1' "
@@ -120,8 +116,7 @@ TEST(ImagePlanes, a_plane_in_another_file_of_an_ome_set_is_an_error) {
   EXPECT_TRUE(has_words(refusal(folder / "a.ome.tif", {.channel = "2"}), "another file of the set"));
 }
 
-TEST(ImagePlanes, a_renamed_file_of_ome_is_the_one_whose_planes_it_has) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, a_renamed_file_of_ome_is_the_one_whose_planes_it_has) {
   const auto named = [](const std::string& file, int first, int n) {
     return "<TiffData FirstT='" + std::to_string(first) + "' IFD='0' PlaneCount='" + std::to_string(n) +
            "'><UUID FileName='" + file + "'>urn:uuid:" + file + "</UUID></TiffData>";
@@ -141,8 +136,7 @@ TEST(ImagePlanes, a_renamed_file_of_ome_is_the_one_whose_planes_it_has) {
   EXPECT_TRUE(has_words(refusal(folder / "either.tif", {.time = 1}), "a.ome.tif, b.ome.tif"));
 }
 
-TEST(ImagePlanes, an_aborted_recording_has_the_frames_that_are_there) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, an_aborted_recording_has_the_frames_that_are_there) {
   write_pages(folder / "a.tif", 3, ome("SizeC='1' SizeZ='1' SizeT='100'", "<TiffData IFD='0' PlaneCount='100'/>"));
   EXPECT_EQ(value_of(folder / "a.tif", {.time = 3}), 2);
   EXPECT_TRUE(has_words(refusal(folder / "a.tif", {.time = 4}), "3 frames of the 100 that it states"));
@@ -151,8 +145,7 @@ TEST(ImagePlanes, an_aborted_recording_has_the_frames_that_are_there) {
   EXPECT_EQ(value_of(folder / "one.tif", {}), 0) << "the only one";
 }
 
-TEST(ImagePlanes, images_with_an_interval_between_them_are_frames) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, images_with_an_interval_between_them_are_frames) {
   write_pages(folder / "a.tif", 5, "ImageJ=1.53t\nimages=5\nslices=5\nfinterval=30.0\n");
   EXPECT_TRUE(has_words(refusal(folder / "a.tif", {}), "the frame to be chosen")) << "not their maximum";
   EXPECT_EQ(value_of(folder / "a.tif", {.time = 2}), 1);
@@ -160,8 +153,7 @@ TEST(ImagePlanes, images_with_an_interval_between_them_are_frames) {
   EXPECT_EQ(value_of(folder / "z.tif", {}), 4);
 }
 
-TEST(ImagePlanes, what_was_taken_of_several_planes_is_said) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, what_was_taken_of_several_planes_is_said) {
   write_pages(folder / "pages.tif", 5, "");
   write_pages(folder / "slices.tif", 3, "ImageJ=1.53t\nimages=3\nslices=3\n");
   write_pages(folder / "one.tif", 1, "");
@@ -187,16 +179,14 @@ void write_with_thumbnail(const fs::path& file) {
   TIFFClose(tiff);
 }
 
-TEST(ImagePlanes, a_thumbnail_is_not_the_picture) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, a_thumbnail_is_not_the_picture) {
   write_with_thumbnail(folder / "a.tif");
   EXPECT_EQ(value_of(folder / "a.tif", {}), 4);
   EXPECT_EQ(read_field(folder / "a.tif").width, 4);
   EXPECT_EQ(value_of(folder / "a.tif", {.page = 1}), 2) << "a page that is asked for";
 }
 
-TEST(ImagePlanes, ome_tells_of_each_plane_once_and_each_slice_has_a_page_of_its_own) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, ome_tells_of_each_plane_once_and_each_slice_has_a_page_of_its_own) {
   const std::string one_slice = "SizeC='1' SizeZ='3' SizeT='1'";
   write_pages(folder / "same.tif", 3,
               ome(one_slice, "<TiffData IFD='0' FirstZ='0' PlaneCount='2'/><TiffData IFD='1' FirstZ='2'/>"));
@@ -208,8 +198,7 @@ TEST(ImagePlanes, ome_tells_of_each_plane_once_and_each_slice_has_a_page_of_its_
   EXPECT_TRUE(has_words(refusal(folder / "again.tif", {}), "over and over"));
 }
 
-TEST(ImagePlanes, channels_are_called_by_name_and_listed_where_none_was_chosen) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, channels_are_called_by_name_and_listed_where_none_was_chosen) {
   const fs::path file = folder / "a.ome.tif";
   write_pages(
       file, 3,
@@ -224,16 +213,14 @@ TEST(ImagePlanes, channels_are_called_by_name_and_listed_where_none_was_chosen) 
   EXPECT_TRUE(has_words(refusal(file, {.channel = "4"}), "3 channels"));
 }
 
-TEST(ImagePlanes, a_claim_of_millions_of_channels_is_told_in_a_line) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, a_claim_of_millions_of_channels_is_told_in_a_line) {
   write_pages(folder / "a.ome.tif", 1, ome("SizeC='4000000' SizeZ='1' SizeT='1'", ""));
   const std::string told = refusal(folder / "a.ome.tif", {});
   EXPECT_TRUE(has_words(told, "4000000 channels: 1, 2, 3,")) << told.substr(0, 300);
   EXPECT_LT(told.size(), 500u);
 }
 
-TEST(ImagePlanes, frames_must_be_chosen_and_slices_be_there) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, frames_must_be_chosen_and_slices_be_there) {
   const fs::path file = folder / "a.tif";
   write_pages(file, 6, "ImageJ=1.53t\nimages=6\nslices=3\nframes=2\n");
   EXPECT_TRUE(has_words(refusal(file, {.prefix = "actin"}), "2 frames; set actin_time"));
@@ -243,15 +230,13 @@ TEST(ImagePlanes, frames_must_be_chosen_and_slices_be_there) {
   EXPECT_EQ(value_of(file, {.time = 2}), 5);
 }
 
-TEST(ImagePlanes, samples_of_a_pixel_are_channels) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, samples_of_a_pixel_are_channels) {
   write_pages(folder / "a.tif", 1, "", 2);
   EXPECT_EQ(value_of(folder / "a.tif", {.channel = "2"}), 100);
   EXPECT_TRUE(has_words(refusal(folder / "a.tif", {}), "2 channels"));
 }
 
-TEST(ImagePlanes, contradicting_dimensions_are_an_error_but_pages_can_still_be_read) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, contradicting_dimensions_are_an_error_but_pages_can_still_be_read) {
   int n = 0;
   for (const std::string& description :
        {std::string("ImageJ=1.53t\nimages=4\nchannels=3\n"), std::string("ImageJ=1.53t\nimages=4\nchannels=x\n"),
@@ -265,9 +250,8 @@ TEST(ImagePlanes, contradicting_dimensions_are_an_error_but_pages_can_still_be_r
   }
 }
 
-TEST(ImagePlanes, more_than_4_GB_of_imagej_are_planes_after_the_only_page) {
+TEST_F(ImagePlanes, more_than_4_GB_of_imagej_are_planes_after_the_only_page) {
   // as ij.io.TiffEncoder writes it: big-endian, tags first, then the planes without pages of their own
-  const TemporaryFolder folder;
   const auto stack = [&](int bits, int n_planes_there) {
     const std::string description = "ImageJ=1.53t\nimages=6\nchannels=2\nslices=3\nhyperstack=true\n";
     std::string bytes = {'M', 'M', 0, 42, 0, 0, 0, 8};
@@ -312,7 +296,7 @@ TEST(ImagePlanes, more_than_4_GB_of_imagej_are_planes_after_the_only_page) {
 
 const fs::path kSharedImages = test::source_folder().parent_path() / "shared/data";
 
-TEST(ImagePlanes, real_hyperstacks_are_read_as_by_another_program) {
+TEST_F(ImagePlanes, real_hyperstacks_are_read_as_by_another_program) {
   if (!fs::exists(kSharedImages / "tiff")) GTEST_SKIP() << "the images of other programs are not here";
   struct Case {
     const char* file;
@@ -335,8 +319,7 @@ TEST(ImagePlanes, real_hyperstacks_are_read_as_by_another_program) {
   }
 }
 
-TEST(ImagePlanes, the_distance_of_slices_is_the_files_own) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, the_distance_of_slices_is_the_files_own) {
   const fs::path file = folder / "a.tif";
   const auto step_of = [&](const std::string& description) {
     write_pages(file, 3, description);
@@ -358,8 +341,7 @@ TEST(ImagePlanes, the_distance_of_slices_is_the_files_own) {
   EXPECT_FALSE(step_of(ome("")));
 }
 
-TEST(ImagePlanes, a_stack_comes_back_as_it_was_written) {
-  const TemporaryFolder folder;
+TEST_F(ImagePlanes, a_stack_comes_back_as_it_was_written) {
   std::vector<Image> slices(5);
   for (std::size_t k = 0; k < slices.size(); ++k) {
     slices[k].width = 4, slices[k].height = 3, slices[k].pixel_size_um = 0.2, slices[k].z_step_um = 0.65;

@@ -12,7 +12,9 @@
 namespace mbtfm {
 namespace {
 
-TEST(Names, characters_of_utf8_have_their_lengths_and_nothing_else_has_one) {
+using Names = test::InFolder;
+
+TEST_F(Names, characters_of_utf8_have_their_lengths_and_nothing_else_has_one) {
   for (const auto& [text, length] : std::vector<std::pair<std::string, std::size_t>>{{"a", 1},
                                                                                      {"\xC3\xA9", 2},
                                                                                      {"\xE2\x82\xAC", 3},
@@ -33,7 +35,7 @@ TEST(Names, characters_of_utf8_have_their_lengths_and_nothing_else_has_one) {
     EXPECT_EQ(files::utf8_length(text), length) << files::shown_name(text);
 }
 
-TEST(Names, numbers_count_as_numbers_and_a_point_in_front_hides) {
+TEST_F(Names, numbers_count_as_numbers_and_a_point_in_front_hides) {
   const std::vector<fs::path> ordered = {"a",
                                          "b 2/z",
                                          "b 10/a",
@@ -65,7 +67,6 @@ TEST(Names, numbers_count_as_numbers_and_a_point_in_front_hides) {
                                                         {"v9", "v0010"},
                                                         {"v99999999999999999999", "v100000000000000000000"}})
     EXPECT_LT(place(first), place(second)) << first << " " << second;
-  const TemporaryFolder folder;
   for (const char* name : {"t10.tif", "t2.tif", "._t2.tif", ".snapshot", "t1.tif"})
     files::write_text(folder / name, "x");
   EXPECT_EQ(files::visible_in(folder.path()),
@@ -75,7 +76,7 @@ TEST(Names, numbers_count_as_numbers_and_a_point_in_front_hides) {
   EXPECT_TRUE(error);
 }
 
-TEST(Names, a_name_of_any_bytes_is_shown_as_utf8_and_shown_again_stays_as_it_is) {
+TEST_F(Names, a_name_of_any_bytes_is_shown_as_utf8_and_shown_again_stays_as_it_is) {
   EXPECT_EQ(files::shown_name("Zelle 3, caf\xC3\xA9"), "Zelle 3, caf\xC3\xA9");
   EXPECT_EQ(files::shown_name("caf\xE9.tif"), "caf\\xE9.tif");
   std::mt19937_64 random(5);
@@ -89,8 +90,7 @@ TEST(Names, a_name_of_any_bytes_is_shown_as_utf8_and_shown_again_stays_as_it_is)
   }
 }
 
-TEST(Names, the_file_shown_by_a_name_is_found) {
-  const test::TemporaryFolder folder;
+TEST_F(Names, the_file_shown_by_a_name_is_found) {
   files::write_text(folder / "caf\xE9", "");
   EXPECT_EQ(files::file_shown_as(folder.path(), "caf\\xE9"), folder / "caf\xE9");
   files::write_text(folder / "caf\\xE9", "");
@@ -98,8 +98,7 @@ TEST(Names, the_file_shown_by_a_name_is_found) {
       << "one of just that name comes first";
 }
 
-TEST(Names, letters_with_marks_are_the_same_as_one_character_or_as_two) {
-  const test::TemporaryFolder folder;
+TEST_F(Names, letters_with_marks_are_the_same_as_one_character_or_as_two) {
   files::write_text(folder / "Zellko\u0308rper e\u0301.tif", "");
   EXPECT_EQ(files::file_shown_as(folder.path(), "Zellk\u00F6rper \u00E9.tif"), folder / "Zellko\u0308rper e\u0301.tif");
   files::write_text(folder / "Fl\u00E4che.tif", "");
@@ -107,11 +106,11 @@ TEST(Names, letters_with_marks_are_the_same_as_one_character_or_as_two) {
   EXPECT_EQ(files::file_shown_as(folder.path(), "Flache.tif"), folder / "Flache.tif") << "another name";
 }
 
-TEST(Names, no_shown_name_leads_out_of_its_folder) {
+TEST_F(Names, no_shown_name_leads_out_of_its_folder) {
   EXPECT_EQ(files::file_shown_as("cell", "\\x2E\\x2E\\x2Fetc"), "cell/\\x2E\\x2E\\x2Fetc");
 }
 
-TEST(Names, json_and_tables_are_utf8_whatever_a_name_is) {
+TEST_F(Names, json_and_tables_are_utf8_whatever_a_name_is) {
   const nlohmann::ordered_json json = {{"caf\xE9", {"a\xFF", 3, nullptr, {{"k", "\xC3\xA9"}}}}};
   EXPECT_EQ(files::json_text(json), "{\"caf\\\\xE9\":[\"a\\\\xFF\",3,null,{\"k\":\"\xC3\xA9\"}]}");
   files::CsvText csv({"cell"});

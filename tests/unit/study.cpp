@@ -606,9 +606,10 @@ void expect_figures(const Study& study, const Study& made, const std::vector<Fig
   }
 }
 
-TEST(SheetStudy, has_what_the_fit_found_and_compares_the_contraction_first) {
+using SheetStudy = test::InFolder;
+
+TEST_F(SheetStudy, has_what_the_fit_found_and_compares_the_contraction_first) {
   const Study made = test::simulated_sheets({.condition_effect_nN_per_um = 1});
-  const test::TemporaryFolder folder;
   const Study study = read_again(made, folder);
   ASSERT_EQ(study.cells.size(), 12u);
   EXPECT_EQ(n_of_kind(study, CellKind::sheet), 12);
@@ -633,7 +634,7 @@ TEST(SheetStudy, has_what_the_fit_found_and_compares_the_contraction_first) {
   expect_no_word_of_fibres(page);
 }
 
-TEST(SheetStudy, its_figures_are_those_of_each_sheet_under_their_names_units_and_conditions) {
+TEST_F(SheetStudy, its_figures_are_those_of_each_sheet_under_their_names_units_and_conditions) {
   const Study study = test::simulated_sheets({.condition_effect_nN_per_um = 1});
   using S = StudyCell;
   expect_figures(study, study,
@@ -648,7 +649,7 @@ TEST(SheetStudy, its_figures_are_those_of_each_sheet_under_their_names_units_and
 }
 
 /// Of twelve sheets of 2 nN/um one says 22 ± 20: the plain mean is off by 1.7.
-TEST(SheetStudy, a_sheet_that_the_beads_hardly_tell_counts_little_in_the_mean) {
+TEST_F(SheetStudy, a_sheet_that_the_beads_hardly_tell_counts_little_in_the_mean) {
   Study study = test::simulated_sheets({.n_conditions = 1});
   SheetEstimate& poor = study.cells[3].sheet->estimates[0];
   poor.value += 20;
@@ -664,7 +665,7 @@ TEST(SheetStudy, a_sheet_that_the_beads_hardly_tell_counts_little_in_the_mean) {
 
 /// The error of the gel's modulus is larger than all scatter here. Counted as one of each sheet, it would hide the
 /// difference: nearly all intervals would hold the truth, and many no difference, too.
-TEST(SheetStudy, intervals_of_the_difference_hold_it_and_leave_out_what_sheets_share) {
+TEST_F(SheetStudy, intervals_of_the_difference_hold_it_and_leave_out_what_sheets_share) {
   constexpr int kStudies = 200;
   int n_held = 0, n_found = 0;
   for (int seed = 1; seed <= kStudies; ++seed) {
@@ -684,7 +685,7 @@ TEST(SheetStudy, intervals_of_the_difference_hold_it_and_leave_out_what_sheets_s
   EXPECT_GE(n_found, 190);
 }
 
-TEST(SheetStudy, other_primary_comparisons_are_made_if_they_are_asked_for) {
+TEST_F(SheetStudy, other_primary_comparisons_are_made_if_they_are_asked_for) {
   const Study study = test::simulated_sheets({.condition_effect_nN_per_um = 1});
   EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::mean_tension}).primary.measure, "mean tension of sheets");
   EXPECT_EQ(analyse(study, {.primary = PrimaryMeasure::total_force}).primary.measure, "total force of sheets");
@@ -695,7 +696,7 @@ TEST(SheetStudy, other_primary_comparisons_are_made_if_they_are_asked_for) {
   EXPECT_EQ(analyse(test::simulated_study({.n_conditions = 2}), {}).primary.measure, "tension of ventral fibres");
 }
 
-TEST(SheetStudy, takes_no_value_that_was_given_or_that_the_beads_limit_to_one_side) {
+TEST_F(SheetStudy, takes_no_value_that_was_given_or_that_the_beads_limit_to_one_side) {
   Study made = test::simulated_sheets({.n_sheets = 6, .n_conditions = 2});
   SheetEstimate& given = made.cells[0].sheet->estimates[1];
   given.low = given.high = given.value;
@@ -703,7 +704,6 @@ TEST(SheetStudy, takes_no_value_that_was_given_or_that_the_beads_limit_to_one_si
   SheetEstimate& open = made.cells[1].sheet->estimates[1];
   open.high = open.sigma = std::nullopt;
   open.identifiable = false;
-  const test::TemporaryFolder folder;
   const Study study = read_again(made, folder);
   const Analysis analysis = analyse(study, {});
   EXPECT_EQ(sample_named(analysis, "stiffness_nN_per_um")->values.size(), 4u);
@@ -718,7 +718,7 @@ TEST(SheetStudy, takes_no_value_that_was_given_or_that_the_beads_limit_to_one_si
 }
 
 /// Edges and insides are kinds, which are compared within sheets; labels of cells are not the same from sheet to sheet.
-TEST(SheetStudy, parts_of_sheets_are_kinds_and_cells_in_it_one_kind) {
+TEST_F(SheetStudy, parts_of_sheets_are_kinds_and_cells_in_it_one_kind) {
   Study study = test::simulated_sheets({.n_sheets = 8, .n_conditions = 1});
   for (StudyCell& cell : study.cells) {
     std::vector<SheetEstimate> parts;
@@ -743,9 +743,8 @@ TEST(SheetStudy, parts_of_sheets_are_kinds_and_cells_in_it_one_kind) {
   EXPECT_GT(tests.number(row, "effect"), 1);
 }
 
-TEST(SheetStudy, leaves_out_a_copy_a_sheet_without_its_fit_and_one_that_did_not_converge) {
+TEST_F(SheetStudy, leaves_out_a_copy_a_sheet_without_its_fit_and_one_that_did_not_converge) {
   const Study made = test::simulated_sheets({.n_sheets = 6});
-  const test::TemporaryFolder folder;
   read_again(made, folder);
   const DisplacementField field = {{.position_um = {1, 2}, .sigma_um = 1}};
   const auto a = [&](const char* name) { return folder / "a" / name; };
@@ -765,9 +764,10 @@ TEST(SheetStudy, leaves_out_a_copy_a_sheet_without_its_fit_and_one_that_did_not_
   EXPECT_EQ(study.cells.size(), 4u);
 }
 
-TEST(SpaceStudy, has_the_figures_of_each_cell_and_compares_the_total_force_first) {
+using SpaceStudy = test::InFolder;
+
+TEST_F(SpaceStudy, has_the_figures_of_each_cell_and_compares_the_total_force_first) {
   const Study made = test::simulated_cells_in_space({.condition_effect_nN = 200});
-  const test::TemporaryFolder folder;
   const Study study = read_again(made, folder);
   ASSERT_EQ(n_of_kind(study, CellKind::space), 12);
   const Analysis analysis = analyse(study, {});
@@ -815,12 +815,11 @@ TEST(SpaceStudy, has_the_figures_of_each_cell_and_compares_the_total_force_first
 }
 
 /// A mean tension of a sheet is no tension of a fibre, and the forces of a sheet's triangles are none of adhesions.
-TEST(SpaceStudy, beside_cells_with_fibres_and_sheets_no_figure_mixes_them) {
+TEST_F(SpaceStudy, beside_cells_with_fibres_and_sheets_no_figure_mixes_them) {
   Study made = test::simulated_cells_in_space({.n_cells = 6});
   for (StudyCell& cell : test::simulated_study({.n_cells = 5, .n_conditions = 2}).cells)
     made.cells.push_back(std::move(cell));
   for (StudyCell& cell : test::simulated_sheets({.n_sheets = 4}).cells) made.cells.push_back(std::move(cell));
-  const test::TemporaryFolder folder;
   const Study study = read_again(made, folder);
   ASSERT_EQ(study.cells.size(), 15u);
   const Analysis analysis = analyse(study, {});
@@ -848,14 +847,13 @@ TEST(SpaceStudy, beside_cells_with_fibres_and_sheets_no_figure_mixes_them) {
                         "Stress-fibre tensions of 5 cells, contraction of 4 sheets and forces of 6 cells in space"));
 }
 
-TEST(SpaceStudy, of_cells_without_images_that_older_versions_made_has_what_they_tell) {
+TEST_F(SpaceStudy, of_cells_without_images_that_older_versions_made_has_what_they_tell) {
   Study made = test::simulated_cells_in_space({.n_cells = 6, .n_adhesions = 0});
   for (StudyCell& cell : made.cells) {
     cell.cell.outline_um.clear();
     cell.space->contractile_moment_nN_um = cell.space->contractile_moment_sigma_nN_um = std::nullopt;
     cell.space->total_force_sigma_nN = cell.space->resolution_um = std::nullopt;  // thesis-cg tells no errors
   }
-  const test::TemporaryFolder folder;
   const Study study = read_again(made, folder);
   ASSERT_EQ(study.cells.size(), 6u);
   const Analysis analysis = analyse(study, {});
@@ -865,9 +863,8 @@ TEST(SpaceStudy, of_cells_without_images_that_older_versions_made_has_what_they_
   EXPECT_TRUE(table_of(study, "cells.csv").text(0, "cell_area_um2").empty());
 }
 
-TEST(SpaceStudy, leaves_out_a_copy_one_without_its_tractions_and_one_that_did_not_converge) {
+TEST_F(SpaceStudy, leaves_out_a_copy_one_without_its_tractions_and_one_that_did_not_converge) {
   const Study made = test::simulated_cells_in_space({.n_cells = 6});
-  const test::TemporaryFolder folder;
   read_again(made, folder);
   const auto a = [&](const char* name) { return folder / "a" / name; };
   std::filesystem::copy(a("space_0"), a("space_9"), std::filesystem::copy_options::recursive);
@@ -887,7 +884,7 @@ TEST(SpaceStudy, leaves_out_a_copy_one_without_its_tractions_and_one_that_did_no
   EXPECT_EQ(study.cells.size(), 4u);
 }
 
-TEST(SpaceStudy, says_where_methods_or_resolutions_make_the_difference) {
+TEST_F(SpaceStudy, says_where_methods_or_resolutions_make_the_difference) {
   constexpr const char *kMethods = "different methods", *kCoarser = "are coarser under b than under a";
   Study study = test::simulated_cells_in_space({.condition_effect_nN = 200});
   EXPECT_FALSE(says(analyse(study, {}), kMethods));

@@ -74,8 +74,9 @@ std::string with(std::string text, const std::string& old, const std::string& no
 /// Heights of a few um: some roundings of 1e-15 um each.
 constexpr double kRounding = 1e-13;
 
-TEST(SurfaceMesh, every_format_gives_the_heights_of_the_triangles) {
-  const TemporaryFolder folder;
+using SurfaceMesh = test::InFolder;
+
+TEST_F(SurfaceMesh, every_format_gives_the_heights_of_the_triangles) {
   const TriangleMesh mesh = height_field(wavy);
   // a float holds heights and places of up to 28 um to 1 um/2^20 = 1e-6 um, the surface's slope is at most 1.2 + 0.7
   const double of_float = 3e-6;
@@ -107,29 +108,27 @@ TEST(SurfaceMesh, every_format_gives_the_heights_of_the_triangles) {
   }
 }
 
-TEST(SurfaceMesh, at_the_meshs_own_points_the_heights_are_theirs) {
+TEST_F(SurfaceMesh, at_the_meshs_own_points_the_heights_are_theirs) {
   const MeshSurface sampled = sample_mesh(height_field(wavy), kSide);
   ASSERT_EQ(sampled.map.n_x, kSquares + 1);
   for (std::size_t k = 0; k < sampled.map.z_um.size(); ++k)
     EXPECT_DOUBLE_EQ(sampled.map.z_um[k], wavy(vertex(sampled.map, k)));
 }
 
-TEST(SurfaceMesh, the_unit_of_length_scales_all_coordinates) {
-  const TemporaryFolder folder;
+TEST_F(SurfaceMesh, the_unit_of_length_scales_all_coordinates) {
   const TriangleMesh mesh = height_field(wavy);
   const TriangleMesh read = read_back(folder, "mm.obj", obj_text(mesh), 1000);
   for (std::size_t k = 0; k < mesh.points_um.size(); ++k)
     EXPECT_TRUE(read.points_um[k] == 1000 * mesh.points_um[k]) << k;
 }
 
-TEST(SurfaceMesh, polygons_are_cut_into_triangles) {
-  const TemporaryFolder folder;
+TEST_F(SurfaceMesh, polygons_are_cut_into_triangles) {
   const TriangleMesh read =
       read_back(folder, "pentagon.obj", "v 0 0 1\nv 2 0 1\nv 3 1 1\nv 2 2 1\nv 0 2 1\nf 1/1 2/2 3/3 4/4 5/5 # all\n");
   EXPECT_EQ(read.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
 }
 
-TEST(SurfaceMesh, flipped_triangles_are_counted_and_change_no_height) {
+TEST_F(SurfaceMesh, flipped_triangles_are_counted_and_change_no_height) {
   const TriangleMesh mesh = height_field(wavy);
   TriangleMesh flipped = mesh;
   for (std::size_t k = 0; k < flipped.triangles.size(); k += 3)
@@ -143,7 +142,7 @@ TEST(SurfaceMesh, flipped_triangles_are_counted_and_change_no_height) {
   EXPECT_EQ(sample_mesh(flipped, 0.7).n_flipped, kSquares * kSquares * 2 / 3) << "the fewer are the flipped ones";
 }
 
-TEST(SurfaceMesh, a_hole_has_no_height_there_and_only_there) {
+TEST_F(SurfaceMesh, a_hole_has_no_height_there_and_only_there) {
   TriangleMesh mesh = height_field(wavy);
   const auto in_hole = [](Vec2 p, double rim) { return std::abs(p.x - 1) < 3 - rim && std::abs(p.y - 13) < 3 - rim; };
   std::erase_if(mesh.triangles, [&](const auto& t) {
@@ -155,7 +154,7 @@ TEST(SurfaceMesh, a_hole_has_no_height_there_and_only_there) {
     EXPECT_EQ(std::isnan(map.z_um[k]), in_hole(vertex(map, k), 1e-9)) << k;
 }
 
-TEST(SurfaceMesh, an_overhang_is_refused_by_place) {
+TEST_F(SurfaceMesh, an_overhang_is_refused_by_place) {
   TriangleMesh mesh = height_field(wavy);
   const int n = static_cast<int>(mesh.points_um.size());
   for (const Vec3 p : {Vec3{0.5, 10.5, -9}, {2.5, 10.5, -9}, {0.5, 12.5, -9}}) mesh.points_um.push_back(p);
@@ -164,7 +163,7 @@ TEST(SurfaceMesh, an_overhang_is_refused_by_place) {
 }
 
 /// A step of 2 um along x = 1 um, between vertices of the lattice.
-TEST(SurfaceMesh, a_wall_is_a_jump_where_it_has_a_height) {
+TEST_F(SurfaceMesh, a_wall_is_a_jump_where_it_has_a_height) {
   TriangleMesh mesh;
   mesh.points_um = {{-4, 0, 0}, {0.9, 0, 0}, {0.9, 9, 0}, {-4, 9, 0}, {0.9, 0, 2}, {5, 0, 2}, {5, 9, 2}, {0.9, 9, 2}};
   mesh.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}, {1, 4, 2}, {4, 7, 2}};
@@ -173,7 +172,7 @@ TEST(SurfaceMesh, a_wall_is_a_jump_where_it_has_a_height) {
   EXPECT_EQ(refusal(mesh), "sampled") << "triangles without an area are no wall";
 }
 
-TEST(SurfaceMesh, a_closed_mesh_is_refused_with_the_remedy) {
+TEST_F(SurfaceMesh, a_closed_mesh_is_refused_with_the_remedy) {
   TriangleMesh ball;
   constexpr int kRound = 16, kDown = 8;
   for (int j = 0; j <= kDown; ++j)
@@ -194,7 +193,7 @@ TEST(SurfaceMesh, a_closed_mesh_is_refused_with_the_remedy) {
 }
 
 /// The work goes with what the triangles cover.
-TEST(SurfaceMesh, triangles_that_cover_an_area_again_and_again_are_refused_and_twice_is_read) {
+TEST_F(SurfaceMesh, triangles_that_cover_an_area_again_and_again_are_refused_and_twice_is_read) {
   TriangleMesh mesh = height_field(wavy);
   mesh.triangles.insert(mesh.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
   EXPECT_EQ(refusal(mesh), "sampled");
@@ -203,7 +202,7 @@ TEST(SurfaceMesh, triangles_that_cover_an_area_again_and_again_are_refused_and_t
 }
 
 /// Triangles from one corner to points along the two opposite sides, some of them slivers askew to the lattice.
-TEST(SurfaceMesh, slivers_askew_give_the_plane_that_they_lie_in) {
+TEST_F(SurfaceMesh, slivers_askew_give_the_plane_that_they_lie_in) {
   const auto height = [](Vec2 p) { return 0.3 * p.x - 0.2 * p.y + 1; };
   TriangleMesh mesh;
   const auto add = [&](Vec2 p) { mesh.points_um.push_back({p.x, p.y, height(p)}); };
@@ -215,7 +214,7 @@ TEST(SurfaceMesh, slivers_askew_give_the_plane_that_they_lie_in) {
   for (std::size_t k = 0; k < map.z_um.size(); ++k) EXPECT_NEAR(map.z_um[k], height(vertex(map, k)), kRounding) << k;
 }
 
-TEST(SurfaceMesh, what_spans_no_area_is_refused) {
+TEST_F(SurfaceMesh, what_spans_no_area_is_refused) {
   EXPECT_TRUE(has_words(refusal(TriangleMesh{}), "found none"));
   const TriangleMesh upright = {.points_um = {{0, 0, 0}, {1, 0, 0}, {1, 0, 4}}, .triangles = {{0, 1, 2}}};
   EXPECT_TRUE(has_words(refusal(upright), "one line"));
@@ -225,12 +224,12 @@ TEST(SurfaceMesh, what_spans_no_area_is_refused) {
 }
 
 /// Two of a triangle's three edges are sides, one a diagonal.
-TEST(SurfaceMesh, the_suggested_spacing_is_the_side_of_squares) {
+TEST_F(SurfaceMesh, the_suggested_spacing_is_the_side_of_squares) {
   EXPECT_NEAR(suggested_spacing_um(height_field(wavy)), kSide, 1e-12);
 }
 
 /// A square of two triangles and, in its corner, many more that are a millionth of it wide; then a strip as narrow.
-TEST(SurfaceMesh, small_triangles_beside_large_ones_make_no_lattice_of_millions) {
+TEST_F(SurfaceMesh, small_triangles_beside_large_ones_make_no_lattice_of_millions) {
   for (const double height : {1.0, 1e-6}) {
     TriangleMesh mesh{.points_um = {{0, 0, 0}, {1, 0, 0}, {1, height, 0}, {0, height, 0}},
                       .triangles = {{0, 1, 2}, {0, 2, 3}}};
@@ -248,16 +247,14 @@ TEST(SurfaceMesh, small_triangles_beside_large_ones_make_no_lattice_of_millions)
   }
 }
 
-TEST(SurfaceMesh, stage_coordinates_as_floats_make_no_overhang_and_no_hole) {
-  const TemporaryFolder folder;
+TEST_F(SurfaceMesh, stage_coordinates_as_floats_make_no_overhang_and_no_hole) {
   TriangleMesh mesh = height_field(wavy);
   for (Vec3& p : mesh.points_um) p = {p.x + 40000.3, p.y - 23000.7, p.z + 3000.1};
   const HeightMap map = sample_mesh(read_back(folder, "stage.stl", stl_binary(mesh)), 0.5).map;
   EXPECT_NO_THROW(check(map));
 }
 
-TEST(SurfaceMesh, damaged_files_are_refused_by_name) {
-  const TemporaryFolder folder;
+TEST_F(SurfaceMesh, damaged_files_are_refused_by_name) {
   const TriangleMesh mesh = height_field(wavy, 2);
   const std::string stl = stl_binary(mesh), text = stl_text(mesh), ply = ply_text(mesh), obj = obj_text(mesh),
                     little = ply_binary(mesh, Order::little_endian);

@@ -43,8 +43,9 @@ void expect_same(const Network& read, const Network& truth) {
   }
 }
 
-TEST(VtuFiles, a_network_reads_the_same_however_vtk_stores_it) {
-  const TemporaryFolder folder;
+using VtuFiles = test::InFolder;
+
+TEST_F(VtuFiles, a_network_reads_the_same_however_vtk_stores_it) {
   const std::string whole = written(folder);
   for (const test::VtuVariant& variant : test::vtu_variants()) {
     SCOPED_TRACE(variant.name());
@@ -55,15 +56,13 @@ TEST(VtuFiles, a_network_reads_the_same_however_vtk_stores_it) {
   }
 }
 
-TEST(VtuFiles, a_compression_that_is_not_known_is_refused_by_its_name) {
-  const TemporaryFolder folder;
+TEST_F(VtuFiles, a_compression_that_is_not_known_is_refused_by_its_name) {
   const std::string lzma = test::stored_as(written(folder), {.compressor = vtkXMLWriterBase::LZMA});
   EXPECT_TRUE(has_words(refusal(folder, lzma), "vtkLZMADataCompressor"));
 }
 
 /// As meshio writes it: 64-bit sizes, no padding of numbers, another order of the sections, Float32 labels allowed.
-TEST(VtuFiles, text_written_by_hand_and_in_pieces_is_read) {
-  const TemporaryFolder folder;
+TEST_F(VtuFiles, text_written_by_hand_and_in_pieces_is_read) {
   const auto piece = [](int first_adhesion) {
     return R"(<Piece NumberOfPoints="3" NumberOfCells="2"><Points><DataArray type="Float64" Name="Points"
       NumberOfComponents="3" format="ascii">0 0 0  1 0.5 0  2 1e0 0</DataArray></Points>
@@ -85,8 +84,7 @@ TEST(VtuFiles, text_written_by_hand_and_in_pieces_is_read) {
   EXPECT_EQ(read.vertices_um[4], (Vec2{1, 0.5}));
 }
 
-TEST(VtuFiles, what_a_file_claims_is_compared_with_what_it_holds) {
-  const TemporaryFolder folder;
+TEST_F(VtuFiles, what_a_file_claims_is_compared_with_what_it_holds) {
   const std::string whole = written(folder);
   const std::string points = "NumberOfPoints=\"41\"", cells = "NumberOfCells=\"40\"";
   for (const auto& [changed, expected] : std::vector<std::pair<std::string, std::string>>{
@@ -108,8 +106,7 @@ TEST(VtuFiles, what_a_file_claims_is_compared_with_what_it_holds) {
   }
 }
 
-TEST(VtuFiles, sizes_of_blocks_are_compared_with_the_array) {
-  const TemporaryFolder folder;
+TEST_F(VtuFiles, sizes_of_blocks_are_compared_with_the_array) {
   const std::string whole = written(folder);
   const std::size_t begin = whole.find('_', whole.find("<AppendedData")) + 1;
   for (const std::size_t word : {0, 1, 2, 3}) {  // blocks, their size, the last one's, the first one's packed size
@@ -123,8 +120,7 @@ TEST(VtuFiles, sizes_of_blocks_are_compared_with_the_array) {
   }
 }
 
-TEST(VtuFiles, a_cell_is_a_line_between_points_of_the_file) {
-  const TemporaryFolder folder;
+TEST_F(VtuFiles, a_cell_is_a_line_between_points_of_the_file) {
   const std::string text = test::stored_as(written(folder), {.mode = test::VtuMode::ascii});
   const auto in_array = [&](const std::string& name, const std::string& first) {
     const std::size_t tag = text.find("Name=\"" + name + "\""),
@@ -164,14 +160,14 @@ std::string polygons_in_text() {
          piece("NumberOfLines=\"1\" NumberOfPolys=\"1\"", "4", "0 1 2 3") + "</PolyData></VTKFile>";
 }
 
-TEST(VtuFiles, polygons_are_read_piece_by_piece) {
+TEST_F(VtuFiles, polygons_are_read_piece_by_piece) {
   const files::VtuFile file(polygons_in_text(), "surface.vtp", files::VtuKind::poly_data);
   EXPECT_EQ(file.polygons(), (std::vector<std::vector<int>>{{0, 1, 2}, {0, 2, 3}, {4, 5, 6, 7}}));
   EXPECT_EQ(file.scalars(files::VtuSection::point_data, "sigma_um"), (std::vector<double>{1, 2, 3, 4, 1, 2, 3, 4}));
   EXPECT_EQ(file.coordinates().size(), 24u);
 }
 
-TEST(VtuFiles, damaged_polygons_are_refused) {
+TEST_F(VtuFiles, damaged_polygons_are_refused) {
   const std::string whole = polygons_in_text();
   for (const auto& [changed, expected] : std::vector<std::pair<std::string, std::string>>{
            {with(whole, "NumberOfPolys=\"2\"", "NumberOfPolys=\"3\""), "3 numbers"},
