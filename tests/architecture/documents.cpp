@@ -173,20 +173,16 @@ TEST(Documents, the_list_of_planted_faults_fits_the_sources) {
   EXPECT_GE(n_faults, 60);
 }
 
-/// Each test of tests/stability says what is hard and what must come out, and has its line in the catalogue.
+/// Each test of tests/stability has its line in the catalogue, which says what is hard and what must come out.
 TEST(Documents, the_catalogue_lists_every_hard_case) {
   const std::string page = files::read_text(kDocs / "developers/hard-cases.md");
-  const std::regex any_test("\nTEST(_P)?\\("), stated("\nTEST(_P)?\\(\\w+, (\\w+)\\) \\{\\s*test::hard_case\\(");
+  const std::regex any_test("\nTEST(?:_F|_P)?\\(\\w+, (\\w+)\\)");
   for (const auto& entry : fs::directory_iterator(test::source_folder() / "tests/stability")) {
     const std::string text = files::read_text(entry.path());
-    const auto count = [&](const std::regex& what) {
-      return std::distance(std::sregex_iterator(text.begin(), text.end(), what), {});
-    };
-    EXPECT_EQ(count(any_test), count(stated)) << entry.path() << ": a test without its hard_case(physics, expected)";
-    for (std::sregex_iterator at(text.begin(), text.end(), stated), end; at != end; ++at) {
-      std::string name = (*at)[2];
+    for (std::sregex_iterator at(text.begin(), text.end(), any_test), end; at != end; ++at) {
+      std::string name = (*at)[1];
       std::replace(name.begin(), name.end(), '_', ' ');
-      EXPECT_TRUE(has_words(page, name + " |")) << name << ": give it a row in docs/developers/hard-cases.md";
+      EXPECT_TRUE(has_words(page, "\n| " + name + " |")) << name << ": give it a row in docs/developers/hard-cases.md";
     }
   }
 }

@@ -11,14 +11,12 @@ namespace {
 using namespace mbtfm::test;
 
 TEST(Adhesions, names_a_pixel_that_is_no_number) {
-  test::hard_case("a NaN in the image", "an error that names the pixel");
   images::Image image = even_image(20, 20, 1);
   image.at(3, 4) = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THROW(find_adhesions(image, 0.1, AdhesionParameters{}), InvalidData);
 }
 
 TEST(Adhesions, takes_saturated_adhesions) {
-  test::hard_case("the camera saturates in the adhesions", "all found");
   DrawnScene s = drawn_scene(10, 7);
   for (float& value : s.adhesion_image.pixels) value = std::min(value, 400.0f);
   const auto found = find_adhesions(s.adhesion_image, s.kPixel_um, AdhesionParameters{});
@@ -45,7 +43,6 @@ images::Image noisy(float level, double noise, std::uint64_t seed) {
 }
 
 TEST(Emptiness, a_constant_image_is_called_so) {
-  test::hard_case("the camera saw nothing", "an error with the value");
   EXPECT_EQ(emptiness_of(even_image(20, 20, 100)), "every pixel is 100");
   EXPECT_EQ(finding(even_image(200, 150, 0), std::nullopt), "every pixel is 0");
   test::came_out("every pixel is 0");
@@ -53,7 +50,6 @@ TEST(Emptiness, a_constant_image_is_called_so) {
 }
 
 TEST(Emptiness, a_saturated_image_is_called_so) {
-  test::hard_case("the exposure cut off all that is brighter than the cytosol", "an error with the share of pixels");
   DrawnScene s = drawn_scene(10, 1);
   for (float& value : s.adhesion_image.pixels) value = std::min(value, 190.0f);  // into the cytosol
   const std::string found = finding(s.adhesion_image, s.actin_image);
@@ -62,7 +58,6 @@ TEST(Emptiness, a_saturated_image_is_called_so) {
 }
 
 TEST(Emptiness, an_inverted_image_is_called_so) {
-  test::hard_case("dark on bright, as ImageJ inverts an image", "an error that says so");
   const DrawnScene s = drawn_scene(10, 1);
   const auto inverted = [](images::Image image) {
     const float most = *std::ranges::max_element(image.pixels);
@@ -77,7 +72,6 @@ TEST(Emptiness, an_inverted_image_is_called_so) {
 }
 
 TEST(Emptiness, bright_beads_are_not_called_inverted) {
-  test::hard_case("a bead image in place of the actin image", "an error that asks for the right channel");
   images::Image beads = even_image(400, 300, 200);
   for (int i = 0; i < 400; ++i) {
     const Vec2 place{std::fmod(0.618034 * i, 1.0) * 40, (i + 0.5) / 400 * 30};
@@ -90,7 +84,6 @@ TEST(Emptiness, bright_beads_are_not_called_inverted) {
 }
 
 TEST(Emptiness, noise_alone_is_called_so_and_says_by_how_much) {
-  test::hard_case("an empty field", "an error with the brightest spot in noise deviations");
   for (const std::uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE(seed);
     const std::string found = finding(noisy(200, 15, seed), std::nullopt);
@@ -101,7 +94,6 @@ TEST(Emptiness, noise_alone_is_called_so_and_says_by_how_much) {
 }
 
 TEST(Emptiness, spots_of_the_wrong_size_are_called_so) {
-  test::hard_case("all spots are smaller than asked for", "an error with their number and the parameter");
   images::Image image = noisy(100, 5, 4);
   draw_ellipse(image, ellipse(1, {20, 15}, 0.8, 0.5, 0), 500, 0.15, 0.1);
   AdhesionParameters p;
@@ -113,14 +105,12 @@ TEST(Emptiness, spots_of_the_wrong_size_are_called_so) {
 }
 
 TEST(Emptiness, a_picture_is_not_called_empty) {
-  test::hard_case("few grey levels, but a cell", "no such error");
   const DrawnScene s = drawn_scene(0, 1);  // few grey levels: an even ground, an even cell
   EXPECT_EQ(emptiness_of(s.adhesion_image), "");
   EXPECT_EQ(emptiness_of(s.actin_image), "");
 }
 
 TEST(Emptiness, a_sheet_of_cells_is_called_so) {
-  test::hard_case("touching cells fill the field", "an error that asks for single cells");
   images::Image image = even_image(900, 900, 100);
   for (int i = 0; i < 16; ++i)
     draw_ellipse(image, ellipse(1, {45.0 * (i % 4) + 22, 45.0 * (i / 4) + 22}, 52, 47, 0.3 * i), 100, 0.2, 0.2);
@@ -137,7 +127,6 @@ TEST(Emptiness, a_sheet_of_cells_is_called_so) {
 }
 
 TEST(Adhesions, of_a_texture_without_ellipses_are_valid) {
-  test::hard_case("clouds of all shapes that no ellipse fits", "valid ellipses within the allowed sizes, or none");
   for (const std::uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE(seed);
     // noise summed over 7 x 7 pixels twice: clouds of all shapes, which no ellipse fits
@@ -162,7 +151,6 @@ TEST(Adhesions, of_a_texture_without_ellipses_are_valid) {
 }
 
 TEST(Adhesions, are_not_the_bright_body_of_a_cell) {
-  test::hard_case("a bright cell body without adhesions", "none, and the reason");
   images::Image image = noisy(100, 5, 5);
   draw_ellipse(image, ellipse(1, {20, 15}, 24, 16, 0.5), 1000, 0.15, 0.1);
   EXPECT_TRUE(find_adhesions(image, 0.1, {}).empty());

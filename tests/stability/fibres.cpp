@@ -3,7 +3,6 @@
 
 #include "segment/cells/fibres.h"
 #include "tests/support/drawn_image.h"
-#include "tests/support/hard_case.h"
 #include "tests/support/segmentation_accuracy.h"
 
 namespace mbtfm::cells {
@@ -14,7 +13,6 @@ using namespace mbtfm::test;
 std::vector<Fibre> fibres_of(const images::Image& image) { return find_fibres(image, {}, {}, 0.1, FibreParameters{}); }
 
 TEST(Fibres, of_a_saturated_image_are_none) {
-  test::hard_case("the camera saturates everywhere", "none");
   images::Image image = even_image(300, 300, 70000);
   add_noise(image, 3000, 1);
   for (float& value : image.pixels) value = std::min(value, 65535.0f);
@@ -24,7 +22,6 @@ TEST(Fibres, of_a_saturated_image_are_none) {
 /// The stated meaning of fibre_false_per_cell: where 0.5 lines a cell are expected, Poisson's chance of more than two
 /// is 1.4 %.
 TEST(Fibres, of_a_cell_with_meshwork_alone_are_two_at_most) {
-  test::hard_case("a meshwork makes chains that look like fibres", "no more than its stated false rate allows");
   for (const std::string quality : {"poor", "ordinary", "good"}) {
     SCOPED_TRACE(quality);
     const SimulatedCell cell = simulated_cell("no-fibres", quality, 1);
@@ -35,7 +32,6 @@ TEST(Fibres, of_a_cell_with_meshwork_alone_are_two_at_most) {
 }
 
 TEST(Fibres, of_a_step_are_none) {
-  test::hard_case("an edge of brightness, as at the cell's rim", "none");
   images::Image image = even_image(256, 256, 100);
   for (int row = 0; row < 256; ++row)
     for (int column = 0; column < 256; ++column)
@@ -45,7 +41,6 @@ TEST(Fibres, of_a_step_are_none) {
 }
 
 TEST(Fibres, are_the_same_for_any_number_of_threads) {
-  test::hard_case("1, 2 and 4 threads", "the same bits");
   const DrawnScene scene = drawn_scene(20, 1);
   const int before = cv::getNumThreads();
   std::vector<std::vector<Fibre>> found;

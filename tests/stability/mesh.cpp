@@ -37,7 +37,6 @@ void expect_valid_with(const std::vector<Fibre>& fibres) {
 }
 
 TEST(HardMesh, one_that_memory_cannot_hold_is_refused_with_its_count_before_it_is_made) {
-  test::hard_case("an edge length of a tenth of a nanometre", "refused with the number of vertices and their memory");
   const OutOfMemory error =
       test::thrown<OutOfMemory>([&] { generate_network(square_cell(), {.edge_length_um = 1e-4}); });
   // 400 um2 over the (sqrt 3 / 2) edge^2 that a vertex of an even mesh has to itself: 4.6e10
@@ -45,7 +44,6 @@ TEST(HardMesh, one_that_memory_cannot_hold_is_refused_with_its_count_before_it_i
 }
 
 TEST(HardMesh, edges_too_fine_for_memory_are_refused_before_they_are_filled) {
-  test::hard_case("edge lengths that fall to a tenth of a nanometre", "refused with the number of vertices");
   const Cell cell = square_cell();
   SizeField size(1.5, 1e-9, cell.outline_um);
   size.refine({10, 10}, 1e-4);  // and hardly more anywhere: an even mesh of 1.5 um has 200 vertices, this one 4.6e10
@@ -53,7 +51,6 @@ TEST(HardMesh, edges_too_fine_for_memory_are_refused_before_they_are_filled) {
 }
 
 TEST(HardMesh, crossing_fibres_share_a_vertex) {
-  test::hard_case("two fibres cross", "one common vertex at the crossing, both lengths kept");
   expect_valid_with({fibre_along(1, {{3, 10}, {17, 10}}), fibre_along(2, {{10.2, 3}, {9.9, 17}})});
   Cell cell = square_cell();
   cell.fibres = {fibre_along(1, {{3, 10}, {17, 10}}), fibre_along(2, {{10, 3}, {10, 17}})};
@@ -71,7 +68,6 @@ TEST(HardMesh, crossing_fibres_share_a_vertex) {
 }
 
 TEST(HardMesh, nearly_parallel_fibres) {
-  test::hard_case("fibres 0 to 0.4 um apart, alongside or at a tiny angle", "a valid mesh, both lengths kept");
   for (const double gap : {0.0, 0.01, 0.1, 0.15, 0.2, 0.4}) {
     SCOPED_TRACE("gap " + std::to_string(gap));
     expect_valid_with({fibre_along(1, {{3, 10}, {17, 10}}), fibre_along(2, {{3.4, 10 + gap}, {16.7, 10 + gap}})});
@@ -80,7 +76,6 @@ TEST(HardMesh, nearly_parallel_fibres) {
 }
 
 TEST(HardMesh, fibres_on_the_same_line_each_keep_their_links) {
-  test::hard_case("one fibre lies on another", "links of its own for each, lengths exact");
   Cell cell = square_cell();
   cell.fibres = {fibre_along(1, {{3, 10}, {17, 10}}), fibre_along(2, {{6, 10}, {14, 10}})};
   const GeneratedNetwork generated = generate_network(cell, {});
@@ -91,7 +86,6 @@ TEST(HardMesh, fibres_on_the_same_line_each_keep_their_links) {
 }
 
 TEST(HardMesh, touching_and_branching_fibres) {
-  test::hard_case("fibres that touch, fork and share an end", "a valid mesh, lengths kept");
   expect_valid_with({fibre_along(1, {{3, 10}, {17, 10}}), fibre_along(2, {{10, 10.05}, {13, 16}})});
   expect_valid_with({fibre_along(1, {{3, 10}, {17, 10}}), fibre_along(2, {{3, 10}, {10, 10}, {16, 11}})});
   expect_valid_with(
@@ -99,7 +93,6 @@ TEST(HardMesh, touching_and_branching_fibres) {
 }
 
 TEST(HardMesh, fibres_that_bend_back_and_cross_themselves) {
-  test::hard_case("a loop; a line of 100 pixel steps", "a valid mesh");
   expect_valid_with({fibre_along(1, {{4, 4}, {12, 12}, {12, 6}, {5, 12}})});
   Polyline zigzag;
   for (int i = 0; i < 100; ++i) zigzag.push_back({4 + 0.12 * i, 10 + 0.03 * (i % 2)});  // pixel steps
@@ -109,7 +102,6 @@ TEST(HardMesh, fibres_that_bend_back_and_cross_themselves) {
 }
 
 TEST(HardMesh, bundle_of_crossing_fibres) {
-  test::hard_case("twelve fibres through nearly one point", "a valid mesh, lengths kept");
   std::vector<Fibre> fibres;
   for (int i = 0; i < 12; ++i) {
     const double angle = std::numbers::pi * i / 12;
@@ -121,8 +113,6 @@ TEST(HardMesh, bundle_of_crossing_fibres) {
 }
 
 TEST(HardMesh, fibres_that_leave_the_cell_are_cut_and_named) {
-  test::hard_case("fibres that end outside the outline; one that never enters",
-                  "cut at the outline and reported; the last an error");
   Cell cell = square_cell();
   cell.fibres = {fibre_along(1, {{10, 10}, {26, 11}}), fibre_along(2, {{5, 5}, {15, 5}}),
                  fibre_along(3, {{-4, 14}, {24, 14.5}})};
@@ -137,7 +127,6 @@ TEST(HardMesh, fibres_that_leave_the_cell_are_cut_and_named) {
 }
 
 TEST(HardMesh, fibre_that_leaves_and_comes_back_has_two_parts) {
-  test::hard_case("a bay of the outline cuts the fibre", "two parts of one fibre");
   Cell cell;
   cell.outline_um = {{0, 0}, {20, 0}, {20, 20}, {14, 20}, {14, 6}, {6, 6}, {6, 20}, {0, 20}};
   cell.adhesions = {adhesion_at(1, {2, 2})};
@@ -149,7 +138,6 @@ TEST(HardMesh, fibre_that_leaves_and_comes_back_has_two_parts) {
 }
 
 TEST(HardMesh, adhesions_outside_are_included_up_to_an_edge_length) {
-  test::hard_case("adhesions at and beyond the outline", "moved onto it and reported within one edge, else an error");
   Cell cell = square_cell();
   cell.adhesions.push_back(adhesion_at(5, {21.2, 10}));
   cell.adhesions.push_back(adhesion_at(6, {10, 20}));
@@ -162,7 +150,6 @@ TEST(HardMesh, adhesions_outside_are_included_up_to_an_edge_length) {
 }
 
 TEST(HardMesh, adhesions_at_one_place_each_hold_a_vertex) {
-  test::hard_case("four adhesions in one place, six 0.35 um apart", "each its own vertex, those moved are reported");
   Cell cell = square_cell();
   for (int i = 0; i < 4; ++i) cell.adhesions.push_back(adhesion_at(5 + i, {10, 10}));
   for (int i = 0; i < 6; ++i) cell.adhesions.push_back(adhesion_at(9 + i, {5 + 0.35 * i, 15}));
@@ -172,7 +159,6 @@ TEST(HardMesh, adhesions_at_one_place_each_hold_a_vertex) {
 }
 
 TEST(HardMesh, fibre_through_several_adhesions_is_held_by_each) {
-  test::hard_case("a fibre passes over three adhesions", "a vertex of it belongs to each");
   Cell cell = square_cell();
   for (int i = 0; i < 3; ++i) cell.adhesions.push_back(adhesion_at(5 + i, {6 + 3.0 * i, 10.1}));
   cell.fibres = {fibre_along(1, {{4, 10}, {16, 10}})};
@@ -187,7 +173,6 @@ TEST(HardMesh, fibre_through_several_adhesions_is_held_by_each) {
 }
 
 TEST(HardMesh, fibre_along_the_outline) {
-  test::hard_case("a fibre on the rim, from 0.3 um outside to 0.8 um inside", "a valid mesh");
   for (const double inset : {-0.3, 0.0, 0.1, 0.3, 0.5, 0.8}) {
     SCOPED_TRACE("inset " + std::to_string(inset));
     Cell cell = square_cell();
@@ -197,7 +182,6 @@ TEST(HardMesh, fibre_along_the_outline) {
 }
 
 TEST(HardMesh, outlines_with_sharp_corners_and_thin_necks) {
-  test::hard_case("necks from 0.2 to 3 um, a seven-pointed star", "a valid mesh");
   for (const double neck : {0.2, 0.6, 1.5, 3.0}) {
     SCOPED_TRACE("neck " + std::to_string(neck));
     Cell cell;
@@ -221,8 +205,6 @@ TEST(HardMesh, outlines_with_sharp_corners_and_thin_necks) {
 }
 
 TEST(HardMesh, tip_beyond_a_neck_thinner_than_the_mesh_is_left_out_where_nothing_holds_it) {
-  test::hard_case("a neck of 0.05 um, with and without an adhesion beyond",
-                  "the part without one is left out; else two parts, which is said");
   Cell cell;
   cell.outline_um = {{0, 4},   {8, 4},   {8, 9.975},   {14, 9.975}, {14, 4}, {22, 4},
                      {22, 16}, {14, 16}, {14, 10.025}, {8, 10.025}, {8, 16}, {0, 16}};
@@ -238,7 +220,6 @@ TEST(HardMesh, tip_beyond_a_neck_thinner_than_the_mesh_is_left_out_where_nothing
 }
 
 TEST(HardMesh, outline_of_thousands_of_pixel_steps) {
-  test::hard_case("4 000 steps of pixels of 0.05 to 0.3 um", "the smooth outline's area, mean quality >= 0.9");
   const Cell smooth = test::random_cell(11, {.n_outline_points = 300});
   for (const double pixel : {0.05, 0.1, 0.3}) {
     SCOPED_TRACE("pixel " + std::to_string(pixel));
@@ -256,7 +237,6 @@ TEST(HardMesh, outline_of_thousands_of_pixel_steps) {
 }
 
 TEST(HardMesh, cell_smaller_than_an_edge) {
-  test::hard_case("edges of 10 to 100 um in a cell of 20 um", "a valid mesh, each adhesion held");
   const Cell cell = square_cell();
   for (const AdhesionAnchor anchor : {AdhesionAnchor::rim, AdhesionAnchor::ellipse})
     for (const double edge : {10.0, 20.0, 100.0}) {
@@ -266,8 +246,6 @@ TEST(HardMesh, cell_smaller_than_an_edge) {
 }
 
 TEST(HardMesh, adhesions_of_any_size) {
-  test::hard_case("adhesions of 0.05 to 12 times the usual size",
-                  "area kept, worst free triangle >= 0.3, the fibre straight");
   for (const double scale : {0.05, 0.3, 3.0, 12.0}) {
     SCOPED_TRACE("scale " + std::to_string(scale));
     Cell cell = square_cell();
@@ -286,7 +264,6 @@ TEST(HardMesh, adhesions_of_any_size) {
 }
 
 TEST(HardMesh, points_that_repeat_and_lines_that_run_back) {
-  test::hard_case("an outline with a whisker and a point twice", "a valid mesh");
   Cell cell = square_cell();
   cell.outline_um = {{0, 0}, {10, 0}, {10, 0}, {20, 0}, {20, 20}, {20, 26}, {20, 20}, {0, 20}};  // a whisker
   expect_valid(generate_network(cell, {}), cell, 1.5);
@@ -295,8 +272,6 @@ TEST(HardMesh, points_that_repeat_and_lines_that_run_back) {
 class HardCell : public ::testing::TestWithParam<test::HardCell> {};
 
 TEST_P(HardCell, gives_a_valid_network_with_good_triangles_away_from_its_lines) {
-  test::hard_case("the cell of that name, with each way to anchor adhesions",
-                  "a valid mesh, worst free triangle >= 0.3");
   const Cell& cell = GetParam().cell;
   double worst = 1;
   for (const AdhesionAnchor anchor : values_of<AdhesionAnchor>())
@@ -316,7 +291,6 @@ INSTANTIATE_TEST_SUITE_P(Mesh, HardCell, ::testing::ValuesIn(test::hard_cells())
                          [](const auto& test) { return test.param.name; });
 
 TEST(HardMesh, rims_hold_the_adhesions_areas) {
-  test::hard_case("eight points stand for an ellipse", "their polygon has its area, to 1 %");
   Cell cell = square_cell();
   const GeneratedNetwork generated = generate_network(cell, {.adhesion_anchor = AdhesionAnchor::rim});
   for (const Adhesion& a : cell.adhesions) {
@@ -337,7 +311,6 @@ TEST(HardMesh, rims_hold_the_adhesions_areas) {
 }
 
 TEST(HardMesh, fibre_spans_a_hole) {
-  test::hard_case("a fibre crosses a hole of the cell", "it keeps its length; no other link in the hole");
   Cell cell = square_cell();
   cell.holes_um = {test::circle({10, 10}, 3, 80)};
   cell.fibres = {fibre_along(1, {{3, 10}, {17, 10}})};
@@ -353,7 +326,6 @@ TEST(HardMesh, fibre_spans_a_hole) {
 }
 
 TEST(HardMesh, free_end_in_a_hole_is_cut_off_and_named) {
-  test::hard_case("a fibre ends in a hole", "cut at the rim and reported");
   Cell cell = square_cell();
   cell.holes_um = {test::circle({10, 10}, 3, 80)};
   cell.fibres = {fibre_along(1, {{3, 10}, {10, 10}}), fibre_along(2, {{3, 12}, {17, 12}})};
@@ -365,7 +337,6 @@ TEST(HardMesh, free_end_in_a_hole_is_cut_off_and_named) {
 }
 
 TEST(HardMesh, hole_smaller_than_a_triangle_is_filled) {
-  test::hard_case("a hole of 0.8 um, smaller than an edge", "filled and reported");
   Cell cell = square_cell();
   cell.holes_um = {test::circle({10, 10}, 0.4, 30), test::circle({6, 12}, 2, 30)};
   const GeneratedNetwork generated = generate_network(cell, {});

@@ -1,7 +1,6 @@
 /// Fibres in images that no one here made, where they are at hand (../shared/data); skipped elsewhere.
 #include "segment/cells/segment_cell.h"
 #include "tests/support/folders.h"
-#include "tests/support/hard_case.h"
 #include "tests/support/segmentation_score.h"
 
 namespace mbtfm::images {
@@ -44,7 +43,6 @@ double agreement(const std::vector<Fibre>& a, std::vector<Fibre> b, double toler
 }
 
 TEST(RealFibres, of_cells_on_discs_lie_inside_the_cell) {
-  test::hard_case("six real cells on discs", "fibres inside the cell, 0.35 to 3 mm of them");
   REQUIRE_DATA();
   for (const DiscCell& disc : kDiscCells) {
     SCOPED_TRACE(disc.file);
@@ -58,8 +56,6 @@ TEST(RealFibres, of_cells_on_discs_lie_inside_the_cell) {
 
 /// Lines near the limit come and go with the least change of an image, and a cell has a dozen of them.
 TEST(RealFibres, are_the_same_in_brighter_turned_and_mirrored_images) {
-  test::hard_case("the same cells 20 % brighter or darker, turned, mirrored",
-                  "the same fibres (F >= 0.9 over the cells, >= 0.85 in each)");
   REQUIRE_DATA();
   std::map<std::string, double> mean;
   for (const DiscCell& disc : kDiscCells) {
@@ -112,7 +108,6 @@ double near_share(const Image& a, const Image& b) {
 /// A carpet of 1 000 straight sticks of 1 to 2 pixels' width, 20 pixels long. No pixel size is known: 0.3 um makes them
 /// as wide as fibres are. By default most of a carpet is meshwork, of which any number is allowed here.
 TEST(RealFibres, of_a_carpet_of_sticks_lie_on_the_sticks) {
-  test::hard_case("a carpet of 1 000 sticks, 1 to 2 pixels wide", "F >= 0.97");
   REQUIRE_DATA();
   constexpr double kAssumedPixel_um = 0.3;
   const Image image = read_image(kActin / "synthetic_segmentfibers/SBXIQ_gauss.tif");
@@ -132,7 +127,6 @@ TEST(RealFibres, of_a_carpet_of_sticks_lie_on_the_sticks) {
 }
 
 TEST(RealFibres, of_a_layer_of_many_cells_are_found_without_an_outline) {
-  test::hard_case("a closed layer of cells", "fibres of at least the least length");
   REQUIRE_DATA();
   const Image image = read_image(kActin / "bronchial_monolayer/U13_72_P1_5_SF.tif");
   const auto fibres = cells::find_fibres(image, {}, {}, *image.pixel_size_um, cells::FibreParameters{});

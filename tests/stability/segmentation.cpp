@@ -2,7 +2,6 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "tests/support/drawn_image.h"
-#include "tests/support/hard_case.h"
 #include "tests/support/segmentation_accuracy.h"
 
 namespace mbtfm::cells {
@@ -17,12 +16,10 @@ void expect_nothing(const images::Image& image, double pixel_um = 0.1) {
 }
 
 TEST(Segmentation, finds_nothing_in_a_constant_image) {
-  test::hard_case("an empty image at any level", "no adhesion, fibre or outline");
   for (const float level : {0.0f, 100.0f, 65535.0f}) expect_nothing(even_image(200, 150, level));
 }
 
 TEST(Segmentation, finds_nothing_in_noise_alone) {
-  test::hard_case("noise at three pixel sizes", "no adhesion, fibre or outline");
   for (const std::uint64_t seed : {1, 2, 3})
     for (const double pixel_um : {0.05, 0.1, 0.2}) {
       SCOPED_TRACE(std::to_string(seed) + " " + std::to_string(pixel_um));
@@ -33,13 +30,11 @@ TEST(Segmentation, finds_nothing_in_noise_alone) {
 }
 
 TEST(Segmentation, takes_images_of_few_pixels) {
-  test::hard_case("images of 1 to 17 pixels", "nothing, no error");
   for (const int side : {1, 2, 5, 17})
     for (const int length : {side, 700}) expect_nothing(even_image(side, length, 3));
 }
 
 TEST(Segmentation, says_how_small_a_thing_is_that_is_too_small_for_a_cell) {
-  test::hard_case("a cell smaller than the smallest", "an error that gives its area and names both numbers");
   images::Image image = even_image(300, 300, 100);
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)
@@ -54,7 +49,6 @@ TEST(Segmentation, says_how_small_a_thing_is_that_is_too_small_for_a_cell) {
 }
 
 TEST(Segmentation, says_what_is_missing) {
-  test::hard_case("no image, no pixel size, two sizes, empty channels", "an error that names each");
   SegmentParameters p;
   const images::Channel flat{"flat.tif", even_image(64, 64, 5)}, wide{"wide.tif", even_image(80, 64, 5)};
   EXPECT_THROW(segment_cell({}, {}, p), UsageError);
@@ -93,8 +87,6 @@ class ImagesOfTwoCells : public testing::Test {
 };
 
 TEST_F(ImagesOfTwoCells, are_told_from_those_of_one) {
-  test::hard_case("the adhesion image upside down, or of another cell; an outline of another cell",
-                  "told in each; of one cell nothing is said");
   const double most_adhesions = threshold(FindingKind::adhesions_off_actin),
                most_outline = threshold(FindingKind::outline_off_actin);
   for (const std::uint64_t seed : {71, 72, 73}) {

@@ -43,7 +43,6 @@ double tolerance_of(const std::string& model) {
 }
 
 TEST_P(Model, copes_with_thin_and_thick_gels_near_incompressibility) {
-  test::hard_case("h = 2 and 1 000 um, nu = 0 and 0.4999", "the layer's exact field within the model's tolerance");
   if (std::string(GetParam()) == "half-space") GTEST_SKIP() << "has no thickness";
   double worst = 0;
   for (const auto& [thickness, half_side] : {std::pair{2.0, 4.0}, std::pair{1000.0, 40.0}})
@@ -60,8 +59,6 @@ TEST_P(Model, copes_with_thin_and_thick_gels_near_incompressibility) {
 }
 
 TEST_P(Model, copes_with_slender_and_tiny_and_overlapping_adhesions) {
-  test::hard_case("1 : 10, 0.01 um², over each other, the same twice",
-                  "finite, equal columns for equal ones, the exact field within the tolerance");
   // 1:10; 0.01 um²; two over each other; the same twice
   const std::vector<Ellipse> ellipses = {{{0, 0}, 2, 0.2, 0.3},
                                          {{6, 1}, 0.08, 0.0398, 1},
@@ -81,7 +78,6 @@ TEST_P(Model, copes_with_slender_and_tiny_and_overlapping_adhesions) {
 }
 
 TEST_P(Model, is_continuous_through_the_centre_and_the_rim) {
-  test::hard_case("a bead exactly at the centre or on the rim", "finite, and continuous to 1e-7");
   for (const double b : {0.1, 0.5, 1.0}) {
     const Ellipse ellipse = {{0, 0}, 1, b, 0};
     std::vector<Vec2> points;
@@ -100,7 +96,6 @@ TEST_P(Model, is_continuous_through_the_centre_and_the_rim) {
 }
 
 TEST_P(Model, rejects_what_is_no_gel_no_ellipse_no_point_and_no_force) {
-  test::hard_case("nu > 0.5, E <= 0, axes of zero, NaN", "an error for each");
   const SubstrateParameters parameters = test::model_named(GetParam());
   for (const Gel& gel : {Gel{8.4, 0.51, 20}, Gel{8.4, 0.6, 20}, Gel{8.4, -0.1, 20}, Gel{0, 0.4, 20}, Gel{-1, 0.4, 20},
                          Gel{8.4, 0.4, 0}, Gel{NAN, 0.4, 20}, Gel{8.4, NAN, 20}})
@@ -117,7 +112,6 @@ TEST_P(Model, rejects_what_is_no_gel_no_ellipse_no_point_and_no_force) {
 }
 
 TEST_P(Model, takes_empty_scenes) {
-  test::hard_case("no beads, no adhesions", "empty matrices, no displacement");
   const auto model = choice::make_substrate(kGel, test::model_named(GetParam()), 1);
   EXPECT_EQ(model->compliance_um_per_nN({}, {}).size(), 0);
   EXPECT_EQ(model->compliance_um_per_nN({{0, 0}}, {}).rows(), 2);
@@ -128,7 +122,6 @@ TEST_P(Model, takes_empty_scenes) {
 }
 
 TEST(Substrate, names_the_models_it_knows) {
-  test::hard_case("a misspelt model", "an error that lists the models");
   const UsageError error = test::thrown<UsageError>([&] {
     SubstrateParameters parameters;
     stage::ParameterList list;
@@ -140,7 +133,6 @@ TEST(Substrate, names_the_models_it_knows) {
 }
 
 TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
-  test::hard_case("5 MB allowed; a scene of 1 mm on a gel of 1 um", "an error before memory is taken");
   for (const char* name : {"split", "refined"}) {
     SubstrateParameters parameters = test::model_named(name);
     parameters.memory_limit_GB = 0.005;
@@ -161,7 +153,6 @@ TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
 }
 
 TEST(Substrate, says_which_mesh_would_fit_the_memory) {
-  test::hard_case("memory for part of the mesh asked for", "an error with the mesh that would fit");
   SubstrateParameters parameters = test::model_named("refined");
   parameters.displacement_tolerance = 0;
   parameters.precision = numerics::Precision::double_;
@@ -177,7 +168,6 @@ TEST(Substrate, says_which_mesh_would_fit_the_memory) {
 }
 
 TEST(Substrate, takes_a_thousand_adhesions) {
-  test::hard_case("1 000 adhesions", "the exact field to 0.2 %");
   const auto points = test::scattered_points(200, 60);
   const auto ellipses = test::scattered_ellipses(1000, 60);
   const Eigen::MatrixXd layer = compliance("layer", kGel, points, ellipses);
@@ -187,7 +177,6 @@ TEST(Substrate, takes_a_thousand_adhesions) {
 }
 
 TEST(Substrate, refuses_a_thousand_adhesions_that_refined_has_no_memory_for) {
-  test::hard_case("1 000 adhesions, 0.5 and 1 GB", "an error before more than that is taken");
   const auto points = test::scattered_points(200, 60);
   const auto ellipses = test::scattered_ellipses(1000, 60);
   SubstrateParameters parameters = test::model_named("refined");
@@ -208,7 +197,6 @@ TEST(Substrate, refuses_a_thousand_adhesions_that_refined_has_no_memory_for) {
 }
 
 TEST(Substrate, takes_adhesions_that_touch_a_side) {
-  test::hard_case("an ellipse touches the gel's side", "finite, more than on an endless layer");
   // the scene's rectangle is the block: the ellipse's tip touches the side
   SubstrateParameters parameters = test::model_named("refined");
   parameters.side_distance_um = 1e-6;
@@ -230,8 +218,6 @@ std::string choice(const Gel& gel, const SubstrateParameters& parameters, const 
 }
 
 TEST(Automatic, takes_the_cheapest_model_that_is_right) {
-  test::hard_case("thick and thin gels, near sides, layers of other modulus",
-                  "auto takes the cheapest model that is right");
   const auto points = test::scattered_points(100, 10);
   const std::vector<Ellipse> ellipses = {{{1, 2}, 1, 0.5, 0.3}};
   SubstrateParameters parameters = test::model_named("auto");
@@ -251,7 +237,6 @@ TEST(Automatic, takes_the_cheapest_model_that_is_right) {
 }
 
 TEST(Automatic, leaves_out_no_more_than_the_tolerance) {
-  test::hard_case("scenes at the limit of auto's choice", "what is left out is below the tolerance");
   const auto points = test::scattered_points(1000, 30);
   const auto ellipses = test::scattered_ellipses(6, 25);
   SubstrateParameters parameters = test::model_named("auto");
@@ -283,8 +268,6 @@ GelEffects effects_for(double thickness_um, const SubstrateParameters& parameter
 }
 
 TEST(Automatic, each_effect_of_the_gel_has_a_scene_that_calls_for_it_and_one_that_does_not) {
-  test::hard_case("thick and thin gels, near and far sides, even and graded ones",
-                  "each effect on where its number exceeds the tolerance, else off");
   SubstrateParameters p;
   EXPECT_TRUE(effects_for(60, p).thickness.is_on);
   EXPECT_FALSE(effects_for(20000, p).thickness.is_on);
@@ -303,7 +286,6 @@ TEST(Automatic, each_effect_of_the_gel_has_a_scene_that_calls_for_it_and_one_tha
 }
 
 TEST(Automatic, says_where_an_uneven_surface_matters_that_no_model_has) {
-  test::hard_case("gels that are tilted, or rough", "said where it matters; the model is that of a level gel");
   const auto surface_of = [](double tilt_deg, double roughness_um) {
     SubstrateParameters p;
     p.surface_tilt_deg = tilt_deg;
@@ -321,8 +303,6 @@ TEST(Automatic, says_where_an_uneven_surface_matters_that_no_model_has) {
 }
 
 TEST(Automatic, a_surface_that_is_given_changes_the_field_by_about_what_its_slopes_say) {
-  test::hard_case("a wavy gel, and one that is nearly flat",
-                  "its own model, or that of a flat gel; what it changes is said");
   const std::vector<Ellipse> ellipses = {{{-11, 2}, 1, 1, 0}, {{3, 9}, 1, 1, 0}};
   const std::vector<Vec2> points = {{-20, 3}, {-9, 4}, {1, 2}, {5, 12}, {14, -6}}, forces = {{30, 0}, {-10, 20}};
   const auto gel_of = [](double amplitude_um) {
@@ -352,7 +332,6 @@ TEST(Automatic, a_surface_that_is_given_changes_the_field_by_about_what_its_slop
 }
 
 TEST(Automatic, obeys_its_switches) {
-  test::hard_case("effects switched on or off against the scene", "what is asked for");
   const auto points = test::scattered_points(100, 10);
   const std::vector<Ellipse> ellipses = {{{1, 2}, 1, 0.5, 0.3}};
   SubstrateParameters p;
@@ -367,7 +346,6 @@ TEST(Automatic, obeys_its_switches) {
 }
 
 TEST(Automatic, refuses_switches_without_a_datum_and_models_that_cannot_follow) {
-  test::hard_case("sides without a distance, a model without what is on", "an error that names both");
   const auto refused = [](const std::string& model, Switch stage::EffectSwitches::*member, Switch setting,
                           std::optional<double> side_distance_um = {}) {
     SubstrateParameters p = test::model_named(model);
@@ -387,7 +365,6 @@ TEST(Automatic, refuses_switches_without_a_datum_and_models_that_cannot_follow) 
 }
 
 TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
-  test::hard_case("malformed modulus profiles", "an error for each");
   SubstrateParameters parameters = test::model_named("refined");
   for (const char* text : {"0", "0:", "0:8, -1:4", "0:0", "5:8, 2:4", "0:8 4:4", "a:8", "0:8, 4:4x", "0:-3"}) {
     parameters.modulus_profile = text;
@@ -411,7 +388,6 @@ std::filesystem::path only_file(const std::filesystem::path& folder) {
 }
 
 TEST(Cache, gives_the_same_bits_survives_damage_and_many_writers) {
-  test::hard_case("damaged cache files, four writers at once", "the same bits as without a cache");
   const test::TemporaryFolder folder;
   const auto points = test::scattered_points(50, 20);
   const auto ellipses = test::scattered_ellipses(5, 15);
@@ -449,7 +425,6 @@ TEST(Cache, gives_the_same_bits_survives_damage_and_many_writers) {
 }
 
 TEST(Substrate, writes_its_surface_for_paraview) {
-  test::hard_case("the surface as VTU", "complete, compressed, without NaN");
   const test::TemporaryFolder folder;
   const std::vector<Ellipse> ellipses = {{{0, 0}, 2, 0.5, 0.3}, {{8, 3}, 1, 0.5, 1}};
   const auto model = choice::make_substrate(kGel, test::model_named("layer"), 2);

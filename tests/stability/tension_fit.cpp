@@ -28,7 +28,6 @@ void expect_sound(const EnsembleFit& fit) {
 }
 
 TEST(TensionFitHard, starts_from_1e_6_to_1e3_nN_end_at_the_same_tensions) {
-  test::hard_case("starts over nine decades", "the same tensions to 0.2 standard errors");
   const TensionScene scene = tension_scene("case_22", 1000, 0.07, 5);
   const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
   const Trial first = fit_gauss_newton(problem, {}, uniform_start(problem)).trial;
@@ -48,7 +47,6 @@ TEST(TensionFitHard, starts_from_1e_6_to_1e3_nN_end_at_the_same_tensions) {
 }
 
 TEST(TensionFitHard, beads_all_beside_the_cell_are_refused_with_their_place) {
-  test::hard_case("positions with the wrong sign: no bead is near the cell", "refused, with the places of both");
   const Cell cell = test::round_cell(8, 6);
   DisplacementField beads;
   for (const Adhesion& a : cell.adhesions) beads.push_back({.position_um = a.position_um, .sigma_um = 0.02});
@@ -64,7 +62,6 @@ TEST(TensionFitHard, beads_all_beside_the_cell_are_refused_with_their_place) {
 }
 
 TEST(TensionFitHard, parallel_fibres_0_2_um_apart_are_named_with_their_sum) {
-  test::hard_case("the data cannot tell two parallel fibres apart", "said so, with their sum, which is known");
   Cell cell = test::round_cell(12, 12);
   test::add_ventral(cell, 1, 7);
   test::add_ventral(cell, 3, 9);
@@ -93,7 +90,6 @@ TEST(TensionFitHard, parallel_fibres_0_2_um_apart_are_named_with_their_sum) {
 }
 
 TEST(TensionFitHard, a_hundred_fibres) {
-  test::hard_case("a hundred dorsal fibres, some without tension", "errors as stated");
   Cell cell = test::round_cell(30, 100);
   Eigen::VectorXd tensions(101);
   tensions[0] = 0.06;
@@ -125,7 +121,6 @@ TEST(TensionFitHard, a_hundred_fibres) {
 }
 
 TEST(TensionFitHard, fewer_beads_than_unknowns_are_refused_with_the_count_that_would_do) {
-  test::hard_case("four beads for a dozen tensions", "an error with the number that would do");
   TensionScene scene = tension_scene("case_21", 4, 0.05, 3);
   const InvalidData error = test::thrown<InvalidData>([&] { fit_own_network(scene); });
   const std::string enough = "at least " + std::to_string((scene.tensions_nN.size() + 1) / 2) + " good beads";
@@ -134,7 +129,6 @@ TEST(TensionFitHard, fewer_beads_than_unknowns_are_refused_with_the_count_that_w
 }
 
 TEST(TensionFitHard, a_fibre_without_beads_near_it_gets_a_wide_interval_that_covers) {
-  test::hard_case("beads on one side of the cell only", "intervals widen, and cover");
   TensionScene scene = tension_scene("case_21", 3000, 0.05, 4);
   const EnsembleFit everywhere = fit_own_network(scene);
   double middle_um = 0;  // beads are kept on one side only
@@ -158,7 +152,6 @@ TEST(TensionFitHard, a_fibre_without_beads_near_it_gets_a_wide_interval_that_cov
 }
 
 TEST(TensionFitHard, where_nothing_pulls_no_tension_is_found) {
-  test::hard_case("a dead cell: noise only", "all intervals but one at most reach zero");
   TensionScene scene = tension_scene("case_21", 1000, 0.05, 5);
   const double sigma_um = 0.02;
   std::mt19937_64 random(6);
@@ -178,7 +171,6 @@ TEST(TensionFitHard, where_nothing_pulls_no_tension_is_found) {
 }
 
 TEST(TensionFitHard, one_adhesion_that_carries_everything) {
-  test::hard_case("seven fibres meet in one adhesion", "noise-free tensions to 1e-5; sound with 10 % noise");
   Cell cell = test::round_cell(15, 16);
   for (const int end : {6, 7, 8, 9, 10, 11, 12}) test::add_ventral(cell, 1, end);
   Eigen::VectorXd tensions(8);
@@ -195,7 +187,6 @@ TEST(TensionFitHard, one_adhesion_that_carries_everything) {
 }
 
 TEST(TensionFitHard, noise_as_large_as_the_signal_widens_the_intervals) {
-  test::hard_case("noise 100 %", "wider intervals that cover");
   TensionScene scene = tension_scene("case_22", 2000, 0.05, 9);
   const EnsembleFit little = fit_own_network(scene);
   measure(scene, 1.0, 10);

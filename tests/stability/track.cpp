@@ -25,8 +25,6 @@ bool is_stranger(Vec2 displacement, const std::vector<int>& around, const test::
 }
 
 TEST(TrackStability, lost_beads_uneven_light_and_another_exposure_cost_beads_but_not_trust) {
-  test::hard_case("one bead in ten lost, light falling by half, another exposure",
-                  "80 % tracked, at most 1 % of them wrong");
   const auto peaks = test::ring_of_adhesions(384, 6);
   const auto pair = test::draw_bead_pair(
       peaks, {.width = 384, .n_beads = 2950, .lost = 0.05, .uneven_light = 0.5, .gain = 0.7, .offset = 200, .seed = 4});
@@ -40,8 +38,6 @@ TEST(TrackStability, lost_beads_uneven_light_and_another_exposure_cost_beads_but
 
 /// Loose beads: each takes a step of its own, so that most windows hold beads that moved otherwise.
 TEST(TrackStability, loose_beads_are_followed_and_their_steps_are_in_the_standard_errors) {
-  test::hard_case("each bead moves 0.6 px on its own",
-                  "93 % followed, 1 % wrong, mean squared error over stated variance 0.7 to 1.4");
   const auto peaks = test::ring_of_adhesions(384, 6);
   constexpr double kStep = 0.6;  // px
   double squares = 0, n = 0, n_beads = 0, n_wrong = 0;
@@ -99,8 +95,6 @@ std::string told(const InPeaks& counts) {
 
 /// Where a peak falls by half within a bead distance no two loose beads move alike, and windows lose them.
 TEST(TrackStability, loose_beads_in_steep_peaks_are_found) {
-  test::hard_case("beads that step on their own, under adhesions that pull them by many spacings",
-                  "most of them found");
   const InPeaks counts = followed_in_peaks(test::ring_of_adhesions(384, 12), {});
   // windows alone find two thirds; a share of a hundred beads is good to 0.04
   EXPECT_GE(counts.n_right, 0.75 * counts.n);
@@ -142,8 +136,6 @@ test::Peaks followed_in_cell(std::uint64_t seed, bool adhesions_are_known) {
 }
 
 TEST(TrackStability, adhesions_tell_which_loose_bead_is_which) {
-  test::hard_case("a cell whose adhesions pull loose beads by 5 px and more, adhesions known",
-                  "a quarter of those that are lost without adhesions found, no more wrong");
   const test::Peaks alone = followed_in_cell(1, false), guided = followed_in_cell(1, true);
   EXPECT_LE(guided.n - guided.n_right, 0.75 * (alone.n - alone.n_right));
   EXPECT_LE(guided.n_wrong, alone.n_wrong);
@@ -154,8 +146,6 @@ TEST(TrackStability, adhesions_tell_which_loose_bead_is_which) {
 
 /// A bead comes to rest where the next one lay: windows take one for the other, and both bear each other out.
 TEST(TrackStability, beads_that_took_each_others_places_are_told_apart_beside_adhesions) {
-  test::hard_case("two cells in which beads on one adhesion are taken for each other, adhesions known",
-                  "one wrong at most, three in four found again");
   int n = 0, n_right = 0, n_wrong = 0;
   for (const std::uint64_t seed : {44u, 49u}) {
     const test::Peaks peaks = followed_in_cell(seed, true);
@@ -167,8 +157,6 @@ TEST(TrackStability, beads_that_took_each_others_places_are_told_apart_beside_ad
 }
 
 TEST(TrackStability, adhesions_of_the_wrong_size_or_place_cost_few_beads) {
-  test::hard_case("adhesions drawn at half their width, or where there are none, under loose beads",
-                  "as many beads found in steep peaks as without adhesions, to one in twenty");
   const auto peaks = test::ring_of_adhesions(384, 12);
   const InPeaks alone = followed_in_peaks(peaks, {});
   for (const auto& [name, adhesions] : {std::pair("right", adhesions_at(peaks, {0.5, 0.5}, 2)),
@@ -191,8 +179,6 @@ int n_wrong(const Tracking& tracking, const test::BeadPair& pair) {
 
 /// The wide window then finds one in six: its neighbours are elsewhere.
 TEST(TrackStability, sparse_beads_that_scatter_by_many_widths_are_matched) {
-  test::hard_case("each bead moves on its own by four times its width, nearly a quarter of the distance to the next",
-                  "three in four found, at most one in ten of them wrong");
   const auto peaks = test::ring_of_adhesions(384, 6);
   double n_good = 0, n_beads = 0, n_strangers = 0;
   for (const std::uint64_t seed : {101u, 102u, 103u}) {
@@ -211,8 +197,6 @@ TEST(TrackStability, sparse_beads_that_scatter_by_many_widths_are_matched) {
 }
 
 TEST(TrackStability, a_bead_that_vanished_is_not_matched_with_a_stranger_far_away) {
-  test::hard_case("loose beads far apart, one in five in one of the images only",
-                  "nine in ten of those that vanished are known to have no partner");
   const auto peaks = test::ring_of_adhesions(256, 4);
   int n_vanished = 0, n_matched = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
@@ -233,8 +217,6 @@ TEST(TrackStability, a_bead_that_vanished_is_not_matched_with_a_stranger_far_awa
 
 /// Where beads scatter so, many registrations run off; one that did once asked for more memory than there is.
 TEST(TrackStability, beads_that_are_lost_stay_in_the_picture) {
-  test::hard_case("dense beads that each move by two fifths of their distance",
-                  "all displacements, of flagged beads too, end within 64 px of the picture");
   constexpr double kSide = 400, kDistance = 5;
   const auto peaks = test::ring_of_adhesions(kSide, 6);
   const auto pair = test::draw_bead_pair(peaks, {.width = static_cast<int>(kSide),
@@ -251,7 +233,6 @@ TEST(TrackStability, beads_that_are_lost_stay_in_the_picture) {
 }
 
 TEST(TrackStability, faint_beads_are_tracked_with_larger_errors) {
-  test::hard_case("beads ten times fainter", "larger stated errors, at most 1 % wrong");
   const auto peaks = test::ring_of_adhesions(256, 2);
   const auto bright = test::draw_bead_pair(peaks, {.width = 256, .n_beads = 700});
   const auto faint = test::draw_bead_pair(peaks, {.width = 256, .n_beads = 700, .brightness = 150});
@@ -274,7 +255,6 @@ std::string what_is_wrong(const images::Image& relaxed, const images::Image& str
 }
 
 TEST(TrackStability, images_without_beads_are_refused) {
-  test::hard_case("no beads, constant images", "an error that names the image");
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 300});
   const auto noise = test::draw_bead_pair({}, {.width = 128, .n_beads = 0});
   images::Image constant = pair.relaxed;
@@ -288,8 +268,6 @@ TEST(TrackStability, images_without_beads_are_refused) {
 }
 
 TEST(TrackStability, pictures_of_different_beads_or_turned_against_each_other_give_no_field) {
-  test::hard_case("pictures of two places; a turn by 10°",
-                  "an error, never a field; the turn is followed where it is asked for");
   const auto one = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .turn_rad = 0.17, .seed = 1});
   const auto other = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 2});
   const std::string refused = "the stressed image: expected the beads of the relaxed image, displaced, found ";
@@ -305,7 +283,6 @@ TEST(TrackStability, pictures_of_different_beads_or_turned_against_each_other_gi
 }
 
 TEST(TrackStability, few_beads_of_another_place_are_not_taken_for_the_same) {
-  test::hard_case("pictures of two places with two dozen beads each", "an error, or a fifth of the beads at least");
   int n_refused = 0;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const auto one = test::draw_bead_pair({}, {.width = 80, .n_beads = 24, .bead_sigma = 2.1, .seed = seed});
@@ -321,7 +298,6 @@ TEST(TrackStability, few_beads_of_another_place_are_not_taken_for_the_same) {
 }
 
 TEST(TrackStability, one_bead_and_a_pixel_without_a_number_are_refused) {
-  test::hard_case("a single bead; a NaN", "an error that names it");
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 300});
   images::Image one = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
   test::add_bead(one, {60.3, 50.8}, 3000, 1.3);
@@ -334,7 +310,6 @@ TEST(TrackStability, one_bead_and_a_pixel_without_a_number_are_refused) {
 }
 
 TEST(TrackStability, exchanged_images_are_refused_unless_a_cell_may_push) {
-  test::hard_case("stressed and relaxed exchanged", "an error with the remedy; a field where track.may_push is set");
   const auto peaks = test::ring_of_adhesions(384, 6);
   const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 2950});
   EXPECT_EQ(what_is_wrong(pair.relaxed, pair.stressed), "nothing");
@@ -356,7 +331,6 @@ images::Image cropped(const images::Image& image, int left, int top, int width, 
 /// What a picture shows of a cell that its border cuts may point anywhere: no word of exchanged images either way
 /// round, and none of growth alone.
 TEST(TrackStability, a_cell_that_the_border_cuts_is_never_called_exchanged) {
-  test::hard_case("a cell cut by one, two, three sides, either way round; a picture that grows", "never refused");
   const auto peaks = test::ring_of_adhesions(512, 8);
   const auto pair = test::draw_bead_pair(peaks, {.width = 512, .n_beads = 5242});
   for (const auto& [left, top, width, height] :
@@ -373,7 +347,6 @@ TEST(TrackStability, a_cell_that_the_border_cuts_is_never_called_exchanged) {
 }
 
 TEST(TrackStability, images_of_different_sizes_are_refused) {
-  test::hard_case("the two images differ in size", "an error with both sizes");
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 300});
   const auto other = test::draw_bead_pair({}, {.width = 96, .n_beads = 170});
   EXPECT_EQ(what_is_wrong(pair.relaxed, other.stressed),

@@ -31,8 +31,6 @@ double squared_over_variance(const Tracking& tracking, const std::vector<test::P
 }
 
 TEST(WeakBeads, windows_follow_dense_weak_and_mottled_beads_and_their_standard_errors_hold) {
-  test::hard_case("8 beads in 100 px²; beads of 25 electrons over noise of 13, in 40 grey levels; a mottled ground",
-                  "two windows in three, rms of error over sigma 0.8 to 1.3");
   const auto peaks = wide_adhesions();
   const Vec2 drift{1.7, -0.6};
   struct Case {
@@ -65,8 +63,6 @@ TEST(WeakBeads, windows_follow_dense_weak_and_mottled_beads_and_their_standard_e
 }
 
 TEST(WeakBeads, are_followed_by_windows_of_themselves_and_strong_ones_are_not) {
-  test::hard_case("beads of 25 electrons over noise of 13, in 40 grey levels",
-                  "refused as single beads; followed by windows unasked");
   const auto peaks = wide_adhesions();
   const auto strong = test::draw_bead_pair(peaks, {.seed = 1});
   const Tracking by_beads = track_beads(strong.relaxed, strong.stressed, 1.0, by(TrackMethod::automatic), 2);
@@ -81,8 +77,6 @@ TEST(WeakBeads, are_followed_by_windows_of_themselves_and_strong_ones_are_not) {
 }
 
 TEST(WeakBeads, in_a_part_of_the_image_are_followed_by_windows_beside_the_strong_ones) {
-  test::hard_case("beads of 25 electrons over noise of 13 in the left part of the image, of 1500 in the rest",
-                  "windows there, with rms of error over sigma 0.8 to 1.3; none in an image of strong beads alone");
   const auto peaks = wide_adhesions();
   constexpr int kWeak_px = 200;
   const auto strong = test::draw_bead_pair(peaks, {.seed = 3});
@@ -117,8 +111,6 @@ TEST(WeakBeads, in_a_part_of_the_image_are_followed_by_windows_beside_the_strong
 }
 
 TEST(WeakBeads, the_hint_of_what_cannot_be_followed_names_what_helps) {
-  test::hard_case("weak beads as single ones; pictures of two places",
-                  "an error; its hint names track.method, or nothing");
   const auto other = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 2});
   const auto one = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 1});
   const auto weak =
@@ -133,7 +125,6 @@ TEST(WeakBeads, the_hint_of_what_cannot_be_followed_names_what_helps) {
 }
 
 TEST(Focus, of_twenty_sound_pairs_is_never_called_different) {
-  test::hard_case("twenty pairs in equal focus", "sizes equal within 5 %");
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const auto pair =
         test::draw_bead_pair(test::ring_of_adhesions(192, 4), {.width = 192, .n_beads = 500, .seed = seed});
@@ -144,8 +135,6 @@ TEST(Focus, of_twenty_sound_pairs_is_never_called_different) {
 }
 
 TEST(Focus, of_equal_images_is_equal_and_a_blurred_one_is_found) {
-  test::hard_case("the stressed image blurred: beads 1.5 times as wide",
-                  "the ratio of sizes, within a quarter of the difference");
   const auto peaks = test::ring_of_adhesions(384, 6);
   for (const double blur : {1.0, 1.5})
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
@@ -159,8 +148,6 @@ TEST(Focus, of_equal_images_is_equal_and_a_blurred_one_is_found) {
 }
 
 TEST(Focus, beads_that_are_not_round_are_measured) {
-  test::hard_case("beads' images 1.1 and 1.2 times as high as wide, or as wide as high",
-                  "the ratio within a fifth of what it differs from 1; the direction within 5 degrees");
   const auto peaks = test::ring_of_adhesions(384, 6);
   for (const double aspect : {1 / 1.2, 1 / 1.1, 1.1, 1.2}) {
     SCOPED_TRACE(aspect);
