@@ -4,6 +4,7 @@
 #include "segment/images/image.h"
 #include "segment/images/png.h"
 #include "tests/fuzz/target.h"
+#include "tests/support/folders.h"
 
 namespace mbtfm::fuzz::image_readers {
 namespace {
@@ -71,6 +72,10 @@ std::vector<std::string> samples() {
        .description = "<OME UUID='urn:uuid:a'><Image><Pixels DimensionOrder='XYZCT' SizeC='2' SizeZ='3' SizeT='1' "
                       "PhysicalSizeX='0.1'><Channel Name='a'/><Channel Name='b'/><TiffData IFD='0' FirstC='1' "
                       "PlaneCount='3'><UUID FileName='a.tif'>urn:uuid:a</UUID></TiffData></Pixels></Image></OME>"}));
+  const auto shared = test::source_folder().parent_path() / "shared/data/tiff";  // of other programs, if at hand
+  if (std::filesystem::exists(shared))
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(shared))
+      if (entry.is_regular_file() && entry.path().extension() != ".csv") files.push_back(bytes_of(entry.path()));
   return files;
 }
 

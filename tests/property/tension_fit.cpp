@@ -97,29 +97,6 @@ TEST(TensionFit, the_bias_of_forces_that_bend_is_told_where_noise_is_large) {
   EXPECT_NEAR(sum, bias, 0.5 * std::abs(sum) + 3 * standard_error);  // second order: the next ones are beyond it
 }
 
-TEST(TensionFit, tensions_up_to_10_nN_deviate_as_the_Cramer_Rao_limit_implies) {
-  // thesis 3.3: t uniform in [0, 10] nN, 10 000 beads. Its mean relative deviation depends on the cell and on the
-  // weakest fibre drawn; docs/validation.md has it for whole cells.
-  TensionScene scene = tension_scene("case_22", 10000, 0.05, 3);
-  const Eigen::VectorXd tensions = test::thesis_tensions_nN(static_cast<std::size_t>(scene.tensions_nN.size()) - 1, 4);
-  test::contract(scene, tensions);
-  for (const double noise : {0.05, 0.07, 0.1}) {
-    double deviation = 0, implied = 0;
-    constexpr int kRepeats = 5;
-    for (unsigned repeat = 0; repeat < kRepeats; ++repeat) {
-      measure(scene, noise, 400 + repeat);
-      const Eigen::VectorXd limit = test::cramer_rao_nN(scene);
-      const Eigen::VectorXd values = values_of(fit_own_network(scene));
-      for (Eigen::Index i = 1; i < tensions.size(); ++i) {
-        deviation += std::abs(values[i] / tensions[i] - 1);
-        implied += std::sqrt(2 / 3.141592653589793) * limit[i] / tensions[i];  // mean of |x| of a normal variable
-      }
-    }
-    // The weakest fibre dominates the mean: five repeats of |x| deviate by 0.76/sqrt(5), one third; three of those.
-    EXPECT_LE(deviation, 2 * implied) << "noise " << noise;
-  }
-}
-
 /// A share of the beads goes 10 um astray. @return which do not
 std::vector<bool> spoil(TensionScene& scene, int per_ten, unsigned seed) {
   std::mt19937_64 random(seed);
@@ -133,24 +110,38 @@ std::vector<bool> spoil(TensionScene& scene, int per_ten, unsigned seed) {
   return is_good;
 }
 
+Bead* nearest_bead(TensionScene& scene, std::size_t ellipse) {
+  return &*std::ranges::min_element(
+      scene.beads, {}, [&](const Bead& b) { return norm(b.position_um - scene.ellipses[ellipse].centre_um); });
+}
+
 double squared_error(TensionScene& scene, Loss loss) {
   FitParameters parameters;
   parameters.loss = loss;
   return (values_of(fit_own_network(scene, parameters)) - scene.tensions_nN).squaredNorm();
 }
 
-TEST(TensionFit, robust_losses_bear_outliers_and_cost_little_without) {
-  // Three repeats of some ten tensions: norms of errors are good to 1/sqrt(2 · 30) = 13 %, ratios to 18 %.
-  double plain = 0, outlying_squares = 0;
+TEST(TensionFit, robust_losses_bear_outliers_and_tukeys_is_as_good_as_if_one_knew_them) {
+  // Of Tukey's eight repeats, as the errors of single ones differ by far. Three repeats of some ten tensions: norms of
+  // errors are good to 1/sqrt(2 · 30) = 13 %, ratios to 18 %.
+  double plain = 0, plain_of_eight = 0, outlying_squares = 0, tukey = 0, knowing = 0;
   std::map<Loss, double> clean, outlying;
-  for (unsigned seed = 0; seed < 3; ++seed) {
+  for (unsigned seed = 0; seed < 8; ++seed) {
+    const bool is_of_three = seed < 3;
     TensionScene scene = tension_scene("case_21", 2000, 0.07, 500 + seed);
-    plain += squared_error(scene, Loss::squares);
-    for (const Loss loss : {Loss::huber, Loss::tukey, Loss::l1}) clean[loss] += squared_error(scene, loss);
-    spoil(scene, 3, 600 + seed);
+    const double of_squares = squared_error(scene, Loss::squares);
+    plain_of_eight += of_squares;
+    plain += is_of_three ? of_squares : 0;
+    for (const Loss loss : {Loss::huber, Loss::tukey, Loss::l1})
+      if (is_of_three) clean[loss] += squared_error(scene, loss);
+    const std::vector<bool> is_good = spoil(scene, 3, 600 + seed);
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
-    outlying_squares += squared_error(scene, Loss::squares);
-    for (const Loss loss : {Loss::huber, Loss::l1}) outlying[loss] += squared_error(scene, loss);
+    if (is_of_three) outlying_squares += squared_error(scene, Loss::squares);
+    for (const Loss loss : {Loss::huber, Loss::l1})
+      if (is_of_three) outlying[loss] += squared_error(scene, loss);
+    tukey += squared_error(scene, Loss::tukey);
+    scene.data = reduce(scene.beads, scene.compliance_um_per_nN, is_good);
+    knowing += squared_error(scene, Loss::squares);
   }
   // 1/0.95 and 1/0.79 of the variance, plus the scatter of the two estimates' difference
   EXPECT_LE(clean[Loss::huber], 1.3 * plain);
@@ -158,24 +149,10 @@ TEST(TensionFit, robust_losses_bear_outliers_and_cost_little_without) {
   EXPECT_LE(clean[Loss::l1], 1.8 * plain);
   EXPECT_LE(outlying[Loss::huber], 0.1 * outlying_squares);
   EXPECT_LE(outlying[Loss::l1], 0.1 * outlying_squares);
-}
-
-TEST(TensionFit, tukeys_loss_is_as_good_as_if_one_knew_the_outliers) {
-  // Eight repeats, as the errors of single ones differ by far.
-  double plain = 0, tukey = 0, knowing = 0;
-  for (unsigned seed = 0; seed < 8; ++seed) {
-    TensionScene scene = tension_scene("case_21", 2000, 0.07, 500 + seed);
-    plain += squared_error(scene, Loss::squares);
-    const std::vector<bool> is_good = spoil(scene, 3, 600 + seed);
-    scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
-    tukey += squared_error(scene, Loss::tukey);
-    scene.data = reduce(scene.beads, scene.compliance_um_per_nN, is_good);
-    knowing += squared_error(scene, Loss::squares);
-  }
   // On the same beads: 1/0.95 of the variance, and the scatter of the two estimates' difference (a twentieth of the
   // variance, sqrt(0.05) of the error, is independent), three times over 88 tensions.
   EXPECT_LE(tukey, 1.3 * knowing);
-  EXPECT_LE(std::sqrt(tukey / plain), 1.5);  // 1/sqrt(0.7 · 0.95) = 1.23, and the scatter of 0.7 of the beads
+  EXPECT_LE(std::sqrt(tukey / plain_of_eight), 1.5);  // 1/sqrt(0.7 · 0.95) = 1.23, and the scatter of 0.7 of the beads
 }
 
 TEST(TensionFit, beads_stray_that_are_alone_and_further_off_than_chance_has_it) {
@@ -221,10 +198,8 @@ TEST(TensionFit, leaving_a_stray_bead_out_moves_the_tensions_as_foretold) {
   int n_tried = 0, n_alone = 0;
   for (unsigned seed = 0; seed < 6; ++seed) {
     TensionScene scene = tension_scene("case_21", 2000, 0.05, 720 + seed);
-    const auto nearest = std::min_element(scene.beads.begin(), scene.beads.end(), [&](const Bead& b, const Bead& c) {
-      return norm(b.position_um - scene.ellipses[0].centre_um) < norm(c.position_um - scene.ellipses[0].centre_um);
-    });
-    const Eigen::Index stray = nearest - scene.beads.begin();
+    Bead* const nearest = nearest_bead(scene, 0);
+    const Eigen::Index stray = nearest - scene.beads.data();
     nearest->displacement_um += Vec2{15 * nearest->sigma_um, 0};
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
     const EnsembleFit with = fit_own_network(scene, parameters);
@@ -300,9 +275,7 @@ TEST(TensionFit, by_default_a_few_bad_beads_do_no_harm_and_good_ones_are_fitted_
     EXPECT_EQ(values_of(unspoilt), values_of(fit_own_network(scene, by_squares)));
     clean += error(unspoilt);
     for (std::size_t a = 0; a < 4; ++a) {
-      const auto nearest = std::min_element(scene.beads.begin(), scene.beads.end(), [&](const Bead& b, const Bead& c) {
-        return norm(b.position_um - scene.ellipses[a].centre_um) < norm(c.position_um - scene.ellipses[a].centre_um);
-      });
+      Bead* const nearest = nearest_bead(scene, a);
       nearest->displacement_um += Vec2{15 * nearest->sigma_um, 0};
     }
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN);

@@ -1,13 +1,12 @@
 /// segmentation_accuracy [scenario] [first seed] [last seed] [true-adhesions] [name=value …]: how well simulated cells
 /// are segmented, at three image qualities; mean over the seeds. `true-adhesions` judges the fibres apart from the
-/// adhesions. What is lost of the fibres, and where, is of the ordinary images.
+/// adhesions.
 /// segmentation_accuracy real [name=value …]: adhesions and outlines of real cells that others have marked
 /// (../shared/data), with default parameters, or adhesions with these.
 #include <cstdio>
 #include <cstdlib>
 
 #include "pipeline/contract/errors.h"
-#include "tests/support/fibre_losses.h"
 #include "tests/support/real_adhesions.h"
 #include "tests/support/settings.h"
 
@@ -77,7 +76,6 @@ int main(int argc, char** argv) {
   const std::vector<std::string> settings(argv + std::min(argc, has_true_adhesions ? 5 : 4), argv + argc);
   std::map<std::string, std::map<std::string, double>> table;
   Calibration calibration;
-  FibreLosses losses;
   const std::vector<std::string> qualities = {"poor", "ordinary", "good"};
   for (const std::string& quality : qualities) {
     for (int seed = first; seed <= last; ++seed) {
@@ -98,7 +96,6 @@ int main(int argc, char** argv) {
         std::fprintf(stderr, "%s seed %d: %s\n", quality.c_str(), seed, error.what());
       }
       for (const Fibre& f : found.fibres) calibration.add(f.confidence, is_true_fibre(f, cell.truth.fibres, 0.4));
-      if (quality == "ordinary") add_losses(losses, cell, found);
       for (const auto& [name, value] : accuracy_of(cell.truth, found))
         table[name][quality] += value / (last - first + 1);
     }
@@ -108,5 +105,4 @@ int main(int argc, char** argv) {
   for (auto& [name, row] : table)
     std::printf("%-42s %9.3f %9.3f %9.3f\n", name.c_str(), row["poor"], row["ordinary"], row["good"]);
   calibration.print();
-  print(losses);
 }

@@ -1,5 +1,5 @@
 /// tension_accuracy STUDY [repeats] [cells] [folder]: how well tensions are found, for docs/validation.md. Studies:
-/// descent, noise, bounds, deviations, beside-fttc, segmentation, directions, types. A table (CSV) on stdout; charts
+/// descent, noise, deviations, beside-fttc, segmentation, directions, types. A table (CSV) on stdout; charts
 /// (SVG) into the folder.
 #include <chrono>
 #include <cstdlib>
@@ -294,39 +294,6 @@ void deviations(const Arguments& a) {
   }
 }
 
-// What the bounds t >= 0 do to the network's force, and what the correction leaves of it: on the problem linearised at
-// the truth, where nothing else makes a bias. And what the bending of the forces does, without the bounds.
-void bounds(const Arguments& a) {
-  std::printf("noise,standard_error,unbounded,bounded,corrected,reported,bent\n");
-  for (const double level : {0.05, 0.1, 0.25}) {
-    const TensionScene scene = thesis_scene(1, 10000, level);
-    const tensions::TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
-    const tensions::Trial truth = problem.evaluate(scene.tensions_nN);
-    const Eigen::MatrixXd J = problem.jacobian(truth), H = J.transpose() * J;
-    const Eigen::MatrixXd covariance = H.inverse();
-    double unbounded = 0, bounded = 0, corrected = 0, reported = 0;
-    std::mt19937_64 random(1);
-    std::normal_distribution<double> normal(0, 1);
-    for (int r = 0; r < a.n_repeats; ++r) {
-      Eigen::VectorXd noise(J.rows());
-      for (double& n : noise) n = normal(random);
-      const Eigen::VectorXd g = -J.transpose() * noise;
-      const Eigen::VectorXd found = scene.tensions_nN + tensions::bounded_quadratic_minimum(H, g, -scene.tensions_nN);
-      tensions::LocalMisfit local{.tensions_nN = found, .H = H, .g = g + H * (found - scene.tensions_nN)};
-      for (double& t : local.tensions_nN) t = t < 1e-12 ? 0 : t;  // rounding: at the bound
-      const double unbiased = found[0] + tensions::past_bounds_nN(local, 1)[0];
-      unbounded += scene.tensions_nN[0] - covariance.row(0).dot(g);
-      bounded += found[0];
-      corrected += unbiased;
-      reported += std::max(0.0, unbiased);
-    }
-    const double size = a.n_repeats * scene.tensions_nN[0];
-    std::printf("%g,%.3f,%.4f,%.4f,%.4f,%.4f,%.4f\n", level, std::sqrt(covariance(0, 0)) / scene.tensions_nN[0],
-                unbounded / size, bounded / size, corrected / size, reported / size,
-                1 + tensions::bending_bias_nN(problem, truth, J, covariance, covariance, 2)[0] / scene.tensions_nN[0]);
-  }
-}
-
 /// Arrows of force, at the adhesions or patches.
 std::string arrows(const std::string& title, const Cell& cell, const std::vector<std::pair<Vec2, Vec2>>& forces,
                    double um_per_nN, double left_px) {
@@ -568,11 +535,13 @@ int main(int argc, char** argv) {
   const Arguments a{.n_repeats = argc > 2 ? std::atoi(argv[2]) : 10,
                     .n_cells = argc > 3 ? std::atoi(argv[3]) : 1,
                     .folder = argc > 4 ? argv[4] : "."};
-  const std::pair<const char*, void (*)(const Arguments&)> studies[] = {
-      {"descent", descent},         {"noise", noise},
-      {"bounds", bounds},           {"deviations", deviations},
-      {"beside-fttc", beside_fttc}, {"segmentation", segmentation},
-      {"directions", directions},   {"types", types}};
+  const std::pair<const char*, void (*)(const Arguments&)> studies[] = {{"descent", descent},
+                                                                        {"noise", noise},
+                                                                        {"deviations", deviations},
+                                                                        {"beside-fttc", beside_fttc},
+                                                                        {"segmentation", segmentation},
+                                                                        {"directions", directions},
+                                                                        {"types", types}};
   for (const auto& [name, run] : studies) {
     if (argc > 1 && std::strcmp(argv[1], name) == 0) {
       run(a);
@@ -580,7 +549,7 @@ int main(int argc, char** argv) {
     }
   }
   std::fprintf(stderr,
-               "tension_accuracy descent|noise|bounds|deviations|beside-fttc|segmentation|directions|types [repeats] "
+               "tension_accuracy descent|noise|deviations|beside-fttc|segmentation|directions|types [repeats] "
                "[cells] [folder]\n");
   return 2;
 }

@@ -224,5 +224,21 @@ TEST(Roi, files_of_a_third_program_are_read_as_imagej_does) {
     for (const Vec2 p : read(name).points_px) EXPECT_NEAR(norm(p - Vec2{10, 15}), 1, kFloat) << name;
 }
 
+TEST(Roi, a_set_or_a_geometry_is_refused_wherever_it_is_cut) {
+  const TemporaryFolder folder;
+  Roi roi;
+  roi.name = "ventral 1";
+  roi.shape = RoiShape::polyline;
+  for (int i = 0; i < 40; ++i) roi.points_px.push_back({10.0 + i, 20 + 0.5 * i * i});
+  write_roi_set(folder / "set.zip", {roi});
+  const std::string set = files::read_text(folder / "set.zip");
+  // of a .roi alone what follows the second header may be lacking
+  for (const auto& [name, whole] : {std::pair("cut.zip", set), {"cut.roi", encode_roi(roi).substr(0, 64)}})
+    for (std::size_t n = 0; n < whole.size(); n += 1 + whole.size() / 100) {
+      files::write_text(folder / name, whole.substr(0, n));
+      EXPECT_NE(error_of(folder / name), "no error") << n << " of " << whole.size() << " bytes";
+    }
+}
+
 }  // namespace
 }  // namespace mbtfm::rois

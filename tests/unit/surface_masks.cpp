@@ -2,7 +2,7 @@
 #include "pipeline/contract/errors.h"
 #include "substrate/surface/points.h"
 #include "substrate/surface/voxels.h"
-#include "tests/support/hard_case.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {
@@ -47,7 +47,6 @@ TEST(Masks, a_columns_stated_error_is_its_root_mean_square) {
 }
 
 TEST(Masks, specks_and_bubbles_do_not_matter) {
-  test::hard_case("masks with specks above the gel and bubbles in it", "the same surface, and how many were left out");
   VoxelStack s = masks_of(slope);
   const VoxelPoints clean = points_of_masks(s);
   voxel(s, 5, 5, 2) = voxel(s, 6, 5, 2) = 1;
@@ -59,7 +58,6 @@ TEST(Masks, specks_and_bubbles_do_not_matter) {
 }
 
 TEST(Masks, an_overhang_is_refused_by_place) {
-  test::hard_case("masks of a gel that overhangs", "refused, with the place");
   VoxelStack s = masks_of([](Vec2) { return 20; });
   for (int k = 8; k < 12; ++k)
     for (int i = 10; i < 20; ++i) voxel(s, i, 7, k) = 1;  // a roof

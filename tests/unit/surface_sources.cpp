@@ -4,7 +4,7 @@
 #include "substrate/surface/height.h"
 #include "substrate/surface/missing.h"
 #include "substrate/surface/points.h"
-#include "tests/support/hard_case.h"
+#include "tests/support/test.h"
 
 namespace mbtfm::surface {
 namespace {
@@ -90,7 +90,6 @@ HeightMap with_holes(HeightMap map, const std::function<bool(Vec2)>& is_hole) {
 }
 
 TEST(HeightMap, small_holes_are_filled_smoothly) {
-  test::hard_case("a height map with NaN", "small holes filled by a plate, wide ones refused by place");
   const HeightMap whole = sampled(bumpy, {-20, -20}, {20, 20}, 0.5);
   const auto is_hole = [](Vec2 p) { return norm(p - Vec2{5, 3}) < 2 || norm(p - Vec2{-20, -20}) < 2; };
   const FilledMap mended = filled(with_holes(whole, is_hole), 5);
@@ -185,7 +184,6 @@ TEST(SurfacePoints, the_surface_lies_nearer_than_they_and_knows_its_error) {
 }
 
 TEST(SurfacePoints, strays_are_told_and_pull_little) {
-  test::hard_case("points of the surface of which one in ten lies anywhere", "those are told and do not bend it");
   const Scattered s = scattered(800, 0.2, 0.1, 5);
   const PointFit fit = fit_points(s.points, s.sigma);
   EXPECT_LT(misfit_of(fit).rms_um, 0.2);
