@@ -37,10 +37,9 @@ VectorXd some_tractions() {
 }
 
 VectorXd noise_of(double sigma, int n, unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal(0, sigma);
+  test::Normal normal(seed, sigma);
   VectorXd noise(n);
-  for (double& e : noise) e = normal(random);
+  for (double& e : noise) e = normal();
   return noise;
 }
 
@@ -165,10 +164,9 @@ TEST(Criteria, risk_is_the_squared_error_of_the_tractions_on_average_up_to_a_con
 
 /// Tractions whose answers fall by `fall` from one direction to the next, of length one but for that.
 MatrixXd falling(int n_data, int n_unknowns, double fall, unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
+  test::Normal normal(seed);
   MatrixXd any(n_data, n_unknowns);
-  for (double& a : any.reshaped()) a = normal(random);
+  for (double& a : any.reshaped()) a = normal();
   MatrixXd G = any.householderQr().householderQ() * MatrixXd::Identity(n_data, n_unknowns);
   for (int k = 0; k < n_unknowns; ++k) G.col(k) *= std::pow(fall, k);
   return G;
@@ -268,12 +266,11 @@ struct Loaded {
 };
 
 Loaded loaded(int n_beads, int n_loads) {
-  std::mt19937_64 random(7);
-  std::normal_distribution<double> normal;
+  test::Normal normal(7);
   Loaded scene{{}, MatrixXd(2 * n_beads, n_loads)};
-  for (double& g : scene.G.reshaped()) g = normal(random);
+  for (double& g : scene.G.reshaped()) g = normal();
   for (int i = 0; i < n_beads; ++i) {
-    const double x = normal(random), y = normal(random);
+    const double x = normal(), y = normal();
     scene.beads.push_back({.position_um = {1.0 * i, 0}, .displacement_um = {x, y}, .sigma_um = 1 + 0.1 * i});
   }
   return scene;

@@ -8,11 +8,10 @@ namespace {
 /// Share of the draws whose interval holds the truth; all lengths in units of the error.
 double coverage_of(double truth, unsigned seed) {
   constexpr int kDraws = 2500;
-  std::mt19937_64 engine(seed);
-  std::normal_distribution<double> error;
+  test::Normal error(seed);
   int n_holding = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
-    const double x = truth + error(engine), y = error(engine);
+    const double x = truth + error(), y = error();
     const MagnitudeInterval interval = magnitude_interval_95(std::hypot(x, y), 1);
     EXPECT_GE(interval.low, 0);
     EXPECT_LT(interval.low, interval.high);

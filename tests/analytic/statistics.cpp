@@ -275,13 +275,12 @@ TEST(ClusteredRanks, a_cell_counted_twice_over_changes_nothing) {
 
 TEST(ClusteredRanks, hold_their_level_for_few_cells_that_are_alike) {
   // five cells of six values, no difference between groups: p is even in [0, 1], which F's degrees of freedom decide
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> normal;
+  test::Normal normal(1);
   constexpr int kDraws = 8000;
   int n_below_5 = 0, n_below_20 = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
     std::vector<ClusteredValue> values;
-    for (int i = 0; i < 30; ++i) values.push_back({normal(random), i % 2, i / 6});
+    for (int i = 0; i < 30; ++i) values.push_back({normal(), i % 2, i / 6});
     const double p = clustered_rank_test(values).p_value;
     n_below_5 += p < 0.05;
     n_below_20 += p < 0.2;
@@ -359,10 +358,9 @@ TEST(Deconvolution, a_threshold_far_below_all_values_has_them_all_above) {
 TEST(Deconvolution, finds_the_share_of_two_sharp_values_behind_wide_errors) {
   // three quarters at 6, one at 10; errors of 1.5 put many of the former above 7.5
   std::vector<double> values, errors;
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> normal(0, 1.5);
+  test::Normal normal(1, 1.5);
   for (int i = 0; i < 2000; ++i) {
-    values.push_back(std::max(0.0, (i % 4 != 0 ? 6 : 10) + normal(random)));
+    values.push_back(std::max(0.0, (i % 4 != 0 ? 6 : 10) + normal()));
     errors.push_back(1.5 * 1.5);
   }
   EXPECT_GT(fraction_above(values, 7.5), 0.32);

@@ -123,10 +123,9 @@ TEST(TensionFit, beads_outside_the_region_do_not_count) {
 TEST(Intervals, errors_make_the_sum_of_magnitudes_as_much_too_large_as_they_do_on_average) {
   // Three forces that answer to four tensions of a known covariance; errors of some per cent, each draw and its
   // opposite, so that only what is even in them is left.
-  std::mt19937_64 random(6);
-  std::normal_distribution<double> normal;
+  test::Normal normal(6);
   const auto drawn = [&](int rows, int columns) {
-    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }).eval();
+    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(); }).eval();
   };
   const Eigen::VectorXd forces = 10 * drawn(6, 1);
   const Eigen::MatrixXd D = drawn(6, 4), root = 0.2 * drawn(4, 4);
@@ -169,15 +168,14 @@ TEST(Intervals, of_few_degrees_of_freedom_are_Students_on_either_side) {
 TEST(NoiseVariance, of_few_beads_counts_what_independent_forces_follow) {
   // 24 components, of which 8 forces take 8; over draws of noise alone the mean is the noise's
   constexpr int kBeads = 12, kForces = 8, kDraws = 2000;
-  std::mt19937_64 random(11);
-  std::normal_distribution<double> normal;
-  const Eigen::MatrixXd G = Eigen::MatrixXd::NullaryExpr(2 * kBeads, kForces, [&] { return normal(random); });
+  test::Normal normal(11);
+  const Eigen::MatrixXd G = Eigen::MatrixXd::NullaryExpr(2 * kBeads, kForces, [&] { return normal(); });
   double mean = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
     DisplacementField beads(kBeads);
     for (Bead& b : beads) {
-      const double x = normal(random);
-      b.displacement_um = {0.2 * x, 0.2 * normal(random)};
+      const double x = normal();
+      b.displacement_um = {0.2 * x, 0.2 * normal()};
     }
     mean += noise_variance(reduce(beads, G)) / kDraws;
   }
@@ -189,13 +187,12 @@ TEST(NoiseLevel, is_the_standard_deviation_of_a_component_far_from_the_cell_what
   // moved by what no force explains.
   constexpr double kSigma_um = 0.05;
   const Polygon outline = {{-10, -10}, {10, -10}, {10, 10}, {-10, 10}};
-  std::mt19937_64 random(4);
-  std::normal_distribution<double> noise(0, kSigma_um);
+  test::Normal noise(4, kSigma_um);
   const auto of = [&](int n_far, double astray) {
     DisplacementField beads;
     for (int i = 0; i < n_far + 4000; ++i) {
       const double angle = 0.01 * i, radius = i < n_far ? 40 : 5;
-      const double x = noise(random), y = noise(random);
+      const double x = noise(), y = noise();
       beads.push_back({.position_um = radius * Vec2{std::cos(angle), std::sin(angle)},
                        .displacement_um = {x + (i < n_far && i % 10 == 0 ? astray : 0), y + (i < n_far ? 0 : 1)}});
     }
@@ -242,12 +239,11 @@ TEST(RobustLoss, states_the_variance_that_its_efficiency_leaves) {
   // Beads that nothing pulls: the covariance is this over the sum of the weights, and over that of least squares it is
   // one over the efficiency. The scale by the median is known to 1/sqrt(n) (Rayleigh), its square to twice that.
   constexpr Eigen::Index kBeads = 40000;
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> normal(0, 0.2);
+  test::Normal normal(3, 0.2);
   LinearData data;
   data.weight_per_um = Eigen::VectorXd::Ones(2 * kBeads);
   data.displacement_um.resize(2 * kBeads);
-  for (double& u : data.displacement_um) u = normal(random);
+  for (double& u : data.displacement_um) u = normal();
   data.response = substrate::dense_response(Eigen::MatrixXd::Zero(2 * kBeads, 2));
   data.n_used = 2 * kBeads;
   const Eigen::VectorXd no_forces = Eigen::VectorXd::Zero(2);

@@ -14,21 +14,8 @@ namespace {
 
 using test::ellipse_scene;
 using test::EllipseScene;
+using test::forces_of;
 using test::half_space;
-
-std::vector<Vec2> forces_of(const Reconstruction& r) {
-  std::vector<Vec2> forces;
-  for (const AdhesionForce& f : r.forces) forces.push_back(f.force_nN);
-  return forces;
-}
-
-TEST(EllipseScene, is_the_one_of_the_reference_table) {
-  const EllipseScene scene = ellipse_scene(128, 0);
-  double total_nN = 0;
-  for (const Vec2 f : scene.forces_nN) total_nN += norm(f);
-  EXPECT_NEAR(total_nN, 89.8, 0.05);
-  EXPECT_NEAR(scene.largest_um, 1.03, 0.005);
-}
 
 /// A drift beside, three beads in a hundred that went elsewhere, and three of which nothing is known. The field is that
 /// of a half-space with Poisson's ratio 0.5 as nearly as a layer of 60 um is.

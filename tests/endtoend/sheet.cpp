@@ -174,10 +174,9 @@ class FittedSheet : public Sheet {
     output_of(run(gel_ + sheet_ + "mesh_um = 0.8\nyoungs_modulus_kPa = " + std::to_string(modulus_kPa_) + "\n" + more,
                   "--beads beads.csv " + arguments, outline_));
     DisplacementField beads = files::read_displacement(folder_ / "out" / "displacement.csv");
-    std::mt19937_64 random(3);
-    std::normal_distribution<double> noise(0, 0.01);
+    test::Normal noise(3, 0.01);
     for (Bead& bead : beads) {
-      bead.displacement_um += Vec2{noise(random), noise(random)};
+      bead.displacement_um += Vec2{noise(), noise()};
       bead.sigma_um = 0.01;
     }
     files::write_displacement(folder_ / "displacement.csv", beads);
@@ -263,14 +262,13 @@ TEST_F(FittedSheet, the_stiffness_of_one_far_stiffer_than_its_gel_is_called_unkn
 
 /// Beads that move outward, as if the two images were exchanged, and beads that a rigid sheet moves.
 TEST_F(Sheet, one_that_expands_or_has_the_stiffness_of_a_bound_is_doubted) {
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> noise(0, 0.01);
+  test::Normal noise(3, 0.01);
   const auto fitted = [&](const std::function<double(double)>& outward_um) {
     DisplacementField beads;
     for (int i = -20; i <= 20; ++i)
       for (int j = -20; j <= 20; ++j) {
         const Vec2 at{2.0 * i, 2.0 * j};
-        const double r = norm(at), x = noise(random), y = noise(random);
+        const double r = norm(at), x = noise(), y = noise();
         beads.push_back({.position_um = at,
                          .displacement_um = (r > 0 ? outward_um(r) / r : 0) * at + Vec2{x, y},
                          .sigma_um = 0.01});

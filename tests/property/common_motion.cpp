@@ -113,9 +113,8 @@ TEST(CommonMotion, beads_that_a_contracting_cell_cannot_move_so_are_refused) {
   DisplacementField reversed = scene.beads, still = scene.beads;
   for (Bead& bead : reversed) bead.displacement_um = -1 * bead.displacement_um;
   EXPECT_THROW(start(reversed), InvalidData);
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> normal(0, 1);
-  for (Bead& bead : still) bead.displacement_um = {bead.sigma_um * normal(random), bead.sigma_um * normal(random)};
+  test::Normal normal(3);
+  for (Bead& bead : still) bead.displacement_um = {bead.sigma_um * normal(), bead.sigma_um * normal()};
   EXPECT_NO_THROW(start(still)) << "a cell that pulls at nothing is a cell";
 }
 

@@ -117,8 +117,7 @@ TEST(ErrorBudget, states_what_errors_of_the_segmentation_do) {
   const SegmentationErrors errors{0.05, 0.2, 8, 0};
   const ErrorBudget budget = f.budget(errors);
   constexpr int kDraws = 24;
-  std::mt19937_64 random(5);
-  std::normal_distribution<double> normal;
+  test::Normal normal(5);
   const std::size_t n = budget.tensions.size();
   std::vector<double> squares(n, 0.0);
   for (int draw = 0; draw < kDraws; ++draw) {
@@ -126,13 +125,12 @@ TEST(ErrorBudget, states_what_errors_of_the_segmentation_do) {
     Network network = truth.cables.network();
     for (std::size_t a = 0; a < truth.ellipses.size(); ++a) {
       substrate::Ellipse& e = truth.ellipses[a];
-      const Vec2 shift{errors.adhesion_shift_error_um * normal(random),
-                       errors.adhesion_shift_error_um * normal(random)};
-      const double growth = 1 + errors.adhesion_area_error / 2 * normal(random);
+      const Vec2 shift{errors.adhesion_shift_error_um * normal(), errors.adhesion_shift_error_um * normal()};
+      const double growth = 1 + errors.adhesion_area_error / 2 * normal();
       e.centre_um += shift;
       e.semi_major_um *= growth;
       e.semi_minor_um *= growth;
-      e.angle_rad += errors.adhesion_angle_error_deg * std::numbers::pi / 180 * normal(random);
+      e.angle_rad += errors.adhesion_angle_error_deg * std::numbers::pi / 180 * normal();
       network.vertices_um[static_cast<std::size_t>(truth.adhesion_ids[a]) - 1] += shift;
     }
     const Network& old = f.scene.cables.network();

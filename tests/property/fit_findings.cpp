@@ -52,12 +52,10 @@ class FitFindings : public ::testing::Test {
   }
   /// A corner of the image out of focus.
   void blur_a_corner() {
-    std::mt19937_64 random(3);
-    std::normal_distribution<double> normal;
+    test::Normal normal(3);
     each_bead([&](Bead& b) {
       if (b.position_um.x > 21 || b.position_um.y > 21) return;
-      const double x = normal(random), y = normal(random);
-      b.displacement_um += 3 * b.sigma_um * Vec2{x, y};
+      b.displacement_um += 3 * b.sigma_um * Vec2{normal(), normal()};
     });
   }
   std::vector<Finding> found() const { return report_of(fit_cell(inputs_, parameters_, 2)).findings; }
@@ -229,12 +227,8 @@ TEST_F(FitFindings, a_fibre_that_was_drawn_twice_is_told_apart_from_itself_by_no
 
 /// The stressed image shows the relaxed gel.
 TEST_F(FitFindings, beads_that_did_not_move_tell_no_tension) {
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> normal;
-  each_bead([&](Bead& b) {
-    const double x = normal(random), y = normal(random);
-    b.displacement_um = b.sigma_um * Vec2{x, y};
-  });
+  test::Normal normal(3);
+  each_bead([&](Bead& b) { b.displacement_um = b.sigma_um * Vec2{normal(), normal()}; });
   const std::vector<Finding> findings = found();
   EXPECT_TRUE(fires("network-not-identifiable", findings)) << test::ids_of(findings);
 }

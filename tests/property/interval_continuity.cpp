@@ -48,12 +48,11 @@ struct Answer {
 };
 
 Answer answer_of(const Case& c, double relative, unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
+  test::Normal normal(seed);
   DisplacementField beads = c.scene.beads;
   for (Bead& b : beads) {
-    b.displacement_um.x *= 1 + relative * normal(random);
-    b.displacement_um.y *= 1 + relative * normal(random);
+    b.displacement_um.x *= 1 + relative * normal();
+    b.displacement_um.y *= 1 + relative * normal();
   }
   LinearData data = reduce(beads, c.scene.compliance_um_per_nN);
   const EnsembleFit fit = fit_ensemble(c.networks, data, c.scene.adhesion_ids, {.loss = Loss::squares}, 2);

@@ -24,9 +24,8 @@ Polygon spiked(double radius_um, double spike_um, double longer_um, int n_points
 }
 
 Polygon with_noise(Polygon outline, double sigma_um, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal(0, sigma_um);
-  for (Vec2& p : outline) p += {normal(random), normal(random)};
+  test::Normal normal(seed, sigma_um);
+  for (Vec2& p : outline) p += {normal(), normal()};
   return outline;
 }
 

@@ -113,12 +113,11 @@ TEST(ModelScores, with_discrepancy_prefer_cables_that_are_somewhat_wrong_and_not
   test::TensionScene scene = one_fibre(2, 2000);
   const Eigen::VectorXd exact_um = scene.data.displacement_um;
   const double rms_nN = scene.forces_nN.norm() / std::sqrt(static_cast<double>(scene.forces_nN.size()));
-  std::mt19937_64 random(5);
-  std::normal_distribution<double> normal(0, 1);
+  test::Normal normal(5);
   int n_wrong_by_bic = 0;
   for (const double error : {0.0, 0.1, 0.2}) {
     Eigen::VectorXd beside_nN(scene.forces_nN.size());
-    for (double& f : beside_nN) f = error * rms_nN * normal(random);
+    for (double& f : beside_nN) f = error * rms_nN * normal();
     scene.displacement_um = exact_um + scene.data.response->displace(beside_nN);
     test::measure(scene, 0.01, 17);
     std::vector<ModelScore> models = scores(scene);

@@ -122,16 +122,14 @@ TEST(ModelError, of_the_total_force_is_what_it_misses_where_forces_are_not_the_m
   double z_squared = 0;
   constexpr unsigned kDraws = 40;
   for (unsigned seed = 1; seed <= kDraws; ++seed) {
-    std::mt19937_64 random(seed);
-    std::normal_distribution<double> normal;
+    test::Normal normal(seed);
     Eigen::VectorXd forces_nN = scene.forces_nN;
-    for (double& force : forces_nN) force += 0.25 * normal(random);
+    for (double& force : forces_nN) force += 0.25 * normal();
     const Eigen::VectorXd moved_um = scene.compliance_um_per_nN * forces_nN;
     DisplacementField beads = scene.beads;
     for (std::size_t b = 0; b < beads.size(); ++b) {
       const auto row = 2 * static_cast<Eigen::Index>(b);
-      const double x = normal(random), y = normal(random);
-      beads[b].displacement_um = Vec2{moved_um[row], moved_um[row + 1]} + beads[b].sigma_um * Vec2{x, y};
+      beads[b].displacement_um = Vec2{moved_um[row], moved_um[row + 1]} + beads[b].sigma_um * Vec2{normal(), normal()};
     }
     const Estimate total = fit_ensemble(networks, reduce(beads, scene.compliance_um_per_nN), scene.adhesion_ids,
                                         {.loss = Loss::squares}, 2)

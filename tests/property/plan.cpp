@@ -399,17 +399,16 @@ TEST(PlanInSpace, beads_by_area_or_too_few_or_too_many_are_refused) {
 TEST(CellNumbers, the_power_is_the_share_of_drawn_studies_that_see_the_difference) {
   const Scatter scatter{.mean_nN = 4, .between_cells_nN = 1, .within_nN = 2, .error_nN = 1, .fibres_per_cell = 5};
   constexpr int kStudies = 4000, kPerGroup = 10, kFibres = 5;
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> normal;
+  test::Normal normal(3);
   const double t_limit = 2.1009220402409601;  // Student's t of 18 degrees at 0.975
   int n_seen = 0;
   for (int s = 0; s < kStudies; ++s) {
     double mean[2] = {}, squares[2] = {};
     for (int g = 0; g < 2; ++g) {
       for (int c = 0; c < kPerGroup; ++c) {
-        double cell = 1.5 * g + scatter.between_cells_nN * normal(random);
+        double cell = 1.5 * g + scatter.between_cells_nN * normal();
         for (int f = 0; f < kFibres; ++f)
-          cell += (scatter.within_nN * normal(random) + scatter.error_nN * normal(random)) / kFibres;
+          cell += (scatter.within_nN * normal() + scatter.error_nN * normal()) / kFibres;
         mean[g] += cell / kPerGroup;
         squares[g] += cell * cell;
       }

@@ -243,10 +243,9 @@ TEST(Stacks, jumps_of_the_stage_under_a_cell_that_fills_the_view_are_taken_off) 
 /// is not known of the drift is one.
 TEST(Stacks, errors_of_few_beads_hold_where_the_slices_drift) {
   constexpr double kStep_um = 0.5, kSigma_um = 0.014;
-  std::mt19937_64 random(11);
-  std::normal_distribution<double> step(0, 0.03);
+  test::Normal step(11, 0.03);
   std::vector<Vec2> walk = {{0, 0}};
-  for (int k = 0; k < 400; ++k) walk.push_back(walk.back() + Vec2{step(random), step(random)});
+  for (int k = 0; k < 400; ++k) walk.push_back(walk.back() + Vec2{step(), step()});
   const auto drift = [&](Vec3 x) {
     const double slice = std::clamp(x.z / kStep_um, 0.0, 399.0);
     const auto below = static_cast<std::size_t>(slice);

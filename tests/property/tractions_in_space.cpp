@@ -25,11 +25,8 @@ double apart(const VectorXd& a, const VectorXd& b) { return (a - b).norm() / b.n
 
 /// Of values 1, q, q², … as those of a gel fall.
 MatrixXd smoothing_matrix(int rows, int cols) {
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> normal;
-  const auto filled = [&](int r, int c) {
-    return MatrixXd(MatrixXd::NullaryExpr(r, c, [&]() { return normal(random); }));
-  };
+  test::Normal normal(3);
+  const auto filled = [&](int r, int c) { return MatrixXd(MatrixXd::NullaryExpr(r, c, [&]() { return normal(); })); };
   const MatrixXd left = filled(rows, cols).householderQr().householderQ() * MatrixXd::Identity(rows, cols);
   const MatrixXd right = filled(cols, cols).householderQr().householderQ();
   const VectorXd values = VectorXd::NullaryExpr(cols, [&](Eigen::Index k) { return std::pow(0.97, k); });
@@ -38,11 +35,10 @@ MatrixXd smoothing_matrix(int rows, int cols) {
 
 TEST(Recurrences, agree_with_the_dense_decomposition_at_every_lambda_and_in_their_own) {
   const MatrixXd A = smoothing_matrix(500, 240);
-  std::mt19937_64 random(5);
-  std::normal_distribution<double> normal;
+  test::Normal normal(5);
   constexpr double kNoise = 0.02;
-  const VectorXd truth = VectorXd::NullaryExpr(240, [&]() { return normal(random); });
-  const VectorXd u = A * truth + kNoise * VectorXd::NullaryExpr(500, [&]() { return normal(random); });
+  const VectorXd truth = VectorXd::NullaryExpr(240, [&]() { return normal(); });
+  const VectorXd u = A * truth + kNoise * VectorXd::NullaryExpr(500, [&]() { return normal(); });
   const tractions::Spectrum dense(A.transpose() * A, A.transpose() * u, u.squaredNorm(), 500);
   const tractions::LinearMap map{[&](const MatrixXd& x) { return MatrixXd(A * x); },
                                  [&](const MatrixXd& y) { return MatrixXd(A.transpose() * y); }, 500, 240};
@@ -95,12 +91,11 @@ TEST(Losses, weigh_beads_by_the_length_of_their_residual_whatever_its_direction)
 }
 
 TEST(Losses, find_the_scale_of_most_beads_and_their_variance) {
-  std::mt19937_64 random(11);
-  std::normal_distribution<double> normal;
+  test::Normal normal(11);
   Observed observed;
   observed.at = {std::vector<Vec3>(4000), substrate::Components::all};
   observed.states_errors = false;
-  VectorXd residual = VectorXd::NullaryExpr(12000, [&]() { return 2 * normal(random); });
+  VectorXd residual = VectorXd::NullaryExpr(12000, [&]() { return 2 * normal(); });
   for (Eigen::Index b = 0; b < 400; ++b) residual.segment<3>(3 * b) *= 30;  // a tenth astray
   for (const BeadLoss loss : {BeadLoss::huber, BeadLoss::biweight}) {
     const Weighing w = weigh(loss, observed, residual, 0);
@@ -567,8 +562,7 @@ TEST_F(InSpace, the_part_by_noise_is_the_scatter_of_experiments_with_the_same_be
   Problem seen = exact;
   seen.observed.sigma_um *= kNoise_um / 1e-9;
   traction.lambda_um_per_kPa = f.lambda / lambda_per_um_per_kPa(seen);
-  std::mt19937_64 random(17);
-  std::normal_distribution<double> normal;
+  test::Normal normal(17);
   MatrixXd found(f.mean_nN.size(), kSeeds);
   const Basis basis = orthonormal_basis(norm_of(seen.mesh, seen.ground, [](Vec2) { return 1.0; }));
   const MatrixXd response = basis.response(seen.response_um_per_kPa, 1);
@@ -578,7 +572,7 @@ TEST_F(InSpace, the_part_by_noise_is_the_scatter_of_experiments_with_the_same_be
   for (int k = 0; k < kSeeds; ++k) {
     seen.observed.displacement_um =
         exact.observed.displacement_um + seen.observed.sigma_um.cwiseProduct(VectorXd::NullaryExpr(
-                                             seen.observed.sigma_um.size(), [&]() { return normal(random); }));
+                                             seen.observed.sigma_um.size(), [&]() { return normal(); }));
     const std::vector<PartForce> forces = forces_beside_background(seen, response, r, 1);
     for (std::size_t a = 0; a < forces.size(); ++a) {
       const Vec3 force = forces[a].force_nN;

@@ -154,10 +154,9 @@ TEST(TensionFitHard, a_fibre_without_beads_near_it_gets_a_wide_interval_that_cov
 TEST(TensionFitHard, where_nothing_pulls_no_tension_is_found) {
   TensionScene scene = tension_scene("case_21", 1000, 0.05, 5);
   const double sigma_um = 0.02;
-  std::mt19937_64 random(6);
-  std::normal_distribution<double> normal(0, 1);
+  test::Normal normal(6);
   for (Bead& bead : scene.beads) {
-    bead.displacement_um = {sigma_um * normal(random), sigma_um * normal(random)};
+    bead.displacement_um = {sigma_um * normal(), sigma_um * normal()};
     bead.sigma_um = sigma_um;
   }
   scene.data = reduce(scene.beads, scene.compliance_um_per_nN);

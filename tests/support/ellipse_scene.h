@@ -98,11 +98,10 @@ inline EllipseScene ellipse_scene(int n_side, double noise, unsigned seed = 1, d
   const std::vector<Vec2> u = greens->displacements_um(points, ellipses, scene.forces_nN);
   for (const Vec2 v : u) scene.largest_um = std::max(scene.largest_um, norm(v));
   const double sigma = noise * scene.largest_um;
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal(0, 1);
+  test::Normal normal(seed);
   constexpr int kSub = 8;  // points a pixel side: its share of an ellipse to about 1 %
   for (std::size_t p = 0; p < points.size(); ++p) {
-    const double noise_x = normal(random), noise_y = normal(random);
+    const double noise_x = normal(), noise_y = normal();
     scene.field.push_back({.position_um = points[p],
                            .displacement_um = u[p] + Vec2{sigma * noise_x, sigma * noise_y},
                            .sigma_um = states_errors ? sigma : 0,
@@ -131,6 +130,12 @@ inline double traction_error(const EllipseScene& scene, const std::vector<Vec2>&
     truth += dot(scene.tractions_kPa[p], scene.tractions_kPa[p]);
   }
   return std::sqrt(difference / truth);
+}
+
+inline std::vector<Vec2> forces_of(const tractions::Reconstruction& r) {
+  std::vector<Vec2> forces;
+  for (const AdhesionForce& f : r.forces) forces.push_back(f.force_nN);
+  return forces;
 }
 
 /// Mean |F − true| / |true| of forces by adhesion.

@@ -89,14 +89,13 @@ struct SheetStudySettings {
 
 /// Sheets whose other figures follow the contraction.
 inline statistics::Study simulated_sheets(const SheetStudySettings& s) {
-  std::mt19937_64 random(s.seed);
-  std::normal_distribution<double> normal;
+  test::Normal normal(s.seed);
   statistics::Study study = study_of_squares("sheet_", s.n_sheets, s.n_conditions);
   for (statistics::StudyCell& cell : study.cells) {
     const double value = s.contraction_nN_per_um + cell.condition * s.condition_effect_nN_per_um +
-                         s.sheet_sd_nN_per_um * normal(random) + s.error_nN_per_um * normal(random),
+                         s.sheet_sd_nN_per_um * normal() + s.error_nN_per_um * normal(),
                  sigma = std::hypot(s.error_nN_per_um, s.gel_error_nN_per_um);
-    const double stiffness = 20 * std::exp(0.2 * normal(random));
+    const double stiffness = 20 * std::exp(0.2 * normal());
     cell.sheet = SheetSummary{.estimates = {{.quantity = SheetQuantity::contraction,
                                              .value = value,
                                              .sigma = sigma,
@@ -118,7 +117,7 @@ inline statistics::Study simulated_sheets(const SheetStudySettings& s) {
                               .mean_tension_nN_per_um = 0.8 * value,
                               .total_force_nN = 100 * std::abs(value),
                               .strain_energy_fJ = 30 * value * value,
-                              .area_um2 = 1600 * std::exp(0.1 * normal(random)),
+                              .area_um2 = 1600 * std::exp(0.1 * normal()),
                               .relative_l2 = 0.3,
                               .expected_relative_l2 = 0.25};
     cell.fit.relative_l2 = 0.3;
@@ -140,26 +139,25 @@ struct SpaceStudySettings {
 
 /// Cells on a gel in space whose other figures follow the force.
 inline statistics::Study simulated_cells_in_space(const SpaceStudySettings& s) {
-  std::mt19937_64 random(s.seed);
-  std::normal_distribution<double> normal;
+  test::Normal normal(s.seed);
   statistics::Study study = study_of_squares("space_", s.n_cells, s.n_conditions);
   for (statistics::StudyCell& cell : study.cells) {
-    const double force = s.force_nN + cell.condition * s.condition_effect_nN + s.cell_sd_nN * normal(random) +
-                         s.error_nN * normal(random);
+    const double force =
+        s.force_nN + cell.condition * s.condition_effect_nN + s.cell_sd_nN * normal() + s.error_nN * normal();
     cell.space = statistics::SpaceFigures{.method = "group-l1",
                                           .total_force_nN = force,
                                           .total_force_sigma_nN = s.error_nN,
                                           .strain_energy_fJ = 1e-3 * force * force,
-                                          .contractile_moment_nN_um = 10 * force + 300 * normal(random),
+                                          .contractile_moment_nN_um = 10 * force + 300 * normal(),
                                           .contractile_moment_sigma_nN_um = 100.0,
                                           .normal_force_nN = 0.3 * force,
-                                          .largest_traction_kPa = 2 * std::exp(0.1 * normal(random)),
+                                          .largest_traction_kPa = 2 * std::exp(0.1 * normal()),
                                           .net_force_nN = 20,
                                           .net_moment_nN_um = 300,
-                                          .resolution_um = 9 * std::exp(0.05 * normal(random))};
+                                          .resolution_um = 9 * std::exp(0.05 * normal())};
     for (int a = 0; a < s.n_adhesions; ++a)
       cell.space->adhesions.push_back(
-          {a + 1, force / s.n_adhesions * std::exp(0.3 * normal(random)), s.error_nN / s.n_adhesions});
+          {a + 1, force / s.n_adhesions * std::exp(0.3 * normal()), s.error_nN / s.n_adhesions});
     cell.fit.relative_l2 = 0.3;
     cell.fit.noise_um = 0.02;
   }

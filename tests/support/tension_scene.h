@@ -29,13 +29,12 @@ struct TensionScene {
 
 /// Measure again: Gaussian noise of `noise` largest displacements, and these are stated as the beads' errors.
 inline void measure(TensionScene& scene, double noise, unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal(0, 1);
+  test::Normal normal(seed);
   const double sigma_um = noise * scene.largest_um;
   scene.beads.clear();
   for (std::size_t i = 0; i < scene.points_um.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);
-    const double x = normal(random), y = normal(random);
+    const double x = normal(), y = normal();
     scene.beads.push_back(
         {.position_um = scene.points_um[i],
          .displacement_um = {scene.displacement_um[row] + sigma_um * x, scene.displacement_um[row + 1] + sigma_um * y},

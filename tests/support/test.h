@@ -48,6 +48,17 @@ testing::AssertionResult has_words(const std::string& text, const Words&... word
   return testing::AssertionSuccess() << "all words are in: " << text << '\n';
 }
 
+/// Normal numbers of a seed, one after the other.
+class Normal {
+ public:
+  explicit Normal(std::uint64_t seed, double sigma = 1) : random_(seed), normal_(0, sigma) {}
+  double operator()() { return normal_(random_); }
+
+ private:
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+};
+
 /// The exception of this type that the call ends with.
 template <class Error>
 std::optional<Error> caught(const auto& call) {
