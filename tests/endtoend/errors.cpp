@@ -44,20 +44,56 @@ class Errors : public ::testing::Test {
   static inline TemporaryFolder* scene_ = nullptr;
 };
 
-TEST_F(Errors, a_missing_image_is_named) {
-  fs::remove(cell_ / "actin.tif");
-  expect_error(kInput, {"actin.tif"}, "1_segment");
-}
-
-TEST_F(Errors, an_empty_folder_is_told_what_it_lacks) {
-  fs::remove_all(cell_);
-  fs::create_directory(cell_);
-  expect_error(kInput, {"cell.toml"}, "1_segment");
-}
-
-TEST_F(Errors, a_truncated_image_is_named) {
-  fs::resize_file(cell_ / "actin.tif", fs::file_size(cell_ / "actin.tif") / 3);
-  expect_error(kInput, {"actin.tif"}, "1_segment");
+TEST_F(Errors, in_one_input_are_named_with_their_place_and_leave_nothing) {
+  const auto change_adhesions = [&](const std::function<float()>& value) {
+    images::Image image = images::read_image(cell_ / "paxillin.tif");
+    for (float& pixel : image.pixels) pixel = value();
+    images::write_tiff(cell_ / "paxillin.tif", image);
+  };
+  std::mt19937_64 random(1);
+  struct Case {
+    const char* what;
+    std::function<void()> spoil;
+    std::vector<std::string> words;
+    const char* folder = "1_segment";
+  };
+  const std::vector<Case> cases = {
+      {"a missing image", [&] { fs::remove(cell_ / "actin.tif"); }, {"actin.tif"}},
+      {"an empty folder", [&] { fs::remove_all(cell_), fs::create_directory(cell_); }, {"cell.toml"}},
+      {"a truncated image",
+       [&] { fs::resize_file(cell_ / "actin.tif", fs::file_size(cell_ / "actin.tif") / 3); },
+       {"actin.tif"}},
+      {"a file of a microscope",
+       [&] { files::write_text(cell_ / "actin.tif", std::string("ZISRAWFILE\0\0\0\0\0\0", 16)); },
+       {"a Zeiss CZI file", "Bio-Formats", "bfconvert 'actin.tif' 'actin.ome.tif'"}},
+      {"an image without adhesions",
+       [&] { change_adhesions([&] { return 200 + static_cast<float>(random() % 32); }); },
+       {"no adhesion", "paxillin.tif"}},
+      {"a constant image", [&] { change_adhesions([] { return 200.0f; }); }, {"every pixel is 200", "paxillin.tif"}},
+      {"an unknown key",
+       [&] { replace_in_toml("pixel_size_um", "pixel_sise_um = 0.1"); },
+       {"cell.toml:", "'pixel_sise_um'", "pixel_size_um"}},
+      {"a negative modulus",
+       [&] { replace_in_toml("youngs_modulus_kPa", "youngs_modulus_kPa = -8.4"); },
+       {"cell.toml:", "youngs_modulus_kPa", "a number >= 0.001", "-8.4"}},
+      {"a Poisson's ratio above one half",
+       [&] { replace_in_toml("poisson_ratio", "poisson_ratio = 0.51"); },
+       {"cell.toml:", "poisson_ratio", "<= 0.5", "'0.51'"}},
+      {"no number in a table",
+       [&] {
+         fs::create_directory(cell_ / "2_track");
+         files::write_text(cell_ / "2_track/displacement.csv",
+                           "x_um,y_um,ux_um,uy_um,sigma_um\n1,2,0.1,0.1,0.02\n3,4,nan,0,0.02\n");
+       },
+       {"displacement.csv:3", "'ux_um'", "'nan'"},
+       "4_fit"}};
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.what);
+    fs::remove_all(cell_);
+    SetUp();
+    c.spoil();
+    expect_error(kInput, c.words, c.folder);
+  }
 }
 
 TEST_F(Errors, images_of_different_sizes_are_named_with_their_sizes) {
@@ -107,26 +143,6 @@ TEST_F(Errors, bead_images_of_another_field_are_refused_before_anything_runs_and
   EXPECT_NEAR(farthest_um / (actin.width * actin.pixel_size_um.value()), 1, 0.05) << "places in the cell's own um";
 }
 
-TEST_F(Errors, an_image_without_adhesions_says_so) {
-  images::Image noise = images::read_image(cell_ / "paxillin.tif");
-  std::mt19937_64 random(1);
-  for (float& value : noise.pixels) value = 200 + static_cast<float>(random() % 32);
-  images::write_tiff(cell_ / "paxillin.tif", noise);
-  expect_error(kInput, {"no adhesion", "paxillin.tif"}, "1_segment");
-}
-
-TEST_F(Errors, a_constant_image_is_called_so) {
-  images::Image flat = images::read_image(cell_ / "paxillin.tif");
-  std::fill(flat.pixels.begin(), flat.pixels.end(), 200.0f);
-  images::write_tiff(cell_ / "paxillin.tif", flat);
-  expect_error(kInput, {"every pixel is 200", "paxillin.tif"}, "1_segment");
-}
-
-TEST_F(Errors, an_unknown_key_names_its_line_and_the_nearest_known_one) {
-  replace_in_toml("pixel_size_um", "pixel_sise_um = 0.1");
-  expect_error(kInput, {"cell.toml:", "'pixel_sise_um'", "pixel_size_um"}, "1_segment");
-}
-
 TEST_F(Errors, a_missing_pixel_size_is_asked_for) {
   replace_in_toml("pixel_size_um", "");
   for (const char* name : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"}) {
@@ -147,23 +163,6 @@ TEST_F(Errors, hints_of_a_stage_name_keys_under_a_run_and_flags_alone) {
                         "give it as --adhesion-mask"));
   EXPECT_TRUE(
       has_words(output_of("mbtfm run --set segment.cell=-3 " + cell_.string(), kUsage), "cell in [segment]: expected"));
-}
-
-TEST_F(Errors, a_negative_modulus_is_refused_before_anything_runs) {
-  replace_in_toml("youngs_modulus_kPa", "youngs_modulus_kPa = -8.4");
-  expect_error(kInput, {"cell.toml:", "youngs_modulus_kPa", "a number >= 0.001", "-8.4"}, "1_segment");
-}
-
-TEST_F(Errors, a_poisson_ratio_of_one_half_is_refused_before_anything_runs) {
-  replace_in_toml("poisson_ratio", "poisson_ratio = 0.51");
-  expect_error(kInput, {"cell.toml:", "poisson_ratio", "<= 0.5", "'0.51'"}, "1_segment");
-}
-
-TEST_F(Errors, not_a_number_in_a_table_names_file_line_and_column) {
-  fs::create_directory(cell_ / "2_track");
-  files::write_text(cell_ / "2_track/displacement.csv",
-                    "x_um,y_um,ux_um,uy_um,sigma_um\n1,2,0.1,0.1,0.02\n3,4,nan,0,0.02\n");
-  expect_error(kInput, {"displacement.csv:3", "'ux_um'", "'nan'"}, "4_fit");
 }
 
 TEST_F(Errors, an_adhesion_outside_the_outline_is_named) {
@@ -212,11 +211,6 @@ TEST_F(Errors, what_was_probably_meant_is_named) {
   EXPECT_TRUE(has_words(said("mbtfm run " + misspelt, kInput), "did you mean 'cell'?"));
   EXPECT_TRUE(has_words(said("mbtfm compare " + cell_.string(), kInput), "mbtfm run"));
   EXPECT_TRUE(has_words(said("mbtfm", 0), "check")) << "alone it prints its help";
-}
-
-TEST_F(Errors, files_of_a_microscope_are_answered_with_how_to_convert_them) {
-  files::write_text(cell_ / "actin.tif", std::string("ZISRAWFILE\0\0\0\0\0\0", 16));
-  expect_error(kInput, {"a Zeiss CZI file", "Bio-Formats", "bfconvert 'actin.tif' 'actin.ome.tif'"}, "1_segment");
 }
 
 TEST_F(Errors, check_finds_what_would_spoil_a_batch_and_nothing_in_a_good_cell) {

@@ -68,30 +68,18 @@ class FitFindings : public ::testing::Test {
 TEST_F(FitFindings, a_sound_cell_has_none) {
   const std::vector<Finding> of_sound = found();
   EXPECT_TRUE(of_sound.empty()) << test::ids_of(of_sound);
-  test::expect_silent({"common-motion",
-                       "curved-motion",
-                       "channel-shift",
-                       "explains-little",
-                       "unexplained-displacement",
-                       "strain-beyond-linear",
-                       "noise-unknown",
-                       "noise-disagrees",
-                       "beads-disagree",
-                       "telling-beads-scatter",
-                       "adhesions-without-beads",
-                       "cell-cut",
-                       "missing-fibre",
-                       "missing-adhesion",
-                       "fibre-without-tension",
-                       "not-identifiable",
-                       "network-not-identifiable",
-                       "wide-interval",
-                       "tension-at-zero",
-                       "single-mesh",
-                       "forces-out-of-balance",
-                       "torques-out-of-balance",
-                       "modulus-error-unknown"},
+  test::expect_silent({"common-motion", "curved-motion", "channel-shift", "explains-little", "unexplained-displacement",
+                       "strain-beyond-linear"},
                       of_sound);
+  test::expect_silent({"noise-unknown", "noise-disagrees", "beads-disagree", "telling-beads-scatter",
+                       "adhesions-without-beads", "cell-cut"},
+                      of_sound);
+  test::expect_silent({"missing-fibre", "missing-adhesion", "fibre-without-tension", "not-identifiable",
+                       "network-not-identifiable", "wide-interval"},
+                      of_sound);
+  test::expect_silent(
+      {"tension-at-zero", "single-mesh", "forces-out-of-balance", "torques-out-of-balance", "modulus-error-unknown"},
+      of_sound);
 }
 
 TEST_F(FitFindings, a_gel_that_grew_between_the_images_is_told_and_taken_off) {

@@ -222,15 +222,6 @@ TEST(TractionMeshes, have_tractions_that_do_not_jump_from_face_to_face) {
   }
 }
 
-TEST(TractionMeshes, of_which_nothing_is_split_stay_as_they_are) {
-  const Ground ground(nullptr);
-  const TractionMesh mesh = make_traction_mesh(ground, {{0, 0}, {20, 12}}, 3, [](Vec2) { return true; });
-  const TractionMesh same = with_split(mesh, ground, std::vector<bool>(mesh.leaves.size(), false));
-  EXPECT_EQ(same.areas_um2, mesh.areas_um2);
-  EXPECT_EQ(same.quads.faces, mesh.quads.faces);
-  EXPECT_EQ(MatrixXd(same.mass_um2), MatrixXd(mesh.mass_um2));
-}
-
 TEST(Bases, an_orthonormal_one_has_the_integral_of_squares_for_its_norm) {
   const Ground ground(nullptr);
   const TractionMesh mesh = split_at_random(ground, 3);
@@ -781,7 +772,7 @@ TEST_F(InSpace, an_answer_that_hangs_on_the_loss_is_called_so) {
   scene.n_beads = 60;
   scene.spots[0].force_nN = {80, 50, -30};
   const SpatialInputs inputs{{}, scene.gel, {}, {}};
-  const Problem problem = scene.problem(scene.beads(0.05), parameters);
+  Problem problem = scene.problem(scene.beads(0.05), parameters);
   const auto by = [&](BeadLoss loss) {
     parameters.loss = loss;
     auto r = reconstruct(problem, inputs, traction, parameters, 1);
@@ -790,17 +781,10 @@ TEST_F(InSpace, an_answer_that_hangs_on_the_loss_is_called_so) {
   };
   EXPECT_FALSE(fires("loss-decides", by(BeadLoss::l2)));
   EXPECT_TRUE(fires("loss-decides", by(BeadLoss::biweight)));
-}
-
-TEST_F(InSpace, many_beads_that_are_right_have_one_answer_by_any_loss) {
-  const SpatialInputs inputs{{}, scene.gel, {}, {}};
-  scene.n_beads = 1500;
-  const Problem problem = scene.problem(scene.beads(0.05), parameters);
-  for (const BeadLoss loss : {BeadLoss::mixture, BeadLoss::huber, BeadLoss::biweight}) {
-    parameters.loss = loss;
-    const auto r = reconstruct(problem, inputs, traction, parameters, 1);
-    EXPECT_FALSE(fires("loss-decides", r.findings)) << name_of(loss);
-  }
+  scene.n_beads = 1500;  // many that are right have one answer by any loss
+  problem = scene.problem(scene.beads(0.05), parameters);
+  for (const BeadLoss loss : {BeadLoss::mixture, BeadLoss::huber, BeadLoss::biweight})
+    EXPECT_FALSE(fires("loss-decides", by(loss))) << name_of(loss);
 }
 
 /// Two patches that pull at each other, and beads with the errors that they state.
@@ -824,10 +808,15 @@ TEST_F(FindingsInSpace, are_none_of_a_sound_scene) {
   EXPECT_FALSE(fires("tractions-out-of-balance", noticed_imbalance(balance_of(problem, r))));
 }
 
-TEST_F(FindingsInSpace, tell_beads_above_the_surface_and_below_the_base) {
-  std::vector<BeadInSpace> beads = scene.beads(kSigma_um);
-  for (int b = 0; b < 10; ++b) beads[b].position_um.z = b % 2 ? -2 : scene.gel.thickness_um + 2;
-  EXPECT_TRUE(fires("beads-off-the-gel", found(beads).findings));
+TEST_F(FindingsInSpace, tell_beads_beside_the_gel_stated_errors_that_are_too_small_and_beads_followed_to_another) {
+  const std::vector<BeadInSpace> sound = scene.beads(kSigma_um);
+  std::vector<BeadInSpace> off = sound, overconfident = sound, stray = sound;
+  for (int b = 0; b < 10; ++b) off[b].position_um.z = b % 2 ? -2 : scene.gel.thickness_um + 2;
+  for (BeadInSpace& b : overconfident) b.sigma_um /= 1.5, b.sigma_z_um /= 1.5;
+  for (std::size_t b = 0; b < stray.size(); b += 50) stray[b].displacement_um += Vec3{1.5, -1, 0.5};
+  EXPECT_TRUE(fires("beads-off-the-gel", found(off).findings));
+  EXPECT_TRUE(fires("misfit-in-space", found(overconfident).findings));
+  EXPECT_TRUE(fires("beads-stray", found(stray).findings));
 }
 
 TEST_F(FindingsInSpace, tell_beads_that_lie_deep) {
@@ -839,18 +828,6 @@ TEST_F(FindingsInSpace, tell_beads_that_lie_deep) {
 TEST_F(FindingsInSpace, tell_few_beads_of_much_noise) {
   scene.n_beads = 80;
   EXPECT_TRUE(fires("beads-tell-little", found(scene.beads(0.3)).findings));
-}
-
-TEST_F(FindingsInSpace, tell_stated_errors_that_are_too_small) {
-  std::vector<BeadInSpace> beads = scene.beads(kSigma_um);
-  for (BeadInSpace& b : beads) b.sigma_um /= 1.5, b.sigma_z_um /= 1.5;
-  EXPECT_TRUE(fires("misfit-in-space", found(beads).findings));
-}
-
-TEST_F(FindingsInSpace, tell_beads_that_were_followed_to_another) {
-  std::vector<BeadInSpace> beads = scene.beads(kSigma_um);
-  for (std::size_t b = 0; b < beads.size(); b += 50) beads[b].displacement_um += Vec3{1.5, -1, 0.5};
-  EXPECT_TRUE(fires("beads-stray", found(beads).findings));
 }
 
 TEST_F(FindingsInSpace, tell_a_force_that_nothing_balances) {
