@@ -222,11 +222,11 @@ TEST(Architecture, a_node_is_a_library) {
     std::string library = node;
     std::replace(library.begin(), library.end(), '/', '_');
     const std::string list = mbtfm::files::read_text(kRoot / node / "CMakeLists.txt");
-    EXPECT_TRUE(has_words(list, "mbtfm_library(" + library)) << node << " makes no library " << library;
+    EXPECT_TRUE(mbtfm::test::has_words(list, "mbtfm_library(" + library)) << node << " makes no library " << library;
     for (const std::string& file : sources()) {
       const std::string name = fs::path(file).filename();
       if (node_of(file) != node || !name.ends_with(".cpp")) continue;
-      EXPECT_TRUE(has_words((" " + list), name)) << file << " is not built";
+      EXPECT_TRUE(mbtfm::test::has_words((" " + list), name)) << file << " is not built";
     }
   }
 }

@@ -16,9 +16,8 @@ std::filesystem::path write(const test::TemporaryFolder& folder, const std::stri
   return folder / "field.csv";
 }
 
-using GivenField = test::InFolder;
-
-TEST_F(GivenField, columns_are_mapped_and_pixels_become_um) {
+TEST(GivenField, columns_are_mapped_and_pixels_become_um) {
+  const test::TemporaryFolder folder;
   TrackParameters p;
   p.x_column = "x", p.y_column = "y", p.ux_column = "u", p.uy_column = "v", p.sigma_column = "error";
   p.length_unit = LengthUnit::px;
@@ -35,7 +34,8 @@ TEST_F(GivenField, columns_are_mapped_and_pixels_become_um) {
   }
 }
 
-TEST_F(GivenField, a_grid_of_a_known_field_keeps_its_peaks_and_tells_its_noise) {
+TEST(GivenField, a_grid_of_a_known_field_keeps_its_peaks_and_tells_its_noise) {
+  const test::TemporaryFolder folder;
   const auto peaks = test::ring_of_adhesions(512, 8.3);
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal(0, 0.05);
@@ -56,7 +56,7 @@ TEST_F(GivenField, a_grid_of_a_known_field_keeps_its_peaks_and_tells_its_noise) 
 
 /// A cell that contracts, and in a corner of the picture beads that are pulled out of it as strongly: the field's
 /// centre lies between the two, and all that moves in the corner moves away from it.
-TEST_F(GivenField, a_strong_neighbour_in_a_corner_is_no_push) {
+TEST(GivenField, a_strong_neighbour_in_a_corner_is_no_push) {
   for (const double strength : {0.3, 0.4}) {
     DisplacementField alone, beside;
     for (int i = 0; i < 1600; ++i) {
@@ -74,7 +74,7 @@ TEST_F(GivenField, a_strong_neighbour_in_a_corner_is_no_push) {
   }
 }
 
-TEST_F(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
+TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
   const auto peaks = test::ring_of_adhesions(512, 8.3);
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal(0, 0.05);
@@ -102,7 +102,7 @@ TEST_F(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
   }
 }
 
-TEST_F(GivenField, places_of_the_relaxed_picture_are_moved_with_the_stage_and_asked_for) {
+TEST(GivenField, places_of_the_relaxed_picture_are_moved_with_the_stage_and_asked_for) {
   const Vec2 drift{3, -2};
   DisplacementField truth;
   for (int j = 0; j < 32; ++j)
@@ -128,7 +128,8 @@ TEST_F(GivenField, places_of_the_relaxed_picture_are_moved_with_the_stage_and_as
   }
 }
 
-TEST_F(GivenField, what_cannot_be_used_is_flagged_and_kept) {
+TEST(GivenField, what_cannot_be_used_is_flagged_and_kept) {
+  const test::TemporaryFolder folder;
   files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um", "sigma_um"});
   for (int j = 0; j < 8; ++j)
     for (int i = 0; i < 8; ++i) {
@@ -148,7 +149,8 @@ TEST_F(GivenField, what_cannot_be_used_is_flagged_and_kept) {
 }
 
 /// The search for neighbours takes memory for the points, not for the ways between them.
-TEST_F(GivenField, points_on_a_line_and_points_astray_are_read) {
+TEST(GivenField, points_on_a_line_and_points_astray_are_read) {
+  const test::TemporaryFolder folder;
   for (const bool is_line : {true, false}) {
     files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
     for (int i = 0; i < 40; ++i) csv.add(1.0 * (i % 20)).add(is_line ? 0.0 : i / 20).add(0.1).add(0.01 * i).end_row();
@@ -157,7 +159,8 @@ TEST_F(GivenField, points_on_a_line_and_points_astray_are_read) {
   }
 }
 
-TEST_F(GivenField, what_is_wrong_with_a_file_is_said) {
+TEST(GivenField, what_is_wrong_with_a_file_is_said) {
+  const test::TemporaryFolder folder;
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,u,v\n1,2,3,4\n"), {}), InputError);
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\nNaN,2,3,4\n"), {}), InputError);
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n1,2,NaN,4\n"), {}), InputError);

@@ -74,9 +74,7 @@ void expect_same(const GivenField& given, const Rows& rows, double um = 0.1, dou
   }
 }
 
-using GivenTable = test::InFolder;
-
-TEST_F(GivenTable, is_the_same_in_whatever_form_people_write_it) {
+TEST(GivenTable, is_the_same_in_whatever_form_people_write_it) {
   const Rows rows = vectors();
   const std::string header = "x_px,y_px,u_px,v_px\n", lines = lines_of(rows, ",");
   const auto padded = [](double value) { return "  " + shortest(value) + " "; };
@@ -147,7 +145,7 @@ TEST_F(GivenTable, is_the_same_in_whatever_form_people_write_it) {
   expect_same(read("Punkt\tLage x\tLage y\tx-Weg\ty-Weg\tG\xC3\xBCte\n" + longer, by_number), rows);
 }
 
-TEST_F(GivenTable, numbers_that_can_be_read_in_two_ways_are_refused) {
+TEST(GivenTable, numbers_that_can_be_read_in_two_ways_are_refused) {
   const std::string header = "x_um;y_um;ux_um;uy_um\n";
   const std::map<std::string, std::string> refused = {
       {"thousands or decimals", header + "1,234;5,678;1,111;2,222\n9;9;9;9\n"},
@@ -181,7 +179,7 @@ TEST_F(GivenTable, numbers_that_can_be_read_in_two_ways_are_refused) {
   EXPECT_EQ(read(header + "1,234;5,678;0,111;2,222\n").field[0].position_um, (Vec2{1.234, 5.678}));
 }
 
-TEST_F(GivenTable, a_missing_number_is_flagged_and_a_row_without_a_place_counted) {
+TEST(GivenTable, a_missing_number_is_flagged_and_a_row_without_a_place_counted) {
   std::string text = "x_um,y_um,ux_um,uy_um\n";
   for (int k = 0; k < 20; ++k)
     text += std::to_string(k) + "," + std::to_string(k % 5) + ",0.1,0." + std::to_string(k) + "\n";
@@ -255,7 +253,7 @@ std::vector<Form> forms_of_programs(const Rows& rows) {
       {TableForm::trackmate, spots}};
 }
 
-TEST_F(GivenTable, of_each_program_is_found_by_its_head_and_read_as_it_means_it) {
+TEST(GivenTable, of_each_program_is_found_by_its_head_and_read_as_it_means_it) {
   const Rows rows = vectors();
   for (Form& form : forms_of_programs(rows)) {
     SCOPED_TRACE(name_of(form.form));
@@ -279,7 +277,7 @@ TEST_F(GivenTable, of_each_program_is_found_by_its_head_and_read_as_it_means_it)
   }
 }
 
-TEST_F(GivenTable, its_units_may_differ_by_column_and_be_velocities) {
+TEST(GivenTable, its_units_may_differ_by_column_and_be_velocities) {
   const Rows rows = vectors();
   Rows in_mm = rows;
   for (auto& row : in_mm) row[0] *= 1e-4, row[1] *= 1e-4;
@@ -298,7 +296,7 @@ TEST_F(GivenTable, its_units_may_differ_by_column_and_be_velocities) {
             0.02);
 }
 
-TEST_F(GivenTable, rows_that_their_program_masked_or_filled_in_are_flagged) {
+TEST(GivenTable, rows_that_their_program_masked_or_filled_in_are_flagged) {
   const Rows rows = vectors();
   const auto flag_of_third = [&](const std::string& header, const std::string& good, const std::string& bad,
                                  const std::string& separator) {
@@ -318,7 +316,8 @@ TEST_F(GivenTable, rows_that_their_program_masked_or_filled_in_are_flagged) {
   EXPECT_EQ(flag_of_third("", "1 0 0.9 0 0 0 0 0 0 0 0 0", "1 0 0.9 0 0 0 0 0 0 0 0 999", " "), "filled in");
 }
 
-TEST_F(GivenTable, y_that_falls_from_row_to_row_points_up_and_the_user_is_asked) {
+TEST(GivenTable, y_that_falls_from_row_to_row_points_up_and_the_user_is_asked) {
+  const test::TemporaryFolder folder;
   const Rows rows = vectors();
   const std::string text = "x [px];y [px];u [px];v [px]\n" + lines_of(upwards(rows), ";");
   const GivenField given = read(text, in_pixels());
@@ -347,7 +346,8 @@ TEST_F(GivenTable, y_that_falls_from_row_to_row_points_up_and_the_user_is_asked)
   EXPECT_TRUE(read("x_um,y_um,ux_um,uy_um\n" + lines_of(upwards(rows), ",")).findings.empty());
 }
 
-TEST_F(GivenTable, of_pytfm_is_two_arrays_over_the_picture) {
+TEST(GivenTable, of_pytfm_is_two_arrays_over_the_picture) {
+  const test::TemporaryFolder folder;
   const auto write = [&](const char* name, const std::vector<float>& values) {
     std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }";
     header.resize(117, ' ');
@@ -370,7 +370,8 @@ TEST_F(GivenTable, of_pytfm_is_two_arrays_over_the_picture) {
   EXPECT_THROW(read_given_field(folder / "02u.npy", in_pixels(), images::ImageField{30, 20, {}}), InputError);
 }
 
-TEST_F(GivenTable, is_what_the_other_stages_point_to_where_theirs_is_masked) {
+TEST(GivenTable, is_what_the_other_stages_point_to_where_theirs_is_masked) {
+  const test::TemporaryFolder folder;
   std::string text = "x_um,y_um,ux_um,uy_um\n";
   for (int k = 0; k < 20; ++k)
     text += std::to_string(k) + "," + std::to_string(k % 5) + "," + (k == 7 ? "-9999" : "0.1") + ",0\n";
@@ -410,7 +411,7 @@ std::size_t n_masked(const GivenField& given) {
   return static_cast<std::size_t>(std::ranges::count(given.field, "masked", &Bead::flag));
 }
 
-TEST_F(GivenTable, what_many_rows_share_to_the_last_digit_is_a_mask_and_no_noise) {
+TEST(GivenTable, what_many_rows_share_to_the_last_digit_is_a_mask_and_no_noise) {
   constexpr double kNoise_um = 0.004;
   for (const Vec2 written : {Vec2{-9999, -9999}, {0, 0}, {-1, -1}, {1e10, 1e10}, {0.1, 0.1}, {1e300, -1e300}}) {
     for (const bool is_scattered : {false, true}) {
@@ -432,7 +433,7 @@ TEST_F(GivenTable, what_many_rows_share_to_the_last_digit_is_a_mask_and_no_noise
   }
 }
 
-TEST_F(GivenTable, a_sound_table_shares_values_and_masks_none) {
+TEST(GivenTable, a_sound_table_shares_values_and_masks_none) {
   // digits of a table in um; noise from none to many of its steps
   for (const int digits : {2, 3, 4, 5, 12})
     for (const double noise_um : {0.0, 0.001, 0.003, 0.01, 0.03})
@@ -459,7 +460,7 @@ TEST_F(GivenTable, a_sound_table_shares_values_and_masks_none) {
   EXPECT_EQ(n_masked(read(table_of(alike, 5))), 0u);
 }
 
-TEST_F(GivenTable, as_users_brought_it_is_read) {
+TEST(GivenTable, as_users_brought_it_is_read) {
   const fs::path tables = test::source_folder() / "../shared/faults/users/tables";
   if (!fs::exists(tables)) GTEST_SKIP() << "the shared data are absent: " << tables;
   const DisplacementField plain = read_given_field(tables / "blank_last_lines.csv", in_pixels()).field;
@@ -487,7 +488,7 @@ TEST_F(GivenTable, as_users_brought_it_is_read) {
   }
 }
 
-TEST_F(GivenTable, of_other_peoples_real_work_is_read) {
+TEST(GivenTable, of_other_peoples_real_work_is_read) {
   const fs::path data = test::source_folder() / "../shared/data";
   if (!fs::exists(data)) GTEST_SKIP() << "the shared data are absent: " << data;
   const struct {

@@ -25,9 +25,8 @@ Image ramp(int width, int height) {
   return image;
 }
 
-using Image = test::InFolder;
-
-TEST_F(Image, a_written_tiff_comes_back_with_its_calibration) {
+TEST(Image, a_written_tiff_comes_back_with_its_calibration) {
+  const TemporaryFolder folder;
   Image image = ramp(123, 77);
   for (const double pixel_size_um : {0.1, 0.1625, 0.125, 0.06475, 0.64}) {
     image.pixel_size_um = pixel_size_um;
@@ -45,13 +44,14 @@ TEST_F(Image, a_written_tiff_comes_back_with_its_calibration) {
   EXPECT_FALSE(read_image(folder / "b.tif").pixel_size_um);
 }
 
-TEST_F(Image, a_pipe_is_refused_and_not_waited_for) {
+TEST(Image, a_pipe_is_refused_and_not_waited_for) {
+  const TemporaryFolder folder;
   ASSERT_EQ(mkfifo((folder / "a.tif").c_str(), 0600), 0);
   EXPECT_THROW(read_image(folder / "a.tif"), InputError);
   EXPECT_THROW(read_image("/dev/null"), InputError);
 }
 
-TEST_F(Image, binned_ones_hold_the_means_of_whole_blocks_and_keep_their_scale) {
+TEST(Image, binned_ones_hold_the_means_of_whole_blocks_and_keep_their_scale) {
   Image image = ramp(7, 5);
   image.pixel_size_um = 0.1;
   const Image half = binned(image, 2);
@@ -63,13 +63,15 @@ TEST_F(Image, binned_ones_hold_the_means_of_whole_blocks_and_keep_their_scale) {
   EXPECT_THROW(binned(image, 6), InvalidData);
 }
 
-TEST_F(Image, values_outside_16_bits_are_clamped_and_fractions_rounded) {
+TEST(Image, values_outside_16_bits_are_clamped_and_fractions_rounded) {
+  const TemporaryFolder folder;
   Image image{.width = 4, .height = 1, .pixels = {-3.0f, 1.5f, 70000.0f, 2.4f}, .full_scale = 0};
   write_tiff(folder / "a.tif", image);
   EXPECT_EQ(read_image(folder / "a.tif").pixels, (std::vector<float>{0, 2, 65535, 2}));
 }
 
-TEST_F(Image, colour_is_read_as_the_mean_of_red_green_and_blue) {
+TEST(Image, colour_is_read_as_the_mean_of_red_green_and_blue) {
+  const TemporaryFolder folder;
   write_png(folder / "a.png", {.width = 2, .height = 1, .rgb = {10, 20, 60, 7, 7, 7}});
   const Image image = read_image(folder / "a.png");
   EXPECT_EQ(image.pixels, (std::vector<float>{30, 7}));
@@ -85,7 +87,7 @@ struct CalibrationCase {
   std::optional<double> x_resolution, y_resolution, expected_um;
 };
 
-TEST_F(Image, calibration_is_understood_in_each_dialect) {
+TEST(Image, calibration_is_understood_in_each_dialect) {
   const CalibrationCase cases[] = {
       {"ImageJ=1.53t\nunit=micron\n", 6.153846, 6.153846, 0.1625},
       {"ImageJ=1.53t\nunit=um\n", 8, 8, 0.125},
@@ -116,7 +118,7 @@ TEST_F(Image, calibration_is_understood_in_each_dialect) {
     EXPECT_EQ(pixel_size_um({c.description, c.x_resolution, c.y_resolution, {}}), c.expected_um) << c.description;
 }
 
-TEST_F(Image, a_resolution_counts_if_a_microscope_has_such_pixels) {
+TEST(Image, a_resolution_counts_if_a_microscope_has_such_pixels) {
   constexpr double kInch_um = 25400, kCentimetre_um = 1e4;
   EXPECT_EQ(pixel_size_um({"SlideBook", 62500, 62500, kCentimetre_um}), 0.16);
   EXPECT_EQ(pixel_size_um({"", 254000, 254000, kInch_um}), 0.1);
@@ -132,7 +134,8 @@ std::string error_of(const fs::path& file, int page = 0) {
   return error ? error->found : "no error";
 }
 
-TEST_F(Image, what_is_no_image_is_named_for_what_it_is) {
+TEST(Image, what_is_no_image_is_named_for_what_it_is) {
+  const TemporaryFolder folder;
   EXPECT_EQ(error_of(folder / "none.tif"), "no such file");
   fs::create_directory(folder / "folder.tif");
   EXPECT_EQ(error_of(folder / "folder.tif"), "a folder");
@@ -180,7 +183,8 @@ void write_samples(const fs::path& file, const std::vector<Sample>& samples, int
   TIFFClose(tiff);
 }
 
-TEST_F(Image, half_floats_and_long_integers_are_read) {
+TEST(Image, half_floats_and_long_integers_are_read) {
+  const TemporaryFolder folder;
   // IEEE 754: 1, -2, the largest one, the smallest normal one, the smallest of all, 1/3 to ten bits, 0
   write_samples<std::uint16_t>(folder / "half.tif", {0x3C00, 0xC000, 0x7BFF, 0x0400, 0x0001, 0x3555, 0},
                                SAMPLEFORMAT_IEEEFP);
@@ -192,7 +196,8 @@ TEST_F(Image, half_floats_and_long_integers_are_read) {
   EXPECT_EQ(read_image(folder / "uint64.tif").pixels, (std::vector<float>{0, 7, 1 << 20}));
 }
 
-TEST_F(Image, pixels_without_a_value_are_counted_and_placed) {
+TEST(Image, pixels_without_a_value_are_counted_and_placed) {
+  const TemporaryFolder folder;
   const float nan = std::nanf("");
   write_samples<float>(folder / "a.tif", {1, 2, nan, 4, nan}, SAMPLEFORMAT_IEEEFP);
   EXPECT_TRUE(has_words(error_of(folder / "a.tif"), "2 pixels without a value (NaN), the first in column 2, row 0"));
@@ -200,7 +205,8 @@ TEST_F(Image, pixels_without_a_value_are_counted_and_placed) {
   EXPECT_TRUE(has_words(error_of(folder / "half.tif"), "1 pixel without a value"));
 }
 
-TEST_F(Image, an_empty_tag_of_another_program_is_no_damage) {
+TEST(Image, an_empty_tag_of_another_program_is_no_damage) {
+  const TemporaryFolder folder;
   const std::vector<std::uint16_t> row = {3, 1, 4, 1, 5, 9, 2, 6};
   write_samples(folder / "a.tif", row, SAMPLEFORMAT_UINT);
   std::string bytes = files::read_text(folder / "a.tif");
@@ -256,7 +262,8 @@ TEST(Png, of_indexed_colours_labels_are_the_indices_and_pictures_what_is_seen) {
     EXPECT_EQ(pixels(greys, pixels_are), (std::vector<float>{0, 9, 5, 9}));
 }
 
-TEST_F(Image, a_calibration_of_a_picture_of_another_size_does_not_count) {
+TEST(Image, a_calibration_of_a_picture_of_another_size_does_not_count) {
+  const TemporaryFolder folder;
   const auto xml = [](int width) {
     return "<?xml version='1.0'?><OME><Image><Pixels SizeX='" + std::to_string(width) +
            "' SizeY='1' PhysicalSizeX='0.1' PhysicalSizeY='0.1'/></Image></OME>";
@@ -272,7 +279,8 @@ TEST_F(Image, a_calibration_of_a_picture_of_another_size_does_not_count) {
   EXPECT_EQ(common_pixel_size_um(binned, binned, 0.2), 0.2);
 }
 
-TEST_F(Image, a_size_the_file_cannot_fill_takes_no_memory) {
+TEST(Image, a_size_the_file_cannot_fill_takes_no_memory) {
+  const TemporaryFolder folder;
   write_tiff(folder / "a.tif", ramp(50, 50));
   set_tag(folder / "a.tif", TIFFTAG_IMAGEWIDTH, 2000000000);
   EXPECT_TRUE(has_words(error_of(folder / "a.tif"), "2000000000 x 50 pixels"));
@@ -366,7 +374,7 @@ bool is_equal(const Extremes& e, const Decoded& d, double full_scale) {
          (d.bits < 8 && is_same(k * e.low, k * e.high, k * e.sum));
 }
 
-TEST_F(Image, real_files_decode_as_by_other_programs_or_are_refused) {
+TEST(Image, real_files_decode_as_by_other_programs_or_are_refused) {
   if (!fs::exists(kShared / "tiff")) GTEST_SKIP() << "the images of other programs are not here";
   int n_equal = 0, n_without_reference = 0;
   std::string refused;
@@ -392,7 +400,7 @@ TEST_F(Image, real_files_decode_as_by_other_programs_or_are_refused) {
   std::printf("%d equal, %d decoded here only, refused:\n%s", n_equal, n_without_reference, refused.c_str());
 }
 
-TEST_F(Image, real_calibrations_are_found) {
+TEST(Image, real_calibrations_are_found) {
   if (!fs::exists(kShared / "tiff")) GTEST_SKIP() << "the images of other programs are not here";
   const std::pair<const char*, std::optional<double>> cases[] = {
       {"tiff/imagej153t/hyperstack_c2z3t4_16bit_micron.tif", 0.1625},
