@@ -182,7 +182,7 @@ TEST(Documents, the_catalogue_lists_every_hard_case) {
     for (std::sregex_iterator at(text.begin(), text.end(), any_test), end; at != end; ++at) {
       std::string name = (*at)[1];
       std::replace(name.begin(), name.end(), '_', ' ');
-      EXPECT_TRUE(has_words(page, "\n| " + name + " |")) << name << ": give it a row in docs/developers/hard-cases.md";
+      EXPECT_TRUE(has_words(page, name + " |")) << name << ": give it a row in docs/developers/hard-cases.md";
     }
   }
 }

@@ -187,8 +187,7 @@ TEST_F(Chain, tensions_of_the_oracle_cells_come_back_from_the_displacement_of_th
   const fs::path reference = test::source_folder() / "../shared/reference";
   if (!fs::exists(reference)) GTEST_SKIP() << "no ../shared/reference here";
   for (const char* name : {"oracle_cell_21", "oracle_cell_22"}) {
-    const TemporaryFolder folder;
-    const fs::path cell = folder / "cell";
+    const fs::path cell = folder / name;
     fs::copy(reference / name, cell, fs::copy_options::recursive);
     fs::permissions(cell, fs::perms::owner_write, fs::perm_options::add);
     for (const auto& entry : fs::recursive_directory_iterator(cell))

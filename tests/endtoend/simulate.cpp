@@ -21,8 +21,7 @@ TEST_F(Simulate, every_scenario_makes_a_cell_that_reads_back) {
   for (const auto& entry : fs::directory_iterator(test::source_folder() / "samples" / "scenarios")) {
     const std::string name = entry.path().stem().string();
     SCOPED_TRACE(name);
-    const test::TemporaryFolder folder;
-    const fs::path cell = folder / "cell";
+    const fs::path cell = folder / name;
     output_of(simulate("--beads 500 --mesh_um 6 --scenario " + name + " --out " + cell.string()));
     if (fs::exists(cell / "truth" / "sheet.csv")) {  // a contracting sheet
       EXPECT_FALSE(files::read_outline(cell / "1_segment" / "outline.csv").empty());
