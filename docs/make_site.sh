@@ -1,16 +1,19 @@
 #!/usr/bin/env bash
 # The pages as a site for a browser, by Debian's mkdocs, from the same Markdown:
-#   docs/make_site.sh OUT
+#   docs/make_site.sh OUT [BUILD]
+# BUILD (build, unless given) has the pages that are made, in its docs/: parameters, columns, findings, plausible values.
 # Its menu is the tables of docs/README.md. The theme (mkdocs' own, as Debian has it) brings its fonts and scripts along; nothing is
 # loaded from the network. Links that lead nowhere are errors. Exit code 77: mkdocs is not installed.
 set -euo pipefail
-[ $# -eq 1 ] || { echo "usage: docs/make_site.sh OUT" >&2; exit 2; }
+[ $# -eq 1 ] || [ $# -eq 2 ] || { echo "usage: docs/make_site.sh OUT [BUILD]" >&2; exit 2; }
 command -v mkdocs >/dev/null || { echo "mkdocs is not installed: apt-get install mkdocs" >&2; exit 77; }
 mkdir -p "$1"
 out=$(realpath "$1") project=$(realpath "$(dirname "$0")/..")
+build=$(realpath -m "${2:-$project/build}")
+[ -e "$build/docs/parameters.md" ] || { echo "$build/docs has no pages: build all programs first (./samples/demo.sh --all)" >&2; exit 2; }
 work=$(mktemp -d "${TMPDIR:-/tmp}/mbtfm-site.XXXXXX")
 trap 'rm -rf "$work"' EXIT
-python3 - "$project" "$work" "$out" <<'PYTHON'
+python3 - "$project" "$work" "$out" "$build" <<'PYTHON'
 """Copies the pages and what they link to, at the same relative places, and writes mkdocs.yml."""
 import json
 import os
@@ -18,14 +21,16 @@ import re
 import shutil
 import sys
 
-project, work, out = sys.argv[1:]
+project, work, out, build = sys.argv[1:]
 pages = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "python/README.md", "samples/README.md"]
 for folder, _, files in os.walk(os.path.join(project, "docs")):
     pages += [os.path.relpath(os.path.join(folder, f), project) for f in files if f.endswith(".md")]
+made = [os.path.join("docs", f) for f in ("parameters.md", "columns.md", "findings.md", "plausible.md")]
+pages += made
 
 
 def read(page):
-    with open(os.path.join(project, page), encoding="utf-8") as file:
+    with open(os.path.join(build if page in made else project, page), encoding="utf-8") as file:
         return file.read()
 
 

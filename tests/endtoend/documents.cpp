@@ -2,6 +2,7 @@
 #include <cctype>
 #include <regex>
 
+#include "docs/pages.h"
 #include "tests/support/plain_words.h"
 #include "tests/support/program.h"
 
@@ -126,11 +127,17 @@ TEST(CurvedGels, every_command_runs) {
     EXPECT_TRUE(fs::is_regular_file(folder / file)) << file;
 }
 
-std::vector<fs::path> pages() {
-  std::vector<fs::path> list = {kProject / "README.md", kProject / "CONTRIBUTING.md", kProject / "python/README.md",
-                                kProject / "samples/README.md"};
+/// A page by its name from the root; those that are made lie in the build.
+fs::path file_of(const fs::path& page) {
+  return fs::exists(kProject / page) ? kProject / page : test::build_folder() / page;
+}
+
+/// Names from the root.
+std::vector<fs::path> all_pages() {
+  std::vector<fs::path> list = {"README.md", "CONTRIBUTING.md", "python/README.md", "samples/README.md"};
+  for (const char* name : pages::kMade) list.push_back(fs::path("docs") / name);
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kDocs))
-    if (entry.path().extension() == ".md") list.push_back(entry.path());
+    if (entry.path().extension() == ".md") list.push_back(entry.path().lexically_relative(kProject));
   std::sort(list.begin(), list.end());
   return list;
 }
@@ -174,23 +181,25 @@ std::set<std::string> anchors_of(const fs::path& page) {
 
 TEST(DocumentPages, every_link_between_them_leads_to_a_file_and_a_title_in_it) {
   const std::regex link(R"(\]\(([^)#:]*)(#[^)]*)?\))");
-  for (const fs::path& page : pages()) {
-    const std::string text = files::read_text(page);
+  std::vector<fs::path> linking = all_pages();
+  for (const fs::directory_entry& entry : fs::directory_iterator(kProject / "notes"))
+    if (entry.path().extension() == ".md") linking.push_back(entry.path().lexically_relative(kProject));
+  for (const fs::path& page : linking) {
+    const std::string text = files::read_text(file_of(page));
     for (std::sregex_iterator at(text.begin(), text.end(), link), end; at != end; ++at) {
       const std::string file = (*at)[1], anchor = (*at)[2];
-      const fs::path target = file.empty() ? page : page.parent_path() / file;
-      EXPECT_TRUE(fs::exists(target)) << page.lexically_relative(kProject) << " links to " << file;
+      const fs::path target = file_of(file.empty() ? page : (page.parent_path() / file).lexically_normal());
+      EXPECT_TRUE(fs::exists(target)) << page << " links to " << file;
       if (anchor.empty() || target.extension() != ".md" || !fs::exists(target)) continue;
-      EXPECT_TRUE(anchors_of(target).contains(anchor.substr(1)))
-          << page.lexically_relative(kProject) << " links to " << file << anchor;
+      EXPECT_TRUE(anchors_of(target).contains(anchor.substr(1))) << page << " links to " << file << anchor;
     }
   }
 }
 
 TEST(DocumentPages, the_index_names_every_page) {
   const std::string index = files::read_text(kDocs / "README.md");
-  for (const fs::path& page : pages()) {
-    const std::string name = page.lexically_relative(kDocs).generic_string();
+  for (const fs::path& page : all_pages()) {
+    const std::string name = page.lexically_relative("docs").generic_string();
     if (name.starts_with("..") || name == "README.md") continue;
     EXPECT_TRUE(has_words(index, "(" + name + ")")) << name << " is not in docs/README.md";
   }
@@ -212,7 +221,7 @@ TEST(DocumentPages, every_command_and_exit_code_is_on_its_page) {
   }
   const std::string errors = files::read_text(kProject / "pipeline/contract/errors.h");
   const std::regex code(R"(inline constexpr int k\w+ = (\d+);)");
-  for (const char* name : {"commands.md", "troubleshooting.md", "formats.md"}) {
+  for (const char* name : {"commands.md", "troubleshooting.md"}) {
     const std::string page = files::read_text(kDocs / name);
     for (std::sregex_iterator at(errors.begin(), errors.end(), code), end; at != end; ++at)
       EXPECT_TRUE(has_words(page, "\n| " + (*at)[1].str() + " |")) << name << ": " << (*at)[1];
@@ -221,10 +230,10 @@ TEST(DocumentPages, every_command_and_exit_code_is_on_its_page) {
 
 /// Those of theory are for readers of equations.
 TEST(DocumentPages, for_users_have_plain_words) {
-  for (const fs::path& page : pages()) {
-    const std::string name = page.lexically_relative(kProject).generic_string();
-    if (name.starts_with("docs/developers/") || name.starts_with("docs/theory") || name == "CONTRIBUTING.md") continue;
-    for (const std::string& line : test::lines_of_prose(files::read_text(page)))
+  for (const fs::path& page : all_pages()) {
+    const std::string name = page.generic_string();
+    if (name.starts_with("docs/theory") || name == "CONTRIBUTING.md") continue;
+    for (const std::string& line : test::lines_of_prose(files::read_text(file_of(page))))
       for (const std::string& found : test::unplain_words_in(line)) ADD_FAILURE() << name << ": " << found;
   }
 }
@@ -260,7 +269,7 @@ std::vector<int> sentence_lengths(const fs::path& page) {
 }
 
 void expect_short_sentences(const std::string& page, int median, int p90) {
-  const std::vector<int> lengths = sentence_lengths(kDocs / page);
+  const std::vector<int> lengths = sentence_lengths(file_of((fs::path("docs") / page).lexically_normal()));
   ASSERT_FALSE(lengths.empty()) << page;
   EXPECT_LE(lengths[lengths.size() / 2], median) << page;
   EXPECT_LE(lengths[9 * lengths.size() / 10], p90) << page;
@@ -278,12 +287,12 @@ TEST(DocumentPages, have_short_sentences) {
        30,
        {"../README.md", "tutorial.md", "faq.md", "glossary.md", "acquire.md", "correct-by-hand.md",
         "troubleshooting.md", "limits.md", "statistics.md", "batches.md", "install.md", "planning.md", "curved-gels.md",
-        "sheets.md", "accuracy-and-cost.md", "paraview.md", "../python/README.md"}},
+        "sheets.md", "how-good.md", "paraview.md", "../python/README.md"}},
       {22,
        40,
        {"README.md", "commands.md", "parameters.md", "columns.md", "plausible.md", "effects.md", "findings.md",
-        "formats.md", "resolution.md", "degradations.md", "theory.md", "validation.md", "accuracy.md", "extending.md",
-        "../samples/README.md", "../CONTRIBUTING.md"}}};
+        "formats/cell-folder.md", "formats/tables.md", "formats/other-programs.md", "formats/json.md", "theory.md",
+        "accuracy.md", "extending.md", "../samples/README.md", "../CONTRIBUTING.md"}}};
   for (const Bar& bar : bars)
     for (const char* page : bar.pages) expect_short_sentences(page, bar.median, bar.p90);
 }

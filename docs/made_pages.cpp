@@ -1,0 +1,118 @@
+#include "docs/pages.h"
+
+#include <map>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+#include "continuum/mean/outputs.h"
+#include "continuum/sheet/borders.h"
+#include "continuum/sheet/tables.h"
+#include "continuum/solids/outputs.h"
+#include "mbtfm/plan/tables.h"
+#include "mbtfm/sheets/tables.h"
+#include "mbtfm/spatial/files.h"
+#include "mbtfm/tensions/tables.h"
+#include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/findings.h"
+#include "pipeline/cost/study_report.h"
+#include "pipeline/files/tables.h"
+#include "pipeline/runner/batch_table.h"
+#include "pipeline/runner/process.h"
+#include "pipeline/stage/plausible.h"
+#include "pipeline/statistics/study_files.h"
+
+namespace mbtfm::pages {
+namespace {
+
+constexpr const char* kStages[] = {"segment", "track", "network", "contract", "fit",      "traction",
+                                   "plan",    "sheet", "indent",  "mean",     "simulate", "stats"};
+
+/// What a new user sets first, and then asks for.
+struct Needed {
+  const char *stage, *table, *key;
+};
+constexpr Needed kNeeded[] = {{"segment", "", "pixel_size_um"},    {"fit", "gel", "youngs_modulus_kPa"},
+                              {"fit", "gel", "poisson_ratio"},     {"fit", "gel", "thickness_um"},
+                              {"segment", "segment", "adhesions"}, {"segment", "segment", "fibre_false_per_cell"},
+                              {"track", "track", "method"},        {"track", "track", "z_points"},
+                              {"fit", "substrate", "model"},       {"fit", "fit", "n_meshes"}};
+
+/// The cells of a parameter's row: key, default, value, meaning.
+std::vector<std::string> row_of(const std::string& output, const Needed& needed) {
+  const std::string table = needed.table, key = needed.key;
+  const std::string title = table.empty() ? "### Above the first table" : "### `[" + table + "]`";
+  std::istringstream lines(output);
+  bool is_table = false;
+  std::vector<std::string> cells;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("### ")) is_table = line == title;
+    if (!is_table || !line.starts_with("| `" + key + "` |")) continue;
+    std::string rest = line.substr(2, line.size() - 4);
+    for (auto end = rest.find(" | "); end != rest.npos; end = rest.find(" | ")) {
+      cells.push_back(rest.substr(0, end));
+      rest.erase(0, end + 3);
+    }
+    cells.push_back(rest);
+    break;
+  }
+  if (cells.size() != 4) throw std::runtime_error(std::string(needed.stage) + ": " + title + ": no row of " + key);
+  return cells;
+}
+
+std::string needed_table(const std::map<std::string, std::string>& outputs) {
+  std::string text =
+      "\n## The ten you need\n\nThe first four set the size of every force: check them first. The others help if a "
+      "result is not what you expect.\n\n| key | table | program | default | meaning |\n|---|---|---|---|---|\n";
+  for (const Needed& needed : kNeeded) {
+    const std::vector<std::string> cells = row_of(outputs.at(needed.stage), needed);
+    const std::string table = needed.table;
+    text += "| " + cells[0] + " | " + (table.empty() ? "above the first" : "`[" + table + "]`") + " | `mbtfm-" +
+            needed.stage + "` | " + cells[1] + " | " + cells[3] + " |\n";
+  }
+  return text;
+}
+
+std::string output_of(const std::filesystem::path& program, const std::string& flag) {
+  std::string output;
+  const auto result = runner::run_process({program.string(), flag}, {}, [&](std::string_view text) { output += text; });
+  if (result.exit_code != 0 || result.signal)
+    throw std::runtime_error(program.string() + " " + flag + ": " + runner::how_it_ended(result) + ": " + output);
+  return output;
+}
+
+}  // namespace
+
+std::string parameter_page(const std::filesystem::path& programs) {
+  std::map<std::string, std::string> outputs;
+  for (const char* stage : kStages)
+    outputs[stage] = output_of(programs / ("mbtfm-" + std::string(stage)), "--parameters");
+  std::string page =
+      "# Parameters\n\nMade by the programs themselves (`mbtfm-<stage> --parameters`). Each is a key of `cell.toml` "
+      "and a flag of its\nprogram; flags win. `mbtfm-simulate` reads its tables from a scenario file. How much is "
+      "computed is set\nby a flag of `mbtfm run`: `--preset` ([accuracy](accuracy.md#presets-accuracy-and-time)).\n" +
+      needed_table(outputs);
+  for (const char* stage : kStages) page += "\n## `mbtfm-" + std::string(stage) + "`\n" + outputs[stage];
+  return page;
+}
+
+std::string column_page() {
+  return "# Columns\n\nEvery table of a cell folder, a batch and a study, column by column. The other files are in\n"
+         "[the cell folder](formats/cell-folder.md). *May be missing*: older files, or files made elsewhere, need not "
+         "have this column.\n"
+         "Results have six significant digits; numbers that a later stage computes with have all digits.\n" +
+         files::pages_of_cell_tables() + tensions::pages_of_tables() + tractions::pages_of_tables() +
+         sheet::pages_of_tables() + sheet::pages_of_cells() + sheets::pages_of_tables() + solids::pages_of_tables() +
+         mean::pages_of_tables() + spatial::pages_of_tables() + runner::pages_of_tables() + cost::pages_of_tables() +
+         statistics::pages_of_tables() + plan::pages_of_tables();
+}
+
+std::string made_page(const std::string& name, const std::filesystem::path& programs) {
+  if (name == "parameters.md") return parameter_page(programs);
+  if (name == "columns.md") return column_page();
+  if (name == "findings.md") return findings_page();
+  if (name == "plausible.md") return stage::plausible_page();
+  throw std::runtime_error("no page is made of the name " + name);
+}
+
+}  // namespace mbtfm::pages
