@@ -460,7 +460,7 @@ int start(int argc, char** argv) {
     command->add_flag("--verbose", line.is_verbose, "print every effect with its number, and why a stage is run");
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", kFolder);
   for (CLI::App* command : {run_command, batch_command, check_command})
-    command->add_flag("--json", line.is_json, "print events as JSON, one object a line (docs/formats.md)");
+    command->add_flag("--json", line.is_json, "print events as JSON, one object a line (docs/formats/json.md)");
   add_stage_options(batch_command, line);
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
   batch_command

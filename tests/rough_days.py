@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Simulate and run acquisitions as laboratories make them, and count what came of them (docs/validation.md).
+"""Simulate and run acquisitions as laboratories make them, and count what came of them (notes/validation.md).
 
     tests/rough_days.py FOLDER FIRST LAST [--bin build/bin]
 

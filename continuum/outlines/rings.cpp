@@ -85,7 +85,7 @@ Rings read_rings(const Path& file, const std::optional<double>& pixel_um) {
 }
 
 double usual_error_um(const Path& file, const std::optional<double>& pixel_um) {
-  // half a pixel of those that mbtfm-segment finds (docs/developers/sheets.md); hands follow an edge to some pixels
+  // half a pixel of those that mbtfm-segment finds (notes/sheets.md); hands follow an edge to some pixels
   constexpr double kFound_um = 0.05, kDrawn_um = 0.5;
   const bool is_selection = file.extension() == ".roi" || file.extension() == ".zip";
   const files::OutlineSource source = is_selection                 ? files::OutlineSource::drawn

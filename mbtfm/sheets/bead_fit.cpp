@@ -145,7 +145,7 @@ class Errors {
 };
 
 /// At rest, unless it is asked for: on coarse triangles the odds of the other state mistake their error for it
-/// (docs/developers/sheets.md).
+/// (notes/sheets.md).
 tensions::BeadsOfState state_of(const Question& q, const Fitter& fitter, const DisplacementField& beads) {
   const Switch setting = q.under_load == Switch::on ? Switch::on : Switch::off;
   return tensions::take_state(

@@ -95,7 +95,7 @@ Basis spot_basis(const TractionMesh& mesh, const Ground& ground, double width_um
 
 double spot_width_um(double bead_distance_um) {
   // as wide, at half their height, as 1.3 distances: measured, with 0.9 and 1.7 of them maps are 7 to 20 % worse
-  // (docs/developers/tractions_in_space.md)
+  // (notes/tractions_in_space.md)
   constexpr double kDistances = 0.55;
   return kDistances * bead_distance_um;
 }

@@ -73,7 +73,7 @@ void find_doubts(const Problem& problem, const SpatialParameters& parameters, Sp
   if (r.degrees > 0 && !has_few_unknowns) {
     constexpr double kEnough = 24;  // as the table of findings has it
     // Ten times the noise tells 4.5 times fewer numbers, and noise falls as the root of the number of beads: they grow
-    // about as its cube root. Measured (docs/developers/tractions_in_space.md).
+    // about as its cube root. Measured (notes/tractions_in_space.md).
     const double ratio = kEnough / r.degrees;
     r.findings.push_back(noticed(FindingKind::beads_tell_little, ratio,
                                  "The beads tell " + brief(r.degrees) + " numbers of the tractions; " +

@@ -183,7 +183,7 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& reconstr
 std::optional<Finding> noticed_imbalance(const Balance& balance);
 
 /// Forces closer together than this look like one; from about twice that on they are mostly seen as two
-/// (docs/developers/planning.md). The side of the area over which the beads tell one number for
+/// (notes/planning.md). The side of the area over which the beads tell one number for
 /// each component.
 std::vector<double> resolution_um(const Problem& problem, const SpatialReconstruction& reconstruction);
 

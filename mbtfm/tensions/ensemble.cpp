@@ -58,7 +58,7 @@ void add_errors(MeshFit& mesh, const EnsembleFit& all) {
 }
 
 /// Forces are not linear in the tensions, which matters only where these are badly known: relative to the network's,
-/// the bias falls with the square of its standard error, and is 8 % where that is a half (docs/validation.md).
+/// the bias falls with the square of its standard error, and is 8 % where that is a half (notes/validation.md).
 double network_bias(const MeshFit& mesh, const TensionProblem& problem, int threads) {
   constexpr double kWellKnown = 0.3, kBadlyKnown = 0.4;  // 3 % and 5 % there: not asked for below, in full above
   const double tension = mesh.local.tensions_nN[0], standard_error = std::sqrt(mesh.covariance_nN2(0, 0));

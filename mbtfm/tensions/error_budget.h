@@ -15,7 +15,7 @@ namespace mbtfm::tensions {
 struct EnsembleFit;
 
 /// Standard errors of what the segmentation measures. Found on simulated cells of ordinary image quality, outliers
-/// included (docs/developers/cost-tables.md). For a segmentation that is known to be exact: zero.
+/// included (notes/cost-tables.md). For a segmentation that is known to be exact: zero.
 struct SegmentationErrors {
   double adhesion_shift_error_um = 0.017;  ///< of each coordinate of a centre
   double adhesion_area_error = 0.1;        ///< relative

@@ -6,7 +6,7 @@
 /// in proportion to N_a, what the links of the actin network bring to the adhesion, as of a load that many links share
 /// at random, and to a twentieth of what its fibres bring, whose ends spread over it. (Measured on networks of four
 /// formulations, `other_network forces`: phi is the same within a half from loads of 0.03 to 2 nN.) It is not used to
-/// weigh the data (what meshes tell of it adds more noise than it takes away: docs/validation.md) but makes the
+/// weigh the data (what meshes tell of it adds more noise than it takes away: notes/validation.md) but makes the
 /// tensions' error bars.
 #pragma once
 

@@ -10,7 +10,7 @@ namespace mbtfm {
 
 struct Report;
 
-/// How a program ends (docs/formats.md, "Exit codes").
+/// How a program ends (docs/commands.md, "Exit codes").
 namespace exit_code {
 inline constexpr int kDone = 0;
 inline constexpr int kFailed = 1;  ///< of a batch: some cells failed

@@ -4,7 +4,7 @@
 
 namespace mbtfm::cost {
 
-// What each setting gains and costs: docs/developers/cost-tables.md.
+// What each setting gains and costs: notes/cost-tables.md.
 const std::vector<Preset>& presets() {
   static const std::vector<Preset> list = {
       {"fast",

@@ -26,7 +26,7 @@ enum class Detail {
 /// One line for the stage; below it, indented, its findings and effects.
 std::string text_of(const StageTold& told, Detail detail);
 
-/// JSON objects, one a line: the stage, its findings, its effects (docs/formats.md, "Events").
+/// JSON objects, one a line: the stage, its findings, its effects (docs/formats/json.md, "Events").
 std::string events_of(const StageTold& told);
 /// What a first look at a cell's images found, as `mbtfm check --json` prints it.
 struct ImageLook {

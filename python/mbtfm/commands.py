@@ -16,7 +16,7 @@ from .cell import Cell, PathLike, read
 
 @dataclass(frozen=True)
 class Event:
-    """One line of `mbtfm run --json` (docs/formats.md): ``kind`` is stage, progress, finding, effect, result or error."""
+    """One line of `mbtfm run --json` (docs/formats/json.md): ``kind`` is stage, progress, finding, effect, result or error."""
 
     kind: str
     content: Mapping[str, Any] = field(default_factory=dict)
@@ -34,7 +34,7 @@ class Event:
 
 
 class ProgramFailed(RuntimeError):
-    """A program ended with an error. ``exit_code`` as in docs/formats.md; the message is the program's own."""
+    """A program ended with an error. ``exit_code`` as in docs/commands.md; the message is the program's own."""
 
     def __init__(self, program: str, exit_code: int, message: str) -> None:
         super().__init__(message or f"{program} ended with exit code {exit_code}")

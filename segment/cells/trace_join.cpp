@@ -128,7 +128,7 @@ double over_noise_between(const Parabola& way, const Ridges& ridges) {
 
 /// How badly two fibres fit to one across a gap, over how bright the way between them is; nothing where they do not.
 /// Fibres that lie on one parabola to a fraction of their width, with something brighter than texture between them, are
-/// nearly always one; the brighter the way, the less they need to fit: measured in docs/developers/dense_fibres.md.
+/// nearly always one; the brighter the way, the less they need to fit: measured in notes/dense_fibres.md.
 std::optional<double> mismatch_across(const EndPoint& a, const EndPoint& b, const Ridges& ridges,
                                       const TraceRule& rule) {
   constexpr double kBrighter = 0.4;  // the way between two fibres that are not one is rarely so bright

@@ -168,7 +168,7 @@ greens::PointForceField averaged_field(const Gel& gel, const substrate::Ellipse&
   return sum;
 }
 
-/// With 2 cells of the grid over the thickness (docs/accuracy.md); it falls as the cube of their size.
+/// With 2 cells of the grid over the thickness (notes/accuracy.md); it falls as the cube of their size.
 constexpr double kErrorOfTwoCells = 1e-3;
 
 substrate::SubstrateParameters with_cells_for(substrate::SubstrateParameters parameters, double tolerance) {

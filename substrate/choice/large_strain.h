@@ -30,7 +30,7 @@ class LargeStrain {
   substrate::LazyResponse response_;  ///< of those taken
 };
 
-/// Relative L2 error of the change by its elements, at beads all over the surface: measured (docs/accuracy.md).
+/// Relative L2 error of the change by its elements, at beads all over the surface: measured (notes/accuracy.md).
 constexpr double kStrainElementsError = 0.35;
 
 /// Of forces spread over ellipses: the root mean square of the tractions, by the squares of the forces, as these make
@@ -39,7 +39,7 @@ double mean_traction_kPa(const std::vector<substrate::Ellipse>& ellipses, const 
 
 /// What linear theory leaves out of the displacement, as a share of its L2 norm, within a factor of two: everywhere in
 /// the gel, or at beads all over its surface, most of them far from the adhesions, which are small. Measured
-/// (docs/accuracy.md).
+/// (notes/accuracy.md).
 double left_out_in_gel(const Gel& gel, double traction_kPa);
 double left_out_at_beads(const Gel& gel, double traction_kPa);
 

@@ -32,7 +32,7 @@ Field solve_linear(const Gel& gel, std::shared_ptr<const Block> block, const Loa
                    const numerics::FactorOptions& options);
 
 /// Layers from 0 to a depth, n of them, each 1.4 times as thick as the one above: of four, the error of a field at
-/// depth is a third lower than of even ones (docs/accuracy.md).
+/// depth is a third lower than of even ones (notes/accuracy.md).
 std::vector<double> layers_um(double depth_um, int n);
 
 }  // namespace mbtfm::curved

@@ -80,7 +80,7 @@ TEST(Sheet, discs_on_springs_are_the_closed_form) {
     const int of_case = csv.integer(row, "case", 0);
     const auto value = [&](const char* column) { return csv.number(row, column); };
     const double R = value("radius_um");
-    if (R > 30 * value("penetration_um")) {  // meshes of 100 000 nodes and more: docs/developers/sheets.md
+    if (R > 30 * value("penetration_um")) {  // meshes of 100 000 nodes and more: notes/sheets.md
       while (row < csv.n_rows() && csv.integer(row, "case", 0) == of_case) ++row;
       continue;
     }
@@ -233,7 +233,7 @@ TEST(Sheet, tips_of_spikes_pull_more_than_a_disc_where_the_penetration_length_is
   for (int row = 0; row < csv.n_rows(); ++row) {
     const auto value = [&](const char* column) { return csv.number(row, column); };
     const double l = value("penetration_um"), R = value("radius_um"), a = value("spike_height_um"), w = value("w");
-    if (a != 50 || (l != 6 && l != 12 && l != 200)) continue;  // the others: docs/developers/sheets.md
+    if (a != 50 || (l != 6 && l != 12 && l != 200)) continue;  // the others: notes/sheets.md
     const auto pull_at_tip = [&](double spike_um) {
       const auto radius = [=](double t) { return R + spike_um * std::exp((std::cos(4 * t) - 1) / w); };
       Scene scene;

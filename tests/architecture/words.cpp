@@ -80,7 +80,7 @@ TEST(Words, are_compared_as_texts_in_readers_only) {
     n += in_file.size();
     for (const std::string& place : in_file) places += "\n" + place;
   }
-  EXPECT_LE(n, kMostElsewhere) << "declare an enumeration with words instead (docs/developers/folders.md):" << places;
+  EXPECT_LE(n, kMostElsewhere) << "declare an enumeration with words instead (CONTRIBUTING.md):" << places;
 }
 
 TEST(Words, readers_that_are_excused_compare_texts) {

@@ -195,7 +195,7 @@ TEST(Doublet, tensions_of_drawn_fibres_are_those_of_the_corner_forces) {
   }
   ASSERT_EQ(by_name.size(), 4u);
   // From the corner forces: the left straight fibre 88 to 116 nN, the right one 17 to 37, which the right corners' sums
-  // by regularised tractions give; by forces of the beads alone these are half as large again (docs/accuracy.md). The
+  // by regularised tractions give; by forces of the beads alone these are half as large again (notes/accuracy.md). The
   // intervals meet what lies between.
   const Tension &left = *by_name.at("ventral left"), &right = *by_name.at("ventral right");
   EXPECT_GT(left.high_nN.value_or(0), 88);

@@ -482,7 +482,7 @@ TEST_F(HostileCells, a_cell_folder_and_its_images_and_settings_may_be_links) {
 }
 
 TEST(HostileCellsPage, lists_every_way_that_is_tried) {
-  const std::string page = files::read_text(test::source_folder() / "docs/developers/reliability.md");
+  const std::string page = files::read_text(test::source_folder() / "notes/reliability.md");
   const auto begin = page.find("## Hostile cell folders");
   const std::string section = page.substr(begin, page.find("\n## ", begin) - begin);
   std::set<std::string> listed, tried;

@@ -241,7 +241,7 @@ TEST(AdhesionPair, few_exact_beads_are_worth_less_than_many_poor_ones) {
             1.3 * *resolution().least_distance_um(1, 8, of_10, 0.1));
 }
 
-/// Drawn experiments take minutes: docs/developers/planning.md has those of version 0.2.
+/// Drawn experiments take minutes: notes/planning.md has those of version 0.2.
 TEST(AdhesionPair, by_beads_in_a_volume_the_least_distance_asks_for_force_over_noise_and_modulus) {
   const BeadVolume volume{.depth_um = 12, .axial_noise = 3};
   const PairResolution pairs(kGel, 28, {0.002, 0.008}, volume, {4, 60}, kThreads);

@@ -52,7 +52,7 @@ TEST(Recurrences, agree_with_the_dense_decomposition_at_every_lambda_and_in_thei
     EXPECT_NEAR(chosen_lambda(ours, criterion) / chosen_lambda(theirs, criterion), 1, 0.05) << name_of(criterion);
   }
   // The risk of the tractions has the trace over lambda², in a difference: its flat minimum moves by a fifth with them
-  // (docs/developers/tractions_in_space.md), which must not cost more than a few per cent of the error.
+  // (notes/tractions_in_space.md), which must not cost more than a few per cent of the error.
   const double our_risk = chosen_lambda(ours, tractions::LambdaCriterion::risk),
                their_risk = chosen_lambda(theirs, tractions::LambdaCriterion::risk);
   EXPECT_LE(apart(dense.solve(our_risk), truth), 1.03 * apart(dense.solve(their_risk), truth));

@@ -1,7 +1,7 @@
-/// degradations FOLDER FIRST_SEED [cells] [names], or degradations page TABLE.csv > docs/degradations.md: what a cell's
-/// images go through in a laboratory, and what the program says of it. Each cell is simulated with images, degraded in
-/// one way, run whole (`mbtfm run`) and compared with its truth. A table (CSV) on stdout; `names` are separated by
-/// commas, "sound" is the undegraded one.
+/// degradations FOLDER FIRST_SEED [cells] [names], or degradations page TABLE.csv > notes/degradations.md: what a
+/// cell's images go through in a laboratory, and what the program says of it. Each cell is simulated with images,
+/// degraded in one way, run whole (`mbtfm run`) and compared with its truth. A table (CSV) on stdout; `names` are
+/// separated by commas, "sound" is the undegraded one.
 ///
 /// A degraded cell's error bars hold if at least 90 % of the tensions' 95 % intervals hold the truth, and the total
 /// force lies within three of its standard errors. The truth is that of the adhesions in view. Where they do not, the
@@ -703,7 +703,7 @@ void study(const Degradation& d, int seed, const fs::path& folder) {
   std::fflush(stdout);
 }
 
-/// docs/degradations.md, of a table that this program wrote.
+/// notes/degradations.md, of a table that this program wrote.
 void print_page(const fs::path& file) {
   const files::CsvTable table(file);
   std::printf(
@@ -711,14 +711,15 @@ void print_page(const fs::path& file) {
       "What images go through in a laboratory, and what the program says of it. Simulated cells (scenario `u2os`, "
       "images of\n"
       "ordinary quality) were degraded in one way each and run as they are (`mbtfm run`). Made by "
-      "`docs/make_degradations.sh`.\n\n"
+      "`notes/make_degradations.sh`.\n\n"
       "- **bars hold**: cells of which at least 90 %% of the tensions' 95 %% intervals hold the truth (one fibre more "
       "may miss,\n"
       "  as one of twenty does by chance) and the total force lies within three standard errors of the truth. Of a "
       "cell that\n"
       "  the border cuts, both are those of the adhesions in view.\n"
       "- **error**: of the tensions, relative; of two cells the larger, of more the median.\n"
-      "- **open findings** ([list](findings.md)): those of at least half of the cells; of sound cells all of them, "
+      "- **open findings** ([list](../docs/findings.md)): those of at least half of the cells; of sound cells all of "
+      "them, "
       "with the number of\n"
       "  cells. A cell with one has no green tick.\n"
       "- **named**: of the cells that were refused or whose bars do not hold, those of which a finding or the refusal "

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Make docs/degradations.md: three simulated cells, degraded in each way, and twenty that are sound. Run from the
+# Make notes/degradations.md: three simulated cells, degraded in each way, and twenty that are sound. Run from the
 # project's folder, built; takes some seventy minutes of one processor. What was made before is kept in the work folder
 # (build/degradations).
 set -euo pipefail
@@ -12,4 +12,4 @@ table() { # name, first seed, number of cells, names
 table sound 41 20 sound
 table degraded 61 3 "$(build/tests/degradations | sed -n 's/^| `\([^`]*\)`.*/\1/p' | grep -vx sound | paste -sd,)"
 { cat "$work/sound.csv"; tail -qn +2 "$work/degraded.csv"; } >"$work/all.csv"
-build/tests/degradations page "$work/all.csv" >docs/degradations.md
+build/tests/degradations page "$work/all.csv" >notes/degradations.md

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Make the figures of chapter 4 in docs/validation.md: means of 17 simulated colonies (thesis figs. 4.2 to 4.4) and the map of
+# Make the figures of chapter 4 in notes/validation.md: means of 17 simulated colonies (thesis figs. 4.2 to 4.4) and the map of
 # the indentation (fig. 4.7). Run from the project's folder, built; some three minutes. Needs the Debian package chromium.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-bin=$PWD/build/bin work=${1:-build/chapter4} out=docs/images/validation
+bin=$PWD/build/bin work=${1:-build/chapter4} out=notes/images/validation
 mkdir -p "$work" "$out"
 picture() { # SVG, PNG, width, height
   chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir="$work/profile" --window-size="$3,$4" \

@@ -1,13 +1,13 @@
 #!/bin/sh
-# Make docs/images/validation/calibration.svg (thesis fig. 3.8 and 3.9): simulated cells, fitted, beside FTTC.
+# Make notes/images/validation/calibration.svg (thesis fig. 3.8 and 3.9): simulated cells, fitted, beside FTTC.
 #
-#   docs/make_calibration.sh [CELLS] [FOLDER]
+#   notes/make_calibration.sh [CELLS] [FOLDER]
 #
 # Needs build/bin. Cells of one mesh and 4 000 beads: the total force hangs on neither.
 set -eu
 
-docs=$(cd "$(dirname "$0")" && pwd)
-bin=$docs/../build/bin
+notes=$(cd "$(dirname "$0")" && pwd)
+bin=$notes/../build/bin
 cells=${1:-8}
 folder=${2:-$(mktemp -d)}
 for seed in $(seq 1 "$cells"); do
@@ -16,4 +16,4 @@ for seed in $(seq 1 "$cells"); do
   "$bin/mbtfm" run "$folder/cell$seed"
 done
 "$bin/mbtfm-calibrate" --cells "$folder" --out "$folder/calibration.csv"
-cp "$folder/calibration.svg" "$docs/images/validation/calibration.svg"
+cp "$folder/calibration.svg" "$notes/images/validation/calibration.svg"

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Remake the tables of "A sheet beside the cables" in docs/developers/doublet.md: the real doublet on an H, fitted with
+# Remake the tables of "A sheet beside the cables" in notes/doublet.md: the real doublet on an H, fitted with
 # cables and with contracting sheets. Run from the project's folder, built; some ten minutes of one processor. Needs the
 # doublet's images ($1, or ../shared/data/real/doublet_on_h). What was made before is kept in the work folder
 # (build/doublet).
 set -euo pipefail
 cd "$(dirname "$0")/.."
-data=${1:-../shared/data/real/doublet_on_h} work=${2:-build/doublet} bin=$PWD/build/bin page=docs/developers/doublet.md
+data=${1:-../shared/data/real/doublet_on_h} work=${2:-build/doublet} bin=$PWD/build/bin page=notes/doublet.md
 cell=$work/cell
 if [ ! -s "$cell/4_fit/models.csv" ]; then
   mkdir -p "$cell"

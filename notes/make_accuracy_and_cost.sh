@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Make docs/accuracy-and-cost.md (the presets) and docs/developers/cost-tables.md (the cost studies of simulated
+# Make notes/presets.md (the presets) and notes/cost-tables.md (the cost studies of simulated
 # cells). Run from the project's folder, built, on an idle machine: it counts processor time, which a busy machine
 # lengthens, too. MINUTES (15) is the budget of each of the two cost studies; what was made before is kept in the work
 # folder (build/accuracy-and-cost) and not made again.
@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 bin=$PWD/build/bin
 work=${1:-build/accuracy-and-cost}
-mkdir -p "$work" docs/images/cost
+mkdir -p "$work" notes/images/cost
 
 simulate() { # name, seed, more
   [ -d "$work/$1" ] || "$bin/mbtfm-simulate" --scenario u2os --seed "$2" --beads 10000 --quiet --out "$work/$1" "${@:3}"
@@ -49,8 +49,8 @@ study() { # name, title, cells
   for cell in "$@"; do [ -f "$work/$cell/run.json" ] || "$bin/mbtfm" run --quiet "$work/$cell"; done
   [ -f "$work/study_$name/cost.md" ] ||
     "$bin/mbtfm" cost --repeats 1 --budget "${MINUTES:-15}" --out "$work/study_$name" "${@/#/$work/}"
-  cp "$work/study_$name/cost.svg" "docs/images/cost/$name.svg"
-  sed -e "s|cost.svg|../images/cost/$name.svg|" -e "s|^## .*|## $title|" "$work/study_$name/cost.md"
+  cp "$work/study_$name/cost.svg" "notes/images/cost/$name.svg"
+  sed -e "s|cost.svg|images/cost/$name.svg|" -e "s|^## .*|## $title|" "$work/study_$name/cost.md"
 }
 
 # A round cell in space on 72 um of gel, with its surface given.
@@ -123,7 +123,7 @@ With noise, the presets differ little. For a single cell a coarser preset may co
 
 ## Cells in space
 
-Presets and `mbtfm cost` work for [cells in space](curved-gels.md), too. `mbtfm cost` then runs the stage `traction` alone, and the error is that of the map of
+Presets and `mbtfm cost` work for [cells in space](../docs/curved-gels.md), too. `mbtfm cost` then runs the stage `traction` alone, and the error is that of the map of
 tractions, ‖t̂ − t‖/‖t‖ over the surface, beside the truth or the finest choice. `--accuracy` is an error of fibre tensions and is refused.
 
 | preset | distance of the tractions over that of the beads | elements of the gel |
@@ -141,7 +141,7 @@ PAGE
   cat <<'PAGE'
 
 With noise a finer lattice shows no more. Its map may even be farther off, as more unknowns share the same data. What computing improves is `group-l1`, which is taken if
-adhesions are given: its map is the nearer the finer the lattice is ([measured](developers/tractions_in_space.md#meshes-of-the-gel-and-of-the-tractions)). `fast` is right for a first look at
+adhesions are given: its map is the nearer the finer the lattice is ([measured](tractions_in_space.md#meshes-of-the-gel-and-of-the-tractions)). `fast` is right for a first look at
 hundreds of stacks. The lattice of `high` is bounded by 1 100 vertices.
 
 ## What computing cannot improve
@@ -156,10 +156,10 @@ PAGE
   cat <<'PAGE'
 ```
 
-Then better data help: more beads, less noise, a softer gel ([plan an experiment](planning.md)).
+Then better data help: more beads, less noise, a softer gel ([plan an experiment](../docs/planning.md)).
 
-This page is made by `docs/make_accuracy_and_cost.sh`. How well the budget agrees with observed errors, and what each
-single setting costs, is in [cost tables](developers/cost-tables.md).
+This page is made by `notes/make_accuracy_and_cost.sh`. How well the budget agrees with observed errors, and what each
+single setting costs, is in [cost tables](cost-tables.md).
 PAGE
 } >"$work/page.md"
 
@@ -167,14 +167,14 @@ PAGE
   cat <<'PAGE'
 # Cost tables
 
-Made by `docs/make_accuracy_and_cost.sh`. Costs are seconds of processor time on two threads. Other programs on the machine lengthen
+Made by `notes/make_accuracy_and_cost.sh`. Costs are seconds of processor time on two threads. Other programs on the machine lengthen
 them far less than the time that passes. What each preset sets is in `pipeline/cost/presets.cpp`; what users need of this
-is in [accuracy and cost](../accuracy-and-cost.md).
+is in [presets](presets.md).
 
 ## Do the parts of the error budget add up?
 
 Root sums of squares (nN) over the fibres, or the cells' total forces, of simulated u2os cells with 7 % noise, whose seeds nothing
-was chosen on: what was observed, what the budget stated ([theory](../theory/errors.md#error-budget)), and its parts.
+was chosen on: what was observed, what the budget stated ([theory](../docs/theory/errors.md#error-budget)), and its parts.
 Seeds 101 to 110, from images 101 to 104. Measured with version 0.2 by a study that is no longer in the tree.
 
 | | observed | stated | ratio | beads | segmentation | mesh | substrate | solver | model |
@@ -189,5 +189,5 @@ PAGE
   echo
   study noisy "Seven per cent of noise, from images" imaged1 imaged2 imaged3
 } >"$work/tables.md"
-cp "$work/page.md" docs/accuracy-and-cost.md
-cp "$work/tables.md" docs/developers/cost-tables.md
+cp "$work/page.md" notes/presets.md
+cp "$work/tables.md" notes/cost-tables.md
