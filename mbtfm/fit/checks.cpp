@@ -71,10 +71,8 @@ ModelChecks check_model(const ReadyCell& cell, const EnsembleFit& fit, const Par
                      .drawn = cross_validation_of(cell, fit, p.fit.cross_validation, threads)};
   checks.left_out = leave_each_fibre_out(fit, checks.influence);
   if (is_sheet_asked(p.compare_sheet, checks.models, fit)) {
-    std::vector<Polygon> outline = {of.outline_um};
-    outline.insert(outline.end(), of.holes_um.begin(), of.holes_um.end());
-    if (auto sheet = sheets::score_of_sheet(data, outline, p.gel, *cell.gel, threads))
-      checks.models.push_back(std::move(*sheet));
+    for (ModelScore& sheet : sheets::scores_of_sheets(data, of, p.gel, *cell.gel, threads))
+      checks.models.push_back(std::move(sheet));
   }
   weigh_with_discrepancy(checks.models, data);
   return checks;

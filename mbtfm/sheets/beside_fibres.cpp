@@ -28,48 +28,71 @@ std::shared_ptr<const sheet::Elements> coarse_elements(const sheet::Region& regi
 
 /// None where the sheet finds no balance with its gel.
 std::optional<StiffnessTable> table_of(const std::shared_ptr<const sheet::Elements>& elements,
-                                       const sheet::OnGel& ground, const Gel& gel, const sheet::Region& region,
-                                       int threads) {
+                                       std::vector<sheet::Bundle> bundles, const sheet::OnGel& ground, const Gel& gel,
+                                       const sheet::Region& region, int threads) {
   try {
     return StiffnessTable({.elements = elements,
                            .contractions = {sheet::even(*elements, 1)},
                            .poisson_ratio = 0.5,
                            .n_rims = static_cast<int>(region.rims.size()),
-                           .has_line = false},
+                           .has_line = false,
+                           .bundles = std::move(bundles)},
                           ground, gel, sheet::narrow_um(region), threads);
   } catch (const NotSolved&) {
     return {};
   }
 }
 
+std::vector<sheet::Bundle> bundles_of(const std::vector<Fibre>& fibres, const sheet::Elements& elements) {
+  std::vector<sheet::Bundle> bundles;
+  for (const Fibre& fibre : fibres) {
+    try {
+      bundles.push_back(sheet::within(elements, {{fibre.fibre_id, fibre.points_um}}).front());
+    } catch (const InvalidData&) {  // it leaves the sheet between
+    }
+  }
+  return bundles;
+}
+
+tensions::ModelScore score_of(const char* name, tensions::LinearData data, const StiffnessTable& table,
+                              const substrate::Response& of_patches) {
+  const double variance = tensions::noise_variance(data);
+  const VectorXd displacement_um = data.displacement_um, weight = data.bead_weight;
+  data.motions.forces.resize(0, 0);  // of adhesions, which the sheet has none of
+  data.response = substrate::dense_response(of_patches.displace(table.forces_nN()), data.threads);
+  data = tensions::reweighted(std::move(data), weight);
+  const SheetFit fit = fit_sheet(data, table, tensions::Loss::squares);
+  const double misfit = (tensions::displace(data.reduced, fit.node_amplitudes) - data.reduced.target).squaredNorm() +
+                        data.reduced.floor_squared;
+  tensions::ModelScore score = tensions::score_of(name, table.n_loads() + 1, misfit / variance,
+                                                  tensions::relative_l2(data, fit.node_amplitudes), data);
+  score.left_um = displacement_um - data.response->displace(fit.node_amplitudes);
+  return score;
+}
+
 }  // namespace
 
-std::optional<tensions::ModelScore> score_of_sheet(const tensions::LinearData& data,
-                                                   const std::vector<Polygon>& outline_um, const Gel& gel,
+std::vector<tensions::ModelScore> scores_of_sheets(const tensions::LinearData& data, const Cell& cell, const Gel& gel,
                                                    const substrate::Substrate& model, int threads) {
   if (!substrate::is_alike_everywhere(model.capabilities()) || data.offset_um.size() > 0) return {};
-  if (!sheet::crossing_of(outline_um).empty()) return {};
+  std::vector<Polygon> outline = {cell.outline_um};
+  outline.insert(outline.end(), cell.holes_um.begin(), cell.holes_um.end());
+  if (!sheet::crossing_of(outline).empty()) return {};
   sheet::Region region;
-  for (const Polygon& ring : outline_um) region.rims.emplace_back(ring);
+  for (const Polygon& ring : outline) region.rims.emplace_back(ring);
   const std::shared_ptr<const sheet::Elements> elements = coarse_elements(region);
   if (!elements) return {};
   const sheet::OnGel ground(*elements, model, sheet::adhering_triangles(*elements, {}), threads);
-  const std::optional<StiffnessTable> table = table_of(elements, ground, gel, region, threads);
-  if (!table) return {};
-  tensions::LinearData of_sheet = data;
-  of_sheet.motions.forces.resize(0, 0);  // of adhesions, which the sheet has none of
-  const auto response = model.response({ground.patches(), 2}, {data.position_um});
-  of_sheet.response = substrate::dense_response(response->displace(table->forces_nN()), threads);
-  of_sheet = tensions::reweighted(std::move(of_sheet), data.bead_weight);
-  const SheetFit fit = fit_sheet(of_sheet, *table, tensions::Loss::squares);
-  constexpr int kParameters = 2;
-  const double misfit =
-      (tensions::displace(of_sheet.reduced, fit.node_amplitudes) - of_sheet.reduced.target).squaredNorm() +
-      of_sheet.reduced.floor_squared;
-  tensions::ModelScore score = tensions::score_of("sheet", kParameters, misfit / tensions::noise_variance(data),
-                                                  tensions::relative_l2(of_sheet, fit.node_amplitudes), data);
-  score.left_um = data.displacement_um - of_sheet.response->displace(fit.node_amplitudes);
-  return score;
+  const auto of_patches = model.response({ground.patches(), 2}, {data.position_um});
+  std::vector<tensions::ModelScore> scores;
+  const auto add = [&](const char* name, std::vector<sheet::Bundle> bundles) {
+    const auto table = table_of(elements, std::move(bundles), ground, gel, region, threads);
+    if (table) scores.push_back(score_of(name, data, *table, *of_patches));
+  };
+  add("sheet", {});
+  if (auto bundles = bundles_of(cell.fibres, *elements); !bundles.empty())
+    add("sheet-with-bundles", std::move(bundles));
+  return scores;
 }
 
 }  // namespace mbtfm::sheets

@@ -93,7 +93,7 @@ Table<ModelScore> model_table() {
   using Row = ModelScore;
   return {.file = "4_fit/models.csv",
           .row = "each model that is compared",
-          .columns = {{"model", "its name: no-fibres, full, adhesion-forces, sheet", &Row::name},
+          .columns = {{"model", "its name: no-fibres, full, adhesion-forces, sheet, sheet-with-bundles", &Row::name},
                       {"n_parameters", "numbers that are fitted", &Row::n_parameters},
                       {"chi_squared", "misfit in units of the noise", &Row::chi_squared, kResult},
                       {"relative_l2", "‖measured − model‖ / ‖measured‖", &Row::relative_l2, kResult},

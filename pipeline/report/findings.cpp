@@ -122,8 +122,10 @@ std::string explained_by_network(const FitSummary& fit) {
 }
 
 /// Of models.csv.
-enum class Compared { no_fibres, full, adhesion_forces, sheet };
-constexpr auto words(Compared) { return std::array{"no-fibres", "full", "adhesion-forces", "sheet"}; }
+enum class Compared { no_fibres, full, adhesion_forces, sheet, sheet_with_bundles };
+constexpr auto words(Compared) {
+  return std::array{"no-fibres", "full", "adhesion-forces", "sheet", "sheet-with-bundles"};
+}
 
 /// Empty if the network with its fibres fits best.
 std::string another_model(const FitSummary& fit) {
@@ -134,7 +136,8 @@ std::string another_model(const FitSummary& fit) {
   const auto which = name == nullptr ? std::nullopt : named<Compared>(*name);
   if (!which) return "";
   constexpr std::array kModels = {"a network without fibres", "this one",
-                                  "forces of the adhesions that no network joins", "a sheet that contracts evenly"};
+                                  "forces of the adhesions that no network joins", "a sheet that contracts evenly",
+                                  "an evenly contracting sheet with these fibres in it"};
   return fmt::format(
       "The beads prefer another model to a network with these fibres: {} (by {:.0f} in BIC, with each model's own "
       "error allowed for). The tensions are those of a model that is less likely. The forces of the adhesions follow "

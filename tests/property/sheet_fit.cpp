@@ -710,23 +710,39 @@ TEST(SheetFit, beside_adhesions_the_sheet_is_called_for_where_a_sheet_pulls_and_
     adhesions.push_back({22.0 * Vec2{std::cos(t), std::sin(t)}, 1.5, 1, t});
   }
   const Eigen::MatrixXd compliance = disc.model->compliance_um_per_nN(points_of(disc.beads), adhesions);
-  const auto bic_of = [&](const DisplacementField& field) {
+  Cell cell;
+  cell.outline_um = test::circle(25, 180);
+  for (const int k : {0, 2}) {
+    Fibre& fibre = cell.fibres.emplace_back();
+    fibre.fibre_id = k + 1;
+    fibre.points_um = {adhesions[k].centre_um, adhesions[k + 6].centre_um};
+  }
+  Fibre& outside = cell.fibres.emplace_back();
+  outside.points_um = {{20, 0}, {20, 30}, {0, 20}};
+  struct Bics {
+    double sheet = 0, with_bundles = 0, adhesions = 0;
+  };
+  const auto bics_of = [&](const DisplacementField& field) {
     const tensions::LinearData data = tensions::reduce(field, compliance);
-    const auto sheet = score_of_sheet(data, {test::circle(25, 180)}, disc.gel, *disc.model, 1);
-    EXPECT_TRUE(sheet.has_value());
-    const double of_adhesions = data.reduced.floor_squared / tensions::noise_variance(data) +
-                                static_cast<double>(data.reduced.n_felt) * std::log(static_cast<double>(data.n_used));
-    return std::pair(sheet ? sheet->bic : 0, of_adhesions);
+    const auto sheets = scores_of_sheets(data, cell, disc.gel, *disc.model, 1);
+    EXPECT_EQ(sheets.size(), 2);
+    EXPECT_EQ(sheets.back().name, "sheet-with-bundles");
+    EXPECT_EQ(sheets.back().n_parameters, 4) << "the fibre that leaves the cell is none";
+    return Bics{sheets.front().bic, sheets.back().bic,
+                data.reduced.floor_squared / tensions::noise_variance(data) +
+                    static_cast<double>(data.reduced.n_felt) * std::log(static_cast<double>(data.n_used))};
   };
   std::mt19937_64 random(13);
-  const auto [sheet_of_sheet, adhesions_of_sheet] = bic_of(with_noise(disc.exact(3, 1), random));
-  EXPECT_LT(sheet_of_sheet, adhesions_of_sheet);
+  const Bics of_sheet = bics_of(with_noise(disc.exact(3, 1), random));
+  EXPECT_LT(of_sheet.sheet, of_sheet.adhesions);
+  EXPECT_LT(of_sheet.sheet, of_sheet.with_bundles) << "they explain no more";
   // two fibres: four adhesions pull towards the one across
   Eigen::VectorXd forces = Eigen::VectorXd::Zero(24);
   for (const int k : {0, 6, 2, 8})
     forces.segment<2>(2 * k) << -5 * adhesions[k].centre_um.x / 22, -5 * adhesions[k].centre_um.y / 22;
-  const auto [sheet_of_fibres, adhesions_of_fibres] = bic_of(with_noise(disc.moved_by(compliance * forces), random));
-  EXPECT_GT(sheet_of_fibres, adhesions_of_fibres);
+  const Bics of_fibres = bics_of(with_noise(disc.moved_by(compliance * forces), random));
+  EXPECT_GT(of_fibres.sheet, of_fibres.adhesions);
+  EXPECT_LT(of_fibres.with_bundles, of_fibres.sheet);
 }
 
 TEST(SheetFit, stray_beads_do_not_move_a_robust_fit) {
