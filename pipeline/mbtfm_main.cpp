@@ -416,7 +416,7 @@ int demo(CommandLine line) {
   if (line.folder.empty()) line.folder = "mbtfm-demo";
   if (!line.run.is_quiet) say("simulating a cell in " + line.folder.string());
   std::vector<std::string> command = {(line.run.stage_folder / "mbtfm-simulate").string()};
-  command.insert(command.end(), {"--scenario", "u2os", "--seed", "1", "--noise", "0.07", "--beads", "10000"});
+  command.insert(command.end(), {"--scenario", "u2os", "--seed", "8", "--noise_um", "0.03", "--beads_per_um2", "0.5"});
   command.insert(command.end(),
                  {"--images", "--out", line.folder.string(), "--threads", std::to_string(line.run.threads)});
   if (line.run.is_quiet) command.emplace_back("--quiet");
