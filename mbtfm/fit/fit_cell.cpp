@@ -10,6 +10,7 @@
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/findings.h"
 #include "mbtfm/tensions/missing.h"
+#include "mbtfm/tensions/missing_adhesions.h"
 #include "mbtfm/tensions/second_placement.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/stopwatch.h"
@@ -156,20 +157,28 @@ Found found_by(const ReadyCell& cell, const EnsembleFit& fit, const std::optiona
   return found;
 }
 
-std::vector<FrameFit> fit_frames(const ReadyCell& cell, const EnsembleFit& first, const Inputs& inputs,
+/// What the segmentation misses is found once, its forces in each frame.
+std::vector<FrameFit> fit_frames(const ReadyCell& cell, const WithMissing& first, const Inputs& inputs,
                                  const Parameters& p, const Work& work) {
   const SeriesOnGel& series = cell.series;
   if (series.frames.empty()) return {};
   const auto allow = [&](LinearData of_frame, const VectorXd& forces_nN) {
     if (cell.beyond) of_frame = with_forces_beyond(std::move(of_frame), cell.scene.cell, p.gel).data;
+    if (!first.fitted.empty())
+      of_frame = with_missing_fibres(std::move(of_frame), cell.scene.cell.adhesions, first.fitted, 0);
     if (!cell.decisions.placement.is_on) return of_frame;
     // the same place for all, but each frame has the error of it
     return with_place(std::move(of_frame), cell.scene.cell, p.gel, forces_nN, cell.placement.centre_um, work.threads);
   };
+  const auto find = [&](EnsembleFit of_frame) {
+    std::vector<MissingAdhesion> places = first.adhesions;
+    return places.empty() ? std::move(of_frame)
+                          : with_their_forces(std::move(of_frame), places, p.gel, n_of_place(cell));
+  };
   return fit_series(series.frames, cell.networks, series.response,
                     beads_in_region(beads_of(series.frames), cell.scene.cell, p.fit), adhesion_ids_of(cell.scene.cell),
-                    p.fit, allows_common_motion(p.effects), cell.decisions.time_coupling.is_on, work, next_start(first),
-                    inputs.known_frames, allow);
+                    p.fit, allows_common_motion(p.effects), cell.decisions.time_coupling.is_on, work,
+                    next_start(first.fit), inputs.known_frames, allow, find);
 }
 
 ModelFields fields_of(const ReadyCell& cell, const EnsembleFit& fit, const ModelChecks& checks,
@@ -200,14 +209,14 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   check_place(inputs.beads, inputs.cell);
   auto [ready, first_fit] = ready_and_fitted(inputs, p, work);
-  auto [fit, missing_fibres, missing_adhesions] =
-      with_missing(std::move(first_fit), ready.networks, ready.scene.cell, p.gel, p.segmentation, p.fit,
-                   n_of_place(ready), work.threads);
+  WithMissing with = with_missing(std::move(first_fit), ready.networks, ready.scene.cell, p.gel, p.segmentation, p.fit,
+                                  n_of_place(ready), work.threads);
+  const EnsembleFit& fit = with.fit;
   Found found = found_by(ready, fit, inputs.second_placement, p, work);
   FoundMotions motions = motions_found(ready, fit, p.effects);
   ModelChecks checks = check_model(ready, fit, p, work.threads);
-  checks.missing_fibres = std::move(missing_fibres);
-  checks.missing_adhesions = std::move(missing_adhesions);
+  checks.missing_fibres = with.fibres;
+  checks.missing_adhesions = with.adhesions;
   append(found.summary.more,
          energy_and_moments(fit, ready.scene.cell, p.gel, p.substrate.modulus_profile.empty(), work.threads));
   append(found.summary.more, figures_of(motions));
@@ -223,11 +232,11 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
                                 {"best_smoothing_leaves", smoothing->unexplained_share},
                                 {"unsmoothed_leaves", smoothing->unexplained_as_is}});
   }
-  std::vector<FrameFit> frames = fit_frames(ready, fit, inputs, p, work.part(0.6, 0.35));
+  std::vector<FrameFit> frames = fit_frames(ready, with, inputs, p, work.part(0.6, 0.35));
   FittedCell cell{.seen = inputs.cell,
                   .parameters = p,
                   .ready = std::move(ready),
-                  .fit = std::move(fit),
+                  .fit = std::move(with.fit),
                   .found = std::move(found),
                   .motions = std::move(motions),
                   .checks = std::move(checks),

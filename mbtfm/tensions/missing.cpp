@@ -55,7 +55,7 @@ WithMissing with_missing(EnsembleFit fit, const network::Ensemble& networks, con
     return missing_fibres(of, cell.adhesions, segmentation, threads);
   };
   const auto adhesions_in = [&](const EnsembleFit& of) { return missing_adhesions(of, of.data, cell, gel, threads); };
-  WithMissing found{.fit = std::move(fit), .fibres = {}, .adhesions = {}};
+  WithMissing found{.fit = std::move(fit), .fibres = {}, .fitted = {}, .adhesions = {}};
   found.fibres = fibres_in(found.fit);
   found.adhesions = adhesions_in(found.fit);
   if (explains_more(found.adhesions, found.fibres) && !found.fibres.empty())
@@ -71,6 +71,7 @@ WithMissing with_missing(EnsembleFit fit, const network::Ensemble& networks, con
                                     adhesion_ids_of(cell), parameters, threads, {}, &start);
     if (!takes_over(found.fit, with)) {
       found.fit = std::move(with);
+      found.fitted = std::move(unseen);
       found.adhesions = adhesions_in(found.fit);
     }
   }

@@ -13,7 +13,8 @@ namespace mbtfm::tensions {
 
 struct WithMissing {
   EnsembleFit fit;
-  std::vector<MissingFibre> fibres;        ///< those that are sure, and no segmented one, are fitted, too
+  std::vector<MissingFibre> fibres;
+  std::vector<MissingFibre> fitted;        ///< of these, with the others: those that are sure, and no segmented one
   std::vector<MissingAdhesion> adhesions;  ///< the total force holds theirs
 };
 

@@ -201,7 +201,7 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames, const n
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
                                  bool is_coupled, const Work& work, Trial start, const std::vector<FrameFit>& kept,
-                                 const AllowMore& allow) {
+                                 const AllowMore& allow, const FindMore& find) {
   std::vector<FrameFit> fits;
   const auto fitted = [&](const SeriesFrame& frame) {
     FrameData good = good_beads_of(frame, response, is_used);
@@ -210,8 +210,8 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames, const n
     const TensionProblem problem(networks.front(), data.reduced, adhesion_ids, {}, work.threads);
     const Trial begin = problem.evaluate(start.tensions_nN, &start);
     if (allow) data = allow(std::move(data), begin.forces_nN);
-    return described(frame,
-                     fit_ensemble(networks, std::move(data), adhesion_ids, parameters, work.threads, {}, &begin));
+    EnsembleFit fit = fit_ensemble(networks, std::move(data), adhesion_ids, parameters, work.threads, {}, &begin);
+    return described(frame, find ? find(std::move(fit)) : std::move(fit));
   };
   for (const SeriesFrame& frame : frames) {
     work.tell(static_cast<double>(fits.size()) / static_cast<double>(frames.size()),

@@ -56,6 +56,8 @@ std::vector<FrameFit> read_fits(const Path& folder);
 /// The data of a frame whose beads may do more beside forces and common motion. @param forces_nN  of the network, with
 /// which the frame's fit starts
 using AllowMore = std::function<LinearData(LinearData, const VectorXd& forces_nN)>;
+/// A frame's fit with what is found beside it.
+using FindMore = std::function<EnsembleFit(EnsembleFit)>;
 
 /// @param response  of all beads
 /// @param is_used  by bead, as by reduce(); flagged beads are left out anyway
@@ -67,7 +69,7 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames, const n
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
                                  bool is_coupled, const Work& work, Trial start, const std::vector<FrameFit>& kept = {},
-                                 const AllowMore& allow = {});
+                                 const AllowMore& allow = {}, const FindMore& find = {});
 
 /// By frame and fibre. @param interval_s  between frames, if known
 void write_tracks(const Path& file, const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,

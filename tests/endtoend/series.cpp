@@ -1,6 +1,10 @@
 /// A cell followed over time, through the programs.
+#include <algorithm>
+#include <sstream>
+
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -77,6 +81,32 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
   files::write_text(cell / "2_track/frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
   output_of("mbtfm run " + cell.string());
   EXPECT_EQ(files::CsvTable(cell / "4_fit/frames.csv").n_rows(), 2);
+}
+
+/// A fibre that the beads show is fitted in each frame, and not in the first alone: frames are compared with each
+/// other.
+TEST(Series, a_fibre_that_was_not_segmented_is_fitted_in_each_frame) {
+  const test::TemporaryFolder folder;
+  const fs::path cell = folder / "cell";
+  output_of("mbtfm-simulate --scenario u2os --seed 3 --noise_um 0.02 --beads_per_um2 0.5 --quiet --out " +
+            cell.string());
+  const auto truth = files::read_tensions(cell / "truth/tensions.csv");
+  const int strongest = std::ranges::max_element(truth.begin() + 1, truth.end(), {}, &Tension::tension_nN)->fibre_id;
+  for (const char* table : {"fibres.csv", "fibre_points.csv"}) {
+    std::istringstream lines(files::read_text(cell / "1_segment" / table));
+    std::string kept;
+    for (std::string line; std::getline(lines, line);)
+      if (!line.starts_with(std::to_string(strongest) + ",")) kept += line + "\n";
+    files::write_text(cell / "1_segment" / table, kept);
+  }
+  write_frames(cell / "2_track");
+  ASSERT_EQ(run_program("mbtfm run " + cell.string()).code, 0);
+  ASSERT_GE(files::CsvTable(cell / "4_fit/missing_fibres.csv").n_rows(), 1);
+  const files::CsvTable frames(cell / "4_fit/frames.csv");
+  const FitSummary fit = files::read_fit_summary(cell / "4_fit/fit.json");
+  const double sigma = frames.number(0, "total_force_sigma_nN");
+  EXPECT_NEAR(frames.number(0, "total_force_nN"), fit.total_force_nN, 0.2 * sigma) << "the same beads";
+  EXPECT_NEAR(frames.number(1, "total_force_nN"), 2 * fit.total_force_nN, 4 * frames.number(1, "total_force_sigma_nN"));
 }
 
 }  // namespace
