@@ -8,6 +8,7 @@
 
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "segment/stacks/mean_by_depth.h"
 
 namespace mbtfm::stacks {
 namespace {

@@ -2,7 +2,7 @@
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/track.h"
-#include "segment/stacks/motion.h"
+#include "segment/stacks/mean_by_depth.h"
 #include "segment/stacks/run.h"
 #include "segment/stacks/spots.h"
 #include "segment/stacks/track.h"
