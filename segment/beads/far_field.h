@@ -81,7 +81,7 @@ struct WholeMotion {
   std::vector<FarField> of;  ///< one for each of the kinds asked for
 };
 
-/// Drift from the squares that are at rest (at_rest.h).
+/// Drift from the squares that are at rest.
 ///
 /// Even there the gel moves: a cell's displacement falls with its distance as slowly as 1/r². So they are fitted with a
 /// drift and the field of balanced forces (a cell at rest exerts no net force) in what is not at rest:

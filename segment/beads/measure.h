@@ -16,7 +16,7 @@ void measure(const Scene& scene, double least_similarity, std::vector<Track>& tr
 void verify(const Scene& scene, std::vector<Track>& tracks);
 
 /// Where beads are loose, find again what no window found, or what its neighbours contradicted: matched with the spots
-/// that are left over (match.h), measured without the others' pictures, verified. Where motions are expected, beads
+/// that are left over (match.cpp), measured without the others' pictures, verified. Where motions are expected, beads
 /// whose neighbours do not tell them are matched anew, too: one whose spot is another's is moved, or flagged ambiguous.
 /// @param expected  by bead, px: its motion, as far as it is known; empty: it is not
 void recover(const Scene& scene, double least_similarity, std::vector<Track>& tracks,

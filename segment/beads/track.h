@@ -120,7 +120,7 @@ struct CommonMotion {
   double pull_of_border = 0;          ///< largest motion along the border over the largest anywhere
 };
 
-/// How large and how round the beads' images are (focus.h).
+/// How large and how round the beads' images are (measure.h).
 struct BeadSizes {
   double ratio = 1;             ///< of their size in the stressed image over that in the relaxed one
   double sigma = 0;             ///< its standard error; 0: not known
@@ -190,16 +190,16 @@ class RelaxedBeads {
   /// 3. Each is registered backwards, compared with its neighbours (Westerweel & Scarano, Exp Fluids 39:1096, 2005) and
   ///    flagged where it fails: `no partner`, `ambiguous` (does not come back, goes where another bead goes), `edge`,
   ///    `neighbours disagree`.
-  /// 4. Where beads are loose, those that no window found are matched by pattern, light and neighbours (match.h).
+  /// 4. Where beads are loose, those that no window found are matched by pattern, light and neighbours (measure.h).
   /// 5. With a model of the gel, beads are compared in what they do beside it: those that contradict their neighbours
   ///    then are flagged, and step 4 is done once more. Where the pull is strong, a bead's neighbours move otherwise.
-  /// 6. What the beads around predict is weighed in by how well such predictions hold there (pool.h).
+  /// 6. What the beads around predict is weighed in by how well such predictions hold there (measure.h).
   ///
   /// Where beads are dimmer than for 0.02 px, errors are correlated over some bead distances.
   ///
   /// By correlation, steps 1 to 3 are those of windows on a lattice in place of beads (windows.h): the smallest whose
   /// standard error is a tenth of a pixel. Nothing is weighed in. With `auto` such windows fill the gaps between the
-  /// beads, too (gaps.h).
+  /// beads, too (follow.h).
   /// Places at rest are the beads' places in the relaxed picture, moved as the stage moved (`cell_with`).
   /// @param cell  the relaxed picture in the cell's pictures, if these are with another frame of the series
   /// @throws NotFollowed where the stressed image shows no beads, or others than the relaxed one

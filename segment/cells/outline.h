@@ -69,7 +69,7 @@ struct CellsInImage {
 /// the edge is put to the side, inside or outside, whose mean brightness nearby it resembles more (localised Chan–Vese,
 /// Lankton & Tannenbaum 2008), which follows uneven light and background. Adhesions within the reach are added. Gaps
 /// that are as dark as the surroundings are holes. At last each ring is moved to the edge in the unsmoothed image: see
-/// edge_profile.h.
+/// cell_mask.h.
 /// @returns none where there is no cell (constant or noise)
 CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
                         const OutlineParameters& parameters);
