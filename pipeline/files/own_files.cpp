@@ -97,7 +97,9 @@ fs::path inside(const fs::path& folder, const fs::path& name, const std::string&
 }
 
 void check_cell_folder(const fs::path& cell) {
-  for (const char* folder : {"1_segment", "2_track", "3_network", "4_fit", "truth"}) check_own_folder(cell / folder);
+  for (const char* folder :
+       {"1_segment", "2_track", "3_network", "3_sheet", "3_surface", "4_fit", "4_traction", "truth"})
+    check_own_folder(cell / folder);
 }
 
 void make_way(const fs::path& file) {

@@ -73,7 +73,7 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
 WordsOfFlags words_of_flags(const ParameterList& list) {
   WordsOfFlags words;
   for (const Parameter& p : list.all())
-    if (const auto* choice = std::get_if<Choice>(&p.member)) words["--" + p.name] = choice->words;
+    if (const auto* choice = std::get_if<Choice>(&p.member)) words["--" + p.flag] = choice->words;
   return words;
 }
 

@@ -53,8 +53,11 @@ TEST_F(OwnFiles, what_stages_write_is_files_in_folders) {
   fs::remove(cell_ / "4_fit");
   fs::create_symlink("loop", cell_ / "loop");
   EXPECT_NO_THROW(files::check_cell_folder(cell_));  // no folder of a stage
-  fs::create_symlink("truth", cell_ / "truth");
-  EXPECT_THROW(files::check_cell_folder(cell_), InputError);
+  for (const char* of_stage : {"truth", "2_track", "3_sheet", "3_surface", "4_traction"}) {
+    fs::create_symlink(of_stage, cell_ / of_stage);
+    EXPECT_THROW(files::check_cell_folder(cell_), InputError) << of_stage;
+    fs::remove(cell_ / of_stage);
+  }
 }
 
 TEST_F(OwnFiles, writing_replaces_a_link_and_a_second_name_and_a_pipe) {
