@@ -50,9 +50,9 @@ std::vector<FrameFit> fit(const Series& series, const std::vector<FrameFit>& kep
                     series.scene.adhesion_ids, parameters, true, true, 2, start, kept);
 }
 
-using Series = test::InFolder;
+using FrameSeries = test::InFolder;
 
-TEST_F(Series, tensions_and_total_force_that_change_are_followed_within_their_standard_errors) {
+TEST_F(FrameSeries, tensions_and_total_force_that_change_are_followed_within_their_standard_errors) {
   const Series series = make_series(12);
   const std::vector<FrameFit> fits = fit(series);
   ASSERT_EQ(fits.size(), series.frames.size());
@@ -76,7 +76,7 @@ TEST_F(Series, tensions_and_total_force_that_change_are_followed_within_their_st
   EXPECT_NEAR(std::sqrt(total_squares / n_frames), 1, 4 / std::sqrt(2 * n_frames));
 }
 
-TEST_F(Series, a_frame_without_displacements_or_with_too_few_beads_does_not_stop_the_others) {
+TEST_F(FrameSeries, a_frame_without_displacements_or_with_too_few_beads_does_not_stop_the_others) {
   Series series = make_series(4);
   series.frames[1] = {.frame = 2, .refused = "out of focus"};
   for (std::size_t i = 2; i < series.frames[2].beads.size(); ++i) series.frames[2].beads[i].flag = "lost";
@@ -87,7 +87,7 @@ TEST_F(Series, a_frame_without_displacements_or_with_too_few_beads_does_not_stop
   EXPECT_TRUE(fits[3].converged);
 }
 
-TEST_F(Series, flagged_beads_do_not_count) {
+TEST_F(FrameSeries, flagged_beads_do_not_count) {
   Series series = make_series(1);
   const std::vector<FrameFit> before = fit(series);
   for (std::size_t i = 0; i < series.frames[0].beads.size(); i += 10) series.frames[0].beads[i].flag = "ambiguous";
@@ -101,7 +101,7 @@ TEST_F(Series, flagged_beads_do_not_count) {
   }
 }
 
-TEST_F(Series, the_response_of_beads_that_the_frames_share_is_found_once) {
+TEST_F(FrameSeries, the_response_of_beads_that_the_frames_share_is_found_once) {
   const Series series = make_series(2);
   int n_calls = 0;
   const auto response = [&](const DisplacementField& beads) {
@@ -129,7 +129,7 @@ TEST_F(Series, the_response_of_beads_that_the_frames_share_is_found_once) {
   EXPECT_EQ(n_calls, 4);
 }
 
-TEST_F(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
+TEST_F(FrameSeries, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
   Series series = make_series(3);
   for (SeriesFrame& frame : series.frames) frame.sha256 = "file " + std::to_string(frame.frame);
   std::vector<FrameFit> whole = fit(series);
@@ -153,7 +153,7 @@ TEST_F(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
   EXPECT_EQ(written(known), written(whole));  // the same bytes
 }
 
-TEST_F(Series, time_begins_with_the_first_frame) {
+TEST_F(FrameSeries, time_begins_with_the_first_frame) {
   std::vector<FrameFit> fits(2);
   for (FrameFit& fit : fits) fit.tensions.resize(1);
   fits[0].frame = 1;
@@ -167,7 +167,7 @@ TEST_F(Series, time_begins_with_the_first_frame) {
   }
 }
 
-TEST_F(Series, frames_of_other_beads_are_an_error_that_names_the_file) {
+TEST_F(FrameSeries, frames_of_other_beads_are_an_error_that_names_the_file) {
   Series series = make_series(2);
   files::write_text(folder / "frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
   files::write_displacement(folder / "displacement_0001.csv", series.frames[0].beads);
