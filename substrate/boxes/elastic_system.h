@@ -12,12 +12,9 @@
 #include "pipeline/numerics/cholesky.h"
 #include "substrate/boxes/block_mesh.h"
 #include "substrate/boxes/free_nodes.h"
+#include "substrate/compliance.h"
 #include "substrate/ellipse.h"
 #include "substrate/material.h"
-
-namespace mbtfm::substrate {
-struct VolumeField;
-}
 
 namespace mbtfm::boxes {
 

@@ -1,6 +1,5 @@
 #include "substrate/boxes/elastic_system.h"
 
-#include "substrate/compliance.h"
 #include "substrate/material.h"
 
 namespace mbtfm::boxes {
