@@ -636,12 +636,23 @@ std::string flag_of(RowMark mark, const std::string& cell) {
   return "";
 }
 
+namespace {
+
+std::string text_of(const std::filesystem::path& file) {
+  std::string text = files::read_text(file);
+  if (text.starts_with("PK\x03\x04") || text.starts_with("\xD0\xCF\x11\xE0"))  // .xlsx and .ods; .xls
+    throw InputError(file.string(), "a table as text", "a workbook of a spreadsheet program",
+                     "save its sheet as CSV in that program");
+  return text;
+}
+
+}  // namespace
+
 GivenTable read_given_table(const std::filesystem::path& file, const TrackParameters& parameters,
                             const std::optional<images::ImageField>& picture) {
   const bool is_numpy = parameters.table == TableForm::pytfm || file.extension() == ".npy";
   const std::string name = file.string();
-  ForeignTable table =
-      is_numpy ? read_pytfm(file, picture) : files::read_numbers(files::read_text(file), name, kComponents);
+  ForeignTable table = is_numpy ? read_pytfm(file, picture) : files::read_numbers(text_of(file), name, kComponents);
   take_numbered_header(table);
   const TableForm form = is_numpy ? TableForm::pytfm : form_of(table, parameters);
   int n_left_out = 0;

@@ -175,6 +175,10 @@ TEST(GivenTable, numbers_that_can_be_read_in_two_ways_are_refused) {
     EXPECT_TRUE(error) << what;
     EXPECT_TRUE(has_words(error.value_or(InputError("", "", "")).where, "field.csv")) << what;
   }
+  for (const char* workbook : {"PK\x03\x04\x14", "\xD0\xCF\x11\xE0\xA1"}) {
+    const auto error = test::caught<InputError>([&] { read(workbook); });
+    EXPECT_TRUE(error && has_words(error->hint, "as CSV")) << "a workbook is no text";
+  }
   // one comma that is no thousands' decides for all
   EXPECT_EQ(read(header + "1,234;5,678;0,111;2,222\n").field[0].position_um, (Vec2{1.234, 5.678}));
 }
