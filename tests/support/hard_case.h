@@ -1,4 +1,4 @@
-/// What came out of the hard cases of docs/developers/hard-cases.md, recorded with a test's result.
+/// What came out of the hard cases of notes/hard-cases.md, recorded with a test's result.
 #pragma once
 
 #include "tests/support/test.h"
