@@ -190,8 +190,7 @@ class Refined final : public substrate::Substrate {
     const auto estimated = std::find_if(figures_.begin(), figures_.end(),
                                         [](const auto& figure) { return figure.first == "substrate_estimated_error"; });
     if (estimated != figures_.end()) return std::get<double>(estimated->second);
-    // notes/accuracy.md: 2.3 % with 1.4 elements across, 1.3 % with 2; that is, falling as their number to the
-    // power 1.6
+    // notes/accuracy.md: 2.3 % with 1.4 elements across, 1.3 % with 2; falling as their number to the power 1.6
     return 0.023 * std::pow(1.4 / parameters_.elements_across_adhesion, 1.6);
   }
 
