@@ -1,5 +1,7 @@
 #include "mbtfm/sheets/beside_fibres.h"
 
+#include <ranges>
+
 #include "continuum/sheet/forward.h"
 #include "continuum/sheet/mesh_size.h"
 #include "mbtfm/sheets/sheet_fit.h"
@@ -54,22 +56,6 @@ std::vector<sheet::Bundle> bundles_of(const std::vector<Fibre>& fibres, const sh
   return bundles;
 }
 
-tensions::ModelScore score_of(const char* name, tensions::LinearData data, const StiffnessTable& table,
-                              const substrate::Response& of_patches) {
-  const double variance = tensions::noise_variance(data);
-  const VectorXd displacement_um = data.displacement_um, weight = data.bead_weight;
-  data.motions.forces.resize(0, 0);  // of adhesions, which the sheet has none of
-  data.response = substrate::dense_response(of_patches.displace(table.forces_nN()), data.threads);
-  data = tensions::reweighted(std::move(data), weight);
-  const SheetFit fit = fit_sheet(data, table, tensions::Loss::squares);
-  const double misfit = (tensions::displace(data.reduced, fit.node_amplitudes) - data.reduced.target).squaredNorm() +
-                        data.reduced.floor_squared;
-  tensions::ModelScore score = tensions::score_of(name, table.n_loads() + 1, misfit / variance,
-                                                  tensions::relative_l2(data, fit.node_amplitudes), data);
-  score.left_um = displacement_um - data.response->displace(fit.node_amplitudes);
-  return score;
-}
-
 }  // namespace
 
 std::vector<tensions::ModelScore> scores_of_sheets(const tensions::LinearData& data, const Cell& cell, const Gel& gel,
@@ -83,15 +69,22 @@ std::vector<tensions::ModelScore> scores_of_sheets(const tensions::LinearData& d
   const std::shared_ptr<const sheet::Elements> elements = coarse_elements(region);
   if (!elements) return {};
   const sheet::OnGel ground(*elements, model, sheet::adhering_triangles(*elements, {}), threads);
-  const auto of_patches = model.response({ground.patches(), 2}, {data.position_um});
+  const std::optional<StiffnessTable> table =
+      table_of(elements, bundles_of(cell.fibres, *elements), ground, gel, region, threads);
+  if (!table) return {};
+  tensions::LinearData of_sheet = data;
+  of_sheet.motions.forces.resize(0, 0);  // of adhesions, which the sheet has none of
+  const auto response = model.response({ground.patches(), 2}, {data.position_um});
+  of_sheet.response = substrate::dense_response(response->displace(table->forces_nN()), threads);
+  of_sheet = tensions::reweighted(std::move(of_sheet), data.bead_weight);
+  const SheetFit fit = fit_sheet(of_sheet, *table, tensions::Loss::squares);
+  const double as_in_cell = fit.variance / tensions::noise_variance(data);
   std::vector<tensions::ModelScore> scores;
-  const auto add = [&](const char* name, std::vector<sheet::Bundle> bundles) {
-    const auto table = table_of(elements, std::move(bundles), ground, gel, region, threads);
-    if (table) scores.push_back(score_of(name, data, *table, *of_patches));
-  };
-  add("sheet", {});
-  if (auto bundles = bundles_of(cell.fibres, *elements); !bundles.empty())
-    add("sheet-with-bundles", std::move(bundles));
+  for (const SheetModel& sheet : fit.models | std::views::drop(1)) {  // the first is nothing
+    scores.push_back(
+        tensions::score_of(sheet.name, sheet.n_parameters, as_in_cell * sheet.chi_squared, sheet.relative_l2, data));
+    scores.back().left_um = sheet.left_um;
+  }
   return scores;
 }
 

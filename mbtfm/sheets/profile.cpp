@@ -293,6 +293,7 @@ void Models::add(const std::string& name, Index n_parameters, const VectorXd& am
   const VectorXd left = tensions::displace(data_.reduced, amplitudes) - data_.reduced.target;
   all_.push_back(tensions::score_of(name, n_parameters, (left.squaredNorm() + data_.reduced.floor_squared) / noise_,
                                     tensions::relative_l2(data_, amplitudes), data_));
+  all_.back().left_um = data_.displacement_um - data_.response->displace(amplitudes);
 }
 
 }  // namespace mbtfm::sheets
