@@ -23,7 +23,7 @@ std::vector<Finding> findings_of(const JsonRecord& record);
 /// bytes (names.h), keys too.
 std::string json_text(const nlohmann::ordered_json& json, int indent = -1);
 
-/// What a stage found as JSON objects, one a line: its findings, then its effects (docs/formats.md, "Events").
+/// What a stage found as JSON objects, one a line: its findings, then its effects (docs/formats/json.md, "Events").
 std::string events_of(const std::string& stage, const StageReport& report);
 
 }  // namespace mbtfm::files

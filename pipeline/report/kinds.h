@@ -30,7 +30,7 @@ struct CellResults;
 /// What was found of a cell with fibres, and how well the model explains it.
 std::vector<std::string> facts_of(const CellResults& results);
 
-/// In one line, and as the members of a JSON object (docs/formats.md).
+/// In one line, and as the members of a JSON object (docs/formats/json.md).
 struct Result {
   std::string line, event;
 };

@@ -50,7 +50,7 @@ struct BatchCell {
   std::string failed_stage = {};  ///< empty where it failed outside of one
   std::string how = {};           ///< "exit code 3", "timed out after 60 s"
 };
-/// What became of it as a JSON object on a line (docs/formats.md, "Events").
+/// What became of it as a JSON object on a line (docs/formats/json.md, "Events").
 std::string event_of(const BatchCell& cell);
 
 /// `mbtfm run` for every cell that is not up to date; what it prints goes to run.log in the cell folder. Cells that

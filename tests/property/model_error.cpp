@@ -164,7 +164,7 @@ TEST(ModelError, of_the_total_holds_what_networks_of_other_links_and_edges_find)
   none.cell_variance_nN2 = Eigen::VectorXd::Zero(20);
   const RoughnessOfTotal roughness = roughness_of_total(forces_nN, none);
   EXPECT_EQ(roughness.lacking_nN, 0);
-  // docs/validation.md: by the edge from nothing to 1.1 % too much, evenly; by links and anchors 1.0 % either way
+  // notes/validation.md: by the edge from nothing to 1.1 % too much, evenly; by links and anchors 1.0 % either way
   const double total = total_nN(forces_nN), by_edge = 0.011 * total, by_links = 0.010 * total;
   EXPECT_NEAR(roughness.surplus_nN, by_edge / 2, 1e-9 * total);
   EXPECT_NEAR(roughness.sigma_nN, std::hypot(by_edge / std::sqrt(12.0), by_links), 1e-9 * total);

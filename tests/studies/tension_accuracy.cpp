@@ -1,4 +1,4 @@
-/// tension_accuracy STUDY [repeats] [cells] [folder]: how well tensions are found, for docs/validation.md. Studies:
+/// tension_accuracy STUDY [repeats] [cells] [folder]: how well tensions are found, for notes/validation.md. Studies:
 /// descent, noise, deviations, beside-fttc, segmentation, directions, types. A table (CSV) on stdout; charts
 /// (SVG) into the folder.
 #include <chrono>
