@@ -12,7 +12,7 @@ namespace mbtfm {
 namespace {
 
 constexpr int kLinesOfProduct = 105200;
-constexpr int kLinesOfTests = 44150;
+constexpr int kLinesOfTests = 44300;
 constexpr int kLongSources = 18;                                                  // .cpp of the product above 400 lines
 constexpr int kLongestSource = 860;                                               // lines
 constexpr int kOwnHeadersMedian = 15, kOwnHeadersP90 = 40, kOwnHeadersMost = 94;  // that a source of the product gets
