@@ -18,8 +18,8 @@ from .rois import LINE_ORIGIN_PX, Roi, write_rois
 Layer = Tuple[Any, Dict[str, Any], str]
 ReaderFunction = Callable[[Union[str, Sequence[str]]], List[Layer]]
 
-#: By type of fibre: the report's colours, which colour-blind readers can tell apart (Okabe & Ito 2008).
-COLOURS = {"ventral": "#D55E00", "dorsal": "#0072B2", "arc": "#009E73", "edge": "#CC79A7"}
+#: By type of fibre, as the report has them on images.
+COLOURS = {"dorsal": "#56b4ff", "arc": "#ffb728", "ventral": "#00d68f", "edge": "#ff7a52"}
 _CHANNELS = {"adhesion": "green", "actin": "gray", "beads_stressed": "red", "beads_relaxed": "cyan"}
 _TYPES = ("ventral", "dorsal", "arc", "edge")
 
