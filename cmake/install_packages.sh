@@ -15,7 +15,6 @@ packages=(
   libmetis-dev libfftw3-dev libopenblas0-pthread libopenblas-pthread-dev
   libtiff-dev libpng-dev libjpeg62-turbo-dev libzip-dev libexpat1-dev libssl-dev
   libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev
-  libjs-vega
 )
 [ "$purpose" = cell ] || packages+=(libdeal.ii-dev zlib1g-dev librsvg2-dev pkg-config fonts-dejavu-core)
 [ "$purpose" != tests ] || packages+=(libgtest-dev libgmock-dev python3-jsonschema)

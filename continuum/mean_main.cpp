@@ -389,11 +389,8 @@ void write_page(stage::StageContext& context, const std::string& picture, const 
       .picture_explained =
           "A ratio of tips to edge is mostly resolution: set the model through the same blur (--model) beside it, "
           "never the model as it is.",
-      .tables = {{"Registration",
-                  "How each cell lies on the reference, and how well its outline fits there.",
-                  "registration.csv",
-                  registration_csv,
-                  {"cell", "kept", "angle_deg", "mirrored", "misfit_um", "ambiguous"}}},
+      .tables = {{"Registration", "How each cell lies on the reference, and how well its outline fits there.",
+                  "registration.csv", registration_csv, "cell, kept, angle_deg, mirrored, misfit_um, ambiguous"}},
       .figures = report.figures};
   files::write_text(context.output("out", "mean.html"), report::html_of(page));
 }

@@ -1,5 +1,5 @@
-/// Charts of curves and points: described once, drawn as SVG files and as charts that zoom and answer the mouse in
-/// pages.
+/// Charts of curves and points: described and drawn once, as SVG, for files and for pages, where they zoom and answer
+/// the mouse (pipeline/report/page.js).
 #pragma once
 
 #include <string>
@@ -72,9 +72,9 @@ struct Mark {
   std::vector<Vec2> points = {};  ///< in the units of the axes
   std::string style = {};
   std::string hover = {};  ///< what one reads where the mouse rests on it
-  std::string text = {};
-  double radius_px = 0;  ///< of a dot or diamond
-  Vec2 shift_px = {};    ///< of an arrow, in a frame of the SVG's width; in pages it grows with the frame
+  std::string text = {};   ///< of a bar: its class in the page's style sheet
+  double radius_px = 0;    ///< of a dot or diamond
+  Vec2 shift_px = {};      ///< of an arrow, in a frame of the SVG's width; in pages it grows with the frame
 };
 
 /// One frame with two axes. What reaches beyond the frame is cut off. An axis whose ends are equal or not finite gets
@@ -111,6 +111,11 @@ class Chart {
   void bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover = {}) {
     marks_.push_back({Mark::Kind::bar, {corner, opposite}, style, hover});
   }
+  /// Two colours over a picture in turn: of a picture in two colours each shows one part.
+  void blink(Vec2 corner, Vec2 opposite, const char* first, const char* second) {
+    marks_.push_back({Mark::Kind::bar, {corner, opposite}, std::string("fill:") + first, {}, "blink"});
+    marks_.push_back({Mark::Kind::bar, {corner, opposite}, std::string("fill:") + second, {}, "blink late"});
+  }
   /// An error bar, along x or y.
   void error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover = {}) {
     marks_.push_back({Mark::Kind::error, {from, to}, style, hover});
@@ -137,14 +142,11 @@ class Chart {
   enum class KeySide { left, right, above };  ///< above: in a row over the frame, off what a map shows
   void put_key(KeySide side) { key_side_ = side; }
 
-  static constexpr double kWidth_px = 460;
   static constexpr double kFrameWidth_px = 362;
-  double height_px() const;  ///< of the SVG
-  std::string str() const;   ///< SVG elements, from (0, 0) to the width and height
-
-  /// The frame with axes and marks for Vega (https://vega.github.io), as JSON: it fills the width that its signal
-  /// `width` gives, and shows what lies within its signals `xdom` and `ydom`. Title, subtitle and key are not in it.
-  std::string vega() const;
+  double width_px() const, height_px() const;  ///< of the SVG
+  std::string str() const;                     ///< SVG elements, from (0, 0) to the width and height
+  /// The frame with axes and marks as an SVG element. Title, subtitle and key are not in it.
+  std::string on_page() const;
   const std::string& title() const { return title_; }
   const std::string& subtitle() const { return subtitle_; }
   const std::string& subtitle_colour() const { return subtitle_colour_; }
@@ -152,7 +154,8 @@ class Chart {
   const std::vector<std::pair<std::string, std::string>>& keys() const { return keys_; }
 
  private:
-  double ink_height_px() const;
+  double ink_height_px() const, left_px() const;
+  std::string frame_svg() const;
   std::string title_, subtitle_, subtitle_colour_, second_label_;
   Axis x_, y_;
   std::vector<Mark> marks_;

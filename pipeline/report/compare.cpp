@@ -14,8 +14,8 @@
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/report/numbers.h"
-#include "pipeline/report/page.h"
 #include "pipeline/report/space_results.h"
+#include "pipeline/report/stage_page.h"
 
 namespace mbtfm::report {
 namespace {
@@ -190,9 +190,9 @@ std::string truth_section(const fs::path& cell) {
   Table table{"Beside the truth",
               {"quantity", number("found"), number("low"), number("high"), number("truth"), number("error (%)")}};
   for (const ComparedNumber& n : compared.numbers)
-    table.rows.push_back({n.quantity, rounded(n.found, {}), rounded(n.low, {}), rounded(n.high, {}),
+    table.rows.push_back({heading_of(n.quantity), rounded(n.found, {}), rounded(n.low, {}), rounded(n.high, {}),
                           rounded(n.truth, {}),
-                          n.found && n.truth != 0 ? fmt::format("{:+.1f}", 100 * (*n.found / n.truth - 1)) : "–"});
+                          n.found && n.truth != 0 ? with_sign(100 * (*n.found / n.truth - 1), 1) : "–"});
   return section("Beside the truth",
                  "<p>This cell was simulated, so the truth is known. Low and high: 95 % interval.</p>\n" +
                      html_of(table) + "<p>" + html_escaped(capitalised(compared.note)) + "</p>\n");

@@ -12,7 +12,7 @@ namespace mbtfm::report {
 /// What the kinds' pages have in common is around it: the open findings, how all was computed.
 struct CellPage {
   std::string name;
-  std::string what, sub;  ///< below the title, as HTML
+  std::string what, sub;  ///< below the title
   std::vector<std::string> facts;
   std::string body;     ///< sections
   std::string methods;  ///< a paragraph for a paper

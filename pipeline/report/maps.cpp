@@ -87,12 +87,6 @@ SortedLinks sorted_links(const Network& network, const std::vector<double>& link
   return sorted;
 }
 
-std::map<int, std::string> fibre_texts(const CellResults& results) {
-  std::map<int, std::string> texts;
-  for (const Fibre& fibre : results.cell.fibres) texts[fibre.fibre_id] = hover_of(fibre, results);
-  return texts;
-}
-
 void draw_fibre_ids(Chart& map, const CellResults& results) {
   const Extent box = map_box(results);
   const double clear_um = 15 * (box.high_um.x - box.low_um.x) / Chart::kFrameWidth_px;  // about a label's width
@@ -233,24 +227,46 @@ Figure segmentation_map(const CellResults& results) {
           legend(types + adhesion_keys(results.cell) + missing)};
 }
 
-Figure bead_map(const CellResults& results) {
+std::vector<Figure> bead_maps(const CellResults& results) {
   const Images& images = results.bead_images.value();
-  Chart map = empty_map(images.place, "Beads");
-  map.picture(images.place.low_um, images.place.high_um, data_address(images.file, "image/jpeg"));
-  draw_outline(map, results.cell, "fill:none;stroke-width:1.3;stroke:#ddd");
+  const std::string address = data_address(images.file, "image/jpeg");
+  std::vector<Figure> maps;
+  Chart whole = empty_map(images.place, "Beads");
+  whole.picture(images.place.low_um, images.place.high_um, address);
+  draw_outline(whole, results.cell, "fill:none;stroke-width:1.3;stroke:#ddd");
+  const auto strongest =
+      std::ranges::max_element(results.forces, {}, [](const AdhesionForce& f) { return norm(f.force_nN); });
+  if (strongest != results.forces.end()) {
+    const Adhesion& adhesion = *adhesions_by_id(results.cell).at(strongest->adhesion_id);
+    constexpr Vec2 half{7.5, 7.5};  // um: a bead of 0.2 um is then five px wide
+    const Extent box{adhesion.position_um - half, adhesion.position_um + half};
+    Chart inset = empty_map(box, "Beads close up");
+    inset.picture(images.place.low_um, images.place.high_um, address);
+    inset.blink(box.low_um, box.high_um, "#00ff00", "#ff00ff");
+    inset.polygon(ellipse_corners(adhesion, kEllipseCorners), "fill:none;stroke:#fff;stroke-width:1.4",
+                  hover_of(adhesion, results));
+    whole.bar(box.low_um, box.high_um, "fill:none;stroke:#fff;stroke-width:1.4");
+    maps.push_back(
+        {inset,
+         fmt::format("Relaxed (green) and stressed (purple) beads in turn, 15 µm around adhesion {} (white). "
+                     "Beads beside it must move. It blinks for five seconds, and under the mouse.",
+                     adhesion.adhesion_id),
+         {}});
+  }
   int n_flagged = 0;
   for (const Bead& bead : results.displacement) {
     if (bead.flag.empty()) continue;
     ++n_flagged;
-    map.dot(bead.position_um, 3.5, "fill:#fff;fill-opacity:0.01;stroke-width:1.2;stroke:#ffe14d",
-            "left out: " + bead.flag);
+    whole.dot(bead.position_um, 3.5, "fill:#fff;fill-opacity:0.01;stroke-width:1.2;stroke:#ffe14d",
+              "left out: " + bead.flag);
   }
-  return {map,
-          fmt::format("Relaxed image green, stressed image purple, without their drift; white: beads that did not "
-                      "move. Yellow rings: {} beads that were left out, with the reason.",
-                      n_flagged) +
-              caption_of_cut(results.cell),
-          ""};
+  maps.push_back(
+      {whole,
+       fmt::format("Relaxed image green, stressed image purple, without their drift; white: beads that did "
+                   "not move. Yellow rings: {} beads that were left out, with the reason.{}{}",
+                   n_flagged, maps.empty() ? "" : " White square: the map before.", caption_of_cut(results.cell)),
+       {}});
+  return maps;
 }
 
 Figure adhesion_map(const CellResults& results) {
@@ -313,18 +329,39 @@ Figure usual_method_map(const CellResults& results) {
       legend(colour_bar(colours))};
 }
 
-Figure network_map(const CellResults& results) {
-  Chart map = new_map(results, "Where the fibres are");
-  const ColourScale scale = tension_scale(results, "fitted tension (nN)");
-  const SortedLinks links = sorted_links(results.network, {});
-  const std::map<int, std::string> texts = fibre_texts(results);
-  draw_web(map, results, links.web, Hover::whole);
-  for (const auto& [id, pieces] : links.fibres) {
+namespace {
+
+/// @param link_force_nN  that each link of a fibre is coloured by; empty: the fibre's fitted tension colours all of it
+Chart map_of_network(const CellResults& results, const std::string& title, const Network& network,
+                     const std::vector<double>& link_force_nN, const ColourScale& scale) {
+  Chart map = new_map(results, title);
+  const SortedLinks links = sorted_links(network, link_force_nN);
+  draw_web(map, results, links.web, link_force_nN.empty() ? Hover::whole : Hover::none);
+  for (const Fibre& fibre : results.cell.fibres) {
+    const auto own = links.fibres.find(fibre.fibre_id);
+    if (own == links.fibres.end()) continue;
+    const auto& [id, pieces] = *own;
+    const std::string text = hover_of(fibre, results);
     const auto tension = results.tensions.find(id);
-    map.pieces(pieces, kHalo, texts.at(id));
-    map.pieces(pieces, kThick + (tension == results.tensions.end() ? "#555" : scale.colour(tension->second.tension_nN)),
-               texts.at(id));
+    map.pieces(pieces, kHalo, text);
+    if (link_force_nN.empty())
+      map.pieces(pieces,
+                 kThick + (tension == results.tensions.end() ? "#555" : scale.colour(tension->second.tension_nN)),
+                 text);
+    for (std::size_t k = 0; k < pieces.size() && !link_force_nN.empty(); ++k) {
+      const double carried_nN = links.carried_nN.at(id)[k];
+      map.pieces({pieces[k]}, kThick + scale.colour(carried_nN),
+                 text + "\nthis link carries " + readable(carried_nN) + " nN");
+    }
   }
+  return map;
+}
+
+}  // namespace
+
+Figure network_map(const CellResults& results) {
+  const ColourScale scale = tension_scale(results, "fitted tension (nN)");
+  Chart map = map_of_network(results, "Where the fibres are", results.network, {}, scale);
   draw_fibre_ids(map, results);
   return {map,
           fmt::format("Stress fibres (dorsal d, arc a, ventral v, edge e) with their numbers, coloured by their fitted "
@@ -337,22 +374,10 @@ Figure network_map(const CellResults& results) {
 }
 
 Figure contracted_network_map(const CellResults& results) {
-  Chart map = new_map(results, "Network in equilibrium");
   const ColourScale scale = tension_scale(results, "force carried (nN)");
-  const SortedLinks links = sorted_links(results.contracted.network, results.contracted.link_force_nN);
-  const std::map<int, std::string> texts = fibre_texts(results);
-  draw_web(map, results, links.web, Hover::none);
-  for (const auto& [id, pieces] : links.fibres) {
-    const std::vector<double>& carried_nN = links.carried_nN.at(id);
-    map.pieces(pieces, kHalo, texts.at(id));
-    for (std::size_t k = 0; k < pieces.size(); ++k) {
-      map.pieces({pieces[k]}, kThick + scale.colour(carried_nN[k]),
-                 fmt::format("{}\nthis link carries {} nN", texts.at(id), readable(carried_nN[k])));
-    }
-  }
-  return {map,
-          "The same network where its tensions have drawn it; each link of a fibre is coloured by the force that it "
-          "carries.",
+  return {map_of_network(results, "Network in equilibrium", results.contracted.network,
+                         results.contracted.link_force_nN, scale),
+          "The same network after it has contracted; each link of a fibre is coloured by the force that it carries.",
           legend(colour_bar(scale))};
 }
 

@@ -22,8 +22,9 @@ std::string html_of(const Figure& map);
 
 /// Outline, adhesions and fibres over the images that they were found in, where there are any.
 Figure segmentation_map(const CellResults& results);
-/// Both bead images on each other, with the beads that were left out; only where results.bead_images is known.
-Figure bead_map(const CellResults& results);
+/// Both bead images on each other: around the strongest adhesion, in turn; whole, with the beads that were left out.
+/// Only if results.bead_images is known.
+std::vector<Figure> bead_maps(const CellResults& results);
 /// Ellipses coloured by traction, with the force on the substrate as arrows.
 Figure adhesion_map(const CellResults& results);
 /// Tractions of the usual method in the colours of the adhesion map; only if results.usual_method has tractions.

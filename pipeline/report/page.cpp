@@ -4,13 +4,14 @@
 
 #include <cctype>
 
+#include "pipeline/contract/version.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/files/text.h"
 
 namespace mbtfm::report {
 
-// page.css, page.js and Vega with its licence, made into one C++ file by the build
-extern const std::string_view kStyle, kScript, kVega;
+// page.css and page.js, made into one C++ file by the build
+extern const std::string_view kStyle, kScript;
 
 namespace {
 
@@ -20,19 +21,10 @@ std::string anchor_of(const std::string& title) {
   return anchor;
 }
 
-/// Text of a script element: nothing in it may end the element.
-std::string inside_script(std::string text) {
-  for (std::size_t at = 0; (at = text.find("</", at)) != text.npos; at += 3) text.replace(at, 2, "<\\/");
-  for (std::size_t at = 0; (at = text.find("<!", at)) != text.npos; at += 7) text.replace(at, 2, "\\u003c!");
-  return text;
-}
-
 /// Heard, not seen: a heading above the table says the same.
 std::string caption_of(const std::string& text) {
   return text.empty() ? "" : "<caption class=\"heard\">" + html_escaped(text) + "</caption>";
 }
-
-std::string script(std::string_view text) { return "<script>" + std::string(text) + "</script>\n"; }
 
 /// Links to the sections of a body.
 std::string contents(const std::string& body) {
@@ -51,11 +43,11 @@ std::string contents(const std::string& body) {
 
 std::string html_of(const Table& table) {
   // no <button>: browsers leave these out of the titles that they repeat on each printed page
-  std::string html = "<div class=\"scroll\"><table>" + caption_of(table.caption) + "<thead><tr>";
+  std::string html = "<div class=\"scroll\" tabindex=\"0\"><table>" + caption_of(table.caption) + "<thead><tr>";
   for (const Table::Column& column : table.columns) {
     html += std::string("<th") + (column.is_number ? " class=\"n\"" : "") +
-            "><span role=\"button\" tabindex=\"0\" title=\"click to sort\">" + html_escaped(column.title) +
-            "</span></th>";
+            " scope=\"col\"><span role=\"button\" tabindex=\"0\" title=\"click to sort\">" +
+            html_escaped(column.title) + "</span></th>";
   }
   html += "</tr></thead><tbody>\n";
   for (const auto& row : table.rows) {
@@ -75,7 +67,7 @@ std::string html_of(const Table& table, const Download& csv) {
 }
 
 std::string html_of_pairs(const std::string& caption, const std::vector<std::pair<std::string, std::string>>& pairs) {
-  std::string html = "<div class=\"scroll\"><table>" + caption_of(caption) + "<tbody>\n";
+  std::string html = "<div class=\"scroll\" tabindex=\"0\"><table>" + caption_of(caption) + "<tbody>\n";
   for (const auto& [name, value] : pairs) {
     html += "<tr><th scope=\"row\">" + html_escaped(name) + "</th><td class=\"long\">" + html_escaped(value) +
             "</td></tr>\n";
@@ -113,17 +105,22 @@ std::string figure(const charts::Chart& chart, const std::string& caption, const
       html += fmt::format("<span style=\"color:{}\">{}</span>", charts::readable_on_white(colour), html_escaped(text));
     html += "</div>\n";
   }
-  return html + "<div class=\"chart\"></div><script type=\"application/json\">" + inside_script(chart.vega()) +
-         "</script>\n" + legend + (caption.empty() ? "" : "<figcaption>" + html_escaped(caption) + "</figcaption>") +
-         "</figure>\n";
+  return html + "<div class=\"chart\" role=\"img\" aria-label=\"" + html_escaped(chart.title()) + "\">" +
+         chart.on_page() + "</div>\n" + legend +
+         (caption.empty() ? "" : "<figcaption>" + html_escaped(caption) + "</figcaption>") + "</figure>\n";
 }
 
-std::string page(const std::string& title, const std::string& head, const std::string& body) {
+std::string html_of(const Page& page) {
+  const auto line = [](const char* kind, const std::string& text) {
+    return text.empty() ? text : fmt::format("<p class=\"{}\">{}</p>\n", kind, html_escaped(text));
+  };
+  const std::string title = html_escaped(page.title);
   return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
          "content=\"width=device-width,initial-scale=1\"><link rel=\"icon\" href=\"data:,\"><title>" +
-         html_escaped(title) + "</title><style>" + std::string(kStyle) + "</style></head>\n<body><main>\n" + head +
-         contents(body) + "<noscript><p>The charts of this page need JavaScript.</p></noscript>\n" + body + "</main>" +
-         script(kVega) + script(kScript) + "</body></html>\n";
+         title + " – mbtfm</title><style>" + std::string(kStyle) + "</style></head>\n<body><main>\n<h1>" + title +
+         "</h1>" + line("what", page.what) +
+         line("sub", page.sub + (page.sub.empty() ? "" : " · ") + "mbtfm " + std::string(kVersion)) +
+         contents(page.body) + page.body + "</main><script>" + std::string(kScript) + "</script>\n</body></html>\n";
 }
 
 }  // namespace mbtfm::report

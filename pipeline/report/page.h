@@ -52,8 +52,13 @@ std::string folded(const std::string& title, const std::string& content);
 /// A chart that zooms and answers the mouse. @param legend  HTML below the frame
 std::string figure(const charts::Chart& chart, const std::string& caption, const std::string& legend = {});
 
-/// A whole page with its styles, scripts and Vega inside: it asks for nothing from anywhere. @param head  HTML before
-/// the table of contents
-std::string page(const std::string& title, const std::string& head, const std::string& body);
+/// A page of any kind: a cell's, a sheet's, a plan's, a study's.
+struct Page {
+  std::string title;
+  std::string what = {}, sub = {};  ///< below the title, larger and smaller
+  std::string body = {};            ///< sections
+};
+/// The whole of it with its styles and scripts inside: it asks for nothing from anywhere.
+std::string html_of(const Page& page);
 
 }  // namespace mbtfm::report

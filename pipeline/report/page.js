@@ -28,7 +28,7 @@ tip.className = 'tip';
 tip.hidden = true;
 document.body.appendChild(tip);
 
-function showTip(handler, event, item, text) {
+function showTip(event, text) {
   tip.hidden = !text;
   if (!text) return;
   tip.textContent = text;
@@ -39,80 +39,112 @@ function showTip(handler, event, item, text) {
   tip.style.top = (above ? event.clientY - gap - size.height : event.clientY + gap) + 'px';
 }
 
-// An axis knows which part of it is shown, from 0 to 1 of the whole.
-function axisOf(spec, name) {
-  const ends = spec.signals.find(function (s) { return s.name === name + 'dom'; }).value;
-  const isLog = spec.scales.find(function (s) { return s.name === name; }).type === 'log';
-  // rows with names do not zoom
-  const isFixed = spec.axes.some(function (a) { return a.scale === name && a.values; });
-  const axis = { from: 0, to: 1 };
-  axis.domain = function () {
-    return [axis.from, axis.to].map(function (t) {
-      return isLog ? ends[0] * Math.pow(ends[1] / ends[0], t) : ends[0] + t * (ends[1] - ends[0]);
-    });
+const svgName = 'http://www.w3.org/2000/svg';
+function add(parent, name, attributes, text) {
+  const child = document.createElementNS(svgName, name);
+  for (const key in attributes) child.setAttribute(key, attributes[key]);
+  child.textContent = text || '';
+  parent.appendChild(child);
+}
+
+// Multiples of the smallest step of 1, 2 or 5 times a power of ten that gives no more than six of them.
+function ticks(low, high) {
+  const power = Math.pow(10, Math.floor(Math.log10((high - low) / 5)));
+  const step = [1, 2, 5, 10].map(function (n) { return n * power; }).find(function (s) { return (high - low) / s <= 5; });
+  const list = [];
+  for (let i = Math.ceil(low / step); i * step <= high; ++i) list.push(i * step);
+  return list;
+}
+
+// The ticks of the part of an axis that is shown, from 0 to 1 of the whole.
+function drawAxis(group, whole, frame, from, to) {
+  if (from === 0 && to === 1) { group.innerHTML = whole; return; }
+  const ends = group.dataset.ends.split(' ').map(Number), side = group.dataset.side;
+  const isLog = group.dataset.scale === 'log';
+  const at = function (t) {
+    return isLog ? ends[0] * Math.pow(ends[1] / ends[0], t) : ends[0] + t * (ends[1] - ends[0]);
   };
-  axis.show = function (from, length) {
-    if (isFixed) return;
-    length = Math.min(1, Math.max(0.005, length));
-    axis.from = Math.min(1 - length, Math.max(0, from));
-    axis.to = axis.from + length;
-  };
-  return axis;
+  const low = at(from), high = at(to);
+  group.textContent = '';
+  ticks(Math.min(low, high), Math.max(low, high)).forEach(function (value) {
+    const share = isLog ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+    const text = String(+value.toPrecision(6)).replace('-', '\u2212'), right = frame.x + frame.width;
+    const x = frame.x + share * frame.width, y = frame.y + (1 - share) * frame.height, bottom = frame.y + frame.height;
+    if (side === 'y') {
+      add(group, 'path', { d: 'M' + frame.x + ',' + y + 'H' + right, stroke: '#e3e5e8' });
+      add(group, 'text', { x: frame.x - 6, y: y + 5, 'text-anchor': 'end' }, text);
+    } else {
+      const isUpper = side === 'x2';
+      add(group, 'path', { d: 'M' + x + ',' + frame.y + (isUpper ? 'v-4' : 'V' + bottom), stroke: isUpper ? '#444' : '#e3e5e8' });
+      add(group, 'text', { x: x, y: isUpper ? frame.y - 7 : bottom + 17, 'text-anchor': 'middle' }, text);
+    }
+  });
 }
 
 function draw(box) {
-  const spec = JSON.parse(box.nextElementSibling.textContent);
-  const font = getComputedStyle(document.body).fontFamily;
-  const config = { axis: { labelFont: font, titleFont: font }, text: { font: font }, group: { stroke: '#444' } };
-  const view = new vega.View(vega.parse(spec, config), { renderer: 'svg', container: box, tooltip: showTip, hover: false });
-  const x = axisOf(spec, 'x'), y = axisOf(spec, 'y');
-  const pad = spec.padding;
-  const frame = function () {
-    const r = box.getBoundingClientRect();
-    return { left: r.left + pad.left, top: r.top + pad.top, width: view.width(), height: view.signal('height') };
+  const svg = box.querySelector('svg'), ink = svg.querySelector('.ink'), name = box.getAttribute('aria-label');
+  const view = ink.viewBox.baseVal, frame = { x: view.x, y: view.y, width: view.width, height: view.height };
+  const axes = Array.from(svg.querySelectorAll('.axis')).map(function (group) { return { group: group, whole: group.innerHTML }; });
+  // rows with names do not zoom
+  const isFixed = function (side) { return !svg.querySelector('.axis[data-side=' + side + ']').dataset.ends; };
+  const fixed = { x: isFixed('x'), y: isFixed('y') };
+  // what is shown: from 0 to 1, from the lower left corner
+  const x = { from: 0, length: 1 }, y = { from: 0, length: 1 };
+  const show = function (axis, from, length) {
+    if (fixed[axis === x ? 'x' : 'y']) return;
+    axis.length = Math.min(1, Math.max(0.005, length));
+    axis.from = Math.min(1 - axis.length, Math.max(0, from));
   };
+  const isZoomed = function () { return Math.min(x.length, y.length) < 0.999; };
   const update = function () {
-    view.signal('xdom', x.domain()).signal('ydom', y.domain()).run();
-    const isZoomed = x.to - x.from < 0.999;
-    box.classList.toggle('zoomed', isZoomed);
-    box.style.touchAction = isZoomed ? 'none' : 'pan-y pinch-zoom';
+    ink.setAttribute('viewBox', [frame.x + x.from * frame.width, frame.y + (1 - y.from - y.length) * frame.height,
+      x.length * frame.width, y.length * frame.height].join(' '));
+    // dots and names keep their size
+    ink.style.setProperty('--x', x.length);
+    ink.style.setProperty('--y', y.length);
+    axes.forEach(function (axis) {
+      const part = axis.group.dataset.side === 'y' ? y : x;
+      if (axis.group.dataset.ends) drawAxis(axis.group, axis.whole, frame, part.from, part.length < 1 ? part.from + part.length : 1);
+    });
+    box.classList.toggle('zoomed', isZoomed());
+    box.style.touchAction = isZoomed() ? 'none' : 'pan-y pinch-zoom';
   };
   // keeps the point (u, v) of the frame, from its lower left corner, in its place
   const zoom = function (factor, u, v) {
-    const step = function (axis, at) {
-      const length = axis.to - axis.from;
-      axis.show(axis.from + at * length * (1 - 1 / factor), length / factor);
-    };
+    const step = function (axis, at) { show(axis, axis.from + at * axis.length * (1 - 1 / factor), axis.length / factor); };
     step(x, u);
     step(y, v);
     update();
   };
+  const px = function () { return svg.getBoundingClientRect().width / svg.viewBox.baseVal.width; };
+  const origin = function () {
+    const r = svg.getBoundingClientRect(), k = px(), top = svg.viewBox.baseVal;
+    return { left: r.left + k * (frame.x - top.x), top: r.top + k * (frame.y - top.y), width: k * frame.width, height: k * frame.height };
+  };
   const zoomAt = function (event, factor) {
-    const f = frame();
+    const f = origin();
     zoom(factor, (event.clientX - f.left) / f.width, 1 - (event.clientY - f.top) / f.height);
   };
-  const whole = function () { x.show(0, 1); y.show(0, 1); update(); };
+  const whole = function () { show(x, 0, 1); show(y, 0, 1); update(); };
 
-  const fitTo = function (box_px) {
-    const width = Math.floor(box_px - pad.left - pad.right);
-    if (width < 40 || width === view.width()) return;
-    box.parentNode.style.setProperty('--frame', width / 362);
-    view.width(width).run();
+  // text is as large in every chart
+  const fit = function () {
+    if (!box.clientWidth) return;
+    svg.setAttribute('font-size', 13 / px());
+    box.parentNode.style.setProperty('--frame', px());
   };
-  const fit = function () { fitTo(box.clientWidth); };
   fit();
-  view.run();
-  const caption = box.parentNode.querySelector('figcaption');
-  if (caption) {
-    caption.id = caption.id || 'caption-' + Array.from(document.querySelectorAll('figcaption')).indexOf(caption);
-    box.setAttribute('aria-describedby', caption.id);
-  }
-  update();
   new ResizeObserver(function () { requestAnimationFrame(fit); }).observe(box);
-
-  // half of an A4 page; the style sheet stretches it to what the column has
-  addEventListener('beforeprint', function () { fitTo(330); });
+  addEventListener('beforeprint', function () { svg.setAttribute('font-size', 13 * svg.viewBox.baseVal.width / 400); });
   addEventListener('afterprint', fit);
+
+  // what the browser would show late is shown at once
+  ink.querySelectorAll('title').forEach(function (title) {
+    title.parentNode.dataset.tip = title.textContent;
+    title.remove();
+  });
+  box.addEventListener('pointerover', function (event) { showTip(event, event.target.dataset.tip); });
+  box.addEventListener('pointerleave', function () { tip.hidden = true; });
 
   // the wheel alone scrolls the page
   box.addEventListener('wheel', function (event) {
@@ -120,50 +152,60 @@ function draw(box) {
     event.preventDefault();
     zoomAt(event, Math.exp(-0.002 * event.deltaY));
   }, { passive: false });
-  box.addEventListener('dblclick', function (event) { if (x.to - x.from < 0.999) whole(); else zoomAt(event, 3); });
+  box.addEventListener('dblclick', function (event) { if (isZoomed()) whole(); else zoomAt(event, 3); });
   let last = null;
   box.addEventListener('pointerdown', function (event) { last = { x: event.clientX, y: event.clientY }; });
   box.addEventListener('pointermove', function (event) {
-    if (!last || !event.buttons || x.to - x.from > 0.999) { last = null; return; }
+    if (!last || !event.buttons || !isZoomed()) { last = null; return; }
     if (Math.hypot(event.clientX - last.x, event.clientY - last.y) < 3) return;
     box.setPointerCapture(event.pointerId);
-    const f = frame(), lengthX = x.to - x.from, lengthY = y.to - y.from;
-    x.show(x.from - (event.clientX - last.x) / f.width * lengthX, lengthX);
-    y.show(y.from + (event.clientY - last.y) / f.height * lengthY, lengthY);
+    const f = origin();
+    show(x, x.from - (event.clientX - last.x) / f.width * x.length, x.length);
+    show(y, y.from + (event.clientY - last.y) / f.height * y.length, y.length);
     last = { x: event.clientX, y: event.clientY };
     update();
   });
   box.addEventListener('pointerup', function () { last = null; });
-  box.addEventListener('pointerleave', function () { tip.hidden = true; });
 
   const buttons = document.createElement('div');
   buttons.className = 'buttons';
-  const add = function (text, name, act) {
+  const addButton = function (text, what, act) {
     const button = document.createElement('button');
     button.textContent = text;
-    button.title = name;
-    button.setAttribute('aria-label', text + ': ' + name + ': ' + spec.description);
+    button.title = what;
+    button.setAttribute('aria-label', text + ': ' + what + ': ' + name);
     button.addEventListener('click', act);
     buttons.appendChild(button);
   };
-  add('+', 'zoom in (or Ctrl and wheel)', function () { zoom(1.6, 0.5, 0.5); });
-  add('\u2212', 'zoom out', function () { zoom(1 / 1.6, 0.5, 0.5); });
-  add('1:1', 'show all (or double click)', whole);
+  addButton('+', 'zoom in (or Ctrl and wheel)', function () { zoom(1.6, 0.5, 0.5); });
+  addButton('\u2212', 'zoom out', function () { zoom(1 / 1.6, 0.5, 0.5); });
+  addButton('1:1', 'show all (or double click)', whole);
   const save = function (address, ending) {
     const link = document.createElement('a');
     link.href = address;
-    link.download = spec.description + ending;
+    link.download = name + ending;
     link.click();
   };
-  add('SVG', 'save as a drawing', function () {
-    view.toSVG().then(function (svg) {
-      const address = URL.createObjectURL(new Blob([svg], { type: 'image/svg+xml' }));
-      save(address, '.svg');
-      setTimeout(function () { URL.revokeObjectURL(address); }, 1000);
-    });
+  const address = function () {
+    const copy = svg.cloneNode(true), size = svg.viewBox.baseVal;
+    copy.setAttribute('xmlns', svgName);
+    copy.setAttribute('width', size.width);
+    copy.setAttribute('height', size.height);
+    copy.setAttribute('font-family', getComputedStyle(document.body).fontFamily);
+    copy.setAttribute('style', 'background:#fff');
+    return URL.createObjectURL(new Blob([new XMLSerializer().serializeToString(copy)], { type: 'image/svg+xml' }));
+  };
+  addButton('SVG', 'save as a drawing', function () { save(address(), '.svg'); });
+  addButton('PNG', 'save as a picture', function () {
+    const image = new Image(), canvas = document.createElement('canvas'), size = svg.viewBox.baseVal;
+    image.onload = function () {
+      canvas.width = 4 * size.width; // 4 times the screen's 96 dots per inch
+      canvas.height = 4 * size.height;
+      canvas.getContext('2d').drawImage(image, 0, 0, canvas.width, canvas.height);
+      save(canvas.toDataURL('image/png'), '.png');
+    };
+    image.src = address();
   });
-  // 4 times the screen's 96 dots per inch
-  add('PNG', 'save as a picture', function () { view.toImageURL('png', 4).then(function (url) { save(url, '.png'); }); });
   box.parentNode.appendChild(buttons);
 }
 document.querySelectorAll('.chart').forEach(draw);

@@ -17,6 +17,7 @@
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/results.h"
+#include "pipeline/report/stage_page.h"
 #include "pipeline/report/tensions.h"
 
 namespace mbtfm::report {
@@ -28,19 +29,17 @@ Download file_of(const CellResults& results, const std::string& file) {
   return {results.name + "_" + path.filename().string(), files::read_text(path)};
 }
 
-std::string by_type(const CellResults& results) {
-  const auto chart = tensions_by_type(results);
-  if (!chart) return {};
-  return figure(*chart, "Each mark is a fibre; the line is the mean of its type. Hollow: not identifiable.");
-}
-
 std::string tension_section(const CellResults& results) {
-  return section("Tensions", "<div class=\"grid\">\n" +
-                                 figure(tension_plot(results),
-                                        "By type, the strongest first. The interval holds the bead noise and, if "
-                                        "several meshes were fitted, the spread between them.",
-                                        tension_plot_legend(results)) +
-                                 by_type(results) + html_of(network_map(results)) + "</div>\n" +
+  std::string charts = figure(tension_plot(results),
+                              "By type, the strongest first. The interval holds the bead noise and, if several meshes "
+                              "were fitted, the spread between them.",
+                              tension_plot_legend(results));
+  constexpr std::size_t kFitOneRow = 20;
+  if (results.cell.fibres.size() > kFitOneRow) charts = "<div class=\"tall\">" + charts + "</div>\n";
+  if (const auto chart = tensions_by_type(results))
+    charts += figure(*chart, "Each mark is a fibre; the line is the mean of its type. Hollow: not identifiable.");
+  return section("Tensions", "<div class=\"grid\">\n" + charts + html_of(network_map(results)) +
+                                 html_of(contracted_network_map(results)) + "</div>\n" +
                                  html_of(tension_table(results), file_of(results, "4_fit/tensions.csv")) +
                                  tension_notes(results));
 }
@@ -57,11 +56,12 @@ std::string map_section(const CellResults& results) {
       "<p class=\"sub screen\">Rest the mouse on something to read about it. Ctrl and wheel, or the buttons, zoom; "
       "dragging moves; a double click shows all again.</p><div class=\"grid\">\n" +
       html_of(segmentation_map(results));
-  if (results.bead_images) html += html_of(bead_map(results));
+  if (results.bead_images)
+    for (const Figure& map : bead_maps(results)) html += html_of(map);
   html += html_of(adhesion_map(results));
   if (results.usual_method && results.usual_method->obstacle.empty()) html += html_of(usual_method_map(results));
   for (const Figure& map : displacement_maps(results)) html += html_of(map);
-  html += html_of(contracted_network_map(results));
+  if (results.cell.fibres.empty()) html += html_of(contracted_network_map(results));
   return section("Maps", html + "</div>\n" + usual_method_note(results) +
                              "<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the outer "
                              "corner of its top left pixel.</p>");
@@ -275,31 +275,26 @@ std::string error_budget_html(const CellResults& results) {
   if (!results.fit.error_budget) return {};
   const std::vector<BudgetLine> budget = lines_of(*results.fit.error_budget, results.cell.fibres);
   std::vector<BudgetLine> fibres;
-  Table table{"Error budget", {"of", number("value (nN)"), number("standard error (nN)")}};
-  std::string csv = "fibre_id,type,value_nN,total_nN";
+  std::string csv = "fibre_id,type,value_nN,total_nN", columns = "fibre_id: fibre, type: of, value_nN, total_nN";
   for (const auto& [source, part] : budget.front().parts_nN) {
-    table.columns.push_back(number(source + " (nN)"));
     csv += "," + source + "_nN";
+    columns += ", " + source + "_nN";
   }
   for (const BudgetLine& line : budget) {
     // the network's tension is that of a cable, hundreds of times smaller
     if (line.fibre_id && *line.fibre_id > 0) fibres.push_back(line);
-    std::vector<std::string> row = {html_escaped(name_of(line)), readable(line.value_nN), readable(line.total_nN)};
     csv += fmt::format("\n{},{},{},{}", line.fibre_id ? std::to_string(*line.fibre_id) : "", line.type,
                        shortest(line.value_nN), shortest(line.total_nN));
-    for (const auto& [source, part] : line.parts_nN) {
-      row.push_back(part ? readable(*part) : "–");
-      csv += "," + (part ? shortest(*part) : std::string());
-    }
-    table.rows.push_back(std::move(row));
+    for (const auto& [source, part] : line.parts_nN) csv += "," + (part ? shortest(*part) : std::string());
   }
-  std::ranges::stable_sort(fibres, [](const BudgetLine& a, const BudgetLine& b) { return a.total_nN > b.total_nN; });
-  std::string html = "<div class=\"grid\">" +
-                     figure(chart_of(fibres),
-                            "The largest first. A bar is as long as the standard error; the sources’ squares add up, "
-                            "so each has the share of the bar that it has of the square.") +
-                     "</div>\n";
-  return html + folded("Error budget in numbers", html_of(table, {results.name + "_error_budget.csv", csv + "\n"}));
+  std::ranges::stable_sort(fibres, std::ranges::greater(), &BudgetLine::total_nN);
+  return "<div class=\"grid\">" +
+         figure(chart_of(fibres),
+                "The largest first. A bar is as long as the standard error; the sources’ squares add up, so each has "
+                "the share of the bar that it has of the square.") +
+         "</div>\n" +
+         folded("Error budget in numbers",
+                html_of(Listing{"Error budget", {}, results.name + "_error_budget.csv", csv + "\n", columns}));
 }
 
 }  // namespace

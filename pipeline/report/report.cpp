@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "pipeline/contract/counted.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/own_files.h"
@@ -32,18 +33,17 @@ const OfKind& of(CellKind kind) {
   return kind == CellKind::plane ? kPlane : kind == CellKind::space ? kSpace : kSheet;
 }
 
-std::string effects_table(const Provenance& provenance) {
-  const bool are_timed =
-      std::ranges::any_of(provenance.effects, [](const EffectLine& effect) { return !effect.seconds.empty(); });
-  Table table{"Effects, and why they are on or off", {"effect", "stage", "on", "why"}};
-  if (are_timed) table.columns.push_back(number("seconds"));
+std::string effects_table(const Provenance& provenance, bool is_on) {
+  Table table{is_on ? "Effects that were computed" : "Effects that are off", {"effect", "stage", "why"}};
+  if (is_on) table.columns.push_back(number("seconds"));
   for (const EffectLine& effect : provenance.effects) {
-    std::vector<std::string> row = {html_escaped(effect.name), html_escaped(effect.stage), effect.is_on ? "on" : "off",
-                                    html_escaped(effect.why)};
-    if (are_timed) row.push_back(effect.seconds);
-    table.rows.push_back(row);
+    if (effect.is_on != is_on) continue;
+    table.rows.push_back({html_escaped(effect.name), html_escaped(effect.stage), html_escaped(effect.why)});
+    if (is_on) table.rows.back().push_back(effect.seconds);
   }
-  return html_of(table);
+  if (table.rows.empty()) return {};
+  return is_on ? "<h3>Effects</h3>\n" + html_of(table)
+               : folded(fmt::format("{} that are off", counted(table.rows.size(), "effects")), html_of(table));
 }
 
 /// Stages, effects, parameters. @param figures  HTML, of the last stage
@@ -62,8 +62,7 @@ std::string provenance_section(const Provenance& provenance, const std::string& 
   if (!provenance.preset.empty())
     html += fmt::format("<p class=\"sub\">Preset: {}; it holds for all that cell.toml does not set.</p>\n",
                         html_escaped(provenance.preset));
-  if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
-  html += figures;
+  html += effects_table(provenance, true) + effects_table(provenance, false) + figures;
   for (const StageLine& stage : provenance.stages) {
     if (!stage.parameters.empty())
       html += folded("Parameters of " + stage.name, html_of_pairs("Parameters of " + stage.name, stage.parameters));
@@ -103,12 +102,13 @@ bool has_results(const fs::path& cell) { return files::is_own_file(cell / of(kin
 std::string report_html(const fs::path& cell) {
   const Provenance provenance = read_provenance(cell / "run.json");
   const CellPage of_cell = of(provenance.kind).page(cell, provenance);
-  const std::string head = fmt::format("<h1>{}</h1><p class=\"what\">{}</p>\n<p class=\"sub\">{} · mbtfm {}</p>\n",
-                                       html_escaped(of_cell.name), of_cell.what, of_cell.sub, kVersion);
   const std::string methods = "<p class=\"cite\">" + html_escaped(of_cell.methods) + "</p>\n";
-  return page(of_cell.name + " – mbtfm", head,
-              findings_section(of_cell.facts, provenance) + of_cell.body +
-                  section("For your methods section", methods) + provenance_section(provenance, of_cell.figures));
+  return html_of(Page{.title = of_cell.name,
+                      .what = of_cell.what,
+                      .sub = of_cell.sub,
+                      .body = findings_section(of_cell.facts, provenance) + of_cell.body +
+                              section("For your methods section", methods) +
+                              provenance_section(provenance, of_cell.figures)});
 }
 
 void update_report(const fs::path& cell) {

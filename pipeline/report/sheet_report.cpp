@@ -69,24 +69,21 @@ std::string methods(const SheetResults& r, const Provenance& provenance) {
 }  // namespace
 
 std::vector<Listing> tables_of_sheet(const fs::path& estimates, const fs::path& models, const std::string& of) {
-  return {{"What the beads tell",
-           "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).",
-           of + "sheet_fit.csv",
-           files::read_text(estimates),
-           {"quantity", "part", "value", "sigma", "low", "high", "identifiable"}},
-          {"Does the scene call for the sheet?",
-           "The beads call for the model of the smallest bic. chi_squared is in units of the noise.",
-           of + "sheet_models.csv",
-           files::read_text(models),
-           {"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"}},
-          {"Where the errors come from",
-           "Parts of each standard error: noise of the beads, the motion that all beads share, what the sheet leaves "
-           "beyond noise, its triangles, the place of its outline, the gel's stated errors, the model of the gel. "
-           "Their squares add up to that of sigma; a part that is not there was not asked for.",
-           of + "sheet_fit.csv",
-           files::read_text(estimates),
-           {"quantity", "part", "sigma", "by_beads", "by_motion", "by_model", "by_variation", "by_mesh", "by_outline",
-            "by_gel", "by_substrate"}}};
+  const std::string fit_csv = files::read_text(estimates);
+  return {
+      {"What the beads tell",
+       "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).", of + "sheet_fit.csv",
+       fit_csv, "*quantity, part, value, sigma, low, high, identifiable"},
+      {"Does the scene call for the sheet?",
+       "The beads call for the model of the smallest BIC. χ² is in units of the noise.", of + "sheet_models.csv",
+       files::read_text(models), "model, n_parameters, chi_squared: χ², relative_l2: relative L2, aic: AIC, bic: BIC"},
+      {"Where the errors come from",
+       "Parts of each standard error; their squares add up to its square. By motion: that all beads share. By "
+       "model: what the sheet leaves beyond noise. By mesh: the triangles. By outline: its place. By gel: its "
+       "stated errors. By substrate: the model of the gel. A part that is not there was not asked for.",
+       of + "sheet_fit.csv", fit_csv,
+       "*quantity, part, sigma, by_beads, by_motion, by_model, by_variation, by_mesh, by_outline, by_gel, "
+       "by_substrate"}};
 }
 
 CellPage page_of_sheet(const Path& cell, const Provenance& provenance) {
@@ -101,7 +98,7 @@ CellPage page_of_sheet(const Path& cell, const Provenance& provenance) {
     body += section_of(table);
   return {.name = r.name,
           .what = "Contraction and tensions of one cell or colony, taken as a contracting sheet",
-          .sub = html_escaped(provenance.kind_because),
+          .sub = provenance.kind_because,
           .facts = facts_of(r),
           .body = body,
           .methods = methods(r, provenance),

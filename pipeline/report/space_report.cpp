@@ -215,7 +215,7 @@ CellPage page_in_space(const Path& cell, const Provenance& provenance) {
           .what = "Forces in space of one cell on a curved gel",
           .sub = fmt::format("Gel: Young’s modulus {} kPa, Poisson’s ratio {}, {} µm thick below z = 0 · {}",
                              readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio),
-                             readable(r.gel.thickness_um), html_escaped(provenance.kind_because)),
+                             readable(r.gel.thickness_um), provenance.kind_because),
           .facts = facts_of(r),
           .body = truth_section(cell) + space_section(r) + map_section(r) + force_section(r) + data_section(r) +
                   lambda_section(r),

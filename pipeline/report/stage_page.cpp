@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <sstream>
 
-#include "pipeline/contract/version.h"
 #include "pipeline/contract/words.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/report/numbers.h"
@@ -32,21 +32,59 @@ std::string shown(const std::string& text) {
 
 }  // namespace
 
-std::string section_of(const Listing& listing) {
+std::string heading_of(const std::string& column) {
+  using Unit = std::pair<std::string_view, std::string_view>;
+  static constexpr Unit kUnits[] = {
+      {"_um_per_kPa", "µm/kPa"}, {"_nN_per_um", "nN/µm"}, {"_nN_um", "nN µm"}, {"_per_um2", "1/µm²"},
+      {"_per_um3", "1/µm³"},     {"_um2", "µm²"},         {"_um", "µm"},       {"_nN", "nN"},
+      {"_kPa", "kPa"},           {"_fJ", "fJ"},           {"_deg", "°"},       {"_s", "s"}};
+  static constexpr std::pair<std::string_view, std::string_view> kWords[] = {
+      {"sigma", "std. error"}, {"low", "lower 95 %"}, {"high", "upper 95 %"}, {"sd", "SD"}, {"p_holm", "p (Holm)"}};
+  std::string name = column, unit;
+  const auto* found = std::ranges::find_if(kUnits, [&](const Unit& u) { return name.ends_with(u.first); });
+  if (found != std::end(kUnits)) {
+    name.resize(name.size() - found->first.size());
+    unit = " (" + std::string(found->second) + ")";
+  }
+  if (name.starts_with("n_")) name = name.substr(2);
+  const auto* word = std::ranges::find(kWords, name, &Unit::first);
+  if (word != std::end(kWords)) name = word->second;
+  std::ranges::replace(name, '_', ' ');
+  return name + unit;
+}
+
+Table table_of(const Listing& listing) {
   const files::CsvTable csv(listing.csv, listing.name);
   Table table{.caption = listing.title};
-  table.rows.resize(static_cast<std::size_t>(csv.n_rows()));
-  for (const std::string& column : listing.columns) {
+  std::vector<int> rows;
+  for (int row = 0; row < csv.n_rows(); ++row)
+    if (std::ranges::all_of(listing.only, [&](const auto& is) { return csv.text(row, is.first) == is.second; }))
+      rows.push_back(row);
+  table.rows.resize(rows.size());
+  std::istringstream list(listing.columns);
+  for (std::string part; std::getline(list >> std::ws, part, ',');) {
+    const bool is_of_columns = part.starts_with('*');
+    const std::size_t colon = part.find(": ");
+    const std::string column = part.substr(is_of_columns ? 1 : 0, colon - (is_of_columns ? 1 : 0));
     std::vector<std::string> texts;
-    for (int row = 0; row < csv.n_rows(); ++row) texts.push_back(csv.text(row, column));
-    const auto is_empty = [](const std::string& text) { return text.empty(); };
-    if (std::ranges::all_of(texts, is_empty)) continue;
+    for (const int row : rows) texts.push_back(csv.text(row, column));
+    if (std::ranges::all_of(texts, &std::string::empty)) continue;
     const auto may_be_number = [](const std::string& text) { return text.empty() || is_number(text); };
-    table.columns.push_back({html_escaped(column), std::ranges::all_of(texts, may_be_number)});
-    for (std::size_t row = 0; row < texts.size(); ++row) table.rows[row].push_back(html_escaped(shown(texts[row])));
+    table.columns.push_back(
+        {colon == part.npos ? heading_of(column) : part.substr(colon + 2), std::ranges::all_of(texts, may_be_number)});
+    for (std::size_t row = 0; row < texts.size(); ++row)
+      table.rows[row].push_back(html_escaped(is_of_columns ? heading_of(texts[row]) : shown(texts[row])));
   }
-  return section(listing.title, "<p class=\"sub\">" + html_escaped(listing.explained) + "</p>\n" +
-                                    html_of(table, Download{listing.name, listing.csv}));
+  return table;
+}
+
+std::string html_of(const Listing& listing) {
+  const Table table = table_of(listing);
+  return table.rows.empty() ? "" : html_of(table, Download{listing.name, listing.csv});
+}
+
+std::string section_of(const Listing& listing) {
+  return section(listing.title, "<p class=\"sub\">" + html_escaped(listing.explained) + "</p>\n" + html_of(listing));
 }
 
 std::string section_of_picture(const std::string& title, const std::string& svg_file, const std::string& explained) {
@@ -56,15 +94,13 @@ std::string section_of_picture(const std::string& title, const std::string& svg_
 }
 
 std::string html_of(const StagePage& of) {
-  const std::string head =
-      "<h1>" + html_escaped(of.title) + "</h1><p class=\"sub\">mbtfm " + std::string(kVersion) + "</p>\n";
   std::string body = section("In short", list_of(of.facts, of.findings));
   body += section_of_picture(of.picture_title, of.picture_svg, of.picture_explained);
   for (const Listing& listing : of.tables) body += section_of(listing);
   std::vector<std::pair<std::string, std::string>> pairs;
   for (const auto& [name, value] : of.figures) pairs.emplace_back(name, text_of_figure(value));
   body += section("All figures", html_of_pairs("All figures", pairs));
-  return page(of.title + " – mbtfm", head, body);
+  return html_of(Page{.title = of.title, .body = body});
 }
 
 }  // namespace mbtfm::report

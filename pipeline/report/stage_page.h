@@ -2,21 +2,33 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pipeline/contract/figures.h"
 #include "pipeline/contract/findings.h"
 #include "pipeline/contract/path.h"
+#include "pipeline/report/page.h"
 
 namespace mbtfm::report {
 
-/// A table that the program wrote: these columns of it.
+/// "total force (nN)" of total_force_nN: a column's name and unit as people write them.
+std::string heading_of(const std::string& column);
+
+/// A table that a program wrote, as a page shows it: these columns, without those that are empty.
 struct Listing {
   std::string title, explained;
   std::string name, csv;  ///< of the file, and what is in it
-  std::vector<std::string> columns = {};
+  /// Names between commas, each with another heading than heading_of() after a colon; with a star: its cells are names
+  /// of columns, and shown as headings. "*quantity: measure, n_cells"
+  std::string columns = {};
+  /// Rows that have these words in these columns; empty: all.
+  std::vector<std::pair<std::string, std::string>> only = {};
 };
 
+Table table_of(const Listing& listing);
+/// With the link to the file; empty if no row is left.
+std::string html_of(const Listing& listing);
 /// A section with the table.
 std::string section_of(const Listing& listing);
 /// A section with a drawing of the program's own, no wider than the page.

@@ -105,9 +105,9 @@ std::vector<std::string> truth_cells(const Tension& t, const std::optional<doubl
   if (!truth_nN) return {"–", "–", "–"};
   const double error_nN = t.tension_nN - *truth_nN;
   const auto half_nN = half_interval_nN(t);
-  // one decimal more than the fit deserves: the truth has no error
+  // one decimal more than the fit deserves: the truth has no error. A share of less than the interval says nothing.
   return {rounded(*truth_nN, decimals ? std::optional(*decimals + 1) : std::nullopt),
-          *truth_nN > 0 ? with_sign(100 * error_nN / *truth_nN, 0) : "–",
+          *truth_nN > half_nN.value_or(0) ? with_sign(100 * error_nN / *truth_nN, 0) : "–",
           half_nN ? with_sign(error_nN / *half_nN, 1) : "–"};
 }
 
@@ -305,8 +305,8 @@ std::string tension_notes(const CellResults& results) {
       readable(results.fit.network_surface_tension_nN_per_um));
   if (results.comparison) {
     html +=
-        " Error: fitted minus true tension, in per cent of the truth and in halves of the 95 % interval: between −1 "
-        "and +1 the interval holds the truth.";
+        " Error: fitted minus true tension, in per cent of the truth if that is more than half the 95 % interval, and "
+        "in halves of this interval: between −1 and +1 it holds the truth.";
   }
   html += "</p>\n";
   return results.comparison ? html + missed_fibres(*results.comparison) : html;

@@ -10,7 +10,7 @@ window.look = {
       spoken_otherwise: all(':is(button, a)[aria-label]').filter(e => e.textContent.trim() &&
         !e.getAttribute('aria-label').startsWith(e.textContent.trim())).map(shown),
       images: all('img').filter(e => !e.hasAttribute('alt')).map(shown),
-      charts: all('.chart').filter(e => e.getAttribute('role') !== 'graphics-document' ||
+      charts: all('.chart').filter(e => e.getAttribute('role') !== 'img' ||
         !e.getAttribute('aria-label')).map(shown),
       marks: all('svg [role=graphics-symbol]').filter(e => !hidden(e) && !e.getAttribute('aria-label')).map(shown),
       tables: all('table').filter(e => !e.caption || !e.caption.textContent.trim()).map(shown),
@@ -59,8 +59,8 @@ window.look = {
 
   // names and numbers along an axis
   overlapping() {
-    return [...document.querySelectorAll('.chart svg .role-axis-label')].flatMap(axis => {
-      const texts = [...axis.querySelectorAll('text')].filter(e => e.getAttribute('opacity') !== '0');
+    return [...document.querySelectorAll('.chart .axis')].flatMap(axis => {
+      const texts = [...axis.querySelectorAll('text')].filter(e => e.textContent);
       const boxes = texts.map(e => e.getBoundingClientRect());
       const meet = (r, q) => r.left < q.right && q.left < r.right && r.top < q.bottom - 2 && q.top < r.bottom - 2;
       return texts.filter((e, i) => boxes.some((q, j) => j > i && meet(boxes[i], q))).map(e => e.textContent);

@@ -55,13 +55,11 @@ Vec2 rest_on(Browser& browser, const std::string& chart, const std::string& text
   const test::json at = browser.evaluate(
       "(() => { const figure = [...document.querySelectorAll('figure')].find(f => f.querySelector('h3').textContent "
       "=== '" +
-      chart +
-      "');const path = [...figure.querySelectorAll('svg path')].find(e => e.__data__ && "
-      "String(e.__data__.tooltip).startsWith(" +
+      chart + "');const path = [...figure.querySelectorAll('.ink [data-tip]')].find(e => e.dataset.tip.startsWith(" +
       test::json(text).dump() +
-      "));path.scrollIntoView({block: 'center'});const b = path.getBBox();"  // a line, or the middle of a rectangle
-      "const p = (path.hasAttribute('stroke') ? path.getPointAtLength(path.getTotalLength() / 3) : new DOMPoint(b.x + "
-      "b.width / 2, b.y + b.height / 2)).matrixTransform(path.getScreenCTM());return [p.x, p.y]; })()");
+      "));path.scrollIntoView({block: 'center'});const b = path.getBBox();"  // a line, or the middle of an area
+      "const p = (['path', 'polyline'].includes(path.tagName) ? path.getPointAtLength(path.getTotalLength() / 3) : new "
+      "DOMPoint(b.x + b.width / 2, b.y + b.height / 2)).matrixTransform(path.getScreenCTM());return [p.x, p.y]; })()");
   browser.mouse("mouseMoved", at[0], at[1]);
   return {at[0], at[1]};
 }
@@ -88,10 +86,10 @@ TEST_F(Pages, every_chart_is_drawn) {
   };
   Browser& browser = opened(cell_page());
   EXPECT_GE(browser.evaluate("document.querySelectorAll('.chart').length"), 8);
-  EXPECT_EQ(browser.evaluate(without(".role-mark :is(path, rect)")), 0);
+  EXPECT_EQ(browser.evaluate(without(".ink :is(path, rect, polyline, polygon, circle)")), 0);
   browser.open(study_page());
   EXPECT_GE(browser.evaluate("document.querySelectorAll('.chart').length"), 5);
-  EXPECT_EQ(browser.evaluate(without(".role-axis text")), 0) << "a study of two cells leaves some frames empty";
+  EXPECT_EQ(browser.evaluate(without(".axis text")), 0) << "a study of two cells leaves some frames empty";
 }
 
 TEST_F(Pages, the_mouse_reads_tensions_and_forces_with_their_errors) {
@@ -120,7 +118,8 @@ TEST_F(Pages, charts_zoom_about_the_mouse_move_and_come_back) {
   const auto ink = [&] {
     return browser.evaluate(
         "(() => { const r = [...document.querySelectorAll('figure')].find(f => f.querySelector('h3').textContent === "
-        "'Segmentation').querySelector('path[stroke=\"#00805C\"]').getBoundingClientRect(); return [r.left, r.width]; "
+        "'Segmentation').querySelector('.ink [style*=\"#00805C\"] > *').getBoundingClientRect(); return [r.left, "
+        "r.width]; "
         "})()");
   };
   const Vec2 at = rest_on(browser, chart, "fibre 1 (");
@@ -221,8 +220,8 @@ TEST_F(Pages, print_whole) {
     constexpr int kPaper_px = (210 - 2 * 14) * 96 / 25.4;
     browser.call("Emulation.setEmulatedMedia", {{"media", "print"}});
     browser.resize(kPaper_px, 1000);
-    EXPECT_LE(browser.evaluate(
-                  "Math.max(...[...document.querySelectorAll('main *')].map(e => e.getBoundingClientRect().right))"),
+    EXPECT_LE(browser.evaluate("Math.max(...[...document.querySelectorAll('main *')].filter(e => "
+                               "!e.closest('.ink')).map(e => e.getBoundingClientRect().right))"),
               kPaper_px + 0.5)
         << page;
     const std::string pdf = browser.call("Page.printToPDF", {{"preferCSSPageSize", true}})["data"];

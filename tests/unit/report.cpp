@@ -33,7 +33,7 @@ TEST(Report, names_every_fibre_and_adhesion) {
   for (int fibre = 1; fibre <= 4; ++fibre)
     EXPECT_TRUE(has_words(html, "fibre " + std::to_string(fibre) + " (")) << fibre;
   for (int adhesion = 1; adhesion <= 12; ++adhesion)
-    EXPECT_TRUE(has_words(html, "adhesion " + std::to_string(adhesion) + "\\n")) << adhesion;
+    EXPECT_TRUE(has_words(html, "adhesion " + std::to_string(adhesion) + "\n")) << adhesion;
 }
 
 TEST(Charts, keys_are_dark_enough_to_read_on_white) {
@@ -333,11 +333,41 @@ TEST(StagePage, a_table_shows_three_digits_words_for_truth_and_no_empty_columns)
                                        .csv = "cell,part,angle_deg,misfit_um,bic,n,kept\n"
                                               "a,,122.3690627118605,0.0123456,3008.01,24629,TRUE\n"
                                               "b,,-16.919751115106486,,2996.4,3,FALSE\n",
-                                       .columns = {"cell", "part", "angle_deg", "misfit_um", "bic", "n", "kept"}});
+                                       .columns = "cell, part, angle_deg, misfit_um, bic, n, kept"});
   const std::string table = html.substr(0, html.find("download"));
   for (const char* shown : {">122<", ">-16.9<", ">0.0123<", ">3008<", ">2996<", ">24629<", ">yes<", ">no<"})
     EXPECT_TRUE(has_words(table, shown)) << shown << html;
   EXPECT_FALSE(has_words(table, "part"));
+}
+
+TEST(StagePage, a_heading_has_the_unit_that_the_columns_name_ends_with) {
+  EXPECT_EQ(heading_of("total_force_nN"), "total force (nN)");
+  EXPECT_EQ(heading_of("contraction_nN_per_um"), "contraction (nN/µm)");
+  EXPECT_EQ(heading_of("cell_area_um2"), "cell area (µm²)");
+  EXPECT_EQ(heading_of("n_fibres"), "fibres");
+  EXPECT_EQ(heading_of("p"), "p");
+}
+
+TEST(StagePage, a_table_has_the_rows_and_headings_that_are_asked_for) {
+  const Table table = table_of({.title = "T",
+                                .explained = {},
+                                .name = "t.csv",
+                                .csv = "quantity,model,mean\ntotal_force_nN,a,1\narea_um2,b,2\n",
+                                .columns = "*quantity: measure, mean",
+                                .only = {{"model", "b"}}});
+  ASSERT_EQ(table.rows.size(), 1u);
+  EXPECT_EQ(table.rows[0], (std::vector<std::string>{"area (µm²)", "2"}));
+  EXPECT_EQ(table.columns[0].title, "measure");
+}
+
+TEST(Charts, have_room_for_long_names_of_rows_and_a_line_for_each_word_below_a_narrow_frame) {
+  const std::string name(40, 'x');
+  const charts::Chart rows("t", {.label = "x"}, charts::row_axis({name})), plain("t", {.label = "x"}, {.label = "y"});
+  EXPECT_GT(rows.width_px(), plain.width_px() + 200) << "40 letters of 8 px where 84 px were";
+  charts::Axis types{.label = {}, .low = -0.5, .high = 3.5};
+  for (int k = 0; k < 4; ++k) types.names.emplace_back(k, "transverse arc");
+  const std::string svg = charts::Chart("t", types, {.label = "y"}).on_page();
+  EXPECT_TRUE(has_words(svg, ">transverse</tspan>", ">arc</tspan>"));
 }
 
 TEST(Compare, without_true_fibres_ids_are_the_same) {
