@@ -62,7 +62,7 @@ StageReport statistics(const StudyParameters& parameters, stage::StageContext& c
   StageReport report;
   if (analysis.has_fibres)
     report.summary = counted(n_of_kind(study, CellKind::plane), "cells") + ", " +
-                     counted(std::ssize(analysis.tensions.sample.values), "tensions") + "; ";
+                     counted(std::ssize(analysis.tensions().sample.values), "tensions") + "; ";
   if (const int n = n_of_kind(study, CellKind::sheet); n > 0) report.summary += counted(n, "sheets") + "; ";
   if (const int n = n_of_kind(study, CellKind::space); n > 0)
     report.summary += counted(n, "cell in space", "cells in space") + "; ";

@@ -15,7 +15,10 @@ using charts::readable;
 using charts::Scale;
 
 std::string condition_colour(int condition) {
-  return charts::kColours[static_cast<std::size_t>(condition) % std::size(charts::kColours)];
+  // Tol, "muted" (SRON/EPS/TN/09-002, 2021), dark enough for dots on white
+  constexpr const char* kColours[] = {"#332288", "#C2556B", "#2F8078", "#882255",
+                                      "#7A7A1F", "#AA4499", "#555555", "#4A78B5"};
+  return kColours[static_cast<std::size_t>(condition) % std::size(kColours)];
 }
 
 double place_in_column(int i) {
@@ -111,7 +114,7 @@ Chart distribution_of(const Sample& sample, const std::string& label) {
       if (own.empty()) continue;
       all.push_back({.label = fmt::format("{}{}: {}, {}", prefix_of(sample.conditions[c]), sample.kinds[kind],
                                           counted(std::ssize(own), "adhesions"), counted(n_cells_of(own), "cells")),
-                     .colour = sample.n_conditions() == 1 ? condition_colour(kind) : condition_colour(c),
+                     .colour = colour_of(sample, c, kind),
                      .values = values_of(own),
                      .is_dashed = kind == 1});
     }
@@ -124,13 +127,13 @@ Figure adhesion_distributions(const Analysis& analysis) {
   return {.name = "adhesion_distributions",
           .title = "Area and force of the adhesions",
           .caption = "Connected: a segmented fibre ends on the adhesion.",
-          .charts = {distribution_of(analysis.adhesion_areas.sample, "area"),
-                     distribution_of(analysis.adhesion_forces.sample, "force")},
+          .charts = {distribution_of(analysis.of("adhesion_area_um2").sample, "area"),
+                     distribution_of(analysis.of("adhesion_force_nN").sample, "force")},
           .n_columns = 2};
 }
 
 Figure force_by_area(const Analysis& analysis) {
-  const Sample& sample = analysis.adhesion_forces.sample;
+  const Sample& sample = analysis.of("adhesion_force_nN").sample;
   double x_end = 0, y_end = 0;
   for (const AreaBin& b : analysis.area_bins) {
     x_end = std::max(x_end, b.mean_area_um2);
@@ -180,7 +183,7 @@ Figure directions(const Analysis& analysis) {
                     "Angles at the adhesions. Broken line: what chance would give. In brackets: 95 % interval of the "
                     "mean angle, cells resampled.",
                 .n_columns = 2};
-  const std::vector<std::string>& conditions = analysis.tensions.sample.conditions;
+  const std::vector<std::string>& conditions = analysis.tensions().sample.conditions;
   for (const Relation relation : kRelations) {
     std::vector<Histogram> all;
     for (const DirectionSummary& s : analysis.directions) {
@@ -207,7 +210,7 @@ Figure directions(const Analysis& analysis) {
 
 std::vector<Figure> adhesion_figures_of(const Analysis& analysis) {
   std::vector<Figure> figures;
-  if (analysis.adhesion_forces.sample.values.empty()) {
+  if (analysis.of("adhesion_force_nN").sample.values.empty()) {
     figures.push_back({.name = "adhesion_distributions",
                        .title = "Area and force of the adhesions",
                        .caption = "no cell has an adhesion with a force."});

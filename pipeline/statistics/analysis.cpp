@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "pipeline/charts/chart.h"
 #include "pipeline/contract/counted.h"
@@ -31,67 +30,51 @@ void warn_of_few_cells(const Study& study, std::vector<std::string>& warnings) {
   for (const CellKind kind : mbtfm::values_of<CellKind>()) {
     std::vector<int> n_of(study.conditions.size(), 0);
     for (const StudyCell& cell : study.cells) n_of[cell.condition] += cell.kind() == kind ? 1 : 0;
-    const std::string name = kind == CellKind::sheet ? "sheet" : kind == CellKind::space ? "cell in space" : "cell";
-    const std::string names = kind == CellKind::sheet ? "sheets" : kind == CellKind::space ? "cells in space" : "cells";
+    const char* names = kind == CellKind::sheet ? "sheets" : kind == CellKind::space ? "cells in space" : "cells";
     for (std::size_t i = 0; i < n_of.size(); ++i) {
-      const std::string where = prefix_of(study.conditions[i]);
-      if (n_of[i] == 1) {
-        warnings.push_back(fmt::format("{0}a single {1}: nothing can be said of how {2} differ, and no test counts it.",
-                                       where, name, names));
-      } else if (n_of[i] > 0 && n_of[i] < kFew) {
-        warnings.push_back(
-            fmt::format("{0}{1} {2} only: intervals with the {3} as the unit are wide, and rest on the assumption that "
-                        "{2} scatter normally.",
-                        where, n_of[i], names, kind == CellKind::sheet ? "sheet" : "cell"));
-      }
+      if (n_of[i] == 0 || n_of[i] >= kFew) continue;
+      warnings.push_back(fmt::format("{}{} {} only: {}.", prefix_of(study.conditions[i]), n_of[i],
+                                     n_of[i] == 1 ? kind == CellKind::sheet ? "sheet" : "cell" : names,
+                                     n_of[i] == 1 ? "no scatter is known, and no test counts it"
+                                                  : "intervals are wide, and suppose a normal scatter"));
     }
   }
 }
 
 void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<std::string>& warnings) {
-  int n_unknown = 0, n_fibres = 0;
-  std::set<const StudyCell*> with;
-  for (const MeasuredFibre& f : measured_fibres(study)) with.insert(f.cell);
+  int n_unknown = 0, n_fibres = 0, n_without = 0;
   for (const StudyCell& cell : study.cells) {
+    n_without += cell.kind() == CellKind::plane && measured_fibres(cell).empty() ? 1 : 0;
     for (const Tension& t : cell.tensions) {
       n_fibres += t.fibre_id != 0 ? 1 : 0;
       n_unknown += t.fibre_id != 0 && !t.identifiable ? 1 : 0;
     }
   }
-  if (n_unknown > 0) {
+  if (n_unknown > 0)
     warnings.push_back(
-        fmt::format("The tensions of {} of {} could not be identified and do not enter: if these are the weak ones, "
-                    "the means of the others are too large.",
+        fmt::format("The tensions of {} of {} could not be identified and do not enter. If these are the weak ones, "
+                    "the means are too large.",
                     n_unknown, counted(n_fibres, "fibres")));
-  }
-  if (const int n_without = n_of_kind(study, CellKind::plane) - static_cast<int>(with.size()); n_without > 0) {
+  if (n_without > 0)
+    warnings.push_back(fmt::format("{} no fibre with a known tension: only the forces enter.",
+                                   counted(n_without, "cell has", "cells have")));
+  const int n_tensions = static_cast<int>(tensions.sample.values.size()), n_bare = tensions.sample.n_without_error;
+  if (n_bare > 0)
     warnings.push_back(
-        fmt::format("{} no fibre with a known tension: of these only the forces enter, not the tensions.",
-                    counted(n_without, "cell has", "cells have")));
-  }
-  const int n_tensions = static_cast<int>(tensions.sample.values.size());
-  if (tensions.sample.n_without_error > 0) {
-    warnings.push_back(
-        tensions.sample.n_without_error < n_tensions
-            ? fmt::format(
-                  "{} of {} tensions {} no error bar; their error is taken to be as large as that of the others.",
-                  tensions.sample.n_without_error, n_tensions, tensions.sample.n_without_error == 1 ? "has" : "have")
-            : "No tension has an error bar: what is scatter of the fibres and what error cannot be told.");
-  }
+        n_bare < n_tensions
+            ? fmt::format("{} of {} tensions {} no error bar: their error is taken to be that of the others.", n_bare,
+                          n_tensions, n_bare == 1 ? "has" : "have")
+            : "No tension has an error bar: scatter of the fibres and error cannot be separated.");
   for (const Summary& s : tensions.summaries) {
-    if (s.n > 2 && s.typical_error && s.without_error->reliability < 0.5 && *s.plain.standard_deviation > 0) {
+    const std::string fibres = prefix_of(s.condition) + kind_for_people(s.kind) + " fibres: ";
+    if (s.n > 2 && s.typical_error && s.without_error->reliability < 0.5 && *s.plain.standard_deviation > 0)
+      warnings.push_back(fmt::format("{}more than half of the scatter of tensions is error of measurement ({} nN).",
+                                     fibres, readable(*s.typical_error)));
+    if (s.model && s.mean_interval && std::abs(s.model->estimate - s.plain.mean) > 2 * s.model->standard_error)
       warnings.push_back(
-          fmt::format("{}more than half of the scatter of the tensions of {} fibres is the error of their measurement "
-                      "(typically {} nN).",
-                      prefix_of(s.condition), kind_for_people(s.kind), readable(*s.typical_error)));
-    }
-    if (!s.model || !s.mean_interval) continue;
-    if (std::abs(s.model->estimate - s.plain.mean) > 2 * s.model->standard_error) {
-      warnings.push_back(fmt::format(
-          "{}the mixed model's mean tension of {} fibres, {} nN, is far from the plain mean, {} nN: fibres "
-          "with large error bars, or cells with many fibres, differ from the others. Give both.",
-          prefix_of(s.condition), kind_for_people(s.kind), readable(s.model->estimate), readable(s.plain.mean)));
-    }
+          fmt::format("{}the mixed model's mean tension, {} nN, is far from the plain mean, {} nN: "
+                      "fibres with large errors, or cells with many fibres, differ. Give both.",
+                      fibres, readable(s.model->estimate), readable(s.plain.mean)));
   }
 }
 
@@ -99,8 +82,8 @@ void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
   const auto n = std::ranges::count_if(study.cells, [](const StudyCell& cell) { return !is_network_known(cell); });
   if (n == 0) return;
   warnings.push_back(
-      fmt::format("The network's tension of {} of {} could not be identified: how their total force is shared out to "
-                  "network and fibres is not known and does not enter, nor does the network's surface tension.",
+      fmt::format("The network's tension of {} of {} could not be identified: their forces of network "
+                  "and fibres do not enter.",
                   n, counted(n_of_kind(study, CellKind::plane), "cells")));
 }
 
@@ -115,16 +98,16 @@ void warn_of_sheets(const Study& study, std::vector<std::string>& warnings) {
         n_unknown += e.quantity == quantity && !e.identifiable ? 1 : 0;
       }
     }
-    if (n_unknown == 0) continue;
-    warnings.push_back(
-        fmt::format("The beads limit the {} of sheets to one side only, or not at all, in {} of {}. What is not known "
-                    "does not enter, and the mean of the rest may be biased.",
-                    for_people(quantity).name, n_unknown, counted(n, "fits")));
+    if (n_unknown > 0)
+      warnings.push_back(
+          fmt::format("The beads limit the {} of sheets to one side only, or not at all, in {} of {}. These do not "
+                      "enter, and the mean of the rest may be biased.",
+                      for_people(quantity).name, n_unknown, counted(n, "fits")));
   }
 }
 
 /// What makes maps of cells in space differ although the cells do not.
-void warn_of_space(const Study& study, const std::vector<Measure>& in_space, std::vector<std::string>& warnings) {
+void warn_of_space(const Study& study, const Measure& resolution, std::vector<std::string>& warnings) {
   std::map<std::string, int> n_by_method;
   for (const StudyCell& cell : study.cells)
     if (cell.space) ++n_by_method[cell.space->method];
@@ -132,22 +115,19 @@ void warn_of_space(const Study& study, const std::vector<Measure>& in_space, std
     std::vector<std::string> methods;
     for (const auto& [method, n] : n_by_method) methods.push_back(fmt::format("{} ({})", method, counted(n, "cells")));
     warnings.push_back(
-        fmt::format("Tractions in space were found by different methods: {}. Each smooths in its own way, so their "
-                    "forces and energies differ although the cells may not. Set traction.method, and run all again.",
+        fmt::format("Tractions in space were found by different methods: {}. Each smooths in its own way: set "
+                    "traction.method, and run all again.",
                     listed(methods)));
   }
   constexpr double kLevel = 0.05;
-  for (const Measure& m : in_space) {
-    if (m.sample.column != kResolution) continue;
-    for (const Comparison& c : m.comparisons) {
-      if (c.test != Test::mixed_model || c.group_b.empty() || *c.p_holm >= kLevel) continue;
-      const bool is_first_coarser = c.effect > 0;
-      warnings.push_back(
-          fmt::format("The maps of cells in space are coarser under {} than under {}, by {} on average: fewer beads, "
-                      "more noise or weaker cells. What smoothing takes from force and strain energy differs with it.",
-                      is_first_coarser ? c.group_a : c.group_b, is_first_coarser ? c.group_b : c.group_a,
-                      m.sample.amount(std::abs(c.effect))));
-    }
+  for (const Comparison& c : resolution.comparisons) {
+    if (c.test != Test::mixed_model || c.group_b.empty() || *c.p_holm >= kLevel) continue;
+    const bool is_first_coarser = c.effect > 0;
+    warnings.push_back(
+        fmt::format("The maps of cells in space are coarser under {} than under {}, by {} on average: smoothing takes "
+                    "more from their force and energy.",
+                    is_first_coarser ? c.group_a : c.group_b, is_first_coarser ? c.group_b : c.group_a,
+                    resolution.sample.amount(std::abs(c.effect))));
   }
 }
 
@@ -165,8 +145,8 @@ void warn_of_pseudo_replication(const Measure& m, std::vector<std::string>& warn
     }
     if (smallest < kLevel) continue;
     warnings.push_back(fmt::format(
-        "{}{}: {} and {} {} differ if each counts for itself (p = {}), not with the cell as the unit (p = {}): to "
-        "claim the former would be pseudo-replication.",
+        "{}{}: {} and {} {} differ if each counts for itself (p = {}), not with the cell as the unit (p = {}). The "
+        "former is pseudo-replication.",
         prefix_of(by_value.within), m.sample.name, kind_for_people(by_value.group_a), kind_for_people(by_value.group_b),
         name_of(m.sample.each), readable(*by_value.p_holm), readable(smallest)));
   }
@@ -182,12 +162,22 @@ std::string kind_for_people(const std::string& kind) {
   return named<FibreType>(kind) == FibreType::arc ? "transverse arc" : kind;
 }
 
-std::vector<const Measure*> Analysis::measures() const {
-  std::vector<const Measure*> all;
-  if (has_fibres) all = {&tensions, &adhesion_forces, &adhesion_areas};
-  for (const std::vector<Measure>* list : {&cells, &sheets, &in_space})
-    for (const Measure& m : *list) all.push_back(&m);
-  return all;
+const Measure* Analysis::find(const std::string& column) const {
+  const auto at = std::ranges::find_if(measures, [&](const Measure& m) { return m.sample.column == column; });
+  return at == measures.end() ? nullptr : &*at;
+}
+
+const Measure& Analysis::of(const std::string& column) const {
+  static const Measure none;
+  const Measure* found = find(column);
+  return found ? *found : none;
+}
+
+std::vector<const Measure*> Analysis::of_cells(CellKind kind) const {
+  std::vector<const Measure*> list;
+  for (const Measure& m : measures)
+    if (m.sample.of_cells() == kind) list.push_back(&m);
+  return list;
 }
 
 namespace {
@@ -201,54 +191,51 @@ CellKind most_of(const Study& study) {
 }  // namespace
 
 PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
-  const auto among = [](const std::vector<Measure>& measures, const std::string& column, const std::string& name) {
-    const auto at = std::ranges::find_if(measures, [&](const Measure& m) { return m.sample.column == column; });
-    return PrimaryChoice{at == measures.end() ? nullptr : &*at, 0, name};
-  };
-  const auto of_sheets = [&](const std::string& column, const std::string& name) {
-    return among(analysis.sheets, column, name + " of sheets");
-  };
-  const auto in_space = [&](const std::string& column, const std::string& name) {
-    return among(analysis.in_space, column, name + " of cells in space");
-  };
   const CellKind most = most_of(study);
   PrimaryMeasure asked = parameters.primary;
   if (asked == PrimaryMeasure::automatic)
     asked = most == CellKind::plane   ? PrimaryMeasure::tension
             : most == CellKind::sheet ? PrimaryMeasure::contraction
                                       : PrimaryMeasure::total_force;
-  if (asked == PrimaryMeasure::contraction) return of_sheets(name_of(SheetQuantity::contraction), "contraction");
-  if (asked == PrimaryMeasure::mean_tension) return of_sheets("mean_tension_nN_per_um", "mean tension");
-  if (asked == PrimaryMeasure::contractile_moment)
-    return in_space("space_contractile_moment_nN_um", "contractile moment");
-  if (asked == PrimaryMeasure::strain_energy)
-    return most == CellKind::sheet || analysis.in_space.empty() ? of_sheets("strain_energy_fJ", "strain energy")
-                                                                : in_space("space_strain_energy_fJ", "strain energy");
-  if (asked == PrimaryMeasure::total_force) {
-    if (most == CellKind::plane) return {&analysis.cells.front(), 0, "total force of cells"};
-    return most == CellKind::sheet ? of_sheets("sheet_force_nN", "total force")
-                                   : in_space("space_force_nN", "total force");
+  if (asked == PrimaryMeasure::tension) {
+    const Sample& sample = analysis.tensions().sample;
+    const auto kind = std::ranges::find(sample.kinds, name_of(counted_type(study, parameters.primary_type)));
+    return {analysis.find("tension_nN"), static_cast<int>(kind - sample.kinds.begin()),
+            "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres"};
   }
-  const std::string name = "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres";
-  if (!analysis.has_fibres) return {nullptr, 0, name};
-  const Sample& sample = analysis.tensions.sample;
-  const auto kind = std::ranges::find(sample.kinds, name_of(counted_type(study, parameters.primary_type)));
-  return {&analysis.tensions, static_cast<int>(kind - sample.kinds.begin()), name};
+  const auto of = [&](CellKind kind, const std::string& column, const std::string& name) {
+    const char* cells = kind == CellKind::sheet   ? " of sheets"
+                        : kind == CellKind::space ? " of cells in space"
+                                                  : " of cells";
+    return PrimaryChoice{analysis.find(column), 0, name + cells};
+  };
+  switch (asked) {
+    case PrimaryMeasure::contraction:
+      return of(CellKind::sheet, name_of(SheetQuantity::contraction), "contraction");
+    case PrimaryMeasure::mean_tension:
+      return of(CellKind::sheet, "mean_tension_nN_per_um", "mean tension");
+    case PrimaryMeasure::contractile_moment:
+      return of(CellKind::space, "space_contractile_moment_nN_um", "contractile moment");
+    case PrimaryMeasure::strain_energy:
+      return most == CellKind::sheet || analysis.of_cells(CellKind::space).empty()
+                 ? of(CellKind::sheet, "strain_energy_fJ", "strain energy")
+                 : of(CellKind::space, "space_strain_energy_fJ", "strain energy");
+    default:
+      return of(most,
+                most == CellKind::plane   ? "total_force_nN"
+                : most == CellKind::sheet ? "sheet_force_nN"
+                                          : "space_force_nN",
+                "total force");
+  }
 }
 
 Analysis analyse(const Study& study, const StudyParameters& parameters) {
   const std::vector<CellWeights> draws = draw_cells(study, parameters);
   Analysis a;
   a.has_fibres = n_of_kind(study, CellKind::plane) > 0;
-  a.tensions = measure(sample_tensions(study), draws);
-  a.tensions_by_cell = summarise_by_cell(a.tensions.sample, study);
-  a.shares = shares_above(a.tensions.sample, thresholds_nN(parameters));
-  a.adhesion_forces = measure(sample_adhesion_forces(study), draws);
-  a.adhesion_areas = measure(sample_adhesion_areas(study), draws);
-  if (a.has_fibres)
-    for (Sample& sample : sample_cells(study)) a.cells.push_back(measure(std::move(sample), draws));
-  for (Sample& sample : sample_sheets(study)) a.sheets.push_back(measure(std::move(sample), draws));
-  for (Sample& sample : sample_in_space(study)) a.in_space.push_back(measure(std::move(sample), draws));
+  for (Sample& sample : samples_of(study)) a.measures.push_back(measure(std::move(sample), draws));
+  a.tensions_by_cell = summarise_by_cell(a.tensions().sample, study);
+  a.shares = shares_above(a.tensions().sample, thresholds_nN(parameters));
   const PrimaryChoice primary = primary_choice(study, a, parameters);
   if (primary.measure == nullptr) {
     a.primary.measure = primary.name;
@@ -262,11 +249,11 @@ Analysis analyse(const Study& study, const StudyParameters& parameters) {
   a.directions = summarise_directions(study, draws);
   a.warnings = study.warnings;
   warn_of_few_cells(study, a.warnings);
-  if (a.has_fibres) warn_of_tensions(study, a.tensions, a.warnings);
+  if (a.has_fibres) warn_of_tensions(study, a.tensions(), a.warnings);
   warn_of_networks(study, a.warnings);
   warn_of_sheets(study, a.warnings);
-  warn_of_space(study, a.in_space, a.warnings);
-  for (const Measure* m : a.measures()) warn_of_pseudo_replication(*m, a.warnings);
+  warn_of_space(study, a.of(kResolution), a.warnings);
+  for (const Measure& m : a.measures) warn_of_pseudo_replication(m, a.warnings);
   return a;
 }
 

@@ -45,12 +45,11 @@ std::vector<Comparison> compare(const Sample& sample, const std::optional<Sample
 
 // What goes with what: forces of cells with their size, force of adhesions with their area, directions.
 
-/// A force of the cells against a measure of their size, with a line through the origin (thesis figs. 3.11, 3.12, A.1,
-/// A.2).
+/// A force of the cells, or a size, against a measure of their size, with a line through the origin (thesis figs. 3.11,
+/// 3.12, A.1, A.2).
 struct Correlation {
-  std::string force, size;                                          ///< columns of cells.csv
+  std::string force, size;  ///< columns of cells.csv; force may be a size, or fttc_force_nN of fttc.json
   const char *force_label = "", *size_label = "", *size_unit = "";  ///< for people; unit: what one more of is counted
-  bool is_of_total = false;
   std::string condition;
   std::vector<double> x = {}, y = {};
   std::vector<int> cells = {};                  ///< indices into Study::cells
@@ -111,7 +110,7 @@ struct Primary {
 
 /// "p = 0.012"
 std::string p_text(double p);
-/// "tension of ventral fibres under drug: 1.9 nN less than under control [95 % CI …], …"
+/// "tension of ventral fibres, drug minus control: −1.9 nN (−31 %) [95 % CI −3.0 to −0.8 nN], …"
 std::string sentence_of(const Primary& primary, const PrimaryDifference& difference);
 
 /// Without replicates the test is that of the mixed model (random effects of the cell, known errors). With replicates
@@ -134,18 +133,20 @@ struct Measure {
 struct Analysis {
   bool has_fibres = true;  ///< some cells have them: else nothing is said of fibres and adhesions on flat gels
   Primary primary;
-  Measure tensions;
+  std::vector<Measure> measures;  ///< in the order of the table of measures (samples.cpp)
   std::vector<Summary> tensions_by_cell;
   std::vector<ShareAbove> shares;
-  Measure adhesion_forces, adhesion_areas;
-  std::vector<Measure> cells = {}, sheets, in_space;
   std::vector<Correlation> correlations;
   std::vector<AreaBin> area_bins;
   std::vector<DirectionSummary> directions;
   std::vector<std::string> warnings;  ///< sentences on what the numbers cannot carry
 
-  /// Those of every sample of which the study has cells: tensions, adhesions, cells, sheets, cells in space.
-  std::vector<const Measure*> measures() const;
+  /// Null if no cell has one. @param column  of its sample
+  const Measure* find(const std::string& column) const;
+  /// The same, or one without values.
+  const Measure& of(const std::string& column) const;
+  const Measure& tensions() const { return of("tension_nN"); }
+  std::vector<const Measure*> of_cells(CellKind kind) const;
 };
 
 /// What the primary comparison compares; none: no cell of the study has it.

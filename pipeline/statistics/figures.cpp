@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 #include <sstream>
 
 #include "pipeline/contract/counted.h"
@@ -28,25 +27,13 @@ std::string counts(const std::vector<Observation>& own, Observed each) {
   return counted(std::ssize(own), name_of(each)) + ", " + counted(n_cells_of(own), "cells");
 }
 
-/// Where a condition's column is drawn beside the kind's place.
-double place_of(const Sample& sample, int condition, int kind) {
-  constexpr double kUsed = 0.8;  // of the place between two kinds
-  return kind + kUsed * ((condition + 0.5) / sample.n_conditions() - 0.5);
-}
+}  // namespace
 
 std::string colour_of(const Sample& sample, int condition, int kind) {
-  return sample.n_conditions() == 1 ? charts::colour_of(kFibreTypes[kind]) : condition_colour(condition);
+  if (sample.n_conditions() > 1) return condition_colour(condition);
+  return sample.each == Observed::fibres ? charts::colour_of(kFibreTypes[kind]) : condition_colour(kind);
 }
 
-/// The kinds side by side.
-Axis kind_axis(const Sample& sample) {
-  Axis axis{.label = {}, .low = -0.5, .high = sample.n_kinds() - 0.5};
-  for (int kind = 0; kind < sample.n_kinds(); ++kind)
-    axis.names.emplace_back(kind, kind_for_people(sample.kinds[kind]));
-  return axis;
-}
-
-/// "n = 56, 48, 56 fibres of 8, 8, 8 cells", in the order of the kinds.
 std::string counts_by_kind(const Sample& sample) {
   std::string n, cells;
   for (int kind = 0; kind < sample.n_kinds(); ++kind) {
@@ -62,57 +49,29 @@ std::size_t n_keys_of(const Sample& sample) { return sample.n_conditions() > 1 ?
 
 void add_condition_keys(Chart& chart, const Sample& sample) {
   for (int c = 0; c < sample.n_conditions() && sample.n_conditions() > 1; ++c) {
-    std::set<int> cells;
-    int n = 0;
-    for (const Observation& o : sample.values) {
-      if (o.group / sample.n_kinds() != c) continue;
-      cells.insert(o.cell);
-      ++n;
-    }
-    chart.key(fmt::format("{}: {}, {}", sample.conditions[c], counted(n, name_of(sample.each)),
-                          counted(std::ssize(cells), "cells")),
-              condition_colour(c));
+    std::vector<Observation> own;
+    std::ranges::copy_if(sample.values, std::back_inserter(own),
+                         [&](const Observation& o) { return o.group / sample.n_kinds() == c; });
+    chart.key(sample.conditions[c] + ": " + counts(own, sample.each), condition_colour(c));
   }
 }
 
+namespace {
+
 Figure tensions_by_type(const Study& study, const Analysis& analysis) {
-  const Sample& sample = analysis.tensions.sample;
-  Chart chart("Tension by fibre type", kind_axis(sample),
-              Axis{.label = "tension (nN)", .low = 0, .high = end_below_keys(largest_of(sample), n_keys_of(sample))});
-  chart.subtitle(counts_by_kind(sample), "#555");
-  const std::vector<MeasuredFibre> fibres = measured_fibres(study);
-  std::map<int, int> n_of;
-  constexpr double kDots = 0.5;  // of a condition's column
-  const double width = 0.8 / sample.n_conditions();
-  for (std::size_t i = 0; i < fibres.size(); ++i) {
-    const Observation& o = sample.values[i];  // in the order of the fibres
-    const int condition = o.group / sample.n_kinds();
-    chart.dot({place_of(sample, condition, o.kind) + kDots * width * place_in_column(n_of[o.group]++), o.value}, 2.6,
-              "fill:" + colour_of(sample, condition, o.kind) + ";fill-opacity:.5",
-              fmt::format("{}, fibre {}: {} nN", fibres[i].cell->name, fibres[i].fibre->fibre_id, readable(o.value)));
-  }
-  for (const Summary& s : analysis.tensions.summaries) {
-    const double x = place_of(sample, index_of(sample.conditions, s.condition), index_of(sample.kinds, s.kind));
-    chart.curve({{x - 0.35 * width, s.plain.median}, {x + 0.35 * width, s.plain.median}},
-                "stroke:#000;stroke-width:2.5");
-    if (!s.model) continue;
-    const double beside = x + 0.42 * width;
-    chart.error({beside, s.model->low}, {beside, s.model->high}, "stroke:#000;stroke-width:1.6");
-    chart.dot({beside, s.model->estimate}, 3.4, "fill:#fff;stroke:#000;stroke-width:1.6",
-              fmt::format("mean {} nN", readable(s.model->estimate)));
-  }
-  add_condition_keys(chart, sample);
+  Chart chart = super_plot(study, analysis.tensions(), std::nullopt, "Tension by fibre type");
+  chart.subtitle(counts_by_kind(analysis.tensions().sample), "#555");
   return {.name = "tensions_by_type",
           .title = "Tension of each fibre",
           .caption =
-              "One dot a fibre; bar: median; ring: mean of the mixed model with its 95 % interval, the cell being the "
-              "unit.",
+              "A small dot is a fibre (cell and number under the mouse), a large one the mean of a cell. Black: "
+              "mean of the mixed model with its 95 % interval, the cell being the unit.",
           .charts = {chart}};
 }
 
 /// Distribution of the tensions of each type, with the share above the thresholds.
 Figure tension_distributions(const Analysis& analysis, const StudyParameters& parameters) {
-  const Sample& sample = analysis.tensions.sample;
+  const Sample& sample = analysis.tensions().sample;
   Figure figure{.name = "tension_distributions",
                 .title = "Distribution of the tensions",
                 .caption = fmt::format("Share of a type's fibres by tension. Upright lines: {} and {} nN.",
@@ -136,7 +95,7 @@ Figure tension_distributions(const Analysis& analysis, const StudyParameters& pa
 }
 
 Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters) {
-  const Sample& sample = analysis.tensions.sample;
+  const Sample& sample = analysis.tensions().sample;
   Figure figure{.name = "fibres_above",
                 .title = "Share of the fibres above a tension",
                 .caption =
@@ -144,13 +103,14 @@ Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters
                     "cells do). Cross: the share without the blur of the measurement’s error.",
                 .n_columns = 2};
   for (const double threshold : thresholds_nN(parameters)) {
-    Chart chart("Above " + readable(threshold) + " nN", kind_axis(sample),
+    const ColumnPlaces columns{sample};
+    Chart chart("Above " + readable(threshold) + " nN", columns.axis(),
                 Axis{.label = "share of the fibres (%)", .low = 0, .high = end_below_keys(100, n_keys_of(sample))});
     chart.subtitle(counts_by_kind(sample), "#555");
     for (const ShareAbove& s : analysis.shares) {
       if (s.threshold_nN != threshold) continue;
       const int condition = index_of(sample.conditions, s.condition), kind = index_of(sample.kinds, s.kind);
-      const double x = place_of(sample, condition, kind);
+      const double x = columns.place(condition, kind);
       const std::string colour = colour_of(sample, condition, kind);
       chart.error({x, 100 * s.share.interval.low}, {x, 100 * s.share.interval.high},
                   "stroke:" + colour + ";stroke-width:1.6");
@@ -222,6 +182,7 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
     panels[key].push_back(&c);
   }
   for (const auto& key : order) {
+    if (std::ranges::none_of(panels[key], [](const Correlation* c) { return c->line.has_value(); })) continue;
     double x_end = 0, y_end = 0;
     for (const Correlation* c : panels[key]) {
       for (const double x : c->x) x_end = std::max(x_end, x);
@@ -248,6 +209,7 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
     }
     figure.charts.push_back(chart);
   }
+  if (figure.charts.empty()) figure.caption = "fewer than five cells (correlations.csv has the numbers).";
   return figure;
 }
 
@@ -256,10 +218,10 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
 std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
   std::vector<Figure> figures;
   if (auto primary = primary_figure(study, analysis, parameters)) figures.push_back(std::move(*primary));
-  if (!analysis.sheets.empty()) figures.push_back(sheet_figure(study, analysis));
-  if (!analysis.in_space.empty()) figures.push_back(space_figure(study, analysis));
+  for (const CellKind kind : {CellKind::sheet, CellKind::space})
+    if (!analysis.of_cells(kind).empty()) figures.push_back(figure_of_kind(study, analysis, kind));
   if (!analysis.has_fibres) return figures;
-  if (analysis.tensions.sample.values.empty()) {
+  if (analysis.tensions().sample.values.empty()) {
     figures.push_back(
         {.name = "tensions_by_type", .title = "Tension of each fibre", .caption = "no fibre has a known tension."});
   } else {

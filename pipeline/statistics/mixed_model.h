@@ -15,6 +15,7 @@ struct Observation {
   int cell = 0;
   int kind = 0;   ///< fibre type, or connected or not: kinds differ in their scatter, and in their own way in each cell
   int group = 0;  ///< whose mean is asked for: a kind under a condition
+  int id = 0;     ///< of the fibre or adhesion, for people; 0: of the cell
 };
 
 /// y = mean(group) + a(cell) + b(cell, kind) + e(kind) + measurement error, all normal and independent, with the

@@ -93,14 +93,13 @@ std::string p_text(double p) { return p < 1e-4 ? "p < 0.0001" : fmt::format("p =
 
 std::string sentence_of(const Primary& primary, const PrimaryDifference& d) {
   const Contrast& c = d.difference;
-  const double sign = c.estimate < 0 ? -1 : 1;
-  const double low = sign > 0 ? c.low : -c.high, high = sign > 0 ? c.high : -c.low;
-  std::string text =
-      fmt::format("{} under {}: {} {} {} than under {}", primary.measure, d.condition, readable(std::abs(c.estimate)),
-                  primary.unit, sign > 0 ? "more" : "less", primary.reference);
+  std::string text = fmt::format("{}, {} minus {}: {} {}", primary.measure, d.condition, primary.reference,
+                                 readable(c.estimate), primary.unit);
   if (primary.reference_mean > 0)
-    text += fmt::format(" ({:.0f} %)", 100 * std::abs(c.estimate) / primary.reference_mean);
-  text += fmt::format(" [95 % CI {} to {} {}], {}; ", readable(low), readable(high), primary.unit, p_text(d.p_holm));
+    text +=
+        fmt::format(" ({}{:.0f} %)", c.estimate < 0 ? "−" : "+", 100 * std::abs(c.estimate) / primary.reference_mean);
+  text +=
+      fmt::format(" [95 % CI {} to {} {}], {}; ", readable(c.low), readable(c.high), primary.unit, p_text(d.p_holm));
   if (d.replicates > 0) text += counted(d.replicates, "replicates") + ", ";
   return text + fmt::format("{} and {} {}", d.cells, d.cells_before, primary.cells);
 }

@@ -21,77 +21,98 @@ std::vector<std::string> replicates_of(const Study& study) {
   return {names.begin(), names.end()};
 }
 
-charts::Axis condition_axis(const Sample& sample) {
-  charts::Axis axis{.label = {}, .low = -0.5, .high = sample.n_conditions() - 0.5};
-  for (int c = 0; c < sample.n_conditions(); ++c) axis.names.emplace_back(c, sample.conditions[c]);
-  return axis;
-}
-
 /// Of the interval by its own error; zero of one without an error.
 double half_of_95(const Observation& o) { return kNormal95 * std::sqrt(o.error_variance); }
 
-/// What lies in one condition's column.
-void draw_column(charts::Chart& chart, const Study& study, const Sample& sample, int condition, int kind,
-                 const std::vector<std::string>& replicates) {
-  constexpr double kWidth = 0.6;
-  const auto colour = [&](const StudyCell& cell) {
-    return replicates.size() > 1 ? condition_colour(index_of(replicates, cell.replicate)) : condition_colour(condition);
-  };
+/// What lies in one column. @param colour  of a cell
+template <class Colour>
+void draw_column(charts::Chart& chart, const Study& study, const Sample& sample, const std::vector<Observation>& values,
+                 double x, double width, const Colour& colour) {
   std::map<int, std::vector<Observation>> by_cell;
-  for (const Observation& o : sample.of_group(condition, kind)) by_cell[o.cell].push_back(o);
+  for (const Observation& o : values) by_cell[o.cell].push_back(o);
   const bool is_one_a_cell = sample.is_one_a_cell();
   int n = 0;
-  for (const auto& [index, values] : by_cell) {
-    const StudyCell& cell = study.cells[index];
+  for (const auto& [index, own] : by_cell) {
     if (is_one_a_cell) break;  // its mean says it all
-    for (const Observation& o : values)
-      chart.dot({condition + kWidth * place_in_column(++n), o.value}, 2, "fill:" + colour(cell) + ";fill-opacity:.35",
-                cell.name + ": " + sample.amount(o.value));
+    for (const Observation& o : own)
+      chart.dot({x + width * place_in_column(++n), o.value}, 2,
+                "fill:" + colour(study.cells[index]) + ";fill-opacity:.35",
+                study.cells[index].name + (o.id > 0 ? fmt::format(", {}", o.id) : "") + ": " + sample.amount(o.value));
   }
   n = 0;
-  for (const auto& [index, values] : by_cell) {
+  for (const auto& [index, own] : by_cell) {
     const StudyCell& cell = study.cells[index];
-    const double mean = describe(values_of(values)).mean, x = condition + kWidth * place_in_column(++n);
-    if (const double half = half_of_95(values.front()); is_one_a_cell && half > 0)
-      chart.error({x, mean - half}, {x, mean + half}, "stroke-width:1;stroke:" + colour(cell));
+    const double mean = describe(values_of(own)).mean, at = x + width * place_in_column(++n);
+    if (const double half = half_of_95(own.front()); is_one_a_cell && half > 0)
+      chart.error({at, mean - half}, {at, mean + half}, "stroke-width:1;stroke:" + colour(cell));
     chart.dot(
-        {x, mean}, 5.5, "stroke:#1a1d21;stroke-width:1;fill:" + colour(cell),
+        {at, mean}, 4.5, "stroke:#1a1d21;stroke-width:1;fill:" + colour(cell),
         fmt::format("{}{}{}: {}", cell.name, cell.replicate.empty() ? "" : ", ", cell.replicate, sample.amount(mean)));
   }
 }
 
-charts::Chart super_plot(const Study& study, const Measure& m, int kind, const std::string& title) {
+}  // namespace
+
+charts::Axis ColumnPlaces::axis() const {
+  charts::Axis axis{.label = {}, .low = -0.5, .high = (kind ? sample.n_conditions() : sample.n_kinds()) - 0.5};
+  for (int c = 0; kind && c < sample.n_conditions(); ++c) axis.names.emplace_back(c, sample.conditions[c]);
+  for (int k = 0; !kind && k < sample.n_kinds(); ++k) axis.names.emplace_back(k, kind_for_people(sample.kinds[k]));
+  return axis;
+}
+
+double ColumnPlaces::width() const { return kind ? 0.8 : 0.8 / sample.n_conditions(); }
+
+double ColumnPlaces::place(int condition, int of_kind) const {
+  return kind ? condition : of_kind + width() * (condition + 0.5 - 0.5 * sample.n_conditions());
+}
+
+charts::Chart super_plot(const Study& study, const Measure& m, std::optional<int> kind, const std::string& title) {
   const Sample& sample = m.sample;
+  const ColumnPlaces columns{sample, kind};
   const std::vector<std::string> replicates = replicates_of(study);
-  const bool has_bars = sample.is_one_a_cell();
+  const bool is_by_replicate = kind && replicates.size() > 1;
+  const auto is_shown = [&](int k) { return !kind || *kind == k; };
   double least = 0, largest = 0;
   for (const Observation& o : sample.values) {
-    if (o.kind != kind) continue;
-    const double half = has_bars ? half_of_95(o) : 0;
+    if (!is_shown(o.kind)) continue;
+    const double half = sample.is_one_a_cell() ? half_of_95(o) : 0;
     if (!sample.is_never_negative) least = std::min(least, o.value - half);
     largest = std::max(largest, o.value + half);
   }
   for (const Summary& s : m.summaries) {
-    if (s.kind != sample.kinds[kind] || !s.model) continue;
+    if (!is_shown(index_of(sample.kinds, s.kind)) || !s.model) continue;
     least = std::min(least, s.model->low);
     largest = std::max(largest, s.model->high);
   }
-  const std::size_t n_keys = replicates.size() > 1 ? replicates.size() : 0;
+  const std::size_t n_keys = is_by_replicate ? replicates.size() : kind ? 0 : n_keys_of(sample);
   charts::Chart chart(
-      title, condition_axis(sample),
+      title, columns.axis(),
       charts::Axis{.label = sample.label(), .low = 1.05 * least, .high = end_below_keys(largest, n_keys)});
-  for (int c = 0; c < sample.n_conditions(); ++c) draw_column(chart, study, sample, c, kind, replicates);
-  for (const Summary& s : m.summaries) {
-    if (s.kind != sample.kinds[kind] || !s.model) continue;
-    const double x = index_of(sample.conditions, s.condition);
-    chart.error({x + 0.4, s.model->low}, {x + 0.4, s.model->high}, "stroke:#1a1d21;stroke-width:2");
-    chart.pieces({{{x + 0.34, s.model->estimate}, {x + 0.46, s.model->estimate}}}, "stroke:#1a1d21;stroke-width:2.4",
-                 "mean " + sample.amount(s.model->estimate));
+  for (int c = 0; c < sample.n_conditions(); ++c) {
+    for (int k = 0; k < sample.n_kinds(); ++k) {
+      if (!is_shown(k)) continue;
+      draw_column(chart, study, sample, sample.of_group(c, k), columns.place(c, k), 0.75 * columns.width(),
+                  [&](const StudyCell& cell) {
+                    return is_by_replicate ? condition_colour(index_of(replicates, cell.replicate))
+                                           : colour_of(sample, c, k);
+                  });
+    }
   }
-  for (std::size_t r = 0; r < n_keys; ++r)
+  for (const Summary& s : m.summaries) {
+    const int k = index_of(sample.kinds, s.kind);
+    if (!is_shown(k) || !s.model) continue;
+    const double x = columns.place(index_of(sample.conditions, s.condition), k), w = columns.width();
+    chart.error({x + 0.5 * w, s.model->low}, {x + 0.5 * w, s.model->high}, "stroke:#1a1d21;stroke-width:2");
+    chart.pieces({{{x + 0.42 * w, s.model->estimate}, {x + 0.58 * w, s.model->estimate}}},
+                 "stroke:#1a1d21;stroke-width:2.4", "mean " + sample.amount(s.model->estimate));
+  }
+  if (!kind) add_condition_keys(chart, sample);
+  for (std::size_t r = 0; is_by_replicate && r < replicates.size(); ++r)
     chart.key(replicates[r].empty() ? "no replicate given" : replicates[r], condition_colour(static_cast<int>(r)));
   return chart;
 }
+
+namespace {
 
 charts::Chart effect_plot(const Primary& primary) {
   std::vector<std::string> names;
@@ -114,19 +135,6 @@ charts::Chart effect_plot(const Primary& primary) {
     chart.dot({d.difference.estimate, y}, 5, "fill:" + colour, text);
   }
   return chart;
-}
-
-std::vector<charts::Chart> super_plots(const Study& study, const std::vector<Measure>& measures) {
-  std::vector<charts::Chart> list;
-  for (const Measure& m : measures) {
-    for (int kind = 0; kind < m.sample.n_kinds(); ++kind) {
-      std::string title = m.sample.name;
-      if (m.sample.n_kinds() > 1) title += ": " + m.sample.kinds[kind];
-      if (m.sample.each == Observed::adhesions_in_space) title += " of an adhesion";
-      list.push_back(super_plot(study, m, kind, title));
-    }
-  }
-  return list;
 }
 
 /// What the dots are.
@@ -158,29 +166,20 @@ std::optional<Figure> primary_figure(const Study& study, const Analysis& analysi
   return figure;
 }
 
-Figure sheet_figure(const Study& study, const Analysis& analysis) {
-  Figure figure{
-      .name = "sheets",
-      .title = "Sheets",
-      .caption =
-          "A dot with its 95 % interval is a sheet. Where a sheet has several parts of a kind, these are small dots, "
-          "and the large one is their mean. Black: mean of the mixed model with its 95 % interval.",
-      .charts = super_plots(study, analysis.sheets),
-      .n_columns = 3};
+Figure figure_of_kind(const Study& study, const Analysis& analysis, CellKind kind) {
+  const bool is_sheet = kind == CellKind::sheet;
+  Figure figure{.name = is_sheet ? "sheets" : "cells_in_space",
+                .title = is_sheet ? "Sheets" : "Cells in space",
+                .caption = std::string("A large dot is a ") + (is_sheet ? "sheet" : "cell") +
+                           ", with the 95 % interval of its own error if that is known; small dots are its " +
+                           (is_sheet ? "parts" : "adhesions") +
+                           ". Black: mean of the mixed model with its 95 % interval.",
+                .n_columns = 3};
+  for (const Measure* m : analysis.of_cells(kind))
+    figure.charts.push_back(
+        super_plot(study, *m, m->sample.n_kinds() > 1 ? std::nullopt : std::optional(0),
+                   m->sample.name + (m->sample.each == Observed::adhesions_in_space ? " of an adhesion" : "")));
   return figure;
-}
-
-Figure space_figure(const Study& study, const Analysis& analysis) {
-  const bool has_adhesions = std::ranges::any_of(
-      analysis.in_space, [](const Measure& m) { return m.sample.each == Observed::adhesions_in_space; });
-  return {
-      .name = "cells_in_space",
-      .title = "Cells in space",
-      .caption = std::string("A dot is a cell, with the 95 % interval of its own error if that is known. ") +
-                 (has_adhesions ? "Forces of adhesions: small dots, and the large one is the mean of a cell. " : "") +
-                 "Black: mean of the mixed model with its 95 % interval.",
-      .charts = super_plots(study, analysis.in_space),
-      .n_columns = 3};
 }
 
 }  // namespace mbtfm::statistics

@@ -11,42 +11,46 @@
 namespace mbtfm::statistics {
 namespace {
 
-struct Force {
-  const char *column, *label;
-  double FitSummary::*member;
+/// A number of a cell with fibres; none: not known.
+struct Quantity {
+  const char *column, *label, *unit;  ///< unit: what one more of is counted
+  std::optional<double> (*of)(const StudyCell&);
 };
-constexpr Force kForces[] = {{"total_force_nN", "total force (nN)", &FitSummary::total_force_nN},
-                             {"fibre_force_nN", "force of the fibres (nN)", &FitSummary::fibre_force_nN},
-                             {"network_force_nN", "force of the network (nN)", &FitSummary::network_force_nN}};
-struct Size {
-  const char *column, *label, *unit;
-  double CellFigures::*member;
-};
-constexpr Size kSizes[] = {
-    {"n_adhesions", "number of adhesions", "adhesion", &CellFigures::n_adhesions},
-    {"adhesion_area_um2", "area of all adhesions (µm²)", "µm² of adhesion", &CellFigures::adhesion_area_um2},
-    {"cell_area_um2", "area of the cell (µm²)", "µm² of cell", &CellFigures::cell_area_um2},
-    {"n_fibres", "number of fibres", "fibre", &CellFigures::n_fibres}};
+constexpr Quantity kForces[] = {
+    {"total_force_nN", "total force (nN)", "nN",
+     [](const StudyCell& c) { return std::optional(c.fit.total_force_nN); }},
+    {"fibre_force_nN", "force of the fibres (nN)", "nN",
+     [](const StudyCell& c) { return is_network_known(c) ? std::optional(c.fit.fibre_force_nN) : std::nullopt; }},
+    {"network_force_nN", "force of the network (nN)", "nN",
+     [](const StudyCell& c) { return is_network_known(c) ? std::optional(c.fit.network_force_nN) : std::nullopt; }},
+    {"fttc_force_nN", "total force by FTTC (nN)", "nN", [](const StudyCell& c) { return c.fttc_force_nN; }}};
+constexpr Quantity kSizes[] = {{"n_adhesions", "number of adhesions", "adhesion",
+                                [](const StudyCell& c) { return std::optional(figures_of(c).n_adhesions); }},
+                               {"adhesion_area_um2", "area of all adhesions (µm²)", "µm² of adhesion",
+                                [](const StudyCell& c) { return std::optional(figures_of(c).adhesion_area_um2); }},
+                               {"cell_area_um2", "area of the cell (µm²)", "µm² of cell",
+                                [](const StudyCell& c) { return std::optional(figures_of(c).cell_area_um2); }},
+                               {"n_fibres", "number of fibres", "fibre",
+                                [](const StudyCell& c) { return std::optional(figures_of(c).n_fibres); }}};
 
-std::optional<Correlation> correlate(const Study& study, int condition, const Force& force, const Size& size,
+std::optional<Correlation> correlate(const Study& study, int condition, const Quantity& force, const Quantity& size,
                                      const std::vector<CellWeights>& draws) {
-  const bool is_of_total = force.member == &FitSummary::total_force_nN;
   Correlation c{.force = force.column,
                 .size = size.column,
                 .force_label = force.label,
                 .size_label = size.label,
                 .size_unit = size.unit,
-                .is_of_total = is_of_total,
                 .condition = study.conditions[condition]};
   std::map<int, std::pair<double, double>> products;
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
     if (study.cells[i].condition != condition || study.cells[i].kind() != CellKind::plane) continue;
-    if (!is_of_total && !is_network_known(study.cells[i])) continue;
+    const std::optional<double> x = size.of(study.cells[i]), y = force.of(study.cells[i]);
+    if (!x || !y) continue;
     const int cell = static_cast<int>(i);
     c.cells.push_back(cell);
-    c.x.push_back(figures_of(study.cells[i]).*size.member);
-    c.y.push_back(study.cells[i].fit.*force.member);
-    products[cell] = {c.x.back() * c.y.back(), c.x.back() * c.x.back()};
+    c.x.push_back(*x);
+    c.y.push_back(*y);
+    products[cell] = {*x * *y, *x * *x};
   }
   if (std::ranges::all_of(c.x, [](double x) { return x == 0; })) return std::nullopt;
   if (c.x.size() < kFewestForALine) return c;
@@ -56,11 +60,9 @@ std::optional<Correlation> correlate(const Study& study, int condition, const Fo
 }
 
 /// Inner edges that cut the sorted areas into parts of as many adhesions; equal ones once.
-std::vector<double> bin_edges(const std::vector<SeenAdhesion>& adhesions) {
+std::vector<double> bin_edges(std::vector<double> areas) {
   constexpr int kBins = 8;           // enough to see a bend
   constexpr int kFewestInABin = 20;  // five connected ones, where a quarter are: else fewer bins
-  std::vector<double> areas;
-  for (const SeenAdhesion& a : adhesions) areas.push_back(a.area_um2);
   std::ranges::sort(areas);
   const int n_bins = std::clamp(static_cast<int>(areas.size()) / kFewestInABin, 1, kBins);
   std::set<double> edges = {areas.front(), areas.back()};
@@ -74,20 +76,23 @@ std::vector<double> bin_edges(const std::vector<SeenAdhesion>& adhesions) {
 }  // namespace
 
 std::vector<Correlation> correlate_forces(const Study& study, const std::vector<CellWeights>& draws) {
+  std::vector<std::pair<const Quantity*, const Quantity*>> pairs;  // force and size, thesis figs. 3.12, A.1, A.2
+  for (const Quantity& size : kSizes)
+    for (const Quantity& force : kForces) pairs.emplace_back(&force, &size);
+  for (const Quantity* size : {&kSizes[0], &kSizes[1], &kSizes[3]}) pairs.emplace_back(size, &kSizes[2]);  // fig. 3.11
   std::vector<Correlation> list;
-  for (const Size& size : kSizes) {
-    for (const Force& force : kForces) {
-      for (int condition = 0; condition < static_cast<int>(study.conditions.size()); ++condition)
-        if (auto c = correlate(study, condition, force, size, draws)) list.push_back(std::move(*c));
-    }
-  }
+  for (const auto& [y, x] : pairs)
+    for (int condition = 0; condition < static_cast<int>(study.conditions.size()); ++condition)
+      if (auto c = correlate(study, condition, *y, *x, draws)) list.push_back(std::move(*c));
   return list;
 }
 
 std::vector<AreaBin> bin_by_area(const Study& study, const std::vector<CellWeights>& draws) {
-  const std::vector<SeenAdhesion> adhesions = seen_adhesions(study);
-  if (adhesions.empty()) return {};
-  const std::vector<double> edges = bin_edges(adhesions);
+  std::vector<double> areas;
+  for (const StudyCell& cell : study.cells)
+    for (const SeenAdhesion& a : seen_adhesions(cell)) areas.push_back(a.area_um2);
+  if (areas.empty()) return {};
+  const std::vector<double> edges = bin_edges(areas);
   std::vector<AreaBin> bins;
   for (std::size_t condition = 0; condition < study.conditions.size(); ++condition) {
     for (const bool is_connected : {true, false}) {
@@ -98,13 +103,14 @@ std::vector<AreaBin> bin_by_area(const Study& study, const std::vector<CellWeigh
                     .high_um2 = edges[b + 1]};
         CellMean area, force;
         const bool is_last = b + 2 == edges.size();
-        for (const SeenAdhesion& a : adhesions) {
-          const bool is_inside = a.area_um2 >= bin.low_um2 && (a.area_um2 < bin.high_um2 || is_last);
-          if (study.cells[a.cell].condition != static_cast<int>(condition) || a.is_connected != is_connected ||
-              !is_inside)
-            continue;
-          area.add(a.cell, a.area_um2);
-          force.add(a.cell, a.force_nN);
+        for (std::size_t i = 0; i < study.cells.size(); ++i) {
+          if (study.cells[i].condition != static_cast<int>(condition)) continue;
+          for (const SeenAdhesion& a : seen_adhesions(study.cells[i])) {
+            const bool is_inside = a.area_um2 >= bin.low_um2 && (a.area_um2 < bin.high_um2 || is_last);
+            if (a.is_connected != is_connected || !is_inside) continue;
+            area.add(static_cast<int>(i), a.area_um2);
+            force.add(static_cast<int>(i), a.force_nN);
+          }
         }
         if (force.n() == 0) continue;
         bin.n_cells = force.n_cells();

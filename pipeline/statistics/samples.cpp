@@ -7,116 +7,214 @@
 #include <set>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/errors.h"
 
 namespace mbtfm::statistics {
 namespace {
 
-Sample empty_sample(const Study& study, std::string column, std::string name, std::string unit, Observed each,
-                    std::vector<std::string> kinds) {
-  return {.column = std::move(column),
-          .name = std::move(name),
-          .unit = std::move(unit),
-          .each = each,
-          .kinds = std::move(kinds),
-          .conditions = study.conditions};
+using Number = std::optional<double>;
+
+/// One value of a cell, and of which of the measure's kinds it is.
+struct Value {
+  std::string kind;
+  double value = 0;
+  Number standard_error = {};  ///< 0: exact
+  int id = 0;                  ///< of the fibre or adhesion
+};
+
+/// A row of the table of measures.
+struct MeasureRow {
+  const char *column, *name, *unit;
+  Observed each;
+  std::vector<std::string> kinds;  ///< empty: as they are met
+  std::function<std::vector<Value>(const Study&, const StudyCell&)> of;
+  bool is_never_negative = true;
+};
+
+enum class Sign { positive, any };
+
+/// A number that each cell of a kind has, or lacks. @param kind  the measure's only one
+MeasureRow one(Observed each, const char* kind, const char* column, const char* name, const char* unit,
+               const std::function<Number(const StudyCell&)>& of, const std::function<Number(const StudyCell&)>& sigma,
+               Sign sign = Sign::positive) {
+  const auto values = [=](const Study&, const StudyCell& cell) -> std::vector<Value> {
+    const Number value = of(cell);
+    if (!value) return {};
+    return {{kind, *value, sigma ? sigma(cell) : Number()}};
+  };
+  return {column, name, unit, each, {kind}, values, sign == Sign::positive};
 }
 
-void add(Sample& sample, const StudyCell& cell, int index, int kind, double value,
-         const std::optional<double>& standard_error) {
-  const double error = standard_error.value_or(0);
-  if (error == 0) ++sample.n_without_error;
-  sample.values.push_back({.value = value,
-                           .error_variance = error * error,
-                           .cell = index,
-                           .kind = kind,
-                           .group = sample.group_of(cell.condition, kind)});
+/// Figures of cells with fibres, of sheets, and in space.
+MeasureRow cell(const char* column, const char* name, const char* unit,
+                const std::function<Number(const StudyCell&)>& of, Sign sign = Sign::positive) {
+  return one(Observed::cells, "cell", column, name, unit, of, {}, sign);
+}
+MeasureRow sheet(const char* column, const char* name, const char* unit, auto figure, Sign sign = Sign::positive) {
+  const auto of = [=](const StudyCell& c) -> Number { return std::invoke(figure, *c.sheet); };
+  return one(Observed::sheets, kWholeSheet, column, name, unit, of, {}, sign);
+}
+using OfSpace = std::function<Number(const SpaceFigures&)>;
+MeasureRow space(const char* column, const char* name, const char* unit, const OfSpace& figure,
+                 const OfSpace& sigma = {}, Sign sign = Sign::positive) {
+  const auto of = [](const OfSpace& f) { return [=](const StudyCell& c) { return f(*c.space); }; };
+  return one(Observed::cells_in_space, "cell", column, name, unit, of(figure),
+             sigma ? of(sigma) : std::function<Number(const StudyCell&)>(), sign);
+}
+
+/// One quantity of sheet_fit.csv; its kinds are the parts of the sheets.
+MeasureRow estimate(SheetQuantity quantity) {
+  const auto& [name, unit] = for_people(quantity);
+  const auto values = [=](const Study&, const StudyCell& cell) {
+    std::vector<Value> list;
+    for (const SheetEstimate& e : cell.sheet->estimates)
+      if (e.quantity == quantity && enters(e)) list.push_back({kind_of_part(e), e.value, own_error(e)});
+    return list;
+  };
+  return {name_of(quantity),
+          name,
+          unit,
+          quantity == SheetQuantity::bundle_tension ? Observed::bundles : Observed::sheets,
+          {},
+          values,
+          quantity != SheetQuantity::contraction && quantity != SheetQuantity::contraction_over_stiffness};
+}
+
+std::vector<Value> tensions_of(const Study& study, const StudyCell& cell) {
+  std::vector<Value> list;
+  for (const MeasuredFibre& f : measured_fibres(cell))
+    list.push_back({name_of(counted_type(study, f.fibre->type)), f.tension->tension_nN, standard_error_nN(*f.tension),
+                    f.fibre->fibre_id});
+  return list;
+}
+
+constexpr const char *kConnected = "connected", *kUnconnected = "unconnected";
+std::function<std::vector<Value>(const Study&, const StudyCell&)> of_adhesions(double SeenAdhesion::*figure) {
+  return [=](const Study&, const StudyCell& cell) {
+    std::vector<Value> list;
+    for (const SeenAdhesion& a : seen_adhesions(cell))
+      list.push_back({a.is_connected ? kConnected : kUnconnected, a.*figure,
+                      figure == &SeenAdhesion::force_nN ? a.sigma_nN : Number(0.0)});
+    return list;
+  };
+}
+
+std::vector<Value> forces_in_space(const Study&, const StudyCell& cell) {
+  std::vector<Value> list;
+  for (const SpaceFigures::OfAdhesion& a : cell.space->adhesions)
+    list.push_back({"adhesion", a.force_nN, a.sigma_nN, a.adhesion_id});
+  return list;
+}
+
+/// All that a study compares, in the order of its tables.
+std::vector<MeasureRow> measure_table(int n_fibre_types) {
+  const auto of_fit = [](double FitSummary::*figure) { return [=](const StudyCell& c) { return c.fit.*figure; }; };
+  const auto of_network = [](double FitSummary::*figure) {
+    return [=](const StudyCell& c) { return is_network_known(c) ? Number(c.fit.*figure) : Number(); };
+  };
+  using F = FitSummary;
+  using S = SheetSummary;
+  using Q = SpaceFigures;
+  std::vector<std::string> types;
+  for (const FibreType type : kFibreTypes)
+    if (type != FibreType::edge || n_fibre_types > 3) types.emplace_back(name_of(type));
+  std::vector<MeasureRow> table = {
+      {"tension_nN", "tension", "nN", Observed::fibres, types, tensions_of},
+      {"adhesion_force_nN",
+       "force",
+       "nN",
+       Observed::adhesions,
+       {kConnected, kUnconnected},
+       of_adhesions(&SeenAdhesion::force_nN)},
+      {"adhesion_area_um2",
+       "area",
+       "µm²",
+       Observed::adhesions,
+       {kConnected, kUnconnected},
+       of_adhesions(&SeenAdhesion::area_um2)},
+      cell("total_force_nN", "total force", "nN", of_fit(&F::total_force_nN)),
+      cell("fibre_force_nN", "force of the fibres", "nN", of_network(&F::fibre_force_nN), Sign::any),
+      cell("network_force_nN", "force of the network", "nN", of_network(&F::network_force_nN)),
+      cell("network_surface_tension_nN_per_um", "surface tension of the network", "nN/µm",
+           of_network(&F::network_surface_tension_nN_per_um)),
+      estimate(SheetQuantity::contraction),
+      sheet("mean_tension_nN_per_um", "mean tension", "nN/µm", &S::mean_tension_nN_per_um, Sign::any),
+      sheet("sheet_force_nN", "total force", "nN", &S::total_force_nN),
+      sheet("strain_energy_fJ", "strain energy", "fJ", &S::strain_energy_fJ),
+      sheet("sheet_area_um2", "area", "µm²", &S::area_um2)};
+  for (const SheetQuantity quantity : mbtfm::values_of<SheetQuantity>())
+    if (quantity != SheetQuantity::contraction) table.push_back(estimate(quantity));
+  table.insert(
+      table.end(),
+      {space("space_force_nN", "total force", "nN", &Q::total_force_nN, &Q::total_force_sigma_nN),
+       space("space_strain_energy_fJ", "strain energy", "fJ", &Q::strain_energy_fJ),
+       space("space_contractile_moment_nN_um", "contractile moment", "nN µm", &Q::contractile_moment_nN_um,
+             &Q::contractile_moment_sigma_nN_um, Sign::any),
+       space("space_normal_share", "share of the normal force", "", &Q::normal_share),
+       space("space_largest_traction_kPa", "largest traction", "kPa", &Q::largest_traction_kPa),
+       space(kResolution, "resolution", "µm", &Q::resolution_um),
+       {"space_adhesion_force_nN", "force", "nN", Observed::adhesions_in_space, {"adhesion"}, forces_in_space}});
+  return table;
 }
 
 /// An unknown error taken for zero would give its value more weight than all others: it is as large as theirs.
-Sample with_typical_errors(Sample sample) {
+void fill_in_errors(std::vector<Observation>& values) {
   double sum = 0;
   int n = 0;
-  for (const Observation& o : sample.values) {
+  for (const Observation& o : values) {
     sum += o.error_variance;
     n += o.error_variance > 0 ? 1 : 0;
   }
-  for (Observation& o : sample.values)
+  for (Observation& o : values)
     if (o.error_variance == 0 && n > 0) o.error_variance = sum / n;
+}
+
+Sample sample_of(const Study& study, const MeasureRow& row) {
+  Sample sample{.column = row.column,
+                .name = row.name,
+                .unit = row.unit,
+                .each = row.each,
+                .kinds = row.kinds,
+                .conditions = study.conditions,
+                .is_never_negative = row.is_never_negative};
+  for (std::size_t i = 0; i < study.cells.size(); ++i) {
+    if (study.cells[i].kind() != sample.of_cells()) continue;
+    for (const Value& v : row.of(study, study.cells[i])) {
+      auto kind = std::ranges::find(sample.kinds, v.kind);
+      if (kind == sample.kinds.end()) kind = sample.kinds.insert(kind, v.kind);
+      const double error = v.standard_error.value_or(0);
+      if (error == 0) ++sample.n_without_error;
+      sample.values.push_back({.value = v.value,
+                               .error_variance = error * error,
+                               .cell = static_cast<int>(i),
+                               .kind = static_cast<int>(kind - sample.kinds.begin()),
+                               .id = v.id});
+    }
+  }
+  for (Observation& o : sample.values) o.group = sample.group_of(study.cells[o.cell].condition, o.kind);
+  fill_in_errors(sample.values);
   return sample;
 }
 
-/// Forces, or areas, of the adhesions.
-Sample sample_adhesions(const Study& study, const char* column, const char* name, const char* unit,
-                        double SeenAdhesion::*value) {
-  Sample sample = empty_sample(study, column, name, unit, Observed::adhesions, {"connected", "unconnected"});
-  for (const SeenAdhesion& a : seen_adhesions(study))
-    add(sample, study.cells[a.cell], a.cell, a.is_connected ? 0 : 1, a.*value,
-        value == &SeenAdhesion::force_nN ? a.sigma_nN : 0.0);
-  return with_typical_errors(std::move(sample));
-}
-
-std::vector<int> cells_of(const Study& study, CellKind kind) {
-  std::vector<int> indices;
-  for (std::size_t i = 0; i < study.cells.size(); ++i)
-    if (study.cells[i].kind() == kind) indices.push_back(static_cast<int>(i));
-  return indices;
-}
-
-using Number = std::optional<double>;
-enum class MayBeNegative { no, yes };
-
-/// A number that each cell of a kind has, or lacks.
-struct Measured {
-  const char *column, *name, *unit;
-  std::function<Number(const StudyCell&)> of, sigma = {};  ///< sigma: none where no error is known
-  MayBeNegative may_be_negative = MayBeNegative::no;
-};
-
-/// Of what cells of one kind have. @param figure  a member of it
-template <class Part>
-std::function<Number(const StudyCell&)> figure_of(std::optional<Part> StudyCell::*part, auto figure) {
-  return [=](const StudyCell& c) -> Number { return std::invoke(figure, *(c.*part)); };
-}
-
-/// @param kind  the sample's only one
-Sample sample_of(const Study& study, CellKind of, Observed each, const char* kind, const Measured& m) {
-  Sample sample = empty_sample(study, m.column, m.name, m.unit, each, {kind});
-  sample.is_never_negative = m.may_be_negative == MayBeNegative::no;
-  for (const int i : cells_of(study, of)) {
-    const StudyCell& cell = study.cells[i];
-    if (const Number value = m.of(cell)) add(sample, cell, i, 0, *value, m.sigma ? m.sigma(cell) : Number());
-  }
-  return with_typical_errors(std::move(sample));
-}
-
-bool is_never_negative(SheetQuantity quantity) {
-  return quantity != SheetQuantity::contraction && quantity != SheetQuantity::contraction_over_stiffness;
-}
-
-/// Of one quantity of sheet_fit.csv; kinds are the parts of the sheets, in the order in which they are first met.
-Sample sample_estimates(const Study& study, SheetQuantity quantity) {
-  const auto& [name, unit] = for_people(quantity);
-  Sample sample = empty_sample(study, name_of(quantity), name, unit,
-                               quantity == SheetQuantity::bundle_tension ? Observed::bundles : Observed::sheets, {});
-  sample.is_never_negative = is_never_negative(quantity);
-  const auto visit = [&](const auto& body) {
-    for (const int i : cells_of(study, CellKind::sheet)) {
-      const StudyCell& cell = study.cells[i];
-      for (const SheetEstimate& e : cell.sheet->estimates)
-        if (e.quantity == quantity && enters(e)) body(cell, i, e, kind_of_part(e));
-    }
-  };
-  visit([&](const StudyCell&, int, const SheetEstimate&, const std::string& kind) {
-    if (std::ranges::find(sample.kinds, kind) == sample.kinds.end()) sample.kinds.push_back(kind);
-  });
-  visit([&](const StudyCell& cell, int i, const SheetEstimate& e, const std::string& kind) {
-    const auto at = std::ranges::find(sample.kinds, kind) - sample.kinds.begin();
-    add(sample, cell, i, static_cast<int>(at), e.value, own_error(e));
-  });
-  return with_typical_errors(std::move(sample));
-}
-
 }  // namespace
+
+std::vector<Sample> samples_of(const Study& study) {
+  const bool has_fibres = n_of_kind(study, CellKind::plane) > 0;
+  std::vector<Sample> samples;
+  for (const MeasureRow& row : measure_table(study.n_fibre_types)) {
+    Sample sample = sample_of(study, row);
+    if (!sample.values.empty() || (has_fibres && sample.of_cells() == CellKind::plane))
+      samples.push_back(std::move(sample));
+  }
+  return samples;
+}
+
+Sample sample_of(const Study& study, const std::string& column) {
+  const std::vector<MeasureRow> table = measure_table(study.n_fibre_types);
+  const auto row = std::ranges::find(table, column, &MeasureRow::column);
+  MBTFM_ASSERT(row != table.end());
+  return sample_of(study, *row);
+}
 
 std::vector<Observation> Sample::of_group(int condition, int kind) const {
   std::vector<Observation> own;
@@ -135,98 +233,15 @@ CellKind Sample::of_cells() const {
 
 bool Sample::is_one_a_cell() const { return n_cells_of(values) == static_cast<int>(values.size()); }
 
-Sample sample_tensions(const Study& study) {
-  std::vector<std::string> kinds;
-  for (const FibreType type : kFibreTypes)
-    if (counted_type(study, type) == type) kinds.emplace_back(name_of(type));
-  Sample sample = empty_sample(study, "tension_nN", "tension", "nN", Observed::fibres, kinds);
-  for (const MeasuredFibre& f : measured_fibres(study)) {
-    add(sample, *f.cell, static_cast<int>(f.cell - study.cells.data()),
-        static_cast<int>(counted_type(study, f.fibre->type)), f.tension->tension_nN, standard_error_nN(*f.tension));
-  }
-  return with_typical_errors(std::move(sample));
-}
-
-std::vector<SeenAdhesion> seen_adhesions(const Study& study) {
+std::vector<SeenAdhesion> seen_adhesions(const StudyCell& cell) {
+  std::map<int, double> area;  // of those that were seen: an anchor's or a candidate's size is nobody's measurement
+  for (const Adhesion& a : cell.cell.adhesions)
+    if (!is_assumed(a.origin)) area[a.adhesion_id] = a.area_um2;
   std::vector<SeenAdhesion> list;
-  for (std::size_t i = 0; i < study.cells.size(); ++i) {
-    std::map<int, double> area;  // of those that were seen: an anchor's or a candidate's size is nobody's measurement
-    for (const Adhesion& a : study.cells[i].cell.adhesions)
-      if (!is_assumed(a.origin)) area[a.adhesion_id] = a.area_um2;
-    for (const AdhesionForce& f : study.cells[i].forces)
-      if (area.contains(f.adhesion_id))
-        list.push_back({static_cast<int>(i), f.connected, area.at(f.adhesion_id), norm(f.force_nN), f.sigma_nN});
-  }
+  for (const AdhesionForce& f : cell.forces)
+    if (area.contains(f.adhesion_id))
+      list.push_back({f.connected, area.at(f.adhesion_id), norm(f.force_nN), f.sigma_nN});
   return list;
-}
-
-Sample sample_adhesion_forces(const Study& study) {
-  return sample_adhesions(study, "adhesion_force_nN", "force", "nN", &SeenAdhesion::force_nN);
-}
-
-Sample sample_adhesion_areas(const Study& study) {
-  return sample_adhesions(study, "adhesion_area_um2", "area", "µm²", &SeenAdhesion::area_um2);
-}
-
-std::vector<Sample> sample_cells(const Study& study) {
-  const auto of_network = [](double FitSummary::*figure) {
-    return [=](const StudyCell& c) { return is_network_known(c) ? Number(c.fit.*figure) : Number(); };
-  };
-  const Measured figures[] = {
-      {"total_force_nN", "total force", "nN", [](const StudyCell& c) { return c.fit.total_force_nN; }},
-      {"fibre_force_nN", "force of the fibres", "nN", of_network(&FitSummary::fibre_force_nN), {}, MayBeNegative::yes},
-      {"network_force_nN", "force of the network", "nN", of_network(&FitSummary::network_force_nN)},
-      {"network_surface_tension_nN_per_um", "surface tension of the network", "nN/µm",
-       of_network(&FitSummary::network_surface_tension_nN_per_um)}};
-  std::vector<Sample> samples;
-  for (const Measured& figure : figures)
-    samples.push_back(sample_of(study, CellKind::plane, Observed::cells, "cell", figure));
-  return samples;
-}
-
-std::vector<Sample> sample_sheets(const Study& study) {
-  using S = SheetSummary;
-  constexpr auto kSheet = &StudyCell::sheet;
-  const Measured figures[] = {{"mean_tension_nN_per_um",
-                               "mean tension",
-                               "nN/µm",
-                               figure_of(kSheet, &S::mean_tension_nN_per_um),
-                               {},
-                               MayBeNegative::yes},
-                              {"sheet_force_nN", "total force", "nN", figure_of(kSheet, &S::total_force_nN)},
-                              {"strain_energy_fJ", "strain energy", "fJ", figure_of(kSheet, &S::strain_energy_fJ)},
-                              {"sheet_area_um2", "area", "µm²", figure_of(kSheet, &S::area_um2)}};
-  std::vector<Sample> samples = {sample_estimates(study, SheetQuantity::contraction)};
-  for (const Measured& figure : figures)
-    samples.push_back(sample_of(study, CellKind::sheet, Observed::sheets, kWholeSheet, figure));
-  for (const SheetQuantity quantity : mbtfm::values_of<SheetQuantity>())
-    if (quantity != SheetQuantity::contraction) samples.push_back(sample_estimates(study, quantity));
-  std::erase_if(samples, [](const Sample& s) { return s.values.empty(); });
-  return samples;
-}
-
-std::vector<Sample> sample_in_space(const Study& study) {
-  using S = SpaceFigures;
-  const auto of = [](auto figure) { return figure_of(&StudyCell::space, figure); };
-  const Measured figures[] = {
-      {"space_force_nN", "total force", "nN", of(&S::total_force_nN), of(&S::total_force_sigma_nN)},
-      {"space_strain_energy_fJ", "strain energy", "fJ", of(&S::strain_energy_fJ)},
-      {"space_contractile_moment_nN_um", "contractile moment", "nN µm", of(&S::contractile_moment_nN_um),
-       of(&S::contractile_moment_sigma_nN_um), MayBeNegative::yes},
-      {"space_normal_share", "share of the normal force", "", of(&S::normal_share)},
-      {"space_largest_traction_kPa", "largest traction", "kPa", of(&S::largest_traction_kPa)},
-      {kResolution, "resolution", "µm", of(&S::resolution_um)}};
-  std::vector<Sample> samples;
-  for (const Measured& figure : figures)
-    samples.push_back(sample_of(study, CellKind::space, Observed::cells_in_space, "cell", figure));
-  Sample forces =
-      empty_sample(study, "space_adhesion_force_nN", "force", "nN", Observed::adhesions_in_space, {"adhesion"});
-  for (const int i : cells_of(study, CellKind::space))
-    for (const S::OfAdhesion& a : study.cells[i].space->adhesions)
-      add(forces, study.cells[i], i, 0, a.force_nN, a.sigma_nN);
-  samples.push_back(with_typical_errors(std::move(forces)));
-  std::erase_if(samples, [](const Sample& s) { return s.values.empty(); });
-  return samples;
 }
 
 bool enters(const SheetEstimate& e) { return e.identifiable && !is_given(e); }

@@ -51,26 +51,18 @@ struct Sample {
 
 /// An adhesion that was seen, and has a force.
 struct SeenAdhesion {
-  int cell = 0;  ///< index into Study::cells
   bool is_connected = false;
   double area_um2 = 0, force_nN = 0;
   std::optional<double> sigma_nN = {};  ///< of the force
 };
-std::vector<SeenAdhesion> seen_adhesions(const Study& study);
+std::vector<SeenAdhesion> seen_adhesions(const StudyCell& cell);
 
-Sample sample_tensions(const Study& study);
-Sample sample_adhesion_forces(const Study& study);
-Sample sample_adhesion_areas(const Study& study);
-/// Total, fibre and network force, surface tension of the network: one value a cell with fibres, all but the first of
-/// those whose network's tension is known.
-std::vector<Sample> sample_cells(const Study& study);
-/// Of the sheets: what the beads tell of each, and its mean tension, total force, strain energy and area; without what
-/// no sheet was asked for.
-std::vector<Sample> sample_sheets(const Study& study);
-
-/// Of the cells in space: total force, strain energy, contractile moment, share of the normal force, largest traction,
-/// the forces of their adhesions, and the resolution of their maps; without what no cell has.
-std::vector<Sample> sample_in_space(const Study& study);
+/// Of each row of the table of measures (samples.cpp): tensions, adhesions, figures of cells with fibres, of sheets, of
+/// cells in space; without what the study has no cell of, and what no sheet or cell in space has. The network's figures
+/// are of the cells whose network's tension is known.
+std::vector<Sample> samples_of(const Study& study);
+/// Of one row. @param column  "tension_nN"
+Sample sample_of(const Study& study, const std::string& column);
 inline constexpr const char* kResolution = "space_resolution_um";
 
 /// Whether it is a measurement: not given by the user, and limited to both sides by the beads.

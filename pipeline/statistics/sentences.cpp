@@ -28,33 +28,23 @@ const char* counted_name(const Sample& sample) {
   return sample.each == Observed::sheets ? "parts" : name_of(sample.each);
 }
 
-std::string mean_text(const Summary& s, const Measure& m) {
-  if (!s.model) {
-    const std::string reason = s.n_cells == 1 ? std::string("there is a single ") + m.sample.cell_name() : m.obstacle;
-    return fmt::format("{} (no interval: {})", m.sample.amount(s.plain.mean), reason);
-  }
-  return fmt::format("{} [95 % CI {} to {}]", m.sample.amount(s.model->estimate), readable(s.model->low),
-                     readable(s.model->high));
-}
-
-/// "ventral fibres carry a tension of 4.1 nN [95 % CI …; the cell as the unit, 12 cells, 80 fibres]".
+/// "the mean tension of ventral fibres is 4.1 nN [95 % CI … to …] (12 cells, 80 fibres)", for each condition and kind.
 std::vector<std::string> means(const Measure& m) {
+  const Sample& sample = m.sample;
+  if (m.summaries.empty()) return {fmt::format("No {} of {} is known.", sample.name, name_of(sample.each))};
   std::vector<std::string> list;
-  if (m.summaries.empty()) {
-    list.push_back(
-        fmt::format("No {} of {} is known: nothing can be said of it.", m.sample.name, name_of(m.sample.each)));
-  }
   for (const Summary& s : m.summaries) {
-    std::string text = fmt::format("{}the mean {} of {} is {}", prefix_of(s.condition), m.sample.name,
-                                   plural_of(m.sample, s.kind), mean_text(s, m));
-    text += fmt::format(", the {} being the unit ({}", m.sample.cell_name(), counted(s.n_cells, m.sample.cells_name()));
-    if (!m.sample.is_one_a_cell()) text += ", " + counted(s.n, counted_name(m.sample));
+    std::string text =
+        fmt::format("{}the {}{} of {} is {}", prefix_of(s.condition), sample.name.starts_with("mean") ? "" : "mean ",
+                    sample.name, plural_of(sample, s.kind), sample.amount(s.model ? s.model->estimate : s.plain.mean));
+    if (s.model) text += fmt::format(" [95 % CI {} to {}]", readable(s.model->low), readable(s.model->high));
+    text += " (" + counted(s.n_cells, sample.cells_name());
+    if (!sample.is_one_a_cell()) text += ", " + counted(s.n, counted_name(sample));
+    if (!s.model) text += s.n_cells == 1 ? ": no interval" : ", no interval: " + m.obstacle;
     text += ")";
-    if (m.sample.each != Observed::cells && s.typical_error && s.n > 2) {
-      text += fmt::format("; they scatter by {}, of which {} remain without the error of their measurement",
-                          m.sample.amount(*s.plain.standard_deviation),
-                          m.sample.amount(s.without_error->standard_deviation));
-    }
+    if (sample.each != Observed::cells && s.typical_error && s.n > 2)
+      text += fmt::format("; SD {}, {} without the errors of measurement", sample.amount(*s.plain.standard_deviation),
+                          readable(s.without_error->standard_deviation));
     list.push_back(capitalised(text + "."));
   }
   return list;
@@ -92,42 +82,29 @@ void add_unanswered(const Measure& m, Findings& findings) {
   if (n_different(m.summaries, &Summary::condition) > 1) add(Question::between_conditions, "conditions");
 }
 
-/// A sentence for each pair that the mixed model compares, with those that clearly differ or with the others.
+/// A sentence for each pair that the mixed model compares, with those that clearly differ or with the others. Signs are
+/// those of tests.csv.
 void add_differences(const Measure& m, Findings& findings) {
   add_unanswered(m, findings);
+  const bool is_one_a_cell = m.sample.is_one_a_cell();
   for (const Comparison& c : m.comparisons) {
     if (c.test != Test::mixed_model || c.group_b.empty() || !c.interval) continue;
-    const bool is_of_kinds = c.question == Question::between_kinds;
-    // the larger one first
-    const bool is_turned = c.effect < 0;
-    const std::string& larger = is_turned ? c.group_b : c.group_a;
-    const std::string& smaller = is_turned ? c.group_a : c.group_b;
-    const double low = is_turned ? -c.interval->high : c.interval->low,
-                 high = is_turned ? -c.interval->low : c.interval->high;
-    constexpr double kLevel = 0.05;
-    const bool is_clear = *c.p_holm < kLevel;
     std::string text =
-        is_of_kinds ? fmt::format("{}the {} of {} is {} larger than that of {}", prefix_of(c.within), m.sample.name,
-                                  plural_of(m.sample, larger),
-                                  is_clear ? m.sample.amount(std::abs(c.effect)) : "not demonstrably",
-                                  plural_of(m.sample, smaller))
-                    : fmt::format("the {} of {} is {} larger under {} than under {}", m.sample.name,
-                                  plural_of(m.sample, c.within),
-                                  is_clear ? m.sample.amount(std::abs(c.effect)) : "not demonstrably", larger, smaller);
-    text += fmt::format(" (difference {} [95 % CI {} to {}]; mixed model, t({}) = {}, {}",
-                        m.sample.amount(std::abs(c.effect)), readable(low), readable(high), readable(*c.degrees),
-                        readable(std::abs(c.statistic)), p_text(*c.p_holm));
-    const bool is_one_a_cell = m.sample.is_one_a_cell();
+        c.question == Question::between_kinds
+            ? fmt::format("{}{} of {} minus that of {}", prefix_of(c.within), m.sample.name,
+                          plural_of(m.sample, c.group_a), plural_of(m.sample, c.group_b))
+            : fmt::format("{} of {}, {} minus {}", m.sample.name, plural_of(m.sample, c.within), c.group_a, c.group_b);
+    text += fmt::format(": {} [95 % CI {} to {}] (mixed model, t({}) = {}, {}", m.sample.amount(c.effect),
+                        readable(c.interval->low), readable(c.interval->high), readable(*c.degrees),
+                        readable(c.statistic), p_text(*c.p_holm));
     const Comparison* ranks = same_pair(m, c, is_one_a_cell ? Test::mann_whitney : Test::clustered_rank_sum);
     if (ranks != nullptr)
       text +=
           fmt::format("; {}, {}", is_one_a_cell ? "Mann–Whitney" : "clustered rank-sum test", p_text(*ranks->p_holm));
-    const int cells_a = is_turned ? c.cells_b : c.cells_a, cells_b = is_turned ? c.cells_a : c.cells_b;
-    text += fmt::format("; {} and {} {}", cells_a, cells_b, m.sample.cells_name());
-    if (!is_one_a_cell)
-      text +=
-          fmt::format(", {} and {} {}", is_turned ? c.n_b : c.n_a, is_turned ? c.n_a : c.n_b, counted_name(m.sample));
-    (is_clear ? findings.sentences : findings.unclear).push_back(capitalised(text + ")."));
+    text += fmt::format("; {} and {} {}", c.cells_a, c.cells_b, m.sample.cells_name());
+    if (!is_one_a_cell) text += fmt::format(", {} and {} {}", c.n_a, c.n_b, counted_name(m.sample));
+    constexpr double kLevel = 0.05;
+    (*c.p_holm < kLevel ? findings.sentences : findings.unclear).push_back(capitalised(text + ")."));
   }
 }
 
@@ -136,9 +113,9 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
   for (const ShareAbove& s : analysis.shares) {
     if (s.threshold_nN != parameters.strong_tension_nN) continue;
     list.push_back(capitalised(
-        fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %; {} of {}], {:.0f} % "
-                    "without the blur of the measurement.",
-                    prefix_of(s.condition), 100 * s.share.value, plural_of(analysis.tensions.sample, s.kind),
+        fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %] ({} of {}); {:.0f} % "
+                    "without the errors of measurement.",
+                    prefix_of(s.condition), 100 * s.share.value, plural_of(analysis.tensions().sample, s.kind),
                     readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high,
                     counted(s.n, "fibres"), counted(s.n_cells, "cells"), 100 * s.without_error)));
   }
@@ -148,7 +125,7 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
 std::vector<std::string> lines(const Analysis& analysis) {
   std::vector<std::string> list;
   for (const Correlation& c : analysis.correlations) {
-    if (!c.is_of_total || !c.line) continue;
+    if (c.force != "total_force_nN" || !c.line) continue;
     const std::string error = c.line->slope_error ? " ± " + readable(*c.line->slope_error) : "";
     std::string text = fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition),
                                    readable(c.line->slope), error, c.size_unit, counted(std::ssize(c.x), "cells"));
@@ -183,26 +160,27 @@ void append(std::vector<std::string>& list, const std::vector<std::string>& more
 }  // namespace
 
 std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameters& parameters) {
-  const auto of_all = [](const char* title, const std::vector<Measure>& measures) {
+  const auto of = [](const char* title, const std::vector<const Measure*>& measures) {
     Findings findings{title, {}, {}};
-    for (const Measure& m : measures) {
-      append(findings.sentences, means(m));
-      add_differences(m, findings);
+    for (const Measure* m : measures) {
+      append(findings.sentences, means(*m));
+      add_differences(*m, findings);
     }
     return findings;
   };
   std::vector<Findings> all;
-  if (!analysis.sheets.empty()) all.push_back(of_all("Sheets", analysis.sheets));
-  if (!analysis.in_space.empty()) all.push_back(of_all("Cells in space", analysis.in_space));
+  if (const auto sheets = analysis.of_cells(CellKind::sheet); !sheets.empty()) all.push_back(of("Sheets", sheets));
+  if (const auto cells = analysis.of_cells(CellKind::space); !cells.empty()) all.push_back(of("Cells in space", cells));
   if (!analysis.has_fibres) return all;
-  Findings tensions{"Tensions", means(analysis.tensions), {}}, cells = of_all("Cells", analysis.cells);
-  Findings adhesions{"Adhesions", means(analysis.adhesion_forces), {}};
-  add_differences(analysis.tensions, tensions);
+  std::vector<const Measure*> of_plane = analysis.of_cells(CellKind::plane);
+  std::erase_if(of_plane, [](const Measure* m) { return m->sample.each != Observed::cells; });
+  Findings tensions = of("Tensions", {&analysis.tensions()}), cells = of("Cells", of_plane);
   append(tensions.sentences, shares(analysis, parameters));
-  add_differences(analysis.adhesion_forces, adhesions);
-  add_differences(analysis.adhesion_areas, adhesions);
   append(cells.sentences, lines(analysis));
-  all.insert(all.end(), {tensions, adhesions, cells, {"Directions", directions(analysis), {}}});
+  all.insert(all.end(), {tensions,
+                         of("Adhesions", {&analysis.of("adhesion_force_nN"), &analysis.of("adhesion_area_um2")}),
+                         cells,
+                         {"Directions", directions(analysis), {}}});
   return all;
 }
 

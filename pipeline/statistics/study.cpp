@@ -36,6 +36,7 @@ std::optional<DisplacementField> field_where_there(const Path& file) {
 constexpr const char* kDisplacement = "2_track/displacement.csv";
 constexpr const char* kOutline = "1_segment/outline.csv";
 constexpr const char* kRun = "run.json";
+constexpr const char* kUsual = "4_fit/fttc.json";
 constexpr const char* kFitted = "4_fit/fitted_displacement.csv";
 constexpr const char* kWithoutFibres = "4_fit/displacement_without_fibres.csv";
 
@@ -116,6 +117,9 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
                      "adhesion " + std::to_string(f.adhesion_id),
                      "the segmentation changed after the fit: mbtfm run " + folder.string());
   }
+  if (files::is_own_file(folder / kUsual))
+    if (const auto force = files::JsonRecord(folder / kUsual, "figures of FTTC").find("total_force_nN"))
+      c.fttc_force_nN = force->number();
   if (const auto run = run_of(folder)) c.findings = findings_of(*run);
   if (parameters.list) return c;
   c.directions = directions_of(c.cell, {.measured = field_where_there(folder / kDisplacement),
@@ -288,7 +292,7 @@ const std::vector<std::string>& files_of_a_cell(CellKind kind) {
 }
 
 const std::vector<std::string>& further_files_of_a_cell(CellKind kind) {
-  static const std::vector<std::string> with_fibres = {kDisplacement, kFitted, kWithoutFibres, kRun};
+  static const std::vector<std::string> with_fibres = {kDisplacement, kFitted, kWithoutFibres, kUsual, kRun};
   static const std::vector<std::string> of_sheet = {kDisplacement, kOutline, kRun};
   static const std::vector<std::string> in_space = {"4_traction/traction_adhesion_forces.csv",
                                                     "1_segment/adhesions.csv", kOutline, kRun};
@@ -358,14 +362,18 @@ const Tension* tension_of(const StudyCell& cell, int fibre_id) {
   return found == cell.tensions.end() ? nullptr : &*found;
 }
 
+std::vector<MeasuredFibre> measured_fibres(const StudyCell& cell) {
+  std::vector<MeasuredFibre> fibres;
+  for (const Fibre& fibre : cell.cell.fibres)
+    if (const Tension* tension = tension_of(cell, fibre.fibre_id); tension && is_measured(*tension))
+      fibres.push_back({&cell, &fibre, tension});
+  return fibres;
+}
+
 std::vector<MeasuredFibre> measured_fibres(const Study& study) {
   std::vector<MeasuredFibre> fibres;
-  for (const StudyCell& cell : study.cells) {
-    for (const Fibre& fibre : cell.cell.fibres) {
-      const Tension* tension = tension_of(cell, fibre.fibre_id);
-      if (tension && is_measured(*tension)) fibres.push_back({&cell, &fibre, tension});
-    }
-  }
+  for (const StudyCell& cell : study.cells)
+    for (const MeasuredFibre& fibre : measured_fibres(cell)) fibres.push_back(fibre);
   return fibres;
 }
 

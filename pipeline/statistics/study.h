@@ -84,6 +84,8 @@ struct StudyCell {
   std::vector<Tension> tensions = {};
   FitSummary fit = {};
   std::vector<Direction> directions = {};
+  std::optional<double> fttc_force_nN =
+      {};                                  ///< of the usual method, in the outline; none: it was not asked, or has none
   std::vector<Finding> findings = {};      ///< of all its stages
   std::optional<SheetSummary> sheet = {};  ///< of a sheet, or a colony: it has no fibres, no adhesions, and of `fit` no
                                            ///< more than what the fit leaves and whether it converged
@@ -155,6 +157,7 @@ struct MeasuredFibre {
   const Fibre* fibre = nullptr;
   const Tension* tension = nullptr;
 };
+std::vector<MeasuredFibre> measured_fibres(const StudyCell& cell);
 std::vector<MeasuredFibre> measured_fibres(const Study& study);
 
 /// Whether the network's tension could be identified. Else its share of the total force, the fibres' and its surface

@@ -4,10 +4,8 @@
 #include <map>
 
 #include "pipeline/contract/counted.h"
-#include "pipeline/contract/version.h"
 #include "pipeline/files/own_files.h"
-#include "pipeline/report/numbers.h"
-#include "pipeline/report/page.h"
+#include "pipeline/report/stage_page.h"
 #include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -19,184 +17,80 @@ using charts::readable;
 using report::number;
 using report::Table;
 
-std::string p_cell(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : readable(p); }
-
-std::string number_text(const std::optional<double>& value) { return report::rounded(value, {}); }
-
-std::string interval_text(const std::optional<Interval>& interval) {
-  return interval ? readable(interval->low) + " to " + readable(interval->high) : "–";
-}
-
-/// Between what names the summary and its scatter: mean and 95 % of the mixed model, plain mean and its 95 %.
-void add_row(Table& table, std::vector<std::string> row, const Summary& s, const std::vector<std::string>& scatter) {
-  const auto interval = s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt;
-  row.insert(row.end(), {s.model ? readable(s.model->estimate) : "–", interval_text(interval), readable(s.plain.mean),
-                         interval_text(s.mean_interval)});
-  row.insert(row.end(), scatter.begin(), scatter.end());
-  table.rows.push_back(std::move(row));
-}
-
 bool has_conditions(const Study& study) { return study.conditions.size() > 1 || !study.conditions.front().empty(); }
 
-/// The charts and what they show, without the title.
 std::string charts_of(const Figure& figure) {
-  std::string html = "<div class=\"grid\">\n";
+  std::string html;
   for (const charts::Chart& chart : figure.charts) html += report::figure(chart, {});
-  return html + "</div>\n<p class=\"sub\">" + html_escaped(figure.caption) + "</p>\n";
+  return html;
 }
 
+std::string caption_of(const Figure& figure) { return "<p class=\"sub\">" + html_escaped(figure.caption) + "</p>\n"; }
+
+/// One that has a single chart takes one place of the grid, so that such lie beside each other.
 std::string embedded(const Figure& figure) {
+  if (figure.charts.size() == 1) return report::figure(figure.charts.front(), figure.caption);
+  const std::string title = "<h3>" + html_escaped(figure.title) + "</h3>\n";
   if (figure.charts.empty())
-    return "<h3>" + html_escaped(figure.title) + "</h3>\n<p class=\"sub\">Not drawn: " + html_escaped(figure.caption) +
-           "</p>\n";
-  const bool is_named = figure.charts.size() == 1 && figure.charts.front().title() == figure.title;
-  return (is_named ? "" : "<h3>" + html_escaped(figure.title) + "</h3>\n") + charts_of(figure);
+    return "<div class=\"wide\">" + title + "<p class=\"sub\">Not drawn: " + html_escaped(figure.caption) +
+           "</p></div>\n";
+  return "<div class=\"wide\">" + title + "<div class=\"grid\">\n" + charts_of(figure) + "</div>\n" +
+         caption_of(figure) + "</div>\n";
 }
 
-void without_column(Table& table, std::ptrdiff_t column) {
-  table.columns.erase(table.columns.begin() + column);
-  for (auto& row : table.rows) row.erase(row.begin() + column);
-}
-
-Table types_table(const Study& study, const Analysis& analysis) {
-  Table table{"Tension by fibre type",
-              {"condition", "type", number("cells"), number("fibres"), number("mean, mixed model (nN)"), number("95 %"),
-               number("plain mean (nN)"), number("95 %, cells resampled"), number("median (nN)"), number("SD (nN)"),
-               number("SD without error (nN)")}};
-  for (const Summary& s : analysis.tensions.summaries) {
-    add_row(table, {html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n)},
-            s,
-            {readable(s.plain.median), number_text(s.plain.standard_deviation),
-             s.without_error ? readable(s.without_error->standard_deviation) : "–"});
+/// The study's tables by the names of their files.
+struct Files {
+  std::vector<std::pair<std::string, std::string>> all;
+  /// Of one of them.
+  report::Listing listing(const std::string& title, const std::string& file, const std::string& columns,
+                          const std::vector<std::pair<std::string, std::string>>& only = {}) const {
+    const auto at = std::ranges::find(all, file, &std::pair<std::string, std::string>::first);
+    return {title, {}, file, at->second, columns, only};
   }
-  if (!has_conditions(study)) without_column(table, 0);
-  return table;
+};
+
+std::string measures_table(const Files& files) {
+  return report::html_of(files.listing(
+      "All measures", "summaries.csv",
+      "*quantity: measure, condition, kind, n_cells, n_observations: n, model_mean: mean (mixed model), model_low: "
+      "lower "
+      "95 %, model_high: upper 95 %, mean: plain mean, mean_low: lower 95 % by cells, mean_high: upper 95 % by cells, "
+      "median, sd, sd_without_error: SD without error"));
 }
 
-std::string figure_name(const Sample& sample) {
-  if (sample.each == Observed::bundles) return "tension of bundles (nN)";
-  if (sample.each == Observed::adhesions_in_space) return "force of an adhesion (nN)";
-  return sample.label();
+std::string tests_table(const Files& files, const Sample& sample) {
+  return report::html_of(report::table_of(
+      files.listing("Tests of the " + sample.name, "tests.csv",
+                    "within, test, unit, group_a: group, group_b: against, n_a, n_b, cells_a, cells_b, statistic, "
+                    "degrees_of_freedom: d.f., p, p_holm, effect, effect_low, effect_high, effect_is",
+                    {{"quantity", sample.column}})));
 }
 
-/// What the sheets, or the cells in space, are like: a row for each figure, kind of part and condition.
-/// @param cells  what they are called
-Table figures_table(const Study& study, const std::vector<Measure>& measures, const std::string& title,
-                    const std::string& cells) {
-  Table table{
-      title,
-      {"figure", "condition", "of", number(cells), number("mean, mixed model"), number("95 %"), number("plain mean"),
-       number("95 %, " + cells + " resampled"), number("SD"), number("SD without error")}};
-  for (const Measure& m : measures) {
-    for (const Summary& s : m.summaries) {
-      add_row(table,
-              {html_escaped(figure_name(m.sample)), html_escaped(s.condition), html_escaped(s.kind),
-               std::to_string(s.n_cells)},
-              s,
-              {number_text(s.plain.standard_deviation),
-               s.typical_error && s.without_error ? readable(s.without_error->standard_deviation) : "–"});
-    }
-  }
-  const auto has_parts = [](const Measure& m) { return m.sample.n_kinds() > 1; };
-  if (std::ranges::none_of(measures, has_parts)) without_column(table, 2);
-  if (!has_conditions(study)) without_column(table, 1);
-  return table;
-}
-
-Table tests_table(const Measure& m) {
-  Table table{"Tests of the " + m.sample.name,
-              {"within", "test", "unit", "groups", "observations", "cells", number("statistic"), number("d.f."),
-               number("p"), number("p (Holm)"), number("effect"), "95 %", "effect is"}};
-  for (const Comparison& t : m.comparisons) {
-    const bool is_pair = !t.group_b.empty();
-    table.rows.push_back({html_escaped(t.within), name_of(t.test), name_of(t.unit),
-                          html_escaped(is_pair ? t.group_a + " – " + t.group_b : t.group_a),
-                          is_pair ? fmt::format("{}, {}", t.n_a, t.n_b) : std::to_string(t.n_a),
-                          is_pair ? fmt::format("{}, {}", t.cells_a, t.cells_b) : std::to_string(t.cells_a),
-                          readable(t.statistic), t.degrees ? readable(*t.degrees) : "–", p_cell(t.p_value),
-                          t.p_holm ? p_cell(*t.p_holm) : "–", t.effect_name.empty() ? "–" : readable(t.effect),
-                          interval_text(t.interval), html_escaped(t.effect_name)});
-  }
-  return table;
-}
-
-std::string enters_text(const StudyCell& c) { return c.fit.converged ? "yes" : "yes, not converged"; }
-
-Table cells_table(const Study& study) {
-  Table table{
-      "Cells with fibres",
-      {"cell", "condition", number("fibres"), number("adhesions"), number("total force (nN)"), number("of fibres (nN)"),
-       number("of network (nN)"), number("relative L2"), number("expected"), "enters"}};
-  for (const StudyCell& c : study.cells) {
-    if (c.kind() != CellKind::plane) continue;
-    table.rows.push_back({html_escaped(c.name), html_escaped(condition_of(study, c)),
-                          std::to_string(c.cell.fibres.size()), std::to_string(c.cell.adhesions.size()),
-                          readable(c.fit.total_force_nN), is_network_known(c) ? readable(c.fit.fibre_force_nN) : "–",
-                          is_network_known(c) ? readable(c.fit.network_force_nN) : "–", readable(c.fit.relative_l2),
-                          readable(c.fit.expected_relative_l2), enters_text(c)});
-  }
-  return table;
-}
-
-/// "2.0 (1.9 to 2.2)", "> 30", or nothing of what nobody asked for; with the part's name where it is not the sheet.
-std::string estimates_text(const StudyCell& c, SheetQuantity quantity) {
-  std::string text;
-  for (const SheetEstimate& e : c.sheet->estimates) {
-    if (e.quantity != quantity) continue;
-    text += (text.empty() ? "" : "; ") + (kind_of_part(e) == kWholeSheet ? std::string() : e.part + ": ");
-    if (is_given(e))
-      text += readable(e.value) + " (given)";
-    else if (e.identifiable)
-      text += fmt::format("{} ({} to {})", readable(e.value), readable(*e.low), readable(*e.high));
-    else
-      text += e.low ? "> " + readable(*e.low) : e.high ? "< " + readable(*e.high) : "not known";
-  }
-  return text.empty() ? "–" : text;
-}
-
-Table sheets_table(const Study& study) {
-  Table table{"Sheets",
-              {"sheet", "condition", number("contraction (nN/µm)"), number("stiffness (nN/µm)"),
-               number("mean tension (nN/µm)"), number("total force (nN)"), number("strain energy (fJ)"),
-               number("area (µm²)"), number("relative L2"), number("expected"), "enters"}};
-  for (const StudyCell& c : study.cells) {
-    if (!c.sheet) continue;
-    table.rows.push_back({html_escaped(c.name), html_escaped(condition_of(study, c)),
-                          html_escaped(estimates_text(c, SheetQuantity::contraction)),
-                          html_escaped(estimates_text(c, SheetQuantity::stiffness)),
-                          readable(c.sheet->mean_tension_nN_per_um), readable(c.sheet->total_force_nN),
-                          number_text(c.sheet->strain_energy_fJ), readable(c.sheet->area_um2),
-                          readable(c.sheet->relative_l2), readable(c.sheet->expected_relative_l2), enters_text(c)});
-  }
-  return table;
-}
-
-Table cells_in_space_table(const Study& study) {
-  Table table{"Cells in space",
-              {"cell", "condition", "method", number("total force (nN)"), number("strain energy (fJ)"),
-               number("contractile moment (nN µm)"), number("normal share"), number("largest traction (kPa)"),
-               number("net force (nN)"), number("net moment (nN µm)"), number("resolution (µm)"), number("adhesions"),
-               number("relative L2"), "enters"}};
-  for (const StudyCell& c : study.cells) {
-    if (!c.space) continue;
-    const SpaceFigures& s = *c.space;
-    table.rows.push_back(
-        {html_escaped(c.name), html_escaped(condition_of(study, c)), html_escaped(s.method),
-         report::with_error(s.total_force_nN, s.total_force_sigma_nN), readable(s.strain_energy_fJ),
-         s.contractile_moment_nN_um ? report::with_error(*s.contractile_moment_nN_um, s.contractile_moment_sigma_nN_um)
-                                    : "–",
-         readable(s.normal_share()), readable(s.largest_traction_kPa), readable(s.net_force_nN),
-         readable(s.net_moment_nN_um), number_text(s.resolution_um),
-         s.adhesions.empty() ? "–" : std::to_string(s.adhesions.size()), readable(c.fit.relative_l2), enters_text(c)});
-  }
-  return table;
-}
-
-Table left_out_table(const Study& study) {
-  Table table{"Left out", {"cell", "condition", "why"}};
-  for (const LeftOutCell& c : study.left_out)
-    table.rows.push_back({html_escaped(c.name), html_escaped(c.condition), html_escaped(c.reason)});
-  return table;
+/// Of each kind, then those that were left out.
+std::string cells_tables(const Files& files) {
+  const auto table = [&](const char* title, const std::string& columns, const char* word, const char* is,
+                         const char* file = "cells.csv") {
+    return report::html_of(files.listing(title, file, "cell, condition, " + columns, {{word, is}}));
+  };
+  const std::string quality = ", relative_l2: relative L2, expected_relative_l2: expected, converged, findings";
+  return table("Cells with fibres", "n_fibres, n_adhesions, total_force_nN, fibre_force_nN, network_force_nN" + quality,
+               "model", "fibres") +
+         table(
+             "Sheets",
+             "contraction_nN_per_um, mean_tension_nN_per_um, sheet_force_nN, strain_energy_fJ, cell_area_um2" + quality,
+             "model", "sheet") +
+         table("Estimates of the sheets", "*quantity: estimate, part, value, low, high, identifiable", "enters", "TRUE",
+               "sheets.csv") +
+         table("Estimates that do not enter", "*quantity: estimate, part, value, low, high, identifiable", "enters",
+               "FALSE", "sheets.csv") +
+         table(
+             "Cells in space",
+             "space_method: method, space_force_nN, space_force_sigma_nN, space_strain_energy_fJ, "
+             "space_contractile_moment_nN_um, space_contractile_moment_sigma_nN_um, space_normal_share: normal share, "
+             "space_largest_traction_kPa, space_net_force_nN, space_net_moment_nN_um, space_resolution_um" +
+                 quality,
+             "model", "space") +
+         table("Left out", "reason", "included", "FALSE");
 }
 
 /// The first names; of many.
@@ -227,14 +121,14 @@ Table findings_table(const Study& study) {
   return table;
 }
 
-std::string findings_text(const Study& study, const std::string& table_html) {
+std::string findings_text(const Study& study, const Files& files) {
   const auto n_open = std::ranges::count_if(study.cells, [](const StudyCell& c) { return has_open(c.findings); });
   if (n_open == 0) return "<p><b>✓</b> No finding is open in any cell that enters.</p>\n";
   return fmt::format(
-             "<p>Findings are open in {} of {}: what they name may be off by more than the error bars say. The column "
-             "<code>exclude</code> of the table of conditions leaves a cell out.</p>\n",
+             "<p>Findings are open in {} of {}: their results may be off by more than the error bars say. To leave a "
+             "cell out, write the reason in the column <code>exclude</code> of the table of conditions.</p>\n",
              n_open, counted(study.cells.size(), "cells")) +
-         table_html;
+         report::html_of(findings_table(study), {"findings.csv", files.listing("", "findings.csv", "").csv});
 }
 
 /// Every cell that enters, as its segmentation looks, linked to its page where the study lies beside the cells.
@@ -270,42 +164,23 @@ std::string list_of(const std::vector<std::string>& sentences) {
 }
 
 std::string overview(const Study& study, const Analysis& analysis) {
-  std::size_t n_fibres = 0, n_adhesions = 0, n_contractions = 0;
+  std::size_t n_fibres = 0, n_adhesions = 0;
   for (const StudyCell& c : study.cells) {
     n_fibres += c.cell.fibres.size();
     n_adhesions += static_cast<std::size_t>(
         std::ranges::count_if(c.cell.adhesions, [](const Adhesion& a) { return !is_assumed(a.origin); }));
-    n_contractions += c.sheet && std::ranges::any_of(c.sheet->estimates, [](const SheetEstimate& e) {
-                        return e.quantity == SheetQuantity::contraction && enters(e);
-                      });
   }
-  const int with_fibres = n_of_kind(study, CellKind::plane), sheets = n_of_kind(study, CellKind::sheet),
-            in_space = n_of_kind(study, CellKind::space);
   std::string html = "<p>";
-  if (with_fibres > 0) {
-    html += fmt::format("{} with {} and {}; the tensions of {} of them could be identified and enter the statistics. ",
-                        counted(with_fibres, "cells"), counted(n_adhesions, "adhesions"),
-                        counted(n_fibres, "stress fibres"), analysis.tensions.sample.values.size());
-  }
-  if (sheets > 0) {
-    html += fmt::format(
-        "{}: cells or colonies that are taken as contracting sheets, without fibres. The contraction of {} of them "
-        "could be identified and enters the statistics. ",
-        counted(sheets, "sheets"), n_contractions);
-  }
-  if (in_space > 0)
-    html += fmt::format(
-        "{} in space, of beads in the gel’s volume: their tractions are compared by total force, strain energy, "
-        "contractile moment and what the tables below list. ",
-        counted(in_space, "cells"));
-  if ((with_fibres > 0) + (sheets > 0) + (in_space > 0) > 1)
-    html +=
-        "Figures of cells with fibres, of sheets and of cells in space are kept apart: they have different meanings. ";
+  if (const int n = n_of_kind(study, CellKind::plane); n > 0)
+    html += fmt::format("{} with {} and {}, of which the tensions of {} are identified and enter. ",
+                        counted(n, "cells"), counted(n_adhesions, "adhesions"), counted(n_fibres, "stress fibres"),
+                        analysis.tensions().sample.values.size());
+  if (const int n = n_of_kind(study, CellKind::sheet); n > 0)
+    html += fmt::format("{}, of which {} have an identified contraction. ", counted(n, "sheets"),
+                        n_cells_of(analysis.of(name_of(SheetQuantity::contraction)).sample.values));
+  if (const int n = n_of_kind(study, CellKind::space); n > 0) html += counted(n, "cell in space. ", "cells in space. ");
   if (has_conditions(study)) html += counted(study.conditions.size(), "conditions") + ". ";
-  html += (study.left_out.empty() ? "No cell was left out."
-                                  : fmt::format("{} left out: see the table of cells.",
-                                                counted(study.left_out.size(), "cell was", "cells were"))) +
-          "</p>\n";
+  html += counted(study.left_out.size(), "cell was", "cells were") + " left out.</p>\n";
   if (!analysis.warnings.empty()) html += "<h3>What to distrust</h3>\n" + list_of(analysis.warnings);
   return html;
 }
@@ -325,7 +200,8 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
   for (const PrimaryDifference& d : primary.differences)
     html += "<p class=\"what\"><b>" + html_escaped(report::capitalised(sentence_of(primary, d))) + ".</b></p>\n";
   for (const Figure& figure : figures)
-    if (figure.name == kPrimaryFigure) html += charts_of(figure);
+    if (figure.name == kPrimaryFigure)
+      html += "<div class=\"grid\">\n" + charts_of(figure) + "</div>\n" + caption_of(figure);
   if (!primary.differences.empty())
     html += "<p class=\"sub\">Test: " + html_escaped(primary.test) +
             ", two-sided; p by Holm over the conditions. It was chosen by the parameters <code>primary</code> and "
@@ -334,10 +210,11 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
 }
 
 constexpr const char* kHowToRead =
-    "<p class=\"sub\">Two-sided. The fibres of a cell are not independent: tests whose unit is the observation "
-    "overstate the evidence; those with the unit cell do not (clustered rank sum: Datta &amp; Satten 2005; mixed "
-    "model: random effects of the cell and of each kind in it, known error of each value, Satterthwaite’s degrees of "
-    "freedom). Holm’s correction is over the pairs that one question compares.</p>\n";
+    "<p class=\"sub\">Two-sided; Holm’s correction is over the pairs of one question. The fibres of a cell are not "
+    "independent: tests by observation overstate the evidence, those by cell do not (clustered rank sum: Datta &amp; "
+    "Satten 2005; mixed model: random effects of the cell and of each kind in it, known errors, Satterthwaite’s "
+    "degrees "
+    "of freedom).</p>\n";
 
 /// Which type edge fibres count as; empty without any.
 std::string on_edge_fibres(const Study& study) {
@@ -354,15 +231,17 @@ std::string on_edge_fibres(const Study& study) {
 }
 
 constexpr const char* kHowToReadSheets =
-    "<p class=\"sub\">Errors of the fit are known of what the beads were asked for; the others have none. What the "
-    "gel’s numbers and its model add to them is left out: sheets on gels of one kind share it. A number that the beads "
-    "limit to one side only, or that was given, does not enter.</p>\n";
+    "<p class=\"sub\">Errors of the gel’s numbers and of its model are left out: sheets on gels of one kind share "
+    "them. A "
+    "number that was given, or that the beads limit to one side only, does not enter.</p>\n";
 
 constexpr const char* kHowToReadSpace =
     "<p class=\"sub\">Total force: sum of the sizes of all tractions. Contractile moment: −∫ (x − centre) · t dA, "
-    "above zero where the cell contracts. Share of the normal force: of the sizes. Smoothing takes from force, energy "
-    "and largest traction, the more the coarser the maps are: compare the resolution first. Net force and net moment "
-    "of a cell that nothing else holds are errors alone; they are listed with the cells and not compared.</p>\n";
+    "above "
+    "zero for a cell that contracts. The coarser a map, the more smoothing takes from force, energy and largest "
+    "traction: compare the resolution first. Net force and moment of a free cell are errors alone: they are listed "
+    "with "
+    "the cells and not compared.</p>\n";
 
 /// "Stress-fibre tensions of 8 cells, contraction of 4 sheets and forces of 6 cells in space"
 std::string title_of(const Study& study) {
@@ -382,55 +261,31 @@ std::string title_of(const Study& study) {
 
 std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
                        const StudyParameters& parameters, const Path& page_folder) {
-  const std::string title = title_of(study);
-  const std::string head = fmt::format("<h1>{}</h1><p class=\"sub\">mbtfm {}</p>\n", title, kVersion);
+  const Files files{tables_of(study, analysis)};
   std::string body = report::section("Primary comparison", primary_section(study, analysis, figures)) +
                      report::section("In short", overview(study, analysis));
-  std::string found;
+  std::string found, pictures, tests;
   for (const Findings& f : findings_of(analysis, parameters)) {
     if (!f.sentences.empty()) found += "<h3>" + f.title + "</h3>\n" + list_of(f.sentences);
     if (f.unclear.empty()) continue;
-    found += fmt::format("<details><summary>{} not demonstrably differ</summary>\n{}</details>\n",
-                         counted(f.unclear.size(), "pair that does", "pairs that do"), list_of(f.unclear));
+    found += report::folded(counted(f.unclear.size(), "pair that does", "pairs that do") + " not demonstrably differ",
+                            list_of(f.unclear));
   }
   body += report::section("What was found, exploratory", found);
-  std::string pictures;
+  body += report::section("What the program noticed", findings_text(study, files));
   for (const Figure& figure : figures)
     if (figure.name != kPrimaryFigure) pictures += embedded(figure);
-  const auto files = tables_of(study, analysis);
-  const auto with_file = [&](const Table& table, const std::string& name) {
-    const auto file = std::ranges::find_if(files, [&](const auto& f) { return f.first == name; });
-    return report::html_of(table, {file->first, file->second});
-  };
-  body += report::section("What the program noticed",
-                          findings_text(study, with_file(findings_table(study), "findings.csv")));
-  body += report::section("Figures", pictures);
-  if (!analysis.sheets.empty())
-    body += report::section(
-        "Figures of the sheets",
-        kHowToReadSheets +
-            with_file(figures_table(study, analysis.sheets, "Figures of the sheets", "sheets"), "summaries.csv"));
-  if (!analysis.in_space.empty())
-    body += report::section(
-        "Figures of the cells in space",
-        kHowToReadSpace + with_file(figures_table(study, analysis.in_space, "Figures of the cells in space", "cells"),
-                                    "summaries.csv"));
-  if (analysis.has_fibres)
-    body += report::section("Tension by fibre type",
-                            on_edge_fibres(study) + with_file(types_table(study, analysis), "types.csv"));
-  std::string tests;
-  for (const Measure* m : analysis.measures()) {
-    if (!m->comparisons.empty())
-      tests += report::folded("Tests of the " + m->sample.name + " of " + name_of(m->sample.each),
-                              report::html_of(tests_table(*m)));
-  }
+  body += report::section("Figures", "<div class=\"grid\">\n" + pictures + "</div>\n");
+  body += report::section(
+      "All measures", on_edge_fibres(study) + (analysis.of_cells(CellKind::sheet).empty() ? "" : kHowToReadSheets) +
+                          (analysis.of_cells(CellKind::space).empty() ? "" : kHowToReadSpace) + measures_table(files));
+  for (const Measure& m : analysis.measures)
+    if (!m.comparisons.empty())
+      tests += report::folded("Tests of the " + m.sample.name + " of " + name_of(m.sample.each),
+                              tests_table(files, m.sample));
   body += report::section("Exploratory tests", tests + kHowToRead);
-  std::string cells = gallery(study, page_folder);
-  for (const Table& table :
-       {cells_table(study), sheets_table(study), cells_in_space_table(study), left_out_table(study)})
-    if (!table.rows.empty()) cells += with_file(table, "cells.csv");
-  body += report::section("Cells", cells);
-  return report::page(title + " – mbtfm", head, body);
+  body += report::section("Cells", gallery(study, page_folder) + cells_tables(files));
+  return report::html_of(report::Page{.title = title_of(study), .body = body});
 }
 
 }  // namespace mbtfm::statistics

@@ -320,13 +320,13 @@ std::vector<double> thresholds_of(const Analysis& analysis) {
 
 std::vector<TypeRow> type_rows(const Study& study, const Analysis& analysis) {
   std::vector<TypeRow> rows;
-  for (const Summary& s : analysis.tensions.summaries) {
+  for (const Summary& s : analysis.tensions().summaries) {
     TypeRow& row = rows.emplace_back(TypeRow{s, {}});
     for (const ShareAbove& share : analysis.shares)
       if (share.condition == s.condition && share.kind == s.kind)
         row.shares.push_back({share.share.value, share.share.interval, share.without_error});
   }
-  const Sample& sample = analysis.tensions.sample;
+  const Sample& sample = analysis.tensions().sample;
   for (const Summary& s : analysis.tensions_by_cell) {
     TypeRow& row = rows.emplace_back(TypeRow{s, {}});
     for (const double threshold : thresholds_of(analysis)) {
@@ -371,18 +371,18 @@ Table<VarianceRow> variance_table() {
 /// The scatter between cells, between the kinds of a cell and within them.
 std::vector<VarianceRow> variance_rows(const Analysis& analysis) {
   std::vector<VarianceRow> rows;
-  for (const Measure* m : analysis.measures()) {
+  for (const Measure& m : analysis.measures) {
     const auto add = [&](const std::string& component, const std::optional<double>& variance) {
-      const char* remark = m->model ? "too few values to tell it from the others" : m->obstacle.c_str();
+      const char* remark = m.model ? "too few values to tell it from the others" : m.obstacle.c_str();
       if (variance) remark = *variance > 0 ? "" : "no more than the errors explain";
       rows.push_back(
-          {m->sample.column, component, variance ? std::optional(std::sqrt(*variance)) : std::nullopt, remark});
+          {m.sample.column, component, variance ? std::optional(std::sqrt(*variance)) : std::nullopt, remark});
     };
-    const MixedFit fit = m->model ? m->model->fit : MixedFit{};
+    const MixedFit fit = m.model ? m.model->fit : MixedFit{};
     add("cell", fit.cell_variance);
     add("kind in a cell", fit.cell_kind_variance);
-    for (std::size_t k = 0; k < m->sample.kinds.size(); ++k)
-      add("within: " + m->sample.kinds[k], k < fit.residual_variance.size() ? fit.residual_variance[k] : std::nullopt);
+    for (std::size_t k = 0; k < m.sample.kinds.size(); ++k)
+      add("within: " + m.sample.kinds[k], k < fit.residual_variance.size() ? fit.residual_variance[k] : std::nullopt);
   }
   return rows;
 }
@@ -415,7 +415,7 @@ Table<Comparison> test_table() {
 
 std::vector<Comparison> test_rows(const Analysis& analysis) {
   std::vector<Comparison> rows;
-  for (const Measure* m : analysis.measures()) rows.insert(rows.end(), m->comparisons.begin(), m->comparisons.end());
+  for (const Measure& m : analysis.measures) rows.insert(rows.end(), m.comparisons.begin(), m.comparisons.end());
   return rows;
 }
 
@@ -424,7 +424,7 @@ Table<Correlation> correlation_table() {
   return {
       .file = "statistics/correlations.csv",
       .row = "each force, size and condition",
-      .columns = {{"force", "column of cells.csv", &Row::force},
+      .columns = {{"force", "column of cells.csv; fttc_force_nN: total force by FTTC; or a size", &Row::force},
                   {"size", "column of cells.csv", &Row::size},
                   {"condition", "empty: none was asked for", &Row::condition},
                   {"n_cells", "cells", [](const Row& c) { return static_cast<int>(c.x.size()); }},
@@ -488,8 +488,8 @@ Table<InCell<Finding>> finding_table() {
 
 std::vector<QuantityRow> summary_rows(const Analysis& analysis) {
   std::vector<QuantityRow> rows;
-  for (const Measure* m : analysis.measures())
-    for (const Summary& s : m->summaries) rows.push_back({m->sample.column, s});
+  for (const Measure& m : analysis.measures)
+    for (const Summary& s : m.summaries) rows.push_back({m.sample.column, s});
   return rows;
 }
 

@@ -525,7 +525,7 @@ TEST_F(SheetsOfImages, give_contraction_and_stiffness_back_in_one_command_and_in
     EXPECT_LT(fitted.number(row, "by_beads"), 0.15 * value);
   }
   for (const char* page : {"report.html", "3_sheet/sheet.html"})
-    for (const char* words : {"In short", "Caution:", "What the beads tell", "stiffness_nN_per_um", "<svg"})
+    for (const char* words : {"In short", "Caution:", "What the beads tell", "stiffness (nN/µm)", "<svg"})
       EXPECT_TRUE(has_words(files::read_text(cell_ / page), words)) << page << ": " << words;
 
   const std::string study = study_.string();
@@ -621,7 +621,7 @@ TEST(SheetStudies, a_known_difference_of_contraction_is_found_and_the_tables_agr
     EXPECT_EQ(summaries.number(at, "n_cells"), 4);
   }
   EXPECT_TRUE(has_words(files::read_text(folder / "statistics/report.html"),
-                        "Contraction of sheets under drug: ", "less than under control"));
+                        "Contraction of sheets, drug minus control: −", "[95 % CI −"));
   EXPECT_TRUE(std::filesystem::exists(folder / "statistics/figures/primary.svg"));
   EXPECT_TRUE(std::filesystem::exists(folder / "statistics/figures/sheets.svg"));
 }

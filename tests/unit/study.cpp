@@ -1,5 +1,6 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/statistics/analysis.h"
+#include "pipeline/statistics/drawing.h"
 #include "pipeline/statistics/picture.h"
 #include "pipeline/statistics/samples.h"
 #include "pipeline/statistics/study_files.h"
@@ -231,10 +232,10 @@ TEST(Study, edge_fibres_count_as_ventral_ones_or_as_a_type_of_their_own) {
   const FakeStudy fake;
   for (const int n_types : {3, 4}) {
     Study study = fake.read({.fibre_types = n_types});
-    const std::vector<double> before = values_of(sample_tensions(study).of_group(0, 2));
+    const std::vector<double> before = values_of(sample_of(study, "tension_nN").of_group(0, 2));
     Fibre& ventral = *std::ranges::find(study.cells[0].cell.fibres, FibreType::ventral, &Fibre::type);
     ventral.type = FibreType::edge;
-    const Sample sample = sample_tensions(study);
+    const Sample sample = sample_of(study, "tension_nN");
     EXPECT_EQ(sample.n_kinds(), n_types);
     EXPECT_EQ(sample.values.size(), measured_fibres(study).size());
     EXPECT_EQ(values_of(sample.of_group(0, 2)).size(), before.size() - (n_types == 4 ? 1 : 0));
@@ -253,13 +254,13 @@ TEST(Study, edge_fibres_count_as_ventral_ones_or_as_a_type_of_their_own) {
 TEST(Study, adhesions_that_nobody_saw_do_not_enter) {
   const FakeStudy fake;
   Study study = fake.read();
-  const std::size_t n = sample_adhesion_forces(study).values.size();
+  const std::size_t n = sample_of(study, "adhesion_force_nN").values.size();
   const double area_um2 = figures_of(study.cells[0]).adhesion_area_um2;
   Adhesion& a = study.cells[0].cell.adhesions[0];
   a.origin = AdhesionOrigin::anchor;
   study.cells[0].cell.adhesions[1].origin = AdhesionOrigin::candidate;
-  EXPECT_EQ(sample_adhesion_forces(study).values.size(), n - 2);
-  EXPECT_EQ(sample_adhesion_areas(study).values.size(), n - 2);
+  EXPECT_EQ(sample_of(study, "adhesion_force_nN").values.size(), n - 2);
+  EXPECT_EQ(sample_of(study, "adhesion_area_um2").values.size(), n - 2);
   EXPECT_LT(figures_of(study.cells[0]).adhesion_area_um2, area_um2);
   for (StudyCell& c : study.cells)
     for (Adhesion& all : c.cell.adhesions) all.origin = AdhesionOrigin::candidate;
@@ -273,10 +274,11 @@ TEST(Study, forces_of_a_network_that_cannot_be_identified_do_not_enter) {
   study.cells[0].fit.network_force_nN = 3e5;
   study.cells[0].fit.fibre_force_nN = -3e5;
   const Analysis analysis = analyse(study, {.bootstrap_draws = 100});
-  for (const Measure& m : analysis.cells)
-    EXPECT_EQ(m.sample.values.size(), m.sample.column == "total_force_nN" ? 4u : 3u) << m.sample.column;
+  for (const Measure* m : analysis.of_cells(CellKind::plane))
+    if (m->sample.each == Observed::cells)
+      EXPECT_EQ(m->sample.values.size(), m->sample.column == "total_force_nN" ? 4u : 3u) << m->sample.column;
   for (const Correlation& c : analysis.correlations)
-    EXPECT_EQ(c.x.size(), c.force == "total_force_nN" ? 4u : 3u) << c.force;
+    EXPECT_EQ(c.x.size(), c.force == "fibre_force_nN" || c.force == "network_force_nN" ? 3u : 4u) << c.force;
   const files::CsvTable cells(tables_of(study, analysis)[0].second, "cells.csv");
   EXPECT_FALSE(cells.optional_number(0, "network_force_nN"));
   EXPECT_TRUE(cells.optional_number(1, "network_force_nN"));
@@ -316,7 +318,7 @@ TEST(Study, cells_drawn_as_they_are_have_their_own_mean_and_median) {
   const Study study = test::simulated_study({.n_cells = 7, .seed = 3});
   const std::vector<CellWeights> draws(200, CellWeights(study.cells.size(), 1));
   int n_odd = 0;
-  for (const Summary& s : summarise(sample_tensions(study), {}, draws)) {
+  for (const Summary& s : summarise(sample_of(study, "tension_nN"), {}, draws)) {
     EXPECT_NEAR(s.mean_interval->low, s.plain.mean, 1e-9);
     EXPECT_NEAR(s.mean_interval->high, s.plain.mean, 1e-9);
     if (s.n % 2 == 0) continue;  // the median of a draw is one of its values
@@ -384,7 +386,7 @@ TEST(Analysis, tests_are_made_by_fibre_and_by_cell_between_types_and_conditions)
   const Study study = test::simulated_study({.n_cells = 24, .n_conditions = 2, .condition_effect_nN = 2});
   const Analysis analysis = analyse(study, {.bootstrap_draws = 200});
   std::set<std::string> tests;
-  for (const Comparison& t : analysis.tensions.comparisons) {
+  for (const Comparison& t : analysis.tensions().comparisons) {
     tests.insert(name_of(t.question) + std::string(", ") + name_of(t.test) + ", " + name_of(t.unit));
     EXPECT_GE(t.p_value, 0);
     EXPECT_LE(t.p_value, 1);
@@ -393,15 +395,15 @@ TEST(Analysis, tests_are_made_by_fibre_and_by_cell_between_types_and_conditions)
   }
   // between kinds: Kruskal-Wallis, Mann-Whitney by fibre and by median; clustered; mixed. Between conditions: no K-W
   EXPECT_EQ(tests.size(), 6u + 4u);
-  EXPECT_EQ(analysis.tensions.summaries.size(), 6u);
-  EXPECT_EQ(analysis.correlations.size(), 2u * 12u);
+  EXPECT_EQ(analysis.tensions().summaries.size(), 6u);
+  EXPECT_EQ(analysis.correlations.size(), 2u * (12u + 3u));
 }
 
 /// Truth: dorsal 1.5, arcs 2.5, ventral 4 nN, and 2 more under the second condition.
 TEST(Analysis, the_mixed_model_finds_the_means_and_the_scatter_behind_the_errors) {
   const test::StudySettings settings{.n_cells = 200, .n_conditions = 2, .condition_effect_nN = 2, .error_nN = 1};
   const Analysis analysis = analyse(test::simulated_study(settings), {.bootstrap_draws = 200});
-  for (const Summary& s : analysis.tensions.summaries) {
+  for (const Summary& s : analysis.tensions().summaries) {
     const double truth = (s.kind == "dorsal" ? 1.5
                           : s.kind == "arc"  ? 2.5
                                              : 4) +
@@ -420,11 +422,12 @@ TEST(Analysis, tests_by_cell_hold_their_level_where_those_by_fibre_do_not) {
   constexpr int kStudies = 200;
   std::map<std::string, int> n_rejected;
   for (int i = 0; i < kStudies; ++i) {
-    const Sample sample = sample_tensions(test::simulated_study({.n_cells = 12,
-                                                                 .n_conditions = 2,
-                                                                 .types_differ = false,
-                                                                 .type_in_cell_sd_nN = 0.7,
-                                                                 .seed = 100 + static_cast<std::uint64_t>(i)}));
+    const Sample sample = sample_of(test::simulated_study({.n_cells = 12,
+                                                           .n_conditions = 2,
+                                                           .types_differ = false,
+                                                           .type_in_cell_sd_nN = 0.7,
+                                                           .seed = 100 + static_cast<std::uint64_t>(i)}),
+                                    "tension_nN");
     for (const Comparison& c : compare(sample, model_of(sample).model))
       if (c.question == Question::between_conditions && c.within == "ventral" && c.p_value < 0.05)
         ++n_rejected[name_of(c.test) + std::string(", ") + name_of(c.unit)];
@@ -463,7 +466,7 @@ TEST(Primary, compares_each_condition_with_the_reference_by_the_test_that_was_na
   EXPECT_GT(primary.differences[0].difference.low, 0);
   EXPECT_NEAR(primary.differences[1].difference.estimate, 6, 3 * primary.differences[1].difference.standard_error);
   // the same numbers as among all tests, but for the sign
-  for (const Comparison& c : analysis.tensions.comparisons) {
+  for (const Comparison& c : analysis.tensions().comparisons) {
     if (c.test != statistics::Test::mixed_model || c.within != "ventral" || c.group_a != "a" || c.group_b != "b")
       continue;
     EXPECT_NEAR(primary.differences[0].difference.estimate, -c.effect, 1e-12);
@@ -483,7 +486,7 @@ TEST(Primary, with_replicates_compares_their_means_in_pairs) {
   EXPECT_EQ(d.replicates, 3);
   EXPECT_EQ(d.difference.degrees, 2);
   // by hand: means of cells, of replicates, of their differences
-  const Sample& sample = analysis.tensions.sample;
+  const Sample& sample = analysis.tensions().sample;
   std::map<std::pair<int, std::string>, std::vector<double>> cells_of;
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
     std::vector<double> own;
@@ -561,19 +564,18 @@ void expect_no_word_of_fibres(const std::string& page) {
 /// No figure is of cells of two kinds, and each quantity has a column of its own.
 void expect_unmixed(const Study& study, const Analysis& analysis) {
   std::set<std::string> columns;
-  for (const Measure* m : analysis.measures()) {
-    EXPECT_TRUE(columns.insert(m->sample.column).second) << m->sample.column << " is two quantities";
-    for (const Observation& o : m->sample.values)
-      EXPECT_EQ(study.cells[o.cell].kind(), m->sample.of_cells()) << m->sample.column;
+  for (const Measure& m : analysis.measures) {
+    EXPECT_TRUE(columns.insert(m.sample.column).second) << m.sample.column << " is two quantities";
+    for (const Observation& o : m.sample.values)
+      EXPECT_EQ(study.cells[o.cell].kind(), m.sample.of_cells()) << m.sample.column;
   }
   for (const Correlation& c : analysis.correlations)
     for (const int cell : c.cells) EXPECT_EQ(study.cells[cell].kind(), CellKind::plane) << c.force;
 }
 
 const Sample* sample_named(const Analysis& analysis, const std::string& column) {
-  for (const Measure* m : analysis.measures())
-    if (m->sample.column == column) return &m->sample;
-  return nullptr;
+  const Measure* m = analysis.find(column);
+  return m ? &m->sample : nullptr;
 }
 
 struct FigureOfCell {
@@ -604,6 +606,30 @@ void expect_figures(const Study& study, const Study& made, const std::vector<Fig
       if (*e.in_cells) EXPECT_NEAR(cells.number(row, e.in_cells), value, 1e-5 * value) << e.column << ": six digits";
     }
   }
+}
+
+TEST(Study, the_sentence_of_the_primary_comparison_has_the_signs_of_its_chart) {
+  const Primary primary{.measure = "tension of ventral fibres", .unit = "nN", .reference = "control", .test = {}};
+  const PrimaryDifference less{.condition = "drug", .difference = {.estimate = -1.4, .low = -4.4, .high = 1.6}};
+  EXPECT_TRUE(has_words(sentence_of(primary, less), "drug minus control: −1.4 nN", "[95 % CI −4.4 to 1.6 nN]"));
+}
+
+TEST(Study, conditions_and_types_of_fibres_share_no_colour) {
+  for (int condition = 0; condition < 8; ++condition)
+    for (const FibreType type : kFibreTypes) EXPECT_NE(condition_colour(condition), charts::colour_of(type));
+}
+
+TEST(Study, relates_forces_of_the_usual_method_to_size_where_they_are_known) {
+  Study study = test::simulated_study({.n_cells = 6, .n_conditions = 1});
+  for (StudyCell& cell : study.cells) cell.fttc_force_nN = 2 * figures_of(cell).cell_area_um2;
+  study.cells[0].fttc_force_nN.reset();
+  const auto all = correlate_forces(study, draw_cells(study, {.bootstrap_draws = 100}));
+  const auto found = std::ranges::find_if(
+      all, [](const Correlation& c) { return c.force == "fttc_force_nN" && c.size == "cell_area_um2"; });
+  ASSERT_NE(found, all.end());
+  EXPECT_EQ(found->x.size(), 5u);
+  ASSERT_TRUE(found->line);
+  EXPECT_NEAR(found->line->slope, 2, 1e-12);
 }
 
 using SheetStudy = test::InFolder;
@@ -657,7 +683,7 @@ TEST_F(SheetStudy, a_sheet_that_the_beads_hardly_tell_counts_little_in_the_mean)
   poor.sigma = 20;
   poor.low = poor.value - 39;
   poor.high = poor.value + 39;
-  const Sample sample = sample_sheets(study).front();
+  const Sample sample = sample_of(study, "contraction_nN_per_um");
   const Contrast mean = contrast_of(model_of(sample).model->fit, Eigen::VectorXd::Ones(1));
   EXPECT_NEAR(mean.estimate, 2, 0.3) << "scatter and error of 0.22 make 0.07 of the mean of eleven; four of these";
   EXPECT_LT(mean.standard_error, 0.15);
@@ -671,7 +697,7 @@ TEST_F(SheetStudy, intervals_of_the_difference_hold_it_and_leave_out_what_sheets
   for (int seed = 1; seed <= kStudies; ++seed) {
     const Study study =
         test::simulated_sheets({.condition_effect_nN_per_um = -0.6, .seed = static_cast<std::uint64_t>(seed)});
-    const Sample sample = sample_sheets(study).front();
+    const Sample sample = sample_of(study, "contraction_nN_per_um");
     ASSERT_EQ(sample.column, "contraction_nN_per_um");
     const SampleModel model = *model_of(sample).model;
     const Contrast c = contrast_of(model.fit, Eigen::Vector2d(-1, 1));
@@ -809,7 +835,7 @@ TEST_F(SpaceStudy, has_the_figures_of_each_cell_and_compares_the_total_force_fir
                                 "expected_relative_l2", "n_meshes"})
     EXPECT_TRUE(cells.text(row, of_others).empty()) << of_others;
   const std::string page = page_of(study, analysis);
-  EXPECT_TRUE(has_words(page, "<h1>Forces of 12 cells in space</h1>", "Figures of the cells in space",
+  EXPECT_TRUE(has_words(page, "<h1>Forces of 12 cells in space</h1>", "All measures",
                         "the mean contractile moment of cells in space is"));
   expect_no_word_of_fibres(page);
 }
