@@ -106,8 +106,9 @@ void draw_tractions(Chart& map, const Solution& solution, const Extent& frame) {
   for (const auto& [square, sum] : sums) longest = std::max(longest, norm(sum.force) / sum.area);
   if (longest == 0) return;
   const double px_per_kPa = 1.5 * Chart::kFrameWidth_px / kAcross / longest;
-  for (const auto& [square, sum] : sums)
-    map.arrow(1 / sum.area * sum.place, px_per_kPa / sum.area * sum.force, "stroke:#0072B2;stroke-width:1.5");
+  for (const char* style : {"stroke:#fff;stroke-width:3.4", "stroke:#111;stroke-width:1.4"})  // seen on any colour
+    for (const auto& [square, sum] : sums)
+      map.arrow(1 / sum.area * sum.place, px_per_kPa / sum.area * sum.force, style);
   map.subtitle("longest arrow: a mean of " + charts::readable(longest) + " kPa", "#555");
 }
 

@@ -4,8 +4,7 @@
 #include "mbtfm/plan/answer.h"
 #include "mbtfm/plan/tables.h"
 #include "pipeline/charts/chart.h"
-#include "pipeline/contract/version.h"
-#include "pipeline/report/page.h"
+#include "pipeline/report/stage_page.h"
 
 namespace mbtfm::plan {
 namespace {
@@ -24,8 +23,9 @@ const Texts& texts_of(const Plan&) {
       .of_middle = "tension",
       .drawn = "tension",
       .drawn_explained =
-          "Tensions found in simulated experiments beside the true ones. The fits know neither the cell's own network "
-          "nor its tensions.",
+          "Tensions found in simulated experiments over the true ones; bars: the predicted standard error. The fits "
+          "know "
+          "neither the cell's own network nor its tensions.",
       .how =
           "<p class=\"sub\">The error by the beads is the Cramér–Rao bound of the fit: it grows in proportion to "
           "noise and modulus and falls with the root of the density. The model's part (meshes, segmentation, what is "
@@ -40,7 +40,8 @@ const Texts& texts_of(const SpacePlan&) {
       .middle = "middle patch",
       .of_middle = "force",
       .drawn = "component of a force",
-      .drawn_explained = "Forces found in simulated experiments beside the true ones, by component.",
+      .drawn_explained =
+          "Forces found in simulated experiments over the true ones, by component; bars: the predicted standard error.",
       .how =
           "<p class=\"sub\">Standard errors are those that the reconstruction states, with lambda as data of this "
           "noise choose it. A modulus counts as noise does. More noise makes lambda larger, so that the error grows "
@@ -73,9 +74,9 @@ charts::Chart error_chart(const PlanOf<Quantity>& plan, double noise_um) {
   std::vector<double> errors = {asked.target_nN};  // of all noises, so that the axes are alike
   for (const auto& e : plan.grid.expected)
     if (e.quantity == quantity) errors.push_back(e.standard_error_nN);
-  charts::Chart chart(
-      "Noise " + brief(noise_um) + " µm", charts::axis_over(texts.beads, asked.densities, charts::Scale::logarithmic),
-      charts::axis_over("standard error of the " + texts.middle + " (nN)", errors, charts::Scale::logarithmic));
+  charts::Chart chart("Noise " + brief(noise_um) + " µm",
+                      charts::axis_over(texts.beads, asked.densities, charts::Scale::logarithmic),
+                      charts::axis_over("standard error (nN)", errors, charts::Scale::logarithmic));
   for (std::size_t k = 0; k < asked.youngs_modulus_kPa.size(); ++k) {
     const std::string gel = brief(asked.youngs_modulus_kPa[k]) + " kPa";
     std::vector<Vec2> points;
@@ -117,50 +118,38 @@ std::string below_needed(const Plan& plan) {
 }
 std::string below_needed(const SpacePlan&) { return {}; }
 
-report::Table expected_rows(const Plan& plan) {
-  report::Table table{.columns = {number("gel (kPa)"), number("beads per µm²"), number("noise (µm)"), "quantity",
-                                  number("number"), number("standard error (nN)"), number("by beads"),
-                                  number("by mesh"), number("by segmentation"), number("by the rest"),
-                                  number("within target (%)"), number("two apart from (µm)")}};
-  for (const Expected& e : plan.grid.expected) {
-    table.rows.push_back({brief(e.point.youngs_modulus_kPa), brief(e.point.density), brief(e.point.noise_um),
-                          name_of(e.quantity), std::to_string(e.n), brief(e.standard_error_nN), brief(e.from_beads_nN),
-                          brief(e.from_mesh_nN), brief(e.from_segmentation_nN), brief(e.from_other_nN),
-                          brief(100 * e.share_within), e.least_distance_um ? brief(*e.least_distance_um) : "–"});
-  }
-  return table;
+const char* density_column(const Plan&) { return "beads_per_um2"; }
+const char* density_column(const SpacePlan&) { return "beads_per_um3"; }
+
+template <class Row>
+report::Listing listing_of(const char* title, const char* file, const files::Table<Row>& table,
+                           const std::vector<Row>& rows, const std::string& columns) {
+  return {title, {}, file, text_of(table, rows), columns};
 }
 
-report::Table expected_rows(const SpacePlan& plan) {
-  report::Table table{.columns = {number("gel (kPa)"), number("beads per µm³"), number("noise (µm)"), "quantity",
-                                  number("number"), number("standard error (nN)"), number("by beads"),
-                                  number("by background"), number("within target (%)"), number("map resolves (µm)"),
-                                  number("two told from (µm)"), number("numbers told")}};
-  for (const SpaceExpected& e : plan.grid.expected) {
-    table.rows.push_back({brief(e.point.youngs_modulus_kPa), brief(e.point.density), brief(e.point.noise_um),
-                          name_of(e.quantity), std::to_string(e.n), brief(e.standard_error_nN), brief(e.from_beads_nN),
-                          brief(e.from_background_nN), brief(100 * e.share_within),
-                          e.resolution_um ? brief(*e.resolution_um) : "–",
-                          e.least_distance_um ? brief(*e.least_distance_um) : "–", brief(e.degrees)});
-  }
-  return table;
+const char* further_columns(const Plan&) {
+  return "from_mesh_nN: by mesh (nN), from_segmentation_nN: by segmentation (nN), from_other_nN: by the rest (nN)";
+}
+const char* further_columns(const SpacePlan&) {
+  return "from_background_nN: by background (nN), resolution_um: map resolves (µm), numbers_told: numbers resolved";
 }
 
-report::Table cell_rows(const std::vector<CellNumbers>& cells) {
-  report::Table table{.columns = {"type", number("mean (nN)"), number("between cells (nN)"), number("within (nN)"),
-                                  number("error (nN)"), number("difference (%)"), number("fibres per cell"),
-                                  number("cells of each condition")}};
-  for (const int n : kCells) table.columns.push_back(number("chance with " + std::to_string(n) + " cells (%)"));
-  for (const CellNumbers& n : cells) {
-    std::vector<std::string> row = {
-        name_of(n.scatter.type),           brief(n.scatter.mean_nN),
-        brief(n.scatter.between_cells_nN), brief(n.scatter.within_nN),
-        brief(n.scatter.error_nN),         brief(100 * n.difference),
-        brief(n.fibres_per_cell),          n.cells ? std::to_string(*n.cells) : "&gt; 10000"};
-    for (const double p : n.power) row.push_back(brief(std::round(100 * p)));
-    table.rows.push_back(std::move(row));
-  }
-  return table;
+template <class Quantity>
+report::Listing expected_listing(const PlanOf<Quantity>& plan) {
+  return listing_of(
+      "All numbers", "plan.csv", expected_table(Quantity{}), plan.grid.expected,
+      "youngs_modulus_kPa: gel (kPa), " + std::string(density_column(plan)) + ": " + texts_of(plan).beads +
+          ", noise_um, quantity, n: number, standard_error_nN, from_beads_nN: by beads (nN), " + further_columns(plan) +
+          ", share_within: share within target, least_distance_um: two told apart from (µm)");
+}
+
+report::Listing cell_listing(const std::vector<CellNumbers>& cells) {
+  std::string columns =
+      "type, mean_nN, between_cells_nN: SD between cells (nN), within_nN: SD within a cell (nN), error_nN, difference, "
+      "fibres_per_cell, cells: cells of each condition";
+  for (const int n : kCells)
+    columns += ", power_of_" + std::to_string(n) + "_cells: power with " + std::to_string(n) + " cells";
+  return listing_of("How many cells", "plan_cells.csv", cell_table(), cells, columns);
 }
 
 std::string name_of_number(const Plan&, const DrawnNumber& d) { return "fibre " + std::to_string(d.id); }
@@ -176,7 +165,7 @@ charts::Chart drawn_chart(const PlanOf<Quantity>& plan) {
   for (const DrawnNumber& d : numbers) both.insert(both.end(), {d.true_nN, d.found_nN});
   charts::Chart chart("Drawn experiments",
                       charts::axis_over("true " + texts_of(plan).drawn + " (nN)", both, charts::Scale::linear),
-                      charts::axis_over("found, ± predicted standard error (nN)", both, charts::Scale::linear));
+                      charts::axis_over("found (nN)", both, charts::Scale::linear));
   const auto [least, most] = std::ranges::minmax(both);
   const double from = std::min(0.0, least);
   chart.curve({{from, from}, {most, most}}, "fill:none;stroke:#999;stroke-width:1");
@@ -194,7 +183,7 @@ charts::Chart drawn_chart(const PlanOf<Quantity>& plan) {
 /// By gel and noise.
 template <class Quantity>
 report::Table needed_rows(const PlanOf<Quantity>& plan) {
-  report::Table table{.columns = {number("gel (kPa)")}};
+  report::Table table{.caption = "Beads that are needed", .columns = {number("gel (kPa)")}};
   for (const double noise_um : plan.asked.noise_um) table.columns.push_back(number("noise " + brief(noise_um) + " µm"));
   for (const double E : plan.asked.youngs_modulus_kPa) {
     std::vector<std::string> row = {brief(E)};
@@ -211,6 +200,8 @@ std::string paragraphs(const std::vector<std::string>& texts) {
   return html;
 }
 
+std::string grid(const std::string& figures) { return "<div class=\"grid\">\n" + figures + "</div>\n"; }
+
 }  // namespace
 
 template <class Quantity>
@@ -225,13 +216,11 @@ std::string svg_of(const PlanOf<Quantity>& plan) {
 template <class Quantity>
 std::string html_of(const PlanOf<Quantity>& plan) {
   const Texts& texts = texts_of(plan);
-  const std::string head = "<h1>Plan: " + report::html_escaped(plan.name) + "</h1><p class=\"sub\">mbtfm " +
-                           std::string(kVersion) + "</p>\n<p><b>" + report::html_escaped(answer_sentence(plan)) +
-                           "</b></p>\n" + paragraphs(further_sentences(plan));
-  std::string body, figures;
+  std::string figures, body = report::section("In short", paragraphs(further_sentences(plan)));
   if (!plan.grid.warnings.empty()) body += report::section("What to mind", paragraphs(plan.grid.warnings));
-  for (const charts::Chart& chart : charts_of(plan)) figures += report::figure(chart, dashed(plan.asked));
-  body += report::section("Standard error over density", figures + texts.how);
+  for (const charts::Chart& chart : charts_of(plan))
+    figures += report::figure(chart, "Of the " + texts.middle + ". " + dashed(plan.asked));
+  body += report::section("Standard error over density", grid(figures) + texts.how);
   if (!plan.grid.needed.empty())
     body += report::section(
         report::capitalised(texts.beads) + " that are needed",
@@ -239,17 +228,15 @@ std::string html_of(const PlanOf<Quantity>& plan) {
                         {"plan_needed.csv", files::text_of(needed_table(Quantity{}), plan.grid.needed)}) +
             below_needed(plan));
   if (plan.drawn && !plan.drawn->numbers.empty())
-    body += report::section("How well it held", report::figure(drawn_chart(plan), texts.drawn_explained));
+    body += report::section("How well it held", grid(report::figure(drawn_chart(plan), texts.drawn_explained)));
   if (!plan.cells.empty())
-    body += report::section(
-        "How many cells",
-        report::html_of(cell_rows(plan.cells), {"plan_cells.csv", files::text_of(cell_table(), plan.cells)}) +
-            "<p class=\"sub\">Two-sided t test at 5 % of the means of two groups of cells. Scatter: " +
-            report::html_escaped(plan.cells.front().scatter.source) + ".</p>\n");
-  body += report::section(
-      "All numbers", report::html_of(expected_rows(plan),
-                                     {"plan.csv", files::text_of(expected_table(Quantity{}), plan.grid.expected)}));
-  return report::page("Plan – mbtfm", head, body);
+    body += report::section("How many cells",
+                            report::html_of(cell_listing(plan.cells)) +
+                                "<p class=\"sub\">Two-sided t test at 5 % of the means of two groups of cells; no "
+                                "number: more than 10000 cells. Scatter: " +
+                                report::html_escaped(plan.cells.front().scatter.source) + ".</p>\n");
+  body += report::section("All numbers", report::html_of(expected_listing(plan)));
+  return report::html_of(report::Page{.title = "Plan: " + plan.name, .what = answer_sentence(plan), .body = body});
 }
 
 template std::string svg_of(const Plan&);
