@@ -7,6 +7,7 @@
 #include <map>
 
 #include "pipeline/charts/colour_map.h"
+#include "pipeline/files/base64.h"
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::report {
@@ -122,6 +123,35 @@ std::string arrow_legend(const ArrowScale& scale, const std::string& unit) {
       "style=\"width:calc({0:.1f}px*var(--frame,1))\"><path d=\"{1}\" "
       "style=\"fill:none;stroke:#111;stroke-width:1.6;vector-effect:non-scaling-stroke\"/></svg>{2} {3}</span>",
       length_px, charts::arrow_path({length_px, 0}), charts::readable(value), unit);
+}
+
+std::string picture_of_squares(const VectorField& field, double side_um, const Extent& box,
+                               const ColourScale& colours) {
+  constexpr int kColours = 48;  // neighbours are hardly told apart
+  // by colour, as paths in a frame whose unit is a hundredth of a side; neighbours of one colour along x are one piece
+  std::map<int, std::string> pieces;
+  const std::size_t n = field.positions_um.size();
+  const auto colour_at = [&](std::size_t i) {
+    const double share = colours.high > 0 ? std::min(1.0, norm(field.vectors[i]) / colours.high) : 0;
+    return static_cast<int>(std::round(kColours * share));
+  };
+  for (std::size_t i = 0, next = 0; i < n; i = next) {
+    const int colour = colour_at(i);
+    const double y_um = field.positions_um[i].y;
+    for (next = i + 1; next < n && field.positions_um[next].y == y_um && colour_at(next) == colour;) ++next;
+    const Vec2 corner = 100 / side_um * (field.positions_um[i] - box.low_um) - Vec2{50, 50};
+    // a hundredth more than its sides: no gaps by rounding
+    const auto width = 100 * (next - i) + 1;
+    pieces[colour] += fmt::format("M{:.0f} {:.0f}h{}v101h-{}", corner.x, corner.y, width, width);
+  }
+  const Vec2 size = 100 / side_um * (box.high_um - box.low_um);
+  std::string svg = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
+      "preserveAspectRatio=\"none\" shape-rendering=\"crispEdges\">",
+      size.x, size.y);
+  for (const auto& [step, path] : pieces)
+    svg += fmt::format("<path fill=\"{}\" d=\"{}\"/>", colours.colour(colours.high * step / kColours), path);
+  return "data:image/svg+xml;base64," + files::base64(svg + "</svg>");
 }
 
 }  // namespace mbtfm::report

@@ -56,6 +56,9 @@ ArrowScale arrow_scale(const std::vector<Vec2>& vectors);
 /// @returns the legend as HTML: an arrow and a colour bar
 std::string draw_arrows(charts::Chart& map, const VectorField& field, const ArrowScale& scale, const std::string& what,
                         const std::string& unit);
+/// Squares around the points, in the colours of the vectors' lengths, as the address of a picture of a few dozen
+/// colours: some ten thousand marks of their own would make the page slow.
+std::string picture_of_squares(const VectorField& field, double side_um, const Extent& box, const ColourScale& colours);
 /// What an arrow's length means, as HTML.
 std::string arrow_legend(const ArrowScale& scale, const std::string& unit);
 

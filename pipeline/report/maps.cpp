@@ -9,7 +9,6 @@
 #include "pipeline/contract/beads.h"
 #include "pipeline/contract/network.h"
 #include "pipeline/contract/polyline.h"
-#include "pipeline/files/base64.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
@@ -120,36 +119,6 @@ ColourScale traction_scale(const CellResults& results) {
   for (const AdhesionForce& force : results.forces)
     tractions_kPa.push_back(norm(force.force_nN) / area_stood_for_um2(*by_id.at(force.adhesion_id)));
   return {.low = 0, .high = round_end(numerics::quantile(tractions_kPa, 0.98)), .label = "traction (kPa)"};
-}
-
-/// Squares in a picture of a few dozen colours: some ten thousand marks of their own would make the page slow.
-std::string picture_of_squares(const UsualMethod& usual, const Extent& box, const ColourScale& colours) {
-  constexpr int kColours = 48;  // neighbours are hardly told apart
-  const double side_um = usual.spacing_um;
-  // by colour, as paths in a frame whose unit is a hundredth of a side; neighbours of one colour along x are one piece
-  std::map<int, std::string> pieces;
-  const std::size_t n = usual.positions_um.size();
-  const auto colour_at = [&](std::size_t i) {
-    const double share = colours.high > 0 ? std::min(1.0, norm(usual.tractions_kPa[i]) / colours.high) : 0;
-    return static_cast<int>(std::round(kColours * share));
-  };
-  for (std::size_t i = 0, next = 0; i < n; i = next) {
-    const int colour = colour_at(i);
-    const double y_um = usual.positions_um[i].y;
-    for (next = i + 1; next < n && usual.positions_um[next].y == y_um && colour_at(next) == colour;) ++next;
-    const Vec2 corner = 100 / side_um * (usual.positions_um[i] - box.low_um) - Vec2{50, 50};
-    // a hundredth more than its sides: no gaps by rounding
-    const auto width = 100 * (next - i) + 1;
-    pieces[colour] += fmt::format("M{:.0f} {:.0f}h{}v101h-{}", corner.x, corner.y, width, width);
-  }
-  const Vec2 size = 100 / side_um * (box.high_um - box.low_um);
-  std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
-      "preserveAspectRatio=\"none\" shape-rendering=\"crispEdges\">",
-      size.x, size.y);
-  for (const auto& [step, path] : pieces)
-    svg += fmt::format("<path fill=\"{}\" d=\"{}\"/>", colours.colour(colours.high * step / kColours), path);
-  return "data:image/svg+xml;base64," + files::base64(svg + "</svg>");
 }
 
 /// Adhesions that were seen, and the dashed ones that nobody saw.
@@ -310,7 +279,8 @@ Figure usual_method_map(const CellResults& results) {
   for (const Vec2 t : usual.tractions_kPa) largest_kPa = std::max(largest_kPa, norm(t));
   // its own: smoothed, they are so much smaller that the model's colours show nothing
   const ColourScale colours{.low = 0, .high = round_end(largest_kPa), .label = "traction (kPa)"};
-  map.picture(box.low_um, box.high_um, picture_of_squares(usual, box, colours));
+  map.picture(box.low_um, box.high_um,
+              picture_of_squares({usual.positions_um, usual.tractions_kPa}, usual.spacing_um, box, colours));
   draw_outline(map, results.cell, "fill:none;stroke-width:1.3;stroke:#fff;stroke-dasharray:5 3");
   draw_adhesions(map, results, "fill:none;stroke:#fff;stroke-width:0.7", Hover::none);
   const std::string lambda = usual.lambda_um_per_kPa ? fmt::format(", λ = {} µm/kPa (criterion: {})",

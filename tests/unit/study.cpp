@@ -452,7 +452,7 @@ TEST(Analysis, a_single_cell_of_a_condition_is_warned_of) {
   Study study = test::simulated_study({.n_cells = 5, .n_conditions = 2});
   for (StudyCell& c : study.cells) c.condition = &c == &study.cells[0] ? 0 : 1;
   const auto warnings = analyse(study, {.bootstrap_draws = 100}).warnings;
-  EXPECT_EQ(warnings.front().substr(0, 16), "a: a single cell");
+  EXPECT_EQ(warnings.front().substr(0, 16), "a: 1 cell only: ");
 }
 
 TEST(Primary, compares_each_condition_with_the_reference_by_the_test_that_was_named) {
