@@ -34,6 +34,18 @@ inline bool fires(const std::string& id, const std::string& said) {
   return said.find(" (" + id + "): ") != said.npos || said.find("\"id\": \"" + id + "\"") != said.npos;
 }
 
+/// By the symptom whose sentence has these words.
+inline bool fires(const std::string& id, const std::string& words, const std::vector<Finding>& found) {
+  require_kind(id);
+  return std::ranges::any_of(found, [&](const Finding& f) { return f.id == id && f.text.find(words) != words.npos; });
+}
+inline bool fires(const std::string& id, const std::string& words, const std::optional<Finding>& found) {
+  return fires(id, words, found ? std::vector{*found} : std::vector<Finding>());
+}
+inline bool fires(const std::string& id, const std::string& words, const std::string& said) {
+  return fires(id, said) && said.find(words) != said.npos;
+}
+
 /// Of these kinds none.
 template <class Found>
 void expect_silent(const std::vector<std::string>& ids, const Found& found) {
