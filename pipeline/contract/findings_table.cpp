@@ -1,14 +1,20 @@
 /// Every kind of finding: its cause, in plain words, what to do, and the numbers by which the program sees it.
+#include "pipeline/contract/findings_table.h"
+
+#include <algorithm>
+#include <iterator>
+
 #include "pipeline/contract/kinds_of_findings.h"
 
 namespace mbtfm {
 
-// False alarms of 400: tests/alarm_rates.py FOLDER 1001 1400 with the right segmentation and displacement, so that only
-// the fit was asked.
-const std::vector<KindOfFinding>& kinds_of_findings() {
+namespace {
+
+/// About images and beads.
+std::vector<KindOfFinding> kinds_of_inputs() {
   using enum Symptom;
   using enum Severity;
-  static const std::vector<KindOfFinding> kinds = {
+  return {
       // any stage
       {"unusual-value",
        "A value is beyond what is usual.",
@@ -226,251 +232,18 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
          "difference of near beads over their errors", 1.5, "simulated errors hold to a seventh"},
         {noise_disagrees, "fit", caution, "{at} scatter {} times as much about the model as they state.",
          "scatter about the model over stated error", 1.3, "a third is more than chance and model explain"}}},
-      // the model
-      {"misfit",
-       "The model does not fit the beads.",
-       "Check that all images show the same cell the same way round. In the map of what is left, arrows at one place "
-       "point to a missing adhesion, arrows everywhere to the gel, its surface, sigma_um or a common motion. Of a "
-       "sheet compare sheet_models.csv.",
-       "0 of 400",
-       {{explains_little, "fit", bad,
-         "The model explains {} % of the displacement beyond noise: it is wrong for these beads.",
-         "unexplained share of the displacement beyond noise, less three standard errors", 0.4,
-         "another cell's, mirrored or transposed beads: 0.5 and more; other networks: 0.2"},
-        {unexplained_displacement, "fit", caution,
-         "No forces at the adhesions explain the beads: {} times the squares of their noise are left.",
-         "squares left over those of noise", 1.25, "an eighth beyond noise is no chance, and these forces are free"},
-        {misfit_in_space, "traction", caution,
-         "The tractions leave {} times the squares that the beads' errors explain.",
-         "misfit over stated errors, per datum", 1.5,
-         "right errors: 1 to a few per cent; error bars are widened by its root"},
-        {sheet_unexplained, "sheet", caution, "The residuals exceed noise by {} standard deviations: {at}.",
-         "standard deviations of chi squared (0.2 aside) or correlation (0.05 aside) beyond noise", 3,
-         "chance: one of 740 fits for each; bad if less than 60 % is explained"}}},
-      {"misfit-in-a-region",
-       "The model does not fit in one region.",
-       "Look there in the map of what is left: beads out of focus, another cell, or a missing fibre or adhesion.",
-       "0 of 400",
-       {{beads_disagree_by_region, "fit", caution, "In {at} the forces leave {} times the squares of the noise.",
-         "largest chi squared per degree of freedom in a region", 3, "noise does not reach 2 over its 30 beads"}}},
-      {"misfit-near-adhesions",
-       "The model does not fit near adhesions.",
-       "Look at the beads beside adhesions in the map of what is left: arrows in all directions are wrong matches (use "
-       "smaller pixels or fewer beads), parallel ones an adhesion that is misplaced or missing. Of patches use "
-       "traction.background above 0.",
-       "",
-       {{telling_beads_scatter, "fit", note,
-         "Beads beside adhesions scatter {} times as much as their noise; the intervals allow for it.",
-         "squares left beside adhesions over those of noise, less three standard errors", 1.2,
-         "nine sound cells: 0.8 to 1.1"},
-        {patches_do_not_fit, "traction", caution,
-         "What patches leave looks like tractions beside them: {} standard deviations off chance.",
-         "standard deviations off chance", 4, "chance: one cell of 30 000"}}},
-      {"wrong-orientation",
-       "The displacement lies or points the wrong way.",
-       "Correct the images or the table in the way that is named, and run again; of z check z_points and the sign of "
-       "uz_um. Disregard these results.",
-       "0 of 400",
-       {{read_otherwise, "fit", bad, "The model leaves {} times less of the displacement {at}.",
-         "misfit over that of another reading", 1.5,
-         "mirrored, transposed or exchanged: 1.9 to 13; other reasons: 1.0"},
-        {z_reversed, "traction", caution, "Chi squared falls by {} if all uz_um have the opposite sign.",
-         "fall of chi squared", 10, "odds of 150 to one; the right sign rises by hundreds"}}},
-      {"large-strain",
-       "Strains are too large for the linear model.",
-       "If the gel is rubber-like (polyacrylamide, silicone), set substrate.material = \"neo-hooke\"; of a sheet or "
-       "cell that contracts, strain = large. Check the pixel size, and that no adhesion is drawn too small.",
-       "84 of 400, of which 79 are crowded (`dense`)",
-       {{strain_beyond_linear, "fit", caution, "Small-strain elasticity leaves out {%} of the gel's displacement.",
-         "part of the displacement that small strains leave out", 0.05,
-         "forces are off by as much, more than a good fit's error"},
-        {contraction_beyond_linear, "sheet, indent", caution,
-         "If nothing held the cells, they would contract by {%}: small strains describe that badly.",
-         "contraction if nothing held it: sheet s (1 - nu) / (E h), cell (1 - 2 nu) stress / E", 0.05,
-         "on springs displacements change by 0.8 % at 0.05, 5 % at 0.15"}}},
-      {"noise-unknown",
-       "The beads' noise is unknown.",
-       "Give sigma_um in displacement.csv, or beads that lie fit.far_distance_um and more beside the cell.",
-       "0 of 400",
-       {{noise_unknown, "fit", caution,
-         "{} beads state no errors and too few lie far from the cell: what the model leaves counts as noise.",
-         "beads of unknown noise", 0, "without it no test of the model"}}},
-      {"adhesions-without-beads",
-       "Adhesions have no beads near by.",
-       "Check that the bead images show the whole cell, at the same place and with the same pixel size. Disregard the "
-       "forces of these adhesions.",
-       "0 of 400",
-       {{adhesions_without_beads, "fit", caution, "Adhesions without a bead near by: {} ({at}).",
-         "adhesions three bead distances off all beads", 0, "chance: one in 10^12 adhesions"}}},
-      {"cell-cut",
-       "The image's border cuts the cell.",
-       "Record the whole cell if you can. Distrust what lies near the cut; of a sheet take tensions further than "
-       "cut_reach_um.",
-       "",
-       {{cell_cut, "fit", note, "The image's border cuts the cell: {} nN pass through; forces beyond it are {at}.",
-         "1 if cut", 0, "a caution if forces beyond are not allowed for"},
-        {sheet_cut, "sheet", caution, "The image cuts the sheet: clamped there its mean tension differs by {%}.",
-         "relative difference, clamped or held across", 0, "nothing is known beyond the border"}}},
-      {"neighbour-pulls",
-       "Another cell pulls on the gel.",
-       "Nothing if its forces were allowed for. With effects.beyond_cut = off this cell's forces are wrong: they take "
-       "over what the other pulls. Choose cells that are alone.",
-       "",
-       {{neighbour_pulls, "fit", note, "Something else pulls: {at}.", "other cells, and sides beyond which forces act",
-         0, "a cell at twice its own distance moves beads by a tenth; chance: one side in 10 000 cells"}}},
-      {"missing-fibre",
-       "A fibre was not segmented.",
-       "Look for it in the actin image (dashed in the map). If it is there: mbtfm-add-fibres --rois "
-       "1_segment/RoiSet.zip --missing 4_fit/missing_fibres.csv --out fibres.zip in the cell's folder, then mbtfm run.",
-       "11 of 400",
-       {{missing_fibre, "fit", caution, "Fibres that the beads need and that were not segmented: {} ({at}).",
-         "fibres (24 at most)", 0, "chance: one cell of a hundred, all pairs tried"}}},
-      {"missing-adhesion",
-       "An adhesion was not segmented.",
-       "Look at the dashed circles (4_fit/missing_adhesions.csv) in the adhesion image. If an adhesion is there, lower "
-       "segment.adhesion_seed_noise or segment.adhesion_smallest_um2, or draw it.",
-       "0 of 400",
-       {{missing_adhesion, "fit", caution, "Forces that the beads need away from all adhesions: {} ({at}).", "forces",
-         0, "chance: one cell of a hundred, all places tried"}}},
-      {"fibre-without-tension",
-       "A segmented fibre is missing in the network.",
-       "Run the network stage again: network.vtu is of another segmentation.",
-       "0 of 400",
-       {{fibre_without_tension, "fit", caution, "Segmented fibres without a tension: {} ({at}).", "fibres", 0,
-         "each may carry force"}}},
-      {"not-identifiable",
-       "The beads do not determine a value.",
-       "Disregard what is named (hollow marks; identifiable = FALSE); more beads near by would help. Of a sheet read "
-       "what sheet_fit.csv limits, or give sheet.youngs_modulus_kPa.",
-       "2 of 400",
-       {{not_identifiable, "fit", bad, "Tensions that these beads do not determine: {} (fibres {at}).", "tensions", 0,
-         "such a tension can take any value"},
-        {network_not_identifiable, "fit", bad, "These beads do not determine the tension of the actin network.",
-         "1 if not determined", 0, "then its force and surface tension are unknown, too"},
-        {sheet_not_identifiable, "sheet", caution, "The beads do not determine the sheet's stiffness: {at}.",
-         "1 if a side has no limit, or 20 % of variation moves it by a factor of e", 0,
-         "a stiff sheet shows contraction over stiffness alone, a soft one its contraction"},
-        {sheet_at_bound, "sheet", caution, "The best stiffness, {} nN/um, is an end of the range that was tried.",
-         "1 if at an end", 0, "the misfit falls up to the end"}}},
-      {"wide-interval",
-       "A tension is uncertain by as much as itself.",
-       "Read the interval, not the value; of a tension at zero its upper end.",
-       "",
-       {{wide_interval, "fit", note, "Tensions that are uncertain by as much as themselves: {} (fibres {at}).",
-         "tensions with intervals wider than twice themselves", 0, "they are known to be small, no more"},
-        {tension_at_zero, "fit", note, "Tensions that are zero, the least allowed: {} (fibres {at}).", "tensions", 0,
-         "fibres do not push: weak ones end there"}}},
-      {"mesh-error",
-       "The mesh is an error of its own.",
-       "Set fit.n_meshes = 2 or more; of a sheet a smaller sheet.mesh_um.",
-       "0 of 400",
-       {{single_mesh, "fit", caution, "One mesh was fitted: the intervals do not contain the error of the mesh.",
-         "1 if one mesh", 0, "its choice is usually a larger error than noise"},
-        {sheet_coarse, "sheet", caution, "The tensions jump by {%} between the mesh's triangles.",
-         "estimated relative error", 0.05, "triangles' own tensions against smooth ones; those written are better"}}},
-      {"forces-out-of-balance",
-       "The program made an error.",
-       "This is a fault of the program: please report it with the cell.",
-       "0 of 400",
-       {{forces_out_of_balance, "fit", bad, "The {at} do not sum to zero: {} of their sizes are left.",
-         "size of the sum over the sum of sizes", 1e-6, "equilibria are solved to 1e-9 of the largest tension"}}},
-      // surface and tractions
-      {"beads-off-gel",
-       "Beads lie outside of the gel.",
-       "Check that beads and surface.vtp have one origin, z into the gel, and gel.thickness_um. Take out beads that "
-       "are not in the gel, or state a larger error of z.",
-       "",
-       {{off_the_surface, "surface", caution, "{} beads or points lie off the surface and do not count.",
-         "share of beads or points", 0.01, "a few lie on every gel and in the cell"},
-        {beads_off_the_gel, "traction", caution,
-         "{%} of the beads lie above the gel's surface or below its base, and are left out.", "share of beads", 0.01,
-         "a few lie on every gel and in the cell"}}},
-      {"surface-repaired",
-       "The surface had holes.",
-       "Nothing if the holes are small beside the cell's adhesions. Else measure the surface again.",
-       "",
-       {{surface_repaired, "surface", note, "{at}", "share of vertices filled in, triangles turned over", 0,
-         "holes up to surface.largest_hole_um are filled by the plate that bends least"}}},
-      {"surface-level",
-       "The surface may be the end of the images.",
-       "Check that the stack begins above the gel, and z_points. A flat gel needs no surface.vtp.",
-       "",
-       {{surface_level, "surface", caution, "The surface found is level to {} um: it may be the end of the images.",
-         "distance of beads over the range of z", 4, "below a quarter a flat gel looks like the end of the images"}}},
-      {"surface-off-zero",
-       "The surface is not at z = 0.",
-       "Make surface.vtp with surface.zero_at = mean, or let gel.thickness_um be the z of its base.",
-       "",
-       {{surface_off_zero, "substrate", caution, "The surface lies {%} of the gel's thickness from z = 0.",
-         "distance from z = 0 over thickness", 0.01, "the thickness counts from z = 0"}}},
-      {"low-resolution",
-       "The beads resolve little.",
-       "Image more beads, nearer to the surface or with less noise. Do not trust detail finer than resolution_um.",
-       "",
-       {{beads_far, "traction", caution, "The nearest beads lie {} times their distance from the surface.",
-         "distance from the surface over that between beads (medians)", 2,
-         "forces closer together than beads are deep look like one"},
-        {beads_tell_little, "traction", caution,
-         "The beads resolve {} of the 24 unknowns of four adhesions; that takes {at} beads.",
-         "24 over the unknowns resolved", 1, "with fewer a map is mostly smoothing"}}},
-      {"tractions-out-of-balance",
-       "The tractions do not add up to zero.",
-       "Check that area and beads cover the whole cell or colony, and no part of another; look for what else holds it.",
-       "",
-       {{tractions_out_of_balance, "traction", caution, "The tractions add up to {} nN, of {at}.",
-         "chi squared of net force and moment (six numbers)", 22.5,
-         "chance: one cell of a thousand, with the error of the gel's model"},
-        {tractions_off_balance, "sheet", caution,
-         "Net force or torque is {%} of the largest possible; it was taken off.",
-         "net force over all forces, or net torque over its largest", 0.05, "a colony alone has none but noise"},
-        {tractions_outside, "sheet", note, "{%} of the forces act outside of the area and are left out.",
-         "share of all forces", 0, "a sheet with a free edge cannot carry them"}}},
-      {"outliers",
-       "Outlying beads, or the loss, decide the result.",
-       "Set traction.loss = mixture, and compare with biweight and l2; if l2 has no outliers, take l2. More beads near "
-       "the surface decide it.",
-       "",
-       {{beads_stray, "traction", caution, "{%} of the beads lie further from the model than noise has them.",
-         "share of beads, if the loss is l2", 0.005, "five standard errors: one in a hundred thousand"},
-        {loss_decides, "traction", caution, "{at} and l2 differ by {} standard errors of the total force.",
-         "difference over its standard error", 1, "chance: 0.2 (biweight, huber) to 0.4 (l1)"}}},
-      {"lambda-unbounded",
-       "The choice of lambda is not safe.",
-       "Use more beads: with 500 it never happened. Set traction.loss = mixture; check surface, gel, sigma_um, and "
-       "whether one stack grew. Tractions may be smoothed too much; to choose yourself set traction.lambda_by.",
-       "",
-       {{lambda_runs_away, "traction", caution, "Lambda by evidence, which was taken, is {} times that by risk.",
-         "ratio of both", 2, "sound: 0.1 to 1.4; few beads with outliers, or a stack that grew: tens to thousands"}}},
-      // continua
-      {"cases-not-solved",
-       "Some cases have no equilibrium.",
-       "Read the reasons in indent.csv. Lower cell.contraction_kPa, or leave these cases out of indent.sweep.",
-       "",
-       {{cases_not_solved, "indent", caution, "Cases without an equilibrium: {} ({at}).", "cases", 0,
-         "the map has a hole there"}}},
-      {"registration-ambiguous",
-       "Cells fit the reference in several ways.",
-       "If the shape is symmetric, set mean.symmetry. If not, give outlines with more detail, or set mean.register_by "
-       "= images.",
-       "",
-       {{registration_ambiguous, "mean", caution, "Cells that fit the reference in more than one way: {}.", "cells", 0,
-         "the second-best way fits within the best one's error"}}},
-      {"few-cells",
-       "The mean is over few or selected cells.",
-       "Take more cells; registration.csv has the reason for each that is left out.",
-       "",
-       {{cells_left_out, "mean", caution, "Cells that do not fit the reference and are not in the mean: {}.", "cells",
-         0, "a mean over those that fit is over a selection"},
-        {few_cells, "mean", caution, "The mean is over {} cells.", "five over the number of cells", 1,
-         "errors of four cells and fewer are off by 40 %"}}},
-      {"sheet-thick",
-       "The cells are too thick for a sheet.",
-       "Take a sheet for colonies and spread cells only; for a round cell use mbtfm-indent.",
-       "",
-       {{sheet_thick, "sheet", caution, "The cells are {} of their half width thick: a sheet moves less than they do.",
-         "thickness over half width", 0.02, "a disc moves 2 to 4 % more than a sheet at 0.02, 5.5 to 8 % at 0.04"}}},
   };
-  return kinds;
+}
+
+}  // namespace
+
+const std::vector<KindOfFinding>& kinds_of_findings() {
+  static const std::vector<KindOfFinding> all = [] {
+    std::vector<KindOfFinding> kinds = kinds_of_inputs();
+    std::ranges::copy(kinds_of_results(), std::back_inserter(kinds));
+    return kinds;
+  }();
+  return all;
 }
 
 }  // namespace mbtfm
