@@ -35,12 +35,12 @@ inline bool fires(const std::string& id, const std::string& said) {
 }
 
 /// By the symptom whose sentence has these words.
-inline bool fires(const std::string& id, const std::string& words, const std::vector<Finding>& found) {
-  require_kind(id);
-  return std::ranges::any_of(found, [&](const Finding& f) { return f.id == id && f.text.find(words) != words.npos; });
-}
 inline bool fires(const std::string& id, const std::string& words, const std::optional<Finding>& found) {
-  return fires(id, words, found ? std::vector{*found} : std::vector<Finding>());
+  return fires(id, found) && found->text.find(words) != words.npos;
+}
+template <class Found>
+bool fires(const std::string& id, const std::string& words, const std::vector<Found>& found) {
+  return std::ranges::any_of(found, [&](const std::optional<Finding>& f) { return fires(id, words, f); });
 }
 inline bool fires(const std::string& id, const std::string& words, const std::string& said) {
   return fires(id, said) && said.find(words) != said.npos;
