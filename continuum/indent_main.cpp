@@ -39,32 +39,31 @@ struct Parameters {
 
 void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.gel);
-  list.add("radius_um", p.radius_um, Range::thickness_um(),
-           "radius of the gel around the cell (um); its side is free, its base held");
+  list.add("radius_um", p.radius_um, Range::thickness_um(), "radius of the gel around the cell (um); its side is free");
   list.table("cell");
   list.add("volume_um3", p.volume_um3, Range::between(1, 1e7),
            "volume of the cell (um3); unset: " + brief(kVolume_um3) +
                ", with --outline it follows from the outline and height_um");
   list.add("height_um", p.height_um, Range::zero_or_size_um(),
-           "height of the cell, a section of a sphere (um); must be given, here or in the sweep");
+           "height of the cell, a section of a sphere (um); or give it in the sweep");
   list.add("youngs_modulus_kPa", p.youngs_modulus_kPa, Range::modulus_kPa(), "Young's modulus of the cell (kPa)");
   list.add("poisson_ratio", p.poisson_ratio, Range{.low = 0, .high = 0.5, .excludes_high = true},
-           "Poisson's ratio of the cell; the answer is nearly proportional to 1 - 2 nu, so this number sets its size");
+           "Poisson's ratio of the cell; the result is nearly proportional to 1 - 2 nu");
   list.add("contraction_kPa", p.contraction_kPa, Range::between(0, 1e6),
-           "contractile stress of the cell, the same in all directions (kPa)");
+           "isotropic contractile stress of the cell (kPa)");
   list.table("indent");
   list.add("strain", p.strain,
-           "small: linear elasticity; large: the strain of Green and Lagrange with the law of St Venant and Kirchhoff, "
-           "the contraction added to the second stress of Piola and Kirchhoff");
-  list.add("depths_um", p.depths_um, "depths below the surface at which the displacement is read (um)");
+           "small: linear elasticity; large: St Venant-Kirchhoff, with the contraction added to the second "
+           "Piola-Kirchhoff stress");
+  list.add("depths_um", p.depths_um, "depths at which the displacement is read (um)");
   list.add("sweep", p.sweep,
-           "cases to compute: each height with each ratio of the gel's modulus to the cell's, as "
-           "'height_um=5.3..15.8:11 modulus_ratio=0.1,0.5,1,2'; empty: one case");
+           "cases: each height with each ratio of gel to cell modulus, as 'height_um=5.3..15.8:11 "
+           "modulus_ratio=0.1,0.5,1,2'; empty: one");
   list.add("order", p.order, Range::between(3, 8),
            "order of the finite elements; unset: " + std::to_string(Fineness{}.order) + ", with --outline " +
                std::to_string(kRevolvedFineness.order));
   list.add("towards_rim", p.towards_rim, Range::between(2, 12),
-           "number of elements between the rim of the contact and half its radius, each a fifth of the next; unset: " +
+           "elements between the contact's rim and half its radius, each a fifth of the next; unset: " +
                std::to_string(Fineness{}.towards_rim) + ", with --outline " +
                std::to_string(kRevolvedFineness.towards_rim));
 }
@@ -85,9 +84,8 @@ void expect_sense(const Parameters& p, const Setting& setting, const std::vector
   constexpr double kIncompressible = 0.49999;  // 1 - 2 nu = 2e-5: of 16 digits rounding takes ten
   for (const auto& [who, ratio] : {std::pair{"cell", p.poisson_ratio}, std::pair{"gel", p.gel.poisson_ratio}}) {
     if (ratio > kIncompressible)
-      throw UsageError(
-          std::string("[") + who + "] poisson_ratio: expected at most 0.49999, found " + significant(ratio, 9) +
-          ". A cell of 1/2 keeps its volume and does not move at all under the same contraction in all directions");
+      throw UsageError(std::string("[") + who + "] poisson_ratio: expected at most 0.49999, found " +
+                       significant(ratio, 9) + ". A cell of 1/2 keeps its volume and does not move at all");
   }
   constexpr double kMostContraction = 0.4;  // beyond it the law of St Venant and Kirchhoff softens in compression
   const double free = setting.cell.free_contraction();
@@ -103,10 +101,7 @@ void expect_sense(const Parameters& p, const Setting& setting, const std::vector
 
 void notice_large_contraction(stage::StageContext& context, const Setting& setting) {
   if (setting.strain == Strain::large) return;
-  const double free = setting.cell.free_contraction();
-  context.notice(noticed(FindingKind::contraction_beyond_linear, free,
-                         "The cell would shorten by " + brief(100 * free) +
-                             " % if nothing held it: small strains are a rough picture of that."));
+  context.notice(noticed(Symptom::contraction_beyond_linear, setting.cell.free_contraction()));
 }
 
 Figures figures_of(const Setting& setting, const std::vector<Indentation>& solved) {
@@ -169,11 +164,10 @@ void notice_failures(stage::StageContext& context, const std::vector<Indentation
                                                   : "none of " + std::to_string(solved.size()) +
                                                         " cases has an equilibrium; the first: " + *first.failure});
   }
-  context.notice(noticed(FindingKind::cases_not_solved, static_cast<double>(failed.size()),
-                         "There is no equilibrium in " + std::to_string(failed.size()) + " of " +
-                             counted(std::ssize(solved), "cases") + ". The first has height " +
-                             brief(first.of.height_um) + " um and modulus ratio " + brief(first.of.modulus_ratio) +
-                             ": " + *first.failure + "."));
+  context.notice(noticed(Symptom::cases_not_solved, static_cast<double>(failed.size()),
+                         {.value = std::to_string(failed.size()) + " of " + std::to_string(solved.size()),
+                          .at = "first: height " + brief(first.of.height_um) + " um, modulus ratio " +
+                                brief(first.of.modulus_ratio) + ": " + *first.failure}));
 }
 
 std::vector<Indentation> solved_cases(const Setting& setting, const std::vector<Case>& cases,
@@ -216,7 +210,7 @@ void expect_outline_sense(const Parameters& p) {
   if (!p.sweep.empty())
     throw UsageError("--sweep: expected none with --outline, which is one case; found '" + p.sweep + "'");
   if (p.strain != Strain::small)
-    throw UsageError("[indent] strain: expected small with --outline: large strains are solved for round cells alone");
+    throw UsageError("[indent] strain: expected small with --outline: large strains are for round cells only");
   if (p.volume_um3)
     throw UsageError("[cell] volume_um3: expected none with --outline, found " + brief(*p.volume_um3) +
                      ". The volume follows from the outline and height_um");
@@ -231,7 +225,7 @@ Polygon read_whole_outline(const Path& file) {
                        "leave out the rows of ring 1 and more");
     if (point.is_cut)
       throw InputError(file.string(), "the outline of a whole contact", "one that the image cuts (is_cut)",
-                       "what lies beyond the image also pulls: take a cell that is in it as a whole");
+                       "take a cell that is in the image as a whole: what lies beyond also pulls");
     if (outline.empty() || !(outline.back() == point.position_um)) outline.push_back(point.position_um);
   }
   while (outline.size() > 1 && outline.front() == outline.back()) outline.pop_back();
@@ -247,16 +241,15 @@ Contact read_contact(const Path& file, const Setting& setting) {
   const std::string crossing = sheet::crossing_of({outline});
   if (!crossing.empty())
     throw InputError(file.string(), "an outline that does not cross itself", crossing + " cross",
-                     "a piece runs from a point to the next; remove the loop, or draw the outline again");
+                     "remove the loop, or draw the outline again");
   try {
     Contact contact(outline);
     expect_on_slab(contact, setting.slab);
     sectors_of(contact, setting.fineness.order);
     return contact;
   } catch (const InvalidData& error) {
-    throw InputError(
-        file.string(), error.expected, error.found,
-        "check that it is in um; take a smoother outline, such as its convex hull, or a larger radius_um of the gel");
+    throw InputError(file.string(), error.expected, error.found,
+                     "check that it is in um; smooth the outline (convex hull), or take a larger radius_um");
   }
 }
 
@@ -304,9 +297,8 @@ int main(int argc, char** argv) {
       {.name = "indent",
        .purpose = "find how deep a contracting cell presses into its gel",
        .files = {{"outline", Kind::optional_input,
-                  "outline of a contact that is no circle, as outline.csv of a cell: one ring, in um"},
+                  "outline of a contact that is no circle (outline.csv, one ring, um)"},
                  {"out", Kind::output_folder,
-                  "indent.csv, indent.json, indent.vtu (of the deepest case); of a sweep optima.csv and the map, "
-                  "indent.svg"}}},
+                  "indent.csv, indent.json, indent.vtu (deepest case); of a sweep optima.csv and indent.svg"}}},
       argc, argv, run);
 }

@@ -58,29 +58,28 @@ struct Parameters {
 
 void declare(stage::ParameterList& list, Parameters& p) {
   list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
-           "side of a pixel of outlines that are masks or selections (um), if a cell's own cell.toml does not give it");
+           "side of a pixel of outlines that are masks or selections (um), if cell.toml has none");
   declare(list, p.gel);
   for (stage::Parameter& of_gel : list.all()) of_gel.is_required = false;  // a cell's own cell.toml has it, too
   list.table("mean");
   list.add("reference", p.reference,
-           "name of the cell whose outline is the reference; empty: the pattern, or the most typical outline");
-  list.add("register_by", p.register_by, "what cells are aligned by: their outlines, or images of them");
+           "cell whose outline is the reference; empty: the pattern, or the most typical outline");
+  list.add("register_by", p.register_by, "align cells by outlines, or by images");
   list.add("image", p.image,
-           "image in each cell's folder, with register_by = images: its name, or a key of [images] such as actin");
+           "with register_by = images: name of the image in each folder, or a key of [images] such as actin");
   list.add("symmetry", p.symmetry,
-           "motions that leave the shape as it is: C1 none, C4 turns by a quarter, C4v with mirrors, Cinfv a circle; "
-           "the mean is taken over them, too");
-  list.add("mirror", p.mirror, "whether a cell may be mirrored; auto: if the reference is not its own mirror image");
+           "symmetry of the shape, over which the mean is taken, too: C1 none, C4 quarter turns, C4v with mirrors, "
+           "Cinfv a circle");
+  list.add("mirror", p.mirror, "whether cells may be mirrored; auto: if the reference is not its own mirror image");
   list.add("largest_misfit", p.largest_misfit, Range::between(1e-3, 1),
-           "largest distance of an outline from the reference (root mean square), over the reference's radius");
-  list.add("others", p.others, "what is done with cells of another shape: refused, an error; or left out");
+           "largest distance of an outline from the reference (rms), over its radius");
+  list.add("others", p.others, "cells of another shape: refused (an error), or left out");
   list.add("gel_model", p.gel_model, "layer on a rigid base, or half-space");
   list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::positive(),
-           "regularisation of the tractions (um/kPa); unset: that of the least expected error");
-  list.add(
-      "spacing_um", p.spacing_um, Range::mesh_um(),
-      "distance of the nodes at which the mean is given (um); unset: half the mean distance of the first cell's beads");
-  list.add("seed", p.seed, "random seed of the resampling of cells and of the model's errors of registration");
+           "regularisation of the tractions (um/kPa); unset: by least expected error");
+  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
+           "spacing of the mean's nodes (um); unset: half the first cell's distance of beads");
+  list.add("seed", p.seed, "random seed of the resampling");
 }
 
 /// The first of some names that a folder has; empty: none.
@@ -187,8 +186,8 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Parameters& p) 
   }
   if (cells.size() < 2)
     throw InputError(top.string(),
-                     "two cells or more, each a folder with outline.csv (or 1_segment/outline.csv, or a mask or "
-                     "selection as of mbtfm run) and displacement.csv (or 2_track/displacement.csv)",
+                     "two cells or more, each with an outline (outline.csv, 1_segment/outline.csv, a mask or "
+                     "selection) and displacement.csv (or 2_track/displacement.csv)",
                      std::to_string(cells.size()));
   context.input("cells", read);
   if (have_gels) context.assumed.clear();
@@ -242,15 +241,11 @@ std::vector<CellRow> rows_of(stage::StageContext& context, const Parameters& p, 
   if (n_kept < 2)
     throw InputError(context.inputs_.at("cells").string(), "two cells of the reference's shape",
                      std::to_string(n_kept));
-  context.notice(noticed(
-      FindingKind::cells_left_out, n_left_out,
-      std::to_string(n_left_out) + " of " + counted(std::ssize(rows), "cells") +
-          (n_left_out == 1 ? " is not in the mean: its outline does" : " are not in the mean: their outlines do") +
-          " not fit the reference."));
-  context.notice(noticed(FindingKind::registration_ambiguous, n_ambiguous,
-                         std::to_string(n_ambiguous) + " of " + counted(n_kept, "cells") +
-                             (n_ambiguous == 1 ? " fits" : " fit") + " the reference in more than one way."));
-  context.notice(noticed(FindingKind::few_cells, 5.0 / n_kept, "The mean is over " + counted(n_kept, "cells") + "."));
+  const std::string of_all = " of " + std::to_string(rows.size()), of_kept = " of " + std::to_string(n_kept);
+  context.notice(noticed(Symptom::cells_left_out, n_left_out, {.value = std::to_string(n_left_out) + of_all}));
+  context.notice(
+      noticed(Symptom::registration_ambiguous, n_ambiguous, {.value = std::to_string(n_ambiguous) + of_kept}));
+  context.notice(noticed(Symptom::few_cells, 5.0 / n_kept, {.value = std::to_string(n_kept)}));
   return rows;
 }
 
@@ -387,8 +382,8 @@ void write_page(stage::StageContext& context, const std::string& picture, const 
       .picture_svg = picture,
       .picture_title = "Mean traction",
       .picture_explained =
-          "A ratio of tips to edge is mostly resolution: set the model through the same blur (--model) beside it, "
-          "never the model as it is.",
+          "A ratio of tips to edge is mostly resolution: compare the blurred model (--model), never the model as it "
+          "is.",
       .tables = {{"Registration", "How each cell lies on the reference, and how well its outline fits there.",
                   "registration.csv", registration_csv, "cell, kept, angle_deg, mirrored, misfit_um, ambiguous"}},
       .figures = report.figures};
@@ -471,19 +466,16 @@ int main(int argc, char** argv) {
   using namespace mbtfm::mean;
   return mbtfm::stage::run_stage<Parameters>(
       {.name = "mean",
-       .purpose = "average displacements and tractions over cells of one shape",
-       .files =
-           {{"cells", Kind::input,
-             "folder of cell folders, each with an outline (outline.csv, or a mask or selection as of mbtfm run) "
-             "and displacement.csv",
-             true},
-            {"pattern", Kind::optional_input,
-             "outline of the reference shape: outline.csv, a mask or an ImageJ selection"},
-            {"model", Kind::optional_input,
-             "traction.csv of a model on a lattice in the frame of the reference: it is blurred as the cells are"},
-            {"out", Kind::output_folder,
-             "mean.csv, mean.vtp, mean.json, mean.svg, mean.html, registration.csv, blur.csv, reference.csv; unset: "
-             "mean/ in the folder of the cells",
-             false, "", "mean"}}},
+       .purpose = "mean displacements and tractions over cells of one shape",
+       .files = {{"cells", Kind::input,
+                  "folder of cells, each with an outline (outline.csv, mask or selection) and displacement.csv", true},
+                 {"pattern", Kind::optional_input,
+                  "outline of the reference: outline.csv, a mask or an ImageJ selection"},
+                 {"model", Kind::optional_input,
+                  "traction.csv of a model on a lattice in the reference's frame, blurred as the cells are"},
+                 {"out", Kind::output_folder,
+                  "folder of mean.csv, mean.vtp, mean.json, mean.svg, mean.html, registration.csv, blur.csv, "
+                  "reference.csv; unset: mean/ beside the cells",
+                  false, "", "mean"}}},
       argc, argv, run);
 }

@@ -72,39 +72,32 @@ void declare(stage::ParameterList& list, Parameters& p) {
   modulus.member = &p.gel_modulus_kPa;
   modulus.is_required = false;
   modulus.default_value = "";
-  modulus.meaning += "; unset: springs carry the sheet, or nothing does";
+  modulus.meaning += "; unset: springs, or nothing, carry the sheet";
   declare(list, p.substrate);
   declare(list, p.substrate.effects,
           {"finite_thickness", "finite_sides", "depth_graded_gel", "common_motion", "beads_under_load",
            "effect_tolerance"});
   parameter_named(list, "beads_under_load").meaning =
-      "with --displacement: use the positions of the beads while the cell pulls, as its images show the outline; auto: "
-      "off";
+      "with --displacement: use the beads' positions under load, as the images show the outline; auto: off";
   declare(list, p.sheet);
   list.add("most_unbalanced", p.most_unbalanced, Range::between(0, 1),
-           "with --traction: largest net force or torque that is corrected, as a share; more is refused");
+           "with --traction: largest share of net force or torque that is corrected; more is an error");
   list.add("traction_sigma_kPa", p.traction_sigma_kPa, Range::between(0, 1e4),
-           "with --traction: standard error of a traction's component, for errors of the tensions (kPa); unset: none");
+           "with --traction: standard error of a traction component (kPa), for the tensions' errors; unset: none");
   list.add("traction_correlation_um", p.traction_correlation_um, Range::size_um(),
-           "with --traction: distance over which neighbours share their error, the resolution of the reconstruction "
-           "(um); unset: each patch has an error of its own");
+           "with --traction: resolution, within which neighbours share their error (um); unset: none do");
   list.add("fit_parts", p.fit_parts,
-           "with --displacement: parts with a contraction of their own: none, all of the sheet alike; edge: the band "
-           "of edge_band_um and what is inside of it; cells: each cell of the label image --cells; field: the "
-           "contraction varies smoothly, as much as the beads call for");
-  list.add(
-      "field_points", p.field_points, Range::between(4, 200),
-      "with fit_parts = field: approximate number of points at which the contraction is given, bilinear between them");
+           "with --displacement: parts with their own contraction: none; edge: a band of edge_band_um and the inside; "
+           "cells: each cell of --cells; field: a smooth variation, as the beads require");
+  list.add("field_points", p.field_points, Range::between(4, 200),
+           "with fit_parts = field: approximate number of nodes of the bilinear contraction");
   list.add("fit_line_tension", p.fit_line_tension, "with --displacement: also fit line_tension_nN");
   list.add("fit_adhesion_stiffness", p.fit_adhesion_stiffness,
-           "with --displacement: also fit adhesion_stiffness_nN_per_um3, of springs between sheet and gel");
+           "with --displacement: also fit adhesion_stiffness_nN_per_um3");
   list.add("outline_error_um", p.outline_error_um, Range::zero_or_size_um(),
-           "with --displacement: standard error of the outline's place, outward, along x and along y (um); it is part "
-           "of the intervals; unset: 0.05 of one that mbtfm-segment finds or of a table, a pixel of a mask, 0.5 of one "
-           "drawn by hand");
-  list.add("loss", p.loss,
-           "with --displacement: loss function of the beads' residuals; all but squares give less weight to beads that "
-           "stray");
+           "with --displacement: standard error of the outline's position (um), part of the intervals; unset: 0.05 if "
+           "segmented or from a table, a pixel of a mask, 0.5 if drawn");
+  list.add("loss", p.loss, "with --displacement: loss function of the residuals; all but squares downweight outliers");
 }
 
 // --- inputs
@@ -128,7 +121,7 @@ std::vector<Polygon> adhesive_area(const Parameters& p, stage::StageContext& con
   };
   if (!any_in(rings.front(), outline) && !any_in(outline, rings.front()))
     throw InputError(file.string(), "an area beneath the sheet, where it adheres", "one beside it",
-                     "do the outline and the adhesive area lie in the same image, in the same unit?");
+                     "are outline and adhesive area of one image and in one unit?");
   return rings;
 }
 
@@ -153,7 +146,7 @@ CellLabels read_labels(const Path& file, const std::optional<double>& pixel_um) 
 /// Contraction by cell of the label image; of what has no label, the sheet's own.
 /// @throws UsageError where a cell is in no row and the sheet has no contraction
 std::function<double(Vec2)> contraction_by_cell(const Parameters& p, stage::StageContext& context) {
-  if (!context.has_input("cells")) throw UsageError("--contractions are by cell: give their label image as --cells");
+  if (!context.has_input("cells")) throw UsageError("--contractions needs the label image --cells");
   const Path file = context.input("contractions");
   const files::CsvTable table(file);
   table.require({"cell", "contraction_nN_per_um"});
@@ -166,7 +159,7 @@ std::function<double(Vec2)> contraction_by_cell(const Parameters& p, stage::Stag
   for (const int label : cells->labels)
     if (label != 0 && !by_cell.contains(label) && !has_rest)
       throw InputError(file.string(), "a row for each cell of the label image", "none of cell " + std::to_string(label),
-                       "add it, or give contraction_nN_per_um of all other cells");
+                       "add it, or give contraction_nN_per_um");
   return [=](Vec2 place) {
     const auto found = by_cell.find(cells->at_um(place));
     return found == by_cell.end() ? rest : found->second;
@@ -249,8 +242,7 @@ void append(Figures& to, const Figures& more) { to.insert(to.end(), more.begin()
 /// What is said of every sheet.
 void notice_mesh(stage::StageContext& context, const Solution& solution) {
   const double error = relative_error(*solution.elements, solution.at_points, solution.at_nodes);
-  context.notice(noticed(FindingKind::sheet_coarse, error,
-                         "Between the triangles the tensions jump by " + brief(error) + " of themselves."));
+  context.notice(noticed(Symptom::sheet_coarse, error));
 }
 
 /// displacement.csv: what the patches' forces make of the gel's surface.
@@ -274,10 +266,7 @@ Effect thickness_effect(const Material& material, const Region& region) {
 }
 
 void notice_shape(stage::StageContext& context, const Material& material, const Region& region) {
-  const double ratio = material.thickness_um / narrow_um(region);
-  context.notice(
-      noticed(FindingKind::sheet_thick, ratio,
-              "The cells are " + brief(ratio) + " of their half width thick: a sheet moves less than they."));
+  context.notice(noticed(Symptom::sheet_thick, material.thickness_um / narrow_um(region)));
 }
 
 /// Of the gel; how large the strains are is the sheet's own question.
@@ -329,7 +318,7 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
     check(*gel);
   }
   const auto [ground, response] = decide_ground(p.sheet.ground, scene.material, scene.adhesion_nN_per_um3, gel);
-  // the edge's tension is known for small strains alone: the finding sheet-strain then says what that costs
+  // the edge's tension is known for small strains alone: the finding large-strain then says what that costs
   const bool has_line = scene.line_tension_nN > 0;
   const auto asked_strain = !p.sheet.strain && has_line ? std::optional(Strain::small) : p.sheet.strain;
   const Effect strain = decide_strain(asked_strain, x, ground);
@@ -380,9 +369,7 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
                       "its pull is " + brief(line) + " of the contraction's"),
        thickness_effect(scene.material, region)});
   notice_shape(context, scene.material, region);
-  if (scene.strain == Strain::small)
-    context.notice(
-        noticed(FindingKind::sheet_strain, x, "A sheet that nothing holds would contract by " + brief(x) + "."));
+  if (scene.strain == Strain::small) context.notice(noticed(Symptom::contraction_beyond_linear, x));
   return result;
 }
 
@@ -403,12 +390,7 @@ Figures tell_cut(stage::StageContext& context, const Region& area, const Polygon
                of_clamped = figures_inside(clamped.solution, outline).mean_nN_per_um,
                of_free = figures_inside(free.solution, outline).mean_nN_per_um;
   const double reach = reach_of_cuts_um(held, clamped.solution, area.cuts, kSame * std::abs(mean));
-  context.notice(noticed(FindingKind::sheet_cut, std::abs(of_clamped - mean) / std::abs(mean),
-                         "The image cuts the sheet over " + brief(cut.length_um) + " µm. What lies beyond pulls with " +
-                             brief(norm(cut.force_nN)) + " nN. The mean tension is " + brief(mean) +
-                             " nN/µm if the sheet is held across the cut, " + brief(of_clamped) +
-                             " if it is clamped there, " + brief(of_free) + " if its edge is free; beyond " +
-                             brief(reach) + " µm from the cut the first two agree within 5 %."));
+  context.notice(noticed(Symptom::sheet_cut, std::abs(of_clamped - mean) / std::abs(mean)));
   return {{"cut_length_um", cut.length_um},
           {"cut_pull_nN", norm(cut.force_nN)},
           {"cut_reach_um", reach},
@@ -418,9 +400,8 @@ Figures tell_cut(stage::StageContext& context, const Region& area, const Polygon
 
 Run run_from_traction(const Parameters& p, stage::StageContext& context, const Region& region) {
   if (p.sheet.ground && *p.sheet.ground != Ground::none)
-    throw UsageError("with --traction the ground is the tractions: leave ground out, or set ground = none");
-  if (p.sheet.strain == Strain::large)
-    throw UsageError("strain = large is for a sheet of given contraction: tensions from tractions have small strains");
+    throw UsageError("leave ground out with --traction, or set ground = none");
+  if (p.sheet.strain == Strain::large) throw UsageError("strain = large needs a given contraction, not --traction");
   context.assumed.clear();  // of a gel: none takes part
   const std::vector<GroundPatch> tractions = files::read_tractions(context.input("traction"));
   context.doubt(doubt_about_tractions(tractions), context.input("traction").string() + ": tractions");
@@ -466,17 +447,10 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
     append(result.figures, tell_cut(context, area, outline, result.solution, *found.cut, with));
   }
   const double mean = found.balance.mean_tension_nN_per_um;
-  context.notice(noticed(FindingKind::sheet_expands, mean < 0 ? 1 : 0,
-                         "The mean tension is " + brief(mean) +
-                             " nN/µm: these tractions push outward. Are they those of the gel on the cells?"));
+  context.notice(noticed(Symptom::sheet_expands, mean < 0 ? 1 : 0, {.at = "mean tension " + brief(mean) + " nN/µm"}));
   const double worst = std::max(found.unbalanced.net_force_share, found.unbalanced.net_torque_share);
-  context.notice(noticed(FindingKind::tractions_off_balance, worst,
-                         "Net force and torque of the tractions are " + brief(found.unbalanced.net_force_share) +
-                             " and " + brief(found.unbalanced.net_torque_share) +
-                             " of what the forces could add up to."));
-  context.notice(noticed(
-      FindingKind::tractions_outside, found.unbalanced.outside_share,
-      brief(100 * found.unbalanced.outside_share) + " % of the forces act outside of the area and are left out."));
+  context.notice(noticed(Symptom::tractions_off_balance, worst));
+  context.notice(noticed(Symptom::tractions_outside, found.unbalanced.outside_share));
   return result;
 }
 
@@ -516,10 +490,10 @@ void notice_expansion(stage::StageContext& context, const std::vector<sheets::Co
   const auto least = std::ranges::min_element(field, {}, &sheets::ContractionAt::high_nN_per_um);
   const auto n_below = std::ranges::count_if(field, [](const auto& at) { return at.high_nN_per_um < 0; });
   const double share = static_cast<double>(n_below) / static_cast<double>(field.size());
-  context.notice(noticed(FindingKind::sheet_expands, share,
-                         "By the beads " + brief(100 * share) + " % of the sheet's nodes push outward; most at (" +
-                             brief(least->position_um.x) + ", " + brief(least->position_um.y) + ") um, with " +
-                             with_error(least->nN_per_um, least->sigma_nN_per_um) + " nN/µm."));
+  context.notice(noticed(Symptom::sheet_expands, share,
+                         {.at = brief(100 * share) + " % of its nodes, most at (" + brief(least->position_um.x) + ", " +
+                                brief(least->position_um.y) + ") um, with " +
+                                with_error(least->nN_per_um, least->sigma_nN_per_um) + " nN/µm"}));
 }
 
 void notice_expansion(stage::StageContext& context, const sheets::SheetFit& fit, int n_parts) {
@@ -529,31 +503,27 @@ void notice_expansion(stage::StageContext& context, const sheets::SheetFit& fit,
   for (const SheetEstimate& e : found) {
     const bool is_below = e.high && *e.high < 0;
     is_sure = is_sure || is_below;
-    text += std::string(text.empty() ? "By the beads " : "; ") + (e.part.empty() ? std::string("the sheet") : e.part) +
-            " would contract with " + brief(e.value) + " nN/µm" +
+    text += std::string(text.empty() ? "" : "; ") + (e.part.empty() ? std::string("contraction") : e.part) + " " +
+            brief(e.value) + " nN/µm" +
             (e.low && e.high ? " (" + brief(*e.low) + " to " + brief(*e.high) + ")" : std::string());
   }
-  if (!text.empty()) text += is_sure ? ": it expands." : ": that is no contraction.";
-  context.notice(noticed(FindingKind::sheet_expands, static_cast<double>(found.size()) / n_parts, text,
-                         is_sure ? Severity::bad : Severity::caution));
+  context.notice(noticed(Symptom::sheet_expands, static_cast<double>(found.size()) / n_parts,
+                         {.at = text, .severity = is_sure ? Severity::bad : Severity::caution}));
 }
 
 /// What the beads do and the sheet does not.
 void notice_unexplained(stage::StageContext& context, const sheets::SheetFit& fit, const sheets::Misfit& misfit) {
   if (!fit.expected_relative_l2) return;
-  constexpr double kLittle = 0.4;  // as the tension fit has it: explains-little
+  constexpr double kLittle = 0.4;  // as the tension fit has it: the symptom explains_little
   const double left = fit.relative_l2 * fit.relative_l2, noise = *fit.expected_relative_l2 * *fit.expected_relative_l2;
   const double share = noise < 1 ? std::max(0.0, left - noise) / (1 - noise) : 0;
   const sheets::Statistic &chi = misfit.chi_squared_per_degree, &alike = misfit.correlation;
-  context.notice(noticed(FindingKind::sheet_unexplained, misfit.excess(),
-                         "Noise alone does not leave this: chi² per degree of freedom is " +
-                             with_error(chi.value, chi.sigma) + " (expected " + brief(chi.expected) +
-                             "), the correlation of near beads' residuals " + with_error(alike.value, alike.sigma) +
-                             " (expected " + brief(alike.expected) + ")." +
-                             (share > kLittle ? " The sheet explains " + brief(100 * (1 - share)) +
-                                                    " % of what the beads do beyond their noise: it is the wrong model."
-                                              : ""),
-                         share > kLittle ? Severity::bad : Severity::caution));
+  context.notice(
+      noticed(Symptom::sheet_unexplained, misfit.excess(),
+              {.at = "chi² per degree of freedom " + with_error(chi.value, chi.sigma) + ", correlation of near beads " +
+                     with_error(alike.value, alike.sigma) +
+                     (share > kLittle ? "; " + brief(100 * (1 - share)) + " % of the displacement is explained" : ""),
+               .severity = share > kLittle ? Severity::bad : Severity::caution}));
 }
 
 void add_figures_of(const sheets::FieldFit& field, Figures& figures) {
@@ -565,7 +535,7 @@ void add_figures_of(const sheets::FieldFit& field, Figures& figures) {
 using sheets::Part;
 
 std::vector<Part> parts_of_cells(const Parameters& p, stage::StageContext& context) {
-  if (!context.has_input("cells")) throw UsageError("fit_parts = cells: give the label image of the cells as --cells");
+  if (!context.has_input("cells")) throw UsageError("fit_parts = cells needs --cells");
   const auto cells = std::make_shared<const CellLabels>(read_labels(context.input("cells"), p.pixel_size_um));
   std::set<int> labels(cells->labels.begin(), cells->labels.end());
   labels.erase(0);
@@ -584,7 +554,7 @@ std::vector<Part> parts_of_cells(const Parameters& p, stage::StageContext& conte
 std::vector<Part> parts_of(const Parameters& p, stage::StageContext& context, const Region& region) {
   if (p.fit_parts == Parts::cells) return parts_of_cells(p, context);
   if (p.fit_parts == Parts::none || p.fit_parts == Parts::field) return {};
-  if (!p.sheet.edge_band_um) throw UsageError("[sheet] edge_band_um is missing: fit_parts = edge asks how wide it is");
+  if (!p.sheet.edge_band_um) throw UsageError("[sheet] edge_band_um is missing: fit_parts = edge needs it");
   const auto is_edge = [rims = region.rims, band = *p.sheet.edge_band_um](Vec2 place) {
     return std::ranges::any_of(
         rims, [&](const Curve& rim) { return distance_to_boundary_um(rim.points_um(), place) <= band; });
@@ -607,20 +577,19 @@ std::vector<Bundle> read_bundles(stage::StageContext& context) {
 void check_fit(const Parameters& p) {
   if (!p.gel_modulus_kPa) throw UsageError("[gel] youngs_modulus_kPa is missing: the beads move with the gel");
   if (p.sheet.ground && *p.sheet.ground != Ground::gel)
-    throw UsageError("with --displacement the ground is the gel: leave ground out, or set ground = gel");
+    throw UsageError("with --displacement leave ground out, or set ground = gel");
   if (p.sheet.strain == Strain::large)
     throw UsageError(
-        "with --displacement strains are small: the beads' motion is linear in the contraction. Leave strain out, and "
-        "run the sheet that was found with strain = large to see what it changes");
+        "with --displacement strains are small. Leave strain out, and run the fitted sheet with strain = large to see "
+        "the difference");
   if (p.sheet.contraction_nN_per_um || p.sheet.contraction_kPa)
-    throw UsageError(
-        "with --displacement the contraction is fitted: leave contraction_nN_per_um and contraction_kPa out");
+    throw UsageError("--displacement fits the contraction: leave contraction_nN_per_um and contraction_kPa out");
   if (p.sheet.line_tension_nN > 0)
-    throw UsageError("with --displacement a line tension is fitted (fit_line_tension): leave line_tension_nN out");
+    throw UsageError("--displacement fits the line tension (fit_line_tension): leave line_tension_nN out");
   if (p.fit_adhesion_stiffness && p.sheet.adhesion_stiffness_nN_per_um3)
-    throw UsageError("fit_adhesion_stiffness asks for what adhesion_stiffness_nN_per_um3 gives: leave one of them out");
+    throw UsageError("give either fit_adhesion_stiffness or adhesion_stiffness_nN_per_um3");
   if (p.fit_adhesion_stiffness && p.fit_parts == Parts::field)
-    throw UsageError("fit_parts = field asks for a known bond: leave fit_adhesion_stiffness out");
+    throw UsageError("fit_parts = field needs a known bond: leave fit_adhesion_stiffness out");
   if (!p.sheet.thickness_um) throw UsageError("[sheet] thickness_um is missing: give it in cell.toml");
 }
 
@@ -673,13 +642,11 @@ std::string told_by(const sheets::SheetFit& fit) {
 void notice_fit(stage::StageContext& context, const sheets::BeadFit& found, const std::string& told) {
   const sheets::SheetFit& fit = found.fit;
   const auto stiffness = std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &SheetEstimate::quantity);
-  context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
+  context.notice(noticed(Symptom::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, {.at = told}));
   notice_unexplained(context, fit, found.misfit);
   if (!found.field) notice_expansion(context, fit, found.n_parts);
-  context.notice(noticed(FindingKind::sheet_at_bound, fit.is_at_bound ? 1 : 0,
-                         "The best stiffness, " + brief(fit.stiffnesses.sheet_nN_per_um) +
-                             " nN/µm, is an end of the range " + brief(found.tried_nN_per_um.low) + " to " +
-                             brief(found.tried_nN_per_um.high) + "."));
+  context.notice(
+      noticed(Symptom::sheet_at_bound, fit.is_at_bound ? 1 : 0, {.value = brief(fit.stiffnesses.sheet_nN_per_um)}));
 }
 
 Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region, double usual_outline_error_um) {
@@ -743,13 +710,11 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   result.effects.push_back(stage::decided(EffectKind::common_motion, switched(question.has_motion), question.has_motion,
                                           "shift, turn, growth and shear of all beads are found with the sheet"));
   result.effects.push_back(found.under_load);
-  result.effects.push_back(
-      stage::decided(EffectKind::large_strain, Switch::off, x, kLargestStrain,
-                     "the beads' motion is linear in the contraction; a free sheet would contract by"));
+  result.effects.push_back(stage::decided(EffectKind::large_strain, Switch::off, x, kLargestStrain,
+                                          "the fit is linear in the contraction; a free sheet would contract by"));
   result.effects.push_back(thickness_effect(scene.material, region));
   notice_shape(context, scene.material, region);
-  context.notice(
-      noticed(FindingKind::sheet_strain, x, "A sheet that nothing holds would contract by " + brief(x) + "."));
+  context.notice(noticed(Symptom::contraction_beyond_linear, x));
   return result;
 }
 
@@ -769,7 +734,7 @@ void write_page(stage::StageContext& context, const Run& done, const Balance& ba
   page.picture_svg = picture_of(done.solution, "x to the right, y down");
   page.picture_title = "Tension and traction";
   page.picture_explained =
-      "Left: mean of the two principal tensions. Right: traction on the ground; arrows are means over squares.";
+      "Left: mean principal tension. Right: traction on the ground; arrows are means over squares.";
   page.tables = done.tables;
   files::write_text(context.output("out", "sheet.html"), report::html_of(page));
 }
@@ -779,22 +744,18 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   const Path outline = context.input("outline");
   const Region region = region_of(read_rings(outline, p.pixel_size_um));
   const bool has_tractions = context.has_input("traction");
-  if (p.sheet.ground == Ground::none && !has_tractions)
-    throw UsageError("ground = none needs the --traction under the sheet: nothing else holds it");
+  if (p.sheet.ground == Ground::none && !has_tractions) throw UsageError("ground = none needs --traction");
   const bool has_beads = context.has_input("displacement");
   if (has_beads && has_tractions) throw UsageError("expected --displacement or --traction, not both");
   if (context.has_input("beads") && (has_beads || has_tractions))
-    throw UsageError("--beads is for a sheet of given contraction: leave out --displacement and --traction");
-  if (context.has_input("area") && !has_tractions)
-    throw UsageError("--area is for --traction: without it the outline is the area");
+    throw UsageError("--beads needs a given contraction: leave --displacement and --traction out");
+  if (context.has_input("area") && !has_tractions) throw UsageError("--area needs --traction");
   if (context.has_input("contractions") && (has_beads || has_tractions))
-    throw UsageError("--contractions are for a sheet of given contraction: leave out --displacement and --traction");
+    throw UsageError("--contractions needs a given contraction: leave --displacement and --traction out");
   if (context.has_input("adhesive") && has_tractions)
-    throw UsageError(
-        "--adhesive is for a sheet on springs or a gel: with --traction the tractions tell where it adheres");
-  if (context.has_input("bundles") && !has_beads) throw UsageError("--bundles are for a fit: give --displacement");
-  if (context.has_input("adhesions") && !has_beads)
-    throw UsageError("--adhesions are compared with a fit: give --displacement");
+    throw UsageError("--adhesive is for springs or a gel: leave it out with --traction");
+  if (context.has_input("bundles") && !has_beads) throw UsageError("--bundles needs --displacement");
+  if (context.has_input("adhesions") && !has_beads) throw UsageError("--adhesions needs --displacement");
   Run done = has_tractions ? run_from_traction(p, context, region)
              : has_beads   ? run_fit(p, context, region, outlines::usual_error_um(outline, p.pixel_size_um))
                            : run_forward(p, context, region);
@@ -814,7 +775,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
                    " µm², total force " + brief(balance.total_force_nN) + " nN; " + done.solution.report.reason;
   if (!done.told.empty()) report.summary += "; " + done.told;
   if (!region.cuts.empty() && !has_tractions)
-    report.summary += "; WARNING: the image cuts the sheet, whose edge there is taken for free";
+    report.summary += "; WARNING: the image cuts the sheet, whose edge there counts as free";
   if (n_outside > 0) report.summary += "; " + counted(n_outside, "point lies", "points lie") + " outside of the sheet";
   report.figures = done.figures;
   report.effects = done.effects;
@@ -829,32 +790,28 @@ int main(int argc, char** argv) {
   using namespace mbtfm::sheet;
   return mbtfm::stage::run_stage<Parameters>(
       {.name = "sheet",
-       .purpose = "contract a sheet of cells on its ground, or find a colony's tensions from tractions",
-       .files =
-           {{"outline", Kind::input,
-             "outline of the sheet: outline.csv, a mask (PNG, TIFF) or an ImageJ selection (.roi, .zip)"},
-            {"traction", Kind::optional_input,
-             "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 if they lie on no lattice): tensions "
-             "follow from it"},
-            {"displacement", Kind::optional_input,
-             "displacement.csv of the beads: contraction and stiffness are fitted to them"},
-            {"adhesions", Kind::optional_input,
-             "with --displacement: adhesions.csv, whose forces are compared with the sheet in sheet_models.csv"},
-            {"bundles", Kind::optional_input,
-             "with --displacement: fibre_points.csv of stress fibres in the sheet, whose tensions are fitted, too"},
-            {"beads", Kind::optional_input,
-             "on a gel: points of its surface, x_um, y_um, at which displacement.csv is written"},
-            {"cells", Kind::optional_input,
-             "label image of the cells: borders.csv has the forces between them, cell_tension.csv what is in each"},
-            {"contractions", Kind::optional_input,
-             "with --cells: contraction of each of them (cell, contraction_nN_per_um); of all others that of [sheet]"},
-            {"adhesive", Kind::optional_input,
-             "where the sheet adheres, as the outline: a pattern; everywhere, if not given"},
-            {"area", Kind::optional_input,
-             "with --traction: where the sheet is free to end, around the outline; the outline, if not given"},
-            {"points", Kind::optional_input, "points at which sheet.csv is written: x_um, y_um; else at the nodes"},
-            {"out", Kind::output_folder,
-             "sheet.csv, traction.csv, sheet.vtu, sheet.svg, sheet.html and sheet.json are written here; of a fit "
-             "sheet_fit.csv, sheet_models.csv and displacement.csv, too"}}},
+       .purpose = "contract a sheet of cells, or find a colony's tensions from tractions or beads",
+       .files = {{"outline", Kind::input,
+                  "outline of the sheet: outline.csv, a mask (PNG, TIFF) or an ImageJ selection (.roi, .zip)"},
+                 {"traction", Kind::optional_input,
+                  "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 unless on a lattice)"},
+                 {"displacement", Kind::optional_input,
+                  "displacement.csv of the beads, to fit contraction and stiffness"},
+                 {"adhesions", Kind::optional_input,
+                  "with --displacement: adhesions.csv, a model to compare in sheet_models.csv"},
+                 {"bundles", Kind::optional_input,
+                  "with --displacement: fibre_points.csv of stress fibres whose tensions are fitted, too"},
+                 {"beads", Kind::optional_input, "on a gel: surface points x_um, y_um for displacement.csv"},
+                 {"cells", Kind::optional_input,
+                  "label image of the cells: writes borders.csv (forces between them) and cell_tension.csv"},
+                 {"contractions", Kind::optional_input,
+                  "with --cells: contraction of each (cell, contraction_nN_per_um); others have that of [sheet]"},
+                 {"adhesive", Kind::optional_input, "where the sheet adheres, as the outline; unset: everywhere"},
+                 {"area", Kind::optional_input,
+                  "with --traction: area around the outline in which the sheet ends; unset: the outline"},
+                 {"points", Kind::optional_input, "points of sheet.csv: x_um, y_um; unset: the nodes"},
+                 {"out", Kind::output_folder,
+                  "folder of sheet.csv, traction.csv, sheet.vtu, sheet.svg, sheet.html, sheet.json; of a fit also "
+                  "sheet_fit.csv, sheet_models.csv, displacement.csv"}}},
       argc, argv, run);
 }

@@ -32,9 +32,8 @@ void expect_plausible(stage::StageContext& context, const TractionInputs& inputs
 /// @throws InputError where nothing is left that moves
 std::size_t leave_out(stage::StageContext& context, DisplacementField& beads) {
   const numerics::Masked masked = numerics::flag_masked(beads);
-  context.notice(noticed(FindingKind::vectors_masked, static_cast<double>(masked.n) / static_cast<double>(beads.size()),
-                         std::to_string(masked.n) + " of " + std::to_string(beads.size()) +
-                             " vectors have the displacement " + listed(masked.values_um) + " um to the last digit."));
+  context.notice(noticed(Symptom::vectors_masked, static_cast<double>(masked.n) / static_cast<double>(beads.size()),
+                         {.at = "they have the displacement " + listed(masked.values_um) + " um to the last digit"}));
   const std::size_t n = std::erase_if(beads, [](const Bead& bead) { return !bead.flag.empty(); });
   if (!beads.empty() && std::ranges::none_of(beads, [](const Bead& bead) { return norm(bead.displacement_um) > 0; }))
     throw InputError(context.input("displacement").string(), "displacements, not all of them zero",

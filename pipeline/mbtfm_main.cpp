@@ -109,7 +109,7 @@ void expect_tensions(const fs::path& cell) {
 runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions options) {
   const double wanted = cost::parse_accuracy(line.accuracy);
   const std::function<void()> write_report = std::exchange(options.finish, nullptr);
-  if (!line.run.only.empty()) throw UsageError("--accuracy: is reached by all stages together: leave out --only");
+  if (!line.run.only.empty()) throw UsageError("--accuracy: needs all stages: leave out --only");
   expect_tensions(line.folder);
   const cost::AccuracyOutcome reached = cost::reach_accuracy(wanted, [&](const std::string& preset) {
     options.preset = preset;
@@ -384,12 +384,11 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
     meaning += (names.size() == 1 ? ": " : ", ") + preset.name + " (" + preset.purpose + ")";
   }
   CLI::Option* preset = command->add_option("--preset", line.run.preset, meaning)->check(CLI::IsMember(names));
-  command->add_option("--accuracy", line.accuracy, "the cheapest preset that finds the tensions to this error, as 5%")
+  command->add_option("--accuracy", line.accuracy, "cheapest preset that finds tensions to this error, as 5%")
       ->excludes(preset);
   command
-      ->add_option(
-          "--set", line.set,
-          "a value in place of that in cell.toml: TABLE.KEY=VALUE, as gel.youngs_modulus_kPa=4; may be repeated")
+      ->add_option("--set", line.set,
+                   "a value in place of cell.toml's: TABLE.KEY=VALUE, as gel.youngs_modulus_kPa=4; may be repeated")
       ->allow_extra_args(false);
   // one value a flag: else the folder that follows would be taken for another
   command
@@ -397,16 +396,15 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
                    "run this stage only: " + runner::stage_names() + "; several with commas: segment,track")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command
-      ->add_option("--redo", line.run.redo, "run this stage even if up to date or changed by hand; several with commas")
+  command->add_option("--redo", line.run.redo, "run this stage even if up to date; several with commas")
       ->delimiter(',')
       ->allow_extra_args(false);
   add_stage_folder(command, line);
   const std::map<std::string, double> time_units = {{"s", 1}, {"min", 60}, {"h", 3600}};
-  command->add_option("--timeout", line.run.limits.seconds, "kill a stage that takes longer: 90, 10min, 2h")
+  command->add_option("--timeout", line.run.limits.seconds, "kill a stage after this time: 90, 10min, 2h")
       ->transform(CLI::AsNumberWithUnit(time_units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"))
       ->check(CLI::Range(1e-3, 1e15));
-  command->add_option("--memory", line.run.limits.memory_bytes, "kill a stage that takes more memory: 500MB, 4GB")
+  command->add_option("--memory", line.run.limits.memory_bytes, "kill a stage above this memory: 500MB, 4GB")
       ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true))
       ->check(CLI::Range(1e-3, 1e15));
 }
@@ -442,22 +440,22 @@ int start(int argc, char** argv) {
   CLI::App app("model-based traction force microscopy: from images to stress-fibre tensions", "mbtfm");
   app.set_version_flag("--version", std::string("mbtfm ") + kVersion);
   app.footer("Exit codes: " + stage::exit_codes());
-  CLI::App* demo_command = add_command(
-      app, line, "demo", "simulate a cell, run every stage on it, show its tensions beside the truth", kDemo);
-  demo_command->add_flag("--force", line.is_forced, "write over a cell that an earlier demo or simulation made");
+  CLI::App* demo_command =
+      add_command(app, line, "demo", "simulate a cell, run every stage, compare its tensions with the truth", kDemo);
+  demo_command->add_flag("--force", line.is_forced, "overwrite a cell of an earlier demo or simulation");
   CLI::App* init_command =
       add_command(app, line, "init", "write a cell.toml from what the images of a folder say", kCell);
   init_command->add_option("--like", line.like,
                            "a cell folder: write a cell.toml like its own for each folder below that has none");
-  CLI::App* check_command = add_command(
-      app, line, "check", "what the images below a folder are good for: a second a cell, before a batch", kFolder);
+  CLI::App* check_command = add_command(app, line, "check", "judge the images below a folder, before a batch", kFolder);
   check_command->add_option("MORE", line.more_cells, "further folders");
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", kCell);
   add_stage_options(run_command, line);
-  run_command->add_flag("--checked", line.run.is_checked, "the stages are known to accept the parameters")->group("");
-  run_command->add_flag("--explain", line.run.explain, "fit again and say what each effect that is off would change");
+  run_command->add_flag("--checked", line.run.is_checked, "the parameters were checked before")->group("");
+  run_command->add_flag("--explain", line.run.explain,
+                        "fit again and report what each effect that is off would change");
   for (CLI::App* command : {run_command, demo_command})
-    command->add_flag("--verbose", line.is_verbose, "print every effect with its number, and why a stage is run");
+    command->add_flag("--verbose", line.is_verbose, "print every effect, and why a stage runs");
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", kFolder);
   for (CLI::App* command : {run_command, batch_command, check_command})
     command->add_flag("--json", line.is_json, "print events as JSON, one object a line (docs/formats/json.md)");
@@ -465,46 +463,46 @@ int start(int argc, char** argv) {
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
   batch_command
       ->add_option("--pattern", line.patterns,
-                   "make cell folders for images that lie together: KEY=PATTERN with KEY of [images] and {cell} for "
-                   "the cell's name, as in adhesion='{cell}_pax.tif'")
+                   "make cell folders for images that lie together: KEY=PATTERN, KEY of [images], {cell} the cell's "
+                   "name, as in adhesion='{cell}_pax.tif'")
       ->allow_extra_args(false);
   batch_command->add_option("--template", line.template_toml, "settings for the cell.toml of these folders");
-  batch_command->add_flag("--list", line.only_list, "run nothing; print every cell's stages and their state (CSV)");
+  batch_command->add_flag("--list", line.only_list, "run nothing; print each cell's stages and states (CSV)");
   batch_command->add_flag("--table", line.only_table, "run nothing; write batch.csv of the cells as they are");
   CLI::App* verify_command =
-      add_command(app, line, "verify", "check all inputs and outputs against the hashes in run.json", kCell);
+      add_command(app, line, "verify", "check inputs and outputs against the hashes in run.json", kCell);
   CLI::App* repeat_command =
-      add_command(app, line, "repeat", "repeat the run of a run.json in a new folder and compare the outputs", kCell);
+      add_command(app, line, "repeat", "repeat the run of a run.json in a new folder and compare", kCell);
   repeat_command->add_option("--out", line.out, "the new cell folder")->required();
   repeat_command->add_option("--inputs", line.inputs, "folder of the inputs; default: beside run.json");
   add_stage_folder(repeat_command, line);
   CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", kFolder);
   stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
   CLI::App* cost_command = add_command(app, line, "cost", "what accuracy costs in time, for this cell", kCell);
-  cost_command->add_option("MORE", line.more_cells, "further cells, over all of which the errors are taken");
+  cost_command->add_option("MORE", line.more_cells, "further cells to average the errors over");
   cost_command->add_option("--out", line.out, "folder of cost.csv, cost.svg and cost.md; default: CELL/cost");
-  cost_command->add_option("--budget", line.budget_min, "no run is begun after this (minutes)")
+  cost_command->add_option("--budget", line.budget_min, "begin no run after this (minutes)")
       ->check(CLI::Range(1e-3, 1e6))
       ->capture_default_str();
-  cost_command->add_option("--repeats", line.repeats, "runs of each choice, at most; the median counts")
+  cost_command->add_option("--repeats", line.repeats, "most runs of each choice; the median counts")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
   cost_command->add_flag("--all", line.is_whole, "the choices that take minutes, too");
   add_stage_folder(cost_command, line);
   // what follows is for the program that they become, --help included
-  CLI::App* plan_command = app.add_subcommand(
-      "plan", "how many beads, which gel, how little noise and how many cells a question takes: mbtfm plan --help");
+  CLI::App* plan_command =
+      app.add_subcommand("plan", "how many beads and cells, which gel and noise a question takes: mbtfm plan --help");
   plan_command->set_help_flag();
   plan_command->allow_extras();
   std::vector<std::string> pictures;
   CLI::App* noise_command = app.add_subcommand(
-      "noise", "noise and density of beads from two pictures of a place where no cell pulls: mbtfm noise A.tif B.tif");
+      "noise", "noise and density of beads from two pictures without a cell: mbtfm noise A.tif B.tif");
   noise_command->set_help_flag();
   noise_command->allow_extras()->add_option("PICTURES", pictures, "the two pictures")->expected(0, 2);
   fs::path manuals;
   app.add_option("--manuals", manuals, "write manual page and completions below this folder")->group("");
   app.require_subcommand(0, 1);
-  add_command(app, line, "compare", "print what was found of a simulated cell beside the truth", kCell);
+  add_command(app, line, "compare", "compare a simulated cell with its truth", kCell);
   try {
     std::vector<std::string> arguments(argv + 1, argv + argc);
     for (const char* word : {"help", "version"}) {  // mbtfm help run

@@ -54,31 +54,21 @@ bool is_pattern_beside(const Segmentation& s) {
   return s.pattern && s.pattern->beneath && *s.pattern->beneath < kHalf;
 }
 
-std::string doubt_about_pattern(const Segmentation& s) {
-  if (!is_pattern_beside(s)) return "";
-  return " Only " + brief(100 * *s.pattern->beneath) +
-         " % of the pattern that the cell touches lies beneath it: does the mask lie on these images?";
-}
-
-/// What was assumed of the adhesions, in words; empty where they were seen.
-std::string assumption_of(const Segmentation& s, bool is_by_itself) {
-  const auto n = std::ranges::count(s.cell.adhesions, AdhesionOrigin::candidate, &Adhesion::origin);
-  const std::string why = is_by_itself ? "No adhesion image: forces" : "Forces";
-  const std::string placed = why + " are placed on " + std::to_string(n) + " candidates for adhesions, ";
+/// Where forces act if no adhesions were seen; empty: they were.
+std::string places_of_candidates(const Segmentation& s) {
   switch (s.source) {
     case AdhesionSource::image:
     case AdhesionSource::none:
       return "";
     case AdhesionSource::pattern:
-      return placed + "all over the adhesive pattern under the cell." + doubt_about_pattern(s);
+      return "all over the adhesive pattern under the cell" +
+             (is_pattern_beside(s) ? "; only " + brief(100 * *s.pattern->beneath) +
+                                         " % of the pattern lies beneath it: does the mask lie on these images?"
+                                   : std::string());
     case AdhesionSource::fibre_ends:
-      return placed +
-             "at the ends of the fibres. Which ends are held in truth, and so the types of the fibres, is not known. "
-             "How much this choice matters is not in the error bars.";
+      return "at the fibres' ends, of which nobody knows which are held";
     case AdhesionSource::cell:
-      return placed +
-             "at the ends of the fibres and along the rim of the cell. Which ends are held in truth, and so the types "
-             "of the fibres, is not known.";
+      return "at the fibres' ends and along the cell's rim; nobody knows which are held";
   }
   throw InternalError("unknown source of adhesions");
 }
@@ -91,12 +81,8 @@ Severity severity_of(const Segmentation& s) {
 std::vector<std::optional<Finding>> findings_of(const PatternAtCell& pattern, const std::vector<Adhesion>& adhesions) {
   const auto candidate = std::ranges::find(adhesions, AdhesionOrigin::candidate, &Adhesion::origin);
   const bool has_both = candidate != adhesions.end() && pattern.part_area_um2 > 0;
-  return {noticed(FindingKind::pattern_too_fine, has_both ? candidate->area_um2 / pattern.part_area_um2 : 0,
-                  "The pattern's parts beneath the cell have " + brief(pattern.part_area_um2) +
-                      " um² (median); a candidate for an adhesion has " +
-                      (has_both ? brief(candidate->area_um2) : std::string("none")) + " um²."),
-          noticed(FindingKind::pattern_as_cell, pattern.of_cell,
-                  brief(100 * pattern.of_cell) + " % of the cell's area lies on the pattern.")};
+  return {noticed(Symptom::pattern_too_fine, has_both ? candidate->area_um2 / pattern.part_area_um2 : 0),
+          noticed(Symptom::pattern_as_cell, pattern.of_cell)};
 }
 
 /// Length of bright actin in no fibre: the diagonals of the crests' boxes, as they hardly bend.
@@ -109,14 +95,14 @@ double unexplained_um(const Segmentation& s) {
   return sum;
 }
 
-/// "One adhesion outside the cell was left out."
+/// "3 adhesions and 2 bright things too small for a cell"
 std::string left_out(const Segmentation& s) {
   const auto n_others = static_cast<std::int64_t>(s.left_out_um.size()) - s.n_adhesions_outside;
   std::string text;
   if (s.n_adhesions_outside > 0) text = counted(s.n_adhesions_outside, "adhesions");
   if (n_others > 0)
     text += (text.empty() ? "" : " and ") + counted(n_others, "bright things") + " too small for a cell";
-  return text + " outside the cell " + (s.left_out_um.size() == 1 ? "was" : "were") + " left out.";
+  return text;
 }
 
 StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
@@ -170,49 +156,30 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                    " ventral, " + std::to_string(n_of(FibreType::dorsal)) + " dorsal, " +
                    std::to_string(n_of(FibreType::arc)) + " arcs" +
                    (n_of(FibreType::edge) > 0 ? ", " + std::to_string(n_of(FibreType::edge)) + " edge)" : ")");
-  const double bright_um = unexplained_um(s);
   for (std::optional<Finding> found :
-       {noticed(FindingKind::adhesions_long, cells::aspect_ratio(s.cell.adhesions),
-                "The adhesions are " + brief(cells::aspect_ratio(s.cell.adhesions)) +
-                    " times as long as wide, on average over their area. Adhesions are 2 to 3 times."),
-        noticed(FindingKind::bleed_through, s.bleed_through.value_or(0),
-                "The adhesion image shows the fibres with " + brief(100 * s.bleed_through.value_or(0)) +
-                    " % of the adhesions' contrast."),
-        noticed(FindingKind::bright_actin, bright_um,
-                brief(bright_um) + " um of actin, as bright as the cell's fibres, is in no fibre."),
-        noticed(FindingKind::actin_shift, s.alignment && s.alignment->is_significant() ? 1 : 0,
-                s.alignment ? "Fibres end beside their adhesions: the adhesion image shows them shifted by " +
-                                  sentence_of(*s.alignment) + "." +
-                                  (s.is_aligned ? " They were moved there." : " They were left where they are.")
-                            : std::string(),
-                s.is_aligned ? Severity::note : Severity::caution),
-        noticed(FindingKind::adhesions_off_actin, s.adhesions_off_actin.value_or(0),
-                brief(100 * s.adhesions_off_actin.value_or(0)) +
-                    " % of the adhesions, by area, lie where the actin image shows no cell."),
-        noticed(FindingKind::outline_off_actin, s.outline_off_actin.value_or(0),
-                "In " + brief(100 * s.outline_off_actin.value_or(0)) +
-                    " % of the outline that was given, the actin image shows no cell."),
-        noticed(FindingKind::cells_touch, s.neck ? s.neck->width_um : 0,
-                s.neck ? "The outline is only " + brief(s.neck->width_um) + " um wide at (" + brief(s.neck->at_um.x) +
-                             ", " + brief(s.neck->at_um.y) +
-                             ") um: what lies beyond is taken for another cell, which touches this one."
-                       : std::string()),
-        noticed(FindingKind::adhesions_left_out, static_cast<double>(s.left_out_um.size()), left_out(s)),
-        noticed(FindingKind::adhesions_assumed,
+       {noticed(Symptom::adhesions_long, cells::aspect_ratio(s.cell.adhesions)),
+        noticed(Symptom::bleed_through, s.bleed_through.value_or(0)), noticed(Symptom::bright_actin, unexplained_um(s)),
+        noticed(Symptom::actin_shift, s.alignment && s.alignment->is_significant() ? 1 : 0,
+                {.value = s.alignment ? sentence_of(*s.alignment) : "",
+                .at = s.is_aligned ? "fibres were moved there" : "fibres were left where they are",
+                .severity = s.is_aligned ? Severity::note : Severity::caution}),
+        noticed(Symptom::adhesions_off_actin, s.adhesions_off_actin.value_or(0)),
+        noticed(Symptom::outline_off_actin, s.outline_off_actin.value_or(0)),
+        noticed(Symptom::cells_touch, s.neck ? s.neck->width_um : 0,
+                {.at = s.neck ? "(" + brief(s.neck->at_um.x) + ", " + brief(s.neck->at_um.y) + ")" : ""}),
+        noticed(Symptom::adhesions_left_out, static_cast<double>(s.left_out_um.size()), {.at = left_out(s)}),
+        noticed(Symptom::adhesions_assumed,
                 static_cast<double>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::candidate, &Adhesion::origin)),
-                assumption_of(s, is_assumed_by_itself), severity_of(s)),
-        noticed(
-            FindingKind::fibre_ends_anchored, s.n_anchors,
-            (s.n_anchors == 1 ? "One end of a fibre that must be held reaches no adhesion. It is held by an anchor."
-                              : std::to_string(s.n_anchors) +
-                                    " ends of fibres that must be held reach no adhesion. They are held by anchors."))})
+                {.at = places_of_candidates(s) + (is_assumed_by_itself ? ", as no image shows any" : ""),
+                .severity = severity_of(s)}),
+        noticed(Symptom::fibre_ends_anchored, s.n_anchors)})
     if (found) report.findings.push_back(std::move(*found));
   if (s.pattern) {
     for (std::optional<Finding>& found : findings_of(*s.pattern, s.cell.adhesions))
       if (found) report.findings.push_back(std::move(*found));
   }
   for (const std::string& sentence : s.unused)
-    report.findings.push_back(*noticed(FindingKind::input_not_used, 1, sentence));
+    report.findings.push_back(*noticed(Symptom::input_not_used, 1, {.at = sentence}));
   if (s.is_cut_by_border) report.summary += "; the image's border cuts the cell";
   if (s.n_cells > 1) report.summary += "; one of " + std::to_string(s.n_cells) + " cells in the image";
   return report;
@@ -305,12 +272,11 @@ std::optional<Finding> noticed_unchecked(std::initializer_list<const std::option
   const SizeRatio size = size_ratio(s);
   constexpr double kDoubtful = 2;  // sd: cells of other kinds, one in twenty
   if (!found || std::abs(size.z) < kDoubtful) return found;
-  return noticed(FindingKind::pixel_size_unchecked, 1,
-                 "The given pixel size, " + brief(pixel_size_um) +
-                     " um, is stated by no image. With it the cell, its adhesions and fibres are " +
-                     brief(size.ratio > 1 ? size.ratio : 1 / size.ratio) + " times as " +
-                     (size.ratio > 1 ? "large" : "small") + " as usual.",
-                 Severity::caution);
+  return noticed(Symptom::pixel_size_unchecked, 1,
+                 {.value = brief(pixel_size_um),
+                  .at = "cell, adhesions and fibres are " + brief(size.ratio > 1 ? size.ratio : 1 / size.ratio) +
+                        " times as " + (size.ratio > 1 ? "large" : "small") + " as usual",
+                  .severity = Severity::caution});
 }
 
 StageReport run(const SegmentParameters& given, stage::StageContext& context) {
@@ -358,22 +324,19 @@ int main(int argc, char** argv) {
   using mbtfm::stage::FileArgument;
   return mbtfm::stage::run_stage<mbtfm::cells::SegmentParameters>(
       {.name = "segment",
-       .purpose = "find adhesions, stress fibres and the outline of a cell in its microscope images",
+       .purpose = "find adhesions, stress fibres and the outline of a cell in its images",
        .files = {{"adhesion-image", FileArgument::Kind::optional_input,
-                  "adhesion channel (TIFF, PNG or JPEG); without it forces are placed on candidates: see --adhesions"},
+                  "adhesion channel (TIFF, PNG, JPEG); without it forces act on candidates: see --adhesions"},
                  {"actin-image", FileArgument::Kind::optional_input,
-                  "actin channel (TIFF, PNG or JPEG); without it no fibres, and the outline from the adhesion channel"},
-                 {"outline-roi", FileArgument::Kind::optional_input,
-                  "ImageJ selection used as the cell's outline (.roi)"},
-                 {"adhesion-rois", FileArgument::Kind::optional_input, "ImageJ areas used as adhesions (.roi or .zip)"},
-                 {"fibre-rois", FileArgument::Kind::optional_input, "ImageJ lines used as fibres (.roi or .zip)"},
-                 {"outline-mask", FileArgument::Kind::optional_input,
-                  "mask or label image of the cell, used as its outline (TIFF or PNG)"},
+                  "actin channel (TIFF, PNG, JPEG); without it no fibres"},
+                 {"outline-roi", FileArgument::Kind::optional_input, "ImageJ selection of the cell's outline (.roi)"},
+                 {"adhesion-rois", FileArgument::Kind::optional_input, "ImageJ areas of adhesions (.roi, .zip)"},
+                 {"fibre-rois", FileArgument::Kind::optional_input, "ImageJ lines of fibres (.roi, .zip)"},
+                 {"outline-mask", FileArgument::Kind::optional_input, "mask or label image of the cell (TIFF, PNG)"},
                  {"adhesion-mask", FileArgument::Kind::optional_input,
-                  "mask or label image used as adhesions, or of the adhesive pattern (TIFF or PNG)", false,
-                  "adhesion_mask"},
+                  "mask or label image of adhesions, or of the adhesive pattern (TIFF, PNG)", false, "adhesion_mask"},
                  {"out", FileArgument::Kind::output_folder,
-                  "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
+                  "folder of adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
                   "images.jpg, thumbnail.jpg, images.csv, RoiSet.zip"}}},
       argc, argv, mbtfm::cells::run);
 }

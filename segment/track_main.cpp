@@ -79,10 +79,9 @@ StageReport report_of(const DisplacementField& field) {
   const double still =
       1 - static_cast<double>(figures.n_surely_moving) / static_cast<double>(std::max<std::int64_t>(1, figures.n_good));
   for (std::optional<Finding> found :
-       {noticed(FindingKind::nothing_moves, still,
-                "Nothing moves: " + std::to_string(figures.n_surely_moving) + " of " + std::to_string(figures.n_good) +
-                    " beads by more than six standard errors."),
-        noticed(FindingKind::moves_outward, outwardness(field), "The gel is pushed outward everywhere.")})
+       {noticed(Symptom::nothing_moves, still,
+                {.value = std::to_string(figures.n_surely_moving) + " of " + std::to_string(figures.n_good)}),
+        noticed(Symptom::moves_outward, outwardness(field))})
     if (found) report.findings.push_back(std::move(*found));
   return report;
 }
@@ -113,31 +112,29 @@ std::vector<Finding> findings_of(const Tracking& tracking) {
     if (found) findings.push_back(std::move(*found));
   };
   if (tracking.windows.is_on && tracking.windows.setting == Switch::automatic) {
-    add(noticed(FindingKind::tracked_by_correlation, 1,
-                "Windows of " + brief(tracking.window_um) + " um were followed: " + tracking.windows.why + "."));
+    add(noticed(Symptom::tracked_by_correlation, 1,
+                {.value = brief(tracking.window_um), .at = "as " + tracking.windows.why}));
   }
   if (tracking.n_windows > 0) {
-    add(noticed(FindingKind::tracked_by_correlation, 1,
-                "In " + brief(100 * tracking.share_of_gaps) + " % of the image single beads cannot be followed. " +
-                    std::to_string(tracking.n_windows) + " windows of " + brief(tracking.window_um) +
-                    " um were followed there."));
+    add(noticed(Symptom::tracked_by_correlation, 1,
+                {.value = brief(tracking.window_um),
+                 .at = "where single beads cannot be: " + brief(100 * tracking.share_of_gaps) + " % of the image"}));
   }
   const BeadSizes& sizes = tracking.sizes;
   const double ratio = sizes.ratio, larger = std::max(ratio, 1 / ratio);
   constexpr double kCertain = 3;  // standard errors
   if (std::abs(ratio - 1) > kCertain * sizes.sigma) {
-    add(noticed(FindingKind::defocused, larger,
-                "The beads of the " + std::string(ratio > 1 ? "stressed" : "relaxed") +
-                    " image are wider by a factor of " + with_error(larger, sizes.sigma * larger / ratio) + "."));
+    add(noticed(Symptom::defocused, larger,
+                {.value = with_error(larger, sizes.sigma * larger / ratio), .at = ratio > 1 ? "stressed" : "relaxed"}));
   }
   if (sizes.elongation - 1 > kCertain * sizes.elongation_sigma) {
     const double angle_deg = 180 / std::numbers::pi * sizes.angle_rad;
-    add(noticed(FindingKind::beads_not_round, sizes.elongation,
-                "The images of the beads are " + with_error(sizes.elongation, sizes.elongation_sigma) +
-                    " times as long as wide, along " + brief(std::round(angle_deg < 0 ? angle_deg + 180 : angle_deg)) +
-                    " degrees (0: along the rows, 90: along the columns)" +
-                    (sizes.is_of_pixels ? ", the same in both. Pixels that are not square make them so." : "."),
-                sizes.is_of_pixels ? Severity::caution : Severity::note));
+    add(noticed(
+        Symptom::beads_not_round, sizes.elongation,
+        {.value = with_error(sizes.elongation, sizes.elongation_sigma),
+         .at = brief(std::round(angle_deg < 0 ? angle_deg + 180 : angle_deg)) + " degrees (0: rows, 90: columns)" +
+               (sizes.is_of_pixels ? ", by pixels that are not square" : ""),
+         .severity = sizes.is_of_pixels ? Severity::caution : Severity::note}));
   }
   return findings;
 }
@@ -171,18 +168,11 @@ StageReport report_of(const TrackedFrame& frame, CellWith cell_with) {
                       (cell_with == CellWith::relaxed ? "relaxed" : "stressed") + " image";
   }
   for (Finding& finding : findings_of(tracking)) report.findings.push_back(std::move(finding));
-  const double diameter_um = diameter_in_focus_um(tracking.bead_sigma_um, pixel_size_um);
-  if (auto found =
-          noticed(FindingKind::beads_wide, diameter_um,
-                  "The beads are " + brief(tracking.bead_sigma_um) + " um wide (standard deviation), as those of " +
-                      brief(diameter_um) + " um are in focus. Smaller ones are out of focus in both images."))
+  if (auto found = noticed(Symptom::beads_wide, diameter_in_focus_um(tracking.bead_sigma_um, pixel_size_um)))
     report.findings.push_back(std::move(*found));
   if (tracking.period_um > 0) {
     const double farthest_um = std::max(norm(shift_um), figures_of(tracking.field).largest_um);
-    auto found = noticed(FindingKind::pattern_repeats, farthest_um / tracking.period_um,
-                         "The beads form a pattern that repeats itself every " + brief(tracking.period_um) +
-                             " um, and it moved by " + brief(farthest_um) +
-                             " um: dots may have been taken for their neighbours.");
+    auto found = noticed(Symptom::pattern_repeats, farthest_um / tracking.period_um);
     if (found) report.findings.push_back(std::move(*found));
   }
   const Figures more = {{"cell_with", std::string(name_of(cell_with))},
@@ -259,18 +249,18 @@ auto with_names(const std::string& names, const Body& body) {
   } catch (const ExchangedImages& error) {
     throw InputError(
         names + ": " + error.element, error.expected, error.found,
-        "exchange the files of --stressed and --relaxed; if this cell does push outward, set track.may_push = true");
+        "exchange the files of --stressed and --relaxed; if the cell does push outward, set track.may_push = true");
   } catch (const NotFollowed& error) {
-    throw InputError(names + ": " + error.element, error.expected, error.found,
-                     error.hint.empty()
-                         ? "are these the bead channels of one place, in focus? Check the planes; neither windows "
-                           "(track.method), a longer reach (track.largest_displacement_um), weaker beads "
-                           "(track.detection_snr) nor a turn (effects.drift_affine) made them fit together"
-                         : "tried out, this helps: " + error.hint);
+    throw InputError(
+        names + ": " + error.element, error.expected, error.found,
+        error.hint.empty()
+            ? "do both show the beads of one place, in focus? Check the planes; neither windows (track.method), "
+              "track.largest_displacement_um, track.detection_snr nor effects.drift_affine made them fit"
+            : "tried out, this helps: " + error.hint);
   } catch (const InvalidData& error) {
     throw InputError(names + ": " + error.element, error.expected, error.found,
-                     "are these the bead channels of one place, in focus? Check the planes, detection_snr, and where "
-                     "one may be turned against the other, effects.drift_affine");
+                     "do both show the beads of one place, in focus? Check the planes, detection_snr, and "
+                     "effects.drift_affine if one is turned");
   }
 }
 
@@ -433,11 +423,10 @@ void doubt_pattern(const TrackedFrame& frame, CellWith cell_with, stage::StageCo
   if (cell_with == CellWith::relaxed || shift_um < kMatters_um || !context.has_input("adhesions")) return;
   const std::vector<Adhesion> adhesions = files::read_adhesions(context.input("adhesions"));
   if (std::ranges::find(adhesions, AdhesionOrigin::candidate, &Adhesion::origin) == adhesions.end()) return;
-  context.notice(noticed(FindingKind::assumed_input, 1,
-                         "The stage moved by " + brief(shift_um) +
-                             " um. If the adhesions are those of a pattern whose mask lies on the relaxed beads, set "
-                             "images.cell_with = relaxed.",
-                         Severity::caution));
+  context.notice(noticed(Symptom::assumed_input, 1,
+                         {.at = "The stage moved by " + brief(shift_um) +
+                                " um. If the pattern's mask lies on the relaxed beads, set images.cell_with = relaxed.",
+                          .severity = Severity::caution}));
 }
 
 StageReport track(TrackParameters parameters, int binning, stage::StageContext& context) {
@@ -469,7 +458,7 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
   write_picture(context, frame.picture, relaxed.image, frame.pixel_size_um);
   StageReport report = report_of(frame, parameters.cell_with);
   if (parameters.windows_spacing_um > 0 && tracking.lattice.empty())
-    report.summary += "; no windows.csv: the images show no texture that windows follow";
+    report.summary += "; no windows.csv: the images show no texture to follow";
   return report;
 }
 
@@ -485,7 +474,7 @@ void declare(stage::ParameterList& list, TrackStageParameters& p) {
   declare(list, p.track);
   list.table("track");
   list.add("binning", p.binning, Range::between(1, images::kLargestBinning),
-           "side of the blocks of pixels that are averaged before all else (pixels); 1: the images stay as they are");
+           "side of the blocks of pixels to average first (pixels); 1: none");
   declare(list, p.in_space);
   declare(list, p.surface_plane, "surface", "the stack of beads on the surface");
   declare(list, p.effects, {"drift_affine", "effect_tolerance"});
@@ -534,11 +523,10 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
     std::ranges::move(table.findings, std::back_inserter(report.findings));
     if (motion.unplaced_um) {
       report.findings.push_back(*noticed(
-          FindingKind::assumed_input, 1,
-          "The table holds a drift of " + brief(*motion.unplaced_um) +
-              " um. Its places are read as those of the cell's images; if they are those of the relaxed bead image, "
-              "set track.places = relaxed.",
-          Severity::caution));
+          Symptom::assumed_input, 1,
+          {.at = "The table holds a drift of " + brief(*motion.unplaced_um) +
+                 " um. Its places are read as the cell's; if they are the relaxed image's, set track.places = relaxed.",
+           .severity = Severity::caution}));
     }
     report.summary = std::to_string(field.size()) + " displacements read" + table.how + report.summary;
     if (table.n_left_out > 0) report.summary += "; " + counted(table.n_left_out, "rows") + " without a place left out";
@@ -560,25 +548,23 @@ int main(int argc, char** argv) {
   using Kind = FileArgument::Kind;
   return mbtfm::stage::run_stage<mbtfm::beads::TrackStageParameters>(
       {.name = "track",
-       .purpose = "measure the displacement of the substrate from images of its beads, stressed and relaxed",
+       .purpose = "measure the gel's displacement from images of beads, stressed and relaxed",
        .files =
            {{"stressed", Kind::optional_input,
-             "beads while the cell pulls (TIFF, PNG or JPEG; a stack: in space); a folder of them: a time series",
-             false, "beads_stressed"},
-            {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF, PNG or JPEG)", false,
+             "beads while the cell pulls (TIFF, PNG, JPEG; stacks: in space); a folder: a time series", false,
+             "beads_stressed"},
+            {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF, PNG, JPEG)", false,
              "beads_relaxed"},
             {"surface_beads", Kind::optional_input,
-             "of stacks: beads of another colour on the gel's surface, relaxed; their places are for mbtfm-surface"},
+             "of stacks: beads of another colour on the surface, relaxed; their places are for mbtfm-surface"},
             {"adhesions", Kind::optional_input,
-             "adhesions.csv of the cell: helps to follow single beads where adhesions pull strongly; not used with "
-             "stacks, windows or --displacement"},
-            {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)", false,
+             "adhesions.csv: helps to follow beads near strong adhesions; not for stacks, windows or --displacement"},
+            {"displacement", Kind::optional_input, "instead of images: a table of displacements (CSV)", false,
              "displacement"},
-            {"cell_image", Kind::optional_input,
-             "image of the cell: it must show the same field as the bead images, which its size tells"},
+            {"cell_image", Kind::optional_input, "image of the cell, to check that it shows the beads' field"},
             {"kept", Kind::optional_input,
-             "output folder of an earlier run with the same images and parameters: frames that are there are kept"},
+             "output of an earlier run with the same images and parameters: its frames are kept"},
             {"out", Kind::output_folder,
-             "folder for displacement.csv, displacement.vtp, beads.jpg; of stacks for displacement_3d.csv, .vtp"}}},
+             "folder of displacement.csv, displacement.vtp, beads.jpg; of stacks displacement_3d.csv, .vtp"}}},
       argc, argv, mbtfm::beads::run, mbtfm::beads::look);
 }

@@ -281,10 +281,7 @@ double traction_of(const Load& load) {
 void notice_level(stage::StageContext& context, const Gel& gel) {
   check(gel);
   const auto [low, high] = std::ranges::minmax_element(gel.surface->z_um);
-  context.notice(noticed(FindingKind::surface_off_zero, std::max({0.0, *low, -*high}) / gel.thickness_um,
-                         "The surface lies from z = " + brief(*low) + " to " + brief(*high) +
-                             " um, so that the gel is " + brief(gel.thickness_um - *high) + " to " +
-                             brief(gel.thickness_um - *low) + " um thick."));
+  context.notice(noticed(Symptom::surface_off_zero, std::max({0.0, *low, -*high}) / gel.thickness_um));
 }
 
 StageReport run(const Parameters& given, stage::StageContext& context) {

@@ -60,39 +60,32 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.table("surface");
   list.add("formula", p.formula,
            "surface by formula, instead of a file: " + formulas_listed() + "; values in [ ] are optional");
-  const std::string cut = " of the rectangle; must be given with a formula, else all of the data";
+  const std::string cut = " of the rectangle; unset: all of the data, but not with a formula";
   const Range place = possible_place_um();
   list.add("low_x_um", p.low_x_um, place, "lowest x" + cut);
   list.add("low_y_um", p.low_y_um, place, "lowest y" + cut);
   list.add("high_x_um", p.high_x_um, place, "highest x" + cut);
   list.add("high_y_um", p.high_y_um, place, "highest y" + cut);
-  list.add(
-      "spacing_um", p.spacing_um, Range::mesh_um(),
-      "distance of the heights that are written (um); unset: by the data, a two-hundredth of a formula's rectangle");
+  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
+           "spacing of the heights written (um); unset: by the data, or a two-hundredth of a formula's rectangle");
   list.add("z_points", p.z_points,
-           "where the z of the file points: into-gel or out-of-gel; must be given with a file, since no program can "
-           "tell a surface from its mirror image");
-  list.add("zero_at", p.zero_at,
-           "what becomes z = 0, from where the gel's thickness counts: the zero of the file, or the mean height");
-  list.add("method", p.method,
-           "of beads in the volume: the smooth surface of greatest likelihood, or slices with alpha shapes");
+           "direction of z in the file: into-gel or out-of-gel; required, as no program can tell");
+  list.add("zero_at", p.zero_at, "what becomes z = 0, where the thickness begins: the file's zero, or the mean height");
+  list.add("method", p.method, "beads in the volume: smooth surface of greatest likelihood, or alpha shapes of slices");
   list.add("sigma_z_um", p.sigma_z_um, Range::positive(),
-           "standard error of z of beads and points (um) where the file has no column sigma_z_um; must be given for "
-           "beads; unset for points: found from them");
+           "standard error of z (um) without a column sigma_z_um; required for beads; unset for points: estimated");
   list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
-           "pixel size of a height map or of masks (um); unset: the image's own");
-  list.add("z_unit_um", p.z_unit_um, Range::positive(), "height of one grey value of a height map (um); must be given");
-  list.add("z_step_um", p.z_step_um, Range::mesh_um(), "distance of the slices of masks (um); must be given");
+           "pixel size of a height map or masks (um); unset: the image's own");
+  list.add("z_unit_um", p.z_unit_um, Range::positive(), "height of a grey value (um); required");
+  list.add("z_step_um", p.z_step_um, Range::mesh_um(), "distance of the slices of masks (um); required");
   list.add("length_unit_um", p.length_unit_um, Range::positive(),
-           "unit of a mesh (um): 1000 for millimetres; must be given");
-  list.add("largest_hole_um", p.largest_hole_um, Range::zero_or_size_um(),
-           "largest hole of a height map, masks or a mesh that is filled (um)");
+           "unit of a mesh (um): 1000 for millimetres; required");
+  list.add("largest_hole_um", p.largest_hole_um, Range::zero_or_size_um(), "largest hole that is filled (um)");
   list.add("slice_um", p.slice_um, Range::zero_or_size_um(),
-           "width of the slices of method alpha-shape (um); 0: by the beads' distance");
+           "alpha-shape: width of the slices (um); 0: by the beads' distance");
   list.add("alpha_radius_um", p.alpha_radius_um, Range::zero_or_size_um(),
-           "radius of the alpha shapes' circles (um); 0: the smallest that leaves each slice whole");
-  list.add("slices_along", p.slices_along,
-           "axis along which the slices of method alpha-shape lie one behind the other: that of the crests");
+           "alpha-shape: radius of the circles (um); 0: the smallest that keeps slices whole");
+  list.add("slices_along", p.slices_along, "alpha-shape: axis of the slices, that of the crests");
 }
 
 /// What a source gives.
@@ -140,7 +133,7 @@ HeightMap cut(const HeightMap& map, const Rectangle& to) {
   const auto columns = lines(map.origin_um.x, map.spacing_um.x, map.n_x, to.low.x, to.high.x);
   const auto rows = lines(map.origin_um.y, map.spacing_um.y, map.n_y, to.low.y, to.high.y);
   if (std::min(columns.size(), rows.size()) < 4)
-    throw UsageError("expected a rectangle low_x_um … high_y_um that holds 4 x 4 heights of the file at least");
+    throw UsageError("expected a rectangle low_x_um … high_y_um that holds at least 4 x 4 heights");
   HeightMap kept{.origin_um = map.origin_um + Vec2{columns[0] * map.spacing_um.x, rows[0] * map.spacing_um.y},
                  .spacing_um = map.spacing_um,
                  .n_x = static_cast<int>(columns.size()),
@@ -391,13 +384,10 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
     report.figures.emplace_back("median_sigma_um", sigma);
     report.summary += ", standard error " + brief(sigma) + " um (median)";
   }
-  context.notice(
-      noticed(FindingKind::off_the_surface, made.share_off,
-              std::to_string(made.off_um.size()) + " beads or points lie off the surface and do not count."));
-  context.notice(
-      noticed(FindingKind::surface_level, made.apart_um == 0 ? 0 : made.apart_um / (*high - *low),
-              "The surface found is level to " + brief(*high - *low) + " um: it may be the end of the images."));
-  context.notice(noticed(FindingKind::surface_repaired, made.share_repaired, made.repaired));
+  context.notice(noticed(Symptom::off_the_surface, made.share_off, {.value = std::to_string(made.off_um.size())}));
+  context.notice(noticed(Symptom::surface_level, made.apart_um == 0 ? 0 : made.apart_um / (*high - *low),
+                         {.value = brief(*high - *low)}));
+  context.notice(noticed(Symptom::surface_repaired, made.share_repaired, {.at = made.repaired}));
   return report;
 }
 

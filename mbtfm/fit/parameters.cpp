@@ -14,9 +14,9 @@ void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.fit);
   declare(list, p.segmentation);
   list.add("compare_sheet", p.compare_sheet,
-           "also fit a sheet that contracts evenly, for comparison in models.csv; auto: if the beads do not call for "
-           "fibres, or these bear less than half of the force; never on gels of finite elements");
-  list.add("explain", p.explain, "estimate how far each effect that is off would change the tensions");
+           "also fit an evenly contracting sheet, for models.csv; auto: if the beads do not require fibres, or these "
+           "bear less than half of the force; never on finite elements");
+  list.add("explain", p.explain, "estimate how each effect that is off would change the tensions");
   declare(list, p.effects, effect_keys());
 }
 

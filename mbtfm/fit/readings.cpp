@@ -216,12 +216,8 @@ Reading best_reading(const GelUnderCell& on, const DisplacementField& given, con
   return best.reading;
 }
 
-std::optional<Finding> noticed_reading(FindingKind kind, const Reading& reading) {
-  const auto explained = [](double unexplained) { return brief(100 * std::clamp(1 - unexplained, 0.0, 1.0)); };
-  return noticed(kind, reading.unexplained_as_is / reading.unexplained_share,
-                 "As the displacement was read, the model explains " + explained(reading.unexplained_as_is) +
-                     " % of what the beads do beyond their noise. It explains " + explained(reading.unexplained_share) +
-                     " % " + reading.what + ".");
+std::optional<Finding> noticed_reading(Symptom symptom, const Reading& reading) {
+  return noticed(symptom, reading.unexplained_as_is / reading.unexplained_share, {.at = reading.what});
 }
 
 }  // namespace mbtfm::fit

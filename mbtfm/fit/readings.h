@@ -36,6 +36,6 @@ Reading best_reading(const GelUnderCell& on, const DisplacementField& beads, con
 Reading best_smoothing(const tensions::LinearData& data, const MatrixXd& force_derivatives, double noise_um);
 
 /// @param kind  read_otherwise or field_smoothed
-std::optional<Finding> noticed_reading(FindingKind kind, const Reading& reading);
+std::optional<Finding> noticed_reading(Symptom symptom, const Reading& reading);
 
 }  // namespace mbtfm::fit

@@ -46,16 +46,13 @@ std::vector<Finding> all_findings(const FittedCell& c) {
                    c.checks.missing_adhesions, c.motions.common, c.motions.curved, c.motions.placement, c.ready.beyond,
                    c.ready.decisions.strain,
                    has_far_beads(c.fit.data, c.ready.scene.cell.outline_um, c.parameters.fit.far_distance_um)});
-  for (const auto& [kind, reading] :
-       {std::pair(FindingKind::field_smoothed, c.smoothing), std::pair(FindingKind::read_otherwise, c.reading)}) {
+  for (const auto& [symptom, reading] :
+       {std::pair(Symptom::field_smoothed, c.smoothing), std::pair(Symptom::read_otherwise, c.reading)}) {
     if (!reading) continue;
-    if (auto found = noticed_reading(kind, *reading)) findings.insert(findings.begin(), std::move(*found));
+    if (auto found = noticed_reading(symptom, *reading)) findings.insert(findings.begin(), std::move(*found));
   }
-  const bool has_error = c.parameters.gel.youngs_modulus_sigma_kPa.has_value();
-  if (const auto unknown =
-          noticed(FindingKind::modulus_error_unknown, has_error ? 0 : 1,
-                  "No error of Young's modulus is given. An error of 10 % would change every force by 10 %."))
-    findings.insert(findings.begin(), *unknown);
+  if (!c.parameters.gel.youngs_modulus_sigma_kPa)
+    findings.insert(findings.begin(), *noticed(Symptom::modulus_error_unknown, 1));
   return findings;
 }
 

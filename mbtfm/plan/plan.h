@@ -144,7 +144,7 @@ double share_within(const std::vector<double>& errors_nN, double target_nN);
 std::optional<double> density_of_share(std::vector<double> needed, double share);
 
 constexpr double kOfNoise = 3;          ///< a largest displacement below so many times the noise is hardly seen
-constexpr double kBeyondLinear = 0.05;  ///< as the caution strain-beyond-linear of the fit
+constexpr double kBeyondLinear = 0.05;  ///< as the caution large-strain of the fit
 std::string sentence_of_noise(double youngs_modulus_kPa, double largest_um, double noise_um);
 std::string sentence_of_strain(double youngs_modulus_kPa, double left_out);
 

@@ -135,10 +135,7 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
                                                      r.weighing.n_data, threads);
   r.figures.emplace_back("misfit_of_patches_alone", alone / noise);
   r.figures.emplace_back("tractions_beside_patches", deviate);
-  r.findings.push_back(noticed(FindingKind::patches_do_not_fit, deviate,
-                               "What forces on the patches alone leave, " + brief(alone / noise) +
-                                   " times the squares that the noise has, looks like tractions beside them: " +
-                                   brief(deviate) + " standard deviations off chance."));
+  r.findings.push_back(noticed(Symptom::patches_do_not_fit, deviate));
   return r;
 }
 

@@ -52,44 +52,28 @@ double share_astray(const Problem& problem, const VectorXd& residual) {
 std::optional<Finding> notice_loss(BeadLoss loss, const Balance& by_loss, const Balance& by_squares) {
   const double sigma = std::hypot(by_loss.total_force_sigma_nN, by_squares.total_force_sigma_nN);
   const double apart = std::abs(by_loss.total_force_nN - by_squares.total_force_nN);
-  return noticed(FindingKind::loss_decides, sigma > 0 ? apart / sigma : 0,
-                 "The total force is " + with_error(by_loss.total_force_nN, by_loss.total_force_sigma_nN) + " nN by " +
-                     name_of(loss) + ", and " + with_error(by_squares.total_force_nN, by_squares.total_force_sigma_nN) +
-                     " nN by l2.");
+  return noticed(Symptom::loss_decides, sigma > 0 ? apart / sigma : 0, {.at = name_of(loss)});
 }
 
 void find_doubts(const Problem& problem, const SpatialParameters& parameters, SpatialReconstruction& r) {
   const Observed& observed = problem.observed;
   const int n_off = observed.n_above + observed.n_below_base;
-  r.findings.push_back(noticed(FindingKind::beads_off_the_gel, static_cast<double>(n_off) / (n_off + observed.n_beads),
-                               std::to_string(observed.n_above) + " beads lie above the gel's surface and " +
-                                   std::to_string(observed.n_below_base) + " below its base, of " +
-                                   std::to_string(n_off + observed.n_beads) + "."));
-  const double away_um = distance_to_beads_um(problem);
-  r.findings.push_back(noticed(FindingKind::beads_far, away_um / observed.distance_um,
-                               "The nearest beads lie " + brief(away_um) + " um from the surface, and " +
-                                   brief(observed.distance_um) + " um from each other."));
+  r.findings.push_back(noticed(Symptom::beads_off_the_gel, static_cast<double>(n_off) / (n_off + observed.n_beads)));
+  r.findings.push_back(noticed(Symptom::beads_far, distance_to_beads_um(problem) / observed.distance_um));
   const bool has_few_unknowns = r.method == TractionMethod::patches && parameters.background == 0;  // by choice
   if (r.degrees > 0 && !has_few_unknowns) {
     constexpr double kEnough = 24;  // as the table of findings has it
     // Ten times the noise tells 4.5 times fewer numbers, and noise falls as the root of the number of beads: they grow
     // about as its cube root. Measured (notes/tractions_in_space.md).
     const double ratio = kEnough / r.degrees;
-    r.findings.push_back(noticed(FindingKind::beads_tell_little, ratio,
-                                 "The beads tell " + brief(r.degrees) + " numbers of the tractions; " +
-                                     brief(std::ceil(observed.n_beads * std::pow(ratio, 3))) +
-                                     " beads of the same noise would tell " + brief(kEnough) + "."));
-  }
-  if (r.chi_squared > 0) {
-    r.findings.push_back(noticed(FindingKind::misfit_in_space, r.chi_squared,
-                                 "The tractions leave " + brief(r.chi_squared) +
-                                     " times the squares that the stated errors of the beads explain."));
-  }
-  if (parameters.loss == BeadLoss::l2) {
-    const double share = share_astray(problem, problem.residual(r.traction_kPa, r.weighing.by_row));
     r.findings.push_back(
-        noticed(FindingKind::beads_stray, share,
-                brief(100 * share) + " % of the beads lie further from the model than noise has them."));
+        noticed(Symptom::beads_tell_little, ratio,
+                {.value = brief(r.degrees), .at = brief(std::ceil(observed.n_beads * std::pow(ratio, 3)))}));
+  }
+  if (r.chi_squared > 0) r.findings.push_back(noticed(Symptom::misfit_in_space, r.chi_squared));
+  if (parameters.loss == BeadLoss::l2) {
+    r.findings.push_back(
+        noticed(Symptom::beads_stray, share_astray(problem, problem.residual(r.traction_kPa, r.weighing.by_row))));
   }
 }
 
@@ -155,10 +139,7 @@ SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& i
     r.findings.push_back(notice_loss(parameters.loss, balance_of(problem, r), balance_of(problem, by_squares)));
   }
   const double falls_by = -r.flipped_z_chi_squared.value_or(0);
-  if (auto reversed = noticed(FindingKind::z_reversed, falls_by,
-                              "The beads fit better if all displacements along z have the opposite sign: chi-squared "
-                              "falls by " +
-                                  brief(falls_by) + ".")) {
+  if (auto reversed = noticed(Symptom::z_reversed, falls_by)) {
     r.findings.push_back(std::move(reversed));
     r.remark = "the beads fit better with the opposite sign of uz_um: look at z_points";
   }

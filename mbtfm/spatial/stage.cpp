@@ -88,7 +88,7 @@ Problem problem_of(const StageParameters& p, const SpatialInputs& inputs, const 
       if (context.has_input(input)) names += (names.empty() ? "" : ", ") + context.inputs_.at(input).string();
     }
     throw InputError(names + ": " + error.element, error.expected, error.found,
-                     "do these files belong to one cell, with one origin, in um, and z into the gel?");
+                     "are these files of one cell, with one origin, in um, z into the gel?");
   }
 }
 
@@ -131,21 +131,18 @@ bool has_tangent(const Problem& problem, tractions::TractionMethod method) {
 void declare(stage::ParameterList& list, SpatialParameters& p) {
   list.table("traction");
   list.add("spacing_beads", p.spacing_beads, Range::between(0.2, 5),
-           "beads in space: spacing of the lattice of tractions over the mean distance of the beads, if spacing_um is "
-           "unset; more: fewer tractions, in less time");
+           "beads in space: spacing of tractions over the beads' mean distance, if spacing_um is unset; more: fewer "
+           "tractions, less time");
   list.add("region", p.region,
-           "beads in space: where the cell pulls; auto: in the outline grown by two distances of beads, or everywhere "
-           "if there is no outline");
+           "beads in space: where the cell pulls; auto: the outline grown by two distances of beads, or everywhere");
   list.add("refine", p.refine,
-           "beads in space: faces of tractions are all alike (none), or a quarter as wide in the region as outside "
-           "(region), or begin twice as wide and are split once where the beads resolve more and tractions exceed "
-           "their errors (resolved), or the two fifths with the largest tractions (threshold)");
+           "beads in space: finer faces of tractions: none; in the region (region); where beads resolve more and "
+           "tractions exceed their errors (resolved); the two fifths with the largest tractions (threshold)");
   list.add("background", p.background, Range::between(0, 1),
-           "beads in space: traction expected outside of the region, over the traction within it; 0: none");
-  list.add("loss", p.loss,
-           "beads in space: loss function of a bead's misfit; all but l2 tolerate beads that are wrong");
+           "beads in space: expected traction outside of the region over that inside; 0: none");
+  list.add("loss", p.loss, "beads in space: loss function; all but l2 tolerate outliers");
   list.add("axial_sigma_ratio", p.axial_sigma_ratio, Range::between(0.1, 100),
-           "beads in space: error along z over the error along x and y, if displacement_3d.csv has no sigma_z_um");
+           "beads in space: error along z over that along x and y, without sigma_z_um");
   list.add("with_axial", p.with_axial, "beads in space: also use the displacement along z");
 }
 
@@ -193,10 +190,7 @@ StageReport run_in_space(const StageParameters& p, stage::StageContext& context)
     r.figures.emplace_back("steps_on_strained_gel", std::int64_t{strained.steps});
   } else {
     const double left_out = choice::left_out_in_gel(problem.gel, mean_traction_kPa(problem, r.traction_kPa));
-    context.notice(noticed(FindingKind::strain_beyond_linear, left_out,
-                           "Tractions of " + brief(mean_traction_kPa(problem, r.traction_kPa)) + " kPa on a gel of " +
-                               brief(problem.gel.youngs_modulus_kPa) + " kPa: linear elasticity leaves out " +
-                               brief(100 * left_out) + " % of the displacement."));
+    context.notice(noticed(Symptom::strain_beyond_linear, left_out));
   }
   const auto common = common_motion_beside(problem, r);
   report.effects = {strain, common_motion_effect(p.substrate.effects.common_motion, problem, common)};

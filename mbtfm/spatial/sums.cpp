@@ -213,10 +213,9 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
 
 std::optional<Finding> noticed_imbalance(const Balance& balance) {
   if (!balance.imbalance) return std::nullopt;
-  return noticed(FindingKind::tractions_out_of_balance, *balance.imbalance,
-                 "The tractions add up to " + with_error(norm(balance.force_nN), balance.net_force_sigma_nN) +
-                     " nN, their moments to " + with_error(norm(balance.moment_nN_um), balance.net_moment_sigma_nN_um) +
-                     " nN um; the sum of their sizes is " + brief(balance.total_force_nN) + " nN.");
+  return noticed(Symptom::tractions_out_of_balance, *balance.imbalance,
+                 {.value = with_error(norm(balance.force_nN), balance.net_force_sigma_nN),
+                  .at = brief(balance.total_force_nN) + " nN in all"});
 }
 
 std::vector<double> resolution_um(const Problem& problem, const SpatialReconstruction& r) {

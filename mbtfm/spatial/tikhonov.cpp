@@ -82,10 +82,7 @@ ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& 
       traction.lambda_by == risk && risk_is == RiskIs::unsound ? gcv : traction.lambda_by;
   if (by != risk) return {chosen_lambda(scan, by), by, {}};
   ChosenLambda chosen{scan.by_risk, by, {}};
-  const auto length = [&](double lambda) { return brief(lambda / unit * problem.gel.youngs_modulus_kPa) + " um"; };
-  chosen.finding = noticed(FindingKind::lambda_runs_away, scan.by_evidence / scan.by_risk,
-                           "By risk lambda E is " + length(scan.by_risk) + ", by evidence " + length(scan.by_evidence) +
-                               ". The one by evidence was taken.");
+  chosen.finding = noticed(Symptom::lambda_runs_away, scan.by_evidence / scan.by_risk);
   if (chosen.finding) {
     chosen.lambda = scan.by_evidence;
     chosen.by = evidence;

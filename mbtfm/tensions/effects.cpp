@@ -14,10 +14,9 @@ Effect robust_loss_effect(Switch setting, Loss used_loss) {
   const bool is_robust = used_loss != Loss::squares;
   const std::string why =
       is_robust ? std::string(name_of(used_loss)) +
-                      ": single beads are further off than Gaussian noise explains, and they move a tension by more "
-                      "than a tenth of its standard error or widen the standard errors by more than a tenth"
-                : "no single bead is further off than Gaussian noise explains, or such beads move no tension by a "
-                  "tenth of its standard error and widen none by a tenth";
+                      ": outlying beads move a tension by more than a tenth of its standard error, or widen the "
+                      "standard errors as much"
+                : "no beads are outliers, or they move and widen no tension by a tenth of its standard error";
   return stage::decided(EffectKind::robust_loss, setting, is_robust, why);
 }
 

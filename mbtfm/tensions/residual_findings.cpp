@@ -47,9 +47,9 @@ double left_of(const FitOutcome& o, const std::vector<bool>& beads) {
 }
 
 /// A note where another finding names the cause.
-Severity beneath_named(FindingKind kind, double number_elsewhere) {
-  const KindOfFinding& k = properties_of(kind);
-  return number_elsewhere > k.threshold ? k.severity : Severity::note;
+Severity beneath_named(Symptom symptom, double number_elsewhere) {
+  const KnownSymptom& known = properties_of(symptom);
+  return number_elsewhere > known.threshold ? known.severity : Severity::note;
 }
 
 double stated_noise_um(const LinearData& data) {
@@ -104,26 +104,15 @@ std::optional<Finding> unexplained(const FitOutcome& o) {
   const double ratio = o.summary.expected_relative_l2 > 0 ? std::pow(all / o.summary.expected_relative_l2, 2) : 0;
   const std::vector<Vec2> places = named_places(o);
   const double beside = places.empty() ? ratio : left_of(o, elsewhere(o.data, places));
-  return noticed(FindingKind::unexplained_displacement, ratio,
-                 "No forces at the adhesions explain what the beads do: " + brief(ratio) +
-                     " times the squares of their noise (" + brief(1000 * o.summary.noise_um) +
-                     " nm a component) are left. Something else moves them, or the gel is another.",
-                 beneath_named(FindingKind::unexplained_displacement, beside));
+  return noticed(Symptom::unexplained_displacement, ratio,
+                 {.severity = beneath_named(Symptom::unexplained_displacement, beside)});
 }
 
 std::optional<Finding> noise_disagrees(const FitOutcome& o) {
   const double stated = stated_noise_um(o.data);
   if (!o.data.has_errors || stated <= 0) return {};
-  const double ratio = o.summary.noise_um / stated;
-  std::string text =
-      std::string(o.has_far_beads ? "Far from the cell the beads scatter by " : "The beads scatter by ") +
-      brief(1000 * o.summary.noise_um) + " nm about what the model says; their stated standard error is " +
-      brief(1000 * stated) + " nm.";
-  if (o.motion) {
-    text += " The common motion of all beads, " + brief(1000 * rms_um(o.motion->motion, o.data.position_um)) +
-            " nm, is not part of it: it was taken off.";
-  }
-  return noticed(FindingKind::noise_disagrees, ratio, text);
+  return noticed(Symptom::noise_disagrees, o.summary.noise_um / stated,
+                 {.at = o.has_far_beads ? "Beads far from the cell" : "Beads"});
 }
 
 std::optional<Finding> beads_disagree(const FitOutcome& o) {
@@ -133,11 +122,10 @@ std::optional<Finding> beads_disagree(const FitOutcome& o) {
   };
   const double beside = worst_among(named_places(o)).chi_squared;
   const Region worst = worst_among({});
-  return noticed(FindingKind::beads_disagree_by_region, worst.chi_squared,
-                 "In the square of " + brief(worst.side_um) + " um about (" + brief(worst.centre_um.x) + ", " +
-                     brief(worst.centre_um.y) + ") um the forces leave " + brief(worst.chi_squared) +
-                     " times the squares that the noise of the beads would leave.",
-                 beneath_named(FindingKind::beads_disagree_by_region, beside));
+  return noticed(Symptom::beads_disagree_by_region, worst.chi_squared,
+                 {.at = "the square of " + brief(worst.side_um) + " um about (" + brief(worst.centre_um.x) + ", " +
+                        brief(worst.centre_um.y) + ") um",
+                  .severity = beneath_named(Symptom::beads_disagree_by_region, beside)});
 }
 
 std::optional<Finding> telling_beads_scatter(const FitOutcome& o) {
@@ -146,9 +134,8 @@ std::optional<Finding> telling_beads_scatter(const FitOutcome& o) {
   const Unexplained& left = o.fit.misfit;
   const double ratio = left.telling_variance / std::pow(o.summary.noise_um / stated, 2);
   constexpr double kErrors = 3;  // of the ratio by chance
-  return noticed(FindingKind::telling_beads_scatter, ratio - kErrors * left.telling_error,
-                 "The beads beside adhesions, on which the tensions rest, scatter " + brief(std::sqrt(ratio)) +
-                     " times as much as their noise would. The intervals allow for it.");
+  return noticed(Symptom::telling_beads_scatter, ratio - kErrors * left.telling_error,
+                 {.value = brief(std::sqrt(ratio))});
 }
 
 }  // namespace mbtfm::tensions

@@ -10,32 +10,29 @@ void declare(stage::ParameterList& list, FitParameters& p) {
   list.table("fit");
   list.add("method", p.method, "method that fits the tensions to the beads' displacements");
   list.add("gradients", p.gradients, "how the conjugate gradient methods compute gradients");
-  list.add("robust_kind", p.robust_kind, "loss function of the beads' residuals if the effect robust_loss is on",
+  list.add("robust_kind", p.robust_kind, "loss function of the residuals if the effect robust_loss is on",
            {Loss::huber, Loss::tukey, Loss::l1});
   list.add("substrate", p.substrate,
-           "how the displacements of a trial are computed: from the compliance matrix, which is made once, or solved "
-           "for each trial (per-evaluation)");
+           "displacements of a trial: by the compliance matrix, or solved for each trial (per-evaluation)");
   list.add("region_um", p.region_um, Range::zero_or_size_um(),
-           "beads further than this outside the outline are left out of the fit (um); unset: all beads are used");
+           "beads further outside the outline are left out of the fit (um); unset: none");
   list.add("n_meshes", p.n_meshes, Range::between(1, 1000),
-           "number of networks to fit on; tensions are their mean, and two or more also give the error of the model");
+           "number of networks; tensions are their mean, and two or more give the error of the model");
   list.add("tolerance", p.tolerance, Range::between(1e-15, 1),
            "relative change of the tensions at which the fit stops");
   list.add("max_steps", p.max_steps, Range::between(1, 100000), "most steps of the Gauss-Newton method");
   list.add("max_evaluations", p.max_evaluations, Range::between(1, 10000000),
-           "most equilibria that a conjugate gradient method may solve");
+           "most equilibria of a conjugate gradient method");
   list.add("far_distance_um", p.far_distance_um, Range::zero_or_size_um(),
-           "beads further than this outside the outline give the noise level (um)");
+           "beads further outside the outline give the noise (um)");
   list.add("frame_interval_s", p.frame_interval_s, Range::between(1e-6, 1e7),
            "time between the frames of a series (s)");
-  list.add(
-      "bootstrap", p.bootstrap, Range::between(0, 1000000),
-      "draws of the parametric bootstrap that gives the intervals; 0: the intervals come from the misfit's profile");
+  list.add("bootstrap", p.bootstrap, Range::between(0, 1000000),
+           "draws of the parametric bootstrap for the intervals; 0: intervals by the misfit's profile");
   list.add("surface_lines", p.surface_lines, Range::between(8, 10000),
-           "number of lattice lines of the gel's surface in substrate.vtu, over the longer side of the cell");
+           "lattice lines of the surface in substrate.vtu, over the cell's longer side");
   list.add("cross_validation", p.cross_validation, Range::between(0, 1000000),
-           "number of draws of the tensions by fibre type, and with dorsal and ventral exchanged, whose misfits are "
-           "compared; 0: none");
+           "draws of tensions by fibre type, and with dorsal and ventral exchanged, to compare misfits; 0: none");
 }
 
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads, const Trial& start,

@@ -1,6 +1,6 @@
-/// What the program notices and a user should know. Every finding has a kind, declared in the one table of findings.cpp
-/// with the threshold, its reason and the remedy; docs/findings.md is written from that table. From the records of the
-/// stages the findings reach the terminal, run.json, batch.csv, run.log, the report and the study.
+/// What the program notices and a user should know. Kinds of findings are declared in the one table of
+/// findings_table.cpp, with words, thresholds and remedies; docs/findings.md is written from it. From the records of
+/// the stages findings reach the terminal, run.json, batch.csv, run.log, the report and the study.
 #pragma once
 
 #include <optional>
@@ -19,28 +19,40 @@ enum class Severity {
 
 constexpr auto words(Severity) { return std::array{"note", "caution", "bad"}; }
 
-/// A new kind compiles again only what names kinds: kinds_of_findings.h has the list.
-enum class FindingKind : int;
+/// One number by which a kind of finding is seen. A new one compiles again only what names symptoms:
+/// kinds_of_findings.h has the list.
+enum class Symptom : int;
 
-struct KindOfFinding {
-  FindingKind kind;
-  const char* id;  ///< its identity in files
+struct KnownSymptom {
+  Symptom symptom;
   const char* stage;
   Severity severity;
-  const char* number;  ///< what is asked, with its unit
-  double threshold;    ///< a finding where the number is above it
-  const char* reason;  ///< of the threshold
+  const char* sentence;  ///< `{}`: the value, `{%}`: as a percentage, `{at}`: where, which or how
+  const char* number;    ///< what is asked, with its unit
+  double threshold;      ///< a finding if the number is above it
+  const char* reason;    ///< of the threshold
+};
+
+/// A cause, which may have several symptoms.
+struct KindOfFinding {
+  const char* id;  ///< its identity in files
+  const char* meaning;
   const char* remedy;
+  const char* false_alarms;  ///< "11 of 400" sound cells; empty: not measured
+  std::vector<KnownSymptom> symptoms;
 };
 
 const std::vector<KindOfFinding>& kinds_of_findings();
-const KindOfFinding& properties_of(FindingKind kind);
+const KindOfFinding& kind_of(Symptom symptom);
+const KnownSymptom& properties_of(Symptom symptom);
+/// The identity that took the place of one of older versions; others stay.
+std::string present_id(const std::string& id);
 
 /// As it is written to files and shown, complete in itself.
 struct Finding {
   std::string id;
   Severity severity = Severity::note;
-  std::string text;  ///< what was found, one to three sentences
+  std::string text;  ///< what was found
   std::optional<double> number, threshold;
   std::string number_is;  ///< what the number is, with its unit
   std::string reason, remedy;
@@ -53,10 +65,15 @@ bool spoils_cell(const Finding& finding);
 const Finding* worst_of(const std::vector<Finding>& findings);
 bool has_open(const std::vector<Finding>& findings);
 
-/// A finding where the number is above its kind's threshold, or is not a number.
-std::optional<Finding> noticed(FindingKind kind, double number, const std::string& text);
-/// The same, with another severity than the kind's own: where this case is milder or worse than the kind as a rule.
-std::optional<Finding> noticed(FindingKind kind, double number, const std::string& text, Severity severity);
+/// What a sentence says beside the number.
+struct Shown {
+  std::string value = {};  ///< in place of the number
+  std::string at = {};
+  std::optional<Severity> severity = {};  ///< if this case is milder or worse than the symptom as a rule
+};
+
+/// A finding if the number is above its threshold, or is not a number.
+std::optional<Finding> noticed(Symptom symptom, double number, const Shown& shown = {});
 
 /// "caution (missing-fibre): text Remedy."
 std::string line_of(const Finding& finding);

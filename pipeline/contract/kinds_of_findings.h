@@ -1,24 +1,24 @@
-/// The list of the kinds of findings, for sources that name one.
+/// The symptoms by which findings are seen, for sources that name one.
 #pragma once
 
 #include "pipeline/contract/findings.h"
 
 namespace mbtfm {
 
-enum class FindingKind : int {
-  // any stage
+enum class Symptom : int {
   unusual_value,
   assumed_input,
+  modulus_error_unknown,
   lossy_image,
   saturated,
   pixel_size_unchecked,
   scan_phase,
-  // segment
   adhesions_left_out,
   actin_shift,
+  channel_shift,
   adhesions_long,
-  bright_actin,
   bleed_through,
+  bright_actin,
   adhesions_off_actin,
   outline_off_actin,
   cells_touch,
@@ -27,84 +27,70 @@ enum class FindingKind : int {
   pattern_as_cell,
   fibre_ends_anchored,
   input_not_used,
-  // track
   vectors_masked,
   nothing_moves,
   moves_outward,
+  sheet_expands,
   tracked_by_correlation,
+  field_smoothed,
   defocused,
   beads_wide,
   beads_not_round,
   pattern_repeats,
   beads_lost,
+  light_lost,
   little_at_rest,
   slices_moved,
-  beads_scatter,
-  light_lost,
-  // fit: the displacement
   common_motion,
   curved_motion,
-  channel_shift,
-  explains_little,
-  read_otherwise,
-  field_smoothed,
-  unexplained_displacement,
-  strain_beyond_linear,
-  noise_unknown,
+  beads_scatter,
   noise_disagrees,
+  explains_little,
+  unexplained_displacement,
+  misfit_in_space,
+  sheet_unexplained,
   beads_disagree_by_region,
   telling_beads_scatter,
+  patches_do_not_fit,
+  read_otherwise,
+  z_reversed,
+  strain_beyond_linear,
+  contraction_beyond_linear,
+  noise_unknown,
   adhesions_without_beads,
-  // fit: the cell
   cell_cut,
+  sheet_cut,
   neighbour_pulls,
   missing_fibre,
   missing_adhesion,
   fibre_without_tension,
-  // fit: the answer
   not_identifiable,
   network_not_identifiable,
+  sheet_not_identifiable,
+  sheet_at_bound,
   wide_interval,
   tension_at_zero,
   single_mesh,
+  sheet_coarse,
   forces_out_of_balance,
-  torques_out_of_balance,
-  // surface
   off_the_surface,
+  beads_off_the_gel,
   surface_repaired,
   surface_level,
   surface_off_zero,
-  // traction in space
-  beads_off_the_gel,
   beads_far,
   beads_tell_little,
-  misfit_in_space,
-  patches_do_not_fit,
   tractions_out_of_balance,
-  z_reversed,
+  tractions_off_balance,
+  tractions_outside,
   beads_stray,
   loss_decides,
   lambda_runs_away,
-  // fit: the gel
-  modulus_error_unknown,
-  // indent
-  contraction_beyond_linear,
   cases_not_solved,
-  // mean
   registration_ambiguous,
   cells_left_out,
   few_cells,
-  // sheet
-  sheet_thick,
-  sheet_strain,
-  sheet_coarse,
-  sheet_not_identifiable,
-  sheet_unexplained,
-  sheet_expands,
-  sheet_at_bound,
-  sheet_cut,
-  tractions_off_balance,
-  tractions_outside
+  sheet_thick
 };
 
 }  // namespace mbtfm

@@ -68,7 +68,7 @@ nlohmann::ordered_json json_of(const Finding& f) {
 }
 
 Finding finding_of(const JsonRecord& record) {
-  return {.id = record.at("id").text(),
+  return {.id = present_id(record.at("id").text()),
           .severity = value_of<Severity>(record.at("severity")),
           .text = record.at("text").text(),
           .number = number_in(record, "number"),

@@ -56,7 +56,7 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
     facts.back() += fmt::format(
         " In their joint errors chi-squared of the six numbers is {}; chance makes more than {} in one cell of a "
         "thousand.",
-        readable(*imbalance), readable(properties_of(FindingKind::tractions_out_of_balance).threshold));
+        readable(*imbalance), readable(properties_of(Symptom::tractions_out_of_balance).threshold));
   }
   facts.push_back(
       fmt::format("The cell pulls and presses with {} in total, the sum of the sizes of its tractions over {}; {} nN "

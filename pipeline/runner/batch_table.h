@@ -13,7 +13,7 @@ namespace mbtfm::runner {
 /// @param only  of these stages; empty: of all
 std::string last_summary(const std::filesystem::path& cell, const std::vector<std::string>& only);
 
-/// What became of a cell that was run: "fine", "with cautions (cell-cut)", "NOT USABLE (explains-little)".
+/// What became of a cell that was run: "fine", "with cautions (cell-cut)", "NOT USABLE (misfit)".
 std::string verdict_on(const std::filesystem::path& cell, const std::vector<std::string>& only);
 
 /// What the last lines of a batch say.

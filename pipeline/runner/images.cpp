@@ -24,27 +24,23 @@ struct ImageKey {
 using N = ImageNames;
 constexpr ImageKey kImages[] = {
     {"adhesion", &N::adhesion,
-     "image of the adhesions: a file name or glob in the cell folder; without a file of the default name, forces are "
-     "placed on candidates (segment.adhesions)"},
+     "image of the adhesions: file name or glob; without one, forces act on candidates (segment.adhesions)"},
     {"actin", &N::actin, "image of the actin"},
     {"beads_stressed", &N::beads_stressed, "image of the beads while the cell pulls"},
     {"beads_relaxed", &N::beads_relaxed, "image of the beads after the cell was removed"},
     {"surface_beads", &N::surface_beads,
-     "stack of beads of another colour on the gel's surface, relaxed, if the file is there: the surface is found from "
-     "them"},
-    {"outline_roi", &N::outline_roi, "ImageJ area used as the cell's outline, if the file is there"},
-    {"adhesion_rois", &N::adhesion_rois, "ImageJ areas used as adhesions, if the file is there"},
-    {"fibre_rois", &N::fibre_rois, "ImageJ lines used as fibres, if the file is there"},
-    {"outline_mask", &N::outline_mask,
-     "mask or label image of the cell (TIFF or PNG), used as its outline, if the file is there"},
+     "stack of beads of another colour on the surface, relaxed, if there: the surface is found from them"},
+    {"outline_roi", &N::outline_roi, "ImageJ area of the cell's outline, if there"},
+    {"adhesion_rois", &N::adhesion_rois, "ImageJ areas of adhesions, if there"},
+    {"fibre_rois", &N::fibre_rois, "ImageJ lines of fibres, if there"},
+    {"outline_mask", &N::outline_mask, "mask or label image of the cell (TIFF, PNG), if there"},
     {"adhesion_mask", &N::adhesion_mask,
-     "mask or label image used as adhesions, if the file is there; with segment.adhesions = pattern the adhesive "
-     "pattern; of a sheet, where it adheres"},
+     "mask or label image of adhesions, if there; with segment.adhesions = pattern the adhesive pattern; of a sheet, "
+     "where it adheres"},
     {"cell_labels", &N::cell_labels,
-     "label image of the cells of a colony (TIFF or PNG), if the file is there: the sheet's tensions are then told by "
-     "cell and border"},
+     "label image of a colony's cells (TIFF, PNG), if there: tensions by cell and border"},
     {"displacement", &N::displacement,
-     "displacements from another program (CSV), taken instead of the beads' images; columns and unit: [track]"}};
+     "displacements of another program (CSV) instead of bead images; columns and unit: [track]"}};
 
 }  // namespace
 

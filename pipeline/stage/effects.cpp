@@ -33,18 +33,13 @@ const std::vector<Key>& switches() {
       {"drift_affine", &S::drift_affine,
        "correct turn, growth and shear of the stressed image; auto: if the beads at rest show them"},
       {"common_motion", &S::common_motion,
-       "shift, turn, growth and shear of all beads, found with the tensions; auto: on, if the beads allow it"},
-      {"beads_under_load", &S::beads_under_load,
-       "use the positions of the beads while the cell pulls, as its images show the cell; auto: if the beads fit "
-       "better so"},
+       "fit shift, turn, growth and shear of all beads, too; auto: on, if the beads allow it"},
+      {"beads_under_load", &S::beads_under_load, "use the beads' positions under load; auto: if they fit better"},
       {"channel_shift", &S::channel_shift,
-       "shift and turn of the cell against the beads, found with the tensions; auto: on, if the beads determine it"},
-      {"beyond_cut", &S::beyond_cut,
-       "forces of the part of a cell that lies outside its image, and of other cells; auto: if there are any"},
-      {"cable_elasticity", &S::cable_elasticity,
-       "cables resist being stretched beyond their rest length; auto: if any would be longer"},
-      {"robust_loss", &S::robust_loss,
-       "outlying beads count less; auto: if outliers cost more accuracy than this loss does"},
+       "fit shift and turn of the cell against the beads, too; auto: on, if the beads determine it"},
+      {"beyond_cut", &S::beyond_cut, "forces beyond the image and of other cells; auto: if there are any"},
+      {"cable_elasticity", &S::cable_elasticity, "cables resist stretch; auto: if any would be longer than at rest"},
+      {"robust_loss", &S::robust_loss, "downweight outliers; auto: if they cost more accuracy than this loss does"},
       {"time_coupling", &S::time_coupling, "start from the tensions of the frame before; auto: if there is one"},
   };
   return list;
@@ -68,7 +63,7 @@ void declare(ParameterList& list, EffectSwitches& values, const std::vector<std:
     if (is_named(key.name)) list.add(key.name, values.*key.member, key.meaning);
   if (!is_named(kTolerance)) return;
   list.add(kTolerance, values.effect_tolerance, Range{.low = 0, .high = 1, .excludes_low = true},
-           "an effect that changes the displacement by less than this share is left out if its switch is auto");
+           "with auto, an effect that changes the displacement by less than this share is left out");
 }
 
 Effect decided(EffectKind kind, Switch setting, double number, double threshold, const std::string& found) {

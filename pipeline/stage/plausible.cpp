@@ -60,58 +60,53 @@ std::string range_text(const Range& range) { return describe("", range); }
 const std::vector<PlausibleQuantity>& plausible_quantities() {
   static const std::vector<PlausibleQuantity> table = {
       {"youngs_modulus_kPa", "Young's modulus of the gel", Range::between(0.1, 100), Range::between(0.01, 1000),
-       "Tissues and the gels that stand for them have 0.1 kPa (brain) to 40 kPa (bone before it mineralises): Discher, "
-       "Janmey & Wang, Science 310 (2005) 1139; gels for traction are made up to 100 kPa. Above 1000 kPa the strongest "
-       "adhesions known, 10 kPa over a radius of 1 um, move beads by 20 nm (2.25 t a / E), which images do not show; "
-       "below 0.01 kPa a gel does not keep its shape",
+       "Tissues have 0.1 kPa (brain) to 40 kPa (early bone): Discher, Janmey & Wang, Science 310 (2005) 1139; gels up "
+       "to 100 kPa are in use. Above 1000 kPa the strongest adhesions (10 kPa, radius 1 um) move beads by only 20 nm "
+       "(2.25 t a / E); below 0.01 kPa a gel does not keep its shape",
        "check the modulus and its unit, kPa"},
       {"poisson_ratio", "Poisson's ratio of the gel", Range::between(0.3, 0.5), Range::between(0, 0.5),
-       "Water in a gel has no time to leave it: 0.45 to 0.5 for polyacrylamide and silicone (Takigawa et al., Polym. "
-       "Gels Netw. 4 (1996) 1: 0.457). 0.5 is the limit of an elastic body, and no gel gets thicker where it is pulled",
+       "0.45 to 0.5 for polyacrylamide and silicone (Takigawa et al., Polym. Gels Netw. 4 (1996) 1: 0.457), as water "
+       "has no time to leave. 0.5 is the limit of an elastic body",
        "take 0.49 for polyacrylamide, 0.5 or 0.499 for silicone"},
       {"thickness_um", "thickness of the gel", Range::between(10, 1000), Range::between(1, 1e5),
-       "Gels for traction force microscopy are cast 20 to 100 um thick. Below some 10 um the displacements are set by "
-       "the glass below (Merkel et al., Biophys. J. 93 (2007) 3314); beyond 1000 um no objective with the resolution "
-       "for beads looks through",
-       "measure the thickness by focusing on the glass and on the surface; for a half-space set gel_model or the "
-       "effect finite_thickness"},
+       "Gels are cast 20 to 100 um thick. Below 10 um the glass sets the displacements (Merkel et al., Biophys. J. 93 "
+       "(2007) 3314); no high-resolution objective looks through 1000 um",
+       "measure it by focusing on glass and surface; for a half-space set gel_model or the effect finite_thickness"},
       {kPixelSize, "pixel size", Range::between(0.02, 1.3), Range::between(0.005, 7),
        "Camera pixels of 2 to 16 um behind lenses of 10 to 100 times: 0.02 to 1.3 um; 7 um is a camera without a lens",
-       "check the pixel size and its unit, um: the camera's pixel over the magnification, times the camera's binning"},
+       "check it and its unit, um: the camera's pixel over the magnification, times the binning"},
       {"beads_per_um2", "density of the beads", Range::between(0.02, 10), Range::not_negative(),
-       "Adhesions are some um apart: at less than one bead in 7 x 7 um no force can be told from its neighbours' "
-       "(Sabass et al., Biophys. J. 94 (2008) 207: the resolution is the beads' distance). At more than 10 a um² beads "
-       "are nearer than the 0.3 um that a lens resolves: then neighbours share their errors",
-       "check the pixel size; use more beads, or thin out a field that was interpolated"},
+       "Adhesions are some um apart: with less than one bead in 7 x 7 um forces cannot be separated (Sabass et al., "
+       "Biophys. J. 94 (2008) 207). Above 10 a um² beads are nearer than the 0.3 um that a lens resolves, and share "
+       "errors",
+       "check the pixel size; use more beads, or thin an interpolated field out"},
       {"bead_sigma_um", "width (standard deviation) of the beads in the images", Range::between(0.075, 1),
        Range::between(0.01, 20),
-       "No lens shows a point smaller than 0.21 wavelengths over its aperture: 0.075 um at the 515 nm of yellow-green "
-       "beads and an aperture of 1.45 (Zhang, Zerubia & Olivo-Marin, Appl. Opt. 46 (2007) 1819). 1 um is a bead of 4 "
-       "um across. Below 0.01 and above 20 um no microscope shows single beads",
-       "check the pixel size: were the images binned or reduced after it was measured? Forces go with its square. "
-       "Beads of super-resolved images may be smaller"},
+       "A point looks at least 0.21 wavelengths over the aperture wide: 0.075 um at 515 nm and 1.45 (Zhang, Zerubia & "
+       "Olivo-Marin, Appl. Opt. 46 (2007) 1819). 1 um is a bead of 4 um. Below 0.01 and above 20 um no microscope "
+       "shows single beads",
+       "check the pixel size: were the images binned or reduced later? Super-resolved beads may be smaller"},
       {"adhesion_area_um2", "median area of the adhesions", Range::between(0.1, 10), Range::between(0.01, 100),
-       "Focal adhesions have 0.1 to 10 um² (mean 0.46 um² in U2OS cells: Soine et al., PLoS Comput. Biol. 11 (2015) "
-       "e1004076). A spot of 0.01 um² is a sixth of what a lens resolves; 100 um² is a small cell",
+       "Focal adhesions have 0.1 to 10 um² (mean 0.46 um² in U2OS: Soine et al., PLoS Comput. Biol. 11 (2015) "
+       "e1004076). 0.01 um² is a sixth of what a lens resolves; 100 um² a small cell",
        "check the pixel size, the channel and the thresholds of [segment]"},
       {"cell_area_um2", "area of the cell", Range::between(200, 20000), Range::between(10, 1e6),
-       "Adherent cells spread over 500 to 10 000 um², platelets over 30; 1 mm² is a colony of hundreds of cells",
+       "Adherent cells spread over 500 to 10 000 um², platelets over 30; 1 mm² is a colony",
        "check the pixel size, and whether the outline holds one cell"},
       {"total_force_nN", "total force of the cell", Range::between(1, 5000), Range::between(0, 1e5),
        "U2OS cells exert about 200 nN (3612 adhesions in 21 cells, 1.19 nN each: Soine et al. 2015). 5.5 kPa (Balaban "
-       "et al. 2001) on a tenth of a large cell, 10 000 um², are 5500 nN; 100 000 nN are that on twenty such cells",
-       "check the modulus (kPa) and the pixel size (um) first: the force goes with the product of modulus, "
-       "displacement and length. Of several cells the forces add up"},
+       "et al. 2001) on a tenth of 10 000 um² are 5500 nN; 100 000 nN are twenty such cells",
+       "check the modulus (kPa) and the pixel size (um); forces of several cells add up"},
       {"fibre_tension_nN", "tension of a stress fibre", Range::between(0, 150), Range::between(0, 400),
        "An isolated stress fibre breaks at 380 nN and carried about 10 nN in the cell (Deguchi, Ohashi & Sato, J. "
        "Biomech. 39 (2006) 2603)",
-       "check the modulus (kPa) and the pixel size (um), and whether a fibre is missing beside it"},
+       "check the modulus (kPa), the pixel size (um), and whether a fibre is missing beside it"},
       {"traction_kPa", "traction of the adhesions that bear half of the force", Range::between(0, 15),
        Range::between(0, 100),
        "Adhesions carry 5.5 kPa (Balaban et al., Nat. Cell Biol. 3 (2001) 466), supermature ones 12 kPa (Goffin et "
-       "al., J. Cell Biol. 172 (2006) 259). 100 kPa are 2500 bonds of 40 pN on each um²",
-       "check the modulus (kPa) and the pixel size (um), and the adhesion's ellipse: a force on too small an area is a "
-       "large traction"},
+       "al., J. Cell Biol. 172 (2006) 259). 100 kPa are 2500 bonds of 40 pN a um²",
+       "check the modulus (kPa), the pixel size (um) and the adhesion's ellipse: too small an area makes a large "
+       "traction"},
   };
   return table;
 }
@@ -160,8 +155,8 @@ void require_possible(const Doubt& d, const std::vector<std::string>& allowed, c
 void declare(ParameterList& list, CheckParameters& p) {
   list.table("checks");
   list.add("allow", p.allow,
-           "names of quantities whose implausible values are accepted (docs/plausible.md), with commas between them; "
-           "in cell.toml also an array. Example: \"poisson_ratio\"");
+           "quantities whose implausible values are accepted (docs/plausible.md), with commas between them or as an "
+           "array. Example: \"poisson_ratio\"");
 }
 
 std::vector<std::string> allowed_quantities(const CheckParameters& p) {
@@ -215,10 +210,9 @@ std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um) {
                .limit = of_file_um,
                .source = "The image's own calibration says " + with_unit(kPixelSize, of_file_um) +
                          ". Forces go with the square of the pixel size",
-               .remedy = is_binning
-                             ? "the two differ by a factor of " + brief(whole) +
-                                   ": perhaps the camera's binning, or a reduced copy, was left out in one of them"
-                             : "find out which of the two is right, and leave pixel_size_um out if it is the image's",
+               .remedy = is_binning ? "the two differ by a factor of " + brief(whole) +
+                                          ": was the binning, or a reduced copy, left out in one of them?"
+                                    : "find out which is right, and leave pixel_size_um out if it is the image's",
                .level = ratio > 1 + kRefused ? DoubtLevel::refused : DoubtLevel::caution};
 }
 
@@ -254,7 +248,7 @@ double surest_fibre_tension_nN(const std::vector<Tension>& tensions) {
 std::vector<AssumedInput> assumed_inputs(const ParameterList& list) {
   static const std::vector<AssumedInput> physical = {
       {"thickness_um", "thickness of the gel", "",
-       "On a gel thinner than assumed the forces are larger than found, most of all those far apart."},
+       "On a thinner gel the forces are larger than found, most of all those far apart."},
       {"poisson_ratio", "Poisson's ratio of the gel", "",
        "Between 0.45 and 0.5 the force for a given displacement changes by at most 6 %."}};
   std::vector<AssumedInput> assumed;
@@ -271,7 +265,7 @@ std::vector<AssumedInput> assumed_inputs(const ParameterList& list) {
 
 AssumedInput assumed_noise(double sigma_um) {
   return {"sigma_um", "error of the displacements", with_unit("sigma_um", sigma_um),
-          "It was found from neighbouring beads and taken to be the same for all. Error bars go with it."};
+          "It was estimated from neighbouring beads and is the same for all. Error bars go with it."};
 }
 
 std::string sentence_of(const AssumedInput& input) {

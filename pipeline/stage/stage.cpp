@@ -283,7 +283,7 @@ void commit(const StageContext& context) {
 void add_findings(StageReport& report, const StageContext& context) {
   std::vector<Finding> findings;
   for (const Doubt& doubt : context.doubts) {
-    const Finding kind = *noticed(FindingKind::unusual_value, 1, sentence_of(doubt) + ".");
+    const Finding kind = *noticed(Symptom::unusual_value, 1, {.at = sentence_of(doubt)});
     findings.push_back({.id = kind.id,
                         .severity = kind.severity,
                         .text = kind.text,
@@ -296,7 +296,7 @@ void add_findings(StageReport& report, const StageContext& context) {
   findings.insert(findings.end(), context.findings_.begin(), context.findings_.end());
   report.findings.insert(report.findings.begin(), findings.begin(), findings.end());
   for (const AssumedInput& input : context.assumed)
-    report.findings.push_back(*noticed(FindingKind::assumed_input, 1, sentence_of(input) + ". " + input.effect));
+    report.findings.push_back(*noticed(Symptom::assumed_input, 1, {.at = sentence_of(input) + ". " + input.effect}));
 }
 
 int run(const StageDescription& description, ParameterList& list, const CommandLine& line, StageContext context,

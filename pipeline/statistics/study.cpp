@@ -206,10 +206,12 @@ std::string excluded_by_finding(const StudyCell& cell, const std::vector<std::st
 
 /// @throws UsageError where an id is none
 std::vector<std::string> excluding_findings(const StudyParameters& parameters) {
-  const std::vector<std::string> ids = parts_of(parameters.exclude_findings);
-  for (const std::string& id : ids)
+  std::vector<std::string> ids = parts_of(parameters.exclude_findings);
+  for (std::string& id : ids) {
+    id = present_id(id);
     if (std::ranges::none_of(kinds_of_findings(), [&](const KindOfFinding& kind) { return kind.id == id; }))
       throw UsageError("stats.exclude_findings: there is no finding '" + id + "': docs/findings.md lists them");
+  }
   return ids;
 }
 
@@ -247,7 +249,7 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
            "--table; empty: the column `replicate` or `day` if the table has one");
   list.add("exclude_findings", parameters.exclude_findings,
            "cells with one of these open findings are left out; identities with commas between them. Example: "
-           "\"explains-little, cell-cut\"");
+           "\"misfit, cell-cut\"");
   list.add("primary", parameters.primary,
            "what the study compares first between conditions; tension: of the fibres of primary_type; total-force: of "
            "the cells; contraction, mean-tension: of the sheets; strain-energy: of the cells in space, or of the "

@@ -85,11 +85,10 @@ void move_to_corner(GivenField& given, const GivenTable& table) {
   const double half_um = half_step_um(given.field);
   const Vec2 shift = Vec2{half_um, half_um} - extent.low_um;
   for (Bead& bead : given.field) bead.position_um += shift;
-  given.findings.push_back(*noticed(FindingKind::assumed_input, 1,
-                                    "The places of the table begin at (" + brief(extent.low_um.x) + ", " +
-                                        brief(extent.low_um.y) +
-                                        ") um. They are moved so that they begin at the picture's corner.",
-                                    Severity::caution));
+  given.findings.push_back(*noticed(Symptom::assumed_input, 1,
+                                    {.at = "The table's places begin at (" + brief(extent.low_um.x) + ", " +
+                                           brief(extent.low_um.y) + ") um and are moved to the picture's corner.",
+                                     .severity = Severity::caution}));
 }
 
 /// What one program calls a mask is 1 where it measured, in others where it did not: the smaller part is masked.
@@ -146,10 +145,9 @@ GivenField read_rows(const GivenTable& table, std::optional<double> height_um) {
 void notice_mirrored(const GivenTable& table, std::vector<Finding>& findings) {
   if (table.is_y_up_stated) return;
   findings.push_back(
-      *noticed(FindingKind::assumed_input, 1,
-               "y falls from row to row of the table, so it is read as pointing up. If it points down, set "
-               "track.y_axis = down.",
-               Severity::caution));
+      *noticed(Symptom::assumed_input, 1,
+               {.at = "y falls from row to row and is read as pointing up. If it points down, set track.y_axis = down.",
+                .severity = Severity::caution}));
 }
 
 /// Rows where their program has no displacement. They get none.
@@ -171,12 +169,11 @@ void flag_masked(GivenField& given) {
     }
   }
   if (n_masked == 0) return;
-  const std::string of_all = std::to_string(n_masked) + " of " + std::to_string(field.size()) + " vectors ";
   given.findings.push_back(
-      *noticed(FindingKind::vectors_masked, static_cast<double>(n_masked) / static_cast<double>(field.size()),
-               of_all + (values.empty() ? "are longer than the field is wide."
-                                        : "have the displacement " + listed(values) + " um to the last digit" +
-                                              (n_beyond > 0 ? ", or one longer than the field is wide." : "."))));
+      *noticed(Symptom::vectors_masked, static_cast<double>(n_masked) / static_cast<double>(field.size()),
+               {.at = values.empty() ? "they are longer than the field is wide"
+                                     : "they have the displacement " + listed(values) + " um to the last digit" +
+                                           (n_beyond > 0 ? ", or one longer than the field is wide" : "")}));
 }
 
 /// What a point differs by from the affine motion of its nearest neighbours.

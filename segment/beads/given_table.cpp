@@ -281,10 +281,9 @@ Found header_of(ForeignTable& table, const TrackParameters& parameters) {
       table.above.back().fields.size() > 2) {
     const CsvTable::Row& last = table.above.back();
     if (auto found = found_in(last.fields, parameters, table.name))
-      throw InputError(
-          table.name + ":" + std::to_string(line), std::to_string(last.fields.size()) + " fields, as in the header",
-          std::to_string(n),
-          "a field may have a separator in it, or a decimal comma: save it with semicolons between columns");
+      throw InputError(table.name + ":" + std::to_string(line),
+                       std::to_string(last.fields.size()) + " fields, as in the header", std::to_string(n),
+                       "is a separator or a decimal comma in a field? Save with semicolons between columns");
   }
   // the first four, where there are no others: x, y and the displacement
   TrackParameters by_number = parameters;
@@ -418,8 +417,8 @@ double seconds_of(const std::string& file, const std::string& column, const std:
   if (!is_velocity) return seconds.value_or(1);
   if (seconds) return stated->per_s * *seconds;
   throw InputError(file, "a displacement in the column '" + column + "'", "a velocity",
-                   "set the time (s) between the two images as it was set in that program: track.seconds_between = 1 "
-                   "in cell.toml, or --seconds_between 1");
+                   "set the time (s) between the images as in that program: track.seconds_between = 1 in cell.toml, or "
+                   "--seconds_between 1");
 }
 
 /// The units of places and displacements: of the header, else of the parameter, else of the program.
@@ -482,10 +481,9 @@ void make_vectors_of_spots(ForeignTable& table, const TrackParameters& parameter
   for (const CsvTable::Row& row : table.above)
     if (x < row.fields.size() && !unit) unit = parts_of("_" + row.fields[x]).unit;
   if (!relaxed || !stressed) {
-    throw InputError(
-        table.name, "which frames of the tracks are meant", "no word of it",
-        "track.relaxed_time = 1 and track.stressed_time = 2 in cell.toml, or --relaxed_time 1 --stressed_time 2: "
-        "frames count from 1, TrackMate's FRAME 0 is the first");
+    throw InputError(table.name, "which frames of the tracks are meant", "no word of it",
+                     "track.relaxed_time = 1 and track.stressed_time = 2 in cell.toml, or --relaxed_time 1 "
+                     "--stressed_time 2 (TrackMate's FRAME 0 is 1)");
   }
   const std::string name = table.name;
   std::vector<std::string> numbers;

@@ -85,9 +85,7 @@ double common_pixel_size_um(const Channel& first, const Channel& second, std::op
 }
 
 std::optional<Finding> noticed_loss(const Channel& channel) {
-  return noticed(
-      FindingKind::lossy_image, channel.image.is_lossy ? 1 : 0,
-      channel.name + " is a lossy image (JPEG): its intensities and the positions of its beads are changed.");
+  return noticed(Symptom::lossy_image, channel.image.is_lossy ? 1 : 0, {.at = channel.name});
 }
 
 double share_at_brightest(const Image& image) {
@@ -98,15 +96,13 @@ double share_at_brightest(const Image& image) {
 }
 
 std::optional<Finding> noticed_saturation(const Channel& channel) {
-  const double share = share_at_brightest(channel.image);
-  return noticed(FindingKind::saturated, share,
-                 channel.name + " is saturated: " + brief(100 * share) + " % of its pixels have its largest value.");
+  return noticed(Symptom::saturated, share_at_brightest(channel.image), {.at = channel.name});
 }
 
 std::vector<std::optional<Finding>> noticed_in(const Channel& channel) {
   return {noticed_loss(channel), noticed_saturation(channel),
-          noticed(FindingKind::assumed_input, channel.image.taken.empty() ? 0 : 1,
-                  channel.name + ": " + channel.image.taken + ".")};
+          noticed(Symptom::assumed_input, channel.image.taken.empty() ? 0 : 1,
+                  {.at = channel.name + ": " + channel.image.taken + "."})};
 }
 
 std::optional<Finding> noticed_unchecked(const std::vector<const Channel*>& channels, double pixel_size_um) {
@@ -115,8 +111,8 @@ std::optional<Finding> noticed_unchecked(const std::vector<const Channel*>& chan
     if (channel->image.pixel_size_um) return std::nullopt;
     names += (names.empty() ? "" : ", ") + channel->name;
   }
-  return noticed(FindingKind::pixel_size_unchecked, channels.empty() ? 0 : 1,
-                 names + ": no pixel size is stated. The given " + brief(pixel_size_um) + " um cannot be checked.");
+  return noticed(Symptom::pixel_size_unchecked, channels.empty() ? 0 : 1,
+                 {.value = brief(pixel_size_um), .at = "none is stated by " + names});
 }
 
 std::optional<stage::Doubt> doubt_about_calibration(const Channel& channel, std::optional<double> given_um) {

@@ -142,9 +142,8 @@ std::optional<ScanPhase> scan_phase(const Image& image) {
 std::optional<Finding> take_scan_phase_off(Channel& channel) {
   const std::optional<ScanPhase> phase = scan_phase(channel.image);
   if (!phase) return std::nullopt;
-  auto finding = noticed(FindingKind::scan_phase, std::abs(phase->px),
-                         "In " + channel.name + " every second row is shifted by " +
-                             with_error(std::abs(phase->px), phase->sigma_px) + " pixels. The shift was taken off.");
+  auto finding = noticed(Symptom::scan_phase, std::abs(phase->px),
+                         {.value = with_error(std::abs(phase->px), phase->sigma_px), .at = channel.name});
   if (finding) channel.image = without_scan_phase(channel.image, phase->px);
   return finding;
 }

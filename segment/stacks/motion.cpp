@@ -296,7 +296,7 @@ Means means_by_depth(const std::vector<Moved>& beads, const std::vector<double>&
 /// move than two in three, the scale is that of these, and no measure of rest.
 double weight_at_rest(double scale) {
   constexpr double kHalf = 0.5;    // (1 - r²)² of a bead at 4.2 standard errors, where the scale is theirs
-  constexpr double kRaised = 1.5;  // what errors that are stated too small make of it: beads-scatter
+  constexpr double kRaised = 1.5;  // what errors that are stated too small make of it: noise-understated
   const double r_squared = kHalf * std::pow(std::min(1.0, kRaised / scale), 2);
   return (1 - r_squared) * (1 - r_squared);
 }

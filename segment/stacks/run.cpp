@@ -64,33 +64,20 @@ std::vector<Finding> findings_of(const Followed& f, const WidthRatio& widths, do
   };
   const std::int64_t n_moving = figures_of(f.field).n_surely_moving;
   const double moving = static_cast<double>(n_moving) / std::max(1, f.n_good);
-  add(noticed(FindingKind::saturated, saturated,
-              "A stack is saturated: " + brief(100 * saturated) + " % of its voxels are at the detector's limit."));
-  add(noticed(FindingKind::nothing_moves, 1 - moving,
-              "Nothing moves: " + std::to_string(n_moving) + " of " + std::to_string(f.n_good) +
-                  " beads by more than six standard errors."));
-  add(noticed(FindingKind::beads_lost, 1 - share_followed(f),
-              brief(100 * (1 - share_followed(f))) +
-                  " % of the beads were not followed: " + std::to_string(count(f, TrackFlag::no_partner)) +
-                  " have no partner, " + std::to_string(count(f, TrackFlag::ambiguous)) + " more than one, " +
-                  std::to_string(count(f, TrackFlag::neighbours_disagree)) + " contradict their neighbours."));
-  add(noticed(FindingKind::little_at_rest, 1 - f.common.share_at_rest,
-              "Only " + brief(100 * f.common.share_at_rest) +
-                  " % of the beads move alike, as those at rest do. The motion of the stage is found from these."));
-  add(noticed(FindingKind::slices_moved, f.common.slice_drift_ratio,
-              "The slices of one stack moved against those of the other by " + brief(rms_drift_um(f.common)) +
-                  " um (root mean square); it was " + (f.common.has_slice_drift ? "" : "not ") + "taken off."));
-  add(noticed(FindingKind::beads_scatter, std::max(f.error_ratio, f.error_ratio_z),
-              "Beads that lie together differ by " + brief(f.error_ratio) + " times their errors across and " +
-                  brief(f.error_ratio_z) + " times along z; the standard errors were raised by that."));
-  add(noticed(FindingKind::defocused, widths.larger(),
-              "The beads of the stressed stack are " + brief(widths.across) + " times as wide and " +
-                  brief(widths.along) + " times as long as those of the relaxed one."));
-  if (f.light_ratio > 0) {
-    add(noticed(
-        FindingKind::light_lost, 1 - std::min(f.light_ratio, 1 / f.light_ratio),
-        "The beads of the stressed stack have " + brief(f.light_ratio) + " times the light of the relaxed one's."));
-  }
+  add(noticed(Symptom::saturated, saturated, {.at = "A stack"}));
+  add(noticed(Symptom::nothing_moves, 1 - moving,
+              {.value = std::to_string(n_moving) + " of " + std::to_string(f.n_good)}));
+  add(noticed(Symptom::beads_lost, 1 - share_followed(f),
+              {.at = std::to_string(count(f, TrackFlag::no_partner)) + " have no partner, " +
+                     std::to_string(count(f, TrackFlag::ambiguous)) + " more than one, " +
+                     std::to_string(count(f, TrackFlag::neighbours_disagree)) + " contradict their neighbours"}));
+  add(noticed(Symptom::little_at_rest, 1 - f.common.share_at_rest));
+  add(noticed(Symptom::slices_moved, f.common.slice_drift_ratio,
+              {.value = brief(rms_drift_um(f.common)),
+               .at = f.common.has_slice_drift ? "it was taken off" : "it was not taken off"}));
+  add(noticed(Symptom::beads_scatter, std::max(f.error_ratio, f.error_ratio_z)));
+  add(noticed(Symptom::defocused, widths.larger(), {.at = widths.across * widths.along > 1 ? "stressed" : "relaxed"}));
+  if (f.light_ratio > 0) add(noticed(Symptom::light_lost, 1 - std::min(f.light_ratio, 1 / f.light_ratio)));
   return findings;
 }
 
@@ -114,8 +101,8 @@ Frame frame_of(const std::string& name, const std::vector<images::Image>& slices
 void require_same_size(const Frame& first, const Frame& other) {
   if (first.size() == other.size()) return;
   throw InputError(other.name, first.size() + " as in " + first.name, other.size(),
-                   "both stacks must show the same field at the same magnification, from the same depth to the same; "
-                   "cut the longer one in ImageJ (Image > Stacks > Tools > Make Substack)");
+                   "both stacks must show the same field at the same magnification and depths; cut the longer one in "
+                   "ImageJ (Image > Stacks > Tools > Make Substack)");
 }
 
 void require_slices(const Frame& frame) {
@@ -134,9 +121,9 @@ double step_um(const Frame& first, const Frame& other, const StackParameters& p)
   }
   if (first.step_um) return *first.step_um;
   if (other.step_um) return *other.step_um;
-  throw InputError(first.name, "the distance of its slices in the file", "none",
-                   "set track.z_step_um, how far the stage moved between two slices; or track.dimensions = plane, "
-                   "which follows beads in the maximum projection");
+  throw InputError(
+      first.name, "the distance of its slices in the file", "none",
+      "set track.z_step_um, the distance of two slices; or track.dimensions = plane for the maximum projection");
 }
 
 double pixel_um(const Frame& first, const Frame& other, std::optional<double> given_um) {
@@ -162,8 +149,8 @@ struct Read {
 void require_direction(const StackParameters& p) {
   if (p.z_points) return;
   throw UsageError(
-      "expected track.z_points with stacks: into-gel where the slices lead from the surface into the gel, out-of-gel "
-      "where the first slice is the deepest");
+      "expected track.z_points with stacks: into-gel if slices lead from the surface into the gel, out-of-gel if the "
+      "first is the deepest");
 }
 
 Read read_and_detect(const fs::path& file, const images::PlaneChoice& plane, const char* which, double detection_snr,
@@ -192,8 +179,8 @@ auto with_names(const std::string& names, const Body& body) {
     return body();
   } catch (const InvalidData& error) {
     throw InputError(names + ": " + error.element, error.expected, error.found,
-                     "are these the bead channels of one place? Check channels and times, a lower track.detection_snr "
-                     "where the beads are weak, a larger track.largest_displacement_um where they go far");
+                     "do both show the beads of one place? Check channels and times, track.detection_snr for weak "
+                     "beads, track.largest_displacement_um for large motion");
   }
 }
 
@@ -324,8 +311,7 @@ StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& 
     if (context.progress) context.progress(fraction, what);
   };
   const fs::path relaxed_file = context.input("relaxed"), stressed_file = context.input("stressed");
-  if (track.stressed_last > 0)
-    throw UsageError("stressed_last is for images in the plane: track the stacks of a time series one by one");
+  if (track.stressed_last > 0) throw UsageError("stressed_last is for images in the plane: track stacks one by one");
   require_direction(parameters);
   tell(0, "finding beads of the relaxed stack");
   const Read relaxed = with_names(relaxed_file.string(), [&] {

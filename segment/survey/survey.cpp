@@ -161,7 +161,7 @@ void look_at_cell(const CellImages& cell, double pixel_um, Survey& survey) {
         " um): forces beyond the image are then unknown. Take a larger field, or a cell in its middle.");
 }
 
-/// As the finding `adhesions-long` of the stage segment.
+/// As the finding `bleed-through` of the stage segment.
 void look_at_adhesions(const CellImages& cell, double pixel_um, Survey& survey) {
   if (!cell.adhesion) return;
   constexpr double kCoarse_um = 0.25;  // about the blur of the microscope: shapes are enough here
@@ -169,10 +169,8 @@ void look_at_adhesions(const CellImages& cell, double pixel_um, Survey& survey) 
   const int binning = std::clamp(static_cast<int>(kCoarse_um / pixel_um), 1, std::min(image.width, image.height));
   const double ratio =
       cells::aspect_ratio(cells::find_adhesions(images::binned(image, binning), pixel_um * binning, {}));
-  const KindOfFinding& known = properties_of(FindingKind::adhesions_long);
-  if (ratio > known.threshold)
-    survey.doubts.push_back("What looks like adhesions in " + cell.adhesion->name + " is " + brief(ratio) +
-                            " times as long as wide (limit " + brief(known.threshold) + "). " + known.remedy);
+  if (const auto found = noticed(Symptom::adhesions_long, ratio))
+    survey.doubts.push_back(cell.adhesion->name + ": " + found->text + " " + found->remedy);
 }
 
 }  // namespace

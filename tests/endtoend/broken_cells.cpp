@@ -54,7 +54,7 @@ class BrokenCells : public testing::Test {
   void distrust(const std::string& name) {
     for (const char* file : {"run.json", "4_fit/record.json"}) {
       ordered_json record = ordered_json::parse(files::read_text(study_ / name / file));
-      record["findings"].push_back({{"id", "explains-little"},
+      record["findings"].push_back({{"id", "misfit"},
                                     {"severity", "bad"},
                                     {"text", "It is the wrong model."},
                                     {"number", 0.9},
@@ -77,7 +77,7 @@ class BrokenCells : public testing::Test {
                                                       {"control/c4", "cell.toml.txt"},
                                                       {"control/c5", "geel"},
                                                       {"drug/c11", "the same cell as control/c10"},
-                                                      {"drug/c12", "explains-little"}};
+                                                      {"drug/c12", "misfit"}};
 
   void expect_listed(const files::CsvTable& table, const std::string& by, const auto& is_in) const {
     ASSERT_EQ(table.n_rows(), 12) << by;
@@ -102,7 +102,7 @@ TEST_F(BrokenCells, are_named_alike_by_batch_stats_python_and_r_and_the_others_a
                         "same picture as that of control/c10"));
 
   EXPECT_TRUE(has_words(output_of(batch_, 1), "9 done: 7 fine, 1 not usable, 1 copy; 1 failed; 2 skipped",
-                        "drug/c11: the same cell as", "drug/c12: not usable, as explains-little says",
+                        "drug/c11: the same cell as", "drug/c12: not usable, as misfit says",
                         "control/c3: pictures and no cell.toml", "cell.toml.txt", "geel"));
   const files::CsvTable batch(study_ / "batch.csv");
   expect_listed(batch, "batch", [&](int row) { return batch.text(row, "state") == "fine"; });

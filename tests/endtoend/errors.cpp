@@ -283,7 +283,7 @@ TEST_F(Errors, check_knows_channels_that_are_exchanged_blur_few_beads_and_a_cell
                     relaxed = files::read_text(cell_ / "beads_relaxed.tif");
   files::write_text(cell_ / "paxillin.tif", actin);
   files::write_text(cell_ / "actin.tif", paxillin);
-  EXPECT_TRUE(has_words(said(), "What looks like adhesions in paxillin.tif"));
+  EXPECT_TRUE(has_words(said(), "paxillin.tif: Adhesions are"));
   files::write_text(cell_ / "paxillin.tif", paxillin);
   files::write_text(cell_ / "actin.tif", relaxed);
   files::write_text(cell_ / "beads_relaxed.tif", actin);

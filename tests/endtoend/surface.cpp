@@ -51,7 +51,7 @@ TEST_F(Surface, of_a_formula_a_table_and_its_points_is_the_same) {
   write("lattice.csv", table(20, [](Vec2 p) { return shortest(wave(p)); }));
   const auto whole = run("--z_points into-gel --height_map lattice.csv");
   ASSERT_EQ(whole.code, 0);
-  test::expect_silent({"surface-repaired", "surface-level", "off-the-surface"}, whole.output);
+  test::expect_silent({"surface-repaired", "surface-level", "beads-off-gel"}, whole.output);
   EXPECT_LT(largest_error(surface()), 1e-12);
   write("mirrored.csv", table(20, [](Vec2 p) { return shortest(-wave(p)); }));
   ASSERT_EQ(run("--z_points out-of-gel --height_map mirrored.csv").code, 0);
@@ -92,7 +92,7 @@ TEST_F(Surface, from_beads_knows_its_error_and_tells_beads_above_it) {
   const std::string beads = "--z_points into-gel --beads beads.csv";
   EXPECT_EQ(run(beads).code, 2);  // no error of z
   const std::string outcome = output_of(run(beads + " --sigma_z_um 0.3"));
-  EXPECT_TRUE(fires("off-the-surface", outcome)) << outcome;
+  EXPECT_TRUE(fires("beads-off-gel", "off the surface", outcome)) << outcome;
   EXPECT_FALSE(fires("surface-level", outcome)) << outcome;
   const HeightMap map = surface();
   ASSERT_EQ(map.sigma_um.size(), map.z_um.size());
@@ -110,7 +110,7 @@ TEST_F(Surface, that_beads_find_level_may_be_the_end_of_the_images) {
   write("beads.csv", text);
   const std::string outcome = output_of(run("--z_points into-gel --sigma_z_um 0.1 --beads beads.csv"));
   EXPECT_TRUE(fires("surface-level", outcome)) << outcome;
-  EXPECT_FALSE(fires("off-the-surface", outcome)) << outcome;
+  EXPECT_FALSE(fires("beads-off-gel", "off the surface", outcome)) << outcome;
 }
 
 /// Masks of the gel below the wave, 40 pixels of a micrometre to each side, slices of half a micrometre.

@@ -174,7 +174,7 @@ TEST(CutCells, motions_of_expected_size_are_a_covariance_of_the_beads) {
 }
 
 TEST(CutCells, a_cut_is_a_note_if_allowed_for_and_a_caution_if_not) {
-  EXPECT_EQ(properties_of(FindingKind::cell_cut).severity, Severity::note);
+  EXPECT_EQ(properties_of(Symptom::cell_cut).severity, Severity::note);
   stage::EffectSwitches switches;
   const Scene s = scene(41);
   EXPECT_TRUE(tensions::allows_forces_beyond(switches, s.cut.cell));

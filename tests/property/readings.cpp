@@ -102,7 +102,7 @@ TEST(Readings, name_the_way_in_which_images_or_tables_lie_wrong) {
   for (const Case& c : cases) {
     const Reading reading = best_reading(scene.on(), changed(scene.beads, c.wrong), scene.forces_nN, scene.noise_um);
     EXPECT_TRUE(has_words(reading.what, c.says)) << c.says << ", but";
-    EXPECT_TRUE(test::fires("read-otherwise", noticed_reading(FindingKind::read_otherwise, reading))) << c.says;
+    EXPECT_TRUE(test::fires("wrong-orientation", noticed_reading(Symptom::read_otherwise, reading))) << c.says;
   }
 }
 
@@ -140,9 +140,9 @@ TEST(Readings, name_a_field_that_was_smoothed) {
   };
   const Reading reading = of(smooth);
   EXPECT_TRUE(has_words(reading.what, "over 4 um"));
-  EXPECT_TRUE(test::fires("field-smoothed", noticed_reading(FindingKind::field_smoothed, reading)));
+  EXPECT_TRUE(test::fires("field-smoothed", noticed_reading(Symptom::field_smoothed, reading)));
   const Reading of_sharp = of(scene.beads);
-  EXPECT_FALSE(test::fires("field-smoothed", noticed_reading(FindingKind::field_smoothed, of_sharp))) << of_sharp.what;
+  EXPECT_FALSE(test::fires("field-smoothed", noticed_reading(Symptom::field_smoothed, of_sharp))) << of_sharp.what;
 }
 
 TEST(Readings, find_nothing_better_where_the_reading_is_right_and_the_model_lacks_an_adhesion) {
@@ -151,7 +151,7 @@ TEST(Readings, find_nothing_better_where_the_reading_is_right_and_the_model_lack
   const Reading reading =
       best_reading(scene.on(), scene.beads,
                    scene.forces_nN.head(2 * static_cast<Eigen::Index>(scene.cell.adhesions.size())), scene.noise_um);
-  EXPECT_FALSE(test::fires("read-otherwise", noticed_reading(FindingKind::read_otherwise, reading))) << reading.what;
+  EXPECT_FALSE(test::fires("wrong-orientation", noticed_reading(Symptom::read_otherwise, reading))) << reading.what;
 }
 
 }  // namespace

@@ -287,7 +287,7 @@ TEST(StackFindings, a_sound_pair_has_none_and_each_fault_its_own) {
   const BeadClouds sound = bead_clouds(1200, kError_um, 0.03, 1, pull);
   const std::vector<Finding> of_sound = found_of(sound);
   EXPECT_TRUE(of_sound.empty()) << test::ids_of(of_sound);
-  test::expect_silent({"nothing-moves", "beads-lost", "little-at-rest", "slices-moved", "beads-scatter", "light-lost"},
+  test::expect_silent({"nothing-moves", "beads-lost", "few-beads-at-rest", "common-motion", "noise-understated"},
                       of_sound);
 
   EXPECT_TRUE(fires("nothing-moves", found_of(bead_clouds(1200, kError_um, 0.03, 2, [](Vec3) { return Vec3{}; }))));
@@ -295,19 +295,19 @@ TEST(StackFindings, a_sound_pair_has_none_and_each_fault_its_own) {
   EXPECT_TRUE(fires("beads-lost", found_of(bead_clouds(1000, kError_um, 0.5, 3, pull))));
   // a cell that fills the field: its pull is 30 standard errors and more nearly everywhere
   const auto everywhere = [](Vec3 x) { return Vec3{2 * std::sin(x.x / 12), 2 * std::sin(x.y / 9), std::sin(x.x / 7)}; };
-  EXPECT_TRUE(fires("little-at-rest", found_of(bead_clouds(1200, kError_um, 0.03, 4, everywhere))));
+  EXPECT_TRUE(fires("few-beads-at-rest", found_of(bead_clouds(1200, kError_um, 0.03, 4, everywhere))));
   const auto drift = [](Vec3 x) { return pull(x) + Vec3{0.4 * std::sin(x.z / 8), 0, 0}; };
-  EXPECT_TRUE(fires("slices-moved", found_of(bead_clouds(1200, kError_um, 0.03, 5, drift))));
+  EXPECT_TRUE(fires("common-motion", "slices", found_of(bead_clouds(1200, kError_um, 0.03, 5, drift))));
 
   BeadClouds too_sure = sound;
   for (auto* cloud : {&too_sure.relaxed, &too_sure.stressed})
     for (PlacedBead& bead : *cloud) bead.sigma_um /= 2, bead.sigma_z_um /= 2;
-  EXPECT_TRUE(fires("beads-scatter", found_of(too_sure)));
+  EXPECT_TRUE(fires("noise-understated", "lie together", found_of(too_sure)));
   for (const double left : {0.8, 0.3}) {
     BeadClouds bleached = sound;
     for (PlacedBead& bead : bleached.relaxed) bead.brightness = 1000;
     for (PlacedBead& bead : bleached.stressed) bead.brightness = 1000 * left;
-    EXPECT_EQ(fires("light-lost", found_of(bleached)), left < 0.5) << left;
+    EXPECT_EQ(fires("beads-lost", "dimmer stack", found_of(bleached)), left < 0.5) << left;
   }
   // of the pictures themselves
   const Followed followed = follow(sound.relaxed, sound.stressed, {}, Switch::automatic, {}, 2);

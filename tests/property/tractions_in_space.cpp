@@ -274,12 +274,12 @@ TEST_F(InSpace, a_lambda_by_risk_that_runs_away_is_replaced_and_called_so) {
   const auto chosen = choose_lambda(right, scan, traction, RiskIs::sound);
   EXPECT_EQ(chosen.by, risk);
   EXPECT_EQ(chosen.lambda, scan.by_risk);
-  EXPECT_FALSE(fires("lambda-runs-away", chosen.finding));
+  EXPECT_FALSE(fires("lambda-unbounded", chosen.finding));
   scan.by_evidence = 2.1 * scan.by_risk;
   const auto replaced = choose_lambda(right, scan, traction, RiskIs::sound);
   EXPECT_EQ(replaced.by, evidence);
   EXPECT_EQ(replaced.lambda, scan.by_evidence);
-  ASSERT_TRUE(fires("lambda-runs-away", replaced.finding));
+  ASSERT_TRUE(fires("lambda-unbounded", replaced.finding));
   EXPECT_NEAR(replaced.finding->number.value_or(0), 2.1, 1e-9);
   const auto unsound = choose_lambda(right, scan, traction, RiskIs::unsound);
   EXPECT_EQ(unsound.by, gcv);
@@ -736,7 +736,7 @@ TEST_F(InSpace, lambda_runs_away_where_few_beads_are_astray_or_a_stack_grew) {
   };
   for (scene.seed = 1; scene.seed <= 4; ++scene.seed) {
     const std::vector<BeadInSpace> sound = scene.beads(0.03);
-    EXPECT_FALSE(fires("lambda-runs-away", reconstruct_tikhonov(problem_of(sound), traction, parameters, 1).findings));
+    EXPECT_FALSE(fires("lambda-unbounded", reconstruct_tikhonov(problem_of(sound), traction, parameters, 1).findings));
     std::vector<BeadInSpace> astray = sound, grown = sound;
     std::mt19937_64 random(scene.seed);
     std::uniform_real_distribution<double> in_box(-5, 5);
@@ -746,7 +746,7 @@ TEST_F(InSpace, lambda_runs_away_where_few_beads_are_astray_or_a_stack_grew) {
     for (const auto& beads : {astray, grown}) {
       const Problem problem = problem_of(beads);
       const auto r = reconstruct_tikhonov(problem, traction, parameters, 1);
-      EXPECT_TRUE(fires("lambda-runs-away", r.findings)) << scene.seed;
+      EXPECT_TRUE(fires("lambda-unbounded", r.findings)) << scene.seed;
       EXPECT_EQ(r.lambda_by, tractions::LambdaCriterion::evidence) << scene.seed;
       TractionParameters of_risk = traction;
       of_risk.lambda_um_per_kPa = r.scan->by_risk / lambda_per_um_per_kPa(problem);
@@ -779,12 +779,12 @@ TEST_F(InSpace, an_answer_that_hangs_on_the_loss_is_called_so) {
     RecordProperty(name_of(loss), std::to_string(balance_of(problem, r).total_force_nN));
     return r.findings;
   };
-  EXPECT_FALSE(fires("loss-decides", by(BeadLoss::l2)));
-  EXPECT_TRUE(fires("loss-decides", by(BeadLoss::biweight)));
+  EXPECT_FALSE(fires("outliers", "differ by", by(BeadLoss::l2)));
+  EXPECT_TRUE(fires("outliers", "differ by", by(BeadLoss::biweight)));
   scene.n_beads = 1500;  // many that are right have one answer by any loss
   problem = scene.problem(scene.beads(0.05), parameters);
   for (const BeadLoss loss : {BeadLoss::mixture, BeadLoss::huber, BeadLoss::biweight})
-    EXPECT_FALSE(fires("loss-decides", by(loss))) << name_of(loss);
+    EXPECT_FALSE(fires("outliers", "differ by", by(loss))) << name_of(loss);
 }
 
 /// Two patches that pull at each other, and beads with the errors that they state.
@@ -803,8 +803,7 @@ class FindingsInSpace : public InSpace {
 TEST_F(FindingsInSpace, are_none_of_a_sound_scene) {
   const Problem problem = scene.problem(scene.beads(kSigma_um), parameters);
   const SpatialReconstruction r = found(problem);
-  test::expect_silent({"beads-off-the-gel", "beads-far", "beads-tell-little", "misfit-in-space", "beads-stray"},
-                      r.findings);
+  test::expect_silent({"beads-off-gel", "low-resolution", "misfit", "outliers"}, r.findings);
   EXPECT_FALSE(fires("tractions-out-of-balance", noticed_imbalance(balance_of(problem, r))));
 }
 
@@ -814,20 +813,20 @@ TEST_F(FindingsInSpace, tell_beads_beside_the_gel_stated_errors_that_are_too_sma
   for (int b = 0; b < 10; ++b) off[b].position_um.z = b % 2 ? -2 : scene.gel.thickness_um + 2;
   for (BeadInSpace& b : overconfident) b.sigma_um /= 1.5, b.sigma_z_um /= 1.5;
   for (std::size_t b = 0; b < stray.size(); b += 50) stray[b].displacement_um += Vec3{1.5, -1, 0.5};
-  EXPECT_TRUE(fires("beads-off-the-gel", found(off).findings));
-  EXPECT_TRUE(fires("misfit-in-space", found(overconfident).findings));
-  EXPECT_TRUE(fires("beads-stray", found(stray).findings));
+  EXPECT_TRUE(fires("beads-off-gel", "gel's surface", found(off).findings));
+  EXPECT_TRUE(fires("misfit", "The tractions leave", found(overconfident).findings));
+  EXPECT_TRUE(fires("outliers", "noise has them", found(stray).findings));
 }
 
 TEST_F(FindingsInSpace, tell_beads_that_lie_deep) {
   scene.shallowest_um = 12;
   scene.depth_um = 22;
-  EXPECT_TRUE(fires("beads-far", found(scene.beads(kSigma_um)).findings));
+  EXPECT_TRUE(fires("low-resolution", "from the surface", found(scene.beads(kSigma_um)).findings));
 }
 
 TEST_F(FindingsInSpace, tell_few_beads_of_much_noise) {
   scene.n_beads = 80;
-  EXPECT_TRUE(fires("beads-tell-little", found(scene.beads(0.3)).findings));
+  EXPECT_TRUE(fires("low-resolution", "unknowns", found(scene.beads(0.3)).findings));
 }
 
 TEST_F(FindingsInSpace, tell_a_force_that_nothing_balances) {
@@ -865,7 +864,7 @@ TEST_F(FindingsInSpace, tell_a_patch_that_is_missing) {
     for (const double background : {0.1, 0.0}) {
       parameters.background = background;
       const auto r = reconstruct(scene.problem(beads, parameters), inputs, traction, parameters, 1);
-      EXPECT_EQ(fires("patches-do-not-fit", r.findings), is_missing) << background;
+      EXPECT_EQ(fires("misfit-near-adhesions", "What patches leave", r.findings), is_missing) << background;
     }
   }
 }
@@ -889,13 +888,13 @@ TEST_F(FindingsInSpace, tell_a_weak_patch_that_is_missing_by_what_its_beads_do_t
                          1);
     };
     const auto whole = found_with(scene.beads(kSigma_um));
-    EXPECT_FALSE(fires("patches-do-not-fit", whole.findings)) << scene.seed;
+    EXPECT_FALSE(fires("misfit-near-adhesions", "What patches leave", whole.findings)) << scene.seed;
     without.push_back(figure_of(whole, "tractions_beside_patches"));
     scene.spots.push_back({{12, 12}, 4, {0, -kForce_nN, 0}});
     const std::vector<BeadInSpace> beads = scene.beads(kSigma_um);
     scene.spots.pop_back();
     const auto lacks = found_with(beads);
-    n_told += fires("patches-do-not-fit", lacks.findings) ? 1 : 0;
+    n_told += fires("misfit-near-adhesions", "What patches leave", lacks.findings) ? 1 : 0;
     n_by_squares += figure_of(lacks, "misfit_of_patches_alone") > 1.1 ? 1 : 0;
   }
   double mean = 0, square = 0;
@@ -925,7 +924,7 @@ TEST_F(FindingsInSpace, are_no_tractions_beside_patches_where_the_gel_says_that_
   for (const bool is_said : {false, true}) {
     problem.model_error = is_said ? std::sqrt(off / size) : 0;
     const auto r = reconstruct(problem, {{}, scene.gel, scene.adhesions(), {}}, traction, parameters, 1);
-    EXPECT_EQ(fires("patches-do-not-fit", r.findings), !is_said);
+    EXPECT_EQ(fires("misfit-near-adhesions", "What patches leave", r.findings), !is_said);
   }
 }
 
@@ -966,8 +965,8 @@ TEST_F(InSpace, a_z_that_points_the_other_way_fits_worse) {
   EXPECT_LT(*wrong.flipped_z_chi_squared, -10);
   EXPECT_TRUE(right.remark.empty()) << right.remark;
   EXPECT_TRUE(has_words(wrong.remark, "z_points"));
-  EXPECT_FALSE(fires("z-reversed", right.findings));
-  EXPECT_TRUE(fires("z-reversed", wrong.findings));
+  EXPECT_FALSE(fires("wrong-orientation", "opposite sign", right.findings));
+  EXPECT_TRUE(fires("wrong-orientation", "opposite sign", wrong.findings));
 }
 
 /// Nothing is smoothed of a few forces that the beads tell well, so that their errors are those of the noise.
@@ -979,8 +978,8 @@ TEST_F(FindingsInSpace, patches_that_are_all_there_is_have_the_errors_of_least_s
   for (scene.seed = 1; scene.seed <= kDraws; ++scene.seed) {
     const Problem problem = scene.problem(scene.beads(kSigma_um), parameters);
     const auto r = reconstruct(problem, {{}, scene.gel, scene.adhesions(), {}}, traction, parameters, 1);
-    EXPECT_FALSE(fires("beads-tell-little", r.findings));
-    EXPECT_FALSE(fires("misfit-in-space", r.findings));
+    EXPECT_FALSE(fires("low-resolution", "unknowns", r.findings));
+    EXPECT_FALSE(fires("misfit", "The tractions leave", r.findings));
     EXPECT_FALSE(r.lambda);
     double left_nN = 0;  // of the map
     for (int v = 0; v < problem.mesh.n_vertices(); ++v)

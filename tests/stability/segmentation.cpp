@@ -82,13 +82,13 @@ class ImagesOfTwoCells : public testing::Test {
                          const HandDrawn& drawn = {}) const {
     return segment_cell(adhesion, actin, SegmentParameters{}, drawn);
   }
-  static double threshold(FindingKind kind) { return properties_of(kind).threshold; }
+  static double threshold(Symptom kind) { return properties_of(kind).threshold; }
   static constexpr double kPixel_um = 0.1;
 };
 
 TEST_F(ImagesOfTwoCells, are_told_from_those_of_one) {
-  const double most_adhesions = threshold(FindingKind::adhesions_off_actin),
-               most_outline = threshold(FindingKind::outline_off_actin);
+  const double most_adhesions = threshold(Symptom::adhesions_off_actin),
+               most_outline = threshold(Symptom::outline_off_actin);
   for (const std::uint64_t seed : {71, 72, 73}) {
     SCOPED_TRACE(seed);
     const SimulatedCell cell = simulated_cell("u2os", "ordinary", seed),

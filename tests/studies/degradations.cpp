@@ -289,17 +289,17 @@ std::vector<Degradation> degradations() {
       {"turn-5", "the stressed bead image is turned by 5 degrees", "", stressed(Vec2{}, 0., 5.)},
       {"drift", "the stage drifted by (3.4, -1.7) px between the bead images", "", stressed(Vec2{3.4, -1.7})},
       {"all-motions", "growth, shear, turn and drift together", "", stressed(Vec2{3.4, -1.7}, .001, .3, .001)},
-      {"tiles", "the right half of the stressed bead image was stitched 1 px off", "curved-motion",
+      {"tiles", "the right half of the stressed bead image was stitched 1 px off", "common-motion",
        [](Set& s, const Set&) {
          const double half = 0.55 * s.stressed.width;
          warp(s.stressed, [=](Vec2 p) { return p.x > half ? p - Vec2{1, 0} : p; });
        }},
-      {"rolling-drift", "the stage swung by 0.5 px while the stressed bead image was scanned", "curved-motion",
+      {"rolling-drift", "the stage swung by 0.5 px while the stressed bead image was scanned", "common-motion",
        [](Set& s, const Set&) {
          const double period = s.stressed.height;
          warp(s.stressed, [=](Vec2 p) { return p - Vec2{0.5 * std::sin(2 * std::numbers::pi * p.y / period), 0}; });
        }},
-      {"lens", "the stressed bead image was taken through a lens that distorts by 0.1 % at the border", "curved-motion",
+      {"lens", "the stressed bead image was taken through a lens that distorts by 0.1 % at the border", "common-motion",
        [](Set& s, const Set&) {
          const Vec2 c = middle(s.stressed);
          warp(s.stressed, [=](Vec2 p) {
@@ -308,15 +308,14 @@ std::vector<Degradation> degradations() {
          });
        }},
       {"tilted-stage", "the stage was tilted by 3 degrees: one direction is shorter, the borders are out of focus",
-       "defocused; beads-disagree",
+       "defocused; misfit-in-a-region",
        [](Set& s, const Set&) {
          const Vec2 c = middle(s.stressed);
          warp(s.stressed, [=](Vec2 p) { return Vec2{c.x + (p.x - c.x) / std::cos(3 * std::numbers::pi / 180), p.y}; });
          blur_to_borders(s.stressed, 2);
        }},
       {"half-defocused", "the left half of both bead images is far out of focus (blurred by 4 px)",
-       "tracked-by-correlation; defocused",
-       [](Set& s, const Set&) { to_beads(s, [](Image& i) { blur_left_half(i, 4); }); }},
+       "field-smoothed; defocused", [](Set& s, const Set&) { to_beads(s, [](Image& i) { blur_left_half(i, 4); }); }},
       {"adhesions-3px", "the adhesion channel is shifted by 3 px against the others", "",
        moved(&Set::adhesion, Vec2{2.5, -1.7})},
       {"adhesions-5px", "the adhesion channel is shifted by 5 px against the others", "",
@@ -328,17 +327,17 @@ std::vector<Degradation> degradations() {
                                 }); }},
       {"beads-turned", "both bead images are turned by 0.5 degrees against the cell", "",
        [](Set& s, const Set&) { to_beads(s, [](Image& i) { move(i, {}, 0, .5); }); }},
-      {"beads-mirrored", "both bead images are mirrored", "read-otherwise",
+      {"beads-mirrored", "both bead images are mirrored", "wrong-orientation",
        [](Set& s, const Set&) { to_beads(s, mirror); }},
-      {"beads-transposed", "rows and columns of both bead images are exchanged", "read-otherwise",
+      {"beads-transposed", "rows and columns of both bead images are exchanged", "wrong-orientation",
        [](Set& s, const Set&) { to_beads(s, transpose); }},
       {"beads-exchanged", "the stressed and the relaxed bead image are exchanged", "exchanged",
        [](Set& s, const Set&) { std::swap(s.relaxed, s.stressed); }},
-      {"beads-of-another-cell", "both bead images are those of another cell", "explains-little; nothing-moves",
+      {"beads-of-another-cell", "both bead images are those of another cell", "misfit; nothing-moves",
        [](Set& s, const Set& o) { s.relaxed = o.relaxed, s.stressed = o.stressed; }},
       {"stressed-of-another-cell", "the stressed bead image is that of another cell", "one place",
        [](Set& s, const Set& o) { s.stressed = o.stressed; }},
-      {"channels-exchanged", "the adhesion and the actin image are exchanged", "adhesions-long",
+      {"channels-exchanged", "the adhesion and the actin image are exchanged", "bleed-through",
        [](Set& s, const Set&) { std::swap(s.adhesion, s.actin); }},
       {"bleed-through", "a third of the actin signal is seen in the adhesion channel", "bleed-through",
        [](Set& s, const Set&) {
@@ -346,7 +345,7 @@ std::vector<Degradation> degradations() {
        }},
       {"defocus", "the stressed bead image is out of focus (blurred by 1.5 px)", "defocused",
        [](Set& s, const Set&) { blur(s.stressed, 1.5); }},
-      {"both-defocused", "both bead images are out of focus (blurred by 2 px)", "beads-wide",
+      {"both-defocused", "both bead images are out of focus (blurred by 2 px)", "defocused",
        [](Set& s, const Set&) { to_beads(s, [](Image& i) { blur(i, 2); }); }},
       {"noisy-beads", "three times more noise in both bead images", "",
        [](Set& s, const Set&) {
@@ -384,7 +383,8 @@ std::vector<Degradation> degradations() {
        [](Set& s, const Set&) { s.settings += "[segment]\nfibre_start_noise = 60\n"; }},
       {"adhesions-missed", "small and dim adhesions are not found (adhesion_smallest_um2 = 0.8)", "missing-adhesion",
        [](Set& s, const Set&) { s.settings += "[segment]\nadhesion_smallest_um2 = 0.8\n"; }},
-      {"second-cell", "another cell pulls at the beads in the corner, unseen in the other channels", "beads-disagree",
+      {"second-cell", "another cell pulls at the beads in the corner, unseen in the other channels",
+       "misfit-in-a-region",
        [](Set& s, const Set&) {
          const Vec2 c{.12 * s.stressed.width, .12 * s.stressed.height};
          warp(s.stressed, [=](Vec2 p) {
@@ -445,35 +445,35 @@ std::vector<Degradation> degradations() {
          s.stressed = s.relaxed;
          add_noise(s.stressed, 1, 5);
        }},
-      {"actin-flipped", "the rows of the actin image run upwards", "adhesions-off-actin",
+      {"actin-flipped", "the rows of the actin image run upwards", "images-mismatch",
        [](Set& s, const Set&) { flip_rows(s.actin); }},
-      {"adhesions-flipped", "the rows of the adhesion image run upwards", "adhesions-off-actin",
+      {"adhesions-flipped", "the rows of the adhesion image run upwards", "images-mismatch",
        [](Set& s, const Set&) { flip_rows(s.adhesion); }},
-      {"cell-flipped", "the rows of adhesion and actin image run upwards", "read-otherwise",
+      {"cell-flipped", "the rows of adhesion and actin image run upwards", "wrong-orientation",
        [](Set& s, const Set&) {
          flip_rows(s.adhesion);
          flip_rows(s.actin);
        }},
-      {"actin-of-another-cell", "the actin image is that of another cell", "adhesions-off-actin",
+      {"actin-of-another-cell", "the actin image is that of another cell", "images-mismatch",
        [](Set& s, const Set& o) { s.actin = o.actin; }},
-      {"adhesions-of-another-cell", "the adhesion image is that of another cell", "adhesions-off-actin",
+      {"adhesions-of-another-cell", "the adhesion image is that of another cell", "images-mismatch",
        [](Set& s, const Set& o) { s.adhesion = o.adhesion; }},
-      {"outline-of-another-cell", "the outline is a mask of another cell", "outline-off-actin",
+      {"outline-of-another-cell", "the outline is a mask of another cell", "images-mismatch",
        [](Set& s, const Set& o) { s.more["outline_mask"] = mask_of_outline(o.truth, s.actin.width, s.actin.height); }},
       {"beads-as-actin", "the relaxed bead image is given as actin", "right channel; right file",
        [](Set& s, const Set&) { s.actin = s.relaxed; }},
-      {"beads-as-adhesions", "the relaxed bead image is given as adhesions", "adhesions-off-actin",
+      {"beads-as-adhesions", "the relaxed bead image is given as adhesions", "images-mismatch",
        [](Set& s, const Set&) { s.adhesion = s.relaxed; }},
       {"adhesions-as-actin", "the adhesion image is given as actin, too", "same pixels",
        [](Set& s, const Set&) { s.actin = s.adhesion; }},
       {"actin-as-adhesions", "the actin image is given as adhesions, too", "same pixels",
        [](Set& s, const Set&) { s.adhesion = s.actin; }},
-      {"adhesions-as-pattern", "a mask of the adhesions is given as the adhesive pattern", "pattern-too-fine",
+      {"adhesions-as-pattern", "a mask of the adhesions is given as the adhesive pattern", "pattern-unsuitable",
        [](Set& s, const Set&) {
          s.more["adhesion_mask"] = mask_of_adhesions(s.truth, s.actin.width, s.actin.height);
          s.settings += "[segment]\nadhesions = \"pattern\"\n";
        }},
-      {"cell-as-pattern", "a mask of the cell is given as the adhesive pattern", "pattern-as-cell",
+      {"cell-as-pattern", "a mask of the cell is given as the adhesive pattern", "pattern-unsuitable",
        [](Set& s, const Set&) {
          s.more["adhesion_mask"] = mask_of_outline(s.truth, s.actin.width, s.actin.height);
          s.settings += "[segment]\nadhesions = \"pattern\"\n";
@@ -492,18 +492,18 @@ std::vector<Degradation> degradations() {
       {"thickness-600", "the thickness is given as 600 um; it is 60", "unusual-value",
        [](Set& s, const Set&) { s.thickness_um = "600"; }},
       {"field", "the displacement is of another program", "", as_field([](Bead&) {})},
-      {"field-in-pixels", "the displacement is of another program, in px", "read-otherwise",
+      {"field-in-pixels", "the displacement is of another program, in px", "wrong-orientation",
        as_field([](Bead& b) { scale(b, 10); })},
       {"field-half-in-pixels", "the displacement is of another program, in px, its places in um", "unusual-value",
        as_field([](Bead& b) {
          b.displacement_um = 10 * b.displacement_um;
          b.sigma_um *= 10;
        })},
-      {"field-places-in-pixels", "the displacement is of another program, in um, its places in px", "read-otherwise",
+      {"field-places-in-pixels", "the displacement is of another program, in um, its places in px", "wrong-orientation",
        as_field([](Bead& b) { b.position_um = 10 * b.position_um; })},
       {"field-in-metres", "the displacement is of another program, in m", "um",
        as_field([](Bead& b) { scale(b, 1e-6); })},
-      {"field-y-up", "the displacement is of another program, with y upwards", "read-otherwise",
+      {"field-y-up", "the displacement is of another program, with y upwards", "wrong-orientation",
        [](Set& s, const Set&) {
          const double height_um = 0.1 * s.actin.height;
          s.field = true_field(s.truth, [=](Bead& b) {
@@ -511,14 +511,14 @@ std::vector<Degradation> degradations() {
            b.displacement_um.y = -b.displacement_um.y;
          });
        }},
-      {"field-uy-up", "the displacement is of another program, uy upwards and y downwards", "read-otherwise",
+      {"field-uy-up", "the displacement is of another program, uy upwards and y downwards", "wrong-orientation",
        as_field([](Bead& b) { b.displacement_um.y = -b.displacement_um.y; })},
       {"field-exchanged", "the displacement is of another program, from the stressed to the relaxed state", "exchange",
        as_field([](Bead& b) { b.displacement_um = -1 * b.displacement_um; })},
-      {"field-columns", "the displacement is of another program, ux and uy exchanged", "read-otherwise",
+      {"field-columns", "the displacement is of another program, ux and uy exchanged", "wrong-orientation",
        as_field([](Bead& b) { std::swap(b.displacement_um.x, b.displacement_um.y); })},
       {"field-astray", "a fifth of the beads within 1 um of an adhesion are off by five standard errors",
-       "telling-beads-scatter",
+       "misfit-near-adhesions",
        [](Set& s, const Set&) {
          const std::vector<Adhesion> adhesions = files::read_adhesions(s.truth / "adhesions.csv");
          std::mt19937_64 random(4);

@@ -34,6 +34,18 @@ inline bool fires(const std::string& id, const std::string& said) {
   return said.find(" (" + id + "): ") != said.npos || said.find("\"id\": \"" + id + "\"") != said.npos;
 }
 
+/// By the symptom whose sentence has these words.
+inline bool fires(const std::string& id, const std::string& words, const std::optional<Finding>& found) {
+  return fires(id, found) && found->text.find(words) != words.npos;
+}
+template <class Found>
+bool fires(const std::string& id, const std::string& words, const std::vector<Found>& found) {
+  return std::ranges::any_of(found, [&](const std::optional<Finding>& f) { return fires(id, words, f); });
+}
+inline bool fires(const std::string& id, const std::string& words, const std::string& said) {
+  return fires(id, said) && said.find(words) != said.npos;
+}
+
 /// Of these kinds none.
 template <class Found>
 void expect_silent(const std::vector<std::string>& ids, const Found& found) {

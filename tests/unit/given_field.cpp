@@ -67,7 +67,7 @@ TEST(GivenField, a_strong_neighbour_in_a_corner_is_no_push) {
       beside.push_back(
           {.position_um = place, .displacement_um = own + Vec2{others, others}, .sigma_um = 0.003, .flag = {}});
     }
-    EXPECT_LT(outwardness(beside), 0.3);  // finding moves-outward
+    EXPECT_LT(outwardness(beside), 0.3);  // finding pushes-outward
     EXPECT_LT(outwardness(alone), -0.9);
     for (Bead& bead : alone) bead.displacement_um = -1 * bead.displacement_um;
     EXPECT_GT(outwardness(alone), 0.9) << "exchanged";

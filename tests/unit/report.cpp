@@ -238,9 +238,9 @@ TEST(Report, a_tick_stands_only_where_no_finding_is_open) {
     return findings_section(facts_of(results), p).find("✓") != std::string::npos;
   };
   EXPECT_TRUE(has_tick(fitted_here({})));
-  EXPECT_TRUE(has_tick(fitted_here({*noticed(FindingKind::wide_interval, 1, "x")})));
-  EXPECT_FALSE(has_tick(fitted_here({*noticed(FindingKind::missing_fibre, 1, "x")})));
-  EXPECT_FALSE(has_tick(fitted_here({*noticed(FindingKind::not_identifiable, 2, "x")})));
+  EXPECT_TRUE(has_tick(fitted_here({*noticed(Symptom::wide_interval, 1)})));
+  EXPECT_FALSE(has_tick(fitted_here({*noticed(Symptom::missing_fibre, 1)})));
+  EXPECT_FALSE(has_tick(fitted_here({*noticed(Symptom::not_identifiable, 2)})));
   Provenance not_converged = fitted_here({});
   not_converged.stages.front().converged = false;
   EXPECT_FALSE(has_tick(not_converged));
@@ -249,7 +249,7 @@ TEST(Report, a_tick_stands_only_where_no_finding_is_open) {
 
 TEST(Report, an_open_finding_shows_its_text_number_threshold_and_remedy) {
   const FakeCell cell;
-  const Finding finding = *noticed(FindingKind::missing_fibre, 3, "three <fibres>");
+  const Finding finding = *noticed(Symptom::missing_fibre, 3, {.at = "three <fibres>"});
   EXPECT_TRUE(has_words(findings_section(facts_of(read_results(cell.folder.path())), fitted_here({finding})),
                         std::string("three &lt;fibres&gt;"), charts::html_escaped(finding.remedy),
                         charts::html_escaped(finding.reason), std::string(": 3. Threshold: 0;")));
@@ -257,9 +257,8 @@ TEST(Report, an_open_finding_shows_its_text_number_threshold_and_remedy) {
 
 TEST(Report, shows_the_gravest_finding_first_and_prints_units_as_papers_do) {
   const FakeCell cell;
-  Finding caution =
-      *noticed(FindingKind::missing_fibre, 3, "off by 0.3 +- 0.1 um over 4 um2, see track.beads_pixel_size_um");
-  caution.severity = Severity::caution;
+  Finding caution = *noticed(Symptom::missing_fibre, 3);
+  caution.text = "off by 0.3 +- 0.1 um over 4 um2, see track.beads_pixel_size_um";
   Finding bad = caution;
   bad.severity = Severity::bad;
   bad.text = "must not be used";

@@ -3,7 +3,6 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
-#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/files/text.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/cell_stages.h"
@@ -605,7 +604,7 @@ TEST(Told, events_are_json_objects_a_line) {
   StageTold told{
       .stage = "track", .status = {StageState::must_run, "not run yet"}, .was_run = true, .report = StageReport{}};
   told.report->summary = "two\nlines and \"quotes\"";
-  told.report->findings = {*noticed(FindingKind::nothing_moves, 1, "Nothing moves.")};
+  told.report->findings = {{.id = "nothing-moves", .severity = Severity::caution, .text = "Nothing moves."}};
   std::istringstream lines(events_of(told));
   std::vector<nlohmann::json> events;
   for (std::string line; std::getline(lines, line);) events.push_back(nlohmann::json::parse(line));

@@ -153,7 +153,7 @@ TEST(Study, cells_with_a_finding_that_excludes_are_left_out_with_it_as_the_reaso
                     R"({"findings":[{"id":"cell-cut","severity":"caution","text":"cut"},)"
                     R"({"id":"saturated","severity":"note","text":"a little"}]})");
   EXPECT_EQ(fake.read({.exclude_findings = "saturated"}).cells.size(), 4u) << "a note is not open";
-  const Study study = fake.read({.exclude_findings = "explains-little, cell-cut"});
+  const Study study = fake.read({.exclude_findings = "misfit, cell-cut"});
   EXPECT_EQ(study.cells.size(), 3u);
   EXPECT_EQ(reason_of(study, "control/cell_1"), "the finding cell-cut is open (stats.exclude_findings)");
   EXPECT_THROW(fake.read({.exclude_findings = "cell-cutt"}), UsageError);
@@ -166,10 +166,10 @@ TEST(Study, a_cell_that_a_finding_says_not_to_use_is_left_out_and_one_with_unkno
                       std::string("{\"findings\": [{\"id\": \"") + id +
                           "\", \"severity\": \"bad\", \"text\": \"so\", \"remedy\": \"\"}]}");
   };
-  find("control/cell_1", "explains-little");
+  find("control/cell_1", "misfit");
   find("treated/cell_2", "not-identifiable");
   const Study study = fake.read();
-  EXPECT_EQ(reason_of(study, "control/cell_1"), "not usable, as explains-little says (stats.with_bad)");
+  EXPECT_EQ(reason_of(study, "control/cell_1"), "not usable, as misfit says (stats.with_bad)");
   EXPECT_EQ(study.cells.size(), 3u);
   EXPECT_EQ(fake.read({.with_bad = true}).cells.size(), 4u);
 }
