@@ -20,6 +20,11 @@ struct DipoleOptions {
 struct DipoleScene {
   tractions::TractionInputs inputs;  ///< beads, gel, both discs as adhesions
   double force_nN = 0, radius_um = 0, moment_nN_um = 0;
+  /// Of the traction on disc 0 or 1: towards the other.
+  Vec2 direction(std::size_t disc) const {
+    const Vec2 d = inputs.adhesions[1 - disc].position_um - inputs.adhesions[disc].position_um;
+    return 1 / norm(d) * d;
+  }
   double traction_kPa() const { return force_nN / (std::numbers::pi * radius_um * radius_um); }
 };
 
@@ -60,11 +65,12 @@ inline DipoleScene dipole_scene(const DipoleOptions& o, unsigned seed) {
   const double angle = 0.7 * seed;
   const Vec2 e{std::cos(angle), std::sin(angle)}, middle{0.5 * o.field_um, 0.5 * o.field_um};
   const Vec2 arm = 0.5 * o.distance_um * e;
-  return {.inputs = scattered({disc_adhesion(1, middle + arm, o.radius_um), disc_adhesion(2, middle - arm, o.radius_um)},
-                              {-o.force_nN * e, o.force_nN * e}, o, seed),
-          .force_nN = o.force_nN,
-          .radius_um = o.radius_um,
-          .moment_nN_um = o.force_nN * o.distance_um};
+  return {
+      .inputs = scattered({disc_adhesion(1, middle + arm, o.radius_um), disc_adhesion(2, middle - arm, o.radius_um)},
+                          {-o.force_nN * e, o.force_nN * e}, o, seed),
+      .force_nN = o.force_nN,
+      .radius_um = o.radius_um,
+      .moment_nN_um = o.force_nN * o.distance_um};
 }
 
 /// Deviation of the traction's magnitude on the discs and of that beside them, both over the true one (Sabass et al.,
