@@ -137,8 +137,8 @@ LatticeProblem::LatticeProblem(const DisplacementField& beads, const Gel& gel, c
   field_ = field_of(beads, options);
   box_ = box_of(field_, options.padding);
   transform_ = std::make_unique<WaveTransform>(box_.n_columns, box_.n_rows);
-  spectrum_ = std::make_unique<SurfaceSpectrum>(
-      gel, options.model, box_, options.padding > 1 ? Surroundings::open : Surroundings::periodic, options.basis);
+  spectrum_ = std::make_unique<SurfaceSpectrum>(gel, options.model, box_,
+                                                options.padding > 1 ? Surroundings::open : Surroundings::periodic);
   const double longest_um = field_.spacing_um * std::max(field_.n_columns, field_.n_rows);
   longest_wave_um_per_kPa_ =
       greens::wave_compliance(gel, options.model, 2 * std::numbers::pi / longest_um).across_um_per_kPa;

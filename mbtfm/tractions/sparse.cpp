@@ -34,7 +34,7 @@ struct Choice {
   Report report;
 };
 
-/// Of tractions even in each cell. From where hardly a traction is left, down to the least generalised cross-validation
+/// From where hardly a traction is left, down to the least generalised cross-validation
 /// (12); then back to the largest weight that is as good within the criterion's standard error, sqrt(2 / n) of it, as
 /// is the custom with such penalties (Hastie, Tibshirani & Friedman, The Elements of Statistical Learning, 7.10). A
 /// vector that is not zero takes two degrees of freedom (Yuan & Lin, J. R. Stat. Soc. B 68 (2006) 49, eq. 6.5, from
@@ -178,7 +178,9 @@ struct Refit {
 /// neighbours apart. So tractions are fitted once more (Meinshausen, Comput. Stat. Data Anal. 52 (2007) 374), on these
 /// places and those within a bead distance: sums of Gaussians with a Tikhonov penalty by evidence (14). Their width, in
 /// bead distances, is the largest that is as good in (12) as the best within its standard error.
+/// Where each node has its bead, L1 alone does as well, and better without noise: its tractions stay.
 Refit refit(const LatticeProblem& problem, const NodeField& tractions, double bead_distance_um) {
+  constexpr double kFiner = 1.5;  // bead distances over the spacing: scattered beads have 2, those on a lattice 1
   constexpr double kDeviations[] = {0, 0.5, 0.7, 1, 1.4, 2, 2.8};
   constexpr double kHopeless = 1.1;  // of the least criterion: wider ones are worse still
   constexpr RecurrenceOptions kRecurrences{.steps = 64, .probes = 4, .seed = 1};
@@ -186,7 +188,11 @@ Refit refit(const LatticeProblem& problem, const NodeField& tractions, double be
   const Lattice& box = problem.box();
   const double distance = bead_distance_um / box.spacing_um;
   const std::vector<Index> nodes = grown_support(box, tractions, std::max(1.0, std::round(distance)));
-  Refit best{.tractions = {}, .n_nodes = nodes.size(), .deviation_um = 0};
+  Refit best{.tractions = tractions, .n_nodes = nodes.size(), .deviation_um = 0};
+  if (distance < kFiner) {
+    best.n_nodes = static_cast<std::size_t>((tractions.x != 0 || tractions.y != 0).count());
+    return best;
+  }
   double least = std::numeric_limits<double>::infinity();
   for (const double deviation : kDeviations) {
     const Eigen::SparseMatrix<double> smooth = smoothing(box, nodes, deviation * distance);

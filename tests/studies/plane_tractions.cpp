@@ -1,6 +1,6 @@
-/// plane_tractions [first seed] [last seed] [threads]: maps of two discs that pull at each other (tests/support/
-/// dipole_scene.h), by method and footprint: peak, moment and total force over the true ones, Sabass' score over that of
-/// the best lambda, processor seconds; means over the seeds.
+/// plane_tractions [first seed] [last seed] [threads] [method] [risk | evidence]: maps of two discs that pull at each
+/// other (tests/support/ dipole_scene.h), by method and footprint: peak, moment and total force over the true ones,
+/// Sabass' score over that of the best lambda, processor seconds; means over the seeds.
 #include <cstdio>
 #include <ctime>
 #include <string>
@@ -13,7 +13,7 @@ using namespace mbtfm;
 using namespace mbtfm::tractions;
 
 struct Row {
-  double peak = 0, moment = 0, moment_near = 0, moment_adhesions = 0, total = 0, score = 0, best = 0, seconds = 0, coverage = 0;
+  double peak = 0, moment = 0, moment_near = 0, moment_adhesions = 0, total = 0, score = 0, best = 0, seconds = 0;
 };
 
 Polygon square_outline(double side_um, double margin_um) {
@@ -21,15 +21,14 @@ Polygon square_outline(double side_um, double margin_um) {
   return {{a, a}, {b, a}, {b, b}, {a, b}};
 }
 
-Row measure(const test::DipoleOptions& o, TractionMethod method, unsigned seed, int threads) {
+Row measure(const test::DipoleOptions& o, TractionMethod method, LambdaCriterion lambda_by, unsigned seed,
+            int threads) {
   const test::DipoleScene scene = test::dipole_scene(o, seed);
   TractionParameters parameters;
   parameters.method = method;
   parameters.gel_model = GelModel::half_space;
   parameters.element_um = 2;
-  if (std::getenv("PAD")) parameters.padding = std::stod(std::getenv("PAD"));
-  if (std::getenv("SPACING")) parameters.spacing_um = std::stod(std::getenv("SPACING"));
-  if (std::getenv("BY")) parameters.lambda_by = std::string(std::getenv("BY"))=="gcv"?LambdaCriterion::gcv:LambdaCriterion::evidence;
+  parameters.lambda_by = lambda_by;
   TractionInputs inputs = scene.inputs;
   if (method != TractionMethod::adhesion_forces) inputs.adhesions.clear();
   TractionInputs near = inputs;
@@ -50,13 +49,10 @@ Row measure(const test::DipoleOptions& o, TractionMethod method, unsigned seed, 
   row.total = all.total_force_nN / (2 * scene.force_nN);
   row.best = row.score;
   if (method == TractionMethod::fttc) {
-    for (double factor = 1.0 / 8; factor < 9 && std::getenv("BEST"); factor *= 1.3) {
+    for (double factor = 1.0 / 8; factor < 9; factor *= 1.3) {
       parameters.lambda_um_per_kPa = factor * *r.lambda;
       const Reconstruction other = reconstruct(inputs, parameters, threads);
-      const test::SabassScore sc = test::sabass_score(scene, other.patches);
-      const double value = sc.total();
-      if (std::getenv("SHOW")) std::printf("   x%.2f on %.3f beside %.3f peak %.2f total %.3f moment %.3f near %.3f\n", factor, sc.on_discs, sc.beside, sc.peak, value, sums_of(other, inputs, 1.5).contractile_moment_nN_um() / scene.moment_nN_um, sums_of(other, near, 0).contractile_moment_nN_um() / scene.moment_nN_um);
-      row.best = std::min(row.best, value);
+      row.best = std::min(row.best, test::sabass_score(scene, other.patches).total());
     }
   }
   return row;
@@ -68,11 +64,9 @@ int main(int argc, char** argv) {
   const unsigned first = argc > 1 ? std::stoi(argv[1]) : 1, last = argc > 2 ? std::stoi(argv[2]) : 3;
   const int threads = argc > 3 ? std::stoi(argv[3]) : 1;
   const std::string only = argc > 4 ? argv[4] : "";
+  const LambdaCriterion lambda_by =
+      argc > 5 && argv[5] == std::string("evidence") ? LambdaCriterion::evidence : LambdaCriterion::risk;
   test::DipoleOptions options;
-  if (argc > 5) options.field_um = std::stod(argv[5]);
-  if (argc > 6) options.distance_um = std::stod(argv[6]);
-  if (argc > 7) options.beads_per_um2 = std::stod(argv[7]);
-  if (argc > 8) options.noise_um = std::stod(argv[8]);
   std::printf("method radius_um peak moment moment_near moment_adhesions total score over_best seconds\n");
   for (const TractionMethod method :
        {TractionMethod::fttc, TractionMethod::sparse, TractionMethod::bem, TractionMethod::adhesion_forces}) {
@@ -82,7 +76,7 @@ int main(int argc, char** argv) {
       Row mean;
       const double n = last - first + 1;
       for (unsigned seed = first; seed <= last; ++seed) {
-        const Row row = measure(options, method, seed, threads);
+        const Row row = measure(options, method, lambda_by, seed, threads);
         mean.peak += row.peak / n;
         mean.moment += row.moment / n;
         mean.moment_near += row.moment_near / n;
@@ -92,8 +86,9 @@ int main(int argc, char** argv) {
         mean.best += row.score / row.best / n;
         mean.seconds += row.seconds / n;
       }
-      std::printf("%-15s %4.2f  %5.2f  %5.3f %5.3f %5.3f  %5.2f  %5.3f %5.2f  %5.1f\n", std::string(name_of(method)).c_str(),
-                  radius_um, mean.peak, mean.moment, mean.moment_near, mean.moment_adhesions, mean.total, mean.score, mean.best, mean.seconds);
+      std::printf("%-15s %4.2f  %5.2f  %5.3f %5.3f %5.3f  %5.2f  %5.3f %5.2f  %5.1f\n",
+                  std::string(name_of(method)).c_str(), radius_um, mean.peak, mean.moment, mean.moment_near,
+                  mean.moment_adhesions, mean.total, mean.score, mean.best, mean.seconds);
       std::fflush(stdout);
     }
   }
