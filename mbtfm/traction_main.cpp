@@ -50,7 +50,8 @@ bool is_in_space(stage::StageContext& context) {
 StageReport run(const spatial::StageParameters& p, stage::StageContext& context) {
   if (is_in_space(context)) return spatial::run_in_space(p, context);
   context.progress(0, "reading");
-  TractionInputs inputs{.beads = {}, .gel = p.gel, .adhesions = {}, .outline_um = {}};
+  TractionInputs inputs{
+      .beads = {}, .gel = p.gel, .adhesions = {}, .outline_um = {}, .point_errors = PointErrors::stated};
   inputs.beads = files::read_displacement(context.input("displacement"));
   const std::size_t n_flagged = leave_out(context, inputs.beads);
   if (context.has_input("adhesions")) inputs.adhesions = files::read_adhesions(context.input("adhesions"));
@@ -64,7 +65,7 @@ StageReport run(const spatial::StageParameters& p, stage::StageContext& context)
   const TractionSums sums = sums_of(r, inputs, p.traction.grow_um);
   expect_plausible(context, inputs, r, sums);
 
-  write_tractions(context.output("out"), r.patches);
+  write_tractions(context.output("out"), r.patches, r.sigmas_kPa);
   write_tractions_vtp(context.output_beside("out", ".vtp"), r.patches);
   files::write_figures(context.output_beside("out", ".json"), summary_of(r, sums));
   if (r.scan) {
@@ -81,8 +82,10 @@ StageReport run(const spatial::StageParameters& p, stage::StageContext& context)
 
   StageReport report;
   report.summary = name_of(p.traction.method.value_or(TractionMethod::fttc)) + std::string(": total force ") +
-                   brief(sums.total_force_nN) + " nN, strain energy " + brief(sums.strain_energy_fJ) + " fJ over " +
-                   sums.where + ", relative L2 " + brief(r.relative_l2);
+                   brief(sums.total_force_nN) +
+                   (sums.total_force_sigma_nN ? " ± " + brief(*sums.total_force_sigma_nN) : "") +
+                   " nN, strain energy " + brief(sums.strain_energy_fJ) + " fJ over " + sums.where + ", relative L2 " +
+                   brief(r.relative_l2);
   if (r.length_um) report.summary += ", lambda E " + brief(*r.length_um) + " um";
   if (assumed_um) {
     report.summary += "; the field states no errors: " + brief(*assumed_um) +

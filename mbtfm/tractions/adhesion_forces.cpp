@@ -159,7 +159,12 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
                          .traction_kPa = 1 / adhesion.area_um2 * forces_nN[a],
                          .displacement_um = mean_displacement_um(*gel, ellipses[a], ellipses, forces_nN)});
   }
+  for (std::size_t a = 0; a < ellipses.size(); ++a) {
+    const Eigen::Vector2d sigma = covariance.diagonal().segment<2>(2 * static_cast<Index>(a)).cwiseSqrt();
+    r.sigmas_kPa.push_back(1 / inputs.adhesions[a].area_um2 * Vec2{sigma.x(), sigma.y()});
+  }
   const double size = beads.displacement.norm();
+  if (size > 0) r.magnitudes = expected_magnitudes(forces_nN, covariance);
   r.relative_l2 = size > 0 ? residual.norm() / size : 0;
   if (size == 0) r.remark = "no bead has moved: there is no force";
   r.figures = {{beads.states_errors ? "chi_squared_per_degree" : "residual_variance_um2", chi_squared}};

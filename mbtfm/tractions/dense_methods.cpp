@@ -32,6 +32,7 @@ struct Loads {
   VectorXd values;
   MatrixXd covariance;  ///< by the noise
   MatrixXd response;    ///< to a force of one on each adhesion
+  VectorXd sigma{};     ///< by load: noise, and what the penalty takes of loads as large as evidence has them
   Vec2 at(std::size_t load) const {
     return {values[2 * static_cast<Index>(load)], values[2 * static_cast<Index>(load) + 1]};
   }
@@ -69,7 +70,18 @@ Loads regularised(const TractionInputs& inputs, const TractionParameters& parame
   r.length_um = *r.lambda * length_um;
   const VectorXd loads = problem.spectrum().solve(*r.lambda);
   r.relative_l2 = problem.spectrum().relative_l2(*r.lambda);
-  return {loads, problem.spectrum().covariance(*r.lambda, r.scan->variance), problem.response_to_truth(*r.lambda)};
+  const double prior_variance = r.scan->variance / std::pow(r.scan->by_evidence, 2);
+  return {loads, problem.spectrum().covariance(*r.lambda, r.scan->variance), problem.response_to_truth(*r.lambda),
+          problem.spectrum().error_variances(*r.lambda, r.scan->variance, prior_variance).cwiseSqrt()};
+}
+
+/// By patch, of loads whose traction is `kPa_per_load` each.
+void add_point_errors(const Loads& loads, const std::vector<double>& kPa_per_load, Reconstruction& r) {
+  if (loads.sigma.size() == 0) return;
+  for (std::size_t i = 0; i < kPa_per_load.size(); ++i) {
+    const auto at = 2 * static_cast<Index>(i);
+    r.sigmas_kPa.push_back(kPa_per_load[i] * Vec2{loads.sigma[at], loads.sigma[at + 1]});
+  }
 }
 
 /// Standard errors of the forces' magnitudes, which are `sums` (rows 2a, 2a+1 for adhesion a) of the loads: by the
@@ -143,6 +155,9 @@ Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const Trac
     r.patches.push_back({adhesion.position_um, adhesion.area_um2, 1 / adhesion.area_um2 * forces[a], u.front()});
   }
   state_errors(loads, MatrixXd::Identity(loads.values.size(), loads.values.size()), r.forces);
+  std::vector<double> per_area;
+  for (const Adhesion& a : inputs.adhesions) per_area.push_back(1 / a.area_um2);
+  add_point_errors(loads, per_area, r);
   return r;
 }
 
@@ -182,6 +197,7 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
     if (owner[i] >= 0) sums.block<2, 2>(2 * owner[i], 2 * static_cast<Index>(i)) = area * Eigen::Matrix2d::Identity();
   }
   state_errors(loads, sums, r.forces);
+  add_point_errors(loads, std::vector<double>(centres.size(), 1), r);
   r.figures = {{"n_elements", std::int64_t(centres.size())}};
   return r;
 }

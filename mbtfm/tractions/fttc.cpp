@@ -104,6 +104,8 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   double misfit = 0;
   for (const double d : problem.residuals(displacements)) misfit += d * d;
   r.relative_l2 = std::sqrt(misfit / problem.data_squared());
+  if (inputs.point_errors == PointErrors::stated)
+    r.sigmas_kPa = drawn_errors_kPa(problem, *r.scan, *r.lambda, parameters, threads);
   r.forces = forces_beside(problem, *r.scan, r.patches, inputs, parameters, threads);
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"lattice_columns", std::int64_t(problem.field().n_columns)},
@@ -111,8 +113,7 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   return r;
 }
 
-std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& waves, ReadOut read_out,
-                                double gaussian_um) {
+WaveField smoothed(const LatticeProblem& problem, WaveField waves, ReadOut read_out, double gaussian_um) {
   const Lattice& box = problem.box();
   const auto factors = [&](int n_waves, int n_nodes) {  // along one axis: both smoothings are products over the two
     Eigen::ArrayXd f(n_waves);
@@ -126,13 +127,18 @@ std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& 
   };
   const int n_half = problem.transform().n_half();
   const Eigen::ArrayXd by_column = factors(n_half, box.n_columns), by_row = factors(box.n_rows, box.n_rows);
-  WaveField read = waves;
   for (int j = 0; j < box.n_rows; ++j) {
     const Eigen::Index row = static_cast<Eigen::Index>(n_half) * j;
-    read.x.segment(row, n_half) *= by_row[j] * by_column;
-    read.y.segment(row, n_half) *= by_row[j] * by_column;
+    waves.x.segment(row, n_half) *= by_row[j] * by_column;
+    waves.y.segment(row, n_half) *= by_row[j] * by_column;
   }
-  return on_field(problem, problem.transform().backward(std::move(read), problem.threads()));
+  return waves;
+}
+
+std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& waves, ReadOut read_out,
+                                double gaussian_um) {
+  return on_field(problem,
+                  problem.transform().backward(smoothed(problem, waves, read_out, gaussian_um), problem.threads()));
 }
 
 }  // namespace mbtfm::tractions

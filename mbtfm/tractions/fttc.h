@@ -44,9 +44,16 @@ std::vector<AdhesionForce> forces_beside(const LatticeProblem& problem, const La
                                          const std::vector<GroundPatch>& patches, const TractionInputs& inputs,
                                          const TractionParameters& parameters, int threads);
 
+/// Standard errors of the map along x and y, by node of the field: noise and what the penalty takes, from tractions
+/// drawn as large as those of evidence are around each node, that the same equation finds again from their noisy
+/// displacements. docs/theory/reconstructions.md (19). Each is known to some 6 %.
+std::vector<Vec2> drawn_errors_kPa(const LatticeProblem& problem, const LambdaScan& scan, double lambda,
+                                   const TractionParameters& parameters, int threads);
+
 /// Where all displacements are zero: no tractions, and a remark that says so.
 Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const TractionInputs& inputs);
 
+WaveField smoothed(const LatticeProblem& problem, WaveField waves, ReadOut read_out, double gaussian_um);
 /// Waves of traction to vectors at the nodes of the field, rows first. @param gaussian_um  smooths them; 0: not
 std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& waves, ReadOut read_out,
                                 double gaussian_um);

@@ -148,6 +148,12 @@ MatrixXd Spectrum::posterior(double lambda, double variance) const {
   return outer(variance / (values_ + lambda * lambda));
 }
 
+VectorXd Spectrum::error_variances(double lambda, double variance, double prior_variance) const {
+  const ArrayXd stiffness = (values_ + lambda * lambda).square();
+  return vectors_->array().square().matrix() *
+         ((variance * values_ + prior_variance * std::pow(lambda, 4)) / stiffness).matrix();
+}
+
 VectorXd Spectrum::resolved(double lambda) const {
   return vectors_->array().square().matrix() * (values_ / (values_ + lambda * lambda)).matrix();
 }

@@ -39,6 +39,8 @@ class Spectrum {
   Eigen::MatrixXd covariance(double lambda, double variance) const;
   /// Of s itself, where nothing but its size was known before: noise and what the penalty takes away.
   Eigen::MatrixXd posterior(double lambda, double variance) const;
+  /// By unknown: variance of what solve(lambda) errs by. @param prior_variance  of each unknown before the data
+  Eigen::VectorXd error_variances(double lambda, double variance, double prior_variance) const;
   /// By unknown: how much of a change of it solve(lambda) shows, 0 … 1.
   Eigen::VectorXd resolved(double lambda) const;
   double explained(double lambda) const;  ///< uᵀ H u, H the matrix that takes u to A s

@@ -184,6 +184,12 @@ TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs&
     sums.strain_energy_fJ += 0.5 * dot(force, patches[i].displacement_um);
   }
   if (sums.total_force_nN > 0) centre = 1 / sums.total_force_nN * centre;
+  if (reconstruction.magnitudes) {
+    VectorXd near = VectorXd::Zero(std::ssize(patches));
+    for (std::size_t i = 0; i < patches.size(); ++i) near[static_cast<Index>(i)] = is_near[i] ? 1 : 0;
+    sums.total_force_nN = near.dot(reconstruction.magnitudes->expected_nN);
+    sums.total_force_sigma_nN = std::sqrt(std::max(0.0, near.dot(reconstruction.magnitudes->covariance_nN2 * near)));
+  }
   double inward = 0, weight = 0;
   for (std::size_t i = 0; i < patches.size(); ++i) {
     if (!is_near[i]) continue;
@@ -204,17 +210,26 @@ namespace {
 
 using files::kResult;
 
-files::Table<GroundPatch> patch_table() {
+struct PatchRow {
+  GroundPatch patch;
+  std::optional<Vec2> sigma_kPa;
+};
+files::Table<PatchRow> patch_table() {
+  using Row = PatchRow;
   return {
       .file = "traction.csv",
       .row = "each point or patch of `mbtfm-traction`",
-      .columns = {{"x_um", "the point", files::x_of(&GroundPatch::position_um)},
-                  {"y_um", "the point", files::y_of(&GroundPatch::position_um)},
-                  {"tx_kPa", "traction of the cell on the gel", files::x_of(&GroundPatch::traction_kPa)},
-                  {"ty_kPa", "traction of the cell on the gel", files::y_of(&GroundPatch::traction_kPa)},
-                  {"area_um2", "of the patch around the point", &GroundPatch::area_um2},
-                  {"ux_um", "the model's displacement there", files::x_of(&GroundPatch::displacement_um), kResult},
-                  {"uy_um", "the model's displacement there", files::y_of(&GroundPatch::displacement_um), kResult}}};
+      .columns = {
+          {"x_um", "the point", files::x_of(&Row::patch, &GroundPatch::position_um)},
+          {"y_um", "the point", files::y_of(&Row::patch, &GroundPatch::position_um)},
+          {"tx_kPa", "traction of the cell on the gel", files::x_of(&Row::patch, &GroundPatch::traction_kPa)},
+          {"ty_kPa", "traction of the cell on the gel", files::y_of(&Row::patch, &GroundPatch::traction_kPa)},
+          {"area_um2", "of the patch around the point", files::member(&Row::patch, &GroundPatch::area_um2)},
+          {"ux_um", "the model's displacement there", files::x_of(&Row::patch, &GroundPatch::displacement_um), kResult},
+          {"uy_um", "the model's displacement there", files::y_of(&Row::patch, &GroundPatch::displacement_um), kResult},
+          {"sigma_x_kPa", "standard error of `tx_kPa`: noise and smoothing (not of `sparse`)",
+           files::member(&Row::sigma_kPa, &Vec2::x), kResult},
+          {"sigma_y_kPa", "standard error of `ty_kPa`", files::member(&Row::sigma_kPa, &Vec2::y), kResult}}};
 }
 
 struct LambdaRow {
@@ -243,7 +258,14 @@ files::Table<LambdaRow> lambda_table() {
 
 std::string pages_of_tables() { return page_of(patch_table()) + page_of(lambda_table()); }
 
-void write_tractions(const Path& file, const std::vector<GroundPatch>& patches) { write(file, patch_table(), patches); }
+void write_tractions(const Path& file, const std::vector<GroundPatch>& patches, const std::vector<Vec2>& sigmas_kPa) {
+  std::vector<PatchRow> rows;
+  for (const GroundPatch& patch : patches) rows.push_back({.patch = patch, .sigma_kPa = {}});
+  for (std::size_t i = 0; i < sigmas_kPa.size(); ++i) rows[i].sigma_kPa = sigmas_kPa[i];
+  files::Table<PatchRow> table = patch_table();
+  if (sigmas_kPa.empty()) table.columns = table.columns.without({"sigma_x_kPa", "sigma_y_kPa"});
+  write(file, table, rows);
+}
 
 void write_tractions_vtp(const Path& file, const std::vector<GroundPatch>& patches) {
   files::write_points_vtp(file, positions_of(patches),
@@ -283,6 +305,7 @@ Figures summary_of(const Reconstruction& r, const TractionSums& sums) {
                      {"moment_yy_nN_um", sums.moment_nN_um[1][1]},
                      {"summed_over", sums.where},
                      {"relative_l2", r.relative_l2}};
+  if (sums.total_force_sigma_nN) figures.emplace_back("total_force_sigma_nN", *sums.total_force_sigma_nN);
   if (r.lambda) figures.emplace_back("lambda_" + std::string(name_of(r.lambda_unit)), *r.lambda);
   if (r.length_um) figures.emplace_back("lambda_length_um", *r.length_um);
   if (r.scan && r.lambda && r.length_um) {

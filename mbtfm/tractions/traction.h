@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "mbtfm/tractions/magnitudes.h"
 #include "mbtfm/tractions/parameters.h"
 #include "mbtfm/tractions/regularisation.h"
 #include "pipeline/contract/beads.h"
@@ -18,11 +19,15 @@
 
 namespace mbtfm::tractions {
 
+/// Whether fttc draws standard errors of its map, which takes as long as the map.
+enum class PointErrors { skipped, stated };
+
 struct TractionInputs {
   DisplacementField beads;  ///< without the flagged ones
   Gel gel;
   std::vector<Adhesion> adhesions;  ///< may be empty
   Polygon outline_um;               ///< may be empty
+  PointErrors point_errors = PointErrors::skipped;
 };
 
 std::vector<Vec2> positions_of(const std::vector<GroundPatch>& patches);
@@ -42,6 +47,8 @@ struct Reconstruction {
   std::vector<GroundPatch> patches;
   std::vector<AdhesionForce> forces;       ///< by adhesion, where there are any
   std::vector<Sensitivity> sensitivities;  ///< by adhesion, adhesion-forces only
+  std::vector<Vec2> sigmas_kPa;            ///< by patch, standard errors along x and y; empty: not known
+  std::optional<Magnitudes> magnitudes;    ///< of the patches' forces, adhesion-forces only
   std::optional<LambdaScan> scan;
   std::optional<double> lambda;  ///< in the method's own unit
   LambdaUnit lambda_unit = LambdaUnit::um_per_kPa;
@@ -80,7 +87,8 @@ Vec2 direction_of(Vec2 force_nN);
 
 /// Sums over the patches near the cell.
 struct TractionSums {
-  double total_force_nN = 0;  ///< sum of magnitudes
+  double total_force_nN = 0;  ///< sum of magnitudes, or of expected ones where these are known
+  std::optional<double> total_force_sigma_nN;
   Vec2 net_force_nN;
   double strain_energy_fJ = 0;     ///< half the sum of t · u A
   double moment_nN_um[2][2] = {};  ///< sum of (x − centre)_i F_j
@@ -100,7 +108,9 @@ std::vector<int> adhesion_of_patches(const std::vector<Vec2>& positions_um, cons
 // files beside traction.csv
 /// Their part of docs/columns.md.
 std::string pages_of_tables();
-void write_tractions(const Path& file, const std::vector<GroundPatch>& patches);
+/// @param sigmas_kPa  by patch, or empty: without their columns
+void write_tractions(const Path& file, const std::vector<GroundPatch>& patches,
+                     const std::vector<Vec2>& sigmas_kPa = {});
 void write_tractions_vtp(const Path& file, const std::vector<GroundPatch>& patches);
 void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_um_per_lambda);
 /// The criteria over lambda in both its units, an SVG. @param chosen_by  for people; the reconstruction has a scan

@@ -38,6 +38,8 @@ TEST_F(TractionProgram, writes_what_it_says_for_every_method) {
     const files::CsvTable map(folder / "traction.csv");
     map.require({"x_um", "y_um", "tx_kPa", "ty_kPa"});
     EXPECT_GT(map.n_rows(), 0);
+    EXPECT_EQ(map.has("sigma_x_kPa"), method != "sparse");
+    EXPECT_EQ(map.has("sigma_y_kPa"), method != "sparse");
     EXPECT_EQ(files::read_adhesion_forces(folder / "traction_adhesion_forces.csv").size(), 8u);
     const bool has_scan = method != "sparse" && method != "adhesion-forces";
     for (const auto& [ending, is_there] :
