@@ -119,7 +119,7 @@ std::string left_out(const Segmentation& s) {
   return text + " outside the cell " + (s.left_out_um.size() == 1 ? "was" : "were") + " left out.";
 }
 
-StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
+StageReport report_of(const Segmentation& s, bool is_assumed_by_itself, bool has_actin) {
   StageReport report;
   const auto n_of = [&](FibreType type) {
     std::int64_t n = 0;
@@ -186,9 +186,10 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                                   (s.is_aligned ? " They were moved there." : " They were left where they are.")
                             : std::string(),
                 s.is_aligned ? Severity::note : Severity::caution),
-        noticed(FindingKind::adhesions_off_actin, s.adhesions_off_actin.value_or(0),
-                brief(100 * s.adhesions_off_actin.value_or(0)) +
-                    " % of the adhesions, by area, lie where the actin image shows no cell."),
+        noticed(FindingKind::adhesions_off_actin, s.adhesions_beyond.value_or(0),
+                brief(100 * s.adhesions_beyond.value_or(0)) +
+                    " % of the adhesions, by area, lie outside of all cells that the " +
+                    (has_actin ? "actin" : "adhesion") + " image shows."),
         noticed(FindingKind::outline_off_actin, s.outline_off_actin.value_or(0),
                 "In " + brief(100 * s.outline_off_actin.value_or(0)) +
                     " % of the outline that was given, the actin image shows no cell."),
@@ -344,8 +345,9 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
   if (!parameters.contact_sheet.empty())
     images::write_png(context.output("out", "contact_sheet.png"),
                       draw_contact_sheet(adhesion, actin, parameters, drawn));
-  StageReport report =
-      parameters.cell == 0 ? report_of(cells) : report_of(cells.front(), !parameters.candidates.adhesions);
+  StageReport report = parameters.cell == 0
+                           ? report_of(cells)
+                           : report_of(cells.front(), !parameters.candidates.adhesions, actin.has_value());
   add_drawn_by_hand(report, drawn);
   return report;
 }

@@ -7,6 +7,7 @@
 #include "segment/cells/cell_mask.h"
 #include "segment/cells/ellipse.h"
 #include "segment/cells/grid.h"
+#include "segment/cells/padding.h"
 
 namespace mbtfm::cells {
 namespace {
@@ -105,39 +106,9 @@ std::vector<std::vector<cv::Point2d>> rings_of(const cv::Mat& mask) {
   return rings;
 }
 
-/// With the nearest line in place of the strips of one value that registration leaves along the image's sides: their
-/// edge is none of a cell. A ground of that value, as where dark pixels were set to 0, is left as it is.
-cv::Mat without_padding(const cv::Mat& image) {
-  cv::Rect inner({0, 0}, image.size());
-  const auto share_of = [&](float value, const cv::Rect& line) {
-    return static_cast<double>(cv::countNonZero(image(line) == value)) / line.area();
-  };
-  for (const bool is_row : {true, false}) {
-    for (const bool is_first : {true, false}) {
-      const auto line = [&](int k) {  // the k-th from this side
-        const int n = is_row ? inner.height : inner.width, at = is_first ? k : n - 1 - k;
-        return is_row ? cv::Rect(inner.x, inner.y + at, inner.width, 1)
-                      : cv::Rect(inner.x + at, inner.y, 1, inner.height);
-      };
-      const float value = image.at<float>(line(0).tl());
-      const int most = (is_row ? inner.height : inner.width) / 2;
-      int n = 0;
-      while (n < most && share_of(value, line(n)) == 1) ++n;
-      constexpr double kFew = 0.5;
-      if (n == 0 || n == most || share_of(value, line(n)) > kFew) continue;
-      (is_row ? inner.height : inner.width) -= n;
-      if (is_first) (is_row ? inner.y : inner.x) += n;
-    }
-  }
-  cv::Mat filled;
-  cv::copyMakeBorder(image(inner), filled, inner.y, image.rows - inner.br().y, inner.x, image.cols - inner.br().x,
-                     cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
-  return filled;
-}
-
 Scene scene_of(const cv::Mat& image, double pixel_size_um) {
-  const cv::Mat full = without_padding(image);
-  Scene s{full, {}, pixel_size_um, pixel_size_um, 0, 0};
+  const cv::Mat padding = padding_in(image), full = without_padding(image, padding);
+  Scene s{full, {}, pixel_size_um, pixel_size_um, 0, 0, {}};
   // the rings' last move is made in the full image, so that three pixels a micrometre do here
   const int factor = std::max(1, static_cast<int>(kGrid_um / pixel_size_um));
   s.pixel_um = pixel_size_um * factor;
@@ -146,7 +117,16 @@ Scene scene_of(const cv::Mat& image, double pixel_size_um) {
   const double sigma_px = std::max(0.5, kSmoothing_um / s.pixel_um);
   s.smooth = gaussian(small, sigma_px);
   s.noise = overall_noise(small) * noise_gain(sigma_px);
+  if (padding.empty()) return s;
+  cv::Mat mask;
+  padding.convertTo(mask, CV_32F);
+  cv::distanceTransform(shrink(mask, factor) == 0, s.recorded_px, cv::DIST_L2, cv::DIST_MASK_PRECISE);
   return s;
+}
+
+/// As near to the image's padding as a ring comes that its edge has made.
+bool is_at_padding(const Scene& s, Vec2 p) {
+  return !s.recorded_px.empty() && sample(s.recorded_px, to_pixels(p, s.pixel_um)) * s.pixel_um <= s.border_um();
 }
 
 /// Points at the image's border and at adhesions stay: there the ring is not an edge of this channel. So do those in
@@ -158,7 +138,7 @@ std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Ad
     const double border = std::min({p.x, p.y, s.field_um().x - p.x, s.field_um().y - p.y});
     const int x = std::clamp(static_cast<int>(p.x / s.pixel_um), 0, soft.cols - 1);
     const int y = std::clamp(static_cast<int>(p.y / s.pixel_um), 0, soft.rows - 1);
-    result.push_back(border > s.border_um() && !soft.at<uchar>(y, x) &&
+    result.push_back(border > s.border_um() && !is_at_padding(s, p) && !soft.at<uchar>(y, x) &&
                      std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
                        return norm(a.position_um - p) < a.major_axis_um / 2 + 1 && distance_to_ellipse_um(a, p) < 0.3;
                      }));
@@ -200,6 +180,9 @@ CellOutline outline_of(const Scene& s, const cv::Mat& part, const cv::Mat& holes
       CutRing cut = cut_by_border(polygon, s.field_um(), s.border_um());
       cell.outer_um = std::move(cut.points_um);
       cell.is_cut = std::move(cut.is_cut);
+      const std::size_t n = cell.outer_um.size();
+      for (std::size_t i = 0; i < n; ++i)
+        if (is_at_padding(s, cell.outer_um[i]) && is_at_padding(s, cell.outer_um[(i + 1) % n])) cell.is_cut[i] = true;
       cell.area_um2 = std::abs(signed_area_um2(cell.outer_um));
     } else if (is_inside(polygon, cell.outer_um) && std::abs(signed_area_um2(polygon)) > 0) {
       cell.holes_um.push_back(polygon);
@@ -259,8 +242,12 @@ CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>&
                         const OutlineParameters& p) {
   const Scene s = scene_of(matrix_of(image), pixel_size_um);
   const double smallest = s.px_of(p.outline_smallest_um2);
-  const cv::Mat bright = first_mask(s.smooth, s.noise);
+  cv::Mat bright = first_mask(s.smooth, s.noise);
   auto [mask, soft] = cells_in(s, bright, smallest);
+  if (!mask.empty() && !s.recorded_px.empty()) {
+    mask &= s.recorded_px > 0;
+    bright &= s.recorded_px > 0;
+  }
   if (mask.empty() || cv::countNonZero(mask) == 0) return {};
   const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
   CellsInImage found;
@@ -358,17 +345,25 @@ double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& oth
   return n == 0 ? 0 : static_cast<double>(n_beyond) / n;
 }
 
-std::optional<double> share_off_actin(const CellsInImage& seen, const std::vector<Adhesion>& adhesions) {
+std::optional<double> share_beyond_cells(const CellsInImage& seen, const std::vector<Adhesion>& adhesions) {
   constexpr double kBeyond_um = 1;  // channels are shifted by less
-  constexpr double kOwn_um = 8;     // what is farther is another cell's, which may show no actin
+  constexpr double kStep_um = 8;    // what is farther from the cell and all of its adhesions is another cell's
   if (seen.cells.empty()) return std::nullopt;
-  double near_um2 = 0, beyond_um2 = 0;
-  for (std::size_t i = 0; i < adhesions.size(); ++i) {
-    if (seen.beyond_um[i] > kOwn_um) continue;
-    near_um2 += adhesions[i].area_um2;
+  std::vector<std::size_t> own, others;
+  for (std::size_t i = 0; i < adhesions.size(); ++i) (seen.beyond_um[i] <= kStep_um ? own : others).push_back(i);
+  for (std::size_t k = 0; k < own.size(); ++k) {  // `own` grows
+    const Vec2 at = adhesions[own[k]].position_um;
+    const auto joined = std::ranges::stable_partition(
+        others, [&](std::size_t i) { return norm(adhesions[i].position_um - at) > kStep_um; });
+    own.insert(own.end(), joined.begin(), joined.end());
+    others.erase(joined.begin(), joined.end());
+  }
+  double own_um2 = 0, beyond_um2 = 0;
+  for (const std::size_t i : own) {
+    own_um2 += adhesions[i].area_um2;
     if (seen.beyond_um[i] > kBeyond_um) beyond_um2 += adhesions[i].area_um2;
   }
-  return near_um2 > 0 ? std::optional(beyond_um2 / near_um2) : std::nullopt;
+  return own_um2 > 0 ? std::optional(beyond_um2 / own_um2) : std::nullopt;
 }
 
 std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions) {

@@ -81,9 +81,10 @@ Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& ad
 /// Share of a cell's area that lies more than `far_um` beyond all of the others.
 double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& others, double far_um);
 
-/// Of what the adhesion image shows in or near the cells of the actin image, the share by area that lies beyond them.
-/// Nothing where the actin image shows no cell.
-std::optional<double> share_off_actin(const CellsInImage& seen, const std::vector<Adhesion>& adhesions);
+/// Of the adhesions in or near the cells that the image shows, and of those that follow them in steps of 8 um, the
+/// share by area that lies beyond the cells: of a cell that is dim on one side, or of another picture. Nothing where
+/// the image shows no cell.
+std::optional<double> share_beyond_cells(const CellsInImage& seen, const std::vector<Adhesion>& adhesions);
 
 /// The adhesions whose centre lies in the cell, with their ids renewed.
 std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions);
