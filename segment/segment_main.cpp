@@ -190,6 +190,8 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself, bool has
                 brief(100 * s.adhesions_beyond.value_or(0)) +
                     " % of the adhesions, by area, lie outside of all cells that the " +
                     (has_actin ? "actin" : "adhesion") + " image shows."),
+        noticed(FindingKind::outline_doubtful, s.reach_um,
+                "The outline reaches " + brief(s.reach_um) + " um beyond all adhesions."),
         noticed(FindingKind::outline_off_actin, s.outline_off_actin.value_or(0),
                 "In " + brief(100 * s.outline_off_actin.value_or(0)) +
                     " % of the outline that was given, the actin image shows no cell."),

@@ -64,6 +64,13 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "fifth of its light or less",
        "Look at 1_segment/overlay.png: is the outline right, and do both images show the same cell, the same way up? "
        "Draw the outline (images.outline_roi), or the adhesions if some are a neighbour's (images.adhesion_rois)."},
+      {outline_doubtful, "outline-doubtful", "segment", caution,
+       "distance that the outline reaches beyond the hull of its adhesions (um)", 8,
+       "eighteen simulated and fourteen real cells reach 1.8 to 5.1 um; the edge of a disc of light, of uneven light "
+       "or of "
+       "padding, taken for a cell's, 10 to 50",
+       "Look at 1_segment/overlay.png: is it the cell's edge? Else draw it (images.outline_roi), or crop the images to "
+       "where the light is even."},
       {outline_off_actin, "outline-off-actin", "segment", caution,
        "share of a given outline's area that lies more than 1 um beyond the cells of the actin image", 0.02,
        "the outlines of five simulated cells and of a real doublet have 0.000; those of another cell 0.005 to 0.16, "

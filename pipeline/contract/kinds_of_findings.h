@@ -20,6 +20,7 @@ enum class FindingKind : int {
   bright_actin,
   bleed_through,
   adhesions_off_actin,
+  outline_doubtful,
   outline_off_actin,
   cells_touch,
   adhesions_assumed,

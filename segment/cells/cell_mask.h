@@ -42,7 +42,8 @@ struct Parts {
 Parts parts_of(const cv::Mat& mask, double smallest);
 
 /// Otsu's threshold of log(1 + brightness): cells are bright by a factor, not by an amount.
-cv::Mat first_mask(const cv::Mat& image, double noise);
+/// @param within  a mask: the threshold of the pixels in it alone; empty: of all
+cv::Mat first_mask(const cv::Mat& image, double noise, const cv::Mat& within = {});
 
 /// All cells; holes filled. @param bright  everything that stands out
 Body cells_in(const Scene& scene, const cv::Mat& bright, double smallest);

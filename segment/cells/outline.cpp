@@ -223,32 +223,17 @@ std::optional<OutlineNeck> narrowest_neck(const std::vector<Neck>& necks, const 
   return narrowest;
 }
 
-}  // namespace
-
-void declare(stage::ParameterList& list, OutlineParameters& p) {
-  list.table("segment");
-  list.add("outline_reach_um", p.outline_reach_um, Range::zero_or_size_um(),
-           "an adhesion this far outside still belongs to the cell (um)");
-  list.add("outline_smallest_um2", p.outline_smallest_um2, Range::area_um2(), "least area of a cell (um²)");
-  list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2(), "greatest area of a cell (um²)");
-  list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2(),
-           "least area of a gap in a cell (um²)");
-  list.add("outline_neck", p.outline_neck, Range::between(0.0, 1.0),
-           "cells that touch are cut apart where the outline is narrower than this share of the width of the narrower "
-           "part; 0: never");
-}
-
-CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
-                        const OutlineParameters& p) {
-  const Scene s = scene_of(matrix_of(image), pixel_size_um);
+/// The cells in what stands out, and their mask.
+std::pair<CellsInImage, cv::Mat> cells_of(const Scene& s, cv::Mat bright, const std::vector<Adhesion>& adhesions,
+                                          const OutlineParameters& p) {
   const double smallest = s.px_of(p.outline_smallest_um2);
-  cv::Mat bright = first_mask(s.smooth, s.noise);
   auto [mask, soft] = cells_in(s, bright, smallest);
   if (!mask.empty() && !s.recorded_px.empty()) {
     mask &= s.recorded_px > 0;
     bright &= s.recorded_px > 0;
   }
   if (mask.empty() || cv::countNonZero(mask) == 0) return {};
+  const cv::Mat seen = mask.clone();
   const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
   CellsInImage found;
   found.debris_um = debris_in(s, bright, mask);
@@ -272,112 +257,40 @@ CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>&
     }
   }
   std::ranges::stable_sort(found.cells, std::greater(), &CellOutline::area_um2);
-  return found;
+  return {std::move(found), seen};
 }
 
-CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um) {
-  constexpr int kLeft = 1, kTop = 2, kRight = 4, kBottom = 8;
-  constexpr double kRound = 4;  // of the reach: a ring goes round a corner of the image so near to it
-  const std::size_t n = ring_um.size();
-  const auto sides_near = [&](Vec2 p) {
-    return (p.x <= reach_um ? kLeft : 0) | (p.y <= reach_um ? kTop : 0) | (p.x >= field_um.x - reach_um ? kRight : 0) |
-           (p.y >= field_um.y - reach_um ? kBottom : 0);
-  };
-  const auto put_onto = [&](Vec2& p, int sides) {
-    if (sides & kLeft) p.x = 0;
-    if (sides & kTop) p.y = 0;
-    if (sides & kRight) p.x = field_um.x;
-    if (sides & kBottom) p.y = field_um.y;
-  };
-  std::vector<int> near(n), onto(n, 0);
-  for (std::size_t i = 0; i < n; ++i) near[i] = sides_near(ring_um[i]);
-  CutRing result;
-  std::vector<std::size_t> index;  // of each point in the ring given; n: a corner of the image
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t next = (i + 1) % n;
-    const int common = near[i] & near[next];
-    Vec2 corner = ring_um[i];
-    put_onto(corner, near[i] | near[next]);
-    const bool is_round = common == 0 && near[i] != 0 && near[next] != 0 &&
-                          std::max(norm(ring_um[i] - corner), norm(ring_um[next] - corner)) <= kRound * reach_um;
-    onto[i] |= is_round ? near[i] : common;
-    onto[next] |= is_round ? near[next] : common;
-    result.points_um.push_back(ring_um[i]);
-    result.is_cut.push_back(common != 0 || is_round);
-    index.push_back(i);
-    if (!is_round) continue;
-    result.points_um.push_back(corner);
-    result.is_cut.push_back(true);
-    index.push_back(n);
-  }
-  for (std::size_t k = 0; k < index.size(); ++k)
-    if (index[k] < n) put_onto(result.points_um[k], onto[index[k]]);
-  return result;
+}  // namespace
+
+void declare(stage::ParameterList& list, OutlineParameters& p) {
+  list.table("segment");
+  list.add("outline_reach_um", p.outline_reach_um, Range::zero_or_size_um(),
+           "an adhesion this far outside still belongs to the cell (um)");
+  list.add("outline_smallest_um2", p.outline_smallest_um2, Range::area_um2(), "least area of a cell (um²)");
+  list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2(), "greatest area of a cell (um²)");
+  list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2(),
+           "least area of a gap in a cell (um²)");
+  list.add("outline_neck", p.outline_neck, Range::between(0.0, 1.0),
+           "cells that touch are cut apart where the outline is narrower than this share of the width of the narrower "
+           "part; 0: never");
+}
+
+CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
+                        const OutlineParameters& p) {
+  constexpr double kHeld = 0.02;  // of the adhesions may lie outside: a speck or two
+  const Scene s = scene_of(matrix_of(image), pixel_size_um);
+  auto [first, mask] = cells_of(s, first_mask(s.smooth, s.noise), adhesions, p);
+  if (reach_um(first, adhesions) <= kOutlineReach_um) return first;
+  CellsInImage second = cells_of(s, first_mask(s.smooth, s.noise, mask) & mask, adhesions, p).first;
+  const bool is_better =
+      reach_um(second, adhesions) <= kOutlineReach_um && share_beyond_cells(second, adhesions).value_or(1) <= kHeld;
+  return is_better ? second : first;
 }
 
 Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
                      const OutlineParameters& p) {
   const auto cells = find_cells(image, adhesions, pixel_size_um, p).cells;
   return cells.empty() ? Polygon{} : cells.front().outer_um;
-}
-
-bool is_in_cell(const CellOutline& cell, Vec2 point_um) {
-  const auto is_in = [&](const Polygon& ring) { return contains(ring, point_um); };
-  return is_in(cell.outer_um) && std::ranges::none_of(cell.holes_um, is_in);
-}
-
-double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& others, double far_um) {
-  constexpr double kLines = 100;  // across the cell: its area to a per cent
-  const auto [left, right] = std::ranges::minmax(cell.outer_um, {}, &Vec2::x);
-  const auto [top, bottom] = std::ranges::minmax(cell.outer_um, {}, &Vec2::y);
-  const double step = std::max(right.x - left.x, bottom.y - top.y) / kLines;
-  int n = 0, n_beyond = 0;
-  for (double y = top.y + step / 2; y < bottom.y; y += step) {
-    for (double x = left.x + step / 2; x < right.x; x += step) {
-      const Vec2 p{x, y};
-      if (!is_in_cell(cell, p)) continue;
-      ++n;
-      n_beyond += std::ranges::none_of(others, [&](const CellOutline& other) {
-        return contains(other.outer_um, p) || distance_to_boundary_um(other.outer_um, p) <= far_um;
-      });
-    }
-  }
-  return n == 0 ? 0 : static_cast<double>(n_beyond) / n;
-}
-
-std::optional<double> share_beyond_cells(const CellsInImage& seen, const std::vector<Adhesion>& adhesions) {
-  constexpr double kBeyond_um = 1;  // channels are shifted by less
-  constexpr double kStep_um = 8;    // what is farther from the cell and all of its adhesions is another cell's
-  if (seen.cells.empty()) return std::nullopt;
-  std::vector<std::size_t> own, others;
-  for (std::size_t i = 0; i < adhesions.size(); ++i) (seen.beyond_um[i] <= kStep_um ? own : others).push_back(i);
-  for (std::size_t k = 0; k < own.size(); ++k) {  // `own` grows
-    const Vec2 at = adhesions[own[k]].position_um;
-    const auto joined = std::ranges::stable_partition(
-        others, [&](std::size_t i) { return norm(adhesions[i].position_um - at) > kStep_um; });
-    own.insert(own.end(), joined.begin(), joined.end());
-    others.erase(joined.begin(), joined.end());
-  }
-  double own_um2 = 0, beyond_um2 = 0;
-  for (const std::size_t i : own) {
-    own_um2 += adhesions[i].area_um2;
-    if (seen.beyond_um[i] > kBeyond_um) beyond_um2 += adhesions[i].area_um2;
-  }
-  return own_um2 > 0 ? std::optional(beyond_um2 / own_um2) : std::nullopt;
-}
-
-std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions) {
-  std::vector<Adhesion> kept;
-  for (const Adhesion& adhesion : adhesions) {
-    if (!is_in_cell(cell, adhesion.position_um)) continue;
-    kept.push_back(adhesion);
-    kept.back().adhesion_id = static_cast<int>(kept.size());
-  }
-  return kept;
-}
-
-std::vector<Adhesion> inside(const Polygon& outline_um, const std::vector<Adhesion>& adhesions) {
-  return inside(CellOutline{outline_um, {}}, adhesions);
 }
 
 }  // namespace mbtfm::cells

@@ -344,6 +344,7 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
     s.n_adhesions_outside = static_cast<int>(found.size() - own.size());
     for (const Adhesion& a : found)
       if (inside(around, {a}).empty()) s.left_out_um.push_back(ellipse_corners(a, 24));
+    if (!is_given) s.reach_um = reach_um(around, own);
     if (!found.empty() && own.empty() && p.cell != 0)
       throw InputError(name_of_adhesions(in), "adhesions inside the cell's outline",
                        std::to_string(found.size()) + " outside and none inside",

@@ -43,6 +43,7 @@ struct Segmentation {
   int n_adhesions_outside = 0;                  ///< found beyond the cell and left out
   std::vector<Polygon> left_out_um{};           ///< those, and then other things that are no part of the cell
   std::optional<double> adhesions_beyond{};     ///< see share_beyond_cells()
+  double reach_um = 0;                          ///< of an outline that was found, beyond its adhesions
   std::optional<double> outline_off_actin{};    ///< share of a given outline's area beyond them
   std::optional<double> bleed_through{};        ///< contrast of the fibres over that of the adhesions, in their image
   std::optional<ChannelAlignment> alignment{};  ///< of the actin image on the adhesion image, where fibre ends tell it

@@ -153,5 +153,28 @@ TEST_F(ImagesOfTwoCells, padding_of_a_turned_image_is_no_edge) {
   EXPECT_GT(cut.area_um2, 0.3 * whole.area_um2);
 }
 
+TEST_F(ImagesOfTwoCells, the_edge_of_the_light_is_no_edge_of_a_cell) {
+  const SimulatedCell cell = simulated_cell("u2os", "ordinary", 71);
+  const Segmentation sound = segmented(cell.adhesion, cell.actin);
+  constexpr double kHaze = 100;  // counts of the ground in the light, of some 300 of the cell
+  const auto lit = [&](images::Channel channel, auto light_at) {
+    const float ground = *std::ranges::min_element(channel.image.pixels);
+    for (int j = 0; j < channel.image.height; ++j)
+      for (int i = 0; i < channel.image.width; ++i) {
+        float& value = channel.image.at(i, j);
+        value = ground + static_cast<float>(light_at(i - 512.0) * (value - ground + kHaze));
+      }
+    return channel;
+  };
+  const auto in_a_slit = [](double x) { return 1 / (1 + std::exp((std::abs(x) - 470) / 6)); };
+  const Segmentation found = segmented(lit(cell.adhesion, in_a_slit), lit(cell.actin, in_a_slit));
+  EXPECT_GT(intersection_over_union(sound.cell.outline_um, found.cell.outline_um), 0.97);
+  EXPECT_LT(sound.reach_um, 0.7 * kOutlineReach_um);
+
+  // what no threshold can separate is asked about
+  const auto uneven = [](double x) { return 1.2 + x / 512; };
+  EXPECT_GT(segmented(lit(cell.adhesion, uneven), lit(cell.actin, uneven)).reach_um, kOutlineReach_um);
+}
+
 }  // namespace
 }  // namespace mbtfm::cells
