@@ -105,7 +105,7 @@ std::string left_out(const Segmentation& s) {
   return text;
 }
 
-StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
+StageReport report_of(const Segmentation& s, bool is_assumed_by_itself, bool has_actin) {
   StageReport report;
   const auto n_of = [&](FibreType type) {
     std::int64_t n = 0;
@@ -163,7 +163,9 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                 {.value = s.alignment ? sentence_of(*s.alignment) : "",
                 .at = s.is_aligned ? "fibres were moved there" : "fibres were left where they are",
                 .severity = s.is_aligned ? Severity::note : Severity::caution}),
-        noticed(Symptom::adhesions_off_actin, s.adhesions_off_actin.value_or(0)),
+        noticed(has_actin ? Symptom::adhesions_off_actin : Symptom::adhesions_off_outline,
+                s.adhesions_beyond.value_or(0)),
+        noticed(Symptom::outline_reaches_far, s.reach_um),
         noticed(Symptom::outline_off_actin, s.outline_off_actin.value_or(0)),
         noticed(Symptom::cells_touch, s.neck ? s.neck->width_um : 0,
                 {.at = s.neck ? "(" + brief(s.neck->at_um.x) + ", " + brief(s.neck->at_um.y) + ")" : ""}),
@@ -310,8 +312,9 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
   if (!parameters.contact_sheet.empty())
     images::write_png(context.output("out", "contact_sheet.png"),
                       draw_contact_sheet(adhesion, actin, parameters, drawn));
-  StageReport report =
-      parameters.cell == 0 ? report_of(cells) : report_of(cells.front(), !parameters.candidates.adhesions);
+  StageReport report = parameters.cell == 0
+                           ? report_of(cells)
+                           : report_of(cells.front(), !parameters.candidates.adhesions, actin.has_value());
   add_drawn_by_hand(report, drawn);
   return report;
 }

@@ -69,6 +69,8 @@ std::string present_id(const std::string& id) {
                                                                {"pattern-as-cell", "pattern-unsuitable"},
                                                                {"pattern-too-fine", "pattern-unsuitable"},
                                                                {"read-otherwise", "wrong-orientation"},
+                                                               {"surface-level", "surface-misplaced"},
+                                                               {"surface-off-zero", "surface-misplaced"},
                                                                {"sheet-at-bound", "not-identifiable"},
                                                                {"sheet-coarse", "mesh-error"},
                                                                {"sheet-cut", "cell-cut"},

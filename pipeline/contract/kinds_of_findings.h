@@ -21,6 +21,8 @@ enum class Symptom : int {
   bright_actin,
   adhesions_off_actin,
   outline_off_actin,
+  adhesions_off_outline,
+  outline_reaches_far,
   cells_touch,
   adhesions_assumed,
   pattern_too_fine,

@@ -36,7 +36,8 @@ void declare(stage::ParameterList& list, FaultParameters& p) {
            "share of the beads' light that is lost by the relaxed image");
   list.add("saturated", p.saturated, Range::between(0, 0.5), "share of saturated pixels in the images of the cell");
   list.add("padding_px", p.padding_px, Range::between(0, 8192),
-           "width of a strip without data at the left and upper border of the cell's images (pixels)");
+           "width of the strips without data at the left and upper border of the cell's images, turned by a degree "
+           "(pixels)");
   list.add("scale_bar_px", p.scale_bar_px, Range::between(0, 8192),
            "length of a scale bar that was drawn into the images of the cell (pixels); 0: none");
   list.add("n_hot_pixels", p.n_hot_pixels, Range::between(0, 100000), "number of hot pixels of the camera");
@@ -78,9 +79,11 @@ void spoil(const FaultParameters& f, images::Image& counts) {
     for (float& value : counts.pixels) value = std::min(value, *end);
   }
   const float largest = *std::ranges::max_element(counts.pixels);
+  constexpr double kTurn = 0.0175;  // a degree, as registration turns a picture
   for (int row = 0; row < counts.height; ++row)
     for (int column = 0; column < counts.width; ++column)
-      if (std::min(row, column) < f.padding_px) counts.at(column, row) = 0;
+      if (f.padding_px > 0 && (row < f.padding_px - kTurn * column || column < f.padding_px + kTurn * row))
+        counts.at(column, row) = 0;
   constexpr int kMargin_px = 20, kBar_px = 8;
   for (int row = counts.height - kMargin_px - kBar_px; row < counts.height - kMargin_px; ++row)
     for (int column = counts.width - kMargin_px - f.scale_bar_px; column < counts.width - kMargin_px; ++column)

@@ -10,6 +10,7 @@
 #include "pipeline/stage/parameters.h"
 #include "segment/cells/adhesion_parts.h"
 #include "segment/cells/grid.h"
+#include "segment/cells/padding.h"
 
 namespace mbtfm::cells {
 namespace {
@@ -92,7 +93,7 @@ void declare(stage::ParameterList& list, AdhesionParameters& p) {
 
 std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, double pixel_size_um,
                                                   const AdhesionParameters& p) {
-  const Contrast c = contrast_of(matrix_of(image), pixel_size_um, p);
+  const Contrast c = contrast_of(without_padding(matrix_of(image)), pixel_size_um, p);
   std::vector<AdhesionRegion> regions;
   for (auto& pixels : adhesion_parts(c, pixel_size_um, p)) {
     const Adhesion adhesion = measure_ellipse(pixels, pixel_size_um);
@@ -159,7 +160,7 @@ std::vector<Adhesion> require_adhesions(const images::Channel& channel, double p
 
 std::string why_no_adhesions(const images::Image& image, double pixel_size_um, const AdhesionParameters& p) {
   if (std::string reason = emptiness_of(image); !reason.empty()) return reason;
-  const Contrast c = contrast_of(matrix_of(image), pixel_size_um, p);
+  const Contrast c = contrast_of(without_padding(matrix_of(image)), pixel_size_um, p);
   const auto parts = adhesion_parts(c, pixel_size_um, p);
   if (!parts.empty())
     return "of " + std::to_string(parts.size()) +

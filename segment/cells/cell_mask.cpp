@@ -156,16 +156,21 @@ Parts parts_of(const cv::Mat& mask, double smallest) {
   return result;
 }
 
-cv::Mat first_mask(const cv::Mat& image, double noise) {
+cv::Mat first_mask(const cv::Mat& image, double noise, const cv::Mat& within) {
   const double dark = quantile(image, 0.01), bright = quantile(image, 0.99);
   // neither noise (three deviations) nor a twentieth of the range shall spread over the logarithm's steep part
   const double unit = std::max(3 * noise, 0.05 * (bright - dark));
   if (unit <= 0) return cv::Mat::zeros(image.size(), CV_8U);
-  cv::Mat compressed = cv::max((image - dark) / unit, 0.0) + 1.0, bytes, mask;
+  cv::Mat compressed = cv::max((image - dark) / unit, 0.0) + 1.0, bytes, unused;
   cv::log(compressed, compressed);
   cv::normalize(compressed, bytes, 0, 255, cv::NORM_MINMAX, CV_8U);
-  cv::threshold(bytes, mask, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
-  return mask;
+  std::vector<uchar> values(bytes.begin<uchar>(), bytes.end<uchar>());
+  if (!within.empty()) {
+    values.clear();
+    for (std::size_t i = 0; i < within.total(); ++i)
+      if (within.data[i]) values.push_back(bytes.data[i]);
+  }
+  return bytes > cv::threshold(values, unused, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
 }
 
 cv::Mat holes_in(const cv::Mat& values, const cv::Mat& mask, double band_px, double noise, double smallest) {

@@ -16,6 +16,7 @@ constexpr double kBand_um = 3;         ///< brightness inside and outside is com
 struct Scene {
   cv::Mat full, smooth;
   double pixel_um, full_pixel_um, band_px, noise;
+  cv::Mat recorded_px;  ///< distance from the image's padding, 0 in it; empty: it has none
   double px_of(double area_um2) const { return area_um2 / (pixel_um * pixel_um); }
   Vec2 field_um() const { return {full.cols * full_pixel_um, full.rows * full_pixel_um}; }
   /// A ring as near as this to the image's border is one that the border has made: rings go through pixels' centres.
@@ -41,7 +42,8 @@ struct Parts {
 Parts parts_of(const cv::Mat& mask, double smallest);
 
 /// Otsu's threshold of log(1 + brightness): cells are bright by a factor, not by an amount.
-cv::Mat first_mask(const cv::Mat& image, double noise);
+/// @param within  a mask: the threshold of the pixels in it alone; empty: of all
+cv::Mat first_mask(const cv::Mat& image, double noise, const cv::Mat& within = {});
 
 /// All cells; holes filled. @param bright  everything that stands out
 Body cells_in(const Scene& scene, const cv::Mat& bright, double smallest);

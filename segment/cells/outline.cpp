@@ -7,6 +7,7 @@
 #include "segment/cells/cell_mask.h"
 #include "segment/cells/ellipse.h"
 #include "segment/cells/grid.h"
+#include "segment/cells/padding.h"
 
 namespace mbtfm::cells {
 namespace {
@@ -105,39 +106,9 @@ std::vector<std::vector<cv::Point2d>> rings_of(const cv::Mat& mask) {
   return rings;
 }
 
-/// With the nearest line in place of the strips of one value that registration leaves along the image's sides: their
-/// edge is none of a cell. A ground of that value, as where dark pixels were set to 0, is left as it is.
-cv::Mat without_padding(const cv::Mat& image) {
-  cv::Rect inner({0, 0}, image.size());
-  const auto share_of = [&](float value, const cv::Rect& line) {
-    return static_cast<double>(cv::countNonZero(image(line) == value)) / line.area();
-  };
-  for (const bool is_row : {true, false}) {
-    for (const bool is_first : {true, false}) {
-      const auto line = [&](int k) {  // the k-th from this side
-        const int n = is_row ? inner.height : inner.width, at = is_first ? k : n - 1 - k;
-        return is_row ? cv::Rect(inner.x, inner.y + at, inner.width, 1)
-                      : cv::Rect(inner.x + at, inner.y, 1, inner.height);
-      };
-      const float value = image.at<float>(line(0).tl());
-      const int most = (is_row ? inner.height : inner.width) / 2;
-      int n = 0;
-      while (n < most && share_of(value, line(n)) == 1) ++n;
-      constexpr double kFew = 0.5;
-      if (n == 0 || n == most || share_of(value, line(n)) > kFew) continue;
-      (is_row ? inner.height : inner.width) -= n;
-      if (is_first) (is_row ? inner.y : inner.x) += n;
-    }
-  }
-  cv::Mat filled;
-  cv::copyMakeBorder(image(inner), filled, inner.y, image.rows - inner.br().y, inner.x, image.cols - inner.br().x,
-                     cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
-  return filled;
-}
-
 Scene scene_of(const cv::Mat& image, double pixel_size_um) {
-  const cv::Mat full = without_padding(image);
-  Scene s{full, {}, pixel_size_um, pixel_size_um, 0, 0};
+  const cv::Mat padding = padding_in(image), full = without_padding(image, padding);
+  Scene s{full, {}, pixel_size_um, pixel_size_um, 0, 0, {}};
   // the rings' last move is made in the full image, so that three pixels a micrometre do here
   const int factor = std::max(1, static_cast<int>(kGrid_um / pixel_size_um));
   s.pixel_um = pixel_size_um * factor;
@@ -146,7 +117,16 @@ Scene scene_of(const cv::Mat& image, double pixel_size_um) {
   const double sigma_px = std::max(0.5, kSmoothing_um / s.pixel_um);
   s.smooth = gaussian(small, sigma_px);
   s.noise = overall_noise(small) * noise_gain(sigma_px);
+  if (padding.empty()) return s;
+  cv::Mat mask;
+  padding.convertTo(mask, CV_32F);
+  cv::distanceTransform(shrink(mask, factor) == 0, s.recorded_px, cv::DIST_L2, cv::DIST_MASK_PRECISE);
   return s;
+}
+
+/// As near to the image's padding as a ring comes that its edge has made.
+bool is_at_padding(const Scene& s, Vec2 p) {
+  return !s.recorded_px.empty() && sample(s.recorded_px, to_pixels(p, s.pixel_um)) * s.pixel_um <= s.border_um();
 }
 
 /// Points at the image's border and at adhesions stay: there the ring is not an edge of this channel. So do those in
@@ -158,7 +138,7 @@ std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Ad
     const double border = std::min({p.x, p.y, s.field_um().x - p.x, s.field_um().y - p.y});
     const int x = std::clamp(static_cast<int>(p.x / s.pixel_um), 0, soft.cols - 1);
     const int y = std::clamp(static_cast<int>(p.y / s.pixel_um), 0, soft.rows - 1);
-    result.push_back(border > s.border_um() && !soft.at<uchar>(y, x) &&
+    result.push_back(border > s.border_um() && !is_at_padding(s, p) && !soft.at<uchar>(y, x) &&
                      std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
                        return norm(a.position_um - p) < a.major_axis_um / 2 + 1 && distance_to_ellipse_um(a, p) < 0.3;
                      }));
@@ -200,6 +180,9 @@ CellOutline outline_of(const Scene& s, const cv::Mat& part, const cv::Mat& holes
       CutRing cut = cut_by_border(polygon, s.field_um(), s.border_um());
       cell.outer_um = std::move(cut.points_um);
       cell.is_cut = std::move(cut.is_cut);
+      const std::size_t n = cell.outer_um.size();
+      for (std::size_t i = 0; i < n; ++i)
+        if (is_at_padding(s, cell.outer_um[i]) && is_at_padding(s, cell.outer_um[(i + 1) % n])) cell.is_cut[i] = true;
       cell.area_um2 = std::abs(signed_area_um2(cell.outer_um));
     } else if (is_inside(polygon, cell.outer_um) && std::abs(signed_area_um2(polygon)) > 0) {
       cell.holes_um.push_back(polygon);
@@ -240,28 +223,17 @@ std::optional<OutlineNeck> narrowest_neck(const std::vector<Neck>& necks, const 
   return narrowest;
 }
 
-}  // namespace
-
-void declare(stage::ParameterList& list, OutlineParameters& p) {
-  list.table("segment");
-  list.add("outline_reach_um", p.outline_reach_um, Range::zero_or_size_um(),
-           "an adhesion this far outside still belongs to the cell (um)");
-  list.add("outline_smallest_um2", p.outline_smallest_um2, Range::area_um2(), "least area of a cell (um²)");
-  list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2(), "greatest area of a cell (um²)");
-  list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2(),
-           "least area of a gap in a cell (um²)");
-  list.add("outline_neck", p.outline_neck, Range::between(0.0, 1.0),
-           "cells that touch are cut apart where the outline is narrower than this share of the width of the narrower "
-           "part; 0: never");
-}
-
-CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
-                        const OutlineParameters& p) {
-  const Scene s = scene_of(matrix_of(image), pixel_size_um);
+/// The cells in what stands out, and their mask.
+std::pair<CellsInImage, cv::Mat> cells_of(const Scene& s, cv::Mat bright, const std::vector<Adhesion>& adhesions,
+                                          const OutlineParameters& p) {
   const double smallest = s.px_of(p.outline_smallest_um2);
-  const cv::Mat bright = first_mask(s.smooth, s.noise);
   auto [mask, soft] = cells_in(s, bright, smallest);
+  if (!mask.empty() && !s.recorded_px.empty()) {
+    mask &= s.recorded_px > 0;
+    bright &= s.recorded_px > 0;
+  }
   if (mask.empty() || cv::countNonZero(mask) == 0) return {};
+  const cv::Mat seen = mask.clone();
   const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
   CellsInImage found;
   found.debris_um = debris_in(s, bright, mask);
@@ -285,104 +257,40 @@ CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>&
     }
   }
   std::ranges::stable_sort(found.cells, std::greater(), &CellOutline::area_um2);
-  return found;
+  return {std::move(found), seen};
 }
 
-CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um) {
-  constexpr int kLeft = 1, kTop = 2, kRight = 4, kBottom = 8;
-  constexpr double kRound = 4;  // of the reach: a ring goes round a corner of the image so near to it
-  const std::size_t n = ring_um.size();
-  const auto sides_near = [&](Vec2 p) {
-    return (p.x <= reach_um ? kLeft : 0) | (p.y <= reach_um ? kTop : 0) | (p.x >= field_um.x - reach_um ? kRight : 0) |
-           (p.y >= field_um.y - reach_um ? kBottom : 0);
-  };
-  const auto put_onto = [&](Vec2& p, int sides) {
-    if (sides & kLeft) p.x = 0;
-    if (sides & kTop) p.y = 0;
-    if (sides & kRight) p.x = field_um.x;
-    if (sides & kBottom) p.y = field_um.y;
-  };
-  std::vector<int> near(n), onto(n, 0);
-  for (std::size_t i = 0; i < n; ++i) near[i] = sides_near(ring_um[i]);
-  CutRing result;
-  std::vector<std::size_t> index;  // of each point in the ring given; n: a corner of the image
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t next = (i + 1) % n;
-    const int common = near[i] & near[next];
-    Vec2 corner = ring_um[i];
-    put_onto(corner, near[i] | near[next]);
-    const bool is_round = common == 0 && near[i] != 0 && near[next] != 0 &&
-                          std::max(norm(ring_um[i] - corner), norm(ring_um[next] - corner)) <= kRound * reach_um;
-    onto[i] |= is_round ? near[i] : common;
-    onto[next] |= is_round ? near[next] : common;
-    result.points_um.push_back(ring_um[i]);
-    result.is_cut.push_back(common != 0 || is_round);
-    index.push_back(i);
-    if (!is_round) continue;
-    result.points_um.push_back(corner);
-    result.is_cut.push_back(true);
-    index.push_back(n);
-  }
-  for (std::size_t k = 0; k < index.size(); ++k)
-    if (index[k] < n) put_onto(result.points_um[k], onto[index[k]]);
-  return result;
+}  // namespace
+
+void declare(stage::ParameterList& list, OutlineParameters& p) {
+  list.table("segment");
+  list.add("outline_reach_um", p.outline_reach_um, Range::zero_or_size_um(),
+           "an adhesion this far outside still belongs to the cell (um)");
+  list.add("outline_smallest_um2", p.outline_smallest_um2, Range::area_um2(), "least area of a cell (um²)");
+  list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2(), "greatest area of a cell (um²)");
+  list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2(),
+           "least area of a gap in a cell (um²)");
+  list.add("outline_neck", p.outline_neck, Range::between(0.0, 1.0),
+           "cells that touch are cut apart where the outline is narrower than this share of the width of the narrower "
+           "part; 0: never");
+}
+
+CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
+                        const OutlineParameters& p) {
+  constexpr double kHeld = 0.02;  // of the adhesions may lie outside: a speck or two
+  const Scene s = scene_of(matrix_of(image), pixel_size_um);
+  auto [first, mask] = cells_of(s, first_mask(s.smooth, s.noise), adhesions, p);
+  if (reach_um(first, adhesions) <= kOutlineReach_um) return first;
+  CellsInImage second = cells_of(s, first_mask(s.smooth, s.noise, mask) & mask, adhesions, p).first;
+  const bool is_better =
+      reach_um(second, adhesions) <= kOutlineReach_um && share_beyond_cells(second, adhesions).value_or(1) <= kHeld;
+  return is_better ? second : first;
 }
 
 Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
                      const OutlineParameters& p) {
   const auto cells = find_cells(image, adhesions, pixel_size_um, p).cells;
   return cells.empty() ? Polygon{} : cells.front().outer_um;
-}
-
-bool is_in_cell(const CellOutline& cell, Vec2 point_um) {
-  const auto is_in = [&](const Polygon& ring) { return contains(ring, point_um); };
-  return is_in(cell.outer_um) && std::ranges::none_of(cell.holes_um, is_in);
-}
-
-double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& others, double far_um) {
-  constexpr double kLines = 100;  // across the cell: its area to a per cent
-  const auto [left, right] = std::ranges::minmax(cell.outer_um, {}, &Vec2::x);
-  const auto [top, bottom] = std::ranges::minmax(cell.outer_um, {}, &Vec2::y);
-  const double step = std::max(right.x - left.x, bottom.y - top.y) / kLines;
-  int n = 0, n_beyond = 0;
-  for (double y = top.y + step / 2; y < bottom.y; y += step) {
-    for (double x = left.x + step / 2; x < right.x; x += step) {
-      const Vec2 p{x, y};
-      if (!is_in_cell(cell, p)) continue;
-      ++n;
-      n_beyond += std::ranges::none_of(others, [&](const CellOutline& other) {
-        return contains(other.outer_um, p) || distance_to_boundary_um(other.outer_um, p) <= far_um;
-      });
-    }
-  }
-  return n == 0 ? 0 : static_cast<double>(n_beyond) / n;
-}
-
-std::optional<double> share_off_actin(const CellsInImage& seen, const std::vector<Adhesion>& adhesions) {
-  constexpr double kBeyond_um = 1;  // channels are shifted by less
-  constexpr double kOwn_um = 8;     // what is farther is another cell's, which may show no actin
-  if (seen.cells.empty()) return std::nullopt;
-  double near_um2 = 0, beyond_um2 = 0;
-  for (std::size_t i = 0; i < adhesions.size(); ++i) {
-    if (seen.beyond_um[i] > kOwn_um) continue;
-    near_um2 += adhesions[i].area_um2;
-    if (seen.beyond_um[i] > kBeyond_um) beyond_um2 += adhesions[i].area_um2;
-  }
-  return near_um2 > 0 ? std::optional(beyond_um2 / near_um2) : std::nullopt;
-}
-
-std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions) {
-  std::vector<Adhesion> kept;
-  for (const Adhesion& adhesion : adhesions) {
-    if (!is_in_cell(cell, adhesion.position_um)) continue;
-    kept.push_back(adhesion);
-    kept.back().adhesion_id = static_cast<int>(kept.size());
-  }
-  return kept;
-}
-
-std::vector<Adhesion> inside(const Polygon& outline_um, const std::vector<Adhesion>& adhesions) {
-  return inside(CellOutline{outline_um, {}}, adhesions);
 }
 
 }  // namespace mbtfm::cells

@@ -133,9 +133,8 @@ const std::string& name_of_adhesions(const Inputs& in) {
 
 struct Outlines {
   std::vector<CellOutline> chosen;
-  int n_cells = 1;  ///< in the image
-  CellsInImage seen =
-      {};  ///< by the actin image, whatever outline is given; no cells where there is none, or it shows none
+  int n_cells = 1;         ///< in the image
+  CellsInImage seen = {};  ///< by the actin image, whatever outline is given, or without it by that of adhesions
 };
 
 Outlines outlines_in(const Inputs& in, const std::vector<Adhesion>& found) {
@@ -152,9 +151,8 @@ Outlines outlines_in(const Inputs& in, const std::vector<Adhesion>& found) {
   const images::Channel& shape = in.actin ? *in.actin : *in.adhesion;
   CellsInImage all = outlines_of(shape, found, in.field.pixel_um, p);
   const int n_cells = static_cast<int>(all.cells.size());
-  Outlines outlines{chosen(all.cells, shape, p), n_cells};
-  if (in.actin) outlines.seen = std::move(all);
-  return outlines;
+  if (!in.actin) all.debris_um.clear();  // dots there are adhesions, which are named as such
+  return {chosen(all.cells, shape, p), n_cells, std::move(all)};
 }
 
 /// Fibres before they are tied: traced, or drawn by hand.
@@ -329,7 +327,7 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
   const bool is_given = in.drawn.outline || in.drawn.outline_mask;
   constexpr double kGenerous_um = 1;  // an outline drawn by hand is not false for that
   if (is_given && !all.seen.cells.empty()) s.outline_off_actin = share_beyond(outline, all.seen.cells, kGenerous_um);
-  s.adhesions_off_actin = share_off_actin(all.seen, found);
+  s.adhesions_beyond = share_beyond_cells(all.seen, found);
   Lines lines{.traced = {}, .drawn = {}, .are_drawn = in.drawn.fibres.has_value()};
   if (in.drawn.fibres)
     lines.drawn = drawn_lines(*in.drawn.fibres, in.actin, in.field, p.fibres);
@@ -346,6 +344,7 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
     s.n_adhesions_outside = static_cast<int>(found.size() - own.size());
     for (const Adhesion& a : found)
       if (inside(around, {a}).empty()) s.left_out_um.push_back(ellipse_corners(a, 24));
+    if (!is_given) s.reach_um = reach_um(around, own);
     if (!found.empty() && own.empty() && p.cell != 0)
       throw InputError(name_of_adhesions(in), "adhesions inside the cell's outline",
                        std::to_string(found.size()) + " outside and none inside",

@@ -36,14 +36,14 @@ void declare(stage::ParameterList& list, SegmentParameters& parameters);
 struct Segmentation {
   Cell cell;
   double pixel_size_um = 0;
-  int n_cells = 1;                     ///< that the image shows
-  double area_um2 = 0;                 ///< of the cell, less its holes
-  std::optional<OutlineNeck> neck{};   ///< the cell was cut off another one there
-  bool is_cut_by_border = false;       ///< the image ends before the cell does
-  int n_adhesions_outside = 0;         ///< found beyond the cell and left out
-  std::vector<Polygon> left_out_um{};  ///< those, and then other things that are no part of the cell
-  /// Share of the adhesions' area, in all cells, that lies beyond the cells which the actin image shows.
-  std::optional<double> adhesions_off_actin{};
+  int n_cells = 1;                              ///< that the image shows
+  double area_um2 = 0;                          ///< of the cell, less its holes
+  std::optional<OutlineNeck> neck{};            ///< the cell was cut off another one there
+  bool is_cut_by_border = false;                ///< the image ends before the cell does
+  int n_adhesions_outside = 0;                  ///< found beyond the cell and left out
+  std::vector<Polygon> left_out_um{};           ///< those, and then other things that are no part of the cell
+  std::optional<double> adhesions_beyond{};     ///< see share_beyond_cells()
+  double reach_um = 0;                          ///< of an outline that was found, beyond its adhesions
   std::optional<double> outline_off_actin{};    ///< share of a given outline's area beyond them
   std::optional<double> bleed_through{};        ///< contrast of the fibres over that of the adhesions, in their image
   std::optional<ChannelAlignment> alignment{};  ///< of the actin image on the adhesion image, where fibre ends tell it

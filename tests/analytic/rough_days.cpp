@@ -27,14 +27,15 @@ TEST(Faults, saturate_the_share_of_pixels_asked_for) {
   EXPECT_NEAR(n / 4096, 0.02, 2.0 / 4096);  // whole pixels
 }
 
-TEST(Faults, pad_left_and_above_and_nothing_else) {
+TEST(Faults, pad_left_and_above_by_a_turned_frame_and_nothing_else) {
   const images::Image whole = ramp();
   images::Image image = whole;
   FaultParameters faults;
   faults.padding_px = 5;
   spoil(faults, image);
   for (int j = 0; j < 64; ++j)
-    for (int i = 0; i < 64; ++i) EXPECT_EQ(image.at(i, j), i < 5 || j < 5 ? 0 : whole.at(i, j));
+    for (int i = 0; i < 64; ++i)
+      EXPECT_EQ(image.at(i, j), i < 5 + 0.0175 * j || j < 5 - 0.0175 * i ? 0 : whole.at(i, j));
 }
 
 TEST(Faults, debris_lies_beside_the_cell) {

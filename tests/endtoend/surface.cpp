@@ -51,7 +51,7 @@ TEST_F(Surface, of_a_formula_a_table_and_its_points_is_the_same) {
   write("lattice.csv", table(20, [](Vec2 p) { return shortest(wave(p)); }));
   const auto whole = run("--z_points into-gel --height_map lattice.csv");
   ASSERT_EQ(whole.code, 0);
-  test::expect_silent({"surface-repaired", "surface-level", "beads-off-gel"}, whole.output);
+  test::expect_silent({"surface-repaired", "surface-misplaced", "beads-off-gel"}, whole.output);
   EXPECT_LT(largest_error(surface()), 1e-12);
   write("mirrored.csv", table(20, [](Vec2 p) { return shortest(-wave(p)); }));
   ASSERT_EQ(run("--z_points out-of-gel --height_map mirrored.csv").code, 0);
@@ -93,7 +93,7 @@ TEST_F(Surface, from_beads_knows_its_error_and_tells_beads_above_it) {
   EXPECT_EQ(run(beads).code, 2);  // no error of z
   const std::string outcome = output_of(run(beads + " --sigma_z_um 0.3"));
   EXPECT_TRUE(fires("beads-off-gel", "off the surface", outcome)) << outcome;
-  EXPECT_FALSE(fires("surface-level", outcome)) << outcome;
+  EXPECT_FALSE(fires("surface-misplaced", outcome)) << outcome;
   const HeightMap map = surface();
   ASSERT_EQ(map.sigma_um.size(), map.z_um.size());
   EXPECT_LT(largest_error(map, 5), 1.9);  // half of the beads' distance, three standard errors
@@ -109,7 +109,7 @@ TEST_F(Surface, that_beads_find_level_may_be_the_end_of_the_images) {
     text += brief(across(random)) + "," + brief(across(random)) + "," + brief(down(random)) + "\n";
   write("beads.csv", text);
   const std::string outcome = output_of(run("--z_points into-gel --sigma_z_um 0.1 --beads beads.csv"));
-  EXPECT_TRUE(fires("surface-level", outcome)) << outcome;
+  EXPECT_TRUE(fires("surface-misplaced", outcome)) << outcome;
   EXPECT_FALSE(fires("beads-off-gel", "off the surface", outcome)) << outcome;
 }
 
@@ -241,10 +241,10 @@ TEST_F(Gel, whose_surface_does_not_hold_the_level_from_which_its_thickness_count
       "points.csv --displacement_tolerance 0.1 --out u.csv";
   ASSERT_EQ(run("--formula 'flat z_um=4' --spacing_um 4" + kSquare).code, 0);
   const std::string told = output_of(run_in(folder_, substrate));
-  EXPECT_TRUE(fires("surface-off-zero", told)) << told;
+  EXPECT_TRUE(fires("surface-misplaced", told)) << told;
   EXPECT_TRUE(has_words(told, "26 um thick"));
   ASSERT_EQ(run("--formula 'flat z_um=4' --zero_at mean --spacing_um 4" + kSquare).code, 0);
-  EXPECT_FALSE(fires("surface-off-zero", run_in(folder_, substrate).output));
+  EXPECT_FALSE(fires("surface-misplaced", run_in(folder_, substrate).output));
 }
 
 TEST_F(Gel, is_known_no_further_than_its_surface) {
