@@ -12,20 +12,19 @@
 namespace mbtfm::cells {
 
 struct FibreParameters {
-  double fibre_width_um = 0.6;      ///< typical bundle seen through a microscope; half to twice of it is found
-  double fibre_averaging_um = 0.7;  ///< along the fibre: straight over this length, long enough to beat noise
-  double fibre_start_noise = 3;     ///< faint fibres begin there; their whole length decides what they are
-  double fibre_follow_noise = 2;    ///< once begun a fibre may fade into the noise
-  /// One line in ten may be none. Half would do if real meshwork made no more lines than that of simulated cells.
-  double fibre_least_probability = 0.9;
-  double fibre_faintest = 0.25;         ///< fainter lines are filaments of the mesh, beside what the fibres carry
-  double fibre_smallest_radius_um = 6;  ///< of curvature: bundles under tension are straight or gently curved
-  double fibre_gap_um = 1.5;            ///< a bundle may be hidden by a crossing one for this long
-  double fibre_shortest_um = 3;         ///< shorter lines cannot be told from texture
-  double fibre_edge_um = 1.0;           ///< a line along the outline this near to it is the cortex of the edge
-  double fibre_lamellipodium_um = 3;    ///< its width: this near to the edge a line that winds is a ruffle
-  double fibre_reach_um = 1.0;          ///< an end this near to an adhesion's rim is held by it
-  double fibre_faint_um = 4;            ///< longest faint end of the fibres that experts drew on a real cell
+  double fibre_width_um = 0.6;           ///< typical bundle seen through a microscope; half to twice of it is found
+  double fibre_averaging_um = 0.7;       ///< along the fibre: straight over this length, long enough to beat noise
+  double fibre_start_noise = 3;          ///< faint fibres begin there; their whole length decides what they are
+  double fibre_follow_noise = 2;         ///< once begun a fibre may fade into the noise
+  double fibre_least_probability = 0.5;  ///< so the fewest lines are wrongly taken or left out
+  double fibre_faintest = 0.25;          ///< fainter lines are filaments of the mesh, beside what the fibres carry
+  double fibre_smallest_radius_um = 6;   ///< of curvature: bundles under tension are straight or gently curved
+  double fibre_gap_um = 1.5;             ///< a bundle may be hidden by a crossing one for this long
+  double fibre_shortest_um = 3;          ///< shorter lines cannot be told from texture
+  double fibre_edge_um = 1.0;            ///< a line along the outline this near to it is the cortex of the edge
+  double fibre_lamellipodium_um = 3;     ///< its width: this near to the edge a line that winds is a ruffle
+  double fibre_reach_um = 1.0;           ///< an end this near to an adhesion's rim is held by it
+  double fibre_faint_um = 4;             ///< longest faint end of the fibres that experts drew on a real cell
 };
 
 void declare(stage::ParameterList& list, FibreParameters& parameters);

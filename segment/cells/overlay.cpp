@@ -23,6 +23,12 @@ constexpr double kStemOfU = 4;  // px from the left of the letter's box at size 
 
 cv::Scalar scalar(Colour c) { return cv::Scalar(c.red, c.green, c.blue); }
 
+/// Of a fibre: the fainter, the less sure it is one.
+cv::Scalar faded_colour(const Fibre& f) {
+  constexpr double kFaintest = 0.3;
+  return scalar(colour_of(f.type)) * (kFaintest + (1 - kFaintest) * f.confidence);
+}
+
 /// Part of an image at the size of the picture, 0 to 1 between its 1 % and its 99.8 % quantile, brightened by a root so
 /// that faint structure shows.
 cv::Mat stretched(const images::Image& image, const cv::Rect& part, cv::Size size) {
@@ -273,9 +279,9 @@ void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
   }
   for (const Fibre& f : cell.fibres)
     if (f.type == FibreType::edge)
-      canvas.dashed_line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1, kFibreDash_px);
+      canvas.dashed_line(f.points_um, false, faded_colour(f), thickness + 1, kFibreDash_px);
     else
-      canvas.line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1);
+      canvas.line(f.points_um, false, faded_colour(f), thickness + 1);
 }
 
 }  // namespace

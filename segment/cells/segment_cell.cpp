@@ -337,7 +337,7 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
     TracedLines traced = trace_fibres(in.actin->image, s.cell.outline_um, in.field.pixel_um, p.fibres);
     lines.traced = std::move(traced.fibres);
     s.unexplained_um = std::move(traced.unexplained_um);
-    constexpr double kPerhaps = 0.5;  // as likely as not
+    constexpr double kPerhaps = 0.3;  // of the less probable hardly any is one
     for (TracedFibre& t : traced.rest)
       if (t.fibre.confidence >= kPerhaps) s.doubtful_um.push_back(std::move(t.fibre.points_um));
   }
