@@ -34,7 +34,7 @@ struct Needed {
 };
 constexpr Needed kNeeded[] = {{"segment", "", "pixel_size_um"},    {"fit", "gel", "youngs_modulus_kPa"},
                               {"fit", "gel", "poisson_ratio"},     {"fit", "gel", "thickness_um"},
-                              {"segment", "segment", "adhesions"}, {"segment", "segment", "fibre_false_per_cell"},
+                              {"segment", "segment", "adhesions"}, {"segment", "segment", "fibre_least_probability"},
                               {"track", "track", "method"},        {"track", "track", "z_points"},
                               {"fit", "substrate", "model"},       {"fit", "fit", "n_meshes"}};
 

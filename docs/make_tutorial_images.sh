@@ -13,7 +13,7 @@ mkdir -p "$out"
 
 # a segmentation that nobody should accept, beside that of the defaults
 "$bin/mbtfm-segment" --adhesion-image "$cell/paxillin.tif" --actin-image "$cell/actin.tif" --out "$work/bad" \
-  --adhesion_seed_noise 60 --fibre_false_per_cell 300 --fibre_start_noise 1.5 > /dev/null 2>&1
+  --adhesion_seed_noise 60 --fibre_least_probability 0 --fibre_start_noise 1.5 > /dev/null 2>&1
 convert "$work/bad/overlay.png" -resize 700x "$work/bad.png"
 convert "$cell/1_segment/overlay.png" -resize 700x "$work/good.png"
 convert "$work/good.png" "$work/bad.png" -background white +append -strip -quality 75 "$out/overlays.jpg"

@@ -30,7 +30,7 @@ constexpr std::array kRootKeys = {"pixel_size_um"};
 /// Keys up to version 0.2 that are constants now, as nobody set them; a space before and after each.
 constexpr std::string_view kDeletedKeys =
     " seeds free_fibre_ends edge_growth adhesion_level_radius_um adhesion_blur_um fibre_edge_height fibre_side_ratio "
-    "fibre_simplify_um outline_smoothing_um outline_band_um outline_spacing_um "
+    "fibre_simplify_um fibre_false_per_cell outline_smoothing_um outline_band_um outline_spacing_um "
     "free_edge_concavity adhesion_area_log_sd peripheral_fraction peripheral_band_um n_carpets merging_fraction "
     "nucleus_radius_um simulation_substrate element elements_per_adhesion shift_error_um size_error angle_error_deg "
     "lambda_for margin_um band_um ";

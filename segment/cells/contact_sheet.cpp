@@ -31,7 +31,7 @@ SheetAxis parse_axis(const std::string& text) {
 
 /// What one pair of values gives.
 struct Trial {
-  std::string values;  ///< "adhesion_seed_noise = 3, fibre_false_per_cell = 0.1"
+  std::string values;  ///< "adhesion_seed_noise = 3, fibre_least_probability = 0.5"
   std::optional<Segmentation> segmentation;
   std::string outcome;
 };

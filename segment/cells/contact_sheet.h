@@ -16,7 +16,7 @@ struct SheetAxis {
   std::vector<std::string> values;
 };
 
-/// "adhesion_seed_noise=3,4,5 fibre_false_per_cell=0.1,0.2": the columns, then the rows.
+/// "adhesion_seed_noise=3,4,5 fibre_least_probability=0.5,0.9": the columns, then the rows.
 /// @throws UsageError where it is not written so, or has no or more than two axes, or more than 64 pictures
 std::vector<SheetAxis> parse_axes(const std::string& text);
 

@@ -289,22 +289,14 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
                : n_tied == 1 ? FibreType::dorsal
                              : FibreType::arc;
   if (fibre.type == FibreType::edge) fibre.type_reason += "; along a free edge";
+  if (n_tied == 0 && !outline_um.empty() && is_straight(last_part(line, length_um(line)), outline_um)) {
+    fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
+    fibre.type_reason += "; arcs bulge towards the edge";
+  }
   if (n_tied < 2 && is_long(line) && !adhesions.empty()) {
     fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
     fibre.type_reason += "; fibres as long as this are usually held at both ends";
   }
-}
-
-bool is_held_along(const Fibre& tied, const Polyline& traced, const std::vector<Adhesion>& adhesions) {
-  constexpr double kCourse_um = 2, kOval = 1.3;
-  constexpr double kAlong = 0.94;  // cosine of 20°
-  const auto is_along = [&](const std::optional<int>& id, const Polyline& towards_end) {
-    const auto a = std::ranges::find_if(adhesions, [&](const Adhesion& o) { return id == o.adhesion_id; });
-    if (a == adhesions.end() || a->major_axis_um <= kOval * a->minor_axis_um) return false;
-    const Vec2 axis{std::cos(a->angle_rad), std::sin(a->angle_rad)};
-    return std::abs(dot(axis, direction_of_end(last_part(towards_end, kCourse_um)))) >= kAlong;
-  };
-  return is_along(tied.end_adhesion_id, traced) || is_along(tied.start_adhesion_id, {traced.rbegin(), traced.rend()});
 }
 
 bool is_on_cut(Vec2 end, const Cuts& cuts) {

@@ -5,6 +5,7 @@
 
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
+#include "segment/cells/fibre_probability.h"
 
 namespace mbtfm::cells {
 
@@ -17,8 +18,7 @@ struct WayOn {
 struct TracedFibre {
   Fibre fibre;          ///< without type and label
   WayOn before, after;  ///< its first point, its last
-  /// Too faint for a fibre, unless an adhesion holds it: see is_held_along()
-  bool needs_adhesion = false;
+  FibreEvidence evidence{};
 };
 
 /// An end that reaches no adhesion is led on along its way to the first one there, if the way is brighter than texture
@@ -54,11 +54,6 @@ EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, do
 /// @param ends  the others stay as they are drawn, free
 void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,
               EndsToTie ends = {});
-
-/// Does an adhesion hold an end of it that is itself drawn out along the fibre there, within 20 degrees? Fibres pull
-/// their adhesions to ovals along themselves.
-/// @param traced  the line before its ends were led to the adhesions
-bool is_held_along(const Fibre& tied, const Polyline& traced, const std::vector<Adhesion>& adhesions);
 
 /// A fibre that leaves the image: a free end that points at a cut of the outline from at most `reach_um` away is led to
 /// it. Whether an adhesion holds the fibre out there nobody sees, so its type is as likely wrong as right.

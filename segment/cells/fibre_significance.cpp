@@ -34,32 +34,22 @@ constexpr double kShape = 1.4;
 /// Of lines of texture, the share that a fibre lies beside by chance: of those that are no fibres in 9 simulated cells
 /// of 20 fibres .12, in 9 of 40 fibres .22.
 constexpr double kBeside = 0.15;
-/// The share that an adhesion which lies along them holds by chance: of 2 067 lines of texture in 6 simulated cells
-/// without fibres .091, and a few more that another one holds across.
-constexpr double kOnAdhesion = 0.1;
+constexpr double kMany = 20;  // where noise alone makes such lines
 
 }  // namespace
 
-double TextureLines::expected_false(double significance, LinePlace place) const {
-  constexpr double kBarely = 7, kMany = 20;  // noise alone makes such lines, of pieces that happen to lie in a row …
-  const double n_false = n * std::exp(-std::pow(std::max(0.0, significance - kLeast) / scale, kShape));
-  if (place == LinePlace::alone) return significance < kBarely ? std::max(n_false, kMany) : n_false;
-  const double share = place == LinePlace::beside_a_fibre ? kBeside : kOnAdhesion;
-  return significance < kLeast ? kMany : share * n_false;  // … anywhere, hardly at such places
+double TextureLines::log_false(double significance) const {
+  return std::log(n) - std::pow(std::max(0.0, significance - kLeast) / scale, kShape);
 }
 
-double TextureLines::chance_of_fibre(double significance, double fibres_per_unit, LinePlace place) const {
-  const double x = std::max(0.0, significance - kLeast) / scale;
-  const double density = expected_false(significance, place) * kShape / scale * std::pow(x, kShape - 1);
-  return fibres_per_unit / (fibres_per_unit + density);
+double TextureLines::expected_false(double significance) const {
+  constexpr double kBarely = 7;  // of pieces that happen to lie in a row
+  const double n_false = std::exp(log_false(significance));
+  return significance < kBarely ? std::max(n_false, kMany) : n_false;
 }
 
-double fibres_per_unit(const std::vector<double>& significances) {
-  constexpr double kFrom = 8, kTo = 20;  // above what texture makes, and not far above
-  // As if half a fibre more had been found in 4 units more: crowded simulated cells have one in 8, others none.
-  constexpr double kPrior = 0.5, kPriorUnits = 4;
-  const auto n = std::ranges::count_if(significances, [](double s) { return s >= kFrom && s < kTo; });
-  return (static_cast<double>(n) + kPrior) / (kTo - kFrom + kPriorUnits);
+double TextureLines::expected_beside(double significance) const {
+  return significance < kLeast ? kMany : kBeside * std::exp(log_false(significance));
 }
 
 TextureLines texture_lines(std::vector<double> significances) {
@@ -86,23 +76,24 @@ Vec2 direction_at(const Polyline& line, std::size_t i) {
 
 void Bundles::add(const Polyline& line_um) {
   for (std::size_t i = 0; i < line_um.size(); i += kEach)
-    squares_.add({line_um[i].x, line_um[i].y}, {line_um[i], direction_at(line_um, i)});
+    squares_.add({line_um[i].x, line_um[i].y}, {line_um[i], direction_at(line_um, i), n_lines_});
+  ++n_lines_;
 }
 
 bool Bundles::has_beside(const Place& place) const {
   constexpr double kParallel = 0.9659;  // cosine of 15°
   bool is_found = false;
   squares_.each_near({place.position_um.x, place.position_um.y}, [&](const Place& other) {
-    is_found = is_found || (norm(other.position_um - place.position_um) < kBeside_um &&
+    is_found = is_found || (other.line != place.line && norm(other.position_um - place.position_um) < kBeside_um &&
                             std::abs(dot(other.along, place.along)) > kParallel);
   });
   return is_found;
 }
 
-double Bundles::share_beside(const Polyline& line_um) const {
+double Bundles::share_beside(const Polyline& line_um, std::optional<std::size_t> own) const {
   std::size_t n = 0, n_beside = 0;
   for (std::size_t i = 0; i < line_um.size(); i += kEach, ++n)
-    n_beside += has_beside({line_um[i], direction_at(line_um, i)});
+    n_beside += has_beside({line_um[i], direction_at(line_um, i), own});
   return static_cast<double>(n_beside) / static_cast<double>(std::max<std::size_t>(1, n));
 }
 
@@ -194,8 +185,8 @@ void declare(stage::ParameterList& list, FibreParameters& p) {
            "height that a fibre must reach somewhere (standard deviations of the filtered noise)");
   list.add("fibre_follow_noise", p.fibre_follow_noise, Range::factor(),
            "height that a fibre must keep along its length (standard deviations of the filtered noise)");
-  list.add("fibre_false_per_cell", p.fibre_false_per_cell, Range::factor(),
-           "expected number of lines in a cell that are taken for fibres but belong to the actin meshwork");
+  list.add("fibre_least_probability", p.fibre_least_probability, Range::between(0, 1),
+           "a line is taken for a fibre if it is one with this probability at least");
   list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::size_um(),
            "smallest radius of curvature of a fibre (um)");
   list.add("fibre_faintest", p.fibre_faintest, Range::between(0, 1),

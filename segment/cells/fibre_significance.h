@@ -3,6 +3,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
@@ -22,27 +23,20 @@ double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points
 /// Texture hardly makes more significant lines.
 constexpr double kHardlyTexture = 10;
 
-/// Where a line lies: texture makes lines anywhere, fibres lie beside fibres and end on adhesions that lie along them.
-enum class LinePlace { alone, beside_a_fibre, on_adhesion_along_it };
-
 /// The lines that a cell's texture makes: how many, and how significant they are as a rule.
 struct TextureLines {
   double n = 0;
   double scale = 0;  ///< of their significance
 
-  /// How many at least as significant one finds at such places by chance: the number of false alarms (Desolneux, Moisan
-  /// & Morel, From Gestalt Theory to Image Analysis, Springer 2008, ch. 3).
-  double expected_false(double significance, LinePlace place = LinePlace::alone) const;
-  /// The chance that such a line is a fibre: the density of fibres at that significance over that of all lines.
-  /// @param fibres_per_unit  of significance: see fibres_per_unit()
-  double chance_of_fibre(double significance, double fibres_per_unit, LinePlace place = LinePlace::alone) const;
+  /// Logarithm of how many at least as significant one finds by chance: the number of false alarms (Desolneux, Moisan &
+  /// Morel, From Gestalt Theory to Image Analysis, Springer 2008, ch. 3).
+  double log_false(double significance) const;
+  /// That number for a line that lies alone, and for one beside a fibre.
+  double expected_false(double significance) const;
+  double expected_beside(double significance) const;
 };
 /// From the lines of the cell itself, most of which are its texture's.
 TextureLines texture_lines(std::vector<double> significances);
-
-/// How many fibres a cell has by unit of significance, where texture makes lines as well.
-/// @param significances  of its fibres
-double fibres_per_unit(const std::vector<double>& significances);
 
 /// Lines that others may lie beside. Bundles lie in carpets; a line of texture is beside one by chance.
 class Bundles {
@@ -50,15 +44,18 @@ class Bundles {
   /// @param line_um  with points about a pixel apart
   void add(const Polyline& line_um);
   /// Share of a line that has one of these beside it: nearer than 3 um, at less than 15 degrees.
-  double share_beside(const Polyline& line_um) const;
+  /// @param own  the line itself, if it is one of them, by the order in which they were added
+  double share_beside(const Polyline& line_um, std::optional<std::size_t> own = {}) const;
 
  private:
   struct Place {
     Vec2 position_um, along;
+    std::optional<std::size_t> line;
   };
   bool has_beside(const Place& place) const;
   static constexpr double kBeside_um = 3;  ///< bundles of one carpet lie nearer
   Squares<Place> squares_{kBeside_um};
+  std::size_t n_lines_ = 0;
 };
 
 /// Does the line wind to and fro, as a fold of the membrane does and a bundle under tension does not? Turning beyond

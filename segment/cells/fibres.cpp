@@ -22,7 +22,8 @@ namespace {
 
 constexpr double kSideRatio = 0.1;  // a step (the cell's edge) falls on one side only, a fibre on both
 constexpr double kAboveCortex =
-    1.5;  // a line along the outline is a fibre if it is as many times as high as the cortex
+    1.5;                          // a line along the outline is a fibre if it is as many times as high as the cortex
+constexpr double kMostFalse = 2;  // lines of texture in a cell that the first look may take for fibres
 constexpr double kSimplify_um = 0.05;  // points are left out if the line moves less: half a pixel
 
 /// The part of the image that holds the cell, shrunk until the narrowest filter spans no more pixels than it needs.
@@ -78,9 +79,8 @@ struct Candidate {
   WayOn before, after;
   Profile profile;
   double significance = 0;
-  double expected_false = 0;                             ///< lines as significant as this one that texture would make
-  double expected_beside = 0, expected_on_adhesion = 0;  ///< those of them at such places
-  LinePlace place = LinePlace::alone;
+  double expected_false = 0;   ///< lines as significant as this one that texture would make
+  double expected_beside = 0;  ///< those of them beside a fibre
 };
 
 double significance_of(const std::vector<cv::Point2d>& points, const std::vector<double>& height, const Ridges& ridges,
@@ -114,8 +114,7 @@ cv::Mat free_of_fibres(const std::vector<Trace>& traces, const Ridges& ridges, c
   cv::Mat is_free = field.is_inside.clone();
   const int radius = cvCeil(1.33 * p.fibre_width_um / field.pixel_um);  // the filters' side lobes end there
   for (const Trace& t : traces) {
-    if (texture.expected_false(significance_of(t.points, t.own_height(), ridges, field, p)) > p.fibre_false_per_cell)
-      continue;
+    if (texture.expected_false(significance_of(t.points, t.own_height(), ridges, field, p)) > kMostFalse) continue;
     for (const cv::Point2d& point : t.points) cv::circle(is_free, cv::Point(point), radius, cv::Scalar(0), cv::FILLED);
   }
   return is_free;
@@ -146,9 +145,7 @@ struct Judge {
     c.trace = trace.part(piece.first, piece.first + piece.n);
     c.significance = significance_of(points, c.trace.own_height(), ridges, field, p);
     c.expected_false = texture.expected_false(c.significance);
-    c.expected_beside = texture.expected_false(c.significance, LinePlace::beside_a_fibre);
-    c.expected_on_adhesion = texture.expected_false(c.significance, LinePlace::on_adhesion_along_it);
-    if (std::min(c.expected_beside, c.expected_on_adhesion) > p.fibre_false_per_cell) return std::nullopt;
+    c.expected_beside = texture.expected_beside(c.significance);
     c.profile = profile_across(field.image, points, 1.5 * p.fibre_width_um / field.pixel_um);
     if (!falls_on_both_sides(c.profile, kSideRatio)) return std::nullopt;
     if (is_ruffle(c.points_um, outline_um, p.fibre_lamellipodium_um)) return std::nullopt;
@@ -167,14 +164,12 @@ struct Judge {
 
 struct Judged {
   std::vector<Candidate> fibres;
-  std::vector<Candidate> doubtful;  ///< fibres if adhesions hold them
+  std::vector<Candidate> rest;
 };
 
 /// Those that are more significant than texture, and those beside them that are more significant than the texture that
-/// lies beside fibres by chance. Of the others those that are more significant than the texture that ends on adhesions
-/// by chance: there may be one false one for fifty fibres, so none in a cell without fibres.
-Judged significant(std::vector<Candidate> candidates, const FibreParameters& p) {
-  constexpr double kFalseByFibre = 0.02;
+/// lies beside fibres by chance.
+Judged significant(std::vector<Candidate> candidates) {
   std::vector<Candidate> kept;
   Bundles bundles;
   const auto take = [&](auto is_fibre) {
@@ -185,16 +180,11 @@ Judged significant(std::vector<Candidate> candidates, const FibreParameters& p) 
     candidates.erase(first, candidates.end());
     return has_any;
   };
-  take([&](const Candidate& c) { return c.expected_false <= p.fibre_false_per_cell; });
-  while (take([&](Candidate& c) {
-    if (c.expected_beside > p.fibre_false_per_cell || bundles.share_beside(c.points_um) < kMostBeside) return false;
-    c.place = LinePlace::beside_a_fibre;
-    return true;
+  take([](const Candidate& c) { return c.expected_false <= kMostFalse; });
+  while (take([&](const Candidate& c) {
+    return c.expected_beside <= kMostFalse && bundles.share_beside(c.points_um) >= kMostBeside;
   })) {
   }
-  const double most_false = std::min(p.fibre_false_per_cell, kFalseByFibre * static_cast<double>(kept.size()));
-  std::erase_if(candidates, [&](const Candidate& c) { return c.expected_on_adhesion > most_false; });
-  for (Candidate& c : candidates) c.place = LinePlace::on_adhesion_along_it;
   return {std::move(kept), std::move(candidates)};
 }
 
@@ -228,7 +218,7 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
   std::vector<double> heights, ridge_heights;
   for (const Trace& trace : traces) {
     inner.push_back(judge.candidate(trace, judge.p.fibre_edge_um));
-    if (!inner.back() || inner.back()->expected_false > judge.p.fibre_false_per_cell) continue;
+    if (!inner.back() || inner.back()->expected_false > kMostFalse) continue;
     heights.push_back(inner.back()->profile.height);
     ridge_heights.push_back(numerics::quantile(trace.height, 0.5));
   }
@@ -249,7 +239,7 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
       candidates.push_back(std::move(*inner[i]));
   }
   std::erase_if(candidates, [&](const Candidate& c) { return c.profile.height < faint; });
-  return significant(std::move(candidates), judge.p).fibres;  // what is doubtful is judged without them
+  return significant(std::move(candidates)).fibres;  // the rest is judged without them
 }
 
 /// What is left without the fibres found so far.
@@ -273,7 +263,7 @@ Rest rest_of(const std::vector<Candidate>& fibres, const Judge& judge) {
   return rest;
 }
 
-/// Also the fainter ones, which brighter ones beside or across them hide.
+/// Also the fainter ones, which brighter ones beside or across them hide; and the lines that are none.
 Judged with_hidden(std::vector<Candidate> fibres, const Rest& rest, const Judge& judge) {
   std::vector<Trace> known;
   std::vector<double> heights;
@@ -287,7 +277,46 @@ Judged with_hidden(std::vector<Candidate> fibres, const Rest& rest, const Judge&
     auto c = hidden.candidate(trace, judge.p.fibre_edge_um);
     if (c && c->profile.height >= faint) fibres.push_back(std::move(*c));
   }
-  return significant(std::move(fibres), judge.p);
+  return significant(std::move(fibres));
+}
+
+/// What lies around a line, and speaks for it or against it.
+class Surroundings {
+ public:
+  explicit Surroundings(const std::vector<Candidate>& fibres) {
+    std::vector<double> heights;
+    for (const Candidate& c : fibres) {
+      bundles_.add(c.points_um);
+      heights.push_back(c.profile.height);
+      n_moderate_ += c.significance >= kModerate && c.significance < kHigh;
+    }
+    if (!heights.empty()) usual_height_ = numerics::quantile(std::move(heights), 0.5);
+  }
+  /// @param own  the line's place among these fibres, if it is one of them
+  FibreEvidence evidence(const Candidate& c, const Judge& judge, std::optional<std::size_t> own) const {
+    return {.log_false = judge.texture.log_false(c.significance),
+            .length_um = length_um(c.points_um),
+            .relative_height = usual_height_ > 0 ? c.profile.height / usual_height_ : 1,
+            .share_beside = bundles_.share_beside(c.points_um, own),
+            .cortex = cortex_along(c.points_um, judge.outline_um),
+            .n_fibres = n_moderate_};
+  }
+
+ private:
+  static constexpr double kModerate = 8, kHigh = 20;  // above what texture makes, and not far above
+  Bundles bundles_;
+  double usual_height_ = 0, n_moderate_ = 0;
+};
+
+/// With those of the rest that are fibres rather than not, beside these.
+Judged with_probable(Judged lines, const Judge& judge) {
+  const Surroundings around(lines.fibres);
+  const auto first = std::stable_partition(lines.rest.begin(), lines.rest.end(), [&](const Candidate& c) {
+    return probability_of(around.evidence(c, judge, {})) < judge.p.fibre_least_probability;
+  });
+  std::move(first, lines.rest.end(), std::back_inserter(lines.fibres));
+  lines.rest.erase(first, lines.rest.end());
+  return lines;
 }
 
 /// Put right where fibres cross, and put together where their pieces lie far apart.
@@ -298,8 +327,6 @@ std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Rest& rest
   std::vector<Candidate> result;
   const auto keep = [&](const Trace& trace) {
     auto c = judge.candidate(trace, 0);
-    if (c && c->expected_beside > judge.p.fibre_false_per_cell) c.reset();
-    if (c && c->expected_false > judge.p.fibre_false_per_cell) c->place = LinePlace::beside_a_fibre;  // as found
     if (c) result.push_back(std::move(*c));
     return c.has_value();
   };
@@ -342,32 +369,30 @@ TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, 
   set_noise(ridges, is_free, scales.noise_radius_px);
   const auto traces = trace_lines(ridges, field.is_inside, rule);
   const Judge judge{field, ridges, rule, outline_um, texture_lines_of(traces, ridges, field, p), p};
-  std::vector<Candidate> fibres = judged(traces, judge);
-  std::vector<Candidate> doubtful;
-  if (!fibres.empty()) {
-    const Rest rest = rest_of(fibres, judge);
-    Judged all = with_hidden(std::move(fibres), rest, judge);
-    fibres = regrouped(std::move(all.fibres), rest, judge);
-    doubtful = std::move(all.doubtful);
+  Judged lines{judged(traces, judge), {}};
+  if (!lines.fibres.empty()) {
+    const Rest rest = rest_of(lines.fibres, judge);
+    lines = with_probable(with_hidden(std::move(lines.fibres), rest, judge), judge);
+    lines.fibres = regrouped(std::move(lines.fibres), rest, judge);
   }
-  TracedLines lines{{}, unexplained(fibres, judge)};
-  std::vector<double> significances;
-  for (const Candidate& c : fibres) significances.push_back(c.significance);
-  const double density = fibres_per_unit(significances);
-  const auto add = [&](std::vector<Candidate> candidates) {
-    for (Candidate& c : candidates) {
+  lines = with_probable(std::move(lines), judge);
+  TracedLines traced{{}, {}, unexplained(lines.fibres, judge)};
+  const Surroundings around(lines.fibres);
+  for (const bool is_one : {true, false}) {
+    std::vector<Candidate>& some = is_one ? lines.fibres : lines.rest;
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      Candidate& c = some[i];
+      const FibreEvidence evidence = around.evidence(c, judge, is_one ? std::optional(i) : std::nullopt);
       Fibre fibre;
       fibre.points_um = simplified(c.points_um, kSimplify_um);
       fibre.width_um = c.profile.width_px * field.pixel_um;
       fibre.mean_intensity = c.profile.height;
-      fibre.confidence = judge.texture.chance_of_fibre(c.significance, density, c.place);
-      lines.fibres.push_back(
-          {std::move(fibre), std::move(c.before), std::move(c.after), c.place == LinePlace::on_adhesion_along_it});
+      fibre.confidence = probability_of(evidence);
+      (fibre.confidence < p.fibre_least_probability ? traced.rest : traced.fibres)
+          .push_back({std::move(fibre), std::move(c.before), std::move(c.after), evidence});
     }
-  };
-  add(std::move(fibres));
-  add(std::move(doubtful));
-  return lines;
+  }
+  return traced;
 }
 
 std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,
@@ -375,9 +400,7 @@ std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhes
   std::vector<Fibre> fibres;
   for (TracedFibre& t : traced) {
     lead_on(t, adhesions, outline_um, p.fibre_reach_um);
-    const Polyline course = t.fibre.points_um;
     tie_ends(t.fibre, adhesions, outline_um, p.fibre_reach_um);
-    if (t.needs_adhesion && !is_held_along(t.fibre, course, adhesions)) continue;
     lead_to_cut(t.fibre, cuts, p.fibre_reach_um);
     fibres.push_back(std::move(t.fibre));
   }

@@ -12,26 +12,26 @@
 namespace mbtfm::cells {
 
 struct FibreParameters {
-  double fibre_width_um = 0.6;      ///< typical bundle seen through a microscope; half to twice of it is found
-  double fibre_averaging_um = 0.7;  ///< along the fibre: straight over this length, long enough to beat noise
-  double fibre_start_noise = 3;     ///< faint fibres begin there; their whole length decides what they are
-  double fibre_follow_noise = 2;    ///< once begun a fibre may fade into the noise
-  double fibre_false_per_cell =
-      2;  ///< of meshwork: a fibre too many changes no other tension, one missed does (thesis 3.3)
-  double fibre_faintest = 0.25;         ///< fainter lines are filaments of the mesh, beside what the fibres carry
-  double fibre_smallest_radius_um = 6;  ///< of curvature: bundles under tension are straight or gently curved
-  double fibre_gap_um = 1.5;            ///< a bundle may be hidden by a crossing one for this long
-  double fibre_shortest_um = 3;         ///< shorter lines cannot be told from texture
-  double fibre_edge_um = 1.0;           ///< a line along the outline this near to it is the cortex of the edge
-  double fibre_lamellipodium_um = 3;    ///< its width: this near to the edge a line that winds is a ruffle
-  double fibre_reach_um = 1.0;          ///< an end this near to an adhesion's rim is held by it
-  double fibre_faint_um = 4;            ///< longest faint end of the fibres that experts drew on a real cell
+  double fibre_width_um = 0.6;           ///< typical bundle seen through a microscope; half to twice of it is found
+  double fibre_averaging_um = 0.7;       ///< along the fibre: straight over this length, long enough to beat noise
+  double fibre_start_noise = 3;          ///< faint fibres begin there; their whole length decides what they are
+  double fibre_follow_noise = 2;         ///< once begun a fibre may fade into the noise
+  double fibre_least_probability = 0.5;  ///< so the fewest lines are wrongly taken or left out
+  double fibre_faintest = 0.25;          ///< fainter lines are filaments of the mesh, beside what the fibres carry
+  double fibre_smallest_radius_um = 6;   ///< of curvature: bundles under tension are straight or gently curved
+  double fibre_gap_um = 1.5;             ///< a bundle may be hidden by a crossing one for this long
+  double fibre_shortest_um = 3;          ///< shorter lines cannot be told from texture
+  double fibre_edge_um = 1.0;            ///< a line along the outline this near to it is the cortex of the edge
+  double fibre_lamellipodium_um = 3;     ///< its width: this near to the edge a line that winds is a ruffle
+  double fibre_reach_um = 1.0;           ///< an end this near to an adhesion's rim is held by it
+  double fibre_faint_um = 4;             ///< longest faint end of the fibres that experts drew on a real cell
 };
 
 void declare(stage::ParameterList& list, FibreParameters& parameters);
 
 struct TracedLines {
-  std::vector<TracedFibre> fibres;  ///< also doubtful lines, that need an adhesion
+  std::vector<TracedFibre> fibres;
+  std::vector<TracedFibre> rest;  ///< lines that are hardly fibres: less probable than `fibre_least_probability`
   /// By line the points, in no order, of actin as bright as the fibres that is in none of them; away from the cell's
   /// edge
   std::vector<Polyline> unexplained_um;
@@ -44,16 +44,14 @@ struct TracedLines {
 TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,
                          const FibreParameters& parameters);
 /// Tie their ends, which gives the types; label them from 1, the longest first. Those that end up too short are left
-/// out, and those that need an adhesion that lies along them and are not held by one. @param cuts  of the outline: see
-/// lead_to_cut()
+/// out. @param cuts  of the outline: see lead_to_cut()
 std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,
                         const Polygon& outline_um, const FibreParameters& parameters, const Cuts& cuts = {});
 
 /// Both: oriented ridge filters at two widths, lines traced along the ridges through crossings and gaps,
-/// collinear pieces joined. A line is a fibre where its mean height over the texture around it is so significant that
-/// the meshwork of the whole cell would make fewer than `fibre_false_per_cell` such lines by chance; steps (the cell's
-/// edge) and folds near the edge are left out. Ends are tied to the adhesions they reach, and their number is the type
-/// (Hotulainen & Lappalainen, J Cell Biol 173:383, 2006), with its chance to be right and its reason.
+/// collinear pieces joined. A line is a fibre if it is one with `fibre_least_probability` (probability_of()); steps
+/// (the cell's edge) and folds near the edge are left out. Ends are tied to the adhesions they reach, and their number
+/// is the type (Hotulainen & Lappalainen, J Cell Biol 173:383, 2006), with its chance to be right and its reason.
 ///
 /// A tied end lies at its adhesion's centre. `width_um` is the full width at half maximum of the mean profile,
 /// `mean_intensity` the mean height above both sides in grey levels.

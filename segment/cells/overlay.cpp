@@ -12,7 +12,7 @@ namespace mbtfm::cells {
 namespace {
 
 const cv::Scalar kInk(15, 15, 15), kPaper(255, 255, 255);  // red, green, blue
-const cv::Scalar kLeftOut(190, 190, 190);
+const cv::Scalar kLeftOut(190, 190, 190), kDoubtful(150, 150, 110);
 constexpr double kRingDash_px = 7, kFibreDash_px = 22;
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
 constexpr int kShift = 4;           // OpenCV's drawing takes fixed-point coordinates: sixteenths of a pixel
@@ -22,6 +22,12 @@ constexpr double kFibreText = 1.0, kAdhesionText = 0.6, kLegendText = 1.0;  // t
 constexpr double kStemOfU = 4;  // px from the left of the letter's box at size 1
 
 cv::Scalar scalar(Colour c) { return cv::Scalar(c.red, c.green, c.blue); }
+
+/// Of a fibre: the fainter, the less sure it is one.
+cv::Scalar faded_colour(const Fibre& f) {
+  constexpr double kFaintest = 0.3;
+  return scalar(colour_of(f.type)) * (kFaintest + (1 - kFaintest) * f.confidence);
+}
 
 /// Part of an image at the size of the picture, 0 to 1 between its 1 % and its 99.8 % quantile, brightened by a root so
 /// that faint structure shows.
@@ -208,6 +214,10 @@ std::vector<Entry> entries_of(const Segmentation& s, double pixel_um, int width)
   add_adhesions("anchor", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::anchor; });
   add_adhesions("candidate", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
   if (!s.unexplained_um.empty()) entries.push_back({"bright actin in no fibre", scalar(kUnexplainedColour)});
+  if (const std::size_t n = s.doubtful_um.size(); n > 0) {
+    entries.push_back({"perhaps a fibre " + std::to_string(n), kDoubtful, 56, 4});
+    entries.back().is_dashed = true;
+  }
   if (const std::size_t n = s.left_out_um.size() + s.cell.neighbours_um.size(); n > 0) {
     entries.push_back({"not of this cell " + std::to_string(n), kLeftOut, 56, 4});
     entries.back().is_dashed = true;
@@ -269,9 +279,9 @@ void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
   }
   for (const Fibre& f : cell.fibres)
     if (f.type == FibreType::edge)
-      canvas.dashed_line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1, kFibreDash_px);
+      canvas.dashed_line(f.points_um, false, faded_colour(f), thickness + 1, kFibreDash_px);
     else
-      canvas.line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1);
+      canvas.line(f.points_um, false, faded_colour(f), thickness + 1);
 }
 
 }  // namespace
@@ -293,6 +303,7 @@ images::Picture draw_overlay(const std::optional<images::Channel>& adhesion,
                              const std::optional<images::Channel>& actin, const Segmentation& s) {
   Canvas canvas(adhesion, actin, view_of(s), s.pixel_size_um, kLongSide);
   draw_marks(canvas, s.cell, 2);
+  for (const Polyline& line : s.doubtful_um) canvas.dashed_line(line, false, kDoubtful, 2, kRingDash_px);
   for (const auto* all : {&s.left_out_um, &s.cell.neighbours_um})
     for (const Polygon& ring : *all) canvas.dashed_line(ring, true, kLeftOut, 2, kRingDash_px);
   for (const Polyline& crest : s.unexplained_um)

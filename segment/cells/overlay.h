@@ -31,8 +31,9 @@ constexpr Colour colour_of(FibreType type) {
 
 /// The part of the images that holds the cell: actin in grey, adhesions in purple, both stretched to their own
 /// contrast; over them the outline, the adhesions' ellipses and the fibres in the colours that their types have in the
-/// report (Okabe & Ito's palette, which colour-blind people can tell apart), all fibre ids, and the adhesion ids that
-/// have room, the largest adhesions' first, dots on bright actin that is in no fibre; below a legend and a scale bar.
+/// report (Okabe & Ito's palette, which colour-blind people can tell apart), fainter the less sure ones, dashed the
+/// lines that may be fibres, all fibre ids, and the adhesion ids that have room, the largest adhesions' first, dots on
+/// bright actin that is in no fibre; below a legend and a scale bar.
 images::Picture draw_overlay(const std::optional<images::Channel>& adhesion,
                              const std::optional<images::Channel>& actin, const Segmentation& segmentation);
 

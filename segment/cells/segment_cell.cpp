@@ -92,8 +92,7 @@ std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const images::Ch
 void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& traced,
            const std::vector<Adhesion>& adhesions, const SegmentParameters& p) {
   std::vector<Fibre> fibres;
-  for (const TracedFibre& t : traced)
-    if (!t.needs_adhesion) fibres.push_back(t.fibre);
+  for (const TracedFibre& t : traced) fibres.push_back(t.fibre);
   s.alignment = align_channels(fibres, adhesions);
   if (!s.alignment || p.align_channels == Switch::off || !s.alignment->is_significant()) return;
   s.is_aligned = true;
@@ -104,7 +103,8 @@ void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& trac
   for (Polygon& hole : outline.holes_um) move(hole);
   s.cell.outline_um = outline.outer_um;
   s.cell.holes_um = outline.holes_um;
-  for (Polyline& crest : s.unexplained_um) move(crest);
+  for (auto* lines : {&s.unexplained_um, &s.doubtful_um})
+    for (Polyline& line : *lines) move(line);
   for (TracedFibre& t : traced)
     for (Polyline* points : {&t.fibre.points_um, &t.before.points_um, &t.after.points_um}) move(*points);
 }
@@ -334,8 +334,10 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
   else if (in.actin) {
     TracedLines traced = trace_fibres(in.actin->image, s.cell.outline_um, in.field.pixel_um, p.fibres);
     lines.traced = std::move(traced.fibres);
-    if (in.source != AdhesionSource::image) std::erase_if(lines.traced, &TracedFibre::needs_adhesion);
     s.unexplained_um = std::move(traced.unexplained_um);
+    constexpr double kPerhaps = 0.3;  // of the less probable hardly any is one
+    for (TracedFibre& t : traced.rest)
+      if (t.fibre.confidence >= kPerhaps) s.doubtful_um.push_back(std::move(t.fibre.points_um));
   }
   CellOutline around = outline;
   if (in.source == AdhesionSource::image) {

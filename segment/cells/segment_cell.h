@@ -48,6 +48,7 @@ struct Segmentation {
   std::optional<double> bleed_through{};        ///< contrast of the fibres over that of the adhesions, in their image
   std::optional<ChannelAlignment> alignment{};  ///< of the actin image on the adhesion image, where fibre ends tell it
   std::vector<Polyline> unexplained_um{};       ///< actin as bright as the fibres that is in none of them
+  std::vector<Polyline> doubtful_um{};          ///< lines that may be fibres and are less probable than these must be
   bool is_aligned = false;                      ///< fibres and outline were moved by it
   AdhesionSource source = AdhesionSource::image;
   std::optional<PatternAtCell> pattern{};  ///< where the cell sits on one: see pattern_at()

@@ -19,14 +19,11 @@ TEST(Fibres, of_a_saturated_image_are_none) {
   EXPECT_TRUE(fibres_of(image).empty());
 }
 
-/// The stated meaning of fibre_false_per_cell: where 0.5 lines a cell are expected, Poisson's chance of more than two
-/// is 1.4 %.
 TEST(Fibres, of_a_cell_with_meshwork_alone_are_two_at_most) {
   for (const std::string quality : {"poor", "ordinary", "good"}) {
     SCOPED_TRACE(quality);
     const SimulatedCell cell = simulated_cell("no-fibres", quality, 1);
-    FibreParameters p;
-    p.fibre_false_per_cell = 0.5;
+    const FibreParameters p;
     EXPECT_LE(find_fibres(cell.actin.image, cell.truth.outline_um, cell.truth.adhesions, 0.1, p).size(), 2u);
   }
 }

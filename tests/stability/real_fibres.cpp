@@ -113,7 +113,7 @@ TEST(RealFibres, of_a_carpet_of_sticks_lie_on_the_sticks) {
   const Image image = read_image(kActin / "synthetic_segmentfibers/SBXIQ_gauss.tif");
   const Image truth = read_image(kActin / "synthetic_segmentfibers/SBXIQ_binary.tif");
   cells::FibreParameters p;
-  p.fibre_false_per_cell = 1e12;
+  p.fibre_least_probability = 0;
   p.fibre_shortest_um = 2;
   p.fibre_gap_um = 0.5;
   Image lines = truth;

@@ -1,6 +1,8 @@
 /// fibre_accuracy drawn FOLDER [name=value …]: fibres of shared/data/real/cell_with_drawn_fibres against the experts'.
 /// fibre_accuracy single FOLDER [name=value …]: those of shared/data/actin/single_cells against the skeletons of a
 /// published network's maps, within three pixels.
+/// fibre_accuracy lines SCENARIO FIRST LAST: the lines of simulated cells at three image qualities, what speaks for
+/// each, and whether it is a fibre. fibre_probability.py fits segment/cells/fibre_probability.cpp to them.
 #include <cstdio>
 #include <cstring>
 
@@ -8,6 +10,7 @@
 #include "segment/images/channels.h"
 #include "segment/images/image.h"
 #include "tests/support/drawn_fibres.h"
+#include "tests/support/segmentation_accuracy.h"
 #include "tests/support/settings.h"
 
 namespace {
@@ -101,11 +104,31 @@ int single(const std::filesystem::path& folder, const std::vector<std::string>& 
   return 0;
 }
 
+int lines(const std::string& scenario, int first, int last) {
+  for (const std::string quality : {"poor", "ordinary", "good"})
+    for (int seed = first; seed <= last; ++seed) {
+      const test::SimulatedCell cell = test::simulated_cell(scenario, quality, static_cast<std::uint64_t>(seed));
+      const cells::SegmentParameters p;
+      const Cell found = segment_cell(cell.adhesion, cell.actin, p).cell;
+      const double pixel_um = *cell.actin.image.pixel_size_um;
+      const auto traced = cells::trace_fibres(cell.actin.image, found.outline_um, pixel_um, p.fibres);
+      for (const auto* some : {&traced.fibres, &traced.rest})
+        for (const cells::TracedFibre& line : *some) {
+          const bool is_true = test::is_true_fibre(line.fibre, cell.truth.fibres, 0.4);
+          std::printf("%s,%s,%d,%d,%.4f", scenario.c_str(), quality.c_str(), seed, is_true, line.fibre.confidence);
+          for (const double term : cells::terms_of(line.evidence)) std::printf(",%.4g", term);
+          std::printf("\n");
+        }
+    }
+  return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc > 2 && std::strcmp(argv[1], "drawn") == 0) return drawn(argv[2], {argv + 3, argv + argc});
   if (argc > 2 && std::strcmp(argv[1], "single") == 0) return single(argv[2], {argv + 3, argv + argc});
-  std::fprintf(stderr, "fibre_accuracy drawn|single FOLDER [name=value …]\n");
+  if (argc == 5 && std::strcmp(argv[1], "lines") == 0) return lines(argv[2], std::atoi(argv[3]), std::atoi(argv[4]));
+  std::fprintf(stderr, "fibre_accuracy drawn|single FOLDER [name=value …], or lines SCENARIO FIRST LAST\n");
   return 2;
 }

@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "tests/support/real_adhesions.h"
+#include "tests/support/segmentation_accuracy.h"
 #include "tests/support/settings.h"
 
 namespace {

@@ -16,6 +16,15 @@ Polyline straight(Vec2 from, Vec2 to, double step_um = 0.2) {
   return line;
 }
 
+TEST(FibreParts, a_line_is_not_beside_itself) {
+  Bundles bundles;
+  bundles.add(straight({0, 0}, {20, 0}));
+  bundles.add(straight({0, 1}, {10, 1}));
+  EXPECT_DOUBLE_EQ(bundles.share_beside(straight({0, 1}, {10, 1}), 1), 1);
+  EXPECT_NEAR(bundles.share_beside(straight({0, 0}, {20, 0}), 0), 0.64,
+              0.06);  // sqrt(3² - 1²) um beyond the other's end
+}
+
 TEST(FibreParts, a_line_is_beside_a_fibre_that_is_near_and_parallel) {
   Bundles bundles;
   EXPECT_DOUBLE_EQ(bundles.share_beside(straight({2, 1}, {12, 1})), 0);
@@ -64,41 +73,34 @@ TEST(FibreParts, more_significant_lines_are_made_by_chance_less_often_and_by_mor
     EXPECT_LT(fine.expected_false(s + 1), fine.expected_false(s));
     EXPECT_GT(coarse.expected_false(s), fine.expected_false(s));
     EXPECT_GT(many.expected_false(s), fine.expected_false(s));
-    EXPECT_GT(fine.chance_of_fibre(s, 1), coarse.chance_of_fibre(s, 1));
-    EXPECT_GT(fine.chance_of_fibre(s, 1), fine.chance_of_fibre(s, 0.1));
-    EXPECT_GT(coarse.chance_of_fibre(s, 1, LinePlace::beside_a_fibre), coarse.chance_of_fibre(s, 1));
+    EXPECT_GT(coarse.expected_false(s), coarse.expected_beside(s));
   }
 }
 
-/// Cells of 200 lines of texture and 0, 10 or 40 fibres, as many at each significance from 3 to 43. Of the lines that
-/// are stated with some chance so many are fibres, to a tenth; the cells tell their numbers of fibres themselves. In a
-/// cell without any the two lines of texture that are let through count as fibres, and make each other likelier.
-TEST(FibreParts, of_lines_with_a_stated_chance_that_share_are_fibres) {
-  constexpr int kCells = 400;
-  for (const int n_fibres : {0, 10, 40}) {
-    SCOPED_TRACE(n_fibres);
-    double n = 0, n_true = 0, stated = 0;
-    for (unsigned seed = 1; seed <= kCells; ++seed) {
-      std::mt19937 random(1000 + seed);
-      std::uniform_real_distribution<double> anywhere(3, 43);
-      const std::vector<double> texture = lines_of_texture(200, 2, seed);
-      std::vector<double> fibres, all = texture, taken;
-      for (int i = 0; i < n_fibres; ++i) fibres.push_back(anywhere(random));
-      all.insert(all.end(), fibres.begin(), fibres.end());
-      const TextureLines t = texture_lines(all);
-      std::ranges::copy_if(all, std::back_inserter(taken), [&](double s) { return t.expected_false(s) <= 2; });
-      const double density = fibres_per_unit(taken);
-      const auto add = [&](double s, bool is_true) {
-        const double chance = t.chance_of_fibre(s, density);
-        if (t.expected_false(s) > 2 || chance > 0.9) return;
-        ++n, n_true += is_true, stated += chance;
-      };
-      for (const double s : texture) add(s, false);
-      for (const double s : fibres) add(s, true);
-    }
-    EXPECT_GT(n, 100);
-    EXPECT_NEAR(stated / n, n_true / n, n_fibres == 0 ? 0.3 : 0.1);
-  }
+TEST(FibreParts, each_thing_that_speaks_for_a_line_makes_it_more_probable) {
+  const FibreEvidence doubtful{.log_false = 0, .length_um = 5, .relative_height = 0.6, .n_fibres = 6};
+  const double before = probability_of(doubtful);
+  EXPECT_GT(before, 0.1);
+  EXPECT_LT(before, 0.9);
+  const auto with = [&](auto change) {
+    FibreEvidence other = doubtful;
+    change(other);
+    return probability_of(other);
+  };
+  EXPECT_GT(with([](FibreEvidence& e) { e.log_false = -5; }), before);
+  EXPECT_GT(with([](FibreEvidence& e) { e.length_um = 15; }), before);
+  EXPECT_GT(with([](FibreEvidence& e) { e.relative_height = 1; }), before);
+  EXPECT_GT(with([](FibreEvidence& e) { e.share_beside = 1; }), before);
+  EXPECT_GT(with([](FibreEvidence& e) { e.n_fibres = 20; }), before);
+  EXPECT_LT(with([](FibreEvidence& e) { e.cortex = 0.5; }), before);
+}
+
+TEST(FibreParts, a_line_along_the_outline_is_cortex_as_far_as_it_is_near) {
+  const Polygon outline{{0, 0}, {20, 0}, {20, 20}, {0, 20}};
+  EXPECT_NEAR(cortex_along(straight({5, 0.5}, {15, 0.5}), outline), std::exp(-0.25), 1e-9);
+  EXPECT_NEAR(cortex_along(straight({5, 4}, {15, 4}), outline), std::exp(-2), 1e-9);
+  EXPECT_EQ(cortex_along(straight({10, 1}, {10, 9}), outline), 0);  // straight away from it
+  EXPECT_EQ(cortex_along(straight({5, 0.5}, {15, 0.5}), {}), 0);
 }
 
 TEST(FibreParts, a_line_of_two_deviations_is_none_in_the_cleanest_cell) {
@@ -135,37 +137,6 @@ TEST(FibreParts, a_long_fibre_is_led_on_along_its_faint_end_to_the_adhesion_ther
   tie_ends(bright.fibre, adhesions, {}, 1);
   EXPECT_EQ(bright.fibre.end_adhesion_id, 7);
   EXPECT_NEAR(norm(bright.fibre.points_um.back() - adhesions[0].position_um), 0, 1e-9);
-}
-
-/// An adhesion's centre is 1.2 um aside of the end, and its rim reaches the line.
-TEST(FibreParts, an_adhesion_speaks_for_a_faint_line_that_it_holds_and_lies_along) {
-  Adhesion along = adhesion_at({10.2, 0}), across = along, round = along, before = adhesion_at({-0.2, 0});
-  across.angle_rad = std::numbers::pi / 4;
-  round.major_axis_um = 0.6;
-  const Polyline line = straight({0, 0}, {10, 0});
-  const auto speaks = [&](const Adhesion& adhesion) {
-    Fibre fibre;
-    fibre.points_um = line;
-    tie_ends(fibre, {adhesion}, {}, 1);
-    return is_held_along(fibre, line, {adhesion});
-  };
-  EXPECT_TRUE(speaks(along));
-  EXPECT_TRUE(speaks(before));
-  EXPECT_FALSE(speaks(across));
-  EXPECT_FALSE(speaks(round));
-  EXPECT_FALSE(speaks(adhesion_at({15, 0})));
-}
-
-TEST(FibreParts, a_line_too_faint_for_a_fibre_is_one_if_an_adhesion_speaks_for_it) {
-  TracedFibre faint, bright;
-  faint.fibre.points_um = straight({0, 0}, {10, 0});
-  faint.needs_adhesion = true;
-  bright.fibre.points_um = straight({0, 20}, {8, 20});
-  const auto n_tied = [&](const std::vector<Adhesion>& adhesions) {
-    return tied({faint, bright}, adhesions, {}, {}).size();
-  };
-  EXPECT_EQ(n_tied({adhesion_at({10.2, 0})}), 2u);
-  EXPECT_EQ(n_tied({adhesion_at({15, 0})}), 1u);
 }
 
 TEST(FibreParts, an_end_is_not_tied_where_the_fibre_would_end_in_a_hook) {
