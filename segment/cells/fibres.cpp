@@ -13,6 +13,7 @@
 #include "segment/cells/fibre_profile.h"
 #include "segment/cells/fibre_significance.h"
 #include "segment/cells/grid.h"
+#include "segment/cells/padding.h"
 #include "segment/cells/trace.h"
 #include "segment/cells/trace_join.h"
 #include "segment/cells/without_lines.h"
@@ -360,7 +361,7 @@ std::vector<Polyline> unexplained(const std::vector<Candidate>& fibres, const Ju
 
 TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,
                          const FibreParameters& p) {
-  const Crop field = field_of(matrix_of(image), outline_um, pixel_size_um, p);
+  const Crop field = field_of(without_padding(matrix_of(image)), outline_um, pixel_size_um, p);
   const RidgeScales scales = scales_of(p, field.pixel_um);
   const TraceRule rule = rule_of(p, field.pixel_um);
   Ridges ridges = find_ridges(field.image, field.is_inside, scales);

@@ -7,7 +7,7 @@
 namespace mbtfm::tractions {
 namespace {
 
-TractionParameters half_space(TractionMethod method) {
+TractionParameters on_half_space(TractionMethod method) {
   TractionParameters parameters;
   parameters.method = method;
   parameters.gel_model = GelModel::half_space;
@@ -22,7 +22,7 @@ TEST(Dipoles, sparse_has_neither_peaks_nor_moments_of_its_own_on_scattered_beads
     const test::DipoleScene scene = test::dipole_scene({.radius_um = radius_um}, 1);
     TractionInputs inputs = scene.inputs;
     inputs.adhesions.clear();
-    const Reconstruction r = reconstruct(inputs, half_space(TractionMethod::sparse), 2);
+    const Reconstruction r = reconstruct(inputs, on_half_space(TractionMethod::sparse), 2);
     const double highest = test::sabass_score(scene, r.patches).peak;
     peak += highest / 4;
     EXPECT_LE(highest, 1.4) << radius_um;
@@ -63,7 +63,7 @@ TEST(Dipoles, total_of_adhesion_forces_is_not_that_of_their_noise) {
       double raw = 0, found = 0, z2 = 0, error = 0;
       for (unsigned seed = 1; seed <= kScenes; ++seed) {
         const Crowd scene = crowd(silent, noise_um, seed);
-        const Reconstruction r = reconstruct(scene.inputs, half_space(TractionMethod::adhesion_forces), 2);
+        const Reconstruction r = reconstruct(scene.inputs, on_half_space(TractionMethod::adhesion_forces), 2);
         const TractionSums sums = sums_of(r, scene.inputs, 1.5);
         for (const AdhesionForce& f : r.forces) raw += norm(f.force_nN) / scene.total_nN / kScenes;
         found += sums.total_force_nN / scene.total_nN / kScenes;
@@ -98,7 +98,7 @@ TEST(Dipoles, errors_by_point_of_fttc_hold_the_truth) {
     TractionInputs inputs = scene.inputs;
     inputs.adhesions.clear();
     inputs.point_errors = PointErrors::stated;
-    const Reconstruction r = reconstruct(inputs, half_space(TractionMethod::fttc), 2);
+    const Reconstruction r = reconstruct(inputs, on_half_space(TractionMethod::fttc), 2);
     std::vector<Vec2> truth;
     for (const GroundPatch& p : r.patches) {  // means over cells
       constexpr int kSub = 5;
