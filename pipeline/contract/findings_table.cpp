@@ -90,7 +90,7 @@ std::vector<KindOfFinding> kinds_of_inputs() {
        {{bright_actin, "segment", caution, "Bright actin that is in no fibre: {} um.", "length (um)", 0,
          "lines of 3 um, 3 um off the edge, as bright as the middle fibre; 9 to 26 um without one fibre"}}},
       {"images-mismatch",
-       "The images show different cells, or a part of the cell is dim.",
+       "The images do not show the same cell.",
        "Check in 1_segment/overlay.png that all show the same cell, the same way up. Crop a neighbour away, or draw "
        "the adhesions (images.adhesion_rois) or the outline (images.outline_roi).",
        "0 of 19",

@@ -127,6 +127,19 @@ TEST_F(Segment, a_sound_cell_has_no_findings) {
        "images-mismatch", "channel-shift", "adhesions-assumed", "fibre-ends-anchored", "input-not-used"},
       said);
   EXPECT_FALSE(fires("cells-touch", said)) << said;
+  EXPECT_FALSE(fires("outline-doubtful", said)) << said;
+}
+
+TEST_F(Segment, an_outline_far_beyond_all_adhesions_is_doubted) {
+  images::Image few = test::even_image(256, 256, 100);
+  test::draw_ellipse(few, test::ellipse(1, {12.8, 12.8}, 20, 20, 0), 100, 0.15, scene_.kPixel_um);
+  for (const Vec2 at : {Vec2{6, 9}, Vec2{6, 16}, Vec2{5, 12.5}})
+    test::draw_ellipse(few, test::ellipse(1, at, 1.6, 0.6, 0.6), 500, 0.13, scene_.kPixel_um);
+  test::add_noise(few, 10, 1);
+  few.pixel_size_um = scene_.kPixel_um;
+  images::write_tiff(folder_ / "paxillin.tif", few);
+  const std::string said = segment("out", kBoth).output;
+  EXPECT_TRUE(fires("outline-doubtful", "beyond all adhesions", said)) << said;
 }
 
 TEST_F(Segment, a_second_cell_that_touches_is_cut_off_and_told) {
