@@ -1,7 +1,5 @@
 /// mbtfm-init: a cell.toml from what the files of a folder say, with notes on what is to be completed.
-#include <algorithm>
 #include <filesystem>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,19 +21,6 @@
 namespace {
 
 using namespace mbtfm;
-
-constexpr std::string_view kImages[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
-
-bool is_image(const fs::path& file) {
-  return std::ranges::find(kImages, files::lower_case(file.extension().string())) != std::end(kImages);
-}
-
-std::vector<std::string> images_in(const fs::path& folder) {
-  std::vector<std::string> names;
-  for (const fs::path& file : files::visible_in(folder))
-    if (is_image(file) && files::is_file(file)) names.push_back(file.filename().string());
-  return names;
-}
 
 /// What an image file says of itself, as a comment; its calibration.
 struct Says {
@@ -99,7 +84,7 @@ std::string track_table(const Says& beads, std::vector<std::string>& open) {
 }
 
 Written cell_toml(const fs::path& folder) {
-  const std::vector<std::string> names = images_in(folder);
+  const std::vector<std::string> names = survey::images_in(folder);
   const survey::Roles roles = survey::roles_of(names);
   std::string images;
   std::vector<std::string> open;
@@ -211,7 +196,7 @@ StageReport init(stage::StageContext& context, bool& is_whole) {
   for (const fs::path& file : {folder / "cell.toml", context.outputs_.at("out")})
     if (fs::symlink_status(file).type() != fs::file_type::not_found)
       throw InputError(file.string(), "no cell.toml yet", "one", "it is yours: edit it, or rename it first");
-  if (images_in(folder).empty())
+  if (survey::images_in(folder).empty())
     throw InputError(folder.string(), "images of a cell: TIFF, PNG or JPEG", "none",
                      "files of a microscope (nd2, czi, lif): in Fiji, File > Import > Bio-Formats, then File > Save As "
                      "> Tiff; or bfconvert IN OUT.ome.tif");

@@ -25,6 +25,7 @@
 #include "segment/beads/track.h"
 #include "segment/images/channels.h"
 #include "segment/stacks/run.h"
+#include "segment/survey/roles.h"
 
 namespace mbtfm::beads {
 namespace {
@@ -224,16 +225,11 @@ std::vector<Frame> frames_of_file(const fs::path& file, const TrackParameters& p
   return frames;
 }
 
-constexpr const char* kImageExtensions[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
-
 /// The images of a folder in the order of their names, numbers as numbers, or those of a file.
 std::vector<Frame> frames_of(stage::StageContext& context, const TrackParameters& parameters) {
   const fs::path& given = context.inputs_.at("stressed");
   if (!files::is_folder(given)) return frames_of_file(context.input("stressed"), parameters);
-  std::vector<std::string> names;
-  for (const fs::path& file : files::visible_in(given))
-    if (std::ranges::find(kImageExtensions, file.extension()) != std::end(kImageExtensions))
-      names.push_back(file.filename().string());
+  const std::vector<std::string> names = survey::images_in(given);
   if (names.empty()) throw InputError(given.string(), "images (.tif, .tiff, .png, .jpg, .jpeg)", "none");
   context.input("stressed", names);
   std::vector<Frame> frames;

@@ -47,11 +47,7 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
 }
 
 LatticeOptions lattice_options(const TractionParameters& p, int threads) {
-  return {.model = p.gel_model,
-          .spacing_um = p.spacing_um,
-          .padding = p.padding,
-          .basis = Basis::waves,
-          .threads = threads};
+  return {.model = p.gel_model, .spacing_um = p.spacing_um, .padding = p.padding, .threads = threads};
 }
 
 std::vector<GroundPatch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions,

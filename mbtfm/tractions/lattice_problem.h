@@ -15,7 +15,6 @@ struct LatticeOptions {
   GelModel model = GelModel::layer;
   std::optional<double> spacing_um;  ///< unset: that of beads on a lattice, half the mean distance of scattered ones
   double padding = 1.5;              ///< periods over the field's size; 1: the field is periodic itself
-  Basis basis = Basis::waves;
   int threads = 1;
 };
 

@@ -216,9 +216,7 @@ Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionPa
         "sparse: lambda_um_per_kPa belongs to the other methods; this one has a penalty of its own, chosen by "
         "cross-validation");
   }
-  LatticeOptions options = lattice_options(parameters, threads);
-  options.basis = Basis::cells;
-  const LatticeProblem problem(inputs.beads, inputs.gel, options);
+  const LatticeProblem problem(inputs.beads, inputs.gel, lattice_options(parameters, threads));
   if (problem.data_squared() == 0) return reconstruction_of_nothing(problem, inputs);
   TikhonovSolver smooth(problem);
   const LambdaScan scan = scan_lambda(problem, smooth);

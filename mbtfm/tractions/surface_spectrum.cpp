@@ -45,8 +45,7 @@ double zero_wave_um_per_kPa(const Gel& gel, GelModel model, Surroundings surroun
 
 }  // namespace
 
-SurfaceSpectrum::SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings,
-                                 Basis basis) {
+SurfaceSpectrum::SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings) {
   const int n_x = lattice.n_columns, n_y = lattice.n_rows;
   const int n_half = n_x / 2 + 1;
   const Eigen::Index n_waves = static_cast<Eigen::Index>(n_half) * n_y;
@@ -59,11 +58,7 @@ SurfaceSpectrum::SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& 
       const Eigen::Index at = i + static_cast<Eigen::Index>(n_half) * j;
       const double k_x = step_x * i, k_y = step_y * (2 * j <= n_y ? j : j - n_y);
       const double k2 = k_x * k_x + k_y * k_y;
-      greens::WaveCompliance c = greens::wave_compliance(gel, model, std::sqrt(k2));
-      if (basis == Basis::cells) {
-        const double share = sinc(0.5 * k_x * lattice.spacing_um) * sinc(0.5 * k_y * lattice.spacing_um);
-        c = {share * c.along_um_per_kPa, share * c.across_um_per_kPa};
-      }
+      const greens::WaveCompliance c = greens::wave_compliance(gel, model, std::sqrt(k2));
       smallest_ = std::min({smallest_, c.along_um_per_kPa, c.across_um_per_kPa});
       cos_[at] = k_x / std::sqrt(k2);
       sin_[at] = k_y / std::sqrt(k2);

@@ -17,19 +17,12 @@ enum class Surroundings {
   open       ///< nothing more: the lattice is padded, and its zero wave stands for all that are longer than it
 };
 
-/// What the values at the nodes mean.
-enum class Basis {
-  waves,  ///< a sum of the lattice's waves
-  cells   ///< traction even over the cell around each node: its waves are weaker by sinc(kx a/2) sinc(ky a/2)
-};
-
 double sinc(double x);
 
 /// The compliance of every stored wave of a lattice, in the frame of its wave vector.
 class SurfaceSpectrum {
  public:
-  SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings,
-                  Basis basis = Basis::waves);
+  SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings);
 
   const Eigen::ArrayXd& along_um_per_kPa() const { return along_; }  ///< by wave
   const Eigen::ArrayXd& across_um_per_kPa() const { return across_; }

@@ -23,8 +23,12 @@ namespace {
 
 constexpr double kSideRatio = 0.1;  // a step (the cell's edge) falls on one side only, a fibre on both
 constexpr double kAboveCortex =
-    1.5;                          // a line along the outline is a fibre if it is as many times as high as the cortex
-constexpr double kMostFalse = 2;  // lines of texture in a cell that the first look may take for fibres
+    1.5;  // a line along the outline is a fibre if it is as many times as high as the cortex
+/// Lines of texture in a cell that the first look may take for fibres; any number where all lines are asked for.
+double most_false(const FibreParameters& p) {
+  constexpr double kMost = 2;
+  return p.fibre_least_probability > 0 ? kMost : std::numeric_limits<double>::infinity();
+}
 constexpr double kSimplify_um = 0.05;  // points are left out if the line moves less: half a pixel
 
 /// The part of the image that holds the cell, shrunk until the narrowest filter spans no more pixels than it needs.
@@ -115,7 +119,7 @@ cv::Mat free_of_fibres(const std::vector<Trace>& traces, const Ridges& ridges, c
   cv::Mat is_free = field.is_inside.clone();
   const int radius = cvCeil(1.33 * p.fibre_width_um / field.pixel_um);  // the filters' side lobes end there
   for (const Trace& t : traces) {
-    if (texture.expected_false(significance_of(t.points, t.own_height(), ridges, field, p)) > kMostFalse) continue;
+    if (texture.expected_false(significance_of(t.points, t.own_height(), ridges, field, p)) > most_false(p)) continue;
     for (const cv::Point2d& point : t.points) cv::circle(is_free, cv::Point(point), radius, cv::Scalar(0), cv::FILLED);
   }
   return is_free;
@@ -170,7 +174,7 @@ struct Judged {
 
 /// Those that are more significant than texture, and those beside them that are more significant than the texture that
 /// lies beside fibres by chance.
-Judged significant(std::vector<Candidate> candidates) {
+Judged significant(std::vector<Candidate> candidates, double most_false) {
   std::vector<Candidate> kept;
   Bundles bundles;
   const auto take = [&](auto is_fibre) {
@@ -181,9 +185,9 @@ Judged significant(std::vector<Candidate> candidates) {
     candidates.erase(first, candidates.end());
     return has_any;
   };
-  take([](const Candidate& c) { return c.expected_false <= kMostFalse; });
+  take([&](const Candidate& c) { return c.expected_false <= most_false; });
   while (take([&](const Candidate& c) {
-    return c.expected_beside <= kMostFalse && bundles.share_beside(c.points_um) >= kMostBeside;
+    return c.expected_beside <= most_false && bundles.share_beside(c.points_um) >= kMostBeside;
   })) {
   }
   return {std::move(kept), std::move(candidates)};
@@ -219,7 +223,7 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
   std::vector<double> heights, ridge_heights;
   for (const Trace& trace : traces) {
     inner.push_back(judge.candidate(trace, judge.p.fibre_edge_um));
-    if (!inner.back() || inner.back()->expected_false > kMostFalse) continue;
+    if (!inner.back() || inner.back()->expected_false > most_false(judge.p)) continue;
     heights.push_back(inner.back()->profile.height);
     ridge_heights.push_back(numerics::quantile(trace.height, 0.5));
   }
@@ -240,7 +244,7 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
       candidates.push_back(std::move(*inner[i]));
   }
   std::erase_if(candidates, [&](const Candidate& c) { return c.profile.height < faint; });
-  return significant(std::move(candidates)).fibres;  // the rest is judged without them
+  return significant(std::move(candidates), most_false(judge.p)).fibres;  // the rest is judged without them
 }
 
 /// What is left without the fibres found so far.
@@ -278,7 +282,7 @@ Judged with_hidden(std::vector<Candidate> fibres, const Rest& rest, const Judge&
     auto c = hidden.candidate(trace, judge.p.fibre_edge_um);
     if (c && c->profile.height >= faint) fibres.push_back(std::move(*c));
   }
-  return significant(std::move(fibres));
+  return significant(std::move(fibres), most_false(judge.p));
 }
 
 /// What lies around a line, and speaks for it or against it.

@@ -5,6 +5,9 @@
 #include <cctype>
 #include <string_view>
 
+#include "pipeline/files/names.h"
+#include "pipeline/files/own_files.h"
+
 namespace mbtfm::survey {
 namespace {
 
@@ -36,6 +39,16 @@ std::string key_of(std::string name) {
 }
 
 }  // namespace
+
+std::vector<std::string> images_in(const std::filesystem::path& folder) {
+  constexpr std::array<std::string_view, 5> kEndings = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
+  std::vector<std::string> names;
+  for (const fs::path& file : files::visible_in(folder))
+    if (std::ranges::find(kEndings, files::lower_case(file.extension().string())) != kEndings.end() &&
+        files::is_file(file))
+      names.push_back(file.filename().string());
+  return names;
+}
 
 Roles roles_of(const std::vector<std::string>& names) {
   std::map<std::string, std::vector<std::string>> by_key;

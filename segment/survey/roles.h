@@ -1,11 +1,16 @@
 /// Which image of a folder shows what, by its name.
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
 
 namespace mbtfm::survey {
+
+/// The names of a folder's visible TIFF, PNG and JPEG files, in capitals or not, in their order with numbers as
+/// numbers.
+std::vector<std::string> images_in(const std::filesystem::path& folder);
 
 struct Roles {
   std::map<std::string, std::string> files;  ///< by key of [images]: adhesion, actin, beads_stressed, beads_relaxed

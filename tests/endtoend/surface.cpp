@@ -242,7 +242,7 @@ TEST_F(Gel, whose_surface_does_not_hold_the_level_from_which_its_thickness_count
   ASSERT_EQ(run("--formula 'flat z_um=4' --spacing_um 4" + kSquare).code, 0);
   const std::string told = output_of(run_in(folder_, substrate));
   EXPECT_TRUE(fires("surface-misplaced", told)) << told;
-  EXPECT_TRUE(has_words(told, "26 um thick"));
+  EXPECT_TRUE(has_words(told, "% of the gel's thickness from z = 0"));
   ASSERT_EQ(run("--formula 'flat z_um=4' --zero_at mean --spacing_um 4" + kSquare).code, 0);
   EXPECT_FALSE(fires("surface-misplaced", run_in(folder_, substrate).output));
 }

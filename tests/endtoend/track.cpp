@@ -31,7 +31,7 @@ void write_series(const test::TemporaryFolder& folder) {
   write(folder / "r.tif", one.relaxed, 0.2);
   fs::create_directory(folder / "frames");
   write(folder / "frames/t2.tif", one.stressed, 0.2);
-  write(folder / "frames/t10.tif", two.stressed, 0.2);
+  write(folder / "frames/t10.TIF", two.stressed, 0.2);
   files::write_text(folder / "frames/._t2.tif", "as a Mac leaves on a stick");
 }
 

@@ -174,8 +174,7 @@ TEST(Fttc, cross_validation_smooths_more_where_there_is_more_noise) {
   double before = 0;
   for (const double noise : {0.01, 0.03, 0.1, 0.2}) {
     const EllipseScene scene = ellipse_scene(96, noise, 2, 0, 64, false);
-    const LatticeProblem problem(scene.field, scene.gel,
-                                 {.model = GelModel::half_space, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+    const LatticeProblem problem(scene.field, scene.gel, {.model = GelModel::half_space, .padding = 1.5, .threads = 1});
     TikhonovSolver solver(problem);
     const LambdaScan scan = scan_lambda(problem, solver);
     EXPECT_GT(scan.by_gcv, before);
