@@ -35,7 +35,7 @@ Reading best_reading(const GelUnderCell& on, const DisplacementField& beads, con
 /// @param force_derivatives, noise_um  as above
 Reading best_smoothing(const tensions::LinearData& data, const MatrixXd& force_derivatives, double noise_um);
 
-/// @param kind  read_otherwise or field_smoothed
+/// @param symptom  read_otherwise or field_smoothed
 std::optional<Finding> noticed_reading(Symptom symptom, const Reading& reading);
 
 }  // namespace mbtfm::fit
