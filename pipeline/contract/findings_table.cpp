@@ -102,9 +102,10 @@ std::vector<KindOfFinding> kinds_of_inputs() {
          "share of the outline's area 1 um beyond the actin image's cells", 0.02,
          "right: 0.000; another cell: 0.005 to 0.16, nine of eleven above this"}}},
       {"outline-doubtful",
-       "The outline may not be the cell's.",
-       "Look at 1_segment/overlay.png. Draw the outline (images.outline_roi), or crop the images to where the light is "
-       "even.",
+       "The outline and the adhesions do not fit together.",
+       "Look at 1_segment/overlay.png. If the outline is wrong, draw it (images.outline_roi), or crop to where the "
+       "light "
+       "is even. If adhesions are missing, lower segment.adhesion_faintest or draw them (images.adhesion_rois).",
        "0 of 32",
        {{adhesions_off_outline, "segment", caution, "{%} of the adhesions' area lies outside of the outline.",
          "share of a cell's adhesion area 1 um and more outside", 0.03,

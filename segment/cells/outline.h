@@ -90,7 +90,7 @@ double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& oth
 std::optional<double> share_beyond_cells(const CellsInImage& seen, const std::vector<Adhesion>& adhesions);
 
 /// A cell that spreads has adhesions along its edge: in eighteen simulated and fourteen real cells it reaches at
-/// most 5.1 um beyond the convex hull of their centres, and 10 to 50 where the edge of a disc of light, the dark side
+/// most 6.2 um beyond the convex hull of their centres, and 10 to 50 where the edge of a disc of light, the dark side
 /// of the picture or its padding was taken for the cell's.
 constexpr double kOutlineReach_um = 8;
 /// How far a cell's outline, where the image's border does not cut it, reaches beyond the hull of its adhesions; 0
