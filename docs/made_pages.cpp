@@ -5,11 +5,10 @@
 #include <stdexcept>
 #include <vector>
 
-#include "continuum/mean/outputs.h"
 #include "continuum/sheet/borders.h"
 #include "continuum/sheet/tables.h"
 #include "continuum/solids/outputs.h"
-#include "mbtfm/plan/tables.h"
+#include "mbtfm/mean/outputs.h"
 #include "mbtfm/sheets/tables.h"
 #include "mbtfm/spatial/stage.h"
 #include "mbtfm/tensions/tables.h"
@@ -21,6 +20,7 @@
 #include "pipeline/runner/process.h"
 #include "pipeline/stage/plausible.h"
 #include "pipeline/statistics/study_files.h"
+#include "samples/plan/tables.h"
 
 namespace mbtfm::pages {
 namespace {

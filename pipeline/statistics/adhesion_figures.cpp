@@ -180,7 +180,7 @@ Figure directions(const Analysis& analysis) {
   Figure figure{.name = "directions",
                 .title = "Directions",
                 .caption =
-                    "Angles at the adhesions. Broken line: what chance would give. In brackets: 95 % interval of the "
+                    "Angles at the adhesions. Dashed line: what chance would give. In brackets: 95 % interval of the "
                     "mean angle, cells resampled.",
                 .n_columns = 2};
   const std::vector<std::string>& conditions = analysis.tensions().sample.conditions;

@@ -219,7 +219,7 @@ std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, con
   std::vector<Figure> figures;
   if (auto primary = primary_figure(study, analysis, parameters)) figures.push_back(std::move(*primary));
   for (const CellKind kind : {CellKind::sheet, CellKind::space})
-    if (!analysis.of_cells(kind).empty()) figures.push_back(figure_of_kind(study, analysis, kind));
+    if (n_of_kind(study, kind) > 1) figures.push_back(figure_of_kind(study, analysis, kind));
   if (!analysis.has_fibres) return figures;
   if (analysis.tensions().sample.values.empty()) {
     figures.push_back(

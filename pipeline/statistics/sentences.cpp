@@ -169,18 +169,19 @@ std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameter
     return findings;
   };
   std::vector<Findings> all;
+  if (analysis.has_fibres) {
+    std::vector<const Measure*> of_plane = analysis.of_cells(CellKind::plane);
+    std::erase_if(of_plane, [](const Measure* m) { return m->sample.each != Observed::cells; });
+    Findings tensions = of("Tensions", {&analysis.tensions()}), cells = of("Cells", of_plane);
+    append(tensions.sentences, shares(analysis, parameters));
+    append(cells.sentences, lines(analysis));
+    all = {tensions,
+           of("Adhesions", {&analysis.of("adhesion_force_nN"), &analysis.of("adhesion_area_um2")}),
+           cells,
+           {"Directions", directions(analysis), {}}};
+  }
   if (const auto sheets = analysis.of_cells(CellKind::sheet); !sheets.empty()) all.push_back(of("Sheets", sheets));
   if (const auto cells = analysis.of_cells(CellKind::space); !cells.empty()) all.push_back(of("Cells in space", cells));
-  if (!analysis.has_fibres) return all;
-  std::vector<const Measure*> of_plane = analysis.of_cells(CellKind::plane);
-  std::erase_if(of_plane, [](const Measure* m) { return m->sample.each != Observed::cells; });
-  Findings tensions = of("Tensions", {&analysis.tensions()}), cells = of("Cells", of_plane);
-  append(tensions.sentences, shares(analysis, parameters));
-  append(cells.sentences, lines(analysis));
-  all.insert(all.end(), {tensions,
-                         of("Adhesions", {&analysis.of("adhesion_force_nN"), &analysis.of("adhesion_area_um2")}),
-                         cells,
-                         {"Directions", directions(analysis), {}}});
   return all;
 }
 

@@ -176,7 +176,7 @@ std::string overview(const Study& study, const Analysis& analysis) {
                         counted(n, "cells"), counted(n_adhesions, "adhesions"), counted(n_fibres, "stress fibres"),
                         analysis.tensions().sample.values.size());
   if (const int n = n_of_kind(study, CellKind::sheet); n > 0)
-    html += fmt::format("{}, of which {} have an identified contraction. ", counted(n, "sheets"),
+    html += fmt::format("{}; identified contractions: {}. ", counted(n, "sheets"),
                         n_cells_of(analysis.of(name_of(SheetQuantity::contraction)).sample.values));
   if (const int n = n_of_kind(study, CellKind::space); n > 0) html += counted(n, "cell in space. ", "cells in space. ");
   if (has_conditions(study)) html += counted(study.conditions.size(), "conditions") + ". ";

@@ -15,7 +15,7 @@ const std::map<std::string, std::string> kReaders = {
     {"pipeline/files/vtu_file.cpp", "elements and attributes of VTU"},
     {"pipeline/files/vtu_data.cpp", "VTU's names of compressors"},
     {"pipeline/files/triangle_mesh.cpp", "extensions and words of STL, PLY and OBJ"},
-    {"mbtfm/plan/cell_numbers.cpp", "rows of a study's tables"},
+    {"samples/plan/cell_numbers.cpp", "rows of a study's tables"},
     {"substrate/surface_main.cpp", "the extension of a height map"},
     {"continuum/outlines/rings.cpp", "extensions of outlines"},
     {"pipeline/files/csv.cpp", "true and false in CSV"},

@@ -1,7 +1,6 @@
 /// From two stacks of beads to displacements in space, as a person runs it.
 #include <nlohmann/json.hpp>
 
-#include "mbtfm/plan/scene.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -10,6 +9,7 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/report.h"
 #include "pipeline/report/space_results.h"
+#include "samples/plan/scene.h"
 #include "segment/images/image.h"
 #include "tests/support/program.h"
 

@@ -1,11 +1,11 @@
 /// Laws of a plan: how its errors scale, and that they are those of the fit.
-#include "mbtfm/plan/cell_numbers.h"
-#include "mbtfm/plan/space_grid.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
+#include "samples/plan/cell_numbers.h"
+#include "samples/plan/space_grid.h"
 #include "tests/support/drawn_pair.h"
 
 namespace mbtfm::plan {

@@ -2,11 +2,11 @@
 /// MBTFM_ALL_STUDIES=1 reads all of them from folders and makes all pages, too, instead of one in ten.
 #include <cctype>
 
-#include "mbtfm/plan/cell_numbers.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
+#include "samples/plan/cell_numbers.h"
 #include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
 

@@ -3,7 +3,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "mbtfm/plan/adhesion_pair.h"
+#include "samples/plan/adhesion_pair.h"
 #include "substrate/greens/half_space.h"
 #include "substrate/greens/inside.h"
 #include "tests/support/test.h"

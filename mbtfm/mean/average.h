@@ -1,0 +1,79 @@
+/// Fields of registered cells on common nodes, their mean and its error.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "mbtfm/mean/registration.h"
+#include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/extent.h"
+
+namespace mbtfm::mean {
+
+/// Displacement and traction of the gel's surface at a place.
+struct Sample {
+  Vec2 displacement_um, traction_kPa;
+};
+
+/// A cell's fields in the frame of the reference: found on a lattice of its own frame, cubic between its nodes (Keys
+/// 1981), then turned with it. In the frame of the image the beads fill the lattice, however the cell lies in it; a
+/// lattice of the reference's frame would have empty corners, and its tractions another regularisation for each turn.
+class CellField {
+ public:
+  /// @param patches   of a lattice in the cell's own frame, rows first
+  /// @param motion    from there to the reference
+  /// @param seen      of the beads in the cell's own frame
+  CellField(const std::vector<GroundPatch>& patches, const Motion& motion, const Extent& seen);
+  /// None where the beads do not reach.
+  std::optional<Sample> at(Vec2 place_um) const;
+  /// The mean over the motions of a symmetric shape: at each place of what stands at all its equivalents.
+  std::optional<Sample> at(Vec2 place_um, const std::vector<Motion>& motions) const;
+
+ private:
+  Motion motion_;
+  Extent seen_;
+  Vec2 origin_um_;
+  double spacing_um_ = 0;
+  int n_columns_ = 0, n_rows_ = 0;
+  std::vector<Sample> nodes_;
+};
+
+/// Mean over cells, and its standard error: from the scatter of the cells, so that it holds all that differs between
+/// them: noise of beads, registration, biology.
+struct NodeMean {
+  Vec2 position_um;
+  bool is_inside = false;  ///< of the reference
+  int n_cells = 0;
+  Sample mean;
+  std::optional<Sample> sigma = {};  ///< of each component; none for fewer than two cells
+};
+
+/// @param samples  by cell, then by node
+std::vector<NodeMean> mean_of(const std::vector<Vec2>& nodes_um,
+                              const std::vector<std::vector<std::optional<Sample>>>& samples,
+                              const Polygon& reference_um);
+
+/// Nodes of a lattice over the reference and some margin.
+std::vector<Vec2> lattice_over(const Polygon& reference_um, double margin_um, double spacing_um);
+
+/// Where an outline reaches out: its points that are farthest from the centroid, each by a tenth more than the mean.
+std::vector<Vec2> tips_of(const Polygon& reference_um);
+
+/// By node: which part of the edge it belongs to.
+enum class EdgePart { none, tip, edge };
+std::vector<EdgePart> edge_parts(const std::vector<Vec2>& nodes_um, const Polygon& reference_um, double band_um,
+                                 double tip_um);
+
+/// Traction towards the centroid at the tips over that at the rest of the edge: both are linear in the tractions, so
+/// that noise does not add to them as it does to magnitudes.
+struct Ratio {
+  double tip_kPa = 0, edge_kPa = 0, ratio = 0;
+  double low = 0, high = 0;  ///< 95 % by resampling the cells
+  int n_cells = 0;
+};
+std::optional<Ratio> tip_over_edge(const std::vector<Vec2>& nodes_um,
+                                   const std::vector<std::vector<std::optional<Sample>>>& samples,
+                                   const std::vector<EdgePart>& parts, Vec2 centre_um, std::uint64_t seed);
+
+}  // namespace mbtfm::mean

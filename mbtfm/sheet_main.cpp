@@ -1,0 +1,89 @@
+/// mbtfm-sheet: contracting sheets and colonies on their ground, and tensions from tractions.
+#include "continuum/sheet/recovery.h"
+#include "mbtfm/sheet_stage/outputs.h"
+#include "pipeline/contract/counted.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/fit_summary.h"
+
+namespace mbtfm::sheet_stage {
+namespace {
+
+StageReport run(const Parameters& p, stage::StageContext& context) {
+  context.progress(0, "reading");
+  const Path outline = context.input("outline");
+  const Region region = region_of(outlines::read_rings(outline, p.pixel_size_um));
+  const bool has_tractions = context.has_input("traction");
+  if (p.sheet.ground == Ground::none && !has_tractions) throw UsageError("ground = none needs --traction");
+  const bool has_beads = context.has_input("displacement");
+  if (has_beads && has_tractions) throw UsageError("expected --displacement or --traction, not both");
+  if (context.has_input("beads") && (has_beads || has_tractions))
+    throw UsageError("--beads needs a given contraction: leave --displacement and --traction out");
+  if (context.has_input("area") && !has_tractions) throw UsageError("--area needs --traction");
+  if (context.has_input("contractions") && (has_beads || has_tractions))
+    throw UsageError("--contractions needs a given contraction: leave --displacement and --traction out");
+  if (context.has_input("adhesive") && has_tractions)
+    throw UsageError("--adhesive is for springs or a gel: leave it out with --traction");
+  if (context.has_input("bundles") && !has_beads) throw UsageError("--bundles needs --displacement");
+  if (context.has_input("adhesions") && !has_beads) throw UsageError("--adhesions needs --displacement");
+  Run done = has_tractions ? run_from_traction(p, context, region)
+             : has_beads   ? run_fit(p, context, region, outlines::usual_error_um(outline, p.pixel_size_um))
+                           : run_forward(p, context, region);
+  const Balance balance = done.balance.value_or(balance_of(done.solution));
+  const std::size_t n_outside = write_solution(context, done.solution);
+  append(done.figures, figures_of(done.solution, balance));
+  append(done.figures, write_cells(context, done.solution, p.pixel_size_um));
+  files::write_figures(context.output("out", "sheet.json"), done.figures);
+  const Solution& found = done.solution;
+  context.notice(noticed(Symptom::sheet_coarse, relative_error(*found.elements, found.at_points, found.at_nodes)));
+  write_page(context, done, balance);
+  context.progress(1, "done");
+
+  StageReport report;
+  report.converged = done.solution.report.converged;
+  report.summary = std::to_string(done.solution.elements->n_triangles()) + " triangles, mean tension " +
+                   brief(balance.mean_tension_nN_per_um) + " nN/µm over " + brief(balance.area_um2) +
+                   " µm², total force " + brief(balance.total_force_nN) + " nN; " + done.solution.report.reason;
+  if (!done.told.empty()) report.summary += "; " + done.told;
+  if (!region.cuts.empty() && !has_tractions)
+    report.summary += "; WARNING: the image cuts the sheet, whose edge there counts as free";
+  if (n_outside > 0) report.summary += "; " + counted(n_outside, "point lies", "points lie") + " outside of the sheet";
+  report.figures = done.figures;
+  report.effects = done.effects;
+  return report;
+}
+
+}  // namespace
+}  // namespace mbtfm::sheet_stage
+
+int main(int argc, char** argv) {
+  using Kind = mbtfm::stage::FileArgument::Kind;
+  using namespace mbtfm::sheet_stage;
+  return mbtfm::stage::run_stage<Parameters>(
+      {.name = "sheet",
+       .purpose = "contract a sheet of cells, or find a colony's tensions from tractions or beads",
+       .files = {{"outline", Kind::input,
+                  "outline of the sheet: outline.csv, a mask (PNG, TIFF) or an ImageJ selection (.roi, .zip)"},
+                 {"traction", Kind::optional_input,
+                  "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 unless on a lattice)"},
+                 {"displacement", Kind::optional_input,
+                  "displacement.csv of the beads, to fit contraction and stiffness"},
+                 {"adhesions", Kind::optional_input,
+                  "with --displacement: adhesions.csv, a model to compare in sheet_models.csv"},
+                 {"bundles", Kind::optional_input,
+                  "with --displacement: fibre_points.csv of stress fibres whose tensions are fitted, too"},
+                 {"beads", Kind::optional_input, "on a gel: surface points x_um, y_um for displacement.csv"},
+                 {"cells", Kind::optional_input,
+                  "label image of the cells: writes borders.csv (forces between them) and cell_tension.csv"},
+                 {"contractions", Kind::optional_input,
+                  "with --cells: contraction of each (cell, contraction_nN_per_um); others have that of [sheet]"},
+                 {"adhesive", Kind::optional_input, "where the sheet adheres, as the outline; unset: everywhere"},
+                 {"area", Kind::optional_input,
+                  "with --traction: area around the outline in which the sheet ends; unset: the outline"},
+                 {"points", Kind::optional_input, "points of sheet.csv: x_um, y_um; unset: the nodes"},
+                 {"out", Kind::output_folder,
+                  "folder of sheet.csv, traction.csv, sheet.vtu, sheet.svg, sheet.html, sheet.json; of a fit also "
+                  "sheet_fit.csv, sheet_models.csv, displacement.csv"}}},
+      argc, argv, run);
+}

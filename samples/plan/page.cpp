@@ -1,0 +1,247 @@
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/charts/chart.h"
+#include "pipeline/report/stage_page.h"
+#include "samples/plan/answer.h"
+#include "samples/plan/tables.h"
+
+namespace mbtfm::plan {
+namespace {
+
+using report::number;
+
+/// What is said of flat cells and of cells in space in other words.
+struct Texts {
+  std::string beads, middle, of_middle, drawn, drawn_explained, how;
+};
+
+const Texts& texts_of(const Plan&) {
+  static const Texts texts = {
+      .beads = "beads per µm²",
+      .middle = "middle fibre",
+      .of_middle = "tension",
+      .drawn = "tension",
+      .drawn_explained =
+          "Tensions found in simulated experiments over the true ones; bars: the predicted standard error. The fits "
+          "know "
+          "neither the cell's own network nor its tensions.",
+      .how =
+          "<p class=\"sub\">The error by the beads is the Cramér–Rao bound of the fit: it grows in proportion to "
+          "noise and modulus and falls with the root of the density. The model's part (meshes, segmentation, what is "
+          "missing in the model) is the same for all of them: it is where the curves level off. “Never” means that "
+          "this part alone is larger than the target.</p>\n"};
+  return texts;
+}
+
+const Texts& texts_of(const SpacePlan&) {
+  static const Texts texts = {
+      .beads = "beads per µm³",
+      .middle = "middle patch",
+      .of_middle = "force",
+      .drawn = "component of a force",
+      .drawn_explained =
+          "Forces found in simulated experiments over the true ones, by component; bars: the predicted standard error.",
+      .how =
+          "<p class=\"sub\">Standard errors are those that the reconstruction states, with lambda as data of this "
+          "noise choose it. A modulus counts as noise does. More noise makes lambda larger, so that the error grows "
+          "less than the noise. “By background” is the part by tractions beside the patches that the beads do not "
+          "tell from them.</p>\n"};
+  return texts;
+}
+
+Quantity drawn_quantity(const Plan& plan) {
+  return plan.grid.needed.empty() ? Quantity::total_force : Quantity::fibres;
+}
+SpaceQuantity drawn_quantity(const SpacePlan&) { return SpaceQuantity::force; }
+
+/// Said after a point's numbers.
+std::string further_of(const Expected& e) {
+  return "; " + brief(100 * e.share_within) + " % of the fibres are within the target";
+}
+std::string further_of(const SpaceExpected&) { return {}; }
+
+std::string colour(std::size_t k) { return charts::kColours[k % std::size(charts::kColours)]; }
+
+std::string dashed(const Asked& asked) { return "Dashed: the target of " + brief(asked.target_nN) + " nN."; }
+
+/// Standard error over density at one noise, a curve for each gel, the target as a line.
+template <class Quantity>
+charts::Chart error_chart(const PlanOf<Quantity>& plan, double noise_um) {
+  const Quantity quantity = drawn_quantity(plan);
+  const Texts& texts = texts_of(plan);
+  const Asked& asked = plan.asked;
+  std::vector<double> errors = {asked.target_nN};  // of all noises, so that the axes are alike
+  for (const auto& e : plan.grid.expected)
+    if (e.quantity == quantity) errors.push_back(e.standard_error_nN);
+  charts::Chart chart("Noise " + brief(noise_um) + " µm",
+                      charts::axis_over(texts.beads, asked.densities, charts::Scale::logarithmic),
+                      charts::axis_over("standard error (nN)", errors, charts::Scale::logarithmic));
+  for (std::size_t k = 0; k < asked.youngs_modulus_kPa.size(); ++k) {
+    const std::string gel = brief(asked.youngs_modulus_kPa[k]) + " kPa";
+    std::vector<Vec2> points;
+    for (const auto& e : plan.grid.expected) {
+      if (e.quantity != quantity || e.point.youngs_modulus_kPa != asked.youngs_modulus_kPa[k]) continue;
+      if (e.point.noise_um != noise_um) continue;
+      points.push_back({e.point.density, e.standard_error_nN});
+      chart.dot(points.back(), 3.5, "fill:" + colour(k) + ";stroke:#fff",
+                gel + ", " + brief(e.point.density) + " " + texts.beads + ": " + brief(e.standard_error_nN) +
+                    " nN, of which " + brief(e.from_beads_nN) + " by the beads" + further_of(e));
+    }
+    chart.curve(points, "fill:none;stroke-width:2;stroke:" + colour(k));
+    chart.key(gel, colour(k));
+  }
+  chart.level(asked.target_nN, "stroke:#333;stroke-width:1.5;stroke-dasharray:6 4");
+  return chart;
+}
+
+template <class Quantity>
+std::vector<charts::Chart> charts_of(const PlanOf<Quantity>& plan) {
+  std::vector<charts::Chart> charts;
+  for (const double noise_um : plan.asked.noise_um) charts.push_back(error_chart(plan, noise_um));
+  return charts;
+}
+
+std::string needed_text(const Plan& plan, const Needed& n) {
+  if (!n.density) return "never";
+  return *n.density > plan.most_beads_per_um2 ? "&gt; " + brief(plan.most_beads_per_um2)
+                                              : density_text(plan.asked.densities, *n.density);
+}
+std::string needed_text(const SpacePlan& plan, const Needed& n) {
+  return n.density ? density_text(plan.asked.densities, *n.density)
+                   : "&gt; " + about(most_beads_per_um3(plan.asked.densities));
+}
+
+std::string below_needed(const Plan& plan) {
+  return "<p class=\"sub\">&gt; " + brief(plan.most_beads_per_um2) +
+         ": more beads than can be told apart. “never”: no number of beads suffices.</p>\n";
+}
+std::string below_needed(const SpacePlan&) { return {}; }
+
+const char* density_column(const Plan&) { return "beads_per_um2"; }
+const char* density_column(const SpacePlan&) { return "beads_per_um3"; }
+
+template <class Row>
+report::Listing listing_of(const char* title, const char* file, const files::Table<Row>& table,
+                           const std::vector<Row>& rows, const std::string& columns) {
+  return {title, {}, file, text_of(table, rows), columns};
+}
+
+const char* further_columns(const Plan&) {
+  return "from_mesh_nN: by mesh (nN), from_segmentation_nN: by segmentation (nN), from_other_nN: by the rest (nN)";
+}
+const char* further_columns(const SpacePlan&) {
+  return "from_background_nN: by background (nN), resolution_um: map resolves (µm), numbers_told: numbers resolved";
+}
+
+template <class Quantity>
+report::Listing expected_listing(const PlanOf<Quantity>& plan) {
+  return listing_of(
+      "All numbers", "plan.csv", expected_table(Quantity{}), plan.grid.expected,
+      "youngs_modulus_kPa: gel (kPa), " + std::string(density_column(plan)) + ": " + texts_of(plan).beads +
+          ", noise_um, quantity, n: number, standard_error_nN, from_beads_nN: by beads (nN), " + further_columns(plan) +
+          ", share_within: share within target, least_distance_um: two told apart from (µm)");
+}
+
+report::Listing cell_listing(const std::vector<CellNumbers>& cells) {
+  std::string columns =
+      "type, mean_nN, between_cells_nN: SD between cells (nN), within_nN: SD within a cell (nN), error_nN, difference, "
+      "fibres_per_cell, cells: cells of each condition";
+  for (const int n : kCells)
+    columns += ", power_of_" + std::to_string(n) + "_cells: power with " + std::to_string(n) + " cells";
+  return listing_of("How many cells", "plan_cells.csv", cell_table(), cells, columns);
+}
+
+std::string name_of_number(const Plan&, const DrawnNumber& d) { return "fibre " + std::to_string(d.id); }
+std::string name_of_number(const SpacePlan&, const DrawnNumber& d) {
+  return "patch " + std::to_string(d.id) + ", " + name_of(d.component);
+}
+
+/// Numbers as drawn experiments found them.
+template <class Quantity>
+charts::Chart drawn_chart(const PlanOf<Quantity>& plan) {
+  const std::vector<DrawnNumber>& numbers = plan.drawn->numbers;
+  std::vector<double> both;
+  for (const DrawnNumber& d : numbers) both.insert(both.end(), {d.true_nN, d.found_nN});
+  charts::Chart chart("Drawn experiments",
+                      charts::axis_over("true " + texts_of(plan).drawn + " (nN)", both, charts::Scale::linear),
+                      charts::axis_over("found (nN)", both, charts::Scale::linear));
+  const auto [least, most] = std::ranges::minmax(both);
+  const double from = std::min(0.0, least);
+  chart.curve({{from, from}, {most, most}}, "fill:none;stroke:#999;stroke-width:1");
+  for (const DrawnNumber& d : numbers) {
+    const std::string of = colour(static_cast<std::size_t>(d.experiment));
+    chart.error({d.true_nN, d.found_nN - d.predicted_error_nN}, {d.true_nN, d.found_nN + d.predicted_error_nN},
+                "stroke-width:1;stroke:" + of);
+    chart.dot({d.true_nN, d.found_nN}, 3, "fill:" + of + ";stroke:#fff",
+              name_of_number(plan, d) + ": true " + brief(d.true_nN) + " nN, found " + brief(d.found_nN) + " ± " +
+                  brief(d.predicted_error_nN) + " nN");
+  }
+  return chart;
+}
+
+/// By gel and noise.
+template <class Quantity>
+report::Table needed_rows(const PlanOf<Quantity>& plan) {
+  report::Table table{.caption = "Beads that are needed", .columns = {number("gel (kPa)")}};
+  for (const double noise_um : plan.asked.noise_um) table.columns.push_back(number("noise " + brief(noise_um) + " µm"));
+  for (const double E : plan.asked.youngs_modulus_kPa) {
+    std::vector<std::string> row = {brief(E)};
+    for (const Needed& n : plan.grid.needed)
+      if (n.youngs_modulus_kPa == E) row.push_back(needed_text(plan, n));
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+std::string paragraphs(const std::vector<std::string>& texts) {
+  std::string html;
+  for (const std::string& text : texts) html += "<p>" + report::html_escaped(text) + "</p>\n";
+  return html;
+}
+
+std::string grid(const std::string& figures) { return "<div class=\"grid\">\n" + figures + "</div>\n"; }
+
+}  // namespace
+
+template <class Quantity>
+std::string svg_of(const PlanOf<Quantity>& plan) {
+  const Texts& texts = texts_of(plan);
+  const std::vector<charts::Chart> charts = charts_of(plan);
+  return charts::svg_file(
+      charts, std::min<int>(2, static_cast<int>(charts.size())),
+      {plan.name + ": standard error of the " + texts.middle + "'s " + texts.of_middle + ".", dashed(plan.asked)});
+}
+
+template <class Quantity>
+std::string html_of(const PlanOf<Quantity>& plan) {
+  const Texts& texts = texts_of(plan);
+  std::string figures, body = report::section("In short", paragraphs(further_sentences(plan)));
+  if (!plan.grid.warnings.empty()) body += report::section("What to mind", paragraphs(plan.grid.warnings));
+  for (const charts::Chart& chart : charts_of(plan))
+    figures += report::figure(chart, "Of the " + texts.middle + ". " + dashed(plan.asked));
+  body += report::section("Standard error over density", grid(figures) + texts.how);
+  if (!plan.grid.needed.empty())
+    body += report::section(
+        report::capitalised(texts.beads) + " that are needed",
+        report::html_of(needed_rows(plan),
+                        {"plan_needed.csv", files::text_of(needed_table(Quantity{}), plan.grid.needed)}) +
+            below_needed(plan));
+  if (plan.drawn && !plan.drawn->numbers.empty())
+    body += report::section("How well it held", grid(report::figure(drawn_chart(plan), texts.drawn_explained)));
+  if (!plan.cells.empty())
+    body += report::section("How many cells",
+                            report::html_of(cell_listing(plan.cells)) +
+                                "<p class=\"sub\">Two-sided t test at 5 % of the means of two groups of cells; no "
+                                "number: more than 10000 cells. Scatter: " +
+                                report::html_escaped(plan.cells.front().scatter.source) + ".</p>\n");
+  body += report::section("All numbers", report::html_of(expected_listing(plan)));
+  return report::html_of(report::Page{.title = "Plan: " + plan.name, .what = answer_sentence(plan), .body = body});
+}
+
+template std::string svg_of(const Plan&);
+template std::string svg_of(const SpacePlan&);
+template std::string html_of(const Plan&);
+template std::string html_of(const SpacePlan&);
+
+}  // namespace mbtfm::plan
