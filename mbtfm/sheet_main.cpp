@@ -1,5 +1,7 @@
 /// mbtfm-sheet: contracting sheets and colonies on their ground, and tensions from tractions.
+#include <algorithm>
 #include "continuum/sheet/recovery.h"
+
 #include "mbtfm/sheet_stage/outputs.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
@@ -32,8 +34,8 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
                            : run_forward(p, context, region);
   const Balance balance = done.balance.value_or(balance_of(done.solution));
   const std::size_t n_outside = write_solution(context, done.solution);
-  append(done.figures, figures_of(done.solution, balance));
-  append(done.figures, write_cells(context, done.solution, p.pixel_size_um));
+  std::ranges::copy(figures_of(done.solution, balance), std::back_inserter(done.figures));
+  std::ranges::copy(write_cells(context, done.solution, p.pixel_size_um), std::back_inserter(done.figures));
   files::write_figures(context.output("out", "sheet.json"), done.figures);
   const Solution& found = done.solution;
   context.notice(noticed(Symptom::sheet_coarse, relative_error(*found.elements, found.at_points, found.at_nodes)));

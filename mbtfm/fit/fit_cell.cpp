@@ -199,6 +199,8 @@ FittedCell with_effects(FittedCell cell, const Work& work) {
   return cell;
 }
 
+void append(Figures& figures, const Figures& more) { figures.insert(figures.end(), more.begin(), more.end()); }
+
 }  // namespace
 
 FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& work) {

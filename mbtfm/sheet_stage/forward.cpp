@@ -131,7 +131,7 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
       const std::vector<Vec2> points = files::read_points(context.input("beads"));
       write_beads(context, *model, result.solution, points, points);
     }
-    append(result.figures, model->figures());
+    std::ranges::copy(model->figures(), std::back_inserter(result.figures));
     result.figures.emplace_back("gel_compliance", std::string(name_of(*result.solution.gel_held)));
     result.effects = effects_of(*model);
   }

@@ -94,7 +94,8 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
     const auto with = [&](CutEdge edge) {
       return tensions_from(tractions, area, material, size, context.threads, 1, {}, edge);
     };
-    append(result.figures, tell_cut(context, area, outline, result.solution, *found.cut, with));
+    std::ranges::copy(tell_cut(context, area, outline, result.solution, *found.cut, with),
+                      std::back_inserter(result.figures));
   }
   const double mean = found.balance.mean_tension_nN_per_um;
   context.notice(noticed(Symptom::sheet_expands, mean < 0 ? 1 : 0, {.at = "mean tension " + brief(mean) + " nN/µm"}));

@@ -14,6 +14,4 @@ using Value =
 /// In the order they were added.
 using Figures = std::vector<std::pair<std::string, Value>>;
 
-inline void append(Figures& to, const Figures& more) { to.insert(to.end(), more.begin(), more.end()); }
-
 }  // namespace mbtfm
