@@ -132,6 +132,7 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself, bool has
                     {"n_dorsal", n_of(FibreType::dorsal)},
                     {"n_arc", n_of(FibreType::arc)},
                     {"n_edge", n_of(FibreType::edge)},
+                    {"n_unclassified", std::int64_t(std::ranges::count_if(s.cell.fibres, is_unclassified))},
                     {"fibre_length_um", length},
                     {"cell_area_um2", s.area_um2},
                     {"n_holes", static_cast<std::int64_t>(s.cell.holes_um.size())},

@@ -5,6 +5,7 @@
 
 #include "mbtfm/sheets/beside_fibres.h"
 #include "mbtfm/tensions/evidence.h"
+#include "mbtfm/tensions/existence.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::fit {
@@ -70,6 +71,8 @@ ModelChecks check_model(const ReadyCell& cell, const EnsembleFit& fit, const Par
                      .missing_adhesions = {},
                      .drawn = cross_validation_of(cell, fit, p.fit.cross_validation, threads)};
   checks.left_out = leave_each_fibre_out(fit, checks.influence);
+  const std::vector<double> existence = existence_of(fit, of.fibres);
+  for (std::size_t i = 0; i < existence.size(); ++i) checks.left_out[i].existence = existence[i];
   if (is_sheet_asked(p.compare_sheet, checks.models, fit)) {
     for (ModelScore& sheet : sheets::scores_of_sheets(data, of, p.gel, *cell.gel, threads))
       checks.models.push_back(std::move(sheet));

@@ -40,6 +40,7 @@ struct FibreLeftOut {
   double chi_squared_rise = 0;   ///< from the local misfit, mean over the meshes, in units of the noise
   double aic_rise = 0;           ///< less 2 for the parameter saved: positive where the beads call for the fibre
   double n_informing_beads = 0;  ///< see Influence
+  double existence = 1;          ///< the probability that it is a fibre: existence_of()
 };
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence);
 

@@ -107,14 +107,16 @@ Table<ModelScore> model_table() {
 
 Table<FibreLeftOut> fibre_left_out_table() {
   using Row = FibreLeftOut;
-  return {.file = "4_fit/fibres_left_out.csv",
-          .row = "each fibre",
-          .columns = {{"fibre_id", "the fibre that is left out", &Row::fibre_id},
-                      {"chi_squared_rise", "by how much the misfit rises without it", &Row::chi_squared_rise, kResult},
-                      {"aic_rise", "the same of Akaike's criterion", &Row::aic_rise, kResult},
-                      {"supported", "the beads call for the fibre", [](const Row& f) { return f.aic_rise > 0; }},
-                      {"n_informing_beads", "number of beads, effectively, that determine this tension",
-                       &Row::n_informing_beads, kResult}}};
+  return {
+      .file = "4_fit/fibres_left_out.csv",
+      .row = "each fibre",
+      .columns = {{"fibre_id", "the fibre that is left out", &Row::fibre_id},
+                  {"chi_squared_rise", "by how much the misfit rises without it", &Row::chi_squared_rise, kResult},
+                  {"aic_rise", "the same of Akaike's criterion", &Row::aic_rise, kResult},
+                  {"supported", "the beads call for the fibre", [](const Row& f) { return f.aic_rise > 0; }},
+                  {"n_informing_beads", "number of beads, effectively, that determine this tension",
+                   &Row::n_informing_beads, kResult},
+                  {"existence", "probability that the line is a fibre, by image and beads", &Row::existence, kResult}}};
 }
 
 std::vector<DrawRow> draw_rows(const CrossValidation& result) {

@@ -116,6 +116,20 @@ TEST(Fibres, tell_why_they_have_their_type) {
   EXPECT_GT(fibres[0].type_confidence, 0.95);
 }
 
+TEST(Fibres, that_nothing_holds_are_arcs_if_they_bulge_towards_the_edge_and_else_of_no_type) {
+  const Polygon cell{{1, 1}, {24, 1}, {24, 24}, {1, 24}};
+  const Adhesion far = ellipse(1, {4, 21}, 0.8, 0.6, 0);
+  for (const bool bulges : {true, false}) {
+    SCOPED_TRACE(bulges);
+    Polyline line;
+    for (double s = -5; s <= 5; s += 0.5) line.push_back({12.5 + s, 7 + (bulges ? 0.05 * s * s : 0)});
+    const auto fibres = find_fibres(drawn({line}), cell, {far}, 0.1, FibreParameters{});
+    ASSERT_EQ(fibres.size(), 1u);
+    EXPECT_EQ(fibres[0].type, FibreType::arc);
+    EXPECT_EQ(is_unclassified(fibres[0]), !bulges) << fibres[0].type_reason;
+  }
+}
+
 TEST(Fibres, that_stop_at_the_limit_of_reach_are_decided_by_their_direction) {
   // a cell's edge at x = 22 um, the adhesion 1.4 um ahead of the end: 0.7 of the way counts, about the reach of 1 um
   const Polygon cell{{1, 1}, {22, 1}, {22, 24}, {1, 24}};

@@ -2,6 +2,7 @@
 #include "mbtfm/tensions/tension_fit.h"
 
 #include "mbtfm/tensions/cross_validation.h"
+#include "mbtfm/tensions/existence.h"
 #include "mbtfm/tensions/model_checks.h"
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/numerics/parallel.h"
@@ -451,6 +452,36 @@ TEST(ModelChecks, a_missing_fibre_is_hinted_at_its_adhesions_and_the_full_model_
   EXPECT_EQ(missing[0].end_adhesion_id, 12);
   // a lone fibre pulls both adhesions with its tension; the network around it takes up some
   EXPECT_NEAR(missing[0].tension_nN, 5, 1);
+}
+
+/// The integral over the fibre's tension, by the midpoint rule: its error is far below 1e-4 at these steps.
+TEST(ModelChecks, the_odds_of_a_fibre_are_those_of_its_integral) {
+  const auto normal = [](double x, double sigma) { return std::exp(-x * x / (2 * sigma * sigma)) / sigma; };
+  for (const double t : {-0.4, 0.0, 0.7, 2.5}) {
+    SCOPED_TRACE(t);
+    constexpr double kSigma = 0.5, kUsual = 3, kStep = 1e-3;
+    double fibre = 0;
+    for (double s = kStep / 2; s < 8 * kUsual; s += kStep)
+      fibre += normal(t - s, kSigma) * 2 * normal(s, kUsual) * kStep / std::sqrt(2 * std::numbers::pi);
+    EXPECT_NEAR(log_odds(0.3, t, kSigma, kUsual), std::log(0.3 / 0.7) + std::log(fibre / normal(t, kSigma)), 1e-4);
+  }
+}
+
+TEST(ModelChecks, a_line_that_does_not_pull_is_no_fibre_unless_the_image_is_sure) {
+  Cell cell = test::round_cell(15, 16);
+  test::add_ventral(cell, 1, 7);
+  test::add_ventral(cell, 3, 12);
+  test::add_ventral(cell, 5, 14);
+  TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 0, 5, 6), 3000, 0.05, 10);
+  const EnsembleFit fit = fit_own_network(scene);
+  for (Fibre& fibre : cell.fibres) fibre.confidence = 0.6;
+  const std::vector<double> existence = existence_of(fit, cell.fibres);
+  ASSERT_EQ(existence.size(), 3u);
+  EXPECT_LT(existence[0], 0.5);
+  EXPECT_GT(existence[1], 0.999);
+  EXPECT_GT(existence[2], 0.999);
+  cell.fibres[0].confidence = 1;
+  EXPECT_EQ(existence_of(fit, cell.fibres)[0], 1);
 }
 
 /// Each of two fibres that cross at a small angle pulls nearly along the line to the other's end, too.

@@ -4,6 +4,7 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/files/csv.h"
+#include "segment/cells/fibre_ends.h"
 #include "tests/support/test.h"
 
 namespace mbtfm::test {
@@ -24,7 +25,7 @@ inline std::vector<LinePoint> read_drawn_fibres(const std::filesystem::path& fil
   return points;
 }
 
-/// Points 0.2 um apart.
+/// Points 0.2 um apart; their type is empty where the fibre has none.
 inline std::vector<LinePoint> line_points(const std::vector<Fibre>& fibres) {
   constexpr double kStep_um = 0.2;
   std::vector<LinePoint> points;
@@ -34,7 +35,8 @@ inline std::vector<LinePoint> line_points(const std::vector<Fibre>& fibres) {
       const Vec2 a = f.points_um[i], d = f.points_um[i + 1] - a;
       const double l = norm(d);
       for (; next < gone + l; next += kStep_um)
-        points.push_back({a + ((next - gone) / l) * d, std::atan2(d.y, d.x), std::string(name_of(f.type))});
+        points.push_back({a + ((next - gone) / l) * d, std::atan2(d.y, d.x),
+                          cells::is_unclassified(f) ? "" : std::string(name_of(f.type))});
       gone += l;
     }
   }
@@ -60,8 +62,8 @@ inline std::vector<LinePoint> with_even_directions(const std::vector<LinePoint>&
 
 /// A point of either side is met where the other has one within 0.8 um and 20 degrees.
 struct DrawnScore {
-  double recall = 0, precision = 0, right_type = 0;
-  std::map<std::string, double> recall_of;  ///< by the drawn type
+  double recall = 0, precision = 0, right_type = 0;  ///< the latter of those that have a type
+  std::map<std::string, double> recall_of;           ///< by the drawn type
 };
 
 inline DrawnScore score_drawn(const std::vector<LinePoint>& drawn, const std::vector<LinePoint>& found) {
@@ -80,17 +82,18 @@ inline DrawnScore score_drawn(const std::vector<LinePoint>& drawn, const std::ve
   }
   for (auto& [type, n] : score.recall_of) n /= n_of[type];
   score.recall /= static_cast<double>(drawn.size());
-  int n_met = 0, n_right = 0;
+  int n_met = 0, n_typed = 0, n_right = 0;
   for (const LinePoint& f : found) {
     const LinePoint* nearest = nullptr;
     for (const LinePoint& d : drawn)
       if (meets(d, f) && (!nearest || norm(d.position_um - f.position_um) < norm(nearest->position_um - f.position_um)))
         nearest = &d;
     n_met += nearest != nullptr;
+    n_typed += nearest != nullptr && !f.type.empty();
     n_right += nearest != nullptr && nearest->type == f.type;
   }
   score.precision = static_cast<double>(n_met) / static_cast<double>(std::max<std::size_t>(1, found.size()));
-  score.right_type = static_cast<double>(n_right) / std::max(1, n_met);
+  score.right_type = static_cast<double>(n_right) / std::max(1, n_typed);
   return score;
 }
 
