@@ -144,6 +144,10 @@ bool has_content(const std::vector<std::string>& cells) {
   return std::ranges::any_of(cells, [](const std::string& cell) { return !cell.empty(); });
 }
 
+bool has_letter_or_digit(std::string_view text) {
+  return std::ranges::any_of(text, [](unsigned char c) { return std::isalnum(c) != 0 || c >= 0x80; });
+}
+
 /// "#N/A", "#NV", "#DIV/0!": what a spreadsheet writes for a number that it cannot compute.
 bool is_error_of_spreadsheet(std::string_view cell) {
   return cell.size() > 2 && cell[0] == '#' && std::isupper(static_cast<unsigned char>(cell[1])) &&
@@ -162,11 +166,15 @@ std::string_view without_comment_mark(std::string_view line) {
 }
 
 bool is_row_of_numbers(const Line& line, char separator, std::size_t n_numbers) {
-  const auto is_number = [](const std::string& cell) {
-    return !cell.empty() && (numeral_in(cell) != Numeral::none || is_missing(cell));
-  };
   if (is_comment(line.text)) return false;
-  return static_cast<std::size_t>(std::ranges::count_if(cells_of(line.text, separator), is_number)) >= n_numbers;
+  std::size_t n = 0;
+  bool has_word = false;  // beside dashes: "|---|---|" is none
+  for (const std::string& cell : cells_of(line.text, separator)) {
+    if (cell.empty() || (numeral_in(cell) == Numeral::none && !is_missing(cell))) continue;
+    ++n;
+    has_word = has_word || has_letter_or_digit(cell);
+  }
+  return has_word && n >= n_numbers;
 }
 
 /// `sep=;`, as Excel has it in the first line.
@@ -269,7 +277,7 @@ void expect_equal_widths(std::vector<CsvTable::Row>& rows, const std::string& na
     const bool is_double = row.fields.size() == 2 * n && separator == ',';
     throw InputError(at(name, row.line), std::to_string(n) + " fields, as in line " + std::to_string(rows.front().line),
                      std::to_string(row.fields.size()),
-                     is_double ? kOneMark : "the file may have been cut off, or a field has a separator in it");
+                     is_double ? kOneMark : "take a line out that is no row of the table, or save the table again if it was cut off");
   }
 }
 
@@ -306,12 +314,37 @@ Numeral numeral_in(std::string_view cell) {
 
 bool is_missing(std::string_view cell) {
   if (cell.empty() || is_error_of_spreadsheet(cell)) return true;
-  if (cell.front() == '-' || cell.front() == '+') cell.remove_prefix(1);
-  const std::string word = cell.size() < 10 ? lower_case(std::string(cell)) : "";
-  for (const char* missing : {"nan", "na", "n/a", "inf", "infinity", "none", "null", "nan(ind)", "1.#ind", "1.#qnan"})
+  constexpr std::size_t kLongest = 12;
+  const bool is_of_windows = cell.find("1.#") < 2;  // "-1.#IND00", "1.#QNAN0"
+  if (cell.size() > kLongest || is_of_windows || std::isdigit(static_cast<unsigned char>(cell.back())))
+    return is_of_windows;
+  std::string word;  // "n.d." is "nd", "--" is nothing
+  for (const char c : lower_case(std::string(cell)))
+    if (has_letter_or_digit({&c, 1})) word += c;
+  for (const char* missing : {"", "nan", "na", "nd", "ndef", "inf", "infinity", "\xE2\x88\x9E", "none", "null", "nanind",
+                              "nansnan", "nan0", "nannanj", "missing", "masked", "invalid", "undefined"})
     if (word == missing) return true;
   return false;
 }
+
+namespace {
+
+/// Rows right above the first one that are like it but have nothing where a number is missing: "8.0;8.0;;".
+void take_rows_with_gaps(ForeignTable& table, std::size_t n_numbers) {
+  const auto is_number = [](const std::string& cell) { return numeral_in(cell) != Numeral::none; };
+  while (!table.above.empty()) {
+    const std::vector<std::string>& cells = table.above.back().fields;
+    const bool is_row = cells.size() == table.rows.front().fields.size() &&
+                        2 * static_cast<std::size_t>(std::ranges::count_if(cells, is_number)) >= n_numbers &&
+                        std::ranges::all_of(cells, [&](auto& cell) { return is_number(cell) || is_missing(cell); });
+    if (!is_row) return;
+    table.rows.insert(table.rows.begin(), std::move(table.above.back()));
+    table.above.pop_back();
+    table.lines_above.pop_back();
+  }
+}
+
+}  // namespace
 
 ForeignTable read_numbers(std::string_view bytes, std::string name, std::size_t n_numbers) {
   std::string place;
@@ -332,9 +365,11 @@ ForeignTable read_numbers(std::string_view bytes, std::string name, std::size_t 
   }
   if (table.rows.empty()) {
     throw InputError(table.name, "rows of " + std::to_string(n_numbers) + " numbers or more", "none",
-                     "a row for each vector, its numbers between commas, semicolons, tabs or blanks");
+                     "a row for each vector, its numbers between commas, semicolons, tabs or blanks, without a unit beside "
+                     "them");
   }
   expect_equal_widths(table.rows, table.name, separator);
+  take_rows_with_gaps(table, n_numbers);
   const bool may_have_commas = text.find(',') != text.npos && (separator != ',' || text.find('"') != text.npos);
   if (may_have_commas) make_points(table.rows, table.name);
   if (text.find_first_of("+dD\xE2") == text.npos) return table;

@@ -22,6 +22,10 @@ using files::CsvTable;
 using files::ForeignTable;
 using files::lower_case;
 
+constexpr const char* kHowToWriteNumbers =
+    "a number has one decimal mark, nothing between thousands, no unit beside it and is no date; leave the cell empty "
+    "where there is none";
+
 constexpr std::size_t kComponents = 4;  // x, y and the displacement along them
 
 /// Names as people say them, in the order of TableForm.
@@ -38,6 +42,7 @@ struct Unit {
 std::optional<double> length_named(const std::string& word) {
   static const std::map<std::string, double> lengths_um = {
       {"px", 0},         {"pix", 0},         {"pixel", 0},  {"pixels", 0},  {"um", 1},         {"\xC2\xB5m", 1},
+      {"voxel", 0},      {"voxels", 0},      {"\xC3\xA5", 1e-4}, {"\xC3\x85", 1e-4}, {"angstrom", 1e-4},
       {"\xCE\xBCm", 1},  {"\xB5m", 1},       {"micron", 1}, {"microns", 1}, {"micrometer", 1}, {"micrometers", 1},
       {"micrometre", 1}, {"micrometres", 1}, {"nm", 1e-3},  {"mm", 1e3},    {"cm", 1e4},       {"m", 1e6}};
   const auto found = lengths_um.find(word);
@@ -46,8 +51,16 @@ std::optional<double> length_named(const std::string& word) {
 
 std::optional<Unit> unit_named(std::string text) {
   text = lower_case(std::move(text));
-  std::erase_if(text, [](char c) { return c == ' ' || c == '"'; });
-  static const std::map<std::string, double> times_per_s = {{"s", 1}, {"sec", 1}, {"second", 1}, {"ms", 1e3}};
+  static const std::map<std::string, double> times_per_s = {
+      {"s", 1},         {"sec", 1},         {"second", 1}, {"ms", 1e3},       {"min", 1.0 / 60}, {"minute", 1.0 / 60},
+      {"h", 1.0 / 3600}, {"hr", 1.0 / 3600}, {"hour", 1.0 / 3600}};
+  constexpr std::string_view kRaised = "\xE2\x81\xBB\xC2\xB9";
+  if (const std::size_t raised = text.find(kRaised); raised != text.npos) text.replace(raised, kRaised.size(), "-1");
+  if (const std::size_t blank = text.rfind(' '); text.ends_with("-1") && blank != text.npos) {  // "um s^-1"
+    text[blank] = '/';
+    text.resize(text.size() - 2);
+  }
+  std::erase_if(text, [](char c) { return c == ' ' || c == '"' || c == '^'; });
   const std::size_t slash = text.find('/');
   const std::optional<double> length = length_named(text.substr(0, slash));
   if (!length) return std::nullopt;
@@ -68,13 +81,23 @@ struct ColumnName {
 ColumnName parts_of(const std::string& name) {
   ColumnName parts;
   std::string said = name;
-  const std::size_t open = name.find_first_of("[("), blank = name.find_last_of("_ ");
-  if (open != name.npos) {
+  if (const std::size_t open = name.find_first_of("[("); open != name.npos) {
     parts.unit = unit_named(name.substr(open + 1, name.find_first_of("])", open) - open - 1));
     said = name.substr(0, open);
-  } else if (blank != name.npos) {
-    parts.unit = unit_named(name.substr(blank + 1));
-    if (parts.unit) said = name.substr(0, blank);
+  } else {
+    // "x_px", "x in px", and what R makes of "x [px]" and "u [px/frame]": "x..px.", "u..px.frame."
+    const std::string named = name.substr(0, name.find_last_not_of("._ ") + 1);
+    std::size_t end = named.npos;
+    for (int k = 0; k < 2 && !parts.unit && end != 0; ++k) {
+      const std::size_t mark = named.find_last_of("_ .", end);
+      if (mark == named.npos) break;
+      std::string unit = named.substr(mark + 1);
+      std::ranges::replace(unit, '.', '/');
+      parts.unit = unit_named(unit);
+      if (parts.unit) said = named.substr(0, mark);
+      end = mark - 1;
+    }
+    if (parts.unit && said.ends_with(" in")) said.resize(said.size() - 3);
   }
   for (const char c : lower_case(said))
     if (std::isalnum(static_cast<unsigned char>(c))) parts.key += c;
@@ -86,18 +109,25 @@ const std::array<std::set<std::string>, kComponents>& known_names() {
   static const std::array<std::set<std::string>, kComponents> names = {{
       {"x", "xpos", "posx", "xposition", "positionx", "xcoordinate", "xcoord"},
       {"y", "ypos", "posy", "yposition", "positiony", "ycoordinate", "ycoord"},
-      {"u", "ux", "vx", "dx", "xdisplacement", "displacementx", "dispx", "xdisp", "velocityu", "uvelocity", "velocityx",
+      {"u", "ux", "vx", "dx", "ux1", "xdisplacement", "displacementx", "dispx", "xdisp", "velocityu", "uvelocity", "velocityx",
        "xvelocity", "displacementu", "udisplacement"},
-      {"v", "uy", "vy", "dy", "ydisplacement", "displacementy", "dispy", "ydisp", "velocityv", "vvelocity", "velocityy",
+      {"v", "uy", "vy", "dy", "uy1", "ydisplacement", "displacementy", "dispy", "ydisp", "velocityv", "vvelocity", "velocityy",
        "yvelocity", "displacementv", "vdisplacement"},
   }};
   return names;
 }
 
+/// The same as rows and columns of a picture. Lattices number theirs, too: these count where there are no others.
+constexpr std::array<std::array<std::string_view, 2>, kComponents> kOfPicture = {
+    {{"col", "column"}, {"row", "line"}, {"dc", "dcol"}, {"dr", "drow"}}};
+
 const std::map<std::string, RowMark>& known_marks() {
   static const std::map<std::string, RowMark> marks = {
       {"mask", RowMark::zero_if_measured},   {"flags", RowMark::zero_if_measured},
       {"isnan", RowMark::zero_if_measured},  {"isvalid", RowMark::zero_if_masked},
+      {"outlier", RowMark::zero_if_measured}, {"isoutlier", RowMark::zero_if_measured},
+      {"masked", RowMark::zero_if_measured}, {"ismasked", RowMark::zero_if_measured},
+      {"good", RowMark::zero_if_masked},     {"typevector", RowMark::one_if_measured},
       {"valid", RowMark::zero_if_masked},    {"vectortype", RowMark::one_if_measured},
       {"chc", RowMark::positive_if_measured}};
   return marks;
@@ -140,8 +170,12 @@ std::vector<std::size_t> matches_in(const Header& header, const Asked& asked, st
   const std::string name = without_marks(asked.name);
   std::vector<std::size_t> found = all([&](const std::string& column) { return without_marks(column) == name; });
   if (!found.empty()) return found;
-  if (asked.name == asked.own)
-    return all([&](const std::string& column) { return known_names()[component].contains(parts_of(column).key); });
+  if (asked.name == asked.own) {
+    found = all([&](const std::string& column) { return known_names()[component].contains(parts_of(column).key); });
+    if (!found.empty()) return found;
+    const auto& words = kOfPicture[component];
+    return all([&](const std::string& column) { return std::ranges::find(words, parts_of(column).key) != words.end(); });
+  }
   std::size_t number = 0;
   const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
   if (error == std::errc() && end == name.data() + name.size() && number >= 1 && number <= header.size())
@@ -190,10 +224,13 @@ std::optional<Found> found_in(const Header& header, const TrackParameters& param
     missing += (missing.empty() ? "" : ", ") + asked[k].name;
     how += " --" + std::string(asked[k].parameter) + " " + std::to_string(k + 1);
   }
+  const bool has_angle = std::ranges::any_of(
+      header, [](const std::string& name) { return parts_of(name).key.find("angle") != std::string::npos; });
+  if (has_angle) how = "make two columns of length and angle: ux = length x cos(angle) and uy = length x sin(angle)";
   throw InputError(table.name + ":" + std::to_string(line), "columns " + missing,
                    is_without_names(header) ? std::to_string(header.size()) + " columns without names"
                                             : "the columns " + listed(header),
-                   "name them, or give their numbers, as in" + how + " (in cell.toml: track.x_column = \"1\")");
+                   has_angle ? how : "name them, or give their numbers, as in" + how + " (in cell.toml: track.x_column = \"1\")");
 }
 
 std::string text_of(const CsvTable::Row& row) {
@@ -240,7 +277,7 @@ void expect_no_numbers(const ForeignTable& table, int line_of_header) {
                             : row.fields.size() == n && 2 * n_numbers >= n && !is_without_names(row.fields);
     if (!is_row) continue;
     throw InputError(table.name + ":" + std::to_string(row.line), std::to_string(n) + " numbers or more, or units",
-                     "'" + text_of(row) + "'", "a number has one decimal mark and nothing between thousands");
+                     "'" + text_of(row) + "'", kHowToWriteNumbers);
   }
 }
 
@@ -253,8 +290,11 @@ Found header_of(ForeignTable& table, const TrackParameters& parameters) {
                               return row.fields.back().empty();
                             });
     if (ends_empty) header.emplace_back();
-    // R writes the numbers of the rows in a column without a name
-    if (header.size() + 1 == n && table.rows.front().fields.front() == "1") header.insert(header.begin(), "");
+    // R and Python write the numbers of the rows in a column without a name
+    const std::string& number = table.rows.front().fields.front();
+    if (header.size() + 1 == n && (number == "0" || number == "1") &&
+        table.rows.back().fields.front() == std::to_string(table.rows.size() - (number == "0" ? 1 : 0)))
+      header.insert(header.begin(), "");
     return header.size() == n ? std::optional(std::move(header)) : std::nullopt;
   };
   std::vector<std::pair<Header, int>> candidates;
@@ -290,7 +330,8 @@ Found header_of(ForeignTable& table, const TrackParameters& parameters) {
   std::string* names[] = {&by_number.x_column, &by_number.y_column, &by_number.ux_column, &by_number.uy_column};
   const auto asked = asked_for(parameters);
   const bool is_asked = std::ranges::any_of(asked, [](const Asked& a) { return a.name != a.own; });
-  if (!is_asked && (n == kComponents || parameters.table == TableForm::imagej_piv))
+  constexpr std::array kBeginSo = {TableForm::imagej_piv, TableForm::pivlab, TableForm::openpiv, TableForm::davis};
+  if (!is_asked && (n == kComponents || std::ranges::find(kBeginSo, parameters.table) != kBeginSo.end()))
     for (std::size_t k = 0; k < kComponents; ++k) *names[k] = std::to_string(k + 1);
   expect_no_numbers(table, 0);
   auto found = found_in(numbers, by_number, table.name + ":" + std::to_string(line));
@@ -338,6 +379,7 @@ TableForm form_of(const ForeignTable& table, const TrackParameters& parameters) 
   if (text.find("PIVlab") != text.npos || text.find("conversion factor xy") != text.npos ||
       has_columns(table, {"vectortype"}))
     return TableForm::pivlab;
+  if (has_columns(table, {"ux1", "uy1", "mag1"})) return TableForm::imagej_piv;
   if (has_columns(table, {"label", "trackid"})) return TableForm::trackmate;
   if (has_columns(table, {"x", "y", "u", "v", "mask"}) || has_columns(table, {"x", "y", "u", "v", "flags"}))
     return TableForm::openpiv;
@@ -403,8 +445,10 @@ double pixel_um(const TrackParameters& parameters) {
 double um_of(const std::string& file, const std::string& column, const std::optional<Unit>& unit,
              const TrackParameters& parameters) {
   if (unit) return unit->um > 0 ? unit->um : pixel_um(parameters);
-  throw InputError(file, "a unit of the column '" + column + "'", "none in its name",
-                   how_to_set("length_unit", "px") + " if it is in pixels; um, mm or m are the others");
+  throw InputError(file, "a unit of the column '" + column + "'",
+                   column.find_first_of("[(") == column.npos ? "none in its name" : "one that is not known",
+                   how_to_set("length_unit", "px") +
+                       " if it is in pixels; um, mm or m are the others; convert the column if it is in none of them");
 }
 
 /// Seconds by which the column's numbers are multiplied; 1 for displacements.
@@ -592,6 +636,17 @@ ForeignTable read_pytfm(const std::filesystem::path& file, const std::optional<i
   return table;
 }
 
+/// "Mean" and "SD" beneath a column of numbers, as ImageJ has them: no vectors. @throws InputError
+void expect_no_summary(const ForeignTable& table, std::size_t n_columns_before) {
+  for (std::size_t i = 0; i < n_columns_before; ++i) {
+    const bool is_numbered = files::numeral_in(table.rows.front().fields[i]) == files::Numeral::whole;
+    const std::string& last = table.rows.back().fields[i];
+    if (is_numbered && files::numeral_in(last) == files::Numeral::none && !files::is_missing(last))
+      throw InputError(table.name + ":" + std::to_string(table.rows.back().line), "a vector",
+                       "'" + last + "' in the place of its number", "take the rows out that sum up the others");
+  }
+}
+
 /// In which order the rows of a lattice have their y.
 enum class Order { none, rising, falling };
 
@@ -617,7 +672,8 @@ Order order_of(const std::vector<CsvTable::Row>& rows, std::size_t column) {
 std::string flag_of(RowMark mark, const std::string& cell) {
   constexpr const char* kMasked = "masked";
   constexpr const char* kFilled = "filled in";
-  double code = lower_case(cell) == "true" ? 1 : 0;
+  const std::string word = lower_case(cell);
+  double code = word == "true" || word == "yes" || word == "ok" || word == "good" || word == "valid" ? 1 : 0;
   if (files::numeral_in(cell) != files::Numeral::none) std::from_chars(cell.data(), cell.data() + cell.size(), code);
   switch (mark) {
     case RowMark::zero_if_measured:
@@ -641,6 +697,11 @@ std::string text_of(const std::filesystem::path& file) {
   if (text.starts_with("PK\x03\x04") || text.starts_with("\xD0\xCF\x11\xE0"))  // .xlsx and .ods; .xls
     throw InputError(file.string(), "a table as text", "a workbook of a spreadsheet program",
                      "save its sheet as CSV in that program");
+  if (text.starts_with("\x1F\x8B"))
+    throw InputError(file.string(), "a table as text", "a compressed file", "unpack it: gunzip " + file.string());
+  if (text.starts_with("MATLAB 5.0") || text.starts_with("\x89HDF"))
+    throw InputError(file.string(), "a table as text", "a file of MATLAB",
+                     "in MATLAB: writematrix([x(:) y(:) u(:) v(:)], 'field.csv')");
   return text;
 }
 
@@ -706,6 +767,7 @@ GivenTable read_given_table(const std::filesystem::path& file, const TrackParame
                 (given.place_um == parameters.pixel_size_um ? "; px" : "") + (given.is_y_up ? "; y points up" : "") +
                 ")";
   }
+  expect_no_summary(table, *std::ranges::min_element(found.columns));
   given.rows = CsvTable(std::move(names), std::move(table.rows), name);
   return given;
 }
