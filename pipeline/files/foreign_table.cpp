@@ -3,17 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cstdint>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/files/names.h"
+#include "pipeline/files/table_text.h"
 
 namespace mbtfm::files {
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r\v\f";
-constexpr std::string_view kByteOrder = "\xEF\xBB\xBF", kHardBlank = "\xC2\xA0", kMinus = "\xE2\x88\x92";
+constexpr std::string_view kHardBlank = "\xC2\xA0", kMinus = "\xE2\x88\x92";
 
 std::string_view trimmed(std::string_view text) {
   for (std::size_t before = 0; text.size() != before;) {
@@ -24,56 +24,6 @@ std::string_view trimmed(std::string_view text) {
     if (text.ends_with(kHardBlank)) text.remove_suffix(kHardBlank.size());
   }
   return text;
-}
-
-void append_utf8(std::string& text, std::uint32_t c) {
-  constexpr std::uint32_t kFirst[] = {0, 0xC0, 0xE0, 0xF0};
-  const int n_more = c < 0x80 ? 0 : c < 0x800 ? 1 : c < 0x10000 ? 2 : 3;
-  text += static_cast<char>(kFirst[n_more] | c >> 6 * n_more);
-  for (int k = n_more; k-- > 0;) text += static_cast<char>(0x80 | (c >> 6 * k & 0x3F));
-}
-
-std::string from_utf16(std::string_view bytes, bool is_big_endian) {
-  const auto unit = [&](std::size_t i) -> std::uint32_t {
-    const auto first = static_cast<unsigned char>(bytes[i]), second = static_cast<unsigned char>(bytes[i + 1]);
-    return is_big_endian ? first << 8 | second : second << 8 | first;
-  };
-  std::string text;
-  for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) {
-    std::uint32_t c = unit(i);
-    if (c >= 0xD800 && c < 0xDC00 && i + 3 < bytes.size() && unit(i + 2) >= 0xDC00 && unit(i + 2) < 0xE000) {
-      c = 0x10000 + ((c - 0xD800) << 10) + (unit(i + 2) - 0xDC00);
-      i += 2;
-    }
-    append_utf8(text, c >= 0xD800 && c < 0xE000 ? 0xFFFD : c);
-  }
-  return text;
-}
-
-/// What is neither UTF-8 nor UTF-16 is Latin-1, as of older programs: "\xB5m".
-std::string from_latin1(std::string_view bytes) {
-  std::string text;
-  for (const char c : bytes) append_utf8(text, static_cast<unsigned char>(c));
-  return text;
-}
-
-bool is_ascii(std::string_view text) {
-  return std::ranges::none_of(text, [](char c) { return static_cast<unsigned char>(c) >= 0x80; });
-}
-
-/// As UTF-8 with a line feed after each line. Written to `place` where it is not so already.
-std::string_view as_text(std::string_view bytes, std::string& place) {
-  // half of the bytes of UTF-16 are zero where it holds numbers, whether it says so by a byte order mark or not
-  const bool is_little = bytes.starts_with("\xFF\xFE") || (bytes.size() > 1 && bytes[0] != 0 && bytes[1] == 0);
-  const bool is_big = bytes.starts_with("\xFE\xFF") || (bytes.size() > 1 && bytes[0] == 0 && bytes[1] != 0);
-  if (is_little || is_big) bytes = place = from_utf16(bytes, is_big);
-  if (bytes.starts_with(kByteOrder)) bytes.remove_prefix(kByteOrder.size());
-  if (!is_ascii(bytes) && !is_utf8(bytes)) bytes = place = from_latin1(bytes);
-  if (bytes.find('\n') == bytes.npos && bytes.find('\r') != bytes.npos) {
-    bytes = place = std::string(bytes);
-    std::ranges::replace(place, '\r', '\n');
-  }
-  return bytes;
 }
 
 struct Line {
@@ -204,12 +154,18 @@ char separator_of_numbers(std::string_view text, std::size_t n_numbers) {
   return kSeparators[static_cast<std::size_t>(std::ranges::max_element(n_rows) - n_rows.begin())];
 }
 
-/// Of columns whose names differ from ours by capitals alone.
+std::string letters_of(const std::string& name) {
+  std::string letters = lower_case(name);
+  std::erase_if(letters, [](unsigned char c) { return c < 0x80 && std::isalnum(c) == 0; });
+  return letters;
+}
+
+/// Of columns whose names differ from ours by capitals and marks alone: "Exclude?", "x [um]".
 void take_own_capitals(std::vector<std::string>& header, const std::vector<std::string>& columns) {
   for (const std::string& own : columns) {
     if (std::ranges::find(header, own) != header.end()) continue;
     const auto alike =
-        std::ranges::find_if(header, [&](const std::string& name) { return lower_case(name) == lower_case(own); });
+        std::ranges::find_if(header, [&](const std::string& name) { return letters_of(name) == letters_of(own); });
     if (alike != header.end()) *alike = own;
   }
 }
@@ -277,7 +233,9 @@ void expect_equal_widths(std::vector<CsvTable::Row>& rows, const std::string& na
     const bool is_double = row.fields.size() == 2 * n && separator == ',';
     throw InputError(at(name, row.line), std::to_string(n) + " fields, as in line " + std::to_string(rows.front().line),
                      std::to_string(row.fields.size()),
-                     is_double ? kOneMark : "take a line out that is no row of the table, or save the table again if it was cut off");
+                     is_double
+                         ? kOneMark
+                         : "take a line out that is no row of the table, or save the table again if it was cut off");
   }
 }
 
@@ -321,8 +279,8 @@ bool is_missing(std::string_view cell) {
   std::string word;  // "n.d." is "nd", "--" is nothing
   for (const char c : lower_case(std::string(cell)))
     if (has_letter_or_digit({&c, 1})) word += c;
-  for (const char* missing : {"", "nan", "na", "nd", "ndef", "inf", "infinity", "\xE2\x88\x9E", "none", "null", "nanind",
-                              "nansnan", "nan0", "nannanj", "missing", "masked", "invalid", "undefined"})
+  for (const char* missing : {"", "nan", "na", "nd", "ndef", "inf", "infinity", "\xE2\x88\x9E", "none", "null",
+                              "nanind", "nansnan", "nan0", "nannanj", "missing", "masked", "invalid", "undefined"})
     if (word == missing) return true;
   return false;
 }
@@ -364,9 +322,10 @@ ForeignTable read_numbers(std::string_view bytes, std::string name, std::size_t 
     (is_above ? table.above : table.rows).push_back(std::move(row));
   }
   if (table.rows.empty()) {
-    throw InputError(table.name, "rows of " + std::to_string(n_numbers) + " numbers or more", "none",
-                     "a row for each vector, its numbers between commas, semicolons, tabs or blanks, without a unit beside "
-                     "them");
+    throw InputError(
+        table.name, "rows of " + std::to_string(n_numbers) + " numbers or more", "none",
+        "a row for each vector, its numbers between commas, semicolons, tabs or blanks, without a unit beside "
+        "them");
   }
   expect_equal_widths(table.rows, table.name, separator);
   take_rows_with_gaps(table, n_numbers);
@@ -423,7 +382,7 @@ CsvTable read_records(std::string_view bytes, std::string name, const std::strin
   }
   if (header.empty()) {
     throw InputError(name + ":1", "a column '" + column + "'", "the columns " + listed(first),
-                     "the first row names the columns");
+                     "the first row names the columns, one of them '" + column + "'");
   }
   for (std::size_t i = 0; i < header.size(); ++i)
     if (header[i].empty()) header[i] = "column " + std::to_string(i + 1);

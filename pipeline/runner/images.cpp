@@ -122,9 +122,9 @@ std::string advice_on_missing(const fs::path& folder, const std::string& name, c
   std::string pictures;
   for (std::size_t k = 0; k < std::min(kShown, there.size()); ++k)
     pictures += (k == 0 ? "'" : ", '") + there[k].string() + "'";
-  return there.empty() ? "put it there, or name the file or a glob as " + place
-                       : "name one of the pictures here as " + place + ": " + pictures +
-                             (there.size() > kShown ? " …" : "");
+  return there.empty()
+             ? "put it there, or name the file or a glob as " + place
+             : "name one of the pictures here as " + place + ": " + pictures + (there.size() > kShown ? " …" : "");
 }
 
 }  // namespace

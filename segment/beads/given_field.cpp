@@ -36,9 +36,10 @@ std::optional<double> um_in(const GivenTable& table, int row, const std::string&
   double value = 0;
   const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
   if (end != cell.data() + cell.size() || (error != std::errc() && error != std::errc::result_out_of_range))
-    table.rows.fail(row, column, "a number",
-                    "one decimal mark, nothing between thousands; take out a row that is no vector, and save each time or "
-                    "zone by itself");
+    table.rows.fail(
+        row, column, "a number",
+        "one decimal mark, nothing between thousands; take out a row that is no vector, and save each time or "
+        "zone by itself");
   // too small, or too large, for a number
   if (error != std::errc())
     value = cell.find("e-") == cell.npos && cell.find("E-") == cell.npos ? kNoDisplacement_um : 0;
@@ -188,32 +189,39 @@ void flag_masked(GivenField& given) {
                                            (n_beyond > 0 ? ", or one longer than the field is wide" : "")}));
 }
 
-/// Two more numbers of a vector that people give in the place of its displacement. @throws InputError
-void expect_displacements(const DisplacementField& field, double unit_um, const std::string& file) {
-  constexpr std::size_t kFewest = 20;
+/// @throws InputError where the columns hold the places of the other picture: they rise with the places
+void expect_no_places(const DisplacementField& field, const std::string& file) {
+  constexpr double kFewest = 20, kStretch = 0.5;  // no gel with a cell on it stretches by half
   double n = 0, x = 0, y = 0, ux = 0, uy = 0, xx = 0, yy = 0, xux = 0, yuy = 0;
-  double lowest = 0, low_angle = 0, high_angle = 0;
   for (const Bead& bead : field) {
     if (!bead.flag.empty()) continue;
     const Vec2 p = bead.position_um, u = bead.displacement_um;
     n += 1, x += p.x, y += p.y, ux += u.x, uy += u.y, xx += p.x * p.x, yy += p.y * p.y, xux += p.x * u.x,
         yuy += p.y * u.y;
-    lowest = std::min(lowest, u.x), low_angle = std::min(low_angle, u.y / unit_um);
-    high_angle = std::max(high_angle, u.y / unit_um);
   }
-  if (n < kFewest) return;
-  // a gel that stretches by half is no place for a cell: places rise with places by 1
-  constexpr double kStretch = 0.5, kEnd = 0.98;
-  if (n * xux - x * ux > kStretch * (n * xx - x * x) && n * yuy - y * uy > kStretch * (n * yy - y * y))
+  if (n >= kFewest && n * xux - x * ux > kStretch * (n * xx - x * x) && n * yuy - y * uy > kStretch * (n * yy - y * y))
     throw InputError(file, "displacements", "numbers that rise with the places, as the places of the other picture do",
                      "subtract the places of the relaxed picture from those of the stressed one");
-  for (const double half : {180.0, 3.14159265358979}) {
-    const bool is_signed = low_angle >= -half && low_angle < -kEnd * half && high_angle <= half && high_angle > kEnd * half;
-    const bool is_whole = half == 180 && low_angle == 0 && high_angle <= 360 && high_angle > kEnd * 360;
-    if (lowest == 0 && (is_signed || is_whole))
-      throw InputError(file, "displacements along x and y", "numbers that look like a length and an angle",
-                       "make two columns of them: ux = length x cos(angle) and uy = length x sin(angle)");
+}
+
+/// @throws InputError where the columns hold lengths and angles: none below 0, and a full turn
+void expect_no_angles(const DisplacementField& field, double unit_um, const std::string& file) {
+  constexpr std::size_t kFewest = 20;
+  constexpr double kEnd = 0.98;  // of a turn
+  double lowest = 0, low = 0, high = 0;
+  for (const Bead& bead : field) {
+    if (!bead.flag.empty()) continue;
+    lowest = std::min(lowest, bead.displacement_um.x / unit_um);
+    low = std::min(low, bead.displacement_um.y / unit_um), high = std::max(high, bead.displacement_um.y / unit_um);
   }
+  const auto is_turn = [&](double from, double to) {
+    const double slack = (1 - kEnd) * (to - from);
+    return low >= from && low <= from + slack && high <= to && high >= to - slack;
+  };
+  const double pi = std::acos(-1.0);
+  if (field.size() >= kFewest && lowest == 0 && (is_turn(-180, 180) || is_turn(0, 360) || is_turn(-pi, pi)))
+    throw InputError(file, "displacements along x and y", "numbers that look like a length and an angle",
+                     "make two columns of them: ux = length x cos(angle) and uy = length x sin(angle)");
 }
 
 /// What a point differs by from the affine motion of its nearest neighbours.
@@ -275,8 +283,9 @@ GivenField read_given_field(const std::filesystem::path& file, const TrackParame
   GivenField given = read_rows(table, height_um, file.string());
   DisplacementField& field = given.field;
   notice_mirrored(table, given.findings);
-  expect_displacements(field, table.displacement_um, file.string());
+  expect_no_angles(field, table.displacement_um, file.string());
   flag_masked(given);
+  expect_no_places(field, file.string());
   std::vector<double> lengths;
   for (const Bead& bead : field) {
     if (bead.flag.empty()) lengths.push_back(norm(bead.displacement_um));

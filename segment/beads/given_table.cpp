@@ -13,6 +13,7 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/foreign_table.h"
 #include "pipeline/files/names.h"
+#include "pipeline/files/table_text.h"
 #include "pipeline/files/text.h"
 
 namespace mbtfm::beads {
@@ -41,10 +42,10 @@ struct Unit {
 
 std::optional<double> length_named(const std::string& word) {
   static const std::map<std::string, double> lengths_um = {
-      {"px", 0},         {"pix", 0},         {"pixel", 0},  {"pixels", 0},  {"um", 1},         {"\xC2\xB5m", 1},
-      {"voxel", 0},      {"voxels", 0},      {"\xC3\xA5", 1e-4}, {"\xC3\x85", 1e-4}, {"angstrom", 1e-4},
-      {"\xCE\xBCm", 1},  {"\xB5m", 1},       {"micron", 1}, {"microns", 1}, {"micrometer", 1}, {"micrometers", 1},
-      {"micrometre", 1}, {"micrometres", 1}, {"nm", 1e-3},  {"mm", 1e3},    {"cm", 1e4},       {"m", 1e6}};
+      {"px", 0},          {"pix", 0},    {"pixel", 0},       {"pixels", 0},      {"um", 1},          {"\xC2\xB5m", 1},
+      {"voxel", 0},       {"voxels", 0}, {"\xC3\xA5", 1e-4}, {"\xC3\x85", 1e-4}, {"angstrom", 1e-4}, {"\xCE\xBCm", 1},
+      {"\xB5m", 1},       {"micron", 1}, {"microns", 1},     {"micrometer", 1},  {"micrometers", 1}, {"micrometre", 1},
+      {"micrometres", 1}, {"nm", 1e-3},  {"mm", 1e3},        {"cm", 1e4},        {"m", 1e6}};
   const auto found = lengths_um.find(word);
   return found == lengths_um.end() ? std::nullopt : std::optional(found->second);
 }
@@ -52,7 +53,7 @@ std::optional<double> length_named(const std::string& word) {
 std::optional<Unit> unit_named(std::string text) {
   text = lower_case(std::move(text));
   static const std::map<std::string, double> times_per_s = {
-      {"s", 1},         {"sec", 1},         {"second", 1}, {"ms", 1e3},       {"min", 1.0 / 60}, {"minute", 1.0 / 60},
+      {"s", 1},          {"sec", 1},         {"second", 1},       {"ms", 1e3}, {"min", 1.0 / 60}, {"minute", 1.0 / 60},
       {"h", 1.0 / 3600}, {"hr", 1.0 / 3600}, {"hour", 1.0 / 3600}};
   constexpr std::string_view kRaised = "\xE2\x81\xBB\xC2\xB9";
   if (const std::size_t raised = text.find(kRaised); raised != text.npos) text.replace(raised, kRaised.size(), "-1");
@@ -109,10 +110,10 @@ const std::array<std::set<std::string>, kComponents>& known_names() {
   static const std::array<std::set<std::string>, kComponents> names = {{
       {"x", "xpos", "posx", "xposition", "positionx", "xcoordinate", "xcoord"},
       {"y", "ypos", "posy", "yposition", "positiony", "ycoordinate", "ycoord"},
-      {"u", "ux", "vx", "dx", "ux1", "xdisplacement", "displacementx", "dispx", "xdisp", "velocityu", "uvelocity", "velocityx",
-       "xvelocity", "displacementu", "udisplacement"},
-      {"v", "uy", "vy", "dy", "uy1", "ydisplacement", "displacementy", "dispy", "ydisp", "velocityv", "vvelocity", "velocityy",
-       "yvelocity", "displacementv", "vdisplacement"},
+      {"u", "ux", "vx", "dx", "ux1", "xdisplacement", "displacementx", "dispx", "xdisp", "velocityu", "uvelocity",
+       "velocityx", "xvelocity", "displacementu", "udisplacement"},
+      {"v", "uy", "vy", "dy", "uy1", "ydisplacement", "displacementy", "dispy", "ydisp", "velocityv", "vvelocity",
+       "velocityy", "yvelocity", "displacementv", "vdisplacement"},
   }};
   return names;
 }
@@ -123,12 +124,12 @@ constexpr std::array<std::array<std::string_view, 2>, kComponents> kOfPicture = 
 
 const std::map<std::string, RowMark>& known_marks() {
   static const std::map<std::string, RowMark> marks = {
-      {"mask", RowMark::zero_if_measured},   {"flags", RowMark::zero_if_measured},
-      {"isnan", RowMark::zero_if_measured},  {"isvalid", RowMark::zero_if_masked},
+      {"mask", RowMark::zero_if_measured},    {"flags", RowMark::zero_if_measured},
+      {"isnan", RowMark::zero_if_measured},   {"isvalid", RowMark::zero_if_masked},
       {"outlier", RowMark::zero_if_measured}, {"isoutlier", RowMark::zero_if_measured},
-      {"masked", RowMark::zero_if_measured}, {"ismasked", RowMark::zero_if_measured},
-      {"good", RowMark::zero_if_masked},     {"typevector", RowMark::one_if_measured},
-      {"valid", RowMark::zero_if_masked},    {"vectortype", RowMark::one_if_measured},
+      {"masked", RowMark::zero_if_measured},  {"ismasked", RowMark::zero_if_measured},
+      {"good", RowMark::zero_if_masked},      {"typevector", RowMark::one_if_measured},
+      {"valid", RowMark::zero_if_masked},     {"vectortype", RowMark::one_if_measured},
       {"chc", RowMark::positive_if_measured}};
   return marks;
 }
@@ -174,7 +175,8 @@ std::vector<std::size_t> matches_in(const Header& header, const Asked& asked, st
     found = all([&](const std::string& column) { return known_names()[component].contains(parts_of(column).key); });
     if (!found.empty()) return found;
     const auto& words = kOfPicture[component];
-    return all([&](const std::string& column) { return std::ranges::find(words, parts_of(column).key) != words.end(); });
+    return all(
+        [&](const std::string& column) { return std::ranges::find(words, parts_of(column).key) != words.end(); });
   }
   std::size_t number = 0;
   const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
@@ -227,10 +229,11 @@ std::optional<Found> found_in(const Header& header, const TrackParameters& param
   const bool has_angle = std::ranges::any_of(
       header, [](const std::string& name) { return parts_of(name).key.find("angle") != std::string::npos; });
   if (has_angle) how = "make two columns of length and angle: ux = length x cos(angle) and uy = length x sin(angle)";
-  throw InputError(table.name + ":" + std::to_string(line), "columns " + missing,
-                   is_without_names(header) ? std::to_string(header.size()) + " columns without names"
-                                            : "the columns " + listed(header),
-                   has_angle ? how : "name them, or give their numbers, as in" + how + " (in cell.toml: track.x_column = \"1\")");
+  throw InputError(
+      table.name + ":" + std::to_string(line), "columns " + missing,
+      is_without_names(header) ? std::to_string(header.size()) + " columns without names"
+                               : "the columns " + listed(header),
+      has_angle ? how : "name them, or give their numbers, as in" + how + " (in cell.toml: track.x_column = \"1\")");
 }
 
 std::string text_of(const CsvTable::Row& row) {
@@ -690,28 +693,12 @@ std::string flag_of(RowMark mark, const std::string& cell) {
   return "";
 }
 
-namespace {
-
-std::string text_of(const std::filesystem::path& file) {
-  std::string text = files::read_text(file);
-  if (text.starts_with("PK\x03\x04") || text.starts_with("\xD0\xCF\x11\xE0"))  // .xlsx and .ods; .xls
-    throw InputError(file.string(), "a table as text", "a workbook of a spreadsheet program",
-                     "save its sheet as CSV in that program");
-  if (text.starts_with("\x1F\x8B"))
-    throw InputError(file.string(), "a table as text", "a compressed file", "unpack it: gunzip " + file.string());
-  if (text.starts_with("MATLAB 5.0") || text.starts_with("\x89HDF"))
-    throw InputError(file.string(), "a table as text", "a file of MATLAB",
-                     "in MATLAB: writematrix([x(:) y(:) u(:) v(:)], 'field.csv')");
-  return text;
-}
-
-}  // namespace
-
 GivenTable read_given_table(const std::filesystem::path& file, const TrackParameters& parameters,
                             const std::optional<images::ImageField>& picture) {
   const bool is_numpy = parameters.table == TableForm::pytfm || file.extension() == ".npy";
   const std::string name = file.string();
-  ForeignTable table = is_numpy ? read_pytfm(file, picture) : files::read_numbers(text_of(file), name, kComponents);
+  ForeignTable table =
+      is_numpy ? read_pytfm(file, picture) : files::read_numbers(files::read_table_text(file), name, kComponents);
   take_numbered_header(table);
   const TableForm form = is_numpy ? TableForm::pytfm : form_of(table, parameters);
   int n_left_out = 0;
@@ -743,8 +730,10 @@ GivenTable read_given_table(const std::filesystem::path& file, const TrackParame
     if (mark != known_marks().end()) given.marks.push_back({names[i], mark->second});
   }
   constexpr std::size_t kCodeOfImagej = 15;
-  if (form == TableForm::imagej_piv && names.size() > kCodeOfImagej)
+  if (form == TableForm::imagej_piv && names.size() > kCodeOfImagej) {
+    names[kCodeOfImagej] = "code";  // "flag" means another thing elsewhere
     given.marks.push_back({names[kCodeOfImagej], RowMark::code_of_imagej});
+  }
   if (factors.are_there && !(factors.m_per_px == 1 && factors.m_per_s_per_px == 1))
     take_factors(given, name, factors, parameters);
   else
