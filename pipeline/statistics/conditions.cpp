@@ -86,6 +86,7 @@ std::string reason_in(const std::string& exclude) {
   return files::is_missing(exclude) ? "" : exclude;
 }
 
+const std::vector<std::string> kNoName = {"na", "n/a", "#n/a", "nan"};  // of a condition: "none" may be one
 const std::vector<std::string> kExclude = {"exclude", "excluded"}, kInclude = {"include", "included"};
 
 /// The first of several names that a form has for one column; empty: none.
@@ -141,8 +142,7 @@ CellNotes notes_of(const std::vector<std::string>& names, const std::string& con
     const auto take = [&](const std::string& column, std::string CellNote::*member) {
       if (column.empty()) return;
       notes[i].*member = rows->text(row, column);
-      const std::string word = files::lower_case(notes[i].*member);
-      if (word == "na" || word == "n/a" || word == "#n/a" || word == "nan") (notes[i].*member).clear();
+      if (std::ranges::find(kNoName, files::lower_case(notes[i].*member)) != kNoName.end()) (notes[i].*member).clear();
       if ((notes[i].*member).empty() && notes[i].reason_to_exclude.empty())
         notes[i].reason_to_exclude = "no " + column + " in the table";
     };
