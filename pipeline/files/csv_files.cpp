@@ -10,8 +10,8 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/foreign_table.h"
+#include "pipeline/files/table_text.h"
 #include "pipeline/files/tables.h"
-#include "pipeline/files/text.h"
 
 namespace mbtfm::files {
 
@@ -252,7 +252,7 @@ Vec2 lattice_spacing_um(const std::vector<Vec2>& points, const Path& file) {
 }
 
 std::vector<GroundPatch> read_tractions(const Path& file) {
-  const CsvTable table = read_columns(read_text(file), file.string(), {"x_um", "y_um", "tx_kPa", "ty_kPa"});
+  const CsvTable table = read_columns(read_table_text(file), file.string(), {"x_um", "y_um", "tx_kPa", "ty_kPa"});
   std::vector<Vec2> points;
   for (int row = 0; row < table.n_rows(); ++row)
     points.push_back({table.number(row, "x_um"), table.number(row, "y_um")});

@@ -3,17 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cstdint>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/files/names.h"
+#include "pipeline/files/table_text.h"
 
 namespace mbtfm::files {
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r\v\f";
-constexpr std::string_view kByteOrder = "\xEF\xBB\xBF", kHardBlank = "\xC2\xA0", kMinus = "\xE2\x88\x92";
+constexpr std::string_view kHardBlank = "\xC2\xA0", kMinus = "\xE2\x88\x92";
 
 std::string_view trimmed(std::string_view text) {
   for (std::size_t before = 0; text.size() != before;) {
@@ -24,56 +24,6 @@ std::string_view trimmed(std::string_view text) {
     if (text.ends_with(kHardBlank)) text.remove_suffix(kHardBlank.size());
   }
   return text;
-}
-
-void append_utf8(std::string& text, std::uint32_t c) {
-  constexpr std::uint32_t kFirst[] = {0, 0xC0, 0xE0, 0xF0};
-  const int n_more = c < 0x80 ? 0 : c < 0x800 ? 1 : c < 0x10000 ? 2 : 3;
-  text += static_cast<char>(kFirst[n_more] | c >> 6 * n_more);
-  for (int k = n_more; k-- > 0;) text += static_cast<char>(0x80 | (c >> 6 * k & 0x3F));
-}
-
-std::string from_utf16(std::string_view bytes, bool is_big_endian) {
-  const auto unit = [&](std::size_t i) -> std::uint32_t {
-    const auto first = static_cast<unsigned char>(bytes[i]), second = static_cast<unsigned char>(bytes[i + 1]);
-    return is_big_endian ? first << 8 | second : second << 8 | first;
-  };
-  std::string text;
-  for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) {
-    std::uint32_t c = unit(i);
-    if (c >= 0xD800 && c < 0xDC00 && i + 3 < bytes.size() && unit(i + 2) >= 0xDC00 && unit(i + 2) < 0xE000) {
-      c = 0x10000 + ((c - 0xD800) << 10) + (unit(i + 2) - 0xDC00);
-      i += 2;
-    }
-    append_utf8(text, c >= 0xD800 && c < 0xE000 ? 0xFFFD : c);
-  }
-  return text;
-}
-
-/// What is neither UTF-8 nor UTF-16 is Latin-1, as of older programs: "\xB5m".
-std::string from_latin1(std::string_view bytes) {
-  std::string text;
-  for (const char c : bytes) append_utf8(text, static_cast<unsigned char>(c));
-  return text;
-}
-
-bool is_ascii(std::string_view text) {
-  return std::ranges::none_of(text, [](char c) { return static_cast<unsigned char>(c) >= 0x80; });
-}
-
-/// As UTF-8 with a line feed after each line. Written to `place` where it is not so already.
-std::string_view as_text(std::string_view bytes, std::string& place) {
-  // half of the bytes of UTF-16 are zero where it holds numbers, whether it says so by a byte order mark or not
-  const bool is_little = bytes.starts_with("\xFF\xFE") || (bytes.size() > 1 && bytes[0] != 0 && bytes[1] == 0);
-  const bool is_big = bytes.starts_with("\xFE\xFF") || (bytes.size() > 1 && bytes[0] == 0 && bytes[1] != 0);
-  if (is_little || is_big) bytes = place = from_utf16(bytes, is_big);
-  if (bytes.starts_with(kByteOrder)) bytes.remove_prefix(kByteOrder.size());
-  if (!is_ascii(bytes) && !is_utf8(bytes)) bytes = place = from_latin1(bytes);
-  if (bytes.find('\n') == bytes.npos && bytes.find('\r') != bytes.npos) {
-    bytes = place = std::string(bytes);
-    std::ranges::replace(place, '\r', '\n');
-  }
-  return bytes;
 }
 
 struct Line {
@@ -144,6 +94,10 @@ bool has_content(const std::vector<std::string>& cells) {
   return std::ranges::any_of(cells, [](const std::string& cell) { return !cell.empty(); });
 }
 
+bool has_letter_or_digit(std::string_view text) {
+  return std::ranges::any_of(text, [](unsigned char c) { return std::isalnum(c) != 0 || c >= 0x80; });
+}
+
 /// "#N/A", "#NV", "#DIV/0!": what a spreadsheet writes for a number that it cannot compute.
 bool is_error_of_spreadsheet(std::string_view cell) {
   return cell.size() > 2 && cell[0] == '#' && std::isupper(static_cast<unsigned char>(cell[1])) &&
@@ -162,11 +116,15 @@ std::string_view without_comment_mark(std::string_view line) {
 }
 
 bool is_row_of_numbers(const Line& line, char separator, std::size_t n_numbers) {
-  const auto is_number = [](const std::string& cell) {
-    return !cell.empty() && (numeral_in(cell) != Numeral::none || is_missing(cell));
-  };
   if (is_comment(line.text)) return false;
-  return static_cast<std::size_t>(std::ranges::count_if(cells_of(line.text, separator), is_number)) >= n_numbers;
+  std::size_t n = 0;
+  bool has_word = false;  // beside dashes: "|---|---|" is none
+  for (const std::string& cell : cells_of(line.text, separator)) {
+    if (cell.empty() || (numeral_in(cell) == Numeral::none && !is_missing(cell))) continue;
+    ++n;
+    has_word = has_word || has_letter_or_digit(cell);
+  }
+  return has_word && n >= n_numbers;
 }
 
 /// `sep=;`, as Excel has it in the first line.
@@ -196,12 +154,18 @@ char separator_of_numbers(std::string_view text, std::size_t n_numbers) {
   return kSeparators[static_cast<std::size_t>(std::ranges::max_element(n_rows) - n_rows.begin())];
 }
 
-/// Of columns whose names differ from ours by capitals alone.
+std::string letters_of(const std::string& name) {
+  std::string letters = lower_case(name);
+  std::erase_if(letters, [](unsigned char c) { return c < 0x80 && std::isalnum(c) == 0; });
+  return letters;
+}
+
+/// Of columns whose names differ from ours by capitals and marks alone: "Exclude?", "x [um]".
 void take_own_capitals(std::vector<std::string>& header, const std::vector<std::string>& columns) {
   for (const std::string& own : columns) {
     if (std::ranges::find(header, own) != header.end()) continue;
     const auto alike =
-        std::ranges::find_if(header, [&](const std::string& name) { return lower_case(name) == lower_case(own); });
+        std::ranges::find_if(header, [&](const std::string& name) { return letters_of(name) == letters_of(own); });
     if (alike != header.end()) *alike = own;
   }
 }
@@ -269,7 +233,9 @@ void expect_equal_widths(std::vector<CsvTable::Row>& rows, const std::string& na
     const bool is_double = row.fields.size() == 2 * n && separator == ',';
     throw InputError(at(name, row.line), std::to_string(n) + " fields, as in line " + std::to_string(rows.front().line),
                      std::to_string(row.fields.size()),
-                     is_double ? kOneMark : "the file may have been cut off, or a field has a separator in it");
+                     is_double
+                         ? kOneMark
+                         : "take a line out that is no row of the table, or save the table again if it was cut off");
   }
 }
 
@@ -306,12 +272,37 @@ Numeral numeral_in(std::string_view cell) {
 
 bool is_missing(std::string_view cell) {
   if (cell.empty() || is_error_of_spreadsheet(cell)) return true;
-  if (cell.front() == '-' || cell.front() == '+') cell.remove_prefix(1);
-  const std::string word = cell.size() < 10 ? lower_case(std::string(cell)) : "";
-  for (const char* missing : {"nan", "na", "n/a", "inf", "infinity", "none", "null", "nan(ind)", "1.#ind", "1.#qnan"})
+  constexpr std::size_t kLongest = 12;
+  const bool is_of_windows = cell.find("1.#") < 2;  // "-1.#IND00", "1.#QNAN0"
+  if (cell.size() > kLongest || is_of_windows || std::isdigit(static_cast<unsigned char>(cell.back())))
+    return is_of_windows;
+  std::string word;  // "n.d." is "nd", "--" is nothing
+  for (const char c : lower_case(std::string(cell)))
+    if (has_letter_or_digit({&c, 1})) word += c;
+  for (const char* missing : {"", "nan", "na", "nd", "ndef", "inf", "infinity", "\xE2\x88\x9E", "none", "null",
+                              "nanind", "nansnan", "nan0", "nannanj", "missing", "masked", "invalid", "undefined"})
     if (word == missing) return true;
   return false;
 }
+
+namespace {
+
+/// Rows right above the first one that are like it but have nothing where a number is missing: "8.0;8.0;;".
+void take_rows_with_gaps(ForeignTable& table, std::size_t n_numbers) {
+  const auto is_number = [](const std::string& cell) { return numeral_in(cell) != Numeral::none; };
+  while (!table.above.empty()) {
+    const std::vector<std::string>& cells = table.above.back().fields;
+    const bool is_row = cells.size() == table.rows.front().fields.size() &&
+                        2 * static_cast<std::size_t>(std::ranges::count_if(cells, is_number)) >= n_numbers &&
+                        std::ranges::all_of(cells, [&](auto& cell) { return is_number(cell) || is_missing(cell); });
+    if (!is_row) return;
+    table.rows.insert(table.rows.begin(), std::move(table.above.back()));
+    table.above.pop_back();
+    table.lines_above.pop_back();
+  }
+}
+
+}  // namespace
 
 ForeignTable read_numbers(std::string_view bytes, std::string name, std::size_t n_numbers) {
   std::string place;
@@ -331,10 +322,13 @@ ForeignTable read_numbers(std::string_view bytes, std::string name, std::size_t 
     (is_above ? table.above : table.rows).push_back(std::move(row));
   }
   if (table.rows.empty()) {
-    throw InputError(table.name, "rows of " + std::to_string(n_numbers) + " numbers or more", "none",
-                     "a row for each vector, its numbers between commas, semicolons, tabs or blanks");
+    throw InputError(
+        table.name, "rows of " + std::to_string(n_numbers) + " numbers or more", "none",
+        "a row for each vector, its numbers between commas, semicolons, tabs or blanks, without a unit beside "
+        "them");
   }
   expect_equal_widths(table.rows, table.name, separator);
+  take_rows_with_gaps(table, n_numbers);
   const bool may_have_commas = text.find(',') != text.npos && (separator != ',' || text.find('"') != text.npos);
   if (may_have_commas) make_points(table.rows, table.name);
   if (text.find_first_of("+dD\xE2") == text.npos) return table;
@@ -388,7 +382,7 @@ CsvTable read_records(std::string_view bytes, std::string name, const std::strin
   }
   if (header.empty()) {
     throw InputError(name + ":1", "a column '" + column + "'", "the columns " + listed(first),
-                     "the first row names the columns");
+                     "the first row names the columns, one of them '" + column + "'");
   }
   for (std::size_t i = 0; i < header.size(); ++i)
     if (header[i].empty()) header[i] = "column " + std::to_string(i + 1);

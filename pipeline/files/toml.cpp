@@ -54,7 +54,15 @@ void expect_shallow_keys(std::string_view text, const std::string& name) {
 std::string advice_on(std::string_view text, std::size_t line) {
   for (std::size_t i = 1; i < line && text.find('\n') != text.npos; ++i) text.remove_prefix(text.find('\n') + 1);
   const std::string_view here = text.substr(0, text.find('\n'));
+  if (text.starts_with("{\\rtf")) return "save the file as plain text, not as rich text";
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  const std::size_t equals = here.find('='), colon = here.find(':'), first = here.find_first_not_of(" \t");
+  if (equals == here.npos && first != here.npos && here[first] == '[')
+    return here.find(']') == here.npos
+               ? "a table's name stands between brackets: " + std::string(here.substr(first)) + "]"
+               : "each table stands once: put all its keys below the first";
+  if (equals == here.npos && colon != here.npos)
+    return "an equals sign stands between key and value: pixel_size_um = 0.1";
   if (const auto comma = here.find(','); comma != here.npos && comma > 0 && comma + 1 < here.size() &&
                                          is_digit(here[comma - 1]) && is_digit(here[comma + 1]))
     return "decimals follow a point: 8.4";
@@ -67,6 +75,11 @@ std::string advice_on(std::string_view text, std::size_t line) {
     if (number.ends_with('.')) return "a digit follows the point: " + std::string(number) + "0";
     return "the number alone, without a unit: " + std::string(number);
   }
+  if (equals != here.npos)
+    if (const auto value = here.find_first_not_of(" \t", equals + 1);
+        value != here.npos && here[value] == '.' && value + 1 < here.size() && is_digit(here[value + 1]))
+      return "a digit goes before the point: 0" +
+             std::string(here.substr(value, here.find_first_of(" \t#\r", value) - value));
   if (here.find('\\') != here.npos)
     return "write folders with /, as in \"D:/images/cell 1\", or the text in single quotes";
   if (here.find('=') != here.npos && here.find('"') == here.npos && here.find('\'') == here.npos)

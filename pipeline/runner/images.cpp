@@ -94,6 +94,7 @@ ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) 
 
 namespace {
 
+constexpr std::string_view kOfPictures[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
 constexpr std::string_view kOfMicroscopes[] = {".nd2", ".czi", ".lif", ".oib", ".oif"};
 
 /// Where there is no such file: one that was probably meant; else what can be done.
@@ -114,7 +115,16 @@ std::string advice_on_missing(const fs::path& folder, const std::string& name, c
     if (files::lower_case(file.stem().string()) == files::lower_case(fs::path(name).stem().string()))
       return "there is '" + file.string() + "': name it as " + place;
   }
-  return "put it there, or name the file or a glob as " + place;
+  std::erase_if(there, [&](const fs::path& file) {
+    return std::ranges::find(kOfPictures, files::lower_case(file.extension().string())) == std::end(kOfPictures);
+  });
+  constexpr std::size_t kShown = 6;
+  std::string pictures;
+  for (std::size_t k = 0; k < std::min(kShown, there.size()); ++k)
+    pictures += (k == 0 ? "'" : ", '") + there[k].string() + "'";
+  return there.empty()
+             ? "put it there, or name the file or a glob as " + place
+             : "name one of the pictures here as " + place + ": " + pictures + (there.size() > kShown ? " …" : "");
 }
 
 }  // namespace

@@ -128,7 +128,7 @@ std::vector<std::string> flags_of(const Stage& stage, const std::vector<Setting>
     const bool is_effect = setting.table == "effects";
     const std::vector<std::string>& known = is_effect ? stage.effects : stage.tables;
     if (std::find(known.begin(), known.end(), is_effect ? setting.key : setting.table) == known.end()) continue;
-    flags.push_back("--" + setting.key);
+    flags.push_back("--" + (setting.table.empty() ? "" : setting.table + ".") + setting.key);
     flags.push_back(setting.value);
   }
   return flags;

@@ -24,6 +24,9 @@ constexpr std::array kTables = {"gel",       "images", "segment", "track",    "n
                                 "checks",    "cell",   "indent",  "mean",     "sheet",   "plan",     "run"};
 /// Keys of [gel] that not every program has.
 const std::vector<std::string> kMoreOfGel = {"radius_um"};
+/// What people put elsewhere: not every program has them.
+constexpr std::array kKeysOfGel = {"youngs_modulus_kPa", "shear_modulus_kPa", "poisson_ratio", "thickness_um",
+                                   "radius_um"};
 /// The keys above the first table.
 constexpr std::array kRootKeys = {"pixel_size_um"};
 
@@ -104,6 +107,9 @@ std::string likely_slip(const Parameter& p, const std::string& text) {
   }
   double value = 0;
   if (read_number(text, value)) return unit_slip(p.name, value, p.range);
+  const std::size_t digits = text.find_first_not_of("0123456789.+-");
+  if (digits != text.npos && digits > 0 && text[digits] != ',' && read_number(text.substr(0, digits), value))
+    return "the number alone, without a unit: " + text.substr(0, digits);
   std::string with_point = text;
   std::ranges::replace(with_point, ',', '.');
   return with_point != text && read_number(with_point, value) ? "decimals follow a point: " + with_point : "";
@@ -146,7 +152,8 @@ std::string unknown_key_hint(const ParameterList& list, const std::vector<std::s
     return "this version computes as its default did and has no such key: take the line out (CHANGELOG.md)";
   const std::string closest = nearest(known, key);
   if (!closest.empty() && is_alike(closest, key)) return did_you_mean(closest);
-  if (std::ranges::find(kMoreOfGel, key) != kMoreOfGel.end()) return "it belongs under [gel]";
+  if (std::ranges::find(kKeysOfGel, key) != kKeysOfGel.end()) return "it belongs under [gel]";
+  if (std::ranges::find(kRootKeys, key) != kRootKeys.end()) return "it belongs above the first table";
   for (const Parameter& p : list.all())
     if (p.name == key)
       return p.table.empty() ? "it belongs above the first table" : "it belongs under [" + p.table + "]";

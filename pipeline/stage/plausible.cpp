@@ -211,7 +211,7 @@ std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um) {
                .source = "The image's own calibration says " + with_unit(kPixelSize, of_file_um) +
                          ". Forces go with the square of the pixel size",
                .remedy = is_binning ? "the two differ by a factor of " + brief(whole) +
-                                          ": was the binning, or a reduced copy, left out in one of them?"
+                                          ": the binning, or a reduced copy, may be left out in one of them"
                                     : "find out which is right, and leave pixel_size_um out if it is the image's",
                .level = ratio > 1 + kRefused ? DoubtLevel::refused : DoubtLevel::caution};
 }

@@ -86,6 +86,21 @@ std::string worded(const ParameterList& list, const StageDescription& descriptio
   return in_keys(list, images, text);
 }
 
+/// As CLI11 takes them, the last first. `--TABLE.KEY` is the flag of that key: two tables may have one of a name.
+std::vector<std::string> arguments_of(int argc, char** argv, const ParameterList& list) {
+  std::vector<std::string> arguments;
+  for (int k = argc; k-- > 1;) {
+    std::string& argument = arguments.emplace_back(argv[k]);
+    const std::size_t end = std::min(argument.find('='), argument.size()), point = argument.find('.');
+    if (!argument.starts_with("--") || point >= end) continue;
+    const std::string table = argument.substr(2, point - 2), key = argument.substr(point + 1, end - point - 1);
+    const auto meant =
+        std::ranges::find_if(list.all(), [&](const Parameter& p) { return p.table == table && p.name == key; });
+    argument.replace(2, end - 2, meant == list.all().end() ? key : meant->flag);
+  }
+  return arguments;
+}
+
 /// In a catch block: what was thrown, in other words.
 template <class Words>
 [[noreturn]] void rethrow_worded(const Words& words) {
@@ -425,7 +440,7 @@ int run_stage(const StageDescription& description, int argc, char** argv,
     CLI::App app(description.purpose, "mbtfm-" + stage);
     add_options(app, line, description, list);
     try {
-      app.parse(argc, argv);
+      app.parse(arguments_of(argc, argv, list));
     } catch (const CLI::CallForHelp&) {
       print(app.help());
       return kDone;

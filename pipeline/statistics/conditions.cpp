@@ -7,7 +7,7 @@
 #include "pipeline/contract/listed.h"
 #include "pipeline/files/foreign_table.h"
 #include "pipeline/files/names.h"
-#include "pipeline/files/text.h"
+#include "pipeline/files/table_text.h"
 #include "pipeline/statistics/study.h"
 
 namespace mbtfm::statistics {
@@ -81,9 +81,18 @@ Source source_of(const std::string& asked, const char* flag, const std::vector<s
 /// What a form says where nobody is to be left out.
 std::string reason_in(const std::string& exclude) {
   const std::string word = files::lower_case(exclude);
-  for (const char* nobody : {"no", "n", "0", "false", "f", "-", "none", "nan", "na", "n/a"})
+  for (const char* nobody : {"no", "n", "0", "false", "f", "none", "nein", "non", "nej", "nee"})
     if (word == nobody) return {};
-  return exclude;
+  return files::is_missing(exclude) ? "" : exclude;
+}
+
+const std::vector<std::string> kNoName = {"na", "n/a", "#n/a", "nan"};  // of a condition: "none" may be one
+const std::vector<std::string> kExclude = {"exclude", "excluded"}, kInclude = {"include", "included"};
+
+/// The first of several names that a form has for one column; empty: none.
+std::string column_of(const files::CsvTable& table, const std::vector<std::string>& names) {
+  const auto found = std::ranges::find_if(names, [&](const std::string& name) { return table.has(name); });
+  return found == names.end() ? "" : *found;
 }
 
 /// Names that differ in capitals alone become the first of them.
@@ -109,8 +118,8 @@ CellNotes notes_of(const std::vector<std::string>& names, const std::string& con
                    const std::string& replicate_from, const std::optional<Path>& table) {
   std::optional<files::CsvTable> rows;
   if (table) {
-    rows = files::read_records(files::read_text(*table), table->string(), "cell",
-                               {"cell", "exclude", "condition", "replicate", "day"});
+    rows = files::read_records(files::read_table_text(*table), table->string(), "cell",
+                               {"cell", "exclude", "excluded", "include", "included", "condition", "replicate", "day"});
   }
   const Source condition = source_of(condition_from, "condition-from", {"condition"}, rows);
   const Source replicate = source_of(replicate_from, "replicate-from", {"replicate", "day"}, rows);
@@ -121,15 +130,19 @@ CellNotes notes_of(const std::vector<std::string>& names, const std::string& con
     if (replicate.level > 0) notes[i].replicate = folder_of(names[i], replicate.level);
   }
   if (!rows) return result;
+  const std::string exclude = column_of(*rows, kExclude), include = column_of(*rows, kInclude);
   std::vector<bool> is_named(names.size(), false);
   for (int row = 0; row < rows->n_rows(); ++row) {
     const std::size_t i = index_of_cell(names, *rows, row);
     if (is_named[i]) rows->fail(row, "cell", "each cell once");
     is_named[i] = true;
-    if (rows->has("exclude")) notes[i].reason_to_exclude = reason_in(rows->text(row, "exclude"));
+    if (!exclude.empty()) notes[i].reason_to_exclude = reason_in(rows->text(row, exclude));
+    if (!include.empty() && !rows->text(row, include).empty() && reason_in(rows->text(row, include)).empty())
+      notes[i].reason_to_exclude = include + ": " + rows->text(row, include);
     const auto take = [&](const std::string& column, std::string CellNote::*member) {
       if (column.empty()) return;
       notes[i].*member = rows->text(row, column);
+      if (std::ranges::find(kNoName, files::lower_case(notes[i].*member)) != kNoName.end()) (notes[i].*member).clear();
       if ((notes[i].*member).empty() && notes[i].reason_to_exclude.empty())
         notes[i].reason_to_exclude = "no " + column + " in the table";
     };

@@ -36,22 +36,35 @@ std::optional<double> um_in(const GivenTable& table, int row, const std::string&
   double value = 0;
   const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
   if (end != cell.data() + cell.size() || (error != std::errc() && error != std::errc::result_out_of_range))
-    table.rows.fail(row, column, "a number",
-                    "one decimal mark and nothing between thousands; take a row out that is no vector");
+    table.rows.fail(
+        row, column, "a number",
+        "one decimal mark, nothing between thousands; take out a row that is no vector, and save each time or "
+        "zone by itself");
   // too small, or too large, for a number
   if (error != std::errc())
     value = cell.find("e-") == cell.npos && cell.find("E-") == cell.npos ? kNoDisplacement_um : 0;
   return std::clamp(unit_um * (value + first), -kNoDisplacement_um, kNoDisplacement_um);
 }
 
-void flag_duplicates(DisplacementField& field) {
+/// @throws InputError where many places have several displacements: a table of several times, slices or cells
+void flag_duplicates(DisplacementField& field, const std::string& name) {
   std::vector<std::size_t> order(field.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto place = [&](std::size_t k) { return std::pair(field[k].position_um.x, field[k].position_um.y); };
   std::ranges::sort(order,
                     [&](std::size_t a, std::size_t b) { return std::pair(place(a), a) < std::pair(place(b), b); });
-  for (std::size_t k = 1; k < order.size(); ++k)
-    if (place(order[k]) == place(order[k - 1])) field[order[k]].flag = "duplicate";
+  constexpr std::size_t kSome = 10;  // of so many rows one may be a slip
+  std::size_t n_unlike = 0;
+  for (std::size_t k = 1; k < order.size(); ++k) {
+    Bead &bead = field[order[k]], &other = field[order[k - 1]];
+    if (place(order[k]) != place(order[k - 1])) continue;
+    n_unlike += bead.flag.empty() && !(bead.displacement_um == other.displacement_um);
+    bead.flag = "duplicate";
+  }
+  if (kSome * n_unlike > field.size())
+    throw InputError(name, "one displacement at each place",
+                     std::to_string(n_unlike) + " of " + std::to_string(field.size()) + " rows at another one's place",
+                     "leave one time, slice or frame in the table");
 }
 
 /// y from upwards to downwards. The windows of a lattice begin at the picture's corner: the first row is as far from
@@ -104,7 +117,7 @@ void expect_most_measured(const GivenTable& table) {
   }
 }
 
-GivenField read_rows(const GivenTable& table, std::optional<double> height_um) {
+GivenField read_rows(const GivenTable& table, std::optional<double> height_um, const std::string& name) {
   GivenField given{.form = table.form, .how = table.how, .n_left_out = table.n_left_out};
   given.has_sigma = !table.sigma.empty();
   expect_most_measured(table);
@@ -138,7 +151,7 @@ GivenField read_rows(const GivenTable& table, std::optional<double> height_um) {
   }
   move_to_corner(given, table);
   if (table.is_y_up) mirror(given.field, table, height_um);
-  flag_duplicates(given.field);
+  flag_duplicates(given.field, name);
   return given;
 }
 
@@ -174,6 +187,41 @@ void flag_masked(GivenField& given) {
                {.at = values.empty() ? "they are longer than the field is wide"
                                      : "they have the displacement " + listed(values) + " um to the last digit" +
                                            (n_beyond > 0 ? ", or one longer than the field is wide" : "")}));
+}
+
+/// @throws InputError where the columns hold the places of the other picture: they rise with the places
+void expect_no_places(const DisplacementField& field, const std::string& file) {
+  constexpr double kFewest = 20, kStretch = 0.5;  // no gel with a cell on it stretches by half
+  double n = 0, x = 0, y = 0, ux = 0, uy = 0, xx = 0, yy = 0, xux = 0, yuy = 0;
+  for (const Bead& bead : field) {
+    if (!bead.flag.empty()) continue;
+    const Vec2 p = bead.position_um, u = bead.displacement_um;
+    n += 1, x += p.x, y += p.y, ux += u.x, uy += u.y, xx += p.x * p.x, yy += p.y * p.y, xux += p.x * u.x,
+        yuy += p.y * u.y;
+  }
+  if (n >= kFewest && n * xux - x * ux > kStretch * (n * xx - x * x) && n * yuy - y * uy > kStretch * (n * yy - y * y))
+    throw InputError(file, "displacements", "numbers that rise with the places, as the places of the other picture do",
+                     "subtract the places of the relaxed picture from those of the stressed one");
+}
+
+/// @throws InputError where the columns hold lengths and angles: none below 0, and a full turn
+void expect_no_angles(const DisplacementField& field, double unit_um, const std::string& file) {
+  constexpr std::size_t kFewest = 20;
+  constexpr double kEnd = 0.98;  // of a turn
+  double lowest = 0, low = 0, high = 0;
+  for (const Bead& bead : field) {
+    if (!bead.flag.empty()) continue;
+    lowest = std::min(lowest, bead.displacement_um.x / unit_um);
+    low = std::min(low, bead.displacement_um.y / unit_um), high = std::max(high, bead.displacement_um.y / unit_um);
+  }
+  const auto is_turn = [&](double from, double to) {
+    const double slack = (1 - kEnd) * (to - from);
+    return low >= from && low <= from + slack && high <= to && high >= to - slack;
+  };
+  const double pi = std::acos(-1.0);
+  if (field.size() >= kFewest && lowest == 0 && (is_turn(-180, 180) || is_turn(0, 360) || is_turn(-pi, pi)))
+    throw InputError(file, "displacements along x and y", "numbers that look like a length and an angle",
+                     "make two columns of them: ux = length x cos(angle) and uy = length x sin(angle)");
 }
 
 /// What a point differs by from the affine motion of its nearest neighbours.
@@ -232,10 +280,12 @@ GivenField read_given_field(const std::filesystem::path& file, const TrackParame
   const GivenTable table = read_given_table(file, parameters, picture);
   std::optional<double> height_um;
   if (picture && parameters.pixel_size_um) height_um = *parameters.pixel_size_um * picture->height;
-  GivenField given = read_rows(table, height_um);
+  GivenField given = read_rows(table, height_um, file.string());
   DisplacementField& field = given.field;
   notice_mirrored(table, given.findings);
+  expect_no_angles(field, table.displacement_um, file.string());
   flag_masked(given);
+  expect_no_places(field, file.string());
   std::vector<double> lengths;
   for (const Bead& bead : field) {
     if (bead.flag.empty()) lengths.push_back(norm(bead.displacement_um));

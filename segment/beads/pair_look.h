@@ -44,6 +44,13 @@ struct FieldLook {
 /// counts if it shows that and the given one does not; a cell that is alike in both is no witness.
 FieldLook look_at_field(const DisplacementField& field, const images::Image& cell, double pixel_um);
 
+/// How a whole field, places and vectors, lies against the adhesions of its cell: of the eight readings the one in
+/// which free forces at these places explain it best, without a network. Costs about a second.
+/// @param middle_um  of the picture, about which a field is turned
+/// @returns empty: as it is, or nothing is sure
+std::string orientation_of_forces(const DisplacementField& field, const std::vector<Vec2>& adhesions_um,
+                                  Vec2 middle_um);
+
 /// Relaxed green, stressed purple, white where both are bright, in the frame of the cell's pictures; each stretched
 /// from its median to the brightest beads, and reduced to 1000 pixels at most along its longer side. Black where one of
 /// them shows nothing.

@@ -123,6 +123,9 @@ CellOutline outline_of(const LabelMask& mask, int label, const Field& field, con
     const double area_um2 = (0.5 - signed_area_um2(hole_px)) * pixel_um * pixel_um;
     if (signed_area_um2(hole_px) > 0 || area_um2 < p.outline_smallest_hole_um2) continue;
     if (!contains(outer, hole_px.front())) continue;
+    if (2 * area_um2 > (signed_area_um2(outer) + 0.5) * pixel_um * pixel_um)
+      throw InputError(mask.name, "a mask that covers the cell", "a ring, as of a drawn outline",
+                       "fill it: in ImageJ, Process > Binary > Fill Holes");
     cell.area_um2 -= area_um2;
     cell.holes_um.push_back(
         thinned({in_um(hole_px, pixel_um), {}}, every_nth(hole_px.size(), pixel_um, kOutlineSpacing_um), field_um)
@@ -164,7 +167,7 @@ void require_size_of_adhesion(const LabelMask& mask, const Adhesion& a) {
 /// Half of the largest value, if all values between 0 and it lie in rims: a mask that was drawn, turned or scaled has
 /// grey pixels between both. None of them is a label.
 std::optional<float> level_of_rims(const images::Image& image) {
-  constexpr int kRim_px = 2;         // as wide as interpolation makes them
+  constexpr int kRim_px = 4;         // as wide as interpolation and smoothing make them
   constexpr std::size_t kGreys = 3;  // less: labels that touch
   const float largest = image.pixels.empty() ? 0 : std::ranges::max(image.pixels);
   std::set<float> greys;

@@ -17,6 +17,7 @@ constexpr double kRingDash_px = 7, kFibreDash_px = 22;
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
 constexpr int kShift = 4;           // OpenCV's drawing takes fixed-point coordinates: sixteenths of a pixel
 constexpr double kLongSide = 1600;  // px: two screens' pixels for each where a page shows it 700 px wide
+constexpr double kHalo_um = 1;      // of what is left out: light beside it is its own
 constexpr double kMargin_um = 3;    // around the cell, so that one sees what the outline leaves out
 constexpr double kFibreText = 1.0, kAdhesionText = 0.6, kLegendText = 1.0;  // times 22 px: height of a capital
 constexpr double kStemOfU = 4;  // px from the left of the letter's box at size 1
@@ -31,23 +32,34 @@ cv::Scalar faded_colour(const Fibre& f) {
   return colour_of_fibre(f) * (kFaintest + (1 - kFaintest) * f.confidence);
 }
 
+/// What does not lie in one of the things that are no part of the cell: a dead cell may be ten times as bright.
+cv::Mat without(const cv::Mat& values, const cv::Mat& is_left_out) {
+  std::vector<float> kept;
+  for (int j = 0; j < values.rows; ++j)
+    for (int i = 0; i < values.cols; ++i)
+      if (is_left_out.at<unsigned char>(j, i) == 0) kept.push_back(values.at<float>(j, i));
+  return kept.empty() ? values : cv::Mat(kept, true);
+}
+
 /// Part of an image at the size of the picture, 0 to 1 between its 1 % and its 99.8 % quantile, brightened by a root so
 /// that faint structure shows.
-cv::Mat stretched(const images::Image& image, const cv::Rect& part, cv::Size size) {
+/// @param is_left_out  at the picture's size: what sets no level; empty: nothing
+cv::Mat stretched(const images::Image& image, const cv::Rect& part, cv::Size size, const cv::Mat& is_left_out) {
   cv::Mat values;
   cv::resize(matrix_of(image)(part), values, size, 0, 0, size.width < part.width ? cv::INTER_AREA : cv::INTER_CUBIC);
-  const double low = quantile(values, 0.01), high = quantile(values, 0.998);
+  const cv::Mat counted = is_left_out.empty() ? values : without(values, is_left_out);
+  const double low = quantile(counted, 0.01), high = quantile(counted, 0.998);
   values = cv::min(cv::max((values - low) / std::max(high - low, 1e-12), 0.0), 1.0);
   cv::pow(values, 0.7, values);
   return values;
 }
 
 cv::Mat background(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
-                   const cv::Rect& part, cv::Size size) {
+                   const cv::Rect& part, cv::Size size, const cv::Mat& is_left_out) {
   cv::Mat planes[3];
   const cv::Mat none = cv::Mat::zeros(size, CV_32F);
-  const cv::Mat grey = actin ? stretched(actin->image, part, size) : none;
-  const cv::Mat purple = adhesion ? stretched(adhesion->image, part, size) : none;
+  const cv::Mat grey = actin ? stretched(actin->image, part, size, is_left_out) : none;
+  const cv::Mat purple = adhesion ? stretched(adhesion->image, part, size, is_left_out) : none;
   // alone, a channel may use the whole range; together they share it
   const double share_grey = adhesion ? 150 : 210, share_purple = actin ? 150 : 210;
   const double tint[3] = {1.0, actin ? 0.1 : 1.0, actin ? 0.95 : 1.0};  // alone it is grey, so that marks stand out
@@ -80,7 +92,8 @@ Place centred_text(cv::Point2d centre, const std::string& text, double size) {
 class Canvas {
  public:
   Canvas(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
-         const Extent& view, double pixel_size_um, double long_side) {
+         const Extent& view, const Segmentation& s, double long_side) {
+    const double pixel_size_um = s.pixel_size_um;
     const images::Image& any = actin ? actin->image : adhesion->image;
     const Vec2 low = (1 / pixel_size_um) * view.low_um, high = (1 / pixel_size_um) * view.high_um;
     const cv::Rect wanted(cv::Point(cvFloor(low.x), cvFloor(low.y)), cv::Point(cvCeil(high.x), cvCeil(high.y)));
@@ -89,7 +102,17 @@ class Canvas {
     pixel_um_ = pixel_size_um / zoom;
     corner_um_ = {part.x * pixel_size_um, part.y * pixel_size_um};
     const cv::Size size(std::max(1, cvRound(part.width * zoom)), std::max(1, cvRound(part.height * zoom)));
-    picture_ = background(adhesion, actin, part, size);
+    cv::Mat is_left_out;
+    for (const auto* things : {&s.left_out_um, &s.cell.neighbours_um}) {
+      for (const Polygon& thing : *things) {
+        if (is_left_out.empty()) is_left_out = cv::Mat::zeros(size, CV_8U);
+        std::vector<cv::Point> points;
+        for (const Vec2 p : thing) points.emplace_back(cvRound(at(p).x), cvRound(at(p).y));
+        cv::fillPoly(is_left_out, std::vector{points}, 255);
+      }
+    }
+    if (!is_left_out.empty()) cv::dilate(is_left_out, is_left_out, cv::Mat(), {-1, -1}, cvRound(kHalo_um / pixel_um_));
+    picture_ = background(adhesion, actin, part, size, is_left_out);
   }
 
   void line(const Polyline& points_um, bool is_closed, const cv::Scalar& colour, int thickness) {
@@ -306,7 +329,7 @@ Extent view_of(const Segmentation& s) {
 
 images::Picture draw_overlay(const std::optional<images::Channel>& adhesion,
                              const std::optional<images::Channel>& actin, const Segmentation& s) {
-  Canvas canvas(adhesion, actin, view_of(s), s.pixel_size_um, kLongSide);
+  Canvas canvas(adhesion, actin, view_of(s), s, kLongSide);
   draw_marks(canvas, s.cell, 2);
   for (const Polyline& line : s.doubtful_um) canvas.dashed_line(line, false, kDoubtful, 2, kRingDash_px);
   for (const auto* all : {&s.left_out_um, &s.cell.neighbours_um})
@@ -323,14 +346,14 @@ images::Picture draw_overlay(const std::optional<images::Channel>& adhesion,
 Ground draw_ground(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
                    const Segmentation& s) {
   constexpr double kGroundSide = 1000;  // px: a page shows it some 600 px wide, and carries it
-  const Canvas canvas(adhesion, actin, view_of(s), s.pixel_size_um, kGroundSide);
+  const Canvas canvas(adhesion, actin, view_of(s), s, kGroundSide);
   return {picture_of(canvas.picture()), canvas.corner_um(),
           canvas.pixel_um() * Vec2{double(canvas.picture().cols), double(canvas.picture().rows)}};
 }
 
 cv::Mat draw_thumbnail(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
                        const Segmentation& s, const Extent& view, int long_side_px) {
-  Canvas canvas(adhesion, actin, view, s.pixel_size_um, long_side_px);
+  Canvas canvas(adhesion, actin, view, s, long_side_px);
   draw_marks(canvas, s.cell, 1);
   return canvas.picture();
 }

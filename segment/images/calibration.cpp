@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/contract/range.h"
 #include "segment/images/image_file.h"
 #include "segment/images/stack.h"
@@ -124,7 +125,9 @@ std::optional<std::string_view> line_value(std::string_view text, std::string_vi
   return std::nullopt;
 }
 
-std::optional<double> pixel_size_um(const TiffCalibration& calibration) {
+namespace {
+
+std::optional<PixelSize> stated_size(const TiffCalibration& calibration) {
   const std::string& text = calibration.description;
   std::optional<PixelSize> size;
   if (is_ome(text)) size = ome_pixel_size(calibration);
@@ -132,9 +135,24 @@ std::optional<double> pixel_size_um(const TiffCalibration& calibration) {
   if (!size) size = volocity_pixel_size(text);
   if (!size && !text.starts_with("ImageJ=") && !is_ome(text))
     size = of_a_microscope(size_by_resolution(calibration, calibration.unit_um));
-  // half a per cent: what two roundings to three digits may differ by
-  if (!size || !(std::abs(size->x_um - size->y_um) <= 5e-3 * size->x_um)) return std::nullopt;
-  return without_ratio_noise(size->x_um);
+  return size;
+}
+
+/// Half a per cent: what two roundings to three digits may differ by.
+bool is_square(const PixelSize& size) { return std::abs(size.x_um - size.y_um) <= 5e-3 * size.x_um; }
+
+}  // namespace
+
+std::optional<double> pixel_size_um(const TiffCalibration& calibration) {
+  const std::optional<PixelSize> size = stated_size(calibration);
+  return size && is_square(*size) ? std::optional(without_ratio_noise(size->x_um)) : std::nullopt;
+}
+
+std::string stated_not_square(const TiffCalibration& calibration) {
+  const std::optional<PixelSize> size = stated_size(calibration);
+  if (!size || is_square(*size) || !of_a_microscope(size) || !of_a_microscope(PixelSize{size->y_um, size->x_um}))
+    return "";
+  return shortest(without_ratio_noise(size->x_um)) + " x " + shortest(without_ratio_noise(size->y_um)) + " um";
 }
 
 std::string stated_of_another_size(const TiffCalibration& calibration) {

@@ -158,7 +158,8 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
                        format.is_microscopes ? microscopes_hint(file) : "export it as 8- or 16-bit TIFF");
     }
   }
-  throw InputError(file.string(), kExpected, head.empty() ? "an empty file" : "bytes of neither");
+  throw InputError(file.string(), kExpected, head.empty() ? "an empty file" : "bytes of neither",
+                   "export it as 8- or 16-bit TIFF; copy it again if it was one");
 }
 
 ImageField read_field(const std::filesystem::path& file) {

@@ -78,6 +78,9 @@ std::optional<double> pixel_size_um(const TiffCalibration& calibration);
 /// one was binned or cropped since, and its pixel size may be another one. Empty if not.
 std::string stated_of_another_size(const TiffCalibration& calibration);
 
+/// "0.1 x 0.2 um" where that is what it states; else empty.
+std::string stated_not_square(const TiffCalibration& calibration);
+
 /// The distance of slices: OME-XML's PhysicalSizeZ, ImageJ's spacing in its unit, Volocity's ZCalibrationMicrons.
 std::optional<double> z_step_um(const TiffCalibration& calibration);
 

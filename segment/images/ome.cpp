@@ -75,6 +75,7 @@ struct OmeReader {
   void begin(const std::string& element, const Attributes& a) {
     if (element == "OME") image.uuid = text(a, "UUID");
     if (element == "BinaryOnly") image.companion = text(a, "MetadataFile");
+    image.n_images += element == "Image";
     if (has_pixels) return;
     if (element == "Pixels") begin_pixels(a);
     if (!is_in_pixels) return;

@@ -24,6 +24,7 @@ struct OmeImage {
   std::string order = "XYCZT";  ///< which dimension runs fastest
   int width = 0, height = 0;    ///< pixels; 0: not given
   int n_channels = 1, n_slices = 1, n_frames = 1;
+  int n_images = 0;                                            ///< of which all else here is the first
   std::vector<std::string> channel_names;                      ///< empty where one has none
   std::vector<OmePages> pages;                                 ///< none: all pages in order
   std::string size_x, unit_x, size_y, unit_y, size_z, unit_z;  ///< PhysicalSizeX, …; empty: not given

@@ -40,6 +40,11 @@ class TiffReader {
     else if (!stated && n_pages() > 1)
       image.taken = "it does not state what its " + std::to_string(n_pages()) + " pages are, and page " +
                     std::to_string(pages.front() + 1) + " was taken (" + choice.prefix + "_page)";
+    else if (stated && is_ome(of_first_page_.description) && static_cast<int>(stack.pages.size()) < n_pages() &&
+             parse_ome(of_first_page_.description).n_images > 1)
+      image.taken = "it holds several images, and the first was taken (" + choice.prefix + "_page)";
+    if (const std::string sides = stated_not_square(of_first_page_); !sides.empty() && image.taken.empty())
+      image.taken = "it states pixels of " + sides + ", which are taken for square ones";
     return image;
   }
 

@@ -119,6 +119,13 @@ void look_at_pair(const CellImages& cell, double pixel_um, Survey& survey) {
                             " %): do they belong to one cell? Put the stage back before the second one is recorded.");
 }
 
+std::vector<Adhesion> adhesions_of(const Channel& adhesion, double pixel_um) {
+  constexpr double kCoarse_um = 0.25;  // about the blur of the microscope: shapes are enough here
+  const images::Image& image = adhesion.image;
+  const int binning = std::clamp(static_cast<int>(kCoarse_um / pixel_um), 1, std::min(image.width, image.height));
+  return cells::find_adhesions(images::binned(image, binning), pixel_um * binning, {});
+}
+
 /// Does a table lie as the cell's picture does, and point as cells pull?
 void look_at_table(const CellImages& cell, double pixel_um, Survey& survey) {
   if (cell.given.empty()) return;
@@ -132,6 +139,17 @@ void look_at_table(const CellImages& cell, double pixel_um, Survey& survey) {
     survey.doubts.push_back("The displacements look " + look.places + " against " + picture->name + mend);
   else if (!look.vectors.empty())
     survey.doubts.push_back("The vectors of the table look " + look.vectors + " at their places" + mend);
+  if (!look.places.empty() || !look.vectors.empty() || !cell.adhesion) return;
+  constexpr std::size_t kMost = 200;  // the largest: what costs grows with the cube
+  std::vector<Adhesion> adhesions = adhesions_of(*cell.adhesion, pixel_um);
+  std::ranges::stable_sort(adhesions, std::ranges::greater{}, &Adhesion::area_um2);
+  std::vector<Vec2> places;
+  for (std::size_t k = 0; k < std::min(kMost, adhesions.size()); ++k) places.push_back(adhesions[k].position_um);
+  const Vec2 middle_um = 0.5 * pixel_um * Vec2{double(picture->image.width), double(picture->image.height)};
+  const std::string turned = beads::orientation_of_forces(cell.given, places, middle_um);
+  if (!turned.empty())
+    survey.doubts.push_back("The table as a whole looks " + turned + " against " + picture->name +
+                            ": forces at its adhesions explain it far better so" + mend);
 }
 
 /// From the cell to the nearest side of the image.
@@ -164,11 +182,7 @@ void look_at_cell(const CellImages& cell, double pixel_um, Survey& survey) {
 /// As the finding `bleed-through` of the stage segment.
 void look_at_adhesions(const CellImages& cell, double pixel_um, Survey& survey) {
   if (!cell.adhesion) return;
-  constexpr double kCoarse_um = 0.25;  // about the blur of the microscope: shapes are enough here
-  const images::Image& image = cell.adhesion->image;
-  const int binning = std::clamp(static_cast<int>(kCoarse_um / pixel_um), 1, std::min(image.width, image.height));
-  const double ratio =
-      cells::aspect_ratio(cells::find_adhesions(images::binned(image, binning), pixel_um * binning, {}));
+  const double ratio = cells::aspect_ratio(adhesions_of(*cell.adhesion, pixel_um));
   if (const auto found = noticed(Symptom::adhesions_long, ratio))
     survey.doubts.push_back(cell.adhesion->name + ": " + found->text + " " + found->remedy);
 }

@@ -28,6 +28,7 @@ const std::map<std::string, std::string> kReaders = {
     {"segment/images/stack.cpp", "the order of axes in OME-XML"},
     {"segment/rois/roi_set.cpp", "ImageJ's ROIs and their archives"},
     {"segment/beads/given_table.cpp", "words of other programs' tables"},
+    {"segment/beads/table_columns.cpp", "units and numbers of other programs' columns"},
 };
 
 /// Paths, names of files, units of what a user types and the like: what no enumeration would make clearer.

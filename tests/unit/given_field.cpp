@@ -1,10 +1,12 @@
 #include "segment/beads/given_field.h"
 
 #include <numbers>
+#include <random>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
+#include "segment/beads/pair_look.h"
 #include "tests/support/bead_pair.h"
 #include "tests/support/temporary_folder.h"
 
@@ -153,9 +155,52 @@ TEST(GivenField, points_on_a_line_and_points_astray_are_read) {
   const test::TemporaryFolder folder;
   for (const bool is_line : {true, false}) {
     files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
-    for (int i = 0; i < 40; ++i) csv.add(1.0 * (i % 20)).add(is_line ? 0.0 : i / 20).add(0.1).add(0.01 * i).end_row();
+    for (int i = 0; i < 40; ++i)
+      csv.add(is_line ? 1.0 * i : i % 20).add(is_line ? 0.0 : i / 20).add(0.1).add(0.01 * i).end_row();
     csv.add(9e5).add(is_line ? 0.0 : 9e5).add(0.1).add(0.1).end_row();
     EXPECT_EQ(read_given_field(write(folder, csv.str()), {}).field.size(), 41u);
+  }
+}
+
+/// Thirty adhesions anywhere, two in three of them known, forces towards the middle, and their displacement by Cerruti.
+TEST(GivenField, turned_or_mirrored_as_a_whole_is_named_by_forces_at_the_adhesions) {
+  std::mt19937_64 random(61);
+  std::uniform_real_distribution<> within(15, 85);
+  std::normal_distribution<> noise(0, 0.005);
+  const Vec2 middle{50, 50};
+  std::vector<Vec2> adhesions, forces;
+  for (int k = 0; k < 30; ++k) {
+    adhesions.push_back({within(random), 0.6 * within(random) + 20});
+    forces.push_back(0.05 * (middle - adhesions.back()));
+  }
+  DisplacementField field;
+  for (int j = 0; j < 25; ++j) {
+    for (int i = 0; i < 25; ++i) {
+      Bead& bead = field.emplace_back();
+      bead.position_um = {4.0 * i + 2, 4.0 * j + 2};
+      for (std::size_t k = 0; k < adhesions.size(); ++k) {
+        const Vec2 d = bead.position_um - adhesions[k];
+        const double r = std::hypot(norm(d), 0.8), e = 3.0;
+        const Vec2 direction = 1 / r * d;
+        bead.displacement_um +=
+            1.49 / (std::numbers::pi * e * r) * (0.51 * forces[k] + 0.49 * dot(direction, forces[k]) * direction);
+      }
+      bead.displacement_um += {noise(random), noise(random)};
+    }
+  }
+  const std::vector<Vec2> found(adhesions.begin(), adhesions.begin() + 20);
+  EXPECT_EQ(orientation_of_forces(field, found, middle), "");
+  const auto turned_back = [&](Vec2 v, const Orientation& as) {
+    for (int k = 0; k < as.quarter_turns; ++k) v = {v.y, -v.x};
+    return as.is_mirrored ? Vec2{-v.x, v.y} : v;
+  };
+  for (const Orientation& as : kOtherOrientations) {
+    DisplacementField wrong = field;
+    for (Bead& bead : wrong) {
+      bead.position_um = middle + turned_back(bead.position_um - middle, as);
+      bead.displacement_um = turned_back(bead.displacement_um, as);
+    }
+    EXPECT_EQ(orientation_of_forces(wrong, found, middle), as.name);
   }
 }
 

@@ -120,6 +120,14 @@ TEST(GivenTable, is_the_same_in_whatever_form_people_write_it) {
       {"text above", "PIV export\nFRAME: 1, filenames: A & B, window: 32\n\n" + header + lines},
       {"units beneath", "x,y,ux,uy\n[px],[px],[px],[px]\n" + lines},
       {"names in quotes", "\"x [px]\",\"y [px]\",\"u [px/frame]\",\"v [px/frame]\"\n" + lines},
+      {"names of R", "\"x..px.\",\"y..px.\",\"u..px.frame.\",\"v..px.frame.\"\n" + lines},
+      {"names in words", "x in pixels,y in pixels,dx in pixels,dy in pixels\n" + lines},
+      {"names by points", "X.px;Y.px;dX.px;dY.px\n" + lines_of(rows, ";")},
+      {"columns and rows of a picture", "col_px,row_px,dc_px,dr_px\n" + lines},
+      {"voxels", "x [voxel],y [voxel],u [voxel],v [voxel]\n" + lines},
+      {"bars", "| x_px | y_px | u_px | v_px |\n|---|---|---|---|\n" +
+                   lines_of(
+                       rows, " ", [](double value) { return "| " + shortest(value); }, " |\n")},
       {"rows that R numbers", "\"x_px\" \"y_px\" \"u_px\" \"v_px\"\n" + numbered},
       {"other columns of one name", "i,x_px,i,y_px,i,u_px,v_px\n" + [&] {
          std::string text;
@@ -165,6 +173,26 @@ TEST(GivenTable, numbers_that_can_be_read_in_two_ways_are_refused) {
       {"two zones",
        "VARIABLES = \"x [px]\", \"y [px]\", \"u [px]\", \"v [px]\"\nZONE I=1\n1 2 3 4\nZONE I=1\n1 2 3 4\n"},
       {"a mask of most", "x_um,y_um,ux_um,uy_um,mask\n1,2,3,4,1\n2,2,3,4,1\n3,3,3,4,0\n"},
+      {"places of both pictures",
+       [] {
+         std::string text = "x_um y_um ux_um uy_um\n";
+         for (int k = 0; k < 40; ++k) text += lines_of({{1.0 * (k % 8), 1.0 * (k / 8), k % 8 + 0.1, k / 8 + 0.2}}, " ");
+         return text;
+       }()},
+      {"lengths and angles",
+       [] {
+         std::string text = "x_um,y_um,ux_um,uy_um\n";
+         for (int k = 0; k < 61; ++k) text += lines_of({{1.0 * (k % 8), 1.0 * (k / 8), 0.01 * k, 6.0 * k - 180}}, ",");
+         return text;
+       }()},
+      {"several times",
+       [] {
+         std::string text = "t,x_um,y_um,ux_um,uy_um\n";
+         for (int k = 0; k < 40; ++k) text += "1," + lines_of({{1.0 * (k % 20), 1, 0.01 * k, 0.02}}, ",");
+         return text;
+       }()},
+      {"a sum of the columns", "i,x_um,y_um,ux_um,uy_um\n1,1,2,3,4\n2,2,2,3,4\nMean,1.5,2,3,4\n"},
+      {"a date of Excel", "x_um;y_um;ux_um;uy_um\n1;2;3;4\n2;2;3;01.05.2023\n"},
       {"letters", "x_um,y_um,ux_um,uy_um\n1,2,3,4\n1,2,3,o.4\n"},
       {"nothing", ""},
       {"a page", "<html>\n<body>1 2 3 4</body>\n"}};
@@ -179,6 +207,8 @@ TEST(GivenTable, numbers_that_can_be_read_in_two_ways_are_refused) {
     const auto error = test::caught<InputError>([&] { read(workbook); });
     EXPECT_TRUE(error && has_words(error->hint, "as CSV")) << "a workbook is no text";
   }
+  for (const std::string_view packed : {"\x1F\x8B\x08", "MATLAB 5.0 MAT-file", "\x89HDF\r\n"})
+    EXPECT_TRUE(test::caught<InputError>([&] { read(std::string(packed)); })->hint.size() > 0);
   // one comma that is no thousands' decides for all
   EXPECT_EQ(read(header + "1,234;5,678;0,111;2,222\n").field[0].position_um, (Vec2{1.234, 5.678}));
 }
@@ -195,6 +225,22 @@ TEST(GivenTable, a_missing_number_is_flagged_and_a_row_without_a_place_counted) 
   EXPECT_EQ(given.n_left_out, 2);
   for (std::size_t k = 20; k < given.field.size(); ++k)
     EXPECT_EQ(given.field[k].flag, "not a number") << missing[k - 20];
+}
+
+TEST(GivenTable, a_missing_number_in_the_first_rows_is_no_header) {
+  const Rows rows = vectors();
+  for (const std::string word :
+       {"NaN", "", "--", "-", ".", "?", "*", "********", "n.d.", "n. def.", "masked", "missing", "NaN(0)", "-nan(ind)",
+        "-NaN(SNaN)", "1.#QNAN0", "-1.#IND00", "\xE2\x88\x9E", "#NV"}) {
+    SCOPED_TRACE(word);
+    std::string text = "x_px;y_px;u_px;v_px\n";
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      text += k < 3 ? shortest(rows[k][0]) + ";8;" + word + ";" + word + "\n" : lines_of({rows[k]}, ";");
+    const GivenField given = read(text, in_pixels());
+    ASSERT_EQ(given.field.size(), rows.size());
+    for (std::size_t k = 0; k < 5; ++k) EXPECT_EQ(given.field[k].flag == "not a number", k < 3) << k;
+    EXPECT_NEAR(given.field[5].displacement_um.x, 0.1 * rows[5][2], 1e-12);
+  }
 }
 
 /// y counted upwards from the lower border of a picture of 128 px, rows in the order of the picture.
@@ -293,6 +339,12 @@ TEST(GivenTable, its_units_may_differ_by_column_and_be_velocities) {
   timed.seconds_between = 0.25;
   expect_same(read("x [px],y [px],u [px/s],v [px/s]\n" + lines_of(faster, ","), timed), rows);
   expect_same(read("# x y u v mask\n" + lines_of(faster, " ", shortest, " 0\n"), timed), rows);
+  for (const auto& [unit, seconds] : std::map<std::string, double>{
+           {"px/min", 15}, {"px/h", 900}, {"px s^-1", 0.25}, {"px s\xE2\x81\xBB\xC2\xB9", 0.25}, {"px min-1", 15}}) {
+    SCOPED_TRACE(unit);
+    timed.seconds_between = seconds;
+    expect_same(read("x [px],y [px],u [" + unit + "],v [" + unit + "]\n" + lines_of(faster, ","), timed), rows);
+  }
   EXPECT_THROW(read("x [px],y [px],u [px],v [px]\n" + lines_of(rows, ","), timed), InputError);
   EXPECT_EQ(read("x [px],y [px],u [px],v [px],sigma_um\n" + lines_of(rows, ",", shortest, ",0.02\n"), in_pixels())
                 .field[0]
@@ -317,6 +369,13 @@ TEST(GivenTable, rows_that_their_program_masked_or_filled_in_are_flagged) {
   EXPECT_EQ(flag_of_third("VARIABLES = \"X px\", \"Y px\", \"U px\", \"V px\", \"CHC\"\nZONE I=8\n", "1", "-1", ", "),
             "masked");
   EXPECT_EQ(flag_of_third("x_px;y_px;u_px;v_px;isValid\n", "1", "0", ";"), "masked");
+  for (const auto& [good, bad] : {std::pair("yes", "no"), {"True", "False"}, {"valid", "invalid"}})
+    EXPECT_EQ(flag_of_third("x_px;y_px;u_px;v_px;valid\n", good, bad, ";"), "masked") << good;
+  EXPECT_EQ(flag_of_third("x_px;y_px;u_px;v_px;outlier\n", "0", "1", ";"), "masked");
+  EXPECT_EQ(flag_of_third("x_px;y_px;u_px;v_px;typevector\n", "1", "0", ";"), "masked");
+  EXPECT_EQ(flag_of_third("x y ux1 uy1 mag1 ang1 p1 ux2 uy2 mag2 ang2 p2 ux0 uy0 mag0 flag\n",
+                          "1 0 0.9 0 0 0 0 0 0 0 0 0", "1 0 0.9 0 0 0 0 0 0 0 0 999", " "),
+            "filled in");
   EXPECT_EQ(flag_of_third("", "1 0 0.9 0 0 0 0 0 0 0 0 0", "1 0 0.9 0 0 0 0 0 0 0 0 999", " "), "filled in");
 }
 

@@ -126,6 +126,8 @@ TEST(Image, a_resolution_counts_if_a_microscope_has_such_pixels) {
     EXPECT_EQ(pixel_size_um({"", by_inch, by_inch, kInch_um}), std::nullopt) << by_inch;
   EXPECT_EQ(pixel_size_um({"", 28.35, 28.35, kCentimetre_um}), std::nullopt) << "72 by inch in centimetres";
   EXPECT_EQ(pixel_size_um({"ImageJ=1.53t\nunit=inch\n", 72, 72, kInch_um}), std::nullopt);
+  EXPECT_EQ(stated_not_square({"", 100000, 50000, kCentimetre_um}), "0.1 x 0.2 um");
+  for (const double other : {100000.0, 28.35}) EXPECT_EQ(stated_not_square({"", 100000, other, kCentimetre_um}), "");
 }
 
 std::string error_of(const fs::path& file, int page = 0) {

@@ -161,6 +161,8 @@ TEST_F(ImagePlanes, what_was_taken_of_several_planes_is_said) {
   EXPECT_TRUE(has_words(read_image(folder / "slices.tif").taken, "maximum of its 3 slices"));
   EXPECT_EQ(read_image(folder / "slices.tif", {.z = "2"}).taken, "");
   EXPECT_EQ(read_image(folder / "one.tif").taken, "");
+  write_pages(folder / "two.ome.tif", 2, ome("SizeC='1' SizeZ='1' SizeT='1'", "<TiffData IFD='0'/>"));
+  EXPECT_TRUE(has_words(read_image(folder / "two.ome.tif").taken, "several images"));
 }
 
 /// A page of 4 x 3 pixels, and before it one of half of its size.

@@ -63,6 +63,11 @@ TEST(Mask, grey_rims_of_a_drawn_one_are_rims_and_labels_are_labels) {
   const LabelMask drawn = mask(image);
   EXPECT_TRUE(drawn.is_binary);
   EXPECT_NEAR(n_pixels(drawn), std::numbers::pi * 59 * 59, 0.02 * 59 * 59);
+  images::Image ring = empty();
+  paint_disc(ring, 1, {128, 128}, 60);
+  paint_disc(ring, 0, {128, 128}, 57);
+  EXPECT_TRUE(
+      has_words(hint_of([&] { mask_outlines(mask(ring), 1, kMaskField, {.outline_smallest_um2 = 1}); }), "fill it"));
   for (const float largest : {2.f, 255.f}) {
     images::Image labels = empty();
     paint_disc(labels, 1, {60, 60}, 20);

@@ -272,6 +272,12 @@ TEST(Parameters, what_other_programs_and_countries_write_is_answered_with_how_to
   EXPECT_TRUE(has_words(hint("[images]\nactin = “actin.tif”\n"), "straight quotes"));
   EXPECT_TRUE(has_words(hint("[images]\nactin = \"D:\\images\\cell 1\\actin.tif\"\n"), "write folders with /"));
   EXPECT_TRUE(has_words(hint("[images]\nactin = actin.tif\n"), "needs quotes"));
+  EXPECT_EQ(hint("pixel_size_um = .1\n"), "a digit goes before the point: 0.1");
+  EXPECT_TRUE(has_words(hint("pixel_size_um: 0.1\n"), "an equals sign"));
+  EXPECT_TRUE(has_words(hint("[gel\nthickness_um = 60\n"), "brackets: [gel]"));
+  EXPECT_TRUE(has_words(hint("[gel]\nradius_um = 9\n[gel]\nthickness_um = 60\n"), "below the first"));
+  EXPECT_TRUE(has_words(hint("{\\rtf1 pixel_size_um = 0.1}"), "plain text"));
+  EXPECT_EQ(hint("poisson_ratio = 0.49\n"), "it belongs under [gel]");
 }
 
 }  // namespace

@@ -137,6 +137,15 @@ TEST(Study, names_that_differ_in_capitals_are_one_condition_and_no_is_no_reason)
   EXPECT_EQ(reason_of(study, "treated/cell_4"), "yes");
   ASSERT_EQ(study.warnings.size(), 1u);
   EXPECT_TRUE(has_words(study.warnings[0], "ctrl and Ctrl"));
+  for (const std::string table :
+       {"Cell;Condition;Exclude?\ncell_1;a;nein\ncell_2;a;-\ncell_3;a;\ncell_4;a;out of focus\n",
+        "cell,condition,excluded\ncell_1,a,\ncell_2,a,non\ncell_3,a,no\ncell_4,a,1\n",
+        "cell,condition,include\ncell_1,a,yes\ncell_2,a,1\ncell_3,a,\ncell_4,a,no\n",
+        "cell,condition\ncell_1,a\ncell_2,a\ncell_3,a\ncell_4,#N/A\n"}) {
+    const Study some = fake.read({}, table);
+    EXPECT_EQ(some.cells.size(), 3u) << table;
+    EXPECT_FALSE(reason_of(some, "treated/cell_4").empty()) << table;
+  }
   EXPECT_EQ(analyse(study, {}).warnings.front(), study.warnings.front());
 }
 

@@ -1,0 +1,17 @@
+/// The text of a table as other programs save it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace mbtfm::files {
+
+/// As UTF-8 with a line feed after each line, from UTF-8, UTF-16 or Latin-1. Written to `place` if it is not so
+/// already.
+std::string_view as_text(std::string_view bytes, std::string& place);
+
+/// The bytes of a file. @throws InputError where it is a workbook, compressed, or MATLAB's
+std::string read_table_text(const std::filesystem::path& file);
+
+}  // namespace mbtfm::files
