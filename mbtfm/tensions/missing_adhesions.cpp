@@ -6,6 +6,7 @@
 
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/search.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/numerics/dense.h"
@@ -141,62 +142,101 @@ std::vector<Vec2> free_places(const Cell& cell) {
   return places;
 }
 
-/// With what noise and errors of the model's forces make of the score, the tensions following.
-MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const LinearData& data, const VectorXd& weight) {
-  MatrixXd weighted = MatrixXd::Zero(data.displacement_um.size(), 2);
-  for (std::size_t k = 0; k < q.beads.size(); ++k) {
-    weighted.middleRows<2>(2 * q.beads[k]) = weight[2 * q.beads[k]] * q.fields[k];
+/// Places where what is left of the beads looks most like a force, as the beads around alone have it: beside all that
+/// the adhesions exert, as these explain much of a force nearby, and beside the network's forces.
+std::vector<Vec2> likely_places(const EnsembleFit& fit, const std::vector<Vec2>& places, const Gel& gel, int threads) {
+  constexpr double kLeast = 10;      // of the gain: chance has it at each hundred and fiftieth place
+  constexpr std::size_t kMost = 25;  // of either: where so many fail, the model is wrong as a whole
+  const UsedBeads beads(fit.data);
+  const DiscField disc(gel);
+  const VectorXd weight = squared_weights(fit.data);
+  std::vector<Vec2> tried, likely;
+  for (const VectorXd& forces_nN : {adhesion_forces_nN(fit), fit.forces.nN}) {
+    const VectorXd residual = residual_um(fit.data, forces_nN);
+    const auto ask_at = [&](Vec2 place_um) {
+      return ask(place_um, beads, disc, fit.data, weight, residual, fit.misfit.variance);
+    };
+    std::vector<Question> asked(places.size());
+    numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int i) {
+      asked[i] = ask_at(places[i]);
+      asked[i].fields = {};
+    });
+    std::erase_if(asked, [&](const Question& q) { return q.gain < kLeast; });
+    std::ranges::sort(asked, std::greater(), &Question::gain);
+    const std::size_t most = tried.size() + kMost;
+    for (const Question& q : asked) {
+      if (tried.size() >= most) break;
+      if (std::ranges::any_of(tried, [&](Vec2 p) { return norm(p - q.place_um) < 0.5 * kReach_um; })) continue;
+      tried.push_back(q.place_um);
+      likely.push_back(refined(q, ask_at).place_um);
+    }
   }
-  const ScoreTest test = score_test(fit, data, weighted, q.square, q.score);
-  return {.position_um = q.place_um, .force_nN = {test.sizes[0], test.sizes[1]}, .chi_squared_gain = test.chi_squared};
+  return likely;
+}
+
+/// Displacement of the beads by forces on discs there, 2·beads × 2·places.
+MatrixXd displacement_by(const std::vector<Vec2>& places, const LinearData& data, const Gel& gel) {
+  std::vector<substrate::Ellipse> discs;
+  for (const Vec2 place : places)
+    discs.push_back({.centre_um = place, .semi_major_um = kDisc_um, .semi_minor_um = kDisc_um, .angle_rad = 0});
+  return greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
+      ->compliance_um_per_nN(data.position_um, discs);
+}
+
+std::vector<Index> columns_of(std::size_t place) {
+  const auto first = 2 * static_cast<Index>(place);
+  return {first, first + 1};
 }
 
 }  // namespace
 
-std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const LinearData& data, const Cell& cell,
-                                               const Gel& gel, int threads) {
-  const std::vector<Vec2> places = free_places(cell);
-  const UsedBeads beads(data);
-  const DiscField disc(gel);
-  const VectorXd weight = squared_weights(data), residual = residual_um(data, fit.forces.nN);
-  const auto ask_at = [&](Vec2 place_um) {
-    return ask(place_um, beads, disc, data, weight, residual, fit.misfit.variance);
-  };
-  std::vector<Question> asked(places.size());
-  numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int i) {
-    asked[i] = ask_at(places[i]);
-    if (asked[i].gain < 1) asked[i].fields = {};
-  });
-  // chi squared of two numbers exceeds x by chance exp(-x/2)
-  const double limit = 2 * std::log(std::max<double>(1, static_cast<double>(places.size())) / 0.01);
-  std::erase_if(asked, [&](const Question& q) { return q.gain < limit; });
-  std::ranges::sort(asked, std::greater(), &Question::gain);
-  std::vector<MissingAdhesion> found;
-  std::vector<Vec2> tried;
-  constexpr std::size_t kMost = 50;  // where so many fail, the model is wrong as a whole
-  for (const Question& q : asked) {
-    if (tried.size() >= kMost) break;
-    if (std::ranges::any_of(tried, [&](Vec2 p) { return norm(p - q.place_um) < 0.5 * kReach_um; })) continue;
-    tried.push_back(q.place_um);
-    if (const MissingAdhesion answer = answered(refined(q, ask_at), fit, data, weight);
-        answer.chi_squared_gain >= limit) {
-      found.push_back(answer);
+std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cell& cell, const Gel& gel, int threads) {
+  constexpr double kExpected = 0.1;  // forces that a cell has away from its adhesions, as a rule
+  const std::vector<Vec2> places = free_places(cell), likely = likely_places(fit, places, gel, threads);
+  if (likely.empty()) return {};
+  const Left left(fit);
+  const Scores scores = left.scores_of(pattern_of(fit.data, displacement_by(likely, fit.data, gel)));
+  const VectorXd forces_nN = adhesion_forces_nN(fit);
+  const double kappa =
+      std::max(1e-300, forces_nN.squaredNorm() / static_cast<double>(forces_nN.size())) / left.variance();
+  const double limit = std::log(static_cast<double>(places.size()) / kExpected);
+  std::vector<std::size_t> causes;
+  std::vector<Index> columns;
+  for (Scores rest = scores; causes.size() < likely.size();) {
+    std::size_t best = 0;
+    double most = limit;
+    for (std::size_t k = 0; k < likely.size(); ++k) {
+      if (std::ranges::find(causes, k) != causes.end()) continue;
+      const double here = log_bayes_factor(spectrum_of(at(rest, columns_of(k))), kappa);
+      if (here > most) best = k, most = here;
     }
+    if (most <= limit) break;
+    causes.push_back(best);
+    for (const Index c : columns_of(best)) columns.push_back(c);
+    rest = beside(rest, columns_of(best), kappa);
+  }
+  if (causes.empty()) return {};
+  const Scores there = at(scores, columns);
+  const MatrixXd covariance = numerics::inverse_symmetric(there.information);
+  const VectorXd sizes = numerics::matvec(covariance, there.scores);  // over s
+  std::vector<MissingAdhesion> found;
+  for (std::size_t k = 0; k < causes.size(); ++k) {
+    const auto row = 2 * static_cast<Index>(k);
+    const Eigen::Vector2d size = sizes.segment<2>(row), force_nN = std::sqrt(left.variance()) * size;
+    found.push_back(
+        {.position_um = likely[causes[k]],
+         .force_nN = {force_nN.x(), force_nN.y()},
+         .chi_squared_gain = size.dot(numerics::solve_symmetric(covariance.block<2, 2>(row, row), size).col(0))});
   }
   std::ranges::stable_sort(found, std::greater(), &MissingAdhesion::chi_squared_gain);
   return found;
 }
 
 EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& places, const Gel& gel, Index n_last) {
-  std::vector<substrate::Ellipse> discs;
-  for (const MissingAdhesion& place : places)
-    discs.push_back(
-        {.centre_um = place.position_um, .semi_major_um = kDisc_um, .semi_minor_um = kDisc_um, .angle_rad = 0});
+  std::vector<Vec2> there;
+  for (const MissingAdhesion& place : places) there.push_back(place.position_um);
   LinearData data = std::move(fit.data);
-  Motions motions =
-      joined_ahead(data.motions, n_last,
-                   {.shapes = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
-                                  ->compliance_um_per_nN(data.position_um, discs)});
+  Motions motions = joined_ahead(data.motions, n_last, {.shapes = displacement_by(there, data, gel)});
   fit = with_forces_by(std::move(fit), with_motions(std::move(data), std::move(motions)));
   const VectorXd errors = motions_beside(fit.data, fit).sigma,
                  values = motion_in(fit.data,
