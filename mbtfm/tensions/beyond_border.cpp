@@ -62,27 +62,6 @@ std::vector<substrate::Ellipse> discs_on(const Piece& piece) {
   return discs;
 }
 
-/// The pieces whose forces make the data likelier than chance does, by columns of Z.
-std::set<std::size_t> likely_pieces(Scores scores, const std::vector<std::vector<Index>>& columns) {
-  // half of a likelihood ratio exceeds x by chance less often than exp(-x) (Self & Liang, JASA 82 (1987) 605)
-  const double limit = std::log(static_cast<double>(columns.size()) / 1e-4);
-  std::set<std::size_t> found;
-  while (found.size() < columns.size()) {
-    std::size_t best = 0;
-    double most = 0, kappa = 0;
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-      if (found.contains(k)) continue;
-      const Spectrum spectrum = spectrum_of(at(scores, columns[k]));
-      const double likeliest = likeliest_kappa(spectrum), here = log_bayes_factor(spectrum, likeliest);
-      if (here > most) best = k, most = here, kappa = likeliest;
-    }
-    if (most < limit) break;
-    found.insert(best);
-    scores = beside(scores, columns[best], kappa);
-  }
-  return found;
-}
-
 }  // namespace
 
 std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell& cell, const Gel& gel) {
@@ -113,8 +92,10 @@ std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell
                              std::max<double>(1, static_cast<double>(data.n_used));
   if (variance < kRounding * kRounding * mean_square) return {};
   scores.scores /= std::sqrt(variance);
+  // half of a likelihood ratio exceeds x by chance less often than exp(-x) (Self & Liang, JASA 82 (1987) 605)
+  const double least = std::log(static_cast<double>(columns.size()) / 1e-4);
   std::set<std::size_t> with_next;
-  for (const std::size_t k : likely_pieces(std::move(scores), columns))
+  for (const std::size_t k : causes_among(std::move(scores), columns, least))
     for (const std::size_t near : {k, (k + 1) % pieces.size(), (k + pieces.size() - 1) % pieces.size()})
       with_next.insert(near);
   std::vector<Polygon> found;

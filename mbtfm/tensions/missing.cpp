@@ -41,25 +41,19 @@ bool takes_over(const EnsembleFit& before, const EnsembleFit& after) {
   return false;
 }
 
-/// What is found of each kind beside all that was found before; the first of each explains most.
-struct Candidates {
-  std::vector<MissingFibre> fibres;
-  std::vector<MissingAdhesion> adhesions;
-  bool are_none() const { return fibres.empty() && adhesions.empty(); }
-  bool is_adhesion() const { return explains_more(adhesions, fibres); }
-};
-
 /// The search, and what it has found so far.
 class SearchForMissing {
  public:
   SearchForMissing(EnsembleFit fit, const CellSearched& on)
       : on_(on), without_(fit), found_{.fit = std::move(fit), .fibres = {}, .fitted = {}, .adhesions = {}} {}
 
-  Candidates candidates() const {
-    Candidates more;
-    if (are_fibres_asked_) more.fibres = missing_fibres(found_.fit, on_.cell.adhesions, on_.segmentation, on_.threads);
-    more.adhesions = missing_adhesions(found_.fit, on_.cell, on_.gel, on_.threads);
-    return more;
+  /// Beside all that was found before.
+  std::vector<MissingFibre> fibres() const {
+    if (!are_fibres_asked_) return {};
+    return missing_fibres(found_.fit, on_.cell.adhesions, on_.segmentation, on_.threads);
+  }
+  std::vector<MissingAdhesion> adhesions() const {
+    return missing_adhesions(found_.fit, on_.cell, on_.gel, on_.threads);
   }
   /// @return whether any of these stay
   bool add(const std::vector<MissingAdhesion>& adhesions) {
@@ -121,11 +115,11 @@ WithMissing with_missing(EnsembleFit fit, const CellSearched& on) {
   constexpr int kMostRounds = 6;
   SearchForMissing search(std::move(fit), on);
   for (int round = 0; round < kMostRounds; ++round) {
-    Candidates more = search.candidates();
-    if (more.are_none()) break;
-    if (more.is_adhesion() && search.add(more.adhesions)) continue;
-    if (more.fibres.empty()) break;
-    search.add(std::move(more.fibres));
+    std::vector<MissingFibre> fibres = search.fibres();
+    const std::vector<MissingAdhesion> adhesions = search.adhesions();
+    if (explains_more(adhesions, fibres) && search.add(adhesions)) continue;
+    if (fibres.empty()) break;
+    search.add(std::move(fibres));
   }
   return std::move(search).found();
 }

@@ -74,46 +74,43 @@ class UsedBeads {
   numerics::Near near_;
 };
 
-/// A place, asked.
-struct Question {
+/// A place, and how much less squares a force there would leave of the beads around.
+struct Asked {
   Vec2 place_um;
-  std::vector<Index> beads;
-  std::vector<Eigen::Matrix2d> fields;  ///< by bead, less their mean
-  Eigen::Vector2d score = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d square = Eigen::Matrix2d::Zero();  ///< gᵀ W² g
-  double gain = 0;                                   ///< of noise alone
+  double gain = 0;  ///< of noise alone
 };
 
-Question ask(Vec2 place_um, const UsedBeads& beads, const DiscField& disc, const LinearData& data,
-             const VectorXd& weight, const VectorXd& residual, double variance) {
-  Question q{.place_um = place_um, .beads = beads.near(place_um), .fields = {}};
+Asked ask(Vec2 place_um, const UsedBeads& used, const DiscField& disc, const LinearData& data, const VectorXd& weight,
+          const VectorXd& residual, double variance) {
   constexpr std::size_t kFewest = 10;  // beads for two numbers and a mean
-  if (q.beads.size() < kFewest) return q;
-  Eigen::Matrix2d mean = Eigen::Matrix2d::Zero();
+  const std::vector<Index> beads = used.near(place_um);
+  if (beads.size() < kFewest) return {place_um};
+  std::vector<Eigen::Matrix2d> fields;
+  Eigen::Matrix2d mean = Eigen::Matrix2d::Zero(), square = mean;
+  Eigen::Vector2d score = Eigen::Vector2d::Zero();
   double all = 0;
-  for (const Index b : q.beads) {
-    q.fields.push_back(disc.at(data.position_um[b] - place_um));
-    mean += weight[2 * b] * q.fields.back();
+  for (const Index b : beads) {
+    fields.push_back(disc.at(data.position_um[b] - place_um));
+    mean += weight[2 * b] * fields.back();
     all += weight[2 * b];
   }
-  for (std::size_t k = 0; k < q.beads.size(); ++k) {
-    const Index row = 2 * q.beads[k];
-    q.fields[k] -= mean / all;
-    q.score += weight[row] * q.fields[k] * residual.segment<2>(row);
-    q.square += weight[row] * q.fields[k] * q.fields[k];
+  for (std::size_t k = 0; k < beads.size(); ++k) {
+    const Index row = 2 * beads[k];
+    const Eigen::Matrix2d field = fields[k] - mean / all;
+    score += weight[row] * field * residual.segment<2>(row);
+    square += weight[row] * field * field;
   }
-  q.gain = q.score.dot(Eigen::Vector2d(numerics::solve_symmetric(q.square, q.score))) / variance;
-  return q;
+  return {place_um, score.dot(Eigen::Vector2d(numerics::solve_symmetric(square, score))) / variance};
 }
 
 /// The best place within a step of this one.
 template <class Ask>
-Question refined(Question best, const Ask& ask_at) {
+Asked refined(Asked best, const Ask& ask_at) {
   constexpr int kFiner = 4;
   const Vec2 middle = best.place_um;
   for (int j = -kFiner; j <= kFiner; ++j) {
     for (int i = -kFiner; i <= kFiner; ++i) {
-      Question q = ask_at(middle + kStep_um / kFiner * Vec2{double(i), double(j)});
+      Asked q = ask_at(middle + kStep_um / kFiner * Vec2{double(i), double(j)});
       if (q.gain > best.gain) best = std::move(q);
     }
   }
@@ -156,15 +153,12 @@ std::vector<Vec2> likely_places(const EnsembleFit& fit, const std::vector<Vec2>&
     const auto ask_at = [&](Vec2 place_um) {
       return ask(place_um, beads, disc, fit.data, weight, residual, fit.misfit.variance);
     };
-    std::vector<Question> asked(places.size());
-    numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int i) {
-      asked[i] = ask_at(places[i]);
-      asked[i].fields = {};
-    });
-    std::erase_if(asked, [&](const Question& q) { return q.gain < kLeast; });
-    std::ranges::sort(asked, std::greater(), &Question::gain);
+    std::vector<Asked> asked(places.size());
+    numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int i) { asked[i] = ask_at(places[i]); });
+    std::erase_if(asked, [&](const Asked& q) { return q.gain < kLeast; });
+    std::ranges::sort(asked, std::greater(), &Asked::gain);
     const std::size_t most = tried.size() + kMost;
-    for (const Question& q : asked) {
+    for (const Asked& q : asked) {
       if (tried.size() >= most) break;
       if (std::ranges::any_of(tried, [&](Vec2 p) { return norm(p - q.place_um) < 0.5 * kReach_um; })) continue;
       tried.push_back(q.place_um);
@@ -183,11 +177,6 @@ MatrixXd displacement_by(const std::vector<Vec2>& places, const LinearData& data
       ->compliance_um_per_nN(data.position_um, discs);
 }
 
-std::vector<Index> columns_of(std::size_t place) {
-  const auto first = 2 * static_cast<Index>(place);
-  return {first, first + 1};
-}
-
 }  // namespace
 
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cell& cell, const Gel& gel, int threads) {
@@ -199,24 +188,14 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cel
   const VectorXd forces_nN = adhesion_forces_nN(fit);
   const double kappa =
       std::max(1e-300, forces_nN.squaredNorm() / static_cast<double>(forces_nN.size())) / left.variance();
-  const double limit = std::log(static_cast<double>(places.size()) / kExpected);
-  std::vector<std::size_t> causes;
-  std::vector<Index> columns;
-  for (Scores rest = scores; causes.size() < likely.size();) {
-    std::size_t best = 0;
-    double most = limit;
-    for (std::size_t k = 0; k < likely.size(); ++k) {
-      if (std::ranges::find(causes, k) != causes.end()) continue;
-      const double here = log_bayes_factor(spectrum_of(at(rest, columns_of(k))), kappa);
-      if (here > most) best = k, most = here;
-    }
-    if (most <= limit) break;
-    causes.push_back(best);
-    for (const Index c : columns_of(best)) columns.push_back(c);
-    rest = beside(rest, columns_of(best), kappa);
-  }
+  std::vector<std::vector<Index>> columns;
+  for (Index k = 0; k < std::ssize(likely); ++k) columns.push_back({2 * k, 2 * k + 1});
+  const std::vector<std::size_t> causes =
+      causes_among(scores, columns, std::log(static_cast<double>(places.size()) / kExpected), kappa);
   if (causes.empty()) return {};
-  const Scores there = at(scores, columns);
+  std::vector<Index> of_causes;
+  for (const std::size_t k : causes) of_causes.insert(of_causes.end(), columns[k].begin(), columns[k].end());
+  const Scores there = at(scores, of_causes);
   const MatrixXd covariance = numerics::inverse_symmetric(there.information);
   const VectorXd sizes = numerics::matvec(covariance, there.scores);  // over s
   std::vector<MissingAdhesion> found;

@@ -61,6 +61,26 @@ double likeliest_kappa(const Spectrum& s) {
   return best;
 }
 
+std::vector<std::size_t> causes_among(Scores scores, const std::vector<std::vector<Index>>& columns, double least,
+                                      std::optional<double> kappa) {
+  std::vector<std::size_t> causes;
+  while (causes.size() < columns.size()) {
+    std::size_t best = 0;
+    double most = least, its_kappa = 0;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      if (std::ranges::find(causes, k) != causes.end()) continue;
+      const Spectrum spectrum = spectrum_of(at(scores, columns[k]));
+      const double here_kappa = kappa ? *kappa : likeliest_kappa(spectrum),
+                   here = log_bayes_factor(spectrum, here_kappa);
+      if (here > most) best = k, most = here, its_kappa = here_kappa;
+    }
+    if (most <= least) break;
+    causes.push_back(best);
+    scores = beside(scores, columns[best], its_kappa);
+  }
+  return causes;
+}
+
 Pattern pattern_of(const LinearData& data, const MatrixXd& columns_um) {
   const VectorXd weight = squared_weights(data);
   const MatrixXd weighted = weight.asDiagonal() * less_motion(data, columns_um);

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "mbtfm/tensions/linear_data.h"
@@ -44,6 +45,12 @@ double log_bayes_factor(const Spectrum& spectrum, double kappa);
 /// Of greatest likelihood, to a quarter: what is allowed for hangs on it weakly (restricted maximum likelihood;
 /// Patterson & Thompson, Biometrika 58 (1971) 545).
 double likeliest_kappa(const Spectrum& spectrum);
+
+/// The blocks that the data call for: the one that they speak for most, then the others beside it, as long as
+/// log_bayes_factor() is above `least`.
+/// @param columns  by block  @param kappa  of the sizes of a block; none: the likeliest
+std::vector<std::size_t> causes_among(Scores scores, const std::vector<std::vector<Index>>& columns, double least,
+                                      std::optional<double> kappa = {});
 
 /// Columns of displacements as the data see them.
 struct Pattern {
