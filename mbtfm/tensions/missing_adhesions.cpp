@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
@@ -177,6 +178,29 @@ MatrixXd displacement_by(const std::vector<Vec2>& places, const LinearData& data
       ->compliance_um_per_nN(data.position_um, discs);
 }
 
+/// By how much sums of magnitudes are too small as further adhesions are missed that are too weak to be found: as large
+/// a share of the weak ones as of the strong ones, n of n + n_above + 1 (Chapman, Univ. Calif. Publ. Stat. 1 (1951)
+/// 131). What such a one exerts its neighbour takes over, as a vector: the sum lacks the force times 1 − cos, of the
+/// angle between both.
+double unfound_nN(const VectorXd& forces_nN, const std::vector<Vec2>& centres_um,
+                  const std::vector<MissingAdhesion>& found) {
+  double weakest_nN = std::numeric_limits<double>::infinity(), lacking_nN = 0, n_above = 0;
+  for (const MissingAdhesion& place : found) weakest_nN = std::min(weakest_nN, norm(place.force_nN));
+  for (std::size_t a = 0; a < centres_um.size(); ++a) {
+    const Eigen::Vector2d force = forces_nN.segment<2>(2 * static_cast<Index>(a));
+    if (force.norm() >= weakest_nN) n_above += 1;
+    if (force.norm() >= weakest_nN || force.norm() <= 0) continue;
+    double nearest_um = std::numeric_limits<double>::infinity(), cosine = 1;
+    for (std::size_t b = 0; b < centres_um.size(); ++b) {
+      if (a == b || norm(centres_um[b] - centres_um[a]) >= nearest_um) continue;
+      nearest_um = norm(centres_um[b] - centres_um[a]);
+      cosine = force.normalized().dot(forces_nN.segment<2>(2 * static_cast<Index>(b)).normalized());
+    }
+    lacking_nN += (1 - cosine) * force.norm();
+  }
+  return static_cast<double>(found.size()) / (n_above + 1) * lacking_nN;
+}
+
 }  // namespace
 
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cell& cell, const Gel& gel, int threads) {
@@ -231,6 +255,9 @@ EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& pla
     fit.forces.away_nN2 += along * along;
     fit.total_force_nN.value += force.norm() - std::min(force.norm(), along * along / (2 * force.norm()));
   }
+  const double unfound = unfound_nN(adhesion_forces_nN(fit), fit.data.load_centre_um, places);
+  fit.forces.away_nN2 += unfound * unfound;
+  fit.total_force_nN.value += unfound;
   fit.total_force_nN.standard_error = std::hypot(fit.total_force_nN.standard_error, std::sqrt(fit.forces.away_nN2));
   return fit;
 }
