@@ -209,8 +209,13 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   check_place(inputs.beads, inputs.cell);
   auto [ready, first_fit] = ready_and_fitted(inputs, p, work);
-  WithMissing with = with_missing(std::move(first_fit), ready.networks, ready.scene.cell, p.gel, p.segmentation, p.fit,
-                                  n_of_place(ready), work.threads);
+  WithMissing with = with_missing(std::move(first_fit), {.networks = ready.networks,
+                                                         .cell = ready.scene.cell,
+                                                         .gel = p.gel,
+                                                         .segmentation = p.segmentation,
+                                                         .parameters = p.fit,
+                                                         .n_of_place = n_of_place(ready),
+                                                         .threads = work.threads});
   const EnsembleFit& fit = with.fit;
   Found found = found_by(ready, fit, inputs.second_placement, p, work);
   FoundMotions motions = motions_found(ready, fit, p.effects);

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <set>
 
-#include "mbtfm/tensions/random_forces.h"
+#include "mbtfm/tensions/search.h"
 #include "pipeline/contract/extent.h"
 #include "substrate/greens/models.h"
 
@@ -62,27 +62,6 @@ std::vector<substrate::Ellipse> discs_on(const Piece& piece) {
   return discs;
 }
 
-/// The pieces whose forces make the data likelier than chance does, by columns of Z.
-std::set<std::size_t> likely_pieces(RandomScores scores, const std::vector<std::vector<Index>>& columns) {
-  // a likelihood ratio exceeds x by chance less often than exp(-x/2) (Self & Liang, JASA 82 (1987) 605)
-  const double limit = 2 * std::log(static_cast<double>(columns.size()) / 1e-4);
-  std::set<std::size_t> found;
-  while (found.size() < columns.size()) {
-    std::size_t best = 0;
-    double least = 0, kappa = 0;
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-      if (found.contains(k)) continue;
-      const Spectrum spectrum = spectrum_of({scores.information(columns[k], columns[k]), scores.scores(columns[k])});
-      const double likeliest = likeliest_kappa(spectrum), here = surprise(spectrum, likeliest);
-      if (here < least) best = k, least = here, kappa = likeliest;
-    }
-    if (-least < limit) break;
-    found.insert(best);
-    scores = beside(scores, columns[best], kappa);
-  }
-  return found;
-}
-
 }  // namespace
 
 std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell& cell, const Gel& gel) {
@@ -104,17 +83,19 @@ std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell
   }
   // a layer's tables would take longer than all the rest, and the field of random forces is as smooth
   const auto half_space = greens::make_greens(gel, {.model = substrate::ModelKind::half_space}, data.threads);
-  RandomScores scores =
-      random_scores(data, by_root_of_area(half_space->compliance_um_per_nN(data.position_um, discs), discs));
-  const double variance = variance_beside(data, spectrum_of(scores));
+  Scores scores =
+      pattern_of(data, by_root_of_area(half_space->compliance_um_per_nN(data.position_um, discs), discs)).beyond;
+  const double variance = variance_beside(data, scores);
   // Simulated beads without noise: what is left is rounding, and has a shape.
   constexpr double kRounding = 1e-6;  // of the displacement: tables have nine digits, models five and more
   const double mean_square = squared_weights(data).dot(data.displacement_um.cwiseAbs2()) /
                              std::max<double>(1, static_cast<double>(data.n_used));
   if (variance < kRounding * kRounding * mean_square) return {};
   scores.scores /= std::sqrt(variance);
+  // half of a likelihood ratio exceeds x by chance less often than exp(-x) (Self & Liang, JASA 82 (1987) 605)
+  const double least = std::log(static_cast<double>(columns.size()) / 1e-4);
   std::set<std::size_t> with_next;
-  for (const std::size_t k : likely_pieces(std::move(scores), columns))
+  for (const std::size_t k : causes_among(std::move(scores), columns, least))
     for (const std::size_t near : {k, (k + 1) % pieces.size(), (k + pieces.size() - 1) % pieces.size()})
       with_next.insert(near);
   std::vector<Polygon> found;

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "mbtfm/tensions/common_motion.h"
-#include "mbtfm/tensions/random_forces.h"
+#include "mbtfm/tensions/search.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/kinds_of_effects.h"
@@ -208,8 +208,9 @@ DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::
   const Motions even = by_even_traction(places, n_beyond, compliance_um_per_nN);
   Motions motions = joined(data.motions, even);
   data = with_motions(std::move(data), motions);
-  Spectrum spectrum = spectrum_of(random_scores(data, Z));
-  const double variance = variance_beside(data, spectrum);
+  const Scores scores = pattern_of(data, Z).beyond;
+  const double variance = variance_beside(data, scores);
+  Spectrum spectrum = spectrum_of(scores);
   spectrum.found /= variance;
   // With few beads at the cut the likelihood is flat down to zero; then what is hidden is as strong as what is seen.
   const double n_adhesions = 0.5 * static_cast<double>(data.response->cols());

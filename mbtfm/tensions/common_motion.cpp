@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/search.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/with_error.h"
 #include "pipeline/numerics/dense.h"
@@ -76,14 +77,13 @@ FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<
           .sigma = motions.sigma.head(6)};
 }
 
-CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementField& beads, const EnsembleFit& fit) {
-  const MatrixXd motions = less_motion(data, curved_motions(beads));
-  const MatrixXd weighted = squared_weights(data).asDiagonal() * motions;
-  const ScoreTest test = score_test(fit, data, weighted, numerics::small_transposed_product(weighted, motions),
-                                    numerics::transposed_matvec(weighted, residual_um(data, fit.forces.nN)));
-  const VectorXd moved = numerics::small_product(motions, test.sizes);
-  return {.chi_squared = test.chi_squared,
-          .rms_um = std::sqrt(2.0) * moved.norm() / std::sqrt(std::max(1.0, static_cast<double>(moved.size())))};
+CurvedMotion curved_motion_beside(const EnsembleFit& fit, const DisplacementField& beads) {
+  const MatrixXd motions = less_motion(fit.data, curved_motions(beads));
+  const Left left(fit);
+  const Scores scores = left.scores_of(pattern_of(fit.data, motions));
+  const VectorXd sizes = numerics::shortest_solution(scores.information, scores.scores);  // over s
+  const double rms = numerics::matvec(motions, sizes).norm() / std::sqrt(std::max<double>(1, double(beads.size())));
+  return {.chi_squared = scores.scores.dot(sizes), .rms_um = std::sqrt(left.variance()) * rms};
 }
 
 bool allows_common_motion(const stage::EffectSwitches& switches) { return switches.common_motion != Switch::off; }

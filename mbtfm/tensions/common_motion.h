@@ -50,7 +50,7 @@ struct CurvedMotion {
   double chi_squared = 0;  ///< 14 degrees of freedom where there is none
   double rms_um = 0;       ///< of the beads' displacement by the best of them, the tensions following
 };
-CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementField& beads, const EnsembleFit& fit);
+CurvedMotion curved_motion_beside(const EnsembleFit& fit, const DisplacementField& beads);
 
 /// Always on but where it is switched off: a motion too small to be noticed still shifts the total force by some of its
 /// standard errors, and what it costs where there is none is little (docs/effects.md).

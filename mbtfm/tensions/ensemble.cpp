@@ -394,36 +394,14 @@ VectorXd directions_of(const VectorXd& forces_nN) {
   return along;
 }
 
-namespace {
-/// @param sign  of what the tensions' answer to noise adds: + to estimates beside them, − to scores
-MatrixXd covariance_beside(const EnsembleFit& fit, const MatrixXd& of_noise, const MatrixXd& by_force, int sign) {
-  const MeshFit& mesh = fit.meshes.front();
-  const MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
-  MatrixXd covariance =
-      fit.misfit.variance * of_noise + sign * numerics::congruence(by_tension, mesh.noise_covariance_nN2);
-  if (fit.model_error) {
-    const MatrixXd left =
-        numerics::minus_product(by_force, by_tension, mesh.by_force);  // of errors of the forces, tensions following
-    covariance += numerics::weighted_outer(left, fit.model_error->force_variance_nN2);
-  }
-  return covariance;
-}
-}  // namespace
-
 MatrixXd covariance_of_estimates(const EnsembleFit& fit, const MatrixXd& of_noise, const MatrixXd& by_force) {
-  return covariance_beside(fit, of_noise, by_force, +1);
-}
-
-ScoreTest score_test(const EnsembleFit& fit, const LinearData& data, const MatrixXd& weighted, const MatrixXd& square,
-                     const VectorXd& scores) {
-  const MatrixXd by_force = data.response->pull_back(weighted).transpose();
-  const MatrixXd covariance = covariance_beside(fit, square, by_force, -1);
   const MeshFit& mesh = fit.meshes.front();
   const MatrixXd by_tension = numerics::small_product(by_force, mesh.force_derivatives);
-  const MatrixXd information =
-      square - numerics::congruence(by_tension, mesh.noise_covariance_nN2) / fit.misfit.variance;
-  return {.chi_squared = scores.dot(numerics::shortest_solution(covariance, scores).col(0)),
-          .sizes = numerics::shortest_solution(information, scores)};
+  MatrixXd covariance = fit.misfit.variance * of_noise + numerics::congruence(by_tension, mesh.noise_covariance_nN2);
+  if (!fit.model_error) return covariance;
+  const MatrixXd left =
+      numerics::minus_product(by_force, by_tension, mesh.by_force);  // of errors of the forces, tensions following
+  return covariance + numerics::weighted_outer(left, fit.model_error->force_variance_nN2);
 }
 
 VectorXd adhesion_forces_nN(const EnsembleFit& fit) { return exerted_nN(fit, fit.forces.nN); }
@@ -493,9 +471,10 @@ void add_telling(EnsembleFit& all) {
 }
 
 /// What adhesions exert beside the network, near a cut and where the network is wrong.
-Discrepancy add_discrepancy(EnsembleFit& all, const ModelError& error, bool is_cut) {
+/// @param is_whole  all that the cell pulls at is among them: they balance
+Discrepancy add_discrepancy(EnsembleFit& all, const ModelError& error, bool is_whole) {
   Discrepancy beside = discrepancy_of(all.data.reduced, mean_of(forces_at_mean(all)), sum_over_meshes_nN(all), error,
-                                      is_cut ? std::vector<Vec2>() : all.data.load_centre_um, all.data.threads);
+                                      is_whole ? all.data.load_centre_um : std::vector<Vec2>(), all.data.threads);
   const std::optional<OwnForces> near_cut = own_forces_in(all.data);
   all.forces.own = near_cut ? one_after_the_other(beside.forces, *near_cut) : beside.forces;
   return beside;
@@ -513,7 +492,7 @@ void add_variances(EnsembleFit& all, bool is_cut) {
                                 variance_beside_model_error(all.data, all.forces.nN, n_tensions, all.misfit.loss));
   all.misfit.variance = all.model_error->noise_variance;
   if (!all.model_error->is_told) return;
-  const Discrepancy beside = add_discrepancy(all, *all.model_error, is_cut);
+  const Discrepancy beside = add_discrepancy(all, *all.model_error, !is_cut);
   all.model_error = with_discrepancy(std::move(*all.model_error), beside);
 }
 
@@ -566,7 +545,7 @@ EnsembleFit with_forces_by(EnsembleFit all, LinearData data) {
   if (!all.model_error || !all.model_error->is_told) return all;
   const auto n_tensions = static_cast<Index>(all.tensions.fibre_ids.size());
   const double variance = variance_beside_model_error(all.data, all.forces.nN, n_tensions, all.misfit.loss);
-  add_discrepancy(all, model_error(forces_at_mean(all), all.data.reduced, variance), all.cut.has_value());
+  add_discrepancy(all, model_error(forces_at_mean(all), all.data.reduced, variance), false);
   add_force_estimates(all, all.cut.has_value());
   return all;
 }

@@ -130,18 +130,6 @@ VectorXd directions_of(const VectorXd& forces_nN);
 /// @param by_force  the numbers by adhesion force: some × 2·adhesions
 MatrixXd covariance_of_estimates(const EnsembleFit& fit, const MatrixXd& of_noise, const MatrixXd& by_force);
 
-/// A score test of motions M that the fit does not allow for (Rao, Math Proc Camb Phil Soc 44:50, 1948): what the fit
-/// leaves of the beads is compared with them, and with what noise and the model's error leave of them.
-struct ScoreTest {
-  double chi_squared = 0;  ///< with as many degrees of freedom as there are motions, if the beads do not move so
-  VectorXd sizes;          ///< of the motions, the tensions following
-};
-/// @param weighted  W² M: 2·beads × motions
-/// @param square  Mᵀ W² M
-/// @param scores  Mᵀ W² of what the fit leaves
-ScoreTest score_test(const EnsembleFit& fit, const LinearData& data, const MatrixXd& weighted, const MatrixXd& square,
-                     const VectorXd& scores);
-
 /// What the adhesions exert on the gel: the network's forces and their own.
 VectorXd adhesion_forces_nN(const EnsembleFit& fit);
 /// Of the sum of their magnitudes.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "mbtfm/tensions/missing.h"
 #include "mbtfm/tensions/residual_findings.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/extent.h"
@@ -207,6 +209,8 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
     return noticed_of(symptom, fibres_whose(o.tensions, is_so));
   };
   const auto is_wide = [](const Tension& t) { return t.identifiable && t.tension_nN > 0 && is_uncertain(t); };
+  Noticed cause = missing_fibres_noticed(o), then = missing_adhesions_noticed(o);
+  if (explains_more(o.missing_adhesions, o.missing)) std::swap(cause, then);
   std::vector<Finding> findings;
   for (Noticed found :
        {cell_cut(o),
@@ -214,8 +218,8 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
         common_motion(o),
         curved_motion(o),
         channel_shift(o),
-        missing_fibres_noticed(o),
-        missing_adhesions_noticed(o),
+        std::move(cause),
+        std::move(then),
         noticed_of(Symptom::adhesions_without_beads, adhesions_without_beads(o.cell.adhesions, o.data.position_um)),
         explains_little(o),
         unexplained(o),

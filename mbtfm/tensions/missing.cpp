@@ -28,8 +28,8 @@ std::optional<int> fibre_beside(const MissingFibre& missing, const Cell& cell) {
 /// (`other_network wrong`), as fibres of other ends would.
 bool is_sure(const MissingFibre& fibre) { return fibre.chi_squared_gain >= 100; }
 
-/// Five standard errors, as chance has of a place in one cell of a hundred.
-bool is_sure(const MissingAdhesion& adhesion) { return adhesion.chi_squared_gain >= 25; }
+/// Three standard errors: all beads together have called for it, this is what its own force is known to.
+bool is_sure(const MissingAdhesion& adhesion) { return adhesion.chi_squared_gain >= 9; }
 
 /// A fibre that leaves nothing to a segmented one, of which the beads showed a tension, is that fibre seen elsewhere.
 bool takes_over(const EnsembleFit& before, const EnsembleFit& after) {
@@ -41,47 +41,87 @@ bool takes_over(const EnsembleFit& before, const EnsembleFit& after) {
   return false;
 }
 
-/// They lead the list of each.
+/// The search, and what it has found so far.
+class SearchForMissing {
+ public:
+  SearchForMissing(EnsembleFit fit, const CellSearched& on)
+      : on_(on), without_(fit), found_{.fit = std::move(fit), .fibres = {}, .fitted = {}, .adhesions = {}} {}
+
+  /// Beside all that was found before.
+  std::vector<MissingFibre> fibres() const {
+    if (!are_fibres_asked_) return {};
+    return missing_fibres(found_.fit, on_.cell.adhesions, on_.segmentation, on_.threads);
+  }
+  std::vector<MissingAdhesion> adhesions() const {
+    return missing_adhesions(found_.fit, on_.cell, on_.gel, on_.threads);
+  }
+  /// @return whether any of these stay
+  bool add(const std::vector<MissingAdhesion>& adhesions) {
+    const std::size_t n_before = found_.adhesions.size();
+    found_.adhesions.insert(found_.adhesions.end(), adhesions.begin(), adhesions.end());
+    find_forces();
+    return found_.adhesions.size() > n_before;
+  }
+  /// Those that are sure, and no segmented ones, are fitted, and the others are asked again; or all are named.
+  void add(std::vector<MissingFibre> fibres) {
+    std::vector<MissingFibre> unseen;
+    for (MissingFibre& fibre : fibres) {
+      fibre.beside_fibre_id = fibre_beside(fibre, on_.cell);
+      if (!fibre.beside_fibre_id && is_sure(fibre)) unseen.push_back(fibre);
+    }
+    are_fibres_asked_ = !unseen.empty() && fit_with(unseen);
+    const std::vector<MissingFibre>& named = are_fibres_asked_ ? unseen : fibres;
+    found_.fibres.insert(found_.fibres.end(), named.begin(), named.end());
+  }
+  WithMissing found() && { return std::move(found_); }
+
+ private:
+  bool fit_with(const std::vector<MissingFibre>& unseen) {
+    const Trial start = next_start(without_);
+    EnsembleFit with =
+        fit_ensemble(on_.networks, with_missing_fibres(without_.data, on_.cell.adhesions, unseen, on_.n_of_place),
+                     adhesion_ids_of(on_.cell), on_.parameters, on_.threads, {}, &start);
+    if (takes_over(without_, with)) return false;
+    without_ = std::move(with);
+    found_.fitted.insert(found_.fitted.end(), unseen.begin(), unseen.end());
+    find_forces();
+    return true;
+  }
+  /// Beside the adhesions' own; those that these explain as well are no cause.
+  void find_forces() {
+    std::vector<MissingAdhesion>& places = found_.adhesions;
+    found_.fit = without_;
+    for (bool has_changed = true; has_changed && !places.empty();) {
+      EnsembleFit with = with_their_forces(without_, places, on_.gel, on_.n_of_place);
+      has_changed = std::erase_if(places, [](const MissingAdhesion& a) { return !is_sure(a); }) > 0;
+      if (!has_changed) found_.fit = std::move(with);
+    }
+    std::ranges::stable_sort(places, std::greater(), &MissingAdhesion::chi_squared_gain);
+  }
+
+  const CellSearched& on_;
+  EnsembleFit without_;  ///< the forces at missing adhesions
+  WithMissing found_;
+  bool are_fibres_asked_ = true;
+};
+
+}  // namespace
+
 bool explains_more(const std::vector<MissingAdhesion>& adhesions, const std::vector<MissingFibre>& fibres) {
   return !adhesions.empty() && (fibres.empty() || adhesions.front().chi_squared_gain > fibres.front().chi_squared_gain);
 }
 
-}  // namespace
-
-WithMissing with_missing(EnsembleFit fit, const network::Ensemble& networks, const Cell& cell, const Gel& gel,
-                         const SegmentationErrors& segmentation, const FitParameters& parameters, Index n_of_place,
-                         int threads) {
-  const auto fibres_in = [&](const EnsembleFit& of) {
-    return missing_fibres(of, cell.adhesions, segmentation, threads);
-  };
-  const auto adhesions_in = [&](const EnsembleFit& of) { return missing_adhesions(of, of.data, cell, gel, threads); };
-  WithMissing found{.fit = std::move(fit), .fibres = {}, .fitted = {}, .adhesions = {}};
-  found.fibres = fibres_in(found.fit);
-  found.adhesions = adhesions_in(found.fit);
-  if (explains_more(found.adhesions, found.fibres) && !found.fibres.empty())
-    found.fibres = fibres_in(with_their_forces(found.fit, found.adhesions, gel, n_of_place));
-  std::vector<MissingFibre> unseen;
-  for (MissingFibre& fibre : found.fibres) {
-    fibre.beside_fibre_id = fibre_beside(fibre, cell);
-    if (!fibre.beside_fibre_id && is_sure(fibre)) unseen.push_back(fibre);
+WithMissing with_missing(EnsembleFit fit, const CellSearched& on) {
+  constexpr int kMostRounds = 6;
+  SearchForMissing search(std::move(fit), on);
+  for (int round = 0; round < kMostRounds; ++round) {
+    std::vector<MissingFibre> fibres = search.fibres();
+    const std::vector<MissingAdhesion> adhesions = search.adhesions();
+    if (explains_more(adhesions, fibres) && search.add(adhesions)) continue;
+    if (fibres.empty()) break;
+    search.add(std::move(fibres));
   }
-  if (!unseen.empty()) {
-    const Trial start = next_start(found.fit);
-    EnsembleFit with = fit_ensemble(networks, with_missing_fibres(found.fit.data, cell.adhesions, unseen, n_of_place),
-                                    adhesion_ids_of(cell), parameters, threads, {}, &start);
-    if (!takes_over(found.fit, with)) {
-      found.fit = std::move(with);
-      found.fitted = std::move(unseen);
-      found.adhesions = adhesions_in(found.fit);
-    }
-  }
-  // What the adhesions' own forces explain as well is no cause.
-  for (bool has_changed = true; has_changed && !found.adhesions.empty();) {
-    EnsembleFit with = with_their_forces(found.fit, found.adhesions, gel, n_of_place);
-    has_changed = std::erase_if(found.adhesions, [](const MissingAdhesion& a) { return !is_sure(a); }) > 0;
-    if (!has_changed) found.fit = std::move(with);
-  }
-  return found;
+  return std::move(search).found();
 }
 
 }  // namespace mbtfm::tensions

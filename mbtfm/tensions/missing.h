@@ -1,5 +1,5 @@
-/// Fibres and adhesions that the beads show and the segmentation misses. The one that explains most comes first, and
-/// becomes part of the fit: otherwise the others would get its force.
+/// Fibres and adhesions that the beads show and the segmentation misses. The kind that explains most is the cause: it
+/// becomes part of the fit, as the others would get its force, and both are asked again beside it.
 #pragma once
 
 #include <vector>
@@ -18,11 +18,22 @@ struct WithMissing {
   std::vector<MissingAdhesion> adhesions;  ///< the total force holds theirs
 };
 
+/// The first of these more than the first of those. @param adhesions, fibres  the one that explains most ahead
+bool explains_more(const std::vector<MissingAdhesion>& adhesions, const std::vector<MissingFibre>& fibres);
+
+/// Where they are looked for.
+struct CellSearched {
+  network::Ensemble networks;
+  const Cell& cell;
+  const Gel& gel;
+  const SegmentationErrors& segmentation;
+  const FitParameters& parameters;
+  Index n_of_place = 0;  ///< motions of the data, the last ones, that are the cell's place
+  int threads = 1;
+};
+
 /// A fibre's tension is fitted again beside one that is missing. An adhesion's is not: a fibre whose adhesion was not
 /// found ends in the network, which no force at that place puts right. The adhesions' forces are found beside both.
-/// @param n_of_place  motions of the data, the last ones, that are the cell's place
-WithMissing with_missing(EnsembleFit fit, const network::Ensemble& networks, const Cell& cell, const Gel& gel,
-                         const SegmentationErrors& segmentation, const FitParameters& parameters, Index n_of_place,
-                         int threads);
+WithMissing with_missing(EnsembleFit fit, const CellSearched& on);
 
 }  // namespace mbtfm::tensions

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/search.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/numerics/dense.h"
@@ -73,46 +75,43 @@ class UsedBeads {
   numerics::Near near_;
 };
 
-/// A place, asked.
-struct Question {
+/// A place, and how much less squares a force there would leave of the beads around.
+struct Asked {
   Vec2 place_um;
-  std::vector<Index> beads;
-  std::vector<Eigen::Matrix2d> fields;  ///< by bead, less their mean
-  Eigen::Vector2d score = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d square = Eigen::Matrix2d::Zero();  ///< gᵀ W² g
-  double gain = 0;                                   ///< of noise alone
+  double gain = 0;  ///< of noise alone
 };
 
-Question ask(Vec2 place_um, const UsedBeads& beads, const DiscField& disc, const LinearData& data,
-             const VectorXd& weight, const VectorXd& residual, double variance) {
-  Question q{.place_um = place_um, .beads = beads.near(place_um), .fields = {}};
+Asked ask(Vec2 place_um, const UsedBeads& used, const DiscField& disc, const LinearData& data, const VectorXd& weight,
+          const VectorXd& residual, double variance) {
   constexpr std::size_t kFewest = 10;  // beads for two numbers and a mean
-  if (q.beads.size() < kFewest) return q;
-  Eigen::Matrix2d mean = Eigen::Matrix2d::Zero();
+  const std::vector<Index> beads = used.near(place_um);
+  if (beads.size() < kFewest) return {place_um};
+  std::vector<Eigen::Matrix2d> fields;
+  Eigen::Matrix2d mean = Eigen::Matrix2d::Zero(), square = mean;
+  Eigen::Vector2d score = Eigen::Vector2d::Zero();
   double all = 0;
-  for (const Index b : q.beads) {
-    q.fields.push_back(disc.at(data.position_um[b] - place_um));
-    mean += weight[2 * b] * q.fields.back();
+  for (const Index b : beads) {
+    fields.push_back(disc.at(data.position_um[b] - place_um));
+    mean += weight[2 * b] * fields.back();
     all += weight[2 * b];
   }
-  for (std::size_t k = 0; k < q.beads.size(); ++k) {
-    const Index row = 2 * q.beads[k];
-    q.fields[k] -= mean / all;
-    q.score += weight[row] * q.fields[k] * residual.segment<2>(row);
-    q.square += weight[row] * q.fields[k] * q.fields[k];
+  for (std::size_t k = 0; k < beads.size(); ++k) {
+    const Index row = 2 * beads[k];
+    const Eigen::Matrix2d field = fields[k] - mean / all;
+    score += weight[row] * field * residual.segment<2>(row);
+    square += weight[row] * field * field;
   }
-  q.gain = q.score.dot(Eigen::Vector2d(numerics::solve_symmetric(q.square, q.score))) / variance;
-  return q;
+  return {place_um, score.dot(Eigen::Vector2d(numerics::solve_symmetric(square, score))) / variance};
 }
 
 /// The best place within a step of this one.
 template <class Ask>
-Question refined(Question best, const Ask& ask_at) {
+Asked refined(Asked best, const Ask& ask_at) {
   constexpr int kFiner = 4;
   const Vec2 middle = best.place_um;
   for (int j = -kFiner; j <= kFiner; ++j) {
     for (int i = -kFiner; i <= kFiner; ++i) {
-      Question q = ask_at(middle + kStep_um / kFiner * Vec2{double(i), double(j)});
+      Asked q = ask_at(middle + kStep_um / kFiner * Vec2{double(i), double(j)});
       if (q.gain > best.gain) best = std::move(q);
     }
   }
@@ -141,62 +140,106 @@ std::vector<Vec2> free_places(const Cell& cell) {
   return places;
 }
 
-/// With what noise and errors of the model's forces make of the score, the tensions following.
-MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const LinearData& data, const VectorXd& weight) {
-  MatrixXd weighted = MatrixXd::Zero(data.displacement_um.size(), 2);
-  for (std::size_t k = 0; k < q.beads.size(); ++k) {
-    weighted.middleRows<2>(2 * q.beads[k]) = weight[2 * q.beads[k]] * q.fields[k];
+/// Places where what is left of the beads looks most like a force, as the beads around alone have it: beside all that
+/// the adhesions exert, as these explain much of a force nearby, and beside the network's forces.
+std::vector<Vec2> likely_places(const EnsembleFit& fit, const std::vector<Vec2>& places, const Gel& gel, int threads) {
+  constexpr double kLeast = 10;      // of the gain: chance has it at each hundred and fiftieth place
+  constexpr std::size_t kMost = 25;  // of either: where so many fail, the model is wrong as a whole
+  const UsedBeads beads(fit.data);
+  const DiscField disc(gel);
+  const VectorXd weight = squared_weights(fit.data);
+  std::vector<Vec2> tried, likely;
+  for (const VectorXd& forces_nN : {adhesion_forces_nN(fit), fit.forces.nN}) {
+    const VectorXd residual = residual_um(fit.data, forces_nN);
+    const auto ask_at = [&](Vec2 place_um) {
+      return ask(place_um, beads, disc, fit.data, weight, residual, fit.misfit.variance);
+    };
+    std::vector<Asked> asked(places.size());
+    numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int i) { asked[i] = ask_at(places[i]); });
+    std::erase_if(asked, [&](const Asked& q) { return q.gain < kLeast; });
+    std::ranges::sort(asked, std::greater(), &Asked::gain);
+    const std::size_t most = tried.size() + kMost;
+    for (const Asked& q : asked) {
+      if (tried.size() >= most) break;
+      if (std::ranges::any_of(tried, [&](Vec2 p) { return norm(p - q.place_um) < 0.5 * kReach_um; })) continue;
+      tried.push_back(q.place_um);
+      likely.push_back(refined(q, ask_at).place_um);
+    }
   }
-  const ScoreTest test = score_test(fit, data, weighted, q.square, q.score);
-  return {.position_um = q.place_um, .force_nN = {test.sizes[0], test.sizes[1]}, .chi_squared_gain = test.chi_squared};
+  return likely;
+}
+
+/// Displacement of the beads by forces on discs there, 2·beads × 2·places.
+MatrixXd displacement_by(const std::vector<Vec2>& places, const LinearData& data, const Gel& gel) {
+  std::vector<substrate::Ellipse> discs;
+  for (const Vec2 place : places)
+    discs.push_back({.centre_um = place, .semi_major_um = kDisc_um, .semi_minor_um = kDisc_um, .angle_rad = 0});
+  return greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
+      ->compliance_um_per_nN(data.position_um, discs);
+}
+
+/// By how much sums of magnitudes are too small as further adhesions are missed that are too weak to be found: as large
+/// a share of the weak ones as of the strong ones, n of n + n_above + 1 (Chapman, Univ. Calif. Publ. Stat. 1 (1951)
+/// 131). What such a one exerts its neighbour takes over, as a vector: the sum lacks the force times 1 − cos, of the
+/// angle between both.
+double unfound_nN(const VectorXd& forces_nN, const std::vector<Vec2>& centres_um,
+                  const std::vector<MissingAdhesion>& found) {
+  double weakest_nN = std::numeric_limits<double>::infinity(), lacking_nN = 0, n_above = 0;
+  for (const MissingAdhesion& place : found) weakest_nN = std::min(weakest_nN, norm(place.force_nN));
+  for (std::size_t a = 0; a < centres_um.size(); ++a) {
+    const Eigen::Vector2d force = forces_nN.segment<2>(2 * static_cast<Index>(a));
+    if (force.norm() >= weakest_nN) n_above += 1;
+    if (force.norm() >= weakest_nN || force.norm() <= 0) continue;
+    double nearest_um = std::numeric_limits<double>::infinity(), cosine = 1;
+    for (std::size_t b = 0; b < centres_um.size(); ++b) {
+      if (a == b || norm(centres_um[b] - centres_um[a]) >= nearest_um) continue;
+      nearest_um = norm(centres_um[b] - centres_um[a]);
+      cosine = force.normalized().dot(forces_nN.segment<2>(2 * static_cast<Index>(b)).normalized());
+    }
+    lacking_nN += (1 - cosine) * force.norm();
+  }
+  return static_cast<double>(found.size()) / (n_above + 1) * lacking_nN;
 }
 
 }  // namespace
 
-std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const LinearData& data, const Cell& cell,
-                                               const Gel& gel, int threads) {
-  const std::vector<Vec2> places = free_places(cell);
-  const UsedBeads beads(data);
-  const DiscField disc(gel);
-  const VectorXd weight = squared_weights(data), residual = residual_um(data, fit.forces.nN);
-  const auto ask_at = [&](Vec2 place_um) {
-    return ask(place_um, beads, disc, data, weight, residual, fit.misfit.variance);
-  };
-  std::vector<Question> asked(places.size());
-  numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int i) {
-    asked[i] = ask_at(places[i]);
-    if (asked[i].gain < 1) asked[i].fields = {};
-  });
-  // chi squared of two numbers exceeds x by chance exp(-x/2)
-  const double limit = 2 * std::log(std::max<double>(1, static_cast<double>(places.size())) / 0.01);
-  std::erase_if(asked, [&](const Question& q) { return q.gain < limit; });
-  std::ranges::sort(asked, std::greater(), &Question::gain);
+std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cell& cell, const Gel& gel, int threads) {
+  constexpr double kExpected = 0.1;  // forces that a cell has away from its adhesions, as a rule
+  const std::vector<Vec2> places = free_places(cell), likely = likely_places(fit, places, gel, threads);
+  if (likely.empty()) return {};
+  const Left left(fit);
+  const Scores scores = left.scores_of(pattern_of(fit.data, displacement_by(likely, fit.data, gel)));
+  const VectorXd forces_nN = adhesion_forces_nN(fit);
+  const double kappa =
+      std::max(1e-300, forces_nN.squaredNorm() / static_cast<double>(forces_nN.size())) / left.variance();
+  std::vector<std::vector<Index>> columns;
+  for (Index k = 0; k < std::ssize(likely); ++k) columns.push_back({2 * k, 2 * k + 1});
+  const std::vector<std::size_t> causes =
+      causes_among(scores, columns, std::log(static_cast<double>(places.size()) / kExpected), kappa);
+  if (causes.empty()) return {};
+  std::vector<Index> of_causes;
+  for (const std::size_t k : causes) of_causes.insert(of_causes.end(), columns[k].begin(), columns[k].end());
+  const Scores there = at(scores, of_causes);
+  const MatrixXd covariance = numerics::inverse_symmetric(there.information);
+  const VectorXd sizes = numerics::matvec(covariance, there.scores);  // over s
   std::vector<MissingAdhesion> found;
-  std::vector<Vec2> tried;
-  constexpr std::size_t kMost = 50;  // where so many fail, the model is wrong as a whole
-  for (const Question& q : asked) {
-    if (tried.size() >= kMost) break;
-    if (std::ranges::any_of(tried, [&](Vec2 p) { return norm(p - q.place_um) < 0.5 * kReach_um; })) continue;
-    tried.push_back(q.place_um);
-    if (const MissingAdhesion answer = answered(refined(q, ask_at), fit, data, weight);
-        answer.chi_squared_gain >= limit) {
-      found.push_back(answer);
-    }
+  for (std::size_t k = 0; k < causes.size(); ++k) {
+    const auto row = 2 * static_cast<Index>(k);
+    const Eigen::Vector2d size = sizes.segment<2>(row), force_nN = std::sqrt(left.variance()) * size;
+    found.push_back(
+        {.position_um = likely[causes[k]],
+         .force_nN = {force_nN.x(), force_nN.y()},
+         .chi_squared_gain = size.dot(numerics::solve_symmetric(covariance.block<2, 2>(row, row), size).col(0))});
   }
   std::ranges::stable_sort(found, std::greater(), &MissingAdhesion::chi_squared_gain);
   return found;
 }
 
 EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& places, const Gel& gel, Index n_last) {
-  std::vector<substrate::Ellipse> discs;
-  for (const MissingAdhesion& place : places)
-    discs.push_back(
-        {.centre_um = place.position_um, .semi_major_um = kDisc_um, .semi_minor_um = kDisc_um, .angle_rad = 0});
+  std::vector<Vec2> there;
+  for (const MissingAdhesion& place : places) there.push_back(place.position_um);
   LinearData data = std::move(fit.data);
-  Motions motions =
-      joined_ahead(data.motions, n_last,
-                   {.shapes = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
-                                  ->compliance_um_per_nN(data.position_um, discs)});
+  Motions motions = joined_ahead(data.motions, n_last, {.shapes = displacement_by(there, data, gel)});
   fit = with_forces_by(std::move(fit), with_motions(std::move(data), std::move(motions)));
   const VectorXd errors = motions_beside(fit.data, fit).sigma,
                  values = motion_in(fit.data,
@@ -212,6 +255,9 @@ EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& pla
     fit.forces.away_nN2 += along * along;
     fit.total_force_nN.value += force.norm() - std::min(force.norm(), along * along / (2 * force.norm()));
   }
+  const double unfound = unfound_nN(adhesion_forces_nN(fit), fit.data.load_centre_um, places);
+  fit.forces.away_nN2 += unfound * unfound;
+  fit.total_force_nN.value += unfound;
   fit.total_force_nN.standard_error = std::hypot(fit.total_force_nN.standard_error, std::sqrt(fit.forces.away_nN2));
   return fit;
 }

@@ -12,11 +12,10 @@ namespace mbtfm::tensions {
 
 struct EnsembleFit;
 
-/// The best ones. A score test at places one micrometre apart, of a force spread over a disc of 0.5 um: with g its
-/// displacement of the beads around, less their mean, q = gᵀ W² (u − G R) is compared with its covariance. A gain is
-/// kept where chance would reach it in one cell of a hundred, all places tried (Bonferroni).
-std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const LinearData& data, const Cell& cell,
-                                               const Gel& gel, int threads);
+/// The best ones, each beside those before: places one micrometre apart, of a force spread over a disc of 0.5 um. They
+/// are looked for in what the forces leave of the beads around, and asked by all beads (search.h). Kept are those that
+/// the beads make likelier than not: one place in ten cells is expected, of a force as the adhesions have.
+std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cell& cell, const Gel& gel, int threads);
 
 /// The fit of a cell that pulls at these places, too: the adhesions' forces beside theirs, and the total with them.
 /// @param places  their forces and gains become what the fit finds

@@ -6,14 +6,26 @@
 #include <numbers>
 #include <numeric>
 
+#include "mbtfm/tensions/search.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/distributions.h"
-#include "pipeline/numerics/triangle.h"
 #include "substrate/compliance.h"
 
 namespace mbtfm::tensions {
 
 namespace {
+
+/// Forces at these places of fibres between two of them each, of tension 1: 2·places × pairs.
+MatrixXd chords(const std::vector<Vec2>& places_um, const std::vector<std::array<std::size_t, 2>>& pairs) {
+  MatrixXd forces = MatrixXd::Zero(2 * std::ssize(places_um), std::ssize(pairs));
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const auto [a, b] = pairs[k];
+    const Vec2 chord = places_um[b] - places_um[a], unit = (1 / norm(chord)) * chord;
+    forces.col(static_cast<Index>(k)).segment<2>(2 * static_cast<Index>(a)) << unit.x, unit.y;
+    forces.col(static_cast<Index>(k)).segment<2>(2 * static_cast<Index>(b)) << -unit.x, -unit.y;
+  }
+  return forces;
+}
 
 constexpr double kTradeOff = -0.95;  // see fibres_not_told_apart
 
@@ -146,21 +158,24 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
 
 LinearData with_missing_fibres(LinearData data, const std::vector<Adhesion>& adhesions,
                                const std::vector<MissingFibre>& fibres, Index n_last) {
+  std::vector<Vec2> places_um;
+  for (const Adhesion& a : adhesions) places_um.push_back(a.position_um);
+  std::vector<std::array<std::size_t, 2>> pairs;
+  VectorXd tensions_nN(std::ssize(fibres));
+  for (std::size_t k = 0; k < fibres.size(); ++k) {
+    const auto place = [&](int id) {
+      return static_cast<std::size_t>(std::ranges::find(adhesions, id, &Adhesion::adhesion_id) - adhesions.begin());
+    };
+    pairs.push_back({place(fibres[k].start_adhesion_id), place(fibres[k].end_adhesion_id)});
+    tensions_nN[static_cast<Index>(k)] = fibres[k].tension_nN;
+  }
   // Ten times what was found bounds nothing, but forces along these pairs are then no direction without any meaning.
   constexpr double kAnySize = 10;
-  MatrixXd pairs = MatrixXd::Zero(data.response->cols(), std::ssize(fibres));
-  VectorXd precision(pairs.cols());
-  for (std::size_t k = 0; k < fibres.size(); ++k) {
-    const auto start = std::ranges::find(adhesions, fibres[k].start_adhesion_id, &Adhesion::adhesion_id);
-    const auto end = std::ranges::find(adhesions, fibres[k].end_adhesion_id, &Adhesion::adhesion_id);
-    const Vec2 chord = end->position_um - start->position_um, unit = (1 / norm(chord)) * chord;
-    const auto column = static_cast<Index>(k);
-    pairs.col(column).segment<2>(2 * (start - adhesions.begin())) << unit.x, unit.y;
-    pairs.col(column).segment<2>(2 * (end - adhesions.begin())) << -unit.x, -unit.y;
-    precision[column] = 1 / std::pow(kAnySize * fibres[k].tension_nN, 2);
-  }
+  const MatrixXd forces = chords(places_um, pairs);
   Motions motions = joined_ahead(data.motions, n_last,
-                                 {.shapes = data.response->displace(pairs), .precision = precision, .forces = pairs});
+                                 {.shapes = data.response->displace(forces),
+                                  .precision = (kAnySize * tensions_nN).cwiseAbs2().cwiseInverse(),
+                                  .forces = forces});
   return with_motions(std::move(data), std::move(motions));
 }
 
@@ -196,17 +211,10 @@ class FibresTogether {
   /// Least squares with tensions of zero or more; those that would push are left out, the hardest pushing first.
   Told told_of(std::vector<Pair> pairs) const {
     while (!pairs.empty()) {
-      const auto n = static_cast<Index>(pairs.size());
-      MatrixXd chords = MatrixXd::Zero(K_.rows(), n);
-      for (Index k = 0; k < n; ++k) {
-        const auto [a, b] = pairs[k];
-        const Vec2 chord = places_um_[b] - places_um_[a], unit = (1 / norm(chord)) * chord;
-        chords.col(k).segment<2>(2 * static_cast<Index>(a)) << unit.x, unit.y;
-        chords.col(k).segment<2>(2 * static_cast<Index>(b)) << -unit.x, -unit.y;
-      }
+      const MatrixXd V = chords(places_um_, pairs);
       const MatrixXd inverse =
-          numerics::inverse_symmetric(numerics::small_product(numerics::small_transposed_product(chords, K_), chords));
-      const VectorXd slopes = numerics::transposed_matvec(chords, q_), t = numerics::matvec(inverse, slopes);
+          numerics::inverse_symmetric(numerics::small_product(numerics::small_transposed_product(V, K_), V));
+      const VectorXd slopes = numerics::transposed_matvec(V, q_), t = numerics::matvec(inverse, slopes);
       Index least = 0;
       if (t.minCoeff(&least) > 0)
         return {std::move(pairs), t, inverse.diagonal().cwiseMax(0).cwiseSqrt(), slopes.dot(t)};
@@ -250,32 +258,18 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   const double n_pairs = 0.5 * static_cast<double>(adhesions.size()) * (static_cast<double>(adhesions.size()) - 1);
   if (n_pairs < 1) return {};
   const double limit = numerics::normal_quantile(1 - 0.01 / n_pairs);
-  const MeshFit& mesh = fit.meshes.front();
   const double variance = fit.model_error ? fit.model_error->noise_variance : fit.misfit.variance;
-  ReducedData data = fit.data.reduced;
-  if (fit.model_error) {
-    ModelError error = *fit.model_error;
-    error.force_variance_nN2 += segmentation_variance_nN2(fit.forces.nN, adhesions, segmentation);
-    data = whitened(data, error, threads);
-  }
-  const MatrixXd& C = *data.compliance;
-  const VectorXd residual = data.target - displace(data, fit.forces.nN);
-  // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.
-  const MatrixXd CJ = displace(data, mesh.force_derivatives, threads);
-  const MatrixXd cross_terms = numerics::transposed_product(CJ, C, threads);
-  MatrixXd H = numerics::small_transposed_product(CJ, CJ);
-  H.diagonal() += 1e-9 * H.diagonal() + VectorXd::Constant(H.rows(), 1e-300);
-  const numerics::SmallCholesky solver(H);
-  const MatrixXd explained = solver.solve_lower(cross_terms);
-  const VectorXd q = numerics::transposed_matvec(C, residual) -
-                     numerics::transposed_matvec(cross_terms, solver.solve(numerics::transposed_matvec(CJ, residual)));
+  const Left left(fit,
+                  fit.model_error ? fit.model_error->force_variance_nN2 +
+                                        segmentation_variance_nN2(fit.forces.nN, adhesions, segmentation)
+                                  : VectorXd(),
+                  variance, threads);
+  const VectorXd& q = left.force_scores();
 
   std::vector<MissingFibre> found;
   std::vector<Eigen::Matrix2d> own(adhesions.size());  // blocks of K = Cᵀ P C on its diagonal
-  numerics::for_each_gram_block(C, threads, [&](Index first, const MatrixXd& gram) {
-    const MatrixXd K = gram - numerics::transposed_product(explained.leftCols(gram.rows()),
-                                                           explained.middleCols(first, gram.cols()), threads);
-    for (auto b = static_cast<std::size_t>(first / 2); 2 * static_cast<Index>(b) < gram.rows(); ++b) {
+  left.for_each_block([&](Index first, const MatrixXd& K) {
+    for (auto b = static_cast<std::size_t>(first / 2); 2 * static_cast<Index>(b) < K.rows(); ++b) {
       const auto j = 2 * static_cast<Index>(b);
       own[b] = K.block<2, 2>(j, j - first).selfadjointView<Eigen::Upper>();
       for (std::size_t a = 0; a < b; ++a) {
@@ -318,12 +312,8 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
     places_um.push_back(adhesions[ends[k]].position_um);
     if (k % 2 == 1) pairs.push_back({k - 1, k});
   }
-  const MatrixXd C_there = C(Eigen::all, components), explained_there = explained(Eigen::all, components);
-  const FibresTogether together(std::move(places_um),
-                                (numerics::small_transposed_product(C_there, C_there) -
-                                 numerics::small_transposed_product(explained_there, explained_there)) /
-                                    variance,
-                                q(components) / variance);
+  const Scores there = left.scores_of(components);
+  const FibresTogether together(std::move(places_um), there.information / variance, there.scores / std::sqrt(variance));
   FibresTogether::Told told = together.with_best_partners(std::move(pairs));
   const auto gains = [&] { return VectorXd(told.tension_nN.cwiseQuotient(told.sigma_nN).cwiseAbs2()); };
   for (Index least = 0; !told.pairs.empty() && gains().minCoeff(&least) < limit * limit;) {

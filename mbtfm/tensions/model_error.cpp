@@ -144,11 +144,11 @@ RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError&
           .sigma_nN = std::hypot(of_loads, kOfEdge / std::sqrt(12.0) * total, kOfLinks * total)};
 }
 
-ReducedData whitened(const ReducedData& data, const ModelError& error, int threads) {
+ReducedData whitened(const ReducedData& data, const VectorXd& force_variance, int threads) {
   MBTFM_ASSERT(data.is_upper);
   const MatrixXd& C = *data.compliance;
   MatrixXd root = MatrixXd::Identity(C.rows(), C.rows()), target = data.target;
-  numerics::add_triangle_outer(C, error.force_variance_nN2 / error.noise_variance, root, threads);
+  numerics::add_triangle_outer(C, force_variance, root, threads);
   const bool is_definite = numerics::upper_root(root, threads);
   MBTFM_ASSERT(is_definite);
   ReducedData white = data;

@@ -68,8 +68,9 @@ VectorXd across_nN2(const VectorXd& forces_nN, const MatrixXd& covariance);
 /// @param beads_variance  s²; a floor of (a thousandth of what beads move on average)² is put under it
 ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData& data, double beads_variance);
 
-/// The data in coordinates in which both errors together have the variance s². @param data  C an upper triangle, as is
-/// that of the result
-ReducedData whitened(const ReducedData& data, const ModelError& error, int threads = 1);
+/// The data in coordinates in which noise and errors of the forces together have the variance s².
+/// @param data  C an upper triangle, as is that of the result
+/// @param force_variance  of the errors, by component, over s²
+ReducedData whitened(const ReducedData& data, const VectorXd& force_variance, int threads = 1);
 
 }  // namespace mbtfm::tensions

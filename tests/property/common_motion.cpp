@@ -82,7 +82,7 @@ TEST(CommonMotion, a_bent_one_is_found_and_noise_is_taken_for_none) {
   for (unsigned draw = 1; draw <= kDraws; ++draw) {
     test::measure(scene, 0.05, draw);
     const LinearData data = with_motions(scene, scene.beads);
-    mean += curved_motion_beside(data, scene.beads, fit_of(scene, data)).chi_squared / kDraws;
+    mean += curved_motion_beside(fit_of(scene, data), scene.beads).chi_squared / kDraws;
   }
   EXPECT_NEAR(mean, 14, 4 * std::sqrt(2 * 14.0 / kDraws)) << "chi squared of 14 degrees of freedom";
   const double sigma_um = scene.beads.front().sigma_um;
@@ -97,7 +97,7 @@ TEST(CommonMotion, a_bent_one_is_found_and_noise_is_taken_for_none) {
     bead.displacement_um += bent;
   }
   const LinearData data = with_motions(scene, scene.beads);
-  const CurvedMotion found = curved_motion_beside(data, scene.beads, fit_of(scene, data));
+  const CurvedMotion found = curved_motion_beside(fit_of(scene, data), scene.beads);
   EXPECT_GT(found.chi_squared, 36.1);
   EXPECT_GT(found.rms_um, 0.2 * std::sqrt(squares)) << "most of it is even growth, which is taken off";
   EXPECT_LT(found.rms_um, 2 * std::sqrt(squares));

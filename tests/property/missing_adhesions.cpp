@@ -42,7 +42,7 @@ struct Hidden {
     std::vector<cables::CableNetwork> networks;
     networks.emplace_back(scene.cables.network(), scene.cables.parameters());
     const EnsembleFit fit = fit_ensemble(networks, data, scene.adhesion_ids, {}, 1);
-    return missing_adhesions(fit, fit.data, cell, test::kGel, 1);
+    return missing_adhesions(fit, cell, test::kGel, 1);
   }
 };
 

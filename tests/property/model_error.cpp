@@ -191,7 +191,7 @@ TEST(ModelError, that_is_none_leaves_the_data_as_they_are) {
   data.target = *data.compliance * model.D * model.tensions;
   const ModelError error = model_error(meshes, data, 1);
   EXPECT_LT(error.force_variance_nN2.maxCoeff(), 1e-20);
-  EXPECT_TRUE(whitened(data, error).target.isApprox(data.target, 1e-10));
+  EXPECT_TRUE(whitened(data, error.force_variance_nN2 / error.noise_variance).target.isApprox(data.target, 1e-10));
 }
 
 TEST(ModelError, whitened_data_have_errors_of_one_variance) {
@@ -204,10 +204,10 @@ TEST(ModelError, whitened_data_have_errors_of_one_variance) {
   Eigen::MatrixXd root(60, 60);  // W y for every unit vector y
   for (int i = 0; i < 60; ++i) {
     data.target = Eigen::VectorXd::Unit(60, i);
-    root.col(i) = whitened(data, error).target;
+    root.col(i) = whitened(data, error.force_variance_nN2 / error.noise_variance).target;
   }
   EXPECT_TRUE((root * variance * root.transpose()).isIdentity(1e-9));
-  EXPECT_TRUE(whitened(data, error).compliance->isApprox(root * C, 1e-9));
+  EXPECT_TRUE(whitened(data, error.force_variance_nN2 / error.noise_variance).compliance->isApprox(root * C, 1e-9));
 }
 
 /// Of thirty adhesions: forces that deviate as the law has it, or those of two by far more.

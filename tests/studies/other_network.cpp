@@ -249,8 +249,9 @@ void wrong(Cells cells) {
                    {}, 2, affine_motions(o.beads));
         for (const Adhesion& a : seen.adhesions) data.load_centre_um.push_back(a.position_um);
         const std::vector<cables::CableNetwork> networks = span(seen, FitParameters{}.n_meshes);
-        const WithMissing found =
-            with_missing(fit_ensemble(networks, data, ids, {}, 2), networks, seen, gel, {}, {}, 0, 2);
+        const WithMissing found = with_missing(
+            fit_ensemble(networks, data, ids, {}, 2),
+            {.networks = networks, .cell = seen, .gel = gel, .segmentation = {}, .parameters = {}, .threads = 2});
         double error = 0, size = 0, z = 0;
         int n_in = 0, n_forces_in = 0;
         const auto n = static_cast<int>(found.fit.tensions.fibre_ids.size()) - 1;

@@ -1,0 +1,93 @@
+/// One question for all that a fit may lack: a block of displacements X that is not in it, of sizes b,
+///
+///   what the fit leaves = X b + noise,   q = Xᵀ V⁻¹ P r,   K = Xᵀ V⁻¹ P X,
+///
+/// P takes off what is free to follow, V is the noise's covariance and that of the model's error. Without the block q
+/// has the covariance K (score test: Rao, Math Proc Camb Phil Soc 44:50, 1948); with sizes of variance κ the data speak
+/// for it by log_bayes_factor(). The best block is a cause: the others are asked again beside it.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "mbtfm/tensions/linear_data.h"
+#include "substrate/ellipse.h"
+
+namespace mbtfm::tensions {
+
+struct EnsembleFit;
+
+/// Of each place the displacement by forces of 1 nN/um times the root of its area: 2·beads × 2·places.
+MatrixXd by_root_of_area(MatrixXd compliance_um_per_nN, const std::vector<substrate::Ellipse>& places);
+
+struct Scores {
+  MatrixXd information;  ///< K, of noise of variance 1
+  VectorXd scores;       ///< q; over s where the noise has the variance s²
+};
+/// Of these columns alone.
+Scores at(const Scores& scores, const std::vector<Index>& columns);
+/// Less what these columns explain, which are of variance κ s².
+/// @param scores  over s
+Scores beside(const Scores& scores, const std::vector<Index>& columns, double kappa);
+
+/// Of data with noise of variance s² and random effects of variance κ s²: those along which they do not mix.
+struct Spectrum {
+  VectorXd information;  ///< d: signal over noise, in squares, at κ = 1
+  VectorXd found;        ///< c² / s²: its mean is d (1 + κ d)
+};
+/// @param scores  over s
+Spectrum spectrum_of(const Scores& scores);
+
+/// log of the likelihood of sizes of variance κ s² over that of none: ½ Σ κ c²/(1 + κ d) − log(1 + κ d).
+double log_bayes_factor(const Spectrum& spectrum, double kappa);
+/// Of greatest likelihood, to a quarter: what is allowed for hangs on it weakly (restricted maximum likelihood;
+/// Patterson & Thompson, Biometrika 58 (1971) 545).
+double likeliest_kappa(const Spectrum& spectrum);
+
+/// The blocks that the data call for: the one that they speak for most, then the others beside it, as long as
+/// log_bayes_factor() is above `least`.
+/// @param columns  by block  @param kappa  of the sizes of a block; none: the likeliest
+std::vector<std::size_t> causes_among(Scores scores, const std::vector<std::vector<Index>>& columns, double least,
+                                      std::optional<double> kappa = {});
+
+/// Columns of displacements as the data see them.
+struct Pattern {
+  MatrixXd forces_nN;  ///< of the adhesions that look most like them, (CᵀC)⁻¹ Gᵀ W² P X: 2·adhesions × columns
+  Scores beyond;       ///< of what no such forces do; scores not over s
+};
+/// @param columns_um  2·beads × columns
+Pattern pattern_of(const LinearData& data, const MatrixXd& columns_um);
+/// s²: of what neither forces nor these columns explain, not below the stated errors'.
+double variance_beside(const LinearData& data, const Scores& beyond);
+
+/// What a fit leaves of its data, the tensions free to follow, the error of the model's forces counted.
+class Left {
+ public:
+  /// With the variances that the fit's error bars have.
+  explicit Left(const EnsembleFit& fit);
+  /// @param force_variance_nN2  of the model's error, by component; empty: none
+  /// @param variance  s²
+  Left(const EnsembleFit& fit, const VectorXd& force_variance_nN2, double variance, int threads);
+  /// Of these columns, over s.
+  Scores scores_of(const Pattern& pattern) const;
+  /// Of forces of the adhesions themselves, over s, by components of these.
+  Scores scores_of(const std::vector<Index>& components) const;
+  double variance() const { return variance_; }  ///< s²
+  /// Of each component of the forces, not over s.
+  const VectorXd& force_scores() const { return scores_; }
+  /// Calls body(first, block) with the columns first, first + 1, … of the information of all components of the forces,
+  /// down to the last diagonal entry of the block: a whole is large where adhesions are many.
+  void for_each_block(const std::function<void(Index first, const MatrixXd& information)>& body) const;
+
+ private:
+  Scores over_s(const MatrixXd& compliance, const MatrixXd& followed, const VectorXd& scores) const;
+  ReducedData data_;   ///< whitened
+  MatrixXd followed_;  ///< L⁻¹ Jᵀ C with L Lᵀ = Jᵀ J: what the tensions explain is its square
+  VectorXd scores_;    ///< by component of the forces
+  double variance_;
+  int threads_;
+};
+
+}  // namespace mbtfm::tensions
