@@ -133,14 +133,34 @@ void follow_grid(const Scene& scene, const GridField& grid, double least_similar
   });
 }
 
-/// A track of bead k from what its neighbours do: their affine motion itself, and the stressed image's beads near where
-/// it leads; the most similar counts.
+/// Where the nearest good beads lead bead k, each by its own motion and gradient.
+std::vector<Motion> extrapolated(const Scene& scene, const std::vector<Track>& tracks, int k) {
+  constexpr int kNearest = 4;
+  std::vector<Motion> guesses;
+  for (const int j : good_around(scene, tracks, k, kNearest)) {
+    guesses.push_back(tracks[j].found.motion);
+    guesses.back().u = tracks[j].found.motion.at(scene.position(k) - scene.position(j));
+  }
+  return guesses;
+}
+
+/// Whether one of the nearest beads leads elsewhere: to where another bead may lie.
+bool is_challenged(const Scene& scene, const Track& track, const std::vector<Motion>& extrapolated) {
+  return std::ranges::any_of(
+      extrapolated, [&](const Motion& guess) { return norm(guess.u - track.found.motion.u) > 2 * scene.bead_sigma(); });
+}
+
+/// A track of bead k from what its neighbours do: their affine motion itself, the stressed image's beads near where it
+/// leads, and where each of the nearest leads by itself (Pan, Appl. Opt. 48:1535, 2009); the most similar counts.
 std::optional<Registered> retried(const Scene& scene, const std::vector<Track>& tracks,
                                   const std::vector<Motion>& motions, int k, double least_similarity) {
   const Vec2 place = scene.position(k);
+  std::vector<Motion> guesses = extrapolated(scene, tracks, k);
+  if (tracks[k].is_good() && !is_challenged(scene, tracks[k], guesses)) return std::nullopt;
   const auto local = local_motion(place, good_around(scene, tracks, k, 8), scene.relaxed->positions, motions);
   if (!local || local->n_beads < 3) return std::nullopt;
-  std::vector<Motion> guesses = {local->motion};
+  const std::size_t n_single = guesses.size();
+  guesses.push_back(local->motion);
   const double search = std::clamp(4 * local->spread_px, 2 * scene.bead_sigma(), 5 * scene.bead_sigma());
   for (const int b : scene.stressed.neighbours.within(place + local->motion.u, search, 4)) {
     guesses.push_back(local->motion);
@@ -150,12 +170,18 @@ std::optional<Registered> retried(const Scene& scene, const std::vector<Track>& 
   window.sigma = std::max(2.2 * scene.bead_sigma(), 0.6 * scene.wide.sigma);
   window.is_thinned = false;
   std::optional<Registered> best;
-  for (const Motion& guess : guesses) {
-    const Registered found = registered(scene.relaxed->image, scene.stressed.image.spline, place, guess, window);
-    if (!found.is_converged || norm(found.motion.u - local->motion.u) > search) continue;
+  for (std::size_t g = 0; g < guesses.size(); ++g) {
+    const Registered found = registered(scene.relaxed->image, scene.stressed.image.spline, place, guesses[g], window);
+    const Vec2 from = g < n_single ? guesses[g].u : local->motion.u;
+    if (!found.is_converged || norm(found.motion.u - from) > search) continue;
     if (found.similarity > std::max(least_similarity, best ? best->similarity : -1)) best = found;
   }
   return best;
+}
+
+/// A track that was found is given up for one of half its mismatch.
+bool is_better(const Track& track, const Registered& found) {
+  return !track.is_good() || 1 - found.similarity < 0.5 * (1 - track.found.similarity);
 }
 
 void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Surroundings& surroundings,
@@ -164,13 +190,13 @@ void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Su
   for (int round = 0; round < kMaxRounds; ++round) {
     std::vector<std::optional<Registered>> found(tracks.size());
     for_each_bead(scene, [&](int k) {
-      if (tracks[k].is_good() || !surroundings.is_changed[k]) return;
+      if (!surroundings.is_changed[k]) return;
       // a narrow window may take a stranger for the bead: more is asked of it
       found[k] = retried(scene, tracks, surroundings.motions, k, 0.5 * (1 + parameters.least_similarity));
     });
     int n_found = 0;
     for (std::size_t k = 0; k < tracks.size(); ++k) {
-      if (!found[k]) continue;
+      if (!found[k] || !is_better(tracks[k], *found[k])) continue;
       tracks[k] = {.found = *found[k], .flag = TrackFlag::none};
       ++n_found;
     }
@@ -267,55 +293,60 @@ std::vector<int> groups_of(const Scene& scene, const std::vector<Track>& tracks)
 
 struct Pull {
   double radius_px = 0, sigma_px = 0;
-  double step_px = 0;  ///< length of U
+  double step_px = 0;    ///< length of U
+  double spread_px = 0;  ///< of the others about the fit
 };
 
-using Vec7 = cv::Vec<double, 7>;
-using Mat7 = cv::Matx<double, 7, 7>;
-
-/// Fit of c, G and a, those further off and outliers weighing less, as in local_motion().
+/// Fit of c, G, H and a, those further off and outliers weighing less, as in local_motion().
 std::optional<Pull> pull_of(const Scene& scene, const std::vector<Track>& tracks, int bead,
                             const std::vector<int>& around, double least_spread_px) {
-  constexpr std::size_t kFewest = 8;  // seven numbers from sixteen
+  constexpr std::size_t kFewest = 12;  // thirteen numbers from twenty-four
+  constexpr int kRows = 6, kAll = 2 * kRows + 1;
+  using Row = cv::Vec<double, kAll>;
   if (around.size() < kFewest) return std::nullopt;
   const Vec2 place = scene.position(bead), u = tracks[bead].found.motion.u;
-  const auto start = local_motion(place, around, scene.relaxed->positions, motions_of(tracks));
+  const auto start = local_motion(place, around, scene.relaxed->positions, motions_of(tracks), Order::curved);
   Vec2 rest = start->motion.u;
   const double reach = start->reach_px;
   std::vector<double> trust(around.size(), 1);
   Pull pull;
   constexpr int kRounds = 4;
   for (int round = 0; round < kRounds; ++round) {
-    Mat7 normal, squared;
-    Vec7 right;
-    std::vector<std::pair<Vec7, Vec7>> rows;
+    cv::Matx<double, kAll, kAll> normal, squared;
+    Row right;
+    std::vector<std::pair<Row, Row>> rows(around.size());
     for (std::size_t k = 0; k < around.size(); ++k) {
       const Vec2 d = scene.position(around[k]) - place, moved = tracks[around[k]].found.motion.u;
       const double softened = std::hypot(norm(d), 2 * scene.bead_sigma());  // within the patch all move alike
       const Vec2 e = (1 / softened) * d, own = u - rest, pulled = (1 / softened) * (own + dot(own, e) * e);
-      rows.push_back({{1, d.x, d.y, 0, 0, 0, pulled.x}, {0, 0, 0, 1, d.x, d.y, pulled.y}});
+      const Vec2 r = (1 / reach) * d;
+      const double smooth[kRows] = {1, r.x, r.y, r.x * r.x, r.x * r.y, r.y * r.y};
+      for (int a = 0; a < kRows; ++a) rows[k].first[a] = rows[k].second[kRows + a] = smooth[a];
+      rows[k].first[2 * kRows] = pulled.x, rows[k].second[2 * kRows] = pulled.y;
       const double weight = trust[k] * std::exp(-2 * dot(d, d) / (reach * reach));
-      for (const auto& [row, value] : {std::pair(rows.back().first, moved.x), std::pair(rows.back().second, moved.y)}) {
+      for (const auto& [row, value] : {std::pair(rows[k].first, moved.x), std::pair(rows[k].second, moved.y)}) {
         normal += weight * row * row.t();
         squared += weight * weight * row * row.t();
         right += weight * value * row;
       }
     }
     bool is_regular = false;
-    const Mat7 inverse = normal.inv(cv::DECOMP_CHOLESKY, &is_regular);
+    const auto inverse = normal.inv(cv::DECOMP_CHOLESKY, &is_regular);
     if (!is_regular) return std::nullopt;
-    const Vec7 fitted = inverse * right;
+    const Row fitted = inverse * right;
     std::vector<double> misfits;
     for (std::size_t k = 0; k < around.size(); ++k) {
       const Vec2 moved = tracks[around[k]].found.motion.u;
       misfits.push_back(norm(moved - Vec2{rows[k].first.dot(fitted), rows[k].second.dot(fitted)}));
     }
     const double n = static_cast<double>(around.size());
-    const double spread = std::max(numerics::quantile(misfits, 0.5) / 1.18 * std::sqrt(n / (n - 3.5)), least_spread_px);
+    const double free = n - 0.5 * kAll;
+    const double spread = std::max(numerics::quantile(misfits, 0.5) / 1.18 * std::sqrt(n / free), least_spread_px);
     for (std::size_t k = 0; k < around.size(); ++k)
       trust[k] = std::pow(std::min(1.0, 2.5 * spread / std::max(misfits[k], 1e-9)), 2);
-    rest = {fitted[0], fitted[3]};
-    pull = {fitted[6], spread * std::sqrt((inverse * squared * inverse)(6, 6)), norm(u - rest)};
+    rest = {fitted[0], fitted[kRows]};
+    const double variance = (inverse * squared * inverse)(2 * kRows, 2 * kRows);
+    pull = {fitted[2 * kRows], spread * std::sqrt(variance), norm(u - rest), spread};
   }
   return pull;
 }
@@ -328,31 +359,24 @@ bool is_unlikely(const Pull& pull, double least_px) {
 
 }  // namespace
 
-int flag_unpulled(const Scene& scene, double threshold, std::vector<Track>& tracks) {
+int flag_unpulled(const Scene& scene, double threshold, const std::vector<char>& is_contradicted, double scatter_px,
+                  std::vector<Track>& tracks) {
   const std::vector<int> group = groups_of(scene, tracks);
   std::vector<int> size(tracks.size(), 0);
   for (std::size_t k = 0; k < tracks.size(); ++k) size[group[k]] += tracks[k].is_good();
   const int largest = static_cast<int>(std::ranges::max_element(size) - size.begin());
-  const std::vector<std::optional<LocalMotion>> around = motions_around(scene, tracks);
-  const double typical = typical_spread(around);
-  const auto limit_px = [&](int k) {
-    constexpr double kResolved = 1.5;  // bead sigmas: nearer than that lies a bead's own light, and no other's
-    const double as_outliers = threshold * std::hypot(typical, tracks[k].found.sigma_px) + 0.3;  // flag_outliers()
-    return std::max(kResolved * scene.bead_sigma(), as_outliers);
-  };
-  const auto is_asked = [&](int k) {
-    if (group[k] != group[largest] || !around[k]) return true;
-    return norm(tracks[k].found.motion.u - around[k]->motion.u) > limit_px(k);
-  };
   std::vector<char> is_alone(tracks.size(), 0);
   for_each_bead(scene, [&](int k) {
-    if (!tracks[k].is_good() || !is_asked(k)) return;
-    constexpr int kMost = 20;
+    if (!tracks[k].is_good() || !(is_contradicted[k] || group[k] != group[largest])) return;
+    constexpr int kMost = 24;
     std::vector<int> witnesses = good_around(scene, tracks, k, 2 * kMost);
     std::erase_if(witnesses, [&](int j) { return group[j] != group[largest]; });
     if (witnesses.size() > kMost) witnesses.resize(kMost);
-    const std::optional<Pull> pull = pull_of(scene, tracks, k, witnesses, typical);
-    is_alone[k] = pull && pull->step_px > limit_px(k) && is_unlikely(*pull, scene.bead_sigma());
+    const double sigma_px = std::hypot(scatter_px, tracks[k].found.sigma_px);
+    const std::optional<Pull> pull = pull_of(scene, tracks, k, witnesses, sigma_px);
+    if (!pull) return;
+    const double limit_px = threshold * std::hypot(pull->spread_px, sigma_px);
+    is_alone[k] = pull->step_px > limit_px && is_unlikely(*pull, scene.bead_sigma());
   });
   int n_flagged = 0;
   for (std::size_t k = 0; k < tracks.size(); ++k) {

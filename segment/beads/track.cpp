@@ -237,10 +237,9 @@ Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images
   for (int round = 0; model.um && round < kRounds; ++round) {
     follow_beside(model, *scene, turn, parameters, pixel_size_um, tracks);
   }
-  flag_unpulled(*scene, parameters.outlier_threshold, tracks);  // matches, too, which are made without a window
-  if (turn) flag_turned_out(*scene, *turn, tracks);             // those found again
+  Pooling pooling = pooled(*scene, parameters.outlier_threshold, tracks);  // flags matches, too, made without a window
+  if (turn) flag_turned_out(*scene, *turn, tracks);                        // those found again
   require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
-  Pooling pooling = pooled(*scene, tracks);
   const BeadSizes sizes = sizes_of(*sharp, tracks);
   return {.scene = scene,
           .tracks = std::move(tracks),
