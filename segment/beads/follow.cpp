@@ -153,28 +153,35 @@ bool is_challenged(const Scene& scene, const Track& track, const std::vector<Mot
 /// A track of bead k from what its neighbours do: their affine motion itself, the stressed image's beads near where it
 /// leads, and where each of the nearest leads by itself (Pan, Appl. Opt. 48:1535, 2009); the most similar counts.
 std::optional<Registered> retried(const Scene& scene, const std::vector<Track>& tracks,
-                                  const std::vector<Motion>& motions, int k, double least_similarity) {
+                                  const std::vector<Motion>& motions, int k, double least_similarity, Led led) {
+  if (tracks[k].is_good() && led == Led::together) return std::nullopt;
   const Vec2 place = scene.position(k);
-  std::vector<Motion> guesses = extrapolated(scene, tracks, k);
-  if (tracks[k].is_good() && !is_challenged(scene, tracks[k], guesses)) return std::nullopt;
+  const std::vector<Motion> single = led == Led::by_each ? extrapolated(scene, tracks, k) : std::vector<Motion>{};
+  if (tracks[k].is_good() && !is_challenged(scene, tracks[k], single)) return std::nullopt;
   const auto local = local_motion(place, good_around(scene, tracks, k, 8), scene.relaxed->positions, motions);
   if (!local || local->n_beads < 3) return std::nullopt;
-  const std::size_t n_single = guesses.size();
-  guesses.push_back(local->motion);
   const double search = std::clamp(4 * local->spread_px, 2 * scene.bead_sigma(), 5 * scene.bead_sigma());
-  for (const int b : scene.stressed.neighbours.within(place + local->motion.u, search, 4)) {
-    guesses.push_back(local->motion);
-    guesses.back().u = scene.stressed.positions[b] - place;
-  }
   Window window = scene.wide;
   window.sigma = std::max(2.2 * scene.bead_sigma(), 0.6 * scene.wide.sigma);
   window.is_thinned = false;
   std::optional<Registered> best;
-  for (std::size_t g = 0; g < guesses.size(); ++g) {
-    const Registered found = registered(scene.relaxed->image, scene.stressed.image.spline, place, guesses[g], window);
-    const Vec2 from = g < n_single ? guesses[g].u : local->motion.u;
-    if (!found.is_converged || norm(found.motion.u - from) > search) continue;
+  const auto look = [&](const Motion& guess, Vec2 around) {
+    const Registered found = registered(scene.relaxed->image, scene.stressed.image.spline, place, guess, window);
+    if (!found.is_converged || norm(found.motion.u - around) > search) return;
     if (found.similarity > std::max(least_similarity, best ? best->similarity : -1)) best = found;
+  };
+  look(local->motion, local->motion.u);
+  for (const int b : scene.stressed.neighbours.within(place + local->motion.u, search, 4)) {
+    Motion guess = local->motion;
+    guess.u = scene.stressed.positions[b] - place;
+    look(guess, local->motion.u);
+  }
+  std::vector<Vec2> known = {local->motion.u};  // no need to begin within two bead sigmas once more
+  for (const Motion& guess : single) {
+    const auto is_known = [&](Vec2 u) { return norm(u - guess.u) < 2 * scene.bead_sigma(); };
+    if (std::ranges::any_of(known, is_known)) continue;
+    look(guess, guess.u);
+    known.push_back(guess.u);
   }
   return best;
 }
@@ -184,7 +191,7 @@ bool is_better(const Track& track, const Registered& found) {
   return !track.is_good() || 1 - found.similarity < 0.5 * (1 - track.found.similarity);
 }
 
-void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Surroundings& surroundings,
+void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Led led, Surroundings& surroundings,
                        std::vector<Track>& tracks) {
   constexpr int kMaxRounds = 12;
   for (int round = 0; round < kMaxRounds; ++round) {
@@ -192,7 +199,7 @@ void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Su
     for_each_bead(scene, [&](int k) {
       if (!surroundings.is_changed[k]) return;
       // a narrow window may take a stranger for the bead: more is asked of it
-      found[k] = retried(scene, tracks, surroundings.motions, k, 0.5 * (1 + parameters.least_similarity));
+      found[k] = retried(scene, tracks, surroundings.motions, k, 0.5 * (1 + parameters.least_similarity), led);
     });
     int n_found = 0;
     for (std::size_t k = 0; k < tracks.size(); ++k) {
@@ -216,7 +223,7 @@ void require_common_beads(int n_by_grid, int n_in_the_end, int n_beads) {
                     std::to_string(n_found) + " of " + std::to_string(n_beads) + " of them");
 }
 
-Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters) {
+Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters, Led led) {
   std::vector<Track> tracks(scene.relaxed->beads.size());
   follow_grid(scene, grid, parameters.least_similarity, tracks);
   Surroundings surroundings;
@@ -225,7 +232,7 @@ Followed follow(const Scene& scene, const GridField& grid, const TrackParameters
   const int n_by_grid = n_good(tracks);
   // squares that hold sixteen of few good beads are too large to be gaps
   const bool has_gaps = n_by_grid < kUnwitnessed * scene.n_beads() || Gaps(scene, tracks).are_large();
-  follow_neighbours(scene, parameters, surroundings, tracks);
+  follow_neighbours(scene, parameters, led, surroundings, tracks);
   return {.tracks = std::move(tracks), .n_by_grid = n_by_grid, .period_px = grid.period, .has_gaps = has_gaps};
 }
 
@@ -351,10 +358,10 @@ std::optional<Pull> pull_of(const Scene& scene, const std::vector<Track>& tracks
   return pull;
 }
 
-/// Whether a = 0 is likelier than the least radius: twice the logarithm of the ratio is above 1.
+/// Whether a = 0 is likelier than the least radius by two standard deviations: twice the logarithm of the ratio.
 bool is_unlikely(const Pull& pull, double least_px) {
   const auto square = [&](double radius_px) { return std::pow((pull.radius_px - radius_px) / pull.sigma_px, 2); };
-  return square(least_px) - square(0) > 1;
+  return square(least_px) - square(0) > 4;
 }
 
 }  // namespace

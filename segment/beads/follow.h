@@ -42,9 +42,14 @@ struct Followed {
   bool has_gaps = false;  ///< parts of the picture have no beads that are found so
 };
 
+/// What leads from beads that are found to those around them. Where motions are far and steep what many do together
+/// may miss a bead, and false ones bear each other out: there each bead leads by itself, too, to beads found before as
+/// well, at the cost of a few registrations each.
+enum class Led { together, by_each };
+
 /// Find the beads with the wide window: from the grid's prediction, then, where that fails, from the motion of the
 /// beads already tracked around, again and again.
-Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters);
+Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters, Led led);
 
 /// Of unrelated pictures the wide window finds one bead in twenty "again", by chance, and all that comes after finds up
 /// to two in five; of related ones each finds most. Of beads that scatter by more than their width, but by less than

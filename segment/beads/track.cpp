@@ -114,15 +114,15 @@ GridField field_of(const Scene& scene, const std::vector<Track>& tracks) {
 /// the grid.
 Followed followed_from_grid(const Scene& scene, const TrackParameters& parameters, int window) {
   const Plane &from = scene.relaxed->image.plane, &to = scene.stressed.image.plane;
-  Followed best = follow(scene, coarse_field(from, to, window, scene.threads), parameters);
+  Followed best = follow(scene, coarse_field(from, to, window, scene.threads), parameters, Led::together);
   if (!best.has_gaps || best.period_px > 0) return best;  // of a pattern that repeats itself the least shift counts
-  Followed far = follow(scene, coarse_to_fine_field(from, to, window, scene.threads), parameters);
+  Followed far = follow(scene, coarse_to_fine_field(from, to, window, scene.threads), parameters, Led::by_each);
   if (far.n_by_grid <= best.n_by_grid) return best;
   best = std::move(far);
   const int n_by_grid = best.n_by_grid;
   constexpr int kRounds = 4;
   for (int round = 0; round < kRounds; ++round) {
-    Followed next = follow(scene, field_of(scene, best.tracks), parameters);
+    Followed next = follow(scene, field_of(scene, best.tracks), parameters, Led::by_each);
     if (next.n_by_grid <= best.n_by_grid) break;
     best = std::move(next);
   }

@@ -72,28 +72,5 @@ TEST(FalseBeads, a_group_whose_surroundings_do_not_stretch_towards_it_is_flagged
   }
 }
 
-TEST(FalseBeads, a_bead_that_moves_little_alone_is_flagged_where_the_field_is_curved) {
-  for (const std::uint64_t seed : {8, 9, 10}) {
-    const Vec2 alone{250, 220};  // on the flank of a wide peak, strained by a half
-    Field field = followed({{{200, 200}, {60, 0}, 60}}, seed, {alone});
-    field.tracks[0].found.motion.u += {0, 3};
-    EXPECT_EQ(n_flagged(field), 1) << seed;
-    EXPECT_EQ(field.tracks[0].flag, TrackFlag::neighbours_disagree) << seed;
-  }
-}
-
-TEST(FalseBeads, light_that_is_strained_otherwise_than_the_gel_is_flagged_and_a_bead_that_keeps_its_shape_is_not) {
-  for (const std::uint64_t seed : {11, 12, 13}) {
-    const Vec2 torn{280, 200}, stiff{120, 200};
-    Field field = followed({}, seed, {torn, stiff});
-    for (const int k : {0, 1})
-      field.tracks[k].found.motion.u += {1.3, 0};  // too little to tell from a small patch's pull
-    field.tracks[0].found.motion.ux_x = 0.5;
-    pooled(field.scene, 1e9, field.tracks);
-    EXPECT_EQ(field.tracks[0].flag, TrackFlag::neighbours_disagree) << seed;
-    EXPECT_EQ(field.tracks[1].flag, TrackFlag::none) << seed;
-  }
-}
-
 }  // namespace
 }  // namespace mbtfm::beads
