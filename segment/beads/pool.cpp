@@ -21,8 +21,7 @@ struct Prediction {
   double noise_share = 0;  ///< of its variance over a neighbour's
   double reach_px = 0;
   double gradient = 0;
-  Vec2 off;            ///< own minus predicted
-  double misfit = -1;  ///< mean square of a component of that; < 0: no prediction
+  double misfit = -1;  ///< mean square of a component of own minus predicted; < 0: no prediction
 };
 
 std::vector<Prediction> predictions(const Scene& scene, const std::vector<Track>& tracks, Order order) {
@@ -43,7 +42,6 @@ std::vector<Prediction> predictions(const Scene& scene, const std::vector<Track>
                  .noise_share = local->noise_share,
                  .reach_px = local->reach_px,
                  .gradient = std::hypot(g.ux_x, g.ux_y, std::hypot(g.uy_x, g.uy_y)),
-                 .off = misfit,
                  .misfit = 0.5 * dot(misfit, misfit)};
   });
   return result;
@@ -54,52 +52,24 @@ struct ErrorCheck {
   double scatter = 0;  ///< px, beyond them
 };
 
-/// Two beads next to each other.
-struct Pair {
-  int a = 0, b = 0;
-  double noise_share = 0;  ///< of the variance of the difference of their misfits over the sum of their own
-};
-
-/// Each bead of the calmest quarter with the nearest of those that predict it. Each is among those that predict the
-/// other, all others predict both: with Gaussian weights of sd r/2 at the reach r, a curved motion at distance d takes
-/// 1.6 (1 − d²/r²) exp(−2 d²/r²) of its noise share from a bead.
-std::vector<Pair> calm_pairs(const Scene& scene, const std::vector<Prediction>& predicted) {
+/// Compare the registrations' standard errors with what the neighbours see of them: the median of misfit² / variance
+/// must be that of a two-dimensional normal variable, ln 2 of a component's mean square. A registration may be wrong
+/// about its own variance by half of it, to either side; what is beyond that is scatter of single beads. Only the half
+/// of the beads counts around which the field changes least: elsewhere it is the field that predictions miss.
+ErrorCheck check_errors(const std::vector<Prediction>& predicted, const std::vector<Track>& tracks) {
   std::vector<double> gradients;
   for (const Prediction& p : predicted) {
     if (p.misfit >= 0) gradients.push_back(p.gradient);
   }
-  constexpr double kFewestPairs = 64;  // know the median of their squares to a fifth
-  const double quarter = std::max(0.25, kFewestPairs / std::max(kFewestPairs, 1.0 * gradients.size()));
-  const double calm = numerics::quantile(std::move(gradients), quarter);
-  std::vector<Pair> pairs;
-  for (std::size_t k = 0; k < predicted.size(); ++k) {
-    const Prediction& p = predicted[k];
-    if (p.misfit < 0 || p.gradient > calm || predicted[p.from.front()].misfit < 0) continue;
-    const Vec2 d = scene.position(p.from.front()) - scene.position(static_cast<int>(k));
-    const double relative = dot(d, d) / (p.reach_px * p.reach_px), near = std::exp(-2 * relative);
-    const double by_the_other = 1.6 * p.noise_share * (1 - relative) * near;
-    pairs.push_back({static_cast<int>(k), p.from.front(), std::pow(1 + by_the_other, 2) + p.noise_share * (1 - near)});
-  }
-  return pairs;
-}
-
-/// Compare the registrations' standard errors with what the beads show of them. What predictions miss of the field is
-/// alike for beads that lie together, their errors are not: so the misfits' differences between nearest neighbours
-/// count, where the field changes least. The median of difference² / variance must be that of a two-dimensional normal
-/// variable, ln 2 of a component's mean square. A registration may be wrong about its own variance by half of it, to
-/// either side; what is beyond that is scatter of single beads.
-ErrorCheck check_errors(const std::vector<Pair>& pairs, const std::vector<Prediction>& predicted,
-                        const std::vector<Track>& tracks) {
+  const double calm = numerics::quantile(std::move(gradients), 0.5);
   ErrorCheck result;
-  const auto own_variance = [&](int k, double scatter) {
-    return result.scale * std::pow(tracks[k].found.sigma_px, 2) + scatter * scatter;
-  };
   const auto median_ratio = [&](double scatter) {
     std::vector<double> ratios;
-    for (const Pair& pair : pairs) {
-      const Vec2 differ = predicted[pair.a].off - predicted[pair.b].off;
-      const double variance = pair.noise_share * (own_variance(pair.a, scatter) + own_variance(pair.b, scatter));
-      if (variance > 0) ratios.push_back(0.5 * dot(differ, differ) / variance);
+    for (std::size_t k = 0; k < tracks.size(); ++k) {
+      const double own = result.scale * tracks[k].found.sigma_px * tracks[k].found.sigma_px;
+      const double variance = (1 + predicted[k].noise_share) * (own + scatter * scatter);
+      if (predicted[k].misfit < 0 || predicted[k].gradient > calm || !(variance > 0)) continue;
+      ratios.push_back(predicted[k].misfit / variance);
     }
     return numerics::quantile(std::move(ratios), 0.5) / std::numbers::ln2;
   };
@@ -189,8 +159,7 @@ int flag_false(const Scene& scene, double threshold, const BothOrders& predicted
 
 Pooling pooled(const Scene& scene, double threshold, std::vector<Track>& tracks) {
   BothOrders predicted{{predictions(scene, tracks, Order::affine)}, {predictions(scene, tracks, Order::curved)}};
-  const std::vector<Prediction>& curved = predicted.curved.beads;
-  const ErrorCheck errors = check_errors(calm_pairs(scene, curved), curved, tracks);
+  const ErrorCheck errors = check_errors(predicted.curved.beads, tracks);
   const double loose = errors.scatter * errors.scatter;
   std::vector<double> own_variance;
   for (const Track& track : tracks) own_variance.push_back(errors.scale * std::pow(track.found.sigma_px, 2) + loose);
