@@ -133,44 +133,77 @@ void follow_grid(const Scene& scene, const GridField& grid, double least_similar
   });
 }
 
-/// A track of bead k from what its neighbours do: their affine motion itself, and the stressed image's beads near where
-/// it leads; the most similar counts.
+/// Where the nearest good beads lead bead k, each by its own motion and gradient.
+std::vector<Motion> extrapolated(const Scene& scene, const std::vector<Track>& tracks, int k) {
+  constexpr int kNearest = 4;
+  std::vector<Motion> guesses;
+  for (const int j : good_around(scene, tracks, k, kNearest)) {
+    guesses.push_back(tracks[j].found.motion);
+    guesses.back().u = tracks[j].found.motion.at(scene.position(k) - scene.position(j));
+  }
+  return guesses;
+}
+
+/// Whether one of the nearest beads leads elsewhere: to where another bead may lie.
+bool is_challenged(const Scene& scene, const Track& track, const std::vector<Motion>& extrapolated) {
+  return std::ranges::any_of(
+      extrapolated, [&](const Motion& guess) { return norm(guess.u - track.found.motion.u) > 2 * scene.bead_sigma(); });
+}
+
+/// A track of bead k from what its neighbours do: their affine motion itself, the stressed image's beads near where it
+/// leads, and where each of the nearest leads by itself (Pan, Appl. Opt. 48:1535, 2009); the most similar counts.
 std::optional<Registered> retried(const Scene& scene, const std::vector<Track>& tracks,
-                                  const std::vector<Motion>& motions, int k, double least_similarity) {
+                                  const std::vector<Motion>& motions, int k, double least_similarity, Led led) {
+  if (tracks[k].is_good() && led == Led::together) return std::nullopt;
   const Vec2 place = scene.position(k);
+  const std::vector<Motion> single = led == Led::by_each ? extrapolated(scene, tracks, k) : std::vector<Motion>{};
+  if (tracks[k].is_good() && !is_challenged(scene, tracks[k], single)) return std::nullopt;
   const auto local = local_motion(place, good_around(scene, tracks, k, 8), scene.relaxed->positions, motions);
   if (!local || local->n_beads < 3) return std::nullopt;
-  std::vector<Motion> guesses = {local->motion};
   const double search = std::clamp(4 * local->spread_px, 2 * scene.bead_sigma(), 5 * scene.bead_sigma());
-  for (const int b : scene.stressed.neighbours.within(place + local->motion.u, search, 4)) {
-    guesses.push_back(local->motion);
-    guesses.back().u = scene.stressed.positions[b] - place;
-  }
   Window window = scene.wide;
   window.sigma = std::max(2.2 * scene.bead_sigma(), 0.6 * scene.wide.sigma);
   window.is_thinned = false;
   std::optional<Registered> best;
-  for (const Motion& guess : guesses) {
+  const auto look = [&](const Motion& guess, Vec2 around) {
     const Registered found = registered(scene.relaxed->image, scene.stressed.image.spline, place, guess, window);
-    if (!found.is_converged || norm(found.motion.u - local->motion.u) > search) continue;
+    if (!found.is_converged || norm(found.motion.u - around) > search) return;
     if (found.similarity > std::max(least_similarity, best ? best->similarity : -1)) best = found;
+  };
+  look(local->motion, local->motion.u);
+  for (const int b : scene.stressed.neighbours.within(place + local->motion.u, search, 4)) {
+    Motion guess = local->motion;
+    guess.u = scene.stressed.positions[b] - place;
+    look(guess, local->motion.u);
+  }
+  std::vector<Vec2> known = {local->motion.u};  // no need to begin within two bead sigmas once more
+  for (const Motion& guess : single) {
+    const auto is_known = [&](Vec2 u) { return norm(u - guess.u) < 2 * scene.bead_sigma(); };
+    if (std::ranges::any_of(known, is_known)) continue;
+    look(guess, guess.u);
+    known.push_back(guess.u);
   }
   return best;
 }
 
-void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Surroundings& surroundings,
+/// A track that was found is given up for one of half its mismatch.
+bool is_better(const Track& track, const Registered& found) {
+  return !track.is_good() || 1 - found.similarity < 0.5 * (1 - track.found.similarity);
+}
+
+void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Led led, Surroundings& surroundings,
                        std::vector<Track>& tracks) {
   constexpr int kMaxRounds = 12;
   for (int round = 0; round < kMaxRounds; ++round) {
     std::vector<std::optional<Registered>> found(tracks.size());
     for_each_bead(scene, [&](int k) {
-      if (tracks[k].is_good() || !surroundings.is_changed[k]) return;
+      if (!surroundings.is_changed[k]) return;
       // a narrow window may take a stranger for the bead: more is asked of it
-      found[k] = retried(scene, tracks, surroundings.motions, k, 0.5 * (1 + parameters.least_similarity));
+      found[k] = retried(scene, tracks, surroundings.motions, k, 0.5 * (1 + parameters.least_similarity), led);
     });
     int n_found = 0;
     for (std::size_t k = 0; k < tracks.size(); ++k) {
-      if (!found[k]) continue;
+      if (!found[k] || !is_better(tracks[k], *found[k])) continue;
       tracks[k] = {.found = *found[k], .flag = TrackFlag::none};
       ++n_found;
     }
@@ -190,7 +223,7 @@ void require_common_beads(int n_by_grid, int n_in_the_end, int n_beads) {
                     std::to_string(n_found) + " of " + std::to_string(n_beads) + " of them");
 }
 
-Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters) {
+Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters, Led led) {
   std::vector<Track> tracks(scene.relaxed->beads.size());
   follow_grid(scene, grid, parameters.least_similarity, tracks);
   Surroundings surroundings;
@@ -199,7 +232,7 @@ Followed follow(const Scene& scene, const GridField& grid, const TrackParameters
   const int n_by_grid = n_good(tracks);
   // squares that hold sixteen of few good beads are too large to be gaps
   const bool has_gaps = n_by_grid < kUnwitnessed * scene.n_beads() || Gaps(scene, tracks).are_large();
-  follow_neighbours(scene, parameters, surroundings, tracks);
+  follow_neighbours(scene, parameters, led, surroundings, tracks);
   return {.tracks = std::move(tracks), .n_by_grid = n_by_grid, .period_px = grid.period, .has_gaps = has_gaps};
 }
 
@@ -267,92 +300,90 @@ std::vector<int> groups_of(const Scene& scene, const std::vector<Track>& tracks)
 
 struct Pull {
   double radius_px = 0, sigma_px = 0;
-  double step_px = 0;  ///< length of U
+  double step_px = 0;    ///< length of U
+  double spread_px = 0;  ///< of the others about the fit
 };
 
-using Vec7 = cv::Vec<double, 7>;
-using Mat7 = cv::Matx<double, 7, 7>;
-
-/// Fit of c, G and a, those further off and outliers weighing less, as in local_motion().
+/// Fit of c, G, H and a, those further off and outliers weighing less, as in local_motion().
 std::optional<Pull> pull_of(const Scene& scene, const std::vector<Track>& tracks, int bead,
                             const std::vector<int>& around, double least_spread_px) {
-  constexpr std::size_t kFewest = 8;  // seven numbers from sixteen
+  constexpr std::size_t kFewest = 12;  // thirteen numbers from twenty-four
+  constexpr int kRows = 6, kAll = 2 * kRows + 1;
+  using Row = cv::Vec<double, kAll>;
   if (around.size() < kFewest) return std::nullopt;
   const Vec2 place = scene.position(bead), u = tracks[bead].found.motion.u;
-  const auto start = local_motion(place, around, scene.relaxed->positions, motions_of(tracks));
+  const auto start = local_motion(place, around, scene.relaxed->positions, motions_of(tracks), Order::curved);
   Vec2 rest = start->motion.u;
   const double reach = start->reach_px;
   std::vector<double> trust(around.size(), 1);
   Pull pull;
   constexpr int kRounds = 4;
   for (int round = 0; round < kRounds; ++round) {
-    Mat7 normal, squared;
-    Vec7 right;
-    std::vector<std::pair<Vec7, Vec7>> rows;
+    cv::Matx<double, kAll, kAll> normal, squared;
+    Row right;
+    std::vector<std::pair<Row, Row>> rows(around.size());
     for (std::size_t k = 0; k < around.size(); ++k) {
       const Vec2 d = scene.position(around[k]) - place, moved = tracks[around[k]].found.motion.u;
       const double softened = std::hypot(norm(d), 2 * scene.bead_sigma());  // within the patch all move alike
       const Vec2 e = (1 / softened) * d, own = u - rest, pulled = (1 / softened) * (own + dot(own, e) * e);
-      rows.push_back({{1, d.x, d.y, 0, 0, 0, pulled.x}, {0, 0, 0, 1, d.x, d.y, pulled.y}});
+      const Vec2 r = (1 / reach) * d;
+      const double smooth[kRows] = {1, r.x, r.y, r.x * r.x, r.x * r.y, r.y * r.y};
+      for (int a = 0; a < kRows; ++a) rows[k].first[a] = rows[k].second[kRows + a] = smooth[a];
+      rows[k].first[2 * kRows] = pulled.x, rows[k].second[2 * kRows] = pulled.y;
       const double weight = trust[k] * std::exp(-2 * dot(d, d) / (reach * reach));
-      for (const auto& [row, value] : {std::pair(rows.back().first, moved.x), std::pair(rows.back().second, moved.y)}) {
+      for (const auto& [row, value] : {std::pair(rows[k].first, moved.x), std::pair(rows[k].second, moved.y)}) {
         normal += weight * row * row.t();
         squared += weight * weight * row * row.t();
         right += weight * value * row;
       }
     }
     bool is_regular = false;
-    const Mat7 inverse = normal.inv(cv::DECOMP_CHOLESKY, &is_regular);
+    const auto inverse = normal.inv(cv::DECOMP_CHOLESKY, &is_regular);
     if (!is_regular) return std::nullopt;
-    const Vec7 fitted = inverse * right;
+    const Row fitted = inverse * right;
     std::vector<double> misfits;
     for (std::size_t k = 0; k < around.size(); ++k) {
       const Vec2 moved = tracks[around[k]].found.motion.u;
       misfits.push_back(norm(moved - Vec2{rows[k].first.dot(fitted), rows[k].second.dot(fitted)}));
     }
     const double n = static_cast<double>(around.size());
-    const double spread = std::max(numerics::quantile(misfits, 0.5) / 1.18 * std::sqrt(n / (n - 3.5)), least_spread_px);
+    const double free = n - 0.5 * kAll;
+    const double spread = std::max(numerics::quantile(misfits, 0.5) / 1.18 * std::sqrt(n / free), least_spread_px);
     for (std::size_t k = 0; k < around.size(); ++k)
       trust[k] = std::pow(std::min(1.0, 2.5 * spread / std::max(misfits[k], 1e-9)), 2);
-    rest = {fitted[0], fitted[3]};
-    pull = {fitted[6], spread * std::sqrt((inverse * squared * inverse)(6, 6)), norm(u - rest)};
+    rest = {fitted[0], fitted[kRows]};
+    const double variance = (inverse * squared * inverse)(2 * kRows, 2 * kRows);
+    pull = {fitted[2 * kRows], spread * std::sqrt(variance), norm(u - rest), spread};
   }
   return pull;
 }
 
-/// Whether a = 0 is likelier than the least radius: twice the logarithm of the ratio is above 1.
+/// Whether a = 0 is likelier than the least radius by two standard deviations: twice the logarithm of the ratio.
 bool is_unlikely(const Pull& pull, double least_px) {
   const auto square = [&](double radius_px) { return std::pow((pull.radius_px - radius_px) / pull.sigma_px, 2); };
-  return square(least_px) - square(0) > 1;
+  return square(least_px) - square(0) > 4;
 }
 
 }  // namespace
 
-int flag_unpulled(const Scene& scene, double threshold, std::vector<Track>& tracks) {
+int flag_unpulled(const Scene& scene, double threshold, const std::vector<char>& is_contradicted, double scatter_px,
+                  std::vector<Track>& tracks) {
   const std::vector<int> group = groups_of(scene, tracks);
   std::vector<int> size(tracks.size(), 0);
   for (std::size_t k = 0; k < tracks.size(); ++k) size[group[k]] += tracks[k].is_good();
   const int largest = static_cast<int>(std::ranges::max_element(size) - size.begin());
-  const std::vector<std::optional<LocalMotion>> around = motions_around(scene, tracks);
-  const double typical = typical_spread(around);
-  const auto limit_px = [&](int k) {
-    constexpr double kResolved = 1.5;  // bead sigmas: nearer than that lies a bead's own light, and no other's
-    const double as_outliers = threshold * std::hypot(typical, tracks[k].found.sigma_px) + 0.3;  // flag_outliers()
-    return std::max(kResolved * scene.bead_sigma(), as_outliers);
-  };
-  const auto is_asked = [&](int k) {
-    if (group[k] != group[largest] || !around[k]) return true;
-    return norm(tracks[k].found.motion.u - around[k]->motion.u) > limit_px(k);
-  };
   std::vector<char> is_alone(tracks.size(), 0);
   for_each_bead(scene, [&](int k) {
-    if (!tracks[k].is_good() || !is_asked(k)) return;
-    constexpr int kMost = 20;
+    if (!tracks[k].is_good() || !(is_contradicted[k] || group[k] != group[largest])) return;
+    constexpr int kMost = 24;
     std::vector<int> witnesses = good_around(scene, tracks, k, 2 * kMost);
     std::erase_if(witnesses, [&](int j) { return group[j] != group[largest]; });
     if (witnesses.size() > kMost) witnesses.resize(kMost);
-    const std::optional<Pull> pull = pull_of(scene, tracks, k, witnesses, typical);
-    is_alone[k] = pull && pull->step_px > limit_px(k) && is_unlikely(*pull, scene.bead_sigma());
+    const double sigma_px = std::hypot(scatter_px, tracks[k].found.sigma_px);
+    const std::optional<Pull> pull = pull_of(scene, tracks, k, witnesses, sigma_px);
+    if (!pull) return;
+    const double limit_px = threshold * std::hypot(pull->spread_px, sigma_px);
+    is_alone[k] = pull->step_px > limit_px && is_unlikely(*pull, scene.bead_sigma());
   });
   int n_flagged = 0;
   for (std::size_t k = 0; k < tracks.size(); ++k) {

@@ -42,9 +42,14 @@ struct Followed {
   bool has_gaps = false;  ///< parts of the picture have no beads that are found so
 };
 
+/// What leads from beads that are found to those around them. Where motions are far and steep what many do together
+/// may miss a bead, and false ones bear each other out: there each bead leads by itself, too, to beads found before as
+/// well, at the cost of a few registrations each.
+enum class Led { together, by_each };
+
 /// Find the beads with the wide window: from the grid's prediction, then, where that fails, from the motion of the
 /// beads already tracked around, again and again.
-Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters);
+Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters, Led led);
 
 /// Of unrelated pictures the wide window finds one bead in twenty "again", by chance, and all that comes after finds up
 /// to two in five; of related ones each finds most. Of beads that scatter by more than their width, but by less than
@@ -80,14 +85,17 @@ int flag_outliers_beside(const std::vector<Vec2>& expected, const Scene& scene, 
 /// What pulls a bead pulls those around it, too. About a patch of force of radius a that moves its middle by U beside
 /// what the surroundings do, they move as the surface of an incompressible half-space does (Cerruti),
 ///
-///   u(d) = c + G d + (a/|d|) (U + (U·e) e),   U = u_bead − c,   e = d/|d|,
+///   u(d) = c + G d + d H d + (a/|d|) (U + (U·e) e),   U = u_bead − c,   e = d/|d|,
 ///
-/// of which c, G and a are fitted to the good beads around, softened within two bead sigmas. A right bead at an
+/// of which c, G, H and a are fitted to the good beads around, softened within two bead sigmas. A right bead at an
 /// adhesion has an a of some pixels; a false partner has a = 0, or less if it stays behind where the others are pulled.
-/// Asked are beads that contradict their neighbours as outliers do, and beads of groups that no way of small steps
-/// connects with most of the picture: those agree with one another, and so only the beads beyond the group are
-/// witnesses. A bead is flagged if a is below the radius of what a lens shows, a bead's own, by two standard errors.
+/// Asked are beads that contradict their neighbours, and beads of groups that no way of small steps connects with most
+/// of the picture: those agree with one another, and so only the beads beyond the group are witnesses. A bead is
+/// flagged if U is above `threshold` standard deviations and a = 0 is likelier than the radius of what a lens shows, a
+/// bead's.
+/// @param scatter_px  of single beads beyond their own errors
 /// @return how many
-int flag_unpulled(const Scene& scene, double threshold, std::vector<Track>& tracks);
+int flag_unpulled(const Scene& scene, double threshold, const std::vector<char>& is_contradicted, double scatter_px,
+                  std::vector<Track>& tracks);
 
 }  // namespace mbtfm::beads

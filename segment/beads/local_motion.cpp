@@ -17,46 +17,82 @@ struct StillBead {
 
 double length(Vec2 v) { return std::sqrt(dot(v, v)); }  // std::hypot guards against overflow, at five times the cost
 
+/// 1, x, y, and in a curved motion x², xy, y².
+template <int N>
+cv::Vec<double, N> row_at(Vec2 d) {
+  if constexpr (N == 1) return {1};
+  if constexpr (N == 3) return {1, d.x, d.y};
+  if constexpr (N == 6) return {1, d.x, d.y, d.x * d.x, d.x * d.y, d.y * d.y};
+}
+
+/// Coefficients of the rows, and what they are at the middle of the variance of one bead.
+template <int N>
 struct Fitted {
-  Motion motion;
+  cv::Vec<double, N> x, y;
   double noise_share = 1;
+  Vec2 at(Vec2 d) const { return {row_at<N>(d).dot(x), row_at<N>(d).dot(y)}; }
+  Motion motion() const {
+    if constexpr (N == 1) return {.u = {x[0], y[0]}};
+    if constexpr (N > 1) return {{x[0], y[0]}, x[1], x[2], y[1], y[2]};
+  }
 };
 
-/// Weighted least squares of u = u₀ + G d, the gradient held by a small ridge where beads lie on a line.
-Fitted weighted_fit(const std::vector<StillBead>& witnesses, double reach) {
-  cv::Matx33d normal;
-  cv::Vec3d x, y;
+/// Weighted least squares, the derivatives held by a small ridge where beads lie on a line.
+template <int N>
+Fitted<N> weighted_fit(const std::vector<StillBead>& witnesses, double reach) {
+  cv::Matx<double, N, N> normal;
+  cv::Vec<double, N> x, y;
   for (const StillBead& w : witnesses) {
-    const cv::Vec3d row(1, w.offset.x, w.offset.y);
-    for (int a = 0; a < 3; ++a) {
+    const cv::Vec<double, N> row = row_at<N>(w.offset);
+    for (int a = 0; a < N; ++a) {
       const double weighted = w.weight * row[a];
       for (int b = 0; b <= a; ++b) normal(a, b) += weighted * row[b];
       x[a] += weighted * w.u.x, y[a] += weighted * w.u.y;
     }
   }
   const double total = normal(0, 0);
-  double squares = 0;
-  if (witnesses.size() < 6) {
-    for (const StillBead& w : witnesses) squares += w.weight * w.weight;
-    return {{{x[0] / total, y[0] / total}, 0, 0, 0, 0}, squares / (total * total)};
-  }
   constexpr double kRidge = 0.01;  // of the weight at full reach
-  normal(1, 1) += kRidge * total * reach * reach;
-  normal(2, 2) += kRidge * total * reach * reach;
-  for (const auto& [a, b] : {std::pair(0, 1), std::pair(0, 2), std::pair(1, 2)}) normal(a, b) = normal(b, a);
-  const cv::Matx33d inverse = normal.inv(cv::DECOMP_CHOLESKY);
-  const cv::Vec3d a = inverse * x, b = inverse * y;
-  for (const StillBead& w : witnesses) {
-    const double share = w.weight * (inverse(0, 0) + inverse(0, 1) * w.offset.x + inverse(0, 2) * w.offset.y);
-    squares += share * share;
+  for (int a = 0; a < N; ++a) {
+    if (a > 0) normal(a, a) += kRidge * total * std::pow(reach, a < 3 ? 2 : 4);
+    for (int b = 0; b < a; ++b) normal(b, a) = normal(a, b);
   }
-  return {{{a[0], b[0]}, a[1], a[2], b[1], b[2]}, squares};
+  const cv::Matx<double, N, N> inverse = normal.inv(cv::DECOMP_CHOLESKY);
+  Fitted<N> fitted{inverse * x, inverse * y, 0};
+  for (const StillBead& w : witnesses) {
+    const cv::Vec<double, N> row = row_at<N>(w.offset);
+    double share = 0;
+    for (int a = 0; a < N; ++a) share += inverse(0, a) * row[a];
+    fitted.noise_share += std::pow(w.weight * share, 2);
+  }
+  return fitted;
+}
+
+/// Three rounds, outliers weighing less from the second on.
+template <int N>
+void fit(std::vector<StillBead>& witnesses, LocalMotion& result) {
+  const double n = static_cast<double>(witnesses.size());
+  std::vector<double> misfits(witnesses.size());
+  for (int round = 0; round < 3; ++round) {
+    const Fitted<N> fitted = weighted_fit<N>(witnesses, result.reach_px);
+    result.motion = fitted.motion();
+    result.noise_share = fitted.noise_share;
+    for (std::size_t k = 0; k < misfits.size(); ++k) {
+      misfits[k] = length(witnesses[k].u - fitted.at(witnesses[k].offset));
+    }
+    // the median of a two-dimensional normal's length is 1.18 sd; a fit of three numbers uses up half of six beads
+    result.spread_px = numerics::quantile(misfits, 0.5) / 1.18 * std::sqrt(n / std::max(1.0, n - std::max(3, N)));
+    const double limit = 2.5 * std::max(result.spread_px, 0.02);
+    for (std::size_t k = 0; k < misfits.size(); ++k) {
+      const double most = std::min(1.0, limit / std::max(misfits[k], 1e-9));
+      witnesses[k].weight = witnesses[k].near * most * most;
+    }
+  }
 }
 
 }  // namespace
 
 std::optional<LocalMotion> local_motion(Vec2 place, const std::vector<int>& others, const std::vector<Vec2>& positions,
-                                        const std::vector<Motion>& motions) {
+                                        const std::vector<Motion>& motions, Order order) {
   if (others.empty()) return std::nullopt;
   LocalMotion result;
   result.n_beads = static_cast<int>(others.size());
@@ -70,22 +106,12 @@ std::optional<LocalMotion> local_motion(Vec2 place, const std::vector<int>& othe
   for (StillBead& w : witnesses) {
     w.near = w.weight = std::exp(-2 * per_reach * per_reach * dot(w.offset, w.offset));
   }
-  const double n = static_cast<double>(witnesses.size());
-  std::vector<double> misfits(witnesses.size());
-  for (int round = 0; round < 3; ++round) {
-    const Fitted fitted = weighted_fit(witnesses, result.reach_px);
-    result.motion = fitted.motion;
-    result.noise_share = fitted.noise_share;
-    for (std::size_t k = 0; k < misfits.size(); ++k) {
-      misfits[k] = length(witnesses[k].u - result.motion.at(witnesses[k].offset));
-    }
-    // the median of a two-dimensional normal's length is 1.18 sd; a fit of three numbers uses up half of six beads
-    result.spread_px = numerics::quantile(misfits, 0.5) / 1.18 * std::sqrt(n / std::max(1.0, n - 3));
-    const double limit = 2.5 * std::max(result.spread_px, 0.02);
-    for (std::size_t k = 0; k < misfits.size(); ++k) {
-      const double most = std::min(1.0, limit / std::max(misfits[k], 1e-9));
-      witnesses[k].weight = witnesses[k].near * most * most;
-    }
+  if (others.size() < 6) {
+    fit<1>(witnesses, result);
+  } else if (order == Order::affine || others.size() < 12) {
+    fit<3>(witnesses, result);
+  } else {
+    fit<6>(witnesses, result);
   }
   return result;
 }

@@ -15,9 +15,13 @@ struct LocalMotion {
   int n_beads = 0;
 };
 
-/// Affine motion through the `others` around `place`, nearer ones weighing more, outliers (over 2.5 spreads) less;
-/// their mean where there are fewer than six. Nothing where there is none.
+/// What is fitted: an affine motion, or one with second derivatives, too, where those that a field has exceed its
+/// noise.
+enum class Order { affine, curved };
+
+/// Motion through the `others` around `place`, nearer ones weighing more, outliers (over 2.5 spreads) less;
+/// their mean where there are fewer than six, an affine one where fewer than twelve. Nothing where there is none.
 std::optional<LocalMotion> local_motion(Vec2 place, const std::vector<int>& others, const std::vector<Vec2>& positions,
-                                        const std::vector<Motion>& motions);
+                                        const std::vector<Motion>& motions, Order order = Order::affine);
 
 }  // namespace mbtfm::beads

@@ -79,11 +79,15 @@ struct Pooling {
 ///   u = a u_own + (1 − a) u_predicted,  1/a = 1 + s²/(T² + L²),   sigma² = a² (s² + L²) + (1 − a)² T²
 ///
 /// L is how far single beads scatter about the field: the weight is that of the bead's own place, which is the field's
-/// plus such a step, sigma the standard error of the field. The prediction is an affine motion through the beads
-/// around; T² is how far such predictions miss there, beyond the measurements' own errors, from the neighbours'
-/// misfits: large where the field is steep, where a bead is left to itself, small where noise is all there is. Nothing
-/// is pooled beyond a standard error of 0.02 px, which is small against what a field is used for, so that beads keep
-/// errors of their own.
-Pooling pooled(const Scene& scene, const std::vector<Track>& tracks);
+/// plus such a step, sigma the standard error of the field. The prediction is an affine or a curved motion through the
+/// beads around, the one that misses less; T² is how far such predictions miss there, beyond the measurements' own
+/// errors, from the neighbours' misfits: large where the field is steep, where a bead is left to itself, small where
+/// noise is all there is. Nothing is pooled beyond a standard error of 0.02 px, which is small against what a field is
+/// used for, so that beads keep errors of their own.
+///
+/// Beads further off than four standard deviations, T² by the median of the neighbours' misfits, are flagged
+/// "neighbours disagree" if their light is strained neither as the gel is nor not at all, or as flag_unpulled() does.
+/// @param threshold  of flag_unpulled()
+Pooling pooled(const Scene& scene, double threshold, std::vector<Track>& tracks);
 
 }  // namespace mbtfm::beads

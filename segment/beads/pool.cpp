@@ -3,40 +3,42 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <opencv2/core.hpp>
 
 #include "pipeline/numerics/order_statistics.h"
+#include "segment/beads/follow.h"
 #include "segment/beads/local_motion.h"
 
 namespace mbtfm::beads {
 namespace {
 
-constexpr int kNeighbours = 20;
 constexpr std::size_t kFewest = 8;
 
 /// What the neighbours of a bead say of it.
 struct Prediction {
   std::vector<int> from;
-  Vec2 u;
+  Motion motion;
   double noise_share = 0;  ///< of its variance over a neighbour's
   double reach_px = 0;
   double gradient = 0;
   double misfit = -1;  ///< mean square of a component of own minus predicted; < 0: no prediction
 };
 
-std::vector<Prediction> predictions(const Scene& scene, const std::vector<Track>& tracks) {
+std::vector<Prediction> predictions(const Scene& scene, const std::vector<Track>& tracks, Order order) {
   const std::vector<Motion> motions = motions_of(tracks);
   std::vector<Prediction> result(tracks.size());
+  const int n_neighbours = order == Order::affine ? 20 : 24;
   // nearer ones share the bead's own pixels and errors
   const double gap = 4 * scene.bead_sigma();
   for_each_bead(scene, [&](int k) {
     if (!tracks[k].is_good()) return;
-    std::vector<int> from = good_around(scene, tracks, k, kNeighbours, gap);
+    std::vector<int> from = good_around(scene, tracks, k, n_neighbours, gap);
     if (from.size() < kFewest) return;
-    const auto local = local_motion(scene.position(k), from, scene.relaxed->positions, motions);
+    const auto local = local_motion(scene.position(k), from, scene.relaxed->positions, motions, order);
     const Motion& g = local->motion;
     const Vec2 misfit = motions[k].u - g.u;
     result[k] = {.from = std::move(from),
-                 .u = g.u,
+                 .motion = g,
                  .noise_share = local->noise_share,
                  .reach_px = local->reach_px,
                  .gradient = std::hypot(g.ux_x, g.ux_y, std::hypot(g.uy_x, g.uy_y)),
@@ -53,7 +55,7 @@ struct ErrorCheck {
 /// Compare the registrations' standard errors with what the neighbours see of them: the median of misfit² / variance
 /// must be that of a two-dimensional normal variable, ln 2 of a component's mean square. A registration may be wrong
 /// about its own variance by half of it, to either side; what is beyond that is scatter of single beads. Only the half
-/// of the beads counts around which the field changes least: elsewhere it is the field that affine predictions miss.
+/// of the beads counts around which the field changes least: elsewhere it is the field that predictions miss.
 ErrorCheck check_errors(const std::vector<Prediction>& predicted, const std::vector<Track>& tracks) {
   std::vector<double> gradients;
   for (const Prediction& p : predicted) {
@@ -82,44 +84,115 @@ ErrorCheck check_errors(const std::vector<Prediction>& predicted, const std::vec
   return result;
 }
 
+/// Predictions of one order, and how far they miss.
+struct Predicted {
+  std::vector<Prediction> beads;
+  std::vector<double> missed = {};   ///< T² by bead, px²; < 0: not known
+  std::vector<double> usually = {};  ///< by the median of the beads around, which a false one among them does not move
+};
+
+/// How far predictions around a bead miss, beyond the errors of what they are compared with.
+void find_missed(const Scene& scene, const std::vector<double>& own_variance, Predicted& predicted) {
+  const std::vector<Prediction>& beads = predicted.beads;
+  predicted.missed.assign(beads.size(), -1);
+  predicted.usually.assign(beads.size(), -1);
+  for_each_bead(scene, [&](int k) {
+    if (beads[k].misfit < 0) return;
+    std::vector<double> beyond;
+    beyond.reserve(beads[k].from.size());
+    double sum = 0, variance = 0;
+    for (const int j : beads[k].from) {
+      if (beads[j].misfit < 0) continue;
+      const double own = (1 + beads[j].noise_share) * own_variance[j];
+      beyond.push_back(beads[j].misfit / std::numbers::ln2 - own);
+      sum += beads[j].misfit - own;
+      variance += own_variance[j];
+    }
+    if (beyond.size() < kFewest) return;
+    const double n = static_cast<double>(beyond.size()), noise = beads[k].noise_share * variance / n;
+    predicted.missed[k] = noise + std::max(0.0, sum / n);
+    predicted.usually[k] = noise + std::max(0.0, numerics::quantile(std::move(beyond), 0.5));
+  });
+}
+
+struct BothOrders {
+  Predicted affine, curved;
+  /// The affine one, of nearer beads, unless the curved one misses by half as much: T² of twenty is known to a third.
+  const Predicted& of(int k) const {
+    const double a = affine.missed[k], b = curved.missed[k];
+    return a >= 0 && (b < 0 || a <= 2 * b) ? affine : curved;
+  }
+  void find_missed(const Scene& scene, const std::vector<double>& own_variance) {
+    beads::find_missed(scene, own_variance, affine);
+    beads::find_missed(scene, own_variance, curved);
+  }
+};
+
+/// A lone bead keeps its shape, crowded ones are strained as the gel is. Whether the gel is strained, and the light did
+/// neither, both by two standard deviations of what the registration expects: then the gel drew two beads apart that
+/// one of the images shows as one.
+bool is_torn(const Scene& scene, const Motion& own, const Motion& gel) {
+  const cv::Vec4d g(own.ux_x, own.ux_y, own.uy_x, own.uy_y), strain(gel.ux_x, gel.ux_y, gel.uy_x, gel.uy_y);
+  const double share = std::clamp(g.dot(strain) / std::max(strain.dot(strain), 1e-12), 0.0, 1.0);
+  return std::min(cv::norm(strain), cv::norm(g - share * strain)) > 2 * scene.narrow.gradient_sd;
+}
+
+constexpr double kContradicted = 8;  // of misfit² over variance, of a component: four standard deviations
+
+/// Beads that their neighbours contradict know better, unless they are torn or nothing pulls them. How many are not.
+int flag_false(const Scene& scene, double threshold, const BothOrders& predicted,
+               const std::vector<double>& own_variance, double scatter_px, std::vector<Track>& tracks) {
+  std::vector<char> is_contradicted(tracks.size(), 0);
+  int n_torn = 0;
+  for (int k = 0; k < scene.n_beads(); ++k) {
+    const Predicted& p = predicted.of(k);
+    if (p.missed[k] < 0 || p.beads[k].misfit <= kContradicted * (own_variance[k] + p.usually[k])) continue;
+    is_contradicted[k] = 1;
+    if (!is_torn(scene, tracks[k].found.motion, p.beads[k].motion)) continue;
+    tracks[k].flag = TrackFlag::neighbours_disagree;
+    ++n_torn;
+  }
+  return n_torn + flag_unpulled(scene, threshold, is_contradicted, scatter_px, tracks);
+}
+
 }  // namespace
 
-Pooling pooled(const Scene& scene, const std::vector<Track>& tracks) {
-  const std::vector<Prediction> predicted = predictions(scene, tracks);
+Pooling pooled(const Scene& scene, double threshold, std::vector<Track>& tracks) {
+  BothOrders predicted{{predictions(scene, tracks, Order::affine)}, {predictions(scene, tracks, Order::curved)}};
+  const ErrorCheck errors = check_errors(predicted.curved.beads, tracks);
+  const double loose = errors.scatter * errors.scatter;
+  std::vector<double> own_variance;
+  for (const Track& track : tracks) own_variance.push_back(errors.scale * std::pow(track.found.sigma_px, 2) + loose);
+  predicted.find_missed(scene, own_variance);
+  if (flag_false(scene, threshold, predicted, own_variance, errors.scatter, tracks) > 0) {
+    for (std::size_t k = 0; k < tracks.size(); ++k) {
+      if (!tracks[k].is_good()) predicted.affine.beads[k].misfit = predicted.curved.beads[k].misfit = -1;
+    }
+    predicted.find_missed(scene, own_variance);
+  }
   Pooling result;
-  const ErrorCheck errors = check_errors(predicted, tracks);
   result.scatter_px = errors.scatter;
   result.beads.resize(tracks.size());
-  const double loose = errors.scatter * errors.scatter;
-  const auto own_variance = [&](std::size_t k) {
-    return errors.scale * tracks[k].found.sigma_px * tracks[k].found.sigma_px + loose;
-  };
   for_each_bead(scene, [&](int k) {
-    const Prediction& here = predicted[k];
-    result.beads[k] = {tracks[k].found.motion.u, std::sqrt(own_variance(k))};
-    if (here.misfit < 0 || !(own_variance(k) > 0)) return;
-    double beyond = 0, variance = 0;
-    int n = 0;
-    for (const int j : here.from) {
-      if (predicted[j].misfit < 0) continue;
-      beyond += predicted[j].misfit - (1 + predicted[j].noise_share) * own_variance(j);
-      variance += own_variance(j);
-      ++n;
+    result.beads[k] = {tracks[k].found.motion.u, std::sqrt(own_variance[k])};
+    const Prediction& here = predicted.of(k).beads[k];
+    const double missed = predicted.of(k).missed[k], missed_by_affine = predicted.affine.missed[k];
+    if (missed < 0 || !(own_variance[k] > 0)) return;
+    double own = own_variance[k] - loose;
+    if (missed_by_affine >= 0) {
+      // What an affine motion misses grows with the square of the distance: the share of it that the window sees
+      const double within = 2 * scene.narrow.sigma / predicted.affine.beads[k].reach_px;  // weights fall to 1/e² there
+      own += std::pow(within, 4) * missed_by_affine;
     }
-    if (n < static_cast<int>(kFewest)) return;
-    const double missed = here.noise_share * variance / n + std::max(0.0, beyond / n);
-    // What an affine motion misses grows with the square of the distance: the share of it that the window sees
-    const double within = 2 * scene.narrow.sigma / here.reach_px;  // weights fall to 1/e² at the reach
-    const double own = own_variance(k) - loose + std::pow(within, 4) * missed;
     result.beads[k].sigma_px = std::sqrt(own + loose);
-    // Beyond four standard deviations the bead knows better. Three would leave one in ninety for noise alone to its own
-    // error, and a third of all the error is theirs.
-    if (!(own > 0) || here.misfit > 8 * (own + loose + missed)) return;
+    // Three standard deviations would leave one in ninety for noise alone to its own error, and a third of all the
+    // error is theirs.
+    if (!(own > 0) || here.misfit > kContradicted * (own + loose + missed)) return;
     constexpr double kFineEnough = 0.02;  // px
     const double weight = std::min(1 / (missed + loose), std::max(0.0, 1 / (kFineEnough * kFineEnough) - 1 / own));
     const double share = 1 / (1 + own * weight);  // of the bead's own measurement
     const double variance_of_mean = share * share * (own + loose) + (1 - share) * (1 - share) * missed;
-    result.beads[k] = {share * tracks[k].found.motion.u + (1 - share) * here.u, std::sqrt(variance_of_mean)};
+    result.beads[k] = {share * tracks[k].found.motion.u + (1 - share) * here.motion.u, std::sqrt(variance_of_mean)};
   });
   return result;
 }

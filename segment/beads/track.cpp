@@ -114,15 +114,15 @@ GridField field_of(const Scene& scene, const std::vector<Track>& tracks) {
 /// the grid.
 Followed followed_from_grid(const Scene& scene, const TrackParameters& parameters, int window) {
   const Plane &from = scene.relaxed->image.plane, &to = scene.stressed.image.plane;
-  Followed best = follow(scene, coarse_field(from, to, window, scene.threads), parameters);
+  Followed best = follow(scene, coarse_field(from, to, window, scene.threads), parameters, Led::together);
   if (!best.has_gaps || best.period_px > 0) return best;  // of a pattern that repeats itself the least shift counts
-  Followed far = follow(scene, coarse_to_fine_field(from, to, window, scene.threads), parameters);
+  Followed far = follow(scene, coarse_to_fine_field(from, to, window, scene.threads), parameters, Led::by_each);
   if (far.n_by_grid <= best.n_by_grid) return best;
   best = std::move(far);
   const int n_by_grid = best.n_by_grid;
   constexpr int kRounds = 4;
   for (int round = 0; round < kRounds; ++round) {
-    Followed next = follow(scene, field_of(scene, best.tracks), parameters);
+    Followed next = follow(scene, field_of(scene, best.tracks), parameters, Led::by_each);
     if (next.n_by_grid <= best.n_by_grid) break;
     best = std::move(next);
   }
@@ -237,10 +237,9 @@ Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images
   for (int round = 0; model.um && round < kRounds; ++round) {
     follow_beside(model, *scene, turn, parameters, pixel_size_um, tracks);
   }
-  flag_unpulled(*scene, parameters.outlier_threshold, tracks);  // matches, too, which are made without a window
-  if (turn) flag_turned_out(*scene, *turn, tracks);             // those found again
+  Pooling pooling = pooled(*scene, parameters.outlier_threshold, tracks);  // flags matches, too, made without a window
+  if (turn) flag_turned_out(*scene, *turn, tracks);                        // those found again
   require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
-  Pooling pooling = pooled(*scene, tracks);
   const BeadSizes sizes = sizes_of(*sharp, tracks);
   return {.scene = scene,
           .tracks = std::move(tracks),
