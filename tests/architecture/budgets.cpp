@@ -11,15 +11,15 @@
 namespace mbtfm {
 namespace {
 
-constexpr int kLinesOfProduct = 105500;
-constexpr int kLinesOfTests = 44900;
-constexpr int kLongSources = 18;                                                  // .cpp of the product above 400 lines
-constexpr int kLongestSource = 860;                                               // lines
+constexpr int kLinesOfProduct = 106450;
+constexpr int kLinesOfTests = 45150;
+constexpr int kLongSources = 14;                                                  // .cpp of the product above 400 lines
+constexpr int kLongestSource = 650;                                               // lines
 constexpr int kOwnHeadersMedian = 15, kOwnHeadersP90 = 40, kOwnHeadersMost = 96;  // that a source of the product gets
 constexpr int kSeeFindings = 31;  // sources of product and tests that a new kind of finding compiles again
 constexpr int kKindsOfFindings = 55;
 constexpr int kParameterRows = 491;  // of build/docs/parameters.md
-constexpr int kWordsOfDocs = 51400;
+constexpr int kWordsOfDocs = 51650;
 
 const std::vector<std::string> kProduct = {"pipeline", "segment",   "network", "substrate",
                                            "mbtfm",    "continuum", "samples"};
