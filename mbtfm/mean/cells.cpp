@@ -63,14 +63,6 @@ struct OwnSettings {
   bool has_gel = false;  ///< nothing of it is assumed
 };
 
-/// What a cell's own cell.toml says, in the place of what holds for all.
-struct OwnSettings {
-  Gel gel;
-  std::optional<double> pixel_size_um;
-  runner::ImageNames images;
-  bool has_gel = false;  ///< nothing of it is assumed
-};
-
 OwnSettings settings_of(const Path& cell, const Parameters& otherwise) {
   OwnSettings own{otherwise.gel, otherwise.pixel_size_um, {}, false};
   if (!files::is_file(cell / "cell.toml")) return own;
