@@ -10,10 +10,10 @@ namespace {
 
 using test::TensionScene;
 
-struct Fitted {
+struct FittedToFew {
   TensionScene scene = test::tension_scene("case_21", 200, 0.05, 1);
   EnsembleFit fit;
-  Fitted() {
+  FittedToFew() {
     const LinearData data =
         reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(scene.beads));
     std::vector<cables::CableNetwork> networks;
@@ -23,7 +23,7 @@ struct Fitted {
 };
 
 TEST(Search, scores_are_those_of_generalised_least_squares_of_all_beads) {
-  const Fitted f;
+  const FittedToFew f;
   const LinearData& data = f.fit.data;
   const MatrixXd& G = f.scene.compliance_um_per_nN;
   const double variance = 1.7;
@@ -48,7 +48,7 @@ TEST(Search, scores_are_those_of_generalised_least_squares_of_all_beads) {
 }
 
 TEST(Search, forces_of_the_adhesions_are_columns_as_others_are) {
-  const Fitted f;
+  const FittedToFew f;
   const Left left(f.fit);
   const std::vector<Index> components = {4, 5, 11};
   MatrixXd columns(f.scene.compliance_um_per_nN.rows(), 3);
