@@ -15,8 +15,8 @@ constexpr int kLinesOfProduct = 106450;
 constexpr int kLinesOfTests = 45150;
 constexpr int kLongSources = 14;                                                  // .cpp of the product above 400 lines
 constexpr int kLongestSource = 650;                                               // lines
-constexpr int kOwnHeadersMedian = 15, kOwnHeadersP90 = 40, kOwnHeadersMost = 96;  // that a source of the product gets
-constexpr int kSeeFindings = 31;  // sources of product and tests that a new kind of finding compiles again
+constexpr int kOwnHeadersMedian = 16, kOwnHeadersP90 = 42, kOwnHeadersMost = 90;  // that a source of the product gets
+constexpr int kSeeFindings = 34;  // sources of product and tests that a new kind of finding compiles again
 constexpr int kKindsOfFindings = 55;
 constexpr int kParameterRows = 491;  // of build/docs/parameters.md
 constexpr int kWordsOfDocs = 51650;
