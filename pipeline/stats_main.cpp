@@ -19,6 +19,7 @@ Study read_study(const StudyParameters& parameters, stage::StageContext& context
   const Path folder = context.input("cells");
   const std::optional<Path> table = context.has_input("table") ? std::optional(context.input("table")) : std::nullopt;
   Study study = read_study(folder, parameters, table, context.threads);
+  if (files::is_own_file(folder / kReview)) context.input("cells", {kReview});
   for (const StudyCell& cell : study.cells) {
     for (const std::string& file : files_of_a_cell(cell.kind())) context.input("cells", {cell.name + "/" + file});
     for (const std::string& file : further_files_of_a_cell(cell.kind())) {
@@ -58,6 +59,7 @@ StageReport statistics(const StudyParameters& parameters, stage::StageContext& c
   }
   files::write_text(context.output("out", "report.html"),
                     study_html(study, analysis, figures, parameters, context.outputs_.at("out")));
+  files::write_text(context.output("out", "review.html"), review_html(study, context.outputs_.at("out")));
   files::write_text(context.output("out", "study.R"), std::string(kStudyScript));
   StageReport report;
   if (analysis.has_fibres)
@@ -85,6 +87,6 @@ int main(int argc, char** argv) {
                  {"table", stage::FileArgument::Kind::optional_input,
                   "CSV with a row for each cell: column cell, columns of conditions, column exclude with the reason"},
                  {"out", stage::FileArgument::Kind::output_folder,
-                  "tables, figures/ (SVG, PDF and PNG), report.html, study.R"}}},
+                  "tables, figures/ (SVG, PDF and PNG), report.html, review.html, study.R"}}},
       argc, argv, statistics::statistics);
 }

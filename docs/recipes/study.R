@@ -13,7 +13,9 @@ mbtfm_cells <- function(folder, program = "mbtfm") {
     return(read.csv(text = text, colClasses = "character"))
   }
   if (!file.exists(written)) stop(program, " is not on the PATH: install it, or run mbtfm stats ", folder, " where it is")
-  read.csv(written, colClasses = "character")[c("cell", "condition", "included", "reason")]
+  cells <- read.csv(written, colClasses = "character")
+  if (is.null(cells$fibres_left_out)) cells$fibres_left_out <- ""
+  cells[c("cell", "condition", "included", "reason", "fibres_left_out")]
 }
 
 mbtfm_study <- function(folder, table = "4_fit/tensions.csv", conditions = NULL, with_left_out = FALSE, program = "mbtfm") {
@@ -26,7 +28,9 @@ mbtfm_study <- function(folder, table = "4_fit/tensions.csv", conditions = NULL,
   for (i in which(!cells$included | !there)) message("left out: ", cells$cell[i], ": ", cells$reason[i])
   chosen <- which(there & (cells$included | with_left_out))
   frames <- lapply(chosen, function(i) {
-    cbind(cell = cells$cell[i], read.csv(paths[i]), included = cells$included[i], reason = cells$reason[i])
+    rows <- read.csv(paths[i])
+    if ("fibre_id" %in% names(rows)) rows <- rows[!rows$fibre_id %in% strsplit(cells$fibres_left_out[i], ";")[[1]], ]
+    cbind(cell = rep(cells$cell[i], nrow(rows)), rows, included = rep(cells$included[i], nrow(rows)), reason = rep(cells$reason[i], nrow(rows)))
   })
   columns <- Reduce(union, lapply(frames, names))
   frames <- lapply(frames, function(frame) {

@@ -30,25 +30,6 @@ std::string folder_of(const std::string& name, int level) {
   return std::next(path.begin(), level - 1)->string();
 }
 
-/// By its whole name, or by that of its own folder where no other cell's is the same.
-std::size_t index_of_cell(const std::vector<std::string>& names, const files::CsvTable& table, int row) {
-  std::string asked = table.text(row, "cell");
-  std::ranges::replace(asked, '\\', '/');
-  asked = Path(asked).lexically_normal().generic_string();  // "./cell_1/"
-  if (asked.ends_with('/')) asked.pop_back();
-  const auto exact = std::find(names.begin(), names.end(), asked);
-  if (exact != names.end()) return static_cast<std::size_t>(exact - names.begin());
-  std::vector<std::size_t> matches;
-  for (std::size_t i = 0; i < names.size(); ++i)
-    if (Path(names[i]).filename() == asked) matches.push_back(i);
-  if (matches.size() != 1) {
-    table.fail(row, "cell", "a cell folder of the study",
-               matches.empty() ? "names are relative to the folder of the study, as in " + names.front()
-                               : "several cells are called so: give the folders above it, too");
-  }
-  return matches.front();
-}
-
 /// Where a word about each cell comes from: a folder above it, a column of the table, or nowhere.
 struct Source {
   int level = 0;            ///< of the folder; 0: none
@@ -113,6 +94,24 @@ void join_capitals(std::vector<CellNote>& notes, std::string CellNote::*member, 
 }
 
 }  // namespace
+
+std::size_t index_of_cell(const std::vector<std::string>& names, const files::CsvTable& table, int row) {
+  std::string asked = table.text(row, "cell");
+  std::ranges::replace(asked, '\\', '/');
+  asked = Path(asked).lexically_normal().generic_string();  // "./cell_1/"
+  if (asked.ends_with('/')) asked.pop_back();
+  const auto exact = std::find(names.begin(), names.end(), asked);
+  if (exact != names.end()) return static_cast<std::size_t>(exact - names.begin());
+  std::vector<std::size_t> matches;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    if (Path(names[i]).filename() == asked) matches.push_back(i);
+  if (matches.size() != 1) {
+    table.fail(row, "cell", "a cell folder of the study",
+               matches.empty() ? "names are relative to the folder of the study, as in " + names.front()
+                               : "several cells are called so: give the folders above it, too");
+  }
+  return matches.front();
+}
 
 CellNotes notes_of(const std::vector<std::string>& names, const std::string& condition_from,
                    const std::string& replicate_from, const std::optional<Path>& table) {

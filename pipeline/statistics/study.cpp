@@ -311,12 +311,14 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
   }
   const CellNotes told = notes_of(names, parameters.condition_from, parameters.replicate_from, table);
   const std::vector<CellNote>& notes = told.of_cells;
+  const std::vector<Review> reviews = reviews_of(folder, names, folders);
   const std::vector<std::string> excluding = excluding_findings(parameters);
   std::vector<std::optional<StudyCell>> read(folders.size());
   std::vector<std::string> reasons(folders.size());
   numerics::parallel_for(static_cast<int>(folders.size()), threads, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     reasons[i] = notes[i].reason_to_exclude;
+    if (reasons[i].empty()) reasons[i] = reason_to_exclude(reviews[i]);
     if (!reasons[i].empty()) return;
     try {
       files::check_cell_folder(folders[i]);
@@ -340,10 +342,15 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
   std::vector<std::string> condition_of_cell;
   for (std::size_t i = 0; i < folders.size(); ++i) {
     if (!reasons[i].empty()) {
-      study.left_out.push_back({names[i], notes[i].condition, reasons[i]});
+      study.left_out.push_back({names[i], notes[i].condition, reasons[i], reviews[i]});
       continue;
     }
     study.cells.push_back(std::move(*read[i]));
+    study.cells.back().review = reviews[i];
+    leave_out_fibres(reviews[i], study.cells.back());
+    if (reviews[i].is_of_other_fibres)
+      study.warnings.push_back("Cell " + names[i] + " was segmented again after its review: what " + kReview +
+                               " says of its fibres does not count. Review it again.");
     condition_of_cell.push_back(notes[i].condition);
   }
   for (const runner::SkippedFolder& s : found.skipped)

@@ -14,6 +14,10 @@
 #include "pipeline/stage/parameters_fwd.h"
 #include "pipeline/statistics/directions.h"
 
+namespace mbtfm::files {
+class CsvTable;
+}
+
 namespace mbtfm::statistics {
 
 /// What the study was made to compare between conditions.
@@ -74,6 +78,15 @@ struct SpaceFigures {
   double normal_share() const { return total_force_nN > 0 ? normal_force_nN / total_force_nN : 0; }
 };
 
+/// What people decided who looked at a cell: its rows of review.csv in the folder of the study.
+struct Review {
+  std::string verdict = {};  ///< kAccepted, kLeftOut, or empty
+  std::string note = {};
+  std::vector<int> fibres_left_out = {};
+  bool is_of_other_fibres = false;  ///< it named fibres, and the cell was segmented again since
+};
+inline constexpr const char *kReview = "review.csv", *kAccepted = "accepted", *kLeftOut = "left out";
+
 /// A finished cell.
 struct StudyCell {
   std::string name;            ///< its folder, relative to the study's
@@ -90,6 +103,7 @@ struct StudyCell {
   std::optional<SheetSummary> sheet = {};  ///< of a sheet, or a colony: it has no fibres, no adhesions, and of `fit` no
                                            ///< more than what the fit leaves and whether it converged
   std::optional<SpaceFigures> space = {};  ///< of a cell in space, likewise
+  Review review = {};                      ///< the fibres that it leaves out are not in cell and tensions
 
   CellKind kind() const { return sheet ? CellKind::sheet : space ? CellKind::space : CellKind::plane; }
 };
@@ -97,6 +111,7 @@ struct StudyCell {
 /// A cell that cannot be used, or a folder that cannot be searched for cells.
 struct LeftOutCell {
   std::string name, condition, reason;
+  Review review = {};
 };
 
 struct Study {
@@ -107,7 +122,10 @@ struct Study {
   std::vector<LeftOutCell> left_out;
   Path folder = {};                        ///< names are relative to it
   int n_fibre_types = 3;                   ///< 4: edge fibres are a type of their own; 3: they count as ventral
-  std::vector<std::string> warnings = {};  ///< of the table of conditions
+  std::vector<std::string> warnings = {};  ///< of the table of conditions and of the review
+
+  /// Of a cell of that name; the study's own, if that is the only cell.
+  Path folder_of(const std::string& name) const { return fs::exists(folder / name) ? folder / name : folder; }
 };
 /// The name of its condition.
 const std::string& condition_of(const Study& study, const StudyCell& cell);
@@ -147,6 +165,18 @@ struct CellNotes {
 /// @throws InputError where a cell has no such folder above it, the table no such column, or a row no cell
 CellNotes notes_of(const std::vector<std::string>& names, const std::string& condition_from,
                    const std::string& replicate_from, const std::optional<Path>& table);
+
+/// The cell that a row of a table names: by its whole name, or by that of its own folder if no other has the same.
+/// @throws InputError
+std::size_t index_of_cell(const std::vector<std::string>& names, const files::CsvTable& table, int row);
+
+/// By cell; nothing is said of any if there is no review.csv. @throws InputError if it is malformed or names no cell
+std::vector<Review> reviews_of(const Path& study, const std::vector<std::string>& names,
+                               const std::vector<Path>& folders);
+/// Empty: the cell enters.
+std::string reason_to_exclude(const Review& review);
+/// The review's fibres are no fibres: they leave cell and tensions. What the fit says of the whole cell stays.
+void leave_out_fibres(const Review& review, StudyCell& cell);
 
 /// Null where it has none. @param fibre_id  0: the network
 const Tension* tension_of(const StudyCell& cell, int fibre_id);

@@ -46,4 +46,7 @@ std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameter
 std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
                        const StudyParameters& parameters, const Path& page_folder);
 
+/// A page on which people look at one cell after the other and decide; it saves review.csv.
+std::string review_html(const Study& study, const Path& page_folder);
+
 }  // namespace mbtfm::statistics

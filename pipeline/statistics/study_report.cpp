@@ -153,8 +153,9 @@ std::string gallery(const Study& study, const Path& page_folder) {
   }
   return html +
          "</div>\n<p class=\"sub\">Total force of each cell; a click opens its page. <b>!</b>: findings are open. To "
-         "leave cells out by a rule: <code>--exclude_findings</code>; one by one: a column <code>exclude</code> with "
-         "the reason in <code>--table</code>.</p>\n";
+         "leave cells out by a rule: <code>--exclude_findings</code>; one by one, and fibres, too: <a "
+         "href=\"review.html\">look at them</a>, or write a reason into a column <code>exclude</code> of "
+         "<code>--table</code>.</p>\n";
 }
 
 std::string list_of(const std::vector<std::string>& sentences) {

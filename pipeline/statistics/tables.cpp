@@ -170,12 +170,20 @@ Columns<StudyCell> figure_columns() {
           columns_of(&C::space, space_columns())};
 }
 
+std::string with_semicolons(const std::vector<int>& ids) {
+  std::string list;
+  for (const int id : ids) list += (list.empty() ? "" : ";") + std::to_string(id);
+  return list;
+}
+
 Table<InCell<CellRow>> cell_table() {
   return {.file = "statistics/cells.csv",
           .row = "each cell, also those left out",
           .columns = in_cell<CellRow>(
               {{"included", "it enters the statistics", [](const CellRow& row) { return row.cell != nullptr; }},
                {"reason", "why it does not", &CellRow::reason},
+               {"fibres_left_out", "fibres that review.csv leaves out, with semicolons between them",
+                [](const CellRow& row) { return row.cell ? with_semicolons(row.cell->review.fibres_left_out) : ""; }},
                columns_of(&CellRow::cell, figure_columns())})};
 }
 
@@ -518,7 +526,7 @@ void for_each_table(const Study& study, const Analysis& analysis, const Visit& v
 }  // namespace
 
 std::string list_of_cells(const Study& study) {
-  const auto columns = cell_table().columns.only({"cell", "condition", "included", "reason"});
+  const auto columns = cell_table().columns.only({"cell", "condition", "included", "reason", "fibres_left_out"});
   return text_of(Table<InCell<CellRow>>{.columns = columns}, cell_rows(study));
 }
 

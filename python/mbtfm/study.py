@@ -48,8 +48,8 @@ def _walk(folder: Path) -> Iterator[Path]:
             yield from _walk(Path(entry.path))
 
 
-def _listing(root: Path, parameters: Mapping[str, Value]) -> Dict[str, str]:
-    """By cell, in their order, why it does not enter statistics; empty: it does. As `mbtfm stats` says.
+def _listing(root: Path, parameters: Mapping[str, Value]) -> Dict[str, Tuple[str, List[int]]]:
+    """By cell, in their order, why it does not enter statistics (empty: it does), and the fibres that do not. As `mbtfm stats` says.
 
     Without the program, what `mbtfm stats` has last written counts (statistics/cells.csv).
     """
@@ -66,7 +66,10 @@ def _listing(root: Path, parameters: Mapping[str, Value]) -> Dict[str, str]:
         if done.returncode != 0:
             raise ProgramFailed("mbtfm-stats", done.returncode, done.stderr.strip())
         text = done.stdout
-    return {row["cell"]: row["reason"] for row in csv.DictReader(io.StringIO(text, newline=""))}
+    return {
+        row["cell"]: (row["reason"], [int(fibre) for fibre in (row.get("fibres_left_out") or "").split(";") if fibre])
+        for row in csv.DictReader(io.StringIO(text, newline=""))
+    }
 
 
 def study(
@@ -84,6 +87,7 @@ def study(
                  ``folder`` (the first folder below this one), ``folder2`` (the one below that): the column `condition`.
 
     Cells that `mbtfm stats` leaves out are left out here, too; ``frame.attrs["left_out"]`` has their paths and reasons.
+    So are the fibres that the study's review.csv leaves out.
     with_left_out:  keep their rows, as far as they have any, with `included` false and the `reason`.
     parameters:     of `mbtfm stats`, for other rules: ``study("study", with_not_converged=True)``.
     """
@@ -93,11 +97,15 @@ def study(
     level = re.fullmatch("folder([1-9]?)", os.fspath(conditions)) if conditions is not None else None
     if conditions is not None and not level:
         parameters = {"table": os.fspath(conditions), **parameters}
-    reasons = _listing(root, parameters)
+    listing = _listing(root, parameters)
+    reasons = {name: reason for name, (reason, _) in listing.items()}
     cells = [root / name if (root / name).is_dir() else root for name in reasons]
     frame = _summaries(root, cells) if table == "cells" else _rows(root, cells, TABLES.get(table, table))
     if frame is None:
         raise FileNotFoundError(f"{root}: none of its {len(cells)} cells has {TABLES.get(table, table)}: run mbtfm batch")
+    if "fibre_id" in frame:
+        reviewed = {(name, fibre) for name, (_, fibres) in listing.items() for fibre in fibres}
+        frame = frame[[key not in reviewed for key in zip(frame["cell"], frame["fibre_id"])]]
     if conditions is not None:
         frame = _by_folder(frame, int(level[1] or 1)) if level else _joined(frame, conditions)
     for name in set(reasons).difference(frame["cell"]):  # a table that the statistics do not need

@@ -59,6 +59,34 @@ TEST(Study, leaves_out_cells_with_a_reason_that_the_table_keeps) {
   EXPECT_EQ(cells.text(4, "reason"), "the fit did not converge");
 }
 
+TEST(Study, obeys_the_review_of_cells_and_of_their_present_fibres) {
+  const FakeStudy fake;
+  const auto review = [&](const std::string& rows) {
+    files::write_text(fake.folder / "review.csv", "cell,fibre_id,verdict,note,segmentation\n" + rows);
+    return fake.read();
+  };
+  const std::string page = review_html(fake.read(), fake.folder / "statistics"), mark = "data-segmentation=\"";
+  const std::string segmentation = page.substr(page.find(mark) + mark.size(), 12);
+  EXPECT_NE(page.find("../control/cell_1/"), page.npos);
+  const int fibre = fake.read().cells.front().cell.fibres.front().fibre_id;
+  const std::string of_fibre = "control/cell_1," + std::to_string(fibre) + ",left out,,";
+
+  const Study study = review("control/cell_3,,left out,\"out of focus, twice\",\n" + of_fibre + segmentation + "\n");
+  EXPECT_EQ(reason_of(study, "control/cell_3"), "left out by review.csv: out of focus, twice");
+  ASSERT_EQ(study.cells.front().name, "control/cell_1");
+  EXPECT_EQ(tension_of(study.cells.front(), fibre), nullptr);
+  EXPECT_NE(list_of_cells(study).find("TRUE,," + std::to_string(fibre) + "\n"), std::string::npos);
+  EXPECT_NE(tension_of(study.cells.back(), fibre), nullptr);
+
+  const Study of_other_fibres = review(of_fibre + "0123456789ab\n");
+  EXPECT_NE(tension_of(of_other_fibres.cells.front(), fibre), nullptr);
+  ASSERT_EQ(of_other_fibres.warnings.size(), 1u);
+  EXPECT_NE(of_other_fibres.warnings.front().find("control/cell_1 was segmented again"), std::string::npos);
+
+  EXPECT_THROW(review("control/cell_9,,left out,,\n"), InputError);
+  EXPECT_THROW(review("control/cell_1,,maybe,,\n"), InputError);
+}
+
 TEST(Study, a_copy_of_a_cell_is_no_further_cell_and_a_neighbour_in_the_same_picture_is) {
   const FakeStudy fake;
   const auto of_1 = fake.folder / "control/cell_1";
