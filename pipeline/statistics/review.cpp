@@ -79,7 +79,7 @@ std::string article_of(const Study& study, const std::string& name, const Review
           "</p>\n<p><label>Note <input type=\"text\"></label></p>\n" + fibres_of(folder, review.fibres_left_out);
   if (files::is_own_file(folder / "report.html"))
     html += fmt::format("<p><a href=\"{}report.html\">report</a></p>\n", link);
-  return html + "<p>In napari: <code>napari '" + html_escaped(folder.generic_string()) +
+  return html + "<p>In napari: <code>napari '" + html_escaped(fs::weakly_canonical(folder).string()) +
          "'</code> <button type=\"button\" class=\"copy\">copy</button></p>\n</div></div>\n</article>\n";
 }
 

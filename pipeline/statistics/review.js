@@ -42,7 +42,7 @@ function decide(verdict) {
 document.getElementById("previous").onclick = () => show(at - 1);
 document.getElementById("next").onclick = () => show(at + 1);
 document.addEventListener("keydown", event => {
-  if (event.target.matches("input[type=text]") || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.target.matches?.("input[type=text]") || event.ctrlKey || event.metaKey || event.altKey) return;
   const act = {a: () => decide("accepted"), x: () => decide("left out"), n: () => show(at + 1), p: () => show(at - 1),
                ArrowRight: () => show(at + 1), ArrowLeft: () => show(at - 1)}[event.key];
   if (act) { act(); event.preventDefault(); }
