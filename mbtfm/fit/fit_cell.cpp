@@ -173,7 +173,7 @@ std::vector<FrameFit> fit_frames(const ReadyCell& cell, const WithMissing& first
   const auto find = [&](EnsembleFit of_frame) {
     std::vector<MissingAdhesion> places = first.adhesions;
     return places.empty() ? std::move(of_frame)
-                          : with_their_forces(std::move(of_frame), places, p.gel, n_of_place(cell));
+                          : with_their_forces(std::move(of_frame), cell.scene.cell, places, p.gel, n_of_place(cell));
   };
   return fit_series(series.frames, cell.networks, series.response,
                     beads_in_region(beads_of(series.frames), cell.scene.cell, p.fit), adhesion_ids_of(cell.scene.cell),

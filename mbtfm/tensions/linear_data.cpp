@@ -25,14 +25,16 @@ Root root_of(MatrixXd A, double trace, int threads) {
   const VectorXd diagonal = A.diagonal();
   const double least = kRounding * std::max(trace, 1e-300);
   numerics::mirror_upper(A);  // Cholesky takes the upper half: the lower one keeps it for a second try
-  bool is_definite = numerics::upper_cholesky(A, threads);
-  if (!is_definite || A.diagonal().cwiseAbs2().minCoeff() <= least) {
+  bool is_definite = numerics::upper_cholesky(A, threads) && A.diagonal().cwiseAbs2().minCoeff() > least;
+  double ridge = 0;
+  while (!is_definite) {  // where motions explain nearly all, what they leave is off by the rounding of their inverse
+    ridge = std::max(least, 10 * ridge);
+    MBTFM_ASSERT(ridge <= 1e7 * least);
     numerics::mirror_lower(A);
-    A.diagonal() = diagonal.array() + least;
+    A.diagonal() = diagonal.array() + ridge;
     is_definite = numerics::upper_cholesky(A, threads);
-    MBTFM_ASSERT(is_definite);
   }
-  const Index n_felt = (A.diagonal().array().square() > 4 * least).count();
+  const Index n_felt = (A.diagonal().array().square() > 4 * std::max(ridge, least)).count();
   numerics::clear_below_diagonal(A);
   return {std::move(A), n_felt};
 }

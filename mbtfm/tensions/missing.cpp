@@ -28,8 +28,11 @@ std::optional<int> fibre_beside(const MissingFibre& missing, const Cell& cell) {
 /// (`other_network wrong`), as fibres of other ends would.
 bool is_sure(const MissingFibre& fibre) { return fibre.chi_squared_gain >= 100; }
 
-/// Three standard errors: all beads together have called for it, this is what its own force is known to.
-bool is_sure(const MissingAdhesion& adhesion) { return adhesion.chi_squared_gain >= 9; }
+/// Three standard errors: all beads together have called for it, this is what its own force is known to. Five beside
+/// assumed adhesions: next to such a lattice a force elsewhere is much of the lattice's own error.
+bool is_sure(const MissingAdhesion& adhesion, bool beside_assumed) {
+  return adhesion.chi_squared_gain >= (beside_assumed ? 25 : 9);
+}
 
 /// A fibre that leaves nothing to a segmented one, of which the beads showed a tension, is that fibre seen elsewhere.
 bool takes_over(const EnsembleFit& before, const EnsembleFit& after) {
@@ -92,8 +95,8 @@ class SearchForMissing {
     std::vector<MissingAdhesion>& places = found_.adhesions;
     found_.fit = without_;
     for (bool has_changed = true; has_changed && !places.empty();) {
-      EnsembleFit with = with_their_forces(without_, places, on_.gel, on_.n_of_place);
-      has_changed = std::erase_if(places, [](const MissingAdhesion& a) { return !is_sure(a); }) > 0;
+      EnsembleFit with = with_their_forces(without_, on_.cell, places, on_.gel, on_.n_of_place);
+      has_changed = std::erase_if(places, [&](const MissingAdhesion& a) { return !is_sure(a, is_assumed_); }) > 0;
       if (!has_changed) found_.fit = std::move(with);
     }
     std::ranges::stable_sort(places, std::greater(), &MissingAdhesion::chi_squared_gain);
@@ -103,6 +106,7 @@ class SearchForMissing {
   EnsembleFit without_;  ///< the forces at missing adhesions
   WithMissing found_;
   bool are_fibres_asked_ = true;
+  bool is_assumed_ = are_assumed(on_.cell.adhesions);
 };
 
 }  // namespace

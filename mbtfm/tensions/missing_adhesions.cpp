@@ -235,7 +235,12 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cel
   return found;
 }
 
-EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& places, const Gel& gel, Index n_last) {
+bool are_assumed(const std::vector<Adhesion>& adhesions) {
+  return std::ranges::all_of(adhesions, [](const Adhesion& a) { return is_assumed(a.origin); });
+}
+
+EnsembleFit with_their_forces(EnsembleFit fit, const Cell& cell, std::vector<MissingAdhesion>& places, const Gel& gel,
+                              Index n_last) {
   std::vector<Vec2> there;
   for (const MissingAdhesion& place : places) there.push_back(place.position_um);
   LinearData data = std::move(fit.data);
@@ -255,7 +260,9 @@ EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& pla
     fit.forces.away_nN2 += along * along;
     fit.total_force_nN.value += force.norm() - std::min(force.norm(), along * along / (2 * force.norm()));
   }
-  const double unfound = unfound_nN(adhesion_forces_nN(fit), fit.data.load_centre_um, places);
+  const double unfound = are_assumed(cell.adhesions)
+                             ? 0  // nobody looked for them, so none was missed
+                             : unfound_nN(adhesion_forces_nN(fit), fit.data.load_centre_um, places);
   fit.forces.away_nN2 += unfound * unfound;
   fit.total_force_nN.value += unfound;
   fit.total_force_nN.standard_error = std::hypot(fit.total_force_nN.standard_error, std::sqrt(fit.forces.away_nN2));

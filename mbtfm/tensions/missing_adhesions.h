@@ -17,9 +17,13 @@ struct EnsembleFit;
 /// the beads make likelier than not: one place in ten cells is expected, of a force as the adhesions have.
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cell& cell, const Gel& gel, int threads);
 
+/// None of the adhesions was seen: they stand for forces that nobody knows the places of.
+bool are_assumed(const std::vector<Adhesion>& adhesions);
+
 /// The fit of a cell that pulls at these places, too: the adhesions' forces beside theirs, and the total with them.
 /// @param places  their forces and gains become what the fit finds
 /// @param n_last  motions of the data that stay the last ones
-EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& places, const Gel& gel, Index n_last);
+EnsembleFit with_their_forces(EnsembleFit fit, const Cell& cell, std::vector<MissingAdhesion>& places, const Gel& gel,
+                              Index n_last);
 
 }  // namespace mbtfm::tensions

@@ -8,7 +8,7 @@
 #include "pipeline/files/foreign_table.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/table_text.h"
-#include "pipeline/statistics/study.h"
+#include "pipeline/statistics/review.h"
 
 namespace mbtfm::statistics {
 namespace {

@@ -12,6 +12,7 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/table_text.h"
 #include "pipeline/report/page.h"
+#include "pipeline/statistics/review.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
@@ -134,10 +135,14 @@ std::string reason_to_exclude(const Review& review) {
   return std::string("left out by ") + kReview + (review.note.empty() ? "" : ": " + review.note);
 }
 
-void leave_out_fibres(const Review& review, StudyCell& cell) {
+void take_review(const Review& review, StudyCell& cell, std::vector<std::string>& warnings) {
   const auto is_left_out = [&](int id) { return has(review.fibres_left_out, id); };
+  cell.review = review;
   std::erase_if(cell.cell.fibres, [&](const Fibre& fibre) { return is_left_out(fibre.fibre_id); });
   std::erase_if(cell.tensions, [&](const Tension& t) { return is_left_out(t.fibre_id); });
+  if (review.is_of_other_fibres)
+    warnings.push_back("Cell " + cell.name + " was segmented again after its review: what " + kReview +
+                       " says of its fibres does not count. Review it again.");
 }
 
 std::string review_html(const Study& study, const Path& page_folder) {

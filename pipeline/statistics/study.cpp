@@ -24,6 +24,7 @@
 #include "pipeline/runner/copies.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/statistics/descriptive.h"
+#include "pipeline/statistics/review.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -346,11 +347,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
       continue;
     }
     study.cells.push_back(std::move(*read[i]));
-    study.cells.back().review = reviews[i];
-    leave_out_fibres(reviews[i], study.cells.back());
-    if (reviews[i].is_of_other_fibres)
-      study.warnings.push_back("Cell " + names[i] + " was segmented again after its review: what " + kReview +
-                               " says of its fibres does not count. Review it again.");
+    take_review(reviews[i], study.cells.back(), study.warnings);
     condition_of_cell.push_back(notes[i].condition);
   }
   for (const runner::SkippedFolder& s : found.skipped)

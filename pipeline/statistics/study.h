@@ -14,10 +14,6 @@
 #include "pipeline/stage/parameters_fwd.h"
 #include "pipeline/statistics/directions.h"
 
-namespace mbtfm::files {
-class CsvTable;
-}
-
 namespace mbtfm::statistics {
 
 /// What the study was made to compare between conditions.
@@ -165,18 +161,6 @@ struct CellNotes {
 /// @throws InputError where a cell has no such folder above it, the table no such column, or a row no cell
 CellNotes notes_of(const std::vector<std::string>& names, const std::string& condition_from,
                    const std::string& replicate_from, const std::optional<Path>& table);
-
-/// The cell that a row of a table names: by its whole name, or by that of its own folder if no other has the same.
-/// @throws InputError
-std::size_t index_of_cell(const std::vector<std::string>& names, const files::CsvTable& table, int row);
-
-/// By cell; nothing is said of any if there is no review.csv. @throws InputError if it is malformed or names no cell
-std::vector<Review> reviews_of(const Path& study, const std::vector<std::string>& names,
-                               const std::vector<Path>& folders);
-/// Empty: the cell enters.
-std::string reason_to_exclude(const Review& review);
-/// The review's fibres are no fibres: they leave cell and tensions. What the fit says of the whole cell stays.
-void leave_out_fibres(const Review& review, StudyCell& cell);
 
 /// Null where it has none. @param fibre_id  0: the network
 const Tension* tension_of(const StudyCell& cell, int fibre_id);

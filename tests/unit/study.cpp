@@ -67,7 +67,7 @@ TEST(Study, obeys_the_review_of_cells_and_of_their_present_fibres) {
   };
   const std::string page = review_html(fake.read(), fake.folder / "statistics"), mark = "data-segmentation=\"";
   const std::string segmentation = page.substr(page.find(mark) + mark.size(), 12);
-  EXPECT_NE(page.find("../control/cell_1/"), page.npos);
+  EXPECT_NE(page.find("data-cell=\"control/cell_1\""), page.npos);
   const int fibre = fake.read().cells.front().cell.fibres.front().fibre_id;
   const std::string of_fibre = "control/cell_1," + std::to_string(fibre) + ",left out,,";
 
