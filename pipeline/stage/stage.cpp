@@ -96,7 +96,7 @@ std::vector<std::string> arguments_of(int argc, char** argv, const ParameterList
     const std::string table = argument.substr(2, point - 2), key = argument.substr(point + 1, end - point - 1);
     const auto meant =
         std::ranges::find_if(list.all(), [&](const Parameter& p) { return p.table == table && p.name == key; });
-    argument.replace(2, end - 2, meant == list.all().end() ? key : meant->flag);
+    if (meant != list.all().end()) argument.replace(2, end - 2, meant->flag);  // else it is refused as it stands
   }
   return arguments;
 }
