@@ -140,6 +140,7 @@ void take_review(const Review& review, StudyCell& cell, std::vector<std::string>
   cell.review = review;
   std::erase_if(cell.cell.fibres, [&](const Fibre& fibre) { return is_left_out(fibre.fibre_id); });
   std::erase_if(cell.tensions, [&](const Tension& t) { return is_left_out(t.fibre_id); });
+  std::erase_if(cell.directions, [&](const Direction& d) { return d.fibre_id && is_left_out(*d.fibre_id); });
   if (review.is_of_other_fibres)
     warnings.push_back("Cell " + cell.name + " was segmented again after its review: what " + kReview +
                        " says of its fibres does not count. Review it again.");
