@@ -139,7 +139,8 @@ bool is_torn(const Scene& scene, const Motion& own, const Motion& gel) {
 
 constexpr double kContradicted = 8;  // of misfit² over variance, of a component: four standard deviations
 
-/// Beads that their neighbours contradict know better, unless they are torn or nothing pulls them. How many are not.
+/// Flags beads that their neighbours contradict if they are torn, or if nothing pulls them: others know better.
+/// @return how many
 int flag_false(const Scene& scene, double threshold, const BothOrders& predicted,
                const std::vector<double>& own_variance, double scatter_px, std::vector<Track>& tracks) {
   std::vector<char> is_contradicted(tracks.size(), 0);
