@@ -15,8 +15,8 @@ std::vector<Review> reviews_of(const Path& study, const std::vector<std::string>
                                const std::vector<Path>& folders);
 /// Empty: the cell enters.
 std::string reason_to_exclude(const Review& review);
-/// The fibres that it leaves out are no fibres: they leave cell, tensions and directions. What the fit says of the whole cell
-/// stays.
+/// The fibres that it leaves out are no fibres: they leave cell, tensions and directions. What the fit says of the
+/// whole cell stays.
 void take_review(const Review& review, StudyCell& cell, std::vector<std::string>& warnings);
 
 }  // namespace mbtfm::statistics
