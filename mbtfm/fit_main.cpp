@@ -23,7 +23,7 @@ StageReport run(const Parameters& parameters, stage::StageContext& context) {
   const Inputs inputs = read_inputs(context, parameters);
   context.expect_plausible("beads_per_um2", beads_per_um2(inputs.beads));
   const FittedCell cell = fit_cell(inputs, parameters, {context.threads, context.progress});
-  expect_plausible(context, cell.found, inputs.cell.adhesions);
+  expect_plausible(context, cell.found, cell.ready.scene.cell.adhesions);
   write_results(context, cell, inputs.beads);
   context.progress(0.97, "tractions by the usual method");
   write_usual_method(context, inputs, parameters.gel);

@@ -75,7 +75,10 @@ void write_found(stage::StageContext& context, const FittedCell& fitted) {
   const Found& found = fitted.found;
   const Cell& cell = fitted.ready.scene.cell;
   files::write_tensions(context.output("out", "tensions.csv"), found.tensions, cell.fibres);
-  files::write_adhesion_forces(context.output("out", "adhesion_forces.csv"), found.forces, cell.adhesions);
+  // of those that the segmentation has; missing_adhesions.csv has the others
+  std::vector<AdhesionForce> forces = found.forces;
+  forces.resize(fitted.seen.adhesions.size());
+  files::write_adhesion_forces(context.output("out", "adhesion_forces.csv"), forces, fitted.seen.adhesions);
   files::write_fit_summary(context.output("out", "fit.json"), found.summary, cell.fibres);
   write_contracted(context.output("out", "contracted.vtu"), fitted.ready.networks.front(), fitted.fit);
   write_tractions_vtp(context.output("out", "tractions.vtp"), cell, found.forces);

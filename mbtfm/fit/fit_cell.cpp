@@ -93,10 +93,49 @@ ReadyAndFitted on_cables(const Inputs& inputs, const Parameters& p, const Work& 
   return {std::move(ready), std::move(fit)};
 }
 
-ReadyAndFitted ready_and_fitted(const Inputs& inputs, const Parameters& p, const Work& work) {
+/// The fit with all that the beads show beside the segmentation.
+struct Searched {
+  ReadyCell ready;
+  WithMissing with;
+  std::vector<MissingAdhesion> held = {};  ///< adhesions of the ready cell that the segmentation has not, the last ones
+  /// As they were found.
+  std::vector<MissingAdhesion> missing_adhesions() const {
+    std::vector<MissingAdhesion> all = held;
+    all.insert(all.end(), with.adhesions.begin(), with.adhesions.end());
+    return all;
+  }
+};
+
+Searched fit_and_search(const Inputs& inputs, const Parameters& p, const Work& work) {
   auto [ready, fit] = on_cables(inputs, p, work);
   fit = on_strained_gel(ready, std::move(fit), inputs, p, work.part(0.8, 0.1));
-  return {std::move(ready), std::move(fit)};
+  WithMissing with = with_missing(std::move(fit), {.networks = ready.networks,
+                                                   .cell = ready.scene.cell,
+                                                   .gel = p.gel,
+                                                   .segmentation = p.segmentation,
+                                                   .parameters = p.fit,
+                                                   .n_of_place = n_of_place(ready),
+                                                   .threads = work.threads});
+  return {std::move(ready), std::move(with)};
+}
+
+/// A fibre whose adhesion was not found ends in the network, and no force at that place puts its tension right: the
+/// networks are held there, too, as long as they then explain the beads better.
+Searched hold_where_beads_show(Searched searched, Inputs inputs, const Parameters& p, const Work& work) {
+  constexpr int kMostRounds = 2;
+  if (are_assumed(inputs.cell.adhesions)) return searched;
+  for (int round = 0; round < kMostRounds && !searched.with.adhesions.empty(); ++round) {
+    inputs.cell = held_at(std::move(inputs.cell), searched.with.adhesions);
+    Cell of_network = inputs.cell;
+    if (!searched.ready.decisions.fibres.is_on) of_network.fibres.clear();
+    inputs.network = mesh::generate_network(of_network, p.network).network;
+    Searched next = fit_and_search(inputs, p, work);
+    if (next.with.fit.misfit.chi_squared_per_degree >= searched.with.fit.misfit.chi_squared_per_degree) break;
+    next.held = std::move(searched.held);
+    next.held.insert(next.held.end(), searched.with.adhesions.begin(), searched.with.adhesions.end());
+    searched = std::move(next);
+  }
+  return searched;
 }
 
 /// Of the linear model and of what large strains add to it.
@@ -158,8 +197,9 @@ Found found_by(const ReadyCell& cell, const EnsembleFit& fit, const std::optiona
 }
 
 /// What the segmentation misses is found once, its forces in each frame.
-std::vector<FrameFit> fit_frames(const ReadyCell& cell, const WithMissing& first, const Inputs& inputs,
-                                 const Parameters& p, const Work& work) {
+std::vector<FrameFit> fit_frames(const ReadyCell& cell, const WithMissing& first,
+                                 const std::vector<MissingAdhesion>& missing, const Inputs& inputs, const Parameters& p,
+                                 const Work& work) {
   const SeriesOnGel& series = cell.series;
   if (series.frames.empty()) return {};
   const auto allow = [&](LinearData of_frame, const VectorXd& forces_nN) {
@@ -172,8 +212,8 @@ std::vector<FrameFit> fit_frames(const ReadyCell& cell, const WithMissing& first
   };
   const auto find = [&](EnsembleFit of_frame) {
     std::vector<MissingAdhesion> places = first.adhesions;
-    return places.empty() ? std::move(of_frame)
-                          : with_their_forces(std::move(of_frame), cell.scene.cell, places, p.gel, n_of_place(cell));
+    if (!places.empty()) of_frame = with_their_forces(std::move(of_frame), places, p.gel, n_of_place(cell));
+    return with_unfound(std::move(of_frame), cell.scene.cell, missing);
   };
   return fit_series(series.frames, cell.networks, series.response,
                     beads_in_region(beads_of(series.frames), cell.scene.cell, p.fit), adhesion_ids_of(cell.scene.cell),
@@ -208,20 +248,16 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
   if (!inputs.frames.empty() && p.fit.substrate == TrialDisplacement::per_evaluation)
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   check_place(inputs.beads, inputs.cell);
-  auto [ready, first_fit] = ready_and_fitted(inputs, p, work);
-  WithMissing with = with_missing(std::move(first_fit), {.networks = ready.networks,
-                                                         .cell = ready.scene.cell,
-                                                         .gel = p.gel,
-                                                         .segmentation = p.segmentation,
-                                                         .parameters = p.fit,
-                                                         .n_of_place = n_of_place(ready),
-                                                         .threads = work.threads});
+  Searched searched = hold_where_beads_show(fit_and_search(inputs, p, work), inputs, p, work);
+  const std::vector<MissingAdhesion> missing = searched.missing_adhesions();
+  auto& [ready, with, held] = searched;
+  with.fit = with_unfound(std::move(with.fit), ready.scene.cell, missing);
   const EnsembleFit& fit = with.fit;
   Found found = found_by(ready, fit, inputs.second_placement, p, work);
   FoundMotions motions = motions_found(ready, fit, p.effects);
   ModelChecks checks = check_model(ready, fit, p, work.threads);
   checks.missing_fibres = with.fibres;
-  checks.missing_adhesions = with.adhesions;
+  checks.missing_adhesions = with_forces_of(ready.scene.cell, adhesion_forces_nN(fit), held, with.adhesions);
   append(found.summary.more,
          energy_and_moments(fit, ready.scene.cell, p.gel, p.substrate.modulus_profile.empty(), work.threads));
   append(found.summary.more, figures_of(motions));
@@ -237,7 +273,7 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
                                 {"best_smoothing_leaves", smoothing->unexplained_share},
                                 {"unsmoothed_leaves", smoothing->unexplained_as_is}});
   }
-  std::vector<FrameFit> frames = fit_frames(ready, with, inputs, p, work.part(0.6, 0.35));
+  std::vector<FrameFit> frames = fit_frames(ready, with, missing, inputs, p, work.part(0.6, 0.35));
   FittedCell cell{.seen = inputs.cell,
                   .parameters = p,
                   .ready = std::move(ready),

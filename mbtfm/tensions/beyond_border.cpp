@@ -93,9 +93,9 @@ std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell
   if (variance < kRounding * kRounding * mean_square) return {};
   scores.scores /= std::sqrt(variance);
   // half of a likelihood ratio exceeds x by chance less often than exp(-x) (Self & Liang, JASA 82 (1987) 605)
-  const double least = std::log(static_cast<double>(columns.size()) / 1e-4);
+  const std::vector<double> against(columns.size(), std::log(static_cast<double>(columns.size()) / 1e-4));
   std::set<std::size_t> with_next;
-  for (const std::size_t k : causes_among(std::move(scores), columns, least))
+  for (const std::size_t k : causes_among(std::move(scores), columns, against))
     for (const std::size_t near : {k, (k + 1) % pieces.size(), (k + pieces.size() - 1) % pieces.size()})
       with_next.insert(near);
   std::vector<Polygon> found;

@@ -95,7 +95,7 @@ class SearchForMissing {
     std::vector<MissingAdhesion>& places = found_.adhesions;
     found_.fit = without_;
     for (bool has_changed = true; has_changed && !places.empty();) {
-      EnsembleFit with = with_their_forces(without_, on_.cell, places, on_.gel, on_.n_of_place);
+      EnsembleFit with = with_their_forces(without_, places, on_.gel, on_.n_of_place);
       has_changed = std::erase_if(places, [&](const MissingAdhesion& a) { return !is_sure(a, is_assumed_); }) > 0;
       if (!has_changed) found_.fit = std::move(with);
     }

@@ -33,7 +33,8 @@ struct CellSearched {
 };
 
 /// A fibre's tension is fitted again beside one that is missing. An adhesion's is not: a fibre whose adhesion was not
-/// found ends in the network, which no force at that place puts right. The adhesions' forces are found beside both.
+/// found ends in the network, which no force at that place puts right (held_at()). The adhesions' forces are found
+/// beside both.
 WithMissing with_missing(EnsembleFit fit, const CellSearched& on);
 
 }  // namespace mbtfm::tensions

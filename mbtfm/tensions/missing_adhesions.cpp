@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <optional>
 
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
@@ -129,6 +131,20 @@ bool is_free(const Cell& cell, Vec2 place_um) {
   });
 }
 
+/// Of fibres: many end on an adhesion.
+std::vector<Vec2> free_ends(const Cell& cell) {
+  std::vector<Vec2> ends;
+  const auto add = [&](Vec2 end) {
+    const auto is_near = [&](Vec2 other) { return norm(other - end) < kApart_um; };
+    if (is_free(cell, end) && std::ranges::none_of(ends, is_near)) ends.push_back(end);
+  };
+  for (const Fibre& f : cell.fibres) {
+    if (!f.start_adhesion_id) add(f.points_um.front());
+    if (!f.end_adhesion_id) add(f.points_um.back());
+  }
+  return ends;
+}
+
 std::vector<Vec2> free_places(const Cell& cell) {
   const auto [low, high] = extent_of(cell.outline_um);
   std::vector<Vec2> places;
@@ -182,18 +198,20 @@ MatrixXd displacement_by(const std::vector<Vec2>& places, const LinearData& data
 /// a share of the weak ones as of the strong ones, n of n + n_above + 1 (Chapman, Univ. Calif. Publ. Stat. 1 (1951)
 /// 131). What such a one exerts its neighbour takes over, as a vector: the sum lacks the force times 1 − cos, of the
 /// angle between both.
-double unfound_nN(const VectorXd& forces_nN, const std::vector<Vec2>& centres_um,
+double unfound_nN(const VectorXd& forces_nN, const std::vector<Adhesion>& adhesions,
                   const std::vector<MissingAdhesion>& found) {
   double weakest_nN = std::numeric_limits<double>::infinity(), lacking_nN = 0, n_above = 0;
   for (const MissingAdhesion& place : found) weakest_nN = std::min(weakest_nN, norm(place.force_nN));
-  for (std::size_t a = 0; a < centres_um.size(); ++a) {
+  for (std::size_t a = 0; a < adhesions.size(); ++a) {
+    if (adhesions[a].origin == AdhesionOrigin::beads) continue;
     const Eigen::Vector2d force = forces_nN.segment<2>(2 * static_cast<Index>(a));
     if (force.norm() >= weakest_nN) n_above += 1;
     if (force.norm() >= weakest_nN || force.norm() <= 0) continue;
     double nearest_um = std::numeric_limits<double>::infinity(), cosine = 1;
-    for (std::size_t b = 0; b < centres_um.size(); ++b) {
-      if (a == b || norm(centres_um[b] - centres_um[a]) >= nearest_um) continue;
-      nearest_um = norm(centres_um[b] - centres_um[a]);
+    for (std::size_t b = 0; b < adhesions.size(); ++b) {
+      const double apart_um = norm(adhesions[b].position_um - adhesions[a].position_um);
+      if (a == b || apart_um >= nearest_um) continue;
+      nearest_um = apart_um;
       cosine = force.normalized().dot(forces_nN.segment<2>(2 * static_cast<Index>(b)).normalized());
     }
     lacking_nN += (1 - cosine) * force.norm();
@@ -204,9 +222,18 @@ double unfound_nN(const VectorXd& forces_nN, const std::vector<Vec2>& centres_um
 }  // namespace
 
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cell& cell, const Gel& gel, int threads) {
-  constexpr double kExpected = 0.1;  // forces that a cell has away from its adhesions, as a rule
-  const std::vector<Vec2> places = free_places(cell), likely = likely_places(fit, places, gel, threads);
+  constexpr double kExpected = 0.1;  // forces that a cell has away from its adhesions, half of them at ends of fibres
+  const std::vector<Vec2> places = free_places(cell), ends = free_ends(cell);
+  std::vector<Vec2> likely = ends;
+  for (const Vec2 place : likely_places(fit, places, gel, threads)) {
+    if (std::ranges::none_of(ends, [&](Vec2 end) { return norm(end - place) < kDisc_um + kApart_um; }))
+      likely.push_back(place);
+  }
   if (likely.empty()) return {};
+  std::vector<double> log_odds_against;
+  for (std::size_t k = 0; k < likely.size(); ++k)
+    log_odds_against.push_back(
+        std::log(static_cast<double>(k < ends.size() ? ends.size() : places.size()) / (0.5 * kExpected)));
   const Left left(fit);
   const Scores scores = left.scores_of(pattern_of(fit.data, displacement_by(likely, fit.data, gel)));
   const VectorXd forces_nN = adhesion_forces_nN(fit);
@@ -214,8 +241,7 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cel
       std::max(1e-300, forces_nN.squaredNorm() / static_cast<double>(forces_nN.size())) / left.variance();
   std::vector<std::vector<Index>> columns;
   for (Index k = 0; k < std::ssize(likely); ++k) columns.push_back({2 * k, 2 * k + 1});
-  const std::vector<std::size_t> causes =
-      causes_among(scores, columns, std::log(static_cast<double>(places.size()) / kExpected), kappa);
+  const std::vector<std::size_t> causes = causes_among(scores, columns, log_odds_against, kappa);
   if (causes.empty()) return {};
   std::vector<Index> of_causes;
   for (const std::size_t k : causes) of_causes.insert(of_causes.end(), columns[k].begin(), columns[k].end());
@@ -239,8 +265,7 @@ bool are_assumed(const std::vector<Adhesion>& adhesions) {
   return std::ranges::all_of(adhesions, [](const Adhesion& a) { return is_assumed(a.origin); });
 }
 
-EnsembleFit with_their_forces(EnsembleFit fit, const Cell& cell, std::vector<MissingAdhesion>& places, const Gel& gel,
-                              Index n_last) {
+EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& places, const Gel& gel, Index n_last) {
   std::vector<Vec2> there;
   for (const MissingAdhesion& place : places) there.push_back(place.position_um);
   LinearData data = std::move(fit.data);
@@ -260,12 +285,53 @@ EnsembleFit with_their_forces(EnsembleFit fit, const Cell& cell, std::vector<Mis
     fit.forces.away_nN2 += along * along;
     fit.total_force_nN.value += force.norm() - std::min(force.norm(), along * along / (2 * force.norm()));
   }
-  const double unfound = are_assumed(cell.adhesions)
-                             ? 0  // nobody looked for them, so none was missed
-                             : unfound_nN(adhesion_forces_nN(fit), fit.data.load_centre_um, places);
+  fit.total_force_nN.standard_error = std::hypot(fit.total_force_nN.standard_error, std::sqrt(fit.forces.away_nN2));
+  return fit;
+}
+
+Cell held_at(Cell cell, const std::vector<MissingAdhesion>& places) {
+  const std::size_t n_before = cell.adhesions.size();
+  int id = 0;
+  for (const Adhesion& a : cell.adhesions) id = std::max(id, a.adhesion_id);
+  for (const MissingAdhesion& place : places)
+    cell.adhesions.push_back({.adhesion_id = ++id,
+                              .position_um = place.position_um,
+                              .area_um2 = std::numbers::pi * kDisc_um * kDisc_um,
+                              .major_axis_um = 2 * kDisc_um,
+                              .minor_axis_um = 2 * kDisc_um,
+                              .origin = AdhesionOrigin::beads});
+  const auto holder = [&](Vec2 end) -> std::optional<int> {
+    for (std::size_t a = n_before; a < cell.adhesions.size(); ++a)
+      if (covers(cell.adhesions[a], end, kApart_um)) return cell.adhesions[a].adhesion_id;
+    return {};
+  };
+  for (Fibre& f : cell.fibres) {
+    if (!f.start_adhesion_id) f.start_adhesion_id = holder(f.points_um.front());
+    if (!f.end_adhesion_id) f.end_adhesion_id = holder(f.points_um.back());
+    if (f.start_adhesion_id == f.end_adhesion_id) f.end_adhesion_id.reset();
+  }
+  return cell;
+}
+
+std::vector<MissingAdhesion> with_forces_of(const Cell& cell, const VectorXd& forces_nN,
+                                            std::vector<MissingAdhesion> held,
+                                            const std::vector<MissingAdhesion>& further) {
+  Index at = 2 * std::ssize(cell.adhesions) - 2 * std::ssize(held);
+  for (MissingAdhesion& place : held) {
+    place.force_nN = {forces_nN[at], forces_nN[at + 1]};
+    at += 2;
+  }
+  held.insert(held.end(), further.begin(), further.end());
+  std::ranges::stable_sort(held, std::greater(), &MissingAdhesion::chi_squared_gain);
+  return held;
+}
+
+EnsembleFit with_unfound(EnsembleFit fit, const Cell& cell, const std::vector<MissingAdhesion>& found) {
+  if (found.empty() || are_assumed(cell.adhesions)) return fit;  // nobody looked for assumed ones, so none was missed
+  const double unfound = unfound_nN(adhesion_forces_nN(fit), cell.adhesions, found);
   fit.forces.away_nN2 += unfound * unfound;
   fit.total_force_nN.value += unfound;
-  fit.total_force_nN.standard_error = std::hypot(fit.total_force_nN.standard_error, std::sqrt(fit.forces.away_nN2));
+  fit.total_force_nN.standard_error = std::hypot(fit.total_force_nN.standard_error, unfound);
   return fit;
 }
 

@@ -23,7 +23,18 @@ bool are_assumed(const std::vector<Adhesion>& adhesions);
 /// The fit of a cell that pulls at these places, too: the adhesions' forces beside theirs, and the total with them.
 /// @param places  their forces and gains become what the fit finds
 /// @param n_last  motions of the data that stay the last ones
-EnsembleFit with_their_forces(EnsembleFit fit, const Cell& cell, std::vector<MissingAdhesion>& places, const Gel& gel,
-                              Index n_last);
+EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& places, const Gel& gel, Index n_last);
+
+/// The cell with adhesions at these places, too: a fibre that no adhesion holds is held by the one that it ends on.
+Cell held_at(Cell cell, const std::vector<MissingAdhesion>& places);
+/// Those that held_at() has added, with these forces (fx, fy by adhesion), and further ones: the largest gain first.
+/// @param held  as they were added
+std::vector<MissingAdhesion> with_forces_of(const Cell& cell, const VectorXd& forces_nN,
+                                            std::vector<MissingAdhesion> held,
+                                            const std::vector<MissingAdhesion>& further);
+
+/// The total and its error with the forces of further adhesions, which are too weak to be found.
+/// @param found  all that were missed, as they were found, whether they are adhesions of the cell by now or not
+EnsembleFit with_unfound(EnsembleFit fit, const Cell& cell, const std::vector<MissingAdhesion>& found);
 
 }  // namespace mbtfm::tensions

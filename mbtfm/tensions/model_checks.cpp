@@ -272,6 +272,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
     for (auto b = static_cast<std::size_t>(first / 2); 2 * static_cast<Index>(b) < K.rows(); ++b) {
       const auto j = 2 * static_cast<Index>(b);
       own[b] = K.block<2, 2>(j, j - first).selfadjointView<Eigen::Upper>();
+      if (adhesions[b].origin == AdhesionOrigin::beads) continue;  // the last ones
       for (std::size_t a = 0; a < b; ++a) {
         const Vec2 chord = adhesions[b].position_um - adhesions[a].position_um;
         const Vec2 unit = (1 / norm(chord)) * chord;

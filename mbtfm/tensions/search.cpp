@@ -61,20 +61,20 @@ double likeliest_kappa(const Spectrum& s) {
   return best;
 }
 
-std::vector<std::size_t> causes_among(Scores scores, const std::vector<std::vector<Index>>& columns, double least,
-                                      std::optional<double> kappa) {
+std::vector<std::size_t> causes_among(Scores scores, const std::vector<std::vector<Index>>& columns,
+                                      const std::vector<double>& log_odds_against, std::optional<double> kappa) {
   std::vector<std::size_t> causes;
   while (causes.size() < columns.size()) {
     std::size_t best = 0;
-    double most = least, its_kappa = 0;
+    double most = 0, its_kappa = 0;
     for (std::size_t k = 0; k < columns.size(); ++k) {
       if (std::ranges::find(causes, k) != causes.end()) continue;
       const Spectrum spectrum = spectrum_of(at(scores, columns[k]));
       const double here_kappa = kappa ? *kappa : likeliest_kappa(spectrum),
-                   here = log_bayes_factor(spectrum, here_kappa);
+                   here = log_bayes_factor(spectrum, here_kappa) - log_odds_against[k];
       if (here > most) best = k, most = here, its_kappa = here_kappa;
     }
-    if (most <= least) break;
+    if (most <= 0) break;
     causes.push_back(best);
     scores = beside(scores, columns[best], its_kappa);
   }

@@ -46,11 +46,11 @@ double log_bayes_factor(const Spectrum& spectrum, double kappa);
 /// Patterson & Thompson, Biometrika 58 (1971) 545).
 double likeliest_kappa(const Spectrum& spectrum);
 
-/// The blocks that the data call for: the one that they speak for most, then the others beside it, as long as
-/// log_bayes_factor() is above `least`.
-/// @param columns  by block  @param kappa  of the sizes of a block; none: the likeliest
-std::vector<std::size_t> causes_among(Scores scores, const std::vector<std::vector<Index>>& columns, double least,
-                                      std::optional<double> kappa = {});
+/// The blocks that the data call for: the likeliest one, then the others beside it, as long as log_bayes_factor() is
+/// above the log of the odds against the block.
+/// @param columns, log_odds_against  by block  @param kappa  of the sizes of a block; none: the likeliest
+std::vector<std::size_t> causes_among(Scores scores, const std::vector<std::vector<Index>>& columns,
+                                      const std::vector<double>& log_odds_against, std::optional<double> kappa = {});
 
 /// Columns of displacements as the data see them.
 struct Pattern {

@@ -13,9 +13,10 @@
 namespace mbtfm {
 
 /// Where an adhesion comes from: found in an image or a mask of one; drawn by hand; put where a fibre drawn by hand
-/// must be held and no adhesion is; or put where one may be, because nothing shows the adhesions.
-enum class AdhesionOrigin { image, drawn, anchor, candidate };
-constexpr auto words(AdhesionOrigin) { return std::array{"image", "drawn", "anchor", "candidate"}; }
+/// must be held and no adhesion is; put where one may be, because nothing shows the adhesions; or put where the beads
+/// show a force away from all others.
+enum class AdhesionOrigin { image, drawn, anchor, candidate, beads };
+constexpr auto words(AdhesionOrigin) { return std::array{"image", "drawn", "anchor", "candidate", "beads"}; }
 /// Nobody has seen it: it is an anchor or a candidate.
 inline bool is_assumed(AdhesionOrigin origin) {
   return origin == AdhesionOrigin::anchor || origin == AdhesionOrigin::candidate;

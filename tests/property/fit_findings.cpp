@@ -117,6 +117,22 @@ TEST_F(FitFindings, a_force_away_from_all_adhesions_is_named) {
   EXPECT_TRUE(fires("missing-adhesion", found()));
 }
 
+TEST_F(FitFindings, a_fibre_is_held_where_the_beads_show_its_adhesion) {
+  constexpr int kMissed = 5;
+  const Vec2 missed_um = cell_.adhesions[kMissed - 1].position_um;
+  std::erase_if(inputs_.cell.adhesions, [](const Adhesion& a) { return a.adhesion_id == kMissed; });
+  inputs_.cell.fibres.front().end_adhesion_id.reset();
+  inputs_.network = mesh::generate_network(inputs_.cell, parameters_.network).network;
+  const FittedCell fitted = fit_cell(inputs_, parameters_, 2);
+  const std::vector<MissingAdhesion>& missing = fitted.checks.missing_adhesions;
+  ASSERT_EQ(missing.size(), 1u);
+  EXPECT_LE(norm(missing.front().position_um - missed_um), 1) << "places are a micrometre apart";
+  EXPECT_EQ(fitted.ready.scene.cell.adhesions.back().origin, AdhesionOrigin::beads);
+  const Tension& fibre = *std::ranges::find(fitted.found.tensions, 1, &Tension::fibre_id);
+  EXPECT_LE(std::abs(fibre.tension_nN - 2.5), 3 * fibre.sigma_nN.value());
+  EXPECT_LE(fibre.sigma_nN.value(), 0.5) << "and is known";
+}
+
 /// What a force that has its finding leaves around it is no second cause; what is left at another place is.
 TEST_F(FitFindings, what_is_left_beside_a_named_force_is_open_only_if_more_is_left_elsewhere) {
   const auto is_open_among = [](const std::vector<Finding>& findings, const std::string& id) {

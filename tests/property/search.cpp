@@ -67,7 +67,7 @@ TEST(Search, the_shadow_of_a_cause_is_none) {
   const VectorXd data = 10 * X.col(0) + 8 * X.col(1);
   const Scores scores{X.transpose() * X, X.transpose() * data};
   EXPECT_GT(log_bayes_factor(spectrum_of(at(scores, {2})), 25), 10);
-  EXPECT_EQ(causes_among(scores, {{0}, {1}, {2}, {3}}, 3, 25), (std::vector<std::size_t>{0, 1}));
+  EXPECT_EQ(causes_among(scores, {{0}, {1}, {2}, {3}}, {3, 3, 3, 3}, 25), (std::vector<std::size_t>{0, 1}));
 }
 
 }  // namespace
