@@ -1,32 +1,13 @@
 #include <cmath>
 #include <limits>
 
+#include "mbtfm/tractions/beside_background.h"
 #include "mbtfm/tractions/fttc.h"
 #include "pipeline/numerics/dense.h"
-#include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::tractions {
 
 namespace {
-
-/// Wᵀ D and Wᵀ u for one m.
-struct Normal {
-  MatrixXd matrix;
-  VectorXd right;
-};
-
-Normal normal_for(const LatticeProblem& problem, const MatrixXd& D, double m, int threads) {
-  Normal normal{MatrixXd(D.cols(), D.cols()), VectorXd(D.cols())};
-  numerics::parallel_for(static_cast<int>(D.cols()), threads, [&](int a) {
-    TikhonovSolver solver(problem, problem.pulled_back(problem.spread_of(D.col(a))), 1);
-    solver.solve(m, kTolerance);  // a thirtieth of a standard error
-    const VectorXd w = D.col(a) - problem.at_beads(problem.displaced(solver.solution()));
-    normal.matrix.row(a) = (D.transpose() * w).transpose();
-    normal.right[a] = w.dot(problem.data());
-  });
-  normal.matrix = 0.5 * (normal.matrix + normal.matrix.transpose()).eval();  // but for the solver's tolerance it is
-  return normal;
-}
 
 /// What is known of the forces for one m, with the s² that makes the data most likely.
 struct Known {
@@ -35,7 +16,7 @@ struct Known {
   MatrixXd covariance;
 };
 
-Known known_from(const Normal& normal, double variance) {
+Known known_from(const BesideBackground::Normal& normal, double variance) {
   const auto [values, vectors] = numerics::symmetric_eigen(normal.matrix / variance);
   const double floor = 1e-9 * values.maxCoeff();  // rounding
   const Eigen::ArrayXd d = values.array().max(floor);
@@ -73,12 +54,13 @@ std::vector<double> log_likelihoods_of(const LambdaScan& scan) {
 /// without any adhesion: until it gets less likely.
 Known most_likely(const LatticeProblem& problem, const LambdaScan& scan, const MatrixXd& D, int threads) {
   const std::vector<double> without = log_likelihoods_of(scan);
+  BesideBackground beside(problem, D, threads);
   Known best;
   double likeliest = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const double m = scan.points[i].lambda;
     if (m < scan.by_gcv && i > 0) break;
-    Known known = known_from(normal_for(problem, D, m, threads), scan.variance);
+    Known known = known_from(beside.at(m), scan.variance);
     const double value = without[i] + known.log_likelihood;
     if (value < likeliest) break;
     likeliest = value;

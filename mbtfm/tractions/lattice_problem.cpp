@@ -183,8 +183,8 @@ LatticeProblem::LatticeProblem(const DisplacementField& beads, const Gel& gel, c
   spread_ = spread(x, y);
 }
 
-NodeField LatticeProblem::spread(const Eigen::ArrayXd& x, const Eigen::ArrayXd& y) const {
-  NodeField nodes{Eigen::ArrayXd::Zero(box_.n_nodes()), Eigen::ArrayXd::Zero(box_.n_nodes())};
+NodeField LatticeProblem::spread(const Eigen::ArrayXd& x, const Eigen::ArrayXd& y, NodeField nodes) const {
+  for (auto* part : {&nodes.x, &nodes.y}) part->setZero(box_.n_nodes());
   for (std::size_t i = 0; i < n_beads_; ++i) {
     for (std::size_t k = first_tap_[i]; k < first_tap_[i + 1]; ++k) {
       nodes.x[taps_[k].node] += taps_[k].weight * x[i];
@@ -215,8 +215,9 @@ Eigen::MatrixXd LatticeProblem::weighted(Eigen::MatrixXd by_component) const {
   return by_component;
 }
 
-NodeField LatticeProblem::spread_of(const Eigen::VectorXd& components) const {
-  return spread(components(Eigen::seq(0, Eigen::last, 2)), components(Eigen::seq(1, Eigen::last, 2)));
+NodeField LatticeProblem::spread_of(const Eigen::VectorXd& components, NodeField memory) const {
+  return spread(components(Eigen::seq(0, Eigen::last, 2)), components(Eigen::seq(1, Eigen::last, 2)),
+                std::move(memory));
 }
 
 Eigen::VectorXd LatticeProblem::at_beads(const NodeField& nodes) const {

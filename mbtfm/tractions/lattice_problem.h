@@ -46,8 +46,8 @@ class LatticeProblem {
   Eigen::VectorXd data() const;
   /// 2·beads × any number: rows of beads' components times the roots of their weights.
   Eigen::MatrixXd weighted(Eigen::MatrixXd by_component) const;
-  /// Pᵀ of weighted components
-  NodeField spread_of(const Eigen::VectorXd& components) const;
+  /// Pᵀ of weighted components. @param memory  for it: fresh memory costs more
+  NodeField spread_of(const Eigen::VectorXd& components, NodeField memory = {}) const;
   /// P of displacements on the lattice, component by component
   Eigen::VectorXd at_beads(const NodeField& displacements) const;
   /// u − P of displacements on the lattice, component by component
@@ -60,7 +60,7 @@ class LatticeProblem {
   WaveField pulled_back(const NodeField& spread) const;
 
  private:
-  NodeField spread(const Eigen::ArrayXd& x, const Eigen::ArrayXd& y) const;
+  NodeField spread(const Eigen::ArrayXd& x, const Eigen::ArrayXd& y, NodeField nodes = {}) const;
   Lattice field_, box_;
   std::unique_ptr<SurfaceSpectrum> spectrum_;
   std::unique_ptr<WaveTransform> transform_;

@@ -145,7 +145,7 @@ MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, GelModel gel_model,
   numerics::expect_room_for({.what = "the compliance of the adhesions",
                              .count = n_beads,
                              .parts = "beads",
-                             .bytes_each = 3 * 4 * sizeof(double) * static_cast<double>(inputs.adhesions.size()),
+                             .bytes_each = 6 * 4 * sizeof(double) * static_cast<double>(inputs.adhesions.size()),
                              .remedy = "leave --adhesions out, or take fewer beads"});
   return greens::make_greens(inputs.gel, {.model = substrate::kind_of(gel_model)}, threads)
       ->compliance_um_per_nN(points_of(inputs.beads), substrate::ellipses_of(inputs.adhesions));

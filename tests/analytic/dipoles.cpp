@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 
+#include "mbtfm/tractions/beside_background.h"
 #include "tests/support/dipole_scene.h"
 
 namespace mbtfm::tractions {
@@ -29,6 +30,30 @@ TEST(Dipoles, sparse_has_neither_peaks_nor_moments_of_its_own_on_scattered_beads
     EXPECT_NEAR(sums_of(r, inputs, 0).contractile_moment_nN_um() / scene.moment_nN_um, 1, 0.05) << radius_um;
   }
   EXPECT_LE(peak, 1.2);
+}
+
+TEST(Dipoles, normal_equations_beside_tractions_everywhere_are_those_of_the_dense_covariance) {
+  const test::DipoleScene scene = test::dipole_scene({.beads_per_um2 = 0.08}, 1);
+  const LatticeProblem problem(scene.inputs.beads, scene.inputs.gel, {.model = GelModel::half_space});
+  const MatrixXd D = problem.weighted(even_forces_um_per_nN(scene.inputs, GelModel::half_space, 1));
+  const Index n = D.rows();
+  MatrixXd S(n, n);
+  for (Index k = 0; k < n; ++k)
+    S.col(k) = problem.at_beads(problem.displaced(problem.pulled_back(problem.spread_of(Eigen::VectorXd::Unit(n, k)))));
+  BesideBackground beside(problem, D, 1);
+  for (const double m : {3.0, 0.3, 0.03}) {
+    const MatrixXd W = numerics::solve_symmetric(MatrixXd::Identity(n, n) + S / (m * m), D);
+    const VectorXd right = W.transpose() * problem.data();
+    const MatrixXd matrix = W.transpose() * D;
+    const BesideBackground::Normal found = beside.at(m);
+    // at() stops where a block would change numbers on the diagonal by 1e-5
+    const VectorXd scale = matrix.diagonal().cwiseSqrt();
+    for (Index a = 0; a < D.cols(); ++a) {
+      EXPECT_NEAR(found.right[a], right[a], 1e-4 * scale[a] * problem.data().norm()) << m;
+      for (Index b = 0; b < D.cols(); ++b)
+        EXPECT_NEAR(found.matrix(a, b), matrix(a, b), 1e-4 * scale[a] * scale[b]) << m;
+    }
+  }
 }
 
 /// Adhesions of forces from nothing to many errors, among them neighbours that the beads hardly tell apart.
