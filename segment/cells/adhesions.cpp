@@ -93,9 +93,12 @@ std::vector<AdhesionRegion> divided(const AdhesionRegion& region, const TwoEllip
   std::vector<AdhesionRegion> parts(2);
   for (const CoveredPixel& p : region.pixels)
     parts[second.value(p.column, p.row) > first.value(p.column, p.row)].pixels.push_back(p);
-  for (int i = 0; i < 2; ++i)
-    if (!parts[i].pixels.empty())
-      parts[i].adhesion = with_ellipse(measure_ellipse(parts[i].pixels, pixel_um), two[i], pixel_um);
+  for (int i = 0; i < 2; ++i) {
+    if (parts[i].pixels.empty()) continue;
+    parts[i].adhesion = measure_ellipse(parts[i].pixels, pixel_um);
+    if (agrees(two[i], in_pixels(parts[i].adhesion, pixel_um, {})))
+      parts[i].adhesion = with_ellipse(parts[i].adhesion, two[i], pixel_um);
+  }
   std::erase_if(parts, [](const AdhesionRegion& part) { return part.pixels.empty(); });
   return parts;
 }

@@ -58,7 +58,8 @@ class EllipseSolver {
 
   /// Levenberg–Marquardt (Marquardt 1963).
   static Solution solve(const std::vector<Sample>& samples, const State& start, Shape shape, const Priors& priors) {
-    constexpr int kIterations = 40;    // a dozen do but for the least determined
+    // a dozen do but for the least determined; two that are not settled by then are mostly no two
+    constexpr int kIterations = kEllipses == 1 ? 40 : 25;
     constexpr double kSettled = 0.01;  // of one pixel's mean square: a tenth of the standard error that the noise makes
     Solution s{start, normal_equations(samples, start, priors)};
     const double n_samples = static_cast<double>(samples.size());
