@@ -75,11 +75,10 @@ CommonShape common_shape(const cv::Mat& height, const std::vector<BlurredEllipse
 /// Fit each ellipse and a level ground to the pixels of its window (Levenberg–Marquardt), the light of its neighbours
 /// taken off as they were fitted in the round before; bytes do not depend on the number of threads.
 ///
-/// Where one ellipse leaves enough, two are fitted, too. They stand if they gain more log-likelihood than seven more
-/// unknowns may (Schwarz, Ann. Statist. 6:461, 1978), half of that over, do not lie on each other and neither is too
-/// small:
+/// Where one ellipse leaves enough, two are fitted, too. They stand if they gain twice the log-likelihood that seven
+/// more unknowns may (Schwarz, Ann. Statist. 6:461, 1978), do not lie on each other and neither is too small:
 ///
-///   n (S₁ − S₂) / 2v > 1.5 · 7/2 ln n,   v = noise² + 4π s² m² B²
+///   n (S₁ − S₂) / 2v > 7 ln n,   v = noise² + 4π s² m² B²
 ///
 /// S: mean square left, s: blur. Adhesions are no ellipses: m, the median of the picture's fits, is what is left
 /// besides noise over the brightness B, and 4π s² pixels leave the same.
