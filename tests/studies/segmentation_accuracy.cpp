@@ -1,6 +1,7 @@
 /// segmentation_accuracy [scenario] [first seed] [last seed] [true-adhesions] [name=value …]: how well simulated cells
 /// are segmented, at three image qualities; mean over the seeds. `true-adhesions` judges the fibres apart from the
 /// adhesions.
+/// segmentation_accuracy adhesions SCENARIO FIRST LAST [name=value …]: the adhesions alone, and how many are merged.
 /// segmentation_accuracy real [name=value …]: adhesions and outlines of real cells that others have marked
 /// (../shared/data), with default parameters, or adhesions with these.
 #include <cstdio>
