@@ -2,7 +2,9 @@
 /// discs. Internal to segment/ (OpenCV types).
 #pragma once
 
+#include <array>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "segment/cells/adhesions.h"
@@ -46,12 +48,17 @@ cv::Mat above(const Contrast& contrast, double n_sigma);
 std::vector<std::vector<CoveredPixel>> adhesion_parts(const Contrast& contrast, double pixel_size_um,
                                                       const AdhesionParameters& parameters);
 
+/// Two adhesions that a region may be.
+using TwoEllipses = std::array<BlurredEllipse, 2>;
+
 struct FittedEllipse {
   BlurredEllipse ellipse;
-  double ground = 0;        ///< level around it
-  bool is_settled = false;  ///< the iteration ended at a minimum that is an ellipse within the window
-  double scatter = 0;       ///< mean square of what the model leaves
-  double unexplained = 1;   ///< share of the window's variance, less that of the noise, that the model leaves
+  double ground = 0;                 ///< level around it
+  bool is_settled = false;           ///< the iteration ended at a minimum that is an ellipse within the window
+  double scatter = 0;                ///< mean square of what the model leaves
+  double noise = 0;                  ///< mean square of a pixel's noise
+  double unexplained = 1;            ///< share of the window's variance, less that of the noise, that the model leaves
+  std::optional<TwoEllipses> two{};  ///< the window shows these better than one
 };
 
 /// What the adhesions of an image have in common.
@@ -67,10 +74,21 @@ CommonShape common_shape(const cv::Mat& height, const std::vector<BlurredEllipse
 
 /// Fit each ellipse and a level ground to the pixels of its window (Levenberg–Marquardt), the light of its neighbours
 /// taken off as they were fitted in the round before; bytes do not depend on the number of threads.
-/// @param height  image above its background
-/// @param noise   standard deviation of a pixel
-/// @param start   with their blur and dome, which stay
+///
+/// Where one ellipse leaves enough, two are fitted, too. They stand if they gain twice the log-likelihood that seven
+/// more unknowns may (Schwarz, Ann. Statist. 6:461, 1978), do not lie on each other and neither is too small:
+///
+///   n (S₁ − S₂) / 2v > 7 ln n,   v = noise² + 4π s² m² B²
+///
+/// S: mean square left, s: blur. Adhesions are no ellipses: m, the median of the picture's fits, is what is left
+/// besides noise over the brightness B, and 4π s² pixels leave the same.
+/// @param height   image above its background
+/// @param noise    standard deviation of a pixel
+/// @param start    with their blur and dome, which stay
+/// @param halves   of each, from which two may be fitted
+/// @param least_area  px², of each of two
 std::vector<FittedEllipse> fit_ellipses(const cv::Mat& height, const cv::Mat& noise,
-                                        const std::vector<BlurredEllipse>& start);
+                                        const std::vector<BlurredEllipse>& start,
+                                        const std::vector<std::vector<TwoEllipses>>& halves, double least_area);
 
 }  // namespace mbtfm::cells

@@ -54,7 +54,25 @@ bool agrees(const BlurredEllipse& fit, const BlurredEllipse& region) {
 /// The model explains nine tenths of the variance in the window.
 bool is_elliptical(const FittedEllipse& fit) { return fit.is_settled && fit.unexplained < 0.1; }
 
-std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<AdhesionRegion>& regions, double pixel_um) {
+/// The region cut through its middle, across its length and along it.
+std::vector<TwoEllipses> halves_of(const AdhesionRegion& region, double pixel_um, CommonShape shape) {
+  std::vector<TwoEllipses> result;
+  for (const double turn : {0.0, CV_PI / 2}) {
+    const double angle = region.adhesion.angle_rad + turn;
+    std::array<std::vector<CoveredPixel>, 2> halves;
+    for (const CoveredPixel& p : region.pixels) {
+      const Vec2 away = to_um({1.0 * p.column, 1.0 * p.row}, pixel_um) - region.adhesion.position_um;
+      halves[dot(away, {std::cos(angle), std::sin(angle)}) > 0].push_back(p);
+    }
+    if (std::ranges::any_of(halves, [](const auto& half) { return half.empty(); })) continue;
+    result.push_back({in_pixels(measure_ellipse(halves[0], pixel_um), pixel_um, shape),
+                      in_pixels(measure_ellipse(halves[1], pixel_um), pixel_um, shape)});
+  }
+  return result;
+}
+
+std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<AdhesionRegion>& regions, double pixel_um,
+                                     double smallest_um2) {
   const auto start = [&](CommonShape shape) {
     std::vector<BlurredEllipse> ellipses;
     for (const AdhesionRegion& r : regions) ellipses.push_back(in_pixels(r.adhesion, pixel_um, shape));
@@ -64,7 +82,25 @@ std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<Adhesi
   CommonShape shape = common_shape(c.sharp, start({kUsualBlur_um / pixel_um, kUsualDome}));
   shape.blur = std::min(shape.blur, kWidestBlur_um / pixel_um);
   shape.blur = std::max(shape.blur, 0.5);  // px: what sampling alone does
-  return fit_ellipses(c.sharp, c.sharp_noise, start(shape));
+  std::vector<std::vector<TwoEllipses>> halves;
+  for (const AdhesionRegion& r : regions) halves.push_back(halves_of(r, pixel_um, shape));
+  return fit_ellipses(c.sharp, c.sharp_noise, start(shape), halves, smallest_um2 / (pixel_um * pixel_um));
+}
+
+/// The region's pixels by which of two adhesions is the brighter one there.
+std::vector<AdhesionRegion> divided(const AdhesionRegion& region, const TwoEllipses& two, double pixel_um) {
+  const EllipseModel first(two[0]), second(two[1]);
+  std::vector<AdhesionRegion> parts(2);
+  for (const CoveredPixel& p : region.pixels)
+    parts[second.value(p.column, p.row) > first.value(p.column, p.row)].pixels.push_back(p);
+  for (int i = 0; i < 2; ++i) {
+    if (parts[i].pixels.empty()) continue;
+    parts[i].adhesion = measure_ellipse(parts[i].pixels, pixel_um);
+    if (agrees(two[i], in_pixels(parts[i].adhesion, pixel_um, {})))
+      parts[i].adhesion = with_ellipse(parts[i].adhesion, two[i], pixel_um);
+  }
+  std::erase_if(parts, [](const AdhesionRegion& part) { return part.pixels.empty(); });
+  return parts;
 }
 
 }  // namespace
@@ -100,8 +136,14 @@ std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, do
     // with the blur on it an adhesion is larger, never smaller
     if (adhesion.area_um2 <= p.adhesion_largest_um2) regions.push_back({adhesion, std::move(pixels)});
   }
-  const std::vector<FittedEllipse> fitted = fitted_to(c, regions, pixel_size_um);
-  for (std::size_t i = 0; i < regions.size(); ++i) {
+  const std::vector<FittedEllipse> fitted = fitted_to(c, regions, pixel_size_um, p.adhesion_smallest_um2);
+  for (std::size_t i = 0; i < fitted.size(); ++i) {
+    if (fitted[i].two) {
+      auto parts = divided(regions[i], *fitted[i].two, pixel_size_um);
+      regions[i] = std::move(parts[0]);
+      regions.insert(regions.end(), parts.begin() + 1, parts.end());
+      continue;
+    }
     Adhesion& adhesion = regions[i].adhesion;
     if (is_elliptical(fitted[i]) && agrees(fitted[i].ellipse, in_pixels(adhesion, pixel_size_um, {})))
       adhesion = with_ellipse(adhesion, fitted[i].ellipse, pixel_size_um);

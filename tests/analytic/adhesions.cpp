@@ -156,6 +156,24 @@ TEST(Adhesions, two_that_touch_are_two) {
   EXPECT_NEAR(score.area_ratio, 1, 0.15);
 }
 
+TEST(Adhesions, two_are_two_without_a_dip_between_them_and_one_is_one) {
+  const double pixel_um = 0.1;
+  // tip to tip and side by side, 0.12 um apart, less than one standard deviation of the blur; and a long one
+  const std::vector<Adhesion> drawn = {ellipse(1, {4, 4}, 1.6, 0.6, 0), ellipse(2, {5.72, 4}, 1.6, 0.6, 0),
+                                       ellipse(3, {10, 10}, 1.6, 0.6, 1), ellipse(4, {10.606, 9.611}, 1.6, 0.6, 1),
+                                       ellipse(5, {4, 11}, 3.2, 0.6, 0.5)};
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    SCOPED_TRACE(seed);
+    images::Image image = even_image(160, 160, 100);
+    for (const Adhesion& a : drawn) draw_blurred(image, a, 400, 0.14, pixel_um);
+    add_noise(image, 10, seed);
+    const AdhesionScore score = score_adhesions(drawn, find_adhesions(image, pixel_um, {}));
+    EXPECT_EQ(score.n_matched, 5);
+    EXPECT_EQ(score.n_found, 5);
+    EXPECT_EQ(score.n_merged + score.n_split, 0);
+  }
+}
+
 TEST(Adhesions, the_reference_labels_measure_as_their_authors_did) {
   if (!std::filesystem::exists(kFibroblast)) GTEST_SKIP() << "the shared data are absent: " << kFibroblast;
   const auto table = [](const char* name) { return numbers_of(kFibroblast / "raw_data" / name); };

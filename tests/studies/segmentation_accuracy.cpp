@@ -1,6 +1,7 @@
 /// segmentation_accuracy [scenario] [first seed] [last seed] [true-adhesions] [name=value …]: how well simulated cells
 /// are segmented, at three image qualities; mean over the seeds. `true-adhesions` judges the fibres apart from the
 /// adhesions.
+/// segmentation_accuracy adhesions SCENARIO FIRST LAST [name=value …]: the adhesions alone, and how many are merged.
 /// segmentation_accuracy real [name=value …]: adhesions and outlines of real cells that others have marked
 /// (../shared/data), with default parameters, or adhesions with these.
 #include <cstdio>
@@ -67,9 +68,34 @@ void real(const std::vector<std::string>& settings) {
   std::printf("outline of the doublet: intersection over union %.3f\n", doublet_overlap());
 }
 
+/// Adhesions of simulated cells.
+void adhesions(const std::string& scenario, int first, int last, const std::vector<std::string>& settings) {
+  cells::AdhesionParameters p;
+  stage::ParameterList list;
+  declare(list, p);
+  set_all(list, settings);
+  std::printf("%-24s %6s %6s %6s %8s %8s %9s\n", "", "F1", "recall", "prec.", "merged", "split", "area bias");
+  for (const std::string quality : {"poor", "ordinary", "good"}) {
+    double f1 = 0, bias = 0;
+    int n_true = 0, n_found = 0, n_matched = 0, n_merged = 0, n_split = 0;
+    for (int seed = first; seed <= last; ++seed) {
+      const SimulatedCell cell = simulated_cell(scenario, quality, static_cast<std::uint64_t>(seed));
+      const auto found = cells::find_adhesions(cell.adhesion.image, *cell.adhesion.image.pixel_size_um, p);
+      const AdhesionScore s = score_adhesions(cell.truth.adhesions, found);
+      f1 += s.f1() / (last - first + 1), bias += (s.area_ratio - 1) / (last - first + 1);
+      n_true += s.n_true, n_found += s.n_found, n_matched += s.n_matched, n_merged += s.n_merged, n_split += s.n_split;
+    }
+    std::printf("%-10s %-13s %6.3f %6.3f %6.3f %8.3f %8.3f %9.3f\n", scenario.c_str(), quality.c_str(), f1,
+                1.0 * n_matched / n_true, 1.0 * n_matched / n_found, 1.0 * n_merged / n_true, 1.0 * n_split / n_true,
+                bias);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc > 4 && std::string(argv[1]) == "adhesions")
+    return adhesions(argv[2], std::atoi(argv[3]), std::atoi(argv[4]), {argv + 5, argv + argc}), 0;
   if (argc > 1 && std::string(argv[1]) == "real") return real({argv + 2, argv + argc}), 0;
   const std::string scenario = argc > 1 ? argv[1] : "u2os";
   const int first = argc > 2 ? std::atoi(argv[2]) : 1, last = argc > 3 ? std::atoi(argv[3]) : 4;

@@ -47,6 +47,8 @@ inline Accuracy accuracy_of(const Cell& truth, const Cell& found) {
   const LineScore l = score_lines(truth.fibres, found.fibres, 0.25);
   constexpr double kDegrees = 180 / std::numbers::pi;
   Accuracy result = {{"adhesion F1", a.f1()},
+                     {"adhesions merged", 1.0 * a.n_merged / std::max(1, a.n_true)},
+                     {"adhesions split", 1.0 * a.n_split / std::max(1, a.n_true)},
                      {"adhesion area bias", a.area_ratio - 1},
                      {"adhesion area error, median", median(a.area_errors)},
                      {"adhesion centre error, median (um)", median(a.centre_errors_um)},

@@ -43,6 +43,8 @@ struct AdhesionScore {
   double angle_error_rad = 0;  ///< root mean square, of the matched whose axes' ratio exceeds 1.5
   std::vector<double> area_errors, centre_errors_um, angle_errors_rad;  ///< of each matched one, magnitudes
   std::vector<int> found_id;                                            ///< by true adhesion; 0: none
+  int n_merged = 0;  ///< true ones whose centre lies in a found one that covers another true centre, too
+  int n_split = 0;   ///< true ones that cover the centres of two found ones or more
   double f1() const { return 2.0 * n_matched / std::max(1, n_true + n_found); }
 };
 
@@ -80,6 +82,13 @@ inline AdhesionScore score_adhesions(const std::vector<Adhesion>& truth, const s
       s.angle_errors_rad.push_back(turn);
     }
   }
+  const auto n_covered = [](const Adhesion& one, const std::vector<Adhesion>& others) {
+    return std::ranges::count_if(others, [&](const Adhesion& o) { return covers(one, o.position_um); });
+  };
+  for (const Adhesion& f : found)
+    if (const auto n = static_cast<int>(n_covered(f, truth)); n > 1) s.n_merged += n;
+  s.n_split =
+      static_cast<int>(std::ranges::count_if(truth, [&](const Adhesion& t) { return n_covered(t, found) > 1; }));
   s.area_ratio = found_area / true_area;
   s.centre_error_um = std::sqrt(squares / std::max(1, s.n_matched));
   s.angle_error_rad = std::sqrt(angles / static_cast<double>(std::max<std::size_t>(1, s.angle_errors_rad.size())));
