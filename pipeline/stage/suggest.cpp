@@ -43,7 +43,7 @@ void add_words(const DeclaredCommand& command, std::vector<std::string>& words) 
 std::string slip_in(const std::string& words) {
   std::istringstream all(words);
   for (std::string word; all >> word;) {
-    if (word == "=") return "; write no blanks around =";
+    if (word.size() == 1 && word[0] == '=') return "; write no blanks around =";
     std::string flag = word;
     for (const char* dash : {"\u2013", "\u2014", "\u2212"})
       if (flag.starts_with(dash)) flag.erase(0, std::string_view(dash).size());

@@ -62,7 +62,7 @@ Source source_of(const std::string& asked, const char* flag, const std::vector<s
 /// What a form says where nobody is to be left out.
 std::string reason_in(const std::string& exclude) {
   const std::string word = files::lower_case(exclude);
-  if (word == "?") return exclude;  // a doubt
+  if (word.starts_with('?')) return exclude;  // a doubt
   for (const char* nobody : {"no", "n", "0", "false", "f", "none", "nein", "non", "nej", "nee"})
     if (word == nobody) return {};
   return files::is_missing(exclude) ? "" : exclude;

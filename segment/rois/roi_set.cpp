@@ -7,7 +7,6 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/path.h"
-#include "pipeline/files/names.h"
 #include "segment/rois/roi.h"
 
 namespace mbtfm::rois {
@@ -67,7 +66,7 @@ std::vector<Roi> read_zip(const fs::path& file) {
     const char* raw_name = zip_get_name(archive.get(), index, ZIP_FL_ENC_GUESS);
     const fs::path name = raw_name ? raw_name : "";
     // what else is there, macOS' resource files among it, is none of ours
-    if (files::lower_case(name.extension().string()) != ".roi" || name.string().starts_with("__MACOSX") ||
+    if ((name.extension() != ".roi" && name.extension() != ".ROI") || name.string().starts_with("__MACOSX") ||
         name.filename().string().starts_with("._"))
       continue;
     const std::string where = file.string() + ": " + name.string();
