@@ -516,8 +516,13 @@ int start(int argc, char** argv) {
     std::ostringstream help, message;
     const int code = app.exit(error, help, message);
     std::cerr << message.str();
+    const std::string program = argc > 1 ? "mbtfm-" + std::string(argv[1]) : "";
     if (const std::string meant = stage::suggestion(app, error.what()); code != 0 && !meant.empty())
-      std::cerr << "mbtfm: " << meant.substr(2) << "\n";
+      std::cerr << "mbtfm: "
+                << (files::is_file(runner::executable_folder() / program) && app.get_subcommands().empty()
+                        ? "that is a program of its own: " + program + " --help; of a cell: mbtfm run CELL --only STAGE"
+                        : meant.substr(2))
+                << "\n";
     stage::print(help.str());
     return code == 0 ? kDone : kUsage;
   }

@@ -222,11 +222,13 @@ void write_page(const fs::path& file, const fs::path& folder, const std::vector<
 StageReport check(const fs::path& folder, const CheckParameters& p, int threads, bool& is_fine) {
   setenv(stage::kRunnerVariable, stage::kForPerson, 1);  // of the stages that are asked
   const runner::FoundCells found = runner::search_cells(folder);
+  if (found.cells.empty() && found.skipped.empty()) runner::find_cells(folder);  // says what to do
   std::vector<Seen> seen(found.cells.size());
+  const auto name_of = [&](const fs::path& cell) {
+    return cell == folder ? fs::weakly_canonical(folder).filename().string() : cell.lexically_relative(folder).string();
+  };
   std::vector<std::string> names;
-  for (const fs::path& cell : found.cells)
-    names.push_back(cell == folder ? fs::weakly_canonical(folder).filename().string()
-                                   : cell.lexically_relative(folder).string());
+  for (const fs::path& cell : found.cells) names.push_back(name_of(cell));
   numerics::parallel_for(static_cast<int>(seen.size()), threads, [&](int i) {
     seen[i] = look_at(found.cells[i], names[i]);
     read_beads(found.cells[i], seen[i]);
@@ -234,7 +236,7 @@ StageReport check(const fs::path& folder, const CheckParameters& p, int threads,
   tell_copies(names, seen);
   for (const runner::SkippedFolder& skipped : found.skipped) {
     seen.push_back({.error = skipped.why});
-    seen.back().row.cell = skipped.folder.lexically_relative(folder).string();
+    seen.back().row.cell = name_of(skipped.folder);
   }
   for (const Seen& cell : seen) stage::print(p.json ? json_of(cell) : text_of(cell));
   if (!p.json) stage::print(disk_doubt(folder, seen.size()));

@@ -192,14 +192,19 @@ StageReport init_like(stage::StageContext& context, bool& is_whole) {
 StageReport init(stage::StageContext& context, bool& is_whole) {
   if (context.has_input("like")) return init_like(context, is_whole);
   const fs::path folder = context.input("cell", {});
-  if (!files::is_folder(folder)) throw InputError(folder.string(), "a folder with the images of a cell", "none");
+  runner::require_folder(folder, "a folder with the images of a cell");
   for (const fs::path& file : {folder / "cell.toml", context.outputs_.at("out")})
     if (fs::symlink_status(file).type() != fs::file_type::not_found)
       throw InputError(file.string(), "no cell.toml yet", "one", "it is yours: edit it, or rename it first");
-  if (survey::images_in(folder).empty())
+  if (survey::images_in(folder).empty()) {
+    for (const fs::path& below : files::visible_in(folder))
+      if (files::is_folder(below) && !survey::images_in(below).empty())
+        throw InputError(folder.string(), "images of a cell: TIFF, PNG or JPEG", "some in the folder " + below.string(),
+                         "if that is the cell: mbtfm init '" + below.string() + "'; else move its images up");
     throw InputError(folder.string(), "images of a cell: TIFF, PNG or JPEG", "none",
                      "files of a microscope (nd2, czi, lif): in Fiji, File > Import > Bio-Formats, then File > Save As "
                      "> Tiff; or bfconvert IN OUT.ome.tif");
+  }
   const Written written = cell_toml(folder);
   files::write_text(context.output("out"), written.text);
   StageReport report;

@@ -43,6 +43,8 @@ std::optional<RoiSet> roi_set(stage::StageContext& context, const std::string& a
 std::shared_ptr<const LabelMask> mask(stage::StageContext& context, const std::string& argument, int binning) {
   if (!context.has_input(argument)) return nullptr;
   LabelMask mask = read_mask(context.input(argument));
+  context.notice(
+      noticed(Symptom::assumed_input, mask.taken.empty() ? 0 : 1, {.at = mask.name + ": " + mask.taken + "."}));
   mask.binning = binning;
   return std::make_shared<const LabelMask>(std::move(mask));
 }

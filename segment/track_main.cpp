@@ -206,8 +206,9 @@ struct Frame {
   fs::path file;
   images::PlaneChoice plane;
   std::string name() const {
-    if (plane.page) return file.string() + ", page " + std::to_string(*plane.page);
-    return file.string() + (plane.time ? ", time " + std::to_string(*plane.time) : "");
+    const std::string image = file.filename().string();
+    if (plane.page) return image + ", page " + std::to_string(*plane.page);
+    return image + (plane.time ? ", time " + std::to_string(*plane.time) : "");
   }
 };
 

@@ -184,6 +184,9 @@ void write_outline(const Path& file, const Polygon& outer_um, const std::vector<
 }
 
 Cell read_cell(const Path& folder) {
+  if (!std::filesystem::exists(folder / "outline.csv") && std::filesystem::exists(folder / "1_segment/outline.csv"))
+    throw InputError(folder.string(), "a folder of mbtfm-segment", "the cell that it is in",
+                     "give " + (folder / "1_segment").string());
   Outline outline = outline_in(folder / "outline.csv");
   Cell cell{.adhesions = read_adhesions(folder / "adhesions.csv"),
             .fibres = read_fibres(folder / "fibres.csv", folder / "fibre_points.csv"),

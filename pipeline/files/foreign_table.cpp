@@ -324,8 +324,8 @@ ForeignTable read_numbers(std::string_view bytes, std::string name, std::size_t 
   if (table.rows.empty()) {
     throw InputError(
         table.name, "rows of " + std::to_string(n_numbers) + " numbers or more", "none",
-        "a row for each vector, its numbers between commas, semicolons, tabs or blanks, without a unit beside "
-        "them");
+        "a row for each vector, its numbers between commas, semicolons, tabs or blanks, with one decimal mark, without "
+        "a mark between thousands or a unit beside them");
   }
   expect_equal_widths(table.rows, table.name, separator);
   take_rows_with_gaps(table, n_numbers);
@@ -372,6 +372,11 @@ CsvTable read_records(std::string_view bytes, std::string name, const std::strin
       continue;
     }
     CsvTable::Row row{line.number, cells_of(line.text, separator)};
+    const bool is_cut = std::ranges::any_of(row.fields, [](const std::string& cell) { return cell.starts_with('"'); });
+    if (const int n = is_cut ? take_quoted_breaks(rest, line.text) : 0; n > 0) {
+      row.fields = cells_of(line.text, separator);
+      line.number += n;
+    }
     if (!has_content(row.fields)) continue;
     while (row.fields.size() > header.size() && row.fields.back().empty()) row.fields.pop_back();
     if (row.fields.size() != header.size()) {

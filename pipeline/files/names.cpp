@@ -26,33 +26,6 @@ std::string bytes_told_by(std::string_view text) {
   return bytes;
 }
 
-/// Letters with a mark behind them as one character, as keyboards write them: a Mac's file names have them apart
-/// (Unicode Standard Annex 15, forms D and C; the letters of European languages).
-std::string composed(std::string_view text) {
-  struct Marked {
-    std::string_view mark, letters, composed;  // two bytes a mark and a composed letter
-  };
-  constexpr std::array<Marked, 8> kMarks = {{{"\u0300", "AEIOUaeiou", "ÀÈÌÒÙàèìòù"},
-                                             {"\u0301", "AEIOUYaeiouyCcLlNnRrSsZz", "ÁÉÍÓÚÝáéíóúýĆćĹĺŃńŔŕŚśŹź"},
-                                             {"\u0302", "AEIOUaeiou", "ÂÊÎÔÛâêîôû"},
-                                             {"\u0303", "ANOano", "ÃÑÕãñõ"},
-                                             {"\u0308", "AEIOUaeiouy", "ÄËÏÖÜäëïöüÿ"},
-                                             {"\u030A", "AaUu", "ÅåŮů"},
-                                             {"\u0327", "CcSs", "ÇçŞş"},
-                                             {"\u030C", "CcDdEeNnRrSsTtZz", "ČčĎďĚěŇňŘřŠšŤťŽž"}}};
-  std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    std::string_view letter = text.substr(i, 1);
-    for (const Marked& m : kMarks) {
-      const std::size_t at = text.substr(i + 1).starts_with(m.mark) ? m.letters.find(text[i]) : m.letters.npos;
-      if (at != m.letters.npos) letter = m.composed.substr(2 * at, 2);
-    }
-    result += letter;
-    if (letter.size() == 2) i += 2;
-  }
-  return result;
-}
-
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 /// The digits that the text begins with go from it; zeros in front do not count.
@@ -82,6 +55,32 @@ int compare_names(std::string_view a, std::string_view b) {
 }
 
 }  // namespace
+
+// Unicode Standard Annex 15, forms D and C; the letters of European languages.
+std::string composed(std::string_view text) {
+  struct Marked {
+    std::string_view mark, letters, composed;  // two bytes a mark and a composed letter
+  };
+  constexpr std::array<Marked, 8> kMarks = {{{"\u0300", "AEIOUaeiou", "ÀÈÌÒÙàèìòù"},
+                                             {"\u0301", "AEIOUYaeiouyCcLlNnRrSsZz", "ÁÉÍÓÚÝáéíóúýĆćĹĺŃńŔŕŚśŹź"},
+                                             {"\u0302", "AEIOUaeiou", "ÂÊÎÔÛâêîôû"},
+                                             {"\u0303", "ANOano", "ÃÑÕãñõ"},
+                                             {"\u0308", "AEIOUaeiouy", "ÄËÏÖÜäëïöüÿ"},
+                                             {"\u030A", "AaUu", "ÅåŮů"},
+                                             {"\u0327", "CcSs", "ÇçŞş"},
+                                             {"\u030C", "CcDdEeNnRrSsTtZz", "ČčĎďĚěŇňŘřŠšŤťŽž"}}};
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    std::string_view letter = text.substr(i, 1);
+    for (const Marked& m : kMarks) {
+      const std::size_t at = text.substr(i + 1).starts_with(m.mark) ? m.letters.find(text[i]) : m.letters.npos;
+      if (at != m.letters.npos) letter = m.composed.substr(2 * at, 2);
+    }
+    result += letter;
+    if (letter.size() == 2) i += 2;
+  }
+  return result;
+}
 
 std::size_t utf8_length(std::string_view text) {
   if (text.empty()) return 0;

@@ -21,6 +21,9 @@ std::string shown_name(std::string_view bytes);
 /// or as two), else one with the bytes that it tells.
 std::filesystem::path file_shown_as(const std::filesystem::path& folder, const std::string& name);
 
+/// A letter and a mark behind it as one character, as keyboards write them: ü, where a Mac's file names have u and ¨.
+std::string composed(std::string_view text);
+
 /// Letters of ASCII as small ones.
 std::string lower_case(std::string text);
 

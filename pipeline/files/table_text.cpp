@@ -63,6 +63,20 @@ std::string_view as_text(std::string_view bytes, std::string& place) {
   return bytes;
 }
 
+int take_quoted_breaks(std::string_view& rest, std::string_view& line) {
+  const auto is_open = [](std::string_view text) { return std::ranges::count(text, '"') % 2 != 0; };
+  if (!is_open(line)) return 0;
+  const std::string_view whole(line.data(), static_cast<std::size_t>(rest.data() - line.data()) + rest.size());
+  for (std::size_t end = line.size(); end < whole.size();) {
+    end = std::min(whole.find('\n', end + 1), whole.size());
+    if (is_open(whole.substr(0, end))) continue;
+    line = whole.substr(0, end);
+    rest = whole.substr(std::min(end + 1, whole.size()));
+    return static_cast<int>(std::ranges::count(line, '\n'));
+  }
+  return 0;
+}
+
 std::string read_table_text(const std::filesystem::path& file) {
   std::string bytes = read_text(file);
   const auto refuse = [&](const char* found, const std::string& remedy) {
@@ -71,8 +85,10 @@ std::string read_table_text(const std::filesystem::path& file) {
   if (bytes.starts_with("PK\x03\x04") || bytes.starts_with("\xD0\xCF\x11\xE0"))  // .xlsx and .ods; .xls
     refuse("a workbook of a spreadsheet program", "save its sheet as CSV in that program");
   if (bytes.starts_with("\x1F\x8B")) refuse("a compressed file", "unpack it: gunzip '" + file.string() + "'");
-  if (bytes.starts_with("MATLAB 5.0") || bytes.starts_with("\x89HDF"))
+  if (bytes.starts_with("MATLAB ") || bytes.starts_with("\x89HDF"))
     refuse("a file of MATLAB", "in MATLAB: writetable(table(x(:), y(:), u(:), v(:)), 'field.csv')");
+  if (bytes.starts_with("<?xml"))
+    refuse("an XML file", "export a table as CSV; in TrackMate: Spots, then Export to CSV");
   return bytes;
 }
 

@@ -33,7 +33,7 @@ std::string read_stream(const std::filesystem::path& file) {
 }  // namespace
 
 std::string read_text(const std::filesystem::path& file) {
-  if (is_folder(file)) throw InputError(file.string(), "a file", "a folder");
+  if (is_folder(file)) throw InputError(file.string(), "a file", "a folder", "name the file in it");
   std::error_code unreachable;
   if (!std::filesystem::exists(file, unreachable))
     throw InputError(file.string(), "a file", unreachable ? unreachable.message() : "none of that name");

@@ -31,21 +31,16 @@ namespace {
 
 /// The note on a folder without cell.toml that seems to be a cell all the same. What we write is no TIFF.
 std::optional<SkippedFolder> as_no_cell(const fs::path& folder, const std::vector<fs::path>& entries) {
-  constexpr int kFewest = 2;  // beads are seen twice; one picture may be an overview
-  int n_pictures = 0;
-  for (const fs::path& entry : entries) {
-    const std::string type = files::lower_case(entry.extension().string()),
-                      name = files::lower_case(entry.filename().string());
-    if (name.starts_with("cell") && (name.ends_with(".toml") || name.ends_with(".toml.txt")) && files::is_file(entry))
-      return SkippedFolder{folder,
-                           "its settings are called " + entry.filename().string() + ": rename the file cell.toml"};
-    n_pictures += type.starts_with(".tif") && files::is_file(entry);
-  }
-  if (n_pictures < kFewest) return std::nullopt;
-  return SkippedFolder{folder,
-                       "pictures and no cell.toml: mbtfm init '" + folder.string() +
-                           "', or mbtfm init STUDY --like CELL for all such folders",
-                       true};
+  if (const std::string name = misnamed_settings(entries); !name.empty())
+    return SkippedFolder{folder, "its settings are called " + name + ": rename the file cell.toml"};
+  const auto n_pictures = std::ranges::count_if(entries, [](const fs::path& entry) {
+    return files::lower_case(entry.extension().string()).starts_with(".tif") && files::is_file(entry);
+  });
+  if (n_pictures < 2) return std::nullopt;  // beads are seen twice; one picture may be an overview
+  return SkippedFolder{
+      folder,
+      "pictures and no cell.toml: mbtfm init '" + folder.string() + "', or for all: mbtfm init STUDY --like CELL",
+      true};
 }
 
 /// What cannot be read is skipped: a study may hold lost+found, or a folder of somebody else.
@@ -70,6 +65,8 @@ void collect_cells(const fs::path& folder, FoundCells& found) {
     const fs::file_type type = fs::symlink_status(entry, unseen).type();
     // what is too deep to be looked at is reported as skipped
     if (type == fs::file_type::directory || type == fs::file_type::none) collect_cells(entry, below);
+    if (type == fs::file_type::symlink && files::is_file(entry / "cell.toml"))
+      found.skipped.push_back({entry, "a link, which is not followed: give the folder that it leads to"});
   }
   if (below.cells.empty())
     if (const auto as = as_no_cell(folder, entries)) below.skipped = {*as};  // what is in it is of it: frames, say
@@ -294,8 +291,17 @@ std::string event_of(const BatchCell& cell) {
   return files::json_text(event) + "\n";
 }
 
+std::string misnamed_settings(const std::vector<fs::path>& entries) {
+  for (const fs::path& entry : entries)
+    for (const char* ending : {".toml", ".toml.txt", ".tml"})
+      if (const std::string name = files::lower_case(entry.filename().string());
+          name.starts_with("cell") && name.ends_with(ending) && files::is_file(entry))
+        return entry.filename().string();
+  return "";
+}
+
 FoundCells search_cells(const fs::path& folder) {
-  if (!files::is_folder(folder)) throw InputError(folder.string(), "a folder of cell folders", "none");
+  require_folder(folder, "a folder of cell folders");
   FoundCells found;
   collect_cells(folder, found);
   std::ranges::sort(found.cells, files::is_before);
@@ -309,8 +315,11 @@ FoundCells find_cells(const fs::path& folder) {
     const std::string skipped =
         found.skipped.empty() ? ""
                               : "; skipped " + found.skipped.front().folder.string() + ": " + found.skipped.front().why;
+    fs::path above = fs::weakly_canonical(folder);
+    while (above.has_relative_path() && !files::is_file(above / "cell.toml")) above = above.parent_path();
     throw InputError(folder.string(), "cell folders (with a cell.toml) at or below it", "none" + skipped,
-                     "write a cell.toml beside each cell's images");
+                     above.has_relative_path() ? "it is in the cell " + above.string() + ": give that"
+                                               : "write a cell.toml beside each cell's images");
   }
   return found;
 }

@@ -27,6 +27,8 @@ struct FoundCells {
 FoundCells search_cells(const fs::path& folder);
 /// The same. @throws InputError where there is no cell
 FoundCells find_cells(const fs::path& folder);
+/// A file in a folder without cell.toml that seems to be one of another name, as cell.toml.txt; empty: none.
+std::string misnamed_settings(const std::vector<fs::path>& entries);
 
 struct BatchCell;
 

@@ -103,6 +103,8 @@ std::string advice_on_missing(const fs::path& folder, const std::string& name, c
   if (name.find('\\') != name.npos) return "write folders with / in " + place;
   std::vector<fs::path> there = files::visible_in(folder);
   for (fs::path& file : there) file = file.filename();
+  if (const fs::path link = files::file_shown_as(folder, name); fs::is_symlink(fs::symlink_status(link)))
+    return "it is a link to " + fs::read_symlink(link).string() + ", which is not there: copy the picture here";
   for (const fs::path& file : there)
     if (files::lower_case(file.string()) == files::lower_case(name))
       return "there is '" + file.string() + "': capitals count";
@@ -183,26 +185,32 @@ std::string parent_of(const fs::path& file) {
 
 }  // namespace
 
+void require_folder(const fs::path& folder, const std::string& expected) {
+  if (files::is_folder(folder)) return;
+  if (files::is_file(folder))
+    throw InputError(folder.string(), expected, "a file", "give the folder that it is in: " + parent_of(folder));
+  const std::string name = folder.filename().string();
+  std::vector<std::string> names;
+  for (const fs::path& other : files::visible_in(parent_of(folder))) names.push_back(other.filename().string());
+  const std::string near = stage::nearest(names, name);
+  throw InputError(folder.string(), expected, "none",
+                   folder.string().starts_with("~") ? "~ in quotes is no folder: leave the quotes out, or write $HOME"
+                   : !near.empty() && stage::is_alike(near, name)
+                       ? stage::did_you_mean(near)
+                       : "give the folder of the cell's images and cell.toml, or of all cells, as seen from here");
+}
+
 ImageNames read_image_names(const fs::path& cell) {
-  if (files::is_file(cell))
-    throw InputError(cell.string(), "a cell folder", "a file", "give the folder that it is in: " + parent_of(cell));
-  if (!files::is_folder(cell)) {
-    std::vector<std::string> names;
-    for (const fs::path& other : files::visible_in(parent_of(cell))) names.push_back(other.filename().string());
-    const std::string near = stage::nearest(names, cell.filename().string());
-    const bool is_slip = !near.empty() && stage::is_alike(near, cell.filename().string());
-    throw InputError(cell.string(), "a cell folder", "none",
-                     is_slip ? stage::did_you_mean(near) : "give the folder of the cell's images and cell.toml");
-  }
+  require_folder(cell, "a cell folder");
   if (!files::is_file(cell / "cell.toml")) {
     if (const std::size_t n = n_cells_below(cell); n > 0)
       throw InputError(cell.string(), "a cell folder with cell.toml",
                        "a folder of " + counted(static_cast<std::int64_t>(n), "cells"),
                        "to run them all: mbtfm batch " + cell.string());
+    const std::string misnamed = misnamed_settings(files::visible_in(cell));
     throw InputError(cell.string(), "a cell folder with cell.toml", "no cell.toml",
-                     files::is_file(cell / "cell.toml.txt")
-                         ? "rename cell.toml.txt to cell.toml"
-                         : "to write one from what the images say: mbtfm init " + cell.string());
+                     misnamed.empty() ? "to write one from what the images say: mbtfm init " + cell.string()
+                                      : "rename " + misnamed + " to cell.toml");
   }
   ImageNames names;
   stage::ParameterList list;

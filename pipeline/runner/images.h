@@ -12,6 +12,9 @@
 
 namespace mbtfm::runner {
 
+/// @throws InputError that says which folder was probably meant, where there is none of that name
+void require_folder(const fs::path& folder, const std::string& expected);
+
 /// File names or globs, relative to the cell folder; several with | between them.
 struct ImageNames {
   std::string adhesion = "paxillin.tif";  ///< paxillin is the adhesion protein most often tagged

@@ -253,7 +253,9 @@ std::optional<StageStatus> changed_by_hand(const Stage& stage, const std::option
   const auto is_there = [&](const std::string& name) { return outputs.contains(name); };
   if (!std::ranges::all_of(stage.writes, is_there)) return {};
   if (!record) return StageStatus{StageState::given, "its outputs were there before the first run"};
-  if (!record->finished || !std::ranges::all_of(std::views::keys(record->outputs), is_there)) return {};
+  if (!record->finished ||
+      !std::ranges::all_of(record->outputs, [&](const auto& output) { return is_there(output.first); }))
+    return {};
   for (const auto& [name, hash] : outputs) {
     const auto ours = record->outputs.find(name);
     if (ours == record->outputs.end() || ours->second != hash)

@@ -35,7 +35,7 @@ struct KnownFile {
 
 files::JsonRecord open_run_json(const fs::path& file) {
   if (!files::is_file(file))
-    throw InputError(file.string(), "a run.json of mbtfm run", "none", "run the cell first: mbtfm run");
+    throw InputError(file.string(), "a run.json of mbtfm run", "none", "give a cell's folder, after mbtfm run");
   return files::JsonRecord(file, "a run.json of mbtfm run", "delete it and run the cell again: mbtfm run");
 }
 

@@ -101,6 +101,15 @@ std::vector<std::string> arguments_of(int argc, char** argv, const ParameterList
   return arguments;
 }
 
+/// After an error of the command line: to whom files were given without saying which they are; else nothing.
+std::string how_files_are_given(const StageDescription& description, const std::string& error) {
+  if (!error.starts_with("The following argument") || error.find(" -") != error.npos) return {};
+  std::string flags;
+  for (const FileArgument& file : description.files)
+    if (file.kind == FileArgument::Kind::input || flags.empty()) flags += " --" + file.name + " ...";
+  return "; say what each is: mbtfm-" + description.name + flags;
+}
+
 /// In a catch block: what was thrown, in other words.
 template <class Words>
 [[noreturn]] void rethrow_worded(const Words& words) {
@@ -447,7 +456,7 @@ int run_stage(const StageDescription& description, int argc, char** argv,
     } catch (const CLI::ParseError& error) {
       const bool is_run = std::getenv(kRunnerVariable) != nullptr;
       throw UsageError(
-          error.what() + suggestion(app, error.what()) +
+          error.what() + suggestion(app, error.what()) + how_files_are_given(description, error.what()) +
           (is_run ? " (--set takes the keys of docs/parameters.md)" : " (see mbtfm-" + stage + " --help)"));
     }
     if (line.only_version || line.only_parameters) {

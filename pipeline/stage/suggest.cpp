@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <regex>
 #include <sstream>
@@ -38,6 +39,21 @@ void add_words(const DeclaredCommand& command, std::vector<std::string>& words) 
     if (!option.flag.empty()) words.push_back(option.flag);
 }
 
+/// A flag with a dash that a text program made of "--", and blanks around "="; empty: neither.
+std::string slip_in(const std::string& words) {
+  std::istringstream all(words);
+  for (std::string word; all >> word;) {
+    if (word.size() == 1 && word[0] == '=') return "; write no blanks around =";
+    std::string flag = word;
+    for (const char* dash : {"\u2013", "\u2014", "\u2212"})
+      if (flag.starts_with(dash)) flag.erase(0, std::string_view(dash).size());
+    if (flag.size() < word.size())
+      return "; '" + word + "' begins with a long dash: type --" +
+             flag.substr(std::min(flag.find_first_not_of('-'), flag.size()));
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string nearest(const std::vector<std::string>& known, std::string_view word) {
@@ -47,7 +63,8 @@ std::string nearest(const std::vector<std::string>& known, std::string_view word
 }
 
 bool is_alike(const std::string& known, std::string_view word) {
-  return 2 * edit_distance(known, word) < static_cast<int>(known.size());
+  const std::size_t n_letters = known.size() - std::min(known.find_first_not_of('-'), known.size());
+  return 2 * edit_distance(known, word) < static_cast<int>(n_letters);
 }
 
 std::string did_you_mean(const std::string& word) { return "did you mean '" + word + "'?"; }
@@ -61,17 +78,27 @@ std::string suggestion(const CLI::App& app, const std::string& error) {
     commands.push_back(command.name);
     if (app.got_subcommand(command.name)) add_words(command, flags);
   }
-  std::istringstream words(error.substr(std::min(error.size(), error.find(": ") + 1)));
+  const std::string unknown = error.substr(std::min(error.size(), error.find(": ") + 1));
+  if (const std::string typed = slip_in(unknown); !typed.empty()) return typed;
+  std::istringstream words(unknown);
   const bool has_command = std::ranges::any_of(commands, [&](const auto& name) { return app.got_subcommand(name); });
   std::string meant;
   for (std::string word; words >> word;) {
     word = word.substr(0, word.find('='));
-    const std::string known = nearest(word.starts_with("-") ? flags : commands, word);
+    const bool is_flag = word.starts_with("-");
+    std::string known = nearest(is_flag ? flags : commands, word);
+    // as other programs call them; "-j4" has its value in it
+    constexpr std::array<std::array<std::string_view, 2>, 4> kElsewhere = {
+        {{"--force", "--redo"}, {"--overwrite", "--redo"}, {"-j", "--jobs"}, {"-o", "--out"}}};
+    for (const auto& [theirs, ours] : kElsewhere)
+      if (word.substr(0, word.find_first_of("0123456789")) == theirs && std::ranges::find(flags, ours) != flags.end())
+        known = word = ours;
     if (known.empty() || !is_alike(known, word)) continue;
     meant += (meant.empty() ? "; " : " ") + did_you_mean(known);
   }
   if (!meant.empty() || commands.empty()) return meant;
   if (!has_command) return "; the commands are " + listed(commands);
+  if (unknown.find("-config") != unknown.npos) return "; cell.toml is read from the folder that is given";
   if (error.find(" -") != error.npos) {
     const bool takes_keys = std::ranges::find(flags, "--set") != flags.end();
     return takes_keys ? "; what cell.toml has is set by --set TABLE.KEY=VALUE, as --set gel.youngs_modulus_kPa=4" : "";

@@ -62,12 +62,19 @@ Source source_of(const std::string& asked, const char* flag, const std::vector<s
 /// What a form says where nobody is to be left out.
 std::string reason_in(const std::string& exclude) {
   const std::string word = files::lower_case(exclude);
+  if (word.starts_with('?')) return exclude;  // a doubt
   for (const char* nobody : {"no", "n", "0", "false", "f", "none", "nein", "non", "nej", "nee"})
     if (word == nobody) return {};
   return files::is_missing(exclude) ? "" : exclude;
 }
 
-const std::vector<std::string> kNoName = {"na", "n/a", "#n/a", "nan"};  // of a condition: "none" may be one
+/// Of a condition "none" may be one, and what a spreadsheet could not compute is not ("#REF!").
+bool is_no_name(const std::string& word) {
+  static const std::vector<std::string> kNoName = {"na", "n/a", "nan"};
+  return std::ranges::find(kNoName, files::lower_case(word)) != kNoName.end() ||
+         (word.starts_with('#') && files::is_missing(word));
+}
+
 const std::vector<std::string> kExclude = {"exclude", "excluded"}, kInclude = {"include", "included"};
 
 /// The first of several names that a form has for one column; empty: none.
@@ -93,6 +100,34 @@ void join_capitals(std::vector<CellNote>& notes, std::string CellNote::*member, 
   }
 }
 
+/// Names are the same if they differ in capitals or in how an umlaut is composed.
+std::string letters_of(const std::string& name) { return files::lower_case(files::composed(name)); }
+
+bool is_called(const std::string& name, const std::string& word) {
+  return letters_of(word) == letters_of(name) || letters_of(word) == letters_of(Path(name).filename());
+}
+
+/// Of a cell that is not in the study.
+std::string advice_on_unknown(const std::vector<std::string>& names, const files::CsvTable& table,
+                              const std::string& asked) {
+  for (const Path& path : {Path(asked), Path(asked).parent_path()})  // a folder of another disk, a picture in the cell
+    for (const std::string& name : names)
+      if (path == name || path.generic_string().ends_with("/" + name))
+        return "names are relative to the folder of the study: write '" + name + "'";
+  std::string without_row;
+  for (const std::string& name : names) {
+    bool is_there = false;
+    for (int row = 0; row < table.n_rows() && !is_there; ++row) is_there = is_called(name, table.text(row, "cell"));
+    if (is_there) continue;
+    without_row = "; " + name +
+                  " has no row yet: spreadsheets turn such names into dates or numbers, unless the column "
+                  "is formatted as text";
+    break;
+  }
+  return "names are relative to the folder of the study, as in " + names.front() + without_row +
+         "; take out a row that is no cell";
+}
+
 }  // namespace
 
 std::size_t index_of_cell(const std::vector<std::string>& names, const files::CsvTable& table, int row) {
@@ -102,25 +137,29 @@ std::size_t index_of_cell(const std::vector<std::string>& names, const files::Cs
   if (asked.ends_with('/')) asked.pop_back();
   const auto exact = std::find(names.begin(), names.end(), asked);
   if (exact != names.end()) return static_cast<std::size_t>(exact - names.begin());
-  std::vector<std::size_t> matches;
-  for (std::size_t i = 0; i < names.size(); ++i)
-    if (Path(names[i]).filename() == asked) matches.push_back(i);
-  if (matches.size() != 1) {
-    table.fail(row, "cell", "a cell folder of the study",
-               matches.empty() ? "names are relative to the folder of the study, as in " + names.front()
-                               : "several cells are called so: give the folders above it, too");
-  }
-  return matches.front();
+  const auto those = [&](const auto& is_meant) {
+    std::vector<std::size_t> found;
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (is_meant(names[i])) found.push_back(i);
+    return found;
+  };
+  std::vector<std::size_t> matches = those([&](const std::string& name) { return Path(name).filename() == asked; });
+  if (matches.empty()) matches = those([&](const std::string& name) { return is_called(name, asked); });
+  if (matches.size() == 1) return matches.front();
+  table.fail(row, "cell", "a cell folder of the study",
+             matches.empty() ? advice_on_unknown(names, table, asked)
+                             : "several cells are called so: give the folders above it, too");
 }
 
 CellNotes notes_of(const std::vector<std::string>& names, const std::string& condition_from,
                    const std::string& replicate_from, const std::optional<Path>& table) {
   std::optional<files::CsvTable> rows;
   if (table) {
-    rows = files::read_records(files::read_table_text(*table), table->string(), "cell",
-                               {"cell", "exclude", "excluded", "include", "included", "condition", "replicate", "day"});
+    rows = files::read_records(
+        files::read_table_text(*table), table->string(), "cell",
+        {"cell", "exclude", "excluded", "include", "included", "condition", "group", "treatment", "replicate", "day"});
   }
-  const Source condition = source_of(condition_from, "condition-from", {"condition"}, rows);
+  const Source condition = source_of(condition_from, "condition-from", {"condition", "group", "treatment"}, rows);
   const Source replicate = source_of(replicate_from, "replicate-from", {"replicate", "day"}, rows);
   CellNotes result{.of_cells = std::vector<CellNote>(names.size())};
   std::vector<CellNote>& notes = result.of_cells;
@@ -130,10 +169,14 @@ CellNotes notes_of(const std::vector<std::string>& names, const std::string& con
   }
   if (!rows) return result;
   const std::string exclude = column_of(*rows, kExclude), include = column_of(*rows, kInclude);
+  if (condition.level == 0 && condition.column.empty() && exclude.empty() && include.empty())
+    result.warnings.push_back(
+        "The table has no column condition: its cells are of one condition. Name the column that has it: "
+        "--condition-from COLUMN.");
   std::vector<bool> is_named(names.size(), false);
   for (int row = 0; row < rows->n_rows(); ++row) {
     const std::size_t i = index_of_cell(names, *rows, row);
-    if (is_named[i]) rows->fail(row, "cell", "each cell once");
+    if (is_named[i]) rows->fail(row, "cell", "each cell once", "take one of its rows out");
     is_named[i] = true;
     if (!exclude.empty()) notes[i].reason_to_exclude = reason_in(rows->text(row, exclude));
     if (!include.empty() && !rows->text(row, include).empty() && reason_in(rows->text(row, include)).empty())
@@ -141,7 +184,7 @@ CellNotes notes_of(const std::vector<std::string>& names, const std::string& con
     const auto take = [&](const std::string& column, std::string CellNote::*member) {
       if (column.empty()) return;
       notes[i].*member = rows->text(row, column);
-      if (std::ranges::find(kNoName, files::lower_case(notes[i].*member)) != kNoName.end()) (notes[i].*member).clear();
+      if (is_no_name(notes[i].*member)) (notes[i].*member).clear();
       if ((notes[i].*member).empty() && notes[i].reason_to_exclude.empty())
         notes[i].reason_to_exclude = "no " + column + " in the table";
     };

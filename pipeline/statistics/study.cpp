@@ -241,7 +241,8 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
   list.table("stats");
   list.add("condition_from", parameters.condition_from,
            "source of a cell's condition: `folder` (the first folder below the study's), `folder2` (the one below "
-           "that), or the name of a column of --table; empty: the column `condition` if the table has one");
+           "that), or the name of a column of --table; empty: the column `condition`, `group` or `treatment` if the "
+           "table has one");
   list.add("conditions", parameters.conditions,
            "order of the conditions, with commas between them; the first is the reference that the others are compared "
            "with; empty: by the alphabet. Example: \"control, blebbistatin\"");

@@ -194,8 +194,17 @@ std::optional<Found> found_in(const Header& header, const TrackParameters& param
     missing += (missing.empty() ? "" : ", ") + asked[k].name;
     how += " --" + std::string(asked[k].parameter) + " " + std::to_string(k + 1);
   }
-  const bool has_angle = std::ranges::any_of(
-      header, [](const std::string& name) { return parts_of(name).key.find("angle") != std::string::npos; });
+  const auto has = [&](std::initializer_list<const char*> words) {
+    return std::ranges::any_of(header, [&](const std::string& name) {
+      const std::string key = parts_of(name).key;
+      return std::ranges::any_of(words, [&](const char* word) { return key.find(word) != key.npos; });
+    });
+  };
+  const bool has_angle = has({"angle", "direction", "theta"}), has_tracks = has({"track"});
+  if (has_tracks)
+    throw InputError(table.name + ":" + std::to_string(line), "columns " + missing, "tracks: " + listed(header),
+                     "make a row for each bead: its place in the relaxed picture, and as ux_um, uy_um how far it lies "
+                     "from there in the stressed one");
   if (has_angle) how = "make two columns of length and angle: ux = length x cos(angle) and uy = length x sin(angle)";
   throw InputError(
       table.name + ":" + std::to_string(line), "columns " + missing,

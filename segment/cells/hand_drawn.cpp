@@ -45,7 +45,9 @@ Polygon area_um(const RoiSet& set, const rois::Roi& roi, const Field& field) {
   const std::string where = called(set, roi);
   if (!rois::is_area(roi.shape)) {
     throw InputError(where, "an area: polygon, freehand, traced, oval, ellipse, rectangle or composite",
-                     std::string(name_of(roi.shape)));
+                     std::string(name_of(roi.shape)),
+                     rois::is_line(roi.shape) ? "lines of fibres belong to fibres.zip; draw areas with the polygon tool"
+                                              : "draw the area with the polygon, freehand or oval tool");
   }
   if (roi.is_spline) require_inside(roi.points_px, field, where);  // before it is drawn
   const Polygon polygon_px = rois::area_px(roi);

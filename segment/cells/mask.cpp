@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -164,31 +163,6 @@ void require_size_of_adhesion(const LabelMask& mask, const Adhesion& a) {
                    "outline_mask; of adhesions, check pixel_size_um and that they do not touch each other");
 }
 
-/// Half of the largest value, if all values between 0 and it lie in rims: a mask that was drawn, turned or scaled has
-/// grey pixels between both. None of them is a label.
-std::optional<float> level_of_rims(const images::Image& image) {
-  constexpr int kRim_px = 4;         // as wide as interpolation and smoothing make them
-  constexpr std::size_t kGreys = 3;  // less: labels that touch
-  const float largest = image.pixels.empty() ? 0 : std::ranges::max(image.pixels);
-  std::set<float> greys;
-  for (int j = 0; j < image.height; ++j) {
-    for (int i = 0; i < image.width; ++i) {
-      const float value = image.at(i, j);
-      if (!(value > 0 && value < largest)) continue;
-      bool is_near_none = false, is_near_mask = false;
-      for (int y = std::max(0, j - kRim_px); y <= std::min(image.height - 1, j + kRim_px); ++y) {
-        for (int x = std::max(0, i - kRim_px); x <= std::min(image.width - 1, i + kRim_px); ++x) {
-          is_near_none |= image.at(x, y) == 0;
-          is_near_mask |= image.at(x, y) == largest;
-        }
-      }
-      if (!is_near_none || !is_near_mask) return std::nullopt;
-      greys.insert(value);
-    }
-  }
-  return greys.size() >= kGreys ? std::optional(largest / 2) : std::nullopt;
-}
-
 std::string listed(std::vector<int> labels) {
   constexpr std::size_t kMost = 12;
   std::sort(labels.begin(), labels.end());
@@ -199,37 +173,6 @@ std::string listed(std::vector<int> labels) {
 }
 
 }  // namespace
-
-LabelMask mask_of(const images::Image& image, const std::string& name) {
-  if (image.is_lossy)
-    throw InputError(name, "a mask as TIFF or PNG", "a JPEG, which changes labels and rims",
-                     "save the mask as TIFF or PNG, from the program that made it");
-  constexpr float kLargest = 1 << 24;  // whole numbers that a float holds
-  LabelMask mask{.name = name, .width = image.width, .height = image.height, .labels = {}};
-  const std::optional<float> rim = level_of_rims(image);
-  mask.labels.reserve(image.pixels.size());
-  std::set<int> values;
-  for (std::size_t k = 0; k < image.pixels.size(); ++k) {
-    const float value = rim ? (image.pixels[k] > *rim ? 1.f : 0.f) : image.pixels[k];
-    if (!(value >= 0) || value > kLargest || value != std::floor(value))
-      throw InputError(name + ": pixel " + std::to_string(k % static_cast<std::size_t>(image.width)) + ", " +
-                           std::to_string(k / static_cast<std::size_t>(image.width)),
-                       "a whole number, 0 for the background", shortest(value),
-                       "a picture or a map of probabilities is no mask: threshold it, and save labels or 0 and 255");
-    mask.labels.push_back(static_cast<int>(value));
-    if (values.size() < 2 && value > 0) values.insert(static_cast<int>(value));
-  }
-  if (values.empty())
-    throw InputError(name, "pixels above 0 for what the mask covers", "0 everywhere",
-                     "is this the right file? 0 is the background");
-  mask.is_binary = values.size() == 1;
-  return mask;
-}
-
-LabelMask read_mask(const std::filesystem::path& file) {
-  return mask_of(images::read_image(file, images::PlaneChoice{.prefix = "mask", .pixels = images::PixelsAre::labels}),
-                 file.string());
-}
 
 void require_size(const LabelMask& mask, const Field& field) {
   if (mask.width / mask.binning == field.width_px && mask.height / mask.binning == field.height_px) return;
@@ -244,8 +187,10 @@ void require_upright(const LabelMask& mask, const std::string& what) {
   const int right = mask.width - 1, bottom = mask.height - 1;
   for (const auto& [i, j] : {std::pair{0, 0}, {right, 0}, {0, bottom}, {right, bottom}})
     if (mask.at(i, j) == 0) return;
-  throw InputError(mask.name, what + " on a background of 0", "values above 0 in all four corners of the image",
-                   "the mask seems inverted: in ImageJ, Edit > Invert; the background must look black");
+  throw InputError(
+      mask.name, what + " on a background of 0", "values above 0 in all four corners of the image",
+      "the mask seems inverted: in ImageJ, Edit > Invert; the background must look black, and transparency "
+      "does not count");
 }
 
 void require_upright_pattern(const LabelMask& mask) {

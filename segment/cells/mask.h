@@ -20,6 +20,7 @@ struct LabelMask {
   std::vector<int> labels;
   bool is_binary = false;  ///< one value beside 0: parts are told apart by their place
   int binning = 1;         ///< pixels of the mask a side of one of the images'
+  std::string taken = {};  ///< which plane, if the file has several
   int at(int column, int row) const { return labels[static_cast<std::size_t>(row) * width + column]; }
   int at_or_zero(int column, int row) const {
     return column < 0 || row < 0 || column >= width || row >= height ? 0 : at(column, row);
@@ -27,6 +28,7 @@ struct LabelMask {
 };
 
 /// TIFF (8, 16 or 32 bit, integers or floats that are whole) or PNG; white-is-zero as in images: what looks dark is 0.
+/// In a file without 0 the value of all four corners is the background's.
 /// @throws InputError where a value is no whole number >= 0, nothing is above 0, or the file is lossy
 LabelMask read_mask(const std::filesystem::path& file);
 LabelMask mask_of(const images::Image& image, const std::string& name);

@@ -219,6 +219,15 @@ struct Entry {
   bool is_dashed = false;
 };
 
+/// Rings that the overlay shows, in part or whole.
+std::ptrdiff_t n_in_view(const Segmentation& s, const std::vector<Polygon>& rings_um) {
+  const auto [low, high] = view_of(s);
+  return std::ranges::count_if(rings_um, [low = low, high = high](const Polygon& ring) {
+    return std::ranges::any_of(ring,
+                               [&](Vec2 p) { return p.x >= low.x && p.x <= high.x && p.y >= low.y && p.y <= high.y; });
+  });
+}
+
 std::vector<Entry> entries_of(const Segmentation& s, double pixel_um, int width) {
   const Cell& cell = s.cell;
   std::vector<Entry> entries;
@@ -246,7 +255,7 @@ std::vector<Entry> entries_of(const Segmentation& s, double pixel_um, int width)
     entries.push_back({"perhaps a fibre " + std::to_string(n), kDoubtful, 56, 4});
     entries.back().is_dashed = true;
   }
-  if (const std::size_t n = s.left_out_um.size() + s.cell.neighbours_um.size(); n > 0) {
+  if (const auto n = n_in_view(s, s.left_out_um) + n_in_view(s, s.cell.neighbours_um); n > 0) {
     entries.push_back({"not of this cell " + std::to_string(n), kLeftOut, 56, 4});
     entries.back().is_dashed = true;
   }

@@ -99,8 +99,44 @@ std::optional<Finding> noticed_saturation(const Channel& channel) {
   return noticed(Symptom::saturated, share_at_brightest(channel.image), {.at = channel.name});
 }
 
+namespace {
+
+/// "301 to 419": rows between others that have one value throughout, which no other row has: they were never recorded,
+/// or lost since. Empty: none.
+std::string lost_rows(const Image& image) {
+  constexpr int kFewest = 8;  // of a narrower picture pixels may be equal by chance
+  if (image.width < kFewest) return "";
+  std::vector<std::optional<float>> all_equal;
+  for (int j = 0; j < image.height; ++j) {
+    const auto row = image.pixels.begin() + static_cast<std::ptrdiff_t>(j) * image.width;
+    const bool is_even = std::all_of(row, row + image.width, [&](float value) { return value == *row; });
+    all_equal.push_back(is_even ? std::optional(*row) : std::nullopt);
+  }
+  const auto first = std::ranges::find_if(all_equal, [](const auto& value) { return !value; });
+  const auto begin = std::find_if(first, all_equal.end(), [](const auto& value) { return value.has_value(); });
+  const auto end = std::find_if(begin, all_equal.end(), [&](const auto& value) { return value != *begin; });
+  if (end == all_equal.end()) return "";  // the border's are padding
+  const auto top = begin - all_equal.begin(), bottom = end - all_equal.begin();
+  for (int j = 0; j < image.height; ++j)
+    for (int i = 0; i < image.width && (j < top || j >= bottom); ++i)
+      if (image.at(i, j) == **begin) return "";
+  return std::to_string(top + 1) + " to " + std::to_string(bottom);
+}
+
+/// Of the kind of images that lost something.
+std::optional<Finding> noticed_lost_rows(const Channel& channel) {
+  const std::string lost = lost_rows(channel.image);
+  std::optional<Finding> found = noticed(Symptom::lossy_image, lost.empty() ? 0 : 1, {});
+  if (found)
+    found->text =
+        "Rows " + lost + " of " + channel.name + " were lost: they have one value. What is there is not seen.";
+  return found;
+}
+
+}  // namespace
+
 std::vector<std::optional<Finding>> noticed_in(const Channel& channel) {
-  return {noticed_loss(channel), noticed_saturation(channel),
+  return {noticed_loss(channel), noticed_lost_rows(channel), noticed_saturation(channel),
           noticed(Symptom::assumed_input, channel.image.taken.empty() ? 0 : 1,
                   {.at = channel.name + ": " + channel.image.taken + "."})};
 }

@@ -30,6 +30,7 @@ constexpr Signature kForeignFormats[] = {{"GIF8"sv, "a GIF image"},
                                          {"\x00\x00\x00\x0CjP  "sv, "a JPEG 2000 image"},
                                          {"\x89HDF"sv, "an HDF5 file"},
                                          {"\x1F\x8B"sv, "a gzip archive"},
+                                         {"\x93NUMPY"sv, "a NumPy array"},
                                          {"\xD0\xCF\x11\xE0"sv, "an Olympus OIB or Microsoft file", true}};
 
 std::string microscopes_hint(const std::filesystem::path& file) {
@@ -154,8 +155,13 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
   }
   for (const Signature& format : kForeignFormats) {
     if (head.starts_with(format.bytes)) {
+      const std::string name = file.filename().string();
       throw InputError(file.string(), kExpected, std::string(format.name),
-                       format.is_microscopes ? microscopes_hint(file) : "export it as 8- or 16-bit TIFF");
+                       format.is_microscopes ? microscopes_hint(file)
+                       : format.bytes.ends_with("NUMPY")
+                           ? "in Python: tifffile.imwrite('" + file.stem().string() + ".tif', numpy.load('" + name +
+                                 "')); in Cellpose: File > Save masks as PNG/tif"
+                           : "export it as 8- or 16-bit TIFF");
     }
   }
   throw InputError(file.string(), kExpected, head.empty() ? "an empty file" : "bytes of neither",

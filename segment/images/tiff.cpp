@@ -45,6 +45,10 @@ class TiffReader {
       image.taken = "it holds several images, and the first was taken (" + choice.prefix + "_page)";
     if (const std::string sides = stated_not_square(of_first_page_); !sides.empty() && image.taken.empty())
       image.taken = "it states pixels of " + sides + ", which are taken for square ones";
+    const auto orientation = tag<std::uint16_t>(TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
+    if (orientation != ORIENTATION_TOPLEFT && orientation <= ORIENTATION_LEFTBOT && image.taken.empty())
+      image.taken = "its orientation tag (" + std::to_string(orientation) +
+                    ") asks for a turned or mirrored picture; it is read as it is stored, as by Fiji";
     return image;
   }
 

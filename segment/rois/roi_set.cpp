@@ -66,7 +66,7 @@ std::vector<Roi> read_zip(const fs::path& file) {
     const char* raw_name = zip_get_name(archive.get(), index, ZIP_FL_ENC_GUESS);
     const fs::path name = raw_name ? raw_name : "";
     // what else is there, macOS' resource files among it, is none of ours
-    if (name.extension() != ".roi" || name.string().starts_with("__MACOSX") ||
+    if ((name.extension() != ".roi" && name.extension() != ".ROI") || name.string().starts_with("__MACOSX") ||
         name.filename().string().starts_with("._"))
       continue;
     const std::string where = file.string() + ": " + name.string();
@@ -82,7 +82,9 @@ std::vector<Roi> read_zip(const fs::path& file) {
       refuse_damaged(file.string(), "splines of " + brief(splines_px) + " pixels in it");
     if (rois.back().name.empty()) rois.back().name = name.stem().string();
   }
-  if (rois.empty()) throw InputError(file.string(), kExpected, "a zip archive without a .roi in it");
+  if (rois.empty())
+    throw InputError(file.string(), kExpected, "a zip archive without a .roi in it",
+                     "in ImageJ's ROI manager: More > Save");
   return rois;
 }
 
@@ -103,7 +105,10 @@ std::vector<Roi> read_rois(const fs::path& file) {
   stream.read(head.data(), 4);
   if (!stream) throw InputError(file.string(), kExpected, std::to_string(size) + " bytes that could be read");
   if (head.starts_with("PK")) return read_zip(file);
-  if (head != "Iout") throw InputError(file.string(), kExpected, "bytes of neither", "save the selection in ImageJ");
+  if (head != "Iout")
+    throw InputError(file.string(), kExpected, "bytes of neither",
+                     "save the selection in ImageJ, to which File > Import > XY Coordinates brings a list of points; "
+                     "from other programs export a mask (images.outline_mask, images.adhesion_mask)");
   if (size > kLargestRoi) throw InputError(file.string(), kExpected, "a file of " + std::to_string(size) + " bytes");
   const std::string bytes = head + std::string((std::istreambuf_iterator<char>(stream)), {});
   Roi roi = decode_roi(bytes, file.string());

@@ -1,4 +1,5 @@
 /// Images by file-name patterns, and the table of a batch.
+#include "pipeline/runner/batch.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
@@ -71,6 +72,26 @@ TEST(ImageSets, refuse_what_is_unclear) {
   EXPECT_THROW(parse_pattern("adhesion=pax.tif"), UsageError);
   EXPECT_THROW(parse_pattern("adhesion={cell}{cell}.tif"), UsageError);
   EXPECT_THROW(parse_pattern("adhesions={cell}.tif"), UsageError);
+}
+
+TEST(Cells, that_are_links_or_whose_settings_have_another_name_are_named_with_what_to_do) {
+  const ImageFolder f({"elsewhere/cell.toml", "study/a/Cell.toml", "study/b/cell.toml"});
+  fs::create_directory_symlink(f.folder / "elsewhere", f.folder / "study/linked");
+  const FoundCells found = search_cells(f.folder / "study");
+  EXPECT_EQ(found.cells, std::vector<fs::path>{f.folder / "study/b"});
+  ASSERT_EQ(found.skipped.size(), 2u);
+  EXPECT_TRUE(has_words(found.skipped[0].why, "Cell.toml", "rename"));
+  EXPECT_TRUE(has_words(found.skipped[1].why, "a link", "leads to"));
+  const auto hint = [](const auto& read) { return test::thrown<InputError>(read).hint; };
+  EXPECT_TRUE(has_words(hint([&] { read_image_names(f.folder / "study/a"); }), "rename Cell.toml to cell.toml"));
+  EXPECT_TRUE(has_words(hint([&] { search_cells(f.folder / "study/b/cell.toml"); }), "the folder that it is in"));
+  EXPECT_TRUE(has_words(hint([&] { search_cells(f.folder / "studi"); }), "did you mean 'study'?"));
+  EXPECT_TRUE(has_words(hint([&] { search_cells("~/study"); }), "~ in quotes"));
+  fs::create_directory(f.folder / "study/b/4_fit");
+  EXPECT_TRUE(has_words(hint([&] { find_cells(f.folder / "study/b/4_fit"); }), "it is in the cell"));
+  fs::create_symlink("/nowhere/actin.tif", f.folder / "study/b/actin.tif");
+  EXPECT_TRUE(
+      has_words(hint([&] { resolve_image(f.folder / "study/b", {}, "actin"); }), "a link to /nowhere/actin.tif"));
 }
 
 TEST(BatchTable, has_a_column_for_every_figure_and_a_row_for_every_cell) {

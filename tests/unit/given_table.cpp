@@ -207,7 +207,11 @@ TEST(GivenTable, numbers_that_can_be_read_in_two_ways_are_refused) {
     const auto error = test::caught<InputError>([&] { read(workbook); });
     EXPECT_TRUE(error && has_words(error->hint, "as CSV")) << "a workbook is no text";
   }
-  for (const std::string_view packed : {"\x1F\x8B\x08", "MATLAB 5.0 MAT-file", "\x89HDF\r\n"})
+  const auto hint = [](const std::string& text) { return test::thrown<InputError>([&] { read(text); }).hint; };
+  EXPECT_TRUE(has_words(hint("track_id,t,y,x\n1,0,2,3\n1,1,2,4\n"), "how far it lies")) << "not columns 3 and 4";
+  EXPECT_TRUE(has_words(hint("x_um,y_um,magnitude,direction\n1,2,3,4\n"), "cos"));
+  for (const std::string_view packed :
+       {"\x1F\x8B\x08", "MATLAB 5.0 MAT-file", "MATLAB 7.3 MAT-file", "\x89HDF\r\n", "<?xml version=\"1.0\"?>"})
     EXPECT_TRUE(test::caught<InputError>([&] { read(std::string(packed)); })->hint.size() > 0);
   // one comma that is no thousands' decides for all
   EXPECT_EQ(read(header + "1,234;5,678;0,111;2,222\n").field[0].position_um, (Vec2{1.234, 5.678}));

@@ -480,6 +480,28 @@ TEST(Channels, a_saturated_image_is_noticed_by_the_share_of_its_pixels_at_the_la
   EXPECT_TRUE(has_words(found->text, "a.tif is saturated: 0.5 % of its pixels"));
 }
 
+TEST(Channels, rows_that_were_lost_are_noticed_and_a_dark_ground_or_a_border_is_not) {
+  Image image = ramp(60, 40);
+  for (float& value : image.pixels) value += 100;
+  const auto warns = [](const Image& of) {
+    return std::ranges::any_of(noticed_in({"a.tif", of}), [](const std::optional<Finding>& found) {
+      return found && found->severity == Severity::caution && has_words(found->text, "Rows 11 to 13 of a.tif");
+    });
+  };
+  EXPECT_FALSE(warns(image));
+  Image lost = image;
+  for (int j = 10; j < 13; ++j)
+    for (int i = 0; i < lost.width; ++i) lost.at(i, j) = 0;
+  EXPECT_TRUE(warns(lost));
+  Image dark = lost;
+  dark.at(7, 30) = 0;
+  EXPECT_FALSE(warns(dark)) << "a ground that was subtracted is 0 elsewhere, too";
+  Image border = image;
+  for (int j = 10; j < border.height; ++j)
+    for (int i = 0; i < border.width; ++i) border.at(i, j) = 0;
+  EXPECT_FALSE(warns(border)) << "padding";
+}
+
 TEST(Channels, beads_of_another_field_are_refused_with_what_would_make_it_one) {
   struct Case {
     const char* what;

@@ -10,7 +10,8 @@ namespace mbtfm::images {
 namespace {
 
 /// A TIFF of 8-bit pages of 4 x 3 pixels, page k filled with k; the first has the description.
-void write_pages(const fs::path& file, int n_pages, const std::string& description, int n_samples = 1) {
+void write_pages(const fs::path& file, int n_pages, const std::string& description, int n_samples = 1,
+                 int orientation = ORIENTATION_TOPLEFT) {
   TIFF* tiff = TIFFOpen(file.c_str(), "w");
   for (int page = 0; page < n_pages; ++page) {
     TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, 4);
@@ -19,6 +20,7 @@ void write_pages(const fs::path& file, int n_pages, const std::string& descripti
     TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, n_samples);
     TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
     TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    TIFFSetField(tiff, TIFFTAG_ORIENTATION, orientation);
     if (page == 0 && !description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
     std::vector<unsigned char> row(4 * static_cast<std::size_t>(n_samples));
     for (std::size_t i = 0; i < row.size(); ++i) row[i] = static_cast<unsigned char>(page + 100 * (i % n_samples));
@@ -161,6 +163,8 @@ TEST_F(ImagePlanes, what_was_taken_of_several_planes_is_said) {
   EXPECT_TRUE(has_words(read_image(folder / "slices.tif").taken, "maximum of its 3 slices"));
   EXPECT_EQ(read_image(folder / "slices.tif", {.z = "2"}).taken, "");
   EXPECT_EQ(read_image(folder / "one.tif").taken, "");
+  write_pages(folder / "turned.tif", 1, "", 1, ORIENTATION_RIGHTTOP);
+  EXPECT_TRUE(has_words(read_image(folder / "turned.tif").taken, "orientation tag (6)"));
   write_pages(folder / "two.ome.tif", 2, ome("SizeC='1' SizeZ='1' SizeT='1'", "<TiffData IFD='0'/>"));
   EXPECT_TRUE(has_words(read_image(folder / "two.ome.tif").taken, "several images"));
 }

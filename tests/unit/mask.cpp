@@ -76,6 +76,19 @@ TEST(Mask, grey_rims_of_a_drawn_one_are_rims_and_labels_are_labels) {
   }
 }
 
+TEST(Mask, without_a_zero_the_value_of_the_corners_is_the_background) {
+  images::Image image = empty();
+  paint_disc(image, 1, {128, 128}, 60);
+  const LabelMask plain = mask(image);
+  for (float& value : image.pixels) value = value == 0 ? 2 : 1;  // as ilastik counts
+  EXPECT_EQ(n_pixels(mask(image)), n_pixels(plain));
+  EXPECT_TRUE(mask(image).is_binary);
+  const images::Image even = test::even_image(kSide, kSide, 255);
+  EXPECT_TRUE(has_words(hint_of([&] { mask_outlines(mask(even), 1, kMaskField, {}); }), "transparency"));
+  image.taken = "the maximum of its 3 slices was taken (mask_z = max)";
+  EXPECT_EQ(mask(image).taken, "the maximum of its 3 slices was taken");
+}
+
 TEST(Mask, a_ring_around_n_pixels_has_an_area_of_half_a_pixel_less) {
   images::Image image = empty();
   paint(image, 1, [](double x, double y) { return (x < 20 && y < 9) || (x > 4 && x < 7 && y < 30); });

@@ -67,6 +67,18 @@ TEST(Roi, a_set_comes_back_in_its_order_and_its_bytes_depend_on_the_rois_alone) 
   }
 }
 
+TEST(Roi, a_set_has_names_in_capitals_too_and_one_without_any_says_how_to_save_it) {
+  const test::TemporaryFolder folder;
+  write_roi_set(folder / "a.zip", {polygon("b", {{1, 1}, {2, 1}, {2, 3}})});
+  std::string bytes = files::read_text(folder / "a.zip");
+  for (std::size_t at = 0; (at = bytes.find("b.roi", at)) != bytes.npos; ++at) bytes.replace(at, 5, "B.ROI");
+  files::write_text(folder / "capitals.zip", bytes);
+  EXPECT_EQ(read_rois(folder / "capitals.zip").size(), 1u);
+  for (std::size_t at = 0; (at = bytes.find("B.ROI", at)) != bytes.npos; ++at) bytes.replace(at, 5, "B.tif");
+  files::write_text(folder / "others.zip", bytes);
+  EXPECT_TRUE(has_words(test::thrown<InputError>([&] { read_rois(folder / "others.zip"); }).hint, "More > Save"));
+}
+
 TEST(Roi, a_set_that_cannot_be_written_is_an_output_error) {
   EXPECT_THROW(write_roi_set("/nowhere/RoiSet.zip", {polygon("a", {{0, 0}, {1, 0}, {1, 1}})}), OutputError);
 }

@@ -201,6 +201,9 @@ TEST_F(Stage, flags_win_over_the_file_and_the_file_over_the_default) {
 TEST_F(Stage, wrong_flags_and_values_are_usage_errors_and_a_wrong_file_an_input_error) {
   EXPECT_EQ(run(files_and({"--lenght_um", "2"}), write_two), 2);
   EXPECT_EQ(run(files_and({"--length_um", "-2"}), write_two), 2);
+  EXPECT_EQ(run(files_and({"--fit.length_um", "2"}), write_two), 2) << "a table that the program lacks";
+  EXPECT_EQ(run(files_and({"--network.length_um", "2"}), write_two), 0);
+  fs::remove_all(folder_ / "out");
   EXPECT_EQ(run({"--out", "x"}, write_two), 2) << "an input is missing";
   EXPECT_EQ(run(files_and({"--config", (folder_ / "none.toml").string()}), write_two), 3);
   files::write_text(folder_ / "bad.toml", "[network]\nlength = 3\n");
@@ -211,6 +214,7 @@ TEST_F(Stage, wrong_flags_and_values_are_usage_errors_and_a_wrong_file_an_input_
 TEST(Suggestion, names_the_flag_or_command_that_was_meant_and_nothing_where_none_is_alike) {
   CLI::App app("what it does", "mbtfm");
   app.add_subcommand("batch", "")->add_option("--threads", "");
+  app.get_subcommand("batch")->add_option("--jobs", "");
   app.add_subcommand("verify", "");
   const auto after = [&](std::vector<std::string> arguments) {
     std::ranges::reverse(arguments);
@@ -221,6 +225,11 @@ TEST(Suggestion, names_the_flag_or_command_that_was_meant_and_nothing_where_none
   EXPECT_EQ(after({"bacth"}), "; did you mean 'batch'?");
   EXPECT_EQ(after({"verfy", "CELL"}), "; did you mean 'verify'?");
   EXPECT_EQ(after({"batch", "--xyz"}), "");
+  EXPECT_EQ(after({"batch", "--cell"}), "") << "of --help it has half of the letters, and the dashes";
+  EXPECT_EQ(after({"batch", "-j4"}), "; did you mean '--jobs'?");
+  EXPECT_EQ(after({"batch", "\u2013threads"}), "; '\u2013threads' begins with a long dash: type --threads");
+  EXPECT_EQ(after({"batch", "\u2013-threads", "2"}), "; '\u2013-threads' begins with a long dash: type --threads");
+  EXPECT_EQ(after({"batch", "x", "=", "4"}), "; write no blanks around =");
   EXPECT_EQ(after({"Batch"}), "; did you mean 'batch'?");
   EXPECT_EQ(after({"btach"}), "; did you mean 'batch'?") << "one slip";
   EXPECT_EQ(after({"start"}), "; the commands are batch, verify");

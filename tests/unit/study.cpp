@@ -69,12 +69,17 @@ TEST(Study, obeys_the_review_of_cells_and_of_their_present_fibres) {
   const std::string segmentation = page.substr(page.find(mark) + mark.size(), 12);
   EXPECT_NE(page.find("data-cell=\"control/cell_1\""), page.npos);
   const int fibre = fake.read().cells.front().cell.fibres.front().fibre_id;
+  const auto n_directions = [&](const StudyCell& cell) {
+    return std::ranges::count(cell.directions, std::optional(fibre), &Direction::fibre_id);
+  };
+  EXPECT_GT(n_directions(fake.read().cells.front()), 0);
   const std::string of_fibre = "control/cell_1," + std::to_string(fibre) + ",left out,,";
 
   const Study study = review("control/cell_3,,left out,\"out of focus, twice\",\n" + of_fibre + segmentation + "\n");
   EXPECT_EQ(reason_of(study, "control/cell_3"), "left out by review.csv: out of focus, twice");
   ASSERT_EQ(study.cells.front().name, "control/cell_1");
   EXPECT_EQ(tension_of(study.cells.front(), fibre), nullptr);
+  EXPECT_EQ(n_directions(study.cells.front()), 0);
   EXPECT_NE(list_of_cells(study).find("TRUE,," + std::to_string(fibre) + "\n"), std::string::npos);
   EXPECT_NE(tension_of(study.cells.back(), fibre), nullptr);
 
@@ -144,12 +149,22 @@ TEST(Study, a_table_of_conditions_is_read_as_people_write_it) {
        {"cell,condition\ncell_1,ctrl\ncell_2,drug\n\ncell_3,ctrl\ncell_4,drug\n\n,\n,\n",
         "\xEF\xBB\xBFsep=;\r\ncell ;condition;;\r\ncell_1;ctrl ;;\r\ncell_2; "
         "drug;;\r\ncell_3;ctrl;;\r\ncell_4;drug;;\r\n;;;\r\n",
-        "My study\nCell\tCondition\ncontrol\\cell_1\tctrl\n./treated/cell_2/\tdrug\ncell_3/\tctrl\n\"cell_4\"\tdrug"}) {
+        "My study\nCell\tCondition\ncontrol\\cell_1\tctrl\n./treated/cell_2/\tdrug\ncell_3/\tctrl\n\"cell_4\"\tdrug",
+        "cell,Treatment,remark\nCell_1,ctrl,\"two\nlines\"\nCELL_2,drug,\"a \"\"word\"\"\n\nmore\"\ncell_3,ctrl,5\" "
+        "dish\ncell_4,drug,\n"}) {
     const Study study = fake.read({}, table);
     EXPECT_EQ(study.conditions, expected.conditions) << table;
     ASSERT_EQ(study.cells.size(), 4u) << table;
     EXPECT_TRUE(study.warnings.empty()) << table;
   }
+  const auto hint = [&](const std::string& cell) {
+    const std::string table = "cell,condition\ncell_1,ctrl\n" + cell + ",drug\ncell_3,ctrl\n";
+    return test::thrown<InputError>([&] { fake.read({}, table); }).hint;
+  };
+  EXPECT_TRUE(has_words(hint("D:\\data\\treated\\cell_2"), "write 'treated/cell_2'"));
+  EXPECT_TRUE(has_words(hint("treated/cell_2/actin.tif"), "write 'treated/cell_2'"));
+  EXPECT_TRUE(has_words(hint("02. Jan"), "has no row yet", "dates"));
+  EXPECT_TRUE(has_words(fake.read({}, "cell,colour\ncell_1,red\ncell_2,blue\n").warnings.at(0), "--condition-from"));
   EXPECT_THROW(fake.read({}, "name,condition\ncell_1,ctrl\n"), InputError);
   EXPECT_THROW(fake.read({}, "cell,condition\ncell_1,ctrl,more\n"), InputError);
   EXPECT_THROW(fake.read({}, "cell,condition\n,ctrl\n"), InputError);
@@ -169,7 +184,9 @@ TEST(Study, names_that_differ_in_capitals_are_one_condition_and_no_is_no_reason)
        {"Cell;Condition;Exclude?\ncell_1;a;nein\ncell_2;a;-\ncell_3;a;\ncell_4;a;out of focus\n",
         "cell,condition,excluded\ncell_1,a,\ncell_2,a,non\ncell_3,a,no\ncell_4,a,1\n",
         "cell,condition,include\ncell_1,a,yes\ncell_2,a,1\ncell_3,a,\ncell_4,a,no\n",
-        "cell,condition\ncell_1,a\ncell_2,a\ncell_3,a\ncell_4,#N/A\n"}) {
+        "cell,condition\ncell_1,a\ncell_2,a\ncell_3,a\ncell_4,#N/A\n",
+        "cell,condition\ncell_1,a\ncell_2,a\ncell_3,a\ncell_4,#REF!\n",
+        "cell,condition,exclude\ncell_1,a,\ncell_2,a,\ncell_3,a,\ncell_4,a,?\n"}) {
     const Study some = fake.read({}, table);
     EXPECT_EQ(some.cells.size(), 3u) << table;
     EXPECT_FALSE(reason_of(some, "treated/cell_4").empty()) << table;
