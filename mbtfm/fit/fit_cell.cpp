@@ -119,12 +119,39 @@ Searched fit_and_search(const Inputs& inputs, const Parameters& p, const Work& w
   return {std::move(ready), std::move(with)};
 }
 
+Readings readings_of(const ReadyCell& cell, const EnsembleFit& fit, const DisplacementField& beads, const Parameters& p,
+                     int threads) {
+  const FitSummary summary = summary_of(fit, cell.scene, 0, p.fit);
+  if (unexplained_share(summary) <= kMuchUnexplained) return {};
+  const MatrixXd& by_tension = fit.meshes.front().force_derivatives;
+  return {.other = best_reading(under(cell, p, threads), beads, by_tension, summary.noise_um),
+          .smoothed = best_smoothing(fit.data, by_tension, summary.noise_um)};
+}
+
+Figures figures_of(const Readings& found) {
+  if (!found.other) return {};
+  return {{"best_reading_leaves", found.other->unexplained_share},
+          {"given_reading_leaves", found.other->unexplained_as_is},
+          {"best_smoothing_leaves", found.smoothed->unexplained_share},
+          {"unsmoothed_leaves", found.smoothed->unexplained_as_is}};
+}
+
+/// Forces at missing adhesions that are no minority: pictures or beads are wrong, and adhesions everywhere hide it.
+bool are_many(const std::vector<MissingAdhesion>& missing, const EnsembleFit& fit, std::size_t n_seen) {
+  constexpr double kMinority = 0.5;  // of the forces at those that were seen
+  double sum_nN = 0;
+  for (const MissingAdhesion& place : missing) sum_nN += norm(place.force_nN);
+  return sum_nN > kMinority * total_nN(adhesion_forces_nN(fit).head(2 * static_cast<Index>(n_seen)));
+}
+
 /// A fibre whose adhesion was not found ends in the network, and no force at that place puts its tension right: the
 /// networks are held there, too, as long as they then explain the beads better.
 Searched hold_where_beads_show(Searched searched, Inputs inputs, const Parameters& p, const Work& work) {
   constexpr int kMostRounds = 2;
   if (are_assumed(inputs.cell.adhesions)) return searched;
+  const std::size_t n_seen = inputs.cell.adhesions.size();
   for (int round = 0; round < kMostRounds && !searched.with.adhesions.empty(); ++round) {
+    if (are_many(searched.missing_adhesions(), searched.with.fit, n_seen)) break;
     inputs.cell = held_at(std::move(inputs.cell), searched.with.adhesions);
     Cell of_network = inputs.cell;
     if (!searched.ready.decisions.fibres.is_on) of_network.fibres.clear();
@@ -248,7 +275,9 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
   if (!inputs.frames.empty() && p.fit.substrate == TrialDisplacement::per_evaluation)
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   check_place(inputs.beads, inputs.cell);
-  Searched searched = hold_where_beads_show(fit_and_search(inputs, p, work), inputs, p, work);
+  Searched searched = fit_and_search(inputs, p, work);
+  const Readings readings = readings_of(searched.ready, searched.with.fit, inputs.beads, p, work.threads);
+  if (!is_read_wrongly(readings)) searched = hold_where_beads_show(std::move(searched), inputs, p, work);
   const std::vector<MissingAdhesion> missing = searched.missing_adhesions();
   auto& [ready, with, held] = searched;
   with.fit = with_unfound(std::move(with.fit), ready.scene.cell, missing);
@@ -263,16 +292,7 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
   append(found.summary.more, figures_of(motions));
   append(found.summary.more, figures_of(checks, fit));
   ModelFields fields = fields_of(ready, fit, checks, inputs.beads);
-  std::optional<Reading> reading, smoothing;
-  if (unexplained_share(found.summary) > kMuchUnexplained) {
-    const MatrixXd& by_tension = fit.meshes.front().force_derivatives;
-    reading = best_reading(under(ready, p, work.threads), inputs.beads, by_tension, found.summary.noise_um);
-    smoothing = best_smoothing(fit.data, by_tension, found.summary.noise_um);
-    append(found.summary.more, {{"best_reading_leaves", reading->unexplained_share},
-                                {"given_reading_leaves", reading->unexplained_as_is},
-                                {"best_smoothing_leaves", smoothing->unexplained_share},
-                                {"unsmoothed_leaves", smoothing->unexplained_as_is}});
-  }
+  append(found.summary.more, figures_of(readings));
   std::vector<FrameFit> frames = fit_frames(ready, with, missing, inputs, p, work.part(0.6, 0.35));
   FittedCell cell{.seen = inputs.cell,
                   .parameters = p,
@@ -282,8 +302,8 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
                   .motions = std::move(motions),
                   .checks = std::move(checks),
                   .fields = std::move(fields),
-                  .reading = std::move(reading),
-                  .smoothing = std::move(smoothing),
+                  .reading = readings.other,
+                  .smoothing = readings.smoothed,
                   .frames = std::move(frames)};
   return with_effects(std::move(cell), work);
 }

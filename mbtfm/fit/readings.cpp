@@ -10,6 +10,7 @@
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/extent.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/neighbour_bins.h"
 #include "substrate/response.h"
@@ -218,6 +219,11 @@ Reading best_reading(const GelUnderCell& on, const DisplacementField& given, con
 
 std::optional<Finding> noticed_reading(Symptom symptom, const Reading& reading) {
   return noticed(symptom, reading.unexplained_as_is / reading.unexplained_share, {.at = reading.what});
+}
+
+bool is_read_wrongly(const Readings& readings) {
+  return (readings.other && noticed_reading(Symptom::read_otherwise, *readings.other)) ||
+         (readings.smoothed && noticed_reading(Symptom::field_smoothed, *readings.smoothed));
 }
 
 }  // namespace mbtfm::fit

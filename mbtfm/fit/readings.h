@@ -38,4 +38,11 @@ Reading best_smoothing(const tensions::LinearData& data, const MatrixXd& force_d
 /// @param symptom  read_otherwise or field_smoothed
 std::optional<Finding> noticed_reading(Symptom symptom, const Reading& reading);
 
+/// The best ones. None: not looked for.
+struct Readings {
+  std::optional<Reading> other = {}, smoothed = {};
+};
+/// One of them is noticed.
+bool is_read_wrongly(const Readings& readings);
+
 }  // namespace mbtfm::fit

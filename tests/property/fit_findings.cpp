@@ -127,10 +127,23 @@ TEST_F(FitFindings, a_fibre_is_held_where_the_beads_show_its_adhesion) {
   const std::vector<MissingAdhesion>& missing = fitted.checks.missing_adhesions;
   ASSERT_EQ(missing.size(), 1u);
   EXPECT_LE(norm(missing.front().position_um - missed_um), 1) << "places are a micrometre apart";
-  EXPECT_EQ(fitted.ready.scene.cell.adhesions.back().origin, AdhesionOrigin::beads);
+  const Cell& held = fitted.ready.scene.cell;
+  EXPECT_EQ(held.adhesions.back().origin, AdhesionOrigin::beads);
+  EXPECT_EQ(held.fibres.front().end_adhesion_id, held.adhesions.back().adhesion_id);
   const Tension& fibre = *std::ranges::find(fitted.found.tensions, 1, &Tension::fibre_id);
   EXPECT_LE(std::abs(fibre.tension_nN - 2.5), 3 * fibre.sigma_nN.value());
   EXPECT_LE(fibre.sigma_nN.value(), 0.5) << "and is known";
+}
+
+/// As if the picture of the adhesions were another cell's.
+TEST_F(FitFindings, adhesions_are_not_added_where_most_are_missing) {
+  std::erase_if(inputs_.cell.adhesions, [](const Adhesion& a) { return a.adhesion_id % 4 != 2; });
+  inputs_.cell.fibres.clear();
+  inputs_.network = mesh::generate_network(inputs_.cell, parameters_.network).network;
+  const FittedCell fitted = fit_cell(inputs_, parameters_, 2);
+  EXPECT_FALSE(fitted.checks.missing_adhesions.empty());
+  EXPECT_EQ(fitted.ready.scene.cell.adhesions.size(), inputs_.cell.adhesions.size());
+  EXPECT_TRUE(fires("misfit", report_of(fitted).findings));
 }
 
 /// What a force that has its finding leaves around it is no second cause; what is left at another place is.
