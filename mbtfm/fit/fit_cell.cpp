@@ -158,8 +158,7 @@ Searched hold_where_beads_show(Searched searched, Inputs inputs, const Parameter
     inputs.network = mesh::generate_network(of_network, p.network).network;
     Searched next = fit_and_search(inputs, p, work);
     if (next.with.fit.misfit.chi_squared_per_degree >= searched.with.fit.misfit.chi_squared_per_degree) break;
-    next.held = std::move(searched.held);
-    next.held.insert(next.held.end(), searched.with.adhesions.begin(), searched.with.adhesions.end());
+    next.held = searched.missing_adhesions();
     searched = std::move(next);
   }
   return searched;

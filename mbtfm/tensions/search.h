@@ -46,8 +46,8 @@ double log_bayes_factor(const Spectrum& spectrum, double kappa);
 /// Patterson & Thompson, Biometrika 58 (1971) 545).
 double likeliest_kappa(const Spectrum& spectrum);
 
-/// The blocks that the data call for: the likeliest one, then the others beside it, as long as log_bayes_factor() is
-/// above the log of the odds against the block.
+/// Blocks that are more likely than not, the most likely one first, each in addition to those before: its
+/// log_bayes_factor() is above the log of the prior odds against it.
 /// @param columns, log_odds_against  by block  @param kappa  of the sizes of a block; none: the likeliest
 std::vector<std::size_t> causes_among(Scores scores, const std::vector<std::vector<Index>>& columns,
                                       const std::vector<double>& log_odds_against, std::optional<double> kappa = {});
