@@ -145,7 +145,8 @@ bool are_many(const std::vector<MissingAdhesion>& missing, const EnsembleFit& fi
 }
 
 /// A fibre whose adhesion was not found ends in the network, and no force at that place puts its tension right: the
-/// networks are held there, too, as long as they then explain the beads better.
+/// networks are held there, too, as long as they then explain the beads better. If no such network can be made or
+/// solved, the fit that there is stays.
 Searched hold_where_beads_show(Searched searched, Inputs inputs, const Parameters& p, const Work& work) {
   constexpr int kMostRounds = 2;
   if (are_assumed(inputs.cell.adhesions)) return searched;
@@ -155,11 +156,17 @@ Searched hold_where_beads_show(Searched searched, Inputs inputs, const Parameter
     inputs.cell = held_at(std::move(inputs.cell), searched.with.adhesions);
     Cell of_network = inputs.cell;
     if (!searched.ready.decisions.fibres.is_on) of_network.fibres.clear();
-    inputs.network = mesh::generate_network(of_network, p.network).network;
-    Searched next = fit_and_search(inputs, p, work);
-    if (next.with.fit.misfit.chi_squared_per_degree >= searched.with.fit.misfit.chi_squared_per_degree) break;
-    next.held = searched.missing_adhesions();
-    searched = std::move(next);
+    try {
+      inputs.network = mesh::generate_network(of_network, p.network).network;
+      Searched next = fit_and_search(inputs, p, work);
+      if (next.with.fit.misfit.chi_squared_per_degree >= searched.with.fit.misfit.chi_squared_per_degree) break;
+      next.held = searched.missing_adhesions();
+      searched = std::move(next);
+    } catch (const NotSolved&) {
+      break;
+    } catch (const InvalidData&) {
+      break;
+    }
   }
   return searched;
 }
