@@ -14,7 +14,7 @@ packages=(
   libopencv-dev libvtk9-dev libeigen3-dev libboost-dev libboost-thread-dev libcgal-dev
   libmetis-dev libfftw3-dev libopenblas0-pthread libopenblas-pthread-dev
   libtiff-dev libpng-dev libjpeg62-turbo-dev libzip-dev libexpat1-dev libssl-dev
-  libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev
+  libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev libutf8proc-dev
 )
 [ "$purpose" = cell ] || packages+=(libdeal.ii-dev zlib1g-dev librsvg2-dev pkg-config fonts-dejavu-core)
 [ "$purpose" != tests ] || packages+=(libgtest-dev libgmock-dev python3-jsonschema)

@@ -1,8 +1,11 @@
 #include "pipeline/files/names.h"
 
+#include <utf8proc.h>
+
 #include <algorithm>
-#include <array>
 #include <charconv>
+#include <cstdlib>
+#include <memory>
 
 namespace mbtfm::files {
 
@@ -54,46 +57,32 @@ int compare_names(std::string_view a, std::string_view b) {
   return static_cast<int>(b.empty()) - static_cast<int>(a.empty());
 }
 
+const utf8proc_uint8_t* bytes_of(std::string_view text) {
+  return reinterpret_cast<const utf8proc_uint8_t*>(text.data());
+}
+
+/// A text that is no UTF-8 stays as it is.
+std::string mapped(std::string_view text, int options) {
+  utf8proc_uint8_t* found = nullptr;
+  const utf8proc_ssize_t n = utf8proc_map(bytes_of(text), static_cast<utf8proc_ssize_t>(text.size()), &found,
+                                          static_cast<utf8proc_option_t>(options));
+  if (n < 0) return std::string(text);
+  const std::unique_ptr<utf8proc_uint8_t, decltype(&std::free)> owner(found, &std::free);
+  return {found, found + n};
+}
+
 }  // namespace
 
-// Unicode Standard Annex 15, forms D and C; the letters of European languages.
-std::string composed(std::string_view text) {
-  struct Marked {
-    std::string_view mark, letters, composed;  // two bytes a mark and a composed letter
-  };
-  constexpr std::array<Marked, 8> kMarks = {{{"\u0300", "AEIOUaeiou", "ÀÈÌÒÙàèìòù"},
-                                             {"\u0301", "AEIOUYaeiouyCcLlNnRrSsZz", "ÁÉÍÓÚÝáéíóúýĆćĹĺŃńŔŕŚśŹź"},
-                                             {"\u0302", "AEIOUaeiou", "ÂÊÎÔÛâêîôû"},
-                                             {"\u0303", "ANOano", "ÃÑÕãñõ"},
-                                             {"\u0308", "AEIOUaeiouy", "ÄËÏÖÜäëïöüÿ"},
-                                             {"\u030A", "AaUu", "ÅåŮů"},
-                                             {"\u0327", "CcSs", "ÇçŞş"},
-                                             {"\u030C", "CcDdEeNnRrSsTtZz", "ČčĎďĚěŇňŘřŠšŤťŽž"}}};
-  std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    std::string_view letter = text.substr(i, 1);
-    for (const Marked& m : kMarks) {
-      const std::size_t at = text.substr(i + 1).starts_with(m.mark) ? m.letters.find(text[i]) : m.letters.npos;
-      if (at != m.letters.npos) letter = m.composed.substr(2 * at, 2);
-    }
-    result += letter;
-    if (letter.size() == 2) i += 2;
-  }
-  return result;
+std::string composed(std::string_view text) { return mapped(text, UTF8PROC_STABLE | UTF8PROC_COMPOSE); }
+
+std::string folded(std::string_view text) {
+  return mapped(text, UTF8PROC_STABLE | UTF8PROC_COMPOSE | UTF8PROC_CASEFOLD);
 }
 
 std::size_t utf8_length(std::string_view text) {
-  if (text.empty()) return 0;
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  if (byte(0) < 0x80) return 1;
-  const std::size_t n = byte(0) >= 0xF0 ? 4 : byte(0) >= 0xE0 ? 3 : 2;
-  if (byte(0) < 0xC2 || byte(0) > 0xF4 || text.size() < n) return 0;
-  for (std::size_t i = 1; i < n; ++i)
-    if ((byte(i) & 0xC0) != 0x80) return 0;
-  // longer than it need be, half of a surrogate pair, beyond the last character (RFC 3629)
-  const bool is_allowed = !(byte(0) == 0xE0 && byte(1) < 0xA0) && !(byte(0) == 0xED && byte(1) >= 0xA0) &&
-                          !(byte(0) == 0xF0 && byte(1) < 0x90) && !(byte(0) == 0xF4 && byte(1) >= 0x90);
-  return is_allowed ? n : 0;
+  utf8proc_int32_t character = 0;
+  return static_cast<std::size_t>(std::max<utf8proc_ssize_t>(
+      0, utf8proc_iterate(bytes_of(text), static_cast<utf8proc_ssize_t>(text.size()), &character)));
 }
 
 bool is_utf8(std::string_view text) {

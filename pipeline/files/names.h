@@ -24,6 +24,9 @@ std::filesystem::path file_shown_as(const std::filesystem::path& folder, const s
 /// A letter and a mark behind it as one character, as keyboards write them: ü, where a Mac's file names have u and ¨.
 std::string composed(std::string_view text);
 
+/// For comparing what people write: composed, and small letters for capitals, of any script.
+std::string folded(std::string_view text);
+
 /// Letters of ASCII as small ones.
 std::string lower_case(std::string text);
 

@@ -89,7 +89,7 @@ void join_capitals(std::vector<CellNote>& notes, std::string CellNote::*member, 
   std::map<std::string, std::string> first;
   std::map<std::string, std::set<std::string>> others;
   for (CellNote& note : notes) {
-    const std::string& spelled = first.emplace(files::lower_case(note.*member), note.*member).first->second;
+    const std::string& spelled = first.emplace(files::folded(note.*member), note.*member).first->second;
     if (note.*member == spelled) continue;
     others[spelled].insert(note.*member);
     note.*member = spelled;
@@ -100,11 +100,9 @@ void join_capitals(std::vector<CellNote>& notes, std::string CellNote::*member, 
   }
 }
 
-/// Names are the same if they differ in capitals or in how an umlaut is composed.
-std::string letters_of(const std::string& name) { return files::lower_case(files::composed(name)); }
-
 bool is_called(const std::string& name, const std::string& word) {
-  return letters_of(word) == letters_of(name) || letters_of(word) == letters_of(Path(name).filename());
+  return files::folded(word) == files::folded(name) ||
+         files::folded(word) == files::folded(Path(name).filename().string());
 }
 
 /// Of a cell that is not in the study.
@@ -186,7 +184,7 @@ CellNotes notes_of(const std::vector<std::string>& names, const std::string& con
       notes[i].*member = rows->text(row, column);
       if (is_no_name(notes[i].*member)) (notes[i].*member).clear();
       if ((notes[i].*member).empty() && notes[i].reason_to_exclude.empty())
-        notes[i].reason_to_exclude = "no " + column + " in the table";
+        notes[i].reason_to_exclude = "no " + column + " in the table (of merged rows the first alone has it)";
     };
     take(condition.column, &CellNote::condition);
     take(replicate.column, &CellNote::replicate);

@@ -104,6 +104,12 @@ TEST_F(Names, letters_with_marks_are_the_same_as_one_character_or_as_two) {
   files::write_text(folder / "Fl\u00E4che.tif", "");
   EXPECT_EQ(files::file_shown_as(folder.path(), "Fla\u0308che.tif"), folder / "Fl\u00E4che.tif");
   EXPECT_EQ(files::file_shown_as(folder.path(), "Flache.tif"), folder / "Flache.tif") << "another name";
+  files::write_text(folder / "\u1112\u1161\u11AB.tif", "");
+  EXPECT_EQ(files::file_shown_as(folder.path(), "\uD55C.tif"), folder / "\u1112\u1161\u11AB.tif") << "Hangul";
+  files::write_text(folder / "\u304B\u3099.tif", "");
+  EXPECT_EQ(files::file_shown_as(folder.path(), "\u304C.tif"), folder / "\u304B\u3099.tif") << "Hiragana";
+  EXPECT_EQ(files::folded("ZELLE 3\u00DC"), files::folded("Zelle 3u\u0308"));
+  EXPECT_EQ(files::folded("caf\xE9"), "caf\xE9") << "no UTF-8: as it is";
 }
 
 TEST_F(Names, no_shown_name_leads_out_of_its_folder) {
