@@ -25,6 +25,7 @@
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/image_sets.h"
+#include "pipeline/runner/images.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
@@ -267,15 +268,19 @@ int repeat(const CommandLine& line) {
   throw OutputError("cannot start " + arguments[0]);
 }
 
+bool names(const std::vector<std::string>& arguments, const std::string& flag) {
+  return std::ranges::any_of(arguments, [&](const auto& a) { return a == flag || a.starts_with(flag + "="); });
+}
+
 [[noreturn]] void stats(const CommandLine& line, const std::vector<std::string>& further) {
-  std::vector<std::string> arguments = {
-      "--cells",   line.folder.string(),
-      "--out",     files::inside(line.folder, "statistics", line.folder.string()).string(),
-      "--threads", std::to_string(line.run.threads)};
+  if (!further.empty() && !further.front().starts_with("-"))
+    throw UsageError("stats: one folder at a time: give the folder that both are in");
+  std::vector<std::string> arguments = {"--cells", line.folder.string(), "--threads", std::to_string(line.run.threads)};
+  if (!names(further, "--out"))
+    arguments.insert(arguments.end(),
+                     {"--out", files::inside(line.folder, "statistics", line.folder.string()).string()});
   if (line.run.is_quiet) arguments.emplace_back("--quiet");
-  const auto is_config = [](const std::string& argument) { return argument.starts_with("--config"); };
-  if (const fs::path shared = line.folder / "study.toml";
-      files::is_file(shared) && std::ranges::none_of(further, is_config))
+  if (const fs::path shared = line.folder / "study.toml"; files::is_file(shared) && !names(further, "--config"))
     arguments.insert(arguments.end(), {"--config", shared.string()});
   for (std::string argument : further) {
     // flags are written with dashes, too: --condition-from
@@ -311,24 +316,29 @@ int check(const CommandLine& line) {
 }
 
 [[noreturn]] void init(const CommandLine& line) {
+  const fs::path like =
+      files::is_file(line.like) ? fs::absolute(line.like).parent_path() : line.like;  // of its cell.toml
   std::vector<std::string> arguments = {"--cell", line.folder.string(), "--out", (line.folder / "cell.toml").string()};
-  if (!line.like.empty()) arguments.insert(arguments.end(), {"--like", line.like.string()});
+  if (!line.like.empty()) arguments.insert(arguments.end(), {"--like", like.string()});
   become("mbtfm-init", arguments);
 }
 
 /// @param arguments  as given, in their order
 [[noreturn]] void plan(std::vector<std::string> arguments) {
-  const std::string out = "--out";
-  const auto is_out = [&](const std::string& a) { return a == out || a.starts_with(out + "="); };
-  if (std::ranges::none_of(arguments, is_out)) arguments.insert(arguments.end(), {out, "plan"});
+  if (!names(arguments, "--out")) arguments.insert(arguments.end(), {"--out", "plan"});
   become("mbtfm-plan", std::move(arguments));
 }
 
-[[noreturn]] void noise(const std::vector<std::string>& pictures, const std::vector<std::string>& further) {
-  std::vector<std::string> arguments;
-  if (pictures.size() == 1) throw UsageError("noise: expected two pictures of a place: mbtfm noise A.tif B.tif");
-  if (pictures.size() == 2) arguments = {"--first", pictures[0], "--second", pictures[1]};
-  arguments.insert(arguments.end(), further.begin(), further.end());
+/// @param arguments  as given: pictures, if any, then flags
+[[noreturn]] void noise(std::vector<std::string> arguments) {
+  const auto n_pictures =
+      std::ranges::find_if(arguments, [](const auto& a) { return a.starts_with("-"); }) - arguments.begin();
+  if (n_pictures != 0 && n_pictures != 2)
+    throw UsageError("noise: expected two pictures of a place: mbtfm noise A.tif B.tif");
+  if (n_pictures == 2) {
+    arguments.insert(arguments.begin() + 1, "--second");
+    arguments.insert(arguments.begin(), "--first");
+  }
   become("mbtfm-noise", std::move(arguments));
 }
 
@@ -494,15 +504,14 @@ int start(int argc, char** argv) {
       app.add_subcommand("plan", "how many beads and cells, which gel and noise a question takes: mbtfm plan --help");
   plan_command->set_help_flag();
   plan_command->allow_extras();
-  std::vector<std::string> pictures;
   CLI::App* noise_command = app.add_subcommand(
       "noise", "noise and density of beads from two pictures without a cell: mbtfm noise A.tif B.tif");
   noise_command->set_help_flag();
-  noise_command->allow_extras()->add_option("PICTURES", pictures, "the two pictures")->expected(0, 2);
+  noise_command->allow_extras();
   fs::path manuals;
   app.add_option("--manuals", manuals, "write manual page and completions below this folder")->group("");
   app.require_subcommand(0, 1);
-  add_command(app, line, "compare", "compare a simulated cell with its truth", kCell);
+  CLI::App* compare_command = add_command(app, line, "compare", "compare a simulated cell with its truth", kCell);
   try {
     std::vector<std::string> arguments(argv + 1, argv + argc);
     for (const char* word : {"help", "version"}) {  // mbtfm help run
@@ -538,10 +547,11 @@ int start(int argc, char** argv) {
   if (run_command->parsed()) return run(line);
   if (batch_command->parsed()) return batch(line);
   if (cost_command->parsed()) return cost_study(line);
+  if (verify_command->parsed() || compare_command->parsed()) runner::require_folder(line.folder, "a cell folder");
   if (verify_command->parsed()) return tell(runner::verify_cell(line.folder), line.folder.string());
   if (repeat_command->parsed()) return repeat(line);
   if (plan_command->parsed()) plan(plan_command->remaining());
-  if (noise_command->parsed()) noise(pictures, noise_command->remaining());
+  if (noise_command->parsed()) noise(noise_command->remaining());
   if (stats_command->parsed()) stats(line, stats_command->remaining());
   if (check_command->parsed()) return check(line);
   if (init_command->parsed()) init(line);

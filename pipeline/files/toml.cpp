@@ -57,10 +57,14 @@ std::string advice_on(std::string_view text, std::size_t line) {
   if (text.starts_with("{\\rtf")) return "save the file as plain text, not as rich text";
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
   const std::size_t equals = here.find('='), colon = here.find(':'), first = here.find_first_not_of(" \t");
+  if (first != here.npos && std::string_view("/;%!*").find(here[first]) != std::string_view::npos)
+    return "a comment begins with #";
   if (equals == here.npos && first != here.npos && here[first] == '[')
     return here.find(']') == here.npos
                ? "a table's name stands between brackets: " + std::string(here.substr(first)) + "]"
                : "each table stands once: put all its keys below the first";
+  if (equals != here.npos && here.find_first_not_of(" \t\r", equals + 1) == here.npos)
+    return "a value follows the equals sign, or take the line out";
   if (equals == here.npos && colon != here.npos)
     return "an equals sign stands between key and value: pixel_size_um = 0.1";
   if (const auto comma = here.find(','); comma != here.npos && comma > 0 && comma + 1 < here.size() &&

@@ -3,6 +3,7 @@
 #include <fnmatch.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
@@ -97,6 +98,10 @@ namespace {
 constexpr std::string_view kOfPictures[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
 constexpr std::string_view kOfMicroscopes[] = {".nd2", ".czi", ".lif", ".oib", ".oif"};
 
+bool is_picture(const fs::path& file) {
+  return std::ranges::find(kOfPictures, files::lower_case(file.extension().string())) != std::end(kOfPictures);
+}
+
 /// Where there is no such file: one that was probably meant; else what can be done.
 std::string advice_on_missing(const fs::path& folder, const std::string& name, const std::string& key) {
   const std::string place = "'" + key + "' in [images] of cell.toml";
@@ -106,20 +111,19 @@ std::string advice_on_missing(const fs::path& folder, const std::string& name, c
   if (const fs::path link = files::file_shown_as(folder, name); fs::is_symlink(fs::symlink_status(link)))
     return "it is a link to " + fs::read_symlink(link).string() + ", which is not there: copy the picture here";
   for (const fs::path& file : there)
-    if (files::lower_case(file.string()) == files::lower_case(name))
-      return "there is '" + file.string() + "': capitals count";
+    if (files::folded(file.string()) == files::folded(name)) return "there is '" + file.string() + "': capitals count";
   for (const fs::path& file : there) {
     const std::string type = files::lower_case(file.extension().string());
     if (std::ranges::find(kOfMicroscopes, type) != std::end(kOfMicroscopes))
       return "there is '" + file.string() + "', a file of a microscope: save it as TIFF in Fiji (File > Import > " +
              "Bio-Formats, then File > Save As > Tiff), or: bfconvert '" + file.string() + "' '" +
              file.stem().string() + ".ome.tif'; then name it as " + place;
-    if (files::lower_case(file.stem().string()) == files::lower_case(fs::path(name).stem().string()))
+    if (files::folded(file.stem().string()) == files::folded(fs::path(name).stem().string()))
       return "there is '" + file.string() + "': name it as " + place;
   }
-  std::erase_if(there, [&](const fs::path& file) {
-    return std::ranges::find(kOfPictures, files::lower_case(file.extension().string())) == std::end(kOfPictures);
-  });
+  for (const fs::path& below : there)
+    if (files::is_file(folder / below / name)) return "it is in the folder '" + below.string() + "': move it up";
+  std::erase_if(there, [](const fs::path& file) { return !is_picture(file); });
   constexpr std::size_t kShown = 6;
   std::string pictures;
   for (std::size_t k = 0; k < std::min(kShown, there.size()); ++k)
@@ -130,6 +134,23 @@ std::string advice_on_missing(const fs::path& folder, const std::string& name, c
 }
 
 }  // namespace
+
+std::string unused_pictures(const fs::path& cell, const ImageNames& names) {
+  std::string missing, unused;
+  for (const char* key : {"adhesion", "actin"})
+    if (match_image(cell, name_of_image(names, key)).files.empty())
+      missing += (missing.empty() ? "" : " or ") + std::string(key);
+  if (missing.empty()) return "";
+  std::vector<fs::path> used;
+  for (const ImageKey& image : kImages)
+    std::ranges::copy(match_image(cell, names.*image.member).files, std::back_inserter(used));
+  for (const fs::path& file : files::visible_in(cell))
+    if (is_picture(file) && std::ranges::find(used, file) == used.end())
+      unused += (unused.empty() ? "" : ", ") + file.filename().string();
+  return unused.empty()
+             ? ""
+             : "not used: " + unused + "; if it is the picture of " + missing + ", name it so in [images] of cell.toml";
+}
 
 fs::path other_half(const fs::path& file) {
   constexpr std::string_view kHalf = "u.npy";
@@ -192,11 +213,14 @@ void require_folder(const fs::path& folder, const std::string& expected) {
   const std::string name = folder.filename().string();
   std::vector<std::string> names;
   for (const fs::path& other : files::visible_in(parent_of(folder))) names.push_back(other.filename().string());
-  const std::string near = stage::nearest(names, name);
-  throw InputError(folder.string(), expected, "none",
-                   folder.string().starts_with("~") ? "~ in quotes is no folder: leave the quotes out, or write $HOME"
-                   : !near.empty() && stage::is_alike(near, name)
-                       ? stage::did_you_mean(near)
+  const std::string meant = stage::did_you_mean(names, name), path = folder.string();
+  throw InputError(path, expected, "none",
+                   path.starts_with("~") ? "~ in quotes is no folder: leave the quotes out, or write $HOME"
+                   : path.find_first_of("*?") != path.npos
+                       ? "* and ? stand for folders outside of quotes only; for many cells: mbtfm batch FOLDER"
+                   : path.find("://") != path.npos ? "a path begins with /, not with file://"
+                   : !meant.empty()
+                       ? meant
                        : "give the folder of the cell's images and cell.toml, or of all cells, as seen from here");
 }
 
@@ -207,6 +231,9 @@ ImageNames read_image_names(const fs::path& cell) {
       throw InputError(cell.string(), "a cell folder with cell.toml",
                        "a folder of " + counted(static_cast<std::int64_t>(n), "cells"),
                        "to run them all: mbtfm batch " + cell.string());
+    if (const fs::path above = fs::weakly_canonical(cell).parent_path(); files::is_file(above / "cell.toml"))
+      throw InputError(cell.string(), "a cell folder with cell.toml", "a folder in a cell's own",
+                       "give the cell: " + above.string());
     const std::string misnamed = misnamed_settings(files::visible_in(cell));
     throw InputError(cell.string(), "a cell folder with cell.toml", "no cell.toml",
                      misnamed.empty() ? "to write one from what the images say: mbtfm init " + cell.string()

@@ -54,6 +54,9 @@ struct ImageMatch {
 /// them. A file of exactly that name wins over a glob.
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob);
 
+/// On pictures in the folder that nothing names, where one of the cell itself is missing; empty: there are none.
+std::string unused_pictures(const fs::path& cell, const ImageNames& names);
+
 /// Of pyTFM's u.npy, its v.npy; empty for all others.
 fs::path other_half(const fs::path& file);
 

@@ -13,6 +13,8 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
+#include "pipeline/stage/effects.h"
+#include "pipeline/stage/suggest.h"
 
 namespace mbtfm::runner {
 namespace {
@@ -93,8 +95,10 @@ class CellRun {
     for (const Setting& setting : options.set) {
       if (std::ranges::any_of(of_.stages, [&](const Stage& stage) { return !flags_of(stage, {setting}).empty(); }))
         continue;
-      throw UsageError("--set " + setting.table + "." + setting.key + ": no stage of this cell reads it (" + of_.why +
-                       ")");
+      const std::string meant =
+          setting.table == "effects" ? stage::did_you_mean(stage::effect_keys(), setting.key) : "";
+      throw UsageError("--set " + setting.table + "." + setting.key + ": no stage of this cell reads it" +
+                       (of_.why.empty() ? "" : " (" + of_.why + ")") + (meant.empty() ? "" : "; " + meant));
     }
   }
 
@@ -118,6 +122,8 @@ class CellRun {
     outcome.started = numerics::utc_now();
     if (of_.kind == CellKind::space && options_.note) options_.note("beads in space, as " + of_.why);
     if (of_.kind == CellKind::sheet && options_.note) options_.note("a contracting sheet, as " + of_.why);
+    if (const std::string unused = unused_pictures(cell_, images_); !unused.empty() && options_.note)
+      options_.note(unused);
     const bool has_work = std::ranges::any_of(
         outcome.stages, [](const StageOutcome& stage) { return stage.status.state == StageState::must_run; });
     try {

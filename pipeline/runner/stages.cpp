@@ -6,6 +6,7 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/listed.h"
 #include "pipeline/files/toml.h"
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/stage/suggest.h"
@@ -106,11 +107,17 @@ Setting parse_setting(const std::string& text) {
   const std::size_t begin = point == text.npos ? 0 : point + 1;
   std::set<std::string> tables = {"effects"};
   for (const Stage& stage : all_stages()) tables.insert(stage.tables.begin(), stage.tables.end());
+  if (table == "images" || table == "run")
+    throw UsageError("--set " + text + ": [" + table + "] is for cell.toml alone: write it there");
   if (!tables.contains(table)) {
-    const std::string near = stage::nearest({tables.begin(), tables.end()}, table);
+    const std::string meant = stage::did_you_mean({tables.begin(), tables.end()}, table);
     throw UsageError("--set " + text + ": expected a table of cell.toml, found '" + table + "'" +
-                     (near.empty() ? "" : "; " + stage::did_you_mean(near)));
+                     (meant.empty() ? "; there are " + listed(tables) : "; " + meant));
   }
+  if (const std::size_t comma = text.find(',', equals);
+      comma != text.npos && text.find('=', comma) != text.npos && text.find('.', comma) < text.find('=', comma))
+    throw UsageError("--set " + text + ": one value a flag: --set " + text.substr(0, comma) + " --set " +
+                     text.substr(comma + 1));
   return {table, text.substr(begin, equals - begin), text.substr(equals + 1)};
 }
 
@@ -128,8 +135,7 @@ std::vector<std::string> flags_of(const Stage& stage, const std::vector<Setting>
     const bool is_effect = setting.table == "effects";
     const std::vector<std::string>& known = is_effect ? stage.effects : stage.tables;
     if (std::find(known.begin(), known.end(), is_effect ? setting.key : setting.table) == known.end()) continue;
-    flags.push_back("--" + (setting.table.empty() ? "" : setting.table + ".") + setting.key);
-    flags.push_back(setting.value);
+    flags.push_back("--" + (setting.table.empty() ? "" : setting.table + ".") + setting.key + "=" + setting.value);
   }
   return flags;
 }

@@ -101,10 +101,7 @@ bool try_set(Parameter& p, const std::string& text) {
 
 /// What was probably meant: another unit, or a word of which less than half is misspelt.
 std::string likely_slip(const Parameter& p, const std::string& text) {
-  if (const auto* choice = std::get_if<Choice>(&p.member)) {
-    const std::string word = nearest(choice->words, text);
-    return is_alike(word, text) ? did_you_mean(word) : "";
-  }
+  if (const auto* choice = std::get_if<Choice>(&p.member)) return did_you_mean(choice->words, text);
   double value = 0;
   if (read_number(text, value)) return unit_slip(p.name, value, p.range);
   const std::size_t digits = text.find_first_not_of("0123456789.+-");
@@ -130,7 +127,9 @@ std::string joined(const toml::array& list, const std::string& where) {
   std::string text;
   for (const toml::node& element : list) {
     const auto* name = element.as_string();
-    if (!name) throw InputError(where, "a number, a text, true or false", "an array of other things than texts");
+    if (!name)
+      throw InputError(where, "a number, a text, true or false", "an array of other things than texts",
+                       "one value, without brackets");
     text += (text.empty() ? "" : ",") + name->get();
   }
   return text;
@@ -147,17 +146,17 @@ std::string spelled(const toml::node& node, const std::string& where) {
 }
 
 /// @param list  of the stage, whose keys of other tables may be meant
-std::string unknown_key_hint(const ParameterList& list, const std::vector<std::string>& known, std::string_view key) {
-  if (kDeletedKeys.find(" " + std::string(key) + " ") != kDeletedKeys.npos)
+std::string unknown_key_hint(const ParameterList& list, const std::vector<std::string>& known, const std::string& key) {
+  if (kDeletedKeys.find(" " + key + " ") != kDeletedKeys.npos)
     return "this version computes as its default did and has no such key: take the line out (CHANGELOG.md)";
-  const std::string closest = nearest(known, key);
-  if (!closest.empty() && is_alike(closest, key)) return did_you_mean(closest);
+  if (const std::string meant = did_you_mean(known, key); !meant.empty()) return meant;
   if (std::ranges::find(kKeysOfGel, key) != kKeysOfGel.end()) return "it belongs under [gel]";
   if (std::ranges::find(kRootKeys, key) != kRootKeys.end()) return "it belongs above the first table";
   for (const Parameter& p : list.all())
     if (p.name == key)
       return p.table.empty() ? "it belongs above the first table" : "it belongs under [" + p.table + "]";
-  return "docs/parameters.md has all keys";
+  if (const std::string meant = did_you_mean(effect_keys(), key); !meant.empty()) return meant + " It is in [effects]";
+  return known.empty() ? "docs/parameters.md has all keys" : "there are " + listed(known);
 }
 
 }  // namespace
@@ -201,9 +200,9 @@ void read_table(ParameterList& list, const toml::table& root, const std::string&
           const std::vector<std::string> others = key_name == "effects" ? effect_keys() : std::vector<std::string>();
           const std::vector<std::string>& of_other_stages = key_name == "gel" ? kMoreOfGel : others;
           if (std::ranges::find(of_other_stages, std::string(inner_key.str())) != of_other_stages.end()) continue;
-          throw InputError(place(name, inner), "a known key of [" + key_name + "]",
-                           "'" + std::string(inner_key.str()) + "'",
-                           unknown_key_hint(list, others.empty() ? keys_of[key_name] : others, inner_key.str()));
+          throw InputError(
+              place(name, inner), "a known key of [" + key_name + "]", "'" + std::string(inner_key.str()) + "'",
+              unknown_key_hint(list, others.empty() ? keys_of[key_name] : others, std::string(inner_key.str())));
         }
       } else if (std::find(kTables.begin(), kTables.end(), key_name) == kTables.end()) {
         throw InputError(place(name, node), "a known table", "[" + key_name + "]",
@@ -263,7 +262,7 @@ Parameter& parameter_named(ParameterList& list, const std::string& name) {
     if (p.flag == name) return p;
     known.push_back(p.flag);
   }
-  throw UsageError("no parameter is called '" + name + "': " + did_you_mean(nearest(known, name)));
+  throw UsageError("no parameter is called '" + name + "': " + did_you_mean(known, name));
 }
 
 void check_complete(const ParameterList& list) {

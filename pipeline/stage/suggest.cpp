@@ -2,9 +2,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cctype>
+#include <iterator>
 #include <regex>
+#include <set>
 #include <sstream>
 
 #include "pipeline/contract/listed.h"
@@ -54,56 +55,146 @@ std::string slip_in(const std::string& words) {
   return "";
 }
 
+/// Without the dashes of a flag, in small letters.
+std::string lower(std::string_view word) {
+  std::string small(word.substr(std::min(word.find_first_not_of('-'), word.size())));
+  std::ranges::transform(small, small.begin(), [](unsigned char c) { return std::tolower(c); });
+  return small;
+}
+
+/// How many parts, between lines or dashes, both have; a unit is none, and "fibers" is "fibre".
+int n_common_parts(std::string_view a, std::string_view b) {
+  constexpr std::size_t kShortest = 4;  // letters
+  const auto parts_of = [](std::string text) {
+    std::ranges::replace(text, '-', '_');
+    std::istringstream stream(text);
+    std::set<std::string> parts;
+    for (std::string part; std::getline(stream, part, '_');) {
+      if (part.starts_with("fiber")) part = "fibre";
+      if (part.size() > kShortest && part.ends_with('s')) part.pop_back();
+      if (part.size() >= kShortest) parts.insert(part);
+    }
+    return parts;
+  };
+  const std::set<std::string> of_a = parts_of(lower(a)), of_b = parts_of(lower(b));
+  return static_cast<int>(std::ranges::count_if(of_a, [&](const auto& part) { return of_b.contains(part); }));
+}
+
+/// What other programs call it, and what it is here: a flag, command or key where there is such a one, or a sentence.
+struct Elsewhere {
+  std::string_view theirs;  ///< words with blanks between them, without dashes
+  std::string_view ours;
+};
+constexpr Elsewhere kElsewhere[] = {
+    {"force overwrite", "redo"},
+    {"o output outdir", "out"},
+    {"o output outdir", "the results go into the cell's own folder"},
+    {"j workers parallel", "jobs"},
+    {"j n t workers cores cpus parallel jobs", "threads"},
+    {"until to from skip stage stages step start", "only"},
+    {"resume continue restart", "a run goes on by itself where the last one stopped"},
+    {"exclude ignore without", "name it in the study's table, with its reason in the column 'exclude'"},
+    {"by group groups group_by groupby condition", "condition_from"},
+    {"config cfg", "cell.toml is read from the folder that is given"},
+    {"v vv debug", "verbose"},
+    {"v", "version"},
+    {"? man usage", "help"},
+    {"q silent", "quiet"},
+    {"seed scenario", "mbtfm-simulate makes other cells: mbtfm-simulate --help"},
+    {"start go execute analyse analyze analysis process", "run"},
+    {"all folder runall run-all", "batch"},
+    {"statistics stat summary summarize", "stats"},
+    {"new create setup", "init"},
+    {"report show view results plot", "mbtfm run writes report.html into the cell's folder: open it in a browser"},
+    {"review", "mbtfm stats writes review.html, all overlays on one page"},
+    {"e stiffness elasticity young", "youngs_modulus_kPa"},
+    {"g", "shear_modulus_kPa"},
+    {"nu", "poisson_ratio"},
+    {"scale pixel px um_per_px um_per_pixel", "pixel_size_um"},
+    {"paxillin vinculin zyxin talin focal_adhesions fa", "adhesion"},
+    {"phalloidin lifeact f_actin", "actin"},
+    {"reference relaxed unloaded trypsin before", "beads_relaxed"},
+    {"reference unloaded trypsin before", "relaxed"},
+    {"stressed loaded deformed after", "beads_stressed"},
+    {"loaded deformed after", "stressed"},
+};
+
+std::string quoted(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words)
+    text += (text.empty() ? "'" : &word == &words.back() ? " or '" : ", '") + word + "'";
+  return text;
+}
+
+std::string named_elsewhere(const std::vector<std::string>& known, std::string_view word) {
+  for (const auto& [theirs, ours] : kElsewhere) {
+    if ((" " + std::string(theirs) + " ").find(" " + lower(word) + " ") == std::string::npos) continue;
+    if (ours.find(' ') != ours.npos) return std::string(ours);
+    const auto same = std::ranges::find_if(known, [&](const auto& k) { return lower(k) == lower(ours); });
+    if (same != known.end()) return "did you mean " + quoted({*same}) + "?";
+  }
+  return "";
+}
+
 }  // namespace
 
-std::string nearest(const std::vector<std::string>& known, std::string_view word) {
-  const auto closest = std::ranges::min_element(
-      known, [&](const auto& a, const auto& b) { return edit_distance(a, word) < edit_distance(b, word); });
-  return closest == known.end() ? std::string() : *closest;
+std::string did_you_mean(const std::vector<std::string>& known, std::string_view word) {
+  constexpr std::size_t kShortest = 3, kMost = 12;  // letters of a beginning, words that are offered
+  if (std::string named = named_elsewhere(known, word); !named.empty()) return named;
+  const std::string typed = lower(word);
+  std::vector<std::string> meant;
+  const auto add = [&](const auto& is_meant) {
+    if (meant.empty()) std::ranges::copy_if(known, std::back_inserter(meant), is_meant);
+  };
+  const auto closest = std::ranges::min_element(known, {}, [&](const auto& k) { return edit_distance(k, word); });
+  const auto add_closest = [&](int share) {  // of its letters: fewer may be wrong
+    const auto n_letters = [](const std::string& k) { return static_cast<int>(lower(k).size()); };
+    add([&](const auto& k) { return &k == &*closest && share * edit_distance(k, word) < n_letters(k) + (share > 2); });
+  };
+  add([&](const std::string& k) { return lower(k) == typed; });
+  add([&](const std::string& k) { return typed.size() >= kShortest && lower(k).starts_with(typed); });
+  add_closest(3);
+  int most = 1;
+  for (const std::string& k : known) most = std::max(most, n_common_parts(k, word));
+  add([&](const std::string& k) { return n_common_parts(k, word) == most; });
+  add_closest(2);
+  add([&](const std::string& k) { return lower(k).size() >= kShortest && typed.starts_with(lower(k)); });
+  return meant.empty() || meant.size() > kMost ? "" : "did you mean " + quoted(meant) + "?";
 }
-
-bool is_alike(const std::string& known, std::string_view word) {
-  const std::size_t n_letters = known.size() - std::min(known.find_first_not_of('-'), known.size());
-  return 2 * edit_distance(known, word) < static_cast<int>(n_letters);
-}
-
-std::string did_you_mean(const std::string& word) { return "did you mean '" + word + "'?"; }
 
 std::string suggestion(const CLI::App& app, const std::string& error) {
   if (!error.starts_with("The following argument")) return {};  // was, or were, not expected: CLI::ExtrasError
   const DeclaredCommand program = declared(app);
   std::vector<std::string> flags, commands;
   add_words(program, flags);
+  const CLI::App* given = nullptr;
   for (const DeclaredCommand& command : program.subcommands) {
     commands.push_back(command.name);
-    if (app.got_subcommand(command.name)) add_words(command, flags);
+    if (!app.got_subcommand(command.name)) continue;
+    add_words(command, flags);
+    given = app.get_subcommand(command.name);
   }
   const std::string unknown = error.substr(std::min(error.size(), error.find(": ") + 1));
   if (const std::string typed = slip_in(unknown); !typed.empty()) return typed;
   std::istringstream words(unknown);
-  const bool has_command = std::ranges::any_of(commands, [&](const auto& name) { return app.got_subcommand(name); });
   std::string meant;
   for (std::string word; words >> word;) {
     word = word.substr(0, word.find('='));
     const bool is_flag = word.starts_with("-");
-    std::string known = nearest(is_flag ? flags : commands, word);
-    // as other programs call them; "-j4" has its value in it
-    constexpr std::array<std::array<std::string_view, 2>, 4> kElsewhere = {
-        {{"--force", "--redo"}, {"--overwrite", "--redo"}, {"-j", "--jobs"}, {"-o", "--out"}}};
-    for (const auto& [theirs, ours] : kElsewhere)
-      if (word.substr(0, word.find_first_of("0123456789")) == theirs && std::ranges::find(flags, ours) != flags.end())
-        known = word = ours;
-    if (known.empty() || !is_alike(known, word)) continue;
-    meant += (meant.empty() ? "; " : " ") + did_you_mean(known);
+    if (!is_flag && given != nullptr) continue;
+    if (is_flag && !word.starts_with("--")) word = word.substr(0, word.find_first_of("0123456789"));  // -j4
+    if (const std::size_t point = word.find('.'); is_flag && point != word.npos) word.replace(0, point + 1, "--");
+    const std::string likely = did_you_mean(is_flag ? flags : commands, word);
+    if (!likely.empty()) meant += (meant.empty() ? "; " : " ") + likely;
   }
   if (!meant.empty() || commands.empty()) return meant;
-  if (!has_command) return "; the commands are " + listed(commands);
-  if (unknown.find("-config") != unknown.npos) return "; cell.toml is read from the folder that is given";
-  if (error.find(" -") != error.npos) {
-    const bool takes_keys = std::ranges::find(flags, "--set") != flags.end();
-    return takes_keys ? "; what cell.toml has is set by --set TABLE.KEY=VALUE, as --set gel.youngs_modulus_kPa=4" : "";
-  }
-  return "; one folder at a time: mbtfm batch FOLDER runs all cells below it";
+  if (given == nullptr) return "; the commands are " + listed(commands);
+  if (error.find(" -") != error.npos)
+    return std::ranges::find(flags, "--set") == flags.end()
+               ? "; what is known of a cell is written in its cell.toml"
+               : "; what cell.toml has is set by --set TABLE.KEY=VALUE, as --set gel.youngs_modulus_kPa=4";
+  return std::string("; one folder at a time: mbtfm batch FOLDER runs all cells below it") +
+         (given->get_option_no_throw("--only") == nullptr ? "" : "; single stages: --only segment,track");
 }
 
 std::string in_keys(const ParameterList& list, const std::map<std::string, std::string>& images,

@@ -14,12 +14,10 @@ class App;
 
 namespace mbtfm::stage {
 
-/// The known word that takes the fewest changes of letters; empty where none is known.
-std::string nearest(const std::vector<std::string>& known, std::string_view word);
-/// Less than half of the known word is misspelt.
-bool is_alike(const std::string& known, std::string_view word);
-/// "did you mean 'layer'?"
-std::string did_you_mean(const std::string& word);
+/// "did you mean 'layer'?" of the known words that were probably meant: those which begin so, of which a third is
+/// misspelt, or which have most parts of it (adhesion_min_area: adhesion_smallest_um2); or what other programs call by
+/// that word (E, --cores). Empty: none is like it.
+std::string did_you_mean(const std::vector<std::string>& known, std::string_view word);
 
 /// What to say after an error of the command line: the flags or commands that its unknown words look like; empty: none.
 std::string suggestion(const CLI::App& app, const std::string& error);

@@ -181,10 +181,13 @@ void number_conditions(Study& study, const std::vector<std::string>& condition_o
   std::set<std::string, decltype(&files::is_before)> names(condition_of_cell.begin(), condition_of_cell.end(),
                                                            &files::is_before);  // 2 kPa before 10 kPa
   for (const std::string& asked : parts_of(order)) {
-    const auto name = std::ranges::find(names, files::lower_case(asked), files::lower_case);
+    const auto name = std::ranges::find(names, files::folded(asked), files::folded);
     if (name == names.end())
-      throw UsageError("stats.conditions: no cell that enters is of the condition '" + asked + "'; there are " +
-                       listed(std::vector<std::string>(names.begin(), names.end())));
+      throw UsageError("stats.conditions: no cell that enters is of the condition '" + asked + "'; " +
+                       (names.contains("") && names.size() == 1
+                            ? "none has a condition: give a --table with a column 'condition', or --condition_from "
+                              "folder if each condition has its folder"
+                            : "there are " + listed(std::vector<std::string>(names.begin(), names.end()))));
     study.conditions.push_back(*name);
     names.erase(name);
   }

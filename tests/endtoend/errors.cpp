@@ -197,7 +197,22 @@ TEST_F(Errors, what_was_probably_meant_is_named) {
                         "give the folder that it is in: " + cell_.string()));
   for (const auto& [command, remedy] : {std::pair<std::string, const char*>{"rnu CELL", "did you mean 'run'?"},
                                         {"RUN CELL", "did you mean 'run'?"},
-                                        {"statistics CELL", "the commands are "},
+                                        {"statistics CELL", "did you mean 'stats'?"},
+                                        {"report CELL", "writes report.html"},
+                                        {"run --only segment track CELL", "--only segment,track"},
+                                        {"run -o results CELL", "the cell's own folder"},
+                                        {"run --skip track CELL", "did you mean '--only'?"},
+                                        {"run --set images.actin=a.tif CELL", "[images] is for cell.toml alone"},
+                                        {"run --set gel.poisson_ratio=0.4,fit.n_meshes=2 CELL", "--set fit.n_meshes=2"},
+                                        {"run --set track.may_push=perhaps CELL", "may_push in [track]"},
+                                        {"run --set fit.loss=huber CELL", "'robust_loss in [effects]'"},
+                                        {"stats CELL CELL", "one folder at a time"},
+                                        {"stats CELL --exclude a", "column 'exclude'"},
+                                        {"init CELL --E 4", "written in its cell.toml"},
+                                        {"run CELL segment", "--only segment,track"},
+                                        {"run --jobs 2 CELL", "did you mean '--threads'?"},
+                                        {"run --set effects.thickness=on CELL", "did you mean 'finite_thickness'?"},
+                                        {"noise CELL/actin.tif CELL/actin.tif --pixels 1", "'--pixel_size_um'"},
                                         {"run --loss huber CELL", "--set TABLE.KEY=VALUE"},
                                         {"run CELL CELL", "mbtfm batch FOLDER"},
                                         {"run --set youngs_modulus_kPa=4 CELL", "its table, too"},
@@ -209,6 +224,9 @@ TEST_F(Errors, what_was_probably_meant_is_named) {
   for (const char* word : {"help run", "version"}) said(std::string("mbtfm ") + word, 0);
   const std::string misspelt = cell_.string() + "s";
   EXPECT_TRUE(has_words(said("mbtfm run " + misspelt, kInput), "did you mean 'cell'?"));
+  EXPECT_TRUE(has_words(said("mbtfm compare " + misspelt, kInput), "did you mean 'cell'?"));
+  EXPECT_TRUE(has_words(said("mbtfm run " + (cell_ / "truth").string(), kInput), "give the cell: " + cell_.string()));
+  EXPECT_TRUE(has_words(said("mbtfm run '" + cell_.string() + "*'", kInput), "mbtfm batch FOLDER"));
   EXPECT_TRUE(has_words(said("mbtfm compare " + cell_.string(), kInput), "mbtfm run"));
   EXPECT_TRUE(has_words(said("mbtfm", 0), "check")) << "alone it prints its help";
 }

@@ -112,8 +112,12 @@ TEST(Parameters, an_unknown_key_names_the_line_and_the_nearest_known_one) {
 TEST(Parameters, a_key_in_the_wrong_table_is_told_where_it_belongs_and_one_that_is_like_none_is_not_guessed) {
   EXPECT_EQ(message_of("[network]\nradius_um = 2\n"),
             "cell.toml:2: expected a known key of [network], found 'radius_um' | it belongs under [gel]");
+  EXPECT_EQ(message_of("[network]\nfibres = false\n"),
+            "cell.toml:2: expected a known key of [network], found 'fibres' | did you mean 'stress_fibres'? It is in "
+            "[effects]");
   EXPECT_EQ(message_of("[network]\nwhatever = 2\n"),
-            "cell.toml:2: expected a known key of [network], found 'whatever' | docs/parameters.md has all keys");
+            "cell.toml:2: expected a known key of [network], found 'whatever' | there are length_um, count, page, "
+            "is_on, method, other, seed");
 }
 
 TEST(Parameters, a_deleted_key_is_told_from_a_misspelt_one) {

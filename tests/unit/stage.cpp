@@ -224,8 +224,12 @@ TEST(Suggestion, names_the_flag_or_command_that_was_meant_and_nothing_where_none
   EXPECT_EQ(after({"batch", "--thread=2"}), "; did you mean '--threads'?");
   EXPECT_EQ(after({"bacth"}), "; did you mean 'batch'?");
   EXPECT_EQ(after({"verfy", "CELL"}), "; did you mean 'verify'?");
-  EXPECT_EQ(after({"batch", "--xyz"}), "");
-  EXPECT_EQ(after({"batch", "--cell"}), "") << "of --help it has half of the letters, and the dashes";
+  const std::string none = "; what is known of a cell is written in its cell.toml";
+  EXPECT_EQ(after({"batch", "--xyz"}), none);
+  EXPECT_EQ(after({"batch", "--cell"}), none) << "of --help it has half of the letters, and the dashes";
+  EXPECT_EQ(after({"batch", "--cores", "2"}), "; did you mean '--threads'?") << "another program's word";
+  EXPECT_EQ(after({"batch", "--resume"}), "; a run goes on by itself where the last one stopped");
+  EXPECT_EQ(after({"all"}), "; did you mean 'batch'?");
   EXPECT_EQ(after({"batch", "-j4"}), "; did you mean '--jobs'?");
   EXPECT_EQ(after({"batch", "\u2013threads"}), "; '\u2013threads' begins with a long dash: type --threads");
   EXPECT_EQ(after({"batch", "\u2013-threads", "2"}), "; '\u2013-threads' begins with a long dash: type --threads");
@@ -233,6 +237,22 @@ TEST(Suggestion, names_the_flag_or_command_that_was_meant_and_nothing_where_none
   EXPECT_EQ(after({"Batch"}), "; did you mean 'batch'?");
   EXPECT_EQ(after({"btach"}), "; did you mean 'batch'?") << "one slip";
   EXPECT_EQ(after({"start"}), "; the commands are batch, verify");
+}
+
+TEST(Suggestion, takes_a_word_s_beginning_end_or_part_for_it_and_no_two_letters) {
+  const std::vector<std::string> known = {"--beads_per_um2", "--threads",          "--lambda_by", "--lambda_um_per_kPa",
+                                          "track",           "youngs_modulus_kPa", "layer"};
+  EXPECT_EQ(stage::did_you_mean(known, "--beads"), "did you mean '--beads_per_um2'?") << "nearer than --threads";
+  EXPECT_EQ(stage::did_you_mean(known, "--lambda"), "did you mean '--lambda_by' or '--lambda_um_per_kPa'?");
+  EXPECT_EQ(stage::did_you_mean(known, "tracking"), "did you mean 'track'?");
+  EXPECT_EQ(stage::did_you_mean(known, "modulus"), "did you mean 'youngs_modulus_kPa'?");
+  EXPECT_EQ(stage::did_you_mean(known, "E"), "did you mean 'youngs_modulus_kPa'?");
+  EXPECT_EQ(stage::did_you_mean(known, "layr"), "did you mean 'layer'?");
+  EXPECT_EQ(stage::did_you_mean({"adhesion_time", "adhesion_smallest_area", "fibre_widths"}, "adhesion_min_area"),
+            "did you mean 'adhesion_smallest_area'?")
+      << "more parts are the same, more letters are not";
+  EXPECT_EQ(stage::did_you_mean({"adhesion_time", "fibre_width"}, "--fibers"), "did you mean 'fibre_width'?");
+  for (const char* word : {"la", "y", "", "-", "kPas"}) EXPECT_EQ(stage::did_you_mean(known, word), "") << word;
 }
 
 TEST(Manual, has_every_option_and_hides_what_help_hides) {
