@@ -40,9 +40,8 @@ Region with_borders_of(Region region, const std::vector<Polygon>& adhesive_um) {
 
 CellLabels read_labels(const Path& file, const std::optional<double>& pixel_um) {
   if (!pixel_um) throw UsageError("pixel_size_um is missing: " + file.string() + " counts in pixels");
-  constexpr int kWidestLine_px = 15;
   const cells::LabelMask mask = cells::with_parts_labelled(cells::read_mask(file));
-  return with_lines_filled({mask.width, mask.height, *pixel_um, mask.labels}, kWidestLine_px);
+  return with_lines_filled({mask.width, mask.height, *pixel_um, mask.labels}, cells::kWidestLine_px);
 }
 
 }  // namespace mbtfm::sheet_stage

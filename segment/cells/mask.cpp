@@ -122,7 +122,8 @@ CellOutline outline_of(const LabelMask& mask, int label, const Field& field, con
     const double area_um2 = (0.5 - signed_area_um2(hole_px)) * pixel_um * pixel_um;
     if (signed_area_um2(hole_px) > 0 || area_um2 < p.outline_smallest_hole_um2) continue;
     if (!contains(outer, hole_px.front())) continue;
-    if (2 * area_um2 > (signed_area_um2(outer) + 0.5) * pixel_um * pixel_um)
+    const double outer_px2 = signed_area_um2(outer), ring_px2 = outer_px2 + signed_area_um2(hole_px);
+    if (2 * ring_px2 < std::min(outer_px2, kWidestLine_px * (length_um(outer) + length_um(hole_px))))
       throw InputError(mask.name, "a mask that covers the cell", "a ring, as of a drawn outline",
                        "fill it: in ImageJ, Process > Binary > Fill Holes");
     cell.area_um2 -= area_um2;

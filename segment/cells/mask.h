@@ -27,6 +27,8 @@ struct LabelMask {
   }
 };
 
+inline constexpr int kWidestLine_px = 15;  ///< that a hand draws around a cell
+
 /// TIFF (8, 16 or 32 bit, integers or floats that are whole) or PNG; white-is-zero as in images: what looks dark is 0.
 /// In a file without 0 the value of all four corners is the background's.
 /// @throws InputError where a value is no whole number >= 0, nothing is above 0, or the file is lossy

@@ -68,6 +68,11 @@ TEST(Mask, grey_rims_of_a_drawn_one_are_rims_and_labels_are_labels) {
   paint_disc(ring, 0, {128, 128}, 57);
   EXPECT_TRUE(
       has_words(hint_of([&] { mask_outlines(mask(ring), 1, kMaskField, {.outline_smallest_um2 = 1}); }), "fill it"));
+  paint_disc(ring, 0, {128, 128}, 60);
+  paint_disc(ring, 1, {128, 128}, 75);
+  paint_disc(ring, 0, {128, 128}, 55);
+  EXPECT_EQ(mask_outlines(mask(ring), 1, kMaskField, {.outline_smallest_um2 = 1}).front().holes_um.size(), 1u)
+      << "wider than a line: an area, as an adhesive pattern may be";
   for (const float largest : {2.f, 255.f}) {
     images::Image labels = empty();
     paint_disc(labels, 1, {60, 60}, 20);
