@@ -100,8 +100,7 @@ std::string how_lambda(const SpaceResults& r) {
       "The regularisation was chosen by the data (criterion: " + by->second + "): lambda = " + lambda + ".";
   if (const auto of_sums = r.find("lambda_of_sums_um_per_kPa")) {
     text += " Net force, moment, strain energy and forces that are sums of the map were taken at lambda = " +
-            readable(*of_sums) +
-            " µm/kPa, where the expected error of the displacement is smallest (Mallows’ criterion).";
+            readable(*of_sums) + " µm/kPa, by Mallows’ criterion.";
   }
   return text;
 }
