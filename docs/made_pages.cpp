@@ -81,6 +81,38 @@ std::string output_of(const std::filesystem::path& program, const std::string& f
   return output;
 }
 
+/// A program's tables without the rows that were printed before: of these the keys, and whose they are.
+/// @param first  the program that printed a row first, by its table and itself
+std::string once_each(const std::string& program, const std::string& output,
+                      std::map<std::pair<std::string, std::string>, std::string>& first) {
+  std::string page, title, head, rows;
+  std::map<std::string, std::string> keys_of;  // by program
+  const auto end_table = [&] {
+    if (title.empty()) return;
+    page += title + "\n\n" + (rows.empty() ? "" : head + rows);
+    std::string others;
+    for (const auto& [name, keys] : keys_of) others += (others.empty() ? "" : "; ") + keys + " as for `" + name + "`";
+    if (!others.empty()) page += (rows.empty() ? "" : "\n") + others + ".\n";
+    head.clear(), rows.clear(), keys_of.clear();
+  };
+  std::istringstream lines(output);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("### ")) {
+      end_table();
+      title = "\n" + line;
+    } else if (!line.starts_with("| `")) {
+      head += line.empty() ? "" : line + "\n";
+    } else if (const auto [row, is_new] = first.try_emplace({title, line}, program); is_new) {
+      rows += line + "\n";
+    } else {
+      std::string& keys = keys_of[row->second];
+      keys += (keys.empty() ? "" : ", ") + line.substr(2, line.find(" | ") - 2);
+    }
+  }
+  end_table();
+  return page;
+}
+
 }  // namespace
 
 std::string parameter_page(const std::filesystem::path& programs) {
@@ -89,10 +121,16 @@ std::string parameter_page(const std::filesystem::path& programs) {
     outputs[stage] = output_of(programs / ("mbtfm-" + std::string(stage)), "--parameters");
   std::string page =
       "# Parameters\n\nMade by the programs themselves (`mbtfm-<stage> --parameters`). Each is a key of `cell.toml` "
-      "and a flag of its\nprogram; flags win. `mbtfm-simulate` reads its tables from a scenario file. How much is "
-      "computed is set\nby a flag of `mbtfm run`: `--preset` ([accuracy](accuracy.md#presets-accuracy-and-time)).\n" +
+      "and a flag of its\nprogram; flags win. What several programs have is explained with the first. "
+      "`mbtfm-simulate` reads its tables\nfrom a scenario file: `samples/scenarios/u2os.toml` explains all keys of a "
+      "cell, `patches-on-ring.toml` and\n`colony-spikes.toml` those of `[space]` and `[colony]`. How much is computed "
+      "is set by a flag of `mbtfm run`:\n`--preset` ([accuracy](accuracy.md#presets-accuracy-and-time)).\n" +
       needed_table(outputs);
-  for (const char* stage : kStages) page += "\n## `mbtfm-" + std::string(stage) + "`\n" + outputs[stage];
+  std::map<std::pair<std::string, std::string>, std::string> first;
+  for (const char* stage : kStages) {
+    const std::string program = "mbtfm-" + std::string(stage);
+    page += "\n## `" + program + "`\n" + once_each(program, outputs[stage], first);
+  }
   return page;
 }
 

@@ -10,6 +10,8 @@
 
 namespace mbtfm {
 
+extern const std::vector<std::pair<const char*, const char*>> kFormerIds;  // findings.txt: of now; before, with commas
+
 namespace {
 
 struct Known {
@@ -40,57 +42,9 @@ const KindOfFinding& kind_of(Symptom symptom) { return *known(symptom).kind; }
 const KnownSymptom& properties_of(Symptom symptom) { return *known(symptom).symptom; }
 
 std::string present_id(const std::string& id) {
-  static const std::map<std::string, const char*> of_former = {{"actin-shift", "channel-shift"},
-                                                               {"adhesions-long", "bleed-through"},
-                                                               {"adhesions-off-actin", "images-mismatch"},
-                                                               {"beads-disagree", "misfit-in-a-region"},
-                                                               {"beads-far", "low-resolution"},
-                                                               {"beads-off-the-gel", "beads-off-gel"},
-                                                               {"beads-scatter", "noise-understated"},
-                                                               {"beads-stray", "outliers"},
-                                                               {"beads-tell-little", "low-resolution"},
-                                                               {"beads-wide", "defocused"},
-                                                               {"cells-left-out", "few-cells"},
-                                                               {"contraction-beyond-linear", "large-strain"},
-                                                               {"curved-motion", "common-motion"},
-                                                               {"explains-little", "misfit"},
-                                                               {"lambda-runs-away", "lambda-unbounded"},
-                                                               {"light-lost", "beads-lost"},
-                                                               {"little-at-rest", "few-beads-at-rest"},
-                                                               {"loss-decides", "outliers"},
-                                                               {"misfit-in-space", "misfit"},
-                                                               {"modulus-error-unknown", "assumed-input"},
-                                                               {"moves-outward", "pushes-outward"},
-                                                               {"network-not-identifiable", "not-identifiable"},
-                                                               {"noise-disagrees", "noise-understated"},
-                                                               {"off-the-surface", "beads-off-gel"},
-                                                               {"outline-off-actin", "images-mismatch"},
-                                                               {"patches-do-not-fit", "misfit-near-adhesions"},
-                                                               {"pattern-as-cell", "pattern-unsuitable"},
-                                                               {"pattern-too-fine", "pattern-unsuitable"},
-                                                               {"read-otherwise", "wrong-orientation"},
-                                                               {"surface-level", "surface-misplaced"},
-                                                               {"surface-off-zero", "surface-misplaced"},
-                                                               {"sheet-at-bound", "not-identifiable"},
-                                                               {"sheet-coarse", "mesh-error"},
-                                                               {"sheet-cut", "cell-cut"},
-                                                               {"sheet-expands", "pushes-outward"},
-                                                               {"sheet-not-identifiable", "not-identifiable"},
-                                                               {"sheet-strain", "large-strain"},
-                                                               {"sheet-unexplained", "misfit"},
-                                                               {"single-mesh", "mesh-error"},
-                                                               {"slices-moved", "common-motion"},
-                                                               {"strain-beyond-linear", "large-strain"},
-                                                               {"telling-beads-scatter", "misfit-near-adhesions"},
-                                                               {"tension-at-zero", "wide-interval"},
-                                                               {"torques-out-of-balance", "forces-out-of-balance"},
-                                                               {"tracked-by-correlation", "field-smoothed"},
-                                                               {"tractions-off-balance", "tractions-out-of-balance"},
-                                                               {"tractions-outside", "tractions-out-of-balance"},
-                                                               {"unexplained-displacement", "misfit"},
-                                                               {"z-reversed", "wrong-orientation"}};
-  const auto found = of_former.find(id);
-  return found == of_former.end() ? id : found->second;
+  for (const auto& [present, former] : kFormerIds)
+    if ((" " + std::string(former) + ",").find(" " + id + ",") != std::string::npos) return present;
+  return id;
 }
 
 bool is_open(const Finding& finding) { return finding.severity != Severity::note; }

@@ -1,6 +1,6 @@
-/// What the program notices and a user should know. Kinds of findings are declared in the one table of
-/// findings_table.cpp, with words, thresholds and remedies; docs/findings.md is written from it. From the records of
-/// the stages findings reach the terminal, run.json, batch.csv, run.log, the report and the study.
+/// What the program notices and a user should know. Kinds of findings are declared in findings.txt, with words,
+/// thresholds and remedies; docs/findings.md is written from it. From the records of the stages findings reach the
+/// terminal, run.json, batch.csv, run.log, the report and the study.
 #pragma once
 
 #include <optional>
@@ -19,8 +19,8 @@ enum class Severity {
 
 constexpr auto words(Severity) { return std::array{"note", "caution", "bad"}; }
 
-/// One number by which a kind of finding is seen. A new one compiles again only what names symptoms:
-/// kinds_of_findings.h has the list.
+/// One number by which a kind of finding is seen. A new one compiles again only what names symptoms: what includes
+/// kinds_of_findings.h, which the build makes of findings.txt.
 enum class Symptom : int;
 
 struct KnownSymptom {

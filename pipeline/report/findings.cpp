@@ -140,8 +140,7 @@ std::string another_model(const FitSummary& fit) {
                                   "an evenly contracting sheet with these fibres in it"};
   return fmt::format(
       "The beads prefer another model to a network with these fibres: {} (by {:.0f} in BIC, with each model's own "
-      "error allowed for). The tensions are those of a model that is less likely. The forces of the adhesions follow "
-      "the beads and change little.",
+      "error allowed for). Distrust the tensions; the forces of the adhesions change little.",
       kModels[static_cast<std::size_t>(*which)], *over);
 }
 
@@ -153,22 +152,19 @@ std::string quality(const FitSummary& fit) {
   std::string text;
   if (left2 <= noise2) {
     text = fmt::format(
-        "All that the model leaves unexplained of the displacement is the noise of the beads ({} nm a component): "
-        "relative L2 {}, by noise alone {}.",
+        "All that the model leaves of the displacement is the noise of the beads ({} nm a component): relative L2 {}, "
+        "by noise alone {}.",
         two_digits(1000 * fit.noise_um), percent(fit.relative_l2), percent(fit.expected_relative_l2));
   } else {
     text = fmt::format(
-        "Of the displacement that the model leaves unexplained, {:.0f} % is the noise of the beads ({} nm a component) "
-        "and {:.0f} % the error of the model (mesh, segmentation, gel), as shares of the sum of squares. Relative L2 "
-        "{}, by noise alone {}.",
+        "Of what the model leaves of the displacement {:.0f} % is the noise of the beads ({} nm a component) and "
+        "{:.0f} % the error of the model (mesh, segmentation, gel), in squares. Relative L2 {}, by noise alone {}.",
         100 * noise2 / left2, two_digits(1000 * fit.noise_um), 100 * (1 - noise2 / left2), percent(fit.relative_l2),
         percent(fit.expected_relative_l2));
   }
   constexpr double kLarge = 0.3;  // a reader may take it for a bad fit
   if (fit.expected_relative_l2 > kLarge) {
-    text +=
-        " These are large because relative L2 counts every bead, also the many far from the cell that move less than "
-        "their noise.";
+    text += " They are large as they count the many beads far from the cell, which move less than their noise.";
   }
   return text + explained_by_network(fit);
 }

@@ -257,8 +257,7 @@ Figure adhesion_map(const CellResults& results) {
               "stroke-width:1.4;stroke:#111");
   }
   const std::string of_candidates = has_origin(results.cell, AdhesionOrigin::candidate)
-                                        ? " Candidates are no adhesions that were seen: read their colours as a "
-                                          "traction density (force over the area of a lattice cell)."
+                                        ? " Candidates were not seen: read their colours as a traction density."
                                         : "";
   return {map,
           std::string(std::ranges::all_of(results.cell.adhesions,
@@ -290,9 +289,9 @@ Figure usual_method_map(const CellResults& results) {
       map,
       fmt::format(
           "Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on squares of "
-          "{:.2g} µm; the largest is {} kPa. Its scale of colours is not that of “Forces on the substrate”. FTTC knows "
-          "neither adhesions nor fibres: a traction spreads around its adhesion, and noise makes tractions everywhere. "
-          "Total force in the outline, noise included: {} nN; by the model: {} nN. White: outline and adhesions.",
+          "{:.2g} µm; the largest is {} kPa (colours of its own). FTTC knows neither adhesions nor fibres: tractions "
+          "spread, and noise makes some everywhere. Total force in the outline, noise included: {} nN; by the model: "
+          "{} nN. White: outline and adhesions.",
           lambda, usual.spacing_um, readable(largest_kPa), readable(usual.total_force_nN),
           readable(results.fit.total_force_nN)) +
           caption_of_cut(results.cell),
@@ -371,16 +370,15 @@ std::vector<Figure> displacement_maps(const CellResults& results) {
   };
   std::vector<Figure> figures = {drawn(
       means.means, "Measured displacement", "displacement",
-      fmt::format("Each arrow is the mean of the beads in a square of {:.1f} µm, {:.0f} on average, so that their "
-                  "noise fades; it begins where they lie on the relaxed gel. The fit uses every bead by itself.",
+      fmt::format("Each arrow is the mean of the beads in a square of {:.1f} µm, {:.0f} on average; it begins where "
+                  "they lie on the relaxed gel. The fit uses every bead by itself.",
                   side_um, means.mean_members))};
   if (!results.residual) return figures;
   residual = {results.residual->positions_um, results.residual->residual_um};
   fitted = measured;
   for (std::size_t i = 0; i < fitted.vectors.size(); ++i) fitted.vectors[i] = fitted.vectors[i] - residual.vectors[i];
-  figures.push_back(
-      drawn(averaged(fitted, box, side_um).means, "Fitted displacement", "displacement",
-            "What the model says at the same beads, averaged in the same squares and drawn to the same scale."));
+  figures.push_back(drawn(averaged(fitted, box, side_um).means, "Fitted displacement", "displacement",
+                          "The model at the same beads, in the same squares, to the same scale."));
   figures.push_back(drawn(averaged(residual, box, side_um).means, "Measured minus fitted", "difference",
                           "Same squares, same scale. Bead noise points anywhere; arrows that point the same way over a "
                           "region are the model’s error."));

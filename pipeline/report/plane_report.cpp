@@ -101,9 +101,8 @@ std::string adhesion_section(const CellResults& results) {
       balance.has_moments ? "" : " (without the moments inside single adhesions, which are not in the table)");
   if (has_origin(results.cell, AdhesionOrigin::candidate))
     html +=
-        "<p class=\"sub\">Candidates are places where an adhesion may be. Nobody saw one there: read their tractions "
-        "as a traction density (force over the area of a lattice cell), and sums over neighbours rather than single "
-        "forces.</p>\n";
+        "<p class=\"sub\">Candidates are places where an adhesion may be: read their tractions as a traction density "
+        "(force over the area of a lattice cell), and sums over neighbours rather than single forces.</p>\n";
   html += html_of(top, file_of(results, "4_fit/adhesion_forces.csv"));
   if (all.rows.size() > kTop) html += folded(fmt::format("All {} adhesions", all.rows.size()), html_of(all));
   return section("Forces of the adhesions", html);
@@ -290,8 +289,7 @@ std::string error_budget_html(const CellResults& results) {
   std::ranges::stable_sort(fibres, std::ranges::greater(), &BudgetLine::total_nN);
   return "<div class=\"grid\">" +
          figure(chart_of(fibres),
-                "The largest first. A bar is as long as the standard error; the sources’ squares add up, so each has "
-                "the share of the bar that it has of the square.") +
+                "The largest first. A bar is as long as the standard error; each source has its share of the square.") +
          "</div>\n" +
          folded("Error budget in numbers",
                 html_of(Listing{"Error budget", {}, results.name + "_error_budget.csv", csv + "\n", columns}));

@@ -60,8 +60,8 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   }
   facts.push_back(
       fmt::format("The cell pulls and presses with {} in total, the sum of the sizes of its tractions over {}; {} nN "
-                  "of it are along the surface’s normal. The largest traction is {} kPa. Smoothing takes from this sum "
-                  "and noise adds to it: the moment is known better.",
+                  "of it along the surface’s normal. The largest traction is {} kPa. Smoothing lowers this sum and "
+                  "noise raises it: trust the moment.",
                   with_error(total, r.find("total_force_sigma_nN"), "nN"), r.texts.at("tractions_over"),
                   readable(r.number("normal_force_nN")), readable(largest_traction_kPa(r))));
   if (const auto flipped = r.find("flipped_z_chi_squared")) {
@@ -82,8 +82,8 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   }
   if (const auto resolution = r.find("median_resolution_um")) {
     facts.push_back(
-        fmt::format("Forces closer together than {} µm look like one (median over the surface); from about twice that "
-                    "on they are mostly seen as two. {} numbers of {} are resolved.",
+        fmt::format("Forces closer together than {} µm look like one (median); from twice that they mostly look like "
+                    "two. {} numbers of {} are resolved.",
                     readable(*resolution), readable(r.number("effective_unknowns")), readable(r.number("n_unknowns"))));
   }
   return facts;
@@ -100,8 +100,7 @@ std::string how_lambda(const SpaceResults& r) {
       "The regularisation was chosen by the data (criterion: " + by->second + "): lambda = " + lambda + ".";
   if (const auto of_sums = r.find("lambda_of_sums_um_per_kPa")) {
     text += " Net force, moment, strain energy and forces that are sums of the map were taken at lambda = " +
-            readable(*of_sums) +
-            " µm/kPa, where the expected error of the displacement is smallest (Mallows’ criterion).";
+            readable(*of_sums) + " µm/kPa, by Mallows’ criterion.";
   }
   return text;
 }
@@ -115,12 +114,12 @@ std::string svg_of(const Path& file, const std::string& title, const std::string
 
 std::string space_section(const SpaceResults& r) {
   const ColourScale colours = traction_colours(r);
-  return section("In space",
-                 "<figure><h3>Tractions on the surface</h3>\n" + picture_in_space(r, colours) +
-                     legend(colour_bar(colours)) +
-                     "<figcaption>The gel’s surface from a side and above. Colour: size of the traction; grey: outside "
-                     "of the place where tractions are looked for. Arrows: the strongest tractions, in space. To turn "
-                     "it: paraview --script=view_in_paraview.py in the cell’s folder.</figcaption></figure>\n");
+  return section(
+      "In space",
+      "<figure><h3>Tractions on the surface</h3>\n" + picture_in_space(r, colours) + legend(colour_bar(colours)) +
+          "<figcaption>The gel’s surface from above. Colour: size of the traction; grey: none was looked for. "
+          "Arrows: the strongest tractions. To turn it: paraview --script=view_in_paraview.py in the cell’s "
+          "folder.</figcaption></figure>\n");
 }
 
 std::string map_section(const SpaceResults& r) {

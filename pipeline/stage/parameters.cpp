@@ -114,7 +114,8 @@ std::string likely_slip(const Parameter& p, const std::string& text) {
 
 std::string advice_on(const Parameter& p, const std::string& text) {
   const std::string slip = likely_slip(p, text);
-  return slip.empty() ? p.meaning : slip + " (" + p.meaning + ")";
+  if (slip.empty() || p.meaning.empty()) return slip + p.meaning;
+  return slip + " (" + p.meaning + ")";
 }
 
 /// In the file that the node is from: of a cell.toml some are from study.toml.
@@ -275,6 +276,7 @@ std::string to_markdown(const ParameterList& list) {
   std::string text;
   std::string table = "\n";  // no table is called so
   for (const Parameter& p : list.all()) {
+    if (p.meaning.empty()) continue;
     if (p.table != table) {
       table = p.table;
       text += "\n### " + (table.empty() ? "Above the first table" : "`[" + table + "]`") + "\n\n";

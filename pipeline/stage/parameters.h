@@ -35,7 +35,7 @@ struct Parameter {
   std::string flag = {};  ///< without dashes: the name, or table.name where another table has a key of that name before
   ParameterMember member;
   Range range;
-  std::string meaning;             ///< one sentence, with the unit
+  std::string meaning;             ///< one sentence, with the unit; empty: scenario files say it, --help does not
   std::string default_value = {};  ///< as printed
   bool is_required = false;
   bool is_set = false;

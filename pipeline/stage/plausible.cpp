@@ -7,9 +7,12 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/toml.h"
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::stage {
+
+extern const std::string_view kPlausible;  // plausible.toml
 
 namespace {
 
@@ -58,56 +61,19 @@ std::string range_text(const Range& range) { return describe("", range); }
 }  // namespace
 
 const std::vector<PlausibleQuantity>& plausible_quantities() {
-  static const std::vector<PlausibleQuantity> table = {
-      {"youngs_modulus_kPa", "Young's modulus of the gel", Range::between(0.1, 100), Range::between(0.01, 1000),
-       "Tissues have 0.1 kPa (brain) to 40 kPa (early bone): Discher, Janmey & Wang, Science 310 (2005) 1139; gels up "
-       "to 100 kPa are in use. Above 1000 kPa the strongest adhesions (10 kPa, radius 1 um) move beads by only 20 nm "
-       "(2.25 t a / E); below 0.01 kPa a gel does not keep its shape",
-       "check the modulus and its unit, kPa"},
-      {"poisson_ratio", "Poisson's ratio of the gel", Range::between(0.3, 0.5), Range::between(0, 0.5),
-       "0.45 to 0.5 for polyacrylamide and silicone (Takigawa et al., Polym. Gels Netw. 4 (1996) 1: 0.457), as water "
-       "has no time to leave. 0.5 is the limit of an elastic body",
-       "take 0.49 for polyacrylamide, 0.5 or 0.499 for silicone"},
-      {"thickness_um", "thickness of the gel", Range::between(10, 1000), Range::between(1, 1e5),
-       "Gels are cast 20 to 100 um thick. Below 10 um the glass sets the displacements (Merkel et al., Biophys. J. 93 "
-       "(2007) 3314); no high-resolution objective looks through 1000 um",
-       "measure it by focusing on glass and surface; for a half-space set gel_model or the effect finite_thickness"},
-      {kPixelSize, "pixel size", Range::between(0.02, 1.3), Range::between(0.005, 7),
-       "Camera pixels of 2 to 16 um behind lenses of 10 to 100 times: 0.02 to 1.3 um; 7 um is a camera without a lens",
-       "check it and its unit, um: the camera's pixel over the magnification, times the binning"},
-      {"beads_per_um2", "density of the beads", Range::between(0.02, 10), Range::not_negative(),
-       "Adhesions are some um apart: with less than one bead in 7 x 7 um forces cannot be separated (Sabass et al., "
-       "Biophys. J. 94 (2008) 207). Above 10 a um² beads are nearer than the 0.3 um that a lens resolves, and share "
-       "errors",
-       "check the pixel size; use more beads, or thin an interpolated field out"},
-      {"bead_sigma_um", "width (standard deviation) of the beads in the images", Range::between(0.075, 1),
-       Range::between(0.01, 20),
-       "A point looks at least 0.21 wavelengths over the aperture wide: 0.075 um at 515 nm and 1.45 (Zhang, Zerubia & "
-       "Olivo-Marin, Appl. Opt. 46 (2007) 1819). 1 um is a bead of 4 um. Below 0.01 and above 20 um no microscope "
-       "shows single beads",
-       "check the pixel size: were the images binned or reduced later? Super-resolved beads may be smaller"},
-      {"adhesion_area_um2", "median area of the adhesions", Range::between(0.1, 10), Range::between(0.01, 100),
-       "Focal adhesions have 0.1 to 10 um² (mean 0.46 um² in U2OS: Soine et al., PLoS Comput. Biol. 11 (2015) "
-       "e1004076). 0.01 um² is a sixth of what a lens resolves; 100 um² a small cell",
-       "check the pixel size, the channel and the thresholds of [segment]"},
-      {"cell_area_um2", "area of the cell", Range::between(200, 20000), Range::between(10, 1e6),
-       "Adherent cells spread over 500 to 10 000 um², platelets over 30; 1 mm² is a colony",
-       "check the pixel size, and whether the outline holds one cell"},
-      {"total_force_nN", "total force of the cell", Range::between(1, 5000), Range::between(0, 1e5),
-       "U2OS cells exert about 200 nN (3612 adhesions in 21 cells, 1.19 nN each: Soine et al. 2015). 5.5 kPa (Balaban "
-       "et al. 2001) on a tenth of 10 000 um² are 5500 nN; 100 000 nN are twenty such cells",
-       "check the modulus (kPa) and the pixel size (um); forces of several cells add up"},
-      {"fibre_tension_nN", "tension of a stress fibre", Range::between(0, 150), Range::between(0, 400),
-       "An isolated stress fibre breaks at 380 nN and carried about 10 nN in the cell (Deguchi, Ohashi & Sato, J. "
-       "Biomech. 39 (2006) 2603)",
-       "check the modulus (kPa), the pixel size (um), and whether a fibre is missing beside it"},
-      {"traction_kPa", "traction of the adhesions that bear half of the force", Range::between(0, 15),
-       Range::between(0, 100),
-       "Adhesions carry 5.5 kPa (Balaban et al., Nat. Cell Biol. 3 (2001) 466), supermature ones 12 kPa (Goffin et "
-       "al., J. Cell Biol. 172 (2006) 259). 100 kPa are 2500 bonds of 40 pN a um²",
-       "check the modulus (kPa), the pixel size (um) and the adhesion's ellipse: too small an area makes a large "
-       "traction"},
-  };
+  static const toml::table file = files::parse_toml(kPlausible, "plausible.toml");
+  static const std::vector<PlausibleQuantity> table = [] {
+    std::vector<PlausibleQuantity> all;
+    for (const toml::node& node : *file["quantity"].as_array()) {
+      const toml::table& of = *node.as_table();
+      const auto text = [&](const char* key) { return of[key].as_string()->get().c_str(); };
+      const auto range = [&](const char* key) {
+        return Range::between(of[key][0].value<double>().value(), of[key][1].value<double>().value());
+      };
+      all.push_back({text("id"), text("name"), range("usual"), range("possible"), text("source"), text("remedy")});
+    }
+    return all;
+  }();
   return table;
 }
 

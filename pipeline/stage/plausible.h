@@ -1,5 +1,5 @@
-/// Numbers that a cell, its gel and its images can have: one table with sources, asked of the inputs before a stage
-/// runs and of its results. docs/plausible.md is written from the table.
+/// Numbers that a cell, its gel and its images can have: one table with sources (plausible.toml), asked of the inputs
+/// before a stage runs and of its results. docs/plausible.md is written from the table.
 #pragma once
 
 #include <optional>

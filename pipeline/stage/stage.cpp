@@ -62,7 +62,9 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
     std::string meaning = p.meaning;
     if (const auto* choice = std::get_if<Choice>(&p.member)) meaning += " (one of " + listed(choice->words) + ")";
     if (!p.default_value.empty() && !p.is_required) meaning += " [" + p.default_value + "]";
-    const std::string group = p.table.empty() ? "Parameters of the image" : "Parameters [" + p.table + "]";
+    const std::string group = p.meaning.empty() ? ""
+                              : p.table.empty() ? "Parameters of the image"
+                                                : "Parameters [" + p.table + "]";
     if (std::holds_alternative<bool*>(p.member))
       app.add_flag("--" + p.flag + "{true}", line.values[p.flag], meaning)->group(group);
     else

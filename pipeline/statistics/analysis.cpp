@@ -72,9 +72,8 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
                                      fibres, readable(*s.typical_error)));
     if (s.model && s.mean_interval && std::abs(s.model->estimate - s.plain.mean) > 2 * s.model->standard_error)
       warnings.push_back(
-          fmt::format("{}the mixed model's mean tension, {} nN, is far from the plain mean, {} nN: "
-                      "fibres with large errors, or cells with many fibres, differ. Give both.",
-                      fibres, readable(s.model->estimate), readable(s.plain.mean)));
+          fmt::format("{}the mixed model's mean tension, {} nN, is far from the plain mean, {} nN. Give both.", fibres,
+                      readable(s.model->estimate), readable(s.plain.mean)));
   }
 }
 

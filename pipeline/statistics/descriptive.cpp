@@ -32,12 +32,6 @@ Description describe(std::vector<double> values) {
   return d;
 }
 
-double fraction_above(const std::vector<double>& values, double threshold) {
-  need_values(values);
-  const auto n = std::ranges::count_if(values, [&](double v) { return v > threshold; });
-  return static_cast<double>(n) / static_cast<double>(values.size());
-}
-
 Interval wilson_interval(double share, double n) {
   const double z2 = kNormal95 * kNormal95;
   const double centre = (share + z2 / (2 * n)) / (1 + z2 / n);

@@ -17,8 +17,6 @@ struct Description {
 };
 /// @throws InvalidData where there is no value
 Description describe(std::vector<double> values);
-/// Share of values above the threshold, 0 to 1.
-double fraction_above(const std::vector<double>& values, double threshold);
 
 /// Of the normal distribution: 95 % lie this many standard errors around the mean.
 inline constexpr double kNormal95 = 1.959963984540054;

@@ -93,9 +93,8 @@ constexpr const char* kHowTo =
     "<p class=\"screen\"><button type=\"button\" id=\"previous\">previous (p)</button> <button type=\"button\" "
     "id=\"next\">next (n)</button> <span id=\"where\"></span> <button type=\"button\" id=\"save\">Save "
     "review.csv</button></p>\n<p class=\"sub\">Keys: a accept, x leave out, n and p (or arrows) next and previous. "
-    "Your "
-    "browser keeps what you decide. Put the saved <code>review.csv</code> into the folder of the study: <code>mbtfm "
-    "stats</code>, Python and R then leave out what it leaves out.</p>\n";
+    "Your browser keeps what you decide. Put the saved <code>review.csv</code> into the study’s folder: <code>mbtfm "
+    "stats</code>, Python and R obey it.</p>\n";
 
 }  // namespace
 

@@ -247,8 +247,8 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
            "that), or the name of a column of --table; empty: the column `condition`, `group` or `treatment` if the "
            "table has one");
   list.add("conditions", parameters.conditions,
-           "order of the conditions, with commas between them; the first is the reference that the others are compared "
-           "with; empty: by the alphabet. Example: \"control, blebbistatin\"");
+           "order of the conditions, with commas between them; the first is the reference; empty: by the alphabet. "
+           "Example: \"control, blebbistatin\"");
   list.add("replicate_from", parameters.replicate_from,
            "source of a cell's replicate (day, dish, animal): `folder`, `folder2`, … or the name of a column of "
            "--table; empty: the column `replicate` or `day` if the table has one");
@@ -256,10 +256,9 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
            "cells with one of these open findings are left out; identities with commas between them. Example: "
            "\"misfit, cell-cut\"");
   list.add("primary", parameters.primary,
-           "what the study compares first between conditions; tension: of the fibres of primary_type; total-force: of "
-           "the cells; contraction, mean-tension: of the sheets; strain-energy: of the cells in space, or of the "
-           "sheets; contractile-moment: of the cells in space; auto: tension, contraction of sheets or total-force of "
-           "cells in space, whichever the study has most cells of; total-force and strain-energy go by that, too");
+           "what the study compares first between conditions; tension: of the fibres of primary_type; contraction, "
+           "mean-tension: of sheets; contractile-moment: of cells in space; total-force, strain-energy: of the kind "
+           "that the study has most cells of; auto: tension, contraction or total-force, by that kind");
   list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
   list.add("with_not_converged", parameters.with_not_converged, "include cells whose fit did not converge");
   list.add("list", parameters.list,

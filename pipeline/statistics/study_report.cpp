@@ -125,8 +125,8 @@ std::string findings_text(const Study& study, const Files& files) {
   const auto n_open = std::ranges::count_if(study.cells, [](const StudyCell& c) { return has_open(c.findings); });
   if (n_open == 0) return "<p><b>✓</b> No finding is open in any cell that enters.</p>\n";
   return fmt::format(
-             "<p>Findings are open in {} of {}: their results may be off by more than the error bars say. To leave a "
-             "cell out, write the reason in the column <code>exclude</code> of the table of conditions.</p>\n",
+             "<p>Findings are open in {} of {}: results may be off by more than their error bars say. “Cells” says how "
+             "to leave cells out.</p>\n",
              n_open, counted(study.cells.size(), "cells")) +
          report::html_of(findings_table(study), {"findings.csv", files.listing("", "findings.csv", "").csv});
 }
@@ -153,9 +153,8 @@ std::string gallery(const Study& study, const Path& page_folder) {
   }
   return html +
          "</div>\n<p class=\"sub\">Total force of each cell; a click opens its page. <b>!</b>: findings are open. To "
-         "leave cells out by a rule: <code>--exclude_findings</code>; one by one, and fibres, too: <a "
-         "href=\"review.html\">look at them</a>, or write a reason into a column <code>exclude</code> of "
-         "<code>--table</code>.</p>\n";
+         "leave cells out: <code>--exclude_findings</code>, a reason in the column <code>exclude</code> of "
+         "<code>--table</code>, or <a href=\"review.html\">the review</a>, which takes fibres, too.</p>\n";
 }
 
 std::string list_of(const std::vector<std::string>& sentences) {
@@ -192,8 +191,8 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
   std::string html;
   if (study.conditions.size() < 2) {
     html =
-        "<p>The study has one condition: there is nothing to compare. Give each cell a condition: a column "
-        "<code>condition</code> in <code>--table</code>, or <code>--condition-from folder</code>.</p>\n";
+        "<p>There is one condition: nothing to compare. Conditions come from a column <code>condition</code> of "
+        "<code>--table</code>, or from <code>--condition-from folder</code>.</p>\n";
   } else if (primary.differences.empty()) {
     html = "<p>The " + html_escaped(primary.measure) + " cannot be compared: " + html_escaped(primary.obstacle) +
            ".</p>\n";
@@ -205,17 +204,15 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
       html += "<div class=\"grid\">\n" + charts_of(figure) + "</div>\n" + caption_of(figure);
   if (!primary.differences.empty())
     html += "<p class=\"sub\">Test: " + html_escaped(primary.test) +
-            ", two-sided; p by Holm over the conditions. It was chosen by the parameters <code>primary</code> and "
-            "<code>primary_type</code>, not by its result. All other tests of this page are exploratory.</p>\n";
+            ", two-sided; p by Holm over the conditions. It was chosen by <code>primary</code> and "
+            "<code>primary_type</code>, not by its result. All other tests are exploratory.</p>\n";
   return html;
 }
 
 constexpr const char* kHowToRead =
-    "<p class=\"sub\">Two-sided; Holm’s correction is over the pairs of one question. The fibres of a cell are not "
-    "independent: tests by observation overstate the evidence, those by cell do not (clustered rank sum: Datta &amp; "
-    "Satten 2005; mixed model: random effects of the cell and of each kind in it, known errors, Satterthwaite’s "
-    "degrees "
-    "of freedom).</p>\n";
+    "<p class=\"sub\">Two-sided; Holm’s correction over the pairs of one question. The fibres of a cell are not "
+    "independent: trust the tests by cell (clustered rank sum: Datta &amp; Satten 2005; mixed model: random effects of "
+    "cell and kind, known errors, Satterthwaite’s degrees of freedom).</p>\n";
 
 /// Which type edge fibres count as; empty without any.
 std::string on_edge_fibres(const Study& study) {
@@ -226,23 +223,18 @@ std::string on_edge_fibres(const Study& study) {
   if (n == 0) return "";
   return fmt::format("<p class=\"sub\">{} a free piece of the outline and {} held at both ends. {}</p>\n",
                      counted(n, "edge fibre runs along", "edge fibres run along"), n == 1 ? "is" : "are",
-                     study.n_fibre_types < 4
-                         ? "Here they count as ventral fibres; stats.fibre_types = 4 shows them as a type of their own."
-                         : "Here they are a type of their own.");
+                     study.n_fibre_types < 4 ? "They count as ventral (stats.fibre_types = 4: as a type of their own)."
+                                             : "They are a type of their own.");
 }
 
 constexpr const char* kHowToReadSheets =
-    "<p class=\"sub\">Errors of the gel’s numbers and of its model are left out: sheets on gels of one kind share "
-    "them. A "
-    "number that was given, or that the beads limit to one side only, does not enter.</p>\n";
+    "<p class=\"sub\">Without errors of the gel, which sheets on gels of one kind share. Numbers that were given, or "
+    "that the beads limit to one side only, do not enter.</p>\n";
 
 constexpr const char* kHowToReadSpace =
     "<p class=\"sub\">Total force: sum of the sizes of all tractions. Contractile moment: −∫ (x − centre) · t dA, "
-    "above "
-    "zero for a cell that contracts. The coarser a map, the more smoothing takes from force, energy and largest "
-    "traction: compare the resolution first. Net force and moment of a free cell are errors alone: they are listed "
-    "with "
-    "the cells and not compared.</p>\n";
+    "above zero if the cell contracts. Coarse maps lose force, energy and largest traction: compare the resolution "
+    "first. Net force and moment of a free cell are errors alone, and not compared.</p>\n";
 
 /// "Stress-fibre tensions of 8 cells, contraction of 4 sheets and forces of 6 cells in space"
 std::string title_of(const Study& study) {

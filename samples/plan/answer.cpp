@@ -79,8 +79,7 @@ std::string about_most_fibres(const Plan& plan, const Needed& n) {
   const std::string half = "That holds for half of the fibres. ";
   if (!n.of_most)
     return half +
-           "Nine in ten do not reach it with any number of beads: for some of them mesh and segmentation alone make a "
-           "larger error.";
+           "Nine in ten do not reach it with any number of beads: mesh and segmentation alone make a larger error.";
   if (*n.of_most <= plan.most_beads_per_um2)
     return half + "Nine in ten need " + density_text(plan.asked.densities, *n.of_most) + " beads per µm².";
   return half + "Nine in ten need " + about(*n.of_most) + " beads per µm², more than the " +
@@ -154,9 +153,7 @@ std::string about_drawn_in_space(const Drawn& d) {
   const char* verdict = "The plan holds.";
   if (d.error_over_predicted > 1 + allowed) verdict = "The plan does not hold well here: allow for that factor.";
   if (d.error_over_predicted < 1 - allowed)
-    verdict =
-        "The plan is on the safe side: it allows for forces beside the patches, as the reconstruction does, and there "
-        "are few of them here.";
+    verdict = "The plan is on the safe side: it allows for forces beside the patches, of which there are few here.";
   return checked_with(d, brief(d.point.density) + " beads per µm³",
                       std::to_string(d.numbers.size()) + " components of forces") +
          verdict;
@@ -234,14 +231,13 @@ std::vector<std::string> further_sentences(const SpacePlan& plan) {
     sentences.push_back("That holds for half of the patches. Nine in ten need " + needed_text(plan, n.of_most) +
                         " beads per µm³.");
   const SpaceExpected& patch = expected_of(plan.grid, point, SpaceQuantity::force);
-  sentences.push_back(
-      "At " + beads_text(plan, about(point.density), point.density) +
-      " the force of the middle patch has a standard error of " + error(SpaceQuantity::force) + ", " +
-      error(SpaceQuantity::tangential_force) + " along the surface and " + error(SpaceQuantity::normal_force) +
-      " normal to it; the total force has " + error(SpaceQuantity::total_force) + ", the net force " +
-      error(SpaceQuantity::net_force) +
-      ". The smallest force that can be seen is three times the patch's error. In the map, forces closer than " +
-      about(*patch.resolution_um) + " µm look like one; from about twice that on they are mostly seen as two.");
+  sentences.push_back("At " + beads_text(plan, about(point.density), point.density) +
+                      " the force of the middle patch has a standard error of " + error(SpaceQuantity::force) + ", " +
+                      error(SpaceQuantity::tangential_force) + " along the surface and " +
+                      error(SpaceQuantity::normal_force) + " normal to it; the total force has " +
+                      error(SpaceQuantity::total_force) + ", the net force " + error(SpaceQuantity::net_force) +
+                      ". The smallest force seen is three times the patch's error. In the map, forces closer than " +
+                      about(*patch.resolution_um) + " µm look like one; from twice that they mostly look like two.");
   sentences.push_back(about_pair(plan, patch.least_distance_um));
   if (plan.drawn) sentences.push_back(about_drawn_in_space(*plan.drawn));
   return sentences;

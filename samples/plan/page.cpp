@@ -24,13 +24,11 @@ const Texts& texts_of(const Plan&) {
       .drawn = "tension",
       .drawn_explained =
           "Tensions found in simulated experiments over the true ones; bars: the predicted standard error. The fits "
-          "know "
-          "neither the cell's own network nor its tensions.",
+          "do not know the cell's own network.",
       .how =
-          "<p class=\"sub\">The error by the beads is the Cramér–Rao bound of the fit: it grows in proportion to "
-          "noise and modulus and falls with the root of the density. The model's part (meshes, segmentation, what is "
-          "missing in the model) is the same for all of them: it is where the curves level off. “Never” means that "
-          "this part alone is larger than the target.</p>\n"};
+          "<p class=\"sub\">The error by the beads is the Cramér–Rao bound of the fit: proportional to noise and "
+          "modulus, and to one over the root of the density. The model's part (meshes, segmentation, what the model "
+          "lacks) is where the curves level off. “Never”: it alone exceeds the target.</p>\n"};
   return texts;
 }
 
@@ -43,10 +41,9 @@ const Texts& texts_of(const SpacePlan&) {
       .drawn_explained =
           "Forces found in simulated experiments over the true ones, by component; bars: the predicted standard error.",
       .how =
-          "<p class=\"sub\">Standard errors are those that the reconstruction states, with lambda as data of this "
-          "noise choose it. A modulus counts as noise does. More noise makes lambda larger, so that the error grows "
-          "less than the noise. “By background” is the part by tractions beside the patches that the beads do not "
-          "tell from them.</p>\n"};
+          "<p class=\"sub\">Standard errors as the reconstruction states them. The modulus counts as noise does. More "
+          "noise makes lambda larger, so that the error grows less than the noise. By background: tractions beside "
+          "the patches that the beads do not tell from them.</p>\n"};
   return texts;
 }
 

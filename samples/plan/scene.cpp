@@ -180,9 +180,8 @@ bool is_in_space(const Parameters& parameters) {
   const Scenario s = scenario_of(parameters);
   if (s.colony.shape != colonies::Shape::none)
     throw UsageError("scenario: " + parameters.scenario +
-                     " is a sheet without fibres, and a plan asks for the tensions of fibres. Simulate it with your "
-                     "gel, noise and beads (mbtfm-simulate) and fit it (mbtfm-sheet): sheet_fit.csv then has the "
-                     "standard errors of its contraction and stiffness. The commands are in docs/sheets.md");
+                     " is a sheet without fibres, and a plan asks for tensions of fibres. Simulate it (mbtfm-simulate) "
+                     "and fit it (mbtfm-sheet), as docs/sheets.md shows: sheet_fit.csv has the standard errors");
   return s.space.scene != gels::SpaceScene::none;
 }
 
@@ -221,8 +220,8 @@ std::vector<std::string> warnings_of(spatial::BeadLoss loss) {
   using enum spatial::BeadLoss;
   if (loss == l2 || loss == mixture) return {};
   return {std::string("The cell is evaluated with traction.loss = ") + name_of(loss) +
-          ". In a plan all beads are sound, and its errors are those of l2. With " + name_of(loss) +
-          " errors are larger; mixture has those of l2 where no bead is wrong."};
+          ", and the plan's errors are those of l2: yours are larger. Mixture has those of l2 where no bead is "
+          "wrong."};
 }
 
 }  // namespace

@@ -211,8 +211,7 @@ std::vector<std::string> warnings_of(const SpaceScene& scene, const Asked& asked
     }
     if (told < kFewNumbers)
       warnings.push_back("On " + brief(E) + " kPa the beads tell " + brief(told) +
-                         " numbers of the tractions at most: " +
-                         "forces of single adhesions then rest on their image. Take more beads, or a softer gel.");
+                         " numbers of the tractions at most. Take more beads, or a softer gel.");
     if (last && last->left_out > kBeyondLinear) warnings.push_back(sentence_of_strain(E, last->left_out));
   }
   return warnings;

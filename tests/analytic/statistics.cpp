@@ -41,6 +41,11 @@ struct FromR {
   }
 };
 
+double share_above(const std::vector<double>& values, double threshold) {
+  const auto n = std::ranges::count_if(values, [&](double v) { return v > threshold; });
+  return static_cast<double>(n) / static_cast<double>(values.size());
+}
+
 constexpr double kExact = 1e-9;  // R's numbers are committed with ten digits
 // Both maximise the same likelihood, to tolerances of about 1e-9 in it: the maximum is flat, so that variances agree to
 // the root of that over the curvature. R prints nlme's with seven digits.
@@ -66,7 +71,7 @@ TEST(StatisticsBesideR, rank_tests_and_holm) {
 TEST(StatisticsBesideR, wilson_interval_and_line_through_the_origin) {
   const FromR r;
   const auto ventral = r.by_type()[2];
-  const Interval wilson = wilson_interval(fraction_above(ventral, 5), static_cast<double>(ventral.size()));
+  const Interval wilson = wilson_interval(share_above(ventral, 5), static_cast<double>(ventral.size()));
   r.expect("wilson.low", wilson.low, kExact);
   r.expect("wilson.high", wilson.high, kExact);
   const files::CsvTable table(kData / "cells.csv");
@@ -363,7 +368,7 @@ TEST(Deconvolution, finds_the_share_of_two_sharp_values_behind_wide_errors) {
     values.push_back(std::max(0.0, (i % 4 != 0 ? 6 : 10) + normal()));
     errors.push_back(1.5 * 1.5);
   }
-  EXPECT_GT(fraction_above(values, 7.5), 0.32);
+  EXPECT_GT(share_above(values, 7.5), 0.32);
   EXPECT_NEAR(deconvolved_fraction_above(values, errors, 7.5), 0.25, 0.03);
   const Deconvolved d = deconvolved_moments(values, errors);
   // the variance of 2000 values, 5.25, is known to 5.25 √(2/2000) = 0.17: the root of what is left to 0.05; three of it

@@ -1,10 +1,16 @@
 /// What must hold of every cell that is drawn.
+#include <regex>
+
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/polyline.h"
+#include "pipeline/files/text.h"
 #include "pipeline/stage/parameters.h"
+#include "samples/colonies/parameters.h"
 #include "samples/drawing/draw.h"
 #include "samples/drawing/geometry.h"
 #include "samples/drawing/random.h"
+#include "samples/gels/scene.h"
+#include "tests/support/folders.h"
 #include "tests/support/test.h"
 
 namespace {
@@ -279,6 +285,31 @@ TEST(Poisson, has_mean_and_variance_alike) {
     EXPECT_NEAR(sum / n, mean, 4 * std::sqrt(mean / n));
     EXPECT_NEAR(squares / n, mean, 4 * std::sqrt((2 * mean * mean + mean) / n));
   }
+}
+
+/// Keys without a row of help are explained there.
+TEST(ScenarioFiles, explain_every_key_that_help_leaves_out_and_u2os_is_the_defaults) {
+  ScenarioParameters cell;
+  gels::SpaceParameters space;
+  colonies::ColonyParameters colony;
+  stage::ParameterList list;
+  declare(list, cell);
+  declare(list, space);
+  declare(list, colony);
+  std::string lines;
+  for (const auto& file : fs::directory_iterator(test::source_folder() / "samples/scenarios"))
+    lines += files::read_text(file.path());
+  stage::read_toml(list, test::source_folder() / "samples/scenarios/u2os.toml");
+  int n_keys = 0;
+  for (const stage::Parameter& p : list.all()) {
+    if (!p.meaning.empty()) continue;
+    ++n_keys;
+    const std::regex explained("\n" + p.name + " = [^\n]*# ...|\n# [^\n]*\n" + p.name + " = ");
+    EXPECT_TRUE(std::regex_search(lines, explained)) << p.name;
+    EXPECT_EQ(p.is_set, p.table == "scenario") << p.name;
+    EXPECT_EQ(stage::to_text(p), p.default_value) << p.name;
+  }
+  EXPECT_EQ(n_keys, 109);
 }
 
 }  // namespace

@@ -57,13 +57,6 @@ TEST(Experiment, noise_and_beads_leave_the_cell_as_it_is) {
     EXPECT_TRUE(a.displacement[i].position_um == b.displacement[i].position_um) << "bead " << i;
 }
 
-TEST(Experiment, does_not_depend_on_the_number_of_threads) {
-  const experiment::Experiment a = experiment::simulate(small_scenario(), 1),
-                               b = experiment::simulate(small_scenario(), 3);
-  for (std::size_t i = 0; i < a.measured.size(); ++i)
-    EXPECT_TRUE(a.measured[i].displacement_um == b.measured[i].displacement_um) << "bead " << i;
-}
-
 TEST(Experiment, noise_has_the_standard_deviation_asked_for) {
   drawing::ScenarioParameters p = small_scenario();
   p.noise = 0.1;

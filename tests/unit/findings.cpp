@@ -18,18 +18,15 @@ int n_words(const std::string& text) {
   return n;
 }
 
-TEST(Findings, every_kind_has_an_identity_of_its_own_and_each_symptom_belongs_to_one) {
+TEST(Findings, every_kind_has_an_identity_of_its_own_and_symptoms_that_lead_to_it) {
   std::set<std::string> ids;
-  std::set<Symptom> symptoms;
   for (const KindOfFinding& kind : kinds_of_findings()) {
     EXPECT_TRUE(ids.insert(kind.id).second) << kind.id;
     EXPECT_EQ(std::string(kind.id).find_first_not_of("abcdefghijklmnopqrstuvwxyz-"), std::string::npos) << kind.id;
     EXPECT_FALSE(kind.symptoms.empty()) << kind.id;
     for (const KnownSymptom& s : kind.symptoms) {
-      EXPECT_TRUE(symptoms.insert(s.symptom).second) << s.sentence;
       EXPECT_EQ(&properties_of(s.symptom), &s);
       EXPECT_EQ(&kind_of(s.symptom), &kind);
-      for (const char* text : {s.stage, s.number, s.reason}) EXPECT_FALSE(std::string(text).empty()) << s.sentence;
     }
   }
 }

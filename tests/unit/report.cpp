@@ -104,11 +104,6 @@ TEST(Report, is_well_formed_where_names_hold_markup) {
   EXPECT_EQ(charts::html_escaped("a<b & \"c\""), "a&lt;b &amp; &quot;c&quot;");
 }
 
-TEST(Report, writes_the_same_bytes_twice) {
-  const FakeCell cell;
-  EXPECT_EQ(report_html(cell.folder.path()), report_html(cell.folder.path()));
-}
-
 TEST(Report, is_written_again_only_where_something_has_changed) {
   const FakeCell cell;
   const auto file = cell.folder / "report.html";
