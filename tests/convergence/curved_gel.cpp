@@ -220,28 +220,6 @@ TEST(Shell, vector_harmonics_displace_it_as_they_must) {
   }
 }
 
-TEST(SteepWalls, of_eighty_degrees_are_solved_steeper_ones_refused_by_place) {
-  const auto wall = [](double slope) { return [slope](Vec2 p) { return 5 * std::tanh(slope / 5 * p.x); }; };
-  elements::GridLines lines;
-  for (int k = 0; k <= 8; ++k) lines.x_um.push_back(-20 + 5.0 * k);
-  lines.y_um = {-10, 0, 10};
-  lines.z_um = {0, 15, 30};
-  const auto is_coarse = [](const elements::Box& box) {
-    return box.size_um[0] > 0.7 && std::abs(box.low_um[0] + 0.5 * box.size_um[0]) < 3 && box.low_um[2] < 10;
-  };
-  const auto block_of = [&](double degrees) {
-    return std::make_shared<const Block>(Shape{wall(std::tan(degrees * std::numbers::pi / 180)), 30}, lines, is_coarse,
-                                         Sides::free, 100000, 2);
-  };
-  const Loading pull{
-      .traction_kPa = [](const Eigen::Vector3d&, const Eigen::Vector3d&) { return Eigen::Vector3d(0.1, 0, 0); }};
-  const Field field = solve_linear({10, 0.4999, 30}, block_of(80), pull, kFactor);
-  for (const Eigen::Vector3d& u : field.at_nodes_um) EXPECT_TRUE(u.allFinite());
-  EXPECT_GT(field.displacement_um(field.block->on_surface({0, 0})).x(), 0);
-  const InvalidData error = test::thrown<InvalidData>([&] { block_of(88); });
-  EXPECT_TRUE(has_words(error.what(), "surface at ("));
-}
-
 std::unique_ptr<substrate::Substrate> gel_of(const Gel& gel, const char* model, double tolerance = 0) {
   substrate::SubstrateParameters parameters;
   parameters.model = named<substrate::ModelKind>(model).value();

@@ -1,8 +1,6 @@
 /// Finite elements against the layer, which shares nothing with them, and their building stones.
 #include "substrate/choice/factory.h"
 #include "substrate/elements/ellipse_load.h"
-#include "substrate/elements/linear.h"
-#include "substrate/elements/surface_loads.h"
 #include "substrate/ellipse.h"
 #include "substrate/greens/half_space.h"
 #include "substrate/material.h"
@@ -44,33 +42,6 @@ TEST(EllipseLoad, pieces_cut_by_a_grid_add_up_to_the_ellipse) {
     EXPECT_NEAR(second.xy, (a2 - b2) * c * s, 1e-12 * a2);
     EXPECT_NEAR(second.yy, a2 * s * s + b2 * c * c, 1e-12 * a2);
   }
-}
-
-TEST(Block, its_base_bears_the_whole_load) {
-  const elements::GridLines lines = {{-20, -10, 0, 10, 20}, {-20, -10, 0, 10, 20}, {0, 10}};
-  const auto is_too_large = [](const elements::Box& box) {
-    return box.low_um[2] == 0 && box.size_um[0] > 1 && std::abs(box.low_um[0]) < 3 && std::abs(box.low_um[1]) < 3;
-  };
-  elements::System system({elements::flat(10), lines, is_too_large, elements::Sides::free, 100000, 2},
-                          {.shapes = std::vector<Ellipse>{{{1, 2}, 1.5, 0.6, 0.4}}}, {}, 2);
-  double share = 0;
-  for (const auto& [node, weight] : system.loads.front()) share += weight;
-  EXPECT_NEAR(share, 1, 1e-12);
-  const elements::FreeNodes& nodes = system.space.nodes();
-  std::vector<std::tuple<int, int, Eigen::Matrix3d>> on_base;  // row, column, block
-  system.factor = system.space.factorise(
-      elements::box_stiffness_of({gel_of(0.4999, 10), {}}, system.block.boxes()), {.threads = 2, .memory_limit_GB = 2},
-      [&](int row, int node, const Eigen::Matrix3d& block) { on_base.emplace_back(row, node, block); });
-  elements::Vectors forces(nodes.size(), Eigen::Vector3d::Zero());
-  for (const auto& [node, weight] : system.loads.front()) forces[node].x() += weight;
-  const elements::Vectors u = elements::solve(*system.factor, forces);
-  Eigen::Vector3d reaction = Eigen::Vector3d::Zero();
-  for (const auto& [row, node, block] : on_base) {
-    EXPECT_GE(nodes.held_index_of(node), 0);
-    reaction += block.transpose() * u[row];
-  }
-  // rounding, magnified by lambda / mu = 5000
-  EXPECT_LT((reaction - Eigen::Vector3d(-1, 0, 0)).norm(), 1e-9);
 }
 
 TEST(RefinedLayer, converges_to_the_layer_as_its_elements_halve) {
