@@ -52,7 +52,7 @@ endforeach()
 
 # The libraries that are interfaces: the contract and its files, gels, cables; and what these are made of.
 set(interfaces
-  substrate_choice substrate_curved substrate_boxes substrate_surface substrate_greens substrate
+  substrate_choice substrate_elements substrate_surface substrate_greens substrate
   network_cables network_mesh network
   pipeline_charts pipeline_stage pipeline_numerics pipeline_files pipeline_contract)
 set(archives ${CMAKE_INSTALL_LIBDIR}/mbtfm)

@@ -1,34 +1,18 @@
-/// The stiffness of a sheet's nodes, 2 × 2 blocks, and its factor. The pattern stays while values change.
+/// The stiffness of a sheet's nodes, and what its triangles add to it.
 #pragma once
 
 #include <vector>
 
 #include "continuum/sheet/sheet.h"
-#include "pipeline/numerics/block_cholesky.h"
+#include "pipeline/numerics/held_matrix.h"
 
 namespace mbtfm::sheet {
 
-class Stiffness {
- public:
+struct Stiffness : numerics::HeldMatrix<2> {
   using OfElement = Eigen::Matrix<double, 12, 12>;
 
   /// @param held  by node, along x and y: these do not move; empty: none
   Stiffness(const Elements& elements, std::vector<std::array<bool, 2>> held);
-
-  void set_zero();
-  void add(int triangle, const OfElement& stiffness);
-  /// @returns whether it is positive definite. @param shift  times the mean diagonal, added to the diagonal
-  bool factorise(double shift = 0, int threads = 1);
-  /// With the last factor; what is held stays. @param forces_nN  2·nodes × any number
-  MatrixXd solve(const MatrixXd& forces_nN) const;
-
- private:
-  double mean_diagonal() const;
-  const Elements& elements_;
-  std::vector<std::array<bool, 2>> held_;
-  numerics::BlockMatrix<2> matrix_;
-  std::vector<std::array<int, 21>> slots_;  ///< by triangle: of its pairs i >= j
-  numerics::BlockCholesky<2, double> factor_;
 };
 
 /// ∫ Bᵀ C B of a triangle at rest.

@@ -215,73 +215,37 @@ Vec3 placed(const Contact& contact, const Slab& slab, int part, Vec2 at, double 
   return {centre.x + r * std::cos(angle), centre.y + r * std::sin(angle), at.y};
 }
 
-/// The stiffness of the whole, factorised.
-class Factor {
- public:
-  Factor(const RevolvedBody& body, const Cube& cube, int threads) : mesh_(body.mesh), factor_(nullptr) {
-    const numerics::BlockPattern pattern =
-        pattern_of(static_cast<int>(mesh_.position_um.size()), mesh_.nodes, mesh_.n_nodes());
-    elimination_ = std::make_shared<const numerics::Elimination>(pattern, numerics::Search::quick);
-    numerics::expect_room_for({.what = "the stiffness of the cell on its gel",
-                               .count = elimination_->most_numbers(3) + 9.0 * static_cast<double>(pattern.row.size()),
-                               .parts = "numbers",
-                               .bytes_each = sizeof(double),
-                               .remedy = "choose a lower indent.order or indent.towards_rim, or smooth the outline"});
-    numerics::BlockMatrix<3> matrix;
-    static_cast<numerics::BlockPattern&>(matrix) = pattern;
-    matrix.value.assign(9 * pattern.row.size(), 0);
-    const int n_sectors = mesh_.sectors.n();
-    for (int e = 0; e < mesh_.n_elements(); e += n_sectors) {
-      std::vector<Eigen::MatrixXd> around(n_sectors);
-      numerics::parallel_for(n_sectors, threads, [&](int s) {
-        around[s] = stiffness_of(cube, values_of(mesh_, mesh_.position_um, e + s), body.solids[mesh_.part[e]]);
-      });
-      for (int s = 0; s < n_sectors; ++s) add(around[s], mesh_.nodes_of(e + s), matrix);
-    }
-    for (int k = 0; k < matrix.n; ++k) {
-      if (!is_held(k)) continue;  // what is held has an equation of its own: no displacement
-      for (int i = 0; i < 3; ++i) matrix.block(k, k)[4 * i] = 1;
-    }
-    factor_ = numerics::BlockCholesky<3, double>(elimination_);
-    if (!factor_.factorise(matrix, {.lost_pivot = numerics::LostPivot::fails, .threads = threads}))
-      throw NotSolved(Report{.reason = "the stiffness of the body is lost in rounding"});
+/// The stiffness of the whole, factorised; the base is held.
+numerics::HeldMatrix<3> factorised(const RevolvedBody& body, const Cube& cube, int threads) {
+  const RevolvedMesh& mesh = body.mesh;
+  numerics::HeldMatrix<3>::Held held;
+  for (const Vec3 at : mesh.position_um) {
+    const bool on_base = at.z >= mesh.half_plane.slab.thickness_um * (1 - 1e-12);
+    held.push_back({on_base, on_base, on_base});
   }
-
-  /// Moves by what balances these forces.
-  void move(std::vector<Vec3>& u, const std::vector<Vec3>& forces_nN) const {
-    std::vector<double> x(3 * u.size());
-    const auto at = [&](std::size_t k) { return &x[3 * static_cast<std::size_t>(elimination_->place[k])]; };
-    for (std::size_t k = 0; k < u.size(); ++k) {
-      if (is_held(static_cast<int>(k))) continue;
-      const Vec3 f = forces_nN[k];
-      std::ranges::copy(std::array{-f.x, -f.y, -f.z}, at(k));
-    }
-    factor_.solve(x.data(), 1);
-    for (std::size_t k = 0; k < u.size(); ++k) u[k] += Vec3{at(k)[0], at(k)[1], at(k)[2]};
+  numerics::HeldMatrix<3> matrix(static_cast<int>(mesh.position_um.size()), mesh.nodes, mesh.n_nodes(),
+                                 std::move(held));
+  numerics::expect_room_for({.what = "the stiffness of the cell on its gel",
+                             .count = matrix.n_numbers(),
+                             .parts = "numbers",
+                             .bytes_each = sizeof(double),
+                             .remedy = "choose a lower indent.order or indent.towards_rim, or smooth the outline"});
+  matrix.set_zero();
+  const int n_sectors = mesh.sectors.n();
+  for (int e = 0; e < mesh.n_elements(); e += n_sectors) {
+    std::vector<Eigen::MatrixXd> around(n_sectors);
+    numerics::parallel_for(n_sectors, threads, [&](int s) {
+      around[s] = stiffness_of(cube, values_of(mesh, mesh.position_um, e + s), body.solids[mesh.part[e]]);
+    });
+    for (int s = 0; s < n_sectors; ++s) matrix.add(e + s, around[s]);
   }
-
- private:
-  /// The base is.
-  bool is_held(int node) const { return mesh_.position_um[node].z >= mesh_.half_plane.slab.thickness_um * (1 - 1e-12); }
-
-  void add(const Eigen::MatrixXd& stiffness, const int* nodes, numerics::BlockMatrix<3>& matrix) const {
-    for (int a = 0; a < mesh_.n_nodes(); ++a) {
-      for (int b = 0; b < mesh_.n_nodes(); ++b) {
-        if (nodes[a] < nodes[b] || is_held(nodes[a]) || is_held(nodes[b])) continue;
-        Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(matrix.block(nodes[a], nodes[b])) +=
-            stiffness.block<3, 3>(3 * a, 3 * b);
-      }
-    }
-  }
-
-  const RevolvedMesh& mesh_;
-  std::shared_ptr<const numerics::Elimination> elimination_;
-  numerics::BlockCholesky<3, double> factor_;
-};
+  if (!matrix.factorise(0, threads)) throw NotSolved(Report{.reason = "the stiffness of the body is lost in rounding"});
+  return matrix;
+}
 
 /// Of all elements, or of a part's.
 struct TotalForces {
-  std::vector<Vec3> nN;
+  Eigen::VectorXd nN;  ///< x, y, z of each node in turn
   double energy_fJ = 0;
 };
 TotalForces total_forces(const RevolvedBody& body, const Cube& cube, int threads, const std::vector<char>& parts) {
@@ -292,13 +256,18 @@ TotalForces total_forces(const RevolvedBody& body, const Cube& cube, int threads
       of[e] = forces_of(cube, values_of(mesh, mesh.position_um, e), values_of(mesh, body.displacement_um, e),
                         body.solids[mesh.part[e]]);
   });
-  TotalForces sum{.nN = std::vector<Vec3>(mesh.position_um.size())};
+  TotalForces sum{.nN = Eigen::VectorXd::Zero(3 * std::ssize(mesh.position_um))};
   for (int e = 0; e < mesh.n_elements(); ++e) {
     sum.energy_fJ += of[e].energy_fJ;
-    for (Eigen::Index k = 0; k < of[e].nN.cols(); ++k)
-      sum.nN[mesh.nodes_of(e)[k]] += {of[e].nN(0, k), of[e].nN(1, k), of[e].nN(2, k)};
+    for (Eigen::Index k = 0; k < of[e].nN.cols(); ++k) sum.nN.segment<3>(3 * mesh.nodes_of(e)[k]) += of[e].nN.col(k);
   }
   return sum;
+}
+
+std::vector<Vec3> by_node(const Eigen::VectorXd& values) {
+  std::vector<Vec3> vectors;
+  for (Eigen::Index k = 0; k < values.size(); k += 3) vectors.push_back({values[k], values[k + 1], values[k + 2]});
+  return vectors;
 }
 
 }  // namespace
@@ -363,7 +332,7 @@ std::vector<std::array<double, 6>> RevolvedBody::stress_kPa() const {
 std::vector<Vec3> RevolvedBody::forces_nN(int part) const {
   std::vector<char> parts(solids.size(), 0);
   parts[part] = 1;
-  return total_forces(*this, cube_of(mesh.half_plane.mesh->square), 1, parts).nN;
+  return by_node(total_forces(*this, cube_of(mesh.half_plane.mesh->square), 1, parts).nN);
 }
 
 RevolvedBody solved(RevolvedMesh mesh, const std::vector<Solid>& solids, int threads) {
@@ -372,10 +341,13 @@ RevolvedBody solved(RevolvedMesh mesh, const std::vector<Solid>& solids, int thr
   const Cube cube = cube_of(body.mesh.half_plane.mesh->square);
   expect_not_turned_over(cube, body.mesh);
   const std::vector<char> all(solids.size(), 1);
-  const Factor factor(body, cube, threads);
-  factor.move(body.displacement_um, total_forces(body, cube, threads, all).nN);
+  const numerics::HeldMatrix<3> stiffness = factorised(body, cube, threads);
   // near Poisson's ratio 1/2 rounding leaves 1e-9 of the forces: one refinement takes it
-  factor.move(body.displacement_um, total_forces(body, cube, threads, all).nN);
+  Eigen::VectorXd u = Eigen::VectorXd::Zero(3 * std::ssize(body.displacement_um));
+  for (int step = 0; step < 2; ++step) {
+    u += stiffness.solve(-total_forces(body, cube, threads, all).nN);
+    body.displacement_um = by_node(u);
+  }
   body.energy_fJ = total_forces(body, cube, threads, all).energy_fJ;
   return body;
 }

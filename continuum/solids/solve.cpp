@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -13,7 +12,7 @@ namespace {
 
 /// The energy's slope, and the matrix of its second slopes where asked for.
 struct Assembled {
-  std::vector<double> forces_nN;
+  Eigen::VectorXd forces_nN;
   double size_nN = 0;  ///< of the forces of single elements: what the sum is to be compared with
   double energy_fJ = 0;
   bool is_sound = true;
@@ -27,101 +26,58 @@ Solid at_share(Solid solid, double share) {
 
 class Equilibrium {
  public:
-  Equilibrium(const Body& body, Strain strain) : body_(body), strain_(strain), factor_(body.unknowns->elimination()) {}
+  Equilibrium(const Body& body, Strain strain) : body_(body), strain_(strain), stiffness_(*body.unknowns) {}
 
-  Assembled assemble(const std::vector<Vec2>& u, double share, numerics::BlockMatrix<2>* matrix) const {
+  Assembled assemble(const std::vector<Vec2>& u, double share, Wanted wanted) {
     const Mesh& mesh = *body_.mesh;
-    const int n = mesh.square.n_nodes();
     Assembled sum;
-    sum.forces_nN.assign(2 * mesh.position_um.size(), 0);
+    sum.forces_nN = Eigen::VectorXd::Zero(2 * std::ssize(mesh.position_um));
+    if (wanted == Wanted::stiffness) stiffness_.set_zero();
     for (int e = 0; e < mesh.n_elements(); ++e) {
       const Equations of_element = equations_of(mesh.square, mesh.positions_of(e), mesh.values_of(u, e),
-                                                at_share(body_.solids[mesh.part[e]], share), strain_,
-                                                matrix == nullptr ? Wanted::forces : Wanted::stiffness);
+                                                at_share(body_.solids[mesh.part[e]], share), strain_, wanted);
       if (!of_element.is_sound) {
         sum.is_sound = false;
         return sum;
       }
       sum.energy_fJ += of_element.energy_fJ;
       const int* nodes = mesh.nodes_of(e);
-      for (int k = 0; k < 2 * n; ++k) {
-        if (body_.unknowns->is_held(nodes[k / 2], k % 2)) continue;
-        sum.forces_nN[2 * static_cast<std::size_t>(nodes[k / 2]) + k % 2] += of_element.forces_nN[k];
+      for (int k = 0; k < 2 * mesh.square.n_nodes(); ++k) {
+        if (stiffness_.is_held(nodes[k / 2], k % 2)) continue;
+        sum.forces_nN[2 * nodes[k / 2] + k % 2] += of_element.forces_nN[k];
         sum.size_nN += std::abs(of_element.forces_nN[k]);
       }
-      if (matrix != nullptr) add(of_element.stiffness, nodes, *matrix);
+      if (wanted == Wanted::stiffness) stiffness_.add(e, of_element.stiffness);
     }
-    if (matrix != nullptr) hold(*matrix);
     return sum;
   }
 
-  bool factorise(const numerics::BlockMatrix<2>& matrix) {
-    return factor_.factorise(matrix, {.lost_pivot = numerics::LostPivot::fails});
-  }
-
-  std::vector<Vec2> step(const std::vector<double>& forces_nN) const {
-    const std::vector<int>& place = body_.unknowns->elimination()->place;
-    std::vector<double> x(forces_nN.size());
-    for (std::size_t k = 0; k < place.size(); ++k)
-      for (std::size_t i = 0; i < 2; ++i) x[2 * place[k] + i] = -forces_nN[2 * k + i];
-    factor_.solve(x.data(), 1);
-    std::vector<Vec2> u(place.size());
-    for (std::size_t k = 0; k < place.size(); ++k)
-      u[k] = {x[2 * static_cast<std::size_t>(place[k])], x[2 * static_cast<std::size_t>(place[k]) + 1]};
-    return u;
-  }
+  bool factorise() { return stiffness_.factorise(); }
+  Eigen::VectorXd step(const Eigen::VectorXd& forces_nN) const { return stiffness_.solve(-forces_nN); }
 
  private:
-  void add(const Eigen::MatrixXd& stiffness, const int* nodes, numerics::BlockMatrix<2>& matrix) const {
-    const int n = body_.mesh->square.n_nodes();
-    for (int a = 0; a < n; ++a) {
-      for (int b = 0; b < n; ++b) {
-        if (nodes[a] < nodes[b]) continue;
-        double* block = matrix.block(nodes[a], nodes[b]);
-        for (int i = 0; i < 2; ++i) {
-          for (int j = 0; j < 2; ++j)
-            if (!body_.unknowns->is_held(nodes[a], i) && !body_.unknowns->is_held(nodes[b], j))
-              block[2 * i + j] += stiffness(2 * a + i, 2 * b + j);
-        }
-      }
-    }
-  }
-
-  /// What is held has an equation of its own: no displacement.
-  void hold(numerics::BlockMatrix<2>& matrix) const {
-    for (int k = 0; k < body_.unknowns->n_nodes(); ++k) {
-      for (int i = 0; i < 2; ++i)
-        if (body_.unknowns->is_held(k, i)) matrix.block(k, k)[3 * i] = 1;
-    }
-  }
-
   const Body& body_;
   Strain strain_;
-  numerics::BlockCholesky<2, double> factor_;
+  numerics::HeldMatrix<2> stiffness_;
 };
 
-std::vector<Vec2> moved(const std::vector<Vec2>& u, double share, const std::vector<Vec2>& step) {
-  std::vector<Vec2> sum(u.size());
-  for (std::size_t k = 0; k < u.size(); ++k) sum[k] = u[k] + share * step[k];
-  return sum;
-}
-
-double norm_of(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) sum += value * value;
-  return std::sqrt(sum);
+std::vector<Vec2> moved(std::vector<Vec2> u, double share, const Eigen::VectorXd& step) {
+  for (std::size_t k = 0; k < u.size(); ++k) {
+    const auto of_node = step.segment<2>(2 * static_cast<Eigen::Index>(k));
+    u[k] += share * Vec2{of_node[0], of_node[1]};
+  }
+  return u;
 }
 
 NotSolved failed(const std::string& reason) { return NotSolved(Report{.reason = reason}); }
 
 void solve_small(Equilibrium& equilibrium, Deformed& deformed) {
-  numerics::BlockMatrix<2> matrix = deformed.body.unknowns->matrix();
   std::vector<Vec2>& u = deformed.displacement_um;
-  const Assembled at_rest = equilibrium.assemble(u, 1, &matrix);
-  if (!equilibrium.factorise(matrix)) throw failed("the stiffness of the body is lost in rounding");
-  u = equilibrium.step(at_rest.forces_nN);
+  const Assembled at_rest = equilibrium.assemble(u, 1, Wanted::stiffness);
+  if (!equilibrium.factorise()) throw failed("the stiffness of the body is lost in rounding");
+  u = moved(u, 1, equilibrium.step(at_rest.forces_nN));
   // near Poisson's ratio 1/2 rounding leaves 1e-9 of the forces: one refinement takes it
-  const Assembled left = equilibrium.assemble(u, 1, nullptr);
+  const Assembled left = equilibrium.assemble(u, 1, Wanted::forces);
   u = moved(u, 1, equilibrium.step(left.forces_nN));
   deformed.energy_fJ = left.energy_fJ;
 }
@@ -134,14 +90,13 @@ bool converges(Equilibrium& equilibrium, Deformed& deformed, double share) {
   double size_nN = 0;
   std::vector<Vec2>& u = deformed.displacement_um;
   for (int step = 0; step < kMostSteps; ++step) {
-    numerics::BlockMatrix<2> matrix = deformed.body.unknowns->matrix();
-    const Assembled now = equilibrium.assemble(u, share, &matrix);
+    const Assembled now = equilibrium.assemble(u, share, Wanted::stiffness);
     if (!now.is_sound) return false;
     deformed.energy_fJ = now.energy_fJ;
     size_nN = std::max(size_nN, now.size_nN);
-    const bool is_last = norm_of(now.forces_nN) <= kSmall * size_nN;
-    if (!equilibrium.factorise(matrix)) return false;
-    const std::vector<Vec2> change = equilibrium.step(now.forces_nN);
+    const bool is_last = now.forces_nN.norm() <= kSmall * size_nN;
+    if (!equilibrium.factorise()) return false;
+    const Eigen::VectorXd change = equilibrium.step(now.forces_nN);
     deformed.iterations += 1;
     if (is_last) {
       u = moved(u, 1, change);
@@ -150,10 +105,9 @@ bool converges(Equilibrium& equilibrium, Deformed& deformed, double share) {
     double length = 1;
     std::vector<Vec2> next = moved(u, length, change);
     for (int halving = 0; halving < kMostHalvings; ++halving) {
-      const Assembled there = equilibrium.assemble(next, share, nullptr);
+      const Assembled there = equilibrium.assemble(next, share, Wanted::forces);
       // near the end the energy changes by less than it is rounded, the forces still fall
-      if (there.is_sound && (there.energy_fJ < now.energy_fJ || norm_of(there.forces_nN) < norm_of(now.forces_nN)))
-        break;
+      if (there.is_sound && (there.energy_fJ < now.energy_fJ || there.forces_nN.norm() < now.forces_nN.norm())) break;
       length /= 2;
       next = moved(u, length, change);
     }
@@ -181,42 +135,22 @@ void solve_large(Equilibrium& equilibrium, Deformed& deformed) {
   }
 }
 
-}  // namespace
-
-numerics::BlockPattern pattern_of(int n_nodes, const std::vector<int>& nodes, int per_element) {
-  std::vector<std::vector<int>> below(n_nodes);
-  for (auto of = nodes.begin(); of != nodes.end(); of += per_element)
-    for (auto a = of; a != of + per_element; ++a)
-      std::copy_if(of, of + per_element, std::back_inserter(below[*a]), [&](int b) { return b >= *a; });
-  numerics::BlockPattern pattern{.n = n_nodes, .start = {0}, .row = {}};
-  for (std::vector<int>& rows : below) {
-    std::sort(rows.begin(), rows.end());
-    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-    pattern.row.insert(pattern.row.end(), rows.begin(), rows.end());
-    pattern.start.push_back(static_cast<int>(pattern.row.size()));
-  }
-  return pattern;
-}
-
-Unknowns::Unknowns(const Mesh& mesh, const std::function<Held(Vec2 place_um)>& held)
-    : pattern_(pattern_of(static_cast<int>(mesh.position_um.size()), mesh.nodes, mesh.square.n_nodes())) {
+Unknowns::HeldMatrix::Held held_of(const Mesh& mesh, const std::function<Held(Vec2 place_um)>& held) {
   double size = 0;
   for (const Vec2 at : mesh.position_um) size = std::max(size, at.x);
   constexpr double kOnAxis = 1e-9;  // of the body, as nodes are joined
+  Unknowns::HeldMatrix::Held by_node;
   for (const Vec2 at : mesh.position_um) {
     const Held node = held(at);
-    held_.push_back(node.along_r || at.x <= kOnAxis * size ? 1 : 0);
-    held_.push_back(node.along_z ? 1 : 0);
+    by_node.push_back({node.along_r || at.x <= kOnAxis * size, node.along_z});
   }
-  elimination_ = std::make_shared<const numerics::Elimination>(pattern_, numerics::Search::quick);
+  return by_node;
 }
 
-numerics::BlockMatrix<2> Unknowns::matrix() const {
-  numerics::BlockMatrix<2> matrix;
-  static_cast<numerics::BlockPattern&>(matrix) = pattern_;
-  matrix.value.assign(4 * pattern_.row.size(), 0);
-  return matrix;
-}
+}  // namespace
+
+Unknowns::Unknowns(const Mesh& mesh, const std::function<solids::Held(Vec2 place_um)>& held)
+    : HeldMatrix(static_cast<int>(mesh.position_um.size()), mesh.nodes, mesh.square.n_nodes(), held_of(mesh, held)) {}
 
 Nodes Deformed::displacement_of(int element) const { return body.mesh->values_of(displacement_um, element); }
 

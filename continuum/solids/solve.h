@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "continuum/solids/mesh.h"
-#include "pipeline/numerics/block_cholesky.h"
+#include "pipeline/numerics/held_matrix.h"
 
 namespace mbtfm::solids {
 
@@ -15,25 +15,11 @@ struct Held {
   bool along_r = false, along_z = false;
 };
 
-/// Which nodes share an element. @param nodes  those of an element after those of another; a node may be there twice
-numerics::BlockPattern pattern_of(int n_nodes, const std::vector<int>& nodes, int per_element);
-
 /// The unknowns of a mesh: which are held, and in which order they are eliminated. It serves all meshes that are cut
 /// the same way.
-class Unknowns {
- public:
+struct Unknowns : numerics::HeldMatrix<2> {
   /// @param held  by place; on the axis r is held without being said
-  Unknowns(const Mesh& mesh, const std::function<Held(Vec2 place_um)>& held);
-
-  int n_nodes() const { return pattern_.n; }
-  bool is_held(int node, int axis) const { return held_[2 * static_cast<std::size_t>(node) + axis] != 0; }
-  numerics::BlockMatrix<2> matrix() const;  ///< zero
-  const std::shared_ptr<const numerics::Elimination>& elimination() const { return elimination_; }
-
- private:
-  numerics::BlockPattern pattern_;
-  std::vector<char> held_;
-  std::shared_ptr<const numerics::Elimination> elimination_;
+  Unknowns(const Mesh& mesh, const std::function<solids::Held(Vec2 place_um)>& held);
 };
 
 struct Body {

@@ -1,16 +1,15 @@
 #include "substrate/choice/factory.h"
 
 #include "pipeline/contract/errors.h"
-#include "substrate/boxes/models.h"
-#include "substrate/curved/models.h"
+#include "substrate/elements/models.h"
 #include "substrate/greens/models.h"
 
 namespace mbtfm::choice {
 
 #ifdef MBTFM_FINITE_ELEMENTS
 const std::vector<substrate::Model>& models() {
-  static const std::vector<substrate::Model> table = {greens::half_space(), greens::layer(), boxes::split(),
-                                                      boxes::refined(), curved::curved_gel()};
+  static const std::vector<substrate::Model> table = {greens::half_space(), greens::layer(), elements::split(),
+                                                      elements::refined(), elements::curved_gel()};
   return table;
 }
 #else
@@ -27,9 +26,9 @@ const std::vector<substrate::Model>& models() {
   using enum substrate::ModelKind;
   static const std::vector<substrate::Model> table = {greens::half_space(),
                                                       greens::layer(),
-                                                      {.kind = split, .can = boxes::kSplitCan, .make = not_built},
-                                                      {.kind = refined, .can = boxes::kRefinedCan, .make = not_built},
-                                                      {.kind = curved, .can = curved::kCurvedCan, .make = not_built}};
+                                                      {.kind = split, .can = elements::kSplitCan, .make = not_built},
+                                                      {.kind = refined, .can = elements::kRefinedCan, .make = not_built},
+                                                      {.kind = curved, .can = elements::kCurvedCan, .make = not_built}};
   return table;
 }
 #endif

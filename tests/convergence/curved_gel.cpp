@@ -1,22 +1,21 @@
 /// Finite elements bent onto a surface, against exact fields (tests/data/reference/curved, by another program).
 #include "pipeline/contract/errors.h"
-#include "substrate/boxes/elastic_system.h"
 #include "substrate/choice/factory.h"
-#include "substrate/curved/linear.h"
-#include "substrate/curved/surface_loads.h"
+#include "substrate/elements/linear.h"
+#include "substrate/elements/surface_loads.h"
 #include "substrate/material.h"
 #include "substrate/response.h"
 #include "tests/support/cubed_sphere.h"
 #include "tests/support/field_under_a_surface.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 namespace {
 
 const numerics::FactorOptions kFactor{.threads = 2, .memory_limit_GB = 8};
 
 /// Cells of 120 um / n over the square ±60 um, n / 3 layers of them.
-boxes::GridLines lines_of(const CurvedCase& scene, int n) {
-  boxes::GridLines lines;
+elements::GridLines lines_of(const CurvedCase& scene, int n) {
+  elements::GridLines lines;
   for (int k = 0; k <= n; ++k) lines.x_um.push_back(-60 + 120.0 * k / n);
   lines.y_um = lines.x_um;
   lines.z_um = layers_um(scene.base_um, n / 3);
@@ -34,8 +33,8 @@ Loading exact_loading(const FieldUnderASurface& field) {
 Field solved(const CurvedCase& scene, double poisson_ratio, int n, int threads = 2) {
   const FieldUnderASurface exact = scene.field(poisson_ratio);
   const auto block = std::make_shared<const Block>(
-      Shape{scene.height_um, scene.base_um}, lines_of(scene, n), [](const boxes::Box&) { return false; }, Sides::held,
-      100000, threads);
+      Shape{scene.height_um, scene.base_um}, lines_of(scene, n), [](const elements::Box&) { return false; },
+      Sides::held, 100000, threads);
   return solve_linear(scene.gel(poisson_ratio), block, exact_loading(exact),
                       {.threads = threads, .memory_limit_GB = 8});
 }
@@ -67,19 +66,28 @@ double error_in_volume(const Field& field, const FieldUnderASurface& exact) {
   return std::sqrt(error / size);
 }
 
-TEST(CurvedElement, has_the_stiffness_of_a_box_where_it_is_one) {
-  const boxes::Box box{{1, -2, 3}, {4, 5, 2.5}};
+TEST(CurvedElement, rigid_motions_store_no_energy_and_strains_store_theirs) {
+  const Eigen::Vector3d size(1, 2, 0.5);
   NodePositions nodes;
-  for (int k = 0; k < kNodes; ++k)
-    for (int i = 0; i < 3; ++i) nodes(i, k) = box.low_um[i] + unit_of_node(k)[i] * box.size_um[i];
-  for (const double nu : {0.3, 0.4999}) {
-    const Gel gel{10, nu, 50};
-    const double mu = substrate::shear_modulus_kPa(gel), lambda = 2 * mu * nu / (1 - 2 * nu);
-    const Eigen::MatrixXd expected = boxes::box_stiffness({gel, {}}, 2, box);
-    const Eigen::MatrixXd found = linear_stiffness(Element(nodes), mu, lambda);
-    EXPECT_LE((found - expected).norm(), 1e-12 * expected.norm());
-  }
+  for (int k = 0; k < kNodes; ++k) nodes.col(k) = unit_of_node(k).cwiseProduct(size);
   EXPECT_NEAR(least_scaled_jacobian(nodes), 1, 1e-14);
+  const Gel gel{8.4, 0.4, 30};
+  const double mu = substrate::shear_modulus_kPa(gel), lambda = 2 * mu * 0.4 / (1 - 2 * 0.4);
+  const Eigen::MatrixXd k = linear_stiffness(Element(nodes), {gel, {}});
+  const auto displaced = [&](const Eigen::Matrix3d& gradient) {
+    const NodeValues u = gradient * nodes;
+    return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(u.data(), kUnknowns));
+  };
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Zero(), gradient;
+  turn(0, 1) = 1;
+  turn(1, 0) = -1;
+  EXPECT_LT((k * displaced(turn)).norm(), 1e-12 * k.norm());
+  EXPECT_LT((k * Eigen::VectorXd::Ones(k.rows())).norm(), 1e-12 * k.norm());
+  gradient << 0.1, 0.3, -0.2, 0.05, -0.4, 0.1, 0.2, 0.6, 0.25;
+  const Eigen::Matrix3d strain = 0.5 * (gradient + gradient.transpose());
+  const double expected = size.prod() * (2 * mu * strain.squaredNorm() + lambda * strain.trace() * strain.trace());
+  const Eigen::VectorXd u = displaced(gradient);
+  EXPECT_NEAR(u.dot(k * u), expected, 1e-12 * expected * static_cast<double>(k.rows()));
 }
 
 /// Linear displacements have no body force: a bent cell in such a field is loaded at its outer nodes alone, and the
@@ -87,15 +95,16 @@ TEST(CurvedElement, has_the_stiffness_of_a_box_where_it_is_one) {
 TEST(CurvedElement, holds_a_linear_field_without_force_on_its_inner_node) {
   const CurvedCase scene = curved_case("sharp_wave");
   const Block block(
-      {scene.height_um, scene.base_um}, lines_of(scene, 12), [](const boxes::Box&) { return false; }, Sides::free, 1000,
-      1);
+      {scene.height_um, scene.base_um}, lines_of(scene, 12), [](const elements::Box&) { return false; }, Sides::free,
+      1000, 1);
+  const Gel gel{9, 0.49, 30};
   Eigen::Matrix3d gradient;
   gradient << .1, .2, -.3, .05, -.2, .1, .3, -.1, .15;
   for (int cell = 0; cell < 12; ++cell) {
     const NodePositions nodes = block.mesh().positions_of(cell);
     const NodeValues u = gradient * nodes;
     const Eigen::VectorXd force =
-        linear_stiffness(Element(nodes), 3, 100) * Eigen::Map<const Eigen::VectorXd>(u.data(), kUnknowns);
+        linear_stiffness(Element(nodes), {gel, {}}) * Eigen::Map<const Eigen::VectorXd>(u.data(), kUnknowns);
     EXPECT_LE(force.segment<3>(3 * 13).norm(), 1e-10 * force.norm());
     for (int axis = 0; axis < 3; ++axis)
       EXPECT_NEAR(Eigen::Map<const NodeValues>(force.data()).row(axis).sum(), 0, 1e-11 * force.norm());
@@ -191,9 +200,7 @@ TEST(Shell, vector_harmonics_displace_it_as_they_must) {
     const Space space(sphere.mesh, 2);
     EXPECT_LE(space.n_unknowns(), 100000);
     for (const double nu : {0.3, 0.4999}) {
-      const double mu = 10 / (2 * (1 + nu)), lambda = 2 * mu * nu / (1 - 2 * nu);
-      const auto factor = space.factorise(
-          [&](int cell) { return linear_stiffness(Element(sphere.mesh.positions_of(cell)), mu, lambda); }, kFactor);
+      const auto factor = space.factorise(linear_stiffness_of({{10, nu, 1}, {}}, sphere.mesh), kFactor);
       const Vectors u = space.spread(solve(*factor, space.traction_forces_nN(traction)));
       double error = 0, size = 0;
       for (int row = 0; row < table.n_rows(); ++row) {
@@ -211,28 +218,6 @@ TEST(Shell, vector_harmonics_displace_it_as_they_must) {
       RecordProperty("case" + name + "_" + std::to_string(nu), std::to_string(std::sqrt(error / size)));
     }
   }
-}
-
-TEST(SteepWalls, of_eighty_degrees_are_solved_steeper_ones_refused_by_place) {
-  const auto wall = [](double slope) { return [slope](Vec2 p) { return 5 * std::tanh(slope / 5 * p.x); }; };
-  boxes::GridLines lines;
-  for (int k = 0; k <= 8; ++k) lines.x_um.push_back(-20 + 5.0 * k);
-  lines.y_um = {-10, 0, 10};
-  lines.z_um = {0, 15, 30};
-  const auto is_coarse = [](const boxes::Box& box) {
-    return box.size_um[0] > 0.7 && std::abs(box.low_um[0] + 0.5 * box.size_um[0]) < 3 && box.low_um[2] < 10;
-  };
-  const auto block_of = [&](double degrees) {
-    return std::make_shared<const Block>(Shape{wall(std::tan(degrees * std::numbers::pi / 180)), 30}, lines, is_coarse,
-                                         Sides::free, 100000, 2);
-  };
-  const Loading pull{
-      .traction_kPa = [](const Eigen::Vector3d&, const Eigen::Vector3d&) { return Eigen::Vector3d(0.1, 0, 0); }};
-  const Field field = solve_linear({10, 0.4999, 30}, block_of(80), pull, kFactor);
-  for (const Eigen::Vector3d& u : field.at_nodes_um) EXPECT_TRUE(u.allFinite());
-  EXPECT_GT(field.displacement_um(field.block->on_surface({0, 0})).x(), 0);
-  const InvalidData error = test::thrown<InvalidData>([&] { block_of(88); });
-  EXPECT_TRUE(has_words(error.what(), "surface at ("));
 }
 
 std::unique_ptr<substrate::Substrate> gel_of(const Gel& gel, const char* model, double tolerance = 0) {
@@ -290,13 +275,13 @@ TEST(CurvedModel, takes_the_thickest_gel_and_refuses_a_point_too_far_for_any_mes
 TEST(AnEllipse, pulls_at_the_centre_of_the_area_that_it_covers_of_the_slope) {
   constexpr double kBend = 0.05;
   const substrate::Ellipse ellipse{{6, 0.5}, 4, 3, 0.4};
-  boxes::GridLines lines;
+  elements::GridLines lines;
   for (int k = 0; k <= 16; ++k) lines.x_um.push_back(-16 + 2 * k);
   lines.y_um = lines.x_um;
   lines.z_um = {0, 5, 15, 30};
   const Block block(
-      Shape{[](Vec2 p) { return kBend * p.x * p.x; }, 30}, lines, [](const boxes::Box&) { return false; }, Sides::held,
-      100000, 1);
+      Shape{[](Vec2 p) { return kBend * p.x * p.x; }, 30}, lines, [](const elements::Box&) { return false; },
+      Sides::held, 100000, 1);
   const Space space(block.mesh(), 1);
   std::vector<Vec2> place(static_cast<std::size_t>(space.nodes().size()));
   for (std::size_t node = 0; node < block.mesh().position_um.size(); ++node) {
@@ -306,7 +291,7 @@ TEST(AnEllipse, pulls_at_the_centre_of_the_area_that_it_covers_of_the_slope) {
   }
   Vec2 pulled, centre;
   const auto loads = load_weights(block, space, {.shapes = std::vector<substrate::Ellipse>{ellipse}});
-  for (const boxes::NodeWeight& w : loads.front()) pulled += w.weight * place[w.node];
+  for (const elements::NodeWeight& w : loads.front()) pulled += w.weight * place[w.node];
   double area = 0;
   constexpr int kRings = 400;
   for (int k = 0; k < kRings * kRings; ++k) {
@@ -347,4 +332,4 @@ TEST(TractionsOfASurfaceMesh, pull_back_exactly_as_they_displace_and_add_up_to_t
 }
 
 }  // namespace
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements

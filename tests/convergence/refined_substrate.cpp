@@ -98,21 +98,6 @@ TEST(Refined, takes_layers_and_graded_gels) {
   }
 }
 
-TEST(Refined, split_and_layer_agree_on_a_wide_block) {
-  const Gel gel = gel_of(0.49, 15);
-  const auto points = test::scattered_points(800, 12);
-  const auto ellipses = test::scattered_ellipses(3, 8);
-  const Eigen::MatrixXd layer =
-      greens::make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses);
-  const Eigen::MatrixXd split =
-      choice::make_substrate(gel, test::model_named("split"), 2)->compliance_um_per_nN(points, ellipses);
-  const Eigen::MatrixXd refined =
-      choice::make_substrate(gel, refined_to(0.01), 2)->compliance_um_per_nN(points, ellipses);
-  EXPECT_LT(test::mean_column_difference(split, layer), 1e-3);
-  EXPECT_LT(test::mean_column_difference(refined, layer), 0.02);
-  EXPECT_LT(test::mean_column_difference(refined, split), 0.02);
-}
-
 /// A scene whose rectangle is a square about the origin, so that its mesh turns and mirrors with it.
 struct SquareScene {
   std::vector<Vec2> points = test::scattered_points(100, 8);
@@ -175,24 +160,6 @@ TEST(Refined, is_the_same_for_any_number_of_threads) {
           one ==
           choice::make_substrate(gel, refined_to(0.03), threads)->compliance_um_per_nN(scene.points, scene.ellipses));
   }
-}
-
-TEST(Refined, is_reciprocal_between_two_loaded_ellipses) {
-  // the mean displacement of ellipse B by a force on A is that of A by the same force on B: on one mesh for both, to
-  // the rule that averages over a kinked field
-  const std::vector<Ellipse> pair = {{{0, 0}, 1.5, 0.6, 0.3}, {{4, 1.5}, 1.2, 0.8, 2}};
-  std::vector<Vec2> points;
-  const std::size_t n = ellipse_rule(pair[0], 39).size();
-  for (const Ellipse& ellipse : pair)
-    for (const DiscPoint& p : ellipse_rule(ellipse, 39)) points.push_back(ellipse.centre_um + p.position);
-  const Eigen::MatrixXd g =
-      choice::make_substrate(gel_of(0.49, 10), refined_to(0), 2)->compliance_um_per_nN(points, pair);
-  Eigen::Matrix2d mean[2] = {Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Zero()};
-  for (int at = 0; at < 2; ++at) {
-    const auto rule = ellipse_rule(pair[at], 39);
-    for (std::size_t k = 0; k < n; ++k) mean[at] += rule[k].weight * g.block<2, 2>(2 * (at * n + k), 2 * (1 - at));
-  }
-  EXPECT_LT((mean[0] - mean[1].transpose()).norm(), 1e-4 * mean[0].norm());
 }
 
 TEST(Vertical, of_the_half_space_is_the_average_of_the_point_force) {

@@ -1,7 +1,6 @@
 /// Finite elements against the layer, which shares nothing with them, and their building stones.
-#include "substrate/boxes/elastic_system.h"
-#include "substrate/boxes/ellipse_load.h"
 #include "substrate/choice/factory.h"
+#include "substrate/elements/ellipse_load.h"
 #include "substrate/ellipse.h"
 #include "substrate/greens/half_space.h"
 #include "substrate/material.h"
@@ -18,38 +17,6 @@ Eigen::MatrixXd compliance(const Gel& gel, const SubstrateParameters& parameters
   return choice::make_substrate(gel, parameters, 2)->compliance_um_per_nN(points, ellipses);
 }
 
-TEST(BoxStiffness, rigid_motions_store_no_energy_and_strains_store_theirs) {
-  const Gel gel = gel_of(0.4, 30);
-  const std::array<double, 3> size = {1, 2, 0.5};
-  const double mu = shear_modulus_kPa(gel);
-  const double lambda = 2 * mu * gel.poisson_ratio / (1 - 2 * gel.poisson_ratio);
-  for (const int order : {1, 2}) {
-    const Eigen::MatrixXd k = boxes::box_stiffness({gel, {}}, order, {{}, size});
-    const auto displaced = [&](const Eigen::Matrix3d& gradient) {
-      Eigen::VectorXd u(k.rows());
-      const int n = order + 1;
-      for (int node = 0; node < u.size() / 3; ++node) {
-        const Eigen::Vector3d x(size[0] * (node % n) / order, size[1] * (node / n % n) / order,
-                                size[2] * (node / (n * n)) / order);
-        u.segment<3>(3 * node) = gradient * x;
-      }
-      return u;
-    };
-    Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
-    turn(0, 1) = 1;
-    turn(1, 0) = -1;
-    EXPECT_LT((k * displaced(turn)).norm(), 1e-12 * k.norm());
-    EXPECT_LT((k * Eigen::VectorXd::Ones(k.rows())).norm(), 1e-12 * k.norm());
-    Eigen::Matrix3d gradient;
-    gradient << 0.1, 0.3, -0.2, 0.05, -0.4, 0.1, 0.2, 0.6, 0.25;
-    const Eigen::Matrix3d strain = 0.5 * (gradient + gradient.transpose());
-    const double expected =
-        size[0] * size[1] * size[2] * (2 * mu * strain.squaredNorm() + lambda * strain.trace() * strain.trace());
-    const Eigen::VectorXd u = displaced(gradient);
-    EXPECT_NEAR(u.dot(k * u), expected, 1e-12 * expected * k.rows());
-  }
-}
-
 TEST(EllipseLoad, pieces_cut_by_a_grid_add_up_to_the_ellipse) {
   for (const Ellipse& ellipse : {Ellipse{{0.3, -0.2}, 2, 0.2, 0.7}, Ellipse{{0, 0}, 1, 1, 0},
                                  Ellipse{{0.25, 0.25}, 0.05, 0.04, 2}, Ellipse{{0, 0}, 3, 1, 0.5 * pi}}) {
@@ -58,7 +25,7 @@ TEST(EllipseLoad, pieces_cut_by_a_grid_add_up_to_the_ellipse) {
     greens::Sym2 second;
     for (double y = -4; y < 4; y += 0.25)
       for (double x = -4; x < 4; x += 0.25)
-        for (const DiscPoint& p : boxes::clipped_ellipse_rule(ellipse, {{x, y}, {x + 0.25, y + 0.25}})) {
+        for (const DiscPoint& p : elements::clipped_ellipse_rule(ellipse, {{x, y}, {x + 0.25, y + 0.25}})) {
           EXPECT_GE(p.weight, 0);
           const Vec2 offset = p.position - ellipse.centre_um;
           sum += p.weight;
@@ -74,42 +41,6 @@ TEST(EllipseLoad, pieces_cut_by_a_grid_add_up_to_the_ellipse) {
     EXPECT_NEAR(second.xx, a2 * c * c + b2 * s * s, 1e-12 * a2);
     EXPECT_NEAR(second.xy, (a2 - b2) * c * s, 1e-12 * a2);
     EXPECT_NEAR(second.yy, a2 * s * s + b2 * c * c, 1e-12 * a2);
-  }
-}
-
-TEST(ElasticSystem, the_base_bears_the_whole_load) {
-  const boxes::GridLines lines = {{-20, -10, 0, 10, 20}, {-20, -10, 0, 10, 20}, {0, 10}};
-  const Ellipse ellipse = {{1, 2}, 1.5, 0.6, 0.4};
-  for (const int order : {1, 2}) {
-    const auto is_too_large = [](const boxes::Box& box) {
-      return box.low_um[2] == 0 && box.size_um[0] > 1 && std::abs(box.low_um[0]) < 3 && std::abs(box.low_um[1]) < 3;
-    };
-    const boxes::ElasticSystem system({gel_of(0.4999, 10), {}},
-                                      boxes::make_block_mesh(lines, order, is_too_large, 100000, 2),
-                                      {.threads = 2, .memory_limit_GB = 2});
-    const auto load = system.load_weights(ellipse);
-    double share = 0;
-    for (const auto& [node, weight] : load) share += weight;
-    EXPECT_NEAR(share, 1, 1e-12);
-    Eigen::Vector3d reaction = Eigen::Vector3d::Zero();
-    std::vector<int> all_nodes(system.n_unknowns() / 3);
-    std::iota(all_nodes.begin(), all_nodes.end(), 0);
-    system.factor().solve(
-        1, all_nodes,
-        [&](int, const numerics::NodalColumn& b) {
-          for (const auto& [node, weight] : load) b(node, 0) += weight;
-        },
-        [&](int, const numerics::NodalColumn& u) {
-          Eigen::VectorXd values(system.n_unknowns());
-          for (Eigen::Index k = 0; k < values.size(); ++k)
-            values[k] = u(static_cast<int>(k / 3), static_cast<int>(k % 3));
-          const Eigen::VectorXd on_base = system.bottom_stiffness().transpose() * values;
-          for (Eigen::Index k = 0; k < on_base.size(); ++k) reaction[k % 3] += on_base[k];
-        });
-    // rounding, magnified by lambda / mu = 5000
-    EXPECT_NEAR(reaction[0], -1, 1e-9);
-    EXPECT_NEAR(reaction[1], 0, 1e-9);
-    EXPECT_NEAR(reaction[2], 0, 1e-9);
   }
 }
 

@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "substrate/curved/mesh.h"
+#include "substrate/elements/mesh.h"
 #include "tests/support/test.h"
 
 namespace mbtfm::test {
@@ -20,8 +20,8 @@ class CubedSphere {
       for (int cell = 0; cell < n * n * layers; ++cell) {
         const Eigen::Vector3d low(cell % n, cell / n % n, static_cast<double>(cell / (n * n)));
         if (low.z() == 0) mesh.surface_cells.push_back(mesh.n_cells());
-        for (int k = 0; k < curved::kNodes; ++k) {
-          const Eigen::Vector3d at = place(patch, low + curved::unit_of_node(k));
+        for (int k = 0; k < elements::kNodes; ++k) {
+          const Eigen::Vector3d at = place(patch, low + elements::unit_of_node(k));
           const Eigen::Vector3d digits = 1e7 / outer_um * at;
           const auto [found, is_new] =
               node_at.try_emplace({std::lround(digits.x()), std::lround(digits.y()), std::lround(digits.z())},
@@ -36,7 +36,7 @@ class CubedSphere {
     mesh.hanging.resize(mesh.position_um.size());
   }
 
-  curved::Location locate(const Eigen::Vector3d& point) const {
+  elements::Location locate(const Eigen::Vector3d& point) const {
     Eigen::Index axis = 0;
     point.cwiseAbs().maxCoeff(&axis);
     const int patch = 2 * static_cast<int>(axis) + (point[axis] < 0);
@@ -47,17 +47,17 @@ class CubedSphere {
                              layers_ * (outer_ - point.norm()) / (outer_ - inner_));
     Eigen::Vector3d cell;
     for (int k = 0; k < 3; ++k) cell[k] = std::clamp(std::floor(at[k]), 0.0, (k < 2 ? n_ : layers_) - 1.0);
-    curved::Location found{
+    elements::Location found{
         static_cast<int>(cell[0] + n_ * (cell[1] + n_ * (cell[2] + static_cast<double>(layers_) * patch))), at - cell};
-    const curved::NodePositions nodes = mesh.positions_of(found.cell);
+    const elements::NodePositions nodes = mesh.positions_of(found.cell);
     for (int step = 0; step < 5; ++step) {
-      const Eigen::Matrix3d jacobian = nodes * curved::unit_slopes_at(found.unit);
-      found.unit += jacobian.inverse() * (point - nodes * curved::shapes_at(found.unit));
+      const Eigen::Matrix3d jacobian = nodes * elements::unit_slopes_at(found.unit);
+      found.unit += jacobian.inverse() * (point - nodes * elements::shapes_at(found.unit));
     }
     return found;
   }
 
-  curved::Mesh mesh;
+  elements::Mesh mesh;
 
  private:
   /// Columns: along the patch, along it, outwards; x of them × y of them points inwards.

@@ -1,4 +1,4 @@
-#include "substrate/curved/neo_hooke.h"
+#include "substrate/elements/neo_hooke.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -13,7 +13,7 @@
 #include "pipeline/numerics/parallel.h"
 #include "substrate/material.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 namespace {
 
 using CellVector = Eigen::Matrix<double, kUnknowns, 1>;
@@ -245,7 +245,7 @@ class Solver {
     for (std::size_t k = 0; k < forces.size(); ++k) forces[k] = -residual_nN[k];
     try {
       const auto factor = space_.factorise([&](int cell) { return of_cell(cell, true).tangent; }, options_);
-      return space_.spread(curved::solve(*factor, forces));
+      return space_.spread(elements::solve(*factor, forces));
     } catch (const OutOfMemory&) {
       throw;
     } catch (const NotSolved&) {
@@ -328,11 +328,11 @@ std::function<MatrixXd(int cell)> large_stiffness_of(const Gel& gel, const Space
 }
 
 StressLaw large_stress(const Gel& gel, const LargeState& state) {
-  return {.at = [law = NeoHooke(gel)](const Eigen::Matrix3d& gradient, double pressure) -> Eigen::Matrix3d {
+  return {.at = [law = NeoHooke(gel)](const Eigen::Matrix3d& gradient, double pressure, double) -> Eigen::Matrix3d {
             const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + gradient;
             return law.stress_kPa(F, pressure) * F.transpose() / F.determinant();
           },
-          .pressure_kPa = state.pressure_kPa};
+          .pressures = state.pressure_kPa};
 }
 
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements

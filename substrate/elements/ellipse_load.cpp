@@ -1,4 +1,4 @@
-#include "substrate/boxes/ellipse_load.h"
+#include "substrate/elements/ellipse_load.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "pipeline/numerics/quadrature.h"
 #include "substrate/ellipse.h"
 
-namespace mbtfm::boxes {
+namespace mbtfm::elements {
 
 using std::numbers::pi;
 
@@ -81,4 +81,4 @@ std::vector<substrate::DiscPoint> clipped_ellipse_rule(const substrate::Ellipse&
   return rule;
 }
 
-}  // namespace mbtfm::boxes
+}  // namespace mbtfm::elements

@@ -1,4 +1,4 @@
-#include "substrate/curved/surface_loads.h"
+#include "substrate/elements/surface_loads.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,14 +6,13 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/parallel.h"
 #include "pipeline/numerics/quadrature.h"
-#include "substrate/boxes/ellipse_load.h"
+#include "substrate/elements/ellipse_load.h"
 #include "substrate/ellipse.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 namespace {
-
-using boxes::NodeWeight;
 
 Extent rectangle_of(const substrate::Square& square) {
   const Vec2 half = {0.5 * square.side_um, 0.5 * square.side_um};
@@ -60,7 +59,7 @@ class Sum {
     const numerics::GaussRule gauss = numerics::gauss_legendre(kPoints);
     double covered = 0;
     for (const int cell : block_.mesh().surface_cells) {
-      const boxes::Box& box = block_.boxes().cells[cell];
+      const Box& box = block_.boxes().cells[cell];
       const Vec2 low = {std::max(over.low_um.x, box.low_um[0]), std::max(over.low_um.y, box.low_um[1])};
       const Vec2 high = {std::min(over.high_um.x, box.low_um[0] + box.size_um[0]),
                          std::min(over.high_um.y, box.low_um[1] + box.size_um[1])};
@@ -96,43 +95,44 @@ class Sum {
   double total_ = 0;
 };
 
-void require_inside(bool is_inside, Vec2 at) {
+void require_inside(const Block& block, bool is_inside, Vec2 at) {
   if (is_inside) return;
-  throw InvalidData("the load at (" + brief(at.x) + ", " + brief(at.y) + ") um", "all of it on the gel's block",
-                    "a part of it outside");
+  throw InvalidData("the load at (" + brief(at.x) + ", " + brief(at.y) + ") um",
+                    "all of it on the gel's block, " + block.boxes().extent(), "a part of it outside");
+}
+
+Extent face_of(const Box& box) {
+  const Vec2 low = {box.low_um[0], box.low_um[1]};
+  return {low, low + Vec2{box.size_um[0], box.size_um[1]}};
 }
 
 /// Spread evenly over the area of the surface within the ellipse, seen from above.
 std::vector<NodeWeight> ellipse_weights(const Block& block, const Space& space, const substrate::Ellipse& ellipse) {
   Sum sum(block, space);
   double share = 0;
-  const Vec2 half = substrate::half_extent_um(ellipse), c = ellipse.centre_um;
-  for (const int cell : block.mesh().surface_cells) {
-    const boxes::Box& box = block.boxes().cells[cell];
-    const Vec2 low = {box.low_um[0], box.low_um[1]}, size = {box.size_um[0], box.size_um[1]};
-    if (low.x > c.x + half.x || low.x + size.x < c.x - half.x || low.y > c.y + half.y || low.y + size.y < c.y - half.y)
-      continue;
+  for (const int cell : touched_cells(block, ellipse)) {
+    const Extent face = face_of(block.boxes().cells[cell]);
+    const Vec2 size = face.high_um - face.low_um;
     const NodePositions nodes = block.mesh().positions_of(cell);
-    for (const substrate::DiscPoint& p : boxes::clipped_ellipse_rule(ellipse, {low, low + size})) {
-      const Vec2 unit = {(p.position.x - low.x) / size.x, (p.position.y - low.y) / size.y};
+    for (const substrate::DiscPoint& p : clipped_ellipse_rule(ellipse, face)) {
+      const Vec2 unit = {(p.position.x - face.low_um.x) / size.x, (p.position.y - face.low_um.y) / size.y};
       const double stretch = face_point(nodes, unit.x, unit.y).area_um2.norm() / (size.x * size.y);
       sum.add(cell, unit, p.weight * stretch);
       share += p.weight;
     }
   }
-  require_inside(std::abs(share - 1) < 1e-9, c);  // the rules add up to rounding
+  require_inside(block, std::abs(share - 1) < 1e-9, ellipse.centre_um);  // the rules add up to rounding
   return sum.on_free_nodes(1 / sum.total());
 }
 
 std::vector<NodeWeight> square_weights(const Block& block, const Space& space, const substrate::Square& square) {
   Sum sum(block, space);
   const double covered = sum.integrate(rectangle_of(square), [](Vec2) { return 1.0; });
-  require_inside(std::abs(covered / (square.side_um * square.side_um) - 1) < 1e-9, square.centre_um);
+  require_inside(block, std::abs(covered / (square.side_um * square.side_um) - 1) < 1e-9, square.centre_um);
   return sum.on_free_nodes(1);
 }
 
-std::vector<std::vector<NodeWeight>> vertex_weights(const Block& block, const Space& space,
-                                                    const substrate::SurfaceMesh& mesh) {
+WeightedNodes vertex_weights(const Block& block, const Space& space, const substrate::SurfaceMesh& mesh) {
   std::vector<Sum> sums(mesh.points_um.size(), Sum(block, space));
   for (const std::array<int, 4>& face : mesh.faces) {
     const Extent r = rectangle_of(mesh, face);
@@ -141,10 +141,10 @@ std::vector<std::vector<NodeWeight>> vertex_weights(const Block& block, const Sp
       const Vec2 at = mesh.points_um[corner];
       const double covered = sums[corner].integrate(
           r, [&](Vec2 p) { return (1 - std::abs(p.x - at.x) / size.x) * (1 - std::abs(p.y - at.y) / size.y); });
-      require_inside(std::abs(covered / (size.x * size.y) - 1) < 1e-9, at);
+      require_inside(block, std::abs(covered / (size.x * size.y) - 1) < 1e-9, at);
     }
   }
-  std::vector<std::vector<NodeWeight>> weights;
+  WeightedNodes weights;
   for (const Sum& sum : sums) weights.push_back(sum.on_free_nodes(1));
   return weights;
 }
@@ -178,12 +178,24 @@ std::vector<Target> targets_of(const substrate::Loads& loads, double across) {
   return targets;
 }
 
-std::vector<std::vector<NodeWeight>> load_weights(const Block& block, const Space& space,
-                                                  const substrate::Loads& loads) {
+std::vector<int> touched_cells(const Block& block, const substrate::Ellipse& ellipse) {
+  const Vec2 half = substrate::half_extent_um(ellipse), low = ellipse.centre_um - half, high = ellipse.centre_um + half;
+  std::vector<int> touched;
+  for (const int cell : block.mesh().surface_cells) {
+    const Extent face = face_of(block.boxes().cells[cell]);
+    if (face.low_um.x > high.x || face.high_um.x < low.x || face.low_um.y > high.y || face.high_um.y < low.y) continue;
+    if (!clipped_ellipse_rule(ellipse, face).empty()) touched.push_back(cell);
+  }
+  return touched;
+}
+
+WeightedNodes load_weights(const Block& block, const Space& space, const substrate::Loads& loads) {
   if (const auto* mesh = std::get_if<substrate::SurfaceMesh>(&loads.shapes)) return vertex_weights(block, space, *mesh);
-  std::vector<std::vector<NodeWeight>> weights;
+  WeightedNodes weights;
   if (const auto* ellipses = std::get_if<std::vector<substrate::Ellipse>>(&loads.shapes)) {
-    for (const substrate::Ellipse& e : *ellipses) weights.push_back(ellipse_weights(block, space, e));
+    weights.resize(ellipses->size());
+    numerics::parallel_for(static_cast<int>(weights.size()), space.threads(),
+                           [&](int j) { weights[j] = ellipse_weights(block, space, (*ellipses)[j]); });
   } else {
     for (const auto& s : std::get<std::vector<substrate::Square>>(loads.shapes))
       weights.push_back(square_weights(block, space, s));
@@ -191,4 +203,13 @@ std::vector<std::vector<NodeWeight>> load_weights(const Block& block, const Spac
   return weights;
 }
 
-}  // namespace mbtfm::curved
+System::System(Block made, const substrate::Loads& of, const substrate::Observations& at, int threads)
+    : block(std::move(made)), space(block.mesh(), threads), loads(load_weights(block, space, of)), points(at.size()) {
+  const auto* on_surface = std::get_if<std::vector<Vec2>>(&at.points_um);
+  numerics::parallel_for(static_cast<int>(points.size()), threads, [&](int k) {
+    points[k] = space.weights_at(on_surface ? block.on_surface((*on_surface)[k])
+                                            : block.locate(std::get<std::vector<Vec3>>(at.points_um)[k]));
+  });
+}
+
+}  // namespace mbtfm::elements

@@ -10,18 +10,18 @@
 #include "pipeline/contract/report.h"
 #include "pipeline/contract/stopwatch.h"
 #include "pipeline/numerics/parallel.h"
-#include "substrate/boxes/elastic_system.h"
-#include "substrate/curved/linear.h"
-#include "substrate/curved/models.h"
-#include "substrate/curved/neo_hooke.h"
-#include "substrate/curved/surface_loads.h"
 #include "substrate/effects.h"
+#include "substrate/elements/linear.h"
+#include "substrate/elements/models.h"
+#include "substrate/elements/neo_hooke.h"
+#include "substrate/elements/surface_loads.h"
+#include "substrate/elements/volume.h"
 #include "substrate/ellipse.h"
 #include "substrate/response.h"
 #include "substrate/scene.h"
 #include "substrate/surface/height.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 namespace {
 
 /// How fine a mesh is.
@@ -39,29 +39,6 @@ struct Fineness {
   static constexpr double kFarStep = std::numbers::sqrt2;
 };
 
-using boxes::Axes;
-
-/// A mesh with its factor, its loads and its points.
-struct System {
-  Block block;
-  Space space;
-  std::shared_ptr<const numerics::SparseCholesky> factor;  ///< of small strains; null where nobody asks for them
-  boxes::WeightedNodes loads, points;
-
-  System(Block made, const Gel& gel, const substrate::Loads& of, const substrate::Observations& at, bool is_factorised,
-         const numerics::FactorOptions& options)
-      : block(std::move(made)), space(block.mesh(), options.threads), loads(load_weights(block, space, of)) {
-    if (is_factorised) factor = space.factorise(linear_stiffness_of(gel, block.mesh()), options);
-    if (const auto* on_surface = std::get_if<std::vector<Vec2>>(&at.points_um)) {
-      for (const Vec2 p : *on_surface) points.push_back(space.weights_at(block.on_surface(p)));
-    } else {
-      for (const Vec3& p : std::get<std::vector<Vec3>>(at.points_um)) {
-        points.push_back(space.weights_at(block.locate(p)));
-      }
-    }
-  }
-};
-
 /// By the factor of a tangent, on a mesh.
 class FactoredResponse final : public substrate::Response {
  public:
@@ -72,10 +49,10 @@ class FactoredResponse final : public substrate::Response {
   Index rows() const override { return point_axes_.n * std::ssize(system_->points); }
   Index cols() const override { return load_axes_.n * std::ssize(system_->loads); }
   MatrixXd displace(const MatrixXd& forces) const override {
-    return boxes::solve_between(*factor_, system_->loads, load_axes_, forces, system_->points, point_axes_);
+    return solve_between(*factor_, system_->loads, load_axes_, forces, system_->points, point_axes_);
   }
   MatrixXd pull_back(const MatrixXd& displacements) const override {
-    return boxes::solve_between(*factor_, system_->points, point_axes_, displacements, system_->loads, load_axes_);
+    return solve_between(*factor_, system_->points, point_axes_, displacements, system_->loads, load_axes_);
   }
   MatrixXd matrix() const override {
     if (cols() <= rows()) return displace(MatrixXd::Identity(cols(), cols()));
@@ -175,7 +152,7 @@ class CurvedGel final : public substrate::Substrate {
   const Gel& gel() const { return gel_; }
   int threads() const { return threads_; }
   numerics::FactorOptions factor_options() const {
-    return {.threads = threads_, .memory_limit_GB = boxes::allowed_GB(parameters_.memory_limit_GB)};
+    return {.threads = threads_, .memory_limit_GB = allowed_GB(parameters_.memory_limit_GB)};
   }
   bool is_large() const { return parameters_.effects.large_strain == Switch::on; }
 
@@ -200,7 +177,7 @@ class CurvedGel final : public substrate::Substrate {
     const double tolerance = parameters_.displacement_tolerance;
     const MatrixXd probes = probes_of(loads);
     const auto displaced = [&](const System& s) {
-      return boxes::solve_between(*s.factor, s.loads, load_axes, probes, s.points, point_axes);
+      return solve_between(*s.factor, s.loads, load_axes, probes, s.points, point_axes);
     };
     MatrixXd before;  // two factors at a time are too many: of the coarser mesh these are kept
     if (tolerance > 0) before = displaced(*make_system(fineness.coarser(), loads, observations));
@@ -235,8 +212,8 @@ class CurvedGel final : public substrate::Substrate {
     const substrate::Loads loads{ellipses};
     const auto system = make_system(first_fineness(), loads, {}, !is_large());
     Vectors forces(system->space.nodes().size(), Eigen::Vector3d::Zero());
-    boxes::add_loads(system->loads, {0, 2}, substrate::column_of(forces_nN).data(),
-                     [&](int node, int axis) -> double& { return forces[node][axis]; });
+    add_loads(system->loads, {0, 2}, substrate::column_of(forces_nN).data(),
+              [&](int node, int axis) -> double& { return forces[node][axis]; });
     const bool with_stress = parameters_.stress;
     if (is_large()) {
       const LargeSolution solution = solve_large(*system, forces);
@@ -244,7 +221,7 @@ class CurvedGel final : public substrate::Substrate {
                           with_stress ? large_stress(gel_, solution.state) : StressLaw{});
     }
     const Vectors u = system->space.spread(solve(*system->factor, forces));
-    return volume_field(system->space, u, with_stress ? linear_stress(system->space, gel_, u) : StressLaw{});
+    return volume_field(system->space, u, with_stress ? linear_stress(system->space, {gel_, {}}, u) : StressLaw{});
   }
 
  private:
@@ -260,7 +237,7 @@ class CurvedGel final : public substrate::Substrate {
   }
 
   static Shape shape_of(const Gel& gel, const std::shared_ptr<const surface::Height>& height) {
-    if (!height) return {[](Vec2) { return 0.0; }, gel.thickness_um};
+    if (!height) return flat(gel.thickness_um);
     return {[height](Vec2 at) { return (*height)(at); }, gel.thickness_um};
   }
 
@@ -330,7 +307,7 @@ class CurvedGel final : public substrate::Substrate {
 
   std::unique_ptr<System> make_system(const Fineness& fineness, const substrate::Loads& loads,
                                       const substrate::Observations& observations, bool is_factorised = true) const {
-    const double limit_GB = boxes::allowed_GB(parameters_.memory_limit_GB);
+    const double limit_GB = allowed_GB(parameters_.memory_limit_GB);
     const auto most = static_cast<std::int64_t>(1e9 * limit_GB / 1e5);  // as `refined` counts
     const std::vector<Target> targets = targets_of(loads, fineness.across);
     std::vector<Vec2> places;
@@ -341,10 +318,10 @@ class CurvedGel final : public substrate::Substrate {
     const double depth = mean_depth_um(scene);
     const double coarsest = depth / fineness.layers;
     substrate::check_size(scene, coarsest, most);
-    const boxes::GridLines lines = {boxes::even_lines(scene.low_um.x, scene.high_um.x, margin, coarsest),
-                                    boxes::even_lines(scene.low_um.y, scene.high_um.y, margin, coarsest),
-                                    layers_um(depth, fineness.layers)};
-    const auto is_too_large = [&](const boxes::Box& box) {
+    const GridLines lines = {even_lines(scene.low_um.x, scene.high_um.x, margin, coarsest),
+                             even_lines(scene.low_um.y, scene.high_um.y, margin, coarsest),
+                             layers_um(depth, fineness.layers)};
+    const auto is_too_large = [&](const Box& box) {
       const double side = std::max({box.size_um[0], box.size_um[1], box.size_um[2]});
       double nearest = std::numeric_limits<double>::infinity();
       for (const Target& target : targets) {
@@ -358,8 +335,11 @@ class CurvedGel final : public substrate::Substrate {
       if (misfit > kMostMoved * std::min({box.size_um[0], box.size_um[1], box.size_um[2]})) return true;
       return box.low_um[2] == 0 && misfit > fineness.misfit * (side + nearest);
     };
-    return std::make_unique<System>(Block(shape_, lines, is_too_large, Sides::free, most, threads_), gel_, loads,
-                                    observations, is_factorised, factor_options());
+    auto system = std::make_unique<System>(Block(shape_, lines, is_too_large, Sides::free, most, threads_), loads,
+                                           observations, threads_);
+    if (is_factorised)
+      system->factor = system->space.factorise(linear_stiffness_of({gel_, {}}, system->block.mesh()), factor_options());
+    return system;
   }
 
   double mean_depth_um(const Extent& scene) const {
@@ -373,7 +353,7 @@ class CurvedGel final : public substrate::Substrate {
     return shape_.base_um - sum / (kSamples * kSamples);
   }
 
-  static double distance_um(const boxes::Box& box, const Target& target) {
+  static double distance_um(const Box& box, const Target& target) {
     const auto outside = [](double low, double size, double from, double to) {
       return std::max({0.0, low - to, from - low - size});
     };
@@ -382,7 +362,7 @@ class CurvedGel final : public substrate::Substrate {
   }
 
   /// From the surface to the biquadratic one through nine points over the box, at most.
-  double misfit_um(const boxes::Box& box) const {
+  double misfit_um(const Box& box) const {
     const auto height = [&](double x, double y) {
       return shape_.height_um({box.low_um[0] + x * box.size_um[0], box.low_um[1] + y * box.size_um[1]});
     };
@@ -392,7 +372,7 @@ class CurvedGel final : public substrate::Substrate {
     double largest = 0;
     for (const double y : kPlaces) {
       for (const double x : kPlaces) {
-        const auto along = boxes::shape_values(2, x), across = boxes::shape_values(2, y);
+        const auto along = shape_values(x), across = shape_values(y);
         double value = 0;
         for (int k = 0; k < 9; ++k) value += along[k % 3] * across[k / 3] * at_nodes[k];
         largest = std::max(largest, std::abs(value - height(x, y)));
@@ -442,14 +422,13 @@ MatrixXd CurvedResponse::displace(const MatrixXd& forces) const {
 
 Vectors CurvedResponse::forces_on_nodes(const System& s, const VectorXd& forces) const {
   Vectors at_nodes(s.space.nodes().size(), Eigen::Vector3d::Zero());
-  boxes::add_loads(s.loads, load_axes(), forces.data(),
-                   [&](int node, int axis) -> double& { return at_nodes[node][axis]; });
+  add_loads(s.loads, load_axes(), forces.data(), [&](int node, int axis) -> double& { return at_nodes[node][axis]; });
   return at_nodes;
 }
 
 VectorXd CurvedResponse::at_points(const System& s, const Vectors& free_um) const {
   VectorXd values = VectorXd::Zero(rows());
-  boxes::add_samples(
+  add_samples(
       s.points, point_axes(), [&](int node, int axis) { return free_um[node][axis]; }, values.data());
   return values;
 }
@@ -492,4 +471,4 @@ substrate::Model curved_gel() {
   return {.kind = substrate::ModelKind::curved, .can = kCurvedCan, .make = substrate::make_model<CurvedGel>};
 }
 
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements

@@ -1,4 +1,4 @@
-#include "substrate/curved/mesh.h"
+#include "substrate/elements/mesh.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 namespace {
 
 std::string shown(const Eigen::Vector3d& p) {
@@ -31,9 +31,9 @@ NodePositions Mesh::positions_of(int cell) const {
   return positions;
 }
 
-Block::Block(Shape shape, const boxes::GridLines& lines, const std::function<bool(const boxes::Box&)>& is_too_large,
-             Sides sides, std::int64_t most_cells, int threads)
-    : shape_(std::move(shape)), boxes_(boxes::make_block_mesh(lines, 2, is_too_large, most_cells, threads)) {
+Block::Block(Shape shape, const GridLines& lines, const std::function<bool(const Box&)>& is_too_large, Sides sides,
+             std::int64_t most_cells, int threads)
+    : shape_(std::move(shape)), boxes_(make_block_mesh(lines, is_too_large, most_cells, threads)) {
   mesh_.cell_nodes = boxes_.cell_nodes;
   mesh_.hanging = boxes_.hanging;
   const double depth = lines.z_um.back();
@@ -64,12 +64,12 @@ Block::Block(Shape shape, const boxes::GridLines& lines, const std::function<boo
 }
 
 Location Block::on_surface(Vec2 point_um) const {
-  const int cell = surface_cell(point_um);
+  const int cell = cell_holding(boxes_, {point_um.x, point_um.y, 0});
   if (cell < 0) {
-    throw InvalidData("point (" + brief(point_um.x) + ", " + brief(point_um.y) + ") um", "one in the gel's block",
-                      "it outside");
+    throw InvalidData("point (" + brief(point_um.x) + ", " + brief(point_um.y) + ") um",
+                      "one in the gel's block, " + boxes_.extent(), "it outside");
   }
-  const boxes::Box& box = boxes_.cells[cell];
+  const Box& box = boxes_.cells[cell];
   return {cell, {(point_um.x - box.low_um[0]) / box.size_um[0], (point_um.y - box.low_um[1]) / box.size_um[1], 0}};
 }
 
@@ -80,9 +80,9 @@ Location Block::locate(const Vec3& point_um) const {
   constexpr double kRounding = 1e-9;
   double z = std::clamp(depth * (point.z() - surface) / (shape_.base_um - surface), 0.0, depth);
   for (int step = 0; step < 8; ++step) {  // the pulled lines of hanging cells differ a little from the shape's own
-    const int cell = boxes::cell_holding(boxes_, {point.x(), point.y(), z});
+    const int cell = cell_holding(boxes_, {point.x(), point.y(), z});
     if (cell < 0) throw InvalidData("point " + shown(point), "one in the gel's block", "it outside");
-    const boxes::Box& box = boxes_.cells[cell];
+    const Box& box = boxes_.cells[cell];
     Eigen::Vector3d unit((point.x() - box.low_um[0]) / box.size_um[0], (point.y() - box.low_um[1]) / box.size_um[1],
                          (z - box.low_um[2]) / box.size_um[2]);
     const NodePositions nodes = mesh_.positions_of(cell);
@@ -102,4 +102,4 @@ Location Block::locate(const Vec3& point_um) const {
   throw InternalError("no cell of the gel's block holds a point of it");
 }
 
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements

@@ -10,18 +10,18 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/contract/stopwatch.h"
-#include "pipeline/numerics/parallel.h"
-#include "substrate/boxes/elastic_system.h"
-#include "substrate/boxes/ellipse_load.h"
-#include "substrate/boxes/models.h"
+#include "substrate/elements/ellipse_load.h"
+#include "substrate/elements/linear.h"
+#include "substrate/elements/models.h"
+#include "substrate/elements/surface_loads.h"
+#include "substrate/elements/volume.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"
 #include "substrate/scene.h"
 
-namespace mbtfm::boxes {
+namespace mbtfm::elements {
 namespace {
 
-constexpr int kOrder = 2;               // with discontinuous linear pressures: stable as nu -> 1/2
 const double kFall = std::pow(2, 1.5);  // of the error at a load's rim when the elements there halve
 constexpr double kAim = 0.9;  // of the tolerance: a second try costs more than what is spared by just reaching it
 constexpr int kMostRefinements = 8;  // of refinement: 2^8 times finer than asked for no memory holds
@@ -43,7 +43,7 @@ std::vector<int> columns_by_place(const std::vector<substrate::Ellipse>& ellipse
   return columns;
 }
 
-struct Fineness {
+struct Refinement {
   double across = 1.4;        ///< square root of an ellipse's area over the largest side of an element on it
   int fewest_elements = 4;    ///< that touch an ellipse: the thesis' rule
   double growth = 4;          ///< of a side over its distance to the nearest ellipse, at most
@@ -94,12 +94,13 @@ int n_touched(const substrate::Ellipse& ellipse, Vec2 origin, double side) {
 }
 
 /// An ellipse with the side of element it asks for, covered by discs of its semi-minor axis along its major one.
-struct Target {
+struct CoveredEllipse {
   double side_um, radius_um;
   std::vector<Vec2> centres_um;
 };
 
-Target target_of(const substrate::Ellipse& ellipse, const GridLines& lines, const Fineness& fineness, int halvings) {
+CoveredEllipse covered(const substrate::Ellipse& ellipse, const GridLines& lines, const Refinement& fineness,
+                       int halvings) {
   const double wanted = std::sqrt(std::numbers::pi * ellipse.semi_major_um * ellipse.semi_minor_um) / fineness.across;
   double side = std::max(lines.x_um[1] - lines.x_um[0], lines.y_um[1] - lines.y_um[0]);
   const Vec2 origin = {lines.x_um.front(), lines.y_um.front()};
@@ -110,7 +111,7 @@ Target target_of(const substrate::Ellipse& ellipse, const GridLines& lines, cons
   const double reach = std::max(0.0, ellipse.semi_major_um - b);
   const int n = static_cast<int>(std::ceil(reach / b));
   const Vec2 along = {std::cos(ellipse.angle_rad), std::sin(ellipse.angle_rad)};
-  Target target{.side_um = side, .radius_um = b, .centres_um = {}};
+  CoveredEllipse target{.side_um = side, .radius_um = b, .centres_um = {}};
   for (int k = -n; k <= n; ++k) target.centres_um.push_back(ellipse.centre_um + (n == 0 ? 0 : reach * k / n) * along);
   return target;
 }
@@ -123,22 +124,22 @@ double distance(const Box& box, Vec2 point) {
 }
 
 /// @throws NotSolved where it would have more than `most_cells`
-BlockMesh refined_mesh(const substrate::Material& material, const Extent& scene,
-                       const std::vector<substrate::Ellipse>& ellipses, const Fineness& fineness, double margin_um,
-                       std::int64_t most_cells, int threads) {
+Block refined_block(const substrate::Material& material, const Extent& scene,
+                    const std::vector<substrate::Ellipse>& ellipses, const Refinement& fineness, double margin_um,
+                    std::int64_t most_cells, int threads) {
   const double coarsest = coarsest_side_um(material);
   substrate::check_size(scene, coarsest, most_cells);
   // boxes that are nearly cubes; flatter over thin layers
   const GridLines lines = {even_lines(scene.low_um.x, scene.high_um.x, margin_um, coarsest),
                            even_lines(scene.low_um.y, scene.high_um.y, margin_um, coarsest),
                            depths_of(material, coarsest)};
-  std::vector<Target> targets;
+  std::vector<CoveredEllipse> targets;
   for (std::size_t j = 0; j < ellipses.size(); ++j) {
-    targets.push_back(target_of(ellipses[j], lines, fineness, fineness.halvings[j]));
+    targets.push_back(covered(ellipses[j], lines, fineness, fineness.halvings[j]));
   }
   const auto is_too_large = [&](const Box& box) {
     const double side = std::max(box.size_um[0], box.size_um[1]);
-    for (const Target& target : targets) {
+    for (const CoveredEllipse& target : targets) {
       // the side grows with the distance: the field's own scale
       if (side <= target.side_um * (1 + 1e-9)) continue;
       for (const Vec2 centre : target.centres_um) {
@@ -147,7 +148,7 @@ BlockMesh refined_mesh(const substrate::Material& material, const Extent& scene,
     }
     return false;
   };
-  return make_block_mesh(lines, kOrder, is_too_large, most_cells, threads);
+  return {flat(material.gel.thickness_um), lines, is_too_large, Sides::free, most_cells, threads};
 }
 
 class Refined final : public substrate::Substrate {
@@ -199,20 +200,13 @@ class Refined final : public substrate::Substrate {
                                 const std::vector<Vec2>& forces_nN) const override {
     check(ellipses);
     substrate::check_forces(ellipses, forces_nN);
-    const ElasticSystem system = system_for(first_fineness(ellipses.size()), {}, ellipses);
-    WeightedNodes loads;
-    for (const substrate::Ellipse& ellipse : ellipses) loads.push_back(system.load_weights(ellipse));
-    const VectorXd forces = substrate::column_of(forces_nN);
-    std::vector<int> all_nodes(system.n_unknowns() / 3);
-    std::iota(all_nodes.begin(), all_nodes.end(), 0);
-    substrate::VolumeField field;
-    system.factor().solve(
-        1, all_nodes,
-        [&](int, const numerics::NodalColumn& b) {
-          add_loads(loads, {0, 2}, forces.data(), b);
-        },
-        [&](int, const numerics::NodalColumn& u) { field = volume_field(system, material_, u, parameters_.stress); });
-    return field;
+    const auto system = system_for(first_fineness(ellipses.size()), {}, ellipses);
+    Vectors forces(system->space.nodes().size(), Eigen::Vector3d::Zero());
+    add_loads(system->loads, {0, 2}, substrate::column_of(forces_nN).data(),
+              [&](int node, int axis) -> double& { return forces[node][axis]; });
+    const Vectors u = system->space.spread(elements::solve(*system->factor, forces));
+    return volume_field(system->space, u, parameters_.stress ? linear_stress(system->space, material_, u) : StressLaw{},
+                        Gradients::mean);
   }
 
   Figures figures() const override {
@@ -236,7 +230,7 @@ class Refined final : public substrate::Substrate {
     const Index n_rows = request.n_axes * std::ssize(request.points_um);
     if (n_rows == 0 || request.ellipses.empty()) return MatrixXd::Zero(n_rows, request.forces_nN.cols());
     const Stopwatch watch;
-    Fineness fineness = first_fineness(request.ellipses.size());
+    Refinement fineness = first_fineness(request.ellipses.size());
     MatrixXd columns;
     std::vector<double> errors;
     if (parameters_.displacement_tolerance == 0) {
@@ -251,18 +245,18 @@ class Refined final : public substrate::Substrate {
     return columns;
   }
 
-  Fineness first_fineness(std::size_t n_ellipses) const {
+  Refinement first_fineness(std::size_t n_ellipses) const {
     return {.across = parameters_.elements_across_adhesion,
             .growth = parameters_.growth,
             .halvings = std::vector<int>(n_ellipses, 0)};
   }
 
-  /// Far away the error falls as the side to order + 1, near the rims as its power 3/2: there the side may shrink less.
-  double far_step() const { return std::pow(2, 1.5 / (kOrder + 1)); }
+  /// Far away the error falls as the side cubed, near the rims as its power 3/2: there the side may shrink less.
+  double far_step() const { return std::sqrt(2); }
 
   /// Halve the elements on the adhesions whose columns are worst, those far away by as much as they matter.
   /// @return the estimated error of each adhesion's columns
-  std::vector<double> refine_until_right(Fineness& fineness, const Request& request, MatrixXd& columns) const {
+  std::vector<double> refine_until_right(Refinement& fineness, const Request& request, MatrixXd& columns) const {
     std::vector<double> errors(request.ellipses.size(), std::numeric_limits<double>::infinity());
     for (int level = 0; level < kMostRefinements; ++level) {
       const std::vector<std::size_t> finer_ones = worst(errors);
@@ -296,7 +290,7 @@ class Refined final : public substrate::Substrate {
     return order;
   }
 
-  MatrixXd solve_finer(const Fineness& fineness, const Request& request, const std::vector<double>& errors) const {
+  MatrixXd solve_finer(const Refinement& fineness, const Request& request, const std::vector<double>& errors) const {
     try {
       return solve_on(fineness, request);
     } catch (NotSolved& error) {
@@ -323,34 +317,33 @@ class Refined final : public substrate::Substrate {
     return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
   }
 
-  MatrixXd solve_on(const Fineness& fineness, const Request& request) const {
+  MatrixXd solve_on(const Refinement& fineness, const Request& request) const {
     const Stopwatch watch;
-    const ElasticSystem system = system_for(fineness, request.points_um, request.ellipses);
+    const auto system = system_for(fineness, request.points_um, request.ellipses);
     const double setup_s = watch.seconds();
-    WeightedNodes samples(request.points_um.size()), loads(request.ellipses.size());
-    numerics::parallel_for(static_cast<int>(samples.size()), threads_,
-                           [&](int i) { samples[i] = system.surface_weights(request.points_um[i]); });
-    numerics::parallel_for(static_cast<int>(loads.size()), threads_,
-                           [&](int j) { loads[j] = system.load_weights(request.ellipses[j]); });
     const bool is_one = request.forces_nN.cols() == 1;
-    MatrixXd columns = solve_between(system.factor(), loads, {0, 2}, request.forces_nN, samples, {0, request.n_axes},
-                                     is_one ? std::vector<int>() : columns_by_place(request.ellipses));
-    note(system, request.ellipses, setup_s);
+    MatrixXd columns =
+        solve_between(*system->factor, system->loads, {0, 2}, request.forces_nN, system->points, {0, request.n_axes},
+                      is_one ? std::vector<int>() : columns_by_place(request.ellipses));
+    note(*system, request.ellipses, setup_s);
     return columns;
   }
 
-  ElasticSystem system_for(const Fineness& fineness, const std::vector<Vec2>& points_um,
-                           const std::vector<substrate::Ellipse>& ellipses) const {
+  std::unique_ptr<const System> system_for(const Refinement& fineness, const std::vector<Vec2>& points_um,
+                                           const std::vector<substrate::Ellipse>& ellipses) const {
     // of an element: too few for any mesh (measured: 250 kB); the factor is weighed exactly
     constexpr double kBytes = 1e5;
     const auto most = static_cast<std::int64_t>(1e9 * allowed_GB(parameters_.memory_limit_GB) / kBytes);
-    BlockMesh mesh = refined_mesh(material_, substrate::extent_of(points_um, ellipses), ellipses, fineness,
-                                  substrate::margin_um(material_.gel, parameters_), most, threads_);
-    return {material_,
-            std::move(mesh),
-            {.threads = threads_,
-             .memory_limit_GB = allowed_GB(parameters_.memory_limit_GB),
-             .precision = is_single() ? numerics::Precision::single_ : numerics::Precision::double_}};
+    auto system = std::make_unique<System>(
+        refined_block(material_, substrate::extent_of(points_um, ellipses), ellipses, fineness,
+                      substrate::margin_um(material_.gel, parameters_), most, threads_),
+        substrate::Loads{.shapes = ellipses}, substrate::Observations{.points_um = points_um}, threads_);
+    system->factor = system->space.factorise(
+        box_stiffness_of(material_, system->block.boxes()),
+        {.threads = threads_,
+         .memory_limit_GB = allowed_GB(parameters_.memory_limit_GB),
+         .precision = is_single() ? numerics::Precision::single_ : numerics::Precision::double_});
+    return system;
   }
 
   /// Rounding to single precision changes a column by 1 % at nu = 0.4999 (measured, 250 000 unknowns) and in proportion
@@ -361,21 +354,22 @@ class Refined final : public substrate::Substrate {
     return material_.gel.poisson_ratio <= kMostForSingle;
   }
 
-  void note(const ElasticSystem& system, const std::vector<substrate::Ellipse>& ellipses, double setup_s) const {
-    std::size_t fewest = system.mesh().cells.size();
-    for (const substrate::Ellipse& ellipse : ellipses) fewest = std::min(fewest, system.touched_cells(ellipse).size());
-    const GridLines& lines = system.mesh().lines;
+  void note(const System& system, const std::vector<substrate::Ellipse>& ellipses, double setup_s) const {
+    const BlockMesh& boxes = system.block.boxes();
+    std::size_t fewest = boxes.cells.size();
+    for (const substrate::Ellipse& e : ellipses) fewest = std::min(fewest, touched_cells(system.block, e).size());
+    const GridLines& lines = boxes.lines;
     const std::lock_guard lock(mutex_);
     figures_ = {{"substrate_model", "refined"},
                 {"substrate_element", "q2-p1disc"},
                 {"substrate_precision", std::string(is_single() ? "single" : "double")},
                 {"substrate_thickness_um", material_.gel.thickness_um},
-                {"substrate_unknowns", std::int64_t{system.n_unknowns()}},
-                {"substrate_elements", static_cast<std::int64_t>(system.mesh().cells.size())},
+                {"substrate_unknowns", std::int64_t{system.space.n_unknowns()}},
+                {"substrate_elements", static_cast<std::int64_t>(boxes.cells.size())},
                 {"substrate_fewest_elements_of_an_adhesion", static_cast<std::int64_t>(fewest)},
                 {"substrate_block_x_um", lines.x_um.back() - lines.x_um.front()},
                 {"substrate_block_y_um", lines.y_um.back() - lines.y_um.front()},
-                {"substrate_factor_GB", system.factor().factor_GB()},
+                {"substrate_factor_GB", system.factor->factor_GB()},
                 {"substrate_setup_s", setup_s}};
   }
 
@@ -397,4 +391,4 @@ substrate::Model refined() {
   return {.kind = substrate::ModelKind::refined, .can = kRefinedCan, .make = substrate::make_model<Refined>};
 }
 
-}  // namespace mbtfm::boxes
+}  // namespace mbtfm::elements

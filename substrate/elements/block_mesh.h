@@ -5,11 +5,12 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
 
-namespace mbtfm::boxes {
+namespace mbtfm::elements {
 
 /// An axis-parallel box.
 struct Box {
@@ -34,37 +35,30 @@ struct NodeWeight {
   double weight = 0;
 };
 
-/// Nodes of continuous elements of order 1 or 2, (order+1)³ a cell.
+/// Nodes of continuous quadratic elements.
 struct BlockMesh {
-  int order = 2;
   GridLines lines;
   std::vector<Box> cells;
   std::vector<int> cell_levels;                    ///< by cell: how often one of the grid was halved
-  std::vector<int> cell_nodes;                     ///< by cell, x fastest, then y, then z
+  std::vector<int> cell_nodes;                     ///< 27 a cell, x fastest, then y, then z
   std::vector<std::array<double, 3>> position_um;  ///< by node
   std::vector<std::vector<NodeWeight>> hanging;    ///< by node: what it hangs on; empty: a node of its own
   std::map<BoxKey, int> cell_at;
 
-  int nodes_per_cell() const { return (order + 1) * (order + 1) * (order + 1); }
-  const int* nodes_of(int cell) const { return &cell_nodes[static_cast<std::size_t>(cell) * nodes_per_cell()]; }
   double thickness_um() const { return lines.z_um.back(); }
+  std::string extent() const;  ///< along x and y, for messages
 };
 
 /// Halve cells, keeping neighbours within one level of each other, until `is_too_large` holds of none. It must hold of
 /// no part of a cell of which it does not hold.
 /// @throws NotSolved where the cells grow beyond `most_cells`
-BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function<bool(const Box&)>& is_too_large,
+BlockMesh make_block_mesh(const GridLines& lines, const std::function<bool(const Box&)>& is_too_large,
                           std::int64_t most_cells, int threads);
 
 /// The cell that holds a point of a depth within the block; -1 beside the block.
 int cell_holding(const BlockMesh& mesh, const std::array<double, 3>& point_um);
-/// That of the surface.
-inline int surface_cell(const BlockMesh& mesh, Vec2 point_um) {
-  return cell_holding(mesh, {point_um.x, point_um.y, 0});
-}
 
-/// Shape functions of order 1 or 2 on [0, 1] and their slopes.
-std::array<double, 3> shape_values(int order, double t);
-std::array<double, 3> shape_slopes(int order, double t);
+/// What `memory_limit_GB` stands for: 0 is four fifths of the machine's memory.
+double allowed_GB(double memory_limit_GB);
 
-}  // namespace mbtfm::boxes
+}  // namespace mbtfm::elements

@@ -1,4 +1,4 @@
-#include "substrate/boxes/block_mesh.h"
+#include "substrate/elements/block_mesh.h"
 
 #include <dlfcn.h>
 
@@ -10,9 +10,11 @@
 #include <stdexcept>
 
 #include "pipeline/contract/errors.h"
-#include "substrate/boxes/mesh_maker.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/memory.h"
+#include "substrate/elements/mesh_maker.h"
 
-namespace mbtfm::boxes {
+namespace mbtfm::elements {
 
 namespace {
 
@@ -61,11 +63,10 @@ BoxKey key_of(const GridLines& lines, int level, const std::array<double, 3>& po
 
 }  // namespace
 
-BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function<bool(const Box&)>& is_too_large,
+BlockMesh make_block_mesh(const GridLines& lines, const std::function<bool(const Box&)>& is_too_large,
                           std::int64_t most_cells, int threads) {
   static MakeMesh* const make = load_mesh_maker();
   BlockMesh mesh;
-  mesh.order = order;
   mesh.lines = lines;
   {
     // one at a time: deal.II has one limit of threads for all, and no lock on it
@@ -109,14 +110,14 @@ int cell_holding(const BlockMesh& mesh, const std::array<double, 3>& point_um) {
   throw InternalError("no cell of the block holds a point of it");
 }
 
-std::array<double, 3> shape_values(int order, double t) {
-  if (order == 1) return {1 - t, t, 0};
-  return {(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)};
+std::string BlockMesh::extent() const {
+  const auto range = [](const std::vector<double>& line) { return brief(line.front()) + " to " + brief(line.back()); };
+  return "x " + range(lines.x_um) + ", y " + range(lines.y_um) + " um";
 }
 
-std::array<double, 3> shape_slopes(int order, double t) {
-  if (order == 1) return {-1, 1, 0};
-  return {4 * t - 3, 4 - 8 * t, 4 * t - 1};
+double allowed_GB(double memory_limit_GB) {
+  if (memory_limit_GB > 0) return memory_limit_GB;
+  return 0.8e-9 * numerics::memory_bytes();
 }
 
-}  // namespace mbtfm::boxes
+}  // namespace mbtfm::elements

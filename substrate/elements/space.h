@@ -1,4 +1,4 @@
-/// Quadratic displacements on a mesh of bent hexahedra: the equations over it, what loads it, where it is asked.
+/// Quadratic displacements on a mesh of hexahedra, straight or bent: the equations over it, where it is asked.
 #pragma once
 
 #include <functional>
@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "pipeline/numerics/cholesky.h"
-#include "substrate/boxes/free_nodes.h"
-#include "substrate/curved/mesh.h"
+#include "substrate/elements/free_nodes.h"
+#include "substrate/elements/mesh.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 
 using Vectors = std::vector<Eigen::Vector3d>;
 
@@ -24,15 +24,16 @@ class Space {
   Space(const Mesh& mesh, int threads);
 
   const Mesh& mesh() const { return mesh_; }
-  const boxes::FreeNodes& nodes() const { return nodes_; }
+  const FreeNodes& nodes() const { return nodes_; }
   int threads() const { return threads_; }
   int n_unknowns() const { return 3 * nodes_.size(); }
 
-  /// The matrix over the free nodes. `stiffness_of` is called concurrently.
-  numerics::BlockMatrix<3> assemble(const std::function<MatrixXd(int cell)>& stiffness_of) const;
-  /// Its factor. Any matrix over the nodes has the same order of elimination, which is looked for once.
+  /// The factor of the matrix over the free nodes. `stiffness_of` is called concurrently, `add_held` takes what belongs
+  /// to nodes held. Any matrix over the nodes has the same order of elimination, which is looked for once.
+  /// @throws NotSolved where memory would not suffice
   std::shared_ptr<const numerics::SparseCholesky> factorise(const std::function<MatrixXd(int cell)>& stiffness_of,
-                                                            const numerics::FactorOptions& options) const;
+                                                            const numerics::FactorOptions& options,
+                                                            const FreeNodes::AddHeld& add_held = {}) const;
   /// Forces on the free nodes, by cell and node of it; called concurrently.
   Vectors gather(const std::function<NodeValues(int cell)>& forces_of) const;
   /// Consistent forces (nN) of a traction on the surface.
@@ -45,12 +46,12 @@ class Space {
   NodeValues values_of(int cell, const Vectors& at_nodes) const;
 
   /// The value at a place, as weights of free nodes.
-  std::vector<boxes::NodeWeight> weights_at(const Location& location) const;
+  std::vector<NodeWeight> weights_at(const Location& location) const;
 
  private:
   Mesh mesh_;
   int threads_;
-  boxes::FreeNodes nodes_;
+  FreeNodes nodes_;
   struct Order {
     std::once_flag is_found;
     std::shared_ptr<const numerics::Elimination> elimination;
@@ -69,4 +70,4 @@ std::vector<FaceRulePoint> face_rule(const NodePositions& nodes_um, int n);
 /// One column, by free node.
 Vectors solve(const numerics::SparseCholesky& factor, const Vectors& forces_nN);
 
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements

@@ -1,8 +1,8 @@
-#include "substrate/boxes/free_nodes.h"
+#include "substrate/elements/free_nodes.h"
 
 #include <algorithm>
 
-namespace mbtfm::boxes {
+namespace mbtfm::elements {
 
 FreeNodes::FreeNodes(std::vector<int> cell_nodes, int nodes_per_cell, std::vector<std::vector<NodeWeight>> hanging,
                      const std::vector<char>& is_held)
@@ -130,4 +130,4 @@ MatrixXd solve_between(const numerics::SparseCholesky& factor, const WeightedNod
   return answers;
 }
 
-}  // namespace mbtfm::boxes
+}  // namespace mbtfm::elements

@@ -1,4 +1,4 @@
-#include "substrate/curved/space.h"
+#include "substrate/elements/space.h"
 
 #include <algorithm>
 #include <numeric>
@@ -6,7 +6,7 @@
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/numerics/quadrature.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 namespace {
 
 // so many matrices of cells are held at a time: 6 MB
@@ -28,16 +28,12 @@ void in_batches(int n_cells, int threads, const Make& make, const Take& take) {
 Space::Space(const Mesh& mesh, int threads)
     : mesh_(mesh), threads_(threads), nodes_(mesh.cell_nodes, kNodes, mesh.hanging, mesh.is_held) {}
 
-numerics::BlockMatrix<3> Space::assemble(const std::function<MatrixXd(int cell)>& stiffness_of) const {
+std::shared_ptr<const numerics::SparseCholesky> Space::factorise(const std::function<MatrixXd(int cell)>& stiffness_of,
+                                                                 const numerics::FactorOptions& options,
+                                                                 const FreeNodes::AddHeld& add_held) const {
   numerics::BlockMatrix<3> matrix = nodes_.pattern();
   in_batches<MatrixXd>(mesh_.n_cells(), threads_, stiffness_of,
-                       [&](int cell, const MatrixXd& of_cell) { nodes_.add(cell, of_cell, matrix); });
-  return matrix;
-}
-
-std::shared_ptr<const numerics::SparseCholesky> Space::factorise(const std::function<MatrixXd(int cell)>& stiffness_of,
-                                                                 const numerics::FactorOptions& options) const {
-  const numerics::BlockMatrix<3> matrix = assemble(stiffness_of);
+                       [&](int cell, const MatrixXd& of_cell) { nodes_.add(cell, of_cell, matrix, add_held); });
   std::call_once(order_->is_found, [&] {
     order_->elimination = std::make_shared<const numerics::Elimination>(matrix, numerics::Search::quick);
   });
@@ -104,10 +100,12 @@ NodeValues Space::values_of(int cell, const Vectors& at_nodes) const {
   return values;
 }
 
-std::vector<boxes::NodeWeight> Space::weights_at(const Location& location) const {
+std::vector<NodeWeight> Space::weights_at(const Location& location) const {
   const Shapes shapes = shapes_at(location.unit);
-  std::vector<boxes::NodeWeight> weights;
-  for (int k = 0; k < kNodes; ++k) weights.push_back({mesh_.nodes_of(location.cell)[k], shapes[k]});
+  std::vector<NodeWeight> weights;
+  for (int k = 0; k < kNodes; ++k) {
+    if (shapes[k] != 0) weights.push_back({mesh_.nodes_of(location.cell)[k], shapes[k]});
+  }
   return nodes_.on_free_nodes(weights);
 }
 
@@ -142,4 +140,4 @@ Vectors solve(const numerics::SparseCholesky& factor, const Vectors& forces_nN) 
   return solution;
 }
 
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements

@@ -4,6 +4,7 @@
 /// on the bottom and tractions -sigma(u_c) n on the sides. All of that is as smooth as the gel is thick, so a coarse
 /// grid does, and it knows nothing of the adhesions: one factorisation for all scenes that cover the same squares.
 /// Valid for a homogeneous gel with a flat surface; sides about a thickness away from the adhesions at least.
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,15 +13,16 @@
 
 #include "pipeline/contract/stopwatch.h"
 #include "pipeline/numerics/quadrature.h"
-#include "substrate/boxes/elastic_system.h"
-#include "substrate/boxes/models.h"
+#include "substrate/elements/linear.h"
+#include "substrate/elements/models.h"
+#include "substrate/elements/surface_loads.h"
 #include "substrate/greens/columns.h"
 #include "substrate/loads.h"
 #include "substrate/models.h"
 #include "substrate/response.h"
 #include "substrate/scene.h"
 
-namespace mbtfm::boxes {
+namespace mbtfm::elements {
 namespace {
 
 /// Indices of the squares, of side thickness / cells_per_thickness, that the scene covers.
@@ -28,7 +30,7 @@ using Squares = std::array<int, 4>;
 
 /// A quadrature point of a side of the block.
 struct SidePoint {
-  std::array<double, 3> position_um;
+  Eigen::Vector3d position_um;
   int normal_axis;
   double area_um2;  ///< with the sign of the outward normal
   std::vector<NodeWeight> weights;
@@ -41,7 +43,8 @@ struct Footprint {
 };
 struct SplitBlock {
   Footprint footprint;
-  ElasticSystem system;
+  System system;
+  Eigen::SparseMatrix<double> bottom_stiffness;  ///< rows: free unknowns; columns: those of the nodes held
   std::vector<SidePoint> side_points;
 };
 
@@ -84,8 +87,8 @@ std::int64_t most_cells(const substrate::SubstrateParameters& parameters) {
   return static_cast<std::int64_t>(allowed_GB(parameters.memory_limit_GB) / 45e-6);
 }
 
-std::vector<SidePoint> side_points_of(const ElasticSystem& system) {
-  const BlockMesh& mesh = system.mesh();
+std::vector<SidePoint> side_points_of(const System& system) {
+  const BlockMesh& mesh = system.block.boxes();
   const numerics::GaussRule gauss = numerics::gauss_legendre(3);
   std::vector<SidePoint> points;
   for (std::size_t cell = 0; cell < mesh.cells.size(); ++cell) {
@@ -98,14 +101,14 @@ std::vector<SidePoint> side_points_of(const ElasticSystem& system) {
         if (std::abs(face - (end == 0 ? lines.front() : lines.back())) > tiny) continue;
         const double area = (end == 0 ? -1 : 1) * box.size_um[1 - axis] * box.size_um[2];
         for (int g = 0; g < 9; ++g) {
-          std::array<double, 3> unit;
+          Eigen::Vector3d unit;
           unit[axis] = end;
           unit[1 - axis] = 0.5 * (1 + gauss.nodes[g % 3]);
           unit[2] = 0.5 * (1 + gauss.nodes[g / 3]);
           SidePoint point{.position_um = {},
                           .normal_axis = axis,
                           .area_um2 = 0.25 * gauss.weights[g % 3] * gauss.weights[g / 3] * area,
-                          .weights = system.cell_weights(static_cast<int>(cell), unit)};
+                          .weights = system.space.weights_at({static_cast<int>(cell), unit})};
           for (int k = 0; k < 3; ++k) point.position_um[k] = box.low_um[k] + unit[k] * box.size_um[k];
           points.push_back(std::move(point));
         }
@@ -138,21 +141,30 @@ Footprint footprint_of(const Extent& scene, const Gel& gel, const substrate::Sub
 std::unique_ptr<SplitBlock> make_split_block(const Footprint& footprint, const Gel& gel,
                                              const substrate::SubstrateParameters& parameters, int threads) {
   const GridLines lines = grid_of(footprint, gel, parameters);
-  BlockMesh mesh = make_block_mesh(
-      lines, 2, [](const Box&) { return false; }, most_cells(parameters), threads);
   const numerics::FactorOptions options = {.threads = threads,
                                            .memory_limit_GB = allowed_GB(parameters.memory_limit_GB),
                                            .cache_folder = parameters.cache_folder};
-  auto block =
-      std::unique_ptr<SplitBlock>(new SplitBlock{footprint, ElasticSystem({gel, {}}, std::move(mesh), options), {}});
-  block->side_points = side_points_of(block->system);
+  Block grid(
+      flat(gel.thickness_um), lines, [](const Box&) { return false; }, Sides::free, most_cells(parameters), threads);
+  auto block = std::unique_ptr<SplitBlock>(new SplitBlock{footprint, System(std::move(grid), {}, {}, threads), {}, {}});
+  System& system = block->system;
+  const FreeNodes& nodes = system.space.nodes();
+  std::vector<Eigen::Triplet<double>> bottom;
+  const auto add_bottom = [&](int row, int node, const Eigen::Matrix3d& of_node) {
+    for (int p = 0; p < 3; ++p) {
+      for (int q = 0; q < 3; ++q) bottom.emplace_back(3 * row + p, 3 * nodes.held_index_of(node) + q, of_node(p, q));
+    }
+  };
+  system.factor = system.space.factorise(box_stiffness_of({gel, {}}, system.block.boxes()), options, add_bottom);
+  block->bottom_stiffness.resize(system.space.n_unknowns(), 3 * std::ssize(nodes.held()));
+  block->bottom_stiffness.setFromTriplets(bottom.begin(), bottom.end());
+  block->side_points = side_points_of(system);
   return block;
 }
 
 /// Averages the half-space's inner field over an ellipse, a force along x and y at once.
 greens::PointForceField averaged_field(const Gel& gel, const substrate::Ellipse& ellipse,
-                                       const std::vector<substrate::DiscPoint>& rule,
-                                       const std::array<double, 3>& position) {
+                                       const std::vector<substrate::DiscPoint>& rule, const Eigen::Vector3d& position) {
   greens::PointForceField sum;
   const Vec2 offset = Vec2{position[0], position[1]} - ellipse.centre_um;
   for (const substrate::DiscPoint& p : rule) {
@@ -215,14 +227,14 @@ class Split final : public substrate::Substrate {
     const std::lock_guard lock(mutex_);
     Figures figures = {{"substrate_model", "split"}, {"substrate_thickness_um", gel_.thickness_um}};
     if (!block_) return figures;
-    const GridLines& lines = block_->system.mesh().lines;
-    figures.emplace_back("substrate_unknowns", std::int64_t{block_->system.n_unknowns()});
-    figures.emplace_back("substrate_elements", static_cast<std::int64_t>(block_->system.mesh().cells.size()));
+    const BlockMesh& boxes = block_->system.block.boxes();
+    const GridLines& lines = boxes.lines;
+    figures.emplace_back("substrate_unknowns", std::int64_t{block_->system.space.n_unknowns()});
+    figures.emplace_back("substrate_elements", static_cast<std::int64_t>(boxes.cells.size()));
     figures.emplace_back("substrate_block_x_um", lines.x_um.back() - lines.x_um.front());
     figures.emplace_back("substrate_block_y_um", lines.y_um.back() - lines.y_um.front());
-    figures.emplace_back("substrate_factor_GB", block_->system.factor().factor_GB());
-    if (!parameters_.cache_folder.empty())
-      figures.emplace_back("substrate_cache", block_->system.factor().cache_note());
+    figures.emplace_back("substrate_factor_GB", block_->system.factor->factor_GB());
+    if (!parameters_.cache_folder.empty()) figures.emplace_back("substrate_cache", block_->system.factor->cache_note());
     figures.emplace_back("substrate_setup_s", setup_s_);
     figures.emplace_back("substrate_solve_s", solve_s_);
     return figures;
@@ -291,9 +303,10 @@ class Split final : public substrate::Substrate {
     const SplitBlock& block = block_around(substrate::extent_of(scene.points_um, scene.ellipses));
     const Stopwatch watch;
     WeightedNodes samples(scene.points_um.size());
-    numerics::parallel_for(static_cast<int>(samples.size()), threads_,
-                           [&](int i) { samples[i] = block.system.surface_weights(scene.points_um[i]); });
-    block.system.factor().solve(
+    numerics::parallel_for(static_cast<int>(samples.size()), threads_, [&](int i) {
+      samples[i] = block.system.space.weights_at(block.system.block.on_surface(scene.points_um[i]));
+    });
+    block.system.factor->solve(
         static_cast<int>(columns.cols()), nodes_of(samples),
         [&](int column, const numerics::NodalColumn& b) {
           for (Index j = 0; j < std::ssize(scene.ellipses); ++j) {
@@ -312,17 +325,17 @@ class Split final : public substrate::Substrate {
     const double ratio = ellipse.semi_major_um / gel_.thickness_um;
     const int degree = ratio < 0.05 ? 3 : static_cast<int>(std::ceil(std::log(1e-5) / std::log(std::min(0.8, ratio))));
     const std::vector<substrate::DiscPoint> rule = substrate::ellipse_rule(ellipse, degree);
-    const ElasticSystem& system = block.system;
-    const std::vector<int>& bottom = system.bottom_nodes();
+    const Space& space = block.system.space;
+    const std::vector<int>& bottom = space.nodes().held();
     VectorXd on_bottom(3 * bottom.size());
     for (std::size_t k = 0; k < bottom.size(); ++k) {
-      const auto field = averaged_field(gel_, ellipse, rule, system.mesh().position_um[bottom[k]]);
+      const auto field = averaged_field(gel_, ellipse, rule, space.mesh().position_um[bottom[k]]);
       for (int i = 0; i < 3; ++i) {
         on_bottom[3 * k + i] = force.x * field.u_um_per_nN[0][i] + force.y * field.u_um_per_nN[1][i];
       }
     }
     // w = -u_c there, on the left side
-    const VectorXd data = system.bottom_stiffness() * on_bottom;
+    const VectorXd data = block.bottom_stiffness * on_bottom;
     for (Index k = 0; k < data.size(); ++k) b(static_cast<int>(k / 3), static_cast<int>(k % 3)) += data[k];
 
     const double mu = substrate::shear_modulus_kPa(gel_);
@@ -360,4 +373,4 @@ substrate::Model split() {
           .follows = follows_sides};
 }
 
-}  // namespace mbtfm::boxes
+}  // namespace mbtfm::elements

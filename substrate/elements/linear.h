@@ -4,9 +4,9 @@
 #include <memory>
 
 #include "pipeline/contract/gel.h"
-#include "substrate/curved/space.h"
+#include "substrate/elements/space.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 
 /// What acts on a gel; empty: nothing.
 struct Loading {
@@ -25,7 +25,9 @@ struct Field {
 };
 
 /// By cell of a mesh, which must outlive it.
-std::function<MatrixXd(int cell)> linear_stiffness_of(const Gel& gel, const Mesh& mesh);
+std::function<MatrixXd(int cell)> linear_stiffness_of(const substrate::Material& material, const Mesh& mesh);
+/// The same of boxes. Similar ones of one modulus differ by length and modulus alone: each shape is computed once.
+std::function<MatrixXd(int cell)> box_stiffness_of(const substrate::Material& material, const BlockMesh& mesh);
 
 /// @throws NotSolved where memory would not suffice
 Field solve_linear(const Gel& gel, std::shared_ptr<const Block> block, const Loading& loading,
@@ -35,4 +37,4 @@ Field solve_linear(const Gel& gel, std::shared_ptr<const Block> block, const Loa
 /// depth is a third lower than of even ones (notes/accuracy.md).
 std::vector<double> layers_um(double depth_um, int n);
 
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements

@@ -11,9 +11,9 @@
 #include <optional>
 
 #include "pipeline/contract/gel.h"
-#include "substrate/curved/models.h"
+#include "substrate/elements/volume.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 
 struct NeoHooke {
   explicit NeoHooke(const Gel& gel);
@@ -69,4 +69,4 @@ std::function<MatrixXd(int cell)> large_stiffness_of(const Gel& gel, const Space
 /// Cauchy's, of a state.
 StressLaw large_stress(const Gel& gel, const LargeState& state);
 
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements

@@ -6,9 +6,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
-namespace mbtfm::curved {
+#include "substrate/material.h"
+
+namespace mbtfm::elements {
 
 inline constexpr int kNodes = 27;             ///< x fastest, then y, then z
 inline constexpr int kPressures = 4;          ///< 1, x, y, z from the middle
@@ -21,6 +24,9 @@ using Slopes = Eigen::Matrix<double, kNodes, 3>;
 
 /// Unit coordinates of a node.
 inline Eigen::Vector3d unit_of_node(int k) { return {0.5 * (k % 3), 0.5 * (k / 3 % 3), 0.5 * (k / 9)}; }
+/// Shape functions on [0, 1], and their slopes.
+std::array<double, 3> shape_values(double t);
+std::array<double, 3> shape_slopes(double t);
 /// Shape functions at a point of [0, 1]³, and their slopes by unit coordinate.
 Shapes shapes_at(const Eigen::Vector3d& unit);
 Slopes unit_slopes_at(const Eigen::Vector3d& unit);
@@ -49,8 +55,9 @@ struct Element {
 /// is flat, below 0 where it is turned inside out.
 double least_scaled_jacobian(const NodePositions& nodes_um);
 
-/// 2 mu (eps u, eps v) + lambda (P div u, P div v), P the projection onto the pressures; moduli in kPa. Symmetric.
-Eigen::MatrixXd linear_stiffness(const Element& element, double mu_kPa, double lambda_kPa);
+/// 2 mu (eps u, eps v) + lambda (P div u, P div v), P the projection onto the pressures; the modulus may change with z.
+/// So the pressure of a mixed method is eliminated, the matrix stays positive definite, and nothing locks as nu -> 1/2.
+Eigen::MatrixXd linear_stiffness(const Element& element, const substrate::Material& material);
 
 /// Of the face z = 0 of the unit cube, at unit coordinates x, y.
 struct FacePoint {
@@ -59,4 +66,4 @@ struct FacePoint {
 };
 FacePoint face_point(const NodePositions& nodes_um, double x, double y);
 
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements

@@ -5,17 +5,17 @@
 #include <functional>
 #include <vector>
 
-#include "substrate/boxes/block_mesh.h"
-#include "substrate/curved/element.h"
+#include "substrate/elements/block_mesh.h"
+#include "substrate/elements/element.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 
 struct Mesh {
-  std::vector<int> cell_nodes;                          ///< kNodes a cell; the face z = 0 of a cell is its outer one
-  std::vector<Eigen::Vector3d> position_um;             ///< by node
-  std::vector<std::vector<boxes::NodeWeight>> hanging;  ///< by node: what it hangs on, in position, too; empty: nothing
-  std::vector<char> is_held;                            ///< by node: its displacement is given
-  std::vector<int> surface_cells;                       ///< those whose outer face carries tractions
+  std::vector<int> cell_nodes;                   ///< kNodes a cell; the face z = 0 of a cell is its outer one
+  std::vector<Eigen::Vector3d> position_um;      ///< by node
+  std::vector<std::vector<NodeWeight>> hanging;  ///< by node: what it hangs on, in position, too; empty: nothing
+  std::vector<char> is_held;                     ///< by node: its displacement is given
+  std::vector<int> surface_cells;                ///< those whose outer face carries tractions
 
   int n_cells() const { return static_cast<int>(cell_nodes.size()) / kNodes; }
   const int* nodes_of(int cell) const { return &cell_nodes[static_cast<std::size_t>(cell) * kNodes]; }
@@ -30,6 +30,10 @@ struct Shape {
   std::function<double(Vec2)> height_um;
   double base_um = 0;
 };
+
+inline Shape flat(double thickness_um) {
+  return {[](Vec2) { return 0.0; }, thickness_um};
+}
 
 /// @throws InvalidData where the point lies above the surface or below the base
 void check_inside(const Shape& shape, const Vec3& point_um);
@@ -50,14 +54,12 @@ class Block {
   /// @param is_too_large  of its boxes: see make_block_mesh
   /// @throws InvalidData where a cell is bent so much that its scaled Jacobian falls below 0.1, by place; NotSolved
   ///         where the cells grow beyond `most_cells`
-  Block(Shape shape, const boxes::GridLines& lines, const std::function<bool(const boxes::Box&)>& is_too_large,
-        Sides sides, std::int64_t most_cells, int threads);
+  Block(Shape shape, const GridLines& lines, const std::function<bool(const Box&)>& is_too_large, Sides sides,
+        std::int64_t most_cells, int threads);
 
   const Mesh& mesh() const { return mesh_; }
-  const boxes::BlockMesh& boxes() const { return boxes_; }
+  const BlockMesh& boxes() const { return boxes_; }
   const Shape& shape() const { return shape_; }
-  /// The cell of the surface under a place; -1 outside of the block.
-  int surface_cell(Vec2 point_um) const { return boxes::surface_cell(boxes_, point_um); }
   /// A place of the surface, seen from above. @throws InvalidData where it lies outside the block
   Location on_surface(Vec2 point_um) const;
   /// @throws InvalidData where the point lies outside the block, above its surface or below its base
@@ -65,8 +67,8 @@ class Block {
 
  private:
   Shape shape_;
-  boxes::BlockMesh boxes_;
+  BlockMesh boxes_;
   Mesh mesh_;
 };
 
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements

@@ -11,9 +11,9 @@
 
 #include <stdexcept>
 
-#include "substrate/boxes/mesh_maker.h"
+#include "substrate/elements/mesh_maker.h"
 
-namespace mbtfm::boxes {
+namespace mbtfm::elements {
 
 namespace {
 
@@ -75,14 +75,14 @@ extern "C" void mbtfm_make_mesh(BlockMesh& mesh, const std::function<bool(const 
                                                     {steps(lines.x_um), steps(lines.y_um), steps(lines.z_um)},
                                                     corner(lines, true), corner(lines, false));
   refine(triangulation, is_too_large, most_cells);
-  const dealii::FE_Q<3> element(mesh.order);
+  const dealii::FE_Q<3> element(2);
   dealii::DoFHandler<3> handler(triangulation);
   handler.distribute_dofs(element);
 
   mesh.position_um.resize(handler.n_dofs());
   mesh.hanging = hanging_nodes(handler);
   mesh.cells.reserve(triangulation.n_active_cells());
-  const auto order_of = dealii::FETools::lexicographic_to_hierarchic_numbering<3>(mesh.order);
+  const auto order_of = dealii::FETools::lexicographic_to_hierarchic_numbering<3>(2);
   std::vector<dealii::types::global_dof_index> nodes(element.n_dofs_per_cell());
   for (const auto& cell : handler.active_cell_iterators()) {
     const Box box = box_of(cell);
@@ -100,4 +100,4 @@ extern "C" void mbtfm_make_mesh(BlockMesh& mesh, const std::function<bool(const 
   }
 }
 
-}  // namespace mbtfm::boxes
+}  // namespace mbtfm::elements

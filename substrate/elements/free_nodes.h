@@ -6,9 +6,9 @@
 #include <span>
 
 #include "pipeline/numerics/cholesky.h"
-#include "substrate/boxes/block_mesh.h"
+#include "substrate/elements/block_mesh.h"
 
-namespace mbtfm::boxes {
+namespace mbtfm::elements {
 
 class FreeNodes {
  public:
@@ -90,4 +90,4 @@ MatrixXd solve_between(const numerics::SparseCholesky& factor, const WeightedNod
                        const MatrixXd& values, const WeightedNodes& to, Axes to_axes,
                        const std::vector<int>& order = {});
 
-}  // namespace mbtfm::boxes
+}  // namespace mbtfm::elements

@@ -1,4 +1,4 @@
-#include "substrate/curved/element.h"
+#include "substrate/elements/element.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -7,12 +7,11 @@
 #include <limits>
 
 #include "pipeline/numerics/quadrature.h"
-#include "substrate/boxes/block_mesh.h"
 
-namespace mbtfm::curved {
+namespace mbtfm::elements {
 namespace {
 
-constexpr int kRulePoints = 27;
+constexpr int kRulePoints = 27, kMiddle = 13;
 
 struct UnitRule {
   std::array<double, kRulePoints> weight{};
@@ -42,9 +41,11 @@ const UnitRule& unit_rule() {
 
 }  // namespace
 
+std::array<double, 3> shape_values(double t) { return {(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)}; }
+std::array<double, 3> shape_slopes(double t) { return {4 * t - 3, 4 - 8 * t, 4 * t - 1}; }
+
 Shapes shapes_at(const Eigen::Vector3d& unit) {
-  const auto x = boxes::shape_values(2, unit.x()), y = boxes::shape_values(2, unit.y()),
-             z = boxes::shape_values(2, unit.z());
+  const auto x = shape_values(unit.x()), y = shape_values(unit.y()), z = shape_values(unit.z());
   Shapes shapes;
   for (int k = 0; k < kNodes; ++k) shapes[k] = x[k % 3] * y[k / 3 % 3] * z[k / 9];
   return shapes;
@@ -53,8 +54,8 @@ Shapes shapes_at(const Eigen::Vector3d& unit) {
 Slopes unit_slopes_at(const Eigen::Vector3d& unit) {
   std::array<std::array<double, 3>, 3> value, slope;
   for (int axis = 0; axis < 3; ++axis) {
-    value[axis] = boxes::shape_values(2, unit[axis]);
-    slope[axis] = boxes::shape_slopes(2, unit[axis]);
+    value[axis] = shape_values(unit[axis]);
+    slope[axis] = shape_slopes(unit[axis]);
   }
   Slopes slopes;
   for (int k = 0; k < kNodes; ++k) {
@@ -88,30 +89,40 @@ Element::Element(const NodePositions& nodes_um) : points(kRulePoints), mass(Eige
 }
 
 double least_scaled_jacobian(const NodePositions& nodes_um) {
+  static const std::array<Slopes, kNodes> slopes_at_nodes = [] {
+    std::array<Slopes, kNodes> slopes;
+    for (int k = 0; k < kNodes; ++k) slopes[k] = unit_slopes_at(unit_of_node(k));
+    return slopes;
+  }();
   double least = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < kNodes; ++k) {
-    const Eigen::Matrix3d jacobian = nodes_um * unit_slopes_at(unit_of_node(k));
+  for (const Slopes& slopes : slopes_at_nodes) {
+    const Eigen::Matrix3d jacobian = nodes_um * slopes;
     const double lengths = jacobian.colwise().norm().prod();
     least = std::min(least, lengths > 0 ? jacobian.determinant() / lengths : 0.0);
   }
   return least;
 }
 
-Eigen::MatrixXd linear_stiffness(const Element& element, double mu_kPa, double lambda_kPa) {
+Eigen::MatrixXd linear_stiffness(const Element& element, const substrate::Material& material) {
+  const double mu_kPa = substrate::shear_modulus_kPa(material.gel), middle_um = element.points[kMiddle].position_um.z();
   // by axis: the slopes of all points, scaled so that a product is an integral
   std::array<Eigen::Matrix<double, kRulePoints, kNodes>, 3> slopes;
   Eigen::Matrix<double, kUnknowns, kPressures> divergence = Eigen::Matrix<double, kUnknowns, kPressures>::Zero();
+  Eigen::Matrix4d compressibility = Eigen::Matrix4d::Zero();  // (q_m, q_n / lambda), times the gel's lambda
   for (int q = 0; q < kRulePoints; ++q) {
     const QuadraturePoint& point = element.points[q];
+    const double modulus = substrate::relative_modulus(material, point.position_um.z(), middle_um);
     for (int axis = 0; axis < 3; ++axis) {
-      slopes[axis].row(q) = std::sqrt(mu_kPa * point.volume_um3) * point.slopes.col(axis).transpose();
+      slopes[axis].row(q) = std::sqrt(modulus * mu_kPa * point.volume_um3) * point.slopes.col(axis).transpose();
     }
+    compressibility += point.volume_um3 / modulus * point.pressures * point.pressures.transpose();
     const Eigen::Matrix<double, 3, kNodes, Eigen::ColMajor> by_node = point.slopes.transpose();
     divergence += point.volume_um3 * Eigen::Map<const Eigen::Matrix<double, kUnknowns, 1>>(by_node.data()) *
                   point.pressures.transpose();
   }
   // 2 mu eps : eps = mu (grad_a . grad_b d_ij + d_j N_a d_i N_b)
-  Eigen::MatrixXd stiffness = lambda_kPa * divergence * element.mass.ldlt().solve(divergence.transpose());
+  Eigen::MatrixXd stiffness =
+      substrate::lame_modulus_kPa(material.gel) * divergence * compressibility.ldlt().solve(divergence.transpose());
   Eigen::Matrix<double, kNodes, kNodes> even = Eigen::Matrix<double, kNodes, kNodes>::Zero();
   const auto block = [&](int i, int j) {
     return stiffness(Eigen::seqN(i, Eigen::fix<kNodes>, 3), Eigen::seqN(j, Eigen::fix<kNodes>, 3));
@@ -137,4 +148,4 @@ FacePoint face_point(const NodePositions& nodes_um, double x, double y) {
   return {nodes_um * shapes_at(unit), jacobian.col(1).cross(jacobian.col(0))};
 }
 
-}  // namespace mbtfm::curved
+}  // namespace mbtfm::elements
