@@ -88,7 +88,7 @@ StageReport run_in_space(const SimulateParameters& p, stage::StageContext& conte
                     {"noise_um", scene.noise_um},
                     {"share_beside_patches", scene.share_beside_patches}};
   report.summary = std::string(name_of(p.space.scene)) + ": " + std::to_string(scene.patches.size()) +
-                   " patches, total force " + brief(total_nN) + " nN, largest displacement " +
+                   " patches, whose forces are " + brief(total_nN) + " nN in all, largest displacement " +
                    brief(scene.largest_displacement_um) + " um, " + std::to_string(scene.truth.size()) + " beads";
   return report;
 }
