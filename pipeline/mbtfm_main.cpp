@@ -253,6 +253,7 @@ int tell(const runner::Verification& found, const std::string& what) {
 
 int repeat(const CommandLine& line) {
   speak_for_stages(line);
+  if (!files::is_file(line.folder)) runner::require_folder(line.folder, "a cell folder");
   const fs::path run_json = files::is_file(line.folder) ? line.folder : line.folder / "run.json";
   const fs::path inputs = line.inputs.empty() ? run_json.parent_path() : line.inputs;
   return tell(runner::repeat_run(run_json, inputs, line.out, run_options(line), say), line.out.string());

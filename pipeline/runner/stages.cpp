@@ -101,8 +101,10 @@ Setting parse_setting(const std::string& text) {
   const std::size_t equals = text.find('='), point = text.substr(0, equals).find('.');
   if (equals == text.npos || equals + 1 == text.size() || equals == (point == text.npos ? 0 : point + 1))
     throw UsageError("--set " + text + ": expected TABLE.KEY=VALUE, as in gel.youngs_modulus_kPa=4");
+  const std::string meant = stage::did_you_mean({"pixel_size_um"}, text.substr(0, equals));
   if (point == text.npos && !text.starts_with("pixel_size_um="))  // the one above the first table
-    throw UsageError("--set " + text + ": expected its table, too: TABLE.KEY=VALUE, as in gel.youngs_modulus_kPa=4");
+    throw UsageError("--set " + text + ": expected its table, too: TABLE.KEY=VALUE, as in gel.youngs_modulus_kPa=4" +
+                     (meant.empty() ? "" : "; " + meant));
   const std::string table = point == text.npos ? "" : text.substr(0, point);
   const std::size_t begin = point == text.npos ? 0 : point + 1;
   std::set<std::string> tables = {"effects"};
@@ -110,9 +112,9 @@ Setting parse_setting(const std::string& text) {
   if (table == "images" || table == "run")
     throw UsageError("--set " + text + ": [" + table + "] is for cell.toml alone: write it there");
   if (!tables.contains(table)) {
-    const std::string meant = stage::did_you_mean({tables.begin(), tables.end()}, table);
+    const std::string named = stage::did_you_mean({tables.begin(), tables.end()}, table);
     throw UsageError("--set " + text + ": expected a table of cell.toml, found '" + table + "'" +
-                     (meant.empty() ? "; there are " + listed(tables) : "; " + meant));
+                     (named.empty() ? "; there are " + listed(tables) : "; " + named));
   }
   if (const std::size_t comma = text.find(',', equals);
       comma != text.npos && text.find('=', comma) != text.npos && text.find('.', comma) < text.find('=', comma))

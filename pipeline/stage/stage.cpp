@@ -456,10 +456,8 @@ int run_stage(const StageDescription& description, int argc, char** argv,
       print(app.help());
       return kDone;
     } catch (const CLI::ParseError& error) {
-      const bool is_run = std::getenv(kRunnerVariable) != nullptr;
-      throw UsageError(
-          error.what() + suggestion(app, error.what()) + how_files_are_given(description, error.what()) +
-          (is_run ? " (--set takes the keys of docs/parameters.md)" : " (see mbtfm-" + stage + " --help)"));
+      throw UsageError(error.what() + suggestion(app, error.what()) + how_files_are_given(description, error.what()) +
+                       " (see mbtfm-" + stage + " --help)");
     }
     if (line.only_version || line.only_parameters) {
       print(line.only_version ? "mbtfm-" + stage + " " + kVersion + "\n" : to_markdown(list));

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
+#include <climits>
 #include <iterator>
 #include <regex>
 #include <set>
@@ -100,6 +101,8 @@ constexpr Elsewhere kElsewhere[] = {
     {"v", "version"},
     {"? man usage", "help"},
     {"q silent", "quiet"},
+    {"density", "beads_per_um2"},
+    {"density", "beads_per_um3"},
     {"seed scenario", "mbtfm-simulate makes other cells: mbtfm-simulate --help"},
     {"start go execute analyse analyze analysis process", "run"},
     {"all folder runall run-all", "batch"},
@@ -139,7 +142,7 @@ std::string named_elsewhere(const std::vector<std::string>& known, std::string_v
 }  // namespace
 
 std::string did_you_mean(const std::vector<std::string>& known, std::string_view word) {
-  constexpr std::size_t kShortest = 3, kMost = 12;  // letters of a beginning, words that are offered
+  constexpr std::size_t kShortest = 3, kMost = 16;  // letters of a beginning, words that are offered
   if (std::string named = named_elsewhere(known, word); !named.empty()) return named;
   const std::string typed = lower(word);
   std::vector<std::string> meant;
@@ -147,17 +150,20 @@ std::string did_you_mean(const std::vector<std::string>& known, std::string_view
     if (meant.empty()) std::ranges::copy_if(known, std::back_inserter(meant), is_meant);
   };
   const auto closest = std::ranges::min_element(known, {}, [&](const auto& k) { return edit_distance(k, word); });
-  const auto add_closest = [&](int share) {  // of its letters: fewer may be wrong
-    const auto n_letters = [](const std::string& k) { return static_cast<int>(lower(k).size()); };
-    add([&](const auto& k) { return &k == &*closest && share * edit_distance(k, word) < n_letters(k) + (share > 2); });
+  const auto add_closest = [&](int share, int most) {  // how many letters may be wrong: fewer than a share, and so many
+    const auto is_near = [&](const std::string& k) {
+      const int n_wrong = edit_distance(k, word);
+      return n_wrong <= most && share * n_wrong < static_cast<int>(lower(k).size()) + (share > 2);
+    };
+    add([&](const auto& k) { return &k == &*closest && is_near(k); });
   };
   add([&](const std::string& k) { return lower(k) == typed; });
   add([&](const std::string& k) { return typed.size() >= kShortest && lower(k).starts_with(typed); });
-  add_closest(3);
+  add_closest(3, 2);
   int most = 1;
   for (const std::string& k : known) most = std::max(most, n_common_parts(k, word));
   add([&](const std::string& k) { return n_common_parts(k, word) == most; });
-  add_closest(2);
+  add_closest(2, INT_MAX);
   add([&](const std::string& k) { return lower(k).size() >= kShortest && typed.starts_with(lower(k)); });
   return meant.empty() || meant.size() > kMost ? "" : "did you mean " + quoted(meant) + "?";
 }
