@@ -79,7 +79,8 @@ std::vector<Listing> tables_of_sheet(const fs::path& estimates, const fs::path& 
        files::read_text(models), "model, n_parameters, chi_squared: χ², relative_l2: relative L2, aic: AIC, bic: BIC"},
       {"Where the errors come from",
        "Parts of each standard error; their squares add up to its square. By motion: that all beads share. By "
-       "model: what the sheet leaves beyond noise. By gel: its stated errors. By substrate: the model of the gel.",
+       "model: what the sheet leaves beyond noise. By gel: its stated errors. By substrate: the model of the gel. A "
+       "part that is not there was not asked for.",
        of + "sheet_fit.csv", fit_csv,
        "*quantity, part, sigma, by_beads, by_motion, by_model, by_variation, by_mesh, by_outline, by_gel, "
        "by_substrate"}};

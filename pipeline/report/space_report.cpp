@@ -61,7 +61,7 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   facts.push_back(
       fmt::format("The cell pulls and presses with {} in total, the sum of the sizes of its tractions over {}; {} nN "
                   "of it along the surface’s normal. The largest traction is {} kPa. Smoothing lowers this sum and "
-                  "noise raises it: trust the moment.",
+                  "noise raises it: the moment is known better.",
                   with_error(total, r.find("total_force_sigma_nN"), "nN"), r.texts.at("tractions_over"),
                   readable(r.number("normal_force_nN")), readable(largest_traction_kPa(r))));
   if (const auto flipped = r.find("flipped_z_chi_squared")) {
@@ -114,12 +114,12 @@ std::string svg_of(const Path& file, const std::string& title, const std::string
 
 std::string space_section(const SpaceResults& r) {
   const ColourScale colours = traction_colours(r);
-  return section(
-      "In space",
-      "<figure><h3>Tractions on the surface</h3>\n" + picture_in_space(r, colours) + legend(colour_bar(colours)) +
-          "<figcaption>The gel’s surface from above. Colour: size of the traction; grey: none was looked for. "
-          "Arrows: the strongest tractions. To turn it: paraview --script=view_in_paraview.py in the cell’s "
-          "folder.</figcaption></figure>\n");
+  return section("In space",
+                 "<figure><h3>Tractions on the surface</h3>\n" + picture_in_space(r, colours) +
+                     legend(colour_bar(colours)) +
+                     "<figcaption>The gel’s surface from a side and above. Colour: size of the traction; grey: none "
+                     "was looked for. Arrows: the strongest tractions. To turn it: paraview "
+                     "--script=view_in_paraview.py in the cell’s folder.</figcaption></figure>\n");
 }
 
 std::string map_section(const SpaceResults& r) {

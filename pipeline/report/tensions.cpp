@@ -305,8 +305,8 @@ std::string tension_notes(const CellResults& results) {
       readable(results.fit.network_surface_tension_nN_per_um));
   if (results.comparison) {
     html +=
-        " Error: fitted minus true tension, in per cent, and in halves of the 95 % interval: between −1 and +1 it "
-        "holds the truth.";
+        " Error: fitted minus true tension, in per cent if the truth exceeds half the 95 % interval, and in halves of "
+        "this interval: between −1 and +1 it holds the truth.";
   }
   html += "</p>\n";
   return results.comparison ? html + missed_fibres(*results.comparison) : html;

@@ -79,7 +79,7 @@ std::string about_most_fibres(const Plan& plan, const Needed& n) {
   const std::string half = "That holds for half of the fibres. ";
   if (!n.of_most)
     return half +
-           "Nine in ten do not reach it with any number of beads: mesh and segmentation alone make a larger error.";
+           "No number of beads brings nine in ten there: for some, mesh and segmentation alone make a larger error.";
   if (*n.of_most <= plan.most_beads_per_um2)
     return half + "Nine in ten need " + density_text(plan.asked.densities, *n.of_most) + " beads per µm².";
   return half + "Nine in ten need " + about(*n.of_most) + " beads per µm², more than the " +
