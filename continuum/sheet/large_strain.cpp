@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "continuum/sheet/stiffness.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"

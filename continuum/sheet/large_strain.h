@@ -4,10 +4,12 @@
 #include <functional>
 #include <optional>
 
-#include "continuum/sheet/stiffness.h"
+#include "continuum/sheet/sheet.h"
 #include "pipeline/contract/report.h"
 
 namespace mbtfm::sheet {
+
+struct Stiffness;
 
 /// What contraction pulls at when strains are large.
 enum class ContractionMeasure {
