@@ -10,7 +10,6 @@
 #include <sstream>
 
 #include "pipeline/contract/listed.h"
-#include "pipeline/stage/manual.h"
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::stage {
@@ -36,9 +35,9 @@ int edit_distance(std::string_view a, std::string_view b) {
   return d[a.size()][b.size()];
 }
 
-void add_words(const DeclaredCommand& command, std::vector<std::string>& words) {
-  for (const DeclaredOption& option : command.options)
-    if (!option.flag.empty()) words.push_back(option.flag);
+void add_flags(const CLI::App& app, std::vector<std::string>& flags) {
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
 }
 
 /// A flag with a dash that a text program made of "--", and blanks around "="; empty: neither.
@@ -170,15 +169,14 @@ std::string did_you_mean(const std::vector<std::string>& known, std::string_view
 
 std::string suggestion(const CLI::App& app, const std::string& error) {
   if (!error.starts_with("The following argument")) return {};  // was, or were, not expected: CLI::ExtrasError
-  const DeclaredCommand program = declared(app);
   std::vector<std::string> flags, commands;
-  add_words(program, flags);
+  add_flags(app, flags);
   const CLI::App* given = nullptr;
-  for (const DeclaredCommand& command : program.subcommands) {
-    commands.push_back(command.name);
-    if (!app.got_subcommand(command.name)) continue;
-    add_words(command, flags);
-    given = app.get_subcommand(command.name);
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    commands.push_back(command->get_name());
+    if (!command->parsed()) continue;
+    add_flags(*command, flags);
+    given = command;
   }
   const std::string unknown = error.substr(std::min(error.size(), error.find(": ") + 1));
   if (const std::string typed = slip_in(unknown); !typed.empty()) return typed;
