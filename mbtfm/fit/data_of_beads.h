@@ -7,7 +7,7 @@
 #include "mbtfm/fit/parameters.h"
 #include "mbtfm/tensions/beyond_cut.h"
 #include "mbtfm/tensions/linear_data.h"
-#include "mbtfm/tensions/under_load.h"
+#include "mbtfm/tensions/placement.h"
 #include "substrate/compliance.h"
 
 namespace mbtfm::fit {

@@ -6,7 +6,7 @@
 #include "mbtfm/fit/effects.h"
 #include "mbtfm/fit/networks.h"
 #include "mbtfm/fit/strained_gel.h"
-#include "mbtfm/tensions/energy.h"
+#include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/findings.h"
 #include "mbtfm/tensions/missing.h"

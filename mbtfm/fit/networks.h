@@ -6,7 +6,7 @@
 
 #include "mbtfm/fit/parameters.h"
 #include "mbtfm/tensions/linear_data.h"
-#include "mbtfm/tensions/tension_problem.h"
+#include "mbtfm/tensions/tension_fit.h"
 #include "pipeline/contract/network.h"
 #include "pipeline/contract/results.h"
 

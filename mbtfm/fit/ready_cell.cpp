@@ -4,7 +4,7 @@
 
 #include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/fit/networks.h"
-#include "mbtfm/tensions/beyond_border.h"
+#include "mbtfm/tensions/search.h"
 #include "mbtfm/tensions/effects.h"
 #include "mbtfm/tensions/second_placement.h"
 #include "network/cables/effects.h"

@@ -9,7 +9,6 @@
 #include "mbtfm/tensions/beyond_cut.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/placement.h"
-#include "mbtfm/tensions/under_load.h"
 #include "pipeline/contract/work.h"
 
 namespace mbtfm::fit {

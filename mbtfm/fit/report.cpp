@@ -5,7 +5,7 @@
 #include "mbtfm/fit/checks.h"
 #include "mbtfm/fit/fit_cell.h"
 #include "mbtfm/tensions/findings.h"
-#include "mbtfm/tensions/noise.h"
+#include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"

@@ -8,7 +8,7 @@
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/fit_results.h"
-#include "mbtfm/tensions/under_load.h"
+#include "mbtfm/tensions/placement.h"
 #include "substrate/compliance.h"
 
 namespace mbtfm::sheets {
