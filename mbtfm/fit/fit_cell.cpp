@@ -2,9 +2,8 @@
 
 #include <mutex>
 
-#include "mbtfm/fit/data_of_beads.h"
+#include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/fit/effects.h"
-#include "mbtfm/fit/networks.h"
 #include "mbtfm/fit/strained_gel.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/error_budget.h"
