@@ -5,7 +5,7 @@
 #include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/spatial/rows.h"
-#include "mbtfm/tractions/recurrences.h"
+#include "mbtfm/tractions/spectrum.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"

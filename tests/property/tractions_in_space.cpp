@@ -6,7 +6,7 @@
 #include "mbtfm/spatial/loss.h"
 #include "mbtfm/spatial/repeated.h"
 #include "mbtfm/spatial/rows.h"
-#include "mbtfm/tractions/recurrences.h"
+#include "mbtfm/tractions/spectrum.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/findings.h"
 #include "tests/support/half_space_problem.h"
