@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/spatial/basis.h"
+#include "mbtfm/spatial/traction_mesh.h"
 #include "mbtfm/spatial/loss.h"
 #include "mbtfm/spatial/problem.h"
 #include "mbtfm/tractions/parameters.h"

@@ -3,7 +3,7 @@
 #include <numbers>
 
 #include "mbtfm/spatial/reconstruction.h"
-#include "mbtfm/spatial/rows.h"
+#include "mbtfm/spatial/problem.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"
