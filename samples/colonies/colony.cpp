@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "continuum/sheet/decide.h"
+#include "continuum/sheet/parameters.h"
 #include "continuum/sheet/mesh_size.h"
 #include "pipeline/contract/errors.h"
 #include "samples/drawing/geometry.h"

@@ -1,7 +1,7 @@
 /// Sheets bonded to gels against an exact spectral solution (tests/data/reference/chapter4).
 #include <Eigen/LU>
 
-#include "continuum/sheet/decide.h"
+#include "continuum/sheet/parameters.h"
 #include "continuum/sheet/forward.h"
 #include "continuum/sheet/mesh_size.h"
 #include "pipeline/contract/errors.h"
