@@ -23,13 +23,6 @@ Sample& operator+=(Sample& a, const Sample& b) {
   return a;
 }
 
-/// Weights of the four nodes around a share of the way from the second to the third. Source: Keys, IEEE Trans. ASSP 29
-/// (1981) 1153, a = -1/2.
-std::array<double, 4> keys(double s) {
-  return {s * (-0.5 + s * (1 - 0.5 * s)), 1 + s * s * (-2.5 + 1.5 * s), s * (0.5 + s * (2 - 1.5 * s)),
-          s * s * (-0.5 + 0.5 * s)};
-}
-
 Vec2 squared(Vec2 v) { return {v.x * v.x, v.y * v.y}; }
 Vec2 root(Vec2 v) { return {std::sqrt(std::max(0.0, v.x)), std::sqrt(std::max(0.0, v.y))}; }
 
@@ -58,7 +51,7 @@ std::optional<Sample> CellField::at(Vec2 place_um) const {
   const Vec2 at = (1 / spacing_um_) * (there - origin_um_);
   const int column = static_cast<int>(std::floor(at.x)), row = static_cast<int>(std::floor(at.y));
   if (column < 0 || row < 0 || column >= n_columns_ || row >= n_rows_) return std::nullopt;
-  const auto by_column = keys(at.x - column), by_row = keys(at.y - row);
+  const auto by_column = tractions::keys_weights(at.x - column), by_row = tractions::keys_weights(at.y - row);
   Sample sum;
   for (int j = 0; j < 4; ++j) {
     for (int i = 0; i < 4; ++i) {

@@ -43,32 +43,13 @@ struct Pair {
   Vec2 moved, way;
 };
 
-Pair nearest_pair(Vec2 point, const Polygon& line) {
-  Vec2 nearest = line.back();
-  double least = dot(point - nearest, point - nearest);
-  Vec2 before = line.back();
-  for (const Vec2 corner : line) {
-    const Vec2 span = corner - before;
-    const double length2 = dot(span, span);
-    const double share = length2 > 0 ? std::clamp(dot(point - before, span) / length2, 0.0, 1.0) : 0;
-    const Vec2 candidate = before + share * span;
-    const double distance2 = dot(point - candidate, point - candidate);
-    if (distance2 < least) {
-      least = distance2;
-      nearest = candidate;
-    }
-    before = corner;
-  }
-  return {point, point - nearest};
-}
-
 /// Each outline's points with the nearest ones of the other.
 std::vector<Pair> pairs_of(const Polygon& moved_outline, const Polygon& reference) {
   std::vector<Pair> pairs;
-  for (const Vec2 p : moved_outline) pairs.push_back(nearest_pair(p, reference));
+  for (const Vec2 p : moved_outline) pairs.push_back({p, p - nearest_on_boundary_um(reference, p)});
   for (const Vec2 q : reference) {
-    const Pair seen = nearest_pair(q, moved_outline);
-    pairs.push_back({q - seen.way, -1.0 * seen.way});
+    const Vec2 seen = nearest_on_boundary_um(moved_outline, q);
+    pairs.push_back({seen, seen - q});
   }
   return pairs;
 }
@@ -121,7 +102,7 @@ double independent(const std::vector<double>& values) {
 std::vector<double> signed_distances(const Polygon& outline, const Polygon& reference) {
   std::vector<double> distances;
   for (const Vec2 p : outline)
-    distances.push_back((contains(reference, p) ? -1 : 1) * norm(nearest_pair(p, reference).way));
+    distances.push_back((contains(reference, p) ? -1 : 1) * distance_to_boundary_um(reference, p));
   return distances;
 }
 
