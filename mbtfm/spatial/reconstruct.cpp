@@ -2,8 +2,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/spatial/problem.h"
+#include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/spatial/traction_mesh.h"
 #include "mbtfm/tractions/spectrum.h"
 #include "pipeline/contract/errors.h"

@@ -270,14 +270,8 @@ double standard_error(const EnsembleFit& fit, const VectorXd& gradient) {
   return std::sqrt(variance + own_variances(fit, gradient)[0]);
 }
 
-Vec2 centre_of(const std::vector<substrate::Ellipse>& ellipses) {
-  Vec2 sum{};
-  for (const substrate::Ellipse& e : ellipses) sum = sum + e.centre_um;
-  return 1.0 / static_cast<double>(ellipses.size()) * sum;
-}
-
 Figures moments_of(const EnsembleFit& fit, const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN) {
-  const Vec2 centre = centre_of(ellipses);
+  const Vec2 centre = centre_of(ellipses, &substrate::Ellipse::centre_um);
   Eigen::Matrix2d moment = Eigen::Matrix2d::Zero();
   VectorXd of_trace(forces_nN.size());
   for (Index a = 0; a < std::ssize(ellipses); ++a) {

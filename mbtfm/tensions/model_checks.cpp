@@ -30,6 +30,12 @@ MatrixXd chords(const std::vector<Vec2>& places_um, const std::vector<std::array
   return forces;
 }
 
+/// Of the adhesion in the list.
+std::size_t place_of(int adhesion_id, const std::vector<Adhesion>& adhesions) {
+  const auto at = std::ranges::find(adhesions, adhesion_id, &Adhesion::adhesion_id);
+  return static_cast<std::size_t>(at - adhesions.begin());
+}
+
 constexpr double kTradeOff = -0.95;  // see fibres_not_told_apart
 
 /// Forces of the one tension of all cables that fits best: Gauss–Newton in one variable. Zero where the beads want the
@@ -166,10 +172,7 @@ LinearData with_missing_fibres(LinearData data, const std::vector<Adhesion>& adh
   std::vector<std::array<std::size_t, 2>> pairs;
   VectorXd tensions_nN(std::ssize(fibres));
   for (std::size_t k = 0; k < fibres.size(); ++k) {
-    const auto place = [&](int id) {
-      return static_cast<std::size_t>(std::ranges::find(adhesions, id, &Adhesion::adhesion_id) - adhesions.begin());
-    };
-    pairs.push_back({place(fibres[k].start_adhesion_id), place(fibres[k].end_adhesion_id)});
+    pairs.push_back({place_of(fibres[k].start_adhesion_id, adhesions), place_of(fibres[k].end_adhesion_id, adhesions)});
     tensions_nN[static_cast<Index>(k)] = fibres[k].tension_nN;
   }
   // Ten times what was found bounds nothing, but forces along these pairs are then no direction without any meaning.
@@ -302,10 +305,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   const auto is_end = [&](std::size_t a) { return std::ranges::find(ends, a) != ends.end(); };
   for (const MissingFibre& f : found) {
     if (ends.size() == 2 * kMostMissingFibres) break;
-    const auto place = [&](int id) {
-      return static_cast<std::size_t>(std::ranges::find(adhesions, id, &Adhesion::adhesion_id) - adhesions.begin());
-    };
-    const std::size_t a = place(f.start_adhesion_id), b = place(f.end_adhesion_id);
+    const std::size_t a = place_of(f.start_adhesion_id, adhesions), b = place_of(f.end_adhesion_id, adhesions);
     if (!is_end(a) && !is_end(b)) ends.insert(ends.end(), {a, b});
   }
   std::vector<Index> components;

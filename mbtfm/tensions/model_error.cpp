@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
@@ -167,8 +168,7 @@ constexpr double kDegrees = 4;  // ν
 /// By force: the sums that are zero if all forces together balance; 2·adhesions × 3, or × 0.
 MatrixXd sums_in_balance(const std::vector<Vec2>& centres_um) {
   MatrixXd sums(2 * std::ssize(centres_um), centres_um.empty() ? 0 : 3);
-  Vec2 middle;
-  for (const Vec2 c : centres_um) middle += (1.0 / static_cast<double>(centres_um.size())) * c;
+  const Vec2 middle = centre_of(centres_um);
   for (std::size_t a = 0; a < centres_um.size(); ++a) {
     const Vec2 arm = centres_um[a] - middle;
     sums.middleRows<2>(2 * static_cast<Index>(a)) << 1, 0, -arm.y, 0, 1, arm.x;

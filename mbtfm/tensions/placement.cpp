@@ -47,9 +47,7 @@ Slopes slopes_of_point(const Gel& gel, Vec2 offset_um, Vec2 F) {
 /// Of the force spread over the ellipse, by differences of the exact field.
 Slopes slopes_of_ellipse(const greens::HalfSpaceEllipse& field, double step_um, Vec2 at, Vec2 F) {
   const auto difference = [&](Vec2 h) {
-    const greens::Sym2 a = field.compliance_um_per_nN(at + h), b = field.compliance_um_per_nN(at - h);
-    const greens::Sym2 d = 1 / (2 * step_um) * greens::Sym2{a.xx - b.xx, a.xy - b.xy, a.yy - b.yy};
-    return Vec2{d.xx * F.x + d.xy * F.y, d.xy * F.x + d.yy * F.y};
+    return 1 / (2 * step_um) * (field.compliance_um_per_nN(at + h) - field.compliance_um_per_nN(at - h)) * F;
   };
   return {difference({step_um, 0}), difference({0, step_um})};
 }
@@ -135,12 +133,6 @@ Placement moved(Placement placement, const Eigen::Vector3d& step) {
   return placement;
 }
 
-Vec2 centre_of(const Cell& cell) {
-  Vec2 sum;
-  for (const Adhesion& a : cell.adhesions) sum += a.position_um;
-  return (1 / std::max<double>(1, static_cast<double>(cell.adhesions.size()))) * sum;
-}
-
 /// Of the adhesions about their centre, root mean square.
 double lever_of(const Cell& cell, Vec2 centre_um) {
   double squares = 0;
@@ -217,8 +209,7 @@ VectorXd carried_um(const Gel& gel, const std::vector<Ellipse>& ellipses, const 
         sum += by.x * slopes.by_x + by.y * slopes.by_y;
         continue;
       }
-      const greens::Sym2 a = fields[k].compliance_um_per_nN(at), c = fields[k].compliance_um_per_nN(at + by);
-      sum += {(c.xx - a.xx) * F.x + (c.xy - a.xy) * F.y, (c.xy - a.xy) * F.x + (c.yy - a.yy) * F.y};
+      sum += (fields[k].compliance_um_per_nN(at + by) - fields[k].compliance_um_per_nN(at)) * F;
     }
     change.segment<2>(row) << sum.x, sum.y;
   });
@@ -245,7 +236,7 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
   constexpr int kMostPasses = 12;  // far off it takes four
   const double width_um = mean_semi_minor_um(cell);
   const std::vector<substrate::Ellipse> ellipses = substrate::ellipses_of(cell.adhesions);
-  const Placement none{.centre_um = centre_of(cell), .shift_um = {}};
+  const Placement none{.centre_um = centre_of(cell.adhesions, &Adhesion::position_um), .shift_um = {}};
   const double lever_um = lever_of(cell, none.centre_um);
   PlacedCell result{.placement = none, .data = {}, .start = start, .effect = {}};
   const auto off = [&](const std::string& why) {

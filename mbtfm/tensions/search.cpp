@@ -156,9 +156,9 @@ void Left::for_each_block(const std::function<void(Index, const MatrixXd&)>& bod
 
 namespace {
 
-constexpr double kDepth_um = 60;  // of a spread cell
-constexpr double kPiece_um = 30;  // half of its breadth
-constexpr double kMost = 10;      // pieces of a side: a field that is wider has room for rest
+constexpr double kDepth_um = 60;    // of a spread cell
+constexpr double kPiece_um = 30;    // half of its breadth
+constexpr double kMostPieces = 10;  // of a side: a field that is wider has room for rest
 
 struct Piece {
   Vec2 low_um, high_um;
@@ -169,7 +169,9 @@ struct Piece {
 std::vector<Piece> pieces_around(const Extent& field) {
   const auto& [low, high] = field;
   const Vec2 size = high - low, deep{kDepth_um, kDepth_um};
-  const auto n_along = [](double um) { return static_cast<int>(std::clamp(std::round(um / kPiece_um), 1.0, kMost)); };
+  const auto n_along = [](double um) {
+    return static_cast<int>(std::clamp(std::round(um / kPiece_um), 1.0, kMostPieces));
+  };
   const int n_across = n_along(size.x), n_down = n_along(size.y);
   const Vec2 step{size.x / n_across, size.y / n_down};
   std::vector<Piece> pieces{{low - deep, low}};
