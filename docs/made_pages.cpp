@@ -9,7 +9,7 @@
 #include "continuum/sheet/tables.h"
 #include "continuum/solids/outputs.h"
 #include "mbtfm/mean/outputs.h"
-#include "mbtfm/sheets/tables.h"
+#include "mbtfm/sheets/bead_fit.h"
 #include "mbtfm/spatial/stage.h"
 #include "mbtfm/tensions/tables.h"
 #include "mbtfm/tractions/traction.h"

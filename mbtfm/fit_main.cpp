@@ -3,8 +3,6 @@
 
 #include "mbtfm/fit/files.h"
 #include "mbtfm/fit/fit_cell.h"
-#include "mbtfm/fit/report.h"
-#include "mbtfm/fit/usual_method.h"
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm::fit {

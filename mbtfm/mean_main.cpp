@@ -1,7 +1,7 @@
 /// mbtfm-mean: the mean displacement and traction of cells of one shape.
 #include "mbtfm/mean/cells.h"
 #include "mbtfm/mean/model.h"
-#include "mbtfm/mean/symmetry.h"
+#include "mbtfm/mean/registration.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include "continuum/sheet/recovery.h"
 
-#include "mbtfm/sheet_stage/outputs.h"
+#include "mbtfm/sheet_stage/runs.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "continuum/sheet/bundles.h"
+#include "continuum/sheet/elements.h"
+#include "continuum/sheet/large_strain.h"
 #include "continuum/sheet/on_gel.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/contract/words.h"
@@ -118,5 +120,22 @@ struct Balance {
   double area_um2 = 0;
 };
 Balance balance_of(const Solution& solution);
+
+// A sheet on springs: small strains in one solve, large ones by Newton's method.
+
+/// u of a sheet on springs, small strains. @throws NotSolved where nothing holds the sheet
+NodeVectors on_springs(const Elements& elements, const Sheet& sheet, int threads);
+
+/// The same at large strains; springs per area at rest. @throws as in_load_steps
+LargeStrain on_springs_large(const Elements& elements, const Sheet& sheet, ContractionMeasure measure, int threads);
+
+// A sheet whose outline lies elsewhere, on the same triangles: another mesh would differ by more than the outline
+// does.
+
+/// The rims lie further out by this much: the sheet grows, its holes shrink. Inside, nodes follow as those of an
+/// elastic sheet whose rims are pulled there.
+/// @param n_rims  curves 0 … n_rims − 1 are rims: the outer one, then holes
+/// @throws InvalidData where a triangle is turned inside out
+Elements with_rims_further_out(const Elements& elements, int n_rims, double outward_um);
 
 }  // namespace mbtfm::sheet

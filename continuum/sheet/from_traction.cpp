@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -13,7 +14,57 @@
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::sheet {
+
 namespace {
+
+/// Along which axis a cut holds the sheet if it is held across.
+std::size_t axis_across(const std::pair<Vec2, Vec2>& cut) {
+  constexpr double kAslant = 1e-3;  // of its length: coordinates are written with some digits
+  const Vec2 along = cut.second - cut.first;
+  if (std::min(std::abs(along.x), std::abs(along.y)) > kAslant * norm(along))
+    throw InvalidData("the outline's cut from (" + brief(cut.first.x) + ", " + brief(cut.first.y) + ") um",
+                      "a piece along x or y, as the image's border runs",
+                      "one to (" + brief(cut.second.x) + ", " + brief(cut.second.y) + ") um");
+  return std::abs(along.x) > std::abs(along.y) ? 1 : 0;
+}
+
+/// The sheet's hold at its cuts.
+struct CutHold {
+  std::vector<std::array<bool, 2>> held;  ///< by node, along x and y; empty: nowhere
+  std::array<bool, 2> holds{};            ///< the sheet as a whole, along x and y
+  double length_um = 0;                   ///< of all cuts
+  bool is_anywhere() const { return holds[0] || holds[1]; }
+};
+
+/// @param region  whose cuts run along x or along y, as an image's border does. @throws InvalidData where one does not
+CutHold hold_at_cuts(const Elements& elements, const Region& region, CutEdge edge) {
+  CutHold hold;
+  if (region.cuts.empty() || edge == CutEdge::free) return hold;
+  constexpr double kOnCut = 0.05;  // of a side: curves through the outline's points are rounded where it turns a little
+  const std::vector<Vec2>& x = elements.triangles().nodes_um;
+  hold.held.assign(x.size(), {false, false});
+  for (const Triangles::Side& side : elements.triangles().sides) {
+    if (side.curve >= std::ssize(region.rims)) continue;
+    const double length = norm(x[side.nodes[1]] - x[side.nodes[0]]);
+    const auto nearest = [&](int node) {
+      return std::ranges::min_element(
+          region.cuts, {}, [&](const auto& cut) { return distance_to_segment_um(x[node], cut.first, cut.second); });
+    };
+    const bool is_cut = std::ranges::all_of(side.nodes, [&](int node) {
+      const auto cut = nearest(node);
+      return distance_to_segment_um(x[node], cut->first, cut->second) < kOnCut * length;
+    });
+    if (!is_cut) continue;
+    hold.length_um += length;
+    const std::size_t across = axis_across(*nearest(side.nodes[2]));
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      if (axis != across && edge == CutEdge::held) continue;
+      hold.holds[axis] = true;
+      for (const int node : side.nodes) hold.held[node][axis] = true;
+    }
+  }
+  return hold;
+}
 
 /// A part of a patch, where the sheet takes it.
 struct Part {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "continuum/sheet/cut_edge.h"
+#include "continuum/sheet/elements.h"
 #include "continuum/sheet/forward.h"
 
 namespace mbtfm::sheet {
@@ -45,6 +45,13 @@ struct FromTraction {
 
 /// A fifth: what smoothing and noise leave of a whole colony's forces is below.
 inline constexpr double kMostUnbalanced = 0.2;
+
+/// What is taken for known along a cut, of which nothing is known.
+enum class CutEdge {
+  held,     ///< no displacement across the cut, no shear: as where the sheet beyond mirrors what is seen
+  clamped,  ///< no displacement at all
+  free      ///< as a rim: nothing pulls there
+};
 
 /// S of a free sheet under −T: div S = T, S n = 0 on the rims. An elastic law decides what balance alone does not; S
 /// does not depend on its modulus. A patch whose centre lies in the region acts as the square of its area; the

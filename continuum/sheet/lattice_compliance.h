@@ -4,7 +4,7 @@
 #include <Eigen/SparseCore>
 #include <array>
 
-#include "continuum/sheet/patch_compliance.h"
+#include "continuum/sheet/patches.h"
 #include "pipeline/numerics/waves.h"
 #include "substrate/compliance.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "continuum/sheet/large_strain.h"
-#include "continuum/sheet/patch_compliance.h"
+#include "continuum/sheet/patches.h"
 #include "substrate/compliance.h"
 
 namespace mbtfm::sheet {

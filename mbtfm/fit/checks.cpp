@@ -5,7 +5,6 @@
 
 #include "mbtfm/sheets/beside_fibres.h"
 #include "mbtfm/tensions/evidence.h"
-#include "mbtfm/tensions/existence.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::fit {

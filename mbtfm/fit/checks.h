@@ -6,7 +6,6 @@
 
 #include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/tensions/common_motion.h"
-#include "mbtfm/tensions/cross_validation.h"
 #include "mbtfm/tensions/missing_adhesions.h"
 #include "mbtfm/tensions/model_checks.h"
 

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
-#include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/fit/fit_cell.h"
-#include "mbtfm/fit/networks.h"
+#include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/tensions/beyond_cut.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/effects.h"
+#include "pipeline/contract/kinds_of_effects.h"
 #include "substrate/choice/factory.h"
 
 namespace mbtfm::fit {

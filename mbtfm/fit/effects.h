@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mbtfm/tensions/explain.h"
+#include "mbtfm/tensions/effects.h"
 
 namespace mbtfm::fit {
 

@@ -3,6 +3,8 @@
 
 #include "mbtfm/fit/inputs.h"
 #include "mbtfm/fit/parameters.h"
+#include "pipeline/contract/gel.h"
+#include "pipeline/contract/stage_report.h"
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm::fit {
@@ -13,5 +15,16 @@ struct FittedCell;
 Inputs read_inputs(stage::StageContext& context, const Parameters& parameters);
 
 void write_results(stage::StageContext& context, const FittedCell& cell, const DisplacementField& tracked);
+
+// What the usual method says of the same beads: tractions by FTTC, beside the fit and never in it.
+
+/// fttc.csv and fttc.json: as mbtfm-traction writes them with its defaults, on and around the cell. If the beads do not
+/// allow it, fttc.json has the reason as its `obstacle`, and there is no fttc.csv.
+void write_usual_method(stage::StageContext& context, const Inputs& inputs, const Gel& gel);
+
+// What the fit tells of itself: into its record and the last line on the terminal.
+
+/// The gel's figures are those of its last call.
+StageReport report_of(const FittedCell& cell);
 
 }  // namespace mbtfm::fit

@@ -2,13 +2,12 @@
 
 #include <mutex>
 
-#include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/fit/effects.h"
-#include "mbtfm/fit/networks.h"
+#include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/fit/strained_gel.h"
-#include "mbtfm/tensions/energy.h"
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/findings.h"
+#include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/missing.h"
 #include "mbtfm/tensions/missing_adhesions.h"
 #include "mbtfm/tensions/second_placement.h"

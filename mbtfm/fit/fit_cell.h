@@ -6,7 +6,7 @@
 
 #include "mbtfm/fit/checks.h"
 #include "mbtfm/fit/readings.h"
-#include "mbtfm/tensions/explain.h"
+#include "mbtfm/tensions/effects.h"
 #include "pipeline/contract/fit_summary.h"
 
 namespace mbtfm::fit {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "mbtfm/fit/data_of_beads.h"
+#include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"

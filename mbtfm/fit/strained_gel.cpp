@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "mbtfm/fit/data_of_beads.h"
+#include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"

@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "mbtfm/tensions/ensemble.h"
-#include "mbtfm/tensions/tension_problem.h"
+#include "mbtfm/tensions/tension_fit.h"
 #include "pipeline/contract/effects.h"
 #include "pipeline/contract/work.h"
 

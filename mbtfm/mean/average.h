@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "mbtfm/mean/registration.h"
 #include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/beads.h"
 #include "pipeline/contract/extent.h"
+#include "pipeline/contract/gel.h"
 
 namespace mbtfm::mean {
 
@@ -75,5 +78,37 @@ struct Ratio {
 std::optional<Ratio> tip_over_edge(const std::vector<Vec2>& nodes_um,
                                    const std::vector<std::vector<std::optional<Sample>>>& samples,
                                    const std::vector<EdgePart>& parts, Vec2 centre_um, std::uint64_t seed);
+
+// Tractions of a registered cell by FTTC, and what the same way makes of other tractions.
+
+/// A cell's beads in its own frame, with the gel under it, and how it is laid onto the reference.
+struct Registered {
+  DisplacementField beads;
+  Gel gel;
+  Motion motion;
+  double shift_error_um = 0, angle_error_rad = 0;
+};
+
+/// That of the least expected error of the tractions.
+double lambda_by_risk_um_per_kPa(const Registered& cell, const tractions::TractionParameters& parameters);
+
+CellField field_of(const Registered& cell, const tractions::TractionParameters& parameters, double lambda_um_per_kPa);
+
+/// What FTTC would find of these tractions from the cell's beads, without noise: tractions of the reference's frame are
+/// brought to the cell, displace its beads, and are found again. So a model is blurred as the cell is.
+/// @param traction_kPa  by place
+CellField blurred(const std::function<Vec2(Vec2 place_um)>& traction_kPa, const Registered& cell,
+                  const tractions::TractionParameters& parameters, double lambda_um_per_kPa);
+
+/// Which part of a wave of traction is left: of the mean, along and across the wave, by the regularisation of each cell
+/// and its error of registration, in turn.
+struct WaveShare {
+  double wavelength_um = 0, along = 0, across = 0, registration = 0;
+};
+std::vector<WaveShare> wave_shares(const std::vector<Registered>& cells, const std::vector<double>& lambdas_um_per_kPa,
+                                   GelModel model, double size_um);
+
+/// Standard deviation of the Gaussian that leaves half of the wave of which this leaves half.
+double gaussian_um(const std::vector<WaveShare>& shares, const std::function<double(const WaveShare&)>& share);
 
 }  // namespace mbtfm::mean

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 
@@ -36,16 +36,9 @@ Samples samples_of(std::size_t n_cells, const std::vector<Vec2>& nodes, const st
 }
 
 std::function<Vec2(Vec2)> model_in(const Path& file) {
-  const files::CsvTable table(file);
-  table.require({"x_um", "y_um", "tx_kPa", "ty_kPa"});
-  std::vector<GroundPatch> patches;
+  std::vector<GroundPatch> patches = files::read_tractions(file);
   std::set<double> columns;
-  for (int row = 0; row < table.n_rows(); ++row) {
-    patches.push_back({.position_um = {table.number(row, "x_um"), table.number(row, "y_um")},
-                       .traction_kPa = {table.number(row, "tx_kPa"), table.number(row, "ty_kPa")},
-                       .displacement_um = {}});
-    columns.insert(patches.back().position_um.x);
-  }
+  for (const GroundPatch& patch : patches) columns.insert(patch.position_um.x);
   const std::size_t n_columns = columns.size(), n_rows = patches.size() / std::max<std::size_t>(1, n_columns);
   if (n_columns < 2 || n_rows < 2 || n_columns * n_rows != patches.size())
     throw InputError(file.string(), "tractions on a whole lattice of at least two columns and rows",

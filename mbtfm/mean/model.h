@@ -1,7 +1,7 @@
 /// The fields of all cells on common nodes, and a model as their mean would show it.
 #pragma once
 
-#include "mbtfm/mean/align.h"
+#include "mbtfm/mean/cells.h"
 
 namespace mbtfm::mean {
 

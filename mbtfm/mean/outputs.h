@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "mbtfm/mean/average.h"
-#include "mbtfm/mean/cell_tractions.h"
 #include "pipeline/contract/figures.h"
 #include "pipeline/contract/path.h"
 

@@ -3,12 +3,16 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
+#include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
 
 namespace mbtfm::mean {
+
 namespace {
 
 constexpr int kAngles = 72;  // at which the misfit is looked at first: outlines of up to some 18 spikes
@@ -39,32 +43,13 @@ struct Pair {
   Vec2 moved, way;
 };
 
-Pair nearest_pair(Vec2 point, const Polygon& line) {
-  Vec2 nearest = line.back();
-  double least = dot(point - nearest, point - nearest);
-  Vec2 before = line.back();
-  for (const Vec2 corner : line) {
-    const Vec2 span = corner - before;
-    const double length2 = dot(span, span);
-    const double share = length2 > 0 ? std::clamp(dot(point - before, span) / length2, 0.0, 1.0) : 0;
-    const Vec2 candidate = before + share * span;
-    const double distance2 = dot(point - candidate, point - candidate);
-    if (distance2 < least) {
-      least = distance2;
-      nearest = candidate;
-    }
-    before = corner;
-  }
-  return {point, point - nearest};
-}
-
 /// Each outline's points with the nearest ones of the other.
 std::vector<Pair> pairs_of(const Polygon& moved_outline, const Polygon& reference) {
   std::vector<Pair> pairs;
-  for (const Vec2 p : moved_outline) pairs.push_back(nearest_pair(p, reference));
+  for (const Vec2 p : moved_outline) pairs.push_back({p, p - nearest_on_boundary_um(reference, p)});
   for (const Vec2 q : reference) {
-    const Pair seen = nearest_pair(q, moved_outline);
-    pairs.push_back({q - seen.way, -1.0 * seen.way});
+    const Vec2 seen = nearest_on_boundary_um(moved_outline, q);
+    pairs.push_back({seen, seen - q});
   }
   return pairs;
 }
@@ -117,7 +102,7 @@ double independent(const std::vector<double>& values) {
 std::vector<double> signed_distances(const Polygon& outline, const Polygon& reference) {
   std::vector<double> distances;
   for (const Vec2 p : outline)
-    distances.push_back((contains(reference, p) ? -1 : 1) * norm(nearest_pair(p, reference).way));
+    distances.push_back((contains(reference, p) ? -1 : 1) * distance_to_boundary_um(reference, p));
   return distances;
 }
 
@@ -245,6 +230,67 @@ bool fit_equally(const Way& a, const Way& b, double size_um) {
   constexpr double kSeen = 1e-3, kTenth = 1.1;
   const double floor = kSeen * size_um;
   return std::hypot(b.misfit_um, floor) < kTenth * std::hypot(a.misfit_um, floor);
+}
+
+namespace {
+
+constexpr int kTurnsOfCircle = 72;
+constexpr int kMostTurns = 24;
+
+/// Of the axis of a mirror, where the shape has one.
+std::optional<double> axis_angle_rad(const Polygon& reference) {
+  for (const Way& way : ways_onto(reference, reference, Mirrors::tried))
+    if (way.motion.is_mirrored) return way.motion.angle_rad / 2;
+  return std::nullopt;
+}
+
+}  // namespace
+
+Symmetry symmetry_of(const std::string& text) {
+  if (text == "Cinfv") return {kTurnsOfCircle, true, true};
+  Symmetry symmetry;
+  const bool has_v = text.ends_with('v');
+  const std::string digits = text.substr(std::min<std::size_t>(1, text.size()), text.size() - 1 - (has_v ? 1 : 0));
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), symmetry.n_turns);
+  if (!text.starts_with('C') || error != std::errc() || end != digits.data() + digits.size() || symmetry.n_turns < 1 ||
+      symmetry.n_turns > kMostTurns)
+    throw UsageError(
+        "--symmetry: expected C1 (none), C2, C3, ... C24, with v where it has mirrors (C4v), or Cinfv (a circle), "
+        "found '" +
+        text + "'");
+  symmetry.has_mirrors = has_v;
+  return symmetry;
+}
+
+std::vector<Motion> motions_of(const Symmetry& symmetry, const Polygon& reference) {
+  const Vec2 centre = centroid_um(reference);
+  const double axis = symmetry.has_mirrors && !symmetry.is_circle ? axis_angle_rad(reference).value_or(0) : 0;
+  std::vector<Motion> motions;
+  for (const bool is_mirrored : {false, true}) {
+    if (is_mirrored && !symmetry.has_mirrors) continue;
+    for (int k = 0; k < symmetry.n_turns; ++k) {
+      const double turn = 2 * std::numbers::pi * k / symmetry.n_turns;
+      motions.push_back({centre, centre, turn + (is_mirrored ? 2 * axis : 0), is_mirrored});
+    }
+  }
+  return motions;
+}
+
+double asymmetry_um(const Polygon& reference, const std::vector<Motion>& motions) {
+  double largest = 0;
+  for (const Motion& motion : motions) largest = std::max(largest, misfit_um(moved(reference, motion), reference));
+  return largest;
+}
+
+bool are_equivalent(const Way& a, const Way& b, const std::vector<Motion>& motions) {
+  constexpr double kSame = 0.1;  // rad: of ways that differ by noise
+  return std::ranges::any_of(motions, [&](const Motion& motion) {
+    // b after the motion turns by this, and mirrors if just one of the two does
+    const bool is_mirrored = b.motion.is_mirrored != motion.is_mirrored;
+    const double angle = motion.angle_rad + (motion.is_mirrored ? -b.motion.angle_rad : b.motion.angle_rad);
+    return is_mirrored == a.motion.is_mirrored &&
+           std::abs(std::remainder(angle - a.motion.angle_rad, 2 * std::numbers::pi)) < kSame;
+  });
 }
 
 }  // namespace mbtfm::mean

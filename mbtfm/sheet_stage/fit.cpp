@@ -6,7 +6,6 @@
 #include "continuum/sheet/recovery.h"
 #include "mbtfm/sheet_stage/runs.h"
 #include "mbtfm/sheets/bead_fit.h"
-#include "mbtfm/sheets/tables.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tractions/neighbour_noise.h"

@@ -1,4 +1,4 @@
-#include "mbtfm/sheet_stage/outputs.h"
+#include "mbtfm/sheet_stage/runs.h"
 
 #include <algorithm>
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <optional>
 
-#include "continuum/sheet/decide.h"
 #include "continuum/sheet/from_traction.h"
 #include "continuum/sheet/parameters.h"
 #include "mbtfm/tensions/tension_fit.h"

@@ -9,7 +9,9 @@
 
 #include "continuum/sheet/forward.h"
 #include "mbtfm/sheets/field_fit.h"
+#include "mbtfm/sheets/sheet_fit.h"
 #include "pipeline/contract/effects.h"
+#include "pipeline/contract/path.h"
 
 namespace mbtfm::sheets {
 
@@ -87,5 +89,15 @@ class FinerMeshes {
 };
 /// The table's answer and this change together move the beads.
 tensions::LinearData corrected(tensions::LinearData data, const MeshChange& change);
+
+// Files of a sheet's fit.
+
+struct ContractionAt;
+
+void write_estimates(const Path& file, const SheetFit& fit);
+void write_contractions(const Path& file, const std::vector<ContractionAt>& rows);
+void write_models(const Path& file, const SheetFit& fit);
+/// Their part of docs/columns.md.
+std::string pages_of_tables();
 
 }  // namespace mbtfm::sheets

@@ -5,7 +5,6 @@
 #include <map>
 #include <set>
 
-#include "mbtfm/sheets/contraction_prior.h"
 #include "mbtfm/sheets/profile.h"
 #include "mbtfm/sheets/variation.h"
 #include "mbtfm/tensions/intervals.h"

@@ -58,9 +58,7 @@ LinearData reweighed(LinearData data, tensions::Loss loss, const std::function<V
     const VectorXd residual = tensions::weighted_residual(data, amplitudes(data));
     const double scale = fixed_scale.value_or(tensions::robust_scale(data, residual));
     if (!(scale > 0)) break;
-    VectorXd weight(residual.size() / 2);
-    for (Index b = 0; b < weight.size(); ++b)
-      weight(b) = tensions::robust_weight(loss, residual.segment<2>(2 * b).norm() / scale);
+    const VectorXd weight = tensions::robust_weights(loss, residual, scale);
     const double change = (weight - data.bead_weight).cwiseAbs().maxCoeff();
     data = tensions::reweighted(std::move(data), weight);
     if (change < 1e-3) break;

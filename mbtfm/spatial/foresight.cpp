@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mbtfm/spatial/basis.h"
-#include "mbtfm/spatial/rows.h"
+#include "mbtfm/spatial/problem.h"
+#include "mbtfm/spatial/traction_mesh.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
 

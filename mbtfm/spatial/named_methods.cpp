@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mbtfm/spatial/basis.h"
+#include "mbtfm/spatial/problem.h"
 #include "mbtfm/spatial/reconstruction.h"
-#include "mbtfm/spatial/rows.h"
+#include "mbtfm/spatial/traction_mesh.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/numerics/dense.h"

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/loss.h"
 #include "mbtfm/spatial/problem.h"
+#include "mbtfm/spatial/traction_mesh.h"
 #include "mbtfm/tractions/parameters.h"
 #include "pipeline/contract/findings.h"
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "mbtfm/spatial/problem.h"
 #include "mbtfm/spatial/repeated.h"
-#include "mbtfm/spatial/rows.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"

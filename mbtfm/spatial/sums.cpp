@@ -2,8 +2,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "mbtfm/spatial/problem.h"
 #include "mbtfm/spatial/reconstruction.h"
-#include "mbtfm/spatial/rows.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"

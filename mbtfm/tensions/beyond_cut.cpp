@@ -23,6 +23,10 @@ struct Square {
   Vec2 low_um;
   double side_um = 0;
   Vec2 centre() const { return low_um + 0.5 * Vec2{side_um, side_um}; }
+  substrate::Ellipse disc() const {  // of the same area
+    const double radius_um = side_um / std::sqrt(std::numbers::pi);
+    return {.centre_um = centre(), .semi_major_um = radius_um, .semi_minor_um = radius_um, .angle_rad = 0};
+  }
   Square quarter(int i) const {
     const double half = 0.5 * side_um;
     return {low_um + half * Vec2{double(i % 2), double(i / 2)}, half};
@@ -116,11 +120,7 @@ std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um
   MBTFM_ASSERT(finest_um > 0);
   std::vector<substrate::Ellipse> places;
   const Tiling tiling(cell, finest_um, growth);
-  for (const Square& square : tiling.squares()) {
-    const double radius_um = square.side_um / std::sqrt(std::numbers::pi);
-    places.push_back(
-        {.centre_um = square.centre(), .semi_major_um = radius_um, .semi_minor_um = radius_um, .angle_rad = 0});
-  }
+  for (const Square& square : tiling.squares()) places.push_back(square.disc());
   return places;
 }
 
@@ -160,8 +160,7 @@ class NeighbourTiling {
     if (square.side_um > std::max(finest_um_, growth_ * distance_to_bead_um(centre))) {
       for (int i = 0; i < 4; ++i) divide(outline_um, square.quarter(i));
     } else if (is_inside || edge_um <= std::max(kReach_um, square.side_um / 4)) {  // or it covers little of it
-      const double radius_um = square.side_um / std::sqrt(std::numbers::pi);
-      places.push_back({.centre_um = centre, .semi_major_um = radius_um, .semi_minor_um = radius_um, .angle_rad = 0});
+      places.push_back(square.disc());
     }
   }
   double growth_, finest_um_ = 0;

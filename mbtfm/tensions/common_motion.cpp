@@ -12,16 +12,6 @@
 
 namespace mbtfm::tensions {
 
-namespace {
-
-Vec2 centre_of(const std::vector<Vec2>& places) {
-  Vec2 sum;
-  for (const Vec2 place : places) sum += place;
-  return (1 / std::max(1.0, static_cast<double>(places.size()))) * sum;
-}
-
-}  // namespace
-
 MatrixXd affine_motions(const DisplacementField& beads) {
   const std::vector<Vec2> places_um = points_of(beads);
   const Vec2 centre = centre_of(places_um);

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +18,15 @@
 namespace mbtfm::tensions {
 
 struct EnsembleFit;
+
+/// Of no places: 0.
+/// @param place  of each
+template <class Things, class Place = std::identity>
+Vec2 centre_of(const Things& things, Place place = {}) {
+  Vec2 sum;
+  for (const auto& thing : things) sum += std::invoke(place, thing);
+  return (1 / std::max<double>(1, static_cast<double>(things.size()))) * sum;
+}
 
 /// The six motions of unit size as displacements of the beads, 2·beads × 6: shift (um), then turn, growth and shears
 /// (relative).

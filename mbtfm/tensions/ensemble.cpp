@@ -5,7 +5,7 @@
 #include <functional>
 #include <mutex>
 
-#include "mbtfm/tensions/discrepancy.h"
+#include "mbtfm/tensions/model_error.h"
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"

@@ -163,10 +163,8 @@ VectorXd change_by_other_ellipse(const BudgetInputs& in, const std::vector<Index
   VectorXd change(2 * static_cast<Index>(near.size()));
   for (std::size_t i = 0; i < near.size(); ++i) {
     const Vec2 at = in.beads[near[i]].position_um;
-    const greens::Sym2 a = other.compliance_um_per_nN(at), c = old.compliance_um_per_nN(at);
-    const greens::Sym2 g{a.xx - c.xx, a.xy - c.xy, a.yy - c.yy};
-    change.segment<2>(2 * static_cast<Index>(i)) << g.xx * force_nN.x + g.xy * force_nN.y,
-        g.xy * force_nN.x + g.yy * force_nN.y;
+    const Vec2 u = (other.compliance_um_per_nN(at) - old.compliance_um_per_nN(at)) * force_nN;
+    change.segment<2>(2 * static_cast<Index>(i)) << u.x, u.y;
   }
   return change;
 }
@@ -254,11 +252,10 @@ VectorXd field_of_base_um(const BudgetInputs& in) {
   VectorXd field = VectorXd::Zero(2 * static_cast<Index>(in.beads.size()));
   for (std::size_t b = 0; b < in.beads.size(); ++b) {
     for (std::size_t a = 0; a < in.cell.adhesions.size(); ++a) {
-      const greens::Sym2 g =
-          layer.point_correction_um_per_nN(in.beads[b].position_um - in.cell.adhesions[a].position_um);
       const Eigen::Vector2d f = in.fit.forces.nN.segment<2>(2 * static_cast<Index>(a));
-      field.segment<2>(2 * static_cast<Index>(b)) +=
-          Eigen::Vector2d(g.xx * f.x() + g.xy * f.y(), g.xy * f.x() + g.yy * f.y());
+      const Vec2 offset = in.beads[b].position_um - in.cell.adhesions[a].position_um;
+      const Vec2 u = layer.point_correction_um_per_nN(offset) * Vec2{f.x(), f.y()};
+      field.segment<2>(2 * static_cast<Index>(b)) += Eigen::Vector2d(u.x, u.y);
     }
   }
   return field;

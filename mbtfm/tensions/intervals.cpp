@@ -6,7 +6,6 @@
 #include <numeric>
 #include <random>
 
-#include "mbtfm/tensions/tension_fit.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 

@@ -5,11 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "mbtfm/tensions/tension_problem.h"
+#include "mbtfm/tensions/tension_fit.h"
 
 namespace mbtfm::tensions {
-
-struct FitParameters;
 
 inline constexpr double kNormal95 = 1.959963984540054;  ///< two-sided 95 % of a normal variable
 

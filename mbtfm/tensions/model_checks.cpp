@@ -5,10 +5,13 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <random>
 
 #include "mbtfm/tensions/search.h"
+#include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/distributions.h"
+#include "pipeline/numerics/parallel.h"
 #include "substrate/compliance.h"
 
 namespace mbtfm::tensions {
@@ -25,6 +28,12 @@ MatrixXd chords(const std::vector<Vec2>& places_um, const std::vector<std::array
     forces.col(static_cast<Index>(k)).segment<2>(2 * static_cast<Index>(b)) << -unit.x, -unit.y;
   }
   return forces;
+}
+
+/// Of the adhesion in the list.
+std::size_t place_of(int adhesion_id, const std::vector<Adhesion>& adhesions) {
+  const auto at = std::ranges::find(adhesions, adhesion_id, &Adhesion::adhesion_id);
+  return static_cast<std::size_t>(at - adhesions.begin());
 }
 
 constexpr double kTradeOff = -0.95;  // see fibres_not_told_apart
@@ -163,10 +172,7 @@ LinearData with_missing_fibres(LinearData data, const std::vector<Adhesion>& adh
   std::vector<std::array<std::size_t, 2>> pairs;
   VectorXd tensions_nN(std::ssize(fibres));
   for (std::size_t k = 0; k < fibres.size(); ++k) {
-    const auto place = [&](int id) {
-      return static_cast<std::size_t>(std::ranges::find(adhesions, id, &Adhesion::adhesion_id) - adhesions.begin());
-    };
-    pairs.push_back({place(fibres[k].start_adhesion_id), place(fibres[k].end_adhesion_id)});
+    pairs.push_back({place_of(fibres[k].start_adhesion_id, adhesions), place_of(fibres[k].end_adhesion_id, adhesions)});
     tensions_nN[static_cast<Index>(k)] = fibres[k].tension_nN;
   }
   // Ten times what was found bounds nothing, but forces along these pairs are then no direction without any meaning.
@@ -299,10 +305,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   const auto is_end = [&](std::size_t a) { return std::ranges::find(ends, a) != ends.end(); };
   for (const MissingFibre& f : found) {
     if (ends.size() == 2 * kMostMissingFibres) break;
-    const auto place = [&](int id) {
-      return static_cast<std::size_t>(std::ranges::find(adhesions, id, &Adhesion::adhesion_id) - adhesions.begin());
-    };
-    const std::size_t a = place(f.start_adhesion_id), b = place(f.end_adhesion_id);
+    const std::size_t a = place_of(f.start_adhesion_id, adhesions), b = place_of(f.end_adhesion_id, adhesions);
     if (!is_end(a) && !is_end(b)) ends.insert(ends.end(), {a, b});
   }
   std::vector<Index> components;
@@ -332,6 +335,38 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   }
   std::ranges::stable_sort(best, std::greater(), &MissingFibre::chi_squared_gain);
   return best;
+}
+
+namespace {
+
+FibreType exchanged(FibreType type) {
+  if (type == FibreType::dorsal) return FibreType::ventral;
+  return type == FibreType::ventral ? FibreType::dorsal : type;
+}
+
+}  // namespace
+
+CrossValidation cross_validate(const TensionProblem& problem, const LinearData& data, const Trial& around,
+                               const std::vector<FibreType>& types, const TypeTensions& tensions, int n_draws,
+                               std::uint64_t seed, int threads) {
+  MBTFM_ASSERT(static_cast<int>(types.size()) + 1 == problem.n_tensions());
+  CrossValidation result;
+  result.own.resize(static_cast<std::size_t>(n_draws));
+  result.exchanged = result.own;
+  numerics::parallel_for(2 * n_draws, threads, [&](int k) {
+    const bool is_exchanged = k >= n_draws;
+    const auto draw = static_cast<std::size_t>(is_exchanged ? k - n_draws : k);
+    // the same numbers for both, so that they differ by the types alone
+    std::mt19937_64 random(seed + 1000003 * (draw + 1));
+    VectorXd drawn = around.tensions_nN;
+    for (std::size_t i = 0; i < types.size(); ++i) {
+      const std::vector<double>& choice = tensions.at(is_exchanged ? exchanged(types[i]) : types[i]);
+      drawn[static_cast<Index>(i) + 1] = choice[random() % choice.size()];
+    }
+    (is_exchanged ? result.exchanged : result.own)[draw] =
+        relative_l2(data, problem.evaluate(drawn, &around).forces_nN);
+  });
+  return result;
 }
 
 }  // namespace mbtfm::tensions

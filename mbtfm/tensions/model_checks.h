@@ -2,11 +2,15 @@
 /// more.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/error_budget.h"
+#include "mbtfm/tensions/linear_data.h"
+#include "mbtfm/tensions/tension_fit.h"
 #include "pipeline/contract/cell.h"
 
 namespace mbtfm::tensions {
@@ -68,5 +72,22 @@ LinearData with_missing_fibres(LinearData data, const std::vector<Adhesion>& adh
 /// the area (the displacement on an adhesion goes as one over the root of its area), φ that of the angle.
 VectorXd segmentation_variance_nN2(const VectorXd& forces_nN, const std::vector<Adhesion>& adhesions,
                                    const SegmentationErrors& errors);
+
+// Do the fibres' types matter? Tensions drawn from what the types usually have, and the same with dorsal and ventral
+// exchanged: where the second explain the beads worse, the types carry information (thesis fig. 3.15).
+
+/// Tensions that fibres of a type were found to have; draws take one of them.
+using TypeTensions = std::map<FibreType, std::vector<double>>;
+
+struct CrossValidation {
+  std::vector<double> own, exchanged;  ///< relative L2 of each draw
+};
+
+/// Every draw is an equilibrium of its own, started from that of the given trial: tensions drawn at random are too far
+/// from it for derivatives.
+/// @param types  of the network's groups from 1 on; the network keeps the trial's tension
+CrossValidation cross_validate(const TensionProblem& problem, const LinearData& data, const Trial& around,
+                               const std::vector<FibreType>& types, const TypeTensions& tensions, int n_draws,
+                               std::uint64_t seed, int threads);
 
 }  // namespace mbtfm::tensions

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/robust.h"
@@ -12,6 +13,7 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/stopwatch.h"
 #include "pipeline/contract/with_error.h"
+#include "pipeline/files/csv.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/effects.h"
@@ -45,9 +47,7 @@ Slopes slopes_of_point(const Gel& gel, Vec2 offset_um, Vec2 F) {
 /// Of the force spread over the ellipse, by differences of the exact field.
 Slopes slopes_of_ellipse(const greens::HalfSpaceEllipse& field, double step_um, Vec2 at, Vec2 F) {
   const auto difference = [&](Vec2 h) {
-    const greens::Sym2 a = field.compliance_um_per_nN(at + h), b = field.compliance_um_per_nN(at - h);
-    const greens::Sym2 d = 1 / (2 * step_um) * greens::Sym2{a.xx - b.xx, a.xy - b.xy, a.yy - b.yy};
-    return Vec2{d.xx * F.x + d.xy * F.y, d.xy * F.x + d.yy * F.y};
+    return 1 / (2 * step_um) * (field.compliance_um_per_nN(at + h) - field.compliance_um_per_nN(at - h)) * F;
   };
   return {difference({step_um, 0}), difference({0, step_um})};
 }
@@ -133,12 +133,6 @@ Placement moved(Placement placement, const Eigen::Vector3d& step) {
   return placement;
 }
 
-Vec2 centre_of(const Cell& cell) {
-  Vec2 sum;
-  for (const Adhesion& a : cell.adhesions) sum += a.position_um;
-  return (1 / std::max<double>(1, static_cast<double>(cell.adhesions.size()))) * sum;
-}
-
 /// Of the adhesions about their centre, root mean square.
 double lever_of(const Cell& cell, Vec2 centre_um) {
   double squares = 0;
@@ -215,8 +209,7 @@ VectorXd carried_um(const Gel& gel, const std::vector<Ellipse>& ellipses, const 
         sum += by.x * slopes.by_x + by.y * slopes.by_y;
         continue;
       }
-      const greens::Sym2 a = fields[k].compliance_um_per_nN(at), c = fields[k].compliance_um_per_nN(at + by);
-      sum += {(c.xx - a.xx) * F.x + (c.xy - a.xy) * F.y, (c.xy - a.xy) * F.x + (c.yy - a.yy) * F.y};
+      sum += (fields[k].compliance_um_per_nN(at + by) - fields[k].compliance_um_per_nN(at)) * F;
     }
     change.segment<2>(row) << sum.x, sum.y;
   });
@@ -243,7 +236,7 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
   constexpr int kMostPasses = 12;  // far off it takes four
   const double width_um = mean_semi_minor_um(cell);
   const std::vector<substrate::Ellipse> ellipses = substrate::ellipses_of(cell.adhesions);
-  const Placement none{.centre_um = centre_of(cell), .shift_um = {}};
+  const Placement none{.centre_um = centre_of(cell.adhesions, &Adhesion::position_um), .shift_um = {}};
   const double lever_um = lever_of(cell, none.centre_um);
   PlacedCell result{.placement = none, .data = {}, .start = start, .effect = {}};
   const auto off = [&](const std::string& why) {
@@ -309,6 +302,72 @@ Figures figures_of(const FoundPlacement& found) {
 std::string sentence_of(const FoundPlacement& found) {
   return in_words(found.placement.shift_um, found.sigma) + ", turned by " +
          with_error(kDegree * found.placement.turn_rad, kDegree * found.sigma[2]) + " degrees";
+}
+
+namespace {
+
+/// What independent forces leave of the beads. Of exact data that is rounding, and says nothing.
+double left_by_forces(const ReducedData& reduced, double floor_squared) {
+  constexpr double kRounding = 1e-10;  // of the squares; those of G'G are rounded to its condition
+  return std::max(floor_squared, kRounding * (reduced.floor_squared + reduced.target.squaredNorm()));
+}
+
+/// Twice the logarithm of the odds of the other state.
+/// @param floor_squared  what independent forces leave in that state
+double evidence_of(const LinearData& data, const ReducedData& other, double floor_squared) {
+  return static_cast<double>(data.n_used) *
+         std::log(left_by_forces(data.reduced, data.reduced.floor_squared) / left_by_forces(other, floor_squared));
+}
+
+double largest_displacement_um(const DisplacementField& beads) {
+  double largest = 0;
+  for (const Bead& b : beads) largest = std::max(largest, norm(b.displacement_um));
+  return largest;
+}
+
+}  // namespace
+
+DisplacementField under_load(DisplacementField beads) {
+  for (Bead& b : beads) b.position_um += b.displacement_um;
+  return beads;
+}
+
+BeadsOfState take_state(const DisplacementField& at_rest, LinearData data,
+                        const std::function<LinearData(const DisplacementField&)>& data_of, double size_um,
+                        double tolerance, Switch setting, const Carried& carried) {
+  constexpr EffectKind kKind = EffectKind::beads_under_load;
+  constexpr double kVeryStrong = 10;
+  constexpr double kHopeless = -100;  // estimates of -230 to -450 were -350 to -470
+  const Stopwatch watch;
+  BeadsOfState result{.beads = at_rest, .data = std::move(data), .effect = {}};
+  const double largest = largest_displacement_um(at_rest);
+  if (setting == Switch::off || (setting == Switch::automatic && !(largest > tolerance * size_um))) {
+    result.effect = stage::decided(kKind, setting, largest / size_um, tolerance,
+                                   "over the size of an adhesion the largest displacement is");
+    return result;
+  }
+  if (setting == Switch::automatic && carried) {  // the exact answer costs as much as all that went before
+    const VectorXd there = result.data.displacement_um - carried(result.data);
+    const double estimate = evidence_of(result.data, result.data.reduced, explained(result.data, there).floor_squared);
+    if (estimate < kHopeless) {
+      result.effect = stage::decided(
+          kKind, setting, estimate, kHopeless,
+          "twice the logarithm of the odds, estimated with the forces that explain the beads at rest, is");
+      result.effect.seconds = watch.seconds();
+      return result;
+    }
+  }
+  DisplacementField moved = under_load(at_rest);
+  LinearData loaded = data_of(moved);
+  const double evidence = evidence_of(result.data, loaded.reduced, loaded.reduced.floor_squared);
+  result.effect =
+      stage::decided(kKind, setting, evidence, kVeryStrong,
+                     "twice the logarithm of the odds, by what independent forces of the adhesions leave, is");
+  result.effect.seconds = watch.seconds();
+  if (!result.effect.is_on) return result;
+  result.beads = std::move(moved);
+  result.data = std::move(loaded);
+  return result;
 }
 
 }  // namespace mbtfm::tensions

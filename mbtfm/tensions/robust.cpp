@@ -26,14 +26,6 @@ std::vector<double> used_lengths(const LinearData& data, const VectorXd& residua
   return lengths;
 }
 
-VectorXd weights_of(Loss loss, const VectorXd& residual, double scale) {
-  VectorXd weights(residual.size() / 2);
-  for (Index i = 0; i < weights.size(); ++i) {
-    weights[i] = robust_weight(loss, residual.segment<2>(2 * i).norm() / scale);
-  }
-  return weights;
-}
-
 /// Where the middle bead is explained to rounding there is nothing to be robust against.
 bool is_exact(const LinearData& data, double scale) {
   return scale <= 1e-9 * data.weight_per_um.cwiseProduct(data.displacement_um).cwiseAbs().maxCoeff();
@@ -101,7 +93,7 @@ VectorXd times(const BeadJacobian& J, const VectorXd& s, int threads) {
 VectorXd linear_weights(Loss loss, const VectorXd& residual, const BeadJacobian& J, const VectorXd& low, double scale,
                         int threads) {
   VectorXd step = VectorXd::Zero(J.cols());
-  VectorXd weights = weights_of(loss, residual, scale);
+  VectorXd weights = robust_weights(loss, residual, scale);
   constexpr int kMaxSteps = 50;  // the weights settle linearly, in some ten steps
   for (int i = 0; i < kMaxSteps; ++i) {
     auto [H, b] = normal_equations(J, weights, residual, threads);
@@ -109,7 +101,7 @@ VectorXd linear_weights(Loss loss, const VectorXd& residual, const BeadJacobian&
     const VectorXd next = bounded_quadratic_minimum(H, -b, low);
     const double change = (next - step).norm();
     step = next;
-    weights = weights_of(loss, residual - times(J, step, threads), scale);
+    weights = robust_weights(loss, residual - times(J, step, threads), scale);
     if (change <= 1e-4 * step.norm()) break;
   }
   return weights;
@@ -261,6 +253,14 @@ double robust_weight(Loss loss, double residual) {
       return 1 / std::max(residual, kSmallest);
   }
   throw InternalError("unknown loss");
+}
+
+VectorXd robust_weights(Loss loss, const VectorXd& residual, double scale) {
+  VectorXd weights(residual.size() / 2);
+  for (Index i = 0; i < weights.size(); ++i) {
+    weights[i] = robust_weight(loss, residual.segment<2>(2 * i).norm() / scale);
+  }
+  return weights;
 }
 
 double robust_scale(const LinearData& data, const VectorXd& weighted_residual) {

@@ -45,6 +45,9 @@ double harm_done_by(const std::vector<Index>& strays, const LinearData& data, co
 /// so that nothing depends on the axes.
 double robust_weight(Loss loss, double residual);
 
+/// By bead, of its residual. @param residual  2·beads  @param scale  standard deviation of a component
+VectorXd robust_weights(Loss loss, const VectorXd& residual, double scale);
+
 /// Standard deviation of a component that the middle of the residuals tells: median of |r_b| / 1.1774 (Rayleigh).
 double robust_scale(const LinearData& data, const VectorXd& weighted_residual);
 

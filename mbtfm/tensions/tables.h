@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/tensions/cross_validation.h"
-#include "mbtfm/tensions/explain.h"
+#include "mbtfm/tensions/effects.h"
 #include "mbtfm/tensions/model_checks.h"
 #include "mbtfm/tensions/series.h"
 #include "pipeline/files/tables.h"

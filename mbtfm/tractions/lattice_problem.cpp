@@ -15,6 +15,11 @@
 
 namespace mbtfm::tractions {
 
+std::array<double, 4> keys_weights(double s) {
+  const double s2 = s * s, s3 = s2 * s;
+  return {0.5 * (-s3 + 2 * s2 - s), 0.5 * (3 * s3 - 5 * s2 + 2), 0.5 * (-3 * s3 + 4 * s2 + s), 0.5 * (s3 - s2)};
+}
+
 namespace {
 
 constexpr double kOnNode = 1e-6;  // of a spacing: files hold six digits at least
@@ -106,12 +111,6 @@ Lattice box_of(const Lattice& field, double padding) {
   box.n_columns = numerics::quick_size(static_cast<int>(std::ceil(padding * field.n_columns)));
   box.n_rows = numerics::quick_size(static_cast<int>(std::ceil(padding * field.n_rows)));
   return box;
-}
-
-/// Cubic convolution with a = −1/2: third order, exact on nodes. Source: Keys, IEEE Trans. ASSP 29 (1981) 1153, eq. 15.
-std::array<double, 4> keys_weights(double s) {
-  const double s2 = s * s, s3 = s2 * s;
-  return {0.5 * (-s3 + 2 * s2 - s), 0.5 * (3 * s3 - 5 * s2 + 2), 0.5 * (-3 * s3 + 4 * s2 + s), 0.5 * (s3 - s2)};
 }
 
 struct Stencil {

@@ -2,6 +2,7 @@
 /// docs/theory/reconstructions.md (9), (10).
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -10,6 +11,10 @@
 #include "pipeline/contract/beads.h"
 
 namespace mbtfm::tractions {
+
+/// Weights of the four nodes around a share s of the way from the second to the third: cubic convolution with a = −1/2,
+/// third order, exact on nodes. Source: Keys, IEEE Trans. ASSP 29 (1981) 1153, eq. 15.
+std::array<double, 4> keys_weights(double s);
 
 struct LatticeOptions {
   GelModel model = GelModel::layer;

@@ -1,5 +1,4 @@
-#include "mbtfm/tractions/magnitudes.h"
-
+/// How large forces are that are known with errors.
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 
 #include "mbtfm/tractions/fttc.h"
 #include "mbtfm/tractions/group_lasso.h"
-#include "mbtfm/tractions/recurrences.h"
+#include "mbtfm/tractions/spectrum.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::tractions {

@@ -1,11 +1,11 @@
 /// Standard traction reconstructions from bead displacements, and what is summed up of them.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "mbtfm/tractions/magnitudes.h"
 #include "mbtfm/tractions/parameters.h"
 #include "mbtfm/tractions/regularisation.h"
 #include "pipeline/contract/beads.h"
@@ -42,6 +42,19 @@ struct Sensitivity {
 /// Of a penalty on tractions, and of one on forces.
 enum class LambdaUnit { um_per_kPa, um_per_nN };
 constexpr auto words(LambdaUnit) { return std::array{"um_per_kPa", "um_per_nN"}; }
+
+/// How large forces are that are known with errors: noise makes every one longer.
+struct Magnitudes {
+  Eigen::VectorXd expected_nN;     ///< by force
+  Eigen::MatrixXd covariance_nN2;  ///< of the true magnitudes around these
+};
+
+/// Expected |F_a| for found forces F̂ = F + error, error ~ N(0, C), docs/theory/reconstructions.md (18). Before the
+/// measurement each F_a is normal with a deviation s that is one of a list, from nothing to more than the largest
+/// force; the shares of these are the most likely ones for all F̂ (Stephens, Biostatistics 18 (2017) 275). With them the
+/// sum of the expected magnitudes is right in the mean, however many forces are no larger than their errors.
+/// @param covariance_nN2  C, rows 2a and 2a + 1 of force a, positive definite
+Magnitudes expected_magnitudes(const std::vector<Vec2>& forces_nN, const Eigen::MatrixXd& covariance_nN2);
 
 struct Reconstruction {
   std::vector<GroundPatch> patches;

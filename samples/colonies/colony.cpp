@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "continuum/sheet/decide.h"
 #include "continuum/sheet/mesh_size.h"
+#include "continuum/sheet/parameters.h"
 #include "pipeline/contract/errors.h"
 #include "samples/drawing/geometry.h"
 #include "samples/drawing/random.h"

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "mbtfm/fit/networks.h"
+#include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "mbtfm/fit/networks.h"
+#include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/fit_results.h"

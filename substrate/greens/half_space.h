@@ -18,7 +18,9 @@ inline Sym2& operator+=(Sym2& a, const Sym2& b) {
   a.yy += b.yy;
   return a;
 }
+inline Sym2 operator-(const Sym2& a, const Sym2& b) { return {a.xx - b.xx, a.xy - b.xy, a.yy - b.yy}; }
 inline Sym2 operator*(double s, const Sym2& a) { return {s * a.xx, s * a.xy, s * a.yy}; }
+inline Vec2 operator*(const Sym2& a, Vec2 v) { return {a.xx * v.x + a.xy * v.y, a.xy * v.x + a.yy * v.y}; }
 
 /// Moments of the chords of an ellipse through a point, c(t) being the length of the chord in direction e(t):
 ///

@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 
-#include "mbtfm/tractions/beside_background.h"
+#include "mbtfm/tractions/fttc.h"
 #include "tests/support/dipole_scene.h"
 
 namespace mbtfm::tractions {

@@ -1,9 +1,9 @@
 /// Sheets bonded to gels against an exact spectral solution (tests/data/reference/chapter4).
 #include <Eigen/LU>
 
-#include "continuum/sheet/decide.h"
 #include "continuum/sheet/forward.h"
 #include "continuum/sheet/mesh_size.h"
+#include "continuum/sheet/parameters.h"
 #include "pipeline/contract/errors.h"
 #include "substrate/greens/models.h"
 #include "tests/support/sheets.h"

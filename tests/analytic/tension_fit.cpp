@@ -1,5 +1,5 @@
 #include "mbtfm/tensions/tension_fit.h"
-#include "mbtfm/tensions/noise.h"
+#include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/robust.h"
 #include "tests/support/tension_scene.h"
 

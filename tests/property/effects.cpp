@@ -2,7 +2,6 @@
 /// out, against a fit that has them.
 #include "mbtfm/tensions/effects.h"
 
-#include "mbtfm/tensions/explain.h"
 #include "network/cables/effects.h"
 #include "pipeline/contract/errors.h"
 #include "substrate/effects.h"

@@ -1,6 +1,6 @@
 /// What the fit of a cell notices: nothing on a sound one, and each fault of its inputs by its own finding.
+#include "mbtfm/fit/files.h"
 #include "mbtfm/fit/fit_cell.h"
-#include "mbtfm/fit/report.h"
 #include "mbtfm/tensions/findings.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/findings.h"

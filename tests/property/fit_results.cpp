@@ -1,7 +1,6 @@
 /// What the fit tells its user of a cell as a whole.
 #include <Eigen/Geometry>
 
-#include "mbtfm/tensions/energy.h"
 #include "mbtfm/tensions/findings.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "tests/support/substrate_scene.h"

@@ -1,7 +1,7 @@
 /// Registered cells and their mean.
-#include "mbtfm/mean/align.h"
+#include "mbtfm/mean/cells.h"
 #include "mbtfm/mean/images.h"
-#include "mbtfm/mean/symmetry.h"
+#include "mbtfm/mean/registration.h"
 #include "pipeline/contract/errors.h"
 #include "substrate/greens/half_space.h"
 #include "tests/support/test.h"

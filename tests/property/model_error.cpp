@@ -1,7 +1,6 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 
-#include "mbtfm/tensions/discrepancy.h"
 #include "mbtfm/tensions/model_checks.h"
 #include "mbtfm/tensions/model_error.h"
 #include "tests/support/tension_scene.h"

@@ -1,8 +1,8 @@
 /// Cells that pull at the gel beside the one that is fitted, in the picture and beyond its border.
-#include "mbtfm/tensions/beyond_border.h"
 #include "mbtfm/tensions/beyond_cut.h"
 #include "mbtfm/tensions/common_motion.h"
-#include "mbtfm/tensions/noise.h"
+#include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/search.h"
 #include "samples/drawing/scenario.h"
 #include "samples/experiment/experiment.h"
 #include "substrate/greens/models.h"

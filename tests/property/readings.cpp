@@ -1,5 +1,5 @@
 #include "mbtfm/fit/readings.h"
-#include "mbtfm/fit/data_of_beads.h"
+#include "mbtfm/fit/ready_cell.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "substrate/choice/factory.h"
 #include "tests/support/findings.h"

@@ -1,7 +1,6 @@
 /// The fit of a sheet to the beads under it: what it finds, and whether its error bars hold.
 #include "continuum/sheet/forward.h"
 #include "continuum/sheet/mesh_size.h"
-#include "continuum/sheet/moved_rims.h"
 #include "mbtfm/sheets/bead_fit.h"
 #include "mbtfm/sheets/beside_fibres.h"
 #include "mbtfm/sheets/variation.h"

@@ -1,6 +1,6 @@
 /// The fit on a gel that is strained beyond linear elasticity, with forces free of any network.
 #include "mbtfm/fit/strained_gel.h"
-#include "mbtfm/fit/data_of_beads.h"
+#include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "substrate/choice/factory.h"
 #include "substrate/choice/large_strain.h"

@@ -1,8 +1,7 @@
 /// What the tension fit must do over many repeats: its errors are as small as the data allow and as large as it says.
 #include "mbtfm/tensions/tension_fit.h"
 
-#include "mbtfm/tensions/cross_validation.h"
-#include "mbtfm/tensions/existence.h"
+#include "mbtfm/tensions/evidence.h"
 #include "mbtfm/tensions/model_checks.h"
 #include "mbtfm/tensions/robust.h"
 #include "pipeline/numerics/parallel.h"

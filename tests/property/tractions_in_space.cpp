@@ -1,12 +1,12 @@
 /// Laws of reconstructions in space: on a half-space, whose answer is a closed form.
 #include <Eigen/QR>
 
-#include "mbtfm/spatial/basis.h"
 #include "mbtfm/spatial/foresight.h"
 #include "mbtfm/spatial/loss.h"
+#include "mbtfm/spatial/problem.h"
 #include "mbtfm/spatial/repeated.h"
-#include "mbtfm/spatial/rows.h"
-#include "mbtfm/tractions/recurrences.h"
+#include "mbtfm/spatial/traction_mesh.h"
+#include "mbtfm/tractions/spectrum.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/findings.h"
 #include "tests/support/half_space_problem.h"

@@ -1,4 +1,3 @@
-#include "mbtfm/tensions/under_load.h"
 
 #include "mbtfm/tensions/placement.h"
 #include "pipeline/stage/effects.h"

@@ -8,10 +8,9 @@
 #include <cstring>
 #include <string>
 
+#include "mbtfm/fit/fit_cell.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
-#include "mbtfm/tensions/missing.h"
-#include "mbtfm/tensions/missing_adhesions.h"
 #include "samples/experiment/experiment.h"
 #include "tests/support/tension_scene.h"
 
@@ -102,8 +101,8 @@ std::vector<cables::CableNetwork> span(const Cell& cell, int n_meshes, mesh::Net
   return networks;
 }
 
-tensions::EnsembleFit fit(const std::vector<cables::CableNetwork>& networks, const tensions::LinearData& data,
-                          const OtherNetwork& o, int threads = 2) {
+tensions::EnsembleFit fitted_on(const std::vector<cables::CableNetwork>& networks, const tensions::LinearData& data,
+                                const OtherNetwork& o, int threads = 2) {
   tensions::FitParameters parameters;
   parameters.n_meshes = static_cast<int>(networks.size());
   return tensions::fit_ensemble(networks, data, o.adhesion_ids, parameters, threads);
@@ -137,8 +136,8 @@ void formulations(Cells cells) {
     OtherNetwork o = other_network(c);
     for (const bool is_thesis : {false, true}) {
       const int n_meshes = is_thesis ? 1 : tensions::FitParameters{}.n_meshes;
-      const Score s =
-          score(fit(span(o.experiment.cell, n_meshes, is_thesis ? thesis : mesh::NetworkParameters{}), o.noisy, o), o);
+      const Score s = score(
+          fitted_on(span(o.experiment.cell, n_meshes, is_thesis ? thesis : mesh::NetworkParameters{}), o.noisy, o), o);
       std::printf("%d,%s,%d,%.4f,%.3f,%.3f\n", int(c), is_thesis ? "thesis" : "default", n_meshes, s.relative_error,
                   s.over_stated, s.coverage);
     }
@@ -161,7 +160,8 @@ void forces(Cells cells) {
   for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
     for (const auto& [name, truth] : true_formulations()) {
       OtherNetwork o = other_network(c, &truth);
-      const tensions::EnsembleFit found = fit(span(o.experiment.cell, tensions::FitParameters{}.n_meshes), o.noisy, o);
+      const tensions::EnsembleFit found =
+          fitted_on(span(o.experiment.cell, tensions::FitParameters{}.n_meshes), o.noisy, o);
       const tensions::Estimate& total = found.total_force_nN;
       std::printf("%d,%s,0,0,%.5g,%.5g,%.5g,0,0,0\n", int(c), name, tensions::total_nN(o.forces_nN), total.value,
                   total.standard_error);
@@ -227,42 +227,13 @@ Cell seen_wrongly(const experiment::Experiment& e, const std::string& how, std::
   return cell;
 }
 
-/// As mbtfm::fit has it: the networks are held where the beads show an adhesion, too.
-struct FoundOn {
-  WithMissing with;
-  std::vector<MissingAdhesion> adhesions;  ///< all of them
-};
-FoundOn found_on(Cell cell, const DisplacementField& beads) {
-  constexpr int kMostRounds = 3;
-  const Gel gel = drawing::ScenarioParameters{}.gel;
-  std::optional<WithMissing> best;
-  std::vector<MissingAdhesion> held;
-  for (int round = 0; round < kMostRounds; ++round) {
-    LinearData data = reduce(
-        beads,
-        substrate::dense_response(greens::make_greens(gel, {.model = substrate::ModelKind::layer}, 2)
-                                      ->compliance_um_per_nN(points_of(beads), substrate::ellipses_of(cell.adhesions))),
-        {}, 2, affine_motions(beads));
-    for (const Adhesion& a : cell.adhesions) data.load_centre_um.push_back(a.position_um);
-    const std::vector<cables::CableNetwork> networks = span(cell, FitParameters{}.n_meshes);
-    WithMissing with = with_missing(
-        fit_ensemble(networks, std::move(data), adhesion_ids_of(cell), {}, 2),
-        {.networks = networks, .cell = cell, .gel = gel, .segmentation = {}, .parameters = {}, .threads = 2});
-    if (best) {
-      std::fprintf(stderr, "chi2 %g then %g\n", best->fit.misfit.chi_squared_per_degree,
-                   with.fit.misfit.chi_squared_per_degree);
-      if (with.fit.misfit.chi_squared_per_degree >= best->fit.misfit.chi_squared_per_degree) break;
-      held.insert(held.end(), best->adhesions.begin(), best->adhesions.end());
-    }
-    best = std::move(with);
-    if (best->adhesions.empty()) break;
-    cell = held_at(std::move(cell), best->adhesions);
-  }
-  cell.adhesions.resize(static_cast<std::size_t>(best->fit.forces.nN.size() / 2));
-  std::vector<MissingAdhesion> all = std::move(held);
-  all.insert(all.end(), best->adhesions.begin(), best->adhesions.end());
-  best->fit = with_unfound(std::move(best->fit), cell, all);
-  return {std::move(*best), std::move(all)};
+/// By the program's own fit, beads and adhesions being on each other.
+fit::FittedCell found_on(const Cell& cell, const DisplacementField& beads) {
+  fit::Parameters p;
+  p.gel = drawing::ScenarioParameters{}.gel;
+  p.effects.channel_shift = p.effects.beads_under_load = p.compare_sheet = Switch::off;
+  return fit::fit_cell({.cell = cell, .network = mesh::generate_network(cell, p.network).network, .beads = beads}, p,
+                       2);
 }
 
 void wrong(Cells cells) {
@@ -279,7 +250,7 @@ void wrong(Cells cells) {
         for (std::size_t i = 0; i < ids.size(); ++i)
           forces_nN.segment<2>(2 * static_cast<Eigen::Index>(i)) =
               o.forces_nN.segment<2>(2 * (std::ranges::find(o.adhesion_ids, ids[i]) - o.adhesion_ids.begin()));
-        const auto [found, missing_adhesions] = found_on(seen, o.beads);
+        const fit::FittedCell found = found_on(seen, o.beads);
         double error = 0, size = 0, z = 0;
         int n_in = 0, n_forces_in = 0;
         const auto n = static_cast<int>(found.fit.tensions.fibre_ids.size()) - 1;
@@ -306,8 +277,8 @@ void wrong(Cells cells) {
                     std::sqrt(error / size), double(n_in) / n, std::sqrt(z / n),
                     (network_nN - forces_nN).norm() / forces_nN.norm(),
                     (exerted_nN - forces_nN).norm() / forces_nN.norm(), double(n_forces_in) / double(ids.size()),
-                    total.value / total_nN, (total.value - total_nN) / total.standard_error, int(found.fibres.size()),
-                    int(missing_adhesions.size()));
+                    total.value / total_nN, (total.value - total_nN) / total.standard_error,
+                    int(found.checks.missing_fibres.size()), int(found.checks.missing_adhesions.size()));
       }
     }
   }

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "mbtfm/tensions/cross_validation.h"
+#include "mbtfm/tensions/model_checks.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/dense.h"

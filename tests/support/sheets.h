@@ -1,7 +1,7 @@
 /// Sheets of the reference values, and how far a solution is from them.
 #pragma once
 
-#include "continuum/sheet/on_springs.h"
+#include "continuum/sheet/forward.h"
 #include "continuum/sheet/recovery.h"
 #include "pipeline/files/csv.h"
 #include "tests/support/folders.h"
