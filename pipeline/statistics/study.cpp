@@ -185,8 +185,7 @@ void number_conditions(Study& study, const std::vector<std::string>& condition_o
     if (name == names.end())
       throw UsageError("stats.conditions: no cell that enters is of the condition '" + asked + "'; " +
                        (names.contains("") && names.size() == 1
-                            ? "none has a condition: give a --table with a column 'condition', or --condition_from "
-                              "folder if each condition has its folder"
+                            ? "none has one: give a --table with a column 'condition', or --condition_from folder"
                             : "there are " + listed(std::vector<std::string>(names.begin(), names.end()))));
     study.conditions.push_back(*name);
     names.erase(name);

@@ -24,11 +24,12 @@ std::unique_ptr<substrate::Substrate> not_built(const Gel&, const substrate::Sub
 /// The same table: what a scene needs does not depend on what was built.
 const std::vector<substrate::Model>& models() {
   using enum substrate::ModelKind;
-  static const std::vector<substrate::Model> table = {greens::half_space(),
-                                                      greens::layer(),
-                                                      {.kind = split, .can = elements::kSplitCan, .make = not_built},
-                                                      {.kind = refined, .can = elements::kRefinedCan, .make = not_built},
-                                                      {.kind = curved, .can = elements::kCurvedCan, .make = not_built}};
+  static const std::vector<substrate::Model> table = {
+      greens::half_space(),
+      greens::layer(),
+      {.kind = split, .can = elements::kSplitCan, .make = not_built},
+      {.kind = refined, .can = elements::kRefinedCan, .make = not_built},
+      {.kind = curved, .can = elements::kCurvedCan, .make = not_built}};
   return table;
 }
 #endif
