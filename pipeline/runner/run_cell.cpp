@@ -95,8 +95,7 @@ class CellRun {
     for (const Setting& setting : options.set) {
       if (std::ranges::any_of(of_.stages, [&](const Stage& stage) { return !flags_of(stage, {setting}).empty(); }))
         continue;
-      const std::string meant =
-          setting.table == "effects" ? stage::did_you_mean(stage::effect_keys(), setting.key) : "";
+      const std::string meant = stage::did_you_mean(stage::effect_keys(), setting.key);
       throw UsageError("--set " + setting.table + "." + setting.key + ": no stage of this cell reads it" +
                        (of_.why.empty() ? "" : " (" + of_.why + ")") + (meant.empty() ? "" : "; " + meant));
     }

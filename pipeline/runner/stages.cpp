@@ -109,7 +109,8 @@ Setting parse_setting(const std::string& text) {
   const std::size_t begin = point == text.npos ? 0 : point + 1;
   std::set<std::string> tables = {"effects"};
   for (const Stage& stage : all_stages()) tables.insert(stage.tables.begin(), stage.tables.end());
-  if (table == "images" || table == "run")
+  static const std::set<std::string> kInFileAlone = {"images", "run"};
+  if (kInFileAlone.contains(table))
     throw UsageError("--set " + text + ": [" + table + "] is for cell.toml alone: write it there");
   if (!tables.contains(table)) {
     const std::string named = stage::did_you_mean({tables.begin(), tables.end()}, table);

@@ -114,6 +114,7 @@ constexpr Elsewhere kElsewhere[] = {
     {"nu", "poisson_ratio"},
     {"scale pixel px um_per_px um_per_pixel", "pixel_size_um"},
     {"paxillin vinculin zyxin talin focal_adhesions fa", "adhesion"},
+    {"adhesion_size adhesion_area min_area", "adhesion_smallest_um2"},
     {"phalloidin lifeact f_actin", "actin"},
     {"reference relaxed unloaded trypsin before", "beads_relaxed"},
     {"reference unloaded trypsin before", "relaxed"},
