@@ -10,7 +10,6 @@
 
 namespace mbtfm::statistics {
 
-using report::capitalised;
 namespace {
 
 using charts::readable;
@@ -20,6 +19,11 @@ std::string plural_of(const Sample& sample, const std::string& kind) {
     return name_of(sample.each);
   if (sample.each == Observed::sheets) return sample.n_kinds() == 1 ? "sheets" : "sheets (" + kind + ")";
   return named<FibreType>(kind) == FibreType::arc ? "transverse arcs" : kind + " " + name_of(sample.each);
+}
+
+/// A capital letter, but of a condition, which keeps its name.
+std::string begun(const std::string& condition, const std::string& text) {
+  return !condition.empty() && text.starts_with(prefix_of(condition)) ? text : report::capitalised(text);
 }
 
 /// What its observations are, where a cell may have several.
@@ -45,7 +49,7 @@ std::vector<std::string> means(const Measure& m) {
     if (sample.each != Observed::cells && s.typical_error && s.n > 2)
       text += fmt::format("; SD {}, {} without the errors of measurement", sample.amount(*s.plain.standard_deviation),
                           readable(s.without_error->standard_deviation));
-    list.push_back(capitalised(text + "."));
+    list.push_back(begun(s.condition, text + "."));
   }
   return list;
 }
@@ -104,7 +108,7 @@ void add_differences(const Measure& m, Findings& findings) {
     text += fmt::format("; {} and {} {}", c.cells_a, c.cells_b, m.sample.cells_name());
     if (!is_one_a_cell) text += fmt::format(", {} and {} {}", c.n_a, c.n_b, counted_name(m.sample));
     constexpr double kLevel = 0.05;
-    (*c.p_holm < kLevel ? findings.sentences : findings.unclear).push_back(capitalised(text + ")."));
+    (*c.p_holm < kLevel ? findings.sentences : findings.unclear).push_back(begun(c.within, text + ")."));
   }
 }
 
@@ -112,7 +116,8 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
   std::vector<std::string> list;
   for (const ShareAbove& s : analysis.shares) {
     if (s.threshold_nN != parameters.strong_tension_nN) continue;
-    list.push_back(capitalised(
+    list.push_back(begun(
+        s.condition,
         fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %] ({} of {}); {:.0f} % "
                     "without the errors of measurement.",
                     prefix_of(s.condition), 100 * s.share.value, plural_of(analysis.tensions().sample, s.kind),
@@ -130,7 +135,7 @@ std::vector<std::string> lines(const Analysis& analysis) {
     std::string text = fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition),
                                    readable(c.line->slope), error, c.size_unit, counted(std::ssize(c.x), "cells"));
     if (c.line->correlation) text += ", r = " + readable(*c.line->correlation);
-    list.push_back(capitalised(text + ")."));
+    list.push_back(begun(c.condition, text + ")."));
   }
   return list;
 }
@@ -146,9 +151,9 @@ std::vector<std::string> directions(const Analysis& analysis) {
                                    full_name_of(s.relation), s.mean_angle_deg);
     if (s.angle_interval_deg)
       text += fmt::format(" [95 % CI {:.0f}° to {:.0f}°]", s.angle_interval_deg->low, s.angle_interval_deg->high);
-    list.push_back(capitalised(text + fmt::format(", where chance would give {:.0f}° ({} of {}).",
-                                                  largest_angle_deg(s.relation) / 2, counted(s.n, "angles"),
-                                                  counted(s.n_cells, "cells"))));
+    list.push_back(begun(s.condition, text + fmt::format(", where chance would give {:.0f}° ({} of {}).",
+                                                         largest_angle_deg(s.relation) / 2, counted(s.n, "angles"),
+                                                         counted(s.n_cells, "cells"))));
   }
   return list;
 }

@@ -65,6 +65,8 @@ ModelResult model_of(const Sample& sample) {
   for (int& i : index) i = i < 0 ? -1 : n++;
   std::vector<Observation> data = sample.values;
   for (Observation& o : data) o.group = index[o.group];
+  if (std::ssize(data) == n)
+    return {.model = {}, .obstacle = std::string("each needs values of two ") + sample.cells_name()};
   try {
     MixedFit fit = fit_mixed_model(std::move(data));
     if (!fit.converged) return {.model = {}, .obstacle = "the mixed model did not converge"};

@@ -92,6 +92,21 @@ TEST(Study, obeys_the_review_of_cells_and_of_their_present_fibres) {
   EXPECT_THROW(review("control/cell_1,,maybe,,\n"), InputError);
 }
 
+TEST(Study, one_cell_a_condition_is_why_nothing_is_compared_and_a_condition_keeps_its_name) {
+  const FakeStudy fake;
+  const StudyParameters parameters{.condition_from = "folder"};
+  const Study study =
+      fake.read({.condition_from = "folder"}, "cell,exclude\ncell_1,\ncell_2,\ncell_3,x\ncell_4,x\ncell_5,x\n");
+  std::string all;
+  for (const Findings& findings : findings_of(analyse(study, parameters), parameters))
+    for (const std::string& sentence : findings.sentences) all += sentence + "\n";
+  EXPECT_TRUE(has_words(all,
+                        "total force of cells differs between conditions cannot be said: each needs values of two "
+                        "cells."));
+  EXPECT_TRUE(has_words(all, "\ncontrol: the mean total force"));
+  EXPECT_EQ(all.find("Control"), all.npos);
+}
+
 TEST(Study, a_copy_of_a_cell_is_no_further_cell_and_a_neighbour_in_the_same_picture_is) {
   const FakeStudy fake;
   const auto of_1 = fake.folder / "control/cell_1";
