@@ -11,14 +11,14 @@
 namespace mbtfm {
 namespace {
 
-constexpr int kLinesOfProduct = 107350;
-constexpr int kLinesOfTests = 45420;
+constexpr int kLinesOfProduct = 105740;
+constexpr int kLinesOfTests = 45330;
 constexpr int kLongSources = 14;                                                  // .cpp of the product above 400 lines
 constexpr int kLongestSource = 650;                                               // lines
 constexpr int kOwnHeadersMedian = 16, kOwnHeadersP90 = 42, kOwnHeadersMost = 90;  // that a source of the product gets
 constexpr int kSeeFindings = 35;  // sources of product and tests that a new kind of finding compiles again
 constexpr int kKindsOfFindings = 55;
-constexpr int kParameterRows = 491;  // of build/docs/parameters.md
+constexpr int kParameterRows = 278;  // of build/docs/parameters.md
 constexpr int kWordsOfDocs = 51960;
 
 const std::vector<std::string> kProduct = {"pipeline", "segment",   "network", "substrate",
