@@ -129,10 +129,12 @@ std::string quoted(const std::vector<std::string>& words) {
   return text;
 }
 
-std::string named_elsewhere(const std::vector<std::string>& known, std::string_view word) {
+enum class Ours { words, words_and_sentences };  // sentences are of flags and commands
+
+std::string named_elsewhere(const std::vector<std::string>& known, std::string_view word, Ours as) {
   for (const auto& [theirs, ours] : kElsewhere) {
     if ((" " + std::string(theirs) + " ").find(" " + lower(word) + " ") == std::string::npos) continue;
-    if (ours.find(' ') != ours.npos) return std::string(ours);
+    if (ours.find(' ') != ours.npos && as == Ours::words_and_sentences) return std::string(ours);
     const auto same = std::ranges::find_if(known, [&](const auto& k) { return lower(k) == lower(ours); });
     if (same != known.end()) return "did you mean " + quoted({*same}) + "?";
   }
@@ -143,7 +145,7 @@ std::string named_elsewhere(const std::vector<std::string>& known, std::string_v
 
 std::string did_you_mean(const std::vector<std::string>& known, std::string_view word) {
   constexpr std::size_t kShortest = 3, kMost = 16;  // letters of a beginning, words that are offered
-  if (std::string named = named_elsewhere(known, word); !named.empty()) return named;
+  if (std::string named = named_elsewhere(known, word, Ours::words); !named.empty()) return named;
   const std::string typed = lower(word);
   std::vector<std::string> meant;
   const auto add = [&](const auto& is_meant) {
@@ -189,7 +191,9 @@ std::string suggestion(const CLI::App& app, const std::string& error) {
     if (!is_flag && given != nullptr) continue;
     if (is_flag && !word.starts_with("--")) word = word.substr(0, word.find_first_of("0123456789"));  // -j4
     if (const std::size_t point = word.find('.'); is_flag && point != word.npos) word.replace(0, point + 1, "--");
-    const std::string likely = did_you_mean(is_flag ? flags : commands, word);
+    const std::vector<std::string>& known = is_flag ? flags : commands;
+    std::string likely = named_elsewhere(known, word, Ours::words_and_sentences);
+    if (likely.empty()) likely = did_you_mean(known, word);
     if (!likely.empty()) meant += (meant.empty() ? "; " : " ") + likely;
   }
   if (!meant.empty() || commands.empty()) return meant;
