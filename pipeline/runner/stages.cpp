@@ -101,10 +101,11 @@ Setting parse_setting(const std::string& text) {
   const std::size_t equals = text.find('='), point = text.substr(0, equals).find('.');
   if (equals == text.npos || equals + 1 == text.size() || equals == (point == text.npos ? 0 : point + 1))
     throw UsageError("--set " + text + ": expected TABLE.KEY=VALUE, as in gel.youngs_modulus_kPa=4");
-  const std::string meant = stage::did_you_mean({"pixel_size_um"}, text.substr(0, equals));
-  if (point == text.npos && !text.starts_with("pixel_size_um="))  // the one above the first table
+  if (point == text.npos && !text.starts_with("pixel_size_um=")) {  // the one above the first table
+    const std::string meant = stage::did_you_mean({"pixel_size_um"}, text.substr(0, equals));
     throw UsageError("--set " + text + ": expected its table, too: TABLE.KEY=VALUE, as in gel.youngs_modulus_kPa=4" +
                      (meant.empty() ? "" : "; " + meant));
+  }
   const std::string table = point == text.npos ? "" : text.substr(0, point);
   const std::size_t begin = point == text.npos ? 0 : point + 1;
   std::set<std::string> tables = {"effects"};
@@ -117,8 +118,9 @@ Setting parse_setting(const std::string& text) {
     throw UsageError("--set " + text + ": expected a table of cell.toml, found '" + table + "'" +
                      (named.empty() ? "; there are " + listed(tables) : "; " + named));
   }
-  if (const std::size_t comma = text.find(',', equals);
-      comma != text.npos && text.find('=', comma) != text.npos && text.find('.', comma) < text.find('=', comma))
+  const std::size_t comma = std::min(text.find(',', equals), text.size() - 1);
+  const std::string next = text.substr(comma + 1, text.find('.', comma) - comma - 1);  // of "gel.a=1,gel.b=2": gel
+  if (!next.empty() && tables.contains(next))
     throw UsageError("--set " + text + ": one value a flag: --set " + text.substr(0, comma) + " --set " +
                      text.substr(comma + 1));
   return {table, text.substr(begin, equals - begin), text.substr(equals + 1)};

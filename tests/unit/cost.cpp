@@ -239,6 +239,9 @@ TEST(Settings, that_are_set_have_a_table_a_key_and_a_value) {
   EXPECT_EQ(gel.table + " " + gel.key + " " + gel.value, "gel youngs_modulus_kPa 4");
   EXPECT_EQ(runner::parse_setting("pixel_size_um=0.1").table, "");
   EXPECT_EQ(runner::parse_setting("track.x_column=a=b").value, "a=b");
+  for (const char* list : {"adhesion_rim_level=0.3,0.5 adhesion_seed_noise=4,5", "0.1,.5", "a,b,"})
+    EXPECT_EQ(runner::parse_setting(std::string("segment.contact_sheet=") + list).value, list) << "commas in a value";
+  EXPECT_THROW(runner::parse_setting("gel.youngs_modulus_kPa=4,gel.poisson_ratio=0.4"), UsageError);
   for (const char* text :
        {"gel.youngs_modulus_kPa", "=4", "gel.=4", "gel.youngs_modulus_kPa=", "jel.youngs_modulus_kPa=4"})
     EXPECT_THROW(runner::parse_setting(text), UsageError) << text;
