@@ -269,7 +269,7 @@ int repeat(const CommandLine& line) {
   throw OutputError("cannot start " + arguments[0]);
 }
 
-bool names(const std::vector<std::string>& arguments, const std::string& flag) {
+bool has_flag(const std::vector<std::string>& arguments, const std::string& flag) {
   return std::ranges::any_of(arguments, [&](const auto& a) { return a == flag || a.starts_with(flag + "="); });
 }
 
@@ -277,11 +277,10 @@ bool names(const std::vector<std::string>& arguments, const std::string& flag) {
   if (!further.empty() && !further.front().starts_with("-"))
     throw UsageError("stats: one folder at a time: give the folder that both are in");
   std::vector<std::string> arguments = {"--cells", line.folder.string(), "--threads", std::to_string(line.run.threads)};
-  if (!names(further, "--out"))
-    arguments.insert(arguments.end(),
-                     {"--out", files::inside(line.folder, "statistics", line.folder.string()).string()});
+  if (!has_flag(further, "--out"))
+    arguments.push_back("--out=" + files::inside(line.folder, "statistics", line.folder.string()).string());
   if (line.run.is_quiet) arguments.emplace_back("--quiet");
-  if (const fs::path shared = line.folder / "study.toml"; files::is_file(shared) && !names(further, "--config"))
+  if (const fs::path shared = line.folder / "study.toml"; files::is_file(shared) && !has_flag(further, "--config"))
     arguments.insert(arguments.end(), {"--config", shared.string()});
   for (std::string argument : further) {
     // flags are written with dashes, too: --condition-from
@@ -326,7 +325,7 @@ int check(const CommandLine& line) {
 
 /// @param arguments  as given, in their order
 [[noreturn]] void plan(std::vector<std::string> arguments) {
-  if (!names(arguments, "--out")) arguments.insert(arguments.end(), {"--out", "plan"});
+  if (!has_flag(arguments, "--out")) arguments.insert(arguments.end(), {"--out", "plan"});
   become("mbtfm-plan", std::move(arguments));
 }
 

@@ -233,7 +233,7 @@ ImageNames read_image_names(const fs::path& cell) {
                        "to run them all: mbtfm batch " + cell.string());
     if (const fs::path above = fs::weakly_canonical(cell).parent_path(); files::is_file(above / "cell.toml"))
       throw InputError(cell.string(), "a cell folder with cell.toml", "a folder in a cell's own",
-                       "give the cell: " + above.string());
+                       "give the cell: " + above.string() + ", or make one here: mbtfm init " + cell.string());
     const std::string misnamed = misnamed_settings(files::visible_in(cell));
     throw InputError(cell.string(), "a cell folder with cell.toml", "no cell.toml",
                      misnamed.empty() ? "to write one from what the images say: mbtfm init " + cell.string()

@@ -153,11 +153,10 @@ std::string did_you_mean(const std::vector<std::string>& known, std::string_view
   };
   const auto closest = std::ranges::min_element(known, {}, [&](const auto& k) { return edit_distance(k, word); });
   const auto add_closest = [&](int share, int most) {  // how many letters may be wrong: fewer than a share, and so many
-    const auto is_near = [&](const std::string& k) {
-      const int n_wrong = edit_distance(k, word);
-      return n_wrong <= most && share * n_wrong < static_cast<int>(lower(k).size()) + (share > 2);
-    };
-    add([&](const auto& k) { return &k == &*closest && is_near(k); });
+    add([&](const std::string& k) {
+      const int n_wrong = edit_distance(k, word), n_letters = static_cast<int>(lower(k).size());
+      return &k == &*closest && n_wrong <= most && share * n_wrong < n_letters + (share > 2);
+    });
   };
   add([&](const std::string& k) { return lower(k) == typed; });
   add([&](const std::string& k) { return typed.size() >= kShortest && lower(k).starts_with(typed); });

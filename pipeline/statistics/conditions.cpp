@@ -184,7 +184,7 @@ CellNotes notes_of(const std::vector<std::string>& names, const std::string& con
       notes[i].*member = rows->text(row, column);
       if (is_no_name(notes[i].*member)) (notes[i].*member).clear();
       if ((notes[i].*member).empty() && notes[i].reason_to_exclude.empty())
-        notes[i].reason_to_exclude = "no " + column + " in the table (of merged rows the first alone has it)";
+        notes[i].reason_to_exclude = "no " + column + " in the table (of merged cells, the first alone has it)";
     };
     take(condition.column, &CellNote::condition);
     take(replicate.column, &CellNote::replicate);
