@@ -7,7 +7,6 @@
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/contract/polyline.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/own_files.h"

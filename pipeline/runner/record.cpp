@@ -14,7 +14,6 @@
 #include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
-#include "pipeline/runner/cell_stages.h"
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm::runner {

@@ -5,7 +5,6 @@
 #include <mutex>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/machine.h"

@@ -9,7 +9,6 @@
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/columns.h"
-#include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/suggest.h"

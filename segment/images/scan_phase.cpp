@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "pipeline/contract/kinds_of_findings.h"
-#include "pipeline/contract/numbers.h"
 #include "pipeline/contract/with_error.h"
 
 namespace mbtfm::images {
