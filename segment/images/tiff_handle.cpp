@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <cstring>
 #include <limits>
-#include <set>
+#include <string_view>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
@@ -19,55 +19,37 @@ namespace {
 /// libtiff complains of each tag that is not as it expects; those of other programs (private ones), and names and
 /// dates, are not needed for the pixels.
 bool is_of_a_needed_tag(const std::string& message) {
-  static const std::set<std::string> needed = {"ImageWidth",
-                                               "ImageLength",
-                                               "BitsPerSample",
-                                               "Compression",
-                                               "PhotometricInterpretation",
-                                               "ImageDescription",
-                                               "StripOffsets",
-                                               "SamplesPerPixel",
-                                               "RowsPerStrip",
-                                               "StripByteCounts",
-                                               "XResolution",
-                                               "YResolution",
-                                               "PlanarConfiguration",
-                                               "ResolutionUnit",
-                                               "Predictor",
-                                               "ColorMap",
-                                               "TileWidth",
-                                               "TileLength",
-                                               "TileOffsets",
-                                               "TileByteCounts",
-                                               "ExtraSamples",
-                                               "SampleFormat",
-                                               "JPEGTables",
-                                               "FillOrder",
-                                               "YCbCrSubsampling",
-                                               "ReferenceBlackWhite",
-                                               "SubFileType"};
+  constexpr std::string_view kNeeded =
+      " ImageWidth ImageLength BitsPerSample Compression PhotometricInterpretation ImageDescription StripOffsets "
+      "SamplesPerPixel RowsPerStrip StripByteCounts XResolution YResolution PlanarConfiguration ResolutionUnit "
+      "Predictor ColorMap TileWidth TileLength TileOffsets TileByteCounts ExtraSamples SampleFormat JPEGTables "
+      "FillOrder YCbCrSubsampling ReferenceBlackWhite SubFileType ";
   const std::size_t begin = message.find('"'), end = message.find('"', begin + 1);
   return begin == std::string::npos || end == std::string::npos ||
-         needed.contains(message.substr(begin + 1, end - begin - 1));
+         kNeeded.find(" " + message.substr(begin + 1, end - begin - 1) + " ") != kNeeded.npos;
+}
+
+std::string text_of(const char* format, va_list arguments) {
+  char text[512];
+  std::vsnprintf(text, sizeof text, format, arguments);
+  return text;
+}
+
+/// 1: handled, nothing goes to the terminal.
+int keep(void* messages, const std::string& text) {
+  auto& first = static_cast<Messages*>(messages)->first_error;
+  if (first.empty() && is_of_a_needed_tag(text)) first = text;
+  return 1;
 }
 
 int keep_error(TIFF*, void* messages, const char*, const char* format, va_list arguments) {
-  char text[512];
-  std::vsnprintf(text, sizeof text, format, arguments);
-  auto& first = static_cast<Messages*>(messages)->first_error;
-  if (first.empty() && is_of_a_needed_tag(text)) first = text;
-  return 1;  // handled: nothing goes to the terminal
+  return keep(messages, text_of(format, arguments));
 }
 
 /// Warnings are of no concern, but for the one that a file ends within its tags: the calibration may be lost with them.
-int keep_warning_of_early_end(TIFF* tiff, void* messages, const char* module, const char* format, va_list arguments) {
-  char text[512];
-  va_list copy;
-  va_copy(copy, arguments);
-  std::vsnprintf(text, sizeof text, format, copy);
-  va_end(copy);
-  if (std::strstr(text, "IO error during reading")) return keep_error(tiff, messages, module, format, arguments);
-  return 1;
+int keep_warning_of_early_end(TIFF*, void* messages, const char*, const char* format, va_list arguments) {
+  const std::string text = text_of(format, arguments);
+  return text.find("IO error during reading") == text.npos ? 1 : keep(messages, text);
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& expected, const std::string& found,
