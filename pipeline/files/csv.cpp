@@ -1,7 +1,6 @@
 #include "pipeline/files/csv.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <unordered_set>
@@ -9,6 +8,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/parsed.h"
 #include "pipeline/contract/place.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/text.h"
@@ -159,13 +159,10 @@ Range possible(const std::string& column) {
 }  // namespace
 
 double CsvTable::number(int row, const std::string& column, Range range) const {
-  const std::string& field = rows_[row].fields[index_of(column)];
-  double value = 0;
-  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-  const bool is_number = error == std::errc() && end == field.data() + field.size() && std::isfinite(value);
-  if (!is_number || !is_inside(range, value)) fail(row, column, describe("a number", range));
-  if (!is_inside(possible(column), value)) fail(row, column, describe("a number", possible(column)));
-  return value;
+  const auto value = parsed<double>(rows_[row].fields[index_of(column)]);
+  if (!value || !std::isfinite(*value) || !is_inside(range, *value)) fail(row, column, describe("a number", range));
+  if (!is_inside(possible(column), *value)) fail(row, column, describe("a number", possible(column)));
+  return *value;
 }
 
 std::optional<double> CsvTable::optional_number(int row, const std::string& column) const {
@@ -174,12 +171,9 @@ std::optional<double> CsvTable::optional_number(int row, const std::string& colu
 }
 
 int CsvTable::integer(int row, const std::string& column, int smallest) const {
-  const std::string& field = rows_[row].fields[index_of(column)];
-  int value = 0;
-  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (error != std::errc() || end != field.data() + field.size() || value < smallest)
-    fail(row, column, "an integer >= " + std::to_string(smallest));
-  return value;
+  const auto value = parsed<int>(rows_[row].fields[index_of(column)]);
+  if (!value || *value < smallest) fail(row, column, "an integer >= " + std::to_string(smallest));
+  return *value;
 }
 
 bool CsvTable::truth(int row, const std::string& column) const {

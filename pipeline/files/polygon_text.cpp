@@ -1,12 +1,12 @@
 #include "pipeline/files/polygon_text.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/parsed.h"
 
 namespace mbtfm::files {
 namespace {
@@ -55,9 +55,8 @@ double number_of(std::string_view word, const std::string& where) {
   constexpr std::size_t kShown = 40;
   std::string_view digits = word;
   if (digits.starts_with('+')) digits.remove_prefix(1);
-  double value = 0;
-  const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error == std::errc() && stop == digits.data() + digits.size() && std::isfinite(value)) return value;
+  const auto value = parsed<double>(digits);
+  if (value && std::isfinite(*value)) return *value;
   throw InputError(where, "a finite number",
                    word.empty() ? "the end of the file" : "'" + std::string(word.substr(0, kShown)) + "'");
 }

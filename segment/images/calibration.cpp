@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -7,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/parsed.h"
 #include "pipeline/contract/range.h"
 #include "segment/images/image_file.h"
 #include "segment/images/stack.h"
@@ -28,10 +28,8 @@ std::optional<double> unit_um(std::string_view unit) {
 }
 
 std::optional<double> positive_number(std::string_view text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || !std::isfinite(value) || value <= 0) return std::nullopt;
-  return value;
+  const auto value = parsed<double>(text);
+  return value && std::isfinite(*value) && *value > 0 ? value : std::nullopt;
 }
 
 struct PixelSize {
