@@ -1,7 +1,6 @@
 #include "pipeline/files/triangle_mesh.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <functional>
@@ -15,6 +14,7 @@
 #include "pipeline/files/names.h"
 #include "pipeline/files/polygon_text.h"
 #include "pipeline/files/text.h"
+#include "pipeline/files/vtu_data.h"
 #include "pipeline/files/vtu_file.h"
 
 namespace mbtfm::files {
@@ -108,32 +108,12 @@ TriangleMesh parse_stl(std::string_view text, const std::string& name) {
   return !fits && is_text ? parse_text_stl(text, name) : parse_binary_stl(text, name);
 }
 
-static_assert(std::endian::native == std::endian::little);
-
 enum class PlyFormat { ascii, little_endian, big_endian };
-
-template <class T>
-double ply_number(const char* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof(T));
-  return static_cast<double>(value);
-}
-
-struct PlyType {
-  std::string_view name, other_name;
-  std::size_t n_bytes;
-  double (*number)(const char* bytes);
-};
-constexpr PlyType kPlyTypes[] = {
-    {"char", "int8", 1, ply_number<std::int8_t>},    {"uchar", "uint8", 1, ply_number<std::uint8_t>},
-    {"short", "int16", 2, ply_number<std::int16_t>}, {"ushort", "uint16", 2, ply_number<std::uint16_t>},
-    {"int", "int32", 4, ply_number<std::int32_t>},   {"uint", "uint32", 4, ply_number<std::uint32_t>},
-    {"float", "float32", 4, ply_number<float>},      {"double", "float64", 8, ply_number<double>}};
 
 struct PlyProperty {
   std::string_view name;
-  const PlyType* type = nullptr;
-  const PlyType* count = nullptr;  ///< of a list
+  const NumberType* type = nullptr;
+  const NumberType* count = nullptr;  ///< of a list
 };
 
 struct PlyElement {
@@ -147,9 +127,12 @@ struct PlyHead {
   std::vector<PlyElement> elements;
 };
 
-const PlyType* ply_type(std::string_view name, const std::string& where) {
-  for (const PlyType& type : kPlyTypes)
-    if (name == type.name || name == type.other_name) return &type;
+const NumberType* ply_type(std::string_view name, const std::string& where) {
+  constexpr std::string_view kOldNames[][2] = {{"char", "int8"},     {"uchar", "uint8"},   {"short", "int16"},
+                                               {"ushort", "uint16"}, {"int", "int32"},     {"uint", "uint32"},
+                                               {"float", "float32"}, {"double", "float64"}};
+  const auto old = std::ranges::find(kOldNames, name, [](const auto& names) { return names[0]; });
+  if (const NumberType* type = number_type(old == std::end(kOldNames) ? name : (*old)[1])) return type;
   throw InputError(where, "a type of PLY's numbers", "'" + std::string(name) + "'");
 }
 
@@ -176,8 +159,8 @@ PlyHead take_head(TextRest& text) {
       const int n = index_of(number_of(words[2], text.where()), text.where());
       head.elements.push_back({.name = words[1], .n = n});
     } else if (key == "property" && (words.size() == 3 || is_list) && !head.elements.empty()) {
-      const PlyType* type = ply_type(words[words.size() - 2], text.where());
-      const PlyType* count = is_list ? ply_type(words[2], text.where()) : nullptr;
+      const NumberType* type = ply_type(words[words.size() - 2], text.where());
+      const NumberType* count = is_list ? ply_type(words[2], text.where()) : nullptr;
       head.elements.back().properties.push_back({.name = words.back(), .type = type, .count = count});
     } else {
       throw InputError(text.where(), "a line of a PLY header", "'" + std::string(key.substr(0, 40)) + "...'");
@@ -190,7 +173,7 @@ PlyHead take_head(TextRest& text) {
 void require_room(const PlyElement& element, PlyFormat format, const TextRest& text) {
   std::size_t least = 0;
   for (const PlyProperty& p : element.properties) {
-    const PlyType* first = p.count != nullptr ? p.count : p.type;
+    const NumberType* first = p.count != nullptr ? p.count : p.type;
     least += format == PlyFormat::ascii ? 2 : first->n_bytes;
   }
   if (static_cast<std::size_t>(element.n) * least <= text.rest().size() + 1) return;
@@ -199,15 +182,12 @@ void require_room(const PlyElement& element, PlyFormat format, const TextRest& t
                    std::to_string(text.rest().size()) + " bytes", "the file may be damaged or cut short");
 }
 
-double take_number(TextRest& text, const PlyType& type, PlyFormat format) {
+double take_number(TextRest& text, const NumberType& type, PlyFormat format) {
   if (format == PlyFormat::ascii) {
     const std::string_view word = text.word();
     return number_of(word, text.where());
   }
-  char own[8];
-  std::ranges::copy(text.bytes(type.n_bytes), own);
-  if (format == PlyFormat::big_endian) std::reverse(own, own + type.n_bytes);
-  return type.number(own);
+  return type.number_at(text.bytes(type.n_bytes).data(), format == PlyFormat::big_endian);
 }
 
 std::vector<double> take_values(TextRest& text, const PlyProperty& property, PlyFormat format) {

@@ -7,11 +7,12 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cstring>
 #include <limits>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/parsed.h"
+#include "pipeline/files/names.h"
 
 namespace mbtfm::files {
 namespace {
@@ -159,21 +160,11 @@ double number_at(const char* bytes, bool is_swapped) {
   return static_cast<double>(value);
 }
 
-struct NumberType {
-  std::string_view name;
-  int n_bytes;
-  double (*number_at)(const char* bytes, bool is_swapped);
-};
-constexpr NumberType kNumberTypes[] = {{"Int8", 1, number_at<std::int8_t>},   {"UInt8", 1, number_at<std::uint8_t>},
-                                       {"Int16", 2, number_at<std::int16_t>}, {"UInt16", 2, number_at<std::uint16_t>},
-                                       {"Int32", 4, number_at<std::int32_t>}, {"UInt32", 4, number_at<std::uint32_t>},
-                                       {"Int64", 8, number_at<std::int64_t>}, {"UInt64", 8, number_at<std::uint64_t>},
-                                       {"Float32", 4, number_at<float>},      {"Float64", 8, number_at<double>}};
-
-const NumberType* number_type(std::string_view name) {
-  const auto found = std::ranges::find(kNumberTypes, name, &NumberType::name);
-  return found == std::end(kNumberTypes) ? nullptr : found;
-}
+constexpr NumberType kNumberTypes[] = {{"int8", 1, number_at<std::int8_t>},   {"uint8", 1, number_at<std::uint8_t>},
+                                       {"int16", 2, number_at<std::int16_t>}, {"uint16", 2, number_at<std::uint16_t>},
+                                       {"int32", 4, number_at<std::int32_t>}, {"uint32", 4, number_at<std::uint32_t>},
+                                       {"int64", 8, number_at<std::int64_t>}, {"uint64", 8, number_at<std::uint64_t>},
+                                       {"float32", 4, number_at<float>},      {"float64", 8, number_at<double>}};
 
 std::vector<double> decode_binary(const VtuData& data, const VtuEncoding& encoding, const NumberType& type,
                                   const std::string& element) {
@@ -199,12 +190,10 @@ std::vector<double> decode_text(const VtuData& data, const std::string& element)
   for (std::size_t at = data.bytes.find_first_not_of(kSpace); at != data.bytes.npos;
        at = data.bytes.find_first_not_of(kSpace, at)) {
     const std::size_t end = std::min(data.bytes.find_first_of(kSpace, at), data.bytes.size());
-    double value = 0;
-    const auto [stop, error] = std::from_chars(data.bytes.data() + at, data.bytes.data() + end, value);
-    if (error != std::errc() || stop != data.bytes.data() + end)
-      refuse(element, "numbers", "other text after " + std::to_string(numbers.size()) + " numbers");
+    const auto value = parsed<double>(data.bytes.substr(at, end - at));
+    if (!value) refuse(element, "numbers", "other text after " + std::to_string(numbers.size()) + " numbers");
     if (numbers.size() == data.n_values) refuse(element, std::to_string(data.n_values) + " numbers", "more");
-    numbers.push_back(value);
+    numbers.push_back(*value);
     at = end;
   }
   if (numbers.size() != data.n_values)
@@ -213,6 +202,11 @@ std::vector<double> decode_text(const VtuData& data, const std::string& element)
 }
 
 }  // namespace
+
+const NumberType* number_type(std::string_view name) {
+  const auto found = std::ranges::find(kNumberTypes, lower_case(std::string(name)), &NumberType::name);
+  return found == std::end(kNumberTypes) ? nullptr : found;
+}
 
 std::vector<double> decode_vtu(const VtuData& data, const VtuEncoding& encoding, const std::string& element) {
   const NumberType* type = number_type(data.type);

@@ -29,6 +29,15 @@ struct VtuData {
   std::uint64_t n_values = 0;
 };
 
+/// A type of numbers in binary files.
+struct NumberType {
+  std::string_view name;  ///< in small letters
+  std::size_t n_bytes;
+  double (*number_at)(const char* bytes, bool is_swapped);
+};
+/// By VTK's name or PLY's newer one: "Int32", "int32"; null: none is called so.
+const NumberType* number_type(std::string_view name);
+
 /// The numbers of an array; integers above 2^53 are rounded.
 /// @throws InvalidData that calls the array `element`, where it has not exactly `n_values` numbers
 std::vector<double> decode_vtu(const VtuData& data, const VtuEncoding& encoding, const std::string& element);
