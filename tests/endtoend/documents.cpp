@@ -204,14 +204,14 @@ TEST(DocumentPages, the_index_names_every_page) {
   }
 }
 
-/// Commands as pipeline/mbtfm_main.cpp adds them, programs as they were built, codes as the sources name them.
+/// Commands as pipeline/commands/table.cpp has them, programs as they were built, codes as the sources name them.
 TEST(DocumentPages, every_command_and_exit_code_is_on_its_page) {
   const std::string commands = files::read_text(kDocs / "commands.md");
-  const std::string source = files::read_text(kProject / "pipeline/mbtfm_main.cpp");
-  const std::regex added(R"re(add_(command\(\s*app,\s*line,|subcommand\()\s*"([a-z]+)")re");
+  const std::string source = files::read_text(kProject / "pipeline/commands/table.cpp");
+  const std::regex added(R"re(\n +\{"([a-z]+)",)re");
   int n_commands = 0;
   for (std::sregex_iterator at(source.begin(), source.end(), added), end; at != end; ++at, ++n_commands)
-    EXPECT_TRUE(has_words(commands, "| `mbtfm " + (*at)[2].str())) << (*at)[2];
+    EXPECT_TRUE(has_words(commands, "| `mbtfm " + (*at)[1].str())) << (*at)[1];
   EXPECT_GE(n_commands, 12);
   for (const fs::directory_entry& entry : fs::directory_iterator(test::build_folder() / "bin")) {
     const std::string name = entry.path().filename().string();
