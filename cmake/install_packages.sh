@@ -13,7 +13,7 @@ packages=(
   g++ cmake ninja-build ccache mold
   libopencv-dev libvtk9-dev libeigen3-dev libboost-dev libboost-thread-dev libcgal-dev
   libmetis-dev libfftw3-dev libopenblas0-pthread libopenblas-pthread-dev
-  libtiff-dev libpng-dev libjpeg62-turbo-dev libzip-dev libexpat1-dev libssl-dev
+  libtiff-dev libpng-dev libjpeg62-turbo-dev libzip-dev libpugixml-dev libssl-dev
   libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev libutf8proc-dev
 )
 [ "$purpose" = cell ] || packages+=(libdeal.ii-dev zlib1g-dev librsvg2-dev pkg-config fonts-dejavu-core)

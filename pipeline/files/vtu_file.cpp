@@ -1,17 +1,14 @@
 #include "pipeline/files/vtu_file.h"
 
-#include <expat.h>
-
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <optional>
-#include <type_traits>
+#include <pugixml.hpp>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/parsed.h"
 
 namespace mbtfm::files {
 namespace {
@@ -28,16 +25,13 @@ const char* type_of(VtuKind kind) { return kind == VtuKind::poly_data ? "PolyDat
 
 std::optional<std::uint64_t> count_of(const std::string& text) {
   const std::size_t begin = text.find_first_not_of(' '), end = text.find_last_not_of(' ');
-  if (begin == text.npos) return std::nullopt;
-  std::uint64_t value = 0;
-  const auto [stop, error] = std::from_chars(text.data() + begin, text.data() + end + 1, value);
-  if (error != std::errc() || stop != text.data() + end + 1) return std::nullopt;
-  return value;
+  return begin == text.npos ? std::nullopt
+                            : parsed<std::uint64_t>(std::string_view(text).substr(begin, end + 1 - begin));
 }
 
 /// By VtuSection.
 struct Section {
-  std::string_view element, name;
+  const char *element, *name;
 };
 constexpr Section kSections[] = {{"PointData", "point array"},
                                  {"CellData", "cell array"},
@@ -45,115 +39,42 @@ constexpr Section kSections[] = {{"PointData", "point array"},
                                  {"Cells", "array of cells"},
                                  {"Polys", "array of polygons"}};
 
-std::optional<VtuSection> section_of(std::string_view element) {
-  const auto found = std::ranges::find(kSections, element, &Section::element);
-  if (found == std::end(kSections)) return std::nullopt;
-  return static_cast<VtuSection>(found - kSections);
+std::string name_of(VtuSection section) { return kSections[static_cast<int>(section)].name; }
+
+std::uint64_t count(const pugi::xml_node& piece, const char* attribute, const std::string& name) {
+  const std::string text = piece.attribute(attribute).value();
+  if (const auto value = count_of(text)) return *value;
+  throw InputError(name, "a number of points or cells", attribute + ("=\"" + text + "\""), kDamaged);
 }
 
-std::string name_of(VtuSection section) { return std::string(kSections[static_cast<int>(section)].name); }
-
-using Attributes = std::map<std::string, std::string>;
-
-/// What the XML says, up to the appended data, which need not be XML.
-struct Structure {
-  VtuKind kind = VtuKind::unstructured_grid;
-  XML_Parser parser = nullptr;
-  Attributes head, appended;
-  std::vector<VtuFile::Piece> pieces;
-  std::optional<std::size_t> appended_begin;  ///< the first byte after the tag
-  std::string error;                          ///< a count that is none
-
-  std::vector<std::string> open;  ///< elements
-  std::optional<VtuSection> section;
-
-  std::uint64_t count(Attributes& attributes, const char* name) {
-    const auto value = count_of(attributes[name]);
-    if (!value && error.empty()) error = std::string(name) + "=\"" + attributes[name] + "\"";
-    return value.value_or(0);
-  }
-
-  /// Of polygons: kinds of cells that a file lacks need not be named.
-  void count_cells(VtuFile::Piece& piece, Attributes& attributes) {
-    if (kind == VtuKind::unstructured_grid) {
-      piece.n_cells = count(attributes, "NumberOfCells");
-      return;
-    }
-    const auto count_if_named = [&](const char* name) {
-      return attributes.contains(name) ? count(attributes, name) : 0;
+VtuFile::Piece piece_of(const pugi::xml_node& xml, VtuKind kind, const std::string& name) {
+  VtuFile::Piece piece;
+  piece.n_points = count(xml, "NumberOfPoints", name);
+  if (kind == VtuKind::unstructured_grid) {
+    piece.n_cells = count(xml, "NumberOfCells", name);
+  } else {  // kinds of cells that a file lacks need not be named
+    const auto if_named = [&](const char* kind_of_cells) {
+      return xml.attribute(kind_of_cells) ? count(xml, kind_of_cells, name) : 0;
     };
-    piece.n_polygons = count_if_named("NumberOfPolys");
-    piece.n_strips = count_if_named("NumberOfStrips");
-    piece.n_cells = piece.n_polygons;
-    for (const std::uint64_t n : {piece.n_strips, count_if_named("NumberOfVerts"), count_if_named("NumberOfLines")})
+    piece.n_cells = piece.n_polygons = if_named("NumberOfPolys");
+    piece.n_strips = if_named("NumberOfStrips");
+    for (const std::uint64_t n : {piece.n_strips, if_named("NumberOfVerts"), if_named("NumberOfLines")})
       piece.n_cells = n > kMost - piece.n_cells ? kMost : piece.n_cells + n;
   }
-
-  void begin(const std::string& element, Attributes attributes) {
-    open.push_back(element);
-    if (element == "VTKFile") head = attributes;
-    if (element == "Piece") {
-      pieces.emplace_back();
-      pieces.back().n_points = count(attributes, "NumberOfPoints");
-      count_cells(pieces.back(), attributes);
-    }
-    if (const auto begun = section_of(element); begun && !pieces.empty()) section = begun;
-    if (element == "DataArray" && section) {
-      pieces.back().arrays.push_back({.section = *section,
-                                      .name = attributes["Name"],
-                                      .type = attributes["type"],
-                                      .format = attributes["format"],
-                                      .offset = attributes["offset"],
-                                      .n_components = attributes["NumberOfComponents"]});
-    }
-    if (element == "AppendedData") {
-      appended = std::move(attributes);
-      appended_begin = static_cast<std::size_t>(XML_GetCurrentByteIndex(parser) + XML_GetCurrentByteCount(parser));
-      XML_StopParser(parser, XML_FALSE);
+  for (int s = 0; s < static_cast<int>(std::size(kSections)); ++s) {
+    for (const pugi::xml_node& xml_array : xml.child(kSections[s].element).children("DataArray")) {
+      const auto word = [&](const char* attribute) { return xml_array.attribute(attribute).value(); };
+      piece.arrays.push_back({.section = static_cast<VtuSection>(s),
+                              .name = word("Name"),
+                              .type = word("type"),
+                              .format = word("format"),
+                              .offset = word("offset"),
+                              .n_components = word("NumberOfComponents")});
+      // its own text, not that of the keys that VTK puts into it
+      for (const pugi::xml_node& part : xml_array.children()) piece.arrays.back().text += part.value();
     }
   }
-
-  void end(const std::string& element) {
-    open.pop_back();
-    if (section_of(element)) section.reset();
-  }
-
-  void add_text(std::string_view text) {
-    // an array's own, not that of the keys that VTK puts into it
-    const bool is_own = section && !open.empty() && open.back() == "DataArray" && !pieces.back().arrays.empty();
-    if (is_own) pieces.back().arrays.back().text += text;
-  }
-};
-
-void on_begin(void* structure, const char* element, const char** attributes) {
-  Attributes named;
-  for (; *attributes; attributes += 2) named[attributes[0]] = attributes[1];
-  static_cast<Structure*>(structure)->begin(element, std::move(named));
-}
-void on_end(void* structure, const char* element) { static_cast<Structure*>(structure)->end(element); }
-void on_text(void* structure, const char* text, int length) {
-  static_cast<Structure*>(structure)->add_text({text, static_cast<std::size_t>(length)});
-}
-
-Structure structure_of(const std::string& text, const std::string& name, VtuKind kind) {
-  Structure structure;
-  structure.kind = kind;
-  const std::unique_ptr<std::remove_pointer_t<XML_Parser>, decltype(&XML_ParserFree)> parser(XML_ParserCreate(nullptr),
-                                                                                             &XML_ParserFree);
-  structure.parser = parser.get();
-  XML_SetUserData(parser.get(), &structure);
-  XML_SetElementHandler(parser.get(), on_begin, on_end);
-  XML_SetCharacterDataHandler(parser.get(), on_text);
-  constexpr std::size_t kPart = 1u << 20;  // expat counts with int
-  for (std::size_t at = 0; at < text.size() && !structure.appended_begin; at += kPart) {
-    const std::size_t n = std::min(kPart, text.size() - at);
-    const auto status = XML_Parse(parser.get(), text.data() + at, static_cast<int>(n), at + n == text.size());
-    if (status != XML_STATUS_OK && !structure.appended_begin) {
-      throw InputError(name + ":" + std::to_string(XML_GetCurrentLineNumber(parser.get())), words_of(kind),
-                       XML_ErrorString(XML_GetErrorCode(parser.get())), kDamaged);
-    }
-  }
-  return structure;
+  return piece;
 }
 
 /// What a file of this size may claim: as many numbers as it has bytes, eight times over for those that pack well, and
@@ -187,22 +108,32 @@ void require_points(const std::vector<double>& points, std::uint64_t n, const st
 VtuFile::VtuFile(std::string text, std::string name, VtuKind kind) : text_(std::move(text)), name_(std::move(name)) {
   if (text_.find(kEnd) == text_.npos)
     throw InputError(name_, "a VTK XML file that ends with " + std::string(kEnd), "an early end or another format");
-  Structure structure = structure_of(text_, name_, kind);
-  const auto word = [&](const char* key) { return structure.head.contains(key) ? structure.head[key] : std::string(); };
+  // appended data need not be XML
+  const std::size_t tag = text_.find("<AppendedData"), tag_end = tag == text_.npos ? tag : text_.find('>', tag);
+  const std::string head =
+      tag_end == text_.npos ? text_ : text_.substr(0, tag_end + 1) + "</AppendedData>" + std::string(kEnd);
+  pugi::xml_document xml;
+  if (const pugi::xml_parse_result parsed = xml.load_buffer(head.data(), head.size()); !parsed) {
+    const auto line = 1 + std::count(head.begin(), head.begin() + parsed.offset, '\n');
+    throw InputError(name_ + ":" + std::to_string(line), words_of(kind), parsed.description(), kDamaged);
+  }
+  const pugi::xml_node file = xml.child("VTKFile");
+  const auto word = [&](const char* attribute) { return std::string(file.attribute(attribute).value()); };
   if (word("type") != type_of(kind)) throw InputError(name_, words_of(kind), "type '" + word("type") + "'");
-  if (!structure.error.empty()) throw InputError(name_, "a number of points or cells", structure.error, kDamaged);
-  if (structure.pieces.empty()) throw InputError(name_, words_of(kind), "no points");
-  require_plausible_counts(structure.pieces, text_.size(), name_);
+  for (const pugi::xml_node& piece : file.child(type_of(kind)).children("Piece"))
+    pieces_.push_back(piece_of(piece, kind, name_));
+  if (pieces_.empty()) throw InputError(name_, words_of(kind), "no points");
+  require_plausible_counts(pieces_, text_.size(), name_);
   encoding_ = {.is_big_endian = word("byte_order") == "BigEndian",
                .header_bytes = word("header_type") == "UInt64" ? 8 : 4,
                .compressor = word("compressor")};
-  pieces_ = std::move(structure.pieces);
-  if (!structure.appended_begin) return;
-  const std::size_t begin = text_.find('_', *structure.appended_begin), end = text_.rfind(kEnd);
+  if (tag == text_.npos) return;
+  const std::size_t begin = text_.find('_', tag_end), end = text_.rfind(kEnd);
   if (begin == text_.npos || end < begin || text_.find_first_not_of(" \t\r\n", end + kEnd.size()) != text_.npos)
     throw InputError(name_, "appended data after a '_', and " + std::string(kEnd) + " at the end", "none", kDamaged);
   appended_ = std::string_view(text_).substr(begin + 1, end - begin - 1);
-  appended_storage_ = structure.appended["encoding"] == "base64" ? VtuStorage::base64 : VtuStorage::raw;
+  const std::string encoding = file.child("AppendedData").attribute("encoding").value();
+  appended_storage_ = encoding == "base64" ? VtuStorage::base64 : VtuStorage::raw;
 }
 
 const VtuFile::Array* VtuFile::find(const Piece& piece, VtuSection section, const std::string& array) const {

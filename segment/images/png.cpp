@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/text.h"
 #include "segment/images/image_file.h"
 
 namespace mbtfm::images {
@@ -134,13 +134,6 @@ std::string png_of(const Picture& picture) {
   return bytes;
 }
 
-void write_png(const std::filesystem::path& file, const Picture& picture) {
-  const std::string bytes = png_of(picture);
-  FileHandle stream(std::fopen(file.c_str(), "wb"));
-  if (!stream) throw OutputError(file.string() + ": cannot be written: " + std::strerror(errno));
-  bool is_written = std::fwrite(bytes.data(), 1, bytes.size(), stream.get()) == bytes.size();
-  is_written = std::fclose(stream.release()) == 0 && is_written;  // a full disk shows here at the latest
-  if (!is_written) throw OutputError(file.string() + ": cannot be written: " + std::strerror(errno));
-}
+void write_png(const std::filesystem::path& file, const Picture& picture) { files::write_text(file, png_of(picture)); }
 
 }  // namespace mbtfm::images

@@ -1,23 +1,17 @@
 #include "segment/images/stack.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <map>
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/parsed.h"
+#include "pipeline/files/names.h"
 #include "segment/images/image_file.h"
 
 namespace mbtfm::images {
 namespace {
-
-std::optional<int> whole_number(std::string_view text) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
 
 constexpr long long kMostPlanes = 1 << 22;  // beyond any file's; keeps a damaged count from taking memory
 
@@ -121,7 +115,7 @@ bool positive(const std::optional<std::string_view>& number) {
 std::optional<Stack> stack_of_imagej(const std::string& description) {
   const auto count = [&](const char* key) {
     const auto text = line_value(description, key);
-    const auto n = text ? whole_number(*text) : std::optional(1);
+    const auto n = text ? parsed<int>(*text) : std::optional(1);
     if (!n || *n < 1)
       throw InvalidData("ImageJ's description", "a number >= 1 of " + std::string(key), "'" + std::string(*text) + "'");
     return *n;
@@ -160,11 +154,6 @@ std::string listed(const std::vector<std::string>& names) {
   return list;
 }
 
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 /// How many frames are in the file, from the first on: less than it states where the recording was aborted.
 int n_recorded(const Stack& s) {
   const int n_of_frame = s.n_slices * s.n_channels;
@@ -197,7 +186,7 @@ std::optional<Stack> stack_of(const std::string& description, const FileOfPages&
 
 int n_imagej_images(const std::string& description) {
   if (!description.starts_with("ImageJ=")) return 1;
-  return std::max(1, whole_number(line_value(description, "images").value_or("1")).value_or(1));
+  return std::max(1, parsed<int>(line_value(description, "images").value_or("1")).value_or(1));
 }
 
 int chosen_channel(const std::vector<std::string>& names, const PlaneChoice& choice, const std::string& file) {
@@ -209,12 +198,12 @@ int chosen_channel(const std::vector<std::string>& names, const PlaneChoice& cho
   }
   for (const bool is_exact : {true, false}) {
     const auto is_it = [&](const std::string& name) {
-      return !name.empty() && (is_exact ? name == wanted : lower(name) == lower(wanted));
+      return !name.empty() && (is_exact ? name == wanted : files::lower_case(name) == files::lower_case(wanted));
     };
     if (std::count_if(names.begin(), names.end(), is_it) == 1)
       return static_cast<int>(std::find_if(names.begin(), names.end(), is_it) - names.begin());
   }
-  const auto number = whole_number(wanted);
+  const auto number = parsed<int>(wanted);
   if (number && *number >= 1 && *number <= static_cast<int>(names.size())) return *number - 1;
   throw InputError(file, "channel '" + wanted + "'", listed(names), hint);
 }
@@ -223,7 +212,7 @@ std::vector<int> chosen_pages(const Stack& s, const PlaneChoice& choice, const s
   const int channel = chosen_channel(s.channel_names, choice, file), frame = chosen_frame(s, choice, file);
   int low = 0, high = s.n_slices;
   if (choice.z != kProjection) {
-    const auto slice = whole_number(choice.z);
+    const auto slice = parsed<int>(choice.z);
     if (!slice || *slice < 1 || *slice > s.n_slices) {
       throw InputError(file, "slice '" + choice.z + "'",
                        std::to_string(s.n_slices) + " slice" + (s.n_slices == 1 ? "" : "s"),

@@ -24,7 +24,6 @@ const std::map<std::string, std::string> kReaders = {
     {"pipeline/report/sheet_report.cpp", "values of sheet_fit.csv and of records"},
     {"pipeline/report/space_report.cpp", "values of traction.json and of records"},
     {"pipeline/stage/parameters.cpp", "tables, true and false of cell.toml and flags"},
-    {"segment/images/ome.cpp", "elements of OME-XML"},
     {"segment/images/stack.cpp", "the order of axes in OME-XML"},
     {"segment/rois/roi_set.cpp", "ImageJ's ROIs and their archives"},
     {"segment/beads/given_table.cpp", "words of other programs' tables"},
