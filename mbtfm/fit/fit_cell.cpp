@@ -246,6 +246,7 @@ std::vector<FrameFit> fit_frames(const ReadyCell& cell, const WithMissing& first
   const auto find = [&](EnsembleFit of_frame) {
     std::vector<MissingAdhesion> places = first.adhesions;
     if (!places.empty()) of_frame = with_their_forces(std::move(of_frame), places, p.gel, n_of_place(cell));
+    of_frame = with_edge_forces(std::move(of_frame), first.fit.forces.edge, cell.scene.cell, p.gel, n_of_place(cell));
     return with_unfound(std::move(of_frame), cell.scene.cell, missing);
   };
   return fit_series(series.frames, cell.networks, series.response,
