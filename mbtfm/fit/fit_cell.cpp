@@ -5,6 +5,7 @@
 #include "mbtfm/fit/effects.h"
 #include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/fit/strained_gel.h"
+#include "mbtfm/tensions/edge_forces.h"
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/findings.h"
 #include "mbtfm/tensions/fit_results.h"
@@ -245,6 +246,7 @@ std::vector<FrameFit> fit_frames(const ReadyCell& cell, const WithMissing& first
   const auto find = [&](EnsembleFit of_frame) {
     std::vector<MissingAdhesion> places = first.adhesions;
     if (!places.empty()) of_frame = with_their_forces(std::move(of_frame), places, p.gel, n_of_place(cell));
+    of_frame = with_edge_forces(std::move(of_frame), first.fit.forces.edge, cell.scene.cell, p.gel, n_of_place(cell));
     return with_unfound(std::move(of_frame), cell.scene.cell, missing);
   };
   return fit_series(series.frames, cell.networks, series.response,
@@ -285,6 +287,10 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
   if (!is_read_wrongly(readings)) searched = hold_where_beads_show(std::move(searched), inputs, p, work);
   const std::vector<MissingAdhesion> missing = searched.missing_adhesions();
   auto& [ready, with, held] = searched;
+  if (!is_read_wrongly(readings)) {
+    const EdgeForces edge = edge_forces(with.fit, ready.scene.cell, p.gel);
+    with.fit = with_edge_forces(std::move(with.fit), edge, ready.scene.cell, p.gel, n_of_place(ready));
+  }
   with.fit = with_unfound(std::move(with.fit), ready.scene.cell, missing);
   const EnsembleFit& fit = with.fit;
   Found found = found_by(ready, fit, inputs.second_placement, p, work);

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "mbtfm/tensions/edge_forces.h"
 #include "mbtfm/tensions/intervals.h"
 #include "mbtfm/tensions/model_error.h"
 #include "mbtfm/tensions/tension_fit.h"
@@ -67,6 +68,7 @@ struct FoundForces {
   VectorXd torques_nN_um;            ///< by adhesion, about the origin
   std::vector<Estimate> magnitudes;  ///< by adhesion
   VectorXd of_network_nN;            ///< with every fibre at the network's tension: the network's part
+  EdgeForces edge;                   ///< beside those of the adhesions
   double away_nN2 = 0;               ///< variance of the total by forces away from all adhesions that it holds
 };
 

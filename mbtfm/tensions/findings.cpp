@@ -213,6 +213,11 @@ Noticed missing_adhesions_noticed(const FitOutcome& o) {
   return noticed(Symptom::missing_adhesion, static_cast<double>(missing.size()), {.at = places});
 }
 
+Noticed edge_forces_noticed(const FitOutcome& o) {
+  const EdgeForces& edge = o.fit.forces.edge;
+  return noticed(Symptom::edge_forces, edge.probability, {.at = brief(edge.sum_nN()) + " nN"});
+}
+
 Noticed fibres_without_tension(const FitOutcome& o) {
   std::vector<int> ids;
   for (const Fibre& fibre : o.cell.fibres) {
@@ -350,6 +355,7 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
         channel_shift(o),
         std::move(cause),
         std::move(then),
+        edge_forces_noticed(o),
         noticed_of(Symptom::adhesions_without_beads, adhesions_without_beads(o.cell.adhesions, o.data.position_um)),
         explains_little(o),
         unexplained(o),

@@ -120,17 +120,6 @@ Asked refined(Asked best, const Ask& ask_at) {
   return best;
 }
 
-bool is_free(const Cell& cell, Vec2 place_um) {
-  if (!contains(cell.outline_um, place_um)) return false;
-  for (const Polygon& hole : cell.holes_um) {
-    if (contains(hole, place_um)) return false;
-  }
-  return std::ranges::none_of(cell.adhesions, [&](const Adhesion& a) {
-    const Vec2 d = a.position_um - place_um;
-    return dot(d, d) < std::pow(a.major_axis_um / 2 + kApart_um, 2);
-  });
-}
-
 /// Of fibres: many end on an adhesion.
 std::vector<Vec2> free_ends(const Cell& cell) {
   std::vector<Vec2> ends;
@@ -220,6 +209,17 @@ double unfound_nN(const VectorXd& forces_nN, const std::vector<Adhesion>& adhesi
 }
 
 }  // namespace
+
+bool is_free(const Cell& cell, Vec2 place_um) {
+  if (!contains(cell.outline_um, place_um)) return false;
+  for (const Polygon& hole : cell.holes_um) {
+    if (contains(hole, place_um)) return false;
+  }
+  return std::ranges::none_of(cell.adhesions, [&](const Adhesion& a) {
+    const Vec2 d = a.position_um - place_um;
+    return dot(d, d) < std::pow(a.major_axis_um / 2 + kApart_um, 2);
+  });
+}
 
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cell& cell, const Gel& gel, int threads) {
   constexpr double kExpected = 0.1;  // forces that a cell has away from its adhesions, half of them at ends of fibres

@@ -12,6 +12,9 @@ namespace mbtfm::tensions {
 
 struct EnsembleFit;
 
+/// Whether it lies in the cell, and an adhesion there is none of those that were found.
+bool is_free(const Cell& cell, Vec2 place_um);
+
 /// The best ones, each beside those before: places one micrometre apart, of a force spread over a disc of 0.5 um. They
 /// are looked for in what the forces leave of the beads around, and asked by all beads (search.h). Kept are those that
 /// the beads make likelier than not: one place in ten cells is expected, of a force as the adhesions have.

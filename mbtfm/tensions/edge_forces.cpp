@@ -1,0 +1,123 @@
+#include "mbtfm/tensions/edge_forces.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/missing_adhesions.h"
+#include "mbtfm/tensions/search.h"
+#include "pipeline/contract/extent.h"
+#include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/distributions.h"
+#include "pipeline/numerics/order_statistics.h"
+#include "substrate/greens/models.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+constexpr double kApartOnEdge_um = 2;  // of the places: beads are as far apart
+
+/// None on the edge itself.
+Vec2 inward_normal(const Cell& cell, Vec2 place_um) {
+  const Vec2 inward = place_um - nearest_on_boundary_um(cell.outline_um, place_um);
+  return 1 / std::max(norm(inward), 1e-300) * inward;
+}
+
+/// Forces of 1 nN in all, which balance.
+struct Ring {
+  std::vector<substrate::Ellipse> discs;
+  std::vector<Vec2> forces_nN;
+};
+
+Ring ring_along_edge(const Cell& cell) {
+  std::vector<double> depths_um;
+  for (const Adhesion& a : cell.adhesions) depths_um.push_back(distance_to_boundary_um(cell.outline_um, a.position_um));
+  const double depth_um = std::max(kApartOnEdge_um, numerics::quantile(std::move(depths_um), 0.75)),
+               radius_um = kApartOnEdge_um / std::sqrt(std::numbers::pi);
+  const auto [low, high] = extent_of(cell.outline_um);
+  Ring ring;
+  for (double y = low.y + kApartOnEdge_um / 2; y < high.y; y += kApartOnEdge_um) {
+    for (double x = low.x + kApartOnEdge_um / 2; x < high.x; x += kApartOnEdge_um) {
+      const Vec2 place{x, y};
+      const double edge_um = distance_to_boundary_um(cell.outline_um, place);
+      if (edge_um <= 0 || edge_um > depth_um || !is_free(cell, place)) continue;
+      if (!cuts_of(cell).empty() && distance_to_cut_um(cell, place) <= edge_um) continue;  // the cell goes on there
+      ring.discs.push_back(
+          {.centre_um = place, .semi_major_um = radius_um, .semi_minor_um = radius_um, .angle_rad = 0});
+      ring.forces_nN.push_back(inward_normal(cell, place));
+    }
+  }
+  const Vec2 mean = centre_of(ring.forces_nN);
+  double sum = 0;
+  for (Vec2& force : ring.forces_nN) sum += norm(force = force - mean);
+  for (Vec2& force : ring.forces_nN) force = 1 / std::max(sum, 1e-300) * force;
+  return ring;
+}
+
+/// Of the beads, 2·beads × 1; no rows where no place is free.
+MatrixXd displacement_by_ring(const LinearData& data, const Cell& cell, const Gel& gel) {
+  const Ring ring = ring_along_edge(cell);
+  if (ring.discs.empty()) return {};
+  VectorXd forces_nN(2 * std::ssize(ring.forces_nN));
+  for (Index k = 0; k < std::ssize(ring.forces_nN); ++k)
+    forces_nN.segment<2>(2 * k) << ring.forces_nN[k].x, ring.forces_nN[k].y;
+  return numerics::matvec(greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
+                              ->compliance_um_per_nN(data.position_um, ring.discs),
+                          forces_nN);
+}
+
+}  // namespace
+
+EdgeForces edge_forces(const EnsembleFit& fit, const Cell& cell, const Gel& gel) {
+  constexpr double kExpected = 0.1;  // of cells have such forces
+  if (are_assumed(cell.adhesions)) return {};
+  const VectorXd forces_nN = adhesion_forces_nN(fit);
+  double inward_nN = 0;
+  for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
+    const Vec2 place = cell.adhesions[a].position_um;
+    const auto at = 2 * static_cast<Index>(a);
+    inward_nN += dot(inward_normal(cell, place), {forces_nN[at], forces_nN[at + 1]});
+  }
+  const MatrixXd shape = displacement_by_ring(fit.data, cell, gel);
+  if (shape.size() == 0 || inward_nN <= 0) return {};
+  const Left left(fit);
+  const Scores scores = left.scores_of(pattern_of(fit.data, shape));
+  const double information = scores.information(0, 0), most_nN = total_nN(forces_nN);
+  if (!(information > 0)) return {};
+  const double sigma_nN = std::sqrt(left.variance() / information), z = scores.scores[0] / std::sqrt(information),
+               r = 1 / (1 + std::pow(sigma_nN / most_nN, 2)),
+               log_factor = std::log(2 * std::sqrt(1 - r)) + 0.5 * r * z * z +
+                            std::log(std::max(numerics::normal_below(std::sqrt(r) * z), 1e-300));
+  return {.probability = 1 / (1 + (1 - kExpected) / kExpected * std::exp(-log_factor)),
+          .inward_nN = std::max(0.0, z * sigma_nN),
+          .sigma_nN = sigma_nN,
+          .per_inward = most_nN / inward_nN};
+}
+
+EnsembleFit with_edge_forces(EnsembleFit fit, EdgeForces found, const Cell& cell, const Gel& gel, Index n_last) {
+  if (found.are_there()) {
+    LinearData data = std::move(fit.data);
+    Motions motions = joined_ahead(data.motions, n_last, {.shapes = displacement_by_ring(data, cell, gel)});
+    fit = with_forces_by(std::move(fit), with_motions(std::move(data), std::move(motions)));
+    const VectorXd values =
+        motion_in(fit.data, fit.data.displacement_um - fit.data.response->displace(adhesion_forces_nN(fit)));
+    const Index at = values.size() - n_last - 1;
+    found.inward_nN = std::max(0.0, values[at]);
+    found.sigma_nN = motions_beside(fit.data, fit).sigma[at];
+  }
+  fit.forces.edge = found;
+  const double sum_nN = found.sum_nN(), p = found.probability,
+               squares = std::pow(found.per_inward * found.sigma_nN, 2) + 0.25 * sum_nN * sum_nN,
+               variance = found.are_there() ? squares + (1 - p) * sum_nN * sum_nN : p * (squares + sum_nN * sum_nN);
+  fit.forces.away_nN2 += variance;
+  for (Estimate* sum : {&fit.total_force_nN, &fit.network_force_nN}) {
+    if (found.are_there()) sum->value += sum_nN;
+    sum->standard_error = std::hypot(sum->standard_error, std::sqrt(variance));
+  }
+  return fit;
+}
+
+}  // namespace mbtfm::tensions
