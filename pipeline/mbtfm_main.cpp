@@ -32,6 +32,7 @@
 #include "pipeline/runner/stages.h"
 #include "pipeline/runner/verify.h"
 #include "pipeline/stage/console.h"
+#include "pipeline/stage/help.h"
 #include "pipeline/stage/manual.h"
 #include "pipeline/stage/suggest.h"
 
@@ -363,58 +364,35 @@ int cost_study(const CommandLine& line) {
   return kDone;
 }
 
-struct FolderArgument {
-  const char *name, *meaning;
-  bool is_required = true;
-};
-constexpr FolderArgument kCell = {"CELL", "a cell folder"}, kFolder = {"FOLDER", "a folder of cell folders"},
-                         kDemo = {"CELL", "the cell folder to make; default: mbtfm-demo", false};
-
-CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name, const std::string& purpose,
-                      const FolderArgument& folder) {
-  CLI::App* command = app.add_subcommand(name, purpose);
-  command->add_option(folder.name, line.folder, folder.meaning)->required(folder.is_required);
-  command->add_option("--threads", line.run.threads, "processors to use")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
-  command->add_flag("--quiet", line.run.is_quiet, "print errors only");
+CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name, const std::string& folder) {
+  CLI::App* command = app.add_subcommand(name);
+  command->add_option(folder, line.folder)->required(name != "demo");
+  command->add_option("--threads", line.run.threads)->check(CLI::Range(1, 1024))->capture_default_str();
+  command->add_flag("--quiet", line.run.is_quiet);
   return command;
 }
 
 void add_stage_folder(CLI::App* command, CommandLine& line) {
-  command->add_option("--stages-dir", line.run.stage_folder, "folder of the stages' executables")
-      ->capture_default_str();
+  command->add_option("--stages-dir", line.run.stage_folder)->capture_default_str();
 }
 
 void add_stage_options(CLI::App* command, CommandLine& line) {
   std::vector<std::string> names;
-  std::string meaning = "parameters that cell.toml does not set";
-  for (const cost::Preset& preset : cost::presets()) {
-    names.push_back(preset.name);
-    meaning += (names.size() == 1 ? ": " : ", ") + preset.name + " (" + preset.purpose + ")";
-  }
-  CLI::Option* preset = command->add_option("--preset", line.run.preset, meaning)->check(CLI::IsMember(names));
-  command->add_option("--accuracy", line.accuracy, "cheapest preset that finds tensions to this error, as 5%")
-      ->excludes(preset);
-  command
-      ->add_option("--set", line.set,
-                   "a value in place of cell.toml's: TABLE.KEY=VALUE, as gel.youngs_modulus_kPa=4; may be repeated")
-      ->allow_extra_args(false);
+  for (const cost::Preset& preset : cost::presets()) names.push_back(preset.name);
+  CLI::Option* preset = command->add_option("--preset", line.run.preset)->check(CLI::IsMember(names));
+  command->add_option("--accuracy", line.accuracy)->excludes(preset);
+  command->add_option("--set", line.set)->allow_extra_args(false);
   // one value a flag: else the folder that follows would be taken for another
-  command
-      ->add_option("--only", line.run.only,
-                   "run this stage only: " + runner::stage_names() + "; several with commas: segment,track")
+  command->add_option("--only", line.run.only, stage::help_on("any command", "--only", {runner::stage_names()}))
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--redo", line.run.redo, "run this stage even if up to date; several with commas")
-      ->delimiter(',')
-      ->allow_extra_args(false);
+  command->add_option("--redo", line.run.redo)->delimiter(',')->allow_extra_args(false);
   add_stage_folder(command, line);
   const std::map<std::string, double> time_units = {{"s", 1}, {"min", 60}, {"h", 3600}};
-  command->add_option("--timeout", line.run.limits.seconds, "kill a stage after this time: 90, 10min, 2h")
+  command->add_option("--timeout", line.run.limits.seconds)
       ->transform(CLI::AsNumberWithUnit(time_units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"))
       ->check(CLI::Range(1e-3, 1e15));
-  command->add_option("--memory", line.run.limits.memory_bytes, "kill a stage above this memory: 500MB, 4GB")
+  command->add_option("--memory", line.run.limits.memory_bytes)
       ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true))
       ->check(CLI::Range(1e-3, 1e15));
 }
@@ -447,71 +425,54 @@ int start(int argc, char** argv) {
   CommandLine line;
   line.run.stage_folder = runner::executable_folder();
   line.run.threads = numerics::available_threads();
-  CLI::App app("model-based traction force microscopy: from images to stress-fibre tensions", "mbtfm");
+  CLI::App app("", "mbtfm");
   app.set_version_flag("--version", std::string("mbtfm ") + kVersion);
   app.footer("Exit codes: " + stage::exit_codes());
-  CLI::App* demo_command =
-      add_command(app, line, "demo", "simulate a cell, run every stage, compare its tensions with the truth", kDemo);
-  demo_command->add_flag("--force", line.is_forced, "overwrite a cell of an earlier demo or simulation");
-  CLI::App* init_command =
-      add_command(app, line, "init", "write a cell.toml from what the images of a folder say", kCell);
-  init_command->add_option("--like", line.like,
-                           "a cell folder: write a cell.toml like its own for each folder below that has none");
-  CLI::App* check_command = add_command(app, line, "check", "judge the images below a folder, before a batch", kFolder);
-  check_command->add_option("MORE", line.more_cells, "further folders");
-  CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", kCell);
+  CLI::App* demo_command = add_command(app, line, "demo", "CELL");
+  demo_command->add_flag("--force", line.is_forced);
+  CLI::App* init_command = add_command(app, line, "init", "CELL");
+  init_command->add_option("--like", line.like);
+  CLI::App* check_command = add_command(app, line, "check", "FOLDER");
+  check_command->add_option("MORE", line.more_cells);
+  CLI::App* run_command = add_command(app, line, "run", "CELL");
   add_stage_options(run_command, line);
-  run_command->add_flag("--checked", line.run.is_checked, "the parameters were checked before")->group("");
-  run_command->add_flag("--explain", line.run.explain,
-                        "fit again and report what each effect that is off would change");
-  for (CLI::App* command : {run_command, demo_command})
-    command->add_flag("--verbose", line.is_verbose, "print every effect, and why a stage runs");
-  CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", kFolder);
-  for (CLI::App* command : {run_command, batch_command, check_command})
-    command->add_flag("--json", line.is_json, "print events as JSON, one object a line (docs/formats/json.md)");
+  run_command->add_flag("--checked", line.run.is_checked)->group("");
+  run_command->add_flag("--explain", line.run.explain);
+  for (CLI::App* command : {run_command, demo_command}) command->add_flag("--verbose", line.is_verbose);
+  CLI::App* batch_command = add_command(app, line, "batch", "FOLDER");
+  for (CLI::App* command : {run_command, batch_command, check_command}) command->add_flag("--json", line.is_json);
   add_stage_options(batch_command, line);
-  batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
-  batch_command
-      ->add_option("--pattern", line.patterns,
-                   "make cell folders for images that lie together: KEY=PATTERN, KEY of [images], {cell} the cell's "
-                   "name, as in adhesion='{cell}_pax.tif'")
-      ->allow_extra_args(false);
-  batch_command->add_option("--template", line.template_toml, "settings for the cell.toml of these folders");
-  batch_command->add_flag("--list", line.only_list, "run nothing; print each cell's stages and states (CSV)");
-  batch_command->add_flag("--table", line.only_table, "run nothing; write batch.csv of the cells as they are");
-  CLI::App* verify_command =
-      add_command(app, line, "verify", "check inputs and outputs against the hashes in run.json", kCell);
-  CLI::App* repeat_command =
-      add_command(app, line, "repeat", "repeat the run of a run.json in a new folder and compare", kCell);
-  repeat_command->add_option("--out", line.out, "the new cell folder")->required();
-  repeat_command->add_option("--inputs", line.inputs, "folder of the inputs; default: beside run.json");
+  batch_command->add_option("--jobs", line.jobs)->check(CLI::Range(1, 1024))->capture_default_str();
+  batch_command->add_option("--pattern", line.patterns)->allow_extra_args(false);
+  batch_command->add_option("--template", line.template_toml);
+  batch_command->add_flag("--list", line.only_list);
+  batch_command->add_flag("--table", line.only_table);
+  CLI::App* verify_command = add_command(app, line, "verify", "CELL");
+  CLI::App* repeat_command = add_command(app, line, "repeat", "CELL");
+  repeat_command->add_option("--out", line.out)->required();
+  repeat_command->add_option("--inputs", line.inputs);
   add_stage_folder(repeat_command, line);
-  CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", kFolder);
+  CLI::App* stats_command = add_command(app, line, "stats", "FOLDER");
   stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
-  CLI::App* cost_command = add_command(app, line, "cost", "what accuracy costs in time, for this cell", kCell);
-  cost_command->add_option("MORE", line.more_cells, "further cells to average the errors over");
-  cost_command->add_option("--out", line.out, "folder of cost.csv, cost.svg and cost.md; default: CELL/cost");
-  cost_command->add_option("--budget", line.budget_min, "begin no run after this (minutes)")
-      ->check(CLI::Range(1e-3, 1e6))
-      ->capture_default_str();
-  cost_command->add_option("--repeats", line.repeats, "most runs of each choice; the median counts")
-      ->check(CLI::Range(1, 100))
-      ->capture_default_str();
-  cost_command->add_flag("--all", line.is_whole, "the choices that take minutes, too");
+  CLI::App* cost_command = add_command(app, line, "cost", "CELL");
+  cost_command->add_option("MORE", line.more_cells);
+  cost_command->add_option("--out", line.out);
+  cost_command->add_option("--budget", line.budget_min)->check(CLI::Range(1e-3, 1e6))->capture_default_str();
+  cost_command->add_option("--repeats", line.repeats)->check(CLI::Range(1, 100))->capture_default_str();
+  cost_command->add_flag("--all", line.is_whole);
   add_stage_folder(cost_command, line);
   // what follows is for the program that they become, --help included
-  CLI::App* plan_command =
-      app.add_subcommand("plan", "how many beads and cells, which gel and noise a question takes: mbtfm plan --help");
+  CLI::App* plan_command = app.add_subcommand("plan");
   plan_command->set_help_flag();
   plan_command->allow_extras();
-  CLI::App* noise_command = app.add_subcommand(
-      "noise", "noise and density of beads from two pictures without a cell: mbtfm noise A.tif B.tif");
+  CLI::App* noise_command = app.add_subcommand("noise");
   noise_command->set_help_flag();
   noise_command->allow_extras();
   fs::path manuals;
-  app.add_option("--manuals", manuals, "write manual page and completions below this folder")->group("");
+  app.add_option("--manuals", manuals)->group("");
   app.require_subcommand(0, 1);
-  CLI::App* compare_command = add_command(app, line, "compare", "compare a simulated cell with its truth", kCell);
+  CLI::App* compare_command = add_command(app, line, "compare", "CELL");
+  stage::describe(app, "mbtfm");
   try {
     std::vector<std::string> arguments(argv + 1, argv + argc);
     for (const char* word : {"help", "version"}) {  // mbtfm help run
