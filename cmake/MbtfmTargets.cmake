@@ -36,6 +36,19 @@ function(mbtfm_optimise target level)
   target_precompile_headers(${target} REUSE_FROM mbtfm_headers_O${level})
 endfunction()
 
+# mbtfm_embed(OUT NAMESPACE NAME=FILE...): text files as `extern const std::string_view NAME` each, in the source OUT
+function(mbtfm_embed out namespace)
+  set(source ${CMAKE_CURRENT_BINARY_DIR}/embedded_texts.cpp)
+  list(TRANSFORM ARGN REPLACE "=" "=${CMAKE_CURRENT_SOURCE_DIR}/" OUTPUT_VARIABLE entries)
+  list(TRANSFORM ARGN REPLACE "^.*=" "" OUTPUT_VARIABLE files)
+  add_custom_command(OUTPUT ${source}
+    COMMAND ${CMAKE_COMMAND} -DOUT=${source} -DNAMESPACE=${namespace} "-DFILES=${entries}"
+            -P ${CMAKE_SOURCE_DIR}/cmake/embed.cmake
+    DEPENDS ${CMAKE_SOURCE_DIR}/cmake/embed.cmake ${files}
+    VERBATIM)
+  set(${out} ${source} PARENT_SCOPE)
+endfunction()
+
 function(mbtfm_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "HOT;WORDS" "" "PUBLIC;PRIVATE")
   if(NOT arg_UNPARSED_ARGUMENTS)  # headers alone

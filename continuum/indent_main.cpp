@@ -15,6 +15,7 @@
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
+#include "pipeline/stage/help.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 
@@ -39,33 +40,24 @@ struct Parameters {
 
 void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.gel);
-  list.add("radius_um", p.radius_um, Range::thickness_um(), "radius of the gel around the cell (um); its side is free");
+  list.add("radius_um", p.radius_um, Range::thickness_um());
   list.table("cell");
   list.add("volume_um3", p.volume_um3, Range::between(1, 1e7),
-           "volume of the cell (um3); unset: " + brief(kVolume_um3) +
-               ", with --outline it follows from the outline and height_um");
-  list.add("height_um", p.height_um, Range::zero_or_size_um(),
-           "height of the cell, a section of a sphere (um); or give it in the sweep");
-  list.add("youngs_modulus_kPa", p.youngs_modulus_kPa, Range::modulus_kPa(), "Young's modulus of the cell (kPa)");
-  list.add("poisson_ratio", p.poisson_ratio, Range{.low = 0, .high = 0.5, .excludes_high = true},
-           "Poisson's ratio of the cell; the result is nearly proportional to 1 - 2 nu");
-  list.add("contraction_kPa", p.contraction_kPa, Range::between(0, 1e6),
-           "isotropic contractile stress of the cell (kPa)");
+           stage::help_on("cell", "volume_um3", {brief(kVolume_um3)}));
+  list.add("height_um", p.height_um, Range::zero_or_size_um());
+  list.add("youngs_modulus_kPa", p.youngs_modulus_kPa, Range::modulus_kPa());
+  list.add("poisson_ratio", p.poisson_ratio, Range{.low = 0, .high = 0.5, .excludes_high = true});
+  list.add("contraction_kPa", p.contraction_kPa, Range::between(0, 1e6));
   list.table("indent");
-  list.add("strain", p.strain,
-           "small: linear elasticity; large: St Venant-Kirchhoff, with the contraction added to the second "
-           "Piola-Kirchhoff stress");
-  list.add("depths_um", p.depths_um, "depths at which the displacement is read (um)");
-  list.add("sweep", p.sweep,
-           "cases: each height with each ratio of gel to cell modulus, as 'height_um=5.3..15.8:11 "
-           "modulus_ratio=0.1,0.5,1,2'; empty: one");
-  list.add("order", p.order, Range::between(3, 8),
-           "order of the finite elements; unset: " + std::to_string(Fineness{}.order) + ", with --outline " +
-               std::to_string(kRevolvedFineness.order));
-  list.add("towards_rim", p.towards_rim, Range::between(2, 12),
-           "elements between the contact's rim and half its radius, each a fifth of the next; unset: " +
-               std::to_string(Fineness{}.towards_rim) + ", with --outline " +
-               std::to_string(kRevolvedFineness.towards_rim));
+  list.add("strain", p.strain);
+  list.add("depths_um", p.depths_um);
+  list.add("sweep", p.sweep);
+  const auto unset = [](const char* key, int Fineness::*number) {
+    return stage::help_on("indent", key,
+                          {std::to_string(Fineness{}.*number), std::to_string(kRevolvedFineness.*number)});
+  };
+  list.add("order", p.order, Range::between(3, 8), unset("order", &Fineness::order));
+  list.add("towards_rim", p.towards_rim, Range::between(2, 12), unset("towards_rim", &Fineness::towards_rim));
 }
 
 /// @param fineness  of what is not given
@@ -294,11 +286,5 @@ int main(int argc, char** argv) {
   using Kind = mbtfm::stage::FileArgument::Kind;
   using namespace mbtfm::solids;
   return mbtfm::stage::run_stage<Parameters>(
-      {.name = "indent",
-       .purpose = "find how deep a contracting cell presses into its gel",
-       .files = {{"outline", Kind::optional_input,
-                  "outline of a contact that is no circle (outline.csv, one ring, um)"},
-                 {"out", Kind::output_folder,
-                  "indent.csv, indent.json, indent.vtu (deepest case); of a sweep optima.csv and indent.svg"}}},
-      argc, argv, run);
+      {.name = "indent", .files = {{"outline", Kind::optional_input}, {"out", Kind::output_folder}}}, argc, argv, run);
 }

@@ -229,11 +229,6 @@ int main(int argc, char** argv) {
   using mbtfm::stage::FileArgument;
   using namespace mbtfm::tractions;
   return mbtfm::stage::run_stage<TractionParameters>(
-      {.name = "calibrate",
-       .purpose = "compare FTTC's total forces with the fit's over finished cells, for a series of lambdas",
-       .files = {{"cells", FileArgument::Kind::input, "folder of cell folders with 4_fit/fit.json"},
-                 {"out", FileArgument::Kind::output,
-                  "calibration.csv: slope and correlation by lambda E; calibration_cells.csv and calibration.svg come "
-                  "beside it"}}},
-      argc, argv, calibrate);
+      {.name = "calibrate", .files = {{"cells", FileArgument::Kind::input}, {"out", FileArgument::Kind::output}}}, argc,
+      argv, calibrate);
 }

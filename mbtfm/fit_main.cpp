@@ -35,19 +35,13 @@ StageReport run(const Parameters& parameters, stage::StageContext& context) {
 int main(int argc, char** argv) {
   using mbtfm::fit::Parameters;
   using mbtfm::stage::FileArgument;
-  return mbtfm::stage::run_stage<Parameters>(
-      {.name = "fit",
-       .purpose = "find the tension of every stress fibre and the force of every adhesion from bead displacements",
-       .files = {{"cell", FileArgument::Kind::input,
-                  "folder with adhesions.csv, fibres.csv, fibre_points.csv, outline.csv"},
-                 {"network", FileArgument::Kind::input, "network.vtu"},
-                 {"displacement", FileArgument::Kind::input, "displacement.csv of the beads"},
-                 {"start", FileArgument::Kind::optional_input, "tensions.csv to start from: of the frame before"},
-                 {"frames", FileArgument::Kind::optional_input,
-                  "folder with frames.csv and displacement_0001.csv ... of a time series, each of which is fitted"},
-                 {"kept", FileArgument::Kind::optional_input,
-                  "output folder of a run that was alike but for single frames: the others' fits are kept"},
-                 {"out", FileArgument::Kind::output_folder,
-                  "tensions.csv, adhesion_forces.csv, fit.json, fttc.csv, VTK files"}}},
-      argc, argv, mbtfm::fit::run);
+  return mbtfm::stage::run_stage<Parameters>({.name = "fit",
+                                              .files = {{"cell", FileArgument::Kind::input},
+                                                        {"network", FileArgument::Kind::input},
+                                                        {"displacement", FileArgument::Kind::input},
+                                                        {"start", FileArgument::Kind::optional_input},
+                                                        {"frames", FileArgument::Kind::optional_input},
+                                                        {"kept", FileArgument::Kind::optional_input},
+                                                        {"out", FileArgument::Kind::output_folder}}},
+                                             argc, argv, mbtfm::fit::run);
 }

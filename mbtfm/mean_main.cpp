@@ -113,18 +113,10 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
 int main(int argc, char** argv) {
   using Kind = mbtfm::stage::FileArgument::Kind;
   using namespace mbtfm::mean;
-  return mbtfm::stage::run_stage<Parameters>(
-      {.name = "mean",
-       .purpose = "mean displacements and tractions over cells of one shape",
-       .files = {{"cells", Kind::input,
-                  "folder of cells, each with an outline (outline.csv, mask or selection) and displacement.csv", true},
-                 {"pattern", Kind::optional_input,
-                  "outline of the reference: outline.csv, a mask or an ImageJ selection"},
-                 {"model", Kind::optional_input,
-                  "traction.csv of a model on a lattice in the reference's frame, blurred as the cells are"},
-                 {"out", Kind::output_folder,
-                  "folder of mean.csv, mean.vtp, mean.json, mean.svg, mean.html, registration.csv, blur.csv, "
-                  "reference.csv; unset: mean/ beside the cells",
-                  false, "", "mean"}}},
-      argc, argv, run);
+  return mbtfm::stage::run_stage<Parameters>({.name = "mean",
+                                              .files = {{"cells", Kind::input, true},
+                                                        {"pattern", Kind::optional_input},
+                                                        {"model", Kind::optional_input},
+                                                        {"out", Kind::output_folder, false, "", "mean"}}},
+                                             argc, argv, run);
 }

@@ -62,30 +62,18 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
 int main(int argc, char** argv) {
   using Kind = mbtfm::stage::FileArgument::Kind;
   using namespace mbtfm::sheet_stage;
-  return mbtfm::stage::run_stage<Parameters>(
-      {.name = "sheet",
-       .purpose = "contract a sheet of cells, or find a colony's tensions from tractions or beads",
-       .files = {{"outline", Kind::input,
-                  "outline of the sheet: outline.csv, a mask (PNG, TIFF) or an ImageJ selection (.roi, .zip)"},
-                 {"traction", Kind::optional_input,
-                  "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 unless on a lattice)"},
-                 {"displacement", Kind::optional_input,
-                  "displacement.csv of the beads, to fit contraction and stiffness"},
-                 {"adhesions", Kind::optional_input,
-                  "with --displacement: adhesions.csv, a model to compare in sheet_models.csv"},
-                 {"bundles", Kind::optional_input,
-                  "with --displacement: fibre_points.csv of stress fibres whose tensions are fitted, too"},
-                 {"beads", Kind::optional_input, "on a gel: surface points x_um, y_um for displacement.csv"},
-                 {"cells", Kind::optional_input,
-                  "label image of the cells: writes borders.csv (forces between them) and cell_tension.csv"},
-                 {"contractions", Kind::optional_input,
-                  "with --cells: contraction of each (cell, contraction_nN_per_um); others have that of [sheet]"},
-                 {"adhesive", Kind::optional_input, "where the sheet adheres, as the outline; unset: everywhere"},
-                 {"area", Kind::optional_input,
-                  "with --traction: area around the outline in which the sheet ends; unset: the outline"},
-                 {"points", Kind::optional_input, "points of sheet.csv: x_um, y_um; unset: the nodes"},
-                 {"out", Kind::output_folder,
-                  "folder of sheet.csv, traction.csv, sheet.vtu, sheet.svg, sheet.html, sheet.json; of a fit also "
-                  "sheet_fit.csv, sheet_models.csv, displacement.csv"}}},
-      argc, argv, run);
+  return mbtfm::stage::run_stage<Parameters>({.name = "sheet",
+                                              .files = {{"outline", Kind::input},
+                                                        {"traction", Kind::optional_input},
+                                                        {"displacement", Kind::optional_input},
+                                                        {"adhesions", Kind::optional_input},
+                                                        {"bundles", Kind::optional_input},
+                                                        {"beads", Kind::optional_input},
+                                                        {"cells", Kind::optional_input},
+                                                        {"contractions", Kind::optional_input},
+                                                        {"adhesive", Kind::optional_input},
+                                                        {"area", Kind::optional_input},
+                                                        {"points", Kind::optional_input},
+                                                        {"out", Kind::output_folder}}},
+                                             argc, argv, run);
 }

@@ -113,16 +113,10 @@ int main(int argc, char** argv) {
   using namespace mbtfm::tractions;
   return mbtfm::stage::run_stage<mbtfm::spatial::StageParameters>(
       {.name = "traction",
-       .purpose = "reconstruct tractions from bead displacements by a standard method",
-       .files = {{"displacement", FileArgument::Kind::input,
-                  "displacement.csv of the beads, without the column sigma_um their errors are estimated from "
-                  "neighbours; or displacement_3d.csv of beads in space"},
-                 {"surface", FileArgument::Kind::optional_input,
-                  "surface.vtp of mbtfm-surface, if the gel is not flat; its z = 0 is thickness_um above the base"},
-                 {"adhesions", FileArgument::Kind::optional_input, "adhesions.csv: forces are summed up by adhesion"},
-                 {"outline", FileArgument::Kind::optional_input, "outline.csv: sums are taken over the cell"},
-                 {"out", FileArgument::Kind::output,
-                  "traction.csv; traction.vtp, traction.json, traction_lambda.csv and .svg, and "
-                  "traction_adhesion_forces.csv come beside it"}}},
+       .files = {{"displacement", FileArgument::Kind::input},
+                 {"surface", FileArgument::Kind::optional_input},
+                 {"adhesions", FileArgument::Kind::optional_input},
+                 {"outline", FileArgument::Kind::optional_input},
+                 {"out", FileArgument::Kind::output}}},
       argc, argv, run);
 }

@@ -74,11 +74,8 @@ int main(int argc, char** argv) {
   using Kind = stage::FileArgument::Kind;
   return stage::run_stage<ContractParameters>(
       {.name = "contract",
-       .purpose = "contract a cable network with given tensions",
-       .files = {{"network", Kind::input, "network.vtu"},
-                 {"tensions", Kind::input, "tensions.csv: fibre_id, tension_nN; fibre_id 0 is the actin network"},
-                 {"out", Kind::output, "the contracted network (.vtu), with the force each cable carries"},
-                 {"reactions", Kind::output, "force on what holds it at each held vertex (.csv)"}}},
+       .files =
+           {{"network", Kind::input}, {"tensions", Kind::input}, {"out", Kind::output}, {"reactions", Kind::output}}},
       argc, argv, [](const ContractParameters& parameters, stage::StageContext& context) {
         const Path tensions_file = context.input("tensions");
         cables::CableParameters cable_parameters = parameters.cables;

@@ -75,10 +75,7 @@ int main(int argc, char** argv) {
   using namespace mbtfm;
   return stage::run_stage<NetworkStageParameters>(
       {.name = "network",
-       .purpose = "span a contractile cable network over a segmented cell",
-       .files = {{"cell", stage::FileArgument::Kind::input,
-                  "folder of adhesions.csv, fibres.csv, fibre_points.csv, outline.csv"},
-                 {"out", stage::FileArgument::Kind::output, "network.vtu"}}},
+       .files = {{"cell", stage::FileArgument::Kind::input}, {"out", stage::FileArgument::Kind::output}}},
       argc, argv, [](const NetworkStageParameters& parameters, stage::StageContext& context) {
         Cell cell = files::read_cell(context.input("cell", files::kCellFiles));
         const Effect fibres = cables::take_fibres(cell, parameters.effects.stress_fibres);

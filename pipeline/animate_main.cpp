@@ -10,11 +10,8 @@ int main(int argc, char** argv) {
   using namespace mbtfm;
   using Kind = stage::FileArgument::Kind;
   return stage::run_stage(
-      {.name = "animate",
-       .purpose = "draw the frames of a time series, as one animated picture",
-       .files = {{"cell", Kind::input, "a cell folder whose time series was fitted", true},
-                 {"out", Kind::output, "the picture (animated PNG)"}}},
-      argc, argv, [](stage::ParameterList&) {},
+      {.name = "animate", .files = {{"cell", Kind::input, true}, {"out", Kind::output}}}, argc, argv,
+      [](stage::ParameterList&) {},
       [](stage::StageContext& context) {
         const fs::path cell = context.input("cell", {"4_fit/frames.csv", "4_fit/tracks.csv"});
         const std::vector<std::string> frames = report::drawings_of_series(cell);

@@ -16,6 +16,7 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/stage/console.h"
+#include "pipeline/stage/help.h"
 #include "pipeline/stage/manual.h"
 #include "pipeline/stage/suggest.h"
 
@@ -62,13 +63,14 @@ int start(int argc, char** argv) {
   commands::CommandLine line;
   line.run.stage_folder = runner::executable_folder();
   line.run.threads = numerics::available_threads();
-  CLI::App app("model-based traction force microscopy: from images to stress-fibre tensions", "mbtfm");
+  CLI::App app("", "mbtfm");
   app.set_version_flag("--version", std::string("mbtfm ") + kVersion);
   app.footer("Exit codes: " + stage::exit_codes());
   app.require_subcommand(0, 1);
   declare(app, line);
   fs::path manuals;
-  app.add_option("--manuals", manuals, "write manual page and completions below this folder")->group("");
+  app.add_option("--manuals", manuals)->group("");
+  stage::describe(app, "mbtfm");
   try {
     app.parse(arguments_of(argc, argv));
   } catch (const CLI::ParseError& error) {

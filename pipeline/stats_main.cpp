@@ -21,8 +21,8 @@ Study read_study(const StudyParameters& parameters, stage::StageContext& context
   Study study = read_study(folder, parameters, table, context.threads);
   if (files::is_own_file(folder / kReview)) context.input("cells", {kReview});
   for (const StudyCell& cell : study.cells) {
-    for (const std::string& file : files_of_a_cell(cell.kind())) context.input("cells", {cell.name + "/" + file});
-    for (const std::string& file : further_files_of_a_cell(cell.kind())) {
+    for (const std::string& file : in_study(cell.kind()).files) context.input("cells", {cell.name + "/" + file});
+    for (const std::string& file : in_study(cell.kind()).further_files) {
       const std::string name = cell.name + "/" + file;
       if (files::is_own_file(folder / name)) context.input("cells", {name});
     }
@@ -79,14 +79,9 @@ StageReport statistics(const StudyParameters& parameters, stage::StageContext& c
 int main(int argc, char** argv) {
   using namespace mbtfm;
   using namespace mbtfm::statistics;
-  return stage::run_stage<StudyParameters>(
-      {.name = "stats",
-       .purpose = "statistics of stress-fibre tensions, adhesion forces, contracting sheets and forces in space over "
-                  "all finished cells of a folder",
-       .files = {{"cells", stage::FileArgument::Kind::input, "folder with cell folders"},
-                 {"table", stage::FileArgument::Kind::optional_input,
-                  "CSV with a row for each cell: column cell, columns of conditions, column exclude with the reason"},
-                 {"out", stage::FileArgument::Kind::output_folder,
-                  "tables, figures/ (SVG, PDF and PNG), report.html, review.html, study.R"}}},
-      argc, argv, statistics::statistics);
+  return stage::run_stage<StudyParameters>({.name = "stats",
+                                            .files = {{"cells", stage::FileArgument::Kind::input},
+                                                      {"table", stage::FileArgument::Kind::optional_input},
+                                                      {"out", stage::FileArgument::Kind::output_folder}}},
+                                           argc, argv, statistics::statistics);
 }

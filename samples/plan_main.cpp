@@ -124,12 +124,6 @@ int main(int argc, char** argv) {
   using Kind = FileArgument::Kind;
   return mbtfm::stage::run_stage<mbtfm::plan::Parameters>(
       {.name = "plan",
-       .purpose = "how many beads, which gel, how little noise and how many cells a question takes",
-       .files =
-           {{"cell", Kind::optional_input, "a cell folder that mbtfm run has finished, in place of a scenario"},
-            {"study", Kind::optional_input,
-             "statistics folder of a finished study: its scatter within and between cells is planned with"},
-            {"out", Kind::output_folder,
-             "folder for plan.html, plan.csv, plan_needed.csv, plan_cells.csv, plan_drawn.csv, plan.svg, plan.png"}}},
+       .files = {{"cell", Kind::optional_input}, {"study", Kind::optional_input}, {"out", Kind::output_folder}}},
       argc, argv, mbtfm::plan::run);
 }

@@ -65,7 +65,7 @@ struct SimulateParameters {
 
 void declare(stage::ParameterList& list, SimulateParameters& p) {
   declare(list, p.cell);
-  list.add("force", p.force, "write over what an earlier simulation made in the folder; never over anything else");
+  list.add("force", p.force);
   declare(list, p.space);
   declare(list, p.colony);
   declare(list, p.sheet);
@@ -177,10 +177,7 @@ int main(int argc, char** argv) {
   using namespace mbtfm;
   SimulateParameters parameters;
   return stage::run_stage(
-      {.name = "simulate",
-       .purpose = "simulate a traction force microscopy experiment with known truth",
-       .files = {{"out", stage::FileArgument::Kind::output_folder, "cell folder to write"}}},
-      argc, argv,
+      {.name = "simulate", .files = {{"out", stage::FileArgument::Kind::output_folder}}}, argc, argv,
       [&](stage::ParameterList& list) {
         declare(list, parameters);
         set_scenario(list, parameters.cell, argc, argv);

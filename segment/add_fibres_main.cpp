@@ -55,9 +55,8 @@ int main(int argc, char** argv) {
   using namespace mbtfm::rois;
   return mbtfm::stage::run_stage(
       {.name = "add-fibres",
-       .purpose = "put the fibres that the beads call for beside the segmented ones, as fibres.zip for mbtfm run",
-       .files = {{"rois", FileArgument::Kind::input, "1_segment/RoiSet.zip of the cell"},
-                 {"missing", FileArgument::Kind::input, "4_fit/missing_fibres.csv of the same run"},
-                 {"out", FileArgument::Kind::output, "fibres.zip beside cell.toml"}}},
+       .files = {{"rois", FileArgument::Kind::input},
+                 {"missing", FileArgument::Kind::input},
+                 {"out", FileArgument::Kind::output}}},
       argc, argv, [](auto&) {}, add_fibres);
 }

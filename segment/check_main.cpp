@@ -44,7 +44,7 @@ Chosen chosen_in(const fs::path& toml) {
   of_track.table("track");
   declare(of_track, chosen.in_space);
   images::PlaneChoice surface_plane;
-  declare(of_track, surface_plane, "surface", "the stack of beads on the surface");
+  declare(of_track, surface_plane, "surface");
   of_track.table("track");
   of_track.add("binning", binning, Range::between(1, images::kLargestBinning), "pixels of a side in one");
   stage::read_toml(of_track, toml);
@@ -204,8 +204,8 @@ struct CheckParameters {
   std::string page;
 };
 void declare(stage::ParameterList& list, CheckParameters& p) {
-  list.add("json_lines", p.json, "print each cell as a JSON object in a line");
-  list.add("page", p.page, "file of a page with a row of thumbnails a cell; empty: none");
+  list.add("json_lines", p.json);
+  list.add("page", p.page);
 }
 
 /// @throws OutputError where another program made the file
@@ -253,13 +253,10 @@ StageReport check(const fs::path& folder, const CheckParameters& p, int threads,
 
 int main(int argc, char** argv) {
   bool is_fine = true;
-  const int code = stage::run_stage<CheckParameters>(
-      {.name = "check",
-       .purpose = "what the images below a folder are good for, before a batch is run: calibration, sizes, saturation, "
-                  "focus, beads, margin, pictures that are the same, what the stages refuse, disk",
-       .files = {{"cells", stage::FileArgument::Kind::input, "a cell folder, or a folder of cell folders"}}},
-      argc, argv, [&](const CheckParameters& p, stage::StageContext& context) {
-        return check(context.input("cells", {}), p, context.threads, is_fine);
-      });
+  const int code =
+      stage::run_stage<CheckParameters>({.name = "check", .files = {{"cells", stage::FileArgument::Kind::input}}}, argc,
+                                        argv, [&](const CheckParameters& p, stage::StageContext& context) {
+                                          return check(context.input("cells", {}), p, context.threads, is_fine);
+                                        });
   return code == exit_code::kDone && !is_fine ? exit_code::kFailed : code;
 }

@@ -218,13 +218,7 @@ int main(int argc, char** argv) {
   using enum mbtfm::stage::FileArgument::Kind;
   bool is_whole = true;
   const int code = mbtfm::stage::run_stage(
-      {.name = "init",
-       .purpose = "write a cell.toml from what the images of a folder say",
-       .files = {{"cell", input, "folder with the images of a cell; with --like a folder of such folders"},
-                 {"like", optional_input,
-                  "a cell folder: each folder below --cell that has pictures and no cell.toml gets one like its own, "
-                  "with pictures of the same names, or of names with this folder's name in place of that one's"},
-                 {"out", output, "the cell.toml; without --like"}}},
-      argc, argv, [](auto&) {}, [&](mbtfm::stage::StageContext& context) { return init(context, is_whole); });
+      {.name = "init", .files = {{"cell", input}, {"like", optional_input}, {"out", output}}}, argc, argv, [](auto&) {},
+      [&](mbtfm::stage::StageContext& context) { return init(context, is_whole); });
   return code == mbtfm::exit_code::kDone && !is_whole ? mbtfm::exit_code::kFailed : code;
 }

@@ -87,11 +87,5 @@ int main(int argc, char** argv) {
   using mbtfm::stage::FileArgument;
   using Kind = FileArgument::Kind;
   return mbtfm::stage::run_stage<mbtfm::beads::NoiseParameters>(
-      {.name = "noise",
-       .purpose = "from two pictures of beads where no cell pulls: noise and density of the beads, drift, share lost",
-       .files = {{"first", Kind::input, "beads of an unloaded place (TIFF, PNG or JPEG)"},
-                 {"second", Kind::input,
-                  "the same place again, as long after as the stressed and the relaxed picture of an experiment are "
-                  "apart"}}},
-      argc, argv, mbtfm::beads::run);
+      {.name = "noise", .files = {{"first", Kind::input}, {"second", Kind::input}}}, argc, argv, mbtfm::beads::run);
 }

@@ -330,19 +330,13 @@ int main(int argc, char** argv) {
   using mbtfm::stage::FileArgument;
   return mbtfm::stage::run_stage<mbtfm::cells::SegmentParameters>(
       {.name = "segment",
-       .purpose = "find adhesions, stress fibres and the outline of a cell in its images",
-       .files = {{"adhesion-image", FileArgument::Kind::optional_input,
-                  "adhesion channel (TIFF, PNG, JPEG); without it forces act on candidates: see --adhesions"},
-                 {"actin-image", FileArgument::Kind::optional_input,
-                  "actin channel (TIFF, PNG, JPEG); without it no fibres"},
-                 {"outline-roi", FileArgument::Kind::optional_input, "ImageJ selection of the cell's outline (.roi)"},
-                 {"adhesion-rois", FileArgument::Kind::optional_input, "ImageJ areas of adhesions (.roi, .zip)"},
-                 {"fibre-rois", FileArgument::Kind::optional_input, "ImageJ lines of fibres (.roi, .zip)"},
-                 {"outline-mask", FileArgument::Kind::optional_input, "mask or label image of the cell (TIFF, PNG)"},
-                 {"adhesion-mask", FileArgument::Kind::optional_input,
-                  "mask or label image of adhesions, or of the adhesive pattern (TIFF, PNG)", false, "adhesion_mask"},
-                 {"out", FileArgument::Kind::output_folder,
-                  "folder of adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
-                  "images.jpg, thumbnail.jpg, images.csv, RoiSet.zip"}}},
+       .files = {{"adhesion-image", FileArgument::Kind::optional_input},
+                 {"actin-image", FileArgument::Kind::optional_input},
+                 {"outline-roi", FileArgument::Kind::optional_input},
+                 {"adhesion-rois", FileArgument::Kind::optional_input},
+                 {"fibre-rois", FileArgument::Kind::optional_input},
+                 {"outline-mask", FileArgument::Kind::optional_input},
+                 {"adhesion-mask", FileArgument::Kind::optional_input, false, "adhesion_mask"},
+                 {"out", FileArgument::Kind::output_folder}}},
       argc, argv, mbtfm::cells::run);
 }

@@ -470,10 +470,9 @@ struct TrackStageParameters {
 void declare(stage::ParameterList& list, TrackStageParameters& p) {
   declare(list, p.track);
   list.table("track");
-  list.add("binning", p.binning, Range::between(1, images::kLargestBinning),
-           "side of the blocks of pixels to average first (pixels); 1: none");
+  list.add("binning", p.binning, Range::between(1, images::kLargestBinning));
   declare(list, p.in_space);
-  declare(list, p.surface_plane, "surface", "the stack of beads on the surface");
+  declare(list, p.surface_plane, "surface");
   declare(list, p.effects, {"drift_affine", "effect_tolerance"});
 }
 
@@ -545,23 +544,13 @@ int main(int argc, char** argv) {
   using Kind = FileArgument::Kind;
   return mbtfm::stage::run_stage<mbtfm::beads::TrackStageParameters>(
       {.name = "track",
-       .purpose = "measure the gel's displacement from images of beads, stressed and relaxed",
-       .files =
-           {{"stressed", Kind::optional_input,
-             "beads while the cell pulls (TIFF, PNG, JPEG; stacks: in space); a folder: a time series", false,
-             "beads_stressed"},
-            {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF, PNG, JPEG)", false,
-             "beads_relaxed"},
-            {"surface_beads", Kind::optional_input,
-             "of stacks: beads of another colour on the surface, relaxed; their places are for mbtfm-surface"},
-            {"adhesions", Kind::optional_input,
-             "adhesions.csv: helps to follow beads near strong adhesions; not for stacks, windows or --displacement"},
-            {"displacement", Kind::optional_input, "instead of images: a table of displacements (CSV)", false,
-             "displacement"},
-            {"cell_image", Kind::optional_input, "image of the cell, to check that it shows the beads' field"},
-            {"kept", Kind::optional_input,
-             "output of an earlier run with the same images and parameters: its frames are kept"},
-            {"out", Kind::output_folder,
-             "folder of displacement.csv, displacement.vtp, beads.jpg; of stacks displacement_3d.csv, .vtp"}}},
+       .files = {{"stressed", Kind::optional_input, false, "beads_stressed"},
+                 {"relaxed", Kind::optional_input, false, "beads_relaxed"},
+                 {"surface_beads", Kind::optional_input},
+                 {"adhesions", Kind::optional_input},
+                 {"displacement", Kind::optional_input, false, "displacement"},
+                 {"cell_image", Kind::optional_input},
+                 {"kept", Kind::optional_input},
+                 {"out", Kind::output_folder}}},
       argc, argv, mbtfm::beads::run, mbtfm::beads::look);
 }

@@ -28,43 +28,21 @@ std::vector<Ellipse> ellipses_of(const std::vector<Adhesion>& adhesions) {
 
 void declare(stage::ParameterList& list, SubstrateParameters& p) {
   list.table("substrate");
-  list.add("model", p.model, "elastic model of the gel; auto: the cheapest that has the effects that are on");
-  list.add("material", p.material,
-           "law of the gel: linear (small strains), or neo-hooke, if the tractions are large enough");
-  list.add("displacement_tolerance", p.displacement_tolerance, Range::between(0, 1),
-           "refined, curved: the mesh is refined until the estimated error of an adhesion's displacements (relative "
-           "L2, mean over adhesions) is below this; 0: the first mesh, no error estimated");
-  list.add("modulus_profile", p.modulus_profile,
-           "depths (um) and Young's moduli (kPa) of a gel whose modulus changes with depth, linear between, a step if "
-           "a depth is given twice: '0:16, 10:16, 10:8.4'; empty: youngs_modulus_kPa throughout");
-  list.add("margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
-           "split, refined, curved: distance from the adhesions and beads to the sides of the computed block if the "
-           "gel's own sides are far away (gel thicknesses)");
-  list.add("cells_per_thickness", p.cells_per_thickness, Range::between(1, 20),
-           "split: cells of the correction's grid over the gel's thickness");
-  list.add("elements_across_adhesion", p.elements_across_adhesion, Range::between(0.25, 100),
-           "refined, curved: number of elements across an adhesion in the first mesh (square root of its area over an "
-           "element's side)");
-  list.add("precision", p.precision,
-           "refined: precision of the factorised matrix: single or double; auto: single up to a Poisson ratio of "
-           "0.495, above it double");
-  list.add("growth", p.growth, Range::between(0.1, 10),
-           "refined, curved: largest side of an element over its distance to the nearest adhesion; curved takes a "
-           "quarter of this value");
-  list.add("side_distance_um", p.side_distance_um, Range::between(1e-3, 1e5),
-           "distance from the adhesions and beads to the gel's own sides (um); unset: the sides are far away");
-  list.add("surface_tilt_deg", p.surface_tilt_deg, Range{.low = 0, .high = 90, .excludes_high = true},
-           "tilt of the gel's surface against the image plane (degrees); no model uses it: the effect 'uneven surface' "
-           "reports how much it matters");
-  list.add("surface_roughness_um", p.surface_roughness_um, Range::zero_or_size_um(),
-           "root mean square height of the gel's surface about its plane (um); no model uses it: the effect 'uneven "
-           "surface' reports how much it matters");
-  list.add("cache_folder", p.cache_folder,
-           "split: folder where factors of the grid are kept for other runs of the same gel; empty: none");
-  list.add("stress", p.stress, "refined, curved: also write the stress inside the gel");
-  list.add(
-      "memory_limit_GB", p.memory_limit_GB, Range::between(0, 1e6),
-      "split, refined, curved: most memory that the solution may take (GB); 0: four fifths of the machine's memory");
+  list.add("model", p.model);
+  list.add("material", p.material);
+  list.add("displacement_tolerance", p.displacement_tolerance, Range::between(0, 1));
+  list.add("modulus_profile", p.modulus_profile);
+  list.add("margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100));
+  list.add("cells_per_thickness", p.cells_per_thickness, Range::between(1, 20));
+  list.add("elements_across_adhesion", p.elements_across_adhesion, Range::between(0.25, 100));
+  list.add("precision", p.precision);
+  list.add("growth", p.growth, Range::between(0.1, 10));
+  list.add("side_distance_um", p.side_distance_um, Range::between(1e-3, 1e5));
+  list.add("surface_tilt_deg", p.surface_tilt_deg, Range{.low = 0, .high = 90, .excludes_high = true});
+  list.add("surface_roughness_um", p.surface_roughness_um, Range::zero_or_size_um());
+  list.add("cache_folder", p.cache_folder);
+  list.add("stress", p.stress);
+  list.add("memory_limit_GB", p.memory_limit_GB, Range::between(0, 1e6));
 }
 
 void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) {

@@ -327,20 +327,12 @@ StageReport run(const Parameters& given, stage::StageContext& context) {
 int main(int argc, char** argv) {
   using namespace mbtfm;
   using Kind = stage::FileArgument::Kind;
-  return stage::run_stage<Parameters>(
-      {.name = "substrate",
-       .purpose = "displace a gel by forces spread over adhesions, or by tractions",
-       .files = {{"adhesions", Kind::optional_input, "adhesions.csv: the ellipses"},
-                 {"forces", Kind::optional_input, "adhesion_forces.csv: adhesion_id, fx_nN, fy_nN; fz_nN into the gel"},
-                 {"traction", Kind::optional_input,
-                  "instead of those: tractions on a lattice: x_um, y_um, tx_kPa, ty_kPa; tz_kPa into the gel; area_um2 "
-                  "if it is none"},
-                 {"surface", Kind::optional_input,
-                  "surface.vtp of mbtfm-surface, if the gel is not flat; its z = 0 is thickness_um above the base"},
-                 {"points", Kind::optional_input,
-                  "points: x_um, y_um; z_um into the gel, from a flat surface or from the z = 0 of surface.vtp"},
-                 {"out", Kind::output,
-                  "displacement.csv at the points, with z_um or forces into the gel displacement_3d.csv; without "
-                  "points a .vtu of the surface, or of the gel's inside where its name ends with volume.vtu"}}},
-      argc, argv, run);
+  return stage::run_stage<Parameters>({.name = "substrate",
+                                       .files = {{"adhesions", Kind::optional_input},
+                                                 {"forces", Kind::optional_input},
+                                                 {"traction", Kind::optional_input},
+                                                 {"surface", Kind::optional_input},
+                                                 {"points", Kind::optional_input},
+                                                 {"out", Kind::output}}},
+                                      argc, argv, run);
 }

@@ -19,6 +19,7 @@
 #include "pipeline/files/triangle_mesh.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/stage/help.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "segment/images/image.h"
@@ -58,34 +59,25 @@ struct Parameters {
 
 void declare(stage::ParameterList& list, Parameters& p) {
   list.table("surface");
-  list.add("formula", p.formula,
-           "surface by formula, instead of a file: " + formulas_listed() + "; values in [ ] are optional");
-  const std::string cut = " of the rectangle; unset: all of the data, but not with a formula";
+  list.add("formula", p.formula, stage::help_on("surface", "formula", {formulas_listed()}));
   const Range place = possible_place_um();
-  list.add("low_x_um", p.low_x_um, place, "lowest x" + cut);
-  list.add("low_y_um", p.low_y_um, place, "lowest y" + cut);
-  list.add("high_x_um", p.high_x_um, place, "highest x" + cut);
-  list.add("high_y_um", p.high_y_um, place, "highest y" + cut);
-  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
-           "spacing of the heights written (um); unset: by the data, or a two-hundredth of a formula's rectangle");
-  list.add("z_points", p.z_points,
-           "direction of z in the file: into-gel or out-of-gel; required, as no program can tell");
-  list.add("zero_at", p.zero_at, "what becomes z = 0, where the thickness begins: the file's zero, or the mean height");
-  list.add("method", p.method, "beads in the volume: smooth surface of greatest likelihood, or alpha shapes of slices");
-  list.add("sigma_z_um", p.sigma_z_um, Range::positive(),
-           "standard error of z (um) without a column sigma_z_um; required for beads; unset for points: estimated");
-  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
-           "pixel size of a height map or masks (um); unset: the image's own");
-  list.add("z_unit_um", p.z_unit_um, Range::positive(), "height of a grey value (um); required");
-  list.add("z_step_um", p.z_step_um, Range::mesh_um(), "distance of the slices of masks (um); required");
-  list.add("length_unit_um", p.length_unit_um, Range::positive(),
-           "unit of a mesh (um): 1000 for millimetres; required");
-  list.add("largest_hole_um", p.largest_hole_um, Range::zero_or_size_um(), "largest hole that is filled (um)");
-  list.add("slice_um", p.slice_um, Range::zero_or_size_um(),
-           "alpha-shape: width of the slices (um); 0: by the beads' distance");
-  list.add("alpha_radius_um", p.alpha_radius_um, Range::zero_or_size_um(),
-           "alpha-shape: radius of the circles (um); 0: the smallest that keeps slices whole");
-  list.add("slices_along", p.slices_along, "alpha-shape: axis of the slices, that of the crests");
+  list.add("low_x_um", p.low_x_um, place);
+  list.add("low_y_um", p.low_y_um, place);
+  list.add("high_x_um", p.high_x_um, place);
+  list.add("high_y_um", p.high_y_um, place);
+  list.add("spacing_um", p.spacing_um, Range::mesh_um());
+  list.add("z_points", p.z_points);
+  list.add("zero_at", p.zero_at);
+  list.add("method", p.method);
+  list.add("sigma_z_um", p.sigma_z_um, Range::positive());
+  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um());
+  list.add("z_unit_um", p.z_unit_um, Range::positive());
+  list.add("z_step_um", p.z_step_um, Range::mesh_um());
+  list.add("length_unit_um", p.length_unit_um, Range::positive());
+  list.add("largest_hole_um", p.largest_hole_um, Range::zero_or_size_um());
+  list.add("slice_um", p.slice_um, Range::zero_or_size_um());
+  list.add("alpha_radius_um", p.alpha_radius_um, Range::zero_or_size_um());
+  list.add("slices_along", p.slices_along);
 }
 
 /// What a source gives.
@@ -398,16 +390,12 @@ int main(int argc, char** argv) {
   using mbtfm::stage::FileArgument;
   using Kind = FileArgument::Kind;
   using namespace mbtfm::surface;
-  return mbtfm::stage::run_stage<Parameters>(
-      {.name = "surface",
-       .purpose = "find the surface of a gel that is not flat",
-       .files = {{"height_map", Kind::optional_input,
-                  "heights: a TIFF, or a CSV file with x_um, y_um, z_um on a lattice"},
-                 {"points", Kind::optional_input, "points of the surface: x_um, y_um, z_um; sigma_z_um"},
-                 {"mesh", Kind::optional_input, "a mesh of the surface: .stl, .ply, .obj or .vtp"},
-                 {"masks", Kind::optional_input, "a TIFF of masks, one slice after the other, the gel white"},
-                 {"beads", Kind::optional_input, "beads in the gel's volume: x_um, y_um, z_um; sigma_z_um"},
-                 {"out", Kind::output,
-                  "surface.vtp: heights with standard errors; a picture, surface.svg, is beside it"}}},
-      argc, argv, run);
+  return mbtfm::stage::run_stage<Parameters>({.name = "surface",
+                                              .files = {{"height_map", Kind::optional_input},
+                                                        {"points", Kind::optional_input},
+                                                        {"mesh", Kind::optional_input},
+                                                        {"masks", Kind::optional_input},
+                                                        {"beads", Kind::optional_input},
+                                                        {"out", Kind::output}}},
+                                             argc, argv, run);
 }

@@ -64,26 +64,21 @@ std::vector<Vec2> directions(const std::vector<PixelSide>& sides, double reach_u
 files::Table<Border> border_table() {
   using Row = Border;
   return {.file = "borders.csv",
-          .row = "each border between two cells (`mbtfm-sheet --cells`)",
-          .columns = {{"cell_a", "label of a cell", &Row::cell_a},
-                      {"cell_b", "label of its neighbour", &Row::cell_b},
-                      {"length_um", "of the border", &Row::length_um, files::kResult},
-                      {"normal_nN_per_um", "force across the border per length, along its normal; above 0 it pulls",
-                       &Row::normal_nN_per_um, files::kResult},
-                      {"shear_nN_per_um", "the same along the border, its size", &Row::shear_nN_per_um, files::kResult},
-                      {"magnitude_nN_per_um", "size of both together", &Row::magnitude_nN_per_um, files::kResult}}};
+          .columns = {{"cell_a", &Row::cell_a},
+                      {"cell_b", &Row::cell_b},
+                      {"length_um", &Row::length_um, files::kResult},
+                      {"normal_nN_per_um", &Row::normal_nN_per_um, files::kResult},
+                      {"shear_nN_per_um", &Row::shear_nN_per_um, files::kResult},
+                      {"magnitude_nN_per_um", &Row::magnitude_nN_per_um, files::kResult}}};
 }
 
 files::Table<CellTension> cell_table() {
   using Row = CellTension;
   return {.file = "cell_tension.csv",
-          .row = "each cell of a sheet (`mbtfm-sheet --cells`)",
-          .columns = {{"cell", "its label", &Row::cell},
-                      {"area_um2", "of it, as far as the sheet goes", &Row::area_um2, files::kResult},
-                      {"mean_tension_nN_per_um", "half of sxx + syy, mean over the cell", &Row::mean_tension_nN_per_um,
-                       files::kResult},
-                      {"max_shear_nN_per_um", "half the difference of the principal tensions, mean over the cell",
-                       &Row::max_shear_nN_per_um, files::kResult}}};
+          .columns = {{"cell", &Row::cell},
+                      {"area_um2", &Row::area_um2, files::kResult},
+                      {"mean_tension_nN_per_um", &Row::mean_tension_nN_per_um, files::kResult},
+                      {"max_shear_nN_per_um", &Row::max_shear_nN_per_um, files::kResult}}};
 }
 
 }  // namespace

@@ -16,21 +16,17 @@ namespace {
 
 files::Table<SheetPoint> sheet_table() {
   using Row = SheetPoint;
-  return {
-      .file = "sheet.csv",
-      .row = "each point given to `mbtfm-sheet`, or each node of its mesh; empty fields if a point is outside",
-      .columns = {{"x_um", "the point", files::x_of(&Row::position_um)},
-                  {"y_um", "the point", files::y_of(&Row::position_um)},
-                  {"ux_um", "displacement of the sheet", &Row::ux_um},
-                  {"uy_um", "displacement of the sheet", &Row::uy_um},
-                  {"sxx_nN_per_um", "tension along x, contraction included (the same as mN/m)", &Row::sxx_nN_per_um},
-                  {"syy_nN_per_um", "tension along y", &Row::syy_nN_per_um},
-                  {"sxy_nN_per_um", "shear", &Row::sxy_nN_per_um},
-                  {"mean_tension_nN_per_um", "half of sxx + syy", &Row::mean_tension_nN_per_um},
-                  {"max_shear_nN_per_um", "half the difference of the principal tensions", &Row::max_shear_nN_per_um},
-                  {"mean_tension_sigma_nN_per_um",
-                   "its standard error by the tractions' (`traction_sigma_kPa`); empty: not known",
-                   &Row::mean_tension_sigma_nN_per_um}}};
+  return {.file = "sheet.csv",
+          .columns = {{"x_um", files::x_of(&Row::position_um)},
+                      {"y_um", files::y_of(&Row::position_um)},
+                      {"ux_um", &Row::ux_um},
+                      {"uy_um", &Row::uy_um},
+                      {"sxx_nN_per_um", &Row::sxx_nN_per_um},
+                      {"syy_nN_per_um", &Row::syy_nN_per_um},
+                      {"sxy_nN_per_um", &Row::sxy_nN_per_um},
+                      {"mean_tension_nN_per_um", &Row::mean_tension_nN_per_um},
+                      {"max_shear_nN_per_um", &Row::max_shear_nN_per_um},
+                      {"mean_tension_sigma_nN_per_um", &Row::mean_tension_sigma_nN_per_um}}};
 }
 
 SheetPoint row_of(Vec2 place, Vec2 u, const Tensor& S) {

@@ -16,42 +16,34 @@ const Indentation* solved(const Indentation& i) { return i.failure ? nullptr : &
 files::Table<Indentation> table_of_cases(const std::vector<double>& depths_um) {
   using Row = Indentation;
   files::Table<Row> table{.file = "indent.csv",
-                          .row = "each cell on each gel",
-                          .columns = {{"height_um", "height of the cell", member(&Row::of, &Case::height_um)},
-                                      {"modulus_ratio", "Young's modulus of the gel over the cell's",
-                                       member(&Row::of, &Case::modulus_ratio)}}};
+                          .columns = {{"height_um", member(&Row::of, &Case::height_um)},
+                                      {"modulus_ratio", member(&Row::of, &Case::modulus_ratio)}}};
   const auto reading = [](auto number) { return member(solved, &Row::reading, number); };
   for (std::size_t k = 0; k < depths_um.size(); ++k) {
     const std::string depth = shortest(depths_um[k]);
     table.columns.push_back(
-        {"depth_" + depth + "_um", "largest displacement into the gel, " + depth + " um below its surface",
+        {"depth_" + depth + "_um",
          [k](const Row& row) { return solved(row) ? std::optional(row.reading.depth_um[k]) : std::nullopt; }, kResult});
   }
-  table.columns.push_back(
-      {{"largest_u_um", "largest displacement anywhere", reading(&Reading::largest_u_um), kResult},
-       {"error_um", "largest change of the depths and displacements of the row on a coarser mesh",
-        member(solved, &Row::error_um), kResult},
-       {"contact_radius_um", "radius of the contact, or of the circle of its area", &Row::contact_radius_um, kResult},
-       {"contact_area_um2", "area of the contact", &Row::contact_area_um2, kResult},
-       {"lift_um", "largest displacement of the gel's surface out of it, near the rim of the contact",
-        reading(&Reading::lift_um), kResult},
-       {"largest_u_gel_um", "largest displacement in the gel", reading(&Reading::largest_u_gel_um), kResult},
-       {"top_down_um", "displacement of the cell's top towards the gel", reading(&Reading::top_down_um), kResult},
-       {"not_solved", "why the case has no equilibrium; empty: it has one",
-        [](const Row& row) { return row.failure.value_or(""); }}});
+  table.columns.push_back({{"largest_u_um", reading(&Reading::largest_u_um), kResult},
+                           {"error_um", member(solved, &Row::error_um), kResult},
+                           {"contact_radius_um", &Row::contact_radius_um, kResult},
+                           {"contact_area_um2", &Row::contact_area_um2, kResult},
+                           {"lift_um", reading(&Reading::lift_um), kResult},
+                           {"largest_u_gel_um", reading(&Reading::largest_u_gel_um), kResult},
+                           {"top_down_um", reading(&Reading::top_down_um), kResult},
+                           {"not_solved", [](const Row& row) { return row.failure.value_or(""); }}});
   return table;
 }
 
 files::Table<Optimum> table_of_optima() {
   return {.file = "optima.csv",
-          .row = "the best height on each gel, for each depth of reading",
-          .columns = {
-              {"modulus_ratio", "Young's modulus of the gel over the cell's", &Optimum::modulus_ratio},
-              {"read_at_um", "depth of reading below the surface", &Optimum::read_at_um},
-              {"height_um", "height of the cell that presses deepest", &Optimum::height_um, kResult},
-              {"height_error_um", "by which the meshes and the search may be off", &Optimum::height_error_um, kResult},
-              {"depth_um", "displacement into the gel there", &Optimum::depth_um, kResult},
-              {"contact_area_um2", "area of the contact there", &Optimum::contact_area_um2, kResult}}};
+          .columns = {{"modulus_ratio", &Optimum::modulus_ratio},
+                      {"read_at_um", &Optimum::read_at_um},
+                      {"height_um", &Optimum::height_um, kResult},
+                      {"height_error_um", &Optimum::height_error_um, kResult},
+                      {"depth_um", &Optimum::depth_um, kResult},
+                      {"contact_area_um2", &Optimum::contact_area_um2, kResult}}};
 }
 
 }  // namespace

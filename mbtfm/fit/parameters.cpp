@@ -13,10 +13,8 @@ void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.substrate);
   declare(list, p.fit);
   declare(list, p.segmentation);
-  list.add("compare_sheet", p.compare_sheet,
-           "also fit an evenly contracting sheet, for models.csv; auto: if the beads do not require fibres, or these "
-           "bear less than half of the force; never on finite elements");
-  list.add("explain", p.explain, "estimate how each effect that is off would change the tensions");
+  list.add("compare_sheet", p.compare_sheet);
+  list.add("explain", p.explain);
   declare(list, p.effects, effect_keys());
 }
 

@@ -22,29 +22,21 @@
 namespace mbtfm::mean {
 
 void declare(stage::ParameterList& list, Parameters& p) {
-  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
-           "side of a pixel of outlines that are masks or selections (um), if cell.toml has none");
+  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um());
   declare(list, p.gel);
   for (stage::Parameter& of_gel : list.all()) of_gel.is_required = false;  // a cell's own cell.toml has it, too
   list.table("mean");
-  list.add("reference", p.reference,
-           "cell whose outline is the reference; empty: the pattern, or the most typical outline");
-  list.add("register_by", p.register_by, "align cells by outlines, or by images");
-  list.add("image", p.image,
-           "with register_by = images: name of the image in each folder, or a key of [images] such as actin");
-  list.add("symmetry", p.symmetry,
-           "symmetry of the shape, over which the mean is taken, too: C1 none, C4 quarter turns, C4v with mirrors, "
-           "Cinfv a circle");
-  list.add("mirror", p.mirror, "whether cells may be mirrored; auto: if the reference is not its own mirror image");
-  list.add("largest_misfit", p.largest_misfit, Range::between(1e-3, 1),
-           "largest distance of an outline from the reference (rms), over its radius");
-  list.add("others", p.others, "cells of another shape: refused (an error), or left out");
-  list.add("gel_model", p.gel_model, "layer on a rigid base, or half-space");
-  list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::positive(),
-           "regularisation of the tractions (um/kPa); unset: by least expected error");
-  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
-           "spacing of the mean's nodes (um); unset: half the first cell's distance of beads");
-  list.add("seed", p.seed, "random seed of the resampling");
+  list.add("reference", p.reference);
+  list.add("register_by", p.register_by);
+  list.add("image", p.image);
+  list.add("symmetry", p.symmetry);
+  list.add("mirror", p.mirror);
+  list.add("largest_misfit", p.largest_misfit, Range::between(1e-3, 1));
+  list.add("others", p.others);
+  list.add("gel_model", p.gel_model);
+  list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::positive());
+  list.add("spacing_um", p.spacing_um, Range::mesh_um());
+  list.add("seed", p.seed);
 }
 
 namespace {
@@ -70,7 +62,7 @@ OwnSettings settings_of(const Path& cell, const Parameters& otherwise) {
   OwnSettings own{otherwise.gel, otherwise.pixel_size_um, {}, false};
   if (!files::is_file(cell / "cell.toml")) return own;
   stage::ParameterList list;
-  list.add("pixel_size_um", own.pixel_size_um, Range::pixel_um(), "side of a pixel");
+  list.add("pixel_size_um", own.pixel_size_um, Range::pixel_um());
   declare(list, own.gel);
   declare(list, own.images);
   read_toml(list, cell / "cell.toml");

@@ -14,33 +14,23 @@ using files::member;
 double degrees(double rad) { return rad * 180 / std::numbers::pi; }
 
 files::Table<CellRow> table_of_cells() {
-  return {
-      .file = "registration.csv",
-      .row = "each cell",
-      .columns = {
-          {"cell", "folder of the cell", &CellRow::cell},
-          {"kept", "whether it is in the mean", &CellRow::is_kept},
-          {"reason", "why it is not", &CellRow::reason},
-          {"x_um", "place of its centroid, in its own images",
-           files::x_of(&CellRow::way, &Way::motion, &Motion::from_um)},
-          {"y_um", "the same along y", files::y_of(&CellRow::way, &Way::motion, &Motion::from_um)},
-          {"reference_x_um", "where the centroid comes to lie in the frame of the reference",
-           files::x_of(&CellRow::way, &Way::motion, &Motion::to_um)},
-          {"reference_y_um", "the same along y", files::y_of(&CellRow::way, &Way::motion, &Motion::to_um)},
-          {"angle_deg", "by which it is turned about its centroid, from +x towards +y, after it was mirrored",
-           [](const CellRow& c) { return degrees(c.way.motion.angle_rad); }},
-          {"mirrored", "whether y was turned into -y first", member(&CellRow::way, &Way::motion, &Motion::is_mirrored)},
-          {"misfit_um", "root mean square distance of its outline and the reference, both ways",
-           member(&CellRow::way, &Way::misfit_um), kResult},
-          {"second_misfit_um", "the same of the best way that is no symmetry of this one", &CellRow::second_misfit_um,
-           kResult},
-          {"ambiguous", "whether that fits as well", &CellRow::is_ambiguous},
-          {"shift_error_um", "standard error of each component of the shift",
-           member(&CellRow::way, &Way::shift_error_um), kResult},
-          {"angle_error_deg", "standard error of the angle",
-           [](const CellRow& c) { return degrees(c.way.angle_error_rad); }, kResult},
-          {"n_beads", "beads that were used", &CellRow::n_beads},
-          {"lambda_um_per_kPa", "regularisation of its tractions", &CellRow::lambda_um_per_kPa, kResult}}};
+  return {.file = "registration.csv",
+          .columns = {{"cell", &CellRow::cell},
+                      {"kept", &CellRow::is_kept},
+                      {"reason", &CellRow::reason},
+                      {"x_um", files::x_of(&CellRow::way, &Way::motion, &Motion::from_um)},
+                      {"y_um", files::y_of(&CellRow::way, &Way::motion, &Motion::from_um)},
+                      {"reference_x_um", files::x_of(&CellRow::way, &Way::motion, &Motion::to_um)},
+                      {"reference_y_um", files::y_of(&CellRow::way, &Way::motion, &Motion::to_um)},
+                      {"angle_deg", [](const CellRow& c) { return degrees(c.way.motion.angle_rad); }},
+                      {"mirrored", member(&CellRow::way, &Way::motion, &Motion::is_mirrored)},
+                      {"misfit_um", member(&CellRow::way, &Way::misfit_um), kResult},
+                      {"second_misfit_um", &CellRow::second_misfit_um, kResult},
+                      {"ambiguous", &CellRow::is_ambiguous},
+                      {"shift_error_um", member(&CellRow::way, &Way::shift_error_um), kResult},
+                      {"angle_error_deg", [](const CellRow& c) { return degrees(c.way.angle_error_rad); }, kResult},
+                      {"n_beads", &CellRow::n_beads},
+                      {"lambda_um_per_kPa", &CellRow::lambda_um_per_kPa, kResult}}};
 }
 
 struct MeanRow {
@@ -54,33 +44,28 @@ files::Table<MeanRow> table_of_mean() {
   const auto sigma = [](auto vector, auto part) { return member(&Row::node, &NodeMean::sigma, vector, part); };
   const auto u = &Sample::displacement_um, t = &Sample::traction_kPa;
   return {.file = "mean.csv",
-          .row = "each node of the lattice over the reference that beads of some cell reach",
-          .columns = {{"x_um", "place in the frame of the reference", files::x_of(&Row::node, &NodeMean::position_um)},
-                      {"y_um", "the same along y", files::y_of(&Row::node, &NodeMean::position_um)},
-                      {"ux_um", "mean displacement", mean(u, &Vec2::x)},
-                      {"uy_um", "the same along y", mean(u, &Vec2::y)},
-                      {"ux_sigma_um", "its standard error, from the scatter of the cells", sigma(u, &Vec2::x)},
-                      {"uy_sigma_um", "the same along y", sigma(u, &Vec2::y)},
-                      {"tx_kPa", "mean traction", mean(t, &Vec2::x)},
-                      {"ty_kPa", "the same along y", mean(t, &Vec2::y)},
-                      {"tx_sigma_kPa", "its standard error, from the scatter of the cells", sigma(t, &Vec2::x)},
-                      {"ty_sigma_kPa", "the same along y", sigma(t, &Vec2::y)},
-                      {"n_cells", "cells whose beads reach it", member(&Row::node, &NodeMean::n_cells)},
-                      {"inside", "whether the reference holds it", member(&Row::node, &NodeMean::is_inside)},
-                      {"model_tx_kPa", "traction of the model, blurred as the cells are; empty if none was given",
-                       member(&Row::model_kPa, &Vec2::x)},
-                      {"model_ty_kPa", "the same along y", member(&Row::model_kPa, &Vec2::y)}}};
+          .columns = {{"x_um", files::x_of(&Row::node, &NodeMean::position_um)},
+                      {"y_um", files::y_of(&Row::node, &NodeMean::position_um)},
+                      {"ux_um", mean(u, &Vec2::x)},
+                      {"uy_um", mean(u, &Vec2::y)},
+                      {"ux_sigma_um", sigma(u, &Vec2::x)},
+                      {"uy_sigma_um", sigma(u, &Vec2::y)},
+                      {"tx_kPa", mean(t, &Vec2::x)},
+                      {"ty_kPa", mean(t, &Vec2::y)},
+                      {"tx_sigma_kPa", sigma(t, &Vec2::x)},
+                      {"ty_sigma_kPa", sigma(t, &Vec2::y)},
+                      {"n_cells", member(&Row::node, &NodeMean::n_cells)},
+                      {"inside", member(&Row::node, &NodeMean::is_inside)},
+                      {"model_tx_kPa", member(&Row::model_kPa, &Vec2::x)},
+                      {"model_ty_kPa", member(&Row::model_kPa, &Vec2::y)}}};
 }
 
 files::Table<WaveShare> table_of_waves() {
   return {.file = "blur.csv",
-          .row = "waves of traction of each length",
-          .columns = {{"wavelength_um", "length of the wave", &WaveShare::wavelength_um, kResult},
-                      {"fttc_along", "share that the regularisation leaves if the traction points along the wave",
-                       &WaveShare::along, kResult},
-                      {"fttc_across", "the same if it points across", &WaveShare::across, kResult},
-                      {"registration", "share that the errors of registration leave in the mean",
-                       &WaveShare::registration, kResult}}};
+          .columns = {{"wavelength_um", &WaveShare::wavelength_um, kResult},
+                      {"fttc_along", &WaveShare::along, kResult},
+                      {"fttc_across", &WaveShare::across, kResult},
+                      {"registration", &WaveShare::registration, kResult}}};
 }
 
 }  // namespace

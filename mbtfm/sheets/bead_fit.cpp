@@ -265,27 +265,23 @@ using files::kResult;
 files::Table<SheetModel> model_table() {
   using Row = SheetModel;
   return {.file = "sheet_models.csv",
-          .row = "each model of what moves the beads under a sheet",
-          .columns = {
-              {"model", "nothing, the sheet, the sheet with more or in parts, or each adhesion for itself", &Row::name},
-              {"n_parameters", "that were fitted", &Row::n_parameters},
-              {"chi_squared", "of the misfit, in units of the noise", &Row::chi_squared, kResult},
-              {"relative_l2", "of the misfit", &Row::relative_l2, kResult},
-              {"aic", "Akaike's criterion", &Row::aic, kResult},
-              {"bic", "the Bayesian criterion", &Row::bic, kResult}}};
+          .columns = {{"model", &Row::name},
+                      {"n_parameters", &Row::n_parameters},
+                      {"chi_squared", &Row::chi_squared, kResult},
+                      {"relative_l2", &Row::relative_l2, kResult},
+                      {"aic", &Row::aic, kResult},
+                      {"bic", &Row::bic, kResult}}};
 }
 
 files::Table<ContractionAt> contraction_table() {
   using Row = ContractionAt;
-  return {
-      .file = "contraction.csv",
-      .row = "each node of a sheet whose contraction varies (`mbtfm-sheet --displacement` with `fit_parts = field`)",
-      .columns = {{"x_um", "place of the node", files::x_of(&Row::position_um)},
-                  {"y_um", "place of the node", files::y_of(&Row::position_um)},
-                  {"contraction_nN_per_um", "contraction there", &Row::nN_per_um, kResult},
-                  {"sigma_nN_per_um", "its standard error", &Row::sigma_nN_per_um, kResult},
-                  {"low_nN_per_um", "lower end of its 95 % interval", &Row::low_nN_per_um, kResult},
-                  {"high_nN_per_um", "upper end of its 95 % interval", &Row::high_nN_per_um, kResult}}};
+  return {.file = "contraction.csv",
+          .columns = {{"x_um", files::x_of(&Row::position_um)},
+                      {"y_um", files::y_of(&Row::position_um)},
+                      {"contraction_nN_per_um", &Row::nN_per_um, kResult},
+                      {"sigma_nN_per_um", &Row::sigma_nN_per_um, kResult},
+                      {"low_nN_per_um", &Row::low_nN_per_um, kResult},
+                      {"high_nN_per_um", &Row::high_nN_per_um, kResult}}};
 }
 
 }  // namespace

@@ -22,30 +22,22 @@ struct Row {
 
 files::Table<Row> traction_table() {
   return {.file = "traction_3d.csv",
-          .row =
-              "each vertex of the smallest faces of the tractions of `mbtfm-traction` in space, which are bilinear "
-              "between them",
-          .columns = {
-              {"x_um", "the vertex", files::x_of(&Row::position_um)},
-              {"y_um", "the vertex", files::y_of(&Row::position_um)},
-              {"z_um", "the vertex, into the gel", files::z_of(&Row::position_um)},
-              {"tx_kPa", "traction of the cell on the gel, per area of the relaxed surface",
-               files::x_of(&Row::traction_kPa)},
-              {"ty_kPa", "the same along y", files::y_of(&Row::traction_kPa)},
-              {"tz_kPa", "the same into the gel", files::z_of(&Row::traction_kPa)},
-              {"sigma_tx_kPa", "standard error: the beads' noise, and what they do not resolve",
-               files::member(&Row::sigma_kPa, &Vec3::x), kResult},
-              {"sigma_ty_kPa", "the same along y", files::member(&Row::sigma_kPa, &Vec3::y), kResult},
-              {"sigma_tz_kPa", "the same into the gel", files::member(&Row::sigma_kPa, &Vec3::z), kResult},
-              {"resolution_um",
-               "forces closer together than this look like one; from about twice that on they are mostly seen as two",
-               &Row::resolution_um, kResult},
-              {"normal_kPa", "traction along the normal out of the gel: above 0 it pulls", &Row::normal_kPa, kResult},
-              {"tangential_kPa", "size of the traction along the surface", &Row::tangential_kPa, kResult},
-              {"area_um2", "of the curved surface around the vertex", &Row::area_um2, kResult},
-              {"ux_um", "the model's displacement there", files::x_of(&Row::displacement_um), kResult},
-              {"uy_um", "the model's displacement there", files::y_of(&Row::displacement_um), kResult},
-              {"uz_um", "the model's displacement there, into the gel", files::z_of(&Row::displacement_um), kResult}}};
+          .columns = {{"x_um", files::x_of(&Row::position_um)},
+                      {"y_um", files::y_of(&Row::position_um)},
+                      {"z_um", files::z_of(&Row::position_um)},
+                      {"tx_kPa", files::x_of(&Row::traction_kPa)},
+                      {"ty_kPa", files::y_of(&Row::traction_kPa)},
+                      {"tz_kPa", files::z_of(&Row::traction_kPa)},
+                      {"sigma_tx_kPa", files::member(&Row::sigma_kPa, &Vec3::x), kResult},
+                      {"sigma_ty_kPa", files::member(&Row::sigma_kPa, &Vec3::y), kResult},
+                      {"sigma_tz_kPa", files::member(&Row::sigma_kPa, &Vec3::z), kResult},
+                      {"resolution_um", &Row::resolution_um, kResult},
+                      {"normal_kPa", &Row::normal_kPa, kResult},
+                      {"tangential_kPa", &Row::tangential_kPa, kResult},
+                      {"area_um2", &Row::area_um2, kResult},
+                      {"ux_um", files::x_of(&Row::displacement_um), kResult},
+                      {"uy_um", files::y_of(&Row::displacement_um), kResult},
+                      {"uz_um", files::z_of(&Row::displacement_um), kResult}}};
 }
 
 /// As an even lattice of the smallest faces, which every reader understands.
@@ -102,26 +94,22 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
 }
 
 files::Table<PartForce> force_table() {
-  return {
-      .file = "traction_3d_adhesion_forces.csv",
-      .row = "each adhesion of `mbtfm-traction` in space",
-      .columns = {{"adhesion_id", "label of the adhesion", &PartForce::adhesion_id},
-                  {"x_um", "middle of its part of the surface", files::x_of(&PartForce::position_um)},
-                  {"y_um", "middle of its part of the surface", files::y_of(&PartForce::position_um)},
-                  {"z_um", "middle of its part of the surface", files::z_of(&PartForce::position_um)},
-                  {"area_um2", "of the curved surface", &PartForce::area_um2, kResult},
-                  {"fx_nN", "force of the cell on the gel", files::x_of(&PartForce::force_nN)},
-                  {"fy_nN", "the same along y", files::y_of(&PartForce::force_nN)},
-                  {"fz_nN", "the same into the gel", files::z_of(&PartForce::force_nN)},
-                  {"sigma_fx_nN", "standard error: the beads' noise, and what they do not resolve",
-                   files::x_of(&PartForce::sigma_nN), kResult},
-                  {"sigma_fy_nN", "the same along y", files::y_of(&PartForce::sigma_nN), kResult},
-                  {"sigma_fz_nN", "the same into the gel", files::z_of(&PartForce::sigma_nN), kResult},
-                  {"force_nN", "its size", [](const PartForce& f) { return norm(f.force_nN); }, kResult},
-                  {"sigma_nN", "standard error along the force", &PartForce::magnitude_sigma_nN, kResult},
-                  {"angle_deg", "its direction as seen from above, from +x towards +y", &PartForce::angle_deg, kResult},
-                  {"sigma_angle_deg", "standard error of angle_deg; 104: the direction is not known",
-                   &PartForce::angle_sigma_deg, kResult}}};
+  return {.file = "traction_3d_adhesion_forces.csv",
+          .columns = {{"adhesion_id", &PartForce::adhesion_id},
+                      {"x_um", files::x_of(&PartForce::position_um)},
+                      {"y_um", files::y_of(&PartForce::position_um)},
+                      {"z_um", files::z_of(&PartForce::position_um)},
+                      {"area_um2", &PartForce::area_um2, kResult},
+                      {"fx_nN", files::x_of(&PartForce::force_nN)},
+                      {"fy_nN", files::y_of(&PartForce::force_nN)},
+                      {"fz_nN", files::z_of(&PartForce::force_nN)},
+                      {"sigma_fx_nN", files::x_of(&PartForce::sigma_nN), kResult},
+                      {"sigma_fy_nN", files::y_of(&PartForce::sigma_nN), kResult},
+                      {"sigma_fz_nN", files::z_of(&PartForce::sigma_nN), kResult},
+                      {"force_nN", [](const PartForce& f) { return norm(f.force_nN); }, kResult},
+                      {"sigma_nN", &PartForce::magnitude_sigma_nN, kResult},
+                      {"angle_deg", &PartForce::angle_deg, kResult},
+                      {"sigma_angle_deg", &PartForce::angle_sigma_deg, kResult}}};
 }
 
 }  // namespace

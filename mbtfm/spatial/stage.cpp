@@ -130,20 +130,13 @@ bool has_tangent(const Problem& problem, tractions::TractionMethod method) {
 
 void declare(stage::ParameterList& list, SpatialParameters& p) {
   list.table("traction");
-  list.add("spacing_beads", p.spacing_beads, Range::between(0.2, 5),
-           "beads in space: spacing of tractions over the beads' mean distance, if spacing_um is unset; more: fewer "
-           "tractions, less time");
-  list.add("region", p.region,
-           "beads in space: where the cell pulls; auto: the outline grown by two distances of beads, or everywhere");
-  list.add("refine", p.refine,
-           "beads in space: finer faces of tractions: none; in the region (region); where beads resolve more and "
-           "tractions exceed their errors (resolved); the two fifths with the largest tractions (threshold)");
-  list.add("background", p.background, Range::between(0, 1),
-           "beads in space: expected traction outside of the region over that inside; 0: none");
-  list.add("loss", p.loss, "beads in space: loss function; all but l2 tolerate outliers");
-  list.add("axial_sigma_ratio", p.axial_sigma_ratio, Range::between(0.1, 100),
-           "beads in space: error along z over that along x and y, without sigma_z_um");
-  list.add("with_axial", p.with_axial, "beads in space: also use the displacement along z");
+  list.add("spacing_beads", p.spacing_beads, Range::between(0.2, 5));
+  list.add("region", p.region);
+  list.add("refine", p.refine);
+  list.add("background", p.background, Range::between(0, 1));
+  list.add("loss", p.loss);
+  list.add("axial_sigma_ratio", p.axial_sigma_ratio, Range::between(0.1, 100));
+  list.add("with_axial", p.with_axial);
 }
 
 void declare(stage::ParameterList& list, StageParameters& p) {

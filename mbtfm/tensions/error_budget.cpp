@@ -352,14 +352,10 @@ std::vector<Gel> gels_an_error_away(const Gel& gel) {
 
 void declare(stage::ParameterList& list, SegmentationErrors& p) {
   list.table("fit");
-  list.add("adhesion_shift_error_um", p.adhesion_shift_error_um, Range::zero_or_size_um(),
-           "error budget: standard error of each coordinate of an adhesion's centre (um)");
-  list.add("adhesion_area_error", p.adhesion_area_error, Range::between(0, 1),
-           "error budget: relative standard error of an adhesion's area");
-  list.add("adhesion_angle_error_deg", p.adhesion_angle_error_deg, Range::between(0, 90),
-           "error budget: standard error of an adhesion's orientation (degrees)");
-  list.add("fibre_end_error_um", p.fibre_end_error_um, Range::zero_or_size_um(),
-           "error budget: standard error of a fibre's free end, along the fibre (um)");
+  list.add("adhesion_shift_error_um", p.adhesion_shift_error_um, Range::zero_or_size_um());
+  list.add("adhesion_area_error", p.adhesion_area_error, Range::between(0, 1));
+  list.add("adhesion_angle_error_deg", p.adhesion_angle_error_deg, Range::between(0, 90));
+  list.add("fibre_end_error_um", p.fibre_end_error_um, Range::zero_or_size_um());
 }
 
 ErrorBudget error_budget(const BudgetInputs& in, int threads) {

@@ -15,26 +15,16 @@ namespace mbtfm::tractions {
 
 void declare(stage::ParameterList& list, TractionParameters& p) {
   list.table("traction");
-  list.add("method", p.method,
-           "how the tractions are found; auto: fttc, of beads in space group-l1 if there are adhesions, else tikhonov");
-  list.add("gel_model", p.gel_model, "elastic model of the gel");
-  list.add("lambda_by", p.lambda_by, "criterion that chooses the regularisation (not for adhesion-forces)");
-  list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::between(1e-12, 1e12),
-           "fixed regularisation: its square weighs the squares of the tractions on a lattice against those of the "
-           "misfit (um/kPa); unset: by the criterion lambda_by");
-  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
-           "spacing of the lattice of tractions (um; not of trpf, bem); unset: that of beads on a lattice, half the "
-           "mean distance of scattered beads, four fifths of it in space");
-  list.add("padding", p.padding, Range::between(1, 8),
-           "fttc, sparse: period of the computed field over the size of the measured one; 1: the measured field is "
-           "periodic");
-  list.add("read_out", p.read_out, "fttc: tractions at the nodes, or their means over the cells around them");
-  list.add("gaussian_um", p.gaussian_um, Range::zero_or_size_um(),
-           "fttc: standard deviation of the Gaussian that smooths the tractions (um)");
-  list.add("element_um", p.element_um, Range::mesh_um(), "bem: side of the elements that cover the cell (um)");
-  list.add("grow_um", p.grow_um, Range::zero_or_size_um(),
-           "tractions are summed up to this distance from the outline or from the adhesions (um); bem: an adhesion's "
-           "force is that of the tractions on its ellipse grown by this");
+  list.add("method", p.method);
+  list.add("gel_model", p.gel_model);
+  list.add("lambda_by", p.lambda_by);
+  list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::between(1e-12, 1e12));
+  list.add("spacing_um", p.spacing_um, Range::mesh_um());
+  list.add("padding", p.padding, Range::between(1, 8));
+  list.add("read_out", p.read_out);
+  list.add("gaussian_um", p.gaussian_um, Range::zero_or_size_um());
+  list.add("element_um", p.element_um, Range::mesh_um());
+  list.add("grow_um", p.grow_um, Range::zero_or_size_um());
 }
 
 namespace {
@@ -216,20 +206,16 @@ struct PatchRow {
 };
 files::Table<PatchRow> patch_table() {
   using Row = PatchRow;
-  return {
-      .file = "traction.csv",
-      .row = "each point or patch of `mbtfm-traction`",
-      .columns = {
-          {"x_um", "the point", files::x_of(&Row::patch, &GroundPatch::position_um)},
-          {"y_um", "the point", files::y_of(&Row::patch, &GroundPatch::position_um)},
-          {"tx_kPa", "traction of the cell on the gel", files::x_of(&Row::patch, &GroundPatch::traction_kPa)},
-          {"ty_kPa", "traction of the cell on the gel", files::y_of(&Row::patch, &GroundPatch::traction_kPa)},
-          {"area_um2", "of the patch around the point", files::member(&Row::patch, &GroundPatch::area_um2)},
-          {"ux_um", "the model's displacement there", files::x_of(&Row::patch, &GroundPatch::displacement_um), kResult},
-          {"uy_um", "the model's displacement there", files::y_of(&Row::patch, &GroundPatch::displacement_um), kResult},
-          {"sigma_x_kPa", "standard error of `tx_kPa`: noise and smoothing (not of `sparse`)",
-           files::member(&Row::sigma_kPa, &Vec2::x), kResult},
-          {"sigma_y_kPa", "standard error of `ty_kPa`", files::member(&Row::sigma_kPa, &Vec2::y), kResult}}};
+  return {.file = "traction.csv",
+          .columns = {{"x_um", files::x_of(&Row::patch, &GroundPatch::position_um)},
+                      {"y_um", files::y_of(&Row::patch, &GroundPatch::position_um)},
+                      {"tx_kPa", files::x_of(&Row::patch, &GroundPatch::traction_kPa)},
+                      {"ty_kPa", files::y_of(&Row::patch, &GroundPatch::traction_kPa)},
+                      {"area_um2", files::member(&Row::patch, &GroundPatch::area_um2)},
+                      {"ux_um", files::x_of(&Row::patch, &GroundPatch::displacement_um), kResult},
+                      {"uy_um", files::y_of(&Row::patch, &GroundPatch::displacement_um), kResult},
+                      {"sigma_x_kPa", files::member(&Row::sigma_kPa, &Vec2::x), kResult},
+                      {"sigma_y_kPa", files::member(&Row::sigma_kPa, &Vec2::y), kResult}}};
 }
 
 struct LambdaRow {
@@ -238,20 +224,16 @@ struct LambdaRow {
 };
 files::Table<LambdaRow> lambda_table() {
   using Row = LambdaRow;
-  return {
-      .file = "traction_lambda.csv",
-      .row = "each penalty λ that was tried (fttc, trpf, bem)",
-      .columns = {
-          {"lambda", "the penalty, in the method's own unit", files::member(&Row::point, &ScanPoint::lambda), kResult},
-          {"length_um", "λE, the same for every method", &Row::length_um, kResult},
-          {"misfit", "what the model leaves of the displacement", files::member(&Row::point, &ScanPoint::misfit),
-           kResult},
-          {"norm", "of the tractions", files::member(&Row::point, &ScanPoint::norm), kResult},
-          {"degrees", "of freedom that the tractions use", files::member(&Row::point, &ScanPoint::degrees), kResult},
-          {"gcv", "generalised cross-validation; small is good", &Row::gcv, kResult},
-          {"l_curve_curvature", "of the L-curve; large is good", &Row::curvature, kResult},
-          {"log_evidence", "Bayesian evidence; large is good", &Row::evidence, kResult},
-          {"risk", "expected error of the tractions; small is good", &Row::risk, kResult}}};
+  return {.file = "traction_lambda.csv",
+          .columns = {{"lambda", files::member(&Row::point, &ScanPoint::lambda), kResult},
+                      {"length_um", &Row::length_um, kResult},
+                      {"misfit", files::member(&Row::point, &ScanPoint::misfit), kResult},
+                      {"norm", files::member(&Row::point, &ScanPoint::norm), kResult},
+                      {"degrees", files::member(&Row::point, &ScanPoint::degrees), kResult},
+                      {"gcv", &Row::gcv, kResult},
+                      {"l_curve_curvature", &Row::curvature, kResult},
+                      {"log_evidence", &Row::evidence, kResult},
+                      {"risk", &Row::risk, kResult}}};
 }
 
 }  // namespace

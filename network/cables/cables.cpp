@@ -9,6 +9,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense_panel.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/help.h"
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::cables {
@@ -63,17 +64,14 @@ CableState state_of(const Cable& cable, const Pull& pull, Vec2 span_um, const Ro
 
 void declare(stage::ParameterList& list, CableParameters& p) {
   list.table("cables");
-  list.add("axial_stiffness_nN", p.axial_stiffness_nN, Range::force_nN(),
-           "force of a cable per strain beyond its rest length (nN)");
-  list.add("smoothing", p.smoothing, Range{.low = 1e-9, .high = 1e-2},
-           "length over which the kink of a collapsed cable is rounded off (mean edge lengths)");
-  list.add("force_tolerance", p.force_tolerance, Range{.low = 1e-13, .high = 1e-3},
-           "largest net force on a free vertex at equilibrium (as a share of the largest tension)");
+  list.add("axial_stiffness_nN", p.axial_stiffness_nN, Range::force_nN());
+  list.add("smoothing", p.smoothing, Range{.low = 1e-9, .high = 1e-2});
+  list.add("force_tolerance", p.force_tolerance, Range{.low = 1e-13, .high = 1e-3});
   list.add("max_iterations", p.max_iterations, Range::between(1, 1e7),
-           "most steps to the cables' equilibrium; unset: " + std::to_string(CableParameters::kNewtonSteps) +
-               " of Newton's method, " + std::to_string(CableParameters::kConjugateSteps) + " of conjugate gradients");
-  list.add("contraction", p.contraction,
-           "method that finds the cables' equilibrium; conjugate-gradient is the slow one of the first publication");
+           stage::help_on(
+               "cables", "max_iterations",
+               {std::to_string(CableParameters::kNewtonSteps), std::to_string(CableParameters::kConjugateSteps)}));
+  list.add("contraction", p.contraction);
 }
 
 struct CableNetwork::Impl {

@@ -186,19 +186,12 @@ void expect_room_for_even_mesh(const Cell& cell, const NetworkParameters& parame
 
 void declare(stage::ParameterList& list, NetworkParameters& parameters) {
   list.table("network");
-  list.add("edge_length_um", parameters.edge_length_um, Range::mesh_um(), "mean length of the network's cables (um)");
-  list.add("seed", parameters.seed, "random seed of the vertices' first positions");
-  list.add("link_weights", parameters.link_weights,
-           "tension and stiffness of the actin network's links: the same for all, or by the width of material that "
-           "each represents");
-  list.add("link_reach", parameters.link_reach,
-           "what the actin network's links join: vertices at the two ends of an edge, or also those across from each "
-           "other at one, so that links run in twelve directions rather than six");
-  list.add("adhesion_anchor", parameters.adhesion_anchor,
-           "what an adhesion holds: its rim, which the mesh resolves; every vertex that happens to lie in its ellipse; "
-           "or the one at its centre");
-  list.add("rim_points", parameters.rim_points, Range::between(3, 1000),
-           "least number of vertices around an adhesion's rim");
+  list.add("edge_length_um", parameters.edge_length_um, Range::mesh_um());
+  list.add("seed", parameters.seed);
+  list.add("link_weights", parameters.link_weights);
+  list.add("link_reach", parameters.link_reach);
+  list.add("adhesion_anchor", parameters.adhesion_anchor);
+  list.add("rim_points", parameters.rim_points, Range::between(3, 1000));
 }
 
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters) {

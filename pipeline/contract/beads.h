@@ -18,11 +18,6 @@ enum class CellWith {
 };
 constexpr auto words(CellWith) { return std::array{"stressed", "relaxed", "each"}; }
 
-/// Of images.cell_with, for help and pages.
-inline constexpr const char* kCellWithMeaning =
-    "the bead image together with which the cell's images were taken, before the stage moved again: stressed (of a "
-    "time series the first), relaxed, or each (of a time series: each frame has its own)";
-
 /// Displacement (stressed minus relaxed position) of one bead.
 struct Bead {
   Vec2 position_um;  ///< at rest, in the frame of the cell's pictures

@@ -15,7 +15,6 @@ namespace mbtfm::cost {
 /// Parameters that trade accuracy for time together.
 struct Preset {
   std::string name;
-  std::string purpose;
   std::vector<runner::Setting> settings;  ///< where they differ from the defaults, of cells with fibres
   std::vector<runner::Setting> in_space;  ///< the same of cells in space
 };

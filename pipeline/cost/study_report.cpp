@@ -9,6 +9,7 @@
 #include "pipeline/cost/study.h"
 #include "pipeline/files/columns.h"
 #include "pipeline/files/text.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::cost {
 namespace {
@@ -49,31 +50,21 @@ files::Table<CostRow> cost_table() {
   using files::kResult;
   using files::member;
   return {.file = "cost/cost.csv",
-          .row = "each value of each knob that was tried",
-          .columns = {
-              {"knob", "the parameter", member(&Row::measured, &Measurement::rung, &Rung::knob)},
-              {"value", "its value", member(&Row::measured, &Measurement::rung, &Rung::value)},
-              {"seconds", "of all stages if the cell has its images, else of network and fit; in space of traction",
-               member(measured, &Measurement::seconds), kResult},
-              {"cpu_seconds", "the same of all threads", member(measured, &Measurement::cpu_seconds), kResult},
-              {"peak_memory_MB", "the largest of the stages", member(measured, &Measurement::peak_memory_MB), kResult},
-              {"n_runs", "of which the times are the median", member(measured, &Measurement::n_runs)},
-              {"tension_error",
-               "‖t − reference‖/‖reference‖ over the fibres; the reference is the truth if it is known, else the "
-               "finest choice",
-               member(measured_in_plane, &Measurement::error), kResult},
-              {"force_error", "of the total force, relative", member(measured, &Measurement::force_error), kResult},
-              {"stated_tension_error", "what the error budget says",
-               member(measured_in_plane, &Measurement::stated_error), kResult},
-              {"n_fibres", "that the reference knows, too", member(measured_in_plane, &Measurement::n_fibres)},
-              {"is_on_front", "nothing else is both faster and more exact", &Row::is_on_front},
-              {"failure", "why there is no figure",
-               [](const Row& row) { return row.measured.n_runs == 0 ? "no time left" : row.measured.failure; }},
-              {"traction_error",
-               "of a cell in space: ‖t − reference‖/‖reference‖ over its surface, with the same reference",
-               member(measured_in_space, &Measurement::error), kResult},
-              {"stated_traction_error", "what the standard errors of its tractions say; 0: there are none",
-               member(measured_in_space, &Measurement::stated_error), kResult}}};
+          .columns = {{"knob", member(&Row::measured, &Measurement::rung, &Rung::knob)},
+                      {"value", member(&Row::measured, &Measurement::rung, &Rung::value)},
+                      {"seconds", member(measured, &Measurement::seconds), kResult},
+                      {"cpu_seconds", member(measured, &Measurement::cpu_seconds), kResult},
+                      {"peak_memory_MB", member(measured, &Measurement::peak_memory_MB), kResult},
+                      {"n_runs", member(measured, &Measurement::n_runs)},
+                      {"tension_error", member(measured_in_plane, &Measurement::error), kResult},
+                      {"force_error", member(measured, &Measurement::force_error), kResult},
+                      {"stated_tension_error", member(measured_in_plane, &Measurement::stated_error), kResult},
+                      {"n_fibres", member(measured_in_plane, &Measurement::n_fibres)},
+                      {"is_on_front", &Row::is_on_front},
+                      {"failure",
+                       [](const Row& row) { return row.measured.n_runs == 0 ? "no time left" : row.measured.failure; }},
+                      {"traction_error", member(measured_in_space, &Measurement::error), kResult},
+                      {"stated_traction_error", member(measured_in_space, &Measurement::stated_error), kResult}}};
 }
 
 void write_csv(const fs::path& file, const Study& study) {
@@ -196,12 +187,11 @@ void draw(const fs::path& file, const Study& study, const std::string& cell_name
                                            charts::Scale::logarithmic);
   std::vector<charts::Chart> list;
   for (const std::string& group : groups_of(study.kind)) list.push_back(chart_of(group, study, x, y));
-  files::write_text(
-      file, charts::svg_file(
-                list, 2,
-                {cell_name + ": |t − reference| / |reference| over the " +
-                     (study.kind == CellKind::space ? "surface" : "fibres") + "; reference: " + study.reference + ".",
-                 "Grey: the front, which no other choice beats in both. Circle: the settings of the cell."}));
+  files::write_text(file, charts::svg_file(list, 2,
+                                           {cell_name + ": |t − reference| / |reference| over the " +
+                                                (study.kind == CellKind::space ? "surface" : "fibres") +
+                                                "; reference: " + study.reference + ".",
+                                            report::sentence("cost.front")}));
 }
 
 /// The quickest rung of a knob that errs no more than `error`.

@@ -2,7 +2,12 @@
 
 #include <algorithm>
 
+#include "pipeline/files/texts.h"
+
 namespace mbtfm::files {
+
+extern const std::string_view kColumnTexts;  // columns.txt
+
 void Way::go(Through through, Function function, bool may_end) {
   pieces_.at(static_cast<std::size_t>(n_++)) = {offset_, through, function};
   offset_ = 0;
@@ -27,11 +32,9 @@ const void* Way::from(const void* row) const {
   return static_cast<const char*>(row) + offset_;
 }
 
-AnyColumns::AnyColumns(std::string_view name, std::string_view meaning, const Way& way, const FieldType& type,
-                       const ColumnOptions& options) {
+AnyColumns::AnyColumns(std::string_view name, const Way& way, const FieldType& type, const ColumnOptions& options) {
   AnyColumn& column = all_.emplace_back();
   column.name = name;
-  column.meaning = meaning;
   column.options = options;
   column.way = way;
   column.type = &type;
@@ -85,14 +88,17 @@ void AnyColumns::take(void* rows, std::size_t size, CsvTable& table, const char*
   }
 }
 
-std::string AnyColumns::page_of(const char* file, const char* row) const {
+std::string AnyColumns::page_of(const char* file) const {
+  static const Texts texts(kColumnTexts);
+  const std::string row = texts.at(file, "");
   std::string page =
       std::string("\n## `") + file + "`\n\nA row for " + row + ".\n\n| column | is | values |\n|---|---|---|\n";
   for (const AnyColumn& c : all_) {
     std::string kind = c.type->kind(c.options.range);
     if (c.way.may_end() && !kind.ends_with(", or empty")) kind += ", or empty";
-    page +=
-        "| `" + c.name + "` | " + c.meaning + " | " + kind + (c.options.may_lack ? "; may be missing" : "") + " |\n";
+    const std::optional<std::string> own = texts.find(file, c.name);
+    page += "| `" + c.name + "` | " + (own ? *own : texts.at("any table", c.name)) + " | " + kind +
+            (c.options.may_lack ? "; may be missing" : "") + " |\n";
   }
   return page;
 }

@@ -1,12 +1,13 @@
 /// The columns of a table, each declared once. What writes the table, reads it and describes it (docs/columns.md)
 /// follows from there:
 ///
-///   const Table<Tension> table{.file = "tensions.csv", .row = "the network and each fibre", .columns = {
-///       {"fibre_id", "label of the fibre; 0: the actin network", &Tension::fibre_id, {.range = {.low = 0}}},
-///       {"low_nN", "lower end of the 95 % interval", &Tension::low_nN, {.digits = 6, .may_lack = true}},
-///       {"x_um", "place", member(&Tension::position_um, &Vec2::x)},
-///       {"half_nN", "half the tension", [](const Tension& t) { return t.tension_nN / 2; }}}};  // written, never read
+///   const Table<Tension> table{.file = "tensions.csv", .columns = {
+///       {"fibre_id", &Tension::fibre_id, {.range = {.low = 0}}},
+///       {"low_nN", &Tension::low_nN, {.digits = 6, .may_lack = true}},
+///       {"x_um", member(&Tension::position_um, &Vec2::x)},
+///       {"half_nN", [](const Tension& t) { return t.tension_nN / 2; }}}};  // written, never read
 ///
+/// What a column means is in columns.txt.
 /// A column knows where in a row its value lies and of which type it is, so that the compiler has one reader and one
 /// writer for each type and not for each column.
 #pragma once
@@ -217,8 +218,7 @@ auto z_of(To... vector) {
 
 /// A column of rows of any type.
 struct AnyColumn {
-  std::string name;     ///< with its unit
-  std::string meaning;  ///< a phrase for the page
+  std::string name;  ///< with its unit
   ColumnOptions options;
   Way way;
   const FieldType* type = nullptr;
@@ -232,15 +232,14 @@ class AnyColumns {
  public:
   std::string text_of(const void* rows, std::size_t n_rows, std::size_t size) const;
   void take(void* rows, std::size_t size, CsvTable& table, const char* label) const;
-  std::string page_of(const char* file, const char* row) const;
+  std::string page_of(const char* file) const;
 
   /// @param part  which they are columns of
   void add(const AnyColumns& more, const Way& part = {});
 
  protected:
   AnyColumns() = default;
-  AnyColumns(std::string_view name, std::string_view meaning, const Way& way, const FieldType& type,
-             const ColumnOptions& options);
+  AnyColumns(std::string_view name, const Way& way, const FieldType& type, const ColumnOptions& options);
   AnyColumns(const AnyColumns&);
   AnyColumns& operator=(const AnyColumns&);
   ~AnyColumns();
@@ -261,25 +260,22 @@ class Columns : public AnyColumns {
     for (const Columns& part : parts) add(part);
   }
   template <class T>
-  Columns(std::string_view name, std::string_view meaning, const Member<Row, T>& of, const ColumnOptions& options = {})
-      : AnyColumns(name, meaning, of.way, kFieldType<T>, options) {}
+  Columns(std::string_view name, const Member<Row, T>& of, const ColumnOptions& options = {})
+      : AnyColumns(name, of.way, kFieldType<T>, options) {}
   template <class T>
-  requires std::is_object_v<T> Columns(std::string_view name, std::string_view meaning, T Row::*of,
-                                       const ColumnOptions& options = {})
-      : Columns(name, meaning, member(of), options) {}
+  requires std::is_object_v<T> Columns(std::string_view name, T Row::*of, const ColumnOptions& options = {})
+      : Columns(name, member(of), options) {}
   /// What is not kept as it is written: it is not read.
   template <std::invocable<const Row&> Get>
-  requires(!std::is_member_pointer_v<Get>)
-      Columns(std::string_view name, std::string_view meaning, Get get, const ColumnOptions& options = {})
-      : AnyColumns(name, meaning, Way(), kFieldType<Value<Get>>, options) {
+  requires(!std::is_member_pointer_v<Get>) Columns(std::string_view name, Get get, const ColumnOptions& options = {})
+      : AnyColumns(name, Way(), kFieldType<Value<Get>>, options) {
     all_.back().get = [get](const void* row, int digits) {
       return field_of(get(*static_cast<const Row*>(row)), digits);
     };
   }
   /// The same, read by another function. @param put  into a row
   template <class Get, std::invocable<Row&, std::invoke_result_t<Get, const Row&>> Put>
-  Columns(std::string_view name, std::string_view meaning, Get get, Put put, const ColumnOptions& options = {})
-      : Columns(name, meaning, get, options) {
+  Columns(std::string_view name, Get get, Put put, const ColumnOptions& options = {}) : Columns(name, get, options) {
     all_.back().put = [put](void* row, const CsvTable& table, int at, const AnyColumn& column) {
       std::invoke_result_t<Get, const Row&> value{};
       column.type->take(&value, table, at, column.name, column.options.range);
@@ -310,7 +306,6 @@ auto columns_of(Access part, const Columns<Part>& its) {
 template <class Row>
 struct Table {
   const char* file = "";
-  const char* row = "";  ///< what a row is of, for the page
   Columns<Row> columns;
   const char* label = "";  ///< in messages a row is called after it and its first column: "adhesion 11"
 };
@@ -342,7 +337,7 @@ std::vector<Row> read(const Path& file, const Table<Row>& table) {
 /// What the page says of it.
 template <class Row>
 std::string page_of(const Table<Row>& table) {
-  return table.columns.page_of(table.file, table.row);
+  return table.columns.page_of(table.file);
 }
 
 }  // namespace mbtfm::files

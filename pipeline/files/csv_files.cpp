@@ -294,7 +294,7 @@ void write_adhesion_forces(const Path& file, const std::vector<AdhesionForce>& f
   std::vector<ForceOnAdhesion> rows = forces_on(adhesions, forces);
   for (std::size_t k = 0; k < more.size(); ++k) {
     MBTFM_ASSERT(more[k].values.size() == forces.size());
-    table.columns.push_back({more[k].name, "", [k](const ForceOnAdhesion& row) { return row.more[k]; }});
+    table.columns.push_back({more[k].name, [k](const ForceOnAdhesion& row) { return row.more[k]; }});
     for (std::size_t i = 0; i < rows.size(); ++i) rows[i].more.push_back(more[k].values[i]);
   }
   write(file, table, rows);

@@ -6,43 +6,30 @@
 namespace mbtfm::files {
 namespace {
 
-Columns<SheetEstimate> part(const char* name, const char* meaning, std::optional<double> SheetErrorParts::*of) {
-  return {name, meaning, member(&SheetEstimate::parts, of), kResultMayLack};
+Columns<SheetEstimate> part(const char* name, std::optional<double> SheetErrorParts::*of) {
+  return {name, member(&SheetEstimate::parts, of), kResultMayLack};
 }
 
 }  // namespace
 
 Table<SheetEstimate> sheet_estimate_table() {
   using Row = SheetEstimate;
-  return {
-      .file = "sheet_fit.csv",
-      .row = "each number of a sheet that the beads were asked for (`mbtfm-sheet --displacement`)",
-      .columns = {
-          {"quantity", "with its unit; stiffness is E h / (1 - nu²)", &Row::quantity},
-          {"part",
-           "of the sheet, where parts contract each by its own: inside, edge, or a cell of the label image; mean, of a "
-           "contraction that varies; or the bundle; else empty",
-           &Row::part},
-          {"value", "where the misfit is least", &Row::value, kResult},
-          {"sigma", "standard error; empty if the beads do not determine the quantity", &Row::sigma, kResult},
-          {"low", "lower end of the 95 % interval; empty: none", &Row::low, kResult},
-          {"high", "upper end of the 95 % interval; empty: none", &Row::high, kResult},
-          {"identifiable", "the beads limit it to both sides", &Row::identifiable},
-          part("by_beads",
-               "part of sigma by noise of the beads' displacements; the squares of all parts add up to that of sigma",
-               &SheetErrorParts::beads),
-          part("by_motion", "part by the motion that all beads share; empty: none was allowed for",
-               &SheetErrorParts::motion),
-          part("by_model", "part by what the sheet leaves of the beads beyond their noise", &SheetErrorParts::model),
-          part("by_variation",
-               "part by a contraction that varies by 20 % over the sheet, slowly; empty: its variation is fitted",
-               &SheetErrorParts::variation),
-          part("by_mesh", "part by the sheet's triangles", &SheetErrorParts::mesh),
-          part("by_outline", "part by the place of the outline (`outline_error_um`)", &SheetErrorParts::outline),
-          part("by_gel",
-               "part by the gel's modulus, thickness and Poisson's ratio; empty: no errors of these were given",
-               &SheetErrorParts::gel),
-          part("by_substrate", "part by what the model leaves out of the gel", &SheetErrorParts::substrate)}};
+  return {.file = "sheet_fit.csv",
+          .columns = {{"quantity", &Row::quantity},
+                      {"part", &Row::part},
+                      {"value", &Row::value, kResult},
+                      {"sigma", &Row::sigma, kResult},
+                      {"low", &Row::low, kResult},
+                      {"high", &Row::high, kResult},
+                      {"identifiable", &Row::identifiable},
+                      part("by_beads", &SheetErrorParts::beads),
+                      part("by_motion", &SheetErrorParts::motion),
+                      part("by_model", &SheetErrorParts::model),
+                      part("by_variation", &SheetErrorParts::variation),
+                      part("by_mesh", &SheetErrorParts::mesh),
+                      part("by_outline", &SheetErrorParts::outline),
+                      part("by_gel", &SheetErrorParts::gel),
+                      part("by_substrate", &SheetErrorParts::substrate)}};
 }
 
 SheetSummary read_sheet_summary(const Path& folder) {

@@ -16,6 +16,7 @@
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/space_results.h"
 #include "pipeline/report/stage_page.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::report {
 namespace {
@@ -193,9 +194,8 @@ std::string truth_section(const fs::path& cell) {
     table.rows.push_back({heading_of(n.quantity), rounded(n.found, {}), rounded(n.low, {}), rounded(n.high, {}),
                           rounded(n.truth, {}),
                           n.found && n.truth != 0 ? with_sign(100 * (*n.found / n.truth - 1), 1) : "–"});
-  return section("Beside the truth",
-                 "<p>This cell was simulated, so the truth is known. Low and high: 95 % interval.</p>\n" +
-                     html_of(table) + "<p>" + html_escaped(capitalised(compared.note)) + "</p>\n");
+  return section("Beside the truth", paragraph("cell.truth-is-known") + html_of(table) + "<p>" +
+                                         html_escaped(capitalised(compared.note)) + "</p>\n");
 }
 
 std::string comparison_text(const fs::path& cell) {

@@ -15,6 +15,7 @@
 #include "pipeline/report/results.h"
 #include "pipeline/report/stage_page.h"
 #include "pipeline/report/tensions.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::report {
 namespace {
@@ -31,11 +32,8 @@ std::string percent(double share) { return two_digits(100 * share) + " %"; }
 std::string of_cut(const FitSummary& fit) {
   const auto cut = cut_force_of(fit);
   if (!cut) return {};
-  return fmt::format(
-      " The image cuts the cell: {} ± {} nN (x {} ± {}, y {} ± {}; y points down) pass through the cut and balance the "
-      "forces of the adhesions in view.",
-      readable(cut->force_nN), readable(cut->sigma_nN), readable(cut->x_nN), readable(cut->x_sigma_nN),
-      readable(cut->y_nN), readable(cut->y_sigma_nN));
+  return " " + sentence("cell.cut", readable(cut->force_nN), readable(cut->sigma_nN), readable(cut->x_nN),
+                        readable(cut->x_sigma_nN), readable(cut->y_nN), readable(cut->y_sigma_nN));
 }
 
 /// Those that were seen, and those that were put where nobody saw one.
@@ -59,17 +57,16 @@ std::string adhesions_in_words(const Cell& cell) {
 std::string of_candidates(const Cell& cell) {
   if (!has_origin(cell, AdhesionOrigin::candidate)) return {};
   return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return is_assumed(a.origin); })
-             ? " No adhesion was seen: forces are placed where adhesions may be, on the candidates."
-             : " Forces act on the candidates, too, where nobody saw an adhesion.";
+             ? " " + sentence("cell.candidates-alone")
+             : " " + sentence("cell.candidates-too");
 }
 
 /// Where the beads do not tell the network's tension, its part of the force may come out at any size.
 std::string parts_of_total(const CellResults& results) {
   const auto network = results.tensions.find(0);
-  if (network != results.tensions.end() && !network->second.identifiable)
-    return ". The beads do not show how much of it comes from the actin network.";
-  return fmt::format(": {} nN by the fibres, {} nN by the actin network.", readable(results.fit.fibre_force_nN),
-                     readable(results.fit.network_force_nN));
+  if (network != results.tensions.end() && !network->second.identifiable) return sentence("cell.network-unresolved");
+  return sentence("cell.fibres-and-network", readable(results.fit.fibre_force_nN),
+                  readable(results.fit.network_force_nN));
 }
 
 /// With its standard error, where the fit states one.
@@ -82,27 +79,23 @@ std::string what(const CellResults& results) {
   int n_by_type[std::size(kFibreTypes)] = {};
   for (const Fibre& fibre : results.cell.fibres) ++n_by_type[static_cast<int>(fibre.type)];
   const int n_edge = n_by_type[static_cast<int>(FibreType::edge)];
-  return fmt::format(
-             "{} ({} dorsal, {}, {} ventral{}) and {}. The cell pulls with {} in total, summed over its adhesions{}",
-             counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
-             counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
-             n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell),
-             total_in_words(results.fit), parts_of_total(results)) +
+  return sentence("cell.what", counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
+                  counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
+                  n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell),
+                  total_in_words(results.fit), parts_of_total(results)) +
          of_candidates(results.cell) + of_cut(results.fit);
 }
 
 std::string truth(const CellResults& results) {
   const Comparison& comparison = *results.comparison;
-  std::string text = fmt::format(
-      "This cell was simulated, so the truth is known. Over the {} found, the tensions deviate from it by {} (root of "
-      "the summed squares, relative)",
-      counted(comparison.n_matched, "fibre", "fibres"), percent(comparison.relative_error));
+  std::string text =
+      sentence("cell.truth", counted(comparison.n_matched, "fibre", "fibres"), percent(comparison.relative_error));
   if (const Coverage coverage = coverage_of(results); coverage.n > 0)
-    text += fmt::format("; the 95 % interval holds the truth for {} of {}", coverage.n_inside, coverage.n);
+    text += sentence("cell.truth-in-intervals", coverage.n_inside, coverage.n);
   if (comparison.n_long > 0) {
-    text += fmt::format("; {} of {} longer than {:g} µm {} found and typed right", comparison.n_long_found_and_typed,
-                        counted(comparison.n_long, "true fibre", "true fibres"), kLongFibre_um,
-                        comparison.n_long_found_and_typed == 1 ? "was" : "were");
+    text += sentence("cell.truth-long-fibres", comparison.n_long_found_and_typed,
+                     counted(comparison.n_long, "true fibre", "true fibres"), kLongFibre_um,
+                     comparison.n_long_found_and_typed == 1 ? "was" : "were");
   }
   if (comparison.true_total_force_nN) {
     text += fmt::format("; the total force deviates by {}",
@@ -115,10 +108,8 @@ std::string truth(const CellResults& results) {
 std::string explained_by_network(const FitSummary& fit) {
   const auto share = figure_of(fit, "network_explains"), beside_nN = figure_of(fit, "force_beside_network_nN");
   if (!share || !beside_nN || *beside_nN <= 0) return "";
-  return fmt::format(
-      " Beside what the network gives, the beads show {} nN at an adhesion (root mean square, {} of the forces). The "
-      "forces in the tables hold it.",
-      two_digits(*beside_nN), percent(std::sqrt(std::clamp(1 - *share, 0.0, 1.0))));
+  return " " +
+         sentence("cell.beside-network", two_digits(*beside_nN), percent(std::sqrt(std::clamp(1 - *share, 0.0, 1.0))));
 }
 
 /// Of models.csv.
@@ -138,33 +129,24 @@ std::string another_model(const FitSummary& fit) {
   constexpr std::array kModels = {"a network without fibres", "this one",
                                   "forces of the adhesions that no network joins", "a sheet that contracts evenly",
                                   "an evenly contracting sheet with these fibres in it"};
-  return fmt::format(
-      "The beads prefer another model to a network with these fibres: {} (by {:.0f} in BIC, with each model's own "
-      "error allowed for). Distrust the tensions; the forces of the adhesions change little.",
-      kModels[static_cast<std::size_t>(*which)], *over);
+  return sentence("cell.another-model", kModels[static_cast<std::size_t>(*which)], *over);
 }
 
 /// The displacement that the model explains, against what the noise would allow.
 std::string quality(const FitSummary& fit) {
-  if (!(fit.expected_relative_l2 > 0))
-    return fmt::format("The model leaves {} of the displacement unexplained (relative L2).", percent(fit.relative_l2));
+  if (!(fit.expected_relative_l2 > 0)) return sentence("cell.misfit", percent(fit.relative_l2));
   const double left2 = std::pow(fit.relative_l2, 2), noise2 = std::pow(fit.expected_relative_l2, 2);
   std::string text;
   if (left2 <= noise2) {
-    text = fmt::format(
-        "All that the model leaves of the displacement is the noise of the beads ({} nm a component): relative L2 {}, "
-        "by noise alone {}.",
-        two_digits(1000 * fit.noise_um), percent(fit.relative_l2), percent(fit.expected_relative_l2));
+    text = sentence("cell.misfit-is-noise", two_digits(1000 * fit.noise_um), percent(fit.relative_l2),
+                    percent(fit.expected_relative_l2));
   } else {
-    text = fmt::format(
-        "Of what the model leaves of the displacement {:.0f} % is the noise of the beads ({} nm a component) and "
-        "{:.0f} % the error of the model (mesh, segmentation, gel), in squares. Relative L2 {}, by noise alone {}.",
-        100 * noise2 / left2, two_digits(1000 * fit.noise_um), 100 * (1 - noise2 / left2), percent(fit.relative_l2),
-        percent(fit.expected_relative_l2));
+    text = sentence("cell.misfit-and-noise", 100 * noise2 / left2, two_digits(1000 * fit.noise_um),
+                    100 * (1 - noise2 / left2), percent(fit.relative_l2), percent(fit.expected_relative_l2));
   }
   constexpr double kLarge = 0.3;  // a reader may take it for a bad fit
   if (fit.expected_relative_l2 > kLarge) {
-    text += " They are large as they count the many beads far from the cell, which move less than their noise.";
+    text += " " + sentence("cell.misfit-counts-far-beads");
   }
   return text + explained_by_network(fit);
 }
@@ -174,20 +156,16 @@ std::string energy_and_moment(const CellResults& results) {
   const FitSummary& fit = results.fit;
   std::string text;
   const auto energy = figure_of(fit, "strain_energy_fJ"), energy_sigma = figure_of(fit, "strain_energy_sigma_fJ");
-  if (energy && energy_sigma)
-    text += "The forces have put " + with_error(*energy, *energy_sigma, "fJ") + " of strain energy into the gel. ";
-  if (energy && has_assumed(results.cell))
-    text +=
-        "At assumed adhesions it is the energy that the nearest beads show; a force on a smaller area stores more. ";
+  if (energy && energy_sigma) text += sentence("cell.energy", with_error(*energy, *energy_sigma, "fJ")) + " ";
+  if (energy && has_assumed(results.cell)) text += sentence("cell.energy-at-assumed") + " ";
   const auto moment = figure_of(fit, "contractile_moment_nN_um"),
              moment_sigma = figure_of(fit, "contractile_moment_sigma_nN_um"),
              major = figure_of(fit, "contractile_moment_major_nN_um"),
              minor = figure_of(fit, "contractile_moment_minor_nN_um"),
              axis = figure_of(fit, "contractile_moment_axis_deg");
   if (moment && moment_sigma && major && minor && axis) {
-    text += fmt::format(
-        "Contractile moment: {}, of which {} along the main axis ({:.0f}° from x towards y) and {} across it.",
-        with_error(*moment, *moment_sigma, "nN µm"), readable(*major), *axis, readable(*minor));
+    text +=
+        sentence("cell.moment", with_error(*moment, *moment_sigma, "nN µm"), readable(*major), *axis, readable(*minor));
   }
   return text;
 }
@@ -201,13 +179,9 @@ std::vector<std::string> on_outputs(const Provenance& provenance) {
     if (named<StageState>(stage.state) == StageState::replaced)
       sentences.push_back("The outputs of " + stage.name + " are not its own: " + stage.why + ".");
   }
-  if (!given.empty())
-    sentences.push_back("Given with the cell, not computed by this program: the outputs of " + given + ".");
+  if (!given.empty()) sentences.push_back(sentence("cell.given", given));
   return sentences;
 }
-
-constexpr const char* kNothingOpen =
-    "No finding is open: nothing that the program checks speaks against these results.";
 
 /// Findings are written for terminals too, in plain characters: a page has µ and ±.
 std::string printed(const std::string& text) {
@@ -286,9 +260,7 @@ std::string findings_section(const std::vector<std::string>& facts, const Proven
   std::string html = "<ul class=\"findings\">\n", open;
   for (const std::string& fact : facts) html += item("fact", "", fact);
   for (const StageLine& stage : provenance.stages) {
-    if (!stage.converged)
-      open += item("bad", "<b>Distrust:</b> ",
-                   "The stage " + stage.name + " did not converge: what follows from it is provisional.");
+    if (!stage.converged) open += item("bad", "<b>Distrust:</b> ", sentence("cell.not-converged", stage.name));
   }
   auto [of_findings, notes] = items_of(provenance.findings);
   open += of_findings;
@@ -297,7 +269,7 @@ std::string findings_section(const std::vector<std::string>& facts, const Proven
         item(accuracy->is_met ? "fact" : "caution", accuracy->is_met ? "" : "<b>Caution:</b> ",
              "Verified by the error budget: " + accuracy->verdict + ".");
   }
-  if (open.empty() && was_asked(provenance)) open = item("good", "<b>✓</b> ", kNothingOpen);
+  if (open.empty() && was_asked(provenance)) open = item("good", "<b>✓</b> ", sentence("cell.nothing-open"));
   for (const std::string& sentence : on_outputs(provenance)) notes += item("fact", "", sentence);
   return section("In short", html + open + notes + "</ul>\n");
 }
@@ -306,7 +278,7 @@ std::string list_of(const std::vector<std::string>& facts, const std::vector<Fin
   std::string html = "<ul class=\"findings\">\n";
   for (const std::string& fact : facts) html += item("fact", "", fact);
   auto [open, notes] = items_of(findings);
-  if (open.empty()) open = item("good", "<b>✓</b> ", kNothingOpen);
+  if (open.empty()) open = item("good", "<b>✓</b> ", sentence("cell.nothing-open"));
   return html + open + notes + "</ul>\n";
 }
 

@@ -13,6 +13,7 @@
 #include "pipeline/report/page.h"
 #include "pipeline/report/results.h"
 #include "pipeline/report/tensions.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::report {
 namespace {
@@ -46,9 +47,7 @@ void draw_outline(Chart& map, const Cell& cell, const std::string& style) {
   if (!cut.empty()) map.curve(cut, kCutStyle);
 }
 
-std::string caption_of_cut(const Cell& cell) {
-  return cuts_of(cell).empty() ? "" : " Heavy grey dashes: the cut, where the image ends and the cell goes on.";
-}
+std::string caption_of_cut(const Cell& cell) { return cuts_of(cell).empty() ? "" : " " + sentence("maps.cut"); }
 
 Chart new_map(const CellResults& results, const std::string& title) {
   Chart map = empty_map(map_box(results), title);
@@ -188,10 +187,7 @@ Figure segmentation_map(const CellResults& results) {
           : fmt::format("<span><span class=\"type\" style=\"background:{}\"></span>missing (dashed)</span>",
                         of_missing);
   return {map,
-          (is_dark ? "Adhesions, fibres and outline over the images they were found in: actin grey, adhesions purple. "
-                     "Full size: 1_segment/overlay.png."
-                   : "Adhesions, fibres and outline.") +
-              caption_of_cut(results.cell),
+          (is_dark ? sentence("maps.segmentation") : "Adhesions, fibres and outline.") + caption_of_cut(results.cell),
           legend(types + adhesion_keys(results.cell) + missing)};
 }
 
@@ -214,12 +210,7 @@ std::vector<Figure> bead_maps(const CellResults& results) {
     inset.polygon(ellipse_corners(adhesion, kEllipseCorners), "fill:none;stroke:#fff;stroke-width:1.4",
                   hover_of(adhesion, results));
     whole.bar(box.low_um, box.high_um, "fill:none;stroke:#fff;stroke-width:1.4");
-    maps.push_back(
-        {inset,
-         fmt::format("Relaxed (green) and stressed (purple) beads in turn, 15 µm around adhesion {} (white). "
-                     "Beads beside it must move. It blinks for five seconds, and under the mouse.",
-                     adhesion.adhesion_id),
-         {}});
+    maps.push_back({inset, sentence("maps.blink", adhesion.adhesion_id), {}});
   }
   int n_flagged = 0;
   for (const Bead& bead : results.displacement) {
@@ -228,12 +219,10 @@ std::vector<Figure> bead_maps(const CellResults& results) {
     whole.dot(bead.position_um, 3.5, "fill:#fff;fill-opacity:0.01;stroke-width:1.2;stroke:#ffe14d",
               "left out: " + bead.flag);
   }
-  maps.push_back(
-      {whole,
-       fmt::format("Relaxed image green, stressed image purple, without their drift; white: beads that did "
-                   "not move. Yellow rings: {} beads that were left out, with the reason.{}{}",
-                   n_flagged, maps.empty() ? "" : " White square: the map before.", caption_of_cut(results.cell)),
-       {}});
+  maps.push_back({whole,
+                  sentence("maps.beads", n_flagged, maps.empty() ? "" : " White square: the map before.",
+                           caption_of_cut(results.cell)),
+                  {}});
   return maps;
 }
 
@@ -255,17 +244,14 @@ Figure adhesion_map(const CellResults& results) {
     map.arrow(by_id.at(force.adhesion_id)->position_um, scale.px_per_unit * force.force_nN,
               "stroke-width:1.4;stroke:#111");
   }
-  const std::string of_candidates = has_origin(results.cell, AdhesionOrigin::candidate)
-                                        ? " Candidates were not seen: read their colours as a traction density."
-                                        : "";
+  const std::string of_candidates =
+      has_origin(results.cell, AdhesionOrigin::candidate) ? " " + sentence("maps.candidates") : "";
   return {map,
           std::string(std::ranges::all_of(results.cell.adhesions,
                                           [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; })
-                          ? "Each candidate is coloured by the traction at its place; the arrow is the force"
-                          : "Each adhesion’s ellipse is coloured by its mean traction; the arrow is the force") +
-              " of the cell on the substrate. Dashed: the cell’s outline. The few highest tractions share the colour "
-              "at the bar’s end." +
-              of_candidates + caption_of_cut(results.cell),
+                          ? sentence("maps.candidate-colours")
+                          : sentence("maps.adhesion-colours")) +
+              " " + sentence("maps.adhesion-forces") + of_candidates + caption_of_cut(results.cell),
           legend(arrow_legend(scale, "nN") + colour_bar(colours))};
 }
 
@@ -284,17 +270,11 @@ Figure usual_method_map(const CellResults& results) {
   const std::string lambda = usual.lambda_um_per_kPa ? fmt::format(", λ = {} µm/kPa (criterion: {})",
                                                                    readable(*usual.lambda_um_per_kPa), usual.lambda_by)
                                                      : "";
-  return {
-      map,
-      fmt::format(
-          "Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on squares of "
-          "{:.2g} µm; the largest is {} kPa (colours of its own). FTTC knows neither adhesions nor fibres: tractions "
-          "spread, and noise makes some everywhere. Total force in the outline, noise included: {} nN; by the model: "
-          "{} nN. White: outline and adhesions.",
-          lambda, usual.spacing_um, readable(largest_kPa), readable(usual.total_force_nN),
-          readable(results.fit.total_force_nN)) +
-          caption_of_cut(results.cell),
-      legend(colour_bar(colours))};
+  return {map,
+          sentence("maps.fttc", lambda, usual.spacing_um, readable(largest_kPa), readable(usual.total_force_nN),
+                   readable(results.fit.total_force_nN)) +
+              caption_of_cut(results.cell),
+          legend(colour_bar(colours))};
 }
 
 namespace {
@@ -332,11 +312,8 @@ Figure network_map(const CellResults& results) {
   Chart map = map_of_network(results, "Where the fibres are", results.network, {}, scale);
   draw_fibre_ids(map, results);
   return {map,
-          fmt::format("Stress fibres (dorsal d, arc a, ventral v, edge e) with their numbers, coloured by their fitted "
-                      "tension, in the network of the first mesh before it contracts: {} vertices, {} links (grey: "
-                      "actin network). Blue: {}, which hold the vertices inside them.",
-                      results.network.vertices_um.size(), results.network.links.size(),
-                      has_origin(results.cell, AdhesionOrigin::candidate) ? "candidates for adhesions" : "adhesions") +
+          sentence("maps.network", results.network.vertices_um.size(), results.network.links.size(),
+                   has_origin(results.cell, AdhesionOrigin::candidate) ? "candidates for adhesions" : "adhesions") +
               caption_of_cut(results.cell),
           legend(colour_bar(scale))};
 }
@@ -345,8 +322,7 @@ Figure contracted_network_map(const CellResults& results) {
   const ColourScale scale = tension_scale(results, "force carried (nN)");
   return {map_of_network(results, "Network in equilibrium", results.contracted.network,
                          results.contracted.link_force_nN, scale),
-          "The same network after it has contracted; each link of a fibre is coloured by the force that it carries.",
-          legend(colour_bar(scale))};
+          sentence("maps.contracted"), legend(colour_bar(scale))};
 }
 
 std::vector<Figure> displacement_maps(const CellResults& results) {
@@ -367,20 +343,16 @@ std::vector<Figure> displacement_maps(const CellResults& results) {
     const std::string explained = draw_arrows(map, field, scale, what, "µm");
     return Figure{map, caption, explained};
   };
-  std::vector<Figure> figures = {drawn(
-      means.means, "Measured displacement", "displacement",
-      fmt::format("Each arrow is the mean of the beads in a square of {:.1f} µm, {:.0f} on average; it begins where "
-                  "they lie on the relaxed gel. The fit uses every bead by itself.",
-                  side_um, means.mean_members))};
+  std::vector<Figure> figures = {drawn(means.means, "Measured displacement", "displacement",
+                                       sentence("maps.displacement", side_um, means.mean_members))};
   if (!results.residual) return figures;
   residual = {results.residual->positions_um, results.residual->residual_um};
   fitted = measured;
   for (std::size_t i = 0; i < fitted.vectors.size(); ++i) fitted.vectors[i] = fitted.vectors[i] - residual.vectors[i];
   figures.push_back(drawn(averaged(fitted, box, side_um).means, "Fitted displacement", "displacement",
-                          "The model at the same beads, in the same squares, to the same scale."));
+                          sentence("maps.displacement-of-model")));
   figures.push_back(drawn(averaged(residual, box, side_um).means, "Measured minus fitted", "difference",
-                          "Same squares, same scale. Bead noise points anywhere; arrows that point the same way over a "
-                          "region are the model’s error."));
+                          sentence("maps.displacement-left")));
   return figures;
 }
 

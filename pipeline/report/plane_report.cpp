@@ -18,6 +18,7 @@
 #include "pipeline/report/results.h"
 #include "pipeline/report/stage_page.h"
 #include "pipeline/report/tensions.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::report {
 namespace {
@@ -29,41 +30,29 @@ Download file_of(const CellResults& results, const std::string& file) {
 }
 
 std::string tension_section(const CellResults& results) {
-  std::string charts = figure(tension_plot(results),
-                              "By type, the strongest first. The interval holds the bead noise and, if several meshes "
-                              "were fitted, the spread between them.",
-                              tension_plot_legend(results));
+  std::string charts = figure(tension_plot(results), sentence("cell.tensions-chart"), tension_plot_legend(results));
   constexpr std::size_t kFitOneRow = 20;
   if (results.cell.fibres.size() > kFitOneRow) charts = "<div class=\"tall\">" + charts + "</div>\n";
-  if (const auto chart = tensions_by_type(results))
-    charts += figure(*chart, "Each mark is a fibre; the line is the mean of its type. Hollow: not identifiable.");
+  if (const auto chart = tensions_by_type(results)) charts += figure(*chart, sentence("cell.types-chart"));
   return section("Tensions", "<div class=\"grid\">\n" + charts + html_of(network_map(results)) +
                                  html_of(contracted_network_map(results)) + "</div>\n" +
                                  html_of(tension_table(results), file_of(results, "4_fit/tensions.csv")) +
                                  tension_notes(results));
 }
 
-/// Why the usual method has no map.
-std::string usual_method_note(const CellResults& results) {
-  if (!results.usual_method || results.usual_method->obstacle.empty()) return {};
-  return "<p class=\"sub\">The usual method (FTTC) has no answer for these beads: " +
-         html_escaped(results.usual_method->obstacle) + ".</p>\n";
-}
-
 std::string map_section(const CellResults& results) {
-  std::string html =
-      "<p class=\"sub screen\">Rest the mouse on something to read about it. Ctrl and wheel, or the buttons, zoom; "
-      "dragging moves; a double click shows all again.</p><div class=\"grid\">\n" +
-      html_of(segmentation_map(results));
+  std::string html = "<p class=\"sub screen\">" + sentence("cell.mouse") + "</p><div class=\"grid\">\n" +
+                     html_of(segmentation_map(results));
   if (results.bead_images)
     for (const Figure& map : bead_maps(results)) html += html_of(map);
   html += html_of(adhesion_map(results));
-  if (results.usual_method && results.usual_method->obstacle.empty()) html += html_of(usual_method_map(results));
+  const bool has_usual = results.usual_method && results.usual_method->obstacle.empty();
+  if (has_usual) html += html_of(usual_method_map(results));
   for (const Figure& map : displacement_maps(results)) html += html_of(map);
   if (results.cell.fibres.empty()) html += html_of(contracted_network_map(results));
-  return section("Maps", html + "</div>\n" + usual_method_note(results) +
-                             "<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the outer "
-                             "corner of its top left pixel.</p>");
+  html += "</div>\n";
+  if (results.usual_method && !has_usual) html += note("cell.no-fttc", html_escaped(results.usual_method->obstacle));
+  return section("Maps", html + note("cell.axes"));
 }
 
 std::string adhesion_section(const CellResults& results) {
@@ -93,15 +82,10 @@ std::string adhesion_section(const CellResults& results) {
                   all.columns,
                   {all.rows.begin(), all.rows.begin() + std::min(kTop, all.rows.size())}};
   const Balance balance = balance_of(results);
-  std::string html = fmt::format(
-      "<p>The {} strongest of {}. Balance: the sum of all forces is {} of the sum of their magnitudes, that of their "
-      "torques {}{}.</p>\n",
-      top.rows.size(), all.rows.size(), power_of_ten(balance.net_force), power_of_ten(balance.net_torque),
-      balance.has_moments ? "" : " (without the moments inside single adhesions, which are not in the table)");
-  if (has_origin(results.cell, AdhesionOrigin::candidate))
-    html +=
-        "<p class=\"sub\">Candidates are places where an adhesion may be: read their tractions as a traction density "
-        "(force over the area of a lattice cell), and sums over neighbours rather than single forces.</p>\n";
+  std::string html = paragraph("cell.balance", top.rows.size(), all.rows.size(), power_of_ten(balance.net_force),
+                               power_of_ten(balance.net_torque),
+                               balance.has_moments ? "" : " " + sentence("cell.balance-without-moments"));
+  if (has_origin(results.cell, AdhesionOrigin::candidate)) html += note("cell.candidates");
   html += html_of(top, file_of(results, "4_fit/adhesion_forces.csv"));
   if (all.rows.size() > kTop) html += folded(fmt::format("All {} adhesions", all.rows.size()), html_of(all));
   return section("Forces of the adhesions", html);
@@ -125,9 +109,8 @@ std::string figure_pairs(const CellResults& results) {
 
 /// "Over 6 frames the total force goes from 6 nN to 71 nN; …"
 std::string sentence_of(const files::ForceOverTime& s) {
-  std::string text = "Over " + counted(s.n_frames, "frames") + " the total force goes from " + readable(s.first_nN) +
-                     " nN to " + readable(s.last_nN) + " nN; its largest change from the first frame is " +
-                     readable(s.largest_change_nN) + " nN.";
+  std::string text = sentence("cell.series", counted(s.n_frames, "frames"), readable(s.first_nN), readable(s.last_nN),
+                              readable(s.largest_change_nN));
   if (s.n_without_fit > 0) text += " " + counted(s.n_without_fit, "frames") + " could not be fitted.";
   return text;
 }
@@ -143,17 +126,13 @@ std::string series_section(const fs::path& cell) {
     moving = "<figure><img alt=\"The frames in turn\" style=\"width:100%\" src=\"" +
              data_address(animation, "image/png") +
              "\"><figcaption>The frames in turn (<code>4_fit/series.png</code>).</figcaption></figure>\n";
-  return section("Over time", "<p>" + html_escaped(sentence_of(*series)) +
-                                  " Tables: <code>4_fit/tracks.csv</code> and "
-                                  "<code>4_fit/frames.csv</code>. All else on this page is of the first frame.</p>\n" +
-                                  moving + (files::is_own_text(picture) ? files::read_text(picture) : std::string()));
+  return section("Over time", paragraph("cell.series-files", html_escaped(sentence_of(*series))) + moving +
+                                  (files::is_own_text(picture) ? files::read_text(picture) : std::string()));
 }
 
 std::string of_the_gel(const Gel& gel) {
-  return fmt::format(
-      "The gel was taken as an elastic layer on a rigid base (Young’s modulus {} kPa, Poisson’s ratio {}, thickness {} "
-      "µm).",
-      readable(gel.youngs_modulus_kPa), readable(gel.poisson_ratio), readable(gel.thickness_um));
+  return sentence("cell.methods-gel", readable(gel.youngs_modulus_kPa), readable(gel.poisson_ratio),
+                  readable(gel.thickness_um));
 }
 
 /// Beads in the area that they cover.
@@ -169,15 +148,11 @@ std::string of_the_beads(const CellResults& results) {
 std::string of_the_fit(const CellResults& results) {
   const FitSummary& fit = results.fit;
   const bool is_ensemble = fit.n_meshes > 1;
-  return fmt::format(
-      "A network of {} contractile cables with {} stress fibres in it, held at {} adhesions, was fitted to them: {} "
-      "tensions, by least squares with tensions of zero or more and without regularisation. {}Intervals are 95 % "
-      "intervals from the noise of the beads{}. The fit left {} of the displacement (relative L2; the noise alone "
-      "would leave {}).",
-      results.network.links.size(), results.cell.fibres.size(), results.cell.adhesions.size(), results.tensions.size(),
-      is_ensemble ? fmt::format("Tensions are means over {} independent meshes. ", fit.n_meshes) : "",
-      is_ensemble ? " and the spread between the meshes" : "", readable(fit.relative_l2),
-      readable(fit.expected_relative_l2));
+  return sentence("cell.methods-fit", results.network.links.size(), results.cell.fibres.size(),
+                  results.cell.adhesions.size(), results.tensions.size(),
+                  is_ensemble ? sentence("cell.methods-meshes", fit.n_meshes) + " " : "",
+                  is_ensemble ? " and the spread between the meshes" : "", readable(fit.relative_l2),
+                  readable(fit.expected_relative_l2));
 }
 
 std::string effects_that_are_on(const Provenance& provenance) {
@@ -190,11 +165,8 @@ std::string effects_that_are_on(const Provenance& provenance) {
 
 /// With the numbers of this cell.
 std::string methods(const CellResults& results, const Provenance& provenance) {
-  return "Forces were found by model-based traction force microscopy (Soiné et al., PLoS Comput. Biol. 11:e1004076, "
-         "2015) "
-         "with the program " +
-         program_of(provenance) + ". " + of_the_gel(results.gel) + " " + of_the_beads(results) + " " +
-         of_the_fit(results) + effects_that_are_on(provenance);
+  return sentence("cell.methods", program_of(provenance), of_the_gel(results.gel), of_the_beads(results),
+                  of_the_fit(results), effects_that_are_on(provenance));
 }
 
 /// A quantity with its standard error and what each source adds to it; in squares these add up.
@@ -286,10 +258,7 @@ std::string error_budget_html(const CellResults& results) {
     for (const auto& [source, part] : line.parts_nN) csv += "," + (part ? shortest(*part) : std::string());
   }
   std::ranges::stable_sort(fibres, std::ranges::greater(), &BudgetLine::total_nN);
-  return "<div class=\"grid\">" +
-         figure(chart_of(fibres),
-                "The largest first. A bar is as long as the standard error; each source has its share of the square.") +
-         "</div>\n" +
+  return "<div class=\"grid\">" + figure(chart_of(fibres), sentence("cell.error-chart")) + "</div>\n" +
          folded("Error budget in numbers",
                 html_of(Listing{"Error budget", {}, results.name + "_error_budget.csv", csv + "\n", columns}));
 }
@@ -302,12 +271,9 @@ CellPage page_in_plane(const Path& cell, const Provenance& provenance) {
   body += series_section(cell) + map_section(results) + adhesion_section(results);
   if (results.fit.error_budget) body += section("Error budget", error_budget_html(results));
   return {.name = results.name,
-          .what =
-              "Tensions of the stress fibres and forces of the adhesions of one cell, by model-based traction force "
-              "microscopy",
-          .sub = fmt::format("Gel: Young’s modulus {} kPa, Poisson’s ratio {}, {} µm thick",
-                             readable(results.gel.youngs_modulus_kPa), readable(results.gel.poisson_ratio),
-                             readable(results.gel.thickness_um)),
+          .what = sentence("cell.subtitle"),
+          .sub = sentence("cell.gel", readable(results.gel.youngs_modulus_kPa), readable(results.gel.poisson_ratio),
+                          readable(results.gel.thickness_um)),
           .facts = facts_of(results),
           .body = body,
           .methods = methods(results, provenance),

@@ -11,6 +11,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/report/kinds.h"
 #include "pipeline/report/page.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::report {
 
@@ -59,9 +60,7 @@ std::string provenance_section(const Provenance& provenance, const std::string& 
     html += fmt::format("<p class=\"sub\">Run by mbtfm {} from {} to {} on {}.</p>\n", html_escaped(provenance.version),
                         html_escaped(provenance.started), html_escaped(provenance.ended),
                         html_escaped(provenance.processor));
-  if (!provenance.preset.empty())
-    html += fmt::format("<p class=\"sub\">Preset: {}; it holds for all that cell.toml does not set.</p>\n",
-                        html_escaped(provenance.preset));
+  if (!provenance.preset.empty()) html += note("cell.preset", html_escaped(provenance.preset));
   html += effects_table(provenance, true) + effects_table(provenance, false) + figures;
   for (const StageLine& stage : provenance.stages) {
     if (!stage.parameters.empty())

@@ -11,6 +11,7 @@
 #include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
 #include "pipeline/report/results.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::report {
 namespace {
@@ -125,9 +126,7 @@ std::vector<std::string> drawings_of_series(const Path& cell) {
   for (const Frame& frame : frames) {
     std::vector<Chart> all = {map_of(frame, results, box, colours, arrows), curve_of(frames, frame, has_times)};
     if (colours.high > 0) all.push_back(bar_of(colours));
-    drawings.push_back(charts::svg_file(
-        all, 2,
-        {fmt::format("Arrows: displacement, means over squares; the longest is {} µm.", readable(arrows.top))}));
+    drawings.push_back(charts::svg_file(all, 2, {sentence("maps.series", readable(arrows.top))}));
   }
   return drawings;
 }

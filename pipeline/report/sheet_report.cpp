@@ -13,6 +13,7 @@
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/stage_page.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::report {
 namespace {
@@ -32,13 +33,10 @@ SheetResults read_sheet(const fs::path& cell) {
 }
 
 std::vector<std::string> facts_of(const SheetResults& r) {
-  return {
-      "Fitted to the beads: " + r.figures.at("fitted").text() + ". In brackets: 95 % intervals.",
-      fmt::format("The mean tension is {} nN/µm over {} µm². The forces on the gel add up to {} nN in size.",
-                  readable(r.number("mean_tension_nN_per_um")), readable(r.number("area_um2")),
-                  readable(r.number("total_force_nN"))),
-      fmt::format("The sheet leaves {} of the displacement (relative L2); the noise of the beads alone would leave {}.",
-                  readable(r.number("relative_l2")), readable(r.number("expected_relative_l2")))};
+  return {"Fitted to the beads: " + r.figures.at("fitted").text() + ". In brackets: 95 % intervals.",
+          sentence("sheet.mean-tension", readable(r.number("mean_tension_nN_per_um")), readable(r.number("area_um2")),
+                   readable(r.number("total_force_nN"))),
+          sentence("sheet.misfit", readable(r.number("relative_l2")), readable(r.number("expected_relative_l2")))};
 }
 
 /// A parameter of the stage that fitted the sheet, as run.json has it.
@@ -53,51 +51,36 @@ std::string parameter(const Provenance& provenance, const std::string& name) {
 
 std::string methods(const SheetResults& r, const Provenance& provenance) {
   const bool has_motion = parameter(provenance, "effects.common_motion") != "off";
-  return fmt::format(
-      "The contraction was found with the program {}. The cell was taken as an even elastic sheet in plane stress "
-      "({} µm thick, Poisson’s ratio {}) that contracts on the gel (Young’s modulus {} kPa, Poisson’s ratio {}, "
-      "thickness {} µm) and was solved by finite elements ({} quadratic triangles). Fitted to the displacements of {} "
-      "beads{}: {}. The fit left {} of the displacement (relative L2; the noise alone would leave {}). Intervals are "
-      "95 % intervals.",
-      program_of(provenance), parameter(provenance, "sheet.thickness_um"), parameter(provenance, "sheet.poisson_ratio"),
-      parameter(provenance, "gel.youngs_modulus_kPa"), parameter(provenance, "gel.poisson_ratio"),
-      parameter(provenance, "gel.thickness_um"), r.number("n_triangles"), r.number("n_beads"),
-      has_motion ? ", beside a common motion of all beads (shift, turn, growth, shear)" : "",
-      r.figures.at("fitted").text(), readable(r.number("relative_l2")), readable(r.number("expected_relative_l2")));
+  return sentence("sheet.methods", program_of(provenance), parameter(provenance, "sheet.thickness_um"),
+                  parameter(provenance, "sheet.poisson_ratio"), parameter(provenance, "gel.youngs_modulus_kPa"),
+                  parameter(provenance, "gel.poisson_ratio"), parameter(provenance, "gel.thickness_um"),
+                  r.number("n_triangles"), r.number("n_beads"), has_motion ? sentence("sheet.methods-motion") : "",
+                  r.figures.at("fitted").text(), readable(r.number("relative_l2")),
+                  readable(r.number("expected_relative_l2")));
 }
 
 }  // namespace
 
 std::vector<Listing> tables_of_sheet(const fs::path& estimates, const fs::path& models, const std::string& of) {
   const std::string fit_csv = files::read_text(estimates);
-  return {
-      {"What the beads tell",
-       "95 % intervals; an empty end: the beads set no limit there. Stiffness is E h / (1 − ν²).", of + "sheet_fit.csv",
-       fit_csv, "*quantity, part, value, sigma, low, high, identifiable"},
-      {"Does the scene call for the sheet?",
-       "The beads call for the model of the smallest BIC. χ² is in units of the noise.", of + "sheet_models.csv",
-       files::read_text(models), "model, n_parameters, chi_squared: χ², relative_l2: relative L2, aic: AIC, bic: BIC"},
-      {"Where the errors come from",
-       "Parts of each standard error; their squares add up to its square. By motion: that all beads share. By "
-       "model: what the sheet leaves beyond noise. By gel: its stated errors. By substrate: the model of the gel. A "
-       "part that is not there was not asked for.",
-       of + "sheet_fit.csv", fit_csv,
-       "*quantity, part, sigma, by_beads, by_motion, by_model, by_variation, by_mesh, by_outline, by_gel, "
-       "by_substrate"}};
+  return {{"What the beads tell", sentence("sheet.estimates"), of + "sheet_fit.csv", fit_csv,
+           sentence("sheet.columns-of-estimates")},
+          {"Does the scene call for the sheet?", sentence("sheet.models"), of + "sheet_models.csv",
+           files::read_text(models), sentence("sheet.columns-of-models")},
+          {"Where the errors come from", sentence("sheet.error-parts"), of + "sheet_fit.csv", fit_csv,
+           sentence("sheet.columns-of-error-parts")}};
 }
 
 CellPage page_of_sheet(const Path& cell, const Provenance& provenance) {
   const SheetResults r = read_sheet(cell);
   const Path folder = cell / "3_sheet";
   std::string body =
-      section_of_picture("Tension and traction", files::read_text(folder / "sheet.svg"),
-                         "Left: mean of the two principal tensions. Right: traction on the gel; arrows are means over "
-                         "squares. x to the right, y down.") +
+      section_of_picture("Tension and traction", files::read_text(folder / "sheet.svg"), sentence("sheet.picture")) +
       truth_section(cell);
   for (const Listing& table : tables_of_sheet(folder / "sheet_fit.csv", folder / "sheet_models.csv", r.name + "_"))
     body += section_of(table);
   return {.name = r.name,
-          .what = "Contraction and tensions of one cell or colony, taken as a contracting sheet",
+          .what = sentence("sheet.subtitle"),
           .sub = provenance.kind_because,
           .facts = facts_of(r),
           .body = body,

@@ -10,6 +10,7 @@
 #include "pipeline/report/maps.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/space_results.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::report {
 namespace {
@@ -81,8 +82,6 @@ Figure scalar_map(const SpaceResults& r, const std::string& title, const std::st
   draw_cell(map, r);
   return {std::move(map), caption, legend(colour_bar(scale))};
 }
-
-constexpr const char* kFromAbove = "Seen from above: steep parts look narrower than they are.";
 
 Vec3 vertex_of(const HeightMap& map, int i, int j) {
   const auto k = static_cast<std::size_t>(j) * static_cast<std::size_t>(map.n_x) + static_cast<std::size_t>(i);
@@ -247,7 +246,7 @@ Figure normal_map(const SpaceResults& r) {
       map, r, [](const SurfaceTraction& t) { return std::optional(t.normal_kPa); },
       [&](double v) { return signed_colour(top > 0 ? v / top : 0); }, "kPa");
   draw_cell(map, r);
-  return {std::move(map), std::string("Red: the cell pulls the gel outwards; blue: it presses on it. ") + kFromAbove,
+  return {std::move(map), sentence("space.normal-map") + " " + sentence("space.from-above"),
           legend(top > 0 ? signed_bar(top) : std::string())};
 }
 
@@ -255,7 +254,7 @@ Figure tangential_map(const SpaceResults& r) {
   Figure figure = scalar_map(
       r, "Tangential traction", "traction along the surface", "kPa",
       [](const SurfaceTraction& t) { return std::optional(t.tangential_kPa); },
-      std::string("Arrows: the part of the traction in x and y. ") + kFromAbove);
+      sentence("space.arrows") + " " + sentence("space.from-above"));
   std::vector<Vec2> vectors;
   for (const SurfaceTraction& t : r.tractions) vectors.push_back({t.traction_kPa.x, t.traction_kPa.y});
   const ArrowScale scale = arrow_scale(vectors);
@@ -275,14 +274,14 @@ std::optional<Figure> error_map(const SpaceResults& r) {
       [](const SurfaceTraction& t) {
         return t.sigma_kPa ? std::optional(norm(*t.sigma_kPa) / std::sqrt(3.0)) : std::nullopt;
       },
-      "Of one component, root mean square of the three: the noise of the beads, and what they do not resolve.");
+      sentence("space.error-map"));
 }
 
 std::optional<Figure> resolution_map(const SpaceResults& r) {
   if (!r.tractions.front().resolution_um) return std::nullopt;
   return scalar_map(
       r, "Resolution", "distance", "µm", [](const SurfaceTraction& t) { return t.resolution_um; },
-      "Forces closer together than this look like one. From about twice that on they are mostly seen as two.");
+      sentence("space.resolution-map"));
 }
 
 std::vector<Figure> bead_slices(const SpaceResults& r) {
@@ -316,11 +315,8 @@ std::vector<Figure> bead_slices(const SpaceResults& r) {
       chart.dot(at, 1.2, "fill:#888;stroke:none");
     }
     const std::string bar = draw_arrows(chart, field, arrow_scale(field.vectors), "displacement in the slice", "µm");
-    figures.push_back({std::move(chart),
-                       fmt::format("All beads within {} µm of {} = {:.1f} µm, where the strongest traction is. Line: "
-                                   "the surface. Circles: beads that were left out.",
-                                   readable(0.5 * thickness_um), plane.across, at_um),
-                       bar});
+    figures.push_back(
+        {std::move(chart), sentence("space.slice", readable(0.5 * thickness_um), plane.across, at_um), bar});
   }
   return figures;
 }

@@ -16,6 +16,7 @@
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/space_results.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::report {
 namespace {
@@ -42,33 +43,23 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   const Sum force = sum_of(r, "net_force", "nN"), moment = sum_of(r, "moment", "nN_um");
   const double total = r.number("total_force_nN");
   std::vector<std::string> facts;
-  facts.push_back(fmt::format("The strain energy of the gel is {} fJ.", readable(r.number("strain_energy_fJ"))));
+  facts.push_back(sentence("space.energy", readable(r.number("strain_energy_fJ"))));
   if (const auto moment_found = r.find("contractile_moment_nN_um"))
-    facts.back() += fmt::format(
-        " The contractile moment of the tractions about their centre is {}, above zero if they pull inwards.",
-        with_error(*moment_found, r.find("contractile_moment_sigma_nN_um"), "nN µm"));
-  facts.push_back(
-      fmt::format("Balance: the forces add up to {} ({} % of the sum of their sizes), the moments about their centre "
-                  "to {}. A cell that nothing else holds has neither.",
-                  with_error(force.size, force.sigma, "nN"), readable(total > 0 ? 100 * force.size / total : 0),
-                  with_error(moment.size, moment.sigma, "nN µm")));
+    facts.back() +=
+        " " + sentence("space.moment", with_error(*moment_found, r.find("contractile_moment_sigma_nN_um"), "nN µm"));
+  facts.push_back(sentence("space.balance", with_error(force.size, force.sigma, "nN"),
+                           readable(total > 0 ? 100 * force.size / total : 0),
+                           with_error(moment.size, moment.sigma, "nN µm")));
   if (const auto imbalance = r.find("imbalance_chi_squared")) {
-    facts.back() += fmt::format(
-        " In their joint errors chi-squared of the six numbers is {}; chance makes more than {} in one cell of a "
-        "thousand.",
-        readable(*imbalance), readable(properties_of(Symptom::tractions_out_of_balance).threshold));
+    facts.back() += " " + sentence("space.balance-tested", readable(*imbalance),
+                                   readable(properties_of(Symptom::tractions_out_of_balance).threshold));
   }
-  facts.push_back(
-      fmt::format("The cell pulls and presses with {} in total, the sum of the sizes of its tractions over {}; {} nN "
-                  "of it along the surface’s normal. The largest traction is {} kPa. Smoothing lowers this sum and "
-                  "noise raises it: the moment is known better.",
-                  with_error(total, r.find("total_force_sigma_nN"), "nN"), r.texts.at("tractions_over"),
-                  readable(r.number("normal_force_nN")), readable(largest_traction_kPa(r))));
+  facts.push_back(sentence("space.total", with_error(total, r.find("total_force_sigma_nN"), "nN"),
+                           r.texts.at("tractions_over"), readable(r.number("normal_force_nN")),
+                           readable(largest_traction_kPa(r))));
   if (const auto flipped = r.find("flipped_z_chi_squared")) {
-    facts.push_back(fmt::format(
-        "The sign of z: with all displacements along z the other way round, chi-squared of the fit is {} {}.{}",
-        readable(std::abs(*flipped)), *flipped < 0 ? "smaller" : "larger",
-        *flipped < 0 ? " Look at z_points in cell.toml." : ""));
+    facts.push_back(sentence("space.sign-of-z", readable(std::abs(*flipped)), *flipped < 0 ? "smaller" : "larger",
+                             *flipped < 0 ? " " + sentence("space.sign-of-z-hint") : ""));
   }
   if (r.find("common_turn_deg")) {
     std::string shifts;
@@ -77,32 +68,24 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
       if (const auto shift = r.find(name + "_um"))
         shifts += axis + " " + with_error(*shift, r.find(name + "_sigma_um"), "µm") + ", ";
     }
-    facts.push_back("All beads share a shift of " + shifts +
-                    "beside what the tracker took off. It was found with the tractions.");
+    facts.push_back(sentence("space.shift", shifts));
   }
   if (const auto resolution = r.find("median_resolution_um")) {
-    facts.push_back(
-        fmt::format("Forces closer together than {} µm look like one (median); from twice that they mostly look like "
-                    "two. {} numbers of {} are resolved.",
-                    readable(*resolution), readable(r.number("effective_unknowns")), readable(r.number("n_unknowns"))));
+    facts.push_back(sentence("space.resolution", readable(*resolution), readable(r.number("effective_unknowns")),
+                             readable(r.number("n_unknowns"))));
   }
   return facts;
 }
 
 std::string how_lambda(const SpaceResults& r) {
-  if (r.texts.at("method") == "group-l1")
-    return "The weight of the penalty was the one at which the misfit is what the noise of the beads leaves.";
+  if (r.texts.at("method") == "group-l1") return sentence("space.lambda-of-group-l1");
   const auto by = r.texts.find("lambda_by");
   if (!r.find("lambda_um_per_kPa") || by == r.texts.end()) return {};
   const std::string lambda = readable(r.number("lambda_um_per_kPa")) + " µm/kPa";
-  if (by->second == "given") return "The regularisation was given: lambda = " + lambda + ".";
-  std::string text =
-      "The regularisation was chosen by the data (criterion: " + by->second + "): lambda = " + lambda + ".";
-  if (const auto of_sums = r.find("lambda_of_sums_um_per_kPa")) {
-    text += " Net force, moment, strain energy and forces that are sums of the map were taken at lambda = " +
-            readable(*of_sums) + " µm/kPa, by Mallows’ criterion.";
-  }
-  return text;
+  if (by->second == "given") return sentence("space.lambda-given", lambda);
+  const auto of_sums = r.find("lambda_of_sums_um_per_kPa");
+  return sentence("space.lambda-chosen", by->second, lambda) +
+         (of_sums ? " " + sentence("space.lambda-of-sums", readable(*of_sums)) : "");
 }
 
 std::string svg_of(const Path& file, const std::string& title, const std::string& caption) {
@@ -114,12 +97,9 @@ std::string svg_of(const Path& file, const std::string& title, const std::string
 
 std::string space_section(const SpaceResults& r) {
   const ColourScale colours = traction_colours(r);
-  return section("In space",
-                 "<figure><h3>Tractions on the surface</h3>\n" + picture_in_space(r, colours) +
-                     legend(colour_bar(colours)) +
-                     "<figcaption>The gel’s surface from a side and above. Colour: size of the traction; grey: none "
-                     "was looked for. Arrows: the strongest tractions. To turn it: paraview "
-                     "--script=view_in_paraview.py in the cell’s folder.</figcaption></figure>\n");
+  return section("In space", "<figure><h3>Tractions on the surface</h3>\n" + picture_in_space(r, colours) +
+                                 legend(colour_bar(colours)) + "<figcaption>" + sentence("space.picture") +
+                                 "</figcaption></figure>\n");
 }
 
 std::string map_section(const SpaceResults& r) {
@@ -132,10 +112,9 @@ std::string map_section(const SpaceResults& r) {
 std::string data_section(const SpaceResults& r) {
   std::string html = "<div class=\"grid\">\n";
   for (const Figure& slice : bead_slices(r)) html += html_of(slice);
-  return section("Surface and beads",
-                 html + "</div>\n" +
-                     svg_of(r.folder / "3_surface/surface.svg", "The surface",
-                            "Heights, and sections through the middle with the standard error as a band."));
+  return section(
+      "Surface and beads",
+      html + "</div>\n" + svg_of(r.folder / "3_surface/surface.svg", "The surface", sentence("space.surface-picture")));
 }
 
 std::string lambda_section(const SpaceResults& r) {
@@ -143,7 +122,7 @@ std::string lambda_section(const SpaceResults& r) {
   if (text.empty()) return {};
   return section("Regularisation", "<p>" + html_escaped(text) + "</p>\n" +
                                        svg_of(r.folder / "4_traction/traction_lambda.svg", "Criteria by lambda",
-                                              "What each criterion says of every lambda; marked: its choice."));
+                                              sentence("space.lambda-picture")));
 }
 
 std::string force_section(const SpaceResults& r) {
@@ -165,8 +144,7 @@ std::string force_section(const SpaceResults& r) {
   const Path file = r.folder / "4_traction/traction_adhesion_forces.csv";
   return section(
       "Forces of the adhesions",
-      "<p>The adhesions were seen from above and laid onto the surface; their area is that of the surface.</p>\n" +
-          html_of(table, {r.name + "_" + file.filename().string(), files::read_text(file)}));
+      paragraph("space.adhesions") + html_of(table, {r.name + "_" + file.filename().string(), files::read_text(file)}));
 }
 
 std::string methods(const SpaceResults& r, const Provenance& provenance) {
@@ -178,25 +156,14 @@ std::string methods(const SpaceResults& r, const Provenance& provenance) {
     sigma.push_back(bead.sigma_um);
     sigma_z.push_back(bead.sigma_z_um);
   }
-  std::string text = fmt::format(
-      "Tractions in space were found with the program {}. {} beads were followed in the volume of the gel between "
-      "two confocal stacks",
-      program_of(provenance), n_good);
+  std::string text = sentence("space.methods", program_of(provenance), n_good);
   if (!sigma.empty() && numerics::median(sigma) > 0)
-    text += fmt::format(", with a standard error of {} nm across and {} nm along the optical axis (medians)",
-                        readable(1000 * numerics::median(sigma)), readable(1000 * numerics::median(sigma_z)));
-  return text +
-         fmt::format(
-             ". The surface of the gel was found from data, too. The gel was taken as linear elastic on a rigid base "
-             "(Young’s "
-             "modulus {} kPa, Poisson’s ratio {}, thickness {} µm) and its answer to tractions computed by finite "
-             "elements "
-             "that follow the surface. Tractions at the vertices of a lattice of {} × {} µm ({} unknowns) were fitted "
-             "to the "
-             "displacements by the method {} over {}. {} The tractions leave {} of the displacement (relative L2).",
-             readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio), readable(r.gel.thickness_um),
-             readable(r.number("spacing_x_um")), readable(r.number("spacing_y_um")), r.number("n_unknowns"),
-             r.texts.at("method"), r.texts.at("tractions_over"), how_lambda(r), readable(r.number("relative_l2")));
+    text += sentence("space.methods-noise", readable(1000 * numerics::median(sigma)),
+                     readable(1000 * numerics::median(sigma_z)));
+  return text + sentence("space.methods-fit", readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio),
+                         readable(r.gel.thickness_um), readable(r.number("spacing_x_um")),
+                         readable(r.number("spacing_y_um")), r.number("n_unknowns"), r.texts.at("method"),
+                         r.texts.at("tractions_over"), how_lambda(r), readable(r.number("relative_l2")));
 }
 
 std::string figure_pairs(const SpaceResults& r) {
@@ -211,10 +178,9 @@ std::string figure_pairs(const SpaceResults& r) {
 CellPage page_in_space(const Path& cell, const Provenance& provenance) {
   const SpaceResults r = read_space_results(cell);
   return {.name = r.name,
-          .what = "Forces in space of one cell on a curved gel",
-          .sub = fmt::format("Gel: Young’s modulus {} kPa, Poisson’s ratio {}, {} µm thick below z = 0 · {}",
-                             readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio),
-                             readable(r.gel.thickness_um), provenance.kind_because),
+          .what = sentence("space.subtitle"),
+          .sub = sentence("space.gel", readable(r.gel.youngs_modulus_kPa), readable(r.gel.poisson_ratio),
+                          readable(r.gel.thickness_um), provenance.kind_because),
           .facts = facts_of(r),
           .body = truth_section(cell) + space_section(r) + map_section(r) + force_section(r) + data_section(r) +
                   lambda_section(r),

@@ -9,6 +9,7 @@
 #include "pipeline/report/compare.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/results.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::report {
 namespace {
@@ -148,7 +149,7 @@ std::string missed_fibres(const Comparison& comparison) {
                         full_name_of(fibre.truth->type), rounded(fibre.true_tension_nN, {}),
                         readable(length_um(fibre.truth->points_um)));
   }
-  return list.empty() ? "" : "<p class=\"sub\">True fibres that were not found: " + list + ".</p>\n";
+  return list.empty() ? "" : note("cell.missed-fibres", list);
 }
 
 }  // namespace
@@ -299,17 +300,10 @@ Table tension_table(const CellResults& results) {
 }
 
 std::string tension_notes(const CellResults& results) {
-  std::string html = fmt::format(
-      "<p class=\"sub\">The tension of the actin network is that of one cable of the mesh; as a surface tension it is "
-      "{} nN/µm, which does not depend on the mesh.",
-      readable(results.fit.network_surface_tension_nN_per_um));
-  if (results.comparison) {
-    html +=
-        " Error: fitted minus true tension, in per cent if the truth exceeds half the 95 % interval, and in halves of "
-        "this interval: between −1 and +1 it holds the truth.";
-  }
-  html += "</p>\n";
-  return results.comparison ? html + missed_fibres(*results.comparison) : html;
+  const bool has_truth = results.comparison.has_value();
+  return note("cell.network-tension", readable(results.fit.network_surface_tension_nN_per_um),
+              has_truth ? " " + sentence("cell.truth-errors") : "") +
+         (has_truth ? missed_fibres(*results.comparison) : "");
 }
 
 Coverage coverage_of(const CellResults& results) {

@@ -83,7 +83,7 @@ std::string condition_of(const BatchRow& row) {
 }
 
 files::Columns<BatchRow> tension_column(FibreType type) {
-  return {std::string(name_of(type)) + "_tension_nN", "mean over its fibres of this type",
+  return {std::string(name_of(type)) + "_tension_nN",
           [type](const BatchRow& row) -> std::optional<double> {
             if (!row.result || !row.result->types.contains(type)) return std::nullopt;
             return row.result->types.at(type).mean_nN;
@@ -92,35 +92,31 @@ files::Columns<BatchRow> tension_column(FibreType type) {
 }
 
 /// A figure of the fit; of a cell in space or a sheet what its last stage reported.
-files::Columns<BatchRow> result_column(const char* name, const char* meaning, double FitSummary::*of) {
-  return {name, meaning,
+files::Columns<BatchRow> result_column(const char* name, double FitSummary::*of) {
+  return {name,
           [name, of](const BatchRow& row) -> std::optional<double> {
             return row.result ? std::optional(row.result->fit.*of) : number_of(row, name);
           },
           files::kResult};
 }
 
-files::Columns<BatchRow> cell_column() { return {"cell", "its folder, below the batch's", &BatchRow::name}; }
+files::Columns<BatchRow> cell_column() { return {"cell", &BatchRow::name}; }
 
 files::Table<BatchRow> batch_table() {
   using R = files::CellResult;
   return {
       .file = "batch.csv",
-      .row = "each cell of a batch, and each folder that seems to be one",
       .columns = {
           cell_column(),
-          {"condition", "the first of the folders above it, if there are any", condition_of},
-          {"state",
-           "fine, with cautions, not usable (a bad finding), copy, failed, not run, or skipped: pictures without a "
-           "cell.toml, or a folder that cannot be read",
-           [](const BatchRow& row) { return std::string(name_of(row.state)); }},
-          {"worst_finding", "that is open",
+          {"condition", condition_of},
+          {"state", [](const BatchRow& row) { return std::string(name_of(row.state)); }},
+          {"worst_finding",
            [](const BatchRow& row) {
              const Finding* worst = worst_of(row.findings);
              return worst ? worst->id : std::string();
            }},
-          result_column("total_force_nN", "sum of the force magnitudes", &FitSummary::total_force_nN),
-          {"total_force_sigma_nN", "its standard error, of the whole error budget",
+          result_column("total_force_nN", &FitSummary::total_force_nN),
+          {"total_force_sigma_nN",
            [](const BatchRow& row) {
              return row.result ? row.result->total_error_nN : number_of(row, "total_force_sigma_nN");
            },
@@ -129,34 +125,31 @@ files::Table<BatchRow> batch_table() {
           tension_column(FibreType::arc),
           tension_column(FibreType::ventral),
           tension_column(FibreType::edge),
-          {"fibres", "number of its fibres", files::member(&BatchRow::result, &R::n_fibres)},
-          {"uncertain", "of which little more is known than that their tension is small",
-           files::member(&BatchRow::result, &R::n_uncertain)},
-          result_column("relative_l2", "‖measured − model‖ / ‖measured‖", &FitSummary::relative_l2),
-          result_column("expected_relative_l2", "what the beads' noise alone would leave",
-                        &FitSummary::expected_relative_l2),
-          {"first_force_nN", "total force of a time series’ first frame",
-           files::member(&BatchRow::result, &R::over_time, &files::ForceOverTime::first_nN), files::kResult},
-          {"last_force_nN", "of its last frame",
-           files::member(&BatchRow::result, &R::over_time, &files::ForceOverTime::last_nN), files::kResult},
-          {"largest_force_change_nN", "largest change from the first frame, with its sign",
+          {"fibres", files::member(&BatchRow::result, &R::n_fibres)},
+          {"uncertain", files::member(&BatchRow::result, &R::n_uncertain)},
+          result_column("relative_l2", &FitSummary::relative_l2),
+          result_column("expected_relative_l2", &FitSummary::expected_relative_l2),
+          {"first_force_nN", files::member(&BatchRow::result, &R::over_time, &files::ForceOverTime::first_nN),
+           files::kResult},
+          {"last_force_nN", files::member(&BatchRow::result, &R::over_time, &files::ForceOverTime::last_nN),
+           files::kResult},
+          {"largest_force_change_nN",
            files::member(&BatchRow::result, &R::over_time, &files::ForceOverTime::largest_change_nN), files::kResult},
-          {"reason", "why it failed, is not usable, or was skipped", &BatchRow::reason}}};
+          {"reason", &BatchRow::reason}}};
 }
 
 files::Table<BatchRow> whole_table() {
   return {.file = "batch_all.csv",
-          .row = "each cell of a batch, with every figure of its stages",
           .columns = {cell_column(),
-                      {"exit_code", "of `mbtfm run`", files::member(&BatchRow::cell, &BatchCell::exit_code)},
-                      {"seconds", "it took", files::member(&BatchRow::cell, &BatchCell::seconds), files::kResult},
-                      {"message", "why it failed", files::member(&BatchRow::cell, &BatchCell::message)},
-                      {"failed_stage", "where it failed", files::member(&BatchRow::cell, &BatchCell::failed_stage)},
-                      {"findings", "that are open", [](const BatchRow& row) { return open_ids(row.findings); }}}};
+                      {"exit_code", files::member(&BatchRow::cell, &BatchCell::exit_code)},
+                      {"seconds", files::member(&BatchRow::cell, &BatchCell::seconds), files::kResult},
+                      {"message", files::member(&BatchRow::cell, &BatchCell::message)},
+                      {"failed_stage", files::member(&BatchRow::cell, &BatchCell::failed_stage)},
+                      {"findings", [](const BatchRow& row) { return open_ids(row.findings); }}}};
 }
 
 files::Columns<BatchRow> figure_column(const std::string& name) {
-  return {name, "a figure that a stage reported", [name](const BatchRow& row) {
+  return {name, [name](const BatchRow& row) {
             const Value* figure = figure_of(row, name);
             return figure ? text_of(*figure) : std::string();
           }};

@@ -160,11 +160,8 @@ CellStages stages_as_sheet(const fs::path& cell, const ImageNames& images, const
 
 void declare(stage::ParameterList& list, RunSettings& settings) {
   list.table("run");
-  list.add("model", settings.model,
-           "what pulls at a flat gel; fibres: cables in a network, fitted by their tensions; sheet: an evenly "
-           "contracting sheet, as [sheet] says");
-  list.add("bundles", settings.bundles,
-           "model = sheet: the fibres that are seen are cables in the sheet, each with a tension of its own");
+  list.add("model", settings.model);
+  list.add("bundles", settings.bundles);
 }
 
 RunSettings read_run_settings(const fs::path& cell) {

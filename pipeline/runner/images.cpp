@@ -20,35 +20,27 @@ namespace {
 struct ImageKey {
   const char* key;
   std::string ImageNames::*member;
-  const char* meaning;
 };
 using N = ImageNames;
-constexpr ImageKey kImages[] = {
-    {"adhesion", &N::adhesion,
-     "image of the adhesions: file name or glob; without one, forces act on candidates (segment.adhesions)"},
-    {"actin", &N::actin, "image of the actin"},
-    {"beads_stressed", &N::beads_stressed, "image of the beads while the cell pulls"},
-    {"beads_relaxed", &N::beads_relaxed, "image of the beads after the cell was removed"},
-    {"surface_beads", &N::surface_beads,
-     "stack of beads of another colour on the surface, relaxed, if there: the surface is found from them"},
-    {"outline_roi", &N::outline_roi, "ImageJ area of the cell's outline, if there"},
-    {"adhesion_rois", &N::adhesion_rois, "ImageJ areas of adhesions, if there"},
-    {"fibre_rois", &N::fibre_rois, "ImageJ lines of fibres, if there"},
-    {"outline_mask", &N::outline_mask, "mask or label image of the cell (TIFF, PNG), if there"},
-    {"adhesion_mask", &N::adhesion_mask,
-     "mask or label image of adhesions, if there; with segment.adhesions = pattern the adhesive pattern; of a sheet, "
-     "where it adheres"},
-    {"cell_labels", &N::cell_labels,
-     "label image of a colony's cells (TIFF, PNG), if there: tensions by cell and border"},
-    {"displacement", &N::displacement,
-     "displacements of another program (CSV) instead of bead images; columns and unit: [track]"}};
+constexpr ImageKey kImages[] = {{"adhesion", &N::adhesion},
+                                {"actin", &N::actin},
+                                {"beads_stressed", &N::beads_stressed},
+                                {"beads_relaxed", &N::beads_relaxed},
+                                {"surface_beads", &N::surface_beads},
+                                {"outline_roi", &N::outline_roi},
+                                {"adhesion_rois", &N::adhesion_rois},
+                                {"fibre_rois", &N::fibre_rois},
+                                {"outline_mask", &N::outline_mask},
+                                {"adhesion_mask", &N::adhesion_mask},
+                                {"cell_labels", &N::cell_labels},
+                                {"displacement", &N::displacement}};
 
 }  // namespace
 
 void declare(stage::ParameterList& list, ImageNames& names) {
   list.table("images");
-  for (const ImageKey& image : kImages) list.add(image.key, names.*image.member, image.meaning);
-  list.add("cell_with", names.cell_with, kCellWithMeaning);
+  for (const ImageKey& image : kImages) list.add(image.key, names.*image.member);
+  list.add("cell_with", names.cell_with);
 }
 
 std::vector<std::string> image_keys() {

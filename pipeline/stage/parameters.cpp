@@ -11,6 +11,7 @@
 #include "pipeline/files/columns.h"
 #include "pipeline/files/toml.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/help.h"
 #include "pipeline/stage/suggest.h"
 
 namespace mbtfm::stage {
@@ -162,6 +163,7 @@ std::string unknown_key_hint(const ParameterList& list, const std::vector<std::s
 }  // namespace
 
 void ParameterList::add_member(std::string name, ParameterMember member, const Range& range, std::string meaning) {
+  if (meaning.empty()) meaning = help_on(table_.empty() ? "cell.toml" : table_, name);
   Parameter parameter{.table = table_,
                       .name = std::move(name),
                       .member = std::move(member),
@@ -307,22 +309,15 @@ void derive_youngs_modulus(ParameterList& list, Gel& gel) {
 
 void declare(ParameterList& list, Gel& gel) {
   list.table("gel");
-  list.add("youngs_modulus_kPa", gel.youngs_modulus_kPa, Range::modulus_kPa(),
-           "Young's modulus E of the gel (kPa); required, or shear_modulus_kPa");
+  list.add("youngs_modulus_kPa", gel.youngs_modulus_kPa, Range::modulus_kPa());
   list.required();
-  list.add("shear_modulus_kPa", gel.shear_modulus_kPa, Range::modulus_kPa(),
-           "shear modulus G of the gel, as a rheometer measures it (kPa), in place of youngs_modulus_kPa: E = 2 (1 + "
-           "nu) G, about 3 G");
+  list.add("shear_modulus_kPa", gel.shear_modulus_kPa, Range::modulus_kPa());
   list.derive([&gel](ParameterList& of) { derive_youngs_modulus(of, gel); });
-  list.add("poisson_ratio", gel.poisson_ratio, Range::between(0, 0.5),
-           "Poisson's ratio of the gel; 0.5, the incompressible limit, only for models without finite elements");
-  list.add("thickness_um", gel.thickness_um, Range::thickness_um(), "thickness of the gel on its rigid base (um)");
-  list.add("youngs_modulus_sigma_kPa", gel.youngs_modulus_sigma_kPa, Range{.low = 0},
-           "standard error of Young's modulus, for the error budget (kPa); unset: not known");
-  list.add("poisson_ratio_sigma", gel.poisson_ratio_sigma, Range{.low = 0, .high = 0.5},
-           "standard error of Poisson's ratio, for the error budget; unset: not known");
-  list.add("thickness_sigma_um", gel.thickness_sigma_um, Range{.low = 0},
-           "standard error of the thickness, for the error budget (um); unset: not known");
+  list.add("poisson_ratio", gel.poisson_ratio, Range::between(0, 0.5));
+  list.add("thickness_um", gel.thickness_um, Range::thickness_um());
+  list.add("youngs_modulus_sigma_kPa", gel.youngs_modulus_sigma_kPa, Range{.low = 0});
+  list.add("poisson_ratio_sigma", gel.poisson_ratio_sigma, Range{.low = 0, .high = 0.5});
+  list.add("thickness_sigma_um", gel.thickness_sigma_um, Range{.low = 0});
 }
 
 }  // namespace mbtfm::stage

@@ -35,7 +35,7 @@ struct Parameter {
   std::string flag = {};  ///< without dashes: the name, or table.name where another table has a key of that name before
   ParameterMember member;
   Range range;
-  std::string meaning;             ///< one sentence, with the unit; empty: scenario files say it, --help does not
+  std::string meaning;             ///< as help.txt has it, with the unit; empty: scenario files say it, --help does not
   std::string default_value = {};  ///< as printed
   bool is_required = false;
   bool is_set = false;
@@ -52,26 +52,27 @@ class ParameterList {
     table_ = std::move(name);
   }
   bool is_of_several(const std::string& table) const { return tables_of_several_.contains(table); }
-  /// @param member  a number, or an optional one
+  /// @param member   a number, or an optional one
+  /// @param meaning  if it is not as help.txt says
   template <class Number>
-  void add(std::string name, Number& member, const Range& range, std::string meaning) {
+  void add(std::string name, Number& member, const Range& range, std::string meaning = {}) {
     add_member(std::move(name), &member, range, std::move(meaning));
   }
-  void add(std::string name, std::uint64_t& seed, std::string meaning) {
+  void add(std::string name, std::uint64_t& seed, std::string meaning = {}) {
     add_member(std::move(name), &seed, Range::not_negative(), std::move(meaning));
   }
-  void add(std::string name, bool& member, std::string meaning) {
+  void add(std::string name, bool& member, std::string meaning = {}) {
     add_member(std::move(name), &member, Range::any(), std::move(meaning));
   }
-  void add(std::string name, std::string& member, std::string meaning) {
+  void add(std::string name, std::string& member, std::string meaning = {}) {
     add_member(std::move(name), &member, Range::any(), std::move(meaning));
   }
   /// One of the words of its type, or of those `allowed`.
   template <Worded E>
-  void add(std::string name, E& member, std::string meaning, const std::vector<E>& allowed = values_of<E>());
+  void add(std::string name, E& member, std::string meaning = {}, const std::vector<E>& allowed = values_of<E>());
   /// The same, or "auto" where it stays unset.
   template <Worded E>
-  void add(std::string name, std::optional<E>& member, std::string meaning);
+  void add(std::string name, std::optional<E>& member, std::string meaning = {});
   /// The parameter added last has no default.
   void required() { parameters_.back().is_required = true; }
 

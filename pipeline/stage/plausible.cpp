@@ -120,9 +120,7 @@ void require_possible(const Doubt& d, const std::vector<std::string>& allowed, c
 
 void declare(ParameterList& list, CheckParameters& p) {
   list.table("checks");
-  list.add("allow", p.allow,
-           "quantities whose implausible values are accepted (docs/plausible.md), with commas between them or as an "
-           "array. Example: \"poisson_ratio\"");
+  list.add("allow", p.allow);
 }
 
 std::vector<std::string> allowed_quantities(const CheckParameters& p) {

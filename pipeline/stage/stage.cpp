@@ -20,6 +20,7 @@
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/help.h"
 #include "pipeline/stage/manual.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/suggest.h"
@@ -41,23 +42,21 @@ struct CommandLine {
 void add_options(CLI::App& app, CommandLine& line, const StageDescription& description, const ParameterList& list) {
   for (const FileArgument& file : description.files) {
     const bool is_output = file.kind == FileArgument::Kind::output || file.kind == FileArgument::Kind::output_folder;
-    std::string meaning = file.meaning;
+    std::string meaning = help_on("mbtfm-" + description.name, "--" + file.name);
     if (file.kind == FileArgument::Kind::optional_input) meaning += " (optional)";
     app.add_option((file.is_positional ? file.name + "," : "") + "--" + file.name, line.files[file.name], meaning)
         ->type_name(file.kind == FileArgument::Kind::output_folder ? "FOLDER" : "FILE")
         ->group(is_output ? "Outputs" : "Inputs");
   }
-  app.add_option("--config,--gel", line.config, "cell.toml with the parameters")->type_name("FILE")->group("Inputs");
-  app.add_option("--record", line.record, "write the run's provenance here (JSON)")
-      ->type_name("FILE")
-      ->group("Outputs");
-  app.add_option("--threads", line.threads, "processors to use")->check(CLI::Range(1, 1024))->capture_default_str();
-  app.add_flag("--quiet", line.is_quiet, "print errors only");
-  app.add_flag("--json", line.is_json, "print progress, findings and effects as JSON, one object a line");
-  app.add_flag("--check", line.only_check, "read the parameters, look at the inputs that are given, run nothing");
-  app.add_flag("--parameters", line.only_parameters, "print the table of parameters (Markdown)");
-  app.add_flag("--version", line.only_version, "print the version");
-  app.add_option("--manuals", line.manuals, "write manual page and completions below this folder")->group("");
+  app.add_option("--config,--gel", line.config)->type_name("FILE")->group("Inputs");
+  app.add_option("--record", line.record)->type_name("FILE")->group("Outputs");
+  app.add_option("--threads", line.threads)->check(CLI::Range(1, 1024))->capture_default_str();
+  app.add_flag("--quiet", line.is_quiet);
+  app.add_flag("--json", line.is_json);
+  app.add_flag("--check", line.only_check);
+  app.add_flag("--parameters", line.only_parameters);
+  app.add_flag("--version", line.only_version);
+  app.add_option("--manuals", line.manuals)->group("");
   for (const Parameter& p : list.all()) {
     std::string meaning = p.meaning;
     if (const auto* choice = std::get_if<Choice>(&p.member)) meaning += " (one of " + listed(choice->words) + ")";
@@ -142,7 +141,7 @@ void set_files(StageContext& context, const StageDescription& description, const
     if (path.empty() && !file.beneath.empty() && !first.empty()) path = fs::path(first) / file.beneath;
     const bool is_output = file.kind == Kind::output || file.kind == Kind::output_folder;
     if (path.empty() && file.kind != Kind::optional_input && need == Need::as_described)
-      throw UsageError("--" + file.name + " is missing: " + file.meaning);
+      throw UsageError("--" + file.name + " is missing: " + help_on("mbtfm-" + description.name, "--" + file.name));
     if (path.empty()) continue;
     (is_output ? context.outputs_ : context.inputs_)[file.name] = path;
     if (file.kind == Kind::output_folder && files::is_file(path))
@@ -448,8 +447,9 @@ int run_stage(const StageDescription& description, int argc, char** argv,
     CheckParameters checks;
     if (has_plausible_quantity(list)) declare(list, checks);
     CommandLine line;
-    CLI::App app(description.purpose, "mbtfm-" + stage);
+    CLI::App app("", "mbtfm-" + stage);
     add_options(app, line, description, list);
+    describe(app, "mbtfm-" + stage);
     try {
       app.parse(arguments_of(argc, argv, list));
     } catch (const CLI::CallForHelp&) {

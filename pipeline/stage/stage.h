@@ -20,15 +20,13 @@ struct FileArgument {
   enum class Kind { input, optional_input, output, output_folder };
   std::string name;  ///< the flag --name
   Kind kind = Kind::input;
-  std::string meaning;
   bool is_positional = false;  ///< may be given without its flag
   std::string image = {};      ///< key of [images] from which `mbtfm run` takes it
   std::string beneath = {};    ///< of an output that need not be given: its name in the folder that is the first input
 };
 
 struct StageDescription {
-  std::string name;  ///< the executable is mbtfm-NAME
-  std::string purpose;
+  std::string name;  ///< the executable is mbtfm-NAME, of which help.txt has the purpose, and what each file is
   std::vector<FileArgument> files = {};
 };
 

@@ -5,6 +5,7 @@
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/report/texts.h"
 #include "pipeline/statistics/drawing.h"
 
 namespace mbtfm::statistics {
@@ -126,7 +127,7 @@ Chart distribution_of(const Sample& sample, const std::string& label) {
 Figure adhesion_distributions(const Analysis& analysis) {
   return {.name = "adhesion_distributions",
           .title = "Area and force of the adhesions",
-          .caption = "Connected: a segmented fibre ends on the adhesion.",
+          .caption = report::sentence("study.areas"),
           .charts = {distribution_of(analysis.of("adhesion_area_um2").sample, "area"),
                      distribution_of(analysis.of("adhesion_force_nN").sample, "force")},
           .n_columns = 2};
@@ -172,17 +173,13 @@ Figure force_by_area(const Analysis& analysis) {
   }
   return {.name = "adhesion_force_by_area",
           .title = "Force and area of the adhesions",
-          .caption = "Means of bins of as many adhesions each; bars: 95 % interval, cells resampled.",
+          .caption = report::sentence("study.force-by-area"),
           .charts = {chart}};
 }
 
 Figure directions(const Analysis& analysis) {
-  Figure figure{.name = "directions",
-                .title = "Directions",
-                .caption =
-                    "Angles at the adhesions. Dashed line: what chance would give. In brackets: 95 % interval of the "
-                    "mean angle, cells resampled.",
-                .n_columns = 2};
+  Figure figure{
+      .name = "directions", .title = "Directions", .caption = report::sentence("study.angles"), .n_columns = 2};
   const std::vector<std::string>& conditions = analysis.tensions().sample.conditions;
   for (const Relation relation : kRelations) {
     std::vector<Histogram> all;
@@ -213,7 +210,7 @@ std::vector<Figure> adhesion_figures_of(const Analysis& analysis) {
   if (analysis.of("adhesion_force_nN").sample.values.empty()) {
     figures.push_back({.name = "adhesion_distributions",
                        .title = "Area and force of the adhesions",
-                       .caption = "no cell has an adhesion with a force."});
+                       .caption = report::sentence("study.no-adhesion")});
   } else {
     figures.push_back(adhesion_distributions(analysis));
     figures.push_back(force_by_area(analysis));

@@ -9,6 +9,7 @@
 #include "pipeline/charts/chart.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/listed.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -30,11 +31,10 @@ void warn_of_few_cells(const Study& study, std::vector<std::string>& warnings) {
   for (const CellKind kind : mbtfm::values_of<CellKind>()) {
     std::vector<int> n_of(study.conditions.size(), 0);
     for (const StudyCell& cell : study.cells) n_of[cell.condition] += cell.kind() == kind ? 1 : 0;
-    const char* names = kind == CellKind::sheet ? "sheets" : kind == CellKind::space ? "cells in space" : "cells";
     for (std::size_t i = 0; i < n_of.size(); ++i) {
       if (n_of[i] == 0 || n_of[i] >= kFew) continue;
       warnings.push_back(fmt::format("{}{} {} only: {}.", prefix_of(study.conditions[i]), n_of[i],
-                                     n_of[i] == 1 ? kind == CellKind::sheet ? "sheet" : "cell" : names,
+                                     n_of[i] == 1 ? in_study(kind).cell : in_study(kind).many,
                                      n_of[i] == 1 ? "no scatter is known, and no test counts it"
                                                   : "intervals are wide, and suppose a normal scatter"));
     }
@@ -51,29 +51,21 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
     }
   }
   if (n_unknown > 0)
-    warnings.push_back(
-        fmt::format("The tensions of {} of {} could not be identified and do not enter. If these are the weak ones, "
-                    "the means are too large.",
-                    n_unknown, counted(n_fibres, "fibres")));
+    warnings.push_back(report::sentence("study.warn-unresolved", n_unknown, counted(n_fibres, "fibres")));
   if (n_without > 0)
-    warnings.push_back(fmt::format("{} no fibre with a known tension: only the forces enter.",
-                                   counted(n_without, "cell has", "cells have")));
+    warnings.push_back(report::sentence("study.warn-no-fibre", counted(n_without, "cell has", "cells have")));
   const int n_tensions = static_cast<int>(tensions.sample.values.size()), n_bare = tensions.sample.n_without_error;
   if (n_bare > 0)
-    warnings.push_back(
-        n_bare < n_tensions
-            ? fmt::format("{} of {} tensions {} no error bar: their error is taken to be that of the others.", n_bare,
-                          n_tensions, n_bare == 1 ? "has" : "have")
-            : "No tension has an error bar: scatter of the fibres and error cannot be separated.");
+    warnings.push_back(n_bare < n_tensions ? report::sentence("study.warn-some-without-errors", n_bare, n_tensions,
+                                                              n_bare == 1 ? "has" : "have")
+                                           : report::sentence("study.warn-without-errors"));
   for (const Summary& s : tensions.summaries) {
     const std::string fibres = prefix_of(s.condition) + kind_for_people(s.kind) + " fibres: ";
     if (s.n > 2 && s.typical_error && s.without_error->reliability < 0.5 && *s.plain.standard_deviation > 0)
-      warnings.push_back(fmt::format("{}more than half of the scatter of tensions is error of measurement ({} nN).",
-                                     fibres, readable(*s.typical_error)));
+      warnings.push_back(report::sentence("study.warn-mostly-error", fibres, readable(*s.typical_error)));
     if (s.model && s.mean_interval && std::abs(s.model->estimate - s.plain.mean) > 2 * s.model->standard_error)
       warnings.push_back(
-          fmt::format("{}the mixed model's mean tension, {} nN, is far from the plain mean, {} nN. Give both.", fibres,
-                      readable(s.model->estimate), readable(s.plain.mean)));
+          report::sentence("study.warn-means-differ", fibres, readable(s.model->estimate), readable(s.plain.mean)));
   }
 }
 
@@ -81,9 +73,7 @@ void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
   const auto n = std::ranges::count_if(study.cells, [](const StudyCell& cell) { return !is_network_known(cell); });
   if (n == 0) return;
   warnings.push_back(
-      fmt::format("The network's tension of {} of {} could not be identified: their forces of network "
-                  "and fibres do not enter.",
-                  n, counted(n_of_kind(study, CellKind::plane), "cells")));
+      report::sentence("study.warn-network-unresolved", n, counted(n_of_kind(study, CellKind::plane), "cells")));
 }
 
 /// What the beads do not limit to both sides.
@@ -99,9 +89,7 @@ void warn_of_sheets(const Study& study, std::vector<std::string>& warnings) {
     }
     if (n_unknown > 0)
       warnings.push_back(
-          fmt::format("The beads limit the {} of sheets to one side only, or not at all, in {} of {}. These do not "
-                      "enter, and the mean of the rest may be biased.",
-                      for_people(quantity).name, n_unknown, counted(n, "fits")));
+          report::sentence("study.warn-sheets-unresolved", for_people(quantity).name, n_unknown, counted(n, "fits")));
   }
 }
 
@@ -113,20 +101,15 @@ void warn_of_space(const Study& study, const Measure& resolution, std::vector<st
   if (n_by_method.size() > 1) {
     std::vector<std::string> methods;
     for (const auto& [method, n] : n_by_method) methods.push_back(fmt::format("{} ({})", method, counted(n, "cells")));
-    warnings.push_back(
-        fmt::format("Tractions in space were found by different methods: {}. Each smooths in its own way: set "
-                    "traction.method, and run all again.",
-                    listed(methods)));
+    warnings.push_back(report::sentence("study.warn-methods-differ", listed(methods)));
   }
   constexpr double kLevel = 0.05;
   for (const Comparison& c : resolution.comparisons) {
     if (c.test != Test::mixed_model || c.group_b.empty() || *c.p_holm >= kLevel) continue;
     const bool is_first_coarser = c.effect > 0;
-    warnings.push_back(
-        fmt::format("The maps of cells in space are coarser under {} than under {}, by {} on average: smoothing takes "
-                    "more from their force and energy.",
-                    is_first_coarser ? c.group_a : c.group_b, is_first_coarser ? c.group_b : c.group_a,
-                    resolution.sample.amount(std::abs(c.effect))));
+    warnings.push_back(report::sentence("study.warn-resolution-differs", is_first_coarser ? c.group_a : c.group_b,
+                                        is_first_coarser ? c.group_b : c.group_a,
+                                        resolution.sample.amount(std::abs(c.effect))));
   }
 }
 
@@ -143,11 +126,9 @@ void warn_of_pseudo_replication(const Measure& m, std::vector<std::string>& warn
       if (is_same) smallest = std::min(smallest, *by_cell.p_holm);
     }
     if (smallest < kLevel) continue;
-    warnings.push_back(fmt::format(
-        "{}{}: {} and {} {} differ if each counts for itself (p = {}), not with the cell as the unit (p = {}). The "
-        "former is pseudo-replication.",
-        prefix_of(by_value.within), m.sample.name, kind_for_people(by_value.group_a), kind_for_people(by_value.group_b),
-        name_of(m.sample.each), readable(*by_value.p_holm), readable(smallest)));
+    warnings.push_back(report::sentence("study.warn-pseudo-replication", prefix_of(by_value.within), m.sample.name,
+                                        kind_for_people(by_value.group_a), kind_for_people(by_value.group_b),
+                                        name_of(m.sample.each), readable(*by_value.p_holm), readable(smallest)));
   }
 }
 
@@ -183,7 +164,7 @@ namespace {
 /// The kind that the study has most of; of equally many cells with fibres, then sheets.
 CellKind most_of(const Study& study) {
   CellKind most = CellKind::plane;
-  for (const CellKind kind : {CellKind::sheet, CellKind::space})
+  for (const CellKind kind : kKindsOfCells)
     if (n_of_kind(study, kind) > n_of_kind(study, most)) most = kind;
   return most;
 }
@@ -192,10 +173,7 @@ CellKind most_of(const Study& study) {
 PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
   const CellKind most = most_of(study);
   PrimaryMeasure asked = parameters.primary;
-  if (asked == PrimaryMeasure::automatic)
-    asked = most == CellKind::plane   ? PrimaryMeasure::tension
-            : most == CellKind::sheet ? PrimaryMeasure::contraction
-                                      : PrimaryMeasure::total_force;
+  if (asked == PrimaryMeasure::automatic) asked = in_study(most).primary;
   if (asked == PrimaryMeasure::tension) {
     const Sample& sample = analysis.tensions().sample;
     const auto kind = std::ranges::find(sample.kinds, name_of(counted_type(study, parameters.primary_type)));
@@ -203,10 +181,7 @@ PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const
             "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres"};
   }
   const auto of = [&](CellKind kind, const std::string& column, const std::string& name) {
-    const char* cells = kind == CellKind::sheet   ? " of sheets"
-                        : kind == CellKind::space ? " of cells in space"
-                                                  : " of cells";
-    return PrimaryChoice{analysis.find(column), 0, name + cells};
+    return PrimaryChoice{analysis.find(column), 0, name + " of " + in_study(kind).many};
   };
   switch (asked) {
     case PrimaryMeasure::contraction:
@@ -220,11 +195,7 @@ PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const
                  ? of(CellKind::sheet, "strain_energy_fJ", "strain energy")
                  : of(CellKind::space, "space_strain_energy_fJ", "strain energy");
     default:
-      return of(most,
-                most == CellKind::plane   ? "total_force_nN"
-                : most == CellKind::sheet ? "sheet_force_nN"
-                                          : "space_force_nN",
-                "total force");
+      return of(most, in_study(most).force, "total force");
   }
 }
 

@@ -8,6 +8,7 @@
 #include "pipeline/files/foreign_table.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/table_text.h"
+#include "pipeline/report/texts.h"
 #include "pipeline/statistics/review.h"
 
 namespace mbtfm::statistics {
@@ -168,9 +169,7 @@ CellNotes notes_of(const std::vector<std::string>& names, const std::string& con
   if (!rows) return result;
   const std::string exclude = column_of(*rows, kExclude), include = column_of(*rows, kInclude);
   if (condition.level == 0 && condition.column.empty() && exclude.empty() && include.empty())
-    result.warnings.push_back(
-        "The table has no column condition: its cells are of one condition. Name the column that has it: "
-        "--condition-from COLUMN.");
+    result.warnings.push_back(report::sentence("study.warn-no-condition"));
   std::vector<bool> is_named(names.size(), false);
   for (int row = 0; row < rows->n_rows(); ++row) {
     const std::size_t i = index_of_cell(names, *rows, row);

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "pipeline/contract/counted.h"
+#include "pipeline/report/texts.h"
 #include "pipeline/statistics/drawing.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -63,9 +64,7 @@ Figure tensions_by_type(const Study& study, const Analysis& analysis) {
   chart.subtitle(counts_by_kind(analysis.tensions().sample), "#555");
   return {.name = "tensions_by_type",
           .title = "Tension of each fibre",
-          .caption =
-              "A small dot is a fibre (cell and number under the mouse), a large one the mean of a cell. Black: "
-              "mean of the mixed model with its 95 % interval, the cell being the unit.",
+          .caption = report::sentence("study.tensions-by-type"),
           .charts = {chart}};
 }
 
@@ -74,8 +73,8 @@ Figure tension_distributions(const Analysis& analysis, const StudyParameters& pa
   const Sample& sample = analysis.tensions().sample;
   Figure figure{.name = "tension_distributions",
                 .title = "Distribution of the tensions",
-                .caption = fmt::format("Share of a type's fibres by tension. Upright lines: {} and {} nN.",
-                                       readable(parameters.weak_tension_nN), readable(parameters.strong_tension_nN)),
+                .caption = report::sentence("study.tension-shares", readable(parameters.weak_tension_nN),
+                                            readable(parameters.strong_tension_nN)),
                 .n_columns = 3};
   for (int kind = 0; kind < sample.n_kinds(); ++kind) {
     std::vector<Histogram> all;
@@ -98,9 +97,7 @@ Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters
   const Sample& sample = analysis.tensions().sample;
   Figure figure{.name = "fibres_above",
                 .title = "Share of the fibres above a tension",
-                .caption =
-                    "Bars: 95 % interval (Wilson’s, at the number of independent fibres that would scatter as the "
-                    "cells do). Cross: the share without the blur of the measurement’s error.",
+                .caption = report::sentence("study.shares-above"),
                 .n_columns = 2};
   for (const double threshold : thresholds_nN(parameters)) {
     const ColumnPlaces columns{sample};
@@ -158,9 +155,7 @@ Figure forces_by_cell(const Study& study) {
   chart.key("network", "#6b7078");
   return {.name = "forces_by_cell",
           .title = "Total force of each cell",
-          .caption =
-              "Sum of the force magnitudes over adhesions, the strongest cell first: what the fibres add, on what the "
-              "network has without them.",
+          .caption = report::sentence("study.force-sums"),
           .charts = {chart}};
 }
 
@@ -170,9 +165,7 @@ std::string without_unit(const std::string& label) { return label.substr(0, labe
 Figure force_correlations(const Study& study, const Analysis& analysis) {
   Figure figure{.name = "force_correlations",
                 .title = "Forces and size of the cell",
-                .caption =
-                    "One dot a cell. Lines through the origin by least squares: slope ± standard error, and Pearson’s "
-                    "correlation r, from five cells on.",
+                .caption = report::sentence("study.force-and-size"),
                 .n_columns = 3};
   std::map<std::pair<std::string, std::string>, std::vector<const Correlation*>> panels;
   std::vector<std::pair<std::string, std::string>> order;
@@ -209,7 +202,7 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
     }
     figure.charts.push_back(chart);
   }
-  if (figure.charts.empty()) figure.caption = "fewer than five cells (correlations.csv has the numbers).";
+  if (figure.charts.empty()) figure.caption = report::sentence("study.few-cells");
   return figure;
 }
 
@@ -218,8 +211,8 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
 std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
   std::vector<Figure> figures;
   if (auto primary = primary_figure(study, analysis, parameters)) figures.push_back(std::move(*primary));
-  for (const CellKind kind : {CellKind::sheet, CellKind::space})
-    if (n_of_kind(study, kind) > 1) figures.push_back(figure_of_kind(study, analysis, kind));
+  for (const CellKind kind : kKindsOfCells)
+    if (kind != CellKind::plane && n_of_kind(study, kind) > 1) figures.push_back(figure_of_kind(study, analysis, kind));
   if (!analysis.has_fibres) return figures;
   if (analysis.tensions().sample.values.empty()) {
     figures.push_back(

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "pipeline/report/texts.h"
 #include "pipeline/statistics/drawing.h"
 
 namespace mbtfm::statistics {
@@ -153,32 +154,28 @@ std::optional<Figure> primary_figure(const Study& study, const Analysis& analysi
   const auto is_of_kind = [&](const Observation& o) { return o.kind == choice.kind; };
   if (std::ranges::none_of(choice.measure->sample.values, is_of_kind)) return {};
   const Measure& m = *choice.measure;
-  Figure figure{.name = kPrimaryFigure,
-                .title = "Primary comparison",
-                .caption = dots_of(m.sample) + (replicates_of(study).size() > 1 ? ", coloured by replicate" : "") +
-                           ". Line and bar: mean of the mixed model with its 95 % interval." +
-                           (analysis.primary.differences.empty()
-                                ? ""
-                                : " Second chart: difference of means from the reference, with its 95 % interval."),
-                .charts = {super_plot(study, m, choice.kind, choice.name)},
-                .n_columns = 2};
+  Figure figure{
+      .name = kPrimaryFigure,
+      .title = "Primary comparison",
+      .caption = dots_of(m.sample) + (replicates_of(study).size() > 1 ? ", coloured by replicate" : "") +
+                 ". Line and bar: mean of the mixed model with its 95 % interval." +
+                 (analysis.primary.differences.empty() ? "" : " " + report::sentence("study.primary-differences")),
+      .charts = {super_plot(study, m, choice.kind, choice.name)},
+      .n_columns = 2};
   if (!analysis.primary.differences.empty()) figure.charts.push_back(effect_plot(analysis.primary));
   return figure;
 }
 
 Figure figure_of_kind(const Study& study, const Analysis& analysis, CellKind kind) {
-  const bool is_sheet = kind == CellKind::sheet;
-  Figure figure{.name = is_sheet ? "sheets" : "cells_in_space",
-                .title = is_sheet ? "Sheets" : "Cells in space",
-                .caption = std::string("A large dot is a ") + (is_sheet ? "sheet" : "cell") +
-                           ", with the 95 % interval of its own error if that is known; small dots are its " +
-                           (is_sheet ? "parts" : "adhesions") +
-                           ". Black: mean of the mixed model with its 95 % interval.",
+  const KindInStudy& of = in_study(kind);
+  Figure figure{.name = of.figure,
+                .title = of.heading,
+                .caption = report::sentence("study.figure-of-kind", of.cell, of.parts),
                 .n_columns = 3};
   for (const Measure* m : analysis.of_cells(kind))
     figure.charts.push_back(
         super_plot(study, *m, m->sample.n_kinds() > 1 ? std::nullopt : std::optional(0),
-                   m->sample.name + (m->sample.each == Observed::adhesions_in_space ? " of an adhesion" : "")));
+                   m->sample.name + (m->sample.each == Observed::adhesions_in_space ? of.of_part : "")));
   return figure;
 }
 

@@ -226,9 +226,9 @@ std::vector<Observation> Sample::of_group(int condition, int kind) const {
 std::string Sample::amount(double value) const { return charts::readable(value) + (unit.empty() ? "" : " " + unit); }
 
 CellKind Sample::of_cells() const {
-  if (each == Observed::sheets || each == Observed::bundles) return CellKind::sheet;
-  if (each == Observed::cells_in_space || each == Observed::adhesions_in_space) return CellKind::space;
-  return CellKind::plane;
+  using enum CellKind;
+  constexpr std::array kOf = {plane, plane, plane, sheet, sheet, space, space};  // as Observed has them
+  return kOf.at(static_cast<std::size_t>(each));
 }
 
 bool Sample::is_one_a_cell() const { return n_cells_of(values) == static_cast<int>(values.size()); }

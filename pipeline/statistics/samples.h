@@ -36,9 +36,9 @@ struct Sample {
   bool is_one_a_cell() const;
   /// Of which kind its cells are.
   CellKind of_cells() const;
-  const char* cell_name() const { return of_cells() == CellKind::sheet ? "sheet" : "cell"; }
+  const char* cell_name() const { return in_study(of_cells()).cell; }
   /// What its cells are called.
-  const char* cells_name() const { return of_cells() == CellKind::sheet ? "sheets" : "cells"; }
+  const char* cells_name() const { return in_study(of_cells()).cells; }
   int n_kinds() const { return static_cast<int>(kinds.size()); }
   int n_conditions() const { return static_cast<int>(conditions.size()); }
   int group_of(int condition, int kind) const { return condition * n_kinds() + kind; }

@@ -5,6 +5,7 @@
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/report/page.h"
+#include "pipeline/report/texts.h"
 #include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -75,9 +76,9 @@ void add_unanswered(const Measure& m, Findings& findings) {
     const bool is_answered = std::ranges::any_of(
         m.comparisons, [&](const Comparison& c) { return c.question == question && c.test == Test::mixed_model; });
     if (is_answered) return;
-    findings.sentences.push_back(fmt::format(
-        "Whether the {} of {} differs between {} cannot be said: {}.", m.sample.name, name_of(m.sample.each), who,
-        m.model ? fmt::format("each needs values of two {}", m.sample.cells_name()) : m.obstacle));
+    findings.sentences.push_back(
+        report::sentence("study.cannot-be-said", m.sample.name, name_of(m.sample.each), who,
+                         m.model ? fmt::format("each needs values of two {}", m.sample.cells_name()) : m.obstacle));
   };
   if (n_different(m.summaries, &Summary::kind) > 1)
     add(Question::between_kinds, m.sample.each == Observed::fibres   ? "types"
@@ -117,12 +118,10 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
   for (const ShareAbove& s : analysis.shares) {
     if (s.threshold_nN != parameters.strong_tension_nN) continue;
     list.push_back(begun(
-        s.condition,
-        fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %] ({} of {}); {:.0f} % "
-                    "without the errors of measurement.",
-                    prefix_of(s.condition), 100 * s.share.value, plural_of(analysis.tensions().sample, s.kind),
-                    readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high,
-                    counted(s.n, "fibres"), counted(s.n_cells, "cells"), 100 * s.without_error)));
+        s.condition, report::sentence("study.share-above", prefix_of(s.condition), 100 * s.share.value,
+                                      plural_of(analysis.tensions().sample, s.kind), readable(s.threshold_nN),
+                                      100 * s.share.interval.low, 100 * s.share.interval.high, counted(s.n, "fibres"),
+                                      counted(s.n_cells, "cells"), 100 * s.without_error)));
   }
   return list;
 }
@@ -132,8 +131,8 @@ std::vector<std::string> lines(const Analysis& analysis) {
   for (const Correlation& c : analysis.correlations) {
     if (c.force != "total_force_nN" || !c.line) continue;
     const std::string error = c.line->slope_error ? " ± " + readable(*c.line->slope_error) : "";
-    std::string text = fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition),
-                                   readable(c.line->slope), error, c.size_unit, counted(std::ssize(c.x), "cells"));
+    std::string text = report::sentence("study.force-for-size", prefix_of(c.condition), readable(c.line->slope), error,
+                                        c.size_unit, counted(std::ssize(c.x), "cells"));
     if (c.line->correlation) text += ", r = " + readable(*c.line->correlation);
     list.push_back(begun(c.condition, text + ")."));
   }
@@ -143,8 +142,7 @@ std::vector<std::string> lines(const Analysis& analysis) {
 std::vector<std::string> directions(const Analysis& analysis) {
   std::vector<std::string> list;
   if (analysis.directions.empty()) {
-    list.push_back(
-        "No direction is known: no fibre ends on an adhesion, and no beads near one moved by more than noise.");
+    list.push_back(report::sentence("study.no-direction"));
   }
   for (const DirectionSummary& s : analysis.directions) {
     std::string text = fmt::format("{}{} differ by {:.0f}° in the mean", prefix_of(s.condition),

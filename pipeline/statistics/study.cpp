@@ -133,7 +133,7 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
 
 /// Why a cell cannot enter, as its folder tells; empty: it can.
 std::string obstacle(const Path& cell, CellKind kind) {
-  for (const std::string& file : files_of_a_cell(kind))
+  for (const std::string& file : in_study(kind).files)
     if (!files::is_own_file(cell / file)) return "no fit: " + file + " is not there";
   return {};
 }
@@ -241,40 +241,21 @@ bool is_measured(const Tension& t) {
 
 void declare(stage::ParameterList& list, StudyParameters& parameters) {
   list.table("stats");
-  list.add("condition_from", parameters.condition_from,
-           "source of a cell's condition: `folder` (the first folder below the study's), `folder2` (the one below "
-           "that), or the name of a column of --table; empty: the column `condition`, `group` or `treatment` if the "
-           "table has one");
-  list.add("conditions", parameters.conditions,
-           "order of the conditions, with commas between them; the first is the reference; empty: by the alphabet. "
-           "Example: \"control, blebbistatin\"");
-  list.add("replicate_from", parameters.replicate_from,
-           "source of a cell's replicate (day, dish, animal): `folder`, `folder2`, … or the name of a column of "
-           "--table; empty: the column `replicate` or `day` if the table has one");
-  list.add("exclude_findings", parameters.exclude_findings,
-           "cells with one of these open findings are left out; identities with commas between them. Example: "
-           "\"misfit, cell-cut\"");
-  list.add("primary", parameters.primary,
-           "what the study compares first between conditions; tension: of the fibres of primary_type; contraction, "
-           "mean-tension: of sheets; contractile-moment: of cells in space; total-force, strain-energy: of the kind "
-           "that the study has most cells of; auto: tension, contraction or total-force, by that kind");
-  list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
-  list.add("with_not_converged", parameters.with_not_converged, "include cells whose fit did not converge");
-  list.add("list", parameters.list,
-           "print each cell, whether it enters and why not (CSV: cell, condition, included, reason); write nothing");
-  list.add("with_bad", parameters.with_bad, "include cells that a bad finding says not to use");
-  list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
-           "a first tension: the share of fibres above it is given (nN)");
-  list.add("strong_tension_nN", parameters.strong_tension_nN, Range::force_nN(),
-           "a second tension: the share of fibres above it is given (nN)");
-  list.add("near_adhesion_um", parameters.near_adhesion_um, Range::size_um(),
-           "beads this near to an adhesion's centre, or on it, give the direction in which it moves (um)");
-  list.add("bootstrap_draws", parameters.bootstrap_draws, Range::between(100, 1000000),
-           "number of draws of cells that give the intervals of means and medians");
-  list.add("bootstrap_seed", parameters.bootstrap_seed, "random seed of the draws of cells");
-  list.add("fibre_types", parameters.fibre_types, Range::between(3, 4),
-           "number of fibre types; 3: dorsal, arc and ventral, edge fibres count as ventral; 4: edge fibres are a type "
-           "of their own");
+  list.add("condition_from", parameters.condition_from);
+  list.add("conditions", parameters.conditions);
+  list.add("replicate_from", parameters.replicate_from);
+  list.add("exclude_findings", parameters.exclude_findings);
+  list.add("primary", parameters.primary);
+  list.add("primary_type", parameters.primary_type);
+  list.add("with_not_converged", parameters.with_not_converged);
+  list.add("list", parameters.list);
+  list.add("with_bad", parameters.with_bad);
+  list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN());
+  list.add("strong_tension_nN", parameters.strong_tension_nN, Range::force_nN());
+  list.add("near_adhesion_um", parameters.near_adhesion_um, Range::size_um());
+  list.add("bootstrap_draws", parameters.bootstrap_draws, Range::between(100, 1000000));
+  list.add("bootstrap_seed", parameters.bootstrap_seed);
+  list.add("fibre_types", parameters.fibre_types, Range::between(3, 4));
 }
 
 std::vector<double> thresholds_nN(const StudyParameters& parameters) {
@@ -286,22 +267,49 @@ int n_of_kind(const Study& study, CellKind kind) {
   return static_cast<int>(std::ranges::count_if(study.cells, [&](const StudyCell& c) { return c.kind() == kind; }));
 }
 
-const std::vector<std::string>& files_of_a_cell(CellKind kind) {
-  static const std::vector<std::string> with_fibres = {
-      "1_segment/adhesions.csv",   "1_segment/fibres.csv", "1_segment/fibre_points.csv", kOutline, "4_fit/tensions.csv",
-      "4_fit/adhesion_forces.csv", "4_fit/fit.json"};
-  static const std::vector<std::string> of_sheet = {"3_sheet/sheet_fit.csv", "3_sheet/sheet.json", "3_sheet/sheet.csv"};
-  static const std::vector<std::string> in_space = {report::kBeadsInSpace, "3_surface/surface.vtp",
-                                                    "4_traction/traction.csv", "4_traction/traction.json"};
-  return kind == CellKind::sheet ? of_sheet : kind == CellKind::space ? in_space : with_fibres;
-}
-
-const std::vector<std::string>& further_files_of_a_cell(CellKind kind) {
-  static const std::vector<std::string> with_fibres = {kDisplacement, kFitted, kWithoutFibres, kUsual, kRun};
-  static const std::vector<std::string> of_sheet = {kDisplacement, kOutline, kRun};
-  static const std::vector<std::string> in_space = {"4_traction/traction_adhesion_forces.csv",
-                                                    "1_segment/adhesions.csv", kOutline, kRun};
-  return kind == CellKind::sheet ? of_sheet : kind == CellKind::space ? in_space : with_fibres;
+const KindInStudy& in_study(CellKind kind) {
+  static const std::array<KindInStudy, 3> all = {
+      {{"cell",
+        "cells",
+        "cell",
+        "cells",
+        "stress-fibre tensions",
+        PrimaryMeasure::tension,
+        "total_force_nN",
+        "Cells",
+        "cells",
+        "fibres",
+        "",
+        {"1_segment/adhesions.csv", "1_segment/fibres.csv", "1_segment/fibre_points.csv", kOutline,
+         "4_fit/tensions.csv", "4_fit/adhesion_forces.csv", "4_fit/fit.json"},
+        {kDisplacement, kFitted, kWithoutFibres, kUsual, kRun}},
+       {"cell",
+        "cells",
+        "cell in space",
+        "cells in space",
+        "forces",
+        PrimaryMeasure::total_force,
+        "space_force_nN",
+        "Cells in space",
+        "cells_in_space",
+        "adhesions",
+        " of an adhesion",
+        {report::kBeadsInSpace, "3_surface/surface.vtp", "4_traction/traction.csv", "4_traction/traction.json"},
+        {"4_traction/traction_adhesion_forces.csv", "1_segment/adhesions.csv", kOutline, kRun}},
+       {"sheet",
+        "sheets",
+        "sheet",
+        "sheets",
+        "contraction",
+        PrimaryMeasure::contraction,
+        "sheet_force_nN",
+        "Sheets",
+        "sheets",
+        "parts",
+        "",
+        {"3_sheet/sheet_fit.csv", "3_sheet/sheet.json", "3_sheet/sheet.csv"},
+        {kDisplacement, kOutline, kRun}}}};
+  return all.at(static_cast<std::size_t>(kind));
 }
 
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads) {

@@ -1,6 +1,7 @@
 /// The finished cells of a folder: what was measured in each, under which condition, and which do not enter.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -131,9 +132,20 @@ FibreType counted_type(const Study& study, FibreType type);
 /// Those of one kind: with fibres (plane), sheets, or in space.
 int n_of_kind(const Study& study, CellKind kind);
 
-/// Files that must be there of each finished cell, and those that are read where they are, relative to its folder.
-const std::vector<std::string>& files_of_a_cell(CellKind kind);
-const std::vector<std::string>& further_files_of_a_cell(CellKind kind);
+/// What a study has to know of a kind of cells.
+struct KindInStudy {
+  const char *cell, *cells;      ///< "cell"; of sheets "sheet"
+  const char *one, *many;        ///< "cell in space", "cells in space"
+  const char* found;             ///< what the title says of them
+  PrimaryMeasure primary;        ///< of a study that has most of them
+  const char* force;             ///< column of their total force
+  const char *heading, *figure;  ///< of their figures; the name of its file
+  const char *parts, *of_part;   ///< small dots of that figure, and what is added to the name of a part's measure
+  std::vector<std::string> files, further_files;  ///< that must be there, and that are read if they are
+};
+const KindInStudy& in_study(CellKind kind);
+/// In the order in which a page names them.
+inline constexpr std::array kKindsOfCells = {CellKind::plane, CellKind::sheet, CellKind::space};
 
 /// @param table  column `cell` (a cell's folder), any columns of conditions, and `exclude` with the reason why a cell
 ///               must not enter, empty for those that do; or none

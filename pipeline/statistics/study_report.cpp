@@ -6,6 +6,7 @@
 #include "pipeline/contract/counted.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/report/stage_page.h"
+#include "pipeline/report/texts.h"
 #include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -50,20 +51,14 @@ struct Files {
 };
 
 std::string measures_table(const Files& files) {
-  return report::html_of(files.listing(
-      "All measures", "summaries.csv",
-      "*quantity: measure, condition, kind, n_cells, n_observations: n, model_mean: mean (mixed model), model_low: "
-      "lower "
-      "95 %, model_high: upper 95 %, mean: plain mean, mean_low: lower 95 % by cells, mean_high: upper 95 % by cells, "
-      "median, sd, sd_without_error: SD without error"));
+  return report::html_of(
+      files.listing("All measures", "summaries.csv", report::sentence("study.columns-of-summaries")));
 }
 
 std::string tests_table(const Files& files, const Sample& sample) {
-  return report::html_of(report::table_of(
-      files.listing("Tests of the " + sample.name, "tests.csv",
-                    "within, test, unit, group_a: group, group_b: against, n_a, n_b, cells_a, cells_b, statistic, "
-                    "degrees_of_freedom: d.f., p, p_holm, effect, effect_low, effect_high, effect_is",
-                    {{"quantity", sample.column}})));
+  return report::html_of(
+      report::table_of(files.listing("Tests of the " + sample.name, "tests.csv",
+                                     report::sentence("study.columns-of-tests"), {{"quantity", sample.column}})));
 }
 
 /// Of each kind, then those that were left out.
@@ -72,24 +67,14 @@ std::string cells_tables(const Files& files) {
                          const char* file = "cells.csv") {
     return report::html_of(files.listing(title, file, "cell, condition, " + columns, {{word, is}}));
   };
-  const std::string quality = ", relative_l2: relative L2, expected_relative_l2: expected, converged, findings";
-  return table("Cells with fibres", "n_fibres, n_adhesions, total_force_nN, fibre_force_nN, network_force_nN" + quality,
-               "model", "fibres") +
-         table(
-             "Sheets",
-             "contraction_nN_per_um, mean_tension_nN_per_um, sheet_force_nN, strain_energy_fJ, cell_area_um2" + quality,
-             "model", "sheet") +
-         table("Estimates of the sheets", "*quantity: estimate, part, value, low, high, identifiable", "enters", "TRUE",
+  const std::string quality = report::sentence("study.columns-of-quality");
+  return table("Cells with fibres", report::sentence("study.columns-of-cells") + quality, "model", "fibres") +
+         table("Sheets", report::sentence("study.columns-of-sheets") + quality, "model", "sheet") +
+         table("Estimates of the sheets", report::sentence("study.columns-of-estimates"), "enters", "TRUE",
                "sheets.csv") +
-         table("Estimates that do not enter", "*quantity: estimate, part, value, low, high, identifiable", "enters",
-               "FALSE", "sheets.csv") +
-         table(
-             "Cells in space",
-             "space_method: method, space_force_nN, space_force_sigma_nN, space_strain_energy_fJ, "
-             "space_contractile_moment_nN_um, space_contractile_moment_sigma_nN_um, space_normal_share: normal share, "
-             "space_largest_traction_kPa, space_net_force_nN, space_net_moment_nN_um, space_resolution_um" +
-                 quality,
-             "model", "space") +
+         table("Estimates that do not enter", report::sentence("study.columns-of-estimates"), "enters", "FALSE",
+               "sheets.csv") +
+         table("Cells in space", report::sentence("study.columns-in-space") + quality, "model", "space") +
          table("Left out", "reason", "included", "FALSE");
 }
 
@@ -123,11 +108,8 @@ Table findings_table(const Study& study) {
 
 std::string findings_text(const Study& study, const Files& files) {
   const auto n_open = std::ranges::count_if(study.cells, [](const StudyCell& c) { return has_open(c.findings); });
-  if (n_open == 0) return "<p><b>✓</b> No finding is open in any cell that enters.</p>\n";
-  return fmt::format(
-             "<p>Findings are open in {} of {}: results may be off by more than their error bars say. “Cells” says how "
-             "to leave cells out.</p>\n",
-             n_open, counted(study.cells.size(), "cells")) +
+  if (n_open == 0) return report::paragraph("study.nothing-open");
+  return report::paragraph("study.findings-open", n_open, counted(study.cells.size(), "cells")) +
          report::html_of(findings_table(study), {"findings.csv", files.listing("", "findings.csv", "").csv});
 }
 
@@ -151,10 +133,7 @@ std::string gallery(const Study& study, const Path& page_folder) {
         files::is_own_file(picture) ? "<img alt=\"\" src=\"" + report::data_address(picture, "image/jpeg") + "\">" : "",
         html_escaped(text), has_open(c.findings) ? " <b>!</b>" : "");
   }
-  return html +
-         "</div>\n<p class=\"sub\">Total force of each cell; a click opens its page. <b>!</b>: findings are open. To "
-         "leave cells out: <code>--exclude_findings</code>, a reason in the column <code>exclude</code> of "
-         "<code>--table</code>, or <a href=\"review.html\">the review</a>, which takes fibres, too.</p>\n";
+  return html + "</div>\n" + report::note("study.gallery");
 }
 
 std::string list_of(const std::vector<std::string>& sentences) {
@@ -172,9 +151,9 @@ std::string overview(const Study& study, const Analysis& analysis) {
   }
   std::string html = "<p>";
   if (const int n = n_of_kind(study, CellKind::plane); n > 0)
-    html += fmt::format("{} with {} and {}, of which the tensions of {} are identified and enter. ",
-                        counted(n, "cells"), counted(n_adhesions, "adhesions"), counted(n_fibres, "stress fibres"),
-                        analysis.tensions().sample.values.size());
+    html += report::sentence("study.cells-with-fibres", counted(n, "cells"), counted(n_adhesions, "adhesions"),
+                             counted(n_fibres, "stress fibres"), analysis.tensions().sample.values.size()) +
+            " ";
   if (const int n = n_of_kind(study, CellKind::sheet); n > 0)
     html += fmt::format("{}; identified contractions: {}. ", counted(n, "sheets"),
                         n_cells_of(analysis.of(name_of(SheetQuantity::contraction)).sample.values));
@@ -190,9 +169,7 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
   const Primary& primary = analysis.primary;
   std::string html;
   if (study.conditions.size() < 2) {
-    html =
-        "<p>There is one condition: nothing to compare. Conditions come from a column <code>condition</code> of "
-        "<code>--table</code>, or from <code>--condition-from folder</code>.</p>\n";
+    html = report::paragraph("study.one-condition");
   } else if (primary.differences.empty()) {
     html = "<p>The " + html_escaped(primary.measure) + " cannot be compared: " + html_escaped(primary.obstacle) +
            ".</p>\n";
@@ -202,17 +179,9 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
   for (const Figure& figure : figures)
     if (figure.name == kPrimaryFigure)
       html += "<div class=\"grid\">\n" + charts_of(figure) + "</div>\n" + caption_of(figure);
-  if (!primary.differences.empty())
-    html += "<p class=\"sub\">Test: " + html_escaped(primary.test) +
-            ", two-sided; p by Holm over the conditions. It was chosen by <code>primary</code> and "
-            "<code>primary_type</code>, not by its result. All other tests are exploratory.</p>\n";
+  if (!primary.differences.empty()) html += report::note("study.primary-test", html_escaped(primary.test));
   return html;
 }
-
-constexpr const char* kHowToRead =
-    "<p class=\"sub\">Two-sided; Holm’s correction over the pairs of one question. The fibres of a cell are not "
-    "independent: trust the tests by cell (clustered rank sum: Datta &amp; Satten 2005; mixed model: random effects of "
-    "cell and kind, known errors, Satterthwaite’s degrees of freedom).</p>\n";
 
 /// Which type edge fibres count as; empty without any.
 std::string on_edge_fibres(const Study& study) {
@@ -221,30 +190,17 @@ std::string on_edge_fibres(const Study& study) {
     n += static_cast<std::size_t>(
         std::ranges::count_if(cell.cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; }));
   if (n == 0) return "";
-  return fmt::format("<p class=\"sub\">{} a free piece of the outline and {} held at both ends. {}</p>\n",
-                     counted(n, "edge fibre runs along", "edge fibres run along"), n == 1 ? "is" : "are",
-                     study.n_fibre_types < 4 ? "They count as ventral (stats.fibre_types = 4: as a type of their own)."
-                                             : "They are a type of their own.");
+  return report::note(
+      "study.edge-fibres", counted(n, "edge fibre runs along", "edge fibres run along"), n == 1 ? "is" : "are",
+      study.n_fibre_types < 4 ? report::sentence("study.edge-as-ventral") : "They are a type of their own.");
 }
-
-constexpr const char* kHowToReadSheets =
-    "<p class=\"sub\">Without errors of the gel, which sheets on gels of one kind share. Numbers that were given, or "
-    "that the beads limit to one side only, do not enter.</p>\n";
-
-constexpr const char* kHowToReadSpace =
-    "<p class=\"sub\">Total force: sum of the sizes of all tractions. Contractile moment: −∫ (x − centre) · t dA, "
-    "above zero if the cell contracts. Coarse maps lose force, energy and largest traction: compare the resolution "
-    "first. Net force and moment of a free cell are errors alone, and not compared.</p>\n";
 
 /// "Stress-fibre tensions of 8 cells, contraction of 4 sheets and forces of 6 cells in space"
 std::string title_of(const Study& study) {
   std::vector<std::string> parts;
-  const auto add = [&](CellKind kind, const std::string& what, const std::string& one, const std::string& many) {
-    if (const int n = n_of_kind(study, kind); n > 0) parts.push_back(what + " of " + counted(n, one, many));
-  };
-  add(CellKind::plane, "stress-fibre tensions", "cell", "cells");
-  add(CellKind::sheet, "contraction", "sheet", "sheets");
-  add(CellKind::space, "forces", "cell in space", "cells in space");
+  for (const CellKind kind : kKindsOfCells)
+    if (const int n = n_of_kind(study, kind); n > 0)
+      parts.push_back(std::string(in_study(kind).found) + " of " + counted(n, in_study(kind).one, in_study(kind).many));
   std::string title = parts.front();
   for (std::size_t i = 1; i < parts.size(); ++i) title += (i + 1 < parts.size() ? ", " : " and ") + parts[i];
   return report::capitalised(title);
@@ -270,13 +226,15 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
     if (figure.name != kPrimaryFigure) pictures += embedded(figure);
   body += report::section("Figures", "<div class=\"grid\">\n" + pictures + "</div>\n");
   body += report::section(
-      "All measures", on_edge_fibres(study) + (analysis.of_cells(CellKind::sheet).empty() ? "" : kHowToReadSheets) +
-                          (analysis.of_cells(CellKind::space).empty() ? "" : kHowToReadSpace) + measures_table(files));
+      "All measures", on_edge_fibres(study) +
+                          (analysis.of_cells(CellKind::sheet).empty() ? "" : report::note("study.how-to-read-sheets")) +
+                          (analysis.of_cells(CellKind::space).empty() ? "" : report::note("study.how-to-read-space")) +
+                          measures_table(files));
   for (const Measure& m : analysis.measures)
     if (!m.comparisons.empty())
       tests += report::folded("Tests of the " + m.sample.name + " of " + name_of(m.sample.each),
                               tests_table(files, m.sample));
-  body += report::section("Exploratory tests", tests + kHowToRead);
+  body += report::section("Exploratory tests", tests + report::note("study.how-to-read"));
   body += report::section("Cells", gallery(study, page_folder) + cells_tables(files));
   return report::html_of(report::Page{.title = title_of(study), .body = body});
 }

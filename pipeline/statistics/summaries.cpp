@@ -5,6 +5,7 @@
 #include <map>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -72,7 +73,7 @@ ModelResult model_of(const Sample& sample) {
     if (!fit.converged) return {.model = {}, .obstacle = "the mixed model did not converge"};
     return {.model = SampleModel{.fit = std::move(fit), .index = std::move(index)}};
   } catch (const InvalidData&) {
-    return {.model = {}, .obstacle = "the values do not differ, and have no errors that are known"};
+    return {.model = {}, .obstacle = report::sentence("study.obstacle-no-scatter")};
   }
 }
 

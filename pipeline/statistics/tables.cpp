@@ -22,12 +22,11 @@ using Number = std::optional<double>;
 
 /// Both ends of an interval. @param interval  as of member(), optional
 template <class... To>
-auto ends_of(const std::string& low, const std::string& high, const std::string& of, To... interval) {
+auto ends_of(const std::string& low, const std::string& high, To... interval) {
   using Optional = decltype(member(interval...));
   using Ends = typename Optional::Type::value_type;
-  return Columns<typename Optional::Whole>{
-      {low, "lower end of the 95 % interval of " + of, member(interval..., &Ends::low), kResult},
-      {high, "upper end of the 95 % interval of " + of, member(interval..., &Ends::high), kResult}};
+  return Columns<typename Optional::Whole>{{low, member(interval..., &Ends::low), kResult},
+                                           {high, member(interval..., &Ends::high), kResult}};
 }
 
 /// A row of what belongs to a cell.
@@ -38,9 +37,7 @@ struct InCell {
 };
 template <class Of>
 Columns<InCell<Of>> in_cell(const Columns<Of>& columns) {
-  return {{"cell", "its folder below the study's", &InCell<Of>::cell},
-          {"condition", "empty: none was asked for", &InCell<Of>::condition},
-          columns_of(&InCell<Of>::of, columns)};
+  return {{"cell", &InCell<Of>::cell}, {"condition", &InCell<Of>::condition}, columns_of(&InCell<Of>::of, columns)};
 }
 
 /// @param of_cell  gives what a cell has several of
@@ -103,69 +100,56 @@ Number contraction_of(const SheetSummary& sheet) {
 
 Columns<SheetSummary> sheet_columns() {
   using S = SheetSummary;
-  return {
-      {"contraction_nN_per_um", "of a sheet, or the mean over a sheet whose contraction varies", contraction_of,
-       kResult},
-      {"mean_tension_nN_per_um", "in a sheet: half the trace, mean over its area", &S::mean_tension_nN_per_um, kResult},
-      {"sheet_force_nN", "sum of the force magnitudes under a sheet's triangles", &S::total_force_nN, kResult},
-      {"strain_energy_fJ", "of the gel under a sheet: half the sum of force times displacement", &S::strain_energy_fJ,
-       kResult}};
+  return {{"contraction_nN_per_um", contraction_of, kResult},
+          {"mean_tension_nN_per_um", &S::mean_tension_nN_per_um, kResult},
+          {"sheet_force_nN", &S::total_force_nN, kResult},
+          {"strain_energy_fJ", &S::strain_energy_fJ, kResult}};
 }
 
 Columns<SpaceFigures> space_columns() {
   using S = SpaceFigures;
-  return {{"space_method", "that found the tractions of a cell in space", &S::method},
-          {"space_force_nN", "sum of the sizes of the tractions of a cell in space", &S::total_force_nN},
-          {"space_force_sigma_nN", "standard error of space_force_nN", &S::total_force_sigma_nN},
-          {"space_strain_energy_fJ", "of the gel of a cell in space", &S::strain_energy_fJ},
-          {"space_contractile_moment_nN_um",
-           "of a cell in space: minus the integral of place times traction about the cell's centre; above 0: inward",
-           &S::contractile_moment_nN_um},
-          {"space_contractile_moment_sigma_nN_um", "standard error of space_contractile_moment_nN_um",
-           &S::contractile_moment_sigma_nN_um},
-          {"space_normal_share", "sizes of the tractions' parts along the normal over their sizes (0 to 1)",
-           [](const S& s) { return s.normal_share(); }},
-          {"space_largest_traction_kPa", "of the map of a cell in space", &S::largest_traction_kPa},
-          {"space_net_force_nN", "size of the sum of the forces; of a cell that nothing else holds: errors alone",
-           &S::net_force_nN},
-          {"space_net_moment_nN_um", "the same of the moments", &S::net_moment_nN_um},
-          {"space_resolution_um", "forces closer together than this look like one; median over the surface",
-           &S::resolution_um}};
+  return {{"space_method", &S::method},
+          {"space_force_nN", &S::total_force_nN},
+          {"space_force_sigma_nN", &S::total_force_sigma_nN},
+          {"space_strain_energy_fJ", &S::strain_energy_fJ},
+          {"space_contractile_moment_nN_um", &S::contractile_moment_nN_um},
+          {"space_contractile_moment_sigma_nN_um", &S::contractile_moment_sigma_nN_um},
+          {"space_normal_share", [](const S& s) { return s.normal_share(); }},
+          {"space_largest_traction_kPa", &S::largest_traction_kPa},
+          {"space_net_force_nN", &S::net_force_nN},
+          {"space_net_moment_nN_um", &S::net_moment_nN_um},
+          {"space_resolution_um", &S::resolution_um}};
 }
 
 Columns<StudyCell> figure_columns() {
   using C = StudyCell;
   const auto of_fit = [](auto figure) { return member(&C::fit, figure); };
-  return {{"n_adhesions", "without anchors and candidates",
+  return {{"n_adhesions",
            [](const C& c) -> std::optional<int> {
              if (c.kind() != CellKind::plane) return std::nullopt;
              return static_cast<int>(figures_of(c).n_adhesions);
            }},
-          {"n_fibres", "of all types", n_fibres({})},
-          {"n_dorsal", "dorsal fibres", n_fibres(FibreType::dorsal)},
-          {"n_arc", "transverse arcs", n_fibres(FibreType::arc)},
-          {"n_ventral", "ventral fibres, without edge fibres", n_fibres(FibreType::ventral)},
-          {"cell_area_um2", "inside the outline", area_of, kResult},
-          {"adhesion_area_um2", "of all its adhesions",
+          {"n_fibres", n_fibres({})},
+          {"n_dorsal", n_fibres(FibreType::dorsal)},
+          {"n_arc", n_fibres(FibreType::arc)},
+          {"n_ventral", n_fibres(FibreType::ventral)},
+          {"cell_area_um2", area_of, kResult},
+          {"adhesion_area_um2",
            [](const C& c) { return fibre_fit_of(c) ? Number(figures_of(c).adhesion_area_um2) : Number(); }, kResult},
-          {"total_force_nN",
-           "sum of the adhesions' force magnitudes; of a sheet see sheet_force_nN, in space space_force_nN",
-           member(fibre_fit_of, &FitSummary::total_force_nN), kResult},
-          {"network_force_nN", "the same of the network alone", member(network_fit_of, &FitSummary::network_force_nN),
+          {"total_force_nN", member(fibre_fit_of, &FitSummary::total_force_nN), kResult},
+          {"network_force_nN", member(network_fit_of, &FitSummary::network_force_nN), kResult},
+          {"fibre_force_nN", member(network_fit_of, &FitSummary::fibre_force_nN), kResult},
+          {"network_tension_nN", network_tension_of, kResult},
+          {"network_surface_tension_nN_per_um", member(network_fit_of, &FitSummary::network_surface_tension_nN_per_um),
            kResult},
-          {"fibre_force_nN", "what the fibres add", member(network_fit_of, &FitSummary::fibre_force_nN), kResult},
-          {"network_tension_nN", "of a link of the actin network", network_tension_of, kResult},
-          {"network_surface_tension_nN_per_um", "of the actin network as a sheet",
-           member(network_fit_of, &FitSummary::network_surface_tension_nN_per_um), kResult},
-          {"relative_l2", "‖measured − model‖ / ‖measured‖", of_fit(&FitSummary::relative_l2), kResult},
-          {"expected_relative_l2", "what the beads' noise alone would leave", expected_of, kResult},
-          {"noise_um", "of a component of the displacement; in space of one along the surface", noise_of, kResult},
-          {"n_meshes", "that the fit is the mean of", member(fibre_fit_of, &FitSummary::n_meshes)},
-          {"converged", "the fit came to its end", of_fit(&FitSummary::converged)},
-          {"findings", "that are open", [](const C& c) { return open_ids(c.findings); }},
-          {"n_edge", "edge fibres", n_fibres(FibreType::edge)},
-          {"model", "what its row is of: fibres, a sheet, or a cell in space; empty if it was left out",
-           [](const C& c) { return model_of(c); }},
+          {"relative_l2", of_fit(&FitSummary::relative_l2), kResult},
+          {"expected_relative_l2", expected_of, kResult},
+          {"noise_um", noise_of, kResult},
+          {"n_meshes", member(fibre_fit_of, &FitSummary::n_meshes)},
+          {"converged", of_fit(&FitSummary::converged)},
+          {"findings", [](const C& c) { return open_ids(c.findings); }},
+          {"n_edge", n_fibres(FibreType::edge)},
+          {"model", [](const C& c) { return model_of(c); }},
           columns_of(&C::sheet, sheet_columns()),
           columns_of(&C::space, space_columns())};
 }
@@ -178,11 +162,10 @@ std::string with_semicolons(const std::vector<int>& ids) {
 
 Table<InCell<CellRow>> cell_table() {
   return {.file = "statistics/cells.csv",
-          .row = "each cell, also those left out",
           .columns = in_cell<CellRow>(
-              {{"included", "it enters the statistics", [](const CellRow& row) { return row.cell != nullptr; }},
-               {"reason", "why it does not", &CellRow::reason},
-               {"fibres_left_out", "fibres that review.csv leaves out, with semicolons between them",
+              {{"included", [](const CellRow& row) { return row.cell != nullptr; }},
+               {"reason", &CellRow::reason},
+               {"fibres_left_out",
                 [](const CellRow& row) { return row.cell ? with_semicolons(row.cell->review.fibres_left_out) : ""; }},
                columns_of(&CellRow::cell, figure_columns())})};
 }
@@ -200,7 +183,6 @@ Table<AdhesionRow> adhesion_table() {
     return columns_of(files::adhesion_of, files::adhesion_table().columns.only(names));
   };
   return {.file = "statistics/adhesions.csv",
-          .row = "each adhesion",
           .columns = in_cell<files::ForceOnAdhesion>(
               {of_adhesion({"adhesion_id", "x_um", "y_um", "area_um2", "eccentricity"}),
                files::adhesion_force_table().columns.without({"adhesion_id", "x_um", "y_um", "area_um2"}),
@@ -222,60 +204,47 @@ using FibreRow = InCell<MeasuredTension>;
 Table<FibreRow> fibre_table() {
   return {
       .file = "statistics/fibres.csv",
-      .row = "each fibre with a tension",
       .columns = in_cell<MeasuredTension>(
           {columns_of(fibre_of,
                       files::fibre_table().columns.only({"fibre_id", "type", "length_um", "width_um", "confidence"})),
            columns_of(&MeasuredTension::tension,
                       files::tension_table().columns.without({"fibre_id", "type", "sigma_nN"})),
-           {"sigma_nN",
-            "standard error that the statistics take: half the interval over 1.96, the upper half if 0 cuts the lower",
-            [](const MeasuredTension& row) { return standard_error_nN(row.tension.tension); }, kResult}})};
+           {"sigma_nN", [](const MeasuredTension& row) { return standard_error_nN(row.tension.tension); }, kResult}})};
 }
 
 using SpaceForceRow = InCell<SpaceFigures::OfAdhesion>;
 Table<SpaceForceRow> space_force_table() {
   using Of = SpaceFigures::OfAdhesion;
   return {.file = "statistics/adhesions_in_space.csv",
-          .row = "each adhesion of a cell in space",
-          .columns = in_cell<Of>({{"adhesion_id", "label of the adhesion", &Of::adhesion_id},
-                                  {"force_nN", "size of its force", &Of::force_nN},
-                                  {"sigma_nN", "standard error along the force", &Of::sigma_nN}})};
+          .columns = in_cell<Of>(
+              {{"adhesion_id", &Of::adhesion_id}, {"force_nN", &Of::force_nN}, {"sigma_nN", &Of::sigma_nN}})};
 }
 
 using EstimateRow = InCell<SheetEstimate>;
 Table<EstimateRow> estimate_table() {
-  return {
-      .file = "statistics/sheets.csv",
-      .row = "each number of a sheet that its beads were asked for",
-      .columns = in_cell<SheetEstimate>(
-          {files::sheet_estimate_table().columns.only({"quantity", "part", "value", "low", "high", "identifiable"}),
-           {"kind", "as which it counts: the sheet, or the kind of part, without its label",
-            [](const SheetEstimate& e) { return kind_of_part(e); }},
-           {"enters", "the statistics: the beads limit it to both sides, and it was not given",
-            [](const SheetEstimate& e) { return enters(e); }},
-           {"sigma",
-            "standard error that the statistics take: that of the fit without what the gel's numbers, its model and "
-            "a contraction that varies add, which sheets share",
-            [](const SheetEstimate& e) { return own_error(e); }, kResult}})};
+  return {.file = "statistics/sheets.csv",
+          .columns = in_cell<SheetEstimate>(
+              {files::sheet_estimate_table().columns.only({"quantity", "part", "value", "low", "high", "identifiable"}),
+               {"kind", [](const SheetEstimate& e) { return kind_of_part(e); }},
+               {"enters", [](const SheetEstimate& e) { return enters(e); }},
+               {"sigma", [](const SheetEstimate& e) { return own_error(e); }, kResult}})};
 }
 
 /// @param unit  begins with an underscore or is empty
 Columns<Summary> summary_columns(const std::string& counted, const std::string& unit) {
   using S = Summary;
   const auto plain = [](auto figure) { return member(&S::plain, figure); };
-  return {{"n_cells", "cells", &S::n_cells},
-          {"n_" + counted, counted, &S::n},
-          {"mean" + unit, "each counts the same", plain(&Description::mean), kResult},
-          ends_of("mean_low" + unit, "mean_high" + unit, "the mean, cells resampled", &S::mean_interval),
-          {"model_mean" + unit, "mean of the mixed model", member(&S::model, &Contrast::estimate), kResult},
-          ends_of("model_low" + unit, "model_high" + unit, "that mean", &S::model),
-          {"median" + unit, "each counts the same", plain(&Description::median), kResult},
-          ends_of("median_low" + unit, "median_high" + unit, "the median, cells resampled", &S::median_interval),
-          {"sd" + unit, "standard deviation", plain(&Description::standard_deviation), kResult},
-          {"typical_error" + unit, "root mean square of the standard errors", &S::typical_error, kResult},
-          {"sd_without_error" + unit, "what is left of the one without the other",
-           member(&S::without_error, &Deconvolved::standard_deviation), kResult}};
+  return {{"n_cells", &S::n_cells},
+          {"n_" + counted, &S::n},
+          {"mean" + unit, plain(&Description::mean), kResult},
+          ends_of("mean_low" + unit, "mean_high" + unit, &S::mean_interval),
+          {"model_mean" + unit, member(&S::model, &Contrast::estimate), kResult},
+          ends_of("model_low" + unit, "model_high" + unit, &S::model),
+          {"median" + unit, plain(&Description::median), kResult},
+          ends_of("median_low" + unit, "median_high" + unit, &S::median_interval),
+          {"sd" + unit, plain(&Description::standard_deviation), kResult},
+          {"typical_error" + unit, &S::typical_error, kResult},
+          {"sd_without_error" + unit, member(&S::without_error, &Deconvolved::standard_deviation), kResult}};
 }
 
 /// A share of the fibres above a tension; of a cell without its interval.
@@ -292,15 +261,13 @@ struct TypeRow {
 Table<TypeRow> type_table(const std::vector<double>& thresholds_nN) {
   Table<TypeRow> table{
       .file = "statistics/types.csv",
-      .row = "each condition and type, and each cell's",
-      .columns = {{"condition", "empty: none was asked for", member(&TypeRow::summary, &Summary::condition)},
-                  {"cell", "`all`, or the cell",
-                   [](const TypeRow& row) { return row.summary.cell.empty() ? std::string("all") : row.summary.cell; }},
-                  {"type", "of the fibres", member(&TypeRow::summary, &Summary::kind)},
-                  columns_of(&TypeRow::summary, summary_columns("fibres", "_nN"))}};
+      .columns = {
+          {"condition", member(&TypeRow::summary, &Summary::condition)},
+          {"cell", [](const TypeRow& row) { return row.summary.cell.empty() ? std::string("all") : row.summary.cell; }},
+          {"type", member(&TypeRow::summary, &Summary::kind)},
+          columns_of(&TypeRow::summary, summary_columns("fibres", "_nN"))}};
   for (std::size_t k = 0; k < thresholds_nN.size(); ++k) {
     const std::string name = fmt::format("fraction_above_{:g}_nN", thresholds_nN[k]);
-    const std::string interval = " end of the 95 % interval of the share (Wilson's, at the effective number of fibres)";
     const auto of = [k](auto figure) {
       return [k, figure](const TypeRow& row) {
         return k < row.shares.size() ? figure(row.shares[k]) : figure(ShareRow{});
@@ -308,12 +275,11 @@ Table<TypeRow> type_table(const std::vector<double>& thresholds_nN) {
     };
     const auto low = [](const ShareRow& s) { return s.interval ? Number(s.interval->low) : Number(); };
     const auto high = [](const ShareRow& s) { return s.interval ? Number(s.interval->high) : Number(); };
-    table.columns.push_back({{name, "share of the fibres above this tension",
-                              of([](const ShareRow& s) { return Number(s.value); }), kResult},
-                             {name + "_low", "lower" + interval, of(low), kResult},
-                             {name + "_high", "upper" + interval, of(high), kResult},
-                             {name + "_without_error", "the share, the blur of the errors removed",
-                              of([](const ShareRow& s) { return s.without_error; }), kResult}});
+    table.columns.push_back(
+        {{name, of([](const ShareRow& s) { return Number(s.value); }), kResult},
+         {name + "_low", of(low), kResult},
+         {name + "_high", of(high), kResult},
+         {name + "_without_error", of([](const ShareRow& s) { return s.without_error; }), kResult}});
   }
   return table;
 }
@@ -354,10 +320,9 @@ struct QuantityRow {
 Table<QuantityRow> summary_table() {
   using Row = QuantityRow;
   return {.file = "statistics/summaries.csv",
-          .row = "each quantity, condition and kind",
-          .columns = {{"quantity", "with its unit", &Row::quantity},
-                      {"condition", "empty: none was asked for", member(&Row::summary, &Summary::condition)},
-                      {"kind", "of fibres, adhesions, cells, sheets or bundles", member(&Row::summary, &Summary::kind)},
+          .columns = {{"quantity", &Row::quantity},
+                      {"condition", member(&Row::summary, &Summary::condition)},
+                      {"kind", member(&Row::summary, &Summary::kind)},
                       columns_of(&Row::summary, summary_columns("observations", ""))}};
 }
 
@@ -369,11 +334,10 @@ struct VarianceRow {
 Table<VarianceRow> variance_table() {
   using Row = VarianceRow;
   return {.file = "statistics/variances.csv",
-          .row = "each component of the mixed model's scatter",
-          .columns = {{"quantity", "with its unit", &Row::quantity},
-                      {"component", "between cells, between the kinds of a cell, or within a kind", &Row::component},
-                      {"standard_deviation", "of the component", &Row::standard_deviation, kResult},
-                      {"remark", "why it is zero or empty", &Row::remark}}};
+          .columns = {{"quantity", &Row::quantity},
+                      {"component", &Row::component},
+                      {"standard_deviation", &Row::standard_deviation, kResult},
+                      {"remark", &Row::remark}}};
 }
 
 /// The scatter between cells, between the kinds of a cell and within them.
@@ -400,25 +364,24 @@ Table<Comparison> test_table() {
   const auto pair = +[](const Row& t) { return t.group_b.empty() ? nullptr : &t; };
   const auto with_effect = +[](const Row& t) { return t.effect_name.empty() ? nullptr : &t; };
   return {.file = "statistics/tests.csv",
-          .row = "each test",
-          .columns = {{"quantity", "what is compared, with its unit", &Row::column},
-                      {"question", "between kinds or between conditions", &Row::question},
-                      {"within", "which condition, or kind, all groups share", &Row::within},
-                      {"test", "its name", &Row::test},
-                      {"unit", "what counts as independent", &Row::unit},
-                      {"group_a", "the first group", &Row::group_a},
-                      {"group_b", "the second; empty: all groups together", &Row::group_b},
-                      {"n_a", "observations of the first group", &Row::n_a},
-                      {"n_b", "observations of the second", member(pair, &Row::n_b)},
-                      {"cells_a", "cells of the first group", &Row::cells_a},
-                      {"cells_b", "cells of the second", member(pair, &Row::cells_b)},
-                      {"statistic", "of the test", &Row::statistic, kResult},
-                      {"degrees_of_freedom", "of the statistic's denominator", &Row::degrees, kResult},
-                      {"p", "chance of such a difference or a larger one if there is none", &Row::p_value, kResult},
-                      {"p_holm", "corrected over the pairs that one question compares", &Row::p_holm, kResult},
-                      {"effect", "how large the difference is", member(with_effect, &Row::effect), kResult},
-                      {"effect_is", "what the effect is", &Row::effect_name},
-                      ends_of("effect_low", "effect_high", "the effect", &Row::interval)}};
+          .columns = {{"quantity", &Row::column},
+                      {"question", &Row::question},
+                      {"within", &Row::within},
+                      {"test", &Row::test},
+                      {"unit", &Row::unit},
+                      {"group_a", &Row::group_a},
+                      {"group_b", &Row::group_b},
+                      {"n_a", &Row::n_a},
+                      {"n_b", member(pair, &Row::n_b)},
+                      {"cells_a", &Row::cells_a},
+                      {"cells_b", member(pair, &Row::cells_b)},
+                      {"statistic", &Row::statistic, kResult},
+                      {"degrees_of_freedom", &Row::degrees, kResult},
+                      {"p", &Row::p_value, kResult},
+                      {"p_holm", &Row::p_holm, kResult},
+                      {"effect", member(with_effect, &Row::effect), kResult},
+                      {"effect_is", &Row::effect_name},
+                      ends_of("effect_low", "effect_high", &Row::interval)}};
 }
 
 std::vector<Comparison> test_rows(const Analysis& analysis) {
@@ -429,69 +392,60 @@ std::vector<Comparison> test_rows(const Analysis& analysis) {
 
 Table<Correlation> correlation_table() {
   using Row = Correlation;
-  return {
-      .file = "statistics/correlations.csv",
-      .row = "each force, size and condition",
-      .columns = {{"force", "column of cells.csv; fttc_force_nN: total force by FTTC; or a size", &Row::force},
-                  {"size", "column of cells.csv", &Row::size},
-                  {"condition", "empty: none was asked for", &Row::condition},
-                  {"n_cells", "cells", [](const Row& c) { return static_cast<int>(c.x.size()); }},
-                  {"slope", "of the line through the origin; empty below five cells",
-                   member(&Row::line, &LineThroughOrigin::slope), kResult},
-                  {"slope_error", "its standard error", member(&Row::line, &LineThroughOrigin::slope_error), kResult},
-                  ends_of("slope_low", "slope_high", "the slope, cells resampled", &Row::slope_interval),
-                  {"r", "Pearson's correlation; empty below five cells",
-                   member(&Row::line, &LineThroughOrigin::correlation), kResult}}};
+  return {.file = "statistics/correlations.csv",
+          .columns = {{"force", &Row::force},
+                      {"size", &Row::size},
+                      {"condition", &Row::condition},
+                      {"n_cells", [](const Row& c) { return static_cast<int>(c.x.size()); }},
+                      {"slope", member(&Row::line, &LineThroughOrigin::slope), kResult},
+                      {"slope_error", member(&Row::line, &LineThroughOrigin::slope_error), kResult},
+                      ends_of("slope_low", "slope_high", &Row::slope_interval),
+                      {"r", member(&Row::line, &LineThroughOrigin::correlation), kResult}}};
 }
 
 Table<AreaBin> area_bin_table() {
   using Row = AreaBin;
   return {.file = "statistics/adhesion_bins.csv",
-          .row = "each condition, connected or not, and bin of area",
-          .columns = {{"condition", "empty: none was asked for", &Row::condition},
-                      {"connected", "fibres end on the adhesions", &Row::is_connected},
-                      {"area_low_um2", "lower end of the bin", &Row::low_um2, kResult},
-                      {"area_high_um2", "upper end of the bin", &Row::high_um2, kResult},
-                      {"n_cells", "cells", &Row::n_cells},
-                      {"n_adhesions", "adhesions", &Row::n_adhesions},
-                      {"mean_area_um2", "of the adhesions", &Row::mean_area_um2, kResult},
-                      {"mean_force_nN", "of the adhesions", &Row::mean_force_nN, kResult},
-                      ends_of("low_nN", "high_nN", "the mean force, cells resampled", &Row::interval_nN)}};
+          .columns = {{"condition", &Row::condition},
+                      {"connected", &Row::is_connected},
+                      {"area_low_um2", &Row::low_um2, kResult},
+                      {"area_high_um2", &Row::high_um2, kResult},
+                      {"n_cells", &Row::n_cells},
+                      {"n_adhesions", &Row::n_adhesions},
+                      {"mean_area_um2", &Row::mean_area_um2, kResult},
+                      {"mean_force_nN", &Row::mean_force_nN, kResult},
+                      ends_of("low_nN", "high_nN", &Row::interval_nN)}};
 }
 
 Table<InCell<Direction>> direction_table() {
   return {.file = "statistics/directions.csv",
-          .row = "each angle at an adhesion",
-          .columns = in_cell<Direction>({{"relation", "between what", &Direction::relation},
-                                         {"adhesion_id", "the adhesion", &Direction::adhesion_id},
-                                         {"fibre_id", "the fibre, if there is one", &Direction::fibre_id},
-                                         {"angle_deg", "the angle", &Direction::angle_deg, kResult}})};
+          .columns = in_cell<Direction>({{"relation", &Direction::relation},
+                                         {"adhesion_id", &Direction::adhesion_id},
+                                         {"fibre_id", &Direction::fibre_id},
+                                         {"angle_deg", &Direction::angle_deg, kResult}})};
 }
 
 Table<DirectionSummary> direction_mean_table() {
   using Row = DirectionSummary;
   return {.file = "statistics/direction_means.csv",
-          .row = "each relation and condition",
-          .columns = {{"relation", "between what", &Row::relation},
-                      {"condition", "empty: none was asked for", &Row::condition},
-                      {"n_cells", "cells", &Row::n_cells},
-                      {"n", "angles", &Row::n},
-                      {"mean_angle_deg", "their mean", &Row::mean_angle_deg, kResult},
-                      ends_of("low_deg", "high_deg", "the mean, cells resampled", &Row::angle_interval_deg),
-                      {"chance_deg", "what chance would give",
-                       [](const Row& row) { return largest_angle_deg(row.relation) / 2; }, kResult},
-                      {"mean_cosine", "the same of the cosines", &Row::mean_cosine, kResult},
-                      ends_of("cosine_low", "cosine_high", "that mean, cells resampled", &Row::cosine_interval)}};
+          .columns = {{"relation", &Row::relation},
+                      {"condition", &Row::condition},
+                      {"n_cells", &Row::n_cells},
+                      {"n", &Row::n},
+                      {"mean_angle_deg", &Row::mean_angle_deg, kResult},
+                      ends_of("low_deg", "high_deg", &Row::angle_interval_deg),
+                      {"chance_deg", [](const Row& row) { return largest_angle_deg(row.relation) / 2; }, kResult},
+                      {"mean_cosine", &Row::mean_cosine, kResult},
+                      ends_of("cosine_low", "cosine_high", &Row::cosine_interval)}};
 }
 
 Table<InCell<Finding>> finding_table() {
   return {.file = "statistics/findings.csv",
-          .row = "each finding of a cell",
-          .columns = in_cell<Finding>({{"id", "see findings.md", &Finding::id},
-                                       {"severity", "how much it weighs", &Finding::severity},
-                                       {"number", "what was measured", &Finding::number, kResult},
-                                       {"threshold", "from where on it is a finding", &Finding::threshold, kResult},
-                                       {"text", "a sentence", &Finding::text}})};
+          .columns = in_cell<Finding>({{"id", &Finding::id},
+                                       {"severity", &Finding::severity},
+                                       {"number", &Finding::number, kResult},
+                                       {"threshold", &Finding::threshold, kResult},
+                                       {"text", &Finding::text}})};
 }
 
 std::vector<QuantityRow> summary_rows(const Analysis& analysis) {

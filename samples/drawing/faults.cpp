@@ -25,16 +25,16 @@ Vec2 place_beside(const Cell& cell, double clearance_um, double field_um, Random
 }  // namespace
 
 void declare(stage::ParameterList& list, FaultParameters& p) {
-  list.add("n_specks", p.n_specks, Range::between(0, 1000), {});
-  list.add("speck_brightness", p.speck_brightness, Range::factor(), {});
-  list.add("n_dead_cells", p.n_dead_cells, Range::between(0, 100), {});
-  list.add("relaxed_defocus", p.relaxed_defocus, Range::between(1, 10), {});
-  list.add("stressed_defocus", p.stressed_defocus, Range::between(1, 10), {});
-  list.add("light_lost", p.light_lost, Range::between(0, 0.95), {});
-  list.add("saturated", p.saturated, Range::between(0, 0.5), {});
-  list.add("padding_px", p.padding_px, Range::between(0, 8192), {});
-  list.add("scale_bar_px", p.scale_bar_px, Range::between(0, 8192), {});
-  list.add("n_hot_pixels", p.n_hot_pixels, Range::between(0, 100000), {});
+  list.add("n_specks", p.n_specks, Range::between(0, 1000));
+  list.add("speck_brightness", p.speck_brightness, Range::factor());
+  list.add("n_dead_cells", p.n_dead_cells, Range::between(0, 100));
+  list.add("relaxed_defocus", p.relaxed_defocus, Range::between(1, 10));
+  list.add("stressed_defocus", p.stressed_defocus, Range::between(1, 10));
+  list.add("light_lost", p.light_lost, Range::between(0, 0.95));
+  list.add("saturated", p.saturated, Range::between(0, 0.5));
+  list.add("padding_px", p.padding_px, Range::between(0, 8192));
+  list.add("scale_bar_px", p.scale_bar_px, Range::between(0, 8192));
+  list.add("n_hot_pixels", p.n_hot_pixels, Range::between(0, 100000));
 }
 
 void add_debris(const Cell& cell, const FaultParameters& f, std::uint64_t seed, images::Image& paxillin,

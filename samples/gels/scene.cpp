@@ -405,21 +405,20 @@ void require_room(const SpaceParameters& p, const SceneSize& size, const Surface
 
 void declare(stage::ParameterList& list, SpaceParameters& p) {
   list.table("space");
-  list.add("scene", p.scene, "a cell on a gel in space, with exact fields; none: a cell in the plane");
-  list.add("traction_kPa", p.traction_kPa, Range::modulus_kPa(), {});
-  list.add("bead_depth_um", p.bead_depth_um, Range::size_um(), {});
-  list.add("axial_noise", p.axial_noise, Range::factor(), {});
-  list.add("outlier_fraction", p.outlier_fraction, Range::between(0, 1), {});
-  list.add("outlier_box_um", p.outlier_box_um, Range::size_um(), {});
-  list.add("surface_beads", p.surface_beads, Range::between(0, 1000000),
-           "number of beads of another colour on the surface (with images)");
-  list.add("z_step_um", p.z_step_um, Range::mesh_um(), {});
-  list.add("numerical_aperture", p.numerical_aperture, Range::between(0.2, 1.25), {});
-  list.add("gel_index", p.gel_index, Range::between(1.3, 1.6), {});
-  list.add("immersion_index", p.immersion_index, Range::between(1.3, 1.6), {});
-  list.add("peak_photons", p.peak_photons, Range::between(1, 1e6), {});
-  list.add("bleached", p.bleached, Range::between(0, 0.9), {});
-  list.add("slice_drift_um", p.slice_drift_um, Range::between(0, 10), {});
+  list.add("scene", p.scene);
+  list.add("traction_kPa", p.traction_kPa, Range::modulus_kPa());
+  list.add("bead_depth_um", p.bead_depth_um, Range::size_um());
+  list.add("axial_noise", p.axial_noise, Range::factor());
+  list.add("outlier_fraction", p.outlier_fraction, Range::between(0, 1));
+  list.add("outlier_box_um", p.outlier_box_um, Range::size_um());
+  list.add("surface_beads", p.surface_beads, Range::between(0, 1000000));
+  list.add("z_step_um", p.z_step_um, Range::mesh_um());
+  list.add("numerical_aperture", p.numerical_aperture, Range::between(0.2, 1.25));
+  list.add("gel_index", p.gel_index, Range::between(1.3, 1.6));
+  list.add("immersion_index", p.immersion_index, Range::between(1.3, 1.6));
+  list.add("peak_photons", p.peak_photons, Range::between(1, 1e6));
+  list.add("bleached", p.bleached, Range::between(0, 0.9));
+  list.add("slice_drift_um", p.slice_drift_um, Range::between(0, 10));
 }
 
 HeightMap map_of(const GelScene& scene) {

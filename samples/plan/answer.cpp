@@ -5,10 +5,13 @@
 #include <functional>
 
 #include "pipeline/contract/counted.h"
+#include "pipeline/report/texts.h"
 
 namespace mbtfm::plan {
 
 namespace {
+
+using report::sentence;
 
 std::string percent(double share) { return brief(100 * share) + " %"; }
 
@@ -28,16 +31,15 @@ const Needed& needed_of(const std::vector<Needed>& needed, double youngs_modulus
 /// "With your gel of 8 kPa and a noise of 0.05 µm"
 std::string with_gel(const Asked& asked, double own_kPa) {
   const double gel_kPa = answered_gel_kPa(asked, own_kPa);
-  return "With " + std::string(gel_kPa == own_kPa ? "your" : "a") + " gel of " + brief(gel_kPa) +
-         " kPa and a noise of " + brief(asked.noise_um.front()) + " µm";
+  return sentence("plan.with-gel", gel_kPa == own_kPa ? "your" : "a", brief(gel_kPa), brief(asked.noise_um.front()));
 }
 
 /// "; a gel of 4 kPa needs 0.15, one of 16 kPa needs 1.2": of all gels but one. @param needs  what follows "needs"
 std::string of_other_gels(const Asked& asked, double gel_kPa, const std::function<std::string(double)>& needs) {
-  std::string text;
+  std::string list;
   for (const double E : asked.youngs_modulus_kPa)
-    if (E != gel_kPa) text += (text.empty() ? "; a gel of " : ", one of ") + brief(E) + " kPa needs " + needs(E);
-  return text;
+    if (E != gel_kPa) list += sentence("plan.other-gel", list.empty() ? "; a gel" : ", one", brief(E), needs(E));
+  return list;
 }
 
 /// What drawn experiments may be off by beyond chance: as much as such plans are off by anyway (docs/planning.md).
@@ -46,12 +48,17 @@ double allowed_of(const Drawn& d) {
   return 2 * d.by_chance + kMargin;
 }
 
-/// "Checked with 2 simulated experiments at 8 kPa, … of 1). ". @param density, what  "0.5 beads per µm²", "12 tensions"
-std::string checked_with(const Drawn& d, const std::string& density, const std::string& what) {
-  return "Checked with " + counted(d.n_experiments, "simulated experiments") + " at " +
-         brief(d.point.youngs_modulus_kPa) + " kPa, " + density + " and " + brief(d.point.noise_um) +
-         " µm: the errors of " + what + " were " + about(d.error_over_predicted) +
-         " times those predicted (root mean square; by chance within " + about(2 * d.by_chance) + " of 1). ";
+/// @param density, what  "0.5 beads per µm²", "12 tensions"
+std::string checked_with(const Drawn& d, const std::string& density, const std::string& what, const char* verdict) {
+  return sentence("plan.checked", counted(d.n_experiments, "simulated experiments"), brief(d.point.youngs_modulus_kPa),
+                  density, brief(d.point.noise_um), what, about(d.error_over_predicted), about(2 * d.by_chance),
+                  sentence(verdict));
+}
+
+/// Whether two of them are told apart. @param touching_um  below it they touch
+std::string apart(std::optional<double> least_distance_um, double touching_um) {
+  if (!least_distance_um) return sentence("plan.never-apart");
+  return sentence(*least_distance_um > touching_um ? "plan.apart" : "plan.apart-touching", about(*least_distance_um));
 }
 
 // --- a flat cell
@@ -59,66 +66,52 @@ std::string checked_with(const Drawn& d, const std::string& density, const std::
 std::string about_adhesions(const Plan& plan, const Point& p) {
   const Expected& with = expected_of(plan.grid, p, Quantity::adhesion_force);
   const Expected& alone = expected_of(plan.grid, p, Quantity::free_force);
-  std::string text = "At " + about(p.density) + " per µm² the force of the middle adhesion has a standard error of " +
-                     about(with.standard_error_nN) + " nN with the network and " + about(alone.standard_error_nN) +
-                     " nN without it, and FTTC errs by " +
-                     about(expected_of(plan.grid, p, Quantity::fttc_force).standard_error_nN) +
-                     " nN; the smallest force seen is three times that. ";
-  const std::string pair = "Without the network two adhesions of " + brief(plan.asked.tension_nN) + " nN each are ";
-  if (!alone.least_distance_um) return text + pair + "not told apart at any distance in a cell.";
-  const std::string distance = about(*alone.least_distance_um) + " µm";
-  return text + pair +
-         (*alone.least_distance_um > plan.grid.touching_um ? "told apart if they are " + distance + " apart or more"
-                                                           : "told apart even where they touch, at " + distance) +
-         ".";
+  return sentence("plan.adhesions", about(p.density), about(with.standard_error_nN), about(alone.standard_error_nN),
+                  about(expected_of(plan.grid, p, Quantity::fttc_force).standard_error_nN),
+                  brief(plan.asked.tension_nN), apart(alone.least_distance_um, plan.grid.touching_um));
 }
 
 /// Nothing where not even half of the fibres meet the target.
 std::string about_most_fibres(const Plan& plan, const Needed& n) {
   if (!n.density) return "";
-  const std::string half = "That holds for half of the fibres. ";
-  if (!n.of_most)
-    return half +
-           "No number of beads brings nine in ten there: for some, mesh and segmentation alone make a larger error.";
+  if (!n.of_most) return sentence("plan.most-never");
   if (*n.of_most <= plan.most_beads_per_um2)
-    return half + "Nine in ten need " + density_text(plan.asked.densities, *n.of_most) + " beads per µm².";
-  return half + "Nine in ten need " + about(*n.of_most) + " beads per µm², more than the " +
-         about(plan.most_beads_per_um2) + " that can be told apart.";
+    return sentence("plan.most", "fibres", density_text(plan.asked.densities, *n.of_most), "µm²");
+  return sentence("plan.most-too-dense", about(*n.of_most), about(plan.most_beads_per_um2));
 }
 
 std::string about_cells(const Plan& plan) {
-  std::string text;
+  std::string list;
   for (const CellNumbers& n : plan.cells) {
     if (n.difference != plan.parameters.difference) continue;
     if (n.fibres_per_cell != std::max(1.0, std::round(n.scatter.fibres_per_cell))) continue;
-    text += (text.empty() ? "" : ", ") + std::string(n.cells ? std::to_string(*n.cells) : "more than 10000") +
-            " cells for " + name_of(n.scatter.type) + "s (" + brief(n.fibres_per_cell) + " in each cell)";
+    list += (list.empty() ? "" : ", ") + sentence("plan.cells-of-type",
+                                                  n.cells ? std::to_string(*n.cells) : "more than 10000",
+                                                  name_of(n.scatter.type), brief(n.fibres_per_cell));
   }
-  if (text.empty()) return text;
-  return "To see a difference of " + percent(plan.parameters.difference) + " between two conditions with a chance of " +
-         percent(plan.parameters.power) + ", each condition needs " + text + ".";
+  if (list.empty()) return list;
+  return sentence("plan.cells", percent(plan.parameters.difference), percent(plan.parameters.power), list);
 }
 
 std::string about_drawn(const Drawn& d) {
   if (d.numbers.empty()) return "";
   constexpr double kUseless = 0.5;  // of chance: fewer than eight tensions
-  const char* verdict = 2 * d.by_chance > kUseless ? "So few tensions hardly check the plan. "
-                        : std::abs(d.error_over_predicted - 1) < allowed_of(d)
-                            ? "The plan holds. "
-                            : "The plan does not hold well here: allow for that factor. ";
+  const char* verdict = 2 * d.by_chance > kUseless                             ? "plan.too-few-drawn"
+                        : std::abs(d.error_over_predicted - 1) < allowed_of(d) ? "plan.holds"
+                                                                               : "plan.does-not-hold";
   return checked_with(d, brief(d.point.density) + (d.point.density == 1 ? " bead" : " beads") + " per µm²",
-                      counted(std::ssize(d.numbers), "tensions")) +
-         verdict + "Single adhesions' forces were off by " + about(d.forces.with_network_nN) +
-         " nN with the network, by " + about(d.forces.alone_nN) + " nN without it, and by " + about(d.forces.fttc_nN) +
-         " nN with FTTC.";
+                      counted(std::ssize(d.numbers), "tensions"), verdict) +
+         " " +
+         sentence("plan.drawn-forces", about(d.forces.with_network_nN), about(d.forces.alone_nN),
+                  about(d.forces.fttc_nN));
 }
 
 /// Why no number of beads suffices. @param densest  of the points asked for
 std::string why_none(const Plan& plan, const Point& densest) {
   if (plan.grid.model_error_nN >= plan.asked.target_nN)
-    return "networks and segmentation alone make an error of " + about(plan.grid.model_error_nN) + " nN.";
-  return "with " + brief(densest.density) + " per µm² the noise alone makes an error of " +
-         about(expected_of(plan.grid, densest, Quantity::fibres).from_beads_nN) + " nN.";
+    return sentence("plan.model-alone", about(plan.grid.model_error_nN));
+  return sentence("plan.noise-alone", brief(densest.density),
+                  about(expected_of(plan.grid, densest, Quantity::fibres).from_beads_nN));
 }
 
 // --- in space
@@ -140,23 +133,14 @@ std::string needed_text(const SpacePlan& plan, std::optional<double> beads_per_u
                        : "more than " + about(most_beads_per_um3(plan.asked.densities));
 }
 
-std::string about_pair(const SpacePlan& plan, std::optional<double> least_distance_um) {
-  const std::string pair = "Where the image shows two patches of " + brief(plan.asked.tension_nN) +
-                           " nN each, and nothing else pulls, their forces are ";
-  return pair + (least_distance_um ? "told apart if they are " + about(*least_distance_um) + " µm apart or more."
-                                   : "not told apart at any distance in a cell.");
-}
-
 /// Standard errors allow for tractions beside the patches. Where there are none, experiments err by less.
 std::string about_drawn_in_space(const Drawn& d) {
   const double allowed = allowed_of(d);
-  const char* verdict = "The plan holds.";
-  if (d.error_over_predicted > 1 + allowed) verdict = "The plan does not hold well here: allow for that factor.";
-  if (d.error_over_predicted < 1 - allowed)
-    verdict = "The plan is on the safe side: it allows for forces beside the patches, of which there are few here.";
+  const char* verdict = d.error_over_predicted > 1 + allowed   ? "plan.does-not-hold"
+                        : d.error_over_predicted < 1 - allowed ? "plan.on-safe-side"
+                                                               : "plan.holds";
   return checked_with(d, brief(d.point.density) + " beads per µm³",
-                      std::to_string(d.numbers.size()) + " components of forces") +
-         verdict;
+                      std::to_string(d.numbers.size()) + " components of forces", verdict);
 }
 
 }  // namespace
@@ -177,35 +161,35 @@ Point answered_point(const Asked& asked, const std::vector<Needed>& needed, doub
 }
 
 std::string answer_sentence(const Plan& plan) {
-  if (plan.grid.needed.empty()) return "The cell has no stress fibre whose tension could be seen.";
+  if (plan.grid.needed.empty()) return sentence("plan.no-fibre");
   const double gel_kPa = answered_gel_kPa(plan.asked, plan.own_kPa), noise_um = plan.asked.noise_um.front();
-  const std::string asked_for =
-      "to see " + brief(plan.asked.tension_nN) + " nN per fibre to " + percent(plan.asked.within);
-  const std::string with = with_gel(plan.asked, plan.own_kPa) + " ";
+  const std::string with = with_gel(plan.asked, plan.own_kPa), tension = brief(plan.asked.tension_nN),
+                    within = percent(plan.asked.within);
   const Needed& n = needed_of(plan.grid.needed, gel_kPa, noise_um);
   const std::string others = of_other_gels(plan.asked, gel_kPa, [&](double E) {
     const Needed& other = needed_of(plan.grid.needed, E, noise_um);
     return can_be_had(other, plan.most_beads_per_um2) ? density_text(plan.asked.densities, *other.density)
-                                                      : std::string("more beads than can be told apart");
+                                                      : sentence("plan.too-dense");
   });
   if (!n.density)
-    return with + "no number of beads suffices " + asked_for + ": " +
-           why_none(plan, {gel_kPa, plan.asked.densities.back(), noise_um});
+    return sentence("plan.answer-none", with, tension, within,
+                    why_none(plan, {gel_kPa, plan.asked.densities.back(), noise_um}));
   if (!can_be_had(n, plan.most_beads_per_um2))
-    return with + "you would need " + about(*n.density) + " beads per µm² " + asked_for + ", more than the " +
-           about(plan.most_beads_per_um2) + " that can be told apart" + others + ".";
-  return with + "you need " + density_text(plan.asked.densities, *n.density) + " beads per µm² " + asked_for + others +
-         ".";
+    return sentence("plan.answer-too-dense", with, about(*n.density), tension, within, about(plan.most_beads_per_um2),
+                    others);
+  return sentence("plan.answer", with, density_text(plan.asked.densities, *n.density) + " beads per µm²", tension,
+                  "fibre", within, others);
 }
 
 std::string answer_sentence(const SpacePlan& plan) {
   const double gel_kPa = answered_gel_kPa(plan.asked, plan.own_kPa), noise_um = plan.asked.noise_um.front();
   const auto needed = [&](double E) { return needed_of(plan.grid.needed, E, noise_um).density; };
   const std::optional<double> n = needed(gel_kPa);
-  return with_gel(plan.asked, plan.own_kPa) + " (" + brief(plan.axial_noise * noise_um) + " µm along z) you need " +
-         (n ? beads_text(plan, needed_text(plan, n), *n) : needed_text(plan, n) + " beads per µm³") + " to see " +
-         brief(plan.asked.tension_nN) + " nN per patch to " + percent(plan.asked.within) +
-         of_other_gels(plan.asked, gel_kPa, [&](double E) { return needed_text(plan, needed(E)); }) + ".";
+  return sentence("plan.answer",
+                  with_gel(plan.asked, plan.own_kPa) + " (" + brief(plan.axial_noise * noise_um) + " µm along z)",
+                  n ? beads_text(plan, needed_text(plan, n), *n) : needed_text(plan, n) + " beads per µm³",
+                  brief(plan.asked.tension_nN), "patch", percent(plan.asked.within),
+                  of_other_gels(plan.asked, gel_kPa, [&](double E) { return needed_text(plan, needed(E)); }));
 }
 
 std::vector<std::string> further_sentences(const Plan& plan) {
@@ -227,18 +211,13 @@ std::vector<std::string> further_sentences(const SpacePlan& plan) {
     return about(expected_of(plan.grid, point, quantity).standard_error_nN) + " nN";
   };
   std::vector<std::string> sentences;
-  if (n.density)
-    sentences.push_back("That holds for half of the patches. Nine in ten need " + needed_text(plan, n.of_most) +
-                        " beads per µm³.");
+  if (n.density) sentences.push_back(sentence("plan.most", "patches", needed_text(plan, n.of_most), "µm³"));
   const SpaceExpected& patch = expected_of(plan.grid, point, SpaceQuantity::force);
-  sentences.push_back("At " + beads_text(plan, about(point.density), point.density) +
-                      " the force of the middle patch has a standard error of " + error(SpaceQuantity::force) + ", " +
-                      error(SpaceQuantity::tangential_force) + " along the surface and " +
-                      error(SpaceQuantity::normal_force) + " normal to it; the total force has " +
-                      error(SpaceQuantity::total_force) + ", the net force " + error(SpaceQuantity::net_force) +
-                      ". The smallest force seen is three times the patch's error. In the map, forces closer than " +
-                      about(*patch.resolution_um) + " µm look like one; from twice that they mostly look like two.");
-  sentences.push_back(about_pair(plan, patch.least_distance_um));
+  sentences.push_back(sentence("plan.patch", beads_text(plan, about(point.density), point.density),
+                               error(SpaceQuantity::force), error(SpaceQuantity::tangential_force),
+                               error(SpaceQuantity::normal_force), error(SpaceQuantity::total_force),
+                               error(SpaceQuantity::net_force), about(*patch.resolution_um)));
+  sentences.push_back(sentence("plan.pair", brief(plan.asked.tension_nN), apart(patch.least_distance_um, 0)));
   if (plan.drawn) sentences.push_back(about_drawn_in_space(*plan.drawn));
   return sentences;
 }

@@ -7,6 +7,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/report/texts.h"
 #include "samples/plan/adhesion_pair.h"
 #include "substrate/choice/large_strain.h"
 
@@ -200,15 +201,11 @@ std::optional<double> density_of_share(std::vector<double> needed, double share)
 }
 
 std::string sentence_of_noise(double youngs_modulus_kPa, double largest_um, double noise_um) {
-  return "On " + brief(youngs_modulus_kPa) + " kPa no bead moves by more than " + brief(largest_um) +
-         " µm, less than three times the noise of " + brief(noise_um) +
-         " µm: the cell is hardly seen. Take a softer gel.";
+  return report::sentence("plan.unseen", brief(youngs_modulus_kPa), brief(largest_um), brief(noise_um));
 }
 
 std::string sentence_of_strain(double youngs_modulus_kPa, double left_out) {
-  return "On " + brief(youngs_modulus_kPa) + " kPa linear elasticity leaves out some " + brief(100 * left_out) +
-         " % of the displacement, which is strained beyond its range: evaluate with substrate.material = neo-hooke, or "
-         "take a stiffer gel.";
+  return report::sentence("plan.beyond-linear", brief(youngs_modulus_kPa), brief(100 * left_out));
 }
 
 double most_beads_per_um2(const Scene& scene) {

@@ -3,6 +3,7 @@
 
 #include "pipeline/charts/chart.h"
 #include "pipeline/report/stage_page.h"
+#include "pipeline/report/texts.h"
 #include "samples/plan/answer.h"
 #include "samples/plan/tables.h"
 
@@ -13,37 +14,30 @@ using report::number;
 
 /// What is said of flat cells and of cells in space in other words.
 struct Texts {
-  std::string beads, middle, of_middle, drawn, drawn_explained, how;
+  std::string beads, middle, of_middle, drawn, drawn_explained, how, density, further;
 };
 
 const Texts& texts_of(const Plan&) {
-  static const Texts texts = {
-      .beads = "beads per µm²",
-      .middle = "middle fibre",
-      .of_middle = "tension",
-      .drawn = "tension",
-      .drawn_explained =
-          "Tensions found in simulated experiments over the true ones; bars: the predicted standard error. The fits "
-          "do not know the cell's own network.",
-      .how =
-          "<p class=\"sub\">The error by the beads is the Cramér–Rao bound of the fit: proportional to noise and "
-          "modulus, and to one over the root of the density. The model's part (meshes, segmentation, what the model "
-          "lacks) is where the curves level off. “Never”: it alone exceeds the target.</p>\n"};
+  static const Texts texts = {.beads = "beads per µm²",
+                              .middle = "middle fibre",
+                              .of_middle = "tension",
+                              .drawn = "tension",
+                              .drawn_explained = report::sentence("plan.drawn"),
+                              .how = report::note("plan.curves"),
+                              .density = "beads_per_um2",
+                              .further = report::sentence("plan.columns-of-errors")};
   return texts;
 }
 
 const Texts& texts_of(const SpacePlan&) {
-  static const Texts texts = {
-      .beads = "beads per µm³",
-      .middle = "middle patch",
-      .of_middle = "force",
-      .drawn = "component of a force",
-      .drawn_explained =
-          "Forces found in simulated experiments over the true ones, by component; bars: the predicted standard error.",
-      .how =
-          "<p class=\"sub\">Standard errors as the reconstruction states them. The modulus counts as noise does. More "
-          "noise makes lambda larger, so that the error grows less than the noise. By background: tractions beside "
-          "the patches that the beads do not tell from them.</p>\n"};
+  static const Texts texts = {.beads = "beads per µm³",
+                              .middle = "middle patch",
+                              .of_middle = "force",
+                              .drawn = "component of a force",
+                              .drawn_explained = report::sentence("plan.drawn-in-space"),
+                              .how = report::note("plan.curves-in-space"),
+                              .density = "beads_per_um3",
+                              .further = report::sentence("plan.columns-of-errors-in-space")};
   return texts;
 }
 
@@ -54,13 +48,13 @@ SpaceQuantity drawn_quantity(const SpacePlan&) { return SpaceQuantity::force; }
 
 /// Said after a point's numbers.
 std::string further_of(const Expected& e) {
-  return "; " + brief(100 * e.share_within) + " % of the fibres are within the target";
+  return report::sentence("plan.within-target", brief(100 * e.share_within));
 }
 std::string further_of(const SpaceExpected&) { return {}; }
 
 std::string colour(std::size_t k) { return charts::kColours[k % std::size(charts::kColours)]; }
 
-std::string dashed(const Asked& asked) { return "Dashed: the target of " + brief(asked.target_nN) + " nN."; }
+std::string dashed(const Asked& asked) { return report::sentence("plan.target", brief(asked.target_nN)); }
 
 /// Standard error over density at one noise, a curve for each gel, the target as a line.
 template <class Quantity>
@@ -109,14 +103,8 @@ std::string needed_text(const SpacePlan& plan, const Needed& n) {
                    : "&gt; " + about(most_beads_per_um3(plan.asked.densities));
 }
 
-std::string below_needed(const Plan& plan) {
-  return "<p class=\"sub\">&gt; " + brief(plan.most_beads_per_um2) +
-         ": more beads than can be told apart. “never”: no number of beads suffices.</p>\n";
-}
+std::string below_needed(const Plan& plan) { return report::note("plan.never", brief(plan.most_beads_per_um2)); }
 std::string below_needed(const SpacePlan&) { return {}; }
-
-const char* density_column(const Plan&) { return "beads_per_um2"; }
-const char* density_column(const SpacePlan&) { return "beads_per_um3"; }
 
 template <class Row>
 report::Listing listing_of(const char* title, const char* file, const files::Table<Row>& table,
@@ -124,26 +112,15 @@ report::Listing listing_of(const char* title, const char* file, const files::Tab
   return {title, {}, file, text_of(table, rows), columns};
 }
 
-const char* further_columns(const Plan&) {
-  return "from_mesh_nN: by mesh (nN), from_segmentation_nN: by segmentation (nN), from_other_nN: by the rest (nN)";
-}
-const char* further_columns(const SpacePlan&) {
-  return "from_background_nN: by background (nN), resolution_um: map resolves (µm), numbers_told: numbers resolved";
-}
-
 template <class Quantity>
 report::Listing expected_listing(const PlanOf<Quantity>& plan) {
-  return listing_of(
-      "All numbers", "plan.csv", expected_table(Quantity{}), plan.grid.expected,
-      "youngs_modulus_kPa: gel (kPa), " + std::string(density_column(plan)) + ": " + texts_of(plan).beads +
-          ", noise_um, quantity, n: number, standard_error_nN, from_beads_nN: by beads (nN), " + further_columns(plan) +
-          ", share_within: share within target, least_distance_um: two told apart from (µm)");
+  const Texts& texts = texts_of(plan);
+  return listing_of("All numbers", "plan.csv", expected_table(Quantity{}), plan.grid.expected,
+                    report::sentence("plan.columns", texts.density, texts.beads, texts.further));
 }
 
 report::Listing cell_listing(const std::vector<CellNumbers>& cells) {
-  std::string columns =
-      "type, mean_nN, between_cells_nN: SD between cells (nN), within_nN: SD within a cell (nN), error_nN, difference, "
-      "fibres_per_cell, cells: cells of each condition";
+  std::string columns = report::sentence("plan.columns-of-cells");
   for (const int n : kCells)
     columns += ", power_of_" + std::to_string(n) + "_cells: power with " + std::to_string(n) + " cells";
   return listing_of("How many cells", "plan_cells.csv", cell_table(), cells, columns);
@@ -207,7 +184,7 @@ std::string svg_of(const PlanOf<Quantity>& plan) {
   const std::vector<charts::Chart> charts = charts_of(plan);
   return charts::svg_file(
       charts, std::min<int>(2, static_cast<int>(charts.size())),
-      {plan.name + ": standard error of the " + texts.middle + "'s " + texts.of_middle + ".", dashed(plan.asked)});
+      {report::sentence("plan.picture", plan.name, texts.middle, texts.of_middle), dashed(plan.asked)});
 }
 
 template <class Quantity>
@@ -229,9 +206,7 @@ std::string html_of(const PlanOf<Quantity>& plan) {
   if (!plan.cells.empty())
     body += report::section("How many cells",
                             report::html_of(cell_listing(plan.cells)) +
-                                "<p class=\"sub\">Two-sided t test at 5 % of the means of two groups of cells; no "
-                                "number: more than 10000 cells. Scatter: " +
-                                report::html_escaped(plan.cells.front().scatter.source) + ".</p>\n");
+                                report::note("plan.test", report::html_escaped(plan.cells.front().scatter.source)));
   body += report::section("All numbers", report::html_of(expected_listing(plan)));
   return report::html_of(report::Page{.title = "Plan: " + plan.name, .what = answer_sentence(plan), .body = body});
 }

@@ -61,30 +61,19 @@ double share_in(const std::string& name, std::string text) {
 
 void declare(stage::ParameterList& list, Parameters& p) {
   list.table("plan");
-  list.add("scenario", p.scenario, "simulated cell to plan with: name of a scenario, or path of a scenario file");
-  list.add("seed", p.seed, "random seed of the simulated cell and of the drawn experiments");
-  list.add("noise_um", p.noise_um,
-           "standard deviations of the noise in a displacement component (um), with commas between them; the answer is "
-           "for the first");
-  list.add("beads_per_um2", p.beads_per_um2, "beads by area (1/um²), with commas between them");
-  list.add(
-      "beads_per_um3", p.beads_per_um3,
-      "cells in space: beads by volume (1/um³), with commas between them; empty: half, once and twice the cell's own");
-  list.add("axial_noise", p.axial_noise, Range::factor(), "cells in space: noise along z over the noise along x and y");
-  list.add("youngs_modulus_kPa", p.youngs_modulus_kPa,
-           "Young's moduli of the gel (kPa), with commas between them; empty: half, once and twice the cell's own");
-  list.add("tension_nN", p.tension_nN, Range::force_nN(),
-           "tension, or force of an adhesion, that you want to measure (nN); unset: 1, or the median force of a cell "
-           "in space");
-  list.add("within", p.within, "largest standard error of the tension or force tension_nN, as 20% or 0.2");
-  list.add("drawn", p.drawn, Range::between(0, 100),
-           "number of experiments that are simulated and fitted to check the answer");
-  list.add("between_cells", p.between_cells, Range::between(0, 10),
-           "number of cells: standard deviation of a type's mean tension from cell to cell, over that mean");
-  list.add("difference", p.difference, Range::between(0.01, 100),
-           "number of cells: difference between two conditions that you want to find, over the mean tension");
-  list.add("power", p.power, Range::between(0.06, 0.999),
-           "number of cells: chance to find the difference between the conditions at a level of 5 %");
+  list.add("scenario", p.scenario);
+  list.add("seed", p.seed);
+  list.add("noise_um", p.noise_um);
+  list.add("beads_per_um2", p.beads_per_um2);
+  list.add("beads_per_um3", p.beads_per_um3);
+  list.add("axial_noise", p.axial_noise, Range::factor());
+  list.add("youngs_modulus_kPa", p.youngs_modulus_kPa);
+  list.add("tension_nN", p.tension_nN, Range::force_nN());
+  list.add("within", p.within);
+  list.add("drawn", p.drawn, Range::between(0, 100));
+  list.add("between_cells", p.between_cells, Range::between(0, 10));
+  list.add("difference", p.difference, Range::between(0.01, 100));
+  list.add("power", p.power, Range::between(0.06, 0.999));
 }
 
 Asked asked_by(const Parameters& p, double own_kPa) {

@@ -371,49 +371,31 @@ bool is_sound(const Tracking& tracking) {
 
 void declare(stage::ParameterList& list, TrackParameters& p) {
   list.table("");
-  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
-           "side of a pixel in the specimen (um); unset: by the image's calibration");
+  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um());
   list.table_of_several("images");
-  list.add("cell_with", p.cell_with, kCellWithMeaning);
+  list.add("cell_with", p.cell_with);
   list.table("track");
-  declare(list, p.stressed_plane, "stressed", "the stressed bead image");
-  declare(list, p.relaxed_plane, "relaxed", "the relaxed bead image");
-  list.add("beads_pixel_size_um", p.beads_pixel_size_um, Range::pixel_um(),
-           "side of a pixel of the bead images (um), if binned otherwise than the cell's; unset: pixel_size_um");
-  list.add("stressed_last", p.stressed_last, {.low = 0},
-           "last stressed_time or stressed_page of a time series, each against the relaxed image; 0: one image");
-  list.add("method", p.method, "follow single beads, or windows (correlation); auto: windows if beads fail");
-  list.add("detection_snr", p.detection_snr, Range::factor(),
-           "least height of a bead over its background (standard deviations of noise)");
-  list.add(
-      "largest_displacement_um", p.largest_displacement_um, Range::between(0, 100),
-      "how far a bead is searched, after the drift (um); 0: 32 pixels, or up to a third of the image where needed");
-  list.add("may_push", p.may_push,
-           "accept a cell that pushes outward; false: an error, as the images may be exchanged");
-  list.add("least_similarity", p.least_similarity, Range::between(0, 1), "least correlation of a bead's surroundings");
-  list.add("windows_spacing_um", p.windows_spacing_um, Range::between(0, 1000),
-           "spacing of a lattice of windows, written to windows.csv (um; not of a time series); 0: none");
-  list.add("outlier_threshold", p.outlier_threshold, Range::factor(),
-           "difference from its neighbours that flags a bead (robust standard deviations)");
-  list.add("table", p.table,
-           "program that wrote --displacement; auto: by its first lines; plain: columns as named below");
-  list.add("x_column", p.x_column, "column of --displacement with the relaxed x: its name, or number from 1");
-  list.add("y_column", p.y_column, "column of --displacement with the relaxed y");
-  list.add("ux_column", p.ux_column, "column of --displacement with ux: stressed minus relaxed");
-  list.add("uy_column", p.uy_column, "column of --displacement with uy: stressed minus relaxed");
-  list.add("sigma_column", p.sigma_column,
-           "column of --displacement with a component's standard error; without one it is estimated from neighbours");
-  list.add(
-      "length_unit", p.length_unit,
-      "unit of --displacement; auto: by its header or program; px: pixels of pixel_size_um (0: centre of the first)");
-  list.add(
-      "y_axis", p.y_axis,
-      "direction of y in --displacement; up: the field is mirrored; auto: up if y falls from row to row of a lattice");
-  list.add("seconds_between", p.seconds_between, Range::positive(),
-           "time between the images (s), by which velocities in --displacement are multiplied");
-  list.add("places", p.places,
-           "frame of the places in --displacement: cell, or relaxed (the stage's motion is found, taken off and added "
-           "to the places); auto: cell");
+  declare(list, p.stressed_plane, "stressed");
+  declare(list, p.relaxed_plane, "relaxed");
+  list.add("beads_pixel_size_um", p.beads_pixel_size_um, Range::pixel_um());
+  list.add("stressed_last", p.stressed_last, {.low = 0});
+  list.add("method", p.method);
+  list.add("detection_snr", p.detection_snr, Range::factor());
+  list.add("largest_displacement_um", p.largest_displacement_um, Range::between(0, 100));
+  list.add("may_push", p.may_push);
+  list.add("least_similarity", p.least_similarity, Range::between(0, 1));
+  list.add("windows_spacing_um", p.windows_spacing_um, Range::between(0, 1000));
+  list.add("outlier_threshold", p.outlier_threshold, Range::factor());
+  list.add("table", p.table);
+  list.add("x_column", p.x_column);
+  list.add("y_column", p.y_column);
+  list.add("ux_column", p.ux_column);
+  list.add("uy_column", p.uy_column);
+  list.add("sigma_column", p.sigma_column);
+  list.add("length_unit", p.length_unit);
+  list.add("y_axis", p.y_axis);
+  list.add("seconds_between", p.seconds_between, Range::positive());
+  list.add("places", p.places);
 }
 
 RelaxedBeads::RelaxedBeads(const images::Image& relaxed, const TrackParameters& parameters, int threads,

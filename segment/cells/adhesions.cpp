@@ -107,24 +107,16 @@ std::vector<AdhesionRegion> divided(const AdhesionRegion& region, const TwoEllip
 
 void declare(stage::ParameterList& list, AdhesionParameters& p) {
   list.table("segment");
-  list.add("adhesion_background_um", p.adhesion_background_um, Range::size_um(),
-           "radius of the median filter of an adhesion's background (um); up to 1.6 times larger in a noisy image");
-  list.add("adhesion_smoothing_um", p.adhesion_smoothing_um, Range::between(0, 100),
-           "standard deviation of the Gaussian before thresholding (um); unset: the least of 0.05 to 0.2 at which the "
-           "faintest adhesion is above the noise");
-  list.add("adhesion_seed_noise", p.adhesion_seed_noise, Range::factor(),
-           "least height of an adhesion's brightest pixel (standard deviations of noise)");
-  list.add("adhesion_rim_noise", p.adhesion_rim_noise, Range::factor(),
-           "least height of an adhesion's other pixels (standard deviations of noise)");
+  list.add("adhesion_background_um", p.adhesion_background_um, Range::size_um());
+  list.add("adhesion_smoothing_um", p.adhesion_smoothing_um, Range::between(0, 100));
+  list.add("adhesion_seed_noise", p.adhesion_seed_noise, Range::factor());
+  list.add("adhesion_rim_noise", p.adhesion_rim_noise, Range::factor());
   list.add("adhesion_rim_level", p.adhesion_rim_level,
-           {.low = 0, .high = 1, .excludes_low = true, .excludes_high = true},
-           "height of an adhesion's rim as a share of the height within 0.4 um of it");
-  list.add("adhesion_split_depth", p.adhesion_split_depth, Range::between(0, 1),
-           "least dip between two adhesions that touch, as a share of the fainter one's height");
-  list.add("adhesion_smallest_um2", p.adhesion_smallest_um2, Range::area_um2(), "smallest area of an adhesion (um²)");
-  list.add("adhesion_largest_um2", p.adhesion_largest_um2, Range::area_um2(), "largest area of an adhesion (um²)");
-  list.add("adhesion_faintest", p.adhesion_faintest, Range::between(0, 1),
-           "least height of an adhesion as a share of the mean height of bright pixels");
+           {.low = 0, .high = 1, .excludes_low = true, .excludes_high = true});
+  list.add("adhesion_split_depth", p.adhesion_split_depth, Range::between(0, 1));
+  list.add("adhesion_smallest_um2", p.adhesion_smallest_um2, Range::area_um2());
+  list.add("adhesion_largest_um2", p.adhesion_largest_um2, Range::area_um2());
+  list.add("adhesion_faintest", p.adhesion_faintest, Range::between(0, 1));
 }
 
 std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, double pixel_size_um,

@@ -11,17 +11,10 @@ namespace mbtfm::cells {
 
 void declare(stage::ParameterList& list, CandidateParameters& p) {
   list.table("segment");
-  list.add("adhesions", p.adhesions,
-           "where adhesions are; image: as the adhesion image, a mask or ROIs show them; pattern: candidates all over "
-           "the adhesion mask, which says where adhesion is possible; fibre-ends: candidates at the ends of the "
-           "fibres; cell: there and along the rim of the cell; none: no adhesions, the outline and the fibres alone; "
-           "auto: image if there is one, else cell");
-  list.add("candidate_spacing_um", p.candidate_spacing_um, Range::size_um(),
-           "distance of neighbouring candidates for adhesions, and their diameter (um)");
-  list.add("candidate_band_um", p.candidate_band_um, Range::size_um(),
-           "adhesions = cell: candidates lie this near to the cell's edge (um)");
-  list.add("anchor_area_um2", p.anchor_area_um2, Range::area_um2(),
-           "area of the anchor that holds the end of a fibre where no adhesion is (um²)");
+  list.add("adhesions", p.adhesions);
+  list.add("candidate_spacing_um", p.candidate_spacing_um, Range::size_um());
+  list.add("candidate_band_um", p.candidate_band_um, Range::size_um());
+  list.add("anchor_area_um2", p.anchor_area_um2, Range::area_um2());
 }
 
 AdhesionSource source_of(const CandidateParameters& p, bool shows_adhesions, bool has_mask) {

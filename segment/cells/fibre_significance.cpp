@@ -177,30 +177,19 @@ double independent_px(const FibreParameters& p, double pixel_um) {
 
 void declare(stage::ParameterList& list, FibreParameters& p) {
   list.table("segment");
-  list.add("fibre_width_um", p.fibre_width_um, Range::between(1e-3, 100),
-           "typical width of a fibre; half to twice of it is found (um)");
-  list.add("fibre_averaging_um", p.fibre_averaging_um, Range::between(1e-3, 10),
-           "averaging along the fibre (standard deviation, um)");
-  list.add("fibre_start_noise", p.fibre_start_noise, Range::factor(),
-           "height that a fibre must reach somewhere (standard deviations of the filtered noise)");
-  list.add("fibre_follow_noise", p.fibre_follow_noise, Range::factor(),
-           "height that a fibre must keep along its length (standard deviations of the filtered noise)");
-  list.add("fibre_least_probability", p.fibre_least_probability, Range::between(0, 1),
-           "a line is taken for a fibre if it is one with this probability at least");
-  list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::size_um(),
-           "smallest radius of curvature of a fibre (um)");
-  list.add("fibre_faintest", p.fibre_faintest, Range::between(0, 1),
-           "least height of a fibre, as a share of the median height of the cell's fibres");
-  list.add("fibre_edge_um", p.fibre_edge_um, Range::zero_or_size_um(),
-           "a line along the outline this near to it is the cell's edge, not a fibre (um)");
-  list.add("fibre_lamellipodium_um", p.fibre_lamellipodium_um, Range::zero_or_size_um(),
-           "a line that winds this near to the outline is a ruffle, not a fibre (um)");
-  list.add("fibre_gap_um", p.fibre_gap_um, Range::zero_or_size_um(), "length over which a fibre may be invisible (um)");
-  list.add("fibre_shortest_um", p.fibre_shortest_um, Range::size_um(), "shortest fibre (um)");
-  list.add("fibre_reach_um", p.fibre_reach_um, Range::size_um(),
-           "a fibre's end this near to an adhesion is held by it (um)");
-  list.add("fibre_faint_um", p.fibre_faint_um, Range::zero_or_size_um(),
-           "distance over which a fibre's end is followed to an adhesion, while it is brighter than the texture (um)");
+  list.add("fibre_width_um", p.fibre_width_um, Range::between(1e-3, 100));
+  list.add("fibre_averaging_um", p.fibre_averaging_um, Range::between(1e-3, 10));
+  list.add("fibre_start_noise", p.fibre_start_noise, Range::factor());
+  list.add("fibre_follow_noise", p.fibre_follow_noise, Range::factor());
+  list.add("fibre_least_probability", p.fibre_least_probability, Range::between(0, 1));
+  list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::size_um());
+  list.add("fibre_faintest", p.fibre_faintest, Range::between(0, 1));
+  list.add("fibre_edge_um", p.fibre_edge_um, Range::zero_or_size_um());
+  list.add("fibre_lamellipodium_um", p.fibre_lamellipodium_um, Range::zero_or_size_um());
+  list.add("fibre_gap_um", p.fibre_gap_um, Range::zero_or_size_um());
+  list.add("fibre_shortest_um", p.fibre_shortest_um, Range::size_um());
+  list.add("fibre_reach_um", p.fibre_reach_um, Range::size_um());
+  list.add("fibre_faint_um", p.fibre_faint_um, Range::zero_or_size_um());
 }
 
 }  // namespace mbtfm::cells

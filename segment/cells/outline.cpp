@@ -264,15 +264,11 @@ std::pair<CellsInImage, cv::Mat> cells_of(const Scene& s, cv::Mat bright, const 
 
 void declare(stage::ParameterList& list, OutlineParameters& p) {
   list.table("segment");
-  list.add("outline_reach_um", p.outline_reach_um, Range::zero_or_size_um(),
-           "an adhesion this far outside still belongs to the cell (um)");
-  list.add("outline_smallest_um2", p.outline_smallest_um2, Range::area_um2(), "least area of a cell (um²)");
-  list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2(), "greatest area of a cell (um²)");
-  list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2(),
-           "least area of a gap in a cell (um²)");
-  list.add("outline_neck", p.outline_neck, Range::between(0.0, 1.0),
-           "cells that touch are cut apart where the outline is narrower than this share of the width of the narrower "
-           "part; 0: never");
+  list.add("outline_reach_um", p.outline_reach_um, Range::zero_or_size_um());
+  list.add("outline_smallest_um2", p.outline_smallest_um2, Range::area_um2());
+  list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2());
+  list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2());
+  list.add("outline_neck", p.outline_neck, Range::between(0.0, 1.0));
 }
 
 CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,

@@ -15,22 +15,14 @@ namespace mbtfm::cells {
 
 void declare(stage::ParameterList& list, SegmentParameters& p) {
   list.table("");
-  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
-           "side of a pixel in the specimen (um); unset: from the image's own calibration");
+  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um());
   list.table("segment");
-  list.add("binning", p.binning, Range::between(1, images::kLargestBinning),
-           "side of the blocks of pixels that are averaged before all else (pixels); 1: the images stay as they are");
-  list.add(
-      "cell", p.cell, {.low = 0},
-      "which cell of the image, by area from 1, the largest; 0: all, each in a folder cell_1, cell_2, … of its own");
-  declare(list, p.adhesion_plane, "adhesion", "the adhesion image");
-  declare(list, p.actin_plane, "actin", "the actin image");
-  list.add("align_channels", p.align_channels,
-           "move fibres and outline to where the adhesion image has them; auto: if fibre ends show a shift",
-           {Switch::automatic, Switch::off});
-  list.add("contact_sheet", p.contact_sheet,
-           "one or two parameters of this table whose values are compared as overlays in contact_sheet.png: name=a,b,c "
-           "name=d,e");
+  list.add("binning", p.binning, Range::between(1, images::kLargestBinning));
+  list.add("cell", p.cell, {.low = 0});
+  declare(list, p.adhesion_plane, "adhesion");
+  declare(list, p.actin_plane, "actin");
+  list.add("align_channels", p.align_channels, {}, {Switch::automatic, Switch::off});
+  list.add("contact_sheet", p.contact_sheet);
   declare(list, p.adhesions);
   declare(list, p.candidates);
   declare(list, p.fibres);

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/stage/help.h"
 #include "pipeline/stage/parameters.h"
 #include "segment/images/image_file.h"
 #include "segment/images/stack.h"
@@ -116,17 +117,15 @@ Image image_of(const std::vector<unsigned char>& bytes, std::uint32_t width, std
   return image;
 }
 
-void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image) {
+void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix) {
   choice.prefix = prefix;
-  list.add(prefix + "_channel", choice.channel,
-           "channel of " + image + ": its number, from 1, or name; must be given if the file has several");
-  list.add(prefix + "_z", choice.z, "slice of " + image + ", from 1; max: the maximum projection of all");
-  list.add(prefix + "_time", choice.time, {.low = 1},
-           "frame of " + image + ", from 1; must be given if the file has several");
-  list.add(prefix + "_page", choice.page, {.low = 1},
-           "page of " + image +
-               " as it lies in the file, from 1, instead of channel, z and time; unset: the first of a file that does "
-               "not state its dimensions");
+  const auto meaning = [image = stage::help_on("plane", prefix)](const char* key) {
+    return stage::help_on("plane", key, {image});
+  };
+  list.add(prefix + "_channel", choice.channel, meaning("channel"));
+  list.add(prefix + "_z", choice.z, meaning("z"));
+  list.add(prefix + "_time", choice.time, {.low = 1}, meaning("time"));
+  list.add(prefix + "_page", choice.page, {.low = 1}, meaning("page"));
 }
 
 namespace {

@@ -39,8 +39,8 @@ struct PlaneChoice {
   bool may_lack_pixels = false;  ///< NaN is a pixel without a value, and not an error
   PixelsAre pixels = PixelsAre::intensities;
 };
-/// PREFIX_channel, PREFIX_z, PREFIX_time and PREFIX_page. @param image  "the adhesion image"
-void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image);
+/// PREFIX_channel, PREFIX_z, PREFIX_time and PREFIX_page.
+void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix);
 
 /// Read a plane of a TIFF (8 or 16 bit, float; any libtiff compression), a PNG or a JPEG.
 ///

@@ -155,22 +155,12 @@ std::vector<PlacedBead> without_drift(std::vector<PlacedBead> stressed, const Ri
 
 void declare(stage::ParameterList& list, StackParameters& p) {
   list.table("track");
-  list.add("dimensions", p.dimensions,
-           "beads are followed in the plane of the images, or in space through the slices of stacks; auto: in space if "
-           "z_points is given");
-  list.add("z_step_um", p.z_step_um, Range::mesh_um(),
-           "distance of the slices, as the stage moved (um); unset: from the files' own calibration");
-  list.add("z_points", p.z_points,
-           "direction of a stack from its first slice to its last, which the images do not show: into-gel or "
-           "out-of-gel; auto: stacks are projected and beads followed in the plane");
-  list.add("first_slice_z_um", p.first_slice_z_um, Range::between(-1e4, 1e4),
-           "z of the outer face of the slice nearest to the gel's surface (um); z points into the gel");
-  list.add("refractive_index_ratio", p.refractive_index_ratio, Range::between(0.5, 2),
-           "refractive index of the gel over that of the immersion medium: the focus moves further than the stage by "
-           "this factor");
-  list.add("slice_drift", p.slice_drift,
-           "correct the shift of the slices of one stack against those of the other; auto: if the shift is three times "
-           "its error");
+  list.add("dimensions", p.dimensions);
+  list.add("z_step_um", p.z_step_um, Range::mesh_um());
+  list.add("z_points", p.z_points);
+  list.add("first_slice_z_um", p.first_slice_z_um, Range::between(-1e4, 1e4));
+  list.add("refractive_index_ratio", p.refractive_index_ratio, Range::between(0.5, 2));
+  list.add("slice_drift", p.slice_drift);
 }
 
 Vec3 Scale::place_um(Vec3 voxel) const {

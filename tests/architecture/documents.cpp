@@ -1,5 +1,6 @@
 /// The pages of docs/ are in step with the program.
 #include <regex>
+#include <set>
 
 #include "docs/pages.h"
 #include "pipeline/files/csv_files.h"
@@ -38,6 +39,48 @@ TEST(Documents, a_parameters_meaning_stands_alone_in_plain_words) {
     EXPECT_FALSE(std::regex_search(line.substr(last + 3), leans)) << line;
   }
   EXPECT_GE(n_rows, 250);
+}
+
+/// What a page asks for is in texts.txt, and what is there is asked for.
+TEST(Documents, the_sentences_of_pages_are_those_that_the_sources_name) {
+  std::set<std::string> there, asked;
+  std::istringstream lines(files::read_text(test::source_folder() / "pipeline/report/texts.txt"));
+  const std::regex key("([a-z0-9-]+): .*");
+  std::string page;
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch match;
+    if (line.starts_with('[')) page = line.substr(1, line.find(']') - 1);
+    if (std::regex_match(line, match, key)) there.insert(page + "." + match[1].str());
+  }
+  ASSERT_GT(there.size(), 100u);
+  const std::regex name("\"((cell|maps|sheet|space|study|plan|cost)\\.[a-z0-9-]+)\"");
+  for (const char* folder : {"pipeline/report", "pipeline/statistics", "pipeline/cost", "samples/plan"})
+    for (const auto& entry : fs::directory_iterator(test::source_folder() / folder)) {
+      if (entry.path().extension() != ".cpp") continue;
+      const std::string source = files::read_text(entry.path());
+      for (std::sregex_iterator at(source.begin(), source.end(), name), end; at != end; ++at)
+        asked.insert((*at)[1].str());
+    }
+  for (const std::string& sentence : there) EXPECT_TRUE(asked.contains(sentence)) << sentence << ": nobody asks for it";
+}
+
+/// A flag that is gone leaves no text behind.
+TEST(Documents, the_help_has_texts_of_flags_that_are_there) {
+  std::istringstream lines(files::read_text(test::source_folder() / "pipeline/stage/help.txt"));
+  std::string help, program;
+  int n_flags = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with('[')) {
+      program = line.substr(1, line.find(']') - 1);
+      if (!program.starts_with("mbtfm")) continue;
+      help = run_program(program + " --help").output;
+      EXPECT_FALSE(std::regex_search(help, std::regex("\n  -[^ ]*( [A-Z:]+)?\n  -"))) << program << "\n" << help;
+    } else if (program.starts_with("mbtfm") && line.starts_with("--")) {
+      ++n_flags;
+      EXPECT_TRUE(has_words(help, line.substr(0, line.find(':')))) << program << ": " << line;
+    }
+  }
+  EXPECT_GT(n_flags, 80);
 }
 
 TEST(Documents, the_pages_that_are_made_are_not_written_in_the_tree) {

@@ -218,7 +218,7 @@ TEST(SmallStudies, cells_that_lack_files_are_left_out_with_a_reason) {
       test::write_finished_cell(folder / cell.name, cell);
       if (&cell == &whole.cells.front() || random() % 2 == 0) continue;
       ++n_damaged;
-      const auto& files = files_of_a_cell(CellKind::plane);
+      const auto& files = in_study(CellKind::plane).files;
       std::filesystem::remove(folder / cell.name / files[random() % files.size()]);
     }
     const Study read = read_study(folder.path(), kFewDraws, {}, 2);

@@ -2,6 +2,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/files/texts.h"
 #include "pipeline/files/vtk_files.h"
 #include "tests/support/temporary_folder.h"
 
@@ -351,6 +352,18 @@ TEST_F(Files, tractions_are_read_as_people_write_them) {
 TEST_F(Files, what_has_no_end_is_refused_and_what_is_empty_is_empty) {
   EXPECT_EQ(files::read_text("/dev/null"), "");
   EXPECT_THROW(files::read_text("/dev/zero"), InputError);
+}
+
+TEST_F(Files, texts_have_sections_keys_and_lines_that_go_on) {
+  const files::Texts texts("# of nothing\n[a b] its own\nx: one,\n  two\nd_#_um: # um deep\n\n[c]\nx: three: four\n");
+  EXPECT_EQ(texts.at("a b", ""), "its own");
+  EXPECT_EQ(texts.at("a b", "x"), "one, two");
+  EXPECT_EQ(texts.at("c", "x"), "three: four");
+  EXPECT_EQ(texts.at("a b", "d_15_um"), "15 um deep");
+  EXPECT_FALSE(texts.find("c", "d_15_um"));
+  EXPECT_THROW(texts.at("c", "y"), std::logic_error);
+  EXPECT_THROW(files::Texts("[a]\nx: 1\nx: 2\n"), std::logic_error);
+  EXPECT_THROW(files::Texts("[a]\nno key\n"), std::logic_error);
 }
 
 TEST_F(Files, a_surface_beyond_a_metre_is_none) {

@@ -28,9 +28,7 @@ void declare(stage::ParameterList& list, Lengths& e) {
 
 const stage::StageDescription kDescription = {
     .name = "example",
-    .purpose = "an example",
-    .files = {{"in", stage::FileArgument::Kind::input, "what is read"},
-              {"out", stage::FileArgument::Kind::output_folder, "what is written"}}};
+    .files = {{"in", stage::FileArgument::Kind::input}, {"out", stage::FileArgument::Kind::output_folder}}};
 
 class Stage : public ::testing::Test {
  protected:
