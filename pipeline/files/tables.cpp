@@ -37,7 +37,9 @@ Table<Adhesion> adhesion_table() {
                        "held, or put where an adhesion may be",
                        &Adhesion::origin, kMayLack},
                       {"edge_distance_um", "from the centre to the outline or a hole of the cell",
-                       &Adhesion::edge_distance_um, kMayLack}},
+                       &Adhesion::edge_distance_um, kMayLack},
+                      {"probability", "chance that it is an adhesion, no vesicle or haze; empty: not from an image",
+                       &Adhesion::probability, kShareMayLack}},
           .label = "adhesion"};
 }
 
