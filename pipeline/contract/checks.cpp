@@ -52,6 +52,8 @@ void check(const std::vector<Adhesion>& adhesions) {
     require(std::isfinite(a.angle_rad), "'angle_deg' of " + element, "a finite number", shown(a.angle_rad));
     require(!a.edge_distance_um || (std::isfinite(*a.edge_distance_um) && *a.edge_distance_um >= 0),
             "'edge_distance_um' of " + element, "a number >= 0", shown(a.edge_distance_um.value_or(0)));
+    require(!a.probability || (*a.probability >= 0 && *a.probability <= 1), "'probability' of " + element,
+            "a number from 0 to 1", shown(a.probability.value_or(0)));
   }
 }
 

@@ -30,7 +30,8 @@ Table<Adhesion> adhesion_table() {
                       {"eccentricity", &Adhesion::eccentricity, kShare},
                       {"mean_intensity", &Adhesion::mean_intensity},
                       {"origin", &Adhesion::origin, kMayLack},
-                      {"edge_distance_um", &Adhesion::edge_distance_um, kMayLack}},
+                      {"edge_distance_um", &Adhesion::edge_distance_um, kMayLack},
+                      {"probability", &Adhesion::probability, kShareMayLack}},
           .label = "adhesion"};
 }
 

@@ -74,7 +74,7 @@ Bright bright_of(const Contrast& c, double seed_noise) {
 }
 
 Contrast smoothed_contrast(const cv::Mat& image, double pixel_um, double smoothing_um, const AdhesionParameters& p) {
-  Contrast c;
+  Contrast c{};
   c.smoothing_um = smoothing_um;
   c.coarseness = std::hypot(kUsualBlur_um, smoothing_um) / std::hypot(kUsualBlur_um, kLeastSmoothing_um);
   const double smoothing_px = std::max(0.5, smoothing_um / pixel_um);
@@ -107,6 +107,7 @@ Contrast contrast_of(const cv::Mat& image, double pixel_um, const AdhesionParame
   // an image without noise still has the rounding of float arithmetic: 1e-5 of its brightest value
   double darkest = 0, brightest = 0;
   cv::minMaxLoc(image, &darkest, &brightest);
+  c.bright = bright.height;
   c.floor = std::max(p.adhesion_faintest * bright.height, 1e-5 * std::max(std::abs(darkest), std::abs(brightest)));
   return c;
 }

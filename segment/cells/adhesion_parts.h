@@ -27,6 +27,7 @@ struct Contrast {
   cv::Mat sharp_noise;  ///< standard deviation of a pixel
   cv::Mat height;       ///< `sharp`, smoothed
   cv::Mat noise;        ///< standard deviation of `height` where there is no adhesion
+  double bright;        ///< mean height of what is bright, most of it adhesions
   double floor;         ///< heights below are texture or rounding
   cv::Mat least_seed;   ///< heights below may be a step of the background, as at the edge of a bright cell
 };

@@ -9,6 +9,7 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/parameters.h"
 #include "segment/cells/adhesion_parts.h"
+#include "segment/cells/fibre_probability.h"
 #include "segment/cells/grid.h"
 #include "segment/cells/padding.h"
 
@@ -87,6 +88,13 @@ std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<Adhesi
   return fit_ellipses(c.sharp, c.sharp_noise, start(shape), halves, smallest_um2 / (pixel_um * pixel_um));
 }
 
+double peak_of(const AdhesionRegion& region, const cv::Mat& height) {
+  double peak = 0;
+  for (const CoveredPixel& p : region.pixels)
+    if (p.share > 0.5) peak = std::max<double>(peak, height.at<float>(p.row, p.column));
+  return peak;
+}
+
 /// The region's pixels by which of two adhesions is the brighter one there.
 std::vector<AdhesionRegion> divided(const AdhesionRegion& region, const TwoEllipses& two, double pixel_um) {
   const EllipseModel first(two[0]), second(two[1]);
@@ -119,6 +127,17 @@ void declare(stage::ParameterList& list, AdhesionParameters& p) {
   list.add("adhesion_faintest", p.adhesion_faintest, Range::between(0, 1));
 }
 
+std::array<double, 4> adhesion_terms(double height, double bright) {
+  constexpr double kFaintest = 0.1;  // beyond what the regression has seen
+  const double x = std::log(std::max(height / bright, kFaintest));
+  return {1, x, x * x, x * x * x};
+}
+
+double adhesion_probability(const std::array<double, 4>& terms) {
+  constexpr std::array kCoefficients{2.68, 2.61, 2.30, 3.08};
+  return logistic(terms, kCoefficients);
+}
+
 std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, double pixel_size_um,
                                                   const AdhesionParameters& p) {
   const Contrast c = contrast_of(without_padding(matrix_of(image)), pixel_size_um, p);
@@ -126,7 +145,7 @@ std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, do
   for (auto& pixels : adhesion_parts(c, pixel_size_um, p)) {
     const Adhesion adhesion = measure_ellipse(pixels, pixel_size_um);
     // with the blur on it an adhesion is larger, never smaller
-    if (adhesion.area_um2 <= p.adhesion_largest_um2) regions.push_back({adhesion, std::move(pixels)});
+    if (adhesion.area_um2 <= p.adhesion_largest_um2) regions.push_back({adhesion, std::move(pixels), {}});
   }
   const std::vector<FittedEllipse> fitted = fitted_to(c, regions, pixel_size_um, p.adhesion_smallest_um2);
   for (std::size_t i = 0; i < fitted.size(); ++i) {
@@ -143,6 +162,11 @@ std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, do
   std::erase_if(regions, [&](const AdhesionRegion& r) {
     return r.adhesion.area_um2 < p.adhesion_smallest_um2 || r.adhesion.area_um2 > p.adhesion_largest_um2;
   });
+  for (AdhesionRegion& r : regions) {
+    if (c.bright <= 0) break;
+    r.terms = adhesion_terms(peak_of(r, c.height), c.bright);
+    r.adhesion.probability = adhesion_probability(r.terms);
+  }
   std::sort(regions.begin(), regions.end(), [](const AdhesionRegion& a, const AdhesionRegion& b) {
     const Vec2 here = a.adhesion.position_um, there = b.adhesion.position_um;
     return std::pair(here.y, here.x) < std::pair(there.y, there.x);

@@ -1,6 +1,7 @@
 /// Focal adhesions of a fluorescence image, or why it shows none.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,7 +32,17 @@ void declare(stage::ParameterList& list, AdhesionParameters& parameters);
 struct AdhesionRegion {
   Adhesion adhesion;
   std::vector<CoveredPixel> pixels;
+  std::array<double, 4> terms{};  ///< of its probability, where that is known
 };
+
+/// Terms of the log-odds that a bright spot is an adhesion and no vesicle, haze or streak, which are fainter as a rule:
+/// powers of ln(height / bright), 0 to 3.
+/// @param height  of its highest pixel
+/// @param bright  mean height of what is bright in the picture, > 0
+std::array<double, 4> adhesion_terms(double height, double bright);
+/// The probability, 0 to 1. Logistic regression on simulated cells with such clutter:
+/// tests/studies/fibre_probability.py prints the coefficients, docs/theory/segmentation.md, (22d), has the equation.
+double adhesion_probability(const std::array<double, 4>& terms);
 
 /// Find adhesions: subtract the local median (background), threshold at the local noise with hysteresis (and above
 /// what the edge of a bright cell leaves), split at
@@ -41,8 +52,9 @@ struct AdhesionRegion {
 /// and the ellipse of its pixels' second moments stands.
 ///
 /// The result does not depend on gain or offset of the camera: every level is relative to noise or height.
-/// `mean_intensity` is the mean grey value above the local background. Sorted from left-to-right in rows of the image
-/// top to bottom, ids from 1.
+/// `mean_intensity` is the mean grey value above the local background. No adhesion has a `probability` in a picture
+/// with nothing bright, in which it has no scale. Sorted from left-to-right in rows of the image top to bottom, ids
+/// from 1.
 /// @param pixel_size_um  > 0
 /// @returns none where the image is constant or noise alone
 /// @throws InvalidData where a pixel is not finite

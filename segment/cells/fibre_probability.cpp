@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace mbtfm::cells {
 
@@ -20,8 +19,7 @@ std::array<double, 7> terms_of(const FibreEvidence& e) {
 
 double probability_of(const FibreEvidence& evidence) {
   constexpr std::array kCoefficients{-2.07, 0.629, 0.593, 0.123, 0.893, -7.87, 1.376};
-  const auto terms = terms_of(evidence);
-  return 1 / (1 + std::exp(-std::inner_product(terms.begin(), terms.end(), kCoefficients.begin(), 0.0)));
+  return logistic(terms_of(evidence), kCoefficients);
 }
 
 double cortex_along(const Polyline& line, const Polygon& outline_um) {

@@ -2,10 +2,19 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
 
 #include "pipeline/contract/geometry.h"
 
 namespace mbtfm::cells {
+
+/// 1 / (1 + exp(−Σ aᵢ xᵢ)): a probability by logistic regression.
+template <std::size_t n>
+double logistic(const std::array<double, n>& terms, const std::array<double, n>& coefficients) {
+  return 1 / (1 + std::exp(-std::inner_product(terms.begin(), terms.end(), coefficients.begin(), 0.0)));
+}
 
 /// What the actin image shows of a line, without units where none is named.
 struct FibreEvidence {

@@ -26,11 +26,12 @@ cv::Scalar scalar(Colour c) { return cv::Scalar(c.red, c.green, c.blue); }
 
 cv::Scalar colour_of_fibre(const Fibre& f) { return is_unclassified(f) ? kUnclassified : scalar(colour_of(f.type)); }
 
-/// Of a fibre: the fainter, the less sure it is one.
-cv::Scalar faded_colour(const Fibre& f) {
+/// The fainter, the less probable it is what it is drawn as.
+cv::Scalar faded(const cv::Scalar& colour, double probability) {
   constexpr double kFaintest = 0.3;
-  return colour_of_fibre(f) * (kFaintest + (1 - kFaintest) * f.confidence);
+  return colour * (kFaintest + (1 - kFaintest) * probability);
 }
+cv::Scalar faded_colour(const Fibre& f) { return faded(colour_of_fibre(f), f.confidence); }
 
 /// What does not lie in one of the things that are no part of the cell: a dead cell may be ten times as bright.
 cv::Mat without(const cv::Mat& values, const cv::Mat& is_left_out) {
@@ -312,7 +313,7 @@ void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
       canvas.dashed_line(ring, true, scalar(kAdhesionColour), a.origin == AdhesionOrigin::anchor ? thickness : 1,
                          kRingDash_px);
     else
-      canvas.line(ring, true, scalar(kAdhesionColour), thickness);
+      canvas.line(ring, true, faded(scalar(kAdhesionColour), a.probability.value_or(1)), thickness);
   }
   for (const Fibre& f : cell.fibres)
     if (f.type == FibreType::edge)

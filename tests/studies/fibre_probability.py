@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""fibre_probability.py FILE...: the coefficients of segment/cells/fibre_probability.cpp, and how well they are calibrated.
+"""fibre_probability.py FILE...: the coefficients of segment/cells/fibre_probability.cpp or, of adhesions, adhesions.cpp, and how
+well they are calibrated.
 
-FILE: what `fibre_accuracy lines` printed. The coefficients are those of a logistic regression by Newton's method with a weak normal
+FILE: what `fibre_accuracy lines` or `segmentation_accuracy clutter` printed. The coefficients are those of a logistic regression by Newton's method with a weak normal
 prior (standard deviation 1.8, not of the constant). A quarter of the cells at a time is stated by the fit to the others.
 """
 import csv
@@ -49,7 +50,7 @@ def calibration(stated):
         some = [(p, t) for p, t in stated if low <= p < high]
         if some:
             n = len(some)
-            print(f"  stated {sum(p for p, _ in some) / n:.2f}, true {sum(t for _, t in some) / n:.2f}, {n} lines")
+            print(f"  stated {sum(p for p, _ in some) / n:.2f}, true {sum(t for _, t in some) / n:.2f}, {n}")
         low = high
 
 

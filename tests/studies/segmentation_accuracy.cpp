@@ -2,6 +2,9 @@
 /// are segmented, at three image qualities; mean over the seeds. `true-adhesions` judges the fibres apart from the
 /// adhesions.
 /// segmentation_accuracy adhesions SCENARIO FIRST LAST [name=value …]: the adhesions alone, and how many are merged.
+/// segmentation_accuracy clutter SCENARIO FIRST LAST: the adhesions found where vesicles, haze and streaks are among
+/// them, 0 to 1 of them a square micrometre by seed: whether each is one, its stated probability and the terms of it.
+/// fibre_probability.py fits segment/cells/adhesions.cpp to them.
 /// segmentation_accuracy real [name=value …]: adhesions and outlines of real cells that others have marked
 /// (../shared/data), with default parameters, or adhesions with these.
 #include <cstdio>
@@ -17,9 +20,9 @@ namespace {
 using namespace mbtfm;
 using namespace mbtfm::test;
 
-/// How many of the fibres said to be one with some confidence are one.
+/// How many of those said to be one with some probability are one.
 struct Calibration {
-  static constexpr double kLimits[] = {0.3, 0.6, 0.8, 0.9, 0.97, 1.0001};
+  static constexpr double kLimits[] = {0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 1.0001};
   struct Bin {
     int n = 0, n_true = 0;
     double sum = 0;
@@ -30,8 +33,8 @@ struct Calibration {
     bin.n_true += is_true;
     bin.sum += confidence;
   }
-  void print() const {
-    std::printf("confidence of a fibre: stated, true, fibres\n");
+  void print(const char* what) const {
+    std::printf("probability of %s: stated, true, number\n", what);
     for (const Bin& b : bins)
       if (b.n > 0) std::printf("  %.2f  %.2f  %d\n", b.sum / b.n, 1.0 * b.n_true / b.n, b.n);
   }
@@ -53,7 +56,9 @@ void real(const std::vector<std::string>& settings) {
   std::printf("%-12s %16s %16s %15s\n%-12s %9s %6s %9s %6s %8s %6s\n", "adhesions", "by pixels", "by ellipses",
               "number", "", "Dice", "F1", "Dice", "F1", "theirs", "found");
   Overlaps mean;
+  Calibration calibration;
   for (const int i : kHandMasked) {
+    for (const auto& [probability, is_true] : hand_mask_existence(i)) calibration.add(probability, is_true);
     const Overlaps o = hand_mask_overlaps(i, p);
     print("hand mask " + std::to_string(i), o);
     for (const auto& [to, from] : {std::pair(&mean.pixels, &o.pixels), {&mean.ellipses, &o.ellipses}}) {
@@ -66,6 +71,7 @@ void real(const std::vector<std::string>& settings) {
   print("mean", mean);
   print("fibroblast", fibroblast_overlaps(p));
   std::printf("outline of the doublet: intersection over union %.3f\n", doublet_overlap());
+  calibration.print("adhesions in the hand masks, default parameters");
 }
 
 /// Adhesions of simulated cells.
@@ -91,11 +97,30 @@ void adhesions(const std::string& scenario, int first, int last, const std::vect
   }
 }
 
+void clutter(const std::string& scenario, int first, int last) {
+  constexpr int kDensities = 8;
+  for (const std::string quality : {"poor", "ordinary", "good"})
+    for (int seed = first; seed <= last; ++seed) {
+      const int step = seed % kDensities;
+      const double per_um2 = step == 0 ? 0 : std::pow(100, step / (kDensities - 1.0) - 1);
+      const SimulatedCell cell = simulated_cell(scenario, quality, static_cast<std::uint64_t>(seed), 1024, per_um2);
+      for (const cells::AdhesionRegion& r :
+           cells::find_adhesion_regions(cell.adhesion.image, *cell.adhesion.image.pixel_size_um, {})) {
+        std::printf("%s,%s,%d,%d,%.4f", scenario.c_str(), quality.c_str(), seed,
+                    is_true_adhesion(r.adhesion, cell.truth.adhesions), r.adhesion.probability.value());
+        for (const double term : r.terms) std::printf(",%.5g", term);
+        std::printf("\n");
+      }
+    }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc > 4 && std::string(argv[1]) == "adhesions")
     return adhesions(argv[2], std::atoi(argv[3]), std::atoi(argv[4]), {argv + 5, argv + argc}), 0;
+  if (argc == 5 && std::string(argv[1]) == "clutter")
+    return clutter(argv[2], std::atoi(argv[3]), std::atoi(argv[4])), 0;
   if (argc > 1 && std::string(argv[1]) == "real") return real({argv + 2, argv + argc}), 0;
   const std::string scenario = argc > 1 ? argv[1] : "u2os";
   const int first = argc > 2 ? std::atoi(argv[2]) : 1, last = argc > 3 ? std::atoi(argv[3]) : 4;
@@ -131,5 +156,5 @@ int main(int argc, char** argv) {
               last);
   for (auto& [name, row] : table)
     std::printf("%-42s %9.3f %9.3f %9.3f\n", name.c_str(), row["poor"], row["ordinary"], row["good"]);
-  calibration.print();
+  calibration.print("fibres");
 }

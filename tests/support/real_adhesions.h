@@ -150,6 +150,19 @@ inline Overlaps hand_mask_overlaps(int image, const cells::AdhesionParameters& p
                      images::read_image(kHandMasks / "images" / name), kHandMasksPixel_um, p);
 }
 
+/// Of each found adhesion, its probability and whether a person has marked it.
+inline std::vector<std::pair<double, bool>> hand_mask_existence(int image) {
+  const std::string name = std::to_string(image) + ".tif";
+  std::vector<Adhesion> marked;
+  for (const auto& [label, pixels] : components_of(images::read_image(kHandMasks / "masks" / name)))
+    if (pixels.size() >= 5) marked.push_back(cells::measure_ellipse(pixels, kHandMasksPixel_um));
+  std::vector<std::pair<double, bool>> result;
+  for (const Adhesion& a :
+       cells::find_adhesions(images::read_image(kHandMasks / "images" / name), kHandMasksPixel_um, {}))
+    result.emplace_back(a.probability.value(), is_true_adhesion(a, marked));
+  return result;
+}
+
 inline Overlaps fibroblast_overlaps(const cells::AdhesionParameters& p = {}) {
   return overlaps_of(labels_of(images::read_image(kFibroblast / "adhesions.png")),
                      images::read_image(kFibroblast / "focal_image.png"), kFibroblastPixel_um, p);

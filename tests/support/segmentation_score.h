@@ -95,6 +95,14 @@ inline AdhesionScore score_adhesions(const std::vector<Adhesion>& truth, const s
   return s;
 }
 
+/// It is an adhesion, if perhaps merged with another one or a part of one.
+inline bool is_true_adhesion(const Adhesion& found, const std::vector<Adhesion>& truth) {
+  constexpr double kMargin_um = 0.1;
+  return std::ranges::any_of(truth, [&](const Adhesion& t) {
+    return covers(t, found.position_um, kMargin_um) || covers(found, t.position_um);
+  });
+}
+
 /// The middle value; 0 of none.
 inline double median(std::vector<double> values) {
   if (values.empty()) return 0;

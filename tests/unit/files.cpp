@@ -186,7 +186,7 @@ TEST_F(Files, writers_check_what_they_write) {
   EXPECT_THROW(files::write_network(folder / "n.vtu", torn), InvalidData);
 }
 
-TEST_F(Files, an_adhesions_origin_and_its_distance_from_the_edge_are_kept) {
+TEST_F(Files, an_adhesions_origin_distance_from_the_edge_and_probability_are_kept) {
   std::vector<Adhesion> adhesions;
   for (const AdhesionOrigin origin : values_of<AdhesionOrigin>())
     adhesions.push_back({.adhesion_id = static_cast<int>(adhesions.size()) + 1,
@@ -196,12 +196,17 @@ TEST_F(Files, an_adhesions_origin_and_its_distance_from_the_edge_are_kept) {
                          .minor_axis_um = 1.1,
                          .origin = origin});
   adhesions[1].edge_distance_um = 0.25;
+  adhesions[1].probability = 0.75;
   files::write_adhesions(folder / "adhesions.csv", adhesions);
   const auto read = files::read_adhesions(folder / "adhesions.csv");
   ASSERT_EQ(read.size(), adhesions.size());
   for (std::size_t i = 0; i < read.size(); ++i) EXPECT_EQ(read[i].origin, adhesions[i].origin);
   EXPECT_FALSE(read[0].edge_distance_um);
   EXPECT_EQ(read[1].edge_distance_um, 0.25);
+  EXPECT_FALSE(read[0].probability);
+  EXPECT_EQ(read[1].probability, 0.75);
+  adhesions[1].probability = 1.5;
+  EXPECT_THROW(files::write_adhesions(folder / "adhesions.csv", adhesions), InvalidData);
 }
 
 TEST_F(Files, adhesions_of_an_older_version_are_read_as_seen_in_the_image) {
