@@ -7,6 +7,7 @@
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
+#include "segment/beads/report.h"
 #include "segment/beads/unloaded.h"
 #include "segment/images/channels.h"
 
@@ -55,8 +56,7 @@ StageReport run(const NoiseParameters& given, stage::StageContext& context) {
   cv::setNumThreads(context.threads);
   const auto picture = [&](const char* name, const images::PlaneChoice& plane) {
     const std::filesystem::path file = context.input(name);
-    images::Channel channel{file.string(), images::read_image(file, plane)};
-    context.notice(images::take_scan_phase_off(channel));
+    const images::Channel channel = images::read_channel(file.string(), file, plane, 1, context);
     for (const std::optional<Finding>& found : images::noticed_in(channel)) context.notice(found);
     return channel;
   };
@@ -67,17 +67,16 @@ StageReport run(const NoiseParameters& given, stage::StageContext& context) {
     throw InputError(first.name + ", " + second.name, "two pictures of one place", "the same pixels in both",
                      "take two pictures one after the other: their difference is the noise");
   const double pixel_um = images::common_pixel_size_um(first, second, parameters.pixel_size_um);
-  try {
-    const Tracking tracking =
-        track_beads(first.image, second.image, pixel_um, parameters, Work(context.threads, context.progress));
-    const UnloadedPlace place = unloaded_place(tracking, pixel_um * first.image.width, pixel_um * first.image.height);
-    context.progress(1, "done");
-    stage::print(text_of(place));
-    return report_of(place);
-  } catch (const InvalidData& error) {
-    throw InputError(first.name + ", " + second.name + ": " + error.element, error.expected, error.found,
-                     "are these two pictures of the beads of one place, in focus?");
-  }
+  return with_names(
+      first.name + ", " + second.name, "are these two pictures of the beads of one place, in focus?", [&] {
+        const Tracking tracking =
+            track_beads(first.image, second.image, pixel_um, parameters, Work(context.threads, context.progress));
+        const UnloadedPlace place =
+            unloaded_place(tracking, pixel_um * first.image.width, pixel_um * first.image.height);
+        context.progress(1, "done");
+        stage::print(text_of(place));
+        return report_of(place);
+      });
 }
 
 }  // namespace

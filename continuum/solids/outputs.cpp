@@ -1,6 +1,12 @@
 #include "continuum/solids/outputs.h"
 
+#include <algorithm>
+
+#include "pipeline/contract/counted.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/report.h"
 #include "pipeline/files/columns.h"
 #include "pipeline/files/vtk_files.h"
 
@@ -102,5 +108,83 @@ void write_deformed_vtu(const Path& file, const RevolvedBody& deformed) {
 }
 
 std::string pages_of_tables() { return files::page_of(table_of_cases({0, 5})) + files::page_of(table_of_optima()); }
+
+namespace {
+
+Figures figures_of(const Setting& setting, const std::vector<Indentation>& solved) {
+  double error = 0, imbalance = 0;
+  int iterations = 0;
+  std::int64_t n_failed = 0;
+  for (const Indentation& one : solved) {
+    if (one.failure) {
+      ++n_failed;
+      continue;
+    }
+    error = std::max(error, one.error_um / one.reading.largest_u_um);
+    imbalance = std::max(imbalance, one.imbalance);
+    iterations = std::max(iterations, one.iterations);
+  }
+  Figures figures = {{"n_cases", static_cast<std::int64_t>(solved.size())},
+                     {"strain", std::string(name_of(setting.strain))},
+                     {"free_contraction", setting.cell.free_contraction()},
+                     {"sphere_height_um", sphere_height_um(setting.volume_um3)},
+                     {"hemisphere_height_um", hemisphere_height_um(setting.volume_um3)},
+                     {"largest_relative_error", error},
+                     {"net_force_over_sum", imbalance},
+                     {"newton_iterations", std::int64_t{iterations}}};
+  if (n_failed > 0) figures.emplace_back("n_cases_without_equilibrium", n_failed);
+  if (solved.size() > 1) return figures;
+  const Indentation& one = solved.front();
+  for (std::size_t k = 0; k < setting.depths_um.size(); ++k)
+    figures.emplace_back("depth_" + shortest(setting.depths_um[k]) + "_um", one.reading.depth_um[k]);
+  figures.emplace_back("lift_um", one.reading.lift_um);
+  figures.emplace_back("largest_u_um", one.reading.largest_u_um);
+  figures.emplace_back("error_um", one.error_um);
+  figures.emplace_back("energy_fJ", one.energy_fJ);
+  return figures;
+}
+
+std::string summary_of(const Setting& setting, const std::vector<Indentation>& solved, std::ptrdiff_t n_optima) {
+  if (solved.size() == 1) {
+    const Reading& r = solved.front().reading;
+    return "presses " + brief(r.depth_um.back()) + " um deep (" + brief(setting.depths_um.back()) +
+           " um below the surface), moves by " + brief(r.largest_u_um) + " um at most; error " +
+           brief(solved.front().error_um) + " um";
+  }
+  const auto n_failed = std::ranges::count_if(solved, [](const Indentation& i) { return i.failure.has_value(); });
+  return counted(std::ssize(solved), "cases") + ", " +
+         (n_failed > 0 ? std::to_string(n_failed) + " of them without an equilibrium, " : std::string()) +
+         counted(n_optima, "best heights");
+}
+
+}  // namespace
+
+void notice_failures(stage::StageContext& context, const std::vector<Indentation>& solved) {
+  std::vector<const Indentation*> failed;
+  for (const Indentation& one : solved)
+    if (one.failure) failed.push_back(&one);
+  if (failed.empty()) return;
+  const Indentation& first = *failed.front();
+  if (failed.size() == solved.size()) {
+    throw NotSolved({.reason = solved.size() == 1 ? *first.failure
+                                                  : "none of " + std::to_string(solved.size()) +
+                                                        " cases has an equilibrium; the first: " + *first.failure});
+  }
+  context.notice(noticed(Symptom::cases_not_solved, static_cast<double>(failed.size()),
+                         {.value = std::to_string(failed.size()) + " of " + std::to_string(solved.size()),
+                          .at = "first: height " + brief(first.of.height_um) + " um, modulus ratio " +
+                                brief(first.of.modulus_ratio) + ": " + *first.failure}));
+}
+
+StageReport report_of(const Setting& setting, const std::vector<Indentation>& solved, std::ptrdiff_t n_optima,
+                      stage::StageContext& context) {
+  StageReport report;
+  report.converged = std::ranges::none_of(solved, [](const Indentation& i) { return i.failure.has_value(); });
+  report.figures = figures_of(setting, solved);
+  report.summary = summary_of(setting, solved, n_optima);
+  if (setting.strain != Strain::large)
+    context.notice(noticed(Symptom::contraction_beyond_linear, setting.cell.free_contraction()));
+  return report;
+}
 
 }  // namespace mbtfm::solids

@@ -1,4 +1,4 @@
-/// Files of mbtfm-indent.
+/// Files and report of mbtfm-indent.
 #pragma once
 
 #include <string>
@@ -6,6 +6,7 @@
 
 #include "continuum/solids/indent.h"
 #include "pipeline/contract/path.h"
+#include "pipeline/stage/stage.h"
 
 namespace mbtfm::solids {
 
@@ -23,6 +24,12 @@ void write_deformed_vtu(const Path& file, const RevolvedBody& deformed);
 /// For each depth of reading the map over height and stiffness, and the curves over the height: a picture (SVG).
 std::string picture_of(const Setting& setting, const std::vector<Indentation>& solved,
                        const std::vector<Optimum>& optima);
+/// Notice cases that are not solved: all of them, or some of a sweep.
+/// @throws NotSolved where none is solved
+void notice_failures(stage::StageContext& context, const std::vector<Indentation>& solved);
+/// Of round cells and of others.
+StageReport report_of(const Setting& setting, const std::vector<Indentation>& solved, std::ptrdiff_t n_optima,
+                      stage::StageContext& context);
 /// For docs/columns.md.
 std::string pages_of_tables();
 

@@ -33,8 +33,6 @@ struct Values {
   }
 };
 
-Vec3 in_plane(Vec2 place) { return {place.x, place.y, 0}; }
-
 bool is_less(Vec2 a, Vec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); }
 
 Values values_of(const DisplacementField& field, std::vector<std::size_t> order) {
@@ -70,8 +68,8 @@ bool stands_out(const Group& group, const Values& values) {
 }
 
 /// (b), (c) At the rim of the group the field jumps, and does not grow as much again one place further on.
-bool is_cut_out(const Group& group, const Values& values, const DisplacementField& field, const Near& neighbours,
-                double reach_um) {
+bool is_cut_out(const Group& group, const Values& values, const DisplacementField& field,
+                const Neighbours<Vec2>& neighbours, double reach_um) {
   constexpr int kAround = 12;
   constexpr double kSteps = 3, kGrowth = 0.4;
   std::vector<char> is_in(values.order.size(), 0);
@@ -80,7 +78,7 @@ bool is_cut_out(const Group& group, const Values& values, const DisplacementFiel
             is_in.begin() + static_cast<std::ptrdiff_t>(group.end), 1);
   const Vec2 shared = field[values.order[group.begin]].displacement_um;
   const auto around = [&](std::size_t k) {
-    std::vector<int> found = neighbours.within(in_plane(field[values.order[k]].position_um), reach_um, kAround + 1);
+    std::vector<int> found = neighbours.within(field[values.order[k]].position_um, reach_um, kAround + 1);
     std::erase(found, static_cast<int>(k));
     return found;
   };
@@ -123,15 +121,11 @@ Masked flag_masked(DisplacementField& field) {
     if (group.size() >= kLeastShared && stands_out(group, values)) groups.push_back(group);
   if (groups.empty() || groups.front().size() == values.order.size()) return {};
   std::vector<Vec2> places;
-  std::vector<Vec3> in_space;
-  for (const std::size_t k : values.order) {
-    places.push_back(field[k].position_um);
-    in_space.push_back(in_plane(places.back()));
-  }
+  for (const std::size_t k : values.order) places.push_back(field[k].position_um);
   const double spacing_um =
       std::sqrt(std::max(1e-12, extent_of(places).area_um2()) / static_cast<double>(places.size()));
   const double reach_um = 1.6 * spacing_um;  // the eight around on a lattice
-  const Near neighbours(in_space, reach_um);
+  const Neighbours neighbours(places, reach_um);
   std::erase_if(groups, [&](const Group& g) { return !is_cut_out(g, values, field, neighbours, reach_um); });
   Masked masked;
   for (const Group& group : groups) {

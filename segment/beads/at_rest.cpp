@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/plane.h"
@@ -47,17 +48,14 @@ FieldCell cell_of(const std::vector<int>& beads, const std::vector<Vec2>& positi
 
 RestingField in_squares(const std::vector<Vec2>& positions, const std::vector<Vec2>& u, Vec2 corner, double width,
                         double height) {
-  RestingField field;
+  RestingField field{.corner = corner, .width = width, .height = height, .cells = {}, .motion = {}};
   const double wanted = std::sqrt(static_cast<double>(positions.size()) / kBeadsOfSquare);
   field.side = std::sqrt(width * height) / std::clamp(std::floor(wanted), 2.0, 1.0 * kMostSquares);
   field.nx = std::max(1, static_cast<int>(std::lround(width / field.side)));
   field.ny = std::max(1, static_cast<int>(std::lround(height / field.side)));
   std::vector<std::vector<int>> beads(static_cast<std::size_t>(field.nx) * field.ny);
-  for (std::size_t k = 0; k < positions.size(); ++k) {
-    const int i = std::clamp(static_cast<int>((positions[k].x - corner.x) / width * field.nx), 0, field.nx - 1);
-    const int j = std::clamp(static_cast<int>((positions[k].y - corner.y) / height * field.ny), 0, field.ny - 1);
-    beads[static_cast<std::size_t>(j) * field.nx + i].push_back(static_cast<int>(k));
-  }
+  for (std::size_t k = 0; k < positions.size(); ++k)
+    beads[field.square_of(positions[k])].push_back(static_cast<int>(k));
   std::vector<double> spreads;
   for (const auto& own : beads) {
     field.cells.push_back(cell_of(own, positions, u));
@@ -181,61 +179,42 @@ AffineMotion mode_of(const Search& search) {
   return best.motion;
 }
 
-/// Of the eight around a square (inside of the picture) the share for which `is` holds.
-double share_around(const RestingField& field, const std::vector<char>& is, int i, int j) {
-  int n = 0, n_is = 0;
-  for_each_within(field, i, j, 1, [&](int a, int b, std::size_t k) {
-    if (a == i && b == j) return;
-    ++n;
-    n_is += is[k];
-  });
-  return n == 0 ? 1 : 1.0 * n_is / n;
+/// 1 for squares for which something holds, else 0.
+using Squares = cv::Mat1b;
+
+/// How many of the eight around each square, inside of the picture.
+cv::Mat1d n_around(const Squares& is) {
+  cv::Mat1b ring(3, 3, uchar{1});
+  ring(1, 1) = 0;
+  cv::Mat1d n;
+  cv::filter2D(is, n, CV_64F, ring, {-1, -1}, 0, cv::BORDER_CONSTANT);
+  return n;
 }
 
 /// A square goes with most of those around it: noise makes single ones of either kind.
-std::vector<char> smoothed(const RestingField& field, const std::vector<char>& is) {
-  std::vector<char> result = is;
+Squares smoothed(const RestingField& field, const Squares& is) {
+  const cv::Mat1d share = n_around(is) / n_around(Squares(is.size(), 1));
+  Squares result = is.clone();
   for_each_square(field, [&](int i, int j, std::size_t k) {
-    const double share = share_around(field, is, i, j);
-    if (share < 0.3) result[k] = 0;
-    if (share > 0.7 || (field.cells[k].n_beads == 0 && share > 0.5)) result[k] = 1;
+    if (share(j, i) < 0.3) result(j, i) = 0;
+    if (share(j, i) > 0.7 || (field.cells[k].n_beads == 0 && share(j, i) > 0.5)) result(j, i) = 1;
   });
   return result;
 }
 
 /// Only what is connected with the border: inside of a ring of adhesions the gel is quiet, but not far away.
-std::vector<char> from_border(const RestingField& field, const std::vector<char>& is) {
-  std::vector<char> result(is.size(), 0);
-  std::vector<int> open;
-  const auto visit = [&](int i, int j) {
-    if (i < 0 || j < 0 || i >= field.nx || j >= field.ny) return;
-    const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
-    if (!is[k] || result[k]) return;
-    result[k] = 1;
-    open.push_back(static_cast<int>(k));
-  };
-  for (int i = 0; i < field.nx; ++i) visit(i, 0), visit(i, field.ny - 1);
-  for (int j = 0; j < field.ny; ++j) visit(0, j), visit(field.nx - 1, j);
-  while (!open.empty()) {
-    const int k = open.back(), i = k % field.nx, j = k / field.nx;
-    open.pop_back();
-    visit(i - 1, j), visit(i + 1, j), visit(i, j - 1), visit(i, j + 1);
-  }
-  return result;
+Squares from_border(const Squares& is) {
+  Squares framed;
+  cv::copyMakeBorder(is, framed, 1, 1, 1, 1, cv::BORDER_CONSTANT, 1);
+  cv::floodFill(framed, {0, 0}, 2);
+  return (framed(cv::Rect(1, 1, is.cols, is.rows)) == 2) & 1;
 }
 
 /// All squares within `reach` of one for which `is` holds.
-std::vector<char> grown(const RestingField& field, const std::vector<char>& is, int reach) {
-  std::vector<char> result = is;
-  for_each_square(field, [&](int i, int j, std::size_t k) {
-    if (is[k]) for_each_within(field, i, j, reach, [&](int, int, std::size_t near) { result[near] = 1; });
-  });
+Squares grown(const Squares& is, int reach) {
+  Squares result;
+  cv::dilate(is, result, Squares(2 * reach + 1, 2 * reach + 1, 1));
   return result;
-}
-
-std::vector<char> opposite(std::vector<char> is) {
-  for (char& value : is) value = !value;
-  return is;
 }
 
 /// Mean of a square and the eight around it, beside a motion; nothing where there are no beads.
@@ -256,22 +235,20 @@ Around around(const RestingField& field, const AffineMotion& motion, int i, int 
 }
 
 /// Squares that move by more than a share of the largest displacement.
-std::vector<char> pulled(const RestingField& field, double share) {
-  std::vector<char> result;
+Squares pulled(const RestingField& field, double share) {
+  Squares result(field.ny, field.nx);
   for_each_square(field, [&](int i, int j, std::size_t) {
     const Around here = around(field, field.motion, i, j);
     const double error = field.bead_noise / std::sqrt(std::max(1, here.n_beads));
-    result.push_back(here.n_beads == 0 || norm(here.u) > std::max(3 * error, share * field.largest));
+    result(j, i) = here.n_beads == 0 || norm(here.u) > std::max(3 * error, share * field.largest);
   });
   return smoothed(field, result);
 }
 
-double share_of_border(const RestingField& field, const std::vector<char>& is) {
+double share_of_border(const RestingField& field, const Squares& is) {
   int n = 0, n_is = 0;
-  for_each_square(field, [&](int i, int j, std::size_t k) {
-    if (!is_border(field, i, j)) return;
-    ++n;
-    n_is += is[k];
+  for_each_square(field, [&](int i, int j, std::size_t) {
+    if (is_border(field, i, j)) ++n, n_is += is(j, i);
   });
   return 1.0 * n_is / std::max(1, n);
 }
@@ -288,23 +265,28 @@ double pull_of_border(const RestingField& field) {
 /// What rests by the field's motion and largest displacement.
 void divide(RestingField& field, double tail) {
   const int gap = std::max(1, static_cast<int>(std::lround(kGap * std::min(field.nx, field.ny))));
-  const std::vector<char> closed = grown(field, pulled(field, tail), gap);
-  const std::vector<char> rests = grown(field, from_border(field, opposite(closed)), gap - 1);
+  const Squares closed = grown(pulled(field, tail), gap);
+  const Squares rests = grown(from_border(1 - closed), gap - 1);
   int n = 0, n_rests = 0;
   field.n_moving = 0;
-  for (std::size_t k = 0; k < field.cells.size(); ++k) {
-    field.cells[k].rests = rests[k];
-    field.n_moving += !rests[k];
-    if (field.cells[k].n_beads == 0) continue;
-    ++n, n_rests += rests[k];
-  }
+  for_each_square(field, [&](int i, int j, std::size_t k) {
+    field.cells[k].rests = rests(j, i);
+    field.n_moving += !rests(j, i);
+    if (field.cells[k].n_beads > 0) ++n, n_rests += rests(j, i);
+  });
   field.share_at_rest = n == 0 ? 0 : 1.0 * n_rests / n;
-  field.share_of_border_moving = share_of_border(field, opposite(rests));
+  field.share_of_border_moving = share_of_border(field, 1 - rests);
   field.share_of_border_pulled = share_of_border(field, pulled(field, kPulled));
   field.pull_of_border = pull_of_border(field);
 }
 
 }  // namespace
+
+std::size_t RestingField::square_of(Vec2 place) const {
+  const int i = std::clamp(static_cast<int>((place.x - corner.x) / width * nx), 0, nx - 1);
+  const int j = std::clamp(static_cast<int>((place.y - corner.y) / height * ny), 0, ny - 1);
+  return static_cast<std::size_t>(j) * nx + i;
+}
 
 double largest_about(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements,
                      const AffineMotion& motion) {

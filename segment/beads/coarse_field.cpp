@@ -14,6 +14,8 @@
 namespace mbtfm::beads {
 namespace {
 
+cv::Mat matrix_of(const Plane& p) { return {p.height, p.width, CV_32F, const_cast<float*>(p.values.data())}; }
+
 /// `n` x `n` px of the plane in the corner of a square of `side`, less their mean; all else is zero.
 cv::Mat cut(const Plane& plane, int left, int top, int n, int side) {
   cv::Mat result = cv::Mat::zeros(side, side, CV_32F);
@@ -21,8 +23,7 @@ cv::Mat cut(const Plane& plane, int left, int top, int n, int side) {
   const int j0 = std::max(0, -top), j1 = std::min(n, plane.height - top);
   if (i0 >= i1 || j0 >= j1) return result;
   cv::Mat inside = result(cv::Range(j0, j1), cv::Range(i0, i1));
-  const cv::Mat whole(plane.height, plane.width, CV_32F, const_cast<float*>(plane.values.data()));
-  const cv::Mat source = whole(cv::Range(top + j0, top + j1), cv::Range(left + i0, left + i1));
+  const cv::Mat source = matrix_of(plane)(cv::Range(top + j0, top + j1), cv::Range(left + i0, left + i1));
   cv::subtract(source, cv::mean(source), inside);
   return result;
 }
@@ -141,12 +142,10 @@ Plane reduced(const Plane& plane, int scale) {
   Plane result{plane.width / scale, plane.height / scale, {}};
   result.values.resize(static_cast<std::size_t>(result.width) * result.height);
   cv::Mat small(result.height, result.width, CV_32F, result.values.data());
-  const cv::Mat whole(plane.height, plane.width, CV_32F, const_cast<float*>(plane.values.data()));
-  cv::resize(whole({0, 0, scale * result.width, scale * result.height}), small, small.size(), 0, 0, cv::INTER_AREA);
+  cv::resize(matrix_of(plane)({0, 0, scale * result.width, scale * result.height}), small, small.size(), 0, 0,
+             cv::INTER_AREA);
   return result;
 }
-
-cv::Mat matrix_of(const Plane& p) { return {p.height, p.width, CV_32F, const_cast<float*>(p.values.data())}; }
 
 /// Spectrum of a plane that fades towards its borders.
 cv::Mat spectrum_of(const Plane& plane, const cv::Mat& window) {
@@ -312,18 +311,10 @@ void extrapolate(GridField& field, std::vector<std::optional<Vec2>> found, int t
 /// Weighed 1 : 2 : 1 with the neighbours along both axes.
 GridField smoothed(const GridField& field) {
   GridField result = field;
-  for (int j = 0; j < field.ny; ++j) {
-    for (int i = 0; i < field.nx; ++i) {
-      Vec2 sum;
-      for (int b = -1; b <= 1; ++b) {
-        for (int a = -1; a <= 1; ++a) {
-          const int x = std::clamp(i + a, 0, field.nx - 1), y = std::clamp(j + b, 0, field.ny - 1);
-          sum += (2.0 - std::abs(a)) * (2.0 - std::abs(b)) / 16 * field.u[static_cast<std::size_t>(y) * field.nx + x];
-        }
-      }
-      result.u[static_cast<std::size_t>(j) * field.nx + i] = sum;
-    }
-  }
+  const cv::Mat1d weights = (cv::Mat1d(1, 3) << 0.25, 0.5, 0.25);
+  const cv::Mat from(field.ny, field.nx, CV_64FC2, const_cast<Vec2*>(field.u.data()));
+  cv::Mat to(field.ny, field.nx, CV_64FC2, result.u.data());
+  cv::sepFilter2D(from, to, CV_64F, weights, weights, {-1, -1}, 0, cv::BORDER_REPLICATE);
   return result;
 }
 
@@ -332,12 +323,10 @@ GridField smoothed(const GridField& field) {
 GridField field_through(const std::vector<Vec2>& places, const std::vector<Motion>& motions, GridField lattice,
                         int threads) {
   if (places.empty()) return lattice;
-  std::vector<Vec3> points;
-  for (const Vec2 place : places) points.push_back({place.x, place.y, 0});
-  const numerics::Near known(std::move(points), lattice.spacing);
+  const Neighbours known(places, lattice.spacing);
   const auto u = found_on(lattice, threads, [&](Vec2 place) -> std::optional<Vec2> {
     constexpr int kNearest = 12;
-    return local_motion(place, known.nearest({place.x, place.y, 0}, kNearest), places, motions)->motion.u;
+    return local_motion(place, known.nearest(place, kNearest), places, motions)->motion.u;
   });
   for (std::size_t k = 0; k < u.size(); ++k) lattice.u[k] = *u[k];
   return lattice;

@@ -1,4 +1,3 @@
-#include "segment/beads/common_motion.h"
 
 #include <algorithm>
 #include <cmath>
@@ -59,9 +58,8 @@ std::string affine_in_words(const CommonMotion& c) {
 MotionTaken motion_taken(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, Vec2 corner,
                          double width, double height, Switch setting, double tolerance, double large) {
   const Stopwatch watch;
-  const WholeMotion whole =
-      whole_motion(positions, displacements, corner, width, height, {Drift::translation, Drift::affine});
-  const FarField &shifted = whole.of[0], &affine = whole.of[1];
+  const WholeMotion whole = whole_motion(positions, displacements, corner, width, height);
+  const FarField &shifted = whole.shifted, &affine = whole.affine;
   MotionTaken result;
   const double arm = 0.5 * std::min(width, height), reach = affine.drift.largest_within(arm);
   const double unit = std::max(largest_about(positions, displacements, affine.drift), 1e-12);

@@ -1,11 +1,10 @@
 /// Inside of the bead tracker: which part of the picture is at rest, and what moved the image as a whole.
 #pragma once
 
-#include <optional>
+#include <string>
 #include <vector>
 
-#include "pipeline/contract/affine_motion.h"
-#include "pipeline/contract/geometry.h"
+#include "segment/beads/track.h"
 
 namespace mbtfm::beads {
 
@@ -23,6 +22,8 @@ double largest_about(const std::vector<Vec2>& positions, const std::vector<Vec2>
 
 /// The picture in squares, row by row.
 struct RestingField {
+  Vec2 corner;
+  double width = 1, height = 1;
   int nx = 0, ny = 0;
   double side = 1;  ///< of a square
   std::vector<FieldCell> cells;
@@ -36,6 +37,8 @@ struct RestingField {
   double largest = 0;                 ///< 99 % of the beads move by less, beside the motion
   /// A cell pulls at more of the border than an adhesion near it does.
   bool is_cut() const { return share_of_border_pulled > 0.1; }
+  /// That holds a place; beyond the picture the nearest.
+  std::size_t square_of(Vec2 place) const;
   const FieldCell& at(int i, int j) const { return cells[static_cast<std::size_t>(j) * nx + i]; }
 };
 
@@ -54,9 +57,6 @@ struct GlobalColumns {
   double x[6], y[6];
 };
 inline GlobalColumns global_columns(Vec2 d) { return {{1, 0, -d.y, d.x, d.x, d.y}, {0, 1, d.x, d.y, -d.y, d.x}}; }
-
-/// What may have moved an image as a whole: a shift alone, or turn, growth and shear beside it.
-enum class Drift { translation, affine };
 
 /// Standard errors of a motion's numbers.
 struct MotionErrors {
@@ -78,7 +78,8 @@ struct FarField {
 /// What all beads do together, and what of it turned, grew or sheared.
 struct WholeMotion {
   RestingField rest;
-  std::vector<FarField> of;  ///< one for each of the kinds asked for
+  FarField shifted;  ///< a shift alone
+  FarField affine;   ///< turn, growth and shear beside it
 };
 
 /// Drift from the squares that are at rest.
@@ -95,6 +96,26 @@ struct WholeMotion {
 /// the drift is fitted to all squares alike.
 /// @param corner  of the picture, which is width x height; all lengths in one unit
 WholeMotion whole_motion(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, Vec2 corner,
-                         double width, double height, const std::vector<Drift>& kinds);
+                         double width, double height);
+
+struct MotionTaken {
+  AffineMotion motion;  ///< what is taken off
+  CommonMotion common;  ///< what was found, in the unit of the positions for um
+  Effect affine;        ///< whether turn, growth and shear are taken off
+  double rms = 0, noise = 0;
+  /// Turn, growth and shear are found by more than their errors and more than the tolerance, whether taken off or not.
+  bool is_affine = false;
+  bool is_large = false;  ///< they move the border by more than `large`, and are most of what is at rest does
+  int n_moving = 0;       ///< squares of the picture that do not rest
+};
+
+/// automatic: turn, growth and shear are taken off where they displace the border by more than the tolerance, of the
+/// largest displacement, and are no noise: their chi² of four numbers is above 16.3, which one picture in 370 has by
+/// chance, as often as a normal number has three standard deviations.
+MotionTaken motion_taken(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, Vec2 corner,
+                         double width, double height, Switch setting, double tolerance, double large);
+
+/// "a turn of 0.3 +- 0.001 degrees, growth of ..."
+std::string affine_in_words(const CommonMotion& common);
 
 }  // namespace mbtfm::beads

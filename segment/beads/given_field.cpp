@@ -17,7 +17,7 @@
 #include "pipeline/numerics/masked_values.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
-#include "segment/beads/common_motion.h"
+#include "segment/beads/far_field.h"
 #include "segment/beads/given_table.h"
 #include "segment/beads/local_motion.h"
 

@@ -12,7 +12,6 @@
 #include "pipeline/files/foreign_table.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/table_text.h"
-#include "segment/beads/other_files.h"
 #include "segment/beads/table_columns.h"
 
 namespace mbtfm::beads {
@@ -195,21 +194,22 @@ void expect_no_summary(const ForeignTable& table, std::size_t n_columns_before) 
 }
 
 /// In which order the rows of a lattice have their y.
-enum class Order { none, rising, falling };
+enum class RowOrder { none, rising, falling };
 
 /// Of single beads, none: any of them may come first.
-Order order_of(const std::vector<CsvTable::Row>& rows, std::size_t column) {
+RowOrder order_of(const std::vector<CsvTable::Row>& rows, std::size_t column) {
   std::set<std::string> all;
   double before = 0;
-  Order order = Order::none;
+  RowOrder order = RowOrder::none;
   for (const CsvTable::Row& row : rows) {
     const std::string& cell = row.fields[column];
     double y = 0;
     if (std::from_chars(cell.data(), cell.data() + cell.size(), y).ec != std::errc()) continue;
-    if (!all.empty() && order == Order::none && y != before) order = y < before ? Order::falling : Order::rising;
+    if (!all.empty() && order == RowOrder::none && y != before)
+      order = y < before ? RowOrder::falling : RowOrder::rising;
     before = y;
     all.insert(cell);
-    if (2 * all.size() > rows.size()) return Order::none;
+    if (2 * all.size() > rows.size()) return RowOrder::none;
   }
   return order;
 }
@@ -287,9 +287,9 @@ GivenTable read_given_table(const std::filesystem::path& file, const TrackParame
     if (names[i] == given.sigma && found.units[i]) given.sigma_um = um_of(name, names[i], found.units[i], parameters);
   given.is_ours = is_ours;
   const bool is_asked = parameters.y_axis == VerticalAxis::up;
-  const Order order = is_ours && !is_asked ? Order::none : order_of(table.rows, y);
-  given.is_lattice = order != Order::none;
-  const bool is_falling = parameters.y_axis == VerticalAxis::automatic && !is_ours && order == Order::falling;
+  const RowOrder order = is_ours && !is_asked ? RowOrder::none : order_of(table.rows, y);
+  given.is_lattice = order != RowOrder::none;
+  const bool is_falling = parameters.y_axis == VerticalAxis::automatic && !is_ours && order == RowOrder::falling;
   given.is_y_up = is_asked || is_falling;
   given.is_y_up_stated = !is_falling || form == TableForm::openpiv;
   if (form != TableForm::plain || !is_ours) {

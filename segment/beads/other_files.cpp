@@ -1,4 +1,4 @@
-#include "segment/beads/other_files.h"
+#include "segment/beads/table_columns.h"
 
 #include <algorithm>
 #include <cstring>
@@ -7,7 +7,6 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/text.h"
-#include "segment/beads/table_columns.h"
 
 namespace mbtfm::beads {
 

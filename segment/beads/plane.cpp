@@ -142,13 +142,6 @@ double parabola_vertex(double before, double here, double after) {
   return curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
 }
 
-Neighbours::Neighbours(const std::vector<Vec2>& points, double cell) {
-  std::vector<Vec3> in_space;
-  in_space.reserve(points.size());
-  for (const Vec2 p : points) in_space.push_back({p.x, p.y, 0});
-  near_ = numerics::Near(std::move(in_space), cell);
-}
-
 Spline spline_through(const Plane& plane, int threads) {
   const int width = plane.width, height = plane.height;
   Plane inner = plane;

@@ -1,4 +1,4 @@
-/// Inside of the bead tracker: grey values as floats, and a search for neighbours.
+/// Inside of the bead tracker: grey values as floats.
 #pragma once
 
 #include <functional>
@@ -49,19 +49,7 @@ double bead_sigma_of(const Plane& plane);
 /// Vertex of the parabola through three values of which the middle one is highest, within half a pixel of it.
 double parabola_vertex(double before, double here, double after);
 
-/// Points of the plane sorted into square cells.
-class Neighbours {
- public:
-  Neighbours() = default;
-  Neighbours(const std::vector<Vec2>& points, double cell);
-  /// Indices of the points within `radius` of a place, nearest first, at most `n`.
-  std::vector<int> within(Vec2 place, double radius, int n) const {
-    return near_.within({place.x, place.y, 0}, radius, n);
-  }
-
- private:
-  numerics::Near near_;
-};
+using Neighbours = numerics::Neighbours<Vec2>;
 
 /// Call body(from, to) for strips of 0 … n; the strips do not depend on the threads.
 void in_strips(int n, int threads, const std::function<void(int from, int to)>& body);

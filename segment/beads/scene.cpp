@@ -1,11 +1,11 @@
 #include "segment/beads/scene.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
 #include <numeric>
+#include <opencv2/core.hpp>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/order_statistics.h"
@@ -101,27 +101,6 @@ void add_picture(Plane& plane, const DetectedBead& bead, double sigma, double sh
   }
 }
 
-/// Solve a symmetric positive system of 4 by Cholesky; false where it is singular.
-bool solve(std::array<double, 16>& a, std::array<double, 4>& b) {
-  for (int i = 0; i < 4; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      double sum = a[4 * i + j];
-      for (int k = 0; k < j; ++k) sum -= a[4 * i + k] * a[4 * j + k];
-      if (i == j && !(sum > 1e-12)) return false;
-      a[4 * i + j] = i == j ? std::sqrt(sum) : sum / a[4 * j + j];
-    }
-  }
-  for (int i = 0; i < 4; ++i) {
-    for (int k = 0; k < i; ++k) b[i] -= a[4 * i + k] * b[k];
-    b[i] /= a[5 * i];
-  }
-  for (int i = 3; i >= 0; --i) {
-    for (int k = i + 1; k < 4; ++k) b[i] -= a[4 * k + i] * b[k];
-    b[i] /= a[5 * i];
-  }
-  return true;
-}
-
 /// Along one axis of a spot's box: the spot S, S d (d in bead sigmas) and 1, each times the weight W; and sums of
 /// their products, of which those over the box are products, since the box, the spot and the weight are.
 struct Axis {
@@ -146,10 +125,11 @@ DetectedBead improved(const DetectedBead& bead, const Plane& rest, double sigma)
   if (n <= 0 || m <= 0 || !(bead.brightness > 0)) return bead;
   const Axis x(bead.position_px.x, box.left, n, sigma), y(bead.position_px.y, box.top, m, sigma);
   // rows: height, place along x, along y (in units of sigma/height), level
-  std::array<double, 16> normal{
-      x.ss * y.ss,   0, 0,         0,          x.ssd * y.ss, x.ssdd * y.ss, 0, 0, x.ss * y.ssd, x.ssd * y.ssd,
-      x.ss * y.ssdd, 0, x.s * y.s, x.sd * y.s, x.s * y.sd,   x.w * y.w};
-  std::array<double, 4> right{};
+  const double hx = x.ssd * y.ss, hy = x.ss * y.ssd, xy = x.ssd * y.ssd, hl = x.s * y.s, xl = x.sd * y.s,
+               yl = x.s * y.sd;
+  const cv::Matx44d normal(x.ss * y.ss, hx, hy, hl, hx, x.ssdd * y.ss, xy, xl, hy, xy, x.ss * y.ssdd, yl, hl, xl, yl,
+                           x.w * y.w);
+  cv::Vec4d right;
   for (int j = 0; j < m; ++j) {
     const float* row = rest.row(box.top + j) + box.left;
     float spot = 0, slope = 0, one = 0;
@@ -157,12 +137,14 @@ DetectedBead improved(const DetectedBead& bead, const Plane& rest, double sigma)
     right[0] += y.spot[j] * spot, right[1] += y.spot[j] * slope, right[2] += y.slope[j] * spot;
     right[3] += y.one[j] * one;
   }
-  if (!solve(normal, right)) return bead;
+  bool is_regular = false;
+  const cv::Vec4d change = normal.inv(cv::DECOMP_CHOLESKY, &is_regular) * right;
+  if (!is_regular) return bead;
   DetectedBead result = bead;
   const double to_px = sigma / bead.brightness;
-  result.position_px.x += std::clamp(right[1] * to_px, -0.5, 0.5);
-  result.position_px.y += std::clamp(right[2] * to_px, -0.5, 0.5);
-  result.brightness = std::clamp(bead.brightness + right[0], 0.5 * bead.brightness, 2 * bead.brightness);
+  result.position_px.x += std::clamp(change[1] * to_px, -0.5, 0.5);
+  result.position_px.y += std::clamp(change[2] * to_px, -0.5, 0.5);
+  result.brightness = std::clamp(bead.brightness + change[0], 0.5 * bead.brightness, 2 * bead.brightness);
   return result;
 }
 

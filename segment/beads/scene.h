@@ -57,10 +57,6 @@ struct Scene {
 };
 Scene scene_of(std::shared_ptr<const Side> relaxed, Side stressed, int threads);
 
-/// What is wrong with a track.
-enum class TrackFlag { none, no_partner, ambiguous, edge, neighbours_disagree };
-constexpr auto words(TrackFlag) { return std::array{"", "no partner", "ambiguous", "edge", "neighbours disagree"}; }
-
 /// A bead's track; it counts as long as it has no flag.
 struct Track {
   Registered found;

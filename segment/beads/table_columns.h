@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 #include "pipeline/files/foreign_table.h"
 #include "segment/beads/given_table.h"
 #include "segment/beads/track.h"
+#include "segment/images/image.h"
 
 namespace mbtfm::beads {
 
@@ -62,5 +64,14 @@ Header variables_of(const files::ForeignTable& table);
 Found header_of(files::ForeignTable& table, const TrackParameters& parameters);
 /// Columns that a program numbers from 0 or 1 in the first row, as data without a header.
 void take_numbered_header(files::ForeignTable& table);
+
+/// Places and displacements of spots in two frames (TrackMate), as a table of vectors in the place of that of spots.
+/// @returns tracks that have not one spot in each of both frames
+/// @throws InputError
+int make_vectors_of_spots(files::ForeignTable& table, const TrackParameters& parameters);
+
+/// pyTFM's u.npy and v.npy: a lattice over the whole picture, first row on top, in px.
+/// @throws InputError
+files::ForeignTable read_pytfm(const std::filesystem::path& file, const std::optional<images::ImageField>& picture);
 
 }  // namespace mbtfm::beads

@@ -8,31 +8,16 @@
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/stopwatch.h"
-#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/parameters.h"
-#include "segment/beads/coarse_field.h"
-#include "segment/beads/common_motion.h"
-#include "segment/beads/follow.h"
 #include "segment/beads/given_field.h"
-#include "segment/beads/measure.h"
-#include "segment/beads/scene.h"
-#include "segment/beads/windows.h"
+#include "segment/beads/measured.h"
 
 namespace mbtfm::beads {
 namespace {
 
-/// @param least_px  that makes the right peak stand out: sixteen beads
-int search_window(double least_px, const TrackParameters& parameters, double pixel_size_um) {
-  double needed = std::max(64.0, least_px);
-  // shifts are found up to half a window
-  if (parameters.largest_displacement_um > 0) {
-    needed = std::max(needed, 2.2 * parameters.largest_displacement_um / pixel_size_um);
-  }
-  int window = 32;
-  while (window < needed) window *= 2;
-  return window;
-}
+/// Six sigmas of an ordinary bead; set from the bead itself afterwards.
+constexpr double kRoughBackground_px = 12;
 
 void require_numbers(const images::Image& image, const char* which) {
   for (int j = 0; j < image.height; ++j) {
@@ -44,46 +29,11 @@ void require_numbers(const images::Image& image, const char* which) {
   }
 }
 
-/// The motion of each place, px: of a bead, or of a window.
-struct Measured {
-  std::shared_ptr<const Scene> scene;
-  std::vector<Track> tracks;
-  Pooling pooling;
-  BeadSizes sizes = {};
-  double window_px = 0;  ///< Gaussian sigma of the windows; 0: beads
-  double period_px = 0;  ///< of a pattern that repeats itself; 0: it does not
-};
-
-/// What moved the good beads together, px. @param motion_of  by bead. @param setting  as of drift_affine
-template <class MotionOf>
-MotionTaken motion_of_all(const Scene& scene, const std::vector<Track>& tracks, const MotionOf& motion_of,
-                          Switch setting, double tolerance) {
-  std::vector<Vec2> positions, displacements;
-  for (int k = 0; k < scene.n_beads(); ++k) {
-    if (!tracks[k].is_good()) continue;
-    positions.push_back(scene.position(k));
-    displacements.push_back(motion_of(k));
-  }
-  const Plane& plane = scene.relaxed->image.plane;
-  return motion_taken(positions, displacements, {-0.5, -0.5}, plane.width, plane.height, setting, tolerance, 1);
-}
-
 /// A turn that is taken for displacement is a wrong field, however well its beads were found.
 void require_shift_alone(const MotionTaken& all) {
   if (all.affine.is_on || !all.is_large) return;
   throw InvalidData("the stressed image", "one that is shifted at most (effects.drift_affine = off)",
                     affine_in_words(all.common));
-}
-
-/// The beads that left the stressed image when it was turned.
-void flag_turned_out(const Scene& scene, const Turn& turn, std::vector<Track>& tracks) {
-  const Plane& plane = scene.stressed.image.plane;
-  const double margin = 2 * scene.bead_sigma();
-  for (int k = 0; k < scene.n_beads(); ++k) {
-    const Vec2 there = turn.of(scene.position(k) + tracks[k].found.motion.u);
-    const double inside = std::min({there.x, there.y, plane.width - 1 - there.x, plane.height - 1 - there.y});
-    if (inside < margin) tracks[k].flag = TrackFlag::edge;
-  }
 }
 
 /// The beads that the stressed image would not show at rest: what is found in their place, others are.
@@ -94,220 +44,6 @@ void flag_out_of_sight(const Scene& scene, const Placement& stressed, std::vecto
     const bool is_inside = at_rest.x >= 0 && at_rest.y >= 0 && at_rest.x < plane.width && at_rest.y < plane.height;
     if (!is_inside && tracks[k].is_good()) tracks[k].flag = TrackFlag::edge;
   }
-}
-
-/// What the good tracks go on to everywhere.
-GridField field_of(const Scene& scene, const std::vector<Track>& tracks) {
-  std::vector<Vec2> places;
-  std::vector<Motion> motions;
-  for (int k = 0; k < scene.n_beads(); ++k) {
-    if (!tracks[k].is_good()) continue;
-    places.push_back(scene.position(k));
-    motions.push_back(tracks[k].found.motion);
-  }
-  return field_through(places, motions, grid_over(scene.relaxed->image.plane, scene.spacing()), scene.threads);
-}
-
-/// From the grid. If it finds none of the beads in parts of the picture, as where they moved further than it searches,
-/// or by too different distances, from one that searches further; then, again and again, from what the beads found so
-/// far predict, as long as that finds more. Those bear out each other: what the images' grids find counts as found by
-/// the grid.
-Followed followed_from_grid(const Scene& scene, const TrackParameters& parameters, int window) {
-  const Plane &from = scene.relaxed->image.plane, &to = scene.stressed.image.plane;
-  Followed best = follow(scene, coarse_field(from, to, window, scene.threads), parameters, Led::together);
-  if (!best.has_gaps || best.period_px > 0) return best;  // of a pattern that repeats itself the least shift counts
-  Followed far = follow(scene, coarse_to_fine_field(from, to, window, scene.threads), parameters, Led::by_each);
-  if (far.n_by_grid <= best.n_by_grid) return best;
-  best = std::move(far);
-  const int n_by_grid = best.n_by_grid;
-  constexpr int kRounds = 4;
-  for (int round = 0; round < kRounds; ++round) {
-    Followed next = follow(scene, field_of(scene, best.tracks), parameters, Led::by_each);
-    if (next.n_by_grid <= best.n_by_grid) break;
-    best = std::move(next);
-  }
-  best.n_by_grid = n_by_grid;
-  return best;
-}
-
-/// Found from the grid with the wide window, measured in the narrow one, even where beads are loose or not resolved and
-/// single ones scatter: a wider window would hide the scatter and flatten the peaks.
-Followed followed_and_measured(const Scene& scene, const std::optional<Turn>& turn, const TrackParameters& parameters,
-                               int window, const Gaps* gaps = nullptr) {
-  Followed followed = followed_from_grid(scene, parameters, window);
-  // beside windows that are far more alike those in gaps would seem to show something else
-  for (int k = 0; gaps && k < scene.n_beads(); ++k) {
-    if (!gaps->hold(scene.position(k))) followed.tracks[k].flag = TrackFlag::no_partner;
-  }
-  measure(scene, parameters.least_similarity, followed.tracks);
-  verify(scene, followed.tracks);
-  if (turn) flag_turned_out(scene, *turn, followed.tracks);
-  flag_outliers(scene, parameters.outlier_threshold, followed.tracks);
-  return followed;
-}
-
-/// Where a pixel lies, um: positions count from the centre of the first pixel.
-Vec2 place_um(Vec2 position_px, double pixel_size_um) { return pixel_size_um * (position_px + Vec2{0.5, 0.5}); }
-
-/// The relaxed picture in the cell's ones. @param own  the same in this stressed picture
-Placement placement_of_cell(const TrackParameters& parameters, const std::optional<Placement>& cell,
-                            const Placement& own) {
-  switch (parameters.cell_with) {
-    case CellWith::relaxed:
-      return {};
-    case CellWith::stressed:
-      return cell.value_or(own);
-    case CellWith::each:
-      return own;
-  }
-  return own;
-}
-
-/// Of the model of the gel, which is in the frame of the cell's pictures.
-struct PlacedModel {
-  const FieldModel& um;
-  const std::optional<Placement>& cell;  ///< if it is known before the beads are followed
-};
-
-/// Once more, each bead compared with its neighbours in what they do beside the model.
-void follow_beside(const PlacedModel& model, const Scene& scene, const std::optional<Turn>& turn,
-                   const TrackParameters& parameters, double pixel_size_um, std::vector<Track>& tracks) {
-  Placement own{.turn = turn};
-  const bool needs_own =
-      parameters.cell_with != CellWith::relaxed && !(model.cell && parameters.cell_with == CellWith::stressed);
-  if (needs_own) {
-    own.motion = motion_of_all(
-                     scene, tracks, [&](int k) { return tracks[k].found.motion.u; }, parameters.drift_affine,
-                     parameters.effect_tolerance)
-                     .motion;
-  }
-  const Placement cell = placement_of_cell(parameters, model.cell, own);
-  const double angle_rad = cell.turn_rad() - own.motion.turn_rad;  // from the picture turned back
-  DisplacementField beads;
-  for (int k = 0; k < scene.n_beads(); ++k) {
-    beads.push_back({.position_um = place_um(cell.of(scene.position(k)), pixel_size_um),
-                     .displacement_um = pixel_size_um * rotated(tracks[k].found.motion.u, angle_rad),
-                     .sigma_um = 0,
-                     .flag = name_of(tracks[k].flag)});
-  }
-  std::vector<Vec2> expected = model.um(beads);
-  if (expected.empty()) return;
-  for (Vec2& u : expected) u = 1 / pixel_size_um * rotated(u, -angle_rad);
-  flag_outliers_beside(expected, scene, parameters.outlier_threshold, tracks);
-  recover(scene, parameters.least_similarity, tracks, expected);
-}
-
-/// The same beads at the width of another image that is out of focus. The noise stays that of this one's pixels.
-void widen(Side& side, const images::Image& image, double own_px, double wide_px, int threads) {
-  Plane plane = without_background(image, background_sigma(wide_px));
-  if (own_px < wide_px) {
-    plane = blurred(plane, std::sqrt(wide_px * wide_px - own_px * own_px));
-    for (DetectedBead& bead : side.beads) bead.brightness *= std::pow(own_px / wide_px, 2);
-  }
-  side.image = smooth_image(std::move(plane), threads);
-  side.bead_sigma = wide_px;
-}
-
-/// A window of sharp beads does not fit on wide ones. If one image is wider by the factor that `defocused` names, the
-/// sharp one is compared at the width of the other: no narrower window sees more than that one shows.
-std::shared_ptr<const Scene> alike_wide(const std::shared_ptr<const Scene>& scene, const images::Image& relaxed,
-                                        const images::Image& stressed) {
-  constexpr double kOutOfFocus = 1.5;
-  const double here = bead_sigma_of(scene->relaxed->image.plane), there = bead_sigma_of(scene->stressed.image.plane);
-  const double wide = std::max(here, there);
-  if (!(here > 0 && there > 0) || wide < kOutOfFocus * std::min(here, there)) return scene;
-  Side first = *scene->relaxed, second = scene->stressed;
-  widen(first, relaxed, here, wide, scene->threads);
-  widen(second, stressed, there, wide, scene->threads);
-  return std::make_shared<const Scene>(
-      scene_of(std::make_shared<const Side>(std::move(first)), std::move(second), scene->threads));
-}
-
-Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images::Image& image,
-                        const images::Image& stressed, const std::optional<Turn>& turn,
-                        const TrackParameters& parameters, double pixel_size_um, int threads,
-                        const PlacedModel& model) {
-  const auto sharp = std::make_shared<const Scene>(scene_of(
-      relaxed, side_of(stressed, relaxed->bead_sigma, parameters.detection_snr, "stressed", threads), threads));
-  const auto scene = alike_wide(sharp, image, stressed);
-  auto [tracks, n_by_grid, period_px, has_gaps] =
-      followed_and_measured(*scene, turn, parameters, search_window(4 * scene->spacing(), parameters, pixel_size_um));
-  recover(*scene, parameters.least_similarity, tracks);
-  constexpr int kRounds = 2;  // what the first one mends makes the model better
-  for (int round = 0; model.um && round < kRounds; ++round) {
-    follow_beside(model, *scene, turn, parameters, pixel_size_um, tracks);
-  }
-  Pooling pooling = pooled(*scene, parameters.outlier_threshold, tracks);  // flags matches, too, made without a window
-  if (turn) flag_turned_out(*scene, *turn, tracks);                        // those found again
-  require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
-  const BeadSizes sizes = sizes_of(*sharp, tracks);
-  return {.scene = scene,
-          .tracks = std::move(tracks),
-          .pooling = std::move(pooling),
-          .sizes = sizes,
-          .period_px = period_px};
-}
-
-/// What a size of window gives.
-struct Tried {
-  Measured measured;
-  int n_by_grid = 0;
-  bool is_sound = false;  ///< two windows in three are found again, and their errors are known
-  double median_sigma_px = 0;
-  double knowledge = 0;  ///< sum of 1/sigma²
-};
-
-/// @param gaps  whose windows alone count; none: all do
-/// @param spacing_px  of the windows; 0: as far as they do not overlap
-Tried tried_windows(const Texture& relaxed, const Texture& stressed, double window_px, const std::optional<Turn>& turn,
-                    TrackParameters parameters, double pixel_size_um, int threads, const Gaps* gaps,
-                    double spacing_px = 0) {
-  const Windows windows = windows_on(relaxed, stressed, window_px, threads, spacing_px);
-  const auto scene = std::make_shared<const Scene>(windows.scene);
-  parameters.least_similarity = least_similarity(relaxed, window_px);
-  // a square of seven Gaussian sigmas is halved on the finer grid, and holds as much as the Gaussian then
-  auto [tracks, n_by_grid, period_px, has_gaps] =
-      followed_and_measured(*scene, turn, parameters, search_window(7 * window_px, parameters, pixel_size_um), gaps);
-  Tried result{.measured = {scene, std::move(tracks), {}, {}, window_px, period_px}, .n_by_grid = n_by_grid};
-  auto pooling = calibrated(windows, result.measured.tracks);
-  if (!pooling) return result;
-  std::vector<double> sigmas;
-  std::size_t n_counted = 0;
-  for (int k = 0; k < scene->n_beads(); ++k) {
-    if (gaps && !gaps->hold(scene->position(k))) continue;
-    ++n_counted;
-    if (!result.measured.tracks[k].is_good()) continue;
-    const double sigma_px = pooling->beads[k].sigma_px;
-    sigmas.push_back(sigma_px);
-    result.knowledge += 1 / (sigma_px * sigma_px);
-  }
-  result.is_sound = !sigmas.empty() && 3 * sigmas.size() >= 2 * n_counted;
-  result.median_sigma_px = numerics::quantile(std::move(sigmas), 0.5);
-  result.measured.pooling = std::move(*pooling);
-  return result;
-}
-
-/// In the smallest windows that are fine enough; where none are, in those that know most together.
-Measured measured_windows(const Texture& relaxed, const images::Image& stressed, const std::optional<Turn>& turn,
-                          const TrackParameters& parameters, double pixel_size_um, int threads,
-                          const Gaps* gaps = nullptr) {
-  const Texture moved = texture_of(stressed, relaxed.spot_sigma_px, "stressed");
-  std::optional<Tried> best;
-  int n_by_grid = 0, n_found = 0, n_tried = 0;
-  for (const double window_px : window_sigmas(relaxed)) {
-    Tried tried = tried_windows(relaxed, moved, window_px, turn, parameters, pixel_size_um, threads, gaps);
-    constexpr double kFineEnough = 0.1;  // px: a tenth of what moves in a picture worth tracking
-    const bool is_fine = tried.is_sound && tried.median_sigma_px <= kFineEnough;
-    n_by_grid = tried.n_by_grid, n_found = n_good(tried.measured.tracks), n_tried = tried.measured.scene->n_beads();
-    if (tried.is_sound && (is_fine || !best || tried.knowledge > best->knowledge)) best = std::move(tried);
-    if (is_fine) break;
-  }
-  if (!best) {
-    throw NotFollowed(
-        "the stressed image", "the relaxed image's texture, displaced",
-        std::to_string(std::min(n_by_grid, n_found)) + " of " + std::to_string(n_tried) + " windows of it");
-  }
-  return std::move(best->measured);
 }
 
 CommonMotion in_um(CommonMotion common, double pixel_size_um) {
@@ -403,8 +139,7 @@ RelaxedBeads::RelaxedBeads(const images::Image& relaxed, const TrackParameters& 
     : relaxed_(relaxed), parameters_(parameters), threads_(threads), model_(std::move(model)) {
   require_numbers(relaxed, "relaxed");
   const TrackMethod method = parameters.method;
-  const double rough_background = 12;  // px: six sigmas of an ordinary bead; set from the bead itself afterwards
-  const double bead_sigma = bead_sigma_of(without_background(relaxed, rough_background));
+  const double bead_sigma = bead_sigma_of(without_background(relaxed, kRoughBackground_px));
   if (method != TrackMethod::correlation) {
     Side side = side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads);
     side.around = beads_around(side, threads);
@@ -425,10 +160,12 @@ Tracking RelaxedBeads::track(const images::Image& image, double pixel_size_um, c
     throw InvalidData("the stressed image", "the relaxed image's " + size(relaxed_) + " pixels", size(image));
   }
   require_numbers(image, "stressed");
+  if (!(bead_sigma_of(without_background(image, kRoughBackground_px)) > 0))
+    throw NotFollowed("the stressed image", "bright beads on a darker ground", "none");  // no remedy helps
   try {
     return track_by_any(stressed);
   } catch (NotFollowed& error) {
-    error.hint = remedy(stressed);
+    error.remedy = remedy(stressed);
     throw;
   }
 }
@@ -513,12 +250,13 @@ Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const Stress
   }
   const images::Image unturned = turn ? turned_back(stressed.image, *turn, threads_) : stressed.image;
   tell(0, by_beads ? "following beads" : "following windows");
-  Measured measured = by_beads ? measured_beads(side_, relaxed_, unturned, turn, parameters_, pixel_size_um, threads_,
-                                                {model_, stressed.cell})
-                               : measured_windows(*texture_, unturned, turn, parameters_, pixel_size_um, threads_);
-  const MotionTaken all = motion_of_all(
-      *measured.scene, measured.tracks, [&](int k) { return measured.pooling.beads[k].u; }, setting,
-      parameters_.effect_tolerance);
+  const Setting as{turn, parameters_, pixel_size_um, threads_};
+  Measured measured = by_beads ? measured_beads(side_, relaxed_, unturned, as, {model_, stressed.cell})
+                               : measured_windows(*texture_, unturned, as);
+  std::vector<Vec2> motions;
+  for (const Pooled& bead : measured.pooling.beads) motions.push_back(bead.u);
+  const MotionTaken all =
+      motion_of_all(*measured.scene, measured.tracks, motions, setting, parameters_.effect_tolerance);
   require_shift_alone(all);
   const Placement own{all.motion, turn}, cell = placement_of_cell(parameters_, stressed.cell, own);
   flag_out_of_sight(*measured.scene, own, measured.tracks);
@@ -552,7 +290,7 @@ void RelaxedBeads::fill(const Gaps& gaps, const images::Image& unturned, const P
   const Placement& own = tracking.stressed;
   std::optional<Measured> windows;
   try {
-    windows = measured_windows(*texture_, unturned, own.turn, parameters_, pixel_size_um, threads_, &gaps);
+    windows = measured_windows(*texture_, unturned, {own.turn, parameters_, pixel_size_um, threads_}, &gaps);
   } catch (const NotFollowed&) {
     return;  // there is no texture either
   }
@@ -570,11 +308,11 @@ void RelaxedBeads::fill(const Gaps& gaps, const images::Image& unturned, const P
 DisplacementField RelaxedBeads::lattice_of(const images::Image& unturned, const Placement& own, const Placement& cell,
                                            double pixel_size_um) const {
   try {
-    const double window_px =
-        measured_windows(*texture_, unturned, own.turn, parameters_, pixel_size_um, threads_).window_px;
+    const Setting as{own.turn, parameters_, pixel_size_um, threads_};
+    const double window_px = measured_windows(*texture_, unturned, as).window_px;
     const Texture moved = texture_of(unturned, texture_->spot_sigma_px, "stressed");
-    const Tried tried = tried_windows(*texture_, moved, window_px, own.turn, parameters_, pixel_size_um, threads_,
-                                      nullptr, parameters_.windows_spacing_um / pixel_size_um);
+    const double spacing_px = parameters_.windows_spacing_um / pixel_size_um;
+    const Tried tried = tried_windows(*texture_, moved, window_px, as, nullptr, spacing_px);
     DisplacementField lattice;
     for (std::size_t k = 0; k < tried.measured.pooling.beads.size(); ++k)
       lattice.push_back(entry_of(tried.measured, static_cast<int>(k), own, cell, pixel_size_um));

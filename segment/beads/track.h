@@ -87,6 +87,12 @@ struct TrackParameters {
 };
 void declare(stage::ParameterList& list, TrackParameters& parameters);
 
+/// What is wrong with a bead's track.
+enum class TrackFlag { none, no_partner, ambiguous, neighbours_disagree, edge, saturated };
+constexpr auto words(TrackFlag) {
+  return std::array{"", "no partner", "ambiguous", "neighbours disagree", "edge", "saturated"};
+}
+
 /// A bead in one image; pixels, 0 at the centre of the first pixel.
 struct DetectedBead {
   Vec2 position_px;
@@ -154,7 +160,8 @@ struct Tracking {
 /// The beads, or the texture, of one image are not met with again in the other.
 struct NotFollowed : InvalidData {
   using InvalidData::InvalidData;
-  std::string hint;  ///< the parameters that help, as was tried out; empty: none of them does
+  /// The parameters that help, as was tried out; empty: none of them does. Unset: none was tried.
+  std::optional<std::string> remedy = {};
 };
 
 /// The two images seem to be exchanged.

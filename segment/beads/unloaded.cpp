@@ -12,17 +12,6 @@ namespace {
 constexpr double kNormalOfMedian = 1.4826;  // standard deviation of a normal variable over its median magnitude
 constexpr int kRegions = 4;                 // a side
 
-struct Components {
-  std::vector<double> x, y;
-};
-
-double median_magnitude(const Components& c, Vec2 centre) {
-  std::vector<double> magnitudes;
-  for (const double x : c.x) magnitudes.push_back(std::abs(x - centre.x));
-  for (const double y : c.y) magnitudes.push_back(std::abs(y - centre.y));
-  return numerics::median_in(magnitudes);
-}
-
 /// Of the means over regions about the drift, the part that the beads' own noise does not make.
 double shared_um(const DisplacementField& good, Vec2 drift_um, double noise_um, double width_um, double height_um) {
   struct Region {
@@ -53,23 +42,24 @@ double shared_um(const DisplacementField& good, Vec2 drift_um, double noise_um, 
 UnloadedPlace unloaded_place(const Tracking& tracking, double width_um, double height_um) {
   constexpr std::size_t kFewest = 10;
   DisplacementField good;
-  Components components;
+  std::vector<double> x, y, magnitudes;
   double squares = 0;
   for (const Bead& b : tracking.field) {
     if (!b.flag.empty()) continue;
     good.push_back(b);
-    // the tracker has taken its drift off already
-    components.x.push_back(b.displacement_um.x);
-    components.y.push_back(b.displacement_um.y);
+    x.push_back(b.displacement_um.x), y.push_back(b.displacement_um.y);
     squares += b.sigma_um * b.sigma_um;
   }
   if (good.size() < kFewest)
     throw InvalidData("the beads", "at least " + std::to_string(kFewest) + " that both pictures show",
                       std::to_string(good.size()));
   const auto n = static_cast<double>(good.size()), area_um2 = width_um * height_um;
-  const Vec2 rest{numerics::median(components.x), numerics::median(components.y)};
+  const Vec2 rest{numerics::median(x), numerics::median(y)};  // the tracker has taken its drift off already
+  for (const Bead& b : good)
+    for (const double of : {b.displacement_um.x - rest.x, b.displacement_um.y - rest.y})
+      magnitudes.push_back(std::abs(of));
   UnloadedPlace place;
-  place.noise_um = kNormalOfMedian * median_magnitude(components, rest);
+  place.noise_um = kNormalOfMedian * numerics::median_in(magnitudes);
   // of 2n normal numbers the median magnitude has a relative variance of 1.36 / 2n
   place.noise_error = std::sqrt(1.36 / (2 * n));
   place.stated_um = std::sqrt(squares / n);

@@ -6,6 +6,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/stage/stage.h"
 
 namespace mbtfm::images {
 
@@ -154,6 +155,19 @@ std::optional<Finding> noticed_unchecked(const std::vector<const Channel*>& chan
 std::optional<stage::Doubt> doubt_about_calibration(const Channel& channel, std::optional<double> given_um) {
   if (!given_um || !channel.image.pixel_size_um) return std::nullopt;
   return stage::doubt_about_pixel_size(*given_um, *channel.image.pixel_size_um);
+}
+
+Channel read_channel(const std::string& name, const std::filesystem::path& file, const PlaneChoice& plane, int binning,
+                     stage::StageContext& context) {
+  Channel channel{name, read_image(file, plane)};
+  context.notice(take_scan_phase_off(channel));
+  channel.image = binned(std::move(channel.image), binning);
+  return channel;
+}
+
+void notice_image(const Channel& channel, std::optional<double> given_um, stage::StageContext& context) {
+  context.doubt(doubt_about_calibration(channel, given_um), channel.name + ": pixel_size_um");
+  for (const std::optional<Finding>& found : noticed_in(channel)) context.notice(found);
 }
 
 }  // namespace mbtfm::images

@@ -11,7 +11,6 @@
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
-#include "segment/beads/track.h"
 
 namespace mbtfm::stacks {
 namespace {
@@ -107,13 +106,7 @@ struct LocalMotion {
   bool is_sound = false;
 };
 
-struct Sample {
-  Vec3 place;
-  Vec3 displacement;
-  double sigma = 0, sigma_z = 0;
-};
-
-LocalMotion local_motion(Vec3 place, const std::vector<Sample>& samples, double scale_um) {
+LocalMotion local_motion(Vec3 place, const std::vector<Moved>& samples, double scale_um) {
   LocalMotion motion;
   constexpr int kFewest = 6;  // for an affine map one knows more than four points of
   const auto n = static_cast<int>(samples.size());
@@ -124,10 +117,10 @@ LocalMotion local_motion(Vec3 place, const std::vector<Sample>& samples, double 
   Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMost, 3> u(n, 3), left(n, 3);
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1> weight(n), certainty(n);
   for (int k = 0; k < n; ++k) {
-    const Eigen::Vector3d d = as_eigen(samples[k].place - place) / scale_um;
+    const Eigen::Vector3d d = as_eigen(samples[k].place_um - place) / scale_um;
     x.row(k) << 1, d.transpose();
-    u.row(k) = as_eigen(samples[k].displacement).transpose();
-    certainty[k] = 1 / (samples[k].sigma * samples[k].sigma + 1e-8 * scale_um * scale_um);
+    u.row(k) = as_eigen(samples[k].displacement_um).transpose();
+    certainty[k] = 1 / (samples[k].sigma_um * samples[k].sigma_um + 1e-8 * scale_um * scale_um);
   }
   weight = certainty;
   Eigen::Matrix<double, 4, 3> solution;
@@ -159,8 +152,8 @@ LocalMotion local_motion(Vec3 place, const std::vector<Sample>& samples, double 
   const Eigen::Vector4d share = normal.ldlt().solve(Eigen::Vector4d::Unit(0));
   for (int k = 0; k < n; ++k) {
     const double w = weight[k] * x.row(k).dot(share);
-    motion.variance += w * w * samples[k].sigma * samples[k].sigma;
-    motion.variance_z += w * w * samples[k].sigma_z * samples[k].sigma_z;
+    motion.variance += w * w * samples[k].sigma_um * samples[k].sigma_um;
+    motion.variance_z += w * w * samples[k].sigma_z_um * samples[k].sigma_z_um;
   }
   motion.at_place = solution.row(0).transpose();
   motion.gradient = solution.bottomRows<3>().transpose() / scale_um;
@@ -413,7 +406,7 @@ class Matcher {
     return stressed_.beads[m.partner].position_um - relaxed_.beads[bead].position_um;
   }
 
-  Sample sample_of(std::size_t bead) const {
+  Moved sample_of(std::size_t bead) const {
     const PlacedBead &a = relaxed_.beads[bead], &b = stressed_.beads[result_.matches[bead].partner];
     return {a.position_um, displacement(bead), std::hypot(a.sigma_um, b.sigma_um),
             std::hypot(a.sigma_z_um, b.sigma_z_um)};
@@ -421,7 +414,7 @@ class Matcher {
 
   /// From the good beads around one, without itself.
   LocalMotion motion_around(std::size_t bead, int n) const {
-    std::vector<Sample> samples;
+    std::vector<Moved> samples;
     for (const int k : near_good_.nearest(relaxed_.beads[bead].position_um, n + 1)) {
       const auto other = static_cast<std::size_t>(good_[k]);
       if (other != bead) samples.push_back(sample_of(other));
@@ -433,10 +426,11 @@ class Matcher {
 
   /// How far a bead's displacement is from what its neighbours tell, in standard deviations of both.
   double contradiction(std::size_t bead, const LocalMotion& around) const {
-    const Sample own = sample_of(bead);
-    const Eigen::Vector3d off = as_eigen(own.displacement) - around.at_place;
-    const double across = own.sigma * own.sigma + around.variance + around.scatter_um * around.scatter_um;
-    const double along = own.sigma_z * own.sigma_z + around.variance_z + around.scatter_z_um * around.scatter_z_um;
+    const Moved own = sample_of(bead);
+    const Eigen::Vector3d off = as_eigen(own.displacement_um) - around.at_place;
+    const double across = own.sigma_um * own.sigma_um + around.variance + around.scatter_um * around.scatter_um;
+    const double along =
+        own.sigma_z_um * own.sigma_z_um + around.variance_z + around.scatter_z_um * around.scatter_z_um;
     return std::sqrt((off[0] * off[0] + off[1] * off[1]) / across + off[2] * off[2] / along);
   }
 
@@ -502,11 +496,11 @@ class Matcher {
       const bool agrees = contradiction(bead, motions[bead]) <= limit();
       if (m.flag == TrackFlag::none && !agrees) m.flag = TrackFlag::neighbours_disagree;
       if (m.flag == TrackFlag::neighbours_disagree && agrees) m.flag = TrackFlag::none;
-      const Sample own = sample_of(bead);
+      const Moved own = sample_of(bead);
       m.has_neighbours = true;
-      m.from_neighbours_um = own.displacement - as_vec(motions[bead].at_place);
-      m.sigma_um = std::sqrt(own.sigma * own.sigma + motions[bead].variance);
-      m.sigma_z_um = std::sqrt(own.sigma_z * own.sigma_z + motions[bead].variance_z);
+      m.from_neighbours_um = own.displacement_um - as_vec(motions[bead].at_place);
+      m.sigma_um = std::sqrt(own.sigma_um * own.sigma_um + motions[bead].variance);
+      m.sigma_z_um = std::sqrt(own.sigma_z_um * own.sigma_z_um + motions[bead].variance_z);
     }
     gather_good();
   }

@@ -148,60 +148,67 @@ struct Fit {
   double scale = 1;  ///< of the beads at rest over their standard errors
 };
 
+/// What a bead's motion along x, y and z is of the unknowns: three columns each, and their factors.
+struct Rows {
+  Index at[3][3];
+  double of[3][3];
+  /// What they leave of the bead's motion.
+  Eigen::Vector3d left(Vec3 u, const VectorXd& solution) const {
+    Eigen::Vector3d rest(u.x, u.y, u.z);
+    for (int c = 0; c < 3; ++c)
+      for (int p = 0; p < 3; ++p) rest[c] -= of[c][p] * solution[at[c][p]];
+    return rest;
+  }
+};
+
+Rows rows_of(const Moved& bead, const std::vector<double>& z, Vec3 centre) {
+  const Vec3 d = bead.place_um - centre;
+  const auto [place, share] = between(z, bead.place_um.z);
+  const Index low = 2 + 2 * place[0], high = 2 + 2 * place[1];
+  return {{{0, low, high}, {0, low + 1, high + 1}, {1, 1, 1}},
+          {{-d.y, share[0], share[1]}, {d.x, share[0], share[1]}, {1, 0, 0}}};
+}
+
 Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 centre) {
   const auto n_places = static_cast<Index>(z.size());
   const Index n = 2 + 2 * n_places;
   Fit fit{.solution = VectorXd::Zero(n), .covariance = {}, .weights = {}};
   std::vector<double> x, y, along, sigmas, sigmas_z;
+  std::vector<Rows> rows;
   for (const Moved& b : beads) {
     x.push_back(b.displacement_um.x), y.push_back(b.displacement_um.y), along.push_back(b.displacement_um.z);
     sigmas.push_back(b.sigma_um), sigmas_z.push_back(b.sigma_z_um);
+    rows.push_back(rows_of(b, z, centre));
   }
   const double mx = numerics::median(x), my = numerics::median(y);
   fit.solution[1] = numerics::median(along);
   for (Index k = 0; k < n_places; ++k) fit.solution[2 + 2 * k] = mx, fit.solution[3 + 2 * k] = my;
   const double unit = std::max(1e-6, numerics::median(sigmas)), unit_z = std::max(1e-6, numerics::median(sigmas_z));
+  const Eigen::Array3d certainty = Eigen::Array3d(unit, unit, unit_z).square().inverse();
   fit.weights.assign(beads.size(), 0);
   constexpr int kRounds = 15;
   double scale = 0;
   for (int round = 0; round < kRounds; ++round) {
     MatrixXd normal = MatrixXd::Zero(n, n);
     VectorXd right = VectorXd::Zero(n);
-    std::vector<Eigen::Vector3d> left(beads.size());
+    std::vector<Eigen::Vector3d> left;
     std::vector<double> sizes;
     for (std::size_t b = 0; b < beads.size(); ++b) {
-      const Vec3 d = beads[b].place_um - centre, u = beads[b].displacement_um;
-      const Between at = between(z, beads[b].place_um.z);
-      const Index low = 2 + 2 * at.place[0], high = 2 + 2 * at.place[1];
-      const double s = at.share[1];
-      left[b] = {u.x - (1 - s) * fit.solution[low] - s * fit.solution[high] + fit.solution[0] * d.y,
-                 u.y - (1 - s) * fit.solution[low + 1] - s * fit.solution[high + 1] - fit.solution[0] * d.x,
-                 u.z - fit.solution[1]};
-      sizes.push_back(std::sqrt((left[b][0] * left[b][0] + left[b][1] * left[b][1]) / (unit * unit) +
-                                left[b][2] * left[b][2] / (unit_z * unit_z)));
+      left.push_back(rows[b].left(beads[b].displacement_um, fit.solution));
+      sizes.push_back(std::sqrt((left[b].array().square() * certainty).sum()));
     }
     // the quietest third of three normal components lies below 1.24 standard deviations
     scale = std::max(1.0, numerics::quantile(sizes, 1.0 / 3) / 1.24);
     for (std::size_t b = 0; b < beads.size(); ++b) {
       const double r = sizes[b] / (6 * scale);  // three components: 4.685 for one
       fit.weights[b] = r < 1 ? (1 - r * r) * (1 - r * r) : 0;
-      if (fit.weights[b] == 0) continue;
-      const Vec3 d = beads[b].place_um - centre;
-      const Between at = between(z, beads[b].place_um.z);
-      const Index low = 2 + 2 * at.place[0], high = 2 + 2 * at.place[1];
-      const double s = at.share[1];
-      const double w = fit.weights[b] / (unit * unit), wz = fit.weights[b] / (unit_z * unit_z);
-      const Index at_x[] = {0, low, high}, at_y[] = {0, low + 1, high + 1};
-      const double of_x[] = {-d.y, 1 - s, s}, of_y[] = {d.x, 1 - s, s};
-      for (int p = 0; p < 3; ++p) {
-        right[at_x[p]] += w * of_x[p] * left[b][0];
-        right[at_y[p]] += w * of_y[p] * left[b][1];
-        for (int q = 0; q < 3; ++q) {
-          normal(at_x[p], at_x[q]) += w * of_x[p] * of_x[q];
-          normal(at_y[p], at_y[q]) += w * of_y[p] * of_y[q];
+      const auto& [at, of] = rows[b];
+      for (int c = 0; c < 3; ++c)
+        for (int p = 0; p < 3; ++p) {
+          const double weighted = fit.weights[b] * certainty[c] * of[c][p];
+          right[at[c][p]] += weighted * left[b][c];
+          for (int q = 0; q < 3; ++q) normal(at[c][p], at[c][q]) += weighted * of[c][q];
         }
-      }
-      normal(1, 1) += wz, right[1] += wz * left[b][2];
     }
     // places that no bead at rest sees take after their neighbours: a bead's worth of smoothness
     const double stiff = 1 / (unit * unit);
@@ -231,13 +238,8 @@ Scatter scatter_by_depth(const std::vector<Moved>& beads, const std::vector<doub
   };
   std::vector<Off> all;
   for (const Moved& bead : beads) {
-    const Vec3 d = bead.place_um - centre, u = bead.displacement_um;
-    const Between at = between(z, bead.place_um.z);
-    Vec2 mean{-fit.solution[0] * d.y, fit.solution[0] * d.x};
-    for (int p = 0; p < 2; ++p)
-      mean += at.share[p] * Vec2{fit.solution[2 + 2 * at.place[p]], fit.solution[3 + 2 * at.place[p]]};
-    all.push_back({bead.place_um.z, std::hypot(u.x - mean.x, u.y - mean.y), std::abs(u.z - fit.solution[1]),
-                   bead.sigma_um, bead.sigma_z_um});
+    const Eigen::Vector3d off = rows_of(bead, z, centre).left(bead.displacement_um, fit.solution);
+    all.push_back({bead.place_um.z, std::hypot(off[0], off[1]), std::abs(off[2]), bead.sigma_um, bead.sigma_z_um});
   }
   std::ranges::sort(all, {}, &Off::z);
   Scatter scatter;

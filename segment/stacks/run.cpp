@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
@@ -10,29 +9,12 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
-#include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/stage/parameters.h"
+#include "segment/beads/report.h"
 #include "segment/images/channels.h"
 
 namespace mbtfm::stacks {
-
-FieldFigures figures_of(const std::vector<BeadInSpace>& field) {
-  FieldFigures f;
-  std::vector<double> sigma, sigma_z;
-  for (const BeadInSpace& bead : field) {
-    if (!bead.flag.empty()) continue;
-    const Vec3 u = bead.displacement_um;
-    constexpr double kMoving = 3, kSurely = 6;  // standard errors
-    const double off =
-        std::hypot(std::hypot(u.x, u.y) / std::max(1e-9, bead.sigma_um), u.z / std::max(1e-9, bead.sigma_z_um));
-    if (off > kMoving) ++f.n_moving;
-    if (off > kSurely) ++f.n_surely_moving;
-    f.largest_um = std::max(f.largest_um, norm(u));
-    sigma.push_back(bead.sigma_um), sigma_z.push_back(bead.sigma_z_um);
-  }
-  if (!sigma.empty()) f.sigma_um = numerics::median(sigma), f.sigma_z_um = numerics::median(sigma_z);
-  return f;
-}
 
 double rms_drift_um(const CommonMotion& c) {
   double sum = 0;
@@ -62,11 +44,8 @@ std::vector<Finding> findings_of(const Followed& f, const WidthRatio& widths, do
   const auto add = [&](std::optional<Finding> found) {
     if (found) findings.push_back(std::move(*found));
   };
-  const std::int64_t n_moving = figures_of(f.field).n_surely_moving;
-  const double moving = static_cast<double>(n_moving) / std::max(1, f.n_good);
   add(noticed(Symptom::saturated, saturated, {.at = "A stack"}));
-  add(noticed(Symptom::nothing_moves, 1 - moving,
-              {.value = std::to_string(n_moving) + " of " + std::to_string(f.n_good)}));
+  add(beads::noticed_stillness(beads::figures_of(f.field)));
   add(noticed(Symptom::beads_lost, 1 - share_followed(f),
               {.at = std::to_string(count(f, TrackFlag::no_partner)) + " have no partner, " +
                      std::to_string(count(f, TrackFlag::ambiguous)) + " more than one, " +
@@ -172,31 +151,11 @@ Read read_and_detect(const fs::path& file, const images::PlaneChoice& plane, con
   return {frame, detect(std::move(slices), detection_snr, which, context.threads)};
 }
 
-/// @throws InputError naming the files
-template <class Body>
-auto with_names(const std::string& names, const Body& body) {
-  try {
-    return body();
-  } catch (const InvalidData& error) {
-    throw InputError(names + ": " + error.element, error.expected, error.found,
-                     "do both show the beads of one place? Check channels and times, track.detection_snr for weak "
-                     "beads, track.largest_displacement_um for large motion");
-  }
-}
+constexpr const char* kRemedy =
+    "do both show the beads of one place? Check channels and times, track.detection_snr for weak beads, "
+    "track.largest_displacement_um for large motion";
 
 // --- files
-
-void write_field(stage::StageContext& context, const std::vector<BeadInSpace>& field) {
-  files::write_displacement_in_space(context.output("out", "displacement_3d.csv"), field);
-  std::vector<Vec3> points;
-  for (const BeadInSpace& bead : field) points.push_back(bead.position_um);
-  files::write_points_vtp(
-      context.output("out", "displacement_3d.vtp"), points,
-      {files::array_of("displacement_um", field, &BeadInSpace::displacement_um),
-       files::array_of("sigma_um", field, &BeadInSpace::sigma_um),
-       files::array_of("sigma_z_um", field, &BeadInSpace::sigma_z_um),
-       files::array_of("is_good", field, [](const BeadInSpace& bead) { return bead.flag.empty() ? 1 : 0; })});
-}
 
 void write_slices(stage::StageContext& context, const CommonMotion& common) {
   files::CsvText csv({"z_um", "drift_x_um", "drift_y_um", "sigma_um", "taken_off"});
@@ -218,17 +177,22 @@ void write_surface_beads(stage::StageContext& context, const std::vector<PlacedB
 
 // --- the report
 
-constexpr double kRadian_deg = 180 / std::numbers::pi;
+using beads::kRadian_deg;
 
 StageReport report_of(const Followed& f, const Scale& scale, const Read& relaxed, const Read& stressed) {
-  const FieldFigures figures = figures_of(f.field);
+  const beads::FieldFigures figures = beads::figures_of(f.field);
+  std::vector<double> sigmas, sigmas_z;
+  for (const BeadInSpace& bead : f.field)
+    if (bead.flag.empty()) sigmas.push_back(bead.sigma_um), sigmas_z.push_back(bead.sigma_z_um);
+  const auto median = [](const std::vector<double>& values) { return values.empty() ? 0 : numerics::median(values); };
+  const double sigma_um = median(sigmas), sigma_z_um = median(sigmas_z);
   const WidthRatio widths = width_ratio(relaxed.detection, stressed.detection);
   const Vec3 shift = f.first.shift_um + f.common.shift_um;
   StageReport report;
   report.summary = std::to_string(f.n_good) + " of " + std::to_string(f.field.size()) + " beads followed in space; " +
                    std::to_string(f.field.size() - static_cast<std::size_t>(f.n_good)) +
-                   " flagged in displacement_3d.csv; standard error " + brief(figures.sigma_um) + " um across, " +
-                   brief(figures.sigma_z_um) + " um along z";
+                   " flagged in displacement_3d.csv; standard error " + brief(sigma_um) + " um across, " +
+                   brief(sigma_z_um) + " um along z";
   report.figures = {{"n_beads", static_cast<std::int64_t>(f.field.size())},
                     {"n_tracked", static_cast<std::int64_t>(f.n_good)},
                     {"n_beads_stressed", static_cast<std::int64_t>(f.n_stressed)},
@@ -240,8 +204,8 @@ StageReport report_of(const Followed& f, const Scale& scale, const Read& relaxed
                     {"n_saturated", count(f, TrackFlag::saturated)},
                     {"share_followed", share_followed(f)},
                     {"largest_displacement_um", figures.largest_um},
-                    {"sigma_um", figures.sigma_um},
-                    {"sigma_z_um", figures.sigma_z_um},
+                    {"sigma_um", sigma_um},
+                    {"sigma_z_um", sigma_z_um},
                     {"neighbours_agree_um", f.neighbours_um},
                     {"neighbours_agree_z_um", f.neighbours_z_um},
                     {"error_ratio", f.error_ratio},
@@ -272,19 +236,38 @@ StageReport report_of(const Followed& f, const Scale& scale, const Read& relaxed
 
 }  // namespace
 
-bool are_in_space(const beads::TrackParameters& track, const StackParameters& p) {
+void declare(stage::ParameterList& list, TrackStageParameters& p) {
+  declare(list, p.track);
+  list.table("track");
+  list.add("binning", p.binning, Range::between(1, images::kLargestBinning));
+  declare(list, p.in_space);
+  declare(list, p.surface_plane, "surface");
+  declare(list, p.effects, {"drift_affine", "effect_tolerance"});
+}
+
+beads::TrackParameters switched(const TrackStageParameters& given) {
+  beads::TrackParameters parameters = given.track;
+  parameters.drift_affine = given.effects.drift_affine;
+  parameters.effect_tolerance = given.effects.effect_tolerance;
+  if (parameters.beads_pixel_size_um) parameters.pixel_size_um = parameters.beads_pixel_size_um;
+  return parameters;
+}
+
+bool are_in_space(const TrackStageParameters& given) {
   const auto is_whole = [](const images::PlaneChoice& c) { return c.z == images::kProjection && !c.page; };
-  const bool are_whole = is_whole(track.relaxed_plane) && is_whole(track.stressed_plane);
-  if (p.dimensions == Dimensions::plane) return false;
-  if (p.dimensions == Dimensions::space) {
+  const bool are_whole = is_whole(given.track.relaxed_plane) && is_whole(given.track.stressed_plane);
+  if (given.in_space.dimensions == Dimensions::plane) return false;
+  if (given.in_space.dimensions == Dimensions::space) {
     if (are_whole) return true;
     throw UsageError("track.dimensions = space takes all slices: leave relaxed_z, stressed_z and the pages unset");
   }
-  return are_whole && p.z_points.has_value();
+  return are_whole && given.in_space.z_points.has_value();
 }
 
-StackLook look_at_stacks(const fs::path& relaxed, const fs::path& stressed, const beads::TrackParameters& track,
-                         const StackParameters& parameters, int threads) {
+StackLook look_at_stacks(const fs::path& relaxed, const fs::path& stressed, const TrackStageParameters& given,
+                         int threads) {
+  const beads::TrackParameters& track = given.track;
+  const StackParameters& parameters = given.in_space;
   require_direction(parameters);
   std::vector<images::Image> slices = images::read_slices(relaxed, track.relaxed_plane);
   const Frame first = frame_of(relaxed.filename().string(), slices);
@@ -292,8 +275,8 @@ StackLook look_at_stacks(const fs::path& relaxed, const fs::path& stressed, cons
   const Frame other = frame_of(stressed.filename().string(), images::read_slices(stressed, track.stressed_plane));
   require_same_size(first, other);
   const Scale scale = scale_of(first, other, track, parameters);
-  const Detection detection =
-      with_names(first.name, [&] { return detect(std::move(slices), track.detection_snr, "relaxed", threads); });
+  const Detection detection = beads::with_names(
+      first.name, kRemedy, [&] { return detect(std::move(slices), track.detection_snr, "relaxed", threads); });
   const double volume_um3 = scale.pixel_um * first.width * scale.pixel_um * first.height * scale.step_um * first.depth;
   const auto n = static_cast<double>(std::max<std::size_t>(1, detection.spots.size()));
   return {.width = first.width,
@@ -305,8 +288,9 @@ StackLook look_at_stacks(const fs::path& relaxed, const fs::path& stressed, cons
           .distance_um = std::cbrt(volume_um3 / n)};
 }
 
-StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& surface_plane,
-                const StackParameters& parameters, stage::StageContext& context) {
+StageReport run(const TrackStageParameters& given, stage::StageContext& context) {
+  const beads::TrackParameters track = switched(given);
+  const StackParameters& parameters = given.in_space;
   const auto tell = [&](double fraction, const char* what) {
     if (context.progress) context.progress(fraction, what);
   };
@@ -314,13 +298,13 @@ StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& 
   if (track.stressed_last > 0) throw UsageError("stressed_last is for images in the plane: track stacks one by one");
   require_direction(parameters);
   tell(0, "finding beads of the relaxed stack");
-  const Read relaxed = with_names(relaxed_file.string(), [&] {
+  const Read relaxed = beads::with_names(relaxed_file.string(), kRemedy, [&] {
     return read_and_detect(relaxed_file, track.relaxed_plane, "relaxed", track.detection_snr, nullptr, context);
   });
   // what is missing is told before the longer half of the work
   scale_of(relaxed.frame, relaxed.frame, track, parameters);
   tell(0.4, "finding beads of the stressed stack");
-  const Read stressed = with_names(stressed_file.string(), [&] {
+  const Read stressed = beads::with_names(stressed_file.string(), kRemedy, [&] {
     return read_and_detect(stressed_file, track.stressed_plane, "stressed", track.detection_snr, &relaxed.frame,
                            context);
   });
@@ -335,19 +319,20 @@ StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& 
                      "the same beads to the last bit in both", "is one of them given twice?");
   }
   tell(0.8, "following beads");
-  const Followed followed = with_names(relaxed_file.string() + ", " + stressed_file.string(), [&] {
+  const Followed followed = beads::with_names(relaxed_file.string() + ", " + stressed_file.string(), kRemedy, [&] {
     return follow(
         placed(relaxed.detection, scale), placed(stressed.detection, scale),
         {.largest_displacement_um = track.largest_displacement_um, .outlier_threshold = track.outlier_threshold},
         parameters.slice_drift, scale.slices(), context.threads);
   });
-  write_field(context, followed.field);
+  files::write_displacement_in_space(context.output("out", "displacement_3d.csv"), followed.field);
+  beads::write_vtp(context, followed.field, "displacement_3d");
   write_slices(context, followed.common);
   StageReport report = report_of(followed, scale, relaxed, stressed);
   if (context.has_input("surface_beads")) {
     const fs::path file = context.input("surface_beads");
-    const Read surface = with_names(file.string(), [&] {
-      return read_and_detect(file, surface_plane, "surface", track.detection_snr, &relaxed.frame, context);
+    const Read surface = beads::with_names(file.string(), kRemedy, [&] {
+      return read_and_detect(file, given.surface_plane, "surface", track.detection_snr, &relaxed.frame, context);
     });
     write_surface_beads(context, placed(surface.detection, scale));
     report.figures.emplace_back("n_surface_beads", static_cast<std::int64_t>(surface.detection.spots.size()));

@@ -6,19 +6,12 @@
 #include <vector>
 
 #include "pipeline/contract/findings.h"
+#include "pipeline/stage/effects.h"
 #include "pipeline/stage/stage.h"
 #include "segment/beads/track.h"
 #include "segment/stacks/track.h"
 
 namespace mbtfm::stacks {
-
-/// Of the good beads.
-struct FieldFigures {
-  std::int64_t n_moving = 0, n_surely_moving = 0;  ///< by more than three and six standard errors
-  double largest_um = 0;
-  double sigma_um = 0, sigma_z_um = 0;  ///< medians
-};
-FieldFigures figures_of(const std::vector<BeadInSpace>& field);
 
 /// Beads with this flag.
 std::int64_t count(const Followed& followed, TrackFlag flag);
@@ -37,9 +30,21 @@ WidthRatio width_ratio(const Detection& relaxed, const Detection& stressed);
 /// @param saturated  share of a stack's voxels
 std::vector<Finding> findings_of(const Followed& followed, const WidthRatio& widths, double saturated);
 
+/// Of mbtfm-track, in the plane and in space.
+struct TrackStageParameters {
+  beads::TrackParameters track;
+  StackParameters in_space;
+  images::PlaneChoice surface_plane;
+  int binning = 1;  ///< to be quick: beads closer than a few pixels of the reduced images are lost
+  stage::EffectSwitches effects;
+};
+void declare(stage::ParameterList& list, TrackStageParameters& parameters);
+/// What may have moved the image, as the switches say; pixels are those of the beads.
+beads::TrackParameters switched(const TrackStageParameters& given);
+
 /// Whether the two files are stacks to be followed in space.
 /// @throws UsageError where that is asked for and a slice or page was chosen
-bool are_in_space(const beads::TrackParameters& track, const StackParameters& parameters);
+bool are_in_space(const TrackStageParameters& parameters);
 
 /// What two stacks are good for, before they are tracked.
 struct StackLook {
@@ -50,12 +55,11 @@ struct StackLook {
 };
 /// @throws InputError, UsageError as run
 StackLook look_at_stacks(const std::filesystem::path& relaxed, const std::filesystem::path& stressed,
-                         const beads::TrackParameters& track, const StackParameters& parameters, int threads);
+                         const TrackStageParameters& parameters, int threads);
 
 /// Inputs `relaxed`, `stressed` and, where it is given, `surface_beads`; outputs displacement_3d.csv and .vtp,
 /// slices.csv, surface_beads.csv.
 /// @throws InputError where the stacks do not go together, or do not say what is needed
-StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& surface_plane,
-                const StackParameters& parameters, stage::StageContext& context);
+StageReport run(const TrackStageParameters& parameters, stage::StageContext& context);
 
 }  // namespace mbtfm::stacks

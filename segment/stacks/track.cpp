@@ -6,7 +6,6 @@
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/parameters.h"
-#include "segment/beads/track.h"
 
 namespace mbtfm::stacks {
 namespace {

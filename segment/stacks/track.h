@@ -11,16 +11,13 @@
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/words.h"
 #include "pipeline/stage/parameters_fwd.h"
+#include "segment/beads/track.h"
 #include "segment/stacks/motion.h"
 #include "segment/stacks/spots.h"
 
 namespace mbtfm::stacks {
 
-/// What is wrong with a bead's track.
-enum class TrackFlag { none, no_partner, ambiguous, neighbours_disagree, edge, saturated };
-constexpr auto words(TrackFlag) {
-  return std::array{"", "no partner", "ambiguous", "neighbours disagree", "edge", "saturated"};
-}
+using beads::TrackFlag;
 
 /// A bead in one stack.
 struct PlacedBead {

@@ -202,8 +202,7 @@ TEST(FarField, turn_growth_and_shear_beside_a_cell_are_found_within_their_errors
   double squares = 0, n = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
     const DrawnField field = drawn_field(kSide, peaks, truth, kNoise, 1 + draw);
-    const FarField far =
-        whole_motion(field.positions, field.displacements, {-0.5, -0.5}, kSide, kSide, {Drift::affine}).of.front();
+    const FarField far = whole_motion(field.positions, field.displacements, {-0.5, -0.5}, kSide, kSide).affine;
     ASSERT_TRUE(far.is_at_rest);
     for (const auto& [found, wanted, sigma] : {std::array{far.drift.shift.x, truth.shift.x, far.errors.shift},
                                                {far.drift.shift.y, truth.shift.y, far.errors.shift},
@@ -231,7 +230,7 @@ TEST(FarField, displacements_twice_as_large_move_twice_as_far_and_are_known_half
     DrawnField twice = field;
     for (Vec2& u : twice.displacements) u = 2 * u;  // exactly, in binary numbers
     const auto far_field = [&](const DrawnField& of) {
-      return whole_motion(of.positions, of.displacements, {-0.5, -0.5}, kSide, kSide, {Drift::affine}).of.front();
+      return whole_motion(of.positions, of.displacements, {-0.5, -0.5}, kSide, kSide).affine;
     };
     const FarField one = far_field(field), two = far_field(twice);
     const auto expect_twice = [&](double large, double small, const char* what) {

@@ -265,6 +265,11 @@ TEST(TrackStability, images_without_beads_are_refused) {
   EXPECT_EQ(what_is_wrong(pair.relaxed, constant), stressed);
   EXPECT_EQ(what_is_wrong(constant, constant), relaxed);
   EXPECT_EQ(what_is_wrong(noise.relaxed, noise.stressed), relaxed);
+  // where nothing stands out of the noise no remedy is tried, each of which takes as long as tracking does
+  const auto error = test::caught<NotFollowed>([&] { track_beads(pair.relaxed, noise.stressed, 1.0, {}); });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->what(), stressed);
+  EXPECT_FALSE(error->remedy);
 }
 
 TEST(TrackStability, pictures_of_different_beads_or_turned_against_each_other_give_no_field) {

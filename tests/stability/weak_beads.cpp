@@ -118,7 +118,7 @@ TEST(WeakBeads, the_hint_of_what_cannot_be_followed_names_what_helps) {
   const auto hint = [&](const images::Image& relaxed, const images::Image& stressed) -> std::string {
     const auto error =
         test::caught<NotFollowed>([&] { track_beads(relaxed, stressed, 1.0, by(TrackMethod::beads), 2); });
-    return error ? error->hint : "found";
+    return error ? error->remedy.value_or("none was tried") : "found";
   };
   EXPECT_EQ(hint(weak.relaxed, weak.stressed).substr(0, 19), "track.method = auto");
   EXPECT_EQ(hint(one.relaxed, other.stressed), "");
