@@ -20,8 +20,9 @@ Eigen::Array<bool, Eigen::Dynamic, 1> is_felt(const ArrayXd& values) { return va
 
 }  // namespace
 
-Spectrum::Spectrum(const MatrixXd& A, const VectorXd& u, double n_data, int threads)
-    : Spectrum(numerics::gram(A, threads), numerics::transposed_matvec(A, u), u.squaredNorm(), n_data) {}
+Spectrum spectrum_of(const MatrixXd& A, const VectorXd& u, double n_data, int threads) {
+  return {numerics::gram(A, threads), numerics::transposed_matvec(A, u), u.squaredNorm(), n_data};
+}
 
 Spectrum::Spectrum(MatrixXd normal, const VectorXd& adjoint, double data_squared, double n_data)
     : data_squared_(data_squared), n_data_(n_data) {

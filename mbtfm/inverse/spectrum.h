@@ -24,7 +24,6 @@ class Spectrum {
   /// @param normal   AᵀA; what is below its diagonal does not count
   /// @param adjoint  Aᵀu
   Spectrum(MatrixXd normal, const VectorXd& adjoint, double data_squared, double n_data);
-  Spectrum(const MatrixXd& A, const VectorXd& u, double n_data, int threads);
   /// Data whose squares, and those of Aᵀu by direction, are what they are in the mean with white noise beside: criteria
   /// then are what they are expected to be. Of solve() nothing holds but the size.
   /// @param variance  of one datum
@@ -72,6 +71,8 @@ class Spectrum {
   Eigen::ArrayXd values_, projected_;
   std::shared_ptr<const MatrixXd> vectors_;
 };
+
+Spectrum spectrum_of(const MatrixXd& A, const VectorXd& u, double n_data, int threads);
 
 // Every lambda of a linear problem whose matrix is never formed: Golub–Kahan recurrences side by side.
 

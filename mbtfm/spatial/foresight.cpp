@@ -56,7 +56,7 @@ Foresight::Foresight(const Problem& problem, const tractions::TractionParameters
   const MatrixXd A = rows.of(basis.response(problem.response_um_per_kPa, threads)),
                  P = rows.of(problem.patch_response_um_per_nN);
   const VectorXd u = rows.of(displacement_um);
-  spectrum_.emplace(A, u, static_cast<double>(u.size() - rows.n_beside()), threads);
+  spectrum_.emplace(inverse::spectrum_of(A, u, static_cast<double>(u.size() - rows.n_beside()), threads));
   const MatrixXd& V = spectrum_->vectors();
   patches_ = numerics::gram(P, threads);
   hidden_ = numerics::small_transposed_product(V, numerics::small_transposed_product(A, P));

@@ -270,8 +270,8 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
 inverse::Spectrum spectrum_of(const Problem& problem, const MatrixXd& response, const VectorXd& weights_by_row,
                               double n_data, int threads) {
   const inverse::Rows rows = rows_of(problem, weights_by_row);
-  return {rows.of(response), rows.of(problem.displacement_um()), n_data - static_cast<double>(rows.n_beside()),
-          threads};
+  return inverse::spectrum_of(rows.of(response), rows.of(problem.displacement_um()),
+                              n_data - static_cast<double>(rows.n_beside()), threads);
 }
 
 MatrixXd common_motions(const Observed& observed) {
